@@ -1,0 +1,73 @@
+"""Stiffness of cable-driven serpentine manipulators.
+
+    geometry = cdsm.Geometry.universal(...)            # or read from TOML
+    arm = cdsm.Manipulator(geometry, elasticity=...)   # URDF, rigid-body model, cables
+    pose = arm.at(q)                                   # all that depends on the joint angles
+    pull = cdsm.distribute_tension(pose, minimum=50.0) # all that depends on the load
+    K = cdsm.stiffness(pose, pull)                     # joint and Cartesian stiffness
+
+SI units throughout; base frame with x along the straight arm.
+"""
+
+from importlib.metadata import version as _version
+
+from cdsm import presets
+from cdsm.cable import Cable, Site, serpentine_cables
+from cdsm.elasticity import Domain, Elasticity, LinearElasticity, StrandElasticity
+from cdsm.errors import (
+    CableError,
+    CdsmError,
+    ElasticityRangeError,
+    FileError,
+    GeometryError,
+    InfeasibleTension,
+    InvalidInput,
+    JointLimitError,
+    SingularStiffness,
+    SolverError,
+    UnknownName,
+    UrdfError,
+)
+from cdsm.geometry import CableRoute, Geometry, Joint, Link
+from cdsm.manipulator import Manipulator, Posture
+from cdsm.stiffness import Shares, Stiffness, stiffness
+from cdsm.tension import Tension, distribute_tension
+from cdsm.urdf import to_urdf, write_urdf
+
+__version__ = _version("cdsm-stiffness")
+
+__all__ = [
+    "Cable",
+    "CableError",
+    "CableRoute",
+    "CdsmError",
+    "Domain",
+    "Elasticity",
+    "ElasticityRangeError",
+    "FileError",
+    "Geometry",
+    "GeometryError",
+    "InfeasibleTension",
+    "InvalidInput",
+    "Joint",
+    "JointLimitError",
+    "LinearElasticity",
+    "Link",
+    "Manipulator",
+    "Posture",
+    "Shares",
+    "SingularStiffness",
+    "Site",
+    "SolverError",
+    "Stiffness",
+    "StrandElasticity",
+    "Tension",
+    "UnknownName",
+    "UrdfError",
+    "distribute_tension",
+    "presets",
+    "serpentine_cables",
+    "stiffness",
+    "to_urdf",
+    "write_urdf",
+]

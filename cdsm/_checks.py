@@ -1,0 +1,114 @@
+"""Checks at the border: native float64, right shape, finite, and read-only from there on."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from cdsm.errors import InvalidInput, UnknownName
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+Array = NDArray[np.float64]
+
+
+def frozen(array: Array) -> Array:
+    """Return the array itself, made read-only."""
+    array.flags.writeable = False
+    return array
+
+
+class ReadOnlyState:
+    """For frozen dataclasses of read-only arrays: unpickling and copying keep them read-only."""
+
+    def __setstate__(self, state: dict[str, object]) -> None:
+        for value in state.values():
+            if isinstance(value, np.ndarray):
+                value.flags.writeable = False
+        self.__dict__.update(state)
+
+
+def number_array(name: str, value: ArrayLike) -> Array:
+    """Return a fresh native float64 array of finite numbers, or raise :class:`InvalidInput`."""
+    array = _native(name, value)
+    if not np.isfinite(array).all():
+        bad = np.argwhere(~np.isfinite(array))[0]
+        where = f"[{', '.join(map(str, bad))}]" if array.ndim else ""
+        raise InvalidInput(
+            name, f"entry {where} is {array[tuple(bad)]}; all entries must be finite."
+        )
+    return array
+
+
+def vector(name: str, value: ArrayLike, size: int, meaning: str) -> Array:
+    """Return a fresh, read-only, finite vector of the given size.
+
+    Args:
+        name: The argument's name, for the error.
+        value: What the user gave.
+        size: Required number of entries.
+        meaning: What the entries are ("one angle [rad] per joint"), for the error.
+
+    Raises:
+        InvalidInput: Not numbers, masked, not finite, or not of shape (size,).
+    """
+    array = number_array(name, value)
+    if array.shape != (size,):
+        raise InvalidInput(name, f"shape {array.shape} given, ({size},) needed: {meaning}.")
+    return frozen(array)
+
+
+def bound(name: str, value: ArrayLike, size: int) -> Array:
+    """Return a read-only vector (size,) from a scalar or a vector that may hold +inf."""
+    array = _native(name, value)
+    if np.isnan(array).any():
+        raise InvalidInput(name, "holds NaN; give a number of newtons, or inf for no limit.")
+    if array.ndim == 0:
+        array = np.repeat(array, size)
+    if array.shape != (size,):
+        raise InvalidInput(
+            name, f"shape {array.shape} given; give one number, or ({size},): one per cable [N]."
+        )
+    return frozen(array)
+
+
+def scalar(name: str, value: object) -> float:
+    """Return one finite float."""
+    array = number_array(name, value)  # type: ignore[arg-type]
+    if array.ndim != 0:
+        raise InvalidInput(name, f"shape {array.shape} given; one number is needed.")
+    return float(array)
+
+
+def unit_direction(name: str, value: ArrayLike) -> Array:
+    """Return a read-only unit vector (3,) along the one given."""
+    array = vector(name, value, 3, "a direction in base axes")
+    largest = float(abs(array).max())
+    if largest == 0.0:
+        raise InvalidInput(name, "is the zero vector; give a direction, such as (0, 0, 1).")
+    scaled = array / largest  # so that no length over- or underflows
+    return frozen(scaled / np.linalg.norm(scaled))
+
+
+def one_of(kind: str, name: object, known: Iterable[str]) -> str:
+    """Return the name if it is known, else raise :class:`UnknownName` with near matches."""
+    known = tuple(known)
+    if not isinstance(name, str) or name not in known:
+        raise UnknownName(kind, name, known)
+    return name
+
+
+def _native(name: str, value: ArrayLike) -> Array:
+    if isinstance(value, np.ma.MaskedArray):
+        raise InvalidInput(name, "is a masked array; fill or drop the masked entries first.")
+    try:
+        array = np.asarray(value)
+    except (ValueError, TypeError) as error:
+        raise InvalidInput(name, f"is not an array of numbers ({error}).") from None
+    if array.dtype.kind not in "iuf":
+        raise InvalidInput(name, f"holds {array.dtype} entries; real numbers are needed.")
+    # a copy in the machine's own byte order: the caller's array may change later
+    return np.array(array, dtype=np.float64, order="C")

@@ -1,0 +1,97 @@
+"""Reading and writing whole files: named errors, size caps, never a half-written file."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+from cdsm.errors import FileError
+
+MAXIMUM_BYTES = 10_000_000
+"""No description of an arm comes near this; a larger file is a mistake or an attack."""
+
+
+def read_text(path: str | os.PathLike[str]) -> str:
+    """Return the UTF-8 text of a file.
+
+    Raises:
+        FileError: Missing, not readable, larger than :data:`MAXIMUM_BYTES`, or not UTF-8.
+    """
+    path = Path(path)
+    try:
+        with path.open("rb") as file:
+            data = file.read(MAXIMUM_BYTES + 1)
+        if len(data) > MAXIMUM_BYTES:
+            raise FileError(path, f"is larger than the {MAXIMUM_BYTES} bytes that are read.")
+        return data.decode("utf-8")
+    except FileNotFoundError:
+        raise FileError(path, f"does not exist (looked in {Path.cwd()}).") from None
+    except UnicodeDecodeError as error:
+        raise FileError(
+            path, f"is not UTF-8 text (byte {error.start}); save it as UTF-8."
+        ) from None
+    except (OSError, ValueError) as error:
+        if isinstance(error, FileError):
+            raise
+        raise FileError(path, f"cannot be read: {_reason(error)}.") from None
+
+
+def write_text(path: str | os.PathLike[str], text: str) -> Path:
+    """Write UTF-8 text with newline endings, whole or not at all; return the path."""
+    return write_file(path, lambda aside: aside.write_bytes(text.encode()))
+
+
+def write_file(path: str | os.PathLike[str], fill: Callable[[Path], object]) -> Path:
+    """Let ``fill`` write a file beside the wanted one, then rename it into place.
+
+    A failure, of ``fill`` or of the disk, leaves the wanted path as it was.
+
+    Raises:
+        FileError: The folder is missing or not writable, or the disk refuses.
+    """
+    path = Path(path)
+    aside: Path | None = None
+    try:
+        handle, name = tempfile.mkstemp(
+            dir=path.parent, prefix=f".{path.stem}-", suffix=path.suffix
+        )
+        os.close(handle)
+        aside = Path(name)
+        fill(aside)
+        # mkstemp makes the file private; give it the mode a plain open() would have
+        mask = os.umask(0)
+        os.umask(mask)
+        aside.chmod(0o666 & ~mask)
+        aside.replace(path)
+    except FileNotFoundError:
+        raise FileError(path, f"the folder {path.parent} does not exist; create it.") from None
+    except (OSError, ValueError) as error:
+        if isinstance(error, FileError):
+            raise
+        raise FileError(path, f"cannot be written: {_reason(error)}.") from None
+    finally:
+        if aside is not None:
+            with contextlib.suppress(FileNotFoundError):
+                aside.unlink()
+    return path
+
+
+def make_folder(path: str | os.PathLike[str]) -> Path:
+    """Create a folder and its parents if missing; return it.
+
+    Raises:
+        FileError: It cannot be created, or a file stands in its place.
+    """
+    path = Path(path)
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except (OSError, ValueError) as error:
+        raise FileError(path, f"cannot be made a folder: {_reason(error)}.") from None
+    return path
+
+
+def _reason(error: Exception) -> str:
+    return (error.strerror if isinstance(error, OSError) else None) or str(error)

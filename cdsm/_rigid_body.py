@@ -1,0 +1,132 @@
+"""The rigid-body model behind an arm. The only module that speaks Pinocchio.
+
+Pinocchio crashes on wrong ids, reads foreign memory layouts silently and keeps scratch data that
+two threads must not share; everything that could trip it is settled here, once, when a model is
+built, so that callers hand over checked arrays and receive their own copies.
+"""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from cdsm._checks import Array, frozen
+from cdsm.errors import UnknownName, UrdfError
+
+
+class BodyState(NamedTuple):
+    """What depends on q alone: tip pose, its Jacobian, gravity torque and its derivative."""
+
+    tip: Array
+    jacobian: Array
+    gravity_torque: Array
+    gravity_stiffness: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Tree:
+    """The kinematic tree as plain arrays for the kernels; row 0 is the base, row i joint i.
+
+    Attributes:
+        parent: Row of the joint before, (nv+1,).
+        rotation: Joint frame in its parent joint's frame at q = 0, (nv+1, 3, 3).
+        translation: Likewise its origin, (nv+1, 3) [m].
+        axis: Unit axis in the joint's own frame, (nv+1, 3).
+    """
+
+    parent: NDArray[np.intp]
+    rotation: Array
+    translation: Array
+    axis: Array
+
+
+class RigidBody:
+    """A Pinocchio model of a tree of revolute joints, with one tip frame.
+
+    Args:
+        urdf: Text of a URDF that has passed the checks of :mod:`cdsm.urdf`.
+        tip: Name of the link whose frame is the tip.
+        gravity: Gravity in base axes, (3,) [m/s²].
+
+    Raises:
+        UrdfError: Pinocchio does not accept it, or a joint is not revolute.
+        UnknownName: There is no link called ``tip``.
+    """
+
+    def __init__(self, urdf: str, tip: str, gravity: Array) -> None:
+        try:
+            self._model = model = pin.buildModelFromXML(urdf)
+        except ValueError as error:
+            raise UrdfError(f"Pinocchio does not accept the URDF: {error}") from None
+        model.gravity.linear = np.array(gravity)
+        self.joint_names: tuple[str, ...] = tuple(model.names)[1:]
+        if model.nq != len(self.joint_names) or model.nv != len(self.joint_names):
+            raise UrdfError("the URDF has a joint that is not revolute; cdsm takes revolute ones.")
+        self.nv: int = model.nv
+        self.lower = frozen(np.array(model.lowerPositionLimit))
+        self.upper = frozen(np.array(model.upperPositionLimit))
+        self._tip = self._frame(tip)
+        self._scratch = threading.local()
+
+    @property
+    def link_names(self) -> tuple[str, ...]:
+        """Names of all links."""
+        return tuple(f.name for f in self._model.frames if f.type == pin.FrameType.BODY)
+
+    def locate(self, link: str) -> tuple[int, Array, Array]:
+        """Row of the joint that moves a link, and the link's frame in it as (3,3) and (3,).
+
+        Raises:
+            UnknownName: There is no such link.
+        """
+        frame = self._model.frames[self._frame(link)]
+        return (
+            frame.parentJoint,
+            frame.placement.rotation.copy(),
+            frame.placement.translation.copy(),
+        )
+
+    def tree(self) -> Tree:
+        """The tree as plain arrays."""
+        model, data = self._model, self._data()
+        pin.computeJointJacobians(model, data, pin.neutral(model))
+        axis = np.zeros((self.nv + 1, 3))
+        for i in range(1, self.nv + 1):
+            axis[i] = pin.getJointJacobian(model, data, i, pin.LOCAL)[3:, i - 1]
+        return Tree(
+            parent=np.array(model.parents, dtype=np.intp),
+            rotation=np.array([placement.rotation for placement in model.jointPlacements]),
+            translation=np.array([placement.translation for placement in model.jointPlacements]),
+            axis=axis,
+        )
+
+    def state(self, q: Array) -> BodyState:
+        """Evaluate everything that depends on the joint angles (nv,) [rad] alone.
+
+        The Jacobian (6, nv) has linear rows first, in base axes, at the tip.
+        """
+        model, data = self._model, self._data()
+        pin.computeJointJacobians(model, data, q)
+        jacobian = pin.getFrameJacobian(model, data, self._tip, pin.LOCAL_WORLD_ALIGNED)
+        tip = pin.updateFramePlacement(model, data, self._tip).homogeneous
+        stiffness = pin.computeGeneralizedGravityDerivatives(model, data, q)
+        return BodyState(
+            tip, np.ascontiguousarray(jacobian), data.g.copy(), np.ascontiguousarray(stiffness)
+        )
+
+    def _frame(self, link: str) -> int:
+        if not self._model.existFrame(link, pin.FrameType.BODY):
+            raise UnknownName("link", link, self.link_names)
+        index: int = self._model.getFrameId(link, pin.FrameType.BODY)
+        return index
+
+    def _data(self) -> pin.Data:
+        # one per thread, made once: it is scratch memory, and costs milliseconds for long arms
+        if not hasattr(self._scratch, "data"):
+            self._scratch.data = self._model.createData()
+        return self._scratch.data

@@ -1,0 +1,140 @@
+"""Cables: straight runs between sites on links, and the cables of a serpentine geometry."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal, final, get_args
+
+from cdsm._checks import bound, number_array, one_of, vector
+from cdsm.elasticity import Elasticity
+from cdsm.errors import CableError, CdsmError, InvalidInput
+from cdsm.geometry import Geometry
+
+Control = Literal["position", "force"]
+
+
+@final
+@dataclass(frozen=True)
+class Site:
+    """A point fixed to a link that a cable passes or ends at.
+
+    Attributes:
+        link: Name of the link, as in the URDF.
+        position: The point in the link's frame [m].
+    """
+
+    link: str
+    position: tuple[float, float, float]
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.link, str):
+            raise InvalidInput("link", f"{self.link!r} given; the name of a link is needed.")
+        position = vector("position", self.position, 3, f"a point on {self.link} [m]")
+        object.__setattr__(self, "position", tuple(position.tolist()))
+
+
+@final
+@dataclass(frozen=True)
+class Cable:
+    """A frictionless cable through an ordered list of sites, actuator side first.
+
+    Its length is ``lead`` plus the straight segments between neighbouring sites, and its stiffness
+    k = 1/(l_0/EA(F) + 1/k_series), or 0 where the motor controls force.
+
+    Attributes:
+        name: Unique name within an arm.
+        sites: Two or more, from the actuator's side to the end.
+        elasticity: EA(F).
+        lead: Straight cable between the actuator and the first site [m].
+        series_stiffness: k_series of a spring or drive in series [N/m]; inf: none.
+        control: ``"position"``: the motor holds the length; ``"force"``: it holds the tension.
+
+    Raises:
+        CableError: Names the cable and what is wrong with it.
+    """
+
+    name: str
+    sites: tuple[Site, ...]
+    elasticity: Elasticity
+    lead: float = 0.0
+    series_stiffness: float = math.inf
+    control: Control = "position"
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.name, str) or not self.name:
+            raise CableError(str(self.name), "needs a name, a text that is not empty.")
+        sites = tuple(self.sites)
+        if len(sites) < 2 or not all(isinstance(site, Site) for site in sites):
+            raise CableError(self.name, f"sites: {len(sites)} given; two or more Site are needed.")
+        if not isinstance(self.elasticity, Elasticity):
+            raise CableError(
+                self.name, f"elasticity: {self.elasticity!r} given; an Elasticity is needed."
+            )
+        try:
+            one_of("control", self.control, get_args(Control))
+            lead = float(number_array("lead", self.lead))
+            series = float(bound("series_stiffness", self.series_stiffness, 1)[0])
+        except (CdsmError, TypeError) as error:
+            raise CableError(self.name, str(error)) from None
+        if lead < 0.0:
+            raise CableError(self.name, f"lead: {lead:g} m given; it cannot be negative.")
+        if series <= 0.0:
+            raise CableError(
+                self.name, f"series_stiffness: {series:g} N/m given; positive, or inf for none."
+            )
+        object.__setattr__(self, "sites", sites)
+        object.__setattr__(self, "lead", lead)
+        object.__setattr__(self, "series_stiffness", series)
+
+
+def serpentine_cables(
+    geometry: Geometry,
+    elasticity: Elasticity | Sequence[Elasticity],
+    *,
+    series_stiffness: float = math.inf,
+    control: Control = "position",
+) -> tuple[Cable, ...]:
+    """Route the cables of a serpentine arm through the holes of its disks.
+
+    A cable of joint k passes the base disk and every disk of links 1…k−1 and ends on the first disk
+    of link k, always through the hole (x, R cos φ, R sin φ). It is called ``cable{k}_{i}``, the
+    i-th of its joint.
+
+    Args:
+        geometry: The arm.
+        elasticity: One for all cables, or one per cable in the geometry's order.
+        series_stiffness: As in :class:`Cable`, for all cables [N/m].
+        control: As in :class:`Cable`, for all cables.
+
+    Raises:
+        InvalidInput: The number of elasticities is not one, nor that of the cables.
+        CableError: A cable that cannot be.
+    """
+    count = len(geometry.cables)
+    elasticities = (elasticity,) * count if isinstance(elasticity, Elasticity) else elasticity
+    if not isinstance(elasticities, Sequence) or len(elasticities) != count:
+        raise InvalidInput(
+            "elasticity", f"{elasticity!r} given; give one Elasticity, or one for each of {count}."
+        )
+    cables = []
+    of_joint = [0] * len(geometry.joints)
+    for route, material in zip(geometry.cables, elasticities, strict=True):
+        of_joint[route.joint - 1] += 1
+        y = geometry.hole_radius * math.cos(route.angle)
+        z = geometry.hole_radius * math.sin(route.angle)
+        passed = geometry.disks[: route.joint]
+        last, (end, *_) = geometry.disks[route.joint]
+        sites = [Site(link, (x, y, z)) for link, places in passed for x in places]
+        cables.append(
+            Cable(
+                name=f"cable{route.joint}_{of_joint[route.joint - 1]}",
+                sites=(*sites, Site(last, (end, y, z))),
+                elasticity=material,
+                lead=route.lead,
+                series_stiffness=series_stiffness,
+                control=control,
+            )
+        )
+    return tuple(cables)

@@ -1,0 +1,224 @@
+"""What can go wrong, by name: every failure of the library is a :class:`CdsmError`.
+
+Each error carries the data it speaks of as attributes, and its message says what was found, what is
+allowed and what to do about it.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+
+class CdsmError(Exception):
+    """Root of all errors raised by cdsm."""
+
+    def __reduce__(self) -> tuple[object, ...]:
+        # the children take keyword data, which Exception's own pickling would lose
+        return (_restore, (type(self), self.args, self.__dict__))
+
+
+def _restore(kind: type[CdsmError], args: tuple[object, ...], data: dict[str, object]) -> CdsmError:
+    error = kind.__new__(kind, *args)
+    error.args = args
+    error.__dict__.update(data)
+    return error
+
+
+class InvalidInput(CdsmError, ValueError):
+    """An argument has the wrong type, shape or value.
+
+    Attributes:
+        name: The offending argument.
+    """
+
+    def __init__(self, name: str, problem: str) -> None:
+        super().__init__(f"{name}: {problem}")
+        self.name = name
+
+
+class UnknownName(CdsmError, LookupError):
+    """A name (of a link, solver, stiffness term, …) that does not exist here.
+
+    Attributes:
+        name: The name asked for.
+        known: The names that exist.
+    """
+
+    def __init__(self, kind: str, name: object, known: Iterable[str], remedy: str = "") -> None:
+        self.name = name
+        self.known = tuple(known)
+        near = difflib.get_close_matches(str(name), self.known, n=3)
+        listed = self.known if len(self.known) <= 12 else (*self.known[:12], "…")
+        message = f"no {kind} is called {name!r}"
+        message += f"; did you mean {' or '.join(map(repr, near))}?" if near else "."
+        message += f" Known: {', '.join(listed)}."
+        super().__init__(f"{message} {remedy}".rstrip())
+
+
+class FileError(CdsmError, OSError):
+    """A file cannot be read or written.
+
+    Attributes:
+        path: The file.
+    """
+
+    def __init__(self, path: object, problem: str) -> None:
+        super().__init__(f"{path}: {problem}")
+        self.path = str(path)
+
+
+class GeometryError(CdsmError, ValueError):
+    """A geometry that cannot be built.
+
+    Attributes:
+        faults: Every fault found, one sentence each.
+        source: The file it came from, or None.
+    """
+
+    def __init__(self, faults: Sequence[str], source: str | None = None) -> None:
+        self.faults = tuple(faults)
+        self.source = source
+        where = f"{source}: " if source else ""
+        count = f"{len(self.faults)} faults" if len(self.faults) != 1 else "1 fault"
+        super().__init__("\n  - ".join([f"{where}invalid geometry, {count}:", *self.faults]))
+
+
+class UrdfError(CdsmError, ValueError):
+    """A URDF that is not a robot cdsm can work with, or that does not survive being read back."""
+
+
+class CableError(CdsmError, ValueError):
+    """A cable that cannot be routed as described.
+
+    Attributes:
+        cable: Name of the cable.
+    """
+
+    def __init__(self, cable: str, problem: str) -> None:
+        super().__init__(f"cable {cable!r}: {problem}")
+        self.cable = cable
+
+
+class JointLimitError(CdsmError, ValueError):
+    """A joint angle beyond its limit.
+
+    Attributes:
+        joints: Names of the offending joints.
+        angles: Their angles [rad].
+        limits: Their (lower, upper) limits [rad].
+    """
+
+    def __init__(
+        self,
+        joints: Sequence[str],
+        angles: Sequence[float],
+        limits: Sequence[tuple[float, float]],
+    ) -> None:
+        self.joints = tuple(joints)
+        self.angles = tuple(float(angle) for angle in angles)
+        self.limits = tuple((float(low), float(high)) for low, high in limits)
+        listed = "; ".join(
+            f"{joint} = {angle:.6g} rad is outside [{low:.6g}, {high:.6g}] rad"
+            for joint, angle, (low, high) in zip(self.joints, self.angles, self.limits, strict=True)
+        )
+        super().__init__(
+            f"{listed}. Stay inside the limits, widen joint_limit in the geometry, "
+            "or pass check_limits=False to compute beyond them."
+        )
+
+
+class ElasticityRangeError(CdsmError, ValueError):
+    """A tension at which the elasticity is not defined.
+
+    Attributes:
+        tension: The offending tensions [N].
+        cables: Names of the cables that carry them; empty where no cable is known.
+    """
+
+    def __init__(
+        self,
+        problem: str,
+        tension: Sequence[float],
+        indices: Sequence[int] = (),
+        cables: Sequence[str] = (),
+    ) -> None:
+        self.problem = problem
+        self.tension = tuple(float(value) for value in tension)
+        self.indices = tuple(int(index) for index in indices)
+        self.cables = tuple(cables)
+        names = f" (cable {', '.join(self.cables)})" if self.cables else ""
+        values = ", ".join(f"{value:.6g}" for value in self.tension[:8])
+        more = ", …" if len(self.tension) > 8 else ""
+        super().__init__(f"tension {values}{more} N{names}: {problem}")
+
+
+class InfeasibleTension(CdsmError):
+    """No admissible cable tension balances the arm at this posture.
+
+    Attributes:
+        missing: Torque that no admissible tension supplies, per joint, shape (nv,) [N m]; the
+            smallest in the sum of magnitudes.
+        joint: Name of the joint that lacks most.
+        relaxation: By how much all bounds would have to widen [N]; inf if no bounds would do.
+        binding: Names of the cables that stand at a bound in the closest attempt.
+    """
+
+    def __init__(
+        self,
+        missing: NDArray[np.float64],
+        joint: str,
+        relaxation: float,
+        binding: Sequence[str],
+    ) -> None:
+        self.missing = missing
+        self.joint = joint
+        self.relaxation = relaxation
+        self.binding = tuple(binding)
+        total = float(abs(missing).sum())
+        worst = float(abs(missing).max())
+        message = (
+            f"no tension within the bounds balances the arm: {total:.4g} N m are missing, "
+            f"most of it ({worst:.4g} N m) at {joint}. "
+        )
+        if relaxation == float("inf"):
+            message += (
+                "No bounds would help: the cables cannot exert this torque at all. Change the "
+                "posture, the load, or the routing."
+            )
+        else:
+            message += (
+                f"Widening every bound by {relaxation:.4g} N would be enough "
+                f"(cables at a bound: {', '.join(self.binding) or 'none'}). Lower minimum, raise "
+                "maximum, or reduce the load."
+            )
+        super().__init__(message)
+
+
+class SolverError(CdsmError):
+    """A quadratic-programming solver returned something that is not the optimum.
+
+    Attributes:
+        solver: Its name.
+    """
+
+    def __init__(self, solver: str, problem: str) -> None:
+        super().__init__(f"solver {solver!r} {problem}")
+        self.solver = solver
+
+
+class SingularStiffness(CdsmError, ArithmeticError):
+    """A stiffness or compliance matrix that does not exist at this posture.
+
+    Attributes:
+        direction: The critical direction: joint space (nv,) or Cartesian (3,), unit length.
+    """
+
+    def __init__(self, problem: str, direction: NDArray[np.float64]) -> None:
+        super().__init__(problem)
+        self.direction = direction

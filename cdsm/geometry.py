@@ -1,0 +1,404 @@
+"""The description of an arm: joints, links, holes and cable routes, and its TOML form.
+
+SI units throughout (m, rad, kg). The straight arm lies along x; all lengths are measured along it.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from pathlib import Path
+from typing import Annotated, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from cdsm._files import read_text, write_text
+from cdsm._records import (
+    CrossFaults,
+    Direction,
+    Integer,
+    Name,
+    NotNegative,
+    Number,
+    Positive,
+    parse,
+    read_toml,
+    record,
+    toml_lines,
+)
+from cdsm.errors import GeometryError
+
+MAXIMUM_JOINTS = 100
+"""More would overflow the URDF parsers' stack before long; no such arm exists."""
+
+MAXIMUM_CABLES_PER_JOINT = 64
+
+MAXIMUM_DEFAULT_LIMIT = math.radians(80.0)
+
+UNIVERSAL_AXES = ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+_Limit = Annotated[Number, Field(gt=0, le=math.pi)] | None
+
+
+@record
+class Joint:
+    """One joint of the arm and the two disks beside it.
+
+    Attributes:
+        axes: One axis (hinge) or two (universal joint, in this order), in the axes of the link
+            before; any length, none zero, not parallel.
+        disk_offset: h: distance of the disk before and the disk after from the joint centre [m].
+        limit: Largest angle about each axis, both ways [rad]; None: until the disks touch.
+    """
+
+    axes: Annotated[tuple[Direction, ...], Field(strict=False, min_length=1, max_length=2)]
+    disk_offset: Positive
+    limit: _Limit = None
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        lengths = [math.hypot(*axis) for axis in self.axes]
+        faults = [
+            f"axes[{i + 1}]: {axis} has no usable length; give a direction"
+            for i, (axis, length) in enumerate(zip(self.axes, lengths, strict=True))
+            if not 1e-6 < length < 1e6
+        ]
+        if not faults and len(self.axes) == 2:
+            sine = math.hypot(*np.cross(*self.axes)) / (lengths[0] * lengths[1])
+            if sine < 1e-6:
+                faults.append(f"axes: the two axes {self.axes} are parallel; one would do")
+        if faults:
+            raise CrossFaults(faults)
+        return self
+
+
+@record
+class Link:
+    """One link: from its joint centre to the next one, or to the tip.
+
+    Attributes:
+        length: Length [m].
+        mass: Mass [kg], spread as a solid cylinder of the hole radius about mid-link.
+    """
+
+    length: Positive
+    mass: NotNegative
+
+
+@record
+class CableRoute:
+    """The path of one cable: the same hole on every disk until its last one.
+
+    Attributes:
+        joint: Number of the joint it drives, from 1; it ends on the first disk after it.
+        angle: φ: hole angle about x, from y towards z [rad].
+        lead: Straight cable between the actuator and the base disk [m].
+    """
+
+    joint: Annotated[Integer, Field(ge=1)]
+    angle: Number
+    lead: NotNegative = 0.0
+
+
+@record
+class _Uniform:
+    """The keywords that :meth:`Geometry.universal` and :meth:`Geometry.hinged` share."""
+
+    joints: Annotated[Integer, Field(ge=1, le=MAXIMUM_JOINTS)]
+    cables_per_joint: Annotated[Integer, Field(ge=1, le=MAXIMUM_CABLES_PER_JOINT)]
+    link_length: Positive
+    base_length: NotNegative
+    disk_offset: Positive
+    hole_radius: Positive
+    link_mass: NotNegative
+    lead: NotNegative = 0.0
+    joint_limit: _Limit = None
+    name: Name = "arm"
+
+    def geometry(self, axes: list[tuple[Direction, ...]], angles: list[list[float]]) -> Geometry:
+        return Geometry(
+            name=self.name,
+            base_length=self.base_length,
+            hole_radius=self.hole_radius,
+            joints=tuple(
+                Joint(axes=a, disk_offset=self.disk_offset, limit=self.joint_limit) for a in axes
+            ),
+            links=(Link(length=self.link_length, mass=self.link_mass),) * self.joints,
+            cables=tuple(
+                CableRoute(joint=k + 1, angle=angle, lead=self.lead)
+                for k, of_joint in enumerate(angles)
+                for angle in of_joint
+            ),
+        )
+
+
+@record
+class _Universal(_Uniform):
+    def build(self) -> Geometry:
+        n, m = self.joints, self.cables_per_joint
+        angles = [[2.0 * math.pi * (k + n * j) / (n * m) for j in range(m)] for k in range(n)]
+        return self.geometry([UNIVERSAL_AXES] * n, angles)
+
+
+@record
+class _Hinged(_Uniform):
+    twist: Number
+
+    def build(self) -> Geometry:
+        m = self.cables_per_joint
+        rolls = [k * self.twist for k in range(self.joints)]
+        axes: list[tuple[Direction, ...]] = [((0.0, math.cos(r), math.sin(r)),) for r in rolls]
+        # evenly spread from 90 degrees beside the axis: m = 2 gives the antagonistic pair
+        angles = [[r + math.pi / 2 + 2.0 * math.pi * j / m for j in range(m)] for r in rolls]
+        return self.geometry(axes, angles)
+
+
+@record
+class Geometry:
+    """A serpentine arm, joint by joint; frozen, checked, all in SI units.
+
+    The general constructor: joints, links and cables may all differ. :meth:`universal` and
+    :meth:`hinged` fill it for uniform arms. Joint 1 sits at x = ``base_length``, joint k+1 at the
+    end of link k, the tip at the end of the last link. Every joint has one disk ``disk_offset``
+    before and one after it, with holes at ``hole_radius``.
+
+    Attributes:
+        name: Name of the robot: letters, digits and underscores.
+        base_length: L_0: from the base frame to joint 1 [m].
+        hole_radius: R: distance of all holes from the arm's axis [m].
+        joints: One :class:`Joint` each, base to tip.
+        links: One :class:`Link` per joint.
+        cables: One :class:`CableRoute` each.
+
+    Raises:
+        GeometryError: Lists every fault: unknown or missing keys, wrong types, lengths that are
+            not positive, overlapping disks, cables that end past the last joint, > 100 joints.
+    """
+
+    joints: Annotated[
+        tuple[Joint, ...], Field(strict=False, min_length=1, max_length=MAXIMUM_JOINTS)
+    ]
+    links: Annotated[tuple[Link, ...], Field(strict=False)]
+    cables: Annotated[tuple[CableRoute, ...], Field(strict=False, min_length=1)]
+    base_length: NotNegative
+    hole_radius: Positive
+    name: Name = "arm"
+
+    @classmethod
+    def universal(
+        cls,
+        *,
+        joints: int,
+        cables_per_joint: int,
+        link_length: float,
+        base_length: float,
+        disk_offset: float,
+        hole_radius: float,
+        link_mass: float,
+        lead: float = 0.0,
+        joint_limit: float | None = None,
+        name: str = "arm",
+    ) -> Geometry:
+        """Uniform arm of n universal joints with m cables each.
+
+        Cable j = 0…m−1 of joint k = 1…n has its holes at φ = 2π((k−1) + n j)/(n m), so that all
+        holes of the base disk are evenly spread.
+
+        Args:
+            joints: n, 1 to 100.
+            cables_per_joint: m.
+            link_length: Length of every link [m], more than two ``disk_offset``.
+            base_length: L_0: from the base frame to joint 1 [m].
+            disk_offset: h: from each joint centre to the disk before and the disk after it [m].
+            hole_radius: R [m].
+            link_mass: Mass of every link [kg].
+            lead: Straight cable between each actuator and the base disk [m].
+            joint_limit: Largest angle about each axis, both ways [rad]; None: until the disks
+                touch, 2 atan(h/R), at most 80°.
+            name: Name of the robot.
+
+        Raises:
+            GeometryError: Lists every fault.
+        """
+        return _Universal(
+            joints=joints,
+            cables_per_joint=cables_per_joint,
+            link_length=link_length,
+            base_length=base_length,
+            disk_offset=disk_offset,
+            hole_radius=hole_radius,
+            link_mass=link_mass,
+            lead=lead,
+            joint_limit=joint_limit,
+            name=name,
+        ).build()
+
+    @classmethod
+    def hinged(
+        cls,
+        *,
+        joints: int,
+        twist: float,
+        cables_per_joint: int = 2,
+        link_length: float,
+        base_length: float,
+        disk_offset: float,
+        hole_radius: float,
+        link_mass: float,
+        lead: float = 0.0,
+        joint_limit: float | None = None,
+        name: str = "arm",
+    ) -> Geometry:
+        """Uniform arm of n hinges, each turned by ``twist`` about x against the one before.
+
+        Hinge k has the axis cos ψ_k y + sin ψ_k z with ψ_k = (k−1)·twist; the link frames are not
+        twisted. Its cables are evenly spread from φ = ψ_k + 90° on: a pair sits at ψ_k ± 90°.
+
+        Args:
+            joints: n, 1 to 100.
+            twist: Angle between neighbouring hinge axes about x [rad].
+            cables_per_joint: m; 2 is the antagonistic pair.
+            link_length: As for :meth:`universal`, like all that follow.
+            base_length: L_0 [m].
+            disk_offset: h [m].
+            hole_radius: R [m].
+            link_mass: Mass of every link [kg].
+            lead: Straight cable before the base disk [m].
+            joint_limit: Largest angle, both ways [rad].
+            name: Name of the robot.
+
+        Raises:
+            GeometryError: Lists every fault.
+        """
+        return _Hinged(
+            joints=joints,
+            twist=twist,
+            cables_per_joint=cables_per_joint,
+            link_length=link_length,
+            base_length=base_length,
+            disk_offset=disk_offset,
+            hole_radius=hole_radius,
+            link_mass=link_mass,
+            lead=lead,
+            joint_limit=joint_limit,
+            name=name,
+        ).build()
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        faults: list[str] = []
+        if len(self.links) != len(self.joints):
+            faults.append(
+                f"links: {len(self.links)} given for {len(self.joints)} joints; "
+                "every joint has one link after it"
+            )
+        offsets = [joint.disk_offset for joint in self.joints]
+        for k, (link, before, after) in enumerate(
+            zip(self.links, offsets, [*offsets[1:], 0.0], strict=False), start=1
+        ):
+            if link.length <= before + after:
+                last = k == len(self.joints)
+                what = "its disk" if last else "its two disks overlap: they"
+                faults.append(
+                    f"links[{k}].length: {link.length:g} m is too short, {what} "
+                    f"need more than {before + after:g} m; lengthen the link or lower disk_offset"
+                )
+        for c, cable in enumerate(self.cables, start=1):
+            if cable.joint > len(self.joints):
+                faults.append(
+                    f"cables[{c}].joint: {cable.joint} is past the last joint, "
+                    f"{len(self.joints)}; give 1 to {len(self.joints)}"
+                )
+        if faults:
+            raise CrossFaults(faults)
+        return self
+
+    def __str__(self) -> str:
+        dof = sum(len(joint.axes) for joint in self.joints)
+        return (
+            f"{self.name}: {len(self.joints)} joints ({dof} degrees of freedom), "
+            f"{len(self.cables)} cables, {self.length:g} m long"
+        )
+
+    @property
+    def length(self) -> float:
+        """Length of the straight arm, base frame to tip [m]."""
+        return self.base_length + sum(link.length for link in self.links)
+
+    @property
+    def joint_limits(self) -> tuple[float, ...]:
+        """The limit of each joint [rad]: as given, or 2 atan(h/R), at most 80°."""
+        return tuple(
+            min(2.0 * math.atan(joint.disk_offset / self.hole_radius), MAXIMUM_DEFAULT_LIMIT)
+            if joint.limit is None
+            else joint.limit
+            for joint in self.joints
+        )
+
+    @property
+    def disks(self) -> tuple[tuple[str, tuple[float, ...]], ...]:
+        """For each link from the base: its name and where its disks sit on it, along x [m]."""
+        offsets = [joint.disk_offset for joint in self.joints]
+        rows: list[tuple[str, tuple[float, ...]]] = [
+            ("base_disk", (self.base_length - offsets[0],))
+        ]
+        for k, link in enumerate(self.links):
+            places = [offsets[k]]
+            if k + 1 < len(offsets):
+                places.append(link.length - offsets[k + 1])
+            rows.append((f"link{k + 1}", tuple(places)))
+        return tuple(rows)
+
+    def to_toml(self) -> str:
+        """The TOML text that :meth:`read` turns back into an equal geometry."""
+        lines = [
+            "# cdsm geometry. Units: m, rad, kg.",
+            "# axes: in the axes of the link before; angle: of the hole about x, from y towards z;",
+            "# joint (of a cable): the joint it drives, from 1; it ends on the disk after it.",
+        ]
+        lines += toml_lines(self, ("name", "base_length", "hole_radius"))
+        for table in ("joints", "links", "cables"):
+            for entry in getattr(self, table):
+                lines += ["", f"[[{table}]]", *toml_lines(entry)]
+        return "\n".join(lines) + "\n"
+
+    def write(self, path: str | os.PathLike[str]) -> Path:
+        """Write :meth:`to_toml` to a file, whole or not at all; return its path.
+
+        Raises:
+            FileError: The file cannot be written.
+        """
+        return write_text(path, self.to_toml())
+
+    @classmethod
+    def from_toml(cls, text: str, source: str | None = None) -> Geometry:
+        """Parse a geometry from TOML: see :meth:`read`.
+
+        Args:
+            text: The TOML text.
+            source: Where it came from, for the error.
+
+        Raises:
+            GeometryError: Not TOML, or lists every fault found in it.
+        """
+        short = {"universal": _Universal, "hinged": _Hinged}
+        try:
+            data = read_toml(text)
+            kind = next(iter(data)) if len(data) == 1 else ""
+            return parse(short[kind], data[kind]).build() if kind in short else parse(cls, data)
+        except GeometryError as error:
+            raise GeometryError(error.faults, source) from None
+
+    @classmethod
+    def read(cls, path: str | os.PathLike[str]) -> Geometry:
+        """Read a geometry from a TOML file.
+
+        Either the full form that :meth:`write` makes, or one table ``[universal]`` or ``[hinged]``
+        with the keywords of the constructor of that name.
+
+        Raises:
+            FileError: The file cannot be read.
+            GeometryError: Not TOML, or lists every fault found in it; unknown keys are faults.
+        """
+        return cls.from_toml(read_text(path), source=os.fspath(path))

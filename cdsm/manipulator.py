@@ -1,0 +1,356 @@
+"""An arm with its cables, and the postures it takes.
+
+:class:`Manipulator` is what does not change, :class:`Posture` everything that depends on the joint
+angles alone. Both are frozen; a posture exists only once all of it is computed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from cdsm import _kernels
+from cdsm._checks import Array, ReadOnlyState, frozen, vector
+from cdsm._rigid_body import RigidBody, Tree
+from cdsm.cable import Cable, serpentine_cables
+from cdsm.elasticity import Elasticity
+from cdsm.errors import (
+    CableError,
+    ElasticityRangeError,
+    InvalidInput,
+    JointLimitError,
+    UnknownName,
+)
+from cdsm.geometry import Geometry
+from cdsm.urdf import TIP, to_urdf
+
+GRAVITY = (0.0, 0.0, -9.81)
+"""Default gravity in base axes [m/s²]."""
+
+_LIMIT_SLACK = 1e-9
+"""Angles this far [rad] beyond a limit are rounding, as of a conversion from degrees."""
+
+
+@final
+class Manipulator:
+    """A cable-driven arm: rigid links, revolute joints, frictionless cables.
+
+    Args:
+        geometry: The arm.
+        elasticity: Of all cables, or one per cable; the cables are then those of
+            :func:`~cdsm.cable.serpentine_cables`.
+        cables: The cables, instead of ``elasticity``: any sites on any links of :attr:`urdf`.
+        gravity: In base axes (3,) [m/s²]; (0, 0, 0) for none.
+
+    Raises:
+        InvalidInput: Both or neither of ``elasticity`` and ``cables``; gravity not three numbers.
+        CableError: Two cables of one name, or one on a link that does not exist.
+    """
+
+    def __init__(
+        self,
+        geometry: Geometry,
+        elasticity: Elasticity | Sequence[Elasticity] | None = None,
+        *,
+        cables: Sequence[Cable] | None = None,
+        gravity: ArrayLike = GRAVITY,
+    ) -> None:
+        if not isinstance(geometry, Geometry):
+            raise InvalidInput("geometry", f"{geometry!r} given; a Geometry is needed.")
+        if (elasticity is None) == (cables is None):
+            raise InvalidInput(
+                "elasticity",
+                "give either elasticity= (for the cables of the geometry) or cables=, not "
+                + ("both." if cables is not None else "neither."),
+            )
+        if elasticity is not None:
+            cables = serpentine_cables(geometry, elasticity)
+        self._geometry = geometry
+        self._cables = _checked_cables(cables or ())
+        self._gravity = vector("gravity", gravity, 3, "gravity in base axes [m/s²]")
+        self._urdf = to_urdf(geometry)
+        self._body = RigidBody(self._urdf, TIP, self._gravity)
+        self._tree = self._body.tree()
+        self._routing = _route(self._body, self._tree, self._cables)
+
+        self._lowest = self._body.lower - _LIMIT_SLACK
+        self._highest = self._body.upper + _LIMIT_SLACK
+
+        held = [c for c, cable in enumerate(self._cables) if cable.control == "position"]
+        materials = dict.fromkeys(self._cables[c].elasticity for c in held)
+        self._held_by_material = [
+            (law, np.array([c for c in held if self._cables[c].elasticity == law]))
+            for law in materials
+        ]
+        series = np.array([cable.series_stiffness for cable in self._cables])
+        self._series_compliance = 1.0 / series
+
+    @property
+    def geometry(self) -> Geometry:
+        """The geometry it was made from."""
+        return self._geometry
+
+    @property
+    def urdf(self) -> str:
+        """Its URDF text."""
+        return self._urdf
+
+    @property
+    def cables(self) -> tuple[Cable, ...]:
+        """Its cables; their order is that of every (C,) array."""
+        return self._cables
+
+    @property
+    def gravity(self) -> Array:
+        """Gravity in base axes (3,) [m/s²]."""
+        return self._gravity
+
+    @property
+    def nv(self) -> int:
+        """Degrees of freedom."""
+        return self._body.nv
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the joints; their order is that of every (nv,) array."""
+        return self._body.joint_names
+
+    @property
+    def lower(self) -> Array:
+        """Lower joint limits (nv,) [rad]."""
+        return self._body.lower
+
+    @property
+    def upper(self) -> Array:
+        """Upper joint limits (nv,) [rad]."""
+        return self._body.upper
+
+    def __repr__(self) -> str:
+        return f"<Manipulator {self._geometry}>"
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return (_rebuild, (self._geometry, self._cables, self._gravity.tolist()))
+
+    def at(self, q: ArrayLike, *, check_limits: bool = True) -> Posture:
+        """Evaluate the arm at joint angles q: kinematics, cable lengths and gravity.
+
+        Args:
+            q: Joint angles (nv,) [rad], in the order of :attr:`joint_names`.
+            check_limits: Refuse angles beyond the joint limits.
+
+        Raises:
+            InvalidInput: q is not (nv,) finite real numbers.
+            JointLimitError: An angle is beyond its limit, and ``check_limits`` is set.
+            CableError: Two neighbouring sites of a cable coincide at this posture.
+        """
+        q = vector("q", q, self.nv, f"one angle [rad] per joint, {', '.join(self.joint_names)}")
+        if check_limits:
+            beyond = (q < self._lowest) | (q > self._highest)
+            if beyond.any():
+                raise JointLimitError(
+                    [self.joint_names[i] for i in np.flatnonzero(beyond)],
+                    q[beyond].tolist(),
+                    list(zip(self.lower[beyond], self.upper[beyond], strict=True)),
+                )
+        state = self._body.state(q)
+        frames = self._frames(q)
+        length_jacobian = np.zeros((len(self._cables), self.nv))
+        lengths, coincident = _kernels.cable_lengths(self._routing, frames, length_jacobian)
+        if coincident >= 0:
+            raise CableError(
+                self._cables[self._routing.cable[coincident]].name,
+                f"two neighbouring sites coincide at q = {q.tolist()}, so the cable has no "
+                "direction there. Move a site, or change the posture.",
+            )
+        return Posture(
+            arm=self,
+            q=q,
+            tip=frozen(state.tip),
+            jacobian=frozen(state.jacobian),
+            cable_lengths=frozen(lengths),
+            length_jacobian=frozen(length_jacobian),
+            gravity_torque=frozen(state.gravity_torque),
+            gravity_stiffness=frozen(state.gravity_stiffness),
+            _frames=frames,
+        )
+
+    def cable_stiffness(self, lengths: Array, tension: Array) -> Array:
+        """Diagonal of K_L: k = 1/(l_0/EA(F) + 1/k_series), 0 for force-controlled cables.
+
+        Args:
+            lengths: Free lengths l_0 (C,) [m].
+            tension: F (C,) [N].
+
+        Returns:
+            (C,) [N/m].
+
+        Raises:
+            ElasticityRangeError: Names the cables whose tension is outside their elasticity's
+                domain.
+        """
+        stiffness = np.zeros(len(self._cables))
+        for law, held in self._held_by_material:
+            try:
+                rigidity = law.rigidity(tension[held])
+            except ElasticityRangeError as error:
+                names = [self._cables[held[i]].name for i in error.indices]
+                raise ElasticityRangeError(
+                    error.problem, error.tension, held[list(error.indices)].tolist(), names
+                ) from None
+            stiffness[held] = 1.0 / (lengths[held] / rigidity + self._series_compliance[held])
+        return stiffness
+
+    def _frames(self, q: Array) -> _kernels.Frames:
+        # Pinocchio hands out placements one Python object per joint, 14 µs for ten joints; the
+        # kernel, which also places the cable sites, takes 2 µs. A test holds the two equal.
+        tree, routing = self._tree, self._routing
+        return _kernels.Frames(
+            *_kernels.place(
+                tree.parent,
+                tree.rotation,
+                tree.translation,
+                tree.axis,
+                routing.row,
+                routing.point,
+                q,
+            )
+        )
+
+
+@final
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class Posture(ReadOnlyState):
+    """Everything that depends on the joint angles alone; made by :meth:`Manipulator.at`.
+
+    All arrays are read-only and in base axes.
+
+    Attributes:
+        arm: The arm.
+        q: Joint angles (nv,) [rad].
+        tip: Pose of ``tool0`` (4, 4), translation in m (Eqs. 3–4).
+        jacobian: J_X (6, nv): linear rows [m/rad] first, then angular, at ``tool0``.
+        cable_lengths: L (C,) [m], lead included (Eq. 8).
+        length_jacobian: J_L = ∂L/∂θ (C, nv) [m/rad].
+        gravity_torque: g = ∂V/∂θ (nv,) [N m], V the potential energy: J_Hᵀ G_g of Eq. 13.
+        gravity_stiffness: ∂g/∂θ (nv, nv) [N m/rad]: H_H G_g of Eq. 16.
+    """
+
+    arm: Manipulator
+    q: Array
+    tip: Array
+    jacobian: Array
+    cable_lengths: Array
+    length_jacobian: Array
+    gravity_torque: Array
+    gravity_stiffness: Array
+    _frames: _kernels.Frames
+
+    @cached_property
+    def length_hessian(self) -> Array:
+        """H_L[c, i, j] = ∂²L_c/∂θ_i∂θ_j, (C, nv, nv) [m/rad²], built on first use."""
+        count = len(self.arm.cables)
+        return self._length_hessian(frozen(np.ones(count)), np.arange(count))
+
+    @cached_property
+    def cable_paths(self) -> tuple[Array, ...]:
+        """The sites of each cable in base axes, one array (sites, 3) per cable [m]."""
+        counts = [len(cable.sites) for cable in self.arm.cables]
+        paths = np.split(self._frames.site, np.cumsum(counts)[:-1])
+        return tuple(frozen(path.copy()) for path in paths)
+
+    def _active_stiffness(self, tension: Array) -> Array:
+        """H_L·F (nv, nv) without the tensor; for checked, read-only tensions (C,)."""
+        page = np.zeros(tension.size, dtype=np.intp)
+        return frozen(self._length_hessian(tension, page)[0])
+
+    def _load_stiffness(self, wrench: Array) -> Array:
+        """−∂(J_Xᵀ W)/∂θ (nv, nv) of a dead wrench; for a checked, read-only one (6,)."""
+        return frozen(_kernels.load_stiffness(self.jacobian, wrench))
+
+    def link_pose(self, link: str) -> Array:
+        """Pose of a link's frame in the base, (4, 4) [m].
+
+        Raises:
+            UnknownName: There is no such link.
+        """
+        row, rotation, translation = self.arm._body.locate(link)
+        pose = np.eye(4)
+        pose[:3, :3] = self._frames.rotation[row] @ rotation
+        pose[:3, 3] = self._frames.origin[row] + self._frames.rotation[row] @ translation
+        return frozen(pose)
+
+    def _length_hessian(self, weight: Array, page: NDArray[np.intp]) -> Array:
+        nv = self.arm.nv
+        hessian = np.zeros((int(page[-1]) + 1, nv, nv))
+        _kernels.add_length_hessian(self.arm._routing, self._frames, weight, page, hessian)
+        return frozen(hessian)
+
+
+def _rebuild(geometry: Geometry, cables: tuple[Cable, ...], gravity: list[float]) -> Manipulator:
+    return Manipulator(geometry, cables=cables, gravity=gravity)
+
+
+def _checked_cables(cables: Sequence[Cable]) -> tuple[Cable, ...]:
+    if not cables or not all(isinstance(cable, Cable) for cable in cables):
+        raise InvalidInput(
+            "cables", f"{cables!r} given; a sequence of one or more Cable is needed."
+        )
+    names = [cable.name for cable in cables]
+    for name in names:
+        if names.count(name) > 1:
+            raise CableError(name, "the name is used twice; every cable needs its own.")
+    return tuple(cables)
+
+
+def _route(body: RigidBody, tree: Tree, cables: Sequence[Cable]) -> _kernels.Routing:
+    """Place the sites on the joints, and find for every segment the joints that change it."""
+    row, point, fixed = [], [], np.array([cable.lead for cable in cables])
+    cable_of, start, joints, sides = [], [], [], []
+    for c, cable in enumerate(cables):
+        for i, site in enumerate(cable.sites):
+            try:
+                joint, rotation, translation = body.locate(site.link)
+            except UnknownName as error:
+                raise CableError(cable.name, str(error)) from None
+            row.append(joint)
+            point.append(translation + rotation @ np.array(site.position))
+            if i == 0:
+                continue
+            if row[-2] != row[-1]:
+                to_a, to_b = _way(tree, row[-2]), _way(tree, row[-1])
+                only_a = [j for j in to_a if j not in to_b]
+                only_b = [j for j in to_b if j not in to_a]
+                cable_of.append(c)
+                start.append(len(row) - 2)
+                joints.append([*only_a, *only_b])
+                sides += [-1.0] * len(only_a) + [1.0] * len(only_b)
+                continue
+            length = math.dist(point[-2], point[-1])
+            if length < _kernels.SHORTEST_SEGMENT:
+                raise CableError(cable.name, f"sites {i} and {i + 1} coincide; leave one out.")
+            fixed[c] += length
+    return _kernels.Routing(
+        row=np.array(row, dtype=np.intp),
+        point=np.array(point),
+        cable=np.array(cable_of, dtype=np.intp),
+        start=np.array(start, dtype=np.intp),
+        end=np.array(start, dtype=np.intp) + 1,
+        first=np.cumsum([0, *map(len, joints)], dtype=np.intp),
+        joint=np.array([j for of_segment in joints for j in of_segment], dtype=np.intp),
+        side=np.array(sides),
+        fixed=fixed,
+    )
+
+
+def _way(tree: Tree, row: int) -> list[int]:
+    way: list[int] = []
+    while row:
+        way.insert(0, row)
+        row = int(tree.parent[row])
+    return way

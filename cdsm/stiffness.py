@@ -1,0 +1,347 @@
+"""Stiffness of an arm at a posture under given cable tensions.
+
+    K_θ = H_L·F + J_Lᵀ K_L J_L + ∂g/∂θ − ∂(J_Xᵀ W)/∂θ                          (Eq. 16)
+          active   passive       gravity   load
+
+The paper goes on to Cartesian space with J_X⁻¹, which does not exist for a redundant arm. Three
+different numbers hide behind "the stiffness in x", and each has its own name here:
+:meth:`Stiffness.along`, :attr:`Stiffness.cartesian` and :meth:`Stiffness.pseudoinverse`.
+"""
+
+from __future__ import annotations
+
+import html
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal, final, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cdsm._checks import Array, ReadOnlyState, frozen, one_of, unit_direction, vector
+from cdsm.errors import InvalidInput, SingularStiffness
+from cdsm.manipulator import Posture
+from cdsm.tension import Tension
+
+Term = Literal["active", "passive", "gravity", "load", "joint"]
+
+_RANK = 1e-10
+"""Singular values below this part of the largest are rounding, not motion."""
+
+
+@final
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Shares(ReadOnlyState):
+    """What carries the stiffness in one direction; the parts sum to :attr:`total`.
+
+    Attributes:
+        direction: The unit direction (3,), base axes.
+        passive: Elasticity of each cable, (C,) [N/m].
+        active: Tension of each cable, (C,) [N/m]; mostly negative.
+        gravity: Weight of the links [N/m].
+        load: The wrench at the tip [N/m].
+    """
+
+    direction: Array
+    passive: Array
+    active: Array
+    gravity: float
+    load: float
+
+    @property
+    def cables(self) -> Array:
+        """Passive plus active of each cable, (C,) [N/m]."""
+        return frozen(self.passive + self.active)
+
+    @property
+    def total(self) -> float:
+        """Sum of all parts [N/m]: the stiffness along the direction."""
+        return float(self.passive.sum() + self.active.sum() + self.gravity + self.load)
+
+
+@final
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Stiffness(ReadOnlyState):
+    """Joint and Cartesian stiffness, with the posture, tensions and wrench they belong to.
+
+    Cartesian quantities are at ``tool0`` in base axes. All arrays are read-only.
+
+    Attributes:
+        posture: Where.
+        tension: F (C,) [N].
+        wrench: W (6,): force [N], then moment [N m].
+        cable_stiffness: Diagonal of K_L (C,) [N/m]; 0 for force-controlled cables.
+        active: H_L·F (nv, nv) [N m/rad]; also called geometric.
+        passive: J_Lᵀ K_L J_L (nv, nv) [N m/rad]; also called material or elastic.
+        gravity: ∂g/∂θ (nv, nv) [N m/rad].
+        load: −∂(J_Xᵀ W)/∂θ (nv, nv) [N m/rad]; not symmetric if W has a moment.
+        joint: K_θ, their sum (nv, nv) [N m/rad]: rows torque, columns angle.
+    """
+
+    posture: Posture
+    tension: Array
+    wrench: Array
+    cable_stiffness: Array
+    active: Array
+    passive: Array
+    gravity: Array
+    load: Array
+    joint: Array
+
+    @cached_property
+    def residual(self) -> Array:
+        """J_Lᵀ F − (J_Xᵀ W − g) (nv,) [N m]: zero where the tensions balance the arm (Eq. 13)."""
+        pose = self.posture
+        return frozen(
+            self.tension @ pose.length_jacobian - self.wrench @ pose.jacobian + pose.gravity_torque
+        )
+
+    @cached_property
+    def margin(self) -> float:
+        """Smallest eigenvalue of the symmetric part of K_θ [N m/rad]; negative: it buckles."""
+        return float(self._spectrum[0][0])
+
+    @cached_property
+    def critical_direction(self) -> Array:
+        """Unit joint motion (nv,) of the smallest eigenvalue: how the arm gives way first."""
+        return frozen(self._spectrum[1][:, 0].copy())
+
+    @property
+    def is_stable(self) -> bool:
+        """Whether the symmetric part of K_θ is positive definite."""
+        return self.margin > 0.0
+
+    @cached_property
+    def compliance(self) -> Array:
+        """C = J_X K_θ⁻¹ J_Xᵀ (6, 6): tip motion per wrench, what the arm really does.
+
+        Linear rows first: C_vv [m/N], C_vω [m/(N m)] = [rad/N], C_ωω [rad/(N m)].
+
+        Raises:
+            SingularStiffness: K_θ is singular: the arm is just about to buckle.
+        """
+        jacobian = self.posture.jacobian
+        return frozen(jacobian @ self._solve(jacobian.T))
+
+    @cached_property
+    def cartesian(self) -> Array:
+        """(C_vv)⁻¹ (3, 3) [N/m]: force per tip displacement, the tip free to rotate.
+
+        Its diagonal is the stiffness while the other two translations are *held*, a factor 2 to 4
+        above :meth:`along`.
+
+        Raises:
+            SingularStiffness: The tip cannot move in some direction, which the error names; use
+                :meth:`along` for the others. Or K_θ is singular.
+        """
+        self._require_mobile("the Cartesian stiffness matrix")
+        return frozen(np.linalg.inv(self.compliance[:3, :3]).astype(np.float64))
+
+    def along(self, direction: ArrayLike) -> float:
+        """1/(uᵀ C_vv u) [N/m]: what a weight hung at the tip measures in direction u (Eq. 20).
+
+        Args:
+            direction: u (3,) in base axes, any length.
+
+        Returns:
+            The stiffness; inf where no joint moves the tip in this direction. Where the arm is
+            unstable it may be negative: see :attr:`is_stable`.
+
+        Raises:
+            InvalidInput: Not a direction.
+            SingularStiffness: K_θ is singular.
+        """
+        u = unit_direction("direction", direction)
+        torque = self._torque(u)
+        if torque is None:
+            return math.inf
+        return float(1.0 / (torque @ self._solve(torque)))
+
+    def pseudoinverse(self, term: Term = "joint") -> Array:
+        """J⁺ᵀ K J⁺ (3, 3) [N/m] with J the linear rows of J_X: the paper's K_R read literally.
+
+        It reproduces the paper's figures, and overestimates: the arm is stiffer in it than
+        :attr:`cartesian`, by 4 % to over 100 %, because it lets only the joint motion of least norm
+        happen.
+
+        Args:
+            term: Which part of K_θ: ``"active"``, ``"passive"``, ``"gravity"``, ``"load"`` or the
+                sum, ``"joint"``.
+
+        Raises:
+            UnknownName: No such term.
+            SingularStiffness: The tip cannot move in some direction, so J⁺ loses it.
+        """
+        matrix: Array = getattr(self, one_of("stiffness term", term, get_args(Term)))
+        self._require_mobile("the pseudo-inverse reading")
+        inverse = np.linalg.pinv(self.posture.jacobian[:3])
+        return frozen(inverse.T @ matrix @ inverse)
+
+    def shares(self, direction: ArrayLike) -> Shares:
+        """How much of :meth:`along` each cable carries, by elasticity and by tension.
+
+        With δθ the joint motion per unit tip displacement along u, along(u) = δθᵀ K_θ δθ, and K_θ
+        is a sum over cables, gravity and load.
+
+        Args:
+            direction: u (3,) in base axes, any length.
+
+        Raises:
+            InvalidInput: Not a direction.
+            SingularStiffness: The stiffness along u is infinite, or K_θ is singular.
+        """
+        u = unit_direction("direction", direction)
+        torque = self._torque(u)
+        if torque is None:
+            raise SingularStiffness(
+                f"the tip cannot move along {_written(u)}: nothing carries an infinite stiffness.",
+                u,
+            )
+        motion = self._solve(torque)
+        motion = motion / (torque @ motion)
+        pose = self.posture
+        return Shares(
+            direction=u,
+            passive=frozen(self.cable_stiffness * (pose.length_jacobian @ motion) ** 2),
+            active=frozen(self.tension * (pose.length_hessian @ motion @ motion)),
+            gravity=float(motion @ self.gravity @ motion),
+            load=float(motion @ self.load @ motion),
+        )
+
+    def __repr__(self) -> str:
+        state = "stable" if self.is_stable else "UNSTABLE"
+        return f"<Stiffness of {self.posture.arm.geometry.name}, {state}>"
+
+    def __str__(self) -> str:
+        lines = [f"{name:<24}{''.join(f'{cell:>12}' for cell in row)}" for name, *row in self._rows]
+        return "\n".join([*lines, self._verdict])
+
+    def _repr_html_(self) -> str:
+        (_, *axes), *rows = (tuple(map(html.escape, row)) for row in self._rows)
+        head = "".join(f"<th>{axis}</th>" for axis in axes)
+        lines = [f"<tr><th>stiffness [N/mm]</th>{head}</tr>"]
+        lines += [f"<tr>{''.join(f'<td>{cell}</td>' for cell in row)}</tr>" for row in rows]
+        return f"<table>{''.join(lines)}</table><p>{html.escape(self._verdict)}</p>"
+
+    @property
+    def _rows(self) -> list[tuple[str, ...]]:
+        """The summary as a table: a header, then a name and three numbers a row."""
+        parts = {
+            "along": lambda u: self.along(u),
+            "  of it passive": lambda u: self.shares(u).passive.sum(),
+            "  of it active": lambda u: self.shares(u).active.sum(),
+            "  of it gravity": lambda u: self.shares(u).gravity,
+            "  of it load": lambda u: self.shares(u).load,
+            "cartesian, diagonal": lambda u: u @ self.cartesian @ u,
+            "pseudoinverse, diagonal": lambda u: u @ self.pseudoinverse() @ u,
+        }
+        return [
+            ("stiffness [N/mm]", "x", "y", "z"),
+            *((name, *(_millimetres(part, u) for u in np.eye(3))) for name, part in parts.items()),
+        ]
+
+    @property
+    def _verdict(self) -> str:
+        state = "stable" if self.is_stable else "UNSTABLE: the arm buckles"
+        return f"{state}, smallest joint stiffness {self.margin:.4g} N m/rad"
+
+    @cached_property
+    def _spectrum(self) -> tuple[Array, Array]:
+        values, vectors = np.linalg.eigh((self.joint + self.joint.T) / 2.0)
+        return values, vectors
+
+    def _torque(self, u: Array) -> Array | None:
+        """J_vᵀ u (nv,): joint torque of a unit force along u; None if it moves no joint."""
+        linear = self.posture.jacobian[:3]
+        torque = u @ linear
+        return torque if abs(torque).max() > _RANK * abs(linear).max() else None
+
+    def _solve(self, torque: Array) -> Array:
+        """K_θ⁻¹ times a torque or several; refuses a singular K_θ."""
+        values = np.linalg.svd(self.joint, compute_uv=False)
+        if not values[-1] > 1e-14 * values[0]:
+            raise SingularStiffness(
+                "K_θ is singular: the arm is just about to buckle in the joint motion "
+                f"{_written(self.critical_direction)}. Change the tensions or the posture.",
+                self.critical_direction,
+            )
+        return np.linalg.solve(self.joint, torque).astype(np.float64)
+
+    def _require_mobile(self, what: str) -> None:
+        left, values, _ = np.linalg.svd(self.posture.jacobian[:3])
+        values = np.append(values, np.zeros(3 - values.size))
+        if values[2] <= _RANK * values[0]:
+            u = frozen(left[:, 2].copy())
+            raise SingularStiffness(
+                f"{what} does not exist: the tip cannot move along {_written(u)}, where the "
+                "stiffness is infinite. Use along(direction), or bend the arm.",
+                u,
+            )
+
+
+def stiffness(
+    pose: Posture, tension: Tension | ArrayLike, wrench: ArrayLike | None = None
+) -> Stiffness:
+    """Joint stiffness of an arm and its four parts (Eq. 16), and through it the Cartesian one.
+
+    Args:
+        pose: The posture.
+        tension: The answer of :func:`~cdsm.tension.distribute_tension` at this posture, or tensions
+            of your own (C,) [N], not negative. These need not balance the arm; see
+            :attr:`Stiffness.residual`.
+        wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m]; zero if not given.
+            Belongs to tensions of your own: a :class:`~cdsm.tension.Tension` carries its wrench.
+
+    Raises:
+        InvalidInput: Wrong shape, not numbers, a negative tension, tensions of another posture, or
+            a wrench beside a ``Tension``.
+        ElasticityRangeError: A tension outside the domain of the elasticity of its cable.
+    """
+    arm = pose.arm
+    if isinstance(tension, Tension):
+        if tension.posture is not pose and not (
+            tension.posture.arm is arm and np.array_equal(tension.posture.q, pose.q)
+        ):
+            raise InvalidInput(
+                "tension", "was distributed at another posture; distribute it at this one."
+            )
+        if wrench is not None:
+            raise InvalidInput("wrench", "comes with the Tension; leave it out here.")
+        F, W = tension.values, tension.wrench
+    else:
+        F = vector("tension", tension, len(arm.cables), "one tension [N] per cable")
+        W = vector("wrench", (0.0,) * 6 if wrench is None else wrench, 6, "force, then moment")
+        if (F < 0.0).any():
+            c = int(F.argmin())
+            raise InvalidInput(
+                "tension", f"{F[c]:g} N given for {arm.cables[c].name}; cables only pull."
+            )
+    k = arm.cable_stiffness(pose.cable_lengths, F)
+    active = pose._active_stiffness(F)
+    passive = (pose.length_jacobian.T * k) @ pose.length_jacobian
+    load = pose._load_stiffness(W)
+    return Stiffness(
+        posture=pose,
+        tension=F,
+        wrench=W,
+        cable_stiffness=frozen(k),
+        active=active,
+        passive=frozen(passive),
+        gravity=pose.gravity_stiffness,
+        load=load,
+        joint=frozen(active + passive + pose.gravity_stiffness + load),
+    )
+
+
+def _millimetres(part: Callable[[Array], float], u: Array) -> str:
+    """A stiffness in N/mm for the summary, "-" where it does not exist."""
+    try:
+        return f"{part(u) / 1000.0:.4g}"
+    except SingularStiffness:
+        return "-"
+
+
+def _written(direction: Array) -> str:
+    return f"({', '.join(f'{x:.4g}' for x in direction)})"

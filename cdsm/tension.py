@@ -1,0 +1,278 @@
+"""Tension distribution: the least cable tensions that balance the arm. Only qpsolvers user.
+
+A redundant arm leaves the tensions of Eq. 17 undetermined; as is usual, the smallest are taken:
+
+    min ½‖F‖²   so that   J_Lᵀ F = J_Xᵀ W − g   and   minimum ≤ F ≤ maximum.
+
+The problem is made dimensionless before a solver sees it (torques by the largest moment arm times a
+force, forces by that force, both powers of two so that scaling rounds nothing), the answer is
+accepted only if it satisfies the optimality conditions, and infeasibility is decided by linear
+programs, which also say how far off the bounds are.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from dataclasses import dataclass
+from typing import Any, NoReturn, final
+
+import numpy as np
+import qpsolvers
+from numpy.typing import ArrayLike
+from scipy.optimize import linprog
+from scipy.sparse import csc_matrix
+
+from cdsm._checks import Array, ReadOnlyState, bound, frozen, one_of, vector
+from cdsm.errors import InfeasibleTension, InvalidInput, SolverError
+from cdsm.manipulator import Posture
+
+OPTIMALITY = 1e-9
+"""Largest accepted violation of the dimensionless optimality conditions."""
+
+# qpsolvers' defaults miss OPTIMALITY by orders of magnitude for these, and OSQP's polishing step
+# can spoil a solution while it reports success
+_SETTINGS: dict[str, dict[str, Any]] = {
+    "clarabel": {"tol_gap_abs": 1e-11, "tol_gap_rel": 1e-11, "tol_feas": 1e-11},
+    "daqp": {"primal_tol": 1e-10},
+    "osqp": {
+        "eps_abs": 1e-10,
+        "eps_rel": 1e-10,
+        "max_iter": 100_000,
+        "polish": False,
+        "raise_error": False,
+    },
+    "piqp": {"eps_abs": 1e-11, "eps_rel": 1e-11},
+    "proxqp": {"eps_abs": 1e-11, "eps_rel": 0.0},
+}
+
+
+@final
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Tension(ReadOnlyState):
+    """Cable tensions that balance an arm, with the question they answer.
+
+    Attributes:
+        posture: Where.
+        values: F (C,) [N], in the order of ``posture.arm.cables``.
+        wrench: W (6,) at ``tool0``, base axes: force [N], then moment [N m].
+        minimum: Lower bounds (C,) [N].
+        maximum: Upper bounds (C,) [N].
+        solver: Name of the solver that found them.
+        residual: J_Lᵀ F − (J_Xᵀ W − g), what is left of Eq. 13, (nv,) [N m].
+    """
+
+    posture: Posture
+    values: Array
+    wrench: Array
+    minimum: Array
+    maximum: Array
+    solver: str
+    residual: Array
+
+    @property
+    def at_minimum(self) -> tuple[str, ...]:
+        """Names of the cables that stand at their lower bound."""
+        return self._names(self.values - self.minimum)
+
+    @property
+    def at_maximum(self) -> tuple[str, ...]:
+        """Names of the cables that stand at their upper bound."""
+        return self._names(self.maximum - self.values)
+
+    def _names(self, distance: Array) -> tuple[str, ...]:
+        tight = distance <= OPTIMALITY * self.values.max(initial=0.0)
+        return tuple(self.posture.arm.cables[c].name for c in np.flatnonzero(tight))
+
+    def __repr__(self) -> str:
+        return (
+            f"<Tension {self.values.min():.4g} to {self.values.max():.4g} N in "
+            f"{self.values.size} cables>"
+        )
+
+    def __str__(self) -> str:
+        rows = [f"{'cable':<12}{'tension [N]':>14}"]
+        rows += [
+            f"{cable.name:<12}{value:>14.3f}"
+            for cable, value in zip(self.posture.arm.cables, self.values, strict=True)
+        ]
+        return "\n".join([*rows, f"static residual: {abs(self.residual).max():.1e} N m"])
+
+
+def distribute_tension(
+    pose: Posture,
+    minimum: ArrayLike = 0.0,
+    maximum: ArrayLike = math.inf,
+    wrench: ArrayLike = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+    solver: str = "daqp",
+) -> Tension:
+    """Smallest cable tensions in balance: min ‖F‖² with J_Lᵀ F = J_Xᵀ W − g (Eqs. 13, 17).
+
+    Args:
+        pose: The posture.
+        minimum: Lower bound [N], for all cables or (C,); not negative, since cables only pull.
+        maximum: Upper bound [N], for all cables or (C,); inf for none.
+        wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m].
+        solver: ``"daqp"`` (exact), ``"osqp"``, or any other that qpsolvers finds installed.
+
+    Raises:
+        InvalidInput: A bound or the wrench has the wrong shape, is not a number, or the bounds
+            contradict each other.
+        InfeasibleTension: No tension within the bounds balances the arm; says what is missing.
+        UnknownName: No such solver is installed.
+        SolverError: The solver's answer does not satisfy the optimality conditions.
+    """
+    count = len(pose.arm.cables)
+    low, high = _checked_bounds(pose, bound("minimum", minimum, count), maximum)
+    wrench = vector("wrench", wrench, 6, "force [N], then moment [N m], base axes")
+    torque = pose.jacobian.T @ wrench - pose.gravity_torque
+
+    arm_scale = _power_of_two(abs(pose.length_jacobian).max())
+    force_scale = _power_of_two(max(low.max(), abs(torque).max() / arm_scale))
+    A = np.ascontiguousarray(pose.length_jacobian.T) / arm_scale
+    b = torque / arm_scale
+    values = _solve(A, b, low, high, force_scale, solver)
+    if values is None:
+        _explain(pose, A, b, low, high, (arm_scale, force_scale), solver)
+    # within OPTIMALITY of the bounds already; a bound that is active is not crossed by rounding
+    values = np.clip(values, low, high)
+    return Tension(
+        posture=pose,
+        values=frozen(values),
+        wrench=wrench,
+        minimum=low,
+        maximum=high,
+        solver=solver,
+        residual=frozen(values @ pose.length_jacobian - torque),
+    )
+
+
+def _checked_bounds(pose: Posture, low: Array, maximum: ArrayLike) -> tuple[Array, Array]:
+    high = bound("maximum", maximum, low.size)
+    cables = pose.arm.cables
+    allowed = (low >= 0.0) & (low < math.inf)
+    if not allowed.all():
+        c = int(allowed.argmin())
+        raise InvalidInput(
+            "minimum",
+            f"{low[c]:g} N given for {cables[c].name}; cables only pull, so it must be finite "
+            "and not negative.",
+        )
+    ordered = low <= high
+    if not ordered.all():
+        c = int(ordered.argmin())
+        raise InvalidInput(
+            "maximum",
+            f"{high[c]:g} N given for {cables[c].name}, below its minimum of {low[c]:g} N; raise "
+            "maximum or lower minimum.",
+        )
+    return low, high
+
+
+def _power_of_two(value: float) -> float:
+    """The power of two next above a magnitude; 1 for zero."""
+    return 2.0 ** math.ceil(math.log2(value)) if value > 0.0 else 1.0
+
+
+def _solve(
+    A: Array, b: Array, low: Array, high: Array, force_scale: float, solver: str
+) -> Array | None:
+    """Solve the problem in units of the force scale; None if the solver finds no solution."""
+    one_of("installed solver", solver, qpsolvers.available_solvers)
+    sparse = csc_matrix if solver in qpsolvers.sparse_solvers else np.asarray
+    problem = qpsolvers.Problem(
+        sparse(np.eye(low.size)),
+        np.zeros(low.size),
+        A=sparse(A),
+        b=b / force_scale,
+        lb=low / force_scale,
+        ub=high / force_scale,
+    )
+    settings = _SETTINGS.get(solver, {})
+    try:
+        if solver == "daqp":
+            solution = qpsolvers.solve_problem(problem, solver, **settings)
+        else:  # the others also report failure as warnings
+            with warnings.catch_warnings(action="ignore"):
+                solution = qpsolvers.solve_problem(problem, solver, **settings)
+    except Exception as error:  # each backend has its own kinds
+        raise SolverError(solver, f"failed: {error}. Use solver='daqp'.") from error
+    x = solution.x
+    if not solution.found or x is None:
+        return None
+    size = max(1.0, abs(x).max())
+    violations = {
+        "balance or bounds": solution.primal_residual() / size,
+        "stationarity": solution.dual_residual() / size,
+        "duality gap": solution.duality_gap() / size**2,
+    }
+    if not all(value <= OPTIMALITY for value in violations.values()):
+        listed = ", ".join(f"{name} {value:.1e}" for name, value in violations.items())
+        raise SolverError(
+            solver,
+            f"calls a point optimal that violates the optimality conditions by {listed} "
+            f"(dimensionless; {OPTIMALITY:g} is allowed). Use solver='daqp'.",
+        )
+    return np.asarray(x, dtype=np.float64) * force_scale
+
+
+def _explain(
+    pose: Posture,
+    A: Array,
+    b: Array,
+    low: Array,
+    high: Array,
+    scales: tuple[float, float],
+    solver: str,
+) -> NoReturn:
+    """Settle by linear programs why a solver found no tensions, and raise it.
+
+    Raises:
+        InfeasibleTension: There are none. Carries the least missing torque Σ|τ − J_Lᵀ F| within
+            the bounds, and the least widening of all bounds that leaves none missing.
+        SolverError: There are some, so it is the solver that failed; or the linear program did.
+    """
+    arm_scale, force_scale = scales
+    nv, count = A.shape
+    b, lower, upper = b / force_scale, low / force_scale, high / force_scale
+    # variables: F, then missing torque as its positive and negative part
+    identity = np.eye(nv)
+    nearest = linprog(
+        np.concatenate([np.zeros(count), np.ones(2 * nv)]),
+        A_eq=np.hstack([A, identity, -identity]),
+        b_eq=b,
+        bounds=[*zip(lower, upper, strict=True), *[(0.0, None)] * (2 * nv)],
+        method="highs",
+    )
+    if nearest.status != 0:  # it is feasible and bounded by construction
+        raise SolverError("highs", f"cannot tell whether tensions exist: {nearest.message}")
+    values = nearest.x[:count]
+    if nearest.fun <= OPTIMALITY:
+        raise SolverError(
+            solver,
+            "found no solution, though one exists with tensions of up to "
+            f"{values.max() * force_scale:.2g} N: the arm is at the edge of what its cables can "
+            "hold. Change the posture, the load or the bounds, or try another solver.",
+        )
+
+    # variables: F, then the widening t: low − t <= F <= high + t, and F >= 0 all the same
+    rows = np.vstack([-np.eye(count), np.eye(count)])
+    sides = np.concatenate([-lower, upper])
+    finite = np.isfinite(sides)
+    widening = linprog(
+        np.concatenate([np.zeros(count), [1.0]]),
+        A_ub=np.hstack([rows, -np.ones((2 * count, 1))])[finite],
+        b_ub=sides[finite],
+        A_eq=np.hstack([A, np.zeros((nv, 1))]),
+        b_eq=b,
+        bounds=(0.0, None),
+        method="highs",
+    )
+    missing = (b - A @ values) * arm_scale * force_scale
+    tight = np.minimum(values - lower, upper - values) <= OPTIMALITY
+    raise InfeasibleTension(
+        missing=frozen(missing),
+        joint=pose.arm.joint_names[int(abs(missing).argmax())],
+        relaxation=float(widening.x[-1]) * force_scale if widening.status == 0 else math.inf,
+        binding=[pose.arm.cables[c].name for c in np.flatnonzero(tight)],
+    )
