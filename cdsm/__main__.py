@@ -1,0 +1,5 @@
+"""``python -m cdsm`` is ``cdsm``."""
+
+from cdsm.cli import app
+
+app()

@@ -1,0 +1,177 @@
+"""Figures: the arm with its cables, and the paper's figures recomputed. mm and N/mm live here.
+
+Every function returns a :class:`matplotlib.figure.Figure` that belongs to the caller: show it in a
+notebook or save it with ``savefig``. No global plotting state is touched.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from cdsm import paper
+from cdsm._checks import Array
+from cdsm.manipulator import Posture
+from cdsm.tension import Tension
+
+_AXES = ("x", "y", "z")
+_COLORS = ("#3b6fb6", "#c8553d", "#4f8f5b")
+_STYLES = ("-", "--", "-.", ":")
+_MM = 1e3
+_N_PER_MM = 1e-3
+
+
+def plot_arm(pose: Posture, tension: Tension | None = None) -> Figure:
+    """The arm in 3D: backbone, disks and cables, with equal axes in mm.
+
+    Args:
+        pose: The posture to draw.
+        tension: Colours the cables by their tension [N] if given.
+    """
+    figure = Figure(figsize=(7.0, 5.0), layout="constrained")
+    axes: Any = figure.add_subplot(projection="3d")
+    _draw_arm(axes, pose, tension)
+    if tension is not None:
+        figure.colorbar(
+            _tension_colors(tension), ax=axes, label="cable tension [N]", shrink=0.7, pad=0.12
+        )
+    figure.suptitle(str(pose.arm.geometry), fontsize=10)
+    return figure
+
+
+def plot_paper(result: paper.Figure) -> Figure:
+    """One recomputed figure of the paper: its own reading above, a hung weight's stiffness below.
+
+    The cable tension is the mean; the bars are the range over all cables, as in the paper.
+
+    Args:
+        result: What a function in :data:`cdsm.paper.FIGURES` returns.
+    """
+    return _plot_postures(result) if len(result.curves) == 3 else _plot_directions(result)
+
+
+def _plot_directions(result: paper.Figure) -> Figure:
+    """A column for each direction, a curve for each case."""
+    rows: list[tuple[str, Callable[[paper.Curve], Array]]] = [
+        ("paper's reading", lambda curve: curve.pseudoinverse),
+        ("hung weight", lambda curve: curve.along),
+    ]
+    if result.name == "fig4":  # the only one whose original shows it
+        rows.insert(0, ("active part", lambda curve: curve.pseudoinverse_part))
+    figure = Figure(figsize=(11.0, 2.7 * len(rows) + 0.6), layout="constrained")
+    grid: Any = figure.subplots(len(rows), 3, sharex=True, squeeze=False)
+    for row, (reading, values) in zip(grid, rows, strict=True):
+        for i, axes in enumerate(row):
+            for curve, style in zip(result.curves, _STYLES, strict=False):
+                _draw_curve(axes, result, curve, values(curve)[:, i], _COLORS[i], style)
+                if result.part == "passive" and reading == "paper's reading":
+                    x = _swept(result, curve)
+                    axes.plot(x, _N_PER_MM * curve.pseudoinverse_part[:, i], "k.", markersize=3)
+            axes.set_ylabel(f"$K_{_AXES[i]}$, {reading} [N/mm]")
+            axes.grid(alpha=0.3)
+    _finish(figure, grid, result)
+    return figure
+
+
+def _plot_postures(result: paper.Figure) -> Figure:
+    """A column for each posture: its picture, and a curve for each direction."""
+    figure = Figure(figsize=(11.0, 9.0), layout="constrained")
+    grid = figure.add_gridspec(3, 3, height_ratios=(1.15, 1.0, 1.0))
+    bottom = []
+    for i, (curve, pose) in enumerate(zip(result.curves, result.postures, strict=True)):
+        picture: Any = figure.add_subplot(grid[0, i], projection="3d")
+        _draw_arm(picture, pose, None)
+        picture.set_title(curve.label, fontsize=10)
+        for row, (reading, values) in enumerate(
+            (("paper's reading", curve.pseudoinverse), ("hung weight", curve.along)), start=1
+        ):
+            axes: Any = figure.add_subplot(grid[row, i])
+            for j, (name, color) in enumerate(zip(_AXES, _COLORS, strict=True)):
+                _draw_curve(axes, result, curve, values[:, j], color, "-", label=name)
+            axes.set_ylabel(f"stiffness, {reading} [N/mm]")
+            axes.grid(alpha=0.3)
+        bottom.append(axes)
+    handles, labels = bottom[0].get_legend_handles_labels()
+    figure.legend(handles, labels, title="direction", ncols=3, loc="outside lower center")
+    _finish(figure, [bottom], result, legend=False)
+    return figure
+
+
+def _draw_curve(
+    axes: Any,
+    result: paper.Figure,
+    curve: paper.Curve,
+    values: Array,
+    color: str,
+    style: str,
+    label: str | None = None,
+) -> None:
+    x = _swept(result, curve)
+    axes.plot(x, _N_PER_MM * values, style, color=color, label=label or curve.label)
+    if result.swept == "tension":
+        low, mean, high = curve.tension.T
+        spread = np.array([mean - low, high - mean])
+        some = slice(None, None, max(1, len(x) // 8))
+        axes.errorbar(
+            x[some],
+            _N_PER_MM * values[some],
+            xerr=spread[:, some],
+            fmt="none",
+            ecolor=color,
+            elinewidth=0.7,
+            alpha=0.5,
+        )
+
+
+def _swept(result: paper.Figure, curve: paper.Curve) -> Array:
+    return curve.swept / 1e9 if result.swept == "young_modulus" else curve.tension[:, 1]
+
+
+def _finish(figure: Figure, grid: Any, result: paper.Figure, *, legend: bool = True) -> None:
+    label = {
+        "young_modulus": "Young's modulus [GPa]",
+        "tension": "cable tension, mean and range [N]",
+    }[result.swept]
+    for axes in grid[-1]:
+        axes.set_xlabel(label)
+    note = "dots: passive part alone" if result.part == "passive" else ""
+    if legend and (note or len(result.curves) > 1):
+        grid[0][0].legend(fontsize=8, title=note or None, title_fontsize=8)
+    figure.suptitle(result.title)
+
+
+def _draw_arm(axes: Any, pose: Posture, tension: Tension | None) -> None:
+    geometry = pose.arm.geometry
+    circle = np.linspace(0.0, 2.0 * np.pi, 49)
+    ring = geometry.hole_radius * np.array([0.0 * circle, np.cos(circle), np.sin(circle)])
+    for link, places in geometry.disks:
+        placement = pose.link_pose(link)
+        for place in places:
+            center = placement[:3, 3:] + place * placement[:3, :1]
+            edge = center + placement[:3, :3] @ ring
+            axes.plot(*(_MM * edge), color="0.35", linewidth=0.9)
+    joints = [np.zeros(3)]
+    joints += [pose.link_pose(link)[:3, 3] for link, _ in geometry.disks[1:]]
+    axes.plot(*(_MM * np.array([*joints, pose.tip[:3, 3]]).T), color="0.1", linewidth=2.5)
+    colors = [_COLORS[0]] * len(pose.cable_paths)
+    if tension is not None:
+        colors = _tension_colors(tension).to_rgba(tension.values).tolist()
+    for path, color in zip(pose.cable_paths, colors, strict=True):
+        axes.plot(*(_MM * path.T), color=color, linewidth=1.1)
+    for name in _AXES:
+        getattr(axes, f"set_{name}label")(f"{name} [mm]", fontsize=8)
+        getattr(axes, f"{name}axis").set_major_locator(MaxNLocator(4))
+    axes.tick_params(labelsize=7, pad=-1)
+    ranges = np.ptp([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()], axis=1)
+    axes.set_box_aspect(ranges, zoom=0.85)  # equal axes, and room for the labels
+
+
+def _tension_colors(tension: Tension) -> ScalarMappable:
+    low, high = tension.values.min(), tension.values.max()
+    return ScalarMappable(Normalize(low, max(high, low + 1e-9)), "viridis")
