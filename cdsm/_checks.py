@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 def frozen(array: Array) -> Array:
     """Return the array itself, made read-only."""
-    array.flags.writeable = False
+    array.setflags(write=False)
     return array
 
 
@@ -34,7 +34,7 @@ class ReadOnlyState:
 def number_array(name: str, value: ArrayLike) -> Array:
     """Return a fresh native float64 array of finite numbers, or raise :class:`InvalidInput`."""
     array = _native(name, value)
-    if not np.isfinite(array).all():
+    if np.count_nonzero(np.isfinite(array)) < array.size:
         bad = np.argwhere(~np.isfinite(array))[0]
         where = f"[{', '.join(map(str, bad))}]" if array.ndim else ""
         raise InvalidInput(
@@ -58,16 +58,17 @@ def vector(name: str, value: ArrayLike, size: int, meaning: str) -> Array:
     array = number_array(name, value)
     if array.shape != (size,):
         raise InvalidInput(name, f"shape {array.shape} given, ({size},) needed: {meaning}.")
-    return frozen(array)
+    array.setflags(write=False)
+    return array
 
 
 def bound(name: str, value: ArrayLike, size: int) -> Array:
     """Return a read-only vector (size,) from a scalar or a vector that may hold +inf."""
     array = _native(name, value)
-    if np.isnan(array).any():
+    if np.count_nonzero(np.isnan(array)):
         raise InvalidInput(name, "holds NaN; give a number of newtons, or inf for no limit.")
     if array.ndim == 0:
-        array = np.repeat(array, size)
+        array = array.repeat(size)
     if array.shape != (size,):
         raise InvalidInput(
             name, f"shape {array.shape} given; give one number, or ({size},): one per cable [N]."
@@ -102,6 +103,10 @@ def one_of(kind: str, name: object, known: Iterable[str]) -> str:
 
 
 def _native(name: str, value: ArrayLike) -> Array:
+    """A copy in the machine's own byte order: the caller's array may change later."""
+    if type(value) is np.ndarray and value.dtype == np.float64:  # the usual case, and a hot one
+        copy: Array = value.copy()
+        return copy
     if isinstance(value, np.ma.MaskedArray):
         raise InvalidInput(name, "is a masked array; fill or drop the masked entries first.")
     try:
@@ -110,5 +115,4 @@ def _native(name: str, value: ArrayLike) -> Array:
         raise InvalidInput(name, f"is not an array of numbers ({error}).") from None
     if array.dtype.kind not in "iuf":
         raise InvalidInput(name, f"holds {array.dtype} entries; real numbers are needed.")
-    # a copy in the machine's own byte order: the caller's array may change later
     return np.array(array, dtype=np.float64, order="C")

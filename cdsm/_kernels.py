@@ -27,59 +27,63 @@ SHORTEST_SEGMENT = 1e-9
 """A segment shorter than this [m] has no direction: its two sites coincide."""
 
 
+class Tree(NamedTuple):
+    """The kinematic tree as plain arrays; row 0 is the base, row i joint i.
+
+    Attributes:
+        parent: Row of the joint before, (nv+1,).
+        rotation: Joint frame in its parent joint's frame at q = 0, (nv+1, 3, 3).
+        translation: Likewise its origin, (nv+1, 3) [m].
+        axis: Unit axis in the joint's own frame, (nv+1, 3).
+    """
+
+    parent: Indices
+    rotation: Array
+    translation: Array
+    axis: Array
+
+
 class Routing(NamedTuple):
-    """All sites and the cable segments that joints can change, as plain arrays; rows as in a tree.
+    """All cable sites, and the cable segments that joints can change; rows as in a tree.
+
+    Few arrays on purpose: handing one to a kernel costs as much as computing a segment.
 
     Attributes:
         row: Row of the joint that moves each site, (P,).
         point: The site in the frame of that joint, (P, 3) [m].
-        cable: Cable that each segment belongs to, (S,).
-        start: Site a of each segment, (S,).
-        end: Site b, (S,).
-        first: Where the joints of each segment begin in ``joint``, (S+1,).
-        joint: Rows of the joints between a and b, ancestors first on each side.
-        side: +1.0 on the way to b, −1.0 on the way to a.
+        segment: For each segment its cable, site a, site b, and where its joints begin in
+            ``joint``, (S+1, 4); the last row only says where the joints end.
+        joint: The joints between a and b, ancestors first on each side: the row with a plus on the
+            way to b, with a minus on the way to a.
         fixed: Length that joints do not change: lead and segments within one link, (C,) [m].
     """
 
     row: Indices
     point: Array
-    cable: Indices
-    start: Indices
-    end: Indices
-    first: Indices
+    segment: Indices
     joint: Indices
-    side: Array
     fixed: Array
 
 
 class Frames(NamedTuple):
-    """Where everything is, in base axes.
+    """Where the joints and the cable sites are, in base axes.
 
     Attributes:
-        rotation: Orientation of each joint frame, (nv+1, 3, 3).
-        origin: Its origin, (nv+1, 3) [m].
-        axis: Its axis, (nv+1, 3).
+        origin: A point on each joint axis, (nv+1, 3) [m].
+        axis: Its unit direction, (nv+1, 3).
         site: The cable sites, (P, 3) [m].
     """
 
-    rotation: Array
     origin: Array
     axis: Array
     site: Array
 
 
 @njit(cache=True, error_model="numpy")
-def place(
-    parent: Indices,
-    rotation: Array,
-    translation: Array,
-    axis: Array,
-    row: Indices,
-    point: Array,
-    q: Array,
-) -> tuple[Array, Array, Array, Array]:
+def place(tree: Tree, routing: Routing, q: Array) -> tuple[Array, Array, Array]:
     """Forward kinematics: return the fields of :class:`Frames` at the joint angles q (nv,)."""
+    parent, rotation, translation, axis = tree
+    row, point = routing.row, routing.point
     count = parent.shape[0]
     R = np.zeros((count, 3, 3))
     o = np.zeros((count, 3))
@@ -109,7 +113,7 @@ def place(
             x[p, r] = o[i, r] + (
                 R[i, r, 0] * point[p, 0] + R[i, r, 1] * point[p, 1] + R[i, r, 2] * point[p, 2]
             )
-    return R, o, z, x
+    return o, z, x
 
 
 @njit(cache=True, error_model="numpy")
@@ -138,9 +142,10 @@ def _direction(site: Array, a: int, b: int) -> tuple[float, float, float, float]
 
 @njit(cache=True, error_model="numpy")
 def _derivative(
-    axis: Array, origin: Array, site: Array, row: int, p: int, side: float
+    origin: Array, axis: Array, site: Array, joint: int, a: int, b: int
 ) -> tuple[float, float, float]:
-    """D = ±z × (x − o) of site p by the joint of a row."""
+    """∂(b − a)/∂θ = ±z × (x − o) by a joint on the way to site b (+) or to site a (−)."""
+    side, row, p = (1.0, joint, b) if joint > 0 else (-1.0, -joint, a)
     rx = site[p, 0] - origin[row, 0]
     ry = site[p, 1] - origin[row, 1]
     rz = site[p, 2] - origin[row, 2]
@@ -149,25 +154,28 @@ def _derivative(
 
 
 @njit(cache=True, error_model="numpy")
-def cable_lengths(routing: Routing, frames: Frames, length_jacobian: Array) -> tuple[Array, int]:
-    """Fill J_L (C, nv); return L (C,) and the first segment whose sites coincide, or −1."""
-    start, end, first, joint, side = (
-        routing.start, routing.end, routing.first, routing.joint, routing.side
-    )  # fmt: skip
-    origin, axis, site = frames.origin, frames.axis, frames.site
+def evaluate(
+    tree: Tree, routing: Routing, q: Array
+) -> tuple[tuple[Array, Array, Array], Array, Array, int]:
+    """Return the fields of :class:`Frames`, L (C,), J_L (C, nv), and a segment or −1.
+
+    The segment is the first whose two sites coincide; L and J_L are then unfinished.
+    """
+    frames = place(tree, routing, q)
+    origin, axis, site = frames
+    segment, joint = routing.segment, routing.joint
     lengths = routing.fixed.copy()
-    for s in range(routing.cable.shape[0]):
-        ux, uy, uz, length = _direction(site, start[s], end[s])
+    length_jacobian = np.zeros((lengths.shape[0], q.shape[0]))
+    for s in range(segment.shape[0] - 1):
+        cable, a, b, first = segment[s]
+        ux, uy, uz, length = _direction(site, a, b)
         if not length > SHORTEST_SEGMENT:
-            return lengths, s
-        cable = routing.cable[s]
+            return frames, lengths, length_jacobian, s
         lengths[cable] += length
-        for t in range(first[s], first[s + 1]):
-            j = joint[t]
-            p = end[s] if side[t] > 0.0 else start[s]
-            dx, dy, dz = _derivative(axis, origin, site, j, p, side[t])
-            length_jacobian[cable, j - 1] += ux * dx + uy * dy + uz * dz
-    return lengths, -1
+        for t in range(first, segment[s + 1, 3]):
+            dx, dy, dz = _derivative(origin, axis, site, joint[t], a, b)
+            length_jacobian[cable, abs(joint[t]) - 1] += ux * dx + uy * dy + uz * dz
+    return frames, lengths, length_jacobian, -1
 
 
 @njit(cache=True, error_model="numpy")
@@ -177,19 +185,17 @@ def add_length_hessian(
     """Add weight[c] ∂²L_c/∂θ_i∂θ_j to hessian[page[c], i, j] for every cable c.
 
     All pages zero and weight = F gives H_L·F; page c for cable c and weight 1 the whole tensor.
-    No two neighbouring sites may coincide; :func:`cable_lengths` has seen to that.
+    No two neighbouring sites may coincide; :func:`evaluate` has seen to that.
     """
-    start, end, first, joint, side = (
-        routing.start, routing.end, routing.first, routing.joint, routing.side
-    )  # fmt: skip
     origin, axis, site = frames.origin, frames.axis, frames.site
-    for s in range(routing.cable.shape[0]):
-        w, k = weight[routing.cable[s]], page[routing.cable[s]]
-        ux, uy, uz, length = _direction(site, start[s], end[s])
-        for t in range(first[s], first[s + 1]):
-            i = joint[t]
-            p = end[s] if side[t] > 0.0 else start[s]
-            ax, ay, az = _derivative(axis, origin, site, i, p, side[t])
+    segment, joint = routing.segment, routing.joint
+    for s in range(segment.shape[0] - 1):
+        cable, a, b, first = segment[s]
+        w, k = weight[cable], page[cable]
+        ux, uy, uz, length = _direction(site, a, b)
+        for t in range(first, segment[s + 1, 3]):
+            i = abs(joint[t])
+            ax, ay, az = _derivative(origin, axis, site, joint[t], a, b)
             along = ux * ax + uy * ay + uz * az
             # (1 − uuᵀ) d_i / ℓ, to which u × z_i is added for joints on the same side:
             # u·(z_i × d_j) = (u × z_i)·d_j
@@ -199,17 +205,89 @@ def add_length_hessian(
             cx = vx + uy * axis[i, 2] - uz * axis[i, 1]
             cy = vy + uz * axis[i, 0] - ux * axis[i, 2]
             cz = vz + ux * axis[i, 1] - uy * axis[i, 0]
-            for other in range(t, first[s + 1]):
-                j = joint[other]
-                p = end[s] if side[other] > 0.0 else start[s]
-                bx, by, bz = _derivative(axis, origin, site, j, p, side[other])
-                if side[t] == side[other]:
+            for other in range(t, segment[s + 1, 3]):
+                j = abs(joint[other])
+                bx, by, bz = _derivative(origin, axis, site, joint[other], a, b)
+                if (joint[t] > 0) == (joint[other] > 0):
                     value = w * (cx * bx + cy * by + cz * bz)
                 else:
                     value = w * (vx * bx + vy * by + vz * bz)
                 hessian[k, i - 1, j - 1] += value
                 if other != t:
                     hessian[k, j - 1, i - 1] += value
+
+
+@njit(cache=True, error_model="numpy")
+def joint_stiffness(
+    routing: Routing,
+    frames: Frames,
+    jacobian: Array,
+    length_jacobian: Array,
+    gravity: Array,
+    tension: Array,
+    cable_stiffness: Array,
+    wrench: Array,
+) -> tuple[Array, Array, Array, Array]:
+    """Active, passive and load term of Eq. 16 and the sum of all four, (nv, nv) each."""
+    nv = jacobian.shape[1]
+    active = np.zeros((1, nv, nv))
+    page = np.zeros(tension.shape[0], dtype=np.intp)
+    add_length_hessian(routing, frames, tension, page, active)
+    passive = np.zeros((nv, nv))
+    for c in range(length_jacobian.shape[0]):
+        for i in range(nv):
+            pull = cable_stiffness[c] * length_jacobian[c, i]
+            if pull != 0.0:  # a cable moves only with the joints before its end
+                for j in range(i, nv):
+                    passive[i, j] += pull * length_jacobian[c, j]
+    for i in range(nv):
+        for j in range(i):
+            passive[i, j] = passive[j, i]
+    load = load_stiffness(jacobian, wrench)
+    return active[0], passive, load, active[0] + passive + gravity + load
+
+
+@njit(cache=True, error_model="numpy")
+def optimality(
+    A: Array, b: Array, low: Array, high: Array, x: Array, y: Array, z: Array
+) -> tuple[float, float, float]:
+    """How far x is from solving min ½‖x‖² so that A x = b, low ≤ x ≤ high.
+
+    Args:
+        A: (m, n).
+        b: (m,).
+        low: (n,).
+        high: (n,), may hold inf.
+        x: The point (n,).
+        y: Multipliers of the equations (m,).
+        z: Multipliers of the bounds (n,): negative at low, positive at high.
+
+    Returns:
+        Largest violation of the constraints, largest entry of x + Aᵀy + z (or of z⁺ where high is
+        infinite), and the duality gap |xᵀx + bᵀy + lowᵀz⁻ + highᵀz⁺|: all zero exactly at the
+        optimum.
+    """
+    primal = dual = gap = 0.0
+    for i in range(b.shape[0]):
+        residual = -b[i]
+        for j in range(x.shape[0]):
+            residual += A[i, j] * x[j]
+        primal = max(primal, abs(residual))
+        gap += b[i] * y[i]
+    for j in range(x.shape[0]):
+        primal = max(primal, low[j] - x[j], x[j] - high[j])
+        slope = x[j] + z[j]
+        for i in range(b.shape[0]):
+            slope += A[i, j] * y[i]
+        dual = max(dual, abs(slope))
+        gap += x[j] * x[j]
+        if z[j] < 0.0:
+            gap += low[j] * z[j]
+        elif high[j] < np.inf:
+            gap += high[j] * z[j]
+        else:
+            dual = max(dual, z[j])  # a bound that is not there has no multiplier
+    return primal, dual, abs(gap)
 
 
 @njit(cache=True, error_model="numpy")

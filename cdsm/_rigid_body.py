@@ -8,14 +8,13 @@ built, so that callers hand over checked arrays and receive their own copies.
 from __future__ import annotations
 
 import threading
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from cdsm._checks import Array, frozen
+from cdsm._kernels import Tree
 from cdsm.errors import UnknownName, UrdfError
 
 
@@ -26,23 +25,6 @@ class BodyState(NamedTuple):
     jacobian: Array
     gravity_torque: Array
     gravity_stiffness: Array
-
-
-@dataclass(frozen=True, eq=False)
-class Tree:
-    """The kinematic tree as plain arrays for the kernels; row 0 is the base, row i joint i.
-
-    Attributes:
-        parent: Row of the joint before, (nv+1,).
-        rotation: Joint frame in its parent joint's frame at q = 0, (nv+1, 3, 3).
-        translation: Likewise its origin, (nv+1, 3) [m].
-        axis: Unit axis in the joint's own frame, (nv+1, 3).
-    """
-
-    parent: NDArray[np.intp]
-    rotation: Array
-    translation: Array
-    axis: Array
 
 
 class RigidBody:
@@ -118,6 +100,17 @@ class RigidBody:
         return BodyState(
             tip, np.ascontiguousarray(jacobian), data.g.copy(), np.ascontiguousarray(stiffness)
         )
+
+    def placement(self, q: Array, link: str) -> Array:
+        """Pose of a link's frame in the base, (4, 4).
+
+        Raises:
+            UnknownName: There is no such link.
+        """
+        model, data, frame = self._model, self._data(), self._frame(link)
+        pin.forwardKinematics(model, data, q)
+        placement: Array = pin.updateFramePlacement(model, data, frame).homogeneous
+        return placement
 
     def _frame(self, link: str) -> int:
         if not self._model.existFrame(link, pin.FrameType.BODY):

@@ -56,10 +56,9 @@ class Domain:
             ElasticityRangeError: Some lie outside; the error says which.
         """
         values = number_array("tension", tension)
-        outside = (values > self.high) | (
-            (values < self.low) if self.low_included else (values <= self.low)
-        )
-        if outside.any():
+        outside = values <= self.low if not self.low_included else values < self.low
+        outside |= values > self.high
+        if np.count_nonzero(outside):
             raise ElasticityRangeError(
                 f"outside the domain {self} of the elasticity. Keep the tension inside it "
                 "(minimum=, maximum=), or use an elasticity that covers it.",
@@ -118,6 +117,9 @@ class Elasticity(ABC):
         return secant
 
 
+_ALL_TENSIONS = Domain(0.0, math.inf)
+
+
 @final
 @dataclass(frozen=True, init=False, repr=False)
 class LinearElasticity(Elasticity):
@@ -160,11 +162,13 @@ class LinearElasticity(Elasticity):
     @property
     def domain(self) -> Domain:
         """[0 N, inf N)."""
-        return Domain(0.0, math.inf)
+        return _ALL_TENSIONS
 
     def rigidity(self, tension: ArrayLike) -> Array:
         """EA [N], whatever the tension; see :meth:`Elasticity.rigidity`."""
-        return np.full_like(self.domain.check(tension), self._rigidity)
+        rigidity = self.domain.check(tension)
+        rigidity.fill(self._rigidity)
+        return rigidity
 
     def strain(self, tension: ArrayLike) -> Array:
         """F/EA [-]; see :meth:`Elasticity.strain`."""

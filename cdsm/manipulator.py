@@ -13,11 +13,11 @@ from functools import cached_property
 from typing import final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from cdsm import _kernels
 from cdsm._checks import Array, ReadOnlyState, frozen, vector
-from cdsm._rigid_body import RigidBody, Tree
+from cdsm._rigid_body import RigidBody
 from cdsm.cable import Cable, serpentine_cables
 from cdsm.elasticity import Elasticity
 from cdsm.errors import (
@@ -79,13 +79,14 @@ class Manipulator:
         self._tree = self._body.tree()
         self._routing = _route(self._body, self._tree, self._cables)
 
+        self._meaning_of_q = f"one angle [rad] per joint, {', '.join(self.joint_names)}"
         self._lowest = self._body.lower - _LIMIT_SLACK
         self._highest = self._body.upper + _LIMIT_SLACK
 
         held = [c for c, cable in enumerate(self._cables) if cable.control == "position"]
         materials = dict.fromkeys(self._cables[c].elasticity for c in held)
         self._held_by_material = [
-            (law, np.array([c for c in held if self._cables[c].elasticity == law]))
+            (law, np.array([c for c in held if self._cables[c].elasticity == law], dtype=np.intp))
             for law in materials
         ]
         series = np.array([cable.series_stiffness for cable in self._cables])
@@ -149,22 +150,24 @@ class Manipulator:
             JointLimitError: An angle is beyond its limit, and ``check_limits`` is set.
             CableError: Two neighbouring sites of a cable coincide at this posture.
         """
-        q = vector("q", q, self.nv, f"one angle [rad] per joint, {', '.join(self.joint_names)}")
+        q = vector("q", q, self.nv, self._meaning_of_q)
         if check_limits:
             beyond = (q < self._lowest) | (q > self._highest)
-            if beyond.any():
+            if np.count_nonzero(beyond):
                 raise JointLimitError(
                     [self.joint_names[i] for i in np.flatnonzero(beyond)],
                     q[beyond].tolist(),
                     list(zip(self.lower[beyond], self.upper[beyond], strict=True)),
                 )
         state = self._body.state(q)
-        frames = self._frames(q)
-        length_jacobian = np.zeros((len(self._cables), self.nv))
-        lengths, coincident = _kernels.cable_lengths(self._routing, frames, length_jacobian)
+        # Pinocchio hands out placements one Python object per joint, 14 µs for ten joints; the
+        # kernel places joints and cable sites itself in 2 µs. A test holds the two equal.
+        frames, lengths, length_jacobian, coincident = _kernels.evaluate(
+            self._tree, self._routing, q
+        )
         if coincident >= 0:
             raise CableError(
-                self._cables[self._routing.cable[coincident]].name,
+                self._cables[self._routing.segment[coincident, 0]].name,
                 f"two neighbouring sites coincide at q = {q.tolist()}, so the cable has no "
                 "direction there. Move a site, or change the posture.",
             )
@@ -177,7 +180,7 @@ class Manipulator:
             length_jacobian=frozen(length_jacobian),
             gravity_torque=frozen(state.gravity_torque),
             gravity_stiffness=frozen(state.gravity_stiffness),
-            _frames=frames,
+            _frames=_kernels.Frames(*frames),
         )
 
     def cable_stiffness(self, lengths: Array, tension: Array) -> Array:
@@ -203,24 +206,9 @@ class Manipulator:
                 raise ElasticityRangeError(
                     error.problem, error.tension, held[list(error.indices)].tolist(), names
                 ) from None
-            stiffness[held] = 1.0 / (lengths[held] / rigidity + self._series_compliance[held])
+            compliance = lengths[held] / rigidity + self._series_compliance[held]
+            stiffness[held] = 1.0 / compliance
         return stiffness
-
-    def _frames(self, q: Array) -> _kernels.Frames:
-        # Pinocchio hands out placements one Python object per joint, 14 µs for ten joints; the
-        # kernel, which also places the cable sites, takes 2 µs. A test holds the two equal.
-        tree, routing = self._tree, self._routing
-        return _kernels.Frames(
-            *_kernels.place(
-                tree.parent,
-                tree.rotation,
-                tree.translation,
-                tree.axis,
-                routing.row,
-                routing.point,
-                q,
-            )
-        )
 
 
 @final
@@ -254,8 +242,12 @@ class Posture(ReadOnlyState):
     @cached_property
     def length_hessian(self) -> Array:
         """H_L[c, i, j] = ∂²L_c/∂θ_i∂θ_j, (C, nv, nv) [m/rad²], built on first use."""
-        count = len(self.arm.cables)
-        return self._length_hessian(frozen(np.ones(count)), np.arange(count))
+        count, nv = self.length_jacobian.shape
+        hessian = np.zeros((count, nv, nv))
+        _kernels.add_length_hessian(
+            self.arm._routing, self._frames, frozen(np.ones(count)), np.arange(count), hessian
+        )
+        return frozen(hessian)
 
     @cached_property
     def cable_paths(self) -> tuple[Array, ...]:
@@ -264,32 +256,29 @@ class Posture(ReadOnlyState):
         paths = np.split(self._frames.site, np.cumsum(counts)[:-1])
         return tuple(frozen(path.copy()) for path in paths)
 
-    def _active_stiffness(self, tension: Array) -> Array:
-        """H_L·F (nv, nv) without the tensor; for checked, read-only tensions (C,)."""
-        page = np.zeros(tension.size, dtype=np.intp)
-        return frozen(self._length_hessian(tension, page)[0])
-
-    def _load_stiffness(self, wrench: Array) -> Array:
-        """−∂(J_Xᵀ W)/∂θ (nv, nv) of a dead wrench; for a checked, read-only one (6,)."""
-        return frozen(_kernels.load_stiffness(self.jacobian, wrench))
-
     def link_pose(self, link: str) -> Array:
         """Pose of a link's frame in the base, (4, 4) [m].
 
         Raises:
             UnknownName: There is no such link.
         """
-        row, rotation, translation = self.arm._body.locate(link)
-        pose = np.eye(4)
-        pose[:3, :3] = self._frames.rotation[row] @ rotation
-        pose[:3, 3] = self._frames.origin[row] + self._frames.rotation[row] @ translation
-        return frozen(pose)
+        return frozen(self.arm._body.placement(self.q, link))
 
-    def _length_hessian(self, weight: Array, page: NDArray[np.intp]) -> Array:
-        nv = self.arm.nv
-        hessian = np.zeros((int(page[-1]) + 1, nv, nv))
-        _kernels.add_length_hessian(self.arm._routing, self._frames, weight, page, hessian)
-        return frozen(hessian)
+    def _joint_stiffness(
+        self, tension: Array, cable_stiffness: Array, wrench: Array
+    ) -> tuple[Array, Array, Array, Array]:
+        """Active, passive, load and K_θ (nv, nv); of checked, read-only vectors."""
+        active, passive, load, joint = _kernels.joint_stiffness(
+            self.arm._routing,
+            self._frames,
+            self.jacobian,
+            self.length_jacobian,
+            self.gravity_stiffness,
+            tension,
+            cable_stiffness,
+            wrench,
+        )
+        return frozen(active), frozen(passive), frozen(load), frozen(joint)
 
 
 def _rebuild(geometry: Geometry, cables: tuple[Cable, ...], gravity: list[float]) -> Manipulator:
@@ -308,10 +297,11 @@ def _checked_cables(cables: Sequence[Cable]) -> tuple[Cable, ...]:
     return tuple(cables)
 
 
-def _route(body: RigidBody, tree: Tree, cables: Sequence[Cable]) -> _kernels.Routing:
+def _route(body: RigidBody, tree: _kernels.Tree, cables: Sequence[Cable]) -> _kernels.Routing:
     """Place the sites on the joints, and find for every segment the joints that change it."""
     row, point, fixed = [], [], np.array([cable.lead for cable in cables])
-    cable_of, start, joints, sides = [], [], [], []
+    segments: list[tuple[int, int, int, int]] = []
+    joints: list[int] = []
     for c, cable in enumerate(cables):
         for i, site in enumerate(cable.sites):
             try:
@@ -324,31 +314,25 @@ def _route(body: RigidBody, tree: Tree, cables: Sequence[Cable]) -> _kernels.Rou
                 continue
             if row[-2] != row[-1]:
                 to_a, to_b = _way(tree, row[-2]), _way(tree, row[-1])
-                only_a = [j for j in to_a if j not in to_b]
-                only_b = [j for j in to_b if j not in to_a]
-                cable_of.append(c)
-                start.append(len(row) - 2)
-                joints.append([*only_a, *only_b])
-                sides += [-1.0] * len(only_a) + [1.0] * len(only_b)
+                segments.append((c, len(row) - 2, len(row) - 1, len(joints)))
+                joints += [-j for j in to_a if j not in to_b]
+                joints += [j for j in to_b if j not in to_a]
                 continue
             length = math.dist(point[-2], point[-1])
             if length < _kernels.SHORTEST_SEGMENT:
                 raise CableError(cable.name, f"sites {i} and {i + 1} coincide; leave one out.")
             fixed[c] += length
+    segments.append((0, 0, 0, len(joints)))
     return _kernels.Routing(
         row=np.array(row, dtype=np.intp),
         point=np.array(point),
-        cable=np.array(cable_of, dtype=np.intp),
-        start=np.array(start, dtype=np.intp),
-        end=np.array(start, dtype=np.intp) + 1,
-        first=np.cumsum([0, *map(len, joints)], dtype=np.intp),
-        joint=np.array([j for of_segment in joints for j in of_segment], dtype=np.intp),
-        side=np.array(sides),
+        segment=np.array(segments, dtype=np.intp),
+        joint=np.array(joints, dtype=np.intp),
         fixed=fixed,
     )
 
 
-def _way(tree: Tree, row: int) -> list[int]:
+def _way(tree: _kernels.Tree, row: int) -> list[int]:
     way: list[int] = []
     while row:
         way.insert(0, row)

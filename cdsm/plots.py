@@ -169,7 +169,7 @@ def _draw_arm(axes: Any, pose: Posture, tension: Tension | None) -> None:
         getattr(axes, f"{name}axis").set_major_locator(MaxNLocator(4))
     axes.tick_params(labelsize=7, pad=-1)
     ranges = np.ptp([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()], axis=1)
-    axes.set_box_aspect(ranges, zoom=0.85)  # equal axes, and room for the labels
+    axes.set_box_aspect(ranges, zoom=0.8)  # equal axes, and room for the labels
 
 
 def _tension_colors(tension: Tension) -> ScalarMappable:

@@ -27,6 +27,8 @@ from cdsm.tension import Tension
 
 Term = Literal["active", "passive", "gravity", "load", "joint"]
 
+_NO_WRENCH = frozen(np.zeros(6))
+
 _RANK = 1e-10
 """Singular values below this part of the largest are rounding, not motion."""
 
@@ -312,26 +314,26 @@ def stiffness(
         F, W = tension.values, tension.wrench
     else:
         F = vector("tension", tension, len(arm.cables), "one tension [N] per cable")
-        W = vector("wrench", (0.0,) * 6 if wrench is None else wrench, 6, "force, then moment")
-        if (F < 0.0).any():
+        W = _NO_WRENCH
+        if wrench is not None:
+            W = vector("wrench", wrench, 6, "force [N], then moment [N m], base axes")
+        if np.count_nonzero(F < 0.0):
             c = int(F.argmin())
             raise InvalidInput(
                 "tension", f"{F[c]:g} N given for {arm.cables[c].name}; cables only pull."
             )
-    k = arm.cable_stiffness(pose.cable_lengths, F)
-    active = pose._active_stiffness(F)
-    passive = (pose.length_jacobian.T * k) @ pose.length_jacobian
-    load = pose._load_stiffness(W)
+    k = frozen(arm.cable_stiffness(pose.cable_lengths, F))
+    active, passive, load, joint = pose._joint_stiffness(F, k, W)
     return Stiffness(
         posture=pose,
         tension=F,
         wrench=W,
-        cable_stiffness=frozen(k),
+        cable_stiffness=k,
         active=active,
-        passive=frozen(passive),
+        passive=passive,
         gravity=pose.gravity_stiffness,
         load=load,
-        joint=frozen(active + passive + pose.gravity_stiffness + load),
+        joint=joint,
     )
 
 

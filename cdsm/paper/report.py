@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 from cdsm.paper.figures import Figure
 
-
 HEADER = ("figure", "quantity", "paper", "computed", "difference", "hung weight", "assumption")
 
 EXPLANATION = (
