@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
 Array = NDArray[np.float64]
+
+_Kind = TypeVar("_Kind")
 
 
 def frozen(array: Array) -> Array:
@@ -26,21 +28,42 @@ class ReadOnlyState:
 
     def __setstate__(self, state: dict[str, object]) -> None:
         for value in state.values():
-            if isinstance(value, np.ndarray):
-                value.flags.writeable = False
+            for array in value if isinstance(value, tuple) else (value,):
+                if isinstance(array, np.ndarray):
+                    frozen(array)
         self.__dict__.update(state)
+
+
+LARGEST = 1e15
+"""No force, length or rigidity of a real arm comes near this; beyond, products overflow."""
 
 
 def number_array(name: str, value: ArrayLike) -> Array:
     """Return a fresh native float64 array of finite numbers, or raise :class:`InvalidInput`."""
     array = _native(name, value)
-    if np.count_nonzero(np.isfinite(array)) < array.size:
-        bad = np.argwhere(~np.isfinite(array))[0]
-        where = f"[{', '.join(map(str, bad))}]" if array.ndim else ""
+    usable = abs(array) <= LARGEST  # false for NaN too
+    if np.count_nonzero(usable) < array.size:
+        bad = np.argwhere(~usable)[0]
+        where = f"entry [{', '.join(map(str, bad))}] is " if array.ndim else ""
         raise InvalidInput(
-            name, f"entry {where} is {array[tuple(bad)]}; all entries must be finite."
+            name, f"{where}{array[tuple(bad)]:g}; finite numbers up to {LARGEST:g} are allowed."
         )
     return array
+
+
+def instance(name: str, value: _Kind, kind: type[_Kind]) -> _Kind:
+    """Return the value if it is of the kind, else raise :class:`InvalidInput`."""
+    if not isinstance(value, kind):
+        raise InvalidInput(name, f"{value!r} given; a {kind.__name__} is needed.")
+    return value
+
+
+def sequence_of(name: str, value: Iterable[_Kind], kind: type[_Kind]) -> tuple[_Kind, ...]:
+    """Return the values as a tuple if all are of the kind, else raise :class:`InvalidInput`."""
+    entries = tuple(value) if isinstance(value, (list, tuple)) else None
+    if entries is None or not all(isinstance(entry, kind) for entry in entries):
+        raise InvalidInput(name, f"{value!r} given; a list or tuple of {kind.__name__} is needed.")
+    return entries
 
 
 def vector(name: str, value: ArrayLike, size: int, meaning: str) -> Array:
@@ -63,15 +86,22 @@ def vector(name: str, value: ArrayLike, size: int, meaning: str) -> Array:
 
 
 def bound(name: str, value: ArrayLike, size: int) -> Array:
-    """Return a read-only vector (size,) from a scalar or a vector that may hold +inf."""
-    array = _native(name, value)
-    if np.count_nonzero(np.isnan(array)):
-        raise InvalidInput(name, "holds NaN; give a number of newtons, or inf for no limit.")
-    if array.ndim == 0:
-        array = array.repeat(size)
+    """Return a read-only vector (size,) from a scalar or a vector that may hold ±inf."""
+    if isinstance(value, float):  # the usual case, and a hot one
+        array = np.full(size, value)
+    else:
+        array = _native(name, value)
+        array = array.repeat(size) if array.ndim == 0 else array
     if array.shape != (size,):
         raise InvalidInput(
             name, f"shape {array.shape} given; give one number, or ({size},): one per cable [N]."
+        )
+    usable = (abs(array) <= LARGEST) | np.isinf(array)
+    if np.count_nonzero(usable) < size:
+        bad = int(usable.argmin())
+        raise InvalidInput(
+            name,
+            f"entry [{bad}] is {array[bad]:g}; give newtons up to {LARGEST:g}, or inf.",
         )
     return frozen(array)
 
@@ -107,7 +137,9 @@ def _native(name: str, value: ArrayLike) -> Array:
     if type(value) is np.ndarray and value.dtype == np.float64:  # the usual case, and a hot one
         copy: Array = value.copy()
         return copy
-    if isinstance(value, np.ma.MaskedArray):
+    if isinstance(value, np.ma.MaskedArray) or (
+        isinstance(value, (list, tuple)) and any(entry is np.ma.masked for entry in value)
+    ):
         raise InvalidInput(name, "is a masked array; fill or drop the masked entries first.")
     try:
         array = np.asarray(value)
@@ -115,4 +147,7 @@ def _native(name: str, value: ArrayLike) -> Array:
         raise InvalidInput(name, f"is not an array of numbers ({error}).") from None
     if array.dtype.kind not in "iuf":
         raise InvalidInput(name, f"holds {array.dtype} entries; real numbers are needed.")
-    return np.array(array, dtype=np.float64, order="C")
+    if array.dtype == np.float64:
+        return np.array(array, order="C")
+    with np.errstate(over="ignore"):  # what exceeds float64 becomes inf, which is refused later
+        return array.astype(np.float64)

@@ -8,7 +8,7 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
-from cdsm.errors import FileError
+from cdsm.errors import CdsmError, FileError, InvalidInput
 
 MAXIMUM_BYTES = 10_000_000
 """No description of an arm comes near this; a larger file is a mistake or an attack."""
@@ -20,13 +20,15 @@ def read_text(path: str | os.PathLike[str]) -> str:
     Raises:
         FileError: Missing, not readable, larger than :data:`MAXIMUM_BYTES`, or not UTF-8.
     """
-    path = Path(path)
+    path = _path(path)
     try:
         with path.open("rb") as file:
             data = file.read(MAXIMUM_BYTES + 1)
         if len(data) > MAXIMUM_BYTES:
             raise FileError(path, f"is larger than the {MAXIMUM_BYTES} bytes that are read.")
         return data.decode("utf-8")
+    except CdsmError:
+        raise
     except FileNotFoundError:
         raise FileError(path, f"does not exist (looked in {Path.cwd()}).") from None
     except UnicodeDecodeError as error:
@@ -34,8 +36,6 @@ def read_text(path: str | os.PathLike[str]) -> str:
             path, f"is not UTF-8 text (byte {error.start}); save it as UTF-8."
         ) from None
     except (OSError, ValueError) as error:
-        if isinstance(error, FileError):
-            raise
         raise FileError(path, f"cannot be read: {_reason(error)}.") from None
 
 
@@ -52,7 +52,7 @@ def write_file(path: str | os.PathLike[str], fill: Callable[[Path], object]) -> 
     Raises:
         FileError: The folder is missing or not writable, or the disk refuses.
     """
-    path = Path(path)
+    path = _path(path)
     aside: Path | None = None
     try:
         handle, name = tempfile.mkstemp(
@@ -66,11 +66,11 @@ def write_file(path: str | os.PathLike[str], fill: Callable[[Path], object]) -> 
         os.umask(mask)
         aside.chmod(0o666 & ~mask)
         aside.replace(path)
+    except CdsmError:
+        raise
     except FileNotFoundError:
         raise FileError(path, f"the folder {path.parent} does not exist; create it.") from None
     except (OSError, ValueError) as error:
-        if isinstance(error, FileError):
-            raise
         raise FileError(path, f"cannot be written: {_reason(error)}.") from None
     finally:
         if aside is not None:
@@ -85,12 +85,19 @@ def make_folder(path: str | os.PathLike[str]) -> Path:
     Raises:
         FileError: It cannot be created, or a file stands in its place.
     """
-    path = Path(path)
+    path = _path(path)
     try:
         path.mkdir(parents=True, exist_ok=True)
     except (OSError, ValueError) as error:
         raise FileError(path, f"cannot be made a folder: {_reason(error)}.") from None
     return path
+
+
+def _path(path: str | os.PathLike[str]) -> Path:
+    try:
+        return Path(path)
+    except TypeError:
+        raise InvalidInput("path", f"{path!r} given; the path of a file is needed.") from None
 
 
 def _reason(error: Exception) -> str:

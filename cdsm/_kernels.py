@@ -235,16 +235,66 @@ def joint_stiffness(
     add_length_hessian(routing, frames, tension, page, active)
     passive = np.zeros((nv, nv))
     for c in range(length_jacobian.shape[0]):
-        for i in range(nv):
+        last = nv  # a cable moves only with the joints before its end
+        while last > 0 and length_jacobian[c, last - 1] == 0.0:
+            last -= 1
+        for i in range(last):
             pull = cable_stiffness[c] * length_jacobian[c, i]
-            if pull != 0.0:  # a cable moves only with the joints before its end
-                for j in range(i, nv):
-                    passive[i, j] += pull * length_jacobian[c, j]
+            for j in range(i, last):
+                passive[i, j] += pull * length_jacobian[c, j]
     for i in range(nv):
         for j in range(i):
             passive[i, j] = passive[j, i]
     load = load_stiffness(jacobian, wrench)
     return active[0], passive, load, active[0] + passive + gravity + load
+
+
+class Scaled(NamedTuple):
+    """The balance of an arm, J_Lᵀ F = J_Xᵀ W − g with low ≤ F ≤ high, made dimensionless.
+
+    Attributes:
+        A: J_Lᵀ over the largest moment arm (nv, C).
+        b: Torque over moment arm and force (nv,).
+        low: Lower bounds over force (C,).
+        high: Upper bounds over force (C,).
+        arm: Largest moment arm [m], up to the next power of two, so that scaling rounds nothing.
+        force: Largest of the lower bounds and of torque over moment arm [N], likewise.
+    """
+
+    A: Array
+    b: Array
+    low: Array
+    high: Array
+    arm: float
+    force: float
+
+
+@njit(cache=True, error_model="numpy")
+def scaled_balance(
+    length_jacobian: Array, torque: Array, low: Array, high: Array
+) -> tuple[Array, Array, Array, Array, float, float]:
+    """Return the fields of :class:`Scaled`."""
+    count, nv = length_jacobian.shape
+    largest = 0.0
+    A = np.empty((nv, count))
+    for c in range(count):
+        for i in range(nv):
+            A[i, c] = length_jacobian[c, i]
+            largest = max(largest, abs(A[i, c]))
+    arm = _power_of_two(largest)
+    largest = 0.0
+    for i in range(nv):
+        largest = max(largest, abs(torque[i]) / arm)
+    for c in range(count):
+        largest = max(largest, low[c])
+    force = _power_of_two(largest)
+    return A / arm, torque / (arm * force), low / force, high / force, arm, force
+
+
+@njit(cache=True, error_model="numpy")
+def _power_of_two(value: float) -> float:
+    """The power of two next above a magnitude; 1 for zero."""
+    return 2.0 ** math.ceil(math.log2(value)) if value > 0.0 else 1.0
 
 
 @njit(cache=True, error_model="numpy")

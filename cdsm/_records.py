@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-import dataclasses
 import difflib
 import json
 import tomllib
 from collections.abc import Callable, Iterable
+from dataclasses import fields, is_dataclass
 from functools import wraps
-from typing import Annotated, Any, TypeVar, dataclass_transform
+from typing import Annotated, Any, TypeVar, dataclass_transform, get_args, get_type_hints
 
 import numpy as np
 from pydantic import BeforeValidator, ConfigDict, Field, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
 
+from cdsm._checks import LARGEST
 from cdsm.errors import GeometryError
 
 _Record = TypeVar("_Record")
@@ -25,7 +26,7 @@ def _plain(value: object) -> object:
 
 
 Integer = Annotated[int, BeforeValidator(_plain)]
-Number = Annotated[float, BeforeValidator(_plain)]
+Number = Annotated[float, BeforeValidator(_plain), Field(ge=-LARGEST, le=LARGEST)]
 Positive = Annotated[Number, Field(gt=0)]
 NotNegative = Annotated[Number, Field(ge=0)]
 Direction = Annotated[tuple[Number, Number, Number], Field(strict=False), BeforeValidator(_plain)]
@@ -48,9 +49,9 @@ def record(cls: type[_Record]) -> type[_Record]:
     validate: Callable[..., None] = made.__init__
 
     @wraps(validate)
-    def construct(self: object, *args: object, **fields: object) -> None:
+    def construct(self: object, *args: object, **values: object) -> None:
         try:
-            validate(self, *args, **fields)
+            validate(self, *args, **values)
         except ValidationError as error:
             raise GeometryError(_faults(error, type(self))) from None
 
@@ -78,7 +79,7 @@ def parse(kind: type[_Record], data: object) -> _Record:
 
 def toml_lines(record: object, keys: Iterable[str] | None = None) -> list[str]:
     """One TOML line per field that is set."""
-    names = keys or [field.name for field in dataclasses.fields(record)]  # type: ignore[arg-type]
+    names = keys or [field.name for field in fields(record)]  # type: ignore[arg-type]
     values = ((name, getattr(record, name)) for name in names)
     return [f"{name} = {_toml(value)}" for name, value in values if value is not None]
 
@@ -90,8 +91,23 @@ def _toml(value: object) -> str:
     return json.dumps(value) if isinstance(value, str) else repr(value)
 
 
+def _keys(kind: type) -> list[str]:
+    """Names of the fields of a record and of the records in its lists."""
+    hints = get_type_hints(kind)
+    entries = [entry for hint in hints.values() for entry in get_args(hint)]
+    return [
+        *hints,
+        *(
+            key
+            for entry in entries
+            if isinstance(entry, type) and is_dataclass(entry)
+            for key in _keys(entry)
+        ),
+    ]
+
+
 def _faults(error: ValidationError, kind: type) -> list[str]:
-    known = [field.name for field in dataclasses.fields(kind)]
+    known = _keys(kind)
     listed: list[str] = []
     faults = error.errors()
     for fault in faults:

@@ -79,7 +79,7 @@ class RigidBody:
         pin.computeJointJacobians(model, data, pin.neutral(model))
         axis = np.zeros((self.nv + 1, 3))
         for i in range(1, self.nv + 1):
-            axis[i] = pin.getJointJacobian(model, data, i, pin.LOCAL)[3:, i - 1]
+            axis[i] = pin.getJointJacobian(model, data, i, pin.LOCAL).reshape(6, -1)[3:, i - 1]
         return Tree(
             parent=np.array(model.parents, dtype=np.intp),
             rotation=np.array([placement.rotation for placement in model.jointPlacements]),
@@ -97,8 +97,12 @@ class RigidBody:
         jacobian = pin.getFrameJacobian(model, data, self._tip, pin.LOCAL_WORLD_ALIGNED)
         tip = pin.updateFramePlacement(model, data, self._tip).homogeneous
         stiffness = pin.computeGeneralizedGravityDerivatives(model, data, q)
+        # a model with one joint yields vectors for its matrices
         return BodyState(
-            tip, np.ascontiguousarray(jacobian), data.g.copy(), np.ascontiguousarray(stiffness)
+            tip,
+            np.ascontiguousarray(jacobian).reshape(6, self.nv),
+            data.g.copy(),
+            np.ascontiguousarray(stiffness).reshape(self.nv, self.nv),
         )
 
     def placement(self, q: Array, link: str) -> Array:
@@ -113,7 +117,7 @@ class RigidBody:
         return placement
 
     def _frame(self, link: str) -> int:
-        if not self._model.existFrame(link, pin.FrameType.BODY):
+        if not isinstance(link, str) or not self._model.existFrame(link, pin.FrameType.BODY):
             raise UnknownName("link", link, self.link_names)
         index: int = self._model.getFrameId(link, pin.FrameType.BODY)
         return index

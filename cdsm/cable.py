@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, final, get_args
 
-from cdsm._checks import bound, number_array, one_of, vector
+from cdsm._checks import instance, one_of, scalar, sequence_of, vector
 from cdsm.elasticity import Elasticity
 from cdsm.errors import CableError, CdsmError, InvalidInput
 from cdsm.geometry import Geometry
@@ -23,6 +23,9 @@ class Site:
     Attributes:
         link: Name of the link, as in the URDF.
         position: The point in the link's frame [m].
+
+    Raises:
+        InvalidInput: The position is not three finite numbers, or the link not a name.
     """
 
     link: str
@@ -65,24 +68,27 @@ class Cable:
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name:
             raise CableError(str(self.name), "needs a name, a text that is not empty.")
-        sites = tuple(self.sites)
-        if len(sites) < 2 or not all(isinstance(site, Site) for site in sites):
-            raise CableError(self.name, f"sites: {len(sites)} given; two or more Site are needed.")
         if not isinstance(self.elasticity, Elasticity):
             raise CableError(
                 self.name, f"elasticity: {self.elasticity!r} given; an Elasticity is needed."
             )
         try:
+            sites = sequence_of("sites", self.sites, Site)
             one_of("control", self.control, get_args(Control))
-            lead = float(number_array("lead", self.lead))
-            series = float(bound("series_stiffness", self.series_stiffness, 1)[0])
-        except (CdsmError, TypeError) as error:
+            lead = scalar("lead", self.lead)
+            series = self.series_stiffness
+            if series != math.inf:
+                series = scalar("series_stiffness", series)
+        except CdsmError as error:
             raise CableError(self.name, str(error)) from None
+        if len(sites) < 2:
+            raise CableError(self.name, f"sites: {len(sites)} given; two or more Site are needed.")
         if lead < 0.0:
             raise CableError(self.name, f"lead: {lead:g} m given; it cannot be negative.")
         if series <= 0.0:
             raise CableError(
-                self.name, f"series_stiffness: {series:g} N/m given; positive, or inf for none."
+                self.name,
+                f"series_stiffness: {series:g} N/m given; it must be positive, or inf for none.",
             )
         object.__setattr__(self, "sites", sites)
         object.__setattr__(self, "lead", lead)
@@ -112,7 +118,7 @@ def serpentine_cables(
         InvalidInput: The number of elasticities is not one, nor that of the cables.
         CableError: A cable that cannot be.
     """
-    count = len(geometry.cables)
+    count = len(instance("geometry", geometry, Geometry).cables)
     elasticities = (elasticity,) * count if isinstance(elasticity, Elasticity) else elasticity
     if not isinstance(elasticities, Sequence) or len(elasticities) != count:
         raise InvalidInput(

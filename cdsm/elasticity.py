@@ -16,6 +16,7 @@ from typing import final
 import numpy as np
 from numpy.polynomial import Polynomial
 from numpy.typing import ArrayLike
+from scipy.integrate import quad_vec
 
 from cdsm._checks import Array, number_array, scalar
 from cdsm.errors import ElasticityRangeError, InvalidInput
@@ -49,7 +50,10 @@ class Domain:
         return f"{left}{self.low:g} N, {self.high:g} N{right}"
 
     def check(self, tension: ArrayLike) -> Array:
-        """Return the tensions as a float array if all lie in the domain.
+        """Return the tensions as a float array of the same shape if all lie in the domain.
+
+        Args:
+            tension: F [N], any shape.
 
         Raises:
             InvalidInput: Not finite numbers.
@@ -157,7 +161,7 @@ class LinearElasticity(Elasticity):
         for name, value in (("young_modulus", young_modulus), ("diameter", diameter)):
             if scalar(name, value) <= 0.0:
                 raise InvalidInput(name, f"{value:g} given; it must be positive.")
-        return cls(young_modulus * math.pi * diameter**2 / 4.0)
+        return cls(young_modulus * math.pi * (diameter * diameter) / 4.0)
 
     @property
     def domain(self) -> Domain:
@@ -190,6 +194,9 @@ class StrandElasticity(Elasticity):
             range below it. One fewer than the ranges.
         low: Low end of the domain [N], excluded.
         high: High end of the domain [N], included.
+
+    Raises:
+        InvalidInput: Numbers or their count do not fit, or the tensions do not rise.
     """
 
     coefficients: tuple[tuple[float, ...], ...]
@@ -198,8 +205,10 @@ class StrandElasticity(Elasticity):
     high: float
 
     def __post_init__(self) -> None:
-        rows = tuple(tuple(number_array("coefficients", row).tolist()) for row in self.coefficients)
-        joins = tuple(number_array("joins", self.joins).tolist())
+        if not all(isinstance(each, (list, tuple)) for each in (self.coefficients, self.joins)):
+            raise InvalidInput("coefficients", "give a tuple for each range, and a tuple of joins.")
+        rows = tuple(tuple(_row("coefficients", row)) for row in self.coefficients)
+        joins = tuple(_row("joins", self.joins))
         edges = (scalar("low", self.low), *joins, scalar("high", self.high))
         if not rows or not all(rows):
             raise InvalidInput("coefficients", "need at least one range with one coefficient.")
@@ -253,6 +262,9 @@ class StrandElasticity(Elasticity):
 
         Args:
             tension: F [N], any shape; the outer ranges extend beyond the domain.
+
+        Raises:
+            InvalidInput: Not finite numbers.
         """
         values = number_array("tension", tension)
         piece = np.searchsorted(self.joins, values, side="left")
@@ -277,25 +289,50 @@ class StrandElasticity(Elasticity):
         return result
 
     def strain(self, tension: ArrayLike) -> Array:
-        """∫ dF/EA(F) [-], in closed form by partial fractions; see :meth:`Elasticity.strain`."""
+        """∫ dF/EA(F) [-], by adaptive quadrature; see :meth:`Elasticity.strain`."""
         values = self.domain.check(tension)
         total = np.zeros_like(values)
         edges = (self.low, *self.joins, self.high)
         for row, (start, end) in zip(self.coefficients, pairwise(edges), strict=True):
-            upper = np.clip(values, start, end)
             polynomial = Polynomial(row)
-            roots = polynomial.roots().astype(complex)
-            crossed = roots.real[abs(roots.imag) < 1e-9 * self.high]
-            crossed = crossed[(crossed >= start) & (crossed <= upper.max(initial=start))]
-            if crossed.size or polynomial(start) <= 0.0:
-                first = float(crossed.min()) if crossed.size else start
-                raise ElasticityRangeError(
-                    f"the rigidity is not positive from {first:.6g} N on, so there is no strain. "
-                    "If this is Eq. 19 as printed, use StrandElasticity.eq19_repaired().",
-                    values.ravel()[values.ravel() >= first].tolist(),
-                )
-            # 1/p(F) = Σ 1/(p'(r) (F − r)) over the simple roots r of p
-            weights = 1.0 / polynomial.deriv()(roots)
-            logs = np.log((upper[..., None] - roots) / (start - roots))
-            total = total + (weights * logs).sum(axis=-1).real
-        return total
+            upper = np.clip(values, start, end)
+            self._require_positive(polynomial, start, upper)
+            if upper.size == 0 or upper.max() <= start:
+                continue
+
+            def integrand(
+                x: float, p: Polynomial = polynomial, start: float = start, upper: Array = upper
+            ) -> Array:
+                # in logarithmic steps from where EA is small: F = start + (upper - start) x³
+                width = upper - start
+                return np.asarray(3.0 * x**2 * width / p(start + width * x**3))
+
+            total = total + quad_vec(integrand, 0.0, 1.0, epsabs=0.0, epsrel=1e-14, norm="max")[0]
+        return np.asarray(total)
+
+    @staticmethod
+    def _require_positive(polynomial: Polynomial, start: float, upper: Array) -> None:
+        """Refuse to integrate over tensions where the polynomial falls to zero or below."""
+        turns = polynomial.trim().deriv().roots().real
+        points = np.array([start, *turns[(turns > start) & (turns < upper.max(initial=start))]])
+        scale = abs(polynomial(points)).max(initial=0.0)
+        lowest = polynomial(points) <= 1e-12 * scale
+        bad = polynomial(upper) <= 0.0
+        if lowest.any():
+            bad |= upper >= points[lowest].min()
+        bad &= upper > start
+        if bad.any():
+            raise ElasticityRangeError(
+                "the rigidity is not positive everywhere below, so there is no strain. If this is "
+                "Eq. 19 as printed, use StrandElasticity.eq19_repaired().",
+                np.atleast_1d(upper)[np.atleast_1d(bad)].tolist(),
+                np.flatnonzero(bad).tolist(),
+            )
+
+
+def _row(name: str, values: ArrayLike) -> list[float]:
+    numbers = number_array(name, values)
+    if numbers.ndim != 1:
+        raise InvalidInput(name, f"{values!r} given; a sequence of numbers is needed.")
+    row: list[float] = numbers.tolist()
+    return row

@@ -7,6 +7,7 @@ allowed and what to do about it.
 from __future__ import annotations
 
 import difflib
+import math
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
@@ -27,6 +28,9 @@ def _restore(kind: type[CdsmError], args: tuple[object, ...], data: dict[str, ob
     error = kind.__new__(kind, *args)
     error.args = args
     error.__dict__.update(data)
+    for value in data.values():
+        if hasattr(value, "setflags"):
+            value.setflags(write=False)
     return error
 
 
@@ -193,11 +197,17 @@ class InfeasibleTension(CdsmError):
             )
         else:
             message += (
-                f"Widening every bound by {relaxation:.4g} N would be enough "
+                f"Widening every bound by {_rounded_up(relaxation)} N would be enough "
                 f"(cables at a bound: {', '.join(self.binding) or 'none'}). Lower minimum, raise "
                 "maximum, or reduce the load."
             )
         super().__init__(message)
+
+
+def _rounded_up(value: float) -> str:
+    """Four digits, so that what is said to be enough is."""
+    step = 10.0 ** (math.floor(math.log10(value)) - 3) if value > 0.0 else 1.0
+    return f"{math.ceil(value / step) * step:.4g}"
 
 
 class SolverError(CdsmError):

@@ -13,6 +13,7 @@ from typing import Annotated, Self
 import numpy as np
 from pydantic import Field, model_validator
 
+from cdsm._checks import instance
 from cdsm._files import read_text, write_text
 from cdsm._records import (
     CrossFaults,
@@ -38,6 +39,7 @@ MAXIMUM_DEFAULT_LIMIT = math.radians(80.0)
 
 UNIVERSAL_AXES = ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
+_CablesPerJoint = Annotated[Integer, Field(ge=1, le=MAXIMUM_CABLES_PER_JOINT)]
 _Limit = Annotated[Number, Field(gt=0, le=math.pi)] | None
 
 
@@ -50,6 +52,9 @@ class Joint:
             before; any length, none zero, not parallel.
         disk_offset: h: distance of the disk before and the disk after from the joint centre [m].
         limit: Largest angle about each axis, both ways [rad]; None: until the disks touch.
+
+    Raises:
+        GeometryError: Lists every fault.
     """
 
     axes: Annotated[tuple[Direction, ...], Field(strict=False, min_length=1, max_length=2)]
@@ -80,6 +85,9 @@ class Link:
     Attributes:
         length: Length [m].
         mass: Mass [kg], spread as a solid cylinder of the hole radius about mid-link.
+
+    Raises:
+        GeometryError: Lists every fault.
     """
 
     length: Positive
@@ -94,6 +102,9 @@ class CableRoute:
         joint: Number of the joint it drives, from 1; it ends on the first disk after it.
         angle: φ: hole angle about x, from y towards z [rad].
         lead: Straight cable between the actuator and the base disk [m].
+
+    Raises:
+        GeometryError: Lists every fault.
     """
 
     joint: Annotated[Integer, Field(ge=1)]
@@ -106,7 +117,7 @@ class _Uniform:
     """The keywords that :meth:`Geometry.universal` and :meth:`Geometry.hinged` share."""
 
     joints: Annotated[Integer, Field(ge=1, le=MAXIMUM_JOINTS)]
-    cables_per_joint: Annotated[Integer, Field(ge=1, le=MAXIMUM_CABLES_PER_JOINT)]
+    cables_per_joint: _CablesPerJoint
     link_length: Positive
     base_length: NotNegative
     disk_offset: Positive
@@ -144,6 +155,7 @@ class _Universal(_Uniform):
 @record
 class _Hinged(_Uniform):
     twist: Number
+    cables_per_joint: _CablesPerJoint = 2
 
     def build(self) -> Geometry:
         m = self.cables_per_joint
@@ -382,6 +394,7 @@ class Geometry:
         Raises:
             GeometryError: Not TOML, or lists every fault found in it.
         """
+        instance("text", text, str)
         short = {"universal": _Universal, "hinged": _Hinged}
         try:
             data = read_toml(text)

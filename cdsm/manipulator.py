@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm import _kernels
-from cdsm._checks import Array, ReadOnlyState, frozen, vector
+from cdsm._checks import Array, ReadOnlyState, frozen, instance, sequence_of, vector
 from cdsm._rigid_body import RigidBody
 from cdsm.cable import Cable, serpentine_cables
 from cdsm.elasticity import Elasticity
@@ -61,18 +61,16 @@ class Manipulator:
         cables: Sequence[Cable] | None = None,
         gravity: ArrayLike = GRAVITY,
     ) -> None:
-        if not isinstance(geometry, Geometry):
-            raise InvalidInput("geometry", f"{geometry!r} given; a Geometry is needed.")
-        if (elasticity is None) == (cables is None):
+        self._geometry = instance("geometry", geometry, Geometry)
+        if elasticity is not None and cables is None:
+            cables = serpentine_cables(geometry, elasticity)
+        elif elasticity is not None or cables is None:
             raise InvalidInput(
                 "elasticity",
-                "give either elasticity= (for the cables of the geometry) or cables=, not "
-                + ("both." if cables is not None else "neither."),
+                "give one of elasticity= (for the cables of the geometry) and cables=; "
+                + ("both were given." if cables is not None else "neither was."),
             )
-        if elasticity is not None:
-            cables = serpentine_cables(geometry, elasticity)
-        self._geometry = geometry
-        self._cables = _checked_cables(cables or ())
+        self._cables = _checked_cables(cables)
         self._gravity = vector("gravity", gravity, 3, "gravity in base axes [m/s²]")
         self._urdf = to_urdf(geometry)
         self._body = RigidBody(self._urdf, TIP, self._gravity)
@@ -135,8 +133,18 @@ class Manipulator:
     def __repr__(self) -> str:
         return f"<Manipulator {self._geometry}>"
 
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Manipulator) and self._value == other._value
+
+    def __hash__(self) -> int:
+        return hash(self._value)
+
+    @property
+    def _value(self) -> tuple[Geometry, tuple[Cable, ...], tuple[float, ...]]:
+        return self._geometry, self._cables, tuple(self._gravity.tolist())
+
     def __reduce__(self) -> tuple[object, ...]:
-        return (_rebuild, (self._geometry, self._cables, self._gravity.tolist()))
+        return (_rebuild, self._value)
 
     def at(self, q: ArrayLike, *, check_limits: bool = True) -> Posture:
         """Evaluate the arm at joint angles q: kinematics, cable lengths and gravity.
@@ -281,20 +289,21 @@ class Posture(ReadOnlyState):
         return frozen(active), frozen(passive), frozen(load), frozen(joint)
 
 
-def _rebuild(geometry: Geometry, cables: tuple[Cable, ...], gravity: list[float]) -> Manipulator:
+def _rebuild(
+    geometry: Geometry, cables: tuple[Cable, ...], gravity: tuple[float, ...]
+) -> Manipulator:
     return Manipulator(geometry, cables=cables, gravity=gravity)
 
 
 def _checked_cables(cables: Sequence[Cable]) -> tuple[Cable, ...]:
-    if not cables or not all(isinstance(cable, Cable) for cable in cables):
-        raise InvalidInput(
-            "cables", f"{cables!r} given; a sequence of one or more Cable is needed."
-        )
+    cables = sequence_of("cables", cables, Cable)
+    if not cables:
+        raise InvalidInput("cables", "none given; an arm needs at least one.")
     names = [cable.name for cable in cables]
     for name in names:
         if names.count(name) > 1:
             raise CableError(name, "the name is used twice; every cable needs its own.")
-    return tuple(cables)
+    return cables
 
 
 def _route(body: RigidBody, tree: _kernels.Tree, cables: Sequence[Cable]) -> _kernels.Routing:

@@ -20,7 +20,7 @@ from typing import Literal, final, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm._checks import Array, ReadOnlyState, frozen, one_of, unit_direction, vector
+from cdsm._checks import Array, ReadOnlyState, frozen, instance, one_of, unit_direction, vector
 from cdsm.errors import InvalidInput, SingularStiffness
 from cdsm.manipulator import Posture
 from cdsm.tension import Tension
@@ -301,10 +301,10 @@ def stiffness(
             a wrench beside a ``Tension``.
         ElasticityRangeError: A tension outside the domain of the elasticity of its cable.
     """
-    arm = pose.arm
+    arm = instance("pose", pose, Posture).arm
     if isinstance(tension, Tension):
         if tension.posture is not pose and not (
-            tension.posture.arm is arm and np.array_equal(tension.posture.q, pose.q)
+            tension.posture.arm == arm and np.array_equal(tension.posture.q, pose.q)
         ):
             raise InvalidInput(
                 "tension", "was distributed at another posture; distribute it at this one."

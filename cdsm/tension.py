@@ -4,10 +4,9 @@ A redundant arm leaves the tensions of Eq. 17 undetermined; as is usual, the sma
 
     min ½‖F‖²   so that   J_Lᵀ F = J_Xᵀ W − g   and   minimum ≤ F ≤ maximum.
 
-The problem is made dimensionless before a solver sees it (torques by the largest moment arm times a
-force, forces by that force, both powers of two so that scaling rounds nothing), the answer is
-accepted only if it satisfies the optimality conditions, and infeasibility is decided by linear
-programs, which also say how far off the bounds are.
+The problem is made dimensionless before a solver sees it, the answer is accepted only if it meets
+the optimality conditions, and infeasibility is decided by linear programs, which also say how far
+off the bounds are.
 """
 
 from __future__ import annotations
@@ -15,7 +14,7 @@ from __future__ import annotations
 import math
 import warnings
 from dataclasses import dataclass
-from typing import Any, NamedTuple, NoReturn, final
+from typing import Any, NoReturn, final
 
 import numpy as np
 import qpsolvers
@@ -24,7 +23,7 @@ from scipy.optimize import linprog
 from scipy.sparse import csc_matrix
 
 from cdsm import _kernels
-from cdsm._checks import Array, ReadOnlyState, bound, frozen, one_of, vector
+from cdsm._checks import Array, ReadOnlyState, bound, frozen, instance, one_of, vector
 from cdsm.errors import InfeasibleTension, InvalidInput, SolverError
 from cdsm.manipulator import Posture
 
@@ -123,24 +122,17 @@ def distribute_tension(
         UnknownName: No such solver is installed.
         SolverError: The solver's answer does not satisfy the optimality conditions.
     """
-    count = len(pose.arm.cables)
+    count = len(instance("pose", pose, Posture).arm.cables)
     low, high = _checked_bounds(pose, bound("minimum", minimum, count), maximum)
     wrench = vector("wrench", wrench, 6, "force [N], then moment [N m], base axes")
     torque = pose.jacobian.T @ wrench - pose.gravity_torque
 
-    arm_scale = _power_of_two(abs(pose.length_jacobian).max())
-    force_scale = _power_of_two(max(low.max(), abs(torque).max() / arm_scale))
-    scaled = _Problem(
-        A=np.ascontiguousarray(pose.length_jacobian.T) / arm_scale,
-        b=torque / (arm_scale * force_scale),
-        low=low / force_scale,
-        high=high / force_scale,
-    )
-    solution = _solve(scaled, solver)
+    problem = _kernels.Scaled(*_kernels.scaled_balance(pose.length_jacobian, torque, low, high))
+    solution = _solve(problem, solver)
     if solution is None:
-        _explain(pose, scaled, arm_scale, force_scale, solver)
+        _explain(pose, problem, solver)
     # within OPTIMALITY of the bounds already; a bound that is active is not crossed by rounding
-    values = np.minimum(np.maximum(solution * force_scale, low), high)
+    values = np.minimum(np.maximum(solution * problem.force, low), high)
     return Tension(
         posture=pose,
         values=frozen(values),
@@ -174,24 +166,10 @@ def _checked_bounds(pose: Posture, low: Array, maximum: ArrayLike) -> tuple[Arra
     return low, high
 
 
-def _power_of_two(value: float) -> float:
-    """The power of two next above a magnitude; 1 for zero."""
-    return 2.0 ** math.ceil(math.log2(value)) if value > 0.0 else 1.0
-
-
-class _Problem(NamedTuple):
-    """min ½‖x‖² so that A x = b, low ≤ x ≤ high; dimensionless."""
-
-    A: Array
-    b: Array
-    low: Array
-    high: Array
-
-
-def _solve(problem: _Problem, solver: str) -> Array | None:
+def _solve(problem: _kernels.Scaled, solver: str) -> Array | None:
     """Return the verified optimum; None if the solver finds no solution."""
     one_of("installed solver", solver, qpsolvers.available_solvers)
-    A, b, low, high = problem
+    A, b, low, high, *_ = problem
     sparse = csc_matrix if solver in qpsolvers.sparse_solvers else np.asarray
     identity, nothing = np.eye(low.size), np.zeros(low.size)
     qp = qpsolvers.Problem(sparse(identity), nothing, A=sparse(A), b=b, lb=low, ub=high)
@@ -210,8 +188,12 @@ def _solve(problem: _Problem, solver: str) -> Array | None:
     if solution.y is None or solution.z_box is None:
         raise SolverError(solver, "returns no multipliers to verify it by. Use solver='daqp'.")
     # the same as the solution's primal_residual, dual_residual and duality_gap, ten times faster
-    primal, dual, gap = _kernels.optimality(A, b, low, high, x, solution.y, solution.z_box)
-    size = max(1.0, abs(x).max())
+    y, z = (np.asarray(each, dtype=np.float64) for each in (solution.y, solution.z_box))
+    primal, dual, gap = _kernels.optimality(A, b, low, high, x, y, z)
+    size = float(abs(x).max())
+    if not math.isfinite(size):  # comparisons below would let NaN pass
+        raise SolverError(solver, f"calls {x.tolist()} optimal. Use solver='daqp'.")
+    size = max(1.0, size)
     worst = max(primal / size, dual / size, gap / size**2)
     if not worst <= OPTIMALITY:
         raise SolverError(
@@ -223,9 +205,7 @@ def _solve(problem: _Problem, solver: str) -> Array | None:
     return np.asarray(x, dtype=np.float64)
 
 
-def _explain(
-    pose: Posture, problem: _Problem, arm_scale: float, force_scale: float, solver: str
-) -> NoReturn:
+def _explain(pose: Posture, problem: _kernels.Scaled, solver: str) -> NoReturn:
     """Settle by linear programs why a solver found no tensions, and raise it.
 
     Raises:
@@ -233,7 +213,7 @@ def _explain(
             the bounds, and the least widening of all bounds that leaves none missing.
         SolverError: There are some, so it is the solver that failed; or the linear program did.
     """
-    A, b, lower, upper = problem
+    A, b, lower, upper, arm_scale, force_scale = problem
     nv, count = A.shape
     # variables: F, then missing torque as its positive and negative part
     identity = np.eye(nv)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cdsm._checks import Array
+from cdsm._checks import Array, instance
 from cdsm._files import write_file
 from cdsm._rigid_body import RigidBody
 from cdsm.errors import UrdfError
@@ -51,10 +51,14 @@ def to_urdf(geometry: Geometry) -> str:
 
     Args:
         geometry: The arm.
+
+    Raises:
+        InvalidInput: Not a geometry.
     """
     import yourdfpy
     from lxml import etree
 
+    instance("geometry", geometry, Geometry)
     links = [yourdfpy.Link(name="base_link"), _link(geometry, 0)]
     joints = [_fixed("base_joint", "base_link", "base_disk", 0.0)]
     parent, start = "base_disk", geometry.base_length
