@@ -87,11 +87,10 @@ def vector(name: str, value: ArrayLike, size: int, meaning: str) -> Array:
 
 def bound(name: str, value: ArrayLike, size: int) -> Array:
     """Return a read-only vector (size,) from a scalar or a vector that may hold ±inf."""
-    if isinstance(value, float):  # the usual case, and a hot one
-        array = np.full(size, value)
-    else:
-        array = _native(name, value)
-        array = array.repeat(size) if array.ndim == 0 else array
+    # a float for all is the usual case, and a hot one
+    array: Array = np.full(size, value) if isinstance(value, float) else _native(name, value)
+    if array.ndim == 0:
+        array = array.repeat(size)
     if array.shape != (size,):
         raise InvalidInput(
             name, f"shape {array.shape} given; give one number, or ({size},): one per cable [N]."

@@ -1,0 +1,123 @@
+"""The command line, as a user calls it."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner, Result
+
+import cdsm
+from cdsm.cli import app
+
+SHORT = """
+[universal]
+name = "probe"
+joints = 3
+cables_per_joint = 3
+link_length = 0.05
+base_length = 0.02
+disk_offset = 0.01
+hole_radius = 0.02
+link_mass = 0.1
+"""
+
+
+def call(*arguments: object) -> Result:
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+@pytest.fixture
+def geometry(tmp_path: Path) -> Path:
+    path = tmp_path / "probe.toml"
+    path.write_text(SHORT, encoding="utf-8")
+    return path
+
+
+def test_reproduce_writes_five_figures_table_and_numbers(tmp_path: Path) -> None:
+    result = call("reproduce", "--out", tmp_path / "new" / "folder")
+    assert result.exit_code == 0, result.output
+    written = {path.name: path for path in (tmp_path / "new" / "folder").iterdir()}
+    figures = {f"fig{n}.png" for n in (3, 4, 6, 7, 8)}
+    assert set(written) == figures | {"reproduction.json", "reproduction.md"}
+    assert all(written[name].read_bytes().startswith(b"\x89PNG") for name in figures)
+    assert "Fig. 6" in result.output
+    assert "4.2, 2.91, 4.58" in written["reproduction.md"].read_text(encoding="utf-8")
+    json.loads(written["reproduction.json"].read_text(encoding="utf-8"))
+
+
+def test_urdf_writes_what_the_api_writes(geometry: Path, tmp_path: Path) -> None:
+    out = tmp_path / "probe.urdf"
+    result = call("urdf", geometry, "-o", out)
+    assert result.exit_code == 0, result.output
+    assert out.read_text(encoding="utf-8") == cdsm.to_urdf(cdsm.Geometry.read(geometry))
+
+
+def test_stiffness_json_holds_the_numbers_of_the_api(geometry: Path) -> None:
+    angles = [10.0, -5.0, 8.0, 0.0, 3.0, 12.0]
+    result = call(
+        *("stiffness", geometry, "--angles", ",".join(map(str, angles)), "--min-tension", 30),
+        *("--wrench", "1,0,-2,0,0.1,0", "--rigidity", 48000, "--json"),
+    )
+    assert result.exit_code == 0, result.output
+    told = json.loads(result.stdout)
+    arm = cdsm.Manipulator(cdsm.Geometry.read(geometry), cdsm.LinearElasticity(48000.0))
+    pose = arm.at(np.deg2rad(angles))
+    K = cdsm.stiffness(pose, cdsm.distribute_tension(pose, 30.0, wrench=(1, 0, -2, 0, 0.1, 0)))
+    np.testing.assert_array_equal(told["joint_stiffness_Nm_per_rad"], K.joint)
+    np.testing.assert_array_equal(told["along_N_per_m"], [K.along(u) for u in np.eye(3)])
+    np.testing.assert_array_equal(list(told["tension_N"].values()), K.tension)
+    assert told["stable"] is True
+
+
+def test_straight_arm_has_null_for_what_is_infinite(geometry: Path) -> None:
+    told = json.loads(call("stiffness", geometry, "--json").stdout)
+    assert told["along_N_per_m"][0] is None
+    assert told["cartesian_N_per_m"] is None
+
+
+def test_table_shows_tensions_and_stiffness_with_units(geometry: Path) -> None:
+    result = call("stiffness", geometry, "--angles", "5", "--gravity", "0 0 0")
+    assert result.exit_code == 0, result.output
+    for text in ("tension [N]", "cable3_3", "stiffness [N/mm]", "stable"):
+        assert text in result.output
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("stiffness", "absent.toml"), "absent.toml: does not exist"),
+        (("stiffness", "{geometry}", "--angles", "1,2"), "(6,) needed"),
+        (("stiffness", "{geometry}", "--angles", "80"), "joint1_1 = 1.39626 rad"),
+        (("stiffness", "{geometry}", "--min-tension", "1"), "domain (2.2 N, 810 N]"),
+        (("stiffness", "{geometry}", "--solver", "dapq"), "did you mean 'daqp'"),
+        (
+            ("stiffness", "{geometry}", "--max-tension", "10", "--wrench", "0,0,-90,0,0,0"),
+            "N m are",
+        ),
+        (("urdf", "{geometry}", "-o", "absent/arm.urdf"), "folder absent does not exist"),
+        (("reproduce", "--out", "{geometry}"), "cannot be made a folder"),
+    ],
+)
+def test_failure_is_one_message_and_exit_code_1(
+    arguments: tuple[str, ...], said: str, geometry: Path
+) -> None:
+    result = call(*(argument.format(geometry=geometry) for argument in arguments))
+    assert result.exit_code == 1
+    assert result.stderr.startswith("error: ")
+    assert said in result.stderr
+    assert "Traceback" not in result.output
+
+
+def test_text_in_place_of_numbers_is_a_usage_error(geometry: Path) -> None:
+    result = call("stiffness", geometry, "--angles", "ten")
+    assert result.exit_code == 2
+    assert "ten" in result.stderr
+
+
+def test_module_is_the_command() -> None:
+    command = [sys.executable, "-m", "cdsm", "--help"]
+    told = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
+    assert "reproduce" in told.stdout

@@ -1,0 +1,42 @@
+"""Figures draw what they are given; how they look was looked at."""
+
+import numpy as np
+from mpl_toolkits.mplot3d.art3d import Line3D  # type: ignore[import-untyped]
+
+import cdsm
+from cdsm import paper, plots
+from tests.arms import mixed_arm, random_posture
+
+
+def test_arm_is_drawn_with_disks_cables_and_equal_axes() -> None:
+    pose = random_posture(mixed_arm(), 3)
+    pull = cdsm.distribute_tension(pose, 10.0)
+    axes = plots.plot_arm(pose, pull).axes[0]
+    lines = [line for line in axes.get_lines() if isinstance(line, Line3D)]
+    disks = sum(len(places) for _, places in pose.arm.geometry.disks)
+    assert len(lines) == disks + 1 + len(pose.arm.cables)
+    first = np.array(lines[disks + 1].get_data_3d())
+    np.testing.assert_allclose(first, 1e3 * pose.cable_paths[0].T)  # in mm
+    colors = {tuple(line.get_color()) for line in lines[disks + 1 :]}
+    assert len(colors) > 2  # by tension
+    limits = np.ptp([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()], axis=1)  # type: ignore[attr-defined]
+    box = axes._box_aspect  # type: ignore[attr-defined]
+    np.testing.assert_allclose(limits / box, (limits / box)[0])
+
+
+def test_paper_figures_show_both_readings_in_newton_per_millimetre() -> None:
+    for compute in paper.FIGURES.values():
+        result = compute()
+        figure = plots.plot_paper(result)
+        labels = [axes.get_ylabel() for axes in figure.axes]
+        for reading in ("paper's reading", "hung weight"):
+            assert sum(reading in label and "[N/mm]" in label for label in labels) == 3
+        figure.draw_without_rendering()
+
+
+def test_curves_are_drawn_where_they_are() -> None:
+    result = paper.FIGURES["fig6"]()
+    axes = plots.plot_paper(result).axes[0]
+    x, y = np.asarray(axes.get_lines()[0].get_xydata(), dtype=np.float64).T
+    np.testing.assert_allclose(x, result.curves[0].tension[:, 1])
+    np.testing.assert_allclose(y, result.curves[0].pseudoinverse[:, 0] / 1000.0)

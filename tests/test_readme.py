@@ -1,0 +1,40 @@
+"""README is executed: every Python snippet runs, and prints the text block that follows it."""
+
+import io
+import re
+from contextlib import redirect_stdout
+from pathlib import Path
+
+from cdsm import paper
+
+README = Path(__file__).parents[1] / "README.md"
+
+
+def test_snippets_print_what_the_readme_shows() -> None:
+    blocks = re.findall(r"```(\w+)\n(.*?)```", README.read_text(encoding="utf-8"), re.DOTALL)
+    namespace: dict[str, object] = {}
+    printed, compared = "", 0
+    for language, code in blocks:
+        if language == "python":
+            with redirect_stdout(io.StringIO()) as out:
+                exec(code, namespace)
+            printed = out.getvalue()
+        elif language == "text":
+            assert printed == code
+            compared += 1
+    assert compared == 2
+
+
+def test_a_result_is_shown_within_the_first_25_lines() -> None:
+    head = README.read_text(encoding="utf-8").splitlines()[:25]
+    assert any(line.startswith("along ") for line in head)
+
+
+def test_table_is_what_reproduce_computes() -> None:
+    rows = paper.to_rows([compute() for compute in paper.FIGURES.values()])
+    text = README.read_text(encoding="utf-8")
+    shown = re.findall(r"^\| (Fig\. \d).*?\| (.*?) \| (.*?) \| (.*?) \| (.*?) \|$", text, re.M)
+    assert len(shown) == 3
+    computed = [(row[0], *row[2:6]) for row in rows]
+    for row in shown:
+        assert row in computed
