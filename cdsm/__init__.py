@@ -28,8 +28,9 @@ from cdsm.errors import (
     UnknownName,
     UrdfError,
 )
-from cdsm.geometry import CableRoute, Geometry, Joint, Link
+from cdsm.geometry import Geometry
 from cdsm.manipulator import Manipulator, Posture
+from cdsm.parts import CableRoute, Joint, Link
 from cdsm.stiffness import Shares, Stiffness, stiffness
 from cdsm.tension import Tension, distribute_tension
 from cdsm.urdf import to_urdf, write_urdf

@@ -10,160 +10,25 @@ import os
 from pathlib import Path
 from typing import Annotated, Self
 
-import numpy as np
 from pydantic import Field, model_validator
 
 from cdsm._checks import instance
 from cdsm._files import read_text, write_text
 from cdsm._records import (
     CrossFaults,
-    Direction,
-    Integer,
     Name,
     NotNegative,
-    Number,
     Positive,
     parse,
     read_toml,
     record,
     toml_lines,
 )
+from cdsm._uniform import Hinged, Universal
 from cdsm.errors import GeometryError
-
-MAXIMUM_JOINTS = 100
-"""More would overflow the URDF parsers' stack before long; no such arm exists."""
-
-MAXIMUM_CABLES_PER_JOINT = 64
+from cdsm.parts import MAXIMUM_JOINTS, CableRoute, Joint, Link
 
 MAXIMUM_DEFAULT_LIMIT = math.radians(80.0)
-
-UNIVERSAL_AXES = ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-
-_CablesPerJoint = Annotated[Integer, Field(ge=1, le=MAXIMUM_CABLES_PER_JOINT)]
-_Limit = Annotated[Number, Field(gt=0, le=math.pi)] | None
-
-
-@record
-class Joint:
-    """One joint of the arm and the two disks beside it.
-
-    Attributes:
-        axes: One axis (hinge) or two (universal joint, in this order), in the axes of the link
-            before; any length, none zero, not parallel.
-        disk_offset: h: distance of the disk before and the disk after from the joint centre [m].
-        limit: Largest angle about each axis, both ways [rad]; None: until the disks touch.
-
-    Raises:
-        GeometryError: Lists every fault.
-    """
-
-    axes: Annotated[tuple[Direction, ...], Field(strict=False, min_length=1, max_length=2)]
-    disk_offset: Positive
-    limit: _Limit = None
-
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        lengths = [math.hypot(*axis) for axis in self.axes]
-        faults = [
-            f"axes[{i + 1}]: {axis} has no usable length; give a direction"
-            for i, (axis, length) in enumerate(zip(self.axes, lengths, strict=True))
-            if not 1e-6 < length < 1e6
-        ]
-        if not faults and len(self.axes) == 2:
-            sine = math.hypot(*np.cross(*self.axes)) / (lengths[0] * lengths[1])
-            if sine < 1e-6:
-                faults.append(f"axes: the two axes {self.axes} are parallel; one would do")
-        if faults:
-            raise CrossFaults(faults)
-        return self
-
-
-@record
-class Link:
-    """One link: from its joint centre to the next one, or to the tip.
-
-    Attributes:
-        length: Length [m].
-        mass: Mass [kg], spread as a solid cylinder of the hole radius about mid-link.
-
-    Raises:
-        GeometryError: Lists every fault.
-    """
-
-    length: Positive
-    mass: NotNegative
-
-
-@record
-class CableRoute:
-    """The path of one cable: the same hole on every disk until its last one.
-
-    Attributes:
-        joint: Number of the joint it drives, from 1; it ends on the first disk after it.
-        angle: φ: hole angle about x, from y towards z [rad].
-        lead: Straight cable between the actuator and the base disk [m].
-
-    Raises:
-        GeometryError: Lists every fault.
-    """
-
-    joint: Annotated[Integer, Field(ge=1)]
-    angle: Number
-    lead: NotNegative = 0.0
-
-
-@record
-class _Uniform:
-    """The keywords that :meth:`Geometry.universal` and :meth:`Geometry.hinged` share."""
-
-    joints: Annotated[Integer, Field(ge=1, le=MAXIMUM_JOINTS)]
-    cables_per_joint: _CablesPerJoint
-    link_length: Positive
-    base_length: NotNegative
-    disk_offset: Positive
-    hole_radius: Positive
-    link_mass: NotNegative
-    lead: NotNegative = 0.0
-    joint_limit: _Limit = None
-    name: Name = "arm"
-
-    def geometry(self, axes: list[tuple[Direction, ...]], angles: list[list[float]]) -> Geometry:
-        return Geometry(
-            name=self.name,
-            base_length=self.base_length,
-            hole_radius=self.hole_radius,
-            joints=tuple(
-                Joint(axes=a, disk_offset=self.disk_offset, limit=self.joint_limit) for a in axes
-            ),
-            links=(Link(length=self.link_length, mass=self.link_mass),) * self.joints,
-            cables=tuple(
-                CableRoute(joint=k + 1, angle=angle, lead=self.lead)
-                for k, of_joint in enumerate(angles)
-                for angle in of_joint
-            ),
-        )
-
-
-@record
-class _Universal(_Uniform):
-    def build(self) -> Geometry:
-        n, m = self.joints, self.cables_per_joint
-        angles = [[2.0 * math.pi * (k + n * j) / (n * m) for j in range(m)] for k in range(n)]
-        return self.geometry([UNIVERSAL_AXES] * n, angles)
-
-
-@record
-class _Hinged(_Uniform):
-    twist: Number
-    cables_per_joint: _CablesPerJoint = 2
-
-    def build(self) -> Geometry:
-        m = self.cables_per_joint
-        rolls = [k * self.twist for k in range(self.joints)]
-        axes: list[tuple[Direction, ...]] = [((0.0, math.cos(r), math.sin(r)),) for r in rolls]
-        # evenly spread from 90 degrees beside the axis: m = 2 gives the antagonistic pair
-        angles = [[r + math.pi / 2 + 2.0 * math.pi * j / m for j in range(m)] for r in rolls]
-        return self.geometry(axes, angles)
 
 
 @record
@@ -233,7 +98,7 @@ class Geometry:
         Raises:
             GeometryError: Lists every fault.
         """
-        return _Universal(
+        keywords = Universal(
             joints=joints,
             cables_per_joint=cables_per_joint,
             link_length=link_length,
@@ -244,7 +109,8 @@ class Geometry:
             lead=lead,
             joint_limit=joint_limit,
             name=name,
-        ).build()
+        )
+        return cls(**keywords.fields())
 
     @classmethod
     def hinged(
@@ -283,7 +149,7 @@ class Geometry:
         Raises:
             GeometryError: Lists every fault.
         """
-        return _Hinged(
+        keywords = Hinged(
             joints=joints,
             twist=twist,
             cables_per_joint=cables_per_joint,
@@ -295,7 +161,8 @@ class Geometry:
             lead=lead,
             joint_limit=joint_limit,
             name=name,
-        ).build()
+        )
+        return cls(**keywords.fields())
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -395,11 +262,13 @@ class Geometry:
             GeometryError: Not TOML, or lists every fault found in it.
         """
         instance("text", text, str)
-        short = {"universal": _Universal, "hinged": _Hinged}
+        short = {"universal": Universal, "hinged": Hinged}
         try:
             data = read_toml(text)
             kind = next(iter(data)) if len(data) == 1 else ""
-            return parse(short[kind], data[kind]).build() if kind in short else parse(cls, data)
+            if kind in short:
+                return cls(**parse(short[kind], data[kind]).fields())
+            return parse(cls, data)
         except GeometryError as error:
             raise GeometryError(error.faults, source) from None
 

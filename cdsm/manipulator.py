@@ -6,7 +6,6 @@ angles alone. Both are frozen; a posture exists only once all of it is computed.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -18,6 +17,7 @@ from numpy.typing import ArrayLike
 from cdsm import _kernels
 from cdsm._checks import Array, ReadOnlyState, frozen, instance, sequence_of, vector
 from cdsm._rigid_body import RigidBody
+from cdsm._routing import route
 from cdsm.cable import Cable, serpentine_cables
 from cdsm.elasticity import Elasticity
 from cdsm.errors import (
@@ -25,7 +25,6 @@ from cdsm.errors import (
     ElasticityRangeError,
     InvalidInput,
     JointLimitError,
-    UnknownName,
 )
 from cdsm.geometry import Geometry
 from cdsm.urdf import TIP, to_urdf
@@ -75,7 +74,7 @@ class Manipulator:
         self._urdf = to_urdf(geometry)
         self._body = RigidBody(self._urdf, TIP, self._gravity)
         self._tree = self._body.tree()
-        self._routing = _route(self._body, self._tree, self._cables)
+        self._routing = route(self._body, self._tree, self._cables)
 
         self._meaning_of_q = f"one angle [rad] per joint, {', '.join(self.joint_names)}"
         self._lowest = self._body.lower - _LIMIT_SLACK
@@ -304,46 +303,3 @@ def _checked_cables(cables: Sequence[Cable]) -> tuple[Cable, ...]:
         if names.count(name) > 1:
             raise CableError(name, "the name is used twice; every cable needs its own.")
     return cables
-
-
-def _route(body: RigidBody, tree: _kernels.Tree, cables: Sequence[Cable]) -> _kernels.Routing:
-    """Place the sites on the joints, and find for every segment the joints that change it."""
-    row, point, fixed = [], [], np.array([cable.lead for cable in cables])
-    segments: list[tuple[int, int, int, int]] = []
-    joints: list[int] = []
-    for c, cable in enumerate(cables):
-        for i, site in enumerate(cable.sites):
-            try:
-                joint, rotation, translation = body.locate(site.link)
-            except UnknownName as error:
-                raise CableError(cable.name, str(error)) from None
-            row.append(joint)
-            point.append(translation + rotation @ np.array(site.position))
-            if i == 0:
-                continue
-            if row[-2] != row[-1]:
-                to_a, to_b = _way(tree, row[-2]), _way(tree, row[-1])
-                segments.append((c, len(row) - 2, len(row) - 1, len(joints)))
-                joints += [-j for j in to_a if j not in to_b]
-                joints += [j for j in to_b if j not in to_a]
-                continue
-            length = math.dist(point[-2], point[-1])
-            if length < _kernels.SHORTEST_SEGMENT:
-                raise CableError(cable.name, f"sites {i} and {i + 1} coincide; leave one out.")
-            fixed[c] += length
-    segments.append((0, 0, 0, len(joints)))
-    return _kernels.Routing(
-        row=np.array(row, dtype=np.intp),
-        point=np.array(point),
-        segment=np.array(segments, dtype=np.intp),
-        joint=np.array(joints, dtype=np.intp),
-        fixed=fixed,
-    )
-
-
-def _way(tree: _kernels.Tree, row: int) -> list[int]:
-    way: list[int] = []
-    while row:
-        way.insert(0, row)
-        row = int(tree.parent[row])
-    return way

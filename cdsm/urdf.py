@@ -18,7 +18,8 @@ from cdsm._checks import Array, instance
 from cdsm._files import write_file
 from cdsm._rigid_body import RigidBody
 from cdsm.errors import UrdfError
-from cdsm.geometry import Geometry, Link
+from cdsm.geometry import Geometry
+from cdsm.parts import Link
 
 if TYPE_CHECKING:
     import yourdfpy

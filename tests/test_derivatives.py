@@ -10,7 +10,7 @@ import cdsm
 from cdsm import _kernels
 from cdsm._checks import Array
 from cdsm._rigid_body import RigidBody
-from cdsm.manipulator import _route
+from cdsm._routing import route
 from tests import arms
 from tests.differences import assert_second_order, gravity_energy
 
@@ -145,9 +145,9 @@ def test_serpentine_cable_depends_on_no_joint_after_its_own(kind: str) -> None:
     arm = arms.mixed_arm() if kind == "mixed" else arms.random_arm(4, 4, kind)
     pose = arms.random_posture(arm, 1)
     number = np.array([int(name.removeprefix("joint").split("_")[0]) for name in arm.joint_names])
-    for c, route in enumerate(arm.geometry.cables):
-        assert (pose.length_jacobian[c, number > route.joint] == 0.0).all()
-        assert (pose.length_jacobian[c, number <= route.joint] != 0.0).all()
+    for c, cable in enumerate(arm.geometry.cables):
+        assert (pose.length_jacobian[c, number > cable.joint] == 0.0).all()
+        assert (pose.length_jacobian[c, number <= cable.joint] != 0.0).all()
         # neighbouring disks see one joint each, so the Hessian is block diagonal
         H = pose.length_hessian[c]
         assert (H[number[:, None] != number[None, :]] == 0.0).all()
@@ -203,7 +203,7 @@ def test_segment_between_two_branches_of_a_tree() -> None:
         cdsm.Site("root", (0.0, 0.03, 0.04)),
     ]
     cable = cdsm.Cable("between", tuple(sites), arms.STEEL)
-    fork = _Fork(body.tree(), _route(body, body.tree(), [cable]))
+    fork = _Fork(body.tree(), route(body, body.tree(), [cable]))
     q = np.array([0.2, -0.3, 0.4, 0.5, -0.6])
     lengths, jacobian, hessian = fork.evaluate(q)
 
