@@ -151,7 +151,7 @@ def test_serpentine_cable_depends_on_no_joint_after_its_own(kind: str) -> None:
         # neighbouring disks see one joint each, so the Hessian is block diagonal
         H = pose.length_hessian[c]
         assert (H[number[:, None] != number[None, :]] == 0.0).all()
-        assert (H.diagonal()[number <= route.joint] != 0.0).all()
+        assert (H.diagonal()[number <= cable.joint] != 0.0).all()
 
 
 BRANCHES = """<robot name="fork">
