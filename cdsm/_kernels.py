@@ -13,7 +13,8 @@ the same side the second derivative is z_i × d_j.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple, TypeVar, cast
 
 import numpy as np
 from numba import njit
@@ -25,6 +26,20 @@ Indices = NDArray[np.intp]
 
 SHORTEST_SEGMENT = 1e-9
 """A segment shorter than this [m] has no direction: its two sites coincide."""
+
+
+_Function = TypeVar("_Function", bound=Callable[..., Any])
+
+
+def _compiled(function: _Function) -> _Function:
+    """Compile for speed, once for all runs if there is a place to keep the result.
+
+    No fastmath: it may drop NaN. Divisions are not guarded: none here is by zero.
+    """
+    try:
+        return cast(_Function, njit(cache=True, error_model="numpy")(function))
+    except RuntimeError:  # neither the package's folder nor the user's cache can be written
+        return cast(_Function, njit(error_model="numpy")(function))
 
 
 class Tree(NamedTuple):
@@ -79,7 +94,7 @@ class Frames(NamedTuple):
     site: Array
 
 
-@njit(cache=True, error_model="numpy")
+@_compiled
 def place(tree: Tree, routing: Routing, q: Array) -> tuple[Array, Array, Array]:
     """Forward kinematics: return the fields of :class:`Frames` at the joint angles q (nv,)."""
     parent, rotation, translation, axis = tree
@@ -116,7 +131,7 @@ def place(tree: Tree, routing: Routing, q: Array) -> tuple[Array, Array, Array]:
     return o, z, x
 
 
-@njit(cache=True, error_model="numpy")
+@_compiled
 def _axis_rotation(axis: Array, row: int, angle: float, out: Array) -> None:
     """Rodrigues' formula for one row of axes."""
     s, c = math.sin(angle), math.cos(angle)
@@ -130,7 +145,7 @@ def _axis_rotation(axis: Array, row: int, angle: float, out: Array) -> None:
         out[i, j] -= s * axis[row, m]
 
 
-@njit(cache=True, error_model="numpy")
+@_compiled
 def _direction(site: Array, a: int, b: int) -> tuple[float, float, float, float]:
     """Unit vector from site a to site b, and their distance."""
     x = site[b, 0] - site[a, 0]
@@ -140,7 +155,7 @@ def _direction(site: Array, a: int, b: int) -> tuple[float, float, float, float]
     return x / length, y / length, z / length, length
 
 
-@njit(cache=True, error_model="numpy")
+@_compiled
 def _derivative(
     origin: Array, axis: Array, site: Array, joint: int, a: int, b: int
 ) -> tuple[float, float, float]:
@@ -153,7 +168,7 @@ def _derivative(
     return side * (zy * rz - zz * ry), side * (zz * rx - zx * rz), side * (zx * ry - zy * rx)
 
 
-@njit(cache=True, error_model="numpy")
+@_compiled
 def evaluate(
     tree: Tree, routing: Routing, q: Array
 ) -> tuple[tuple[Array, Array, Array], Array, Array, int]:
@@ -178,7 +193,7 @@ def evaluate(
     return frames, lengths, length_jacobian, -1
 
 
-@njit(cache=True, error_model="numpy")
+@_compiled
 def add_length_hessian(
     routing: Routing, frames: Frames, weight: Array, page: Indices, hessian: Array
 ) -> None:
@@ -217,7 +232,7 @@ def add_length_hessian(
                     hessian[k, j - 1, i - 1] += value
 
 
-@njit(cache=True, error_model="numpy")
+@_compiled
 def joint_stiffness(
     routing: Routing,
     frames: Frames,
@@ -269,7 +284,7 @@ class Scaled(NamedTuple):
     force: float
 
 
-@njit(cache=True, error_model="numpy")
+@_compiled
 def scaled_balance(
     length_jacobian: Array, torque: Array, low: Array, high: Array
 ) -> tuple[Array, Array, Array, Array, float, float]:
@@ -291,13 +306,13 @@ def scaled_balance(
     return A / arm, torque / (arm * force), low / force, high / force, arm, force
 
 
-@njit(cache=True, error_model="numpy")
+@_compiled
 def _power_of_two(value: float) -> float:
     """The power of two next above a magnitude; 1 for zero."""
     return 2.0 ** math.ceil(math.log2(value)) if value > 0.0 else 1.0
 
 
-@njit(cache=True, error_model="numpy")
+@_compiled
 def optimality(
     A: Array, b: Array, low: Array, high: Array, x: Array, y: Array, z: Array
 ) -> tuple[float, float, float]:
@@ -340,7 +355,7 @@ def optimality(
     return primal, dual, abs(gap)
 
 
-@njit(cache=True, error_model="numpy")
+@_compiled
 def load_stiffness(jacobian: Array, wrench: Array) -> Array:
     """−∂(J_Xᵀ W)/∂θ (nv, nv) of a dead wrench W (6,): row torque, column angle.
 

@@ -486,3 +486,18 @@ def test_kernels_give_the_same_without_compilation() -> None:
         np.testing.assert_allclose(
             numbers, expected, rtol=1e-12, atol=1e-13 * abs(expected).max(), err_msg=name
         )
+
+
+NO_CACHE = """
+from numba.core import caching
+for kind in (caching.CacheImpl, caching.CompileResultCacheImpl):
+    kind._locator_classes = []  # no folder can be written
+import cdsm
+from tests.arms import mixed_arm, random_posture
+random_posture(mixed_arm(), 3)
+"""
+
+
+def test_kernels_compile_where_no_cache_can_be_written() -> None:
+    command = [sys.executable, "-c", NO_CACHE]
+    subprocess.run(command, cwd=ROOT, timeout=120, check=True)
