@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
@@ -26,6 +27,10 @@ def frozen(array: Array) -> Array:
 class ReadOnlyState:
     """For frozen dataclasses of read-only arrays: unpickling and copying keep them read-only."""
 
+    def __getstate__(self) -> dict[str, object]:
+        # the fields alone: what is computed from them on first use can be large
+        return {field.name: getattr(self, field.name) for field in fields(self)}  # type: ignore[arg-type]
+
     def __setstate__(self, state: dict[str, object]) -> None:
         for value in state.values():
             for array in value if isinstance(value, tuple) else (value,):
@@ -36,6 +41,10 @@ class ReadOnlyState:
 
 LARGEST = 1e15
 """No force, length or rigidity of a real arm comes near this; beyond, products overflow."""
+
+
+SMALLEST = 1e-12
+"""No stiffness or rigidity of a real cable is this small; below, quotients overflow."""
 
 
 def number_array(name: str, value: ArrayLike) -> Array:
@@ -142,7 +151,7 @@ def _native(name: str, value: ArrayLike) -> Array:
         raise InvalidInput(name, "is a masked array; fill or drop the masked entries first.")
     try:
         array = np.asarray(value)
-    except (ValueError, TypeError) as error:
+    except Exception as error:  # whatever a foreign __array__ raises
         raise InvalidInput(name, f"is not an array of numbers ({error}).") from None
     if array.dtype.kind not in "iuf":
         raise InvalidInput(name, f"holds {array.dtype} entries; real numbers are needed.")

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import os
-import tempfile
+import secrets
+import stat
 from collections.abc import Callable
 from pathlib import Path
 
@@ -26,7 +27,7 @@ def read_text(path: str | os.PathLike[str]) -> str:
             data = file.read(MAXIMUM_BYTES + 1)
         if len(data) > MAXIMUM_BYTES:
             raise FileError(path, f"is larger than the {MAXIMUM_BYTES} bytes that are read.")
-        return data.decode("utf-8")
+        return data.decode("utf-8-sig")  # some editors begin a file with a mark
     except CdsmError:
         raise
     except FileNotFoundError:
@@ -47,34 +48,33 @@ def write_text(path: str | os.PathLike[str], text: str) -> Path:
 def write_file(path: str | os.PathLike[str], fill: Callable[[Path], object]) -> Path:
     """Let ``fill`` write a file beside the wanted one, then rename it into place.
 
-    A failure, of ``fill`` or of the disk, leaves the wanted path as it was.
+    A failure, of ``fill`` or of the disk, leaves the wanted path as it was. A link is followed, and
+    an existing file keeps its mode.
 
     Raises:
-        FileError: The folder is missing or not writable, or the disk refuses.
+        FileError: The folder is missing or not writable, the disk refuses, or something that is not
+            a file stands there.
     """
     path = _path(path)
     aside: Path | None = None
     try:
-        handle, name = tempfile.mkstemp(
-            dir=path.parent, prefix=f".{path.stem}-", suffix=path.suffix
-        )
-        os.close(handle)
-        aside = Path(name)
+        target = path.resolve()
+        if target.exists() and not target.is_file():
+            raise FileError(path, "is not a regular file; give the path of a file.")
+        if not target.parent.is_dir():
+            raise FileError(path, f"the folder {path.parent} does not exist; create it.")
+        aside = target.with_name(f".{target.stem}-{secrets.token_hex(4)}{target.suffix}")
+        mode = stat.S_IMODE(target.stat().st_mode) if target.exists() else 0o666
+        os.close(os.open(aside, os.O_CREAT | os.O_EXCL | os.O_WRONLY, mode))
         fill(aside)
-        # mkstemp makes the file private; give it the mode a plain open() would have
-        mask = os.umask(0)
-        os.umask(mask)
-        aside.chmod(0o666 & ~mask)
-        aside.replace(path)
+        aside.replace(target)
     except CdsmError:
         raise
-    except FileNotFoundError:
-        raise FileError(path, f"the folder {path.parent} does not exist; create it.") from None
     except (OSError, ValueError) as error:
         raise FileError(path, f"cannot be written: {_reason(error)}.") from None
     finally:
         if aside is not None:
-            with contextlib.suppress(FileNotFoundError):
+            with contextlib.suppress(OSError):
                 aside.unlink()
     return path
 

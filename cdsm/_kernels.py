@@ -95,10 +95,16 @@ class Frames(NamedTuple):
 
 
 @_compiled
-def place(tree: Tree, routing: Routing, q: Array) -> tuple[Array, Array, Array]:
+def place(
+    parent: Indices,
+    rotation: Array,
+    translation: Array,
+    axis: Array,
+    row: Indices,
+    point: Array,
+    q: Array,
+) -> tuple[Array, Array, Array]:
     """Forward kinematics: return the fields of :class:`Frames` at the joint angles q (nv,)."""
-    parent, rotation, translation, axis = tree
-    row, point = routing.row, routing.point
     count = parent.shape[0]
     R = np.zeros((count, 3, 3))
     o = np.zeros((count, 3))
@@ -147,11 +153,13 @@ def _axis_rotation(axis: Array, row: int, angle: float, out: Array) -> None:
 
 @_compiled
 def _direction(site: Array, a: int, b: int) -> tuple[float, float, float, float]:
-    """Unit vector from site a to site b, and their distance."""
+    """Unit vector from site a to site b, and their distance; zeros if they coincide."""
     x = site[b, 0] - site[a, 0]
     y = site[b, 1] - site[a, 1]
     z = site[b, 2] - site[a, 2]
     length = math.sqrt(x * x + y * y + z * z)
+    if length < SHORTEST_SEGMENT:
+        return 0.0, 0.0, 0.0, 0.0
     return x / length, y / length, z / length, length
 
 
@@ -170,40 +178,56 @@ def _derivative(
 
 @_compiled
 def evaluate(
-    tree: Tree, routing: Routing, q: Array
-) -> tuple[tuple[Array, Array, Array], Array, Array, int]:
-    """Return the fields of :class:`Frames`, L (C,), J_L (C, nv), and a segment or −1.
+    parent: Indices,
+    rotation: Array,
+    translation: Array,
+    local_axis: Array,
+    row: Indices,
+    point: Array,
+    segment: Indices,
+    joint: Indices,
+    fixed: Array,
+    q: Array,
+) -> tuple[Array, Array, Array, Array, Array, int]:
+    """From :class:`Tree`, :class:`Routing` and q (nv,) to everything that depends on q.
 
-    The segment is the first whose two sites coincide; L and J_L are then unfinished.
+    Fields are handed over one by one: unpacking a tuple at the border costs a microsecond.
+
+    Returns:
+        The fields of :class:`Frames`, L (C,), J_L (C, nv), and the first segment whose sites
+        coincide, or −1; if there is one, L and J_L are unfinished.
     """
-    frames = place(tree, routing, q)
-    origin, axis, site = frames
-    segment, joint = routing.segment, routing.joint
-    lengths = routing.fixed.copy()
+    origin, axis, site = place(parent, rotation, translation, local_axis, row, point, q)
+    lengths = fixed.copy()
     length_jacobian = np.zeros((lengths.shape[0], q.shape[0]))
     for s in range(segment.shape[0] - 1):
         cable, a, b, first = segment[s]
         ux, uy, uz, length = _direction(site, a, b)
-        if not length > SHORTEST_SEGMENT:
-            return frames, lengths, length_jacobian, s
+        if length == 0.0:
+            return origin, axis, site, lengths, length_jacobian, s
         lengths[cable] += length
         for t in range(first, segment[s + 1, 3]):
             dx, dy, dz = _derivative(origin, axis, site, joint[t], a, b)
             length_jacobian[cable, abs(joint[t]) - 1] += ux * dx + uy * dy + uz * dz
-    return frames, lengths, length_jacobian, -1
+    return origin, axis, site, lengths, length_jacobian, -1
 
 
 @_compiled
 def add_length_hessian(
-    routing: Routing, frames: Frames, weight: Array, page: Indices, hessian: Array
+    segment: Indices,
+    joint: Indices,
+    origin: Array,
+    axis: Array,
+    site: Array,
+    weight: Array,
+    page: Indices,
+    hessian: Array,
 ) -> None:
     """Add weight[c] ∂²L_c/∂θ_i∂θ_j to hessian[page[c], i, j] for every cable c.
 
     All pages zero and weight = F gives H_L·F; page c for cable c and weight 1 the whole tensor.
     No two neighbouring sites may coincide; :func:`evaluate` has seen to that.
     """
-    origin, axis, site = frames.origin, frames.axis, frames.site
-    segment, joint = routing.segment, routing.joint
     for s in range(segment.shape[0] - 1):
         cable, a, b, first = segment[s]
         w, k = weight[cable], page[cable]
@@ -234,8 +258,11 @@ def add_length_hessian(
 
 @_compiled
 def joint_stiffness(
-    routing: Routing,
-    frames: Frames,
+    segment: Indices,
+    joint: Indices,
+    origin: Array,
+    axis: Array,
+    site: Array,
     jacobian: Array,
     length_jacobian: Array,
     gravity: Array,
@@ -247,7 +274,7 @@ def joint_stiffness(
     nv = jacobian.shape[1]
     active = np.zeros((1, nv, nv))
     page = np.zeros(tension.shape[0], dtype=np.intp)
-    add_length_hessian(routing, frames, tension, page, active)
+    add_length_hessian(segment, joint, origin, axis, site, tension, page, active)
     passive = np.zeros((nv, nv))
     for c in range(length_jacobian.shape[0]):
         last = nv  # a cable moves only with the joints before its end

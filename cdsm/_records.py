@@ -63,7 +63,7 @@ def read_toml(text: str) -> dict[str, Any]:
     """Parse TOML, or raise a :class:`GeometryError` that says where it breaks off."""
     try:
         return tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:  # also integers of too many digits
         raise GeometryError([f"is not TOML: {error}"]) from None
 
 
@@ -132,6 +132,6 @@ def _faults(error: ValidationError, kind: type) -> list[str]:
         else:
             value = repr(fault["input"])
             value = value if len(value) <= 60 else f"{value[:57]}..."
-            message = fault["msg"][0].lower() + fault["msg"][1:]
+            message = fault["msg"][0].lower() + fault["msg"][1:].replace("an object", "a table")
             listed.append(f"{where}: {message}, but is {value}".removeprefix(": "))
     return listed

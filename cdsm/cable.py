@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, final, get_args
 
-from cdsm._checks import instance, one_of, scalar, sequence_of, vector
+from cdsm._checks import SMALLEST, instance, one_of, scalar, sequence_of, vector
 from cdsm.elasticity import Elasticity
 from cdsm.errors import CableError, CdsmError, InvalidInput
 from cdsm.geometry import Geometry
@@ -77,7 +77,7 @@ class Cable:
             one_of("control", self.control, get_args(Control))
             lead = scalar("lead", self.lead)
             series = self.series_stiffness
-            if series != math.inf:
+            if not (isinstance(series, float) and series == math.inf):
                 series = scalar("series_stiffness", series)
         except CdsmError as error:
             raise CableError(self.name, str(error)) from None
@@ -85,10 +85,11 @@ class Cable:
             raise CableError(self.name, f"sites: {len(sites)} given; two or more Site are needed.")
         if lead < 0.0:
             raise CableError(self.name, f"lead: {lead:g} m given; it cannot be negative.")
-        if series <= 0.0:
+        if series < SMALLEST:
             raise CableError(
                 self.name,
-                f"series_stiffness: {series:g} N/m given; it must be positive, or inf for none.",
+                f"series_stiffness: {series:g} N/m given; it must be positive (at least "
+                f"{SMALLEST:g}), or inf for none.",
             )
         object.__setattr__(self, "sites", sites)
         object.__setattr__(self, "lead", lead)

@@ -1,9 +1,11 @@
-"""The command line. mm, degrees and N/mm exist here; heavy imports wait inside the commands."""
+"""The command line. mm, degrees and N/mm exist here; plotting is imported when it is needed."""
 
 from __future__ import annotations
 
+import io
 import json
-from collections.abc import Callable, Iterator
+import sys
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -12,6 +14,8 @@ import typer
 from rich.console import Console
 from rich.progress import track
 from rich.table import Table
+
+import cdsm
 
 if TYPE_CHECKING:
     from cdsm._checks import Array
@@ -24,8 +28,32 @@ app = typer.Typer(
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
 )
 _errors = Console(stderr=True)
+
+_WIDE = 110
+"""Columns from which the table of claims is legible; below, each claim is a few lines."""
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"cdsm {cdsm.__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def main(
+    version: Annotated[
+        bool,
+        typer.Option("--version", callback=_version, is_eager=True, help="Show it and exit."),
+    ] = False,
+) -> None:
+    """Stiffness of cable-driven serpentine manipulators."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # a terminal without Greek shows "?" for it
+            stream.reconfigure(errors="replace")
+
 
 GeometryFile = Annotated[Path, typer.Argument(metavar="GEOMETRY.toml", help="Geometry to read.")]
 
@@ -51,10 +79,8 @@ def reproduce(
         written.append(write_text(out / "reproduction.md", paper.to_markdown(results)))
         numbers = json.dumps(paper.to_dict(results), indent=1, allow_nan=False)
         written.append(write_text(out / "reproduction.json", numbers + "\n"))
-        table = Table(*paper.HEADER, caption=paper.EXPLANATION, caption_justify="left")
-        for row in paper.to_rows(results):
-            table.add_row(*row)
-        Console().print(table)
+        _show(paper.HEADER, paper.to_rows(results))
+        typer.echo(paper.EXPLANATION)
         typer.echo("written: " + ", ".join(map(str, written)))
 
 
@@ -80,7 +106,7 @@ def stiffness(
         str,
         typer.Option(
             help="Joint angles in degrees, separated by commas; or one for all joints.",
-            metavar="DEG,DEG,…",
+            metavar="DEG,DEG,...",
         ),
     ] = "0",
     min_tension: Annotated[float, typer.Option(help="Lower bound of all tensions [N].")] = 10.0,
@@ -92,7 +118,7 @@ def stiffness(
         typer.Option(help="Constant EA of all cables [N]; default: the 1x19 strand of Eq. 19."),
     ] = None,
     wrench: Annotated[
-        str, typer.Option(help="At the tip: FX,FY,FZ,MX,MY,MZ [N, N m].", metavar="FX,…,MZ")
+        str, typer.Option(help="At the tip: FX,FY,FZ,MX,MY,MZ [N, N m].", metavar="FX,...,MZ")
     ] = "0,0,0,0,0,0",
     gravity: Annotated[
         str, typer.Option(help="In base axes: GX,GY,GZ [m/s²].", metavar="GX,GY,GZ")
@@ -114,7 +140,14 @@ def stiffness(
         law = STRAND_1X19 if rigidity is None else LinearElasticity(rigidity)
         arm = Manipulator(Geometry.read(geometry), law, gravity=_numbers("--gravity", gravity))
         degrees = _numbers("--angles", angles)
-        pose = arm.at(np.deg2rad(degrees * arm.nv if len(degrees) == 1 else degrees))
+        degrees = degrees * arm.nv if len(degrees) == 1 else degrees
+        if len(degrees) != arm.nv:
+            names = ", ".join(arm.joint_names)
+            raise typer.BadParameter(
+                f"{len(degrees)} given; give one angle, or one for each of {names}.",
+                param_hint="--angles",
+            )
+        pose = arm.at(np.deg2rad(degrees))
         pull = distribute_tension(
             pose, min_tension, max_tension, _numbers("--wrench", wrench), solver
         )
@@ -125,6 +158,21 @@ def stiffness(
             typer.echo(f"{arm.geometry}\n\n{pull}\n\n{K}")
 
 
+def _show(header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """A table where there is room for one, else a few lines for each row."""
+    console = Console()
+    if console.width >= _WIDE:
+        table = Table(*header)
+        for row in rows:
+            table.add_row(*row)
+        console.print(table)
+        return
+    for figure, quantity, *cells in rows:
+        typer.echo(f"{figure}: {quantity}")
+        for name, cell in zip(header[2:], cells, strict=True):
+            typer.echo(f"    {name:<12} {cell}")
+
+
 @contextmanager
 def _reported() -> Iterator[None]:
     """Turn a CdsmError into one message and exit code 1, without a traceback."""
@@ -132,7 +180,7 @@ def _reported() -> Iterator[None]:
 
     try:
         yield
-    except CdsmError as error:
+    except (CdsmError, OSError) as error:  # OSError: the terminal or pipe itself
         _errors.print(f"error: {error}", style="red", markup=False, highlight=False, soft_wrap=True)
         raise typer.Exit(1) from None
 

@@ -18,7 +18,7 @@ from numpy.polynomial import Polynomial
 from numpy.typing import ArrayLike
 from scipy.integrate import quad_vec
 
-from cdsm._checks import Array, number_array, scalar
+from cdsm._checks import SMALLEST, Array, number_array, scalar
 from cdsm.errors import ElasticityRangeError, InvalidInput
 
 
@@ -31,11 +31,21 @@ class Domain:
         low: Smallest tension [N].
         high: Largest tension [N], included unless infinite.
         low_included: Whether ``low`` itself belongs to the domain.
+
+    Raises:
+        InvalidInput: Not two numbers with 0 <= low < high.
     """
 
     low: float
     high: float
     low_included: bool = True
+
+    def __post_init__(self) -> None:
+        high = self.high
+        if not (isinstance(high, float) and high == math.inf):
+            high = scalar("high", high)
+        if not 0.0 <= scalar("low", self.low) < high:
+            raise InvalidInput("low", f"0 <= low < high needed, but are {self.low}, {self.high} N.")
 
     def __iter__(self) -> Iterator[float]:
         return iter((self.low, self.high))
@@ -140,8 +150,10 @@ class LinearElasticity(Elasticity):
 
     def __init__(self, rigidity: float) -> None:
         value = scalar("rigidity", rigidity)
-        if value <= 0.0:
-            raise InvalidInput("rigidity", f"{value:g} N given; EA must be positive.")
+        if value < SMALLEST:
+            raise InvalidInput(
+                "rigidity", f"{value:g} N given; EA must be positive, at least {SMALLEST:g} N."
+            )
         object.__setattr__(self, "_rigidity", value)
 
     def __repr__(self) -> str:

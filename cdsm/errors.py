@@ -133,7 +133,7 @@ class JointLimitError(CdsmError, ValueError):
         )
         super().__init__(
             f"{listed}. Stay inside the limits, widen joint_limit in the geometry, "
-            "or pass check_limits=False to compute beyond them."
+            "or, in Python, pass check_limits=False to compute beyond them."
         )
 
 
@@ -141,7 +141,9 @@ class ElasticityRangeError(CdsmError, ValueError):
     """A tension at which the elasticity is not defined.
 
     Attributes:
+        problem: What is wrong with it.
         tension: The offending tensions [N].
+        indices: Where they stand in what was given.
         cables: Names of the cables that carry them; empty where no cable is known.
     """
 

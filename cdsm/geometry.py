@@ -265,10 +265,18 @@ class Geometry:
         short = {"universal": Universal, "hinged": Hinged}
         try:
             data = read_toml(text)
-            kind = next(iter(data)) if len(data) == 1 else ""
-            if kind in short:
-                return cls(**parse(short[kind], data[kind]).fields())
-            return parse(cls, data)
+            kind = next((key for key in data if key in short), None)
+            if kind is None and not data.keys() & {"joints", "links", "cables"}:
+                found = ", ".join(data) or "nothing"
+                raise GeometryError(
+                    [f"holds {found}; give a table [universal] or [hinged], or the full form"]
+                )
+            if kind is None:
+                return parse(cls, data)
+            if len(data) > 1:
+                others = ", ".join(key for key in data if key != kind)
+                raise GeometryError([f"{others}: not known beside [{kind}], which says it all"])
+            return cls(**parse(short[kind], data[kind]).fields())
         except GeometryError as error:
             raise GeometryError(error.faults, source) from None
 

@@ -1,7 +1,7 @@
 """An arm with its cables, and the postures it takes.
 
 :class:`Manipulator` is what does not change, :class:`Posture` everything that depends on the joint
-angles alone. Both are frozen; a posture exists only once all of it is computed.
+angles alone. A posture is frozen, and exists only once all of it is computed.
 """
 
 from __future__ import annotations
@@ -15,7 +15,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm import _kernels
-from cdsm._checks import Array, ReadOnlyState, frozen, instance, sequence_of, vector
+from cdsm._checks import (
+    LARGEST,
+    SMALLEST,
+    Array,
+    ReadOnlyState,
+    frozen,
+    instance,
+    sequence_of,
+    vector,
+)
 from cdsm._rigid_body import RigidBody
 from cdsm._routing import route
 from cdsm.cable import Cable, serpentine_cables
@@ -73,18 +82,26 @@ class Manipulator:
         self._gravity = vector("gravity", gravity, 3, "gravity in base axes [m/s²]")
         self._urdf = to_urdf(geometry)
         self._body = RigidBody(self._urdf, TIP, self._gravity)
-        self._tree = self._body.tree()
-        self._routing = route(self._body, self._tree, self._cables)
+        tree = self._body.tree()
+        routing = route(self._body, tree, self._cables)
+        self._constants = (*tree, *routing)
+        self._segments = routing.segment, routing.joint
 
         self._meaning_of_q = f"one angle [rad] per joint, {', '.join(self.joint_names)}"
         self._lowest = self._body.lower - _LIMIT_SLACK
         self._highest = self._body.upper + _LIMIT_SLACK
 
         held = [c for c, cable in enumerate(self._cables) if cable.control == "position"]
-        materials = dict.fromkeys(self._cables[c].elasticity for c in held)
-        self._held_by_material = [
-            (law, np.array([c for c in held if self._cables[c].elasticity == law], dtype=np.intp))
-            for law in materials
+        by_law: dict[object, list[int]] = {}
+        for c in held:
+            by_law.setdefault(_key(self._cables[c].elasticity), []).append(c)
+        # one law for all is the usual case, and a slice costs less than indices
+        self._held_by_law = [
+            (
+                self._cables[cables[0]].elasticity,
+                slice(None) if len(cables) == len(self._cables) else np.array(cables),
+            )
+            for cables in by_law.values()
         ]
         series = np.array([cable.series_stiffness for cable in self._cables])
         self._series_compliance = 1.0 / series
@@ -136,7 +153,7 @@ class Manipulator:
         return isinstance(other, Manipulator) and self._value == other._value
 
     def __hash__(self) -> int:
-        return hash(self._value)
+        return hash(self._geometry)  # an elasticity of the user's own need not be hashable
 
     @property
     def _value(self) -> tuple[Geometry, tuple[Cable, ...], tuple[float, ...]]:
@@ -169,12 +186,12 @@ class Manipulator:
         state = self._body.state(q)
         # Pinocchio hands out placements one Python object per joint, 14 µs for ten joints; the
         # kernel places joints and cable sites itself in 2 µs. A test holds the two equal.
-        frames, lengths, length_jacobian, coincident = _kernels.evaluate(
-            self._tree, self._routing, q
+        origin, axis, site, lengths, length_jacobian, coincident = _kernels.evaluate(
+            *self._constants, q
         )
         if coincident >= 0:
             raise CableError(
-                self._cables[self._routing.segment[coincident, 0]].name,
+                self._cables[self._segments[0][coincident, 0]].name,
                 f"two neighbouring sites coincide at q = {q.tolist()}, so the cable has no "
                 "direction there. Move a site, or change the posture.",
             )
@@ -187,35 +204,38 @@ class Manipulator:
             length_jacobian=frozen(length_jacobian),
             gravity_torque=frozen(state.gravity_torque),
             gravity_stiffness=frozen(state.gravity_stiffness),
-            _frames=_kernels.Frames(*frames),
+            _frames=_kernels.Frames(frozen(origin), frozen(axis), frozen(site)),
         )
 
-    def cable_stiffness(self, lengths: Array, tension: Array) -> Array:
-        """Diagonal of K_L: k = 1/(l_0/EA(F) + 1/k_series), 0 for force-controlled cables.
+    def _cable_stiffness(self, lengths: Array, tension: Array) -> Array:
+        """Diagonal of K_L (C,) [N/m]: 1/(l_0/EA(F) + 1/k_series), 0 for force-controlled cables.
 
-        Args:
-            lengths: Free lengths l_0 (C,) [m].
-            tension: F (C,) [N].
-
-        Returns:
-            (C,) [N/m].
+        Of checked free lengths (C,) [m] and tensions (C,) [N].
 
         Raises:
             ElasticityRangeError: Names the cables whose tension is outside their elasticity's
                 domain.
+            InvalidInput: An elasticity of the user's own gives no positive rigidity.
         """
         stiffness = np.zeros(len(self._cables))
-        for law, held in self._held_by_material:
+        for law, held in self._held_by_law:
+            pulled = tension[held]
             try:
-                rigidity = law.rigidity(tension[held])
+                rigidity = np.asarray(law.rigidity(pulled))
             except ElasticityRangeError as error:
-                names = [self._cables[held[i]].name for i in error.indices]
-                raise ElasticityRangeError(
-                    error.problem, error.tension, held[list(error.indices)].tolist(), names
-                ) from None
+                outside = np.arange(len(self._cables))[held][list(error.indices)].tolist()
+                names = [self._cables[c].name for c in outside]
+                raise ElasticityRangeError(error.problem, error.tension, outside, names) from None
+            usable = (rigidity >= SMALLEST) & (rigidity <= LARGEST)  # false for NaN too
+            if rigidity.shape != pulled.shape or np.count_nonzero(usable) < pulled.size:
+                raise InvalidInput(
+                    "elasticity",
+                    f"{law!r} gives the rigidity {rigidity} N at tensions {pulled} N; one positive "
+                    "number for each is needed.",
+                )
             compliance = lengths[held] / rigidity + self._series_compliance[held]
             stiffness[held] = 1.0 / compliance
-        return stiffness
+        return frozen(stiffness)
 
 
 @final
@@ -246,13 +266,17 @@ class Posture(ReadOnlyState):
     gravity_stiffness: Array
     _frames: _kernels.Frames
 
+    def __repr__(self) -> str:
+        x, y, z = self.tip[:3, 3]
+        return f"<Posture of {self.arm.geometry.name}, tip at ({x:.4g}, {y:.4g}, {z:.4g}) m>"
+
     @cached_property
     def length_hessian(self) -> Array:
         """H_L[c, i, j] = ∂²L_c/∂θ_i∂θ_j, (C, nv, nv) [m/rad²], built on first use."""
         count, nv = self.length_jacobian.shape
         hessian = np.zeros((count, nv, nv))
         _kernels.add_length_hessian(
-            self.arm._routing, self._frames, frozen(np.ones(count)), np.arange(count), hessian
+            *self.arm._segments, *self._frames, frozen(np.ones(count)), np.arange(count), hessian
         )
         return frozen(hessian)
 
@@ -276,8 +300,8 @@ class Posture(ReadOnlyState):
     ) -> tuple[Array, Array, Array, Array]:
         """Active, passive, load and K_θ (nv, nv); of checked, read-only vectors."""
         active, passive, load, joint = _kernels.joint_stiffness(
-            self.arm._routing,
-            self._frames,
+            *self.arm._segments,
+            *self._frames,
             self.jacobian,
             self.length_jacobian,
             self.gravity_stiffness,
@@ -292,6 +316,15 @@ def _rebuild(
     geometry: Geometry, cables: tuple[Cable, ...], gravity: tuple[float, ...]
 ) -> Manipulator:
     return Manipulator(geometry, cables=cables, gravity=gravity)
+
+
+def _key(law: Elasticity) -> object:
+    """What equal laws share; an elasticity of the user's own need not be hashable."""
+    try:
+        hash(law)
+    except TypeError:
+        return id(law)
+    return law
 
 
 def _checked_cables(cables: Sequence[Cable]) -> tuple[Cable, ...]:

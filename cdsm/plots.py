@@ -16,7 +16,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from cdsm import paper
-from cdsm._checks import Array
+from cdsm._checks import Array, instance
+from cdsm.errors import InvalidInput
 from cdsm.manipulator import Posture
 from cdsm.tension import Tension
 
@@ -33,7 +34,13 @@ def plot_arm(pose: Posture, tension: Tension | None = None) -> Figure:
     Args:
         pose: The posture to draw.
         tension: Colours the cables by their tension [N] if given.
+
+    Raises:
+        InvalidInput: Not a posture, or not a tension of its arm.
     """
+    instance("pose", pose, Posture)
+    if tension is not None and instance("tension", tension, Tension).posture.arm != pose.arm:
+        raise InvalidInput("tension", "belongs to another arm than the posture.")
     figure = Figure(figsize=(7.0, 5.0), layout="constrained")
     axes: Any = figure.add_subplot(projection="3d")
     _draw_arm(axes, pose, tension)

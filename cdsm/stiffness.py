@@ -14,8 +14,8 @@ import html
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Literal, final, get_args
+from functools import cached_property, partial
+from typing import Literal, TypeVar, final, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -27,10 +27,18 @@ from cdsm.tension import Tension
 
 Term = Literal["active", "passive", "gravity", "load", "joint"]
 
+_Value = TypeVar("_Value")
+
 _NO_WRENCH = frozen(np.zeros(6))
 
-_RANK = 1e-10
-"""Singular values below this part of the largest are rounding, not motion."""
+_IMMOBILE = 1e-10
+"""Joint torque of a tip force below this part of the largest is rounding: the tip cannot move."""
+
+_FLAT = 1e-6
+"""Smallest ratio of the singular values of J for which a 3×3 stiffness still has 4 digits left.
+
+Its entries differ by the square of the ratio, and float64 holds 16 digits.
+"""
 
 
 @final
@@ -124,22 +132,25 @@ class Stiffness(ReadOnlyState):
         Raises:
             SingularStiffness: K_θ is singular: the arm is just about to buckle.
         """
-        jacobian = self.posture.jacobian
-        return frozen(jacobian @ self._solve(jacobian.T))
+        return frozen(self.posture.jacobian @ self._motion)
 
     @cached_property
     def cartesian(self) -> Array:
         """(C_vv)⁻¹ (3, 3) [N/m]: force per tip displacement, the tip free to rotate.
 
-        Its diagonal is the stiffness while the other two translations are *held*, a factor 2 to 4
-        above :meth:`along`.
+        Its diagonal is the stiffness while the other two translations are *held*, so it is never
+        below :meth:`along`, and often several times above.
 
         Raises:
-            SingularStiffness: The tip cannot move in some direction, which the error names; use
+            SingularStiffness: The tip can hardly move in some direction, which the error names; use
                 :meth:`along` for the others. Or K_θ is singular.
         """
-        self._require_mobile("the Cartesian stiffness matrix")
-        return frozen(np.linalg.inv(self.compliance[:3, :3]).astype(np.float64))
+        # through the singular values of J: C_vv itself is too ill-conditioned near a flat posture
+        left, values, right = self._mobility("the Cartesian stiffness matrix")
+        _ = self._motion  # refuses a singular K_θ
+        inner = right @ np.linalg.solve(self.joint, right.T)
+        outer = left / values
+        return frozen(outer @ np.linalg.inv(inner) @ outer.T)
 
     def along(self, direction: ArrayLike) -> float:
         """1/(uᵀ C_vv u) [N/m]: what a weight hung at the tip measures in direction u (Eq. 20).
@@ -159,14 +170,13 @@ class Stiffness(ReadOnlyState):
         torque = self._torque(u)
         if torque is None:
             return math.inf
-        return float(1.0 / (torque @ self._solve(torque)))
+        return float(1.0 / (torque @ self._motion[:, :3] @ u))
 
     def pseudoinverse(self, term: Term = "joint") -> Array:
         """J⁺ᵀ K J⁺ (3, 3) [N/m] with J the linear rows of J_X: the paper's K_R read literally.
 
-        It reproduces the paper's figures, and overestimates: the arm is stiffer in it than
-        :attr:`cartesian`, by 4 % to over 100 %, because it lets only the joint motion of least norm
-        happen.
+        It reproduces the paper's figures, and overestimates: in it the arm is stiffer than in
+        :attr:`cartesian`, by 4 % to over 100 %, since only the joint motion of least norm happens.
 
         Args:
             term: Which part of K_θ: ``"active"``, ``"passive"``, ``"gravity"``, ``"load"`` or the
@@ -174,11 +184,11 @@ class Stiffness(ReadOnlyState):
 
         Raises:
             UnknownName: No such term.
-            SingularStiffness: The tip cannot move in some direction, so J⁺ loses it.
+            SingularStiffness: The tip can hardly move in some direction, so J⁺ loses it.
         """
         matrix: Array = getattr(self, one_of("stiffness term", term, get_args(Term)))
-        self._require_mobile("the pseudo-inverse reading")
-        inverse = np.linalg.pinv(self.posture.jacobian[:3])
+        left, values, right = self._mobility("the pseudo-inverse reading")
+        inverse = (left / values @ right).T
         return frozen(inverse.T @ matrix @ inverse)
 
     def shares(self, direction: ArrayLike) -> Shares:
@@ -201,7 +211,7 @@ class Stiffness(ReadOnlyState):
                 f"the tip cannot move along {_written(u)}: nothing carries an infinite stiffness.",
                 u,
             )
-        motion = self._solve(torque)
+        motion = self._motion[:, :3] @ u
         motion = motion / (torque @ motion)
         pose = self.posture
         return Shares(
@@ -230,23 +240,26 @@ class Stiffness(ReadOnlyState):
     @property
     def _rows(self) -> list[tuple[str, ...]]:
         """The summary as a table: a header, then a name and three numbers a row."""
-        parts = {
-            "along": lambda u: self.along(u),
-            "  of it passive": lambda u: self.shares(u).passive.sum(),
-            "  of it active": lambda u: self.shares(u).active.sum(),
-            "  of it gravity": lambda u: self.shares(u).gravity,
-            "  of it load": lambda u: self.shares(u).load,
-            "cartesian, diagonal": lambda u: u @ self.cartesian @ u,
-            "pseudoinverse, diagonal": lambda u: u @ self.pseudoinverse() @ u,
+        axes = np.eye(3)
+        shares = [_or_none(partial(self.shares, u)) for u in axes]
+        diagonals = [_or_none(lambda: self.cartesian), _or_none(self.pseudoinverse)]
+        rows: dict[str, list[float | None]] = {
+            "along": [_or_none(partial(self.along, u)) for u in axes],
+            "  of it passive": [None if share is None else share.passive.sum() for share in shares],
+            "  of it active": [None if share is None else share.active.sum() for share in shares],
+            "  of it gravity": [None if share is None else share.gravity for share in shares],
+            "  of it load": [None if share is None else share.load for share in shares],
+            "cartesian, diagonal": _diagonal(diagonals[0]),
+            "pseudoinverse, diagonal": _diagonal(diagonals[1]),
         }
         return [
             ("stiffness [N/mm]", "x", "y", "z"),
-            *((name, *(_millimetres(part, u) for u in np.eye(3))) for name, part in parts.items()),
+            *((name, *map(_millimetres, values)) for name, values in rows.items()),
         ]
 
     @property
     def _verdict(self) -> str:
-        state = "stable" if self.is_stable else "UNSTABLE: the arm buckles"
+        state = "stable" if self.is_stable else "UNSTABLE: K_θ is not positive definite"
         return f"{state}, smallest joint stiffness {self.margin:.4g} N m/rad"
 
     @cached_property
@@ -258,29 +271,32 @@ class Stiffness(ReadOnlyState):
         """J_vᵀ u (nv,): joint torque of a unit force along u; None if it moves no joint."""
         linear = self.posture.jacobian[:3]
         torque = u @ linear
-        return torque if abs(torque).max() > _RANK * abs(linear).max() else None
+        return torque if abs(torque).max() > _IMMOBILE * abs(linear).max() else None
 
-    def _solve(self, torque: Array) -> Array:
-        """K_θ⁻¹ times a torque or several; refuses a singular K_θ."""
-        values = np.linalg.svd(self.joint, compute_uv=False)
+    @cached_property
+    def _motion(self) -> Array:
+        """K_θ⁻¹ J_Xᵀ (nv, 6): joint motion per wrench at the tip; refuses a singular K_θ."""
+        _, values, right = np.linalg.svd(self.joint)
         if not values[-1] > 1e-14 * values[0]:
+            direction = frozen(right[-1].astype(np.float64))
             raise SingularStiffness(
                 "K_θ is singular: the arm is just about to buckle in the joint motion "
-                f"{_written(self.critical_direction)}. Change the tensions or the posture.",
-                self.critical_direction,
+                f"{_written(direction)}. Change the tensions or the posture.",
+                direction,
             )
-        return np.linalg.solve(self.joint, torque).astype(np.float64)
+        return frozen(np.linalg.solve(self.joint, self.posture.jacobian.T).astype(np.float64))
 
-    def _require_mobile(self, what: str) -> None:
-        left, values, _ = np.linalg.svd(self.posture.jacobian[:3])
-        values = np.append(values, np.zeros(3 - values.size))
-        if values[2] <= _RANK * values[0]:
-            u = frozen(left[:, 2].copy())
+    def _mobility(self, what: str) -> tuple[Array, Array, Array]:
+        """Singular vectors and values of the linear rows of J; refuses a lack of motion."""
+        left, values, right = np.linalg.svd(self.posture.jacobian[:3], full_matrices=False)
+        if values.size < 3 or values[2] <= _FLAT * values[0]:
+            u = frozen(np.linalg.svd(self.posture.jacobian[:3])[0][:, 2].astype(np.float64))
             raise SingularStiffness(
                 f"{what} does not exist: the tip cannot move along {_written(u)}, where the "
-                "stiffness is infinite. Use along(direction), or bend the arm.",
+                "stiffness is infinite or nearly so. Use along(direction), or bend the arm.",
                 u,
             )
+        return left, values, right
 
 
 def stiffness(
@@ -322,7 +338,7 @@ def stiffness(
             raise InvalidInput(
                 "tension", f"{F[c]:g} N given for {arm.cables[c].name}; cables only pull."
             )
-    k = frozen(arm.cable_stiffness(pose.cable_lengths, F))
+    k = arm._cable_stiffness(pose.cable_lengths, F)
     active, passive, load, joint = pose._joint_stiffness(F, k, W)
     return Stiffness(
         posture=pose,
@@ -337,12 +353,20 @@ def stiffness(
     )
 
 
-def _millimetres(part: Callable[[Array], float], u: Array) -> str:
-    """A stiffness in N/mm for the summary, "-" where it does not exist."""
+def _or_none(read: Callable[[], _Value]) -> _Value | None:
+    """What is read, or None where it does not exist."""
     try:
-        return f"{part(u) / 1000.0:.4g}"
+        return read()
     except SingularStiffness:
-        return "-"
+        return None
+
+
+def _diagonal(matrix: Array | None) -> list[float | None]:
+    return [None] * 3 if matrix is None else np.diag(matrix).tolist()
+
+
+def _millimetres(stiffness: float | None) -> str:
+    return "-" if stiffness is None else f"{stiffness / 1000.0:.4g}"
 
 
 def _written(direction: Array) -> str:

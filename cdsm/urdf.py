@@ -112,12 +112,12 @@ def write_urdf(geometry: Geometry, path: str | os.PathLike[str]) -> Path:
 
     def fill(aside: Path) -> None:
         aside.write_bytes(text.encode())
-        _read_back(aside)
+        _read_back(aside, geometry.length)
 
     return write_file(path, fill)
 
 
-def _read_back(path: Path) -> None:
+def _read_back(path: Path, length: float) -> None:
     import yourdfpy
 
     ours = RigidBody(path.read_text(encoding="utf-8"), TIP, np.zeros(3))
@@ -132,7 +132,8 @@ def _read_back(path: Path) -> None:
         theirs.update_cfg(dict(zip(ours.joint_names, q, strict=True)))
         # the tip alone: every joint is on the way to it, and yourdfpy takes long to place a link
         difference = abs(ours.state(q).tip - theirs.get_transform(TIP, "base_link")).max()
-        if not difference < 1e-13 * (1 + ours.nv):  # rounding, once per joint multiplied through
+        # rounding, once per joint multiplied through, of rotations and of lengths
+        if not difference < 1e-13 * (1 + ours.nv) * max(1.0, length):
             raise UrdfError(
                 f"Pinocchio and yourdfpy disagree on the pose of the tip by {difference:.3g} at "
                 f"q = {q.tolist()}; the URDF is not written."

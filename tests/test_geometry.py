@@ -487,7 +487,7 @@ def test_writing_into_a_missing_folder_says_so(tmp_path: Path) -> None:
 
 def test_writing_onto_a_folder_is_refused_and_leaves_nothing(tmp_path: Path) -> None:
     (tmp_path / "arm.toml").mkdir()
-    with pytest.raises(cdsm.FileError, match="directory"):
+    with pytest.raises(cdsm.FileError, match="not a regular file"):
         general().write(tmp_path / "arm.toml")
     assert [entry.name for entry in tmp_path.iterdir()] == ["arm.toml"]
 

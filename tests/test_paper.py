@@ -10,11 +10,6 @@ from cdsm import paper, presets
 Results = dict[str, paper.Figure]
 
 
-@pytest.fixture(scope="module")
-def results() -> Results:
-    return {name: compute() for name, compute in paper.FIGURES.items()}
-
-
 def claims(results: Results, name: str, quantity: str) -> list[paper.Claim]:
     found = [claim for claim in results[name].claims if claim.quantity.startswith(quantity)]
     assert found

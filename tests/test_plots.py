@@ -24,9 +24,10 @@ def test_arm_is_drawn_with_disks_cables_and_equal_axes() -> None:
     np.testing.assert_allclose(limits / box, (limits / box)[0])
 
 
-def test_paper_figures_show_both_readings_in_newton_per_millimetre() -> None:
-    for compute in paper.FIGURES.values():
-        result = compute()
+def test_paper_figures_show_both_readings_in_newton_per_millimetre(
+    results: dict[str, paper.Figure],
+) -> None:
+    for result in results.values():
         figure = plots.plot_paper(result)
         labels = [axes.get_ylabel() for axes in figure.axes]
         for reading in ("paper's reading", "hung weight"):
@@ -34,8 +35,8 @@ def test_paper_figures_show_both_readings_in_newton_per_millimetre() -> None:
         figure.draw_without_rendering()
 
 
-def test_curves_are_drawn_where_they_are() -> None:
-    result = paper.FIGURES["fig6"]()
+def test_curves_are_drawn_where_they_are(results: dict[str, paper.Figure]) -> None:
+    result = results["fig6"]
     axes = plots.plot_paper(result).axes[0]
     x, y = np.asarray(axes.get_lines()[0].get_xydata(), dtype=np.float64).T
     np.testing.assert_allclose(x, result.curves[0].tension[:, 1])

@@ -22,7 +22,7 @@ import numpy as np
 import pytest
 
 import cdsm
-from cdsm import errors
+from cdsm import _kernels, errors
 from cdsm._checks import Array
 from tests.arms import STEEL, mixed_arm, random_arm, random_posture, random_tension, random_wrench
 
@@ -501,3 +501,35 @@ random_posture(mixed_arm(), 3)
 def test_kernels_compile_where_no_cache_can_be_written() -> None:
     command = [sys.executable, "-c", NO_CACHE]
     subprocess.run(command, cwd=ROOT, timeout=120, check=True)
+
+
+def test_pickled_values_carry_their_fields_alone() -> None:
+    pose = random_posture(mixed_arm(), 3)
+    stiff = cdsm.stiffness(pose, random_tension(pose.arm, 3))
+    before = len(pickle.dumps(stiff))
+    assert str(stiff)
+    assert pose.length_hessian.size
+    assert len(pickle.dumps(stiff)) == before
+
+
+def test_unpickled_posture_needs_no_new_compilation() -> None:
+    pose = random_posture(mixed_arm(), 3)
+    tension = random_tension(pose.arm, 3)
+    cdsm.stiffness(pose, tension)
+    kernels = [_kernels.joint_stiffness, _kernels.add_length_hessian, _kernels.evaluate]
+    compiled = [len(kernel.signatures) for kernel in kernels]  # type: ignore[attr-defined]
+    again = pickle.loads(pickle.dumps(pose))
+    np.testing.assert_array_equal(
+        cdsm.stiffness(again, tension).joint, cdsm.stiffness(pose, tension).joint
+    )
+    assert again.length_hessian.size
+    assert [len(kernel.signatures) for kernel in kernels] == compiled  # type: ignore[attr-defined]
+
+
+def test_tension_from_another_process_fits_the_posture_at_hand() -> None:
+    pose = random_posture(mixed_arm(), 3)
+    pull = cdsm.distribute_tension(pose, 10.0)
+    again = pickle.loads(pickle.dumps(pull))
+    np.testing.assert_array_equal(
+        cdsm.stiffness(pose, again).joint, cdsm.stiffness(pose, pull).joint
+    )

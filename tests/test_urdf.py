@@ -439,7 +439,7 @@ def test_urdf_into_a_missing_folder_or_onto_a_folder_is_a_file_error(tmp_path: P
     with pytest.raises(cdsm.FileError, match="does not exist; create it"):
         cdsm.write_urdf(mixed_arm().geometry, tmp_path / "nowhere" / "arm.urdf")
     (tmp_path / "folder").mkdir()
-    with pytest.raises(cdsm.FileError, match="directory"):
+    with pytest.raises(cdsm.FileError, match="not a regular file"):
         cdsm.write_urdf(mixed_arm().geometry, tmp_path / "folder")
     assert [entry.name for entry in tmp_path.iterdir()] == ["folder"]
 

@@ -69,6 +69,7 @@ class Claim:
         computed: Ours, in the paper's reading.
         along: Ours, for a weight hung at the tip.
         assumption: What the paper leaves open and we chose.
+        at_most: Whether the paper's number is an upper bound.
     """
 
     figure: str
@@ -78,11 +79,12 @@ class Claim:
     computed: tuple[float, ...]
     along: tuple[float, ...]
     assumption: str
+    at_most: bool = False
 
     @property
     def difference(self) -> tuple[float, ...] | None:
-        """Computed minus the paper's, in :attr:`unit`; None where the paper gives no numbers."""
-        if self.paper is None:
+        """Computed minus the paper's, in :attr:`unit`; None where that means nothing."""
+        if self.paper is None or self.at_most:
             return None
         return tuple(ours - theirs for ours, theirs in zip(self.computed, self.paper, strict=True))
 
@@ -150,6 +152,7 @@ def figure_3() -> Figure:
                     unit="%",
                     paper=(1.5,),
                     assumption=f"solid wire of 1.2 mm, {curve.label}",
+                    at_most=True,
                 )
                 for curve in curves
             ),
@@ -367,6 +370,7 @@ def _claim(
     unit: str,
     paper: tuple[float, ...] | None,
     assumption: str,
+    at_most: bool = False,
 ) -> Claim:
     """A claim about one curve, measured alike in both readings."""
     return Claim(
@@ -377,6 +381,7 @@ def _claim(
         computed=tuple(measure(curve.pseudoinverse, curve.pseudoinverse_part).tolist()),
         along=tuple(measure(curve.along, curve.along_part).tolist()),
         assumption=assumption,
+        at_most=at_most,
     )
 
 

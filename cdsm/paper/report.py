@@ -24,7 +24,7 @@ def to_rows(results: Sequence[Figure]) -> list[tuple[str, ...]]:
         (
             claim.figure,
             f"{claim.quantity} [{claim.unit}]",
-            _numbers(claim.paper, ".4g"),
+            ("≤ " if claim.at_most else "") + _numbers(claim.paper, ".4g"),
             _numbers(claim.computed, ".3g"),
             _numbers(claim.difference, "+.2g"),
             _numbers(claim.along, ".3g"),

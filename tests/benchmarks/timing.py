@@ -17,8 +17,8 @@ def speed_ratio(
     fast: Callable[[], object],
     *,
     slow_repeat: int = 1,
-    fast_repeat: int = 300,
-    rounds: int = 15,
+    fast_repeat: int = 200,
+    rounds: int = 30,
 ) -> float:
     """How many times longer ``slow`` takes than ``fast``: best against best of alternating rounds.
 
