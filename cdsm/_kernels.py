@@ -31,7 +31,7 @@ SHORTEST_SEGMENT = 1e-9
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 
-def _compiled(function: _Function) -> _Function:
+def compiled(function: _Function) -> _Function:
     """Compile for speed, once for all runs if there is a place to keep the result.
 
     No fastmath: it may drop NaN. Divisions are not guarded: none here is by zero.
@@ -94,7 +94,7 @@ class Frames(NamedTuple):
     site: Array
 
 
-@_compiled
+@compiled
 def place(
     parent: Indices,
     rotation: Array,
@@ -137,7 +137,7 @@ def place(
     return o, z, x
 
 
-@_compiled
+@compiled
 def _axis_rotation(axis: Array, row: int, angle: float, out: Array) -> None:
     """Rodrigues' formula for one row of axes."""
     s, c = math.sin(angle), math.cos(angle)
@@ -151,7 +151,7 @@ def _axis_rotation(axis: Array, row: int, angle: float, out: Array) -> None:
         out[i, j] -= s * axis[row, m]
 
 
-@_compiled
+@compiled
 def _direction(site: Array, a: int, b: int) -> tuple[float, float, float, float]:
     """Unit vector from site a to site b, and their distance; zeros if they coincide."""
     x = site[b, 0] - site[a, 0]
@@ -163,7 +163,7 @@ def _direction(site: Array, a: int, b: int) -> tuple[float, float, float, float]
     return x / length, y / length, z / length, length
 
 
-@_compiled
+@compiled
 def _derivative(
     origin: Array, axis: Array, site: Array, joint: int, a: int, b: int
 ) -> tuple[float, float, float]:
@@ -176,7 +176,7 @@ def _derivative(
     return side * (zy * rz - zz * ry), side * (zz * rx - zx * rz), side * (zx * ry - zy * rx)
 
 
-@_compiled
+@compiled
 def evaluate(
     parent: Indices,
     rotation: Array,
@@ -212,7 +212,7 @@ def evaluate(
     return origin, axis, site, lengths, length_jacobian, -1
 
 
-@_compiled
+@compiled
 def add_length_hessian(
     segment: Indices,
     joint: Indices,
@@ -256,7 +256,7 @@ def add_length_hessian(
                     hessian[k, j - 1, i - 1] += value
 
 
-@_compiled
+@compiled
 def joint_stiffness(
     segment: Indices,
     joint: Indices,
@@ -291,98 +291,7 @@ def joint_stiffness(
     return active[0], passive, load, active[0] + passive + gravity + load
 
 
-class Scaled(NamedTuple):
-    """The balance of an arm, J_Lᵀ F = J_Xᵀ W − g with low ≤ F ≤ high, made dimensionless.
-
-    Attributes:
-        A: J_Lᵀ over the largest moment arm (nv, C).
-        b: Torque over moment arm and force (nv,).
-        low: Lower bounds over force (C,).
-        high: Upper bounds over force (C,).
-        arm: Largest moment arm [m], up to the next power of two, so that scaling rounds nothing.
-        force: Largest of the lower bounds and of torque over moment arm [N], likewise.
-    """
-
-    A: Array
-    b: Array
-    low: Array
-    high: Array
-    arm: float
-    force: float
-
-
-@_compiled
-def scaled_balance(
-    length_jacobian: Array, torque: Array, low: Array, high: Array
-) -> tuple[Array, Array, Array, Array, float, float]:
-    """Return the fields of :class:`Scaled`."""
-    count, nv = length_jacobian.shape
-    largest = 0.0
-    A = np.empty((nv, count))
-    for c in range(count):
-        for i in range(nv):
-            A[i, c] = length_jacobian[c, i]
-            largest = max(largest, abs(A[i, c]))
-    arm = _power_of_two(largest)
-    largest = 0.0
-    for i in range(nv):
-        largest = max(largest, abs(torque[i]) / arm)
-    for c in range(count):
-        largest = max(largest, low[c])
-    force = _power_of_two(largest)
-    return A / arm, torque / (arm * force), low / force, high / force, arm, force
-
-
-@_compiled
-def _power_of_two(value: float) -> float:
-    """The power of two next above a magnitude; 1 for zero."""
-    return 2.0 ** math.ceil(math.log2(value)) if value > 0.0 else 1.0
-
-
-@_compiled
-def optimality(
-    A: Array, b: Array, low: Array, high: Array, x: Array, y: Array, z: Array
-) -> tuple[float, float, float]:
-    """How far x is from solving min ½‖x‖² so that A x = b, low ≤ x ≤ high.
-
-    Args:
-        A: (m, n).
-        b: (m,).
-        low: (n,).
-        high: (n,), may hold inf.
-        x: The point (n,).
-        y: Multipliers of the equations (m,).
-        z: Multipliers of the bounds (n,): negative at low, positive at high.
-
-    Returns:
-        Largest violation of the constraints, largest entry of x + Aᵀy + z (or of z⁺ where high is
-        infinite), and the duality gap |xᵀx + bᵀy + lowᵀz⁻ + highᵀz⁺|: all zero exactly at the
-        optimum.
-    """
-    primal = dual = gap = 0.0
-    for i in range(b.shape[0]):
-        residual = -b[i]
-        for j in range(x.shape[0]):
-            residual += A[i, j] * x[j]
-        primal = max(primal, abs(residual))
-        gap += b[i] * y[i]
-    for j in range(x.shape[0]):
-        primal = max(primal, low[j] - x[j], x[j] - high[j])
-        slope = x[j] + z[j]
-        for i in range(b.shape[0]):
-            slope += A[i, j] * y[i]
-        dual = max(dual, abs(slope))
-        gap += x[j] * x[j]
-        if z[j] < 0.0:
-            gap += low[j] * z[j]
-        elif high[j] < np.inf:
-            gap += high[j] * z[j]
-        else:
-            dual = max(dual, z[j])  # a bound that is not there has no multiplier
-    return primal, dual, abs(gap)
-
-
-@_compiled
+@compiled
 def load_stiffness(jacobian: Array, wrench: Array) -> Array:
     """−∂(J_Xᵀ W)/∂θ (nv, nv) of a dead wrench W (6,): row torque, column angle.
 

@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike
 from scipy.optimize import linprog
 from scipy.sparse import csc_matrix
 
-from cdsm import _kernels
+from cdsm import _balance
 from cdsm._checks import Array, ReadOnlyState, bound, frozen, instance, one_of, vector
 from cdsm.errors import InfeasibleTension, InvalidInput, SolverError
 from cdsm.manipulator import Posture
@@ -130,7 +130,7 @@ def distribute_tension(
     wrench = vector("wrench", wrench, 6, "force [N], then moment [N m], base axes")
     torque = pose.jacobian.T @ wrench - pose.gravity_torque
 
-    problem = _kernels.Scaled(*_kernels.scaled_balance(pose.length_jacobian, torque, low, high))
+    problem = _balance.Scaled(*_balance.scaled_balance(pose.length_jacobian, torque, low, high))
     solution = _solve(problem, solver)
     if solution is None:
         _explain(pose, problem, solver)
@@ -169,7 +169,7 @@ def _checked_bounds(pose: Posture, low: Array, maximum: ArrayLike) -> tuple[Arra
     return low, high
 
 
-def _solve(problem: _kernels.Scaled, solver: str) -> Array | None:
+def _solve(problem: _balance.Scaled, solver: str) -> Array | None:
     """Return the verified optimum; None if the solver finds no solution."""
     one_of("installed solver", solver, qpsolvers.available_solvers)
     A, b, low, high, *_ = problem
@@ -205,10 +205,10 @@ def _solve(problem: _kernels.Scaled, solver: str) -> Array | None:
     return point[0]
 
 
-def _shortfall(problem: _kernels.Scaled, point: tuple[Array, ...]) -> str:
+def _shortfall(problem: _balance.Scaled, point: tuple[Array, ...]) -> str:
     """What keeps a point and its multipliers from being the optimum; nothing if they are."""
     # the same as the solution's primal_residual, dual_residual and duality_gap, ten times faster
-    primal, dual, gap = _kernels.optimality(*problem[:4], *point)
+    primal, dual, gap = _balance.optimality(*problem[:4], *point)
     size = max(1.0, float(abs(point[0]).max()))
     distance = math.sqrt(2.0 * gap)  # ½‖x − x*‖² is at most the gap
     if max(primal, dual) <= OPTIMALITY * size and distance <= DISTANCE * size:
@@ -220,7 +220,7 @@ def _shortfall(problem: _kernels.Scaled, point: tuple[Array, ...]) -> str:
     )
 
 
-def _polished(problem: _kernels.Scaled, point: tuple[Array, ...]) -> tuple[Array, ...]:
+def _polished(problem: _balance.Scaled, point: tuple[Array, ...]) -> tuple[Array, ...]:
     """Solve the optimality conditions exactly for the bounds that a near-optimum makes active."""
     A, b, low, high, *_ = problem
     x, _, z = point
@@ -234,7 +234,7 @@ def _polished(problem: _kernels.Scaled, point: tuple[Array, ...]) -> tuple[Array
     return x, y, z
 
 
-def _explain(pose: Posture, problem: _kernels.Scaled, solver: str) -> NoReturn:
+def _explain(pose: Posture, problem: _balance.Scaled, solver: str) -> NoReturn:
     """Settle by linear programs why a solver found no tensions, and raise it.
 
     Raises:

@@ -12,7 +12,7 @@ import qpsolvers
 from scipy.optimize import linprog
 
 import cdsm
-from cdsm import _kernels
+from cdsm import _balance
 from cdsm._checks import Array
 from cdsm.tension import _shortfall
 from tests.arms import STEEL, mixed_arm, random_arm, random_posture, random_tension, random_wrench
@@ -928,7 +928,7 @@ MENDABLE = ("balance is broken", "not the least")
 def test_every_optimality_condition_is_checked() -> None:
     A = POSE.length_jacobian.T
     low, high = np.full(A.shape[1], 10.0), np.full(A.shape[1], INF)
-    problem = _kernels.Scaled(A / 0.01, -POSE.gravity_torque / 0.01, low, high, 0.01, 1.0)
+    problem = _balance.Scaled(A / 0.01, -POSE.gravity_torque / 0.01, low, high, 0.01, 1.0)
     qp = qpsolvers.Problem(
         np.eye(low.size), np.zeros(low.size), A=problem.A, b=problem.b, lb=low, ub=high
     )
@@ -945,7 +945,7 @@ def test_every_optimality_condition_is_checked() -> None:
     ):
         assert _shortfall(problem, wrong)
     # and as qpsolvers itself measures
-    ours = _kernels.optimality(*problem[:4], x, y + 1e-3, z)
+    ours = _balance.optimality(*problem[:4], x, y + 1e-3, z)
     solution.y = y + 1e-3
     theirs = (solution.primal_residual(), solution.dual_residual(), solution.duality_gap())
     np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-12)
