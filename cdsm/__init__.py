@@ -13,7 +13,7 @@ from importlib.metadata import version as _version
 
 from cdsm import presets
 from cdsm.cable import Cable, Site, serpentine_cables
-from cdsm.elasticity import Domain, Elasticity, LinearElasticity, StrandElasticity
+from cdsm.elasticity import Domain, Elasticity, LinearElasticity
 from cdsm.errors import (
     CableError,
     CdsmError,
@@ -34,6 +34,7 @@ from cdsm.parts import CableRoute, Joint, Link
 from cdsm.stiffness import Shares, Stiffness, stiffness
 from cdsm.tension import Tension, distribute_tension
 from cdsm.urdf import to_urdf, write_urdf
+from cdsm.wire import StrandElasticity, TabulatedElasticity
 
 __version__ = _version("cdsm-stiffness")
 
@@ -62,6 +63,7 @@ __all__ = [
     "SolverError",
     "Stiffness",
     "StrandElasticity",
+    "TabulatedElasticity",
     "Tension",
     "UnknownName",
     "UrdfError",

@@ -10,15 +10,12 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import final
 
 import numpy as np
-from numpy.polynomial import Polynomial
 from numpy.typing import ArrayLike
-from scipy.integrate import quad_vec
 
-from cdsm._checks import SMALLEST, Array, number_array, scalar
+from cdsm._checks import LARGEST, SMALLEST, Array, number_array, scalar
 from cdsm.errors import ElasticityRangeError, InvalidInput
 
 
@@ -113,6 +110,59 @@ class Elasticity(ABC):
             ElasticityRangeError: As for :meth:`rigidity`.
         """
 
+    @abstractmethod
+    def energy(self, tension: ArrayLike) -> Array:
+        r"""Elastic energy ∫ F dε = ∫ F dF/EA(F) [N] = [J/m] per metre of free length.
+
+        Counted, like :meth:`strain`, from the low end of the domain.
+
+        Args:
+            tension: F [N], any shape.
+
+        Raises:
+            ElasticityRangeError: As for :meth:`rigidity`.
+        """
+
+    def tension(self, strain: ArrayLike) -> Array:
+        r"""Tension F [N] at a strain: the inverse of :meth:`strain`.
+
+        Args:
+            strain: Δl/l_0 [-] since the low end of the domain, any shape.
+
+        Raises:
+            InvalidInput: Not numbers.
+            ElasticityRangeError: A strain that no tension of the domain gives.
+        """
+        wanted = number_array("strain", strain)
+        low, high = self.domain
+        if math.isinf(high):  # as far as needed: strain grows without bound, or is refused below
+            high = max(1.0, 2.0 * low)
+            while float(self.strain(high)) < wanted.max(initial=0.0) and high < LARGEST:
+                high = min(2.0 * high, LARGEST)
+        most = float(self.strain(high))
+        outside = (wanted < 0.0) | (wanted > most)
+        if outside.any():
+            raise ElasticityRangeError(
+                f"no tension of the domain {self.domain} gives the strain "
+                f"{np.atleast_1d(wanted)[np.atleast_1d(outside)][0]:.6g}; it reaches {most:.6g}.",
+                [high],
+                np.flatnonzero(outside).tolist(),
+            )
+        lower, upper = np.full_like(wanted, low), np.full_like(wanted, high)
+        guess = low + (high - low) * wanted / (most or 1.0)
+        inside = np.nextafter(low, math.inf) if not self.domain.low_included else low
+        for _ in range(200):  # Newton, kept inside a shrinking bracket
+            guess = np.clip(guess, inside, high)
+            error = np.asarray(self.strain(guess)) - wanted
+            lower = np.where(error <= 0.0, guess, lower)
+            upper = np.where(error >= 0.0, guess, upper)
+            step = error * self.rigidity(guess)
+            if (abs(step) <= 4e-16 * np.maximum(guess, 1.0)).all():
+                break
+            guess = guess - step
+            guess = np.where((guess < lower) | (guess > upper), (lower + upper) / 2.0, guess)
+        return guess
+
     def secant_rigidity(self, tension: ArrayLike) -> Array:
         r"""Secant rigidity ΔF/(Δl/l_0) [N] of Eq. 18, both Δ taken from the low end of the domain.
 
@@ -190,161 +240,6 @@ class LinearElasticity(Elasticity):
         """F/EA [-]; see :meth:`Elasticity.strain`."""
         return self.domain.check(tension) / self._rigidity
 
-
-@final
-@dataclass(frozen=True)
-class StrandElasticity(Elasticity):
-    """EA(F) as polynomials in the tension, one per range: the form of Eq. 19.
-
-    The polynomials are read as the *tangent* rigidity. Read as the secant of Eq. 18 they would need
-    the tangent S²/(S − F S'), which is negative wherever S grows faster than F: for Eq. 19 that is
-    the whole range up to 31 N, so that reading is not offered.
-
-    Attributes:
-        coefficients: One tuple per range, lowest power first [N, 1, 1/N, …].
-        joins: Tension [N] at which each range ends and the next begins; a join belongs to the
-            range below it. One fewer than the ranges.
-        low: Low end of the domain [N], excluded.
-        high: High end of the domain [N], included.
-
-    Raises:
-        InvalidInput: Numbers or their count do not fit, or the tensions do not rise.
-    """
-
-    coefficients: tuple[tuple[float, ...], ...]
-    joins: tuple[float, ...]
-    low: float
-    high: float
-
-    def __post_init__(self) -> None:
-        if not all(isinstance(each, (list, tuple)) for each in (self.coefficients, self.joins)):
-            raise InvalidInput("coefficients", "give a tuple for each range, and a tuple of joins.")
-        rows = tuple(tuple(_row("coefficients", row)) for row in self.coefficients)
-        joins = tuple(_row("joins", self.joins))
-        edges = (scalar("low", self.low), *joins, scalar("high", self.high))
-        if not rows or not all(rows):
-            raise InvalidInput("coefficients", "need at least one range with one coefficient.")
-        if len(joins) != len(rows) - 1:
-            raise InvalidInput(
-                "joins", f"{len(joins)} given for {len(rows)} ranges; {len(rows) - 1} needed."
-            )
-        if edges[0] < 0.0 or any(a >= b for a, b in pairwise(edges)):
-            raise InvalidInput("joins", f"0 <= low < joins < high must rise, but are {edges} N.")
-        object.__setattr__(self, "coefficients", rows)
-        object.__setattr__(self, "joins", joins)
-
-    @classmethod
-    def eq19_repaired(cls) -> StrandElasticity:
-        """Eq. 19 with its first coefficient read as −1e-4: a 1×19 strand of 1.2 mm.
-
-        The printed −1e-3 gives −787 884 N at 31 N, where the other branch gives 11 352 N; −1e-4
-        gives 10 870 N and rises all the way, so it is almost surely what was meant. Even so the
-        polynomial is negative below 2.11 N and steps up by 4.4 % at 31 N, and it keeps rising to
-        810 N and beyond, where the text says the strand yields: hence the domain (2.2 N, 810 N].
-        """
-        return cls._eq19(-1e-4)
-
-    @classmethod
-    def eq19_as_printed(cls) -> StrandElasticity:
-        """Eq. 19 exactly as printed, for comparison: it has no positive rigidity from 11 to 31 N.
-
-        See :meth:`eq19_repaired`, which is the one to compute with.
-        """
-        return cls._eq19(-1e-3)
-
-    @classmethod
-    def _eq19(cls, first: float) -> StrandElasticity:
-        return cls(
-            coefficients=(
-                (-556.89, 377.99, -70.49, 8.74, -0.46, 1.12e-2, first),
-                (-1924.5, 493.35, -2.26, 0.0054, -6.94e-6, 4.58e-9, -1.22e-12),
-            ),
-            joins=(31.0,),
-            low=2.2,
-            high=810.0,
-        )
-
-    @property
-    def domain(self) -> Domain:
-        """(low, high]."""
-        return Domain(self.low, self.high, low_included=False)
-
-    def polynomial(self, tension: ArrayLike) -> Array:
-        """The bare polynomials [N], unchecked: for plots and for seeing what a misprint does.
-
-        Args:
-            tension: F [N], any shape; the outer ranges extend beyond the domain.
-
-        Raises:
-            InvalidInput: Not finite numbers.
-        """
-        values = number_array("tension", tension)
-        piece = np.searchsorted(self.joins, values, side="left")
-        result = np.empty_like(values)
-        for index, row in enumerate(self.coefficients):
-            here = piece == index
-            result[here] = np.polyval(row[::-1], values[here])
-        return result
-
-    def rigidity(self, tension: ArrayLike) -> Array:
-        """EA(F) [N] of Eq. 19; see :meth:`Elasticity.rigidity`."""
-        values = self.domain.check(tension)
-        result = self.polynomial(values)
-        if not (result > 0.0).all():
-            bad = np.flatnonzero(result <= 0.0)
-            raise ElasticityRangeError(
-                f"the polynomial gives {result.ravel()[bad[0]]:.6g} N, and a rigidity must be "
-                "positive. If this is Eq. 19 as printed, use StrandElasticity.eq19_repaired().",
-                values.ravel()[bad].tolist(),
-                bad.tolist(),
-            )
-        return result
-
-    def strain(self, tension: ArrayLike) -> Array:
-        """∫ dF/EA(F) [-], by adaptive quadrature; see :meth:`Elasticity.strain`."""
-        values = self.domain.check(tension)
-        total = np.zeros_like(values)
-        edges = (self.low, *self.joins, self.high)
-        for row, (start, end) in zip(self.coefficients, pairwise(edges), strict=True):
-            polynomial = Polynomial(row)
-            upper = np.clip(values, start, end)
-            self._require_positive(polynomial, start, upper)
-            if upper.size == 0 or upper.max() <= start:
-                continue
-
-            def integrand(
-                x: float, p: Polynomial = polynomial, start: float = start, upper: Array = upper
-            ) -> Array:
-                # in logarithmic steps from where EA is small: F = start + (upper - start) x³
-                width = upper - start
-                return np.asarray(3.0 * x**2 * width / p(start + width * x**3))
-
-            total = total + quad_vec(integrand, 0.0, 1.0, epsabs=0.0, epsrel=1e-14, norm="max")[0]
-        return np.asarray(total)
-
-    @staticmethod
-    def _require_positive(polynomial: Polynomial, start: float, upper: Array) -> None:
-        """Refuse to integrate over tensions where the polynomial falls to zero or below."""
-        turns = polynomial.trim().deriv().roots().real
-        points = np.array([start, *turns[(turns > start) & (turns < upper.max(initial=start))]])
-        scale = abs(polynomial(points)).max(initial=0.0)
-        lowest = polynomial(points) <= 1e-12 * scale
-        bad = polynomial(upper) <= 0.0
-        if lowest.any():
-            bad |= upper >= points[lowest].min()
-        bad &= upper > start
-        if bad.any():
-            raise ElasticityRangeError(
-                "the rigidity is not positive everywhere below, so there is no strain. If this is "
-                "Eq. 19 as printed, use StrandElasticity.eq19_repaired().",
-                np.atleast_1d(upper)[np.atleast_1d(bad)].tolist(),
-                np.flatnonzero(bad).tolist(),
-            )
-
-
-def _row(name: str, values: ArrayLike) -> list[float]:
-    numbers = number_array(name, values)
-    if numbers.ndim != 1:
-        raise InvalidInput(name, f"{values!r} given; a sequence of numbers is needed.")
-    row: list[float] = numbers.tolist()
-    return row
+    def energy(self, tension: ArrayLike) -> Array:
+        """F²/(2 EA) [N]; see :meth:`Elasticity.energy`."""
+        return np.asarray(self.domain.check(tension) ** 2 / (2.0 * self._rigidity))

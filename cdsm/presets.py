@@ -10,9 +10,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm.elasticity import Elasticity, LinearElasticity, StrandElasticity
+from cdsm.elasticity import Elasticity, LinearElasticity
 from cdsm.geometry import Geometry
 from cdsm.manipulator import Manipulator
+from cdsm.wire import StrandElasticity
 
 STRAND_1X19: Final = StrandElasticity.eq19_repaired()
 """The 1×19 steel strand of 1.2 mm of Section IV-C: Eq. 19, repaired."""

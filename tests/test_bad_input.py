@@ -1044,6 +1044,9 @@ class Own(cdsm.Elasticity):
     def strain(self, tension: Any) -> Array:
         raise AssertionError("not needed for stiffness")
 
+    def energy(self, tension: Any) -> Array:
+        raise AssertionError("not needed for stiffness")
+
 
 def test_own_elasticity_need_not_be_hashable() -> None:
     arm = cdsm.Manipulator(GEOMETRY, Own(lambda tension: 1e3 + tension))

@@ -16,10 +16,11 @@ from scipy.optimize import brentq
 
 from cdsm import presets
 from cdsm._checks import Array, frozen
-from cdsm.elasticity import LinearElasticity, StrandElasticity
+from cdsm.elasticity import LinearElasticity
 from cdsm.manipulator import Manipulator, Posture
 from cdsm.stiffness import Stiffness, stiffness
 from cdsm.tension import distribute_tension
+from cdsm.wire import StrandElasticity
 
 Part = Literal["active", "passive"]
 
