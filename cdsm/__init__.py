@@ -12,7 +12,7 @@ SI units throughout; base frame with x along the straight arm.
 from importlib.metadata import version as _version
 
 from cdsm import presets
-from cdsm.cable import Cable, Site, serpentine_cables
+from cdsm.cable import Cable, Site, in_series, serpentine_cables
 from cdsm.elasticity import Domain, Elasticity, LinearElasticity
 from cdsm.errors import (
     CableError,
@@ -68,6 +68,7 @@ __all__ = [
     "UnknownName",
     "UrdfError",
     "distribute_tension",
+    "in_series",
     "presets",
     "serpentine_cables",
     "stiffness",

@@ -7,8 +7,21 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, final, get_args
 
-from cdsm._checks import SMALLEST, instance, one_of, scalar, sequence_of, vector
-from cdsm.elasticity import Elasticity
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cdsm._checks import (
+    SMALLEST,
+    Array,
+    bound,
+    instance,
+    number_array,
+    one_of,
+    scalar,
+    sequence_of,
+    vector,
+)
+from cdsm.elasticity import Elasticity, tension_at
 from cdsm.errors import CableError, CdsmError, InvalidInput
 from cdsm.geometry import Geometry
 
@@ -94,6 +107,97 @@ class Cable:
         object.__setattr__(self, "sites", sites)
         object.__setattr__(self, "lead", lead)
         object.__setattr__(self, "series_stiffness", series)
+
+    def elongation(self, tension: ArrayLike, free_length: float) -> Array:
+        """Δl = l_0 ε(F) + ΔF/k_series [m], from the low end of the elasticity's domain.
+
+        Wire and series spring carry the same tension and stretch each on its own: a hybrid cable
+        (Fig. 11), or a wire on a compliant drive.
+
+        Args:
+            tension: F [N], any shape.
+            free_length: l_0 of the wire [m].
+
+        Raises:
+            InvalidInput: The length is not a positive number.
+            ElasticityRangeError: A tension outside the domain of the elasticity.
+        """
+        values = self.elasticity.domain.check(tension)
+        wire = _length(free_length) * self.elasticity.strain(values)
+        return np.asarray(wire + (values - self.elasticity.domain.low) / self.series_stiffness)
+
+    def tangent_stiffness(self, tension: ArrayLike, free_length: float) -> Array:
+        """dF/dΔl = 1/(l_0/EA(F) + 1/k_series) [N/m], whatever the motor controls.
+
+        Args:
+            tension: F [N], any shape.
+            free_length: l_0 of the wire [m].
+
+        Raises:
+            InvalidInput: The length is not a positive number.
+            ElasticityRangeError: A tension outside the domain of the elasticity.
+        """
+        rigidity = self.elasticity.rigidity(tension)
+        return np.asarray(1.0 / (_length(free_length) / rigidity + 1.0 / self.series_stiffness))
+
+    def energy(self, tension: ArrayLike, free_length: float) -> Array:
+        """∫ F dΔl = l_0 ∫ F dε + Δ(F²)/(2 k_series) [J], from the low end of the domain.
+
+        Args:
+            tension: F [N], any shape.
+            free_length: l_0 of the wire [m].
+
+        Raises:
+            InvalidInput: The length is not a positive number.
+            ElasticityRangeError: A tension outside the domain of the elasticity.
+        """
+        values = self.elasticity.domain.check(tension)
+        spring = (values**2 - self.elasticity.domain.low**2) / (2.0 * self.series_stiffness)
+        return np.asarray(_length(free_length) * self.elasticity.energy(values) + spring)
+
+    def tension(self, elongation: ArrayLike, free_length: float) -> Array:
+        """F [N] at an elongation: the inverse of :meth:`elongation`.
+
+        Args:
+            elongation: Δl [m] from the low end of the elasticity's domain, any shape.
+            free_length: l_0 of the wire [m].
+
+        Raises:
+            InvalidInput: Not numbers, or the length is not positive.
+            ElasticityRangeError: An elongation that no tension of the domain gives.
+        """
+        return tension_at(
+            number_array("elongation", elongation),
+            self.elasticity.domain,
+            lambda F: self.elongation(F, free_length),
+            lambda F: 1.0 / self.tangent_stiffness(F, free_length),
+            "elongation",
+        )
+
+
+def _length(value: float) -> float:
+    length = scalar("free_length", value)
+    if length <= 0.0:
+        raise InvalidInput("free_length", f"{length:g} m given; it must be positive.")
+    return length
+
+
+def in_series(*stiffness: float) -> float:
+    """Stiffness of springs in series, 1/Σ(1/k) [N/m]: of a spring behind a compliant drive, say.
+
+    Args:
+        stiffness: One or more k [N/m], each positive; inf for a rigid one.
+
+    Raises:
+        InvalidInput: One of them is not positive, or none is given.
+    """
+    if not stiffness:
+        raise InvalidInput("stiffness", "none given; give one or more in N/m.")
+    springs = bound("stiffness", stiffness, len(stiffness))
+    if (springs < SMALLEST).any():
+        raise InvalidInput("stiffness", f"{springs.tolist()} N/m given; each must be positive.")
+    compliance = float((1.0 / springs).sum())
+    return 1.0 / compliance if compliance > 0.0 else math.inf
 
 
 def serpentine_cables(

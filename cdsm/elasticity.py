@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import final
 
@@ -134,34 +134,9 @@ class Elasticity(ABC):
             ElasticityRangeError: A strain that no tension of the domain gives.
         """
         wanted = number_array("strain", strain)
-        low, high = self.domain
-        if math.isinf(high):  # as far as needed: strain grows without bound, or is refused below
-            high = max(1.0, 2.0 * low)
-            while float(self.strain(high)) < wanted.max(initial=0.0) and high < LARGEST:
-                high = min(2.0 * high, LARGEST)
-        most = float(self.strain(high))
-        outside = (wanted < 0.0) | (wanted > most)
-        if outside.any():
-            raise ElasticityRangeError(
-                f"no tension of the domain {self.domain} gives the strain "
-                f"{np.atleast_1d(wanted)[np.atleast_1d(outside)][0]:.6g}; it reaches {most:.6g}.",
-                [high],
-                np.flatnonzero(outside).tolist(),
-            )
-        lower, upper = np.full_like(wanted, low), np.full_like(wanted, high)
-        guess = low + (high - low) * wanted / (most or 1.0)
-        inside = np.nextafter(low, math.inf) if not self.domain.low_included else low
-        for _ in range(200):  # Newton, kept inside a shrinking bracket
-            guess = np.clip(guess, inside, high)
-            error = np.asarray(self.strain(guess)) - wanted
-            lower = np.where(error <= 0.0, guess, lower)
-            upper = np.where(error >= 0.0, guess, upper)
-            step = error * self.rigidity(guess)
-            if (abs(step) <= 4e-16 * np.maximum(guess, 1.0)).all():
-                break
-            guess = guess - step
-            guess = np.where((guess < lower) | (guess > upper), (lower + upper) / 2.0, guess)
-        return guess
+        return tension_at(
+            wanted, self.domain, self.strain, lambda F: 1.0 / self.rigidity(F), "strain"
+        )
 
     def secant_rigidity(self, tension: ArrayLike) -> Array:
         r"""Secant rigidity ΔF/(Δl/l_0) [N] of Eq. 18, both Δ taken from the low end of the domain.
@@ -243,3 +218,54 @@ class LinearElasticity(Elasticity):
     def energy(self, tension: ArrayLike) -> Array:
         """F²/(2 EA) [N]; see :meth:`Elasticity.energy`."""
         return np.asarray(self.domain.check(tension) ** 2 / (2.0 * self._rigidity))
+
+
+def tension_at(
+    wanted: Array,
+    domain: Domain,
+    stretch: Callable[[Array], Array],
+    slope: Callable[[Array], Array],
+    name: str,
+) -> Array:
+    """Tensions F [N] at which a rising stretch(F), zero at the low end, has the wanted values.
+
+    Newton's method inside a shrinking bracket, so that it converges for every rising law.
+
+    Args:
+        wanted: Strain [-] or elongation [m], any shape.
+        domain: Tensions to look in.
+        stretch: The rising law.
+        slope: Its derivative by F.
+        name: What is wanted, for the error.
+
+    Raises:
+        ElasticityRangeError: No tension of the domain gives one of the values.
+    """
+    low, high = domain
+    if math.isinf(high):  # as far as is needed: an unbounded law stretches without end
+        high = max(1.0, 2.0 * low)
+        while float(stretch(np.array(high))) < wanted.max(initial=0.0) and high < LARGEST:
+            high = min(2.0 * high, LARGEST)
+    most = float(stretch(np.array(high)))
+    outside = (wanted < 0.0) | (wanted > most)
+    if outside.any():
+        raise ElasticityRangeError(
+            f"no tension of the domain {domain} gives the {name} "
+            f"{np.atleast_1d(wanted)[np.atleast_1d(outside)][0]:.6g}; it reaches {most:.6g}.",
+            [high],
+            np.flatnonzero(outside).tolist(),
+        )
+    lower, upper = np.full_like(wanted, low), np.full_like(wanted, high)
+    first = low if domain.low_included else float(np.nextafter(low, math.inf))
+    guess = low + (high - low) * wanted / (most or 1.0)
+    for _ in range(200):  # bisection alone would take 60
+        guess = np.clip(guess, first, high)
+        error = np.asarray(stretch(guess)) - wanted
+        lower = np.where(error <= 0.0, guess, lower)
+        upper = np.where(error >= 0.0, guess, upper)
+        step = error / slope(guess)
+        if (abs(step) <= 1e-13 * np.maximum(guess, 1.0)).all():  # quadrature noise is near
+            break
+        guess = guess - step
+        guess = np.where((guess < lower) | (guess > upper), (lower + upper) / 2.0, guess)
+    return np.asarray(guess)

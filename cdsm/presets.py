@@ -5,11 +5,14 @@ Assumptions are parameters: change them and see what follows.
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cdsm.cable import serpentine_cables
 from cdsm.elasticity import Elasticity, LinearElasticity
 from cdsm.geometry import Geometry
 from cdsm.manipulator import Manipulator
@@ -67,3 +70,74 @@ def virtual_prototype(
         gravity: In base axes (3,) [m/s²]; along −y by assumption.
     """
     return Manipulator(virtual_prototype_geometry(link_mass), elasticity, gravity=gravity)
+
+
+def experimental_prototype_geometry(
+    *,
+    link_length: float = 0.1,
+    base_length: float = 0.05,
+    disk_offset: float = 0.02,
+    hole_radius: float = 0.03,
+    link_mass: float = 0.3,
+    lead: float = 0.3,
+) -> Geometry:
+    """Geometry of Section V: three hinges of ±30°, turned 30° each, one antagonistic pair each.
+
+    The paper gives the joints, their limits, the twist and the pairs. All dimensions are assumed:
+    it prints none.
+
+    Args:
+        link_length: [m]; assumed.
+        base_length: [m]; assumed.
+        disk_offset: [m]; assumed.
+        hole_radius: [m]; assumed.
+        link_mass: [kg]; assumed.
+        lead: [m]; assumed.
+
+    Raises:
+        GeometryError: Lists every fault.
+    """
+    return Geometry.hinged(
+        name="experimental_prototype",
+        joints=3,
+        twist=np.deg2rad(30.0),
+        cables_per_joint=2,
+        joint_limit=np.deg2rad(30.0),
+        link_length=link_length,
+        base_length=base_length,
+        disk_offset=disk_offset,
+        hole_radius=hole_radius,
+        link_mass=link_mass,
+        lead=lead,
+    )
+
+
+def experimental_prototype(
+    elasticity: Elasticity = STRAND_1X19,
+    *,
+    series_stiffness: float = math.inf,
+    gravity: ArrayLike = (0.0, 0.0, -9.81),
+    **dimensions: float,
+) -> Manipulator:
+    """The prototype of Section V-A: of each pair one cable is position-controlled, one force-.
+
+    The first of each pair (``cable1_1`` …) holds its length, the second (``cable1_2`` …) its
+    tension, so that the second contributes no passive stiffness; give its tension to
+    :func:`~cdsm.tension.distribute_tension` as ``fixed``.
+
+    Args:
+        elasticity: Of all cables; the repaired Eq. 19 by default.
+        series_stiffness: Of the springs of the hybrid cables (Fig. 11), or of the drives [N/m].
+        gravity: In base axes (3,) [m/s²]; along −z by assumption.
+        dimensions: Keywords of :func:`experimental_prototype_geometry`; all assumed there.
+
+    Raises:
+        GeometryError: Lists every fault of the dimensions.
+    """
+    geometry = experimental_prototype_geometry(**dimensions)
+    cables = serpentine_cables(geometry, elasticity, series_stiffness=series_stiffness)
+    pairs = [
+        replace(cable, control="position" if cable.name.endswith("_1") else "force")
+        for cable in cables
+    ]
+    return Manipulator(geometry, cables=pairs, gravity=gravity)

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 import warnings
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, NoReturn, final
 
@@ -23,7 +24,7 @@ from scipy.optimize import linprog
 from scipy.sparse import csc_matrix
 
 from cdsm import _balance
-from cdsm._checks import Array, ReadOnlyState, bound, frozen, instance, one_of, vector
+from cdsm._checks import Array, ReadOnlyState, bound, frozen, instance, one_of, scalar, vector
 from cdsm.errors import InfeasibleTension, InvalidInput, SolverError
 from cdsm.manipulator import Posture
 
@@ -108,6 +109,8 @@ def distribute_tension(
     maximum: ArrayLike = math.inf,
     wrench: ArrayLike = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
     solver: str = "daqp",
+    *,
+    fixed: Mapping[str, float] | None = None,
 ) -> Tension:
     """Smallest cable tensions in balance: min ‖F‖² with J_Lᵀ F = J_Xᵀ W − g (Eqs. 13, 17).
 
@@ -117,16 +120,20 @@ def distribute_tension(
         maximum: Upper bound [N], for all cables or (C,); inf for none.
         wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m].
         solver: ``"daqp"`` (exact), ``"osqp"``, or any other that qpsolvers finds installed.
+        fixed: Tensions [N] given by name of the cable, as of motors that control force; the rest
+            is solved for. They stand in place of that cable's bounds.
 
     Raises:
-        InvalidInput: A bound or the wrench has the wrong shape, is not a number, or the bounds
-            contradict each other.
+        InvalidInput: A bound, a fixed tension or the wrench has the wrong shape or is not a
+            number, or the bounds contradict each other.
         InfeasibleTension: No tension within the bounds balances the arm; says what is missing.
-        UnknownName: No such solver is installed.
+        UnknownName: No such solver is installed, or no such cable.
         SolverError: The solver's answer does not satisfy the optimality conditions.
     """
     count = len(instance("pose", pose, Posture).arm.cables)
     low, high = _checked_bounds(pose, bound("minimum", minimum, count), maximum)
+    if fixed:
+        low, high = _with_fixed(pose, low, high, fixed)
     wrench = vector("wrench", wrench, 6, "force [N], then moment [N m], base axes")
     torque = pose.jacobian.T @ wrench - pose.gravity_torque
 
@@ -167,6 +174,20 @@ def _checked_bounds(pose: Posture, low: Array, maximum: ArrayLike) -> tuple[Arra
             "maximum or lower minimum.",
         )
     return low, high
+
+
+def _with_fixed(
+    pose: Posture, low: Array, high: Array, fixed: Mapping[str, float]
+) -> tuple[Array, Array]:
+    """The bounds with those of named cables replaced by one value."""
+    names = [cable.name for cable in pose.arm.cables]
+    low, high = low.copy(), high.copy()
+    for name, value in fixed.items():
+        c = names.index(one_of("cable", name, names))
+        low[c] = high[c] = scalar(f"fixed[{name!r}]", value)
+        if low[c] < 0.0:
+            raise InvalidInput(f"fixed[{name!r}]", f"{low[c]:g} N given; cables only pull.")
+    return frozen(low), frozen(high)
 
 
 def _solve(problem: _balance.Scaled, solver: str) -> Array | None:
