@@ -52,15 +52,43 @@ def plot_arm(pose: Posture, tension: Tension | None = None) -> Figure:
     return figure
 
 
-def plot_paper(result: paper.Figure) -> Figure:
-    """One recomputed figure of the paper: its own reading above, a hung weight's stiffness below.
+def plot_paper(result: paper.Figure | paper.StrandFigure) -> Figure:
+    """One recomputed figure of the paper.
 
-    The cable tension is the mean; the bars are the range over all cables, as in the paper.
+    Of a stiffness its own reading above, that of a hung weight below; the cable tension is the
+    mean, and the bars are the range over all cables, as in the paper.
 
     Args:
         result: What a function in :data:`cdsm.paper.FIGURES` returns.
     """
+    if isinstance(result, paper.StrandFigure):
+        return _plot_strand(result)
     return _plot_postures(result) if len(result.curves) == 3 else _plot_directions(result)
+
+
+def _plot_strand(result: paper.StrandFigure) -> Figure:
+    """(a) force over displacement, (b) rigidity over tension."""
+    figure = Figure(figsize=(10.0, 4.0), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    left.plot(_MM * result.displacement, result.tension, color=_COLORS[0])
+    left.set(
+        xlabel=f"stretch of a {_MM * result.gauge_length:g} mm wire [mm]",
+        ylabel="force [N]",
+        title="(a)",
+    )
+    kilo = 1e-3
+    right.plot(result.tension, kilo * result.tangent, color=_COLORS[0], label="tangent, repaired")
+    right.plot(
+        result.tension, kilo * result.secant, "--", color=_COLORS[2], label="secant (Eq. 18)"
+    )
+    right.plot(result.tension, kilo * result.printed, ":", color=_COLORS[1], label="as printed")
+    right.set_ylim(-5.0, 1.1 * kilo * result.tangent.max())  # as printed it falls to -788 kN
+    right.set(xlabel="tension [N]", ylabel="rigidity EA [kN]", title="(b)")
+    right.legend(fontsize=8)
+    for axes in (left, right):
+        axes.grid(alpha=0.3)
+    figure.suptitle(result.title)
+    return figure
 
 
 def _plot_directions(result: paper.Figure) -> Figure:

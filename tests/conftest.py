@@ -4,8 +4,10 @@ import pytest
 
 from cdsm import paper
 
+Results = dict[str, paper.Figure | paper.StrandFigure]
+
 
 @pytest.fixture(scope="session")
-def results() -> dict[str, paper.Figure]:
+def results() -> Results:
     """The paper's figures, recomputed."""
     return {name: compute() for name, compute in paper.FIGURES.items()}

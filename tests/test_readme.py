@@ -8,6 +8,7 @@ from pathlib import Path
 from cdsm import paper
 
 README = Path(__file__).parents[1] / "README.md"
+from tests.conftest import Results
 
 
 def test_snippets_print_what_the_readme_shows() -> None:
@@ -30,7 +31,9 @@ def test_a_result_is_shown_within_the_first_25_lines() -> None:
     assert any(line.startswith("along ") for line in head)
 
 
-def test_table_is_what_reproduce_computes(results: dict[str, paper.Figure]) -> None:
+def test_table_is_what_reproduce_computes(
+    results: Results,
+) -> None:
     rows = paper.to_rows(list(results.values()))
     text = README.read_text(encoding="utf-8")
     shown = re.findall(r"^\| (Fig\. \d).*?\| (.*?) \| (.*?) \| (.*?) \| (.*?) \|$", text, re.M)

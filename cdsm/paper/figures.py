@@ -68,7 +68,7 @@ class Claim:
         unit: Unit of all numbers.
         paper: The paper's numbers, x, y, z or one; None where it gives words only.
         computed: Ours, in the paper's reading.
-        along: Ours, for a weight hung at the tip.
+        along: Ours, for a weight hung at the tip; empty where no arm is involved.
         assumption: What the paper leaves open and we chose.
         at_most: Whether the paper's number is an upper bound.
     """
@@ -293,15 +293,6 @@ def figure_8() -> Figure:
         claims=tuple(claims),
     )
 
-
-FIGURES: Final[dict[str, Callable[[], Figure]]] = {
-    "fig3": figure_3,
-    "fig4": figure_4,
-    "fig6": figure_6,
-    "fig7": figure_7,
-    "fig8": figure_8,
-}
-"""What computes each figure, by name."""
 
 _TEN = np.full(10, presets.TEN_DEGREES)
 
