@@ -6,9 +6,9 @@ from contextlib import redirect_stdout
 from pathlib import Path
 
 from cdsm import paper
+from tests.conftest import Results
 
 README = Path(__file__).parents[1] / "README.md"
-from tests.conftest import Results
 
 
 def test_snippets_print_what_the_readme_shows() -> None:
