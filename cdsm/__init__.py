@@ -25,16 +25,21 @@ from cdsm.errors import (
     JointLimitError,
     SingularStiffness,
     SolverError,
+    TensileTestError,
     UnknownName,
     UrdfError,
 )
 from cdsm.geometry import Geometry
+from cdsm.identification import Identification, Measurement, identify
 from cdsm.manipulator import Manipulator, Posture
 from cdsm.parts import CableRoute, Joint, Link
 from cdsm.stiffness import Shares, Stiffness, stiffness
+from cdsm.tensile import TensileFit, fit_tensile_test
+from cdsm.tensile_data import TensileTest, read_tensile_csv
 from cdsm.tension import Tension, distribute_tension
 from cdsm.urdf import to_urdf, write_urdf
 from cdsm.wire import StrandElasticity, TabulatedElasticity
+from cdsm.wire_file import read_elasticity, write_elasticity
 
 __version__ = _version("cdsm-stiffness")
 
@@ -49,6 +54,7 @@ __all__ = [
     "FileError",
     "Geometry",
     "GeometryError",
+    "Identification",
     "InfeasibleTension",
     "InvalidInput",
     "Joint",
@@ -56,6 +62,7 @@ __all__ = [
     "LinearElasticity",
     "Link",
     "Manipulator",
+    "Measurement",
     "Posture",
     "Shares",
     "SingularStiffness",
@@ -64,14 +71,22 @@ __all__ = [
     "Stiffness",
     "StrandElasticity",
     "TabulatedElasticity",
+    "TensileFit",
+    "TensileTest",
+    "TensileTestError",
     "Tension",
     "UnknownName",
     "UrdfError",
     "distribute_tension",
+    "fit_tensile_test",
+    "identify",
     "in_series",
     "presets",
+    "read_elasticity",
+    "read_tensile_csv",
     "serpentine_cables",
     "stiffness",
     "to_urdf",
+    "write_elasticity",
     "write_urdf",
 ]

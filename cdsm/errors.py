@@ -109,6 +109,10 @@ class CableError(CdsmError, ValueError):
         self.cable = cable
 
 
+class TensileTestError(CdsmError, ValueError):
+    """A tensile test that no elasticity can be read from."""
+
+
 class JointLimitError(CdsmError, ValueError):
     """A joint angle beyond its limit.
 

@@ -125,3 +125,28 @@ def test_module_is_the_command() -> None:
     command = [sys.executable, "-m", "cdsm", "--help"]
     told = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
     assert "reproduce" in told.stdout
+
+
+STRAND_TEST = Path(__file__).parents[1] / "notebooks" / "data" / "strand_1x19_tensile_test.csv"
+
+
+def test_fit_reports_and_writes_elasticity_and_figure(tmp_path: Path) -> None:
+    toml, png = tmp_path / "strand.toml", tmp_path / "strand.png"
+    result = call("fit", STRAND_TEST, "-o", toml, "--figure", png)
+    assert result.exit_code == 0, result.output
+    for text in ("pre-tensioning", "elastic", "gauge length 500 mm", str(toml), str(png)):
+        assert text in result.output
+    law = cdsm.read_elasticity(toml)
+    tension = np.geomspace(20.0, 780.0, 30)
+    expected = cdsm.presets.STRAND_1X19.rigidity(tension)
+    # the example data have no noise; the step of Eq. 19 at 31 N is smoothed over
+    np.testing.assert_allclose(law.rigidity(tension), expected, rtol=0.05)
+    assert png.read_bytes().startswith(b"\x89PNG")
+
+
+def test_fit_of_a_bad_file_is_one_message(tmp_path: Path) -> None:
+    path = tmp_path / "bad.csv"
+    path.write_text("a,b\n1,2\n", encoding="utf-8")
+    result = call("fit", path)
+    assert result.exit_code == 1
+    assert result.stderr.startswith("error: ")

@@ -339,6 +339,7 @@ def test_stiffness_goes_on_from_a_pickled_tension() -> None:
 
 
 ERRORS: tuple[cdsm.CdsmError, ...] = (
+    cdsm.TensileTestError("two points."),
     cdsm.CdsmError("something"),
     cdsm.InvalidInput("q", "is odd."),
     cdsm.UnknownName("link", "lnk1", ["link1", "link2"], "Look again."),

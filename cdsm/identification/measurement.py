@@ -1,0 +1,103 @@
+"""A stiffness measured on an arm."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, final
+
+import numpy as np
+
+from cdsm._checks import (
+    SMALLEST,
+    number_array,
+    scalar,
+    unit_direction,
+    vector,
+)
+from cdsm.errors import InvalidInput
+
+if TYPE_CHECKING:
+    pass
+
+
+@final
+@dataclass(frozen=True)
+class Measurement:
+    """A stiffness measured at the tip of a real arm, and the conditions it was measured in.
+
+    Attributes:
+        value: Stiffness along the direction [N/m], as a weight hung at the tip measures it.
+        direction: The direction of force and displacement (3,), base axes, any length.
+        angles: Joint angles (nv,) [rad].
+        tension: Cable tensions (C,) [N]; or None, and ``minimum`` is given.
+        minimum: Instead of tensions, the lower bound [N], one or (C,), from which
+            :func:`~cdsm.tension.distribute_tension` balances the model at these angles.
+        std: Standard deviation of the value [N/m].
+        wrench: W (6,) at ``tool0`` in base axes while it was measured: force [N], moment [N m].
+        label: What reports and figures call it.
+
+    Raises:
+        InvalidInput: Names the field and what is wrong with it.
+    """
+
+    value: float
+    direction: tuple[float, float, float]
+    angles: tuple[float, ...]
+    tension: tuple[float, ...] | None = None
+    minimum: float | tuple[float, ...] | None = None
+    std: float = math.nan
+    wrench: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    label: str = ""
+
+    def __post_init__(self) -> None:
+        value = scalar("value", self.value)
+        if value <= 0.0:
+            raise InvalidInput("value", f"{value:g} N/m given; a stiffness measured is positive.")
+        if isinstance(self.std, float) and math.isnan(self.std):
+            raise InvalidInput(
+                "std",
+                "is missing; give the standard deviation of the value [N/m], a guess at it "
+                "if need be: it is the weight of the measurement.",
+            )
+        std = scalar("std", self.std)
+        if std < SMALLEST:
+            raise InvalidInput("std", f"{std:g} N/m given; it must be positive.")
+        if (self.tension is None) == (self.minimum is None):
+            raise InvalidInput(
+                "tension",
+                "give one of tension= (measured, of each cable) and minimum= (a bound to "
+                f"distribute from); {'neither' if self.tension is None else 'both'} given.",
+            )
+        if not isinstance(self.label, str):
+            raise InvalidInput("label", f"{self.label!r} given; a text is needed.")
+        unit_direction("direction", self.direction)
+        direction = vector("direction", self.direction, 3, "a direction in base axes")
+        wrench = vector("wrench", self.wrench, 6, "force [N], then moment [N m], base axes")
+        checked: dict[str, object] = {
+            "value": value,
+            "std": std,
+            "direction": tuple(direction.tolist()),
+            "wrench": tuple(wrench.tolist()),
+            "angles": _numbers("angles", self.angles, "one angle [rad] per joint"),
+        }
+        if self.tension is not None:
+            checked["tension"] = _numbers("tension", self.tension, "one tension [N] per cable")
+        elif np.ndim(self.minimum) == 0:  # type: ignore[arg-type]
+            checked["minimum"] = scalar("minimum", self.minimum)
+        else:
+            checked["minimum"] = _numbers("minimum", self.minimum, "one bound [N] per cable")
+        for name, entry in checked.items():
+            object.__setattr__(self, name, entry)
+
+
+def _numbers(name: str, value: object, meaning: str) -> tuple[float, ...]:
+    array = number_array(name, value)  # type: ignore[arg-type]
+    if array.ndim != 1 or not array.size:
+        raise InvalidInput(name, f"shape {array.shape} given; give {meaning}.")
+    return tuple(array.tolist())
+
+
+def label(i: int, measurement: Measurement) -> str:
+    """What a measurement is called: its label, or its place in the list."""
+    return measurement.label or f"[{i}]"

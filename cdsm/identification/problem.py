@@ -1,0 +1,205 @@
+"""Residuals and their derivatives over the bounds of the parameters."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cdsm._checks import (
+    SMALLEST,
+    Array,
+)
+from cdsm.errors import CdsmError, InvalidInput, SingularStiffness
+from cdsm.manipulator import Manipulator, Posture
+from cdsm.stiffness import stiffness
+from cdsm.tension import Tension, distribute_tension
+
+if TYPE_CHECKING:
+    pass
+
+from cdsm.identification.measurement import Measurement, label
+
+_DECADES = 100.0
+"""Ratio of positive bounds beyond which a parameter is searched by its logarithm."""
+
+
+class NoStiffnessError(Exception):
+    """The model has no stiffness for a measurement at this point."""
+
+
+class UserFaultError(Exception):
+    """A function of the user's own fails with an error that is not of this library."""
+
+    def __init__(self, name: str, given: dict[str, float]) -> None:
+        self.name = name
+        self.given = ", ".join(f"{key}={value:g}" for key, value in given.items())
+
+
+class Problem:
+    """The residuals over the unit cube, which every parameter's bounds are mapped on."""
+
+    def __init__(
+        self,
+        model_of: Callable[..., Manipulator],
+        tension_of: Callable[..., Tension | ArrayLike] | None,
+        measurements: tuple[Measurement, ...],
+        names: tuple[str, ...],
+        bounds: Array,
+    ) -> None:
+        self._model_of = model_of
+        self._tension_of = tension_of
+        self.measurements = measurements
+        self._value = np.array([each.value for each in measurements])
+        self._std = np.array([each.std for each in measurements])
+        self.names = names
+        self.low, self.high = bounds.T
+        self._by_log = (self.low > 0.0) & (self.high > _DECADES * self.low)
+        self._ratio = np.where(self._by_log, self.high / np.where(self._by_log, self.low, 1), 1.0)
+        self._last: tuple[bytes, Array] = (b"", self._value)
+
+    def parameters(self, point: Array) -> Array:
+        """Parameters (P,) in own units at a point of the unit cube."""
+        values = np.where(
+            self._by_log,
+            self.low * self._ratio**point,
+            self.low + point * (self.high - self.low),
+        )
+        # the bounds themselves at 0 and 1, whatever rounding says
+        values = np.where(point == 1.0, self.high, values)
+        return np.asarray(np.clip(values, self.low, self.high), dtype=np.float64)
+
+    def point(self, values: Array) -> Array:
+        """Inverse of :meth:`parameters`."""
+        linear = (values - self.low) / (self.high - self.low)
+        safe = np.where(self._by_log, values / np.where(self._by_log, self.low, 1.0), 1.0)
+        by_log = np.log(safe) / np.where(self._by_log, np.log(self._ratio), 1.0)
+        return np.asarray(np.clip(np.where(self._by_log, by_log, linear), 0.0, 1.0))
+
+    def stretch(self, point: Array) -> Array:
+        """Derivative of :meth:`parameters` (P,)."""
+        by_log = self.parameters(point) * np.log(self._ratio)
+        return np.where(self._by_log, by_log, self.high - self.low)
+
+    def predict(self, point: Array) -> tuple[Manipulator, Array]:
+        """The arm and its stiffnesses (n,) [N/m].
+
+        Raises:
+            NoStiffnessError: It has none for a measurement.
+        """
+        given = dict(zip(self.names, self.parameters(point).tolist(), strict=True))
+        try:
+            arm = _called("model_of", self._model_of, given)
+        except CdsmError as error:
+            raise NoStiffnessError(f"model_of: {error}") from error
+        if not isinstance(arm, Manipulator):
+            raise InvalidInput("model_of", f"returns {arm!r}; a Manipulator is needed.")
+        predicted = np.empty(len(self.measurements))
+        for i, each in enumerate(self.measurements):
+            try:
+                predicted[i] = self._along(arm, each, given)
+            except CdsmError as error:
+                raise NoStiffnessError(f"measurement {label(i, each)}: {error}") from error
+        return arm, predicted
+
+    def _along(self, arm: Manipulator, each: Measurement, given: dict[str, float]) -> float:
+        pose = arm.at(each.angles)
+        K = stiffness(pose, *self._tension(pose, each, given))
+        value = K.along(each.direction)
+        if not (K.is_stable and value < 1.0 / SMALLEST):
+            problem = (
+                "the tip cannot move in its direction, so the stiffness is infinite."
+                if K.is_stable
+                else f"the arm buckles: the smallest stiffness is {K.margin:.3g} N m/rad."
+            )
+            raise SingularStiffness(problem, K.critical_direction)
+        return value
+
+    def _tension(
+        self, pose: Posture, each: Measurement, given: dict[str, float]
+    ) -> tuple[Tension] | tuple[ArrayLike, ArrayLike]:
+        if self._tension_of is not None:
+            pull = _called("tension_of", self._tension_of, given, pose, each)
+            return (pull,) if isinstance(pull, Tension) else (pull, each.wrench)
+        if each.tension is not None:
+            return each.tension, each.wrench
+        assert each.minimum is not None
+        return (distribute_tension(pose, each.minimum, wrench=each.wrench),)
+
+    def residuals(self, point: Array) -> Array:
+        """Residuals r (n,) in σ; inf, from which the searches step back, if there are none."""
+        key = point.tobytes()
+        if self._last[0] != key:
+            try:
+                r = (self.predict(point)[1] - self._value) / self._std
+            except NoStiffnessError:
+                r = np.full(self._value.shape, math.inf)
+            self._last = key, r
+        return self._last[1].copy()
+
+    def cost(self, point: Array) -> float:
+        """χ² at a point."""
+        r = self.residuals(point)
+        return float(r @ r)
+
+    def slopes(self, point: Array) -> Array:
+        """∂r/∂point (n, P) by one-sided differences."""
+        return self._differences(point, 1e-7, central=False)
+
+    def central_slopes(self, point: Array) -> Array:
+        """∂r/∂point (n, P) by differences of second order."""
+        return self._differences(point, 1e-5, central=True)
+
+    def _differences(self, point: Array, step: float, *, central: bool) -> Array:
+        here = self.residuals(point)
+        columns = []
+        for i, name in enumerate(self.names):
+
+            def at(k: int, i: int = i) -> Array | None:
+                """Residuals k steps off; None beyond the bounds or where there are none."""
+                moved = point.copy()
+                moved[i] += k * step
+                if not 0.0 <= moved[i] <= 1.0:
+                    return None
+                r = self.residuals(moved)
+                return r if np.isfinite(r).all() else None
+
+            column = None
+            for side in (1, -1):
+                near = at(side)
+                if near is None:
+                    continue
+                if not central:
+                    column = side * (near - here) / step
+                elif (far := at(-side)) is not None:
+                    column = side * (near - far) / (2.0 * step)
+                elif (far := at(2 * side)) is not None:
+                    column = side * (4.0 * near - far - 3.0 * here) / (2.0 * step)
+                else:
+                    continue
+                break
+            if column is None:
+                raise InvalidInput(
+                    "free",
+                    f"at {self.written(point)} the model has a stiffness for all measurements, "
+                    f"but beside it, in {name}, it has none either way. Change the bounds.",
+                )
+            columns.append(column)
+        return np.column_stack(columns)
+
+    def written(self, point: Array) -> str:
+        """A point in own units, for a sentence."""
+        values = self.parameters(point)
+        return ", ".join(f"{n} = {x:.6g}" for n, x in zip(self.names, values, strict=True))
+
+
+def _called(name: str, function: Callable[..., Any], given: dict[str, float], *args: object) -> Any:
+    try:
+        return function(*args, **given)
+    except CdsmError:
+        raise
+    except Exception as error:
+        raise UserFaultError(name, given) from error

@@ -1,0 +1,273 @@
+"""What an identification found, how well, and what it cannot tell apart."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, final
+
+import numpy as np
+from scipy.linalg import qr
+from scipy.stats import norm, t
+
+from cdsm._checks import (
+    Array,
+    ReadOnlyState,
+    frozen,
+    scalar,
+)
+from cdsm.errors import InvalidInput
+from cdsm.manipulator import Manipulator
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+from cdsm.identification.measurement import Measurement, label
+
+SAME = 1e-6
+"""Smallest singular value of the Jacobian, columns of unit length, that counts for the rank.
+
+The central differences behind it leave some 1e-10.
+"""
+
+
+@final
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class Identification(ReadOnlyState):
+    """Parameters of an arm that explain its measurements best; made by :func:`identify`.
+
+    Of n measurements and P parameters. All arrays are read-only. "Own unit" of a parameter is the
+    one that the user's constructor takes it in: m, kg, N/m, …
+
+    Attributes:
+        names: Names of the parameters; their order is that of every (P,) array.
+        values: Their values (P,), in own units (m, kg, N/m, …).
+        bounds: Their bounds (P, 2), low and high, in own units (m, kg, N/m, …).
+        measurements: What was measured.
+        predicted: What the model says instead (n,) [N/m].
+        jacobian: J = ∂r/∂p (n, P), r in standard deviations [-], p in own units (m, kg, N/m, …).
+        arm: The model with these values.
+        warnings: What not to trust, a sentence each, naming the parameters; empty if all is well.
+    """
+
+    names: tuple[str, ...]
+    values: Array
+    bounds: Array
+    measurements: tuple[Measurement, ...]
+    predicted: Array
+    jacobian: Array
+    arm: Manipulator
+    warnings: tuple[str, ...]
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """The values by name, in own units (m, kg, N/m, …), as ``model_of`` takes them."""
+        return dict(zip(self.names, self.values.tolist(), strict=True))
+
+    @cached_property
+    def measured(self) -> Array:
+        """The values measured (n,) [N/m]."""
+        return frozen(np.array([each.value for each in self.measurements]))
+
+    @cached_property
+    def residuals(self) -> Array:
+        """Residuals r = (predicted − measured)/σ (n,), in standard deviations [-]."""
+        sigma = np.array([each.std for each in self.measurements])
+        return frozen((self.predicted - self.measured) / sigma)
+
+    @property
+    def chi_square(self) -> float:
+        """χ² = Σ r² [-]; about :attr:`freedom` if the model is right and the σ are."""
+        return float(self.residuals @ self.residuals)
+
+    @property
+    def freedom(self) -> int:
+        """Degrees of freedom: n less the rank."""
+        return len(self.measurements) - self.rank
+
+    @property
+    def reduced_chi_square(self) -> float:
+        """χ² per degree of freedom [-]; inf where none is left to judge by."""
+        return self.chi_square / self.freedom if self.freedom else math.inf
+
+    @property
+    def rank(self) -> int:
+        """How many combinations of the parameters the measurements determine, at most P."""
+        return int(self._kept.sum())
+
+    @cached_property
+    def covariance(self) -> Array:
+        """(JᵀJ)⁻¹ (P, P) in own units (m, kg, N/m, …), by the σ given and not scaled by χ².
+
+        Multiply by :attr:`reduced_chi_square` if only the ratios of the σ are known. It knows
+        nothing of the bounds. What the measurements do not determine has infinite variance: the
+        limit of an ever weaker determination.
+        """
+        _, values, right = self._spectrum
+        inner = right[self._kept].T / values[self._kept]
+        covariance = inner @ inner.T / np.outer(self._lengths, self._lengths)
+        loose = self._loose
+        covariance[loose != 0.0] = np.copysign(math.inf, loose[loose != 0.0])
+        return frozen(covariance)
+
+    @cached_property
+    def std(self) -> Array:
+        """Standard deviations of the parameters (P,) in own units (m, kg, N/m, …)."""
+        return frozen(np.sqrt(np.diag(self.covariance)))
+
+    @cached_property
+    def correlation(self) -> Array:
+        """Correlations of the parameters (P, P) [-]; ±1: only a combination is determined."""
+        free = np.diag(self._loose)
+        matrix = np.where(np.outer(free, free) > 0.0, self._loose, 0.0)
+        firm = np.flatnonzero(free == 0.0)
+        matrix[np.ix_(firm, firm)] = self.covariance[np.ix_(firm, firm)]
+        root = np.sqrt(np.diag(matrix))
+        return frozen(np.clip(matrix / np.outer(root, root), -1.0, 1.0))
+
+    def confidence(
+        self, level: float = 0.95, *, scaled: bool = False
+    ) -> dict[str, tuple[float, float]]:
+        """Intervals value ± z·std that hold each true parameter with this probability.
+
+        Linear about the optimum, and blind to the bounds. In own units (m, kg, N/m, …).
+
+        Args:
+            level: The probability, between 0 and 1.
+            scaled: Take the σ as known up to a common factor, which χ² tells: z is Student's, and
+                std grows by √(reduced χ²).
+
+        Raises:
+            InvalidInput: The level is not between 0 and 1.
+        """
+        level = scalar("level", level)
+        if not 0.0 < level < 1.0:
+            raise InvalidInput("level", f"{level:g} given; it must lie between 0 and 1, as 0.95.")
+        half = (1.0 + level) / 2.0
+        if not scaled:
+            width = norm.ppf(half) * self.std
+        elif self.freedom:
+            width = t.ppf(half, self.freedom) * math.sqrt(self.reduced_chi_square) * self.std
+        else:
+            width = np.full(self.std.shape, math.inf)
+        low, high = (self.values - width).tolist(), (self.values + width).tolist()
+        return dict(zip(self.names, zip(low, high, strict=True), strict=True))
+
+    def plot(self) -> Figure:
+        """Predicted over measured [N/mm], and every residual in standard deviations."""
+        # an identification without a figure need not load matplotlib
+        from matplotlib.figure import Figure
+        from matplotlib.ticker import MaxNLocator
+
+        figure = Figure(figsize=(11.0, 4.5), layout="constrained")
+        grid: Any = figure.subplots(1, 2)
+        left, right = grid
+        measured, predicted = self.measured / 1e3, self.predicted / 1e3
+        sigma = [each.std / 1e3 for each in self.measurements]
+        ends = [min(measured.min(), predicted.min()), max(measured.max(), predicted.max())]
+        left.plot(ends, ends, color="0.6", linewidth=0.9)
+        left.errorbar(
+            measured, predicted, xerr=sigma, fmt="o", color="#3b6fb6", markersize=4, capsize=2
+        )
+        left.set_xlabel("measured [N/mm], ± σ")
+        left.set_ylabel("predicted [N/mm]")
+        place = np.arange(len(sigma))
+        for width, shade in ((2.0, 0.12), (1.0, 0.2)):
+            right.axhspan(-width, width, color="0.5", alpha=shade, linewidth=0.0)
+        right.vlines(place, 0.0, self.residuals, color="#3b6fb6", linewidth=1.2)
+        right.plot(place, self.residuals, "o", color="#3b6fb6", markersize=4)
+        right.axhline(0.0, color="0.2", linewidth=0.8)
+        right.set_ylabel("(predicted − measured)/σ, bands at 1 and 2 σ")
+        if len(sigma) <= 30 and any(each.label for each in self.measurements):
+            right.set_xticks(place, self._labels, rotation=90, fontsize=8)
+        else:
+            right.set_xlabel("measurement")
+            right.xaxis.set_major_locator(MaxNLocator(integer=True))
+        for axes in grid:
+            axes.grid(alpha=0.3)
+        figure.suptitle(self._verdict)
+        return figure
+
+    def __repr__(self) -> str:
+        values = ", ".join(f"{name}={value:.4g}" for name, value in self.parameters.items())
+        return f"<Identification {values}; {self._verdict}>"
+
+    def __str__(self) -> str:
+        lines = [
+            f"{'parameter [own unit]':<22}{'value':>12}{'std':>12}{'95 % from':>12}{'to':>12}"
+            f"{'low':>12}{'high':>12}"
+        ]
+        rows = zip(
+            self.names, self.values, self.std, self.confidence().values(), self.bounds, strict=True
+        )
+        for name, value, std, interval, limits in rows:
+            cells = "".join(f"{x:>12.4g}" for x in (value, std, *interval, *limits))
+            lines.append(f"{name:<22}{cells}")
+        lines += ["", f"{'measurement':<22}{'measured':>12}{'predicted':>12}{'residual':>12}"]
+        lines.append(f"{'':<22}{'[N/mm]':>12}{'[N/mm]':>12}{'[σ]':>12}")
+        for name, measured, predicted, residual in zip(
+            self._labels, self.measured, self.predicted, self.residuals, strict=True
+        ):
+            lines.append(
+                f"{name:<22}{measured / 1e3:>12.4g}{predicted / 1e3:>12.4g}{residual:>12.2f}"
+            )
+        return "\n".join(
+            [*lines, "", self._verdict, *(f"warning: {sentence}" for sentence in self.warnings)]
+        )
+
+    @property
+    def _labels(self) -> list[str]:
+        return [label(i, each) for i, each in enumerate(self.measurements)]
+
+    @property
+    def _verdict(self) -> str:
+        return (
+            f"χ² = {self.chi_square:.4g} with {self.freedom} degrees of freedom, "
+            f"rank {self.rank} of {len(self.names)}"
+        )
+
+    @cached_property
+    def _lengths(self) -> Array:
+        """Lengths of the columns of J (P,), and 1 for a column of nothing."""
+        lengths = np.linalg.norm(self.jacobian, axis=0)
+        # over its whole range the parameter moves no residual by a millionth of its σ
+        nothing = lengths * np.ptp(self.bounds, axis=1) < SAME
+        return np.where(nothing, math.inf, lengths)
+
+    @cached_property
+    def _spectrum(self) -> tuple[Array, Array, Array]:
+        """Singular values and vectors of J with columns of unit length, or zero."""
+        left, values, right = np.linalg.svd(self.jacobian / self._lengths, full_matrices=False)
+        return left, values, right
+
+    @cached_property
+    def _kept(self) -> Any:
+        values = self._spectrum[1]
+        return values > SAME * max(values[0], SAME)
+
+    @cached_property
+    def _loose(self) -> Array:
+        """Projector (P, P) on the combinations not determined; exactly 0 where there are none."""
+        loose = self._spectrum[2][~self._kept]
+        projector: Array = loose.T @ loose
+        return np.where(abs(projector) > 1e-8, projector, 0.0)
+
+    @property
+    def _undetermined(self) -> list[str]:
+        """The combinations that change no prediction, written out: "a by +1 and b by -0.3"."""
+        loose = self._spectrum[2][~self._kept]
+        if not len(loose):
+            return []
+        # one leading parameter to each combination, and to no other, reads best
+        leading = qr(loose, mode="r", pivoting=True)[1][: len(loose)]
+        loose = np.linalg.solve(loose[:, leading], loose)
+        scale = np.where(np.isinf(self._lengths), 1.0, self._lengths)
+        written = []
+        for row in loose:
+            row = np.where(abs(row) > 1e-4, row, 0.0) / scale
+            # a step of readable size: 1 % of the range of the one that moves most of its own
+            row = 0.01 * row / (abs(row) / np.ptp(self.bounds, axis=1)).max()
+            terms = [(row[i], self.names[i]) for i in np.flatnonzero(row)]
+            written.append(" and ".join(f"{name} by {part:+.4g}" for part, name in terms))
+        return written

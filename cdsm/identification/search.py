@@ -1,0 +1,328 @@
+"""Identification: the parameters of an arm from stiffnesses measured on it. scipy does the search.
+
+    min Σ r_i²,   r_i = (K_i(p) − K_i) / σ_i,   low ≤ p ≤ high
+
+with K_i measured, K_i(p) what the model with parameters p predicts by
+:meth:`~cdsm.stiffness.Stiffness.along`, and σ_i the standard deviation of the measurement. The
+parameters are whatever a constructor of the user's own takes: dimensions, masses, springs, leads.
+What the measurements cannot tell apart is said by name in :attr:`Identification.warnings`.
+"""
+
+from __future__ import annotations
+
+import inspect
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.optimize import least_squares
+from scipy.stats import chi2, qmc
+
+from cdsm._checks import (
+    Array,
+    frozen,
+    scalar,
+    sequence_of,
+    vector,
+)
+from cdsm.errors import InvalidInput, UnknownName
+from cdsm.manipulator import Manipulator
+from cdsm.tension import Tension
+
+if TYPE_CHECKING:
+    pass
+
+from cdsm.identification.measurement import Measurement
+from cdsm.identification.problem import NoStiffnessError, Problem, UserFaultError
+from cdsm.identification.result import SAME, Identification
+
+CORRELATED = 0.95
+"""Correlation of two parameters beyond which a warning names them."""
+
+_UNLIKELY = 1e-3
+"""Probability of the χ² found, below which the model does not explain the measurements."""
+
+_UNFINISHED = 1e-3
+"""Fall of χ² that a search may leave to be had; 1 would be one standard deviation."""
+
+_ON_BOUND = 1e-9
+"""A parameter this near to a bound, as part of their distance, is on it."""
+
+_CANDIDATES, _STARTS = 24, 3
+"""Points looked at over the bounds, and how many of the best of them a search starts from."""
+
+
+def identify(
+    model_of: Callable[..., Manipulator],
+    measurements: Sequence[Measurement],
+    free: Mapping[str, tuple[float, float]],
+    *,
+    start: Mapping[str, float] | None = None,
+    tension_of: Callable[..., Tension | ArrayLike] | None = None,
+) -> Identification:
+    """Parameters p of an arm from measured stiffnesses: min Σ ((K_i(p) − K_i)/σ_i)² in bounds.
+
+    K_i(p) = ``stiffness(arm.at(angles), tension, wrench).along(direction)`` with
+    ``arm = model_of(**p)``. Where the model has no stable stiffness, or a tension leaves the domain
+    of an elasticity, the search turns back.
+
+    ::
+
+        def model_of(hole_radius, drive):
+            geometry = cdsm.presets.experimental_prototype_geometry(hole_radius=hole_radius)
+            cables = cdsm.serpentine_cables(geometry, strand, series_stiffness=drive)
+            return cdsm.Manipulator(geometry, cables=cables)
+
+        found = cdsm.identify(
+            model_of, measurements, free={"hole_radius": (0.02, 0.04), "drive": (1e3, 1e6)}
+        )
+
+    Args:
+        model_of: Makes the arm from the free parameters, given by keyword.
+        measurements: As many as there are parameters, or more.
+        free: Bounds (low, high) of each parameter, in the unit that ``model_of`` takes it in.
+            Positive ones more than a factor of 100 apart are searched by the logarithm.
+        start: Where to start, one value for each parameter. If not given, the best of several
+            searches spread over the bounds is taken, the same ones every time.
+        tension_of: The tensions (C,) [N] or :class:`~cdsm.tension.Tension` of a measurement, as
+            ``tension_of(posture, measurement, **p)``, with all the free parameters. For parameters
+            of the tensions, such as the offset of a load cell, which no arm holds; ``model_of``
+            then gets all of them too. If not given, those of the measurement.
+
+    Raises:
+        InvalidInput: No measurements or fewer than parameters; bad bounds or start; ``model_of``
+            fails or returns no arm; or no start gives every measurement a stable stiffness.
+        UnknownName: A parameter that ``model_of`` or ``tension_of`` does not take.
+    """
+    measurements = sequence_of("measurements", measurements, Measurement)
+    names, bounds = _checked_bounds(free)
+    if len(measurements) < len(names):
+        raise InvalidInput(
+            "measurements",
+            f"{len(measurements)} given for {len(names)} parameters, {', '.join(names)}; give at "
+            "least as many, or free fewer parameters.",
+        )
+    _check_call("model_of", model_of, 0, names)
+    if tension_of is not None:
+        _check_call("tension_of", tension_of, 2, names)
+    problem = Problem(model_of, tension_of, measurements, names, bounds)
+    try:
+        best = _optimum(problem, _starts(problem, start))
+        return _result(problem, best)
+    except UserFaultError as fault:
+        raise InvalidInput(
+            fault.name,
+            f"fails at {fault.given}: {fault.__cause__!r}. Mend it, narrow the bounds, or let it "
+            "raise a CdsmError where there is no such arm.",
+        ) from fault.__cause__
+
+
+def _checked_bounds(free: Mapping[str, tuple[float, float]]) -> tuple[tuple[str, ...], Array]:
+    if not isinstance(free, Mapping) or not free:
+        raise InvalidInput(
+            "free", f"{free!r} given; give {{name: (low, high)}} for at least one parameter."
+        )
+    rows = []
+    for name, limits in free.items():
+        if not isinstance(name, str):
+            raise InvalidInput("free", f"{name!r} is no name of a parameter.")
+        low, high = vector(f"free[{name!r}]", limits, 2, "the bounds (low, high)")
+        # closer together, rounding would drown the differences the search lives on
+        if not high - low > 1e-9 * max(abs(low), abs(high)):
+            raise InvalidInput(
+                f"free[{name!r}]",
+                f"low = {low:g}, high = {high:g} given; low must be below high. What is known "
+                "belongs into model_of.",
+            )
+        rows.append((low, high))
+    return tuple(free), np.array(rows)
+
+
+def _check_call(name: str, function: object, positional: int, names: Sequence[str]) -> None:
+    """Refuse a function that cannot be called with these parameters, before any search."""
+    if not callable(function):
+        raise InvalidInput(name, f"{function!r} given; a function is needed.")
+    try:
+        signature = inspect.signature(function)
+    except (TypeError, ValueError):  # some compiled functions have none
+        return
+    kinds = signature.parameters.values()
+    if not any(each.kind is each.VAR_KEYWORD for each in kinds):
+        by_keyword = (inspect.Parameter.KEYWORD_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
+        known = [each.name for each in kinds if each.kind in by_keyword][positional:]
+        for each in names:
+            if each not in known:
+                raise UnknownName(
+                    f"parameter of {name}", each, known, f"Give {name} one of that name, or **rest."
+                )
+    try:
+        signature.bind(*(None,) * positional, **dict.fromkeys(names))
+    except TypeError as error:
+        raise InvalidInput(
+            name,
+            f"cannot be called with {', '.join(names)} alone: {error}. Free that parameter too, or "
+            "give it a default.",
+        ) from None
+
+
+def _starts(problem: Problem, start: Mapping[str, float] | None) -> list[Array]:
+    """Points of the unit cube to search from, at each of which the model has its stiffnesses."""
+    count = len(problem.names)
+    if start is None:
+        # Halton's first point is a corner
+        spread = qmc.Halton(count, scramble=False).random(_CANDIDATES)[1:]
+        points = [np.full(count, 0.5), *spread]
+    else:
+        points = [problem.point(_checked_start(problem, start))]
+    # a search that starts on a bound may take it for the optimum
+    points = [np.clip(point, 1e-6, 1.0 - 1e-6) for point in points]
+    usable = [point for point in points if math.isfinite(problem.cost(point))]
+    if usable:
+        return sorted(usable, key=problem.cost)[:_STARTS]
+    try:
+        problem.predict(points[0])
+    except NoStiffnessError as error:
+        where = f"none of {len(points)} starts gives" if start is None else "does not give"
+        raise InvalidInput(
+            "free" if start is None else "start",
+            f"{where} every measurement a stable stiffness. At {problem.written(points[0])}, "
+            f"{error} Mend that, narrow the bounds, or give another start.",
+        ) from error.__cause__
+    raise AssertionError("a point without residuals has a reason")  # pragma: no cover
+
+
+def _checked_start(problem: Problem, start: Mapping[str, float]) -> Array:
+    if not isinstance(start, Mapping) or set(start) != set(problem.names):
+        raise InvalidInput(
+            "start", f"{start!r} given; one value for each of {', '.join(problem.names)} is needed."
+        )
+    values = np.array([scalar(f"start[{name!r}]", start[name]) for name in problem.names])
+    for name, value, low, high in zip(
+        problem.names, values, problem.low, problem.high, strict=True
+    ):
+        if not low <= value <= high:
+            raise InvalidInput(
+                f"start[{name!r}]", f"{value:g} is outside the bounds {low:g} to {high:g}."
+            )
+    return values
+
+
+def _optimum(problem: Problem, starts: Sequence[Array]) -> Array:
+    # trf finds its way from afar; dogbox then goes exactly onto a bound, which trf only nears
+    found = [_search(problem, point, "trf", problem.slopes, 1e-10) for point in starts]
+    best = min(found, key=problem.cost)
+    best = min(
+        _search(problem, best, "dogbox", problem.central_slopes, 1e-14), best, key=problem.cost
+    )
+    # rounding may leave it beside the bound it is on
+    on_bound = np.where(best < _ON_BOUND, 0.0, np.where(best > 1.0 - _ON_BOUND, 1.0, best))
+    return on_bound if math.isfinite(problem.cost(on_bound)) else best
+
+
+def _search(
+    problem: Problem,
+    point: Array,
+    method: str,
+    slopes: Callable[[Array], Array],
+    tolerance: float,
+) -> Array:
+    found = least_squares(
+        problem.residuals,
+        point,
+        slopes,
+        bounds=(0.0, 1.0),
+        method=method,
+        x_scale="jac",
+        ftol=tolerance,
+        xtol=tolerance,
+        gtol=tolerance,
+        max_nfev=200,
+    )
+    return np.asarray(found.x, dtype=np.float64)
+
+
+def _sentences(result: Identification, at_bound: Array) -> list[str]:
+    """What not to trust in a result."""
+    sentences = [
+        f"not identifiable (rank {result.rank} of {len(result.names)}): no prediction changes with "
+        f"{combination}, so their values are one choice of many. Fix one, or measure what tells "
+        "them apart."
+        for combination in result._undetermined
+    ]
+    correlation, std = result.correlation, result.std
+    for i, name in enumerate(result.names):
+        for j in range(i):
+            if abs(correlation[i, j]) > CORRELATED and math.isfinite(std[i]):
+                sentences.append(
+                    f"{result.names[j]} and {name} are correlated at {correlation[i, j]:+.4f}: "
+                    "mostly a combination of them is determined. Measure at other postures, "
+                    "directions or tensions."
+                )
+    for i, name in enumerate(result.names):
+        low, high = result.bounds[i]
+        if at_bound[i]:
+            side, limit = ("lower", low) if result.values[i] == low else ("upper", high)
+            sentences.append(
+                f"{name} is at its {side} bound, {limit:g}: the optimum lies there or beyond, and "
+                "its interval does not hold. Widen the bounds, or doubt the model."
+            )
+        if high - low < std[i] < math.inf:
+            sentences.append(
+                f"{name} is known to ±{std[i]:.2g} only, more than its bounds are apart: it is the "
+                "bounds that determine it, not the measurements."
+            )
+    if result.freedom and chi2.sf(result.chi_square, result.freedom) < _UNLIKELY:
+        worst = int(abs(result.residuals).argmax())
+        sentences.append(
+            f"the model does not explain the measurements within their σ: χ² = "
+            f"{result.chi_square:.4g} with {result.freedom} degrees of freedom, worst at "
+            f"{result._labels[worst]} with {result.residuals[worst]:+.3g} σ. The intervals hold "
+            "for a right model only."
+        )
+    return sentences
+
+
+def _unfinished(problem: Problem, point: Array, slopes: Array) -> list[str]:
+    """Say so if χ² could fall further, as where the model ends on the way to the optimum."""
+    r = problem.residuals(point)
+    gradient = r @ slopes
+    held = ((point == 0.0) & (gradient >= 0.0)) | ((point == 1.0) & (gradient <= 0.0))
+    if held.all():
+        return []
+    step = np.zeros_like(point)
+    step[~held] = np.linalg.lstsq(slopes[:, ~held], -r, rcond=SAME)[0]
+    fall = float(np.sum((slopes @ step) ** 2))
+    if fall < _UNFINISHED:
+        return []
+    reason = "Give another start."
+    # the edge of the model is near if the search stopped for it
+    try:
+        size = 1e-3 / max(1e-3, float(abs(step).max()))
+        problem.predict(np.clip(point + size * step, 0.0, 1.0))
+    except NoStiffnessError as error:
+        reason = f"It lies beyond the edge of the model: {error}"
+    return [
+        f"no optimum within the bounds: χ² would still fall by about {fall:.3g} on the way from "
+        f"{problem.written(point)}. {reason}"
+    ]
+
+
+def _result(problem: Problem, best: Array) -> Identification:
+    arm, predicted = problem.predict(best)
+    slopes = problem.central_slopes(best)
+    result = Identification(
+        names=problem.names,
+        values=frozen(problem.parameters(best)),
+        bounds=frozen(np.column_stack([problem.low, problem.high])),
+        measurements=problem.measurements,
+        predicted=frozen(predicted),
+        jacobian=frozen(slopes / problem.stretch(best)),
+        arm=arm,
+        warnings=(),
+    )
+    at_bound = (best == 0.0) | (best == 1.0)
+    sentences = _sentences(result, at_bound) + _unfinished(problem, best, slopes)
+    return replace(result, warnings=tuple(sentences))

@@ -1,0 +1,305 @@
+"""From a tensile test to the elasticity of a wire: any wire, not only the paper's."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Final, final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cdsm._checks import Array, ReadOnlyState, frozen, one_of, scalar
+from cdsm._loading import FEWEST, loading
+from cdsm._polynomials import coefficients, evaluate, joins_of, polynomials
+from cdsm._rigidity_curve import Basis, Curve, Points, fit_curve
+from cdsm._stages import settled, yield_onset
+from cdsm.elasticity import Elasticity
+from cdsm.errors import InvalidInput, TensileTestError
+from cdsm.tensile_data import TensileTest
+from cdsm.wire import TabulatedElasticity
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+METHODS: Final = ("monotone", "polynomial")
+CONFIDENCE: Final = 0.95
+_KNOTS: Final = 200
+
+
+@final
+@dataclass(frozen=True)
+class Stage:
+    """One stage of a tensile test.
+
+    Attributes:
+        name: ``pre-tensioning``, ``elastic`` or ``plastic``.
+        low: Tension at which it begins [N].
+        high: Tension at which it ends, or the test does [N].
+    """
+
+    name: str
+    low: float
+    high: float
+
+    def __str__(self) -> str:
+        return f"{self.name} {self.low:.4g} N to {self.high:.4g} N"
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Band(ReadOnlyState):
+    """Where EA lies with 95 % confidence, tension by tension.
+
+    Attributes:
+        tensions: F, shape (n,) [N].
+        low: Lower end of EA, shape (n,) [N].
+        high: Upper end of EA, shape (n,) [N].
+    """
+
+    tensions: Array
+    low: Array
+    high: Array
+
+
+@final
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TensileFit(ReadOnlyState):
+    """The elasticity that a tensile test shows, with the test and how well it fits.
+
+    Attributes:
+        elasticity: Defined from the first load to where plasticity begins, or the test ends.
+        stages: What the rigidity curve shows of pre-tensioning, elastic and plastic, in this order.
+        rms: Root mean square of measured minus fitted force, over the domain [N]; of averages where
+            points were averaged.
+        band: 95 % confidence of EA: wild residual bootstrap, of the scatter alone.
+        test: What was fitted.
+        method: ``monotone`` or ``polynomial``.
+        start: Displacement at the low end of the domain [m].
+        notes: What was left out or cut, and why; one sentence each.
+    """
+
+    elasticity: Elasticity
+    stages: tuple[Stage, ...]
+    rms: float
+    band: Band
+    test: TensileTest
+    method: str
+    start: float
+    notes: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        low, high = self.elasticity.domain
+        ends = self.elasticity.rigidity(self.band.tensions[[0, -1]])
+        return "\n".join(
+            [
+                f"Tensile test of {self.test.force.size} points, gauge length "
+                f"{1e3 * self.test.gauge_length:g} mm, fitted by {self.method!r}",
+                f"  tension   {low:.4g} N to {high:.4g} N",
+                f"  rigidity  {ends[0]:.4g} N to {ends[1]:.4g} N",
+                f"  rms       {self.rms:.3g} N of force",
+                *(f"  stage     {stage}" for stage in self.stages),
+                *(f"  note      {note}" for note in self.notes),
+            ]
+        )
+
+    def plot(self) -> Figure:
+        """Force over displacement with the fit, and rigidity with its band and stages.
+
+        Displacement in mm, force in N, rigidity in kN.
+        """
+        from matplotlib.figure import Figure  # only where a figure is wanted: it imports slowly
+
+        figure = Figure(figsize=(10.0, 4.2), layout="constrained")
+        axes: Any = figure.subplots(1, 2)
+        force = self.band.tensions
+        stretch = self.elasticity.strain(force) * self.test.gauge_length
+        axes[0].plot(
+            1e3 * self.test.displacement, self.test.force, ".", color="0.6", ms=3, label="test"
+        )
+        axes[0].plot(1e3 * (self.start + stretch), force, color="#c8553d", label=self.method)
+        axes[0].set(xlabel="displacement [mm]", ylabel="force [N]")
+        axes[1].fill_between(
+            force, self.band.low / 1e3, self.band.high / 1e3, color="#3b6fb6", alpha=0.3,
+            label="95 % band", linewidth=0,
+        )  # fmt: skip
+        axes[1].plot(force, self.elasticity.rigidity(force) / 1e3, color="#c8553d", label="EA")
+        for stage, shade in zip(self.stages, ("0.93", "0.98", "0.88"), strict=False):
+            axes[1].axvspan(stage.low, stage.high, color=shade, zorder=0)
+            axes[1].annotate(
+                stage.name,
+                ((stage.low + stage.high) / 2.0, 1.0),
+                xycoords=("data", "axes fraction"),
+                xytext=(0, -4), textcoords="offset points", rotation=90, ha="center", va="top",
+                fontsize=8, color="0.35",
+            )  # fmt: skip
+        axes[1].set(xlabel="tension [N]", ylabel="tangent rigidity EA [kN]")
+        axes[1].set_ylim(bottom=0.0)
+        for each in axes:
+            each.legend(fontsize=8, loc="best")
+            each.grid(alpha=0.3)
+        return figure
+
+
+def fit_tensile_test(
+    displacement: ArrayLike,
+    force: ArrayLike,
+    gauge_length: float,
+    method: str = "monotone",
+    *,
+    join: float = 31.0,
+    samples: int = 200,
+    seed: int = 0,
+) -> TensileFit:
+    r"""Fit the tangent rigidity EA(F) = l_0 dF/dΔl [N] of a wire to its tensile test.
+
+    ``monotone`` fits the forces themselves by a curve whose log EA is a spline, so that EA > 0 and
+    the curve is C1; its smoothness follows from the data (restricted likelihood).
+    ``polynomial`` is the paper's way, for comparison: slopes of the measured curve, fitted
+    by two polynomials of degree 6. Unloading, slack before the first load and what follows the
+    largest force are left out, points of equal displacement averaged; ``notes`` says so.
+
+    The domain ends where plasticity begins: where EA falls, for good and beyond its uncertainty,
+    below 0.8 of its largest value. Pre-tensioning ends where EA grows slower than √F.
+
+    Units that are a factor of 1000 apart are told only by a strain above 1 or a rigidity outside
+    1 N to 1e9 N: a force in kN passes for a thin thread. Read the report.
+
+    Args:
+        displacement: Δl, shape (n,) [m], in the order recorded.
+        force: F, shape (n,) [N].
+        gauge_length: l_0 [m].
+        method: ``monotone`` or ``polynomial``.
+        join: Tension at which the two polynomials meet [N].
+        samples: Of the bootstrap, at least 40.
+        seed: Of the bootstrap.
+
+    Raises:
+        InvalidInput: Not finite numbers.
+        UnknownName: No such method.
+        TensileTestError: Arrays of different length, fewer than 8 points, a gauge length that is
+            not positive, compression, a force that does not rise, units that cannot be, or
+            polynomials that are not positive on half the range.
+    """
+    one_of("method", method, METHODS)
+    join = scalar("join", join)
+    if type(samples) is not int or samples < 40 or type(seed) is not int or seed < 0:
+        raise InvalidInput("samples", "an integer of at least 40 is needed, and a seed >= 0.")
+    test = TensileTest(displacement, force, gauge_length)  # type: ignore[arg-type]
+    points, noise, notes = loading(test)
+    curve = _curve(points, noise)
+    most = float(points.force.max())
+    onset = yield_onset(curve.basis.tensions, curve.rigidity, curve.deviation(points))
+    if onset is not None:
+        points = points.part(curve.force(points.strain) <= onset)
+        if len(points.force) < FEWEST:
+            raise TensileTestError(
+                f"the wire yields from {onset:.4g} N on, after {len(points.force)} points; a fit "
+                f"needs at least {FEWEST}. Sample more finely below the yield."
+            )
+        curve = _curve(points, noise)  # again, so that the bend does not round off what precedes
+        notes += (f"plastic from {onset:.4g} N on: the domain ends there",)
+    again = _resampled(curve, points, samples, np.random.default_rng(seed))
+    fit = _monotone if method == "monotone" else _polynomial
+    elasticity, start, rigidities, more = fit(curve, points, again, join)
+    low, high = elasticity.domain
+    if not elasticity.domain.low_included:
+        low = float(np.nextafter(low, high))
+    tensions = frozen(_spread(low, high, curve.basis.tensions))
+    tails = (1.0 - CONFIDENCE) / 2.0
+    lower, upper = np.quantile(rigidities(tensions), (tails, 1.0 - tails), axis=0)
+    strain = points.strain - start
+    fitted = np.interp(strain, elasticity.strain(tensions), tensions)
+    inside = (strain >= 0.0) & (fitted < tensions[-1])
+    stages = _stages(curve, points, elasticity, tensions)
+    if onset is not None:
+        stages += (Stage("plastic", float(tensions[-1]), max(most, float(tensions[-1]))),)
+    return TensileFit(
+        elasticity=elasticity,
+        stages=stages,
+        rms=float(np.sqrt(np.mean((points.force - fitted)[inside] ** 2))),
+        band=Band(tensions, frozen(lower), frozen(upper)),
+        test=test,
+        method=method,
+        start=start * test.gauge_length,
+        notes=notes + more,
+    )
+
+
+_Rigidities = Callable[[Array], Array]
+
+
+def _curve(points: Points, noise: float) -> Curve:
+    low, high = max(float(points.force[0]), 0.0), float(points.force.max())
+    corner = max(low, 8.0 * noise, 5e-3 * high)
+    return fit_curve(points, Basis.over(low, high, corner, len(points.force)), noise)
+
+
+def _resampled(
+    curve: Curve, points: Points, samples: int, random: np.random.Generator
+) -> list[Points]:
+    """Tests that might as well have been measured: every residual of either sign.
+
+    Unlike shuffled residuals, these keep noise that grows with the force where it is.
+    """
+    fitted = curve.force(points.strain)
+    leverage = curve.spread(points)[2]
+    # what a flexible curve takes up of the noise is missing from the residuals
+    errors = (points.force - fitted) / np.sqrt(np.maximum(1.0 - leverage, 0.1))
+    signs = random.choice((-1.0, 1.0), (samples, len(errors)))
+    return [replace(points, force=fitted + sign * errors) for sign in signs]
+
+
+def _monotone(
+    curve: Curve, points: Points, again: list[Points], join: float
+) -> tuple[Elasticity, float, _Rigidities, tuple[str, ...]]:
+    """The curve as a table, the strain at its low end, the resampled EA(F), and notes."""
+    grid = curve.basis.tensions
+    # the fit, not the largest noise, says how far the test went
+    first, last = curve.force(points.strain[[0, -1]])
+    tensions = _spread(max(grid[0], float(first)), min(grid[-1], float(last)), grid)
+    strain = np.interp(tensions, grid, curve.strain)
+    curves = [curve.refitted(each, 12).rigidity for each in again]
+    return (
+        TabulatedElasticity(tuple(tensions.tolist()), tuple((strain - strain[0]).tolist())),
+        float(strain[0]),
+        lambda at: np.array([np.interp(at, grid, each) for each in curves]),
+        (),
+    )
+
+
+def _polynomial(
+    curve: Curve, points: Points, again: list[Points], join: float
+) -> tuple[Elasticity, float, _Rigidities, tuple[str, ...]]:
+    """The same of the paper's two polynomials."""
+    law, notes = polynomials(points, join)
+    joins = joins_of(points, join)
+    rows = [coefficients(each, joins) for each in again]
+    tensions = _spread(float(np.nextafter(law.low, law.high)), law.high, curve.basis.tensions)
+    # where the law begins is not measured: it is put where it fits best
+    offsets = np.interp(tensions, curve.basis.tensions, curve.strain) - law.strain(tensions)
+    weight = np.gradient(tensions)
+    return (
+        law,
+        float(np.average(offsets, weights=weight)),
+        lambda at: np.array([evaluate(each, joins, at) for each in rows]),
+        notes,
+    )
+
+
+def _spread(low: float, high: float, grid: Array) -> Array:
+    """Tensions (n,) [N] from low to high, some 200 over the grid."""
+    inside = grid[(grid > low) & (grid < high)][5 :: len(grid) // _KNOTS]
+    return np.array([low, *inside[:-1], high])
+
+
+def _stages(
+    curve: Curve, points: Points, elasticity: Elasticity, tensions: Array
+) -> tuple[Stage, ...]:
+    """Pre-tensioning, if there is any, and elastic."""
+    low, high = float(tensions[0]), float(tensions[-1])
+    deviation = np.interp(tensions, curve.basis.tensions, curve.deviation(points))
+    end = settled(tensions, elasticity.rigidity(tensions), deviation)
+    if end is None:
+        return (Stage("elastic", low, high),)
+    return (Stage("pre-tensioning", low, end), Stage("elastic", end, high))
