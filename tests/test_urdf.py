@@ -23,6 +23,7 @@ ROOT = Path(__file__).parents[1]
 
 PRESETS: dict[str, Callable[[], cdsm.Geometry]] = {
     "virtual_prototype": cdsm.presets.virtual_prototype_geometry,
+    "experimental_prototype": cdsm.presets.experimental_prototype_geometry,
 }
 
 ARMS: dict[str, cdsm.Geometry] = {
