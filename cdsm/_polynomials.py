@@ -30,7 +30,8 @@ def polynomials(points: Points, join: float) -> tuple[StrandElasticity, tuple[st
     rows = coefficients(points, joins)
     low, high = max(float(points.force[0]), 0.0), float(points.force.max())
     tensions = np.linspace(low, high, 4001)
-    positive = evaluate(rows, joins, tensions) > 1e-6 * abs(evaluate(rows, joins, tensions)).max()
+    rigidity = evaluate(rows, joins, tensions)
+    positive = rigidity > 1e-6 * abs(rigidity).max()
     edges = np.flatnonzero(np.diff(np.pad(positive.astype(int), 1)))
     starts, ends = edges[::2], edges[1::2] - 1
     best = int(np.argmax(ends - starts)) if len(starts) else 0

@@ -12,7 +12,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import BSpline
 from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import least_squares
@@ -21,6 +20,14 @@ from cdsm._checks import Array
 
 _INTERVALS = 48
 _GRID = 1200  # quadrature error below 1e-4 of the strain where EA varies thousandfold
+
+
+def _running_integral(values: Array, tensions: Array, axis: int = -1) -> Array:
+    """∫ values dF from the first tension to each, by the trapezoidal rule."""
+    from scipy.integrate import cumulative_trapezoid  # only where wanted: it imports slowly
+
+    integral: Array = cumulative_trapezoid(values, tensions, axis=axis, initial=0.0)
+    return integral
 
 
 @dataclass(frozen=True)
@@ -89,8 +96,7 @@ class Curve:
     @cached_property
     def strain(self) -> Array:
         """ε (g,) [-] on the grid, of the same origin as the points."""
-        rise: Array = cumulative_trapezoid(1.0 / self.rigidity, self.basis.tensions, initial=0.0)
-        return self.start + rise
+        return self.start + _running_integral(1.0 / self.rigidity, self.basis.tensions)
 
     def force(self, strain: Array) -> Array:
         """Tension (n,) [N] at strains (n,); straight beyond the ends."""
@@ -105,8 +111,8 @@ class Curve:
         inside = np.clip(strain, grid[0], grid[-1])
         at = np.clip(np.searchsorted(grid, inside) - 1, 0, len(grid) - 2)
         share = ((inside - grid[at]) / (grid[at + 1] - grid[at]))[:, None]
-        by_coefficients = cumulative_trapezoid(
-            self.basis.splines / self.rigidity[:, None], tensions, axis=0, initial=0.0
+        by_coefficients = _running_integral(
+            self.basis.splines / self.rigidity[:, None], tensions, axis=0
         )
         stretch = (1.0 - share) * by_coefficients[at] + share * by_coefficients[at + 1]
         rigidity = (1.0 - share) * self.rigidity[at, None] + share * self.rigidity[at + 1, None]

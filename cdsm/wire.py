@@ -10,7 +10,6 @@ from typing import final
 import numpy as np
 from numpy.polynomial import Polynomial
 from numpy.typing import ArrayLike
-from scipy.integrate import quad_vec
 from scipy.interpolate import PchipInterpolator, PPoly
 
 from cdsm._checks import Array, number_array, scalar
@@ -137,6 +136,8 @@ class StrandElasticity(Elasticity):
 
     def _integral(self, tension: ArrayLike, power: int) -> Array:
         """∫ F^power dF/EA(F) from the low end of the domain."""
+        from scipy.integrate import quad_vec  # only where it is wanted: it imports slowly
+
         values = self.domain.check(tension)
         total = np.zeros_like(values)
         edges = (self.low, *self.joins, self.high)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 from scipy.linalg import qr
-from scipy.stats import norm, t
+from scipy.special import ndtri, stdtrit
 
 from cdsm._checks import (
     Array,
@@ -146,9 +146,9 @@ class Identification(ReadOnlyState):
             raise InvalidInput("level", f"{level:g} given; it must lie between 0 and 1, as 0.95.")
         half = (1.0 + level) / 2.0
         if not scaled:
-            width = norm.ppf(half) * self.std
+            width = ndtri(half) * self.std
         elif self.freedom:
-            width = t.ppf(half, self.freedom) * math.sqrt(self.reduced_chi_square) * self.std
+            width = stdtrit(self.freedom, half) * math.sqrt(self.reduced_chi_square) * self.std
         else:
             width = np.full(self.std.shape, math.inf)
         low, high = (self.values - width).tolist(), (self.values + width).tolist()

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import least_squares
-from scipy.stats import chi2, qmc
+from scipy.special import chdtrc
 
 from cdsm._checks import (
     Array,
@@ -172,6 +172,8 @@ def _starts(problem: Problem, start: Mapping[str, float] | None) -> list[Array]:
     """Points of the unit cube to search from, at each of which the model has its stiffnesses."""
     count = len(problem.names)
     if start is None:
+        from scipy.stats import qmc  # only where it is wanted: it imports slowly
+
         # Halton's first point is a corner
         spread = qmc.Halton(count, scramble=False).random(_CANDIDATES)[1:]
         points = [np.full(count, 0.5), *spread]
@@ -274,7 +276,7 @@ def _sentences(result: Identification, at_bound: Array) -> list[str]:
                 f"{name} is known to ±{std[i]:.2g} only, more than its bounds are apart: it is the "
                 "bounds that determine it, not the measurements."
             )
-    if result.freedom and chi2.sf(result.chi_square, result.freedom) < _UNLIKELY:
+    if result.freedom and chdtrc(result.freedom, result.chi_square) < _UNLIKELY:
         worst = int(abs(result.residuals).argmax())
         sentences.append(
             f"the model does not explain the measurements within their σ: χ² = "
