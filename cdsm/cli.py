@@ -64,7 +64,7 @@ def reproduce(
         "reproduction"
     ),
 ) -> None:
-    """Recompute Figs. 3 to 8 of the paper: pictures, table and numbers."""
+    """Recompute Figs. 3 to 13 of the paper: pictures, table and numbers."""
     with _reported():
         from cdsm import paper, plots
         from cdsm._files import make_folder, write_file, write_text

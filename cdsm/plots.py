@@ -52,7 +52,7 @@ def plot_arm(pose: Posture, tension: Tension | None = None) -> Figure:
     return figure
 
 
-def plot_paper(result: paper.Figure | paper.StrandFigure) -> Figure:
+def plot_paper(result: paper.Result) -> Figure:
     """One recomputed figure of the paper.
 
     Of a stiffness its own reading above, that of a hung weight below; the cable tension is the
@@ -63,6 +63,10 @@ def plot_paper(result: paper.Figure | paper.StrandFigure) -> Figure:
     """
     if isinstance(result, paper.StrandFigure):
         return _plot_strand(result)
+    if isinstance(result, paper.ExperimentFigure):
+        return _plot_experiment(result)
+    if isinstance(result, paper.PrototypeFigure):
+        return _plot_prototype(result)
     return _plot_postures(result) if len(result.curves) == 3 else _plot_directions(result)
 
 
@@ -135,6 +139,61 @@ def _plot_postures(result: paper.Figure) -> Figure:
     handles, labels = bottom[0].get_legend_handles_labels()
     figure.legend(handles, labels, title="direction", ncols=3, loc="outside lower center")
     _finish(figure, [bottom], result, legend=False)
+    return figure
+
+
+def _plot_experiment(result: paper.ExperimentFigure) -> Figure:
+    """A panel for each trace: computed as a line, the paper's values as dots."""
+    scale = 1.0 if result.relative else _N_PER_MM
+    unit = "stiffness in y over the first [-]" if result.relative else "stiffness [N/mm]"
+    tension = result.swept == "tension"
+    figure = Figure(figsize=(3.7 * len(result.traces) + 1.0, 3.8), layout="constrained")
+    grid: Any = figure.subplots(1, len(result.traces))
+    for axes, trace, color in zip(grid, result.traces, _COLORS, strict=False):
+        across = 1.0 if tension else _N_PER_MM
+        axes.plot(across * trace.swept, scale * trace.computed, color=color, label="computed")
+        axes.plot(across * trace.paper_at, scale * trace.paper, "ko", markersize=4, label="paper")
+        axes.set(
+            title=trace.label,
+            xlabel="tension as reported [N]" if tension else "cable stiffness [N/mm]",
+            ylabel=unit,
+        )
+        axes.set_ylim(bottom=0.0)
+        axes.grid(alpha=0.3)
+        axes.legend(fontsize=8)
+    figure.suptitle(result.title)
+    return figure
+
+
+def _plot_prototype(result: paper.PrototypeFigure) -> Figure:
+    """Residual number by number, with all data and with what contradicts them most left out."""
+    names = paper.prototype.NAMES
+    best = sorted(result.without, key=lambda left_out: result.without[left_out].cost)[:2]
+    fits = {
+        "all data": result.fit,
+        **{f"without {left_out}": result.without[left_out] for left_out in best},
+    }
+    figure = Figure(figsize=(8.0, 7.0), layout="constrained")
+    axes: Any = figure.subplots()
+    places = np.arange(len(names))
+    for (label, fit), marker, color in zip(fits.items(), "os^", _COLORS, strict=True):
+        counted = np.array([name not in fit.without for name in names])
+        axes.plot(
+            100.0 * fit.residuals[counted],
+            places[counted],
+            marker,
+            color=color,
+            markersize=5,
+            alpha=0.8,
+            label=label,
+        )
+    axes.axvline(0.0, color="0.2", linewidth=0.8)
+    axes.set_yticks(places, names, fontsize=8)
+    axes.invert_yaxis()
+    axes.set_xlabel("100 ln(model/paper); Figs. 12, 13: (model − paper)/paper [%]")
+    axes.grid(alpha=0.3)
+    figure.legend(loc="outside lower center", ncols=3, fontsize=8)
+    figure.suptitle(result.title)
     return figure
 
 

@@ -16,6 +16,7 @@ from cdsm.cable import serpentine_cables
 from cdsm.elasticity import Elasticity, LinearElasticity
 from cdsm.geometry import Geometry
 from cdsm.manipulator import Manipulator
+from cdsm.parts import Link
 from cdsm.wire import StrandElasticity
 
 STRAND_1X19: Final = StrandElasticity.eq19_repaired()
@@ -75,6 +76,7 @@ def virtual_prototype(
 def experimental_prototype_geometry(
     *,
     link_length: float = 0.1,
+    tool_length: float | None = None,
     base_length: float = 0.05,
     disk_offset: float = 0.02,
     hole_radius: float = 0.03,
@@ -88,6 +90,7 @@ def experimental_prototype_geometry(
 
     Args:
         link_length: [m]; assumed.
+        tool_length: From the last joint to where the weights hang [m]; None: ``link_length``.
         base_length: [m]; assumed.
         disk_offset: [m]; assumed.
         hole_radius: [m]; assumed.
@@ -97,7 +100,7 @@ def experimental_prototype_geometry(
     Raises:
         GeometryError: Lists every fault.
     """
-    return Geometry.hinged(
+    geometry = Geometry.hinged(
         name="experimental_prototype",
         joints=3,
         twist=np.deg2rad(30.0),
@@ -110,6 +113,10 @@ def experimental_prototype_geometry(
         link_mass=link_mass,
         lead=lead,
     )
+    if tool_length is None:
+        return geometry
+    last = Link(length=tool_length, mass=link_mass)
+    return replace(geometry, links=(*geometry.links[:-1], last))
 
 
 def experimental_prototype(

@@ -4,7 +4,7 @@ import pytest
 
 from cdsm import paper
 
-Results = dict[str, paper.Figure | paper.StrandFigure]
+Results = dict[str, paper.Result]
 
 
 @pytest.fixture(scope="session")

@@ -1,4 +1,4 @@
-"""The paper's simulation study (Section IV), recomputed."""
+"""The paper's simulation study (Section IV), recomputed, and the report of all figures."""
 
 import json
 
@@ -115,5 +115,8 @@ def test_report_is_strict_json_and_a_table(results: Results) -> None:
     assert list(numbers) == list(paper.FIGURES)
     table = paper.to_markdown(figures).splitlines()
     count = sum(len(figure.claims) for figure in figures)
-    assert len([line for line in table if line.startswith("| Fig.")]) == count
+    rows = table[2 : 2 + count]
+    assert all(line.startswith(("| Fig.", "| Table", "| Section")) for line in rows)
     assert len({line.count("|") for line in table[: count + 2]}) == 1
+    parameters = [line for line in table if line.startswith("| link_length |")]
+    assert parameters == ["| link_length | 0.03 | 0.03 | 0.15 | at a bound |"]

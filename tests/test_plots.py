@@ -1,10 +1,12 @@
 """Figures draw what they are given; how they look was looked at."""
 
 import numpy as np
+from matplotlib.lines import Line2D
 from mpl_toolkits.mplot3d.art3d import Line3D  # type: ignore[import-untyped]
 
 import cdsm
 from cdsm import paper, plots
+from cdsm._checks import Array
 from tests.arms import mixed_arm, random_posture
 from tests.conftest import Results
 
@@ -29,9 +31,9 @@ def test_paper_figures_show_both_readings_in_newton_per_millimetre(
     results: Results,
 ) -> None:
     for result in results.values():
-        figure = plots.plot_paper(result)
-        if isinstance(result, paper.StrandFigure):
+        if not isinstance(result, paper.Figure):
             continue
+        figure = plots.plot_paper(result)
         labels = [axes.get_ylabel() for axes in figure.axes]
         for reading in ("paper's reading", "hung weight"):
             assert sum(reading in label and "[N/mm]" in label for label in labels) == 3
@@ -44,6 +46,38 @@ def test_curves_are_drawn_where_they_are(
     result = results["fig6"]
     assert isinstance(result, paper.Figure)
     axes = plots.plot_paper(result).axes[0]
-    x, y = np.asarray(axes.get_lines()[0].get_xydata(), dtype=np.float64).T
+    x, y = _shown(axes.get_lines()[0])
     np.testing.assert_allclose(x, result.curves[0].tension[:, 1])
     np.testing.assert_allclose(y, result.curves[0].pseudoinverse[:, 0] / 1000.0)
+
+
+def test_experiments_show_the_papers_numbers_beside_the_computed(results: Results) -> None:
+    for name in ("fig10", "fig12", "fig13"):
+        result = results[name]
+        assert isinstance(result, paper.ExperimentFigure)
+        figure = plots.plot_paper(result)
+        figure.draw_without_rendering()
+        assert len(figure.axes) == len(result.traces)
+        unit = 1.0 if result.relative else 1e-3
+        for axes, trace in zip(figure.axes, result.traces, strict=True):
+            computed, printed = axes.get_lines()
+            np.testing.assert_allclose(_shown(computed)[1], unit * trace.computed)
+            np.testing.assert_allclose(_shown(printed)[1], unit * trace.paper)
+            assert "[N" in axes.get_xlabel()
+
+
+def test_prototype_figure_shows_a_dot_for_every_number_that_counted(results: Results) -> None:
+    result = results["prototype"]
+    assert isinstance(result, paper.PrototypeFigure)
+    figure = plots.plot_paper(result)
+    figure.draw_without_rendering()
+    (axes,) = figure.axes
+    everything, *others, _ = axes.get_lines()
+    np.testing.assert_allclose(_shown(everything)[0], 100.0 * result.fit.residuals)
+    assert [_shown(line).shape[1] for line in others] == [15, 15]
+    assert len(axes.get_yticklabels()) == 20
+
+
+def _shown(line: Line2D) -> Array:
+    """x and y of a line (2, N)."""
+    return np.asarray(line.get_xydata(), dtype=np.float64).T

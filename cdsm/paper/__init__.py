@@ -1,8 +1,17 @@
-"""The simulation study of the paper (Section IV), recomputed: Figs. 3 to 8."""
+"""The paper recomputed: simulation study (Section IV, Figs. 3 to 8) and experiments (Section V)."""
 
 from collections.abc import Callable
 from typing import Final
 
+from cdsm.paper.experiments import (
+    ExperimentFigure,
+    PrototypeFigure,
+    Trace,
+    figure_10,
+    figure_12,
+    figure_13,
+    figure_prototype,
+)
 from cdsm.paper.figures import (
     Claim,
     Curve,
@@ -13,27 +22,40 @@ from cdsm.paper.figures import (
     figure_7,
     figure_8,
 )
-from cdsm.paper.report import EXPLANATION, HEADER, to_dict, to_markdown, to_rows
+from cdsm.paper.prototype import BOUNDS, Prototype, PrototypeFit, identify_prototype
+from cdsm.paper.report import EXPLANATION, HEADER, Result, to_dict, to_markdown, to_rows
 from cdsm.paper.strand import StrandFigure, figure_5
 
-FIGURES: Final[dict[str, Callable[[], Figure | StrandFigure]]] = {
+FIGURES: Final[dict[str, Callable[[], Result]]] = {
     "fig3": figure_3,
     "fig4": figure_4,
     "fig5": figure_5,
     "fig6": figure_6,
     "fig7": figure_7,
     "fig8": figure_8,
+    "fig10": figure_10,
+    "fig12": figure_12,
+    "fig13": figure_13,
+    "prototype": figure_prototype,
 }
 """What computes each figure, by name."""
 
 __all__ = [
+    "BOUNDS",
     "EXPLANATION",
     "FIGURES",
     "HEADER",
     "Claim",
     "Curve",
+    "ExperimentFigure",
     "Figure",
+    "Prototype",
+    "PrototypeFigure",
+    "PrototypeFit",
+    "Result",
     "StrandFigure",
+    "Trace",
+    "identify_prototype",
     "to_dict",
     "to_markdown",
     "to_rows",

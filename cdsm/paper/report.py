@@ -3,19 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict
 
+from cdsm.paper.experiments import ExperimentFigure, PrototypeFigure
 from cdsm.paper.figures import Figure
+from cdsm.paper.prototype import BOUNDS, NAMES, PrototypeFit
 from cdsm.paper.strand import StrandFigure
+
+Result = Figure | StrandFigure | ExperimentFigure | PrototypeFigure
+"""What any part of the paper recomputed is."""
 
 HEADER = ("figure", "quantity", "paper", "computed", "difference", "hung weight", "assumption")
 
 EXPLANATION = (
     "Three numbers are x, y, z. computed: K_R read as the paper writes it, with the pseudo-inverse "
-    "of the Jacobian; hung weight: the same for the stiffness that a weight at the tip measures."
+    "of the Jacobian; hung weight: the same for the stiffness that a weight at the tip measures. "
+    "Section V was measured with weights: there computed is that, on one prototype identified from "
+    "the same data within stated bounds."
 )
 
 
-def to_rows(results: Sequence[Figure | StrandFigure]) -> list[tuple[str, ...]]:
+def to_rows(results: Sequence[Result]) -> list[tuple[str, ...]]:
     """The claims, one row of text each under :data:`HEADER`.
 
     Args:
@@ -36,7 +44,7 @@ def to_rows(results: Sequence[Figure | StrandFigure]) -> list[tuple[str, ...]]:
     ]
 
 
-def to_markdown(results: Sequence[Figure | StrandFigure]) -> str:
+def to_markdown(results: Sequence[Result]) -> str:
     """The claims as a Markdown table: what the paper says, what comes out, and what was assumed.
 
     Args:
@@ -44,10 +52,22 @@ def to_markdown(results: Sequence[Figure | StrandFigure]) -> str:
     """
     lines = [HEADER, ("---",) * len(HEADER), *to_rows(results)]
     table = "\n".join(f"| {' | '.join(cells)} |" for cells in lines)
-    return f"{table}\n\n{EXPLANATION}\n"
+    sections = [table, EXPLANATION]
+    sections += [_prototype(each.fit) for each in results if isinstance(each, PrototypeFigure)]
+    return "\n\n".join(sections) + "\n"
 
 
-def to_dict(results: Sequence[Figure | StrandFigure]) -> dict[str, object]:
+def _prototype(fit: PrototypeFit) -> str:
+    """The parameters of the identified prototype as a Markdown table."""
+    rows = [("parameter of the identified prototype [SI]", "value", "from", "to", ""), ("---",) * 5]
+    for name, value in asdict(fit.prototype).items():
+        low, high = BOUNDS[name]
+        on_bound = "at a bound" if name in fit.at_bound else ""
+        rows.append((name, f"{value:.4g}", f"{low:.4g}", f"{high:.4g}", on_bound))
+    return "\n".join(f"| {' | '.join(cells)} |" for cells in rows)
+
+
+def to_dict(results: Sequence[Result]) -> dict[str, object]:
     """All curves and claims as plain SI numbers, ready for JSON.
 
     Args:
@@ -56,11 +76,19 @@ def to_dict(results: Sequence[Figure | StrandFigure]) -> dict[str, object]:
     return {
         figure.name: {
             "title": figure.title,
-            **(_strand(figure) if isinstance(figure, StrandFigure) else _stiffness(figure)),
+            **_numbers_of(figure),
             "claims": [{**vars(claim), "difference": claim.difference} for claim in figure.claims],
         }
         for figure in results
     }
+
+
+def _numbers_of(figure: Result) -> dict[str, object]:
+    if isinstance(figure, StrandFigure):
+        return _strand(figure)
+    if isinstance(figure, ExperimentFigure):
+        return _experiment(figure)
+    return _fits(figure) if isinstance(figure, PrototypeFigure) else _stiffness(figure)
 
 
 def _strand(figure: StrandFigure) -> dict[str, object]:
@@ -90,6 +118,38 @@ def _stiffness(figure: Figure) -> dict[str, object]:
                 },
             }
             for curve in figure.curves
+        ],
+    }
+
+
+def _experiment(figure: ExperimentFigure) -> dict[str, object]:
+    swept = {"tension": "tension_N", "cable_stiffness": "cable_stiffness_N_per_m"}[figure.swept]
+    computed = "stiffness_over_first" if figure.relative else "stiffness_N_per_m"
+    return {
+        "curves": [
+            {
+                "label": trace.label,
+                swept: trace.swept.tolist(),
+                computed: trace.computed.tolist(),
+                f"paper_{swept}": trace.paper_at.tolist(),
+                f"paper_{computed}": trace.paper.tolist(),
+            }
+            for trace in figure.traces
+        ]
+    }
+
+
+def _fits(figure: PrototypeFigure) -> dict[str, object]:
+    return {
+        "bounds_SI": BOUNDS,
+        "fits": [
+            {
+                "left_out": left_out,
+                "parameters_SI": asdict(fit.prototype),
+                "at_bound": fit.at_bound,
+                "residuals": dict(zip(NAMES, fit.residuals.tolist(), strict=True)),
+            }
+            for left_out, fit in {"": figure.fit, **figure.without}.items()
         ],
     }
 
