@@ -167,7 +167,7 @@ def _plot_experiment(result: paper.ExperimentFigure) -> Figure:
 
 def _plot_prototype(result: paper.PrototypeFigure) -> Figure:
     """Residual number by number, with all data and with what contradicts them most left out."""
-    names = paper.prototype.NAMES
+    names = paper.section_v.NAMES
     best = sorted(result.without, key=lambda left_out: result.without[left_out].cost)[:2]
     fits = {
         "all data": result.fit,

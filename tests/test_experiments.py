@@ -8,8 +8,9 @@ import pytest
 import cdsm
 from cdsm import paper
 from cdsm._checks import Array
-from cdsm.paper import prototype
-from cdsm.paper.prototype import BOUNDS, HYBRID, NAMES, START, Prototype
+from cdsm.paper import section_v
+from cdsm.paper.prototype import BOUNDS, START, Prototype
+from cdsm.paper.section_v import HYBRID, NAMES
 from tests.conftest import Results
 
 
@@ -37,9 +38,9 @@ def random_prototype(seed: int) -> Prototype:
 
 
 def test_table_2_is_the_papers() -> None:
-    increments = prototype.TABLE_II[-1] / prototype.TABLE_II[0] - 1.0
+    increments = section_v.TABLE_II[-1] / section_v.TABLE_II[0] - 1.0
     np.testing.assert_allclose(increments, (2.11, 3.6, 2.97), atol=0.015)  # as it prints them
-    assert prototype.TENSIONS[[0, -1]].tolist() == [3.0, 86.0]
+    assert section_v.TENSIONS[[0, -1]].tolist() == [3.0, 86.0]
     assert len(NAMES) == 20
 
 
@@ -60,7 +61,7 @@ def test_prototype_has_what_the_paper_does_say() -> None:
 def test_measured_stiffness_is_a_central_difference_of_the_balance() -> None:
     """Hybrid cables: an exact spring, so that statics alone give the stiffness, without K_θ."""
     arm = START.arm(HYBRID)
-    pose = arm.at(prototype.POSTURE)
+    pose = arm.at(section_v.POSTURE)
     (stiffness,) = START.measure(pose, 10.0)
     held = {c.name: 10.0 + START.tension_offset for c in arm.cables if c.control == "force"}
     reference = cdsm.distribute_tension(pose, fixed=held)
@@ -81,14 +82,14 @@ def test_measured_stiffness_is_a_central_difference_of_the_balance() -> None:
 
 
 def test_offset_is_added_to_the_reported_tension() -> None:
-    pose = START.arm().at(prototype.POSTURE)
+    pose = START.arm().at(section_v.POSTURE)
     moved = replace(START, tension_offset=START.tension_offset - 5.0)
     np.testing.assert_allclose(moved.measure(pose, 15.0), START.measure(pose, 10.0), rtol=1e-12)
 
 
 def test_buckling_is_said_and_not_reported_as_a_stiffness() -> None:
     slender = replace(START, hole_radius=0.02, tension_offset=0.0)
-    pose = slender.arm(HYBRID).at(prototype.POSTURE)
+    pose = slender.arm(HYBRID).at(section_v.POSTURE)
     with pytest.raises(cdsm.SingularStiffness, match=r"buckles at 60 N.*Lower the tension"):
         slender.measure(pose, 60.0)
 
@@ -205,5 +206,5 @@ def test_accuracy_check_is_compared_with_the_papers_model_not_its_measurement(
     results: Results,
 ) -> None:
     (check,) = [c for c in prototype_figure(results).claims if c.figure == "Section V-B"]
-    assert check.paper == (prototype.CHECK / 1e3,) == (0.139,)
+    assert check.paper == (section_v.CHECK / 1e3,) == (0.139,)
     assert "0.131 measured" in check.assumption

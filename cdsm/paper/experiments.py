@@ -16,18 +16,8 @@ import numpy as np
 
 from cdsm._checks import Array, frozen
 from cdsm.paper.figures import Claim
-from cdsm.paper.prototype import (
-    AXES,
-    CHECK,
-    DROPS,
-    HYBRID,
-    NAMES,
-    RISES,
-    TABLE_II,
-    TENSIONS,
-    PrototypeFit,
-    identify_prototype,
-)
+from cdsm.paper.prototype import PrototypeFit, identify_prototype
+from cdsm.paper.section_v import AXES, CHECK, DROPS, HYBRID, NAMES, RISES, TABLE_II, TENSIONS
 
 _POINTS: Final = 40
 _LEFT_OUT: Final = ("Table II, x", "Table II, y", "Table II, z", "V-B")

@@ -7,7 +7,8 @@ from dataclasses import asdict
 
 from cdsm.paper.experiments import ExperimentFigure, PrototypeFigure
 from cdsm.paper.figures import Figure
-from cdsm.paper.prototype import BOUNDS, NAMES, PrototypeFit
+from cdsm.paper.prototype import BOUNDS, PrototypeFit
+from cdsm.paper.section_v import NAMES
 from cdsm.paper.strand import StrandFigure
 
 Result = Figure | StrandFigure | ExperimentFigure | PrototypeFigure
