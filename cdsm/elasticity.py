@@ -19,6 +19,10 @@ from cdsm._checks import LARGEST, SMALLEST, Array, number_array, scalar
 from cdsm.errors import ElasticityRangeError, InvalidInput
 
 
+_STEP = 6e-6
+"""Relative step of central differences: the cube root of the rounding of float64."""
+
+
 @final
 @dataclass(frozen=True)
 class Domain:
@@ -55,6 +59,11 @@ class Domain:
         left = "[" if self.low_included else "("
         right = ")" if math.isinf(self.high) else "]"
         return f"{left}{self.low:g} N, {self.high:g} N{right}"
+
+    @property
+    def first(self) -> float:
+        """Smallest tension that belongs to it [N]: ``low``, or the next number above."""
+        return self.low if self.low_included else math.nextafter(self.low, math.inf)
 
     def check(self, tension: ArrayLike) -> Array:
         """Return the tensions as a float array of the same shape if all lie in the domain.
@@ -98,6 +107,36 @@ class Elasticity(ABC):
             ElasticityRangeError: A tension outside :attr:`domain`, or one at which the law gives no
                 positive rigidity.
         """
+
+    def rigidity_slope(self, tension: ArrayLike) -> Array:
+        r"""dEA/dF [-]: how the tangent rigidity grows with tension.
+
+        Unless a law knows better, the central difference over F (1 ± 6e-6), good for some ten
+        digits; beside an end of :attr:`domain` or one of :attr:`jumps` it is taken on the side
+        there is, at a jump below it.
+
+        Args:
+            tension: F [N], any shape.
+
+        Raises:
+            ElasticityRangeError: As for :meth:`rigidity`.
+        """
+        values = self.domain.check(tension)
+        piece = np.searchsorted(self.jumps, values, side="left")
+        first = np.array([self.domain.first, *np.nextafter(self.jumps, math.inf)])[piece]
+        last = np.array([*self.jumps, self.domain.high])[piece]
+        step = _STEP * np.maximum(values, 1.0)
+        before, after = np.maximum(values - step, first), np.minimum(values + step, last)
+        return np.asarray((self.rigidity(after) - self.rigidity(before)) / (after - before))
+
+    @property
+    def jumps(self) -> tuple[float, ...]:
+        """Tensions [N], rising, beyond which the rigidity starts from another value; mostly none.
+
+        A jump belongs to the range below it. A law of your own has to name its jumps if
+        :func:`~cdsm.planning.plan_stiffness` and its kin are to look on both sides of them.
+        """
+        return ()
 
     @abstractmethod
     def strain(self, tension: ArrayLike) -> Array:
@@ -211,6 +250,10 @@ class LinearElasticity(Elasticity):
         rigidity.fill(self._rigidity)
         return rigidity
 
+    def rigidity_slope(self, tension: ArrayLike) -> Array:
+        """Zero [-]; see :meth:`Elasticity.rigidity_slope`."""
+        return np.zeros_like(self.domain.check(tension))
+
     def strain(self, tension: ArrayLike) -> Array:
         """F/EA [-]; see :meth:`Elasticity.strain`."""
         return self.domain.check(tension) / self._rigidity
@@ -218,6 +261,10 @@ class LinearElasticity(Elasticity):
     def energy(self, tension: ArrayLike) -> Array:
         """F²/(2 EA) [N]; see :meth:`Elasticity.energy`."""
         return np.asarray(self.domain.check(tension) ** 2 / (2.0 * self._rigidity))
+
+
+# denser at the low end, where most laws are soft; ends exactly at 0 and 1
+_GRID = np.linspace(0.0, 1.0, 25) ** 3
 
 
 def tension_at(
@@ -228,8 +275,6 @@ def tension_at(
     name: str,
 ) -> Array:
     """Tensions F [N] at which a rising stretch(F), zero at the low end, has the wanted values.
-
-    Newton's method inside a shrinking bracket, so that it converges for every rising law.
 
     Args:
         wanted: Strain [-] or elongation [m], any shape.
@@ -246,26 +291,45 @@ def tension_at(
         high = max(1.0, 2.0 * low)
         while float(stretch(np.array(high))) < wanted.max(initial=0.0) and high < LARGEST:
             high = min(2.0 * high, LARGEST)
-    most = float(stretch(np.array(high)))
-    outside = (wanted < 0.0) | (wanted > most)
+    grid = np.maximum(low + (high - low) * _GRID, domain.first)
+    reached = stretch(grid)
+    outside = (wanted < 0.0) | (wanted > reached[-1])
     if outside.any():
+        first = np.atleast_1d(wanted)[np.atleast_1d(outside)][0]
         raise ElasticityRangeError(
-            f"no tension of the domain {domain} gives the {name} "
-            f"{np.atleast_1d(wanted)[np.atleast_1d(outside)][0]:.6g}; it reaches {most:.6g}.",
+            f"no tension of the domain {domain} gives the {name} {first:.6g}; it reaches "
+            f"{reached[-1]:.6g}.",
             [high],
             np.flatnonzero(outside).tolist(),
         )
-    lower, upper = np.full_like(wanted, low), np.full_like(wanted, high)
-    first = low if domain.low_included else float(np.nextafter(low, math.inf))
-    guess = low + (high - low) * wanted / (most or 1.0)
+    above = np.searchsorted(reached[1:-1], wanted) + 1
+    guess = np.interp(wanted, reached, grid)
+    return rising_root(wanted, guess, grid[above - 1], grid[above], stretch, slope)[0]
+
+
+def rising_root(
+    wanted: Array,
+    guess: Array,
+    lower: Array,
+    upper: Array,
+    stretch: Callable[[Array], Array],
+    slope: Callable[[Array], Array],
+) -> tuple[Array, Array]:
+    """Tensions F [N] between bounds at which a rising stretch(F) has the wanted values, and slope.
+
+    Newton's method inside a shrinking bracket, so that it converges for every rising law. All
+    arrays have one shape; an upper bound may be infinite.
+    """
+    first, last = lower, upper
+    guess = np.minimum(np.maximum(guess, first), last)
     for _ in range(200):  # bisection alone would take 60
-        guess = np.clip(guess, first, high)
-        error = np.asarray(stretch(guess)) - wanted
+        error, rise = np.asarray(stretch(guess)) - wanted, slope(guess)
+        step = error / rise
+        if (abs(step) <= 1e-13 * np.maximum(guess, 1.0)).all():  # rounding is near
+            break
         lower = np.where(error <= 0.0, guess, lower)
         upper = np.where(error >= 0.0, guess, upper)
-        step = error / slope(guess)
-        if (abs(step) <= 1e-13 * np.maximum(guess, 1.0)).all():  # quadrature noise is near
-            break
         guess = guess - step
         guess = np.where((guess < lower) | (guess > upper), (lower + upper) / 2.0, guess)
-    return np.asarray(guess)
+        guess = np.minimum(np.maximum(guess, first), last)
+    return np.asarray(guess), np.asarray(rise)

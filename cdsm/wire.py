@@ -8,11 +8,11 @@ from itertools import pairwise
 from typing import final
 
 import numpy as np
-from numpy.polynomial import Polynomial
 from numpy.typing import ArrayLike
 from scipy.interpolate import PchipInterpolator, PPoly
 
 from cdsm._checks import Array, number_array, scalar
+from cdsm._panels import Panels, coefficient_table, horner, panels
 from cdsm.elasticity import Domain, Elasticity
 from cdsm.errors import ElasticityRangeError, InvalidInput
 
@@ -90,7 +90,7 @@ class StrandElasticity(Elasticity):
             high=810.0,
         )
 
-    @property
+    @cached_property
     def domain(self) -> Domain:
         """(low, high]."""
         return Domain(self.low, self.high, low_included=False)
@@ -105,12 +105,7 @@ class StrandElasticity(Elasticity):
             InvalidInput: Not finite numbers.
         """
         values = number_array("tension", tension)
-        piece = np.searchsorted(self.joins, values, side="left")
-        result = np.empty_like(values)
-        for index, row in enumerate(self.coefficients):
-            here = piece == index
-            result[here] = np.polyval(row[::-1], values[here])
-        return result
+        return horner(self._table, np.searchsorted(self.joins, values, side="left"), values)
 
     def rigidity(self, tension: ArrayLike) -> Array:
         """EA(F) [N] of Eq. 19; see :meth:`Elasticity.rigidity`."""
@@ -126,57 +121,50 @@ class StrandElasticity(Elasticity):
             )
         return result
 
+    def rigidity_slope(self, tension: ArrayLike) -> Array:
+        """Derivative of the polynomials [-]; see :meth:`Elasticity.rigidity_slope`."""
+        values = self.domain.check(tension)
+        self.rigidity(values)  # refuses tensions at which it is not positive
+        return horner(self._slopes, np.searchsorted(self.joins, values, side="left"), values)
+
+    @property
+    def jumps(self) -> tuple[float, ...]:
+        """The :attr:`joins` [N]."""
+        return self.joins
+
     def strain(self, tension: ArrayLike) -> Array:
-        """∫ dF/EA(F) [-], by adaptive quadrature; see :meth:`Elasticity.strain`."""
+        """∫ dF/EA(F) [-], to rounding; see :meth:`Elasticity.strain`."""
         return self._integral(tension, power=0)
 
     def energy(self, tension: ArrayLike) -> Array:
-        """∫ F dF/EA(F) [N], by adaptive quadrature; see :meth:`Elasticity.energy`."""
+        """∫ F dF/EA(F) [N], to rounding; see :meth:`Elasticity.energy`."""
         return self._integral(tension, power=1)
+
+    @cached_property
+    def _table(self) -> Array:
+        return coefficient_table(self.coefficients)
+
+    @cached_property
+    def _slopes(self) -> Array:
+        powers = np.arange(1, len(self._table))
+        return np.vstack([powers[:, None] * self._table[1:], np.zeros(self._table.shape[1])])
+
+    @cached_property
+    def _panels(self) -> Panels:
+        return panels(self.coefficients, (self.low, *self.joins, self.high))
 
     def _integral(self, tension: ArrayLike, power: int) -> Array:
         """∫ F^power dF/EA(F) from the low end of the domain."""
-        from scipy.integrate import quad_vec  # only where it is wanted: it imports slowly
-
         values = self.domain.check(tension)
-        total = np.zeros_like(values)
-        edges = (self.low, *self.joins, self.high)
-        for row, (start, end) in zip(self.coefficients, pairwise(edges), strict=True):
-            polynomial = Polynomial(row)
-            upper = np.clip(values, start, end)
-            self._require_positive(polynomial, start, upper)
-            if upper.size == 0 or upper.max() <= start:
-                continue
-
-            def integrand(
-                x: float, p: Polynomial = polynomial, start: float = start, upper: Array = upper
-            ) -> Array:
-                # small steps where EA is small: F = start + (upper - start) x³
-                width = upper - start
-                F = start + width * x**3
-                return np.asarray(3.0 * x**2 * width * F**power / p(F))
-
-            total = total + quad_vec(integrand, 0.0, 1.0, epsabs=0.0, epsrel=1e-14, norm="max")[0]
-        return np.asarray(total)
-
-    @staticmethod
-    def _require_positive(polynomial: Polynomial, start: float, upper: Array) -> None:
-        """Refuse to integrate over tensions where the polynomial falls to zero or below."""
-        turns = polynomial.trim().deriv().roots().real
-        points = np.array([start, *turns[(turns > start) & (turns < upper.max(initial=start))]])
-        scale = abs(polynomial(points)).max(initial=0.0)
-        lowest = polynomial(points) <= 1e-12 * scale
-        bad = polynomial(upper) <= 0.0
-        if lowest.any():
-            bad |= upper >= points[lowest].min()
-        bad &= upper > start
-        if bad.any():
+        bad = values > self._panels.end
+        if np.count_nonzero(bad):
             raise ElasticityRangeError(
                 "the rigidity is not positive everywhere below, so there is no strain. If this is "
                 "Eq. 19 as printed, use StrandElasticity.eq19_repaired().",
-                np.atleast_1d(upper)[np.atleast_1d(bad)].tolist(),
+                np.atleast_1d(values)[np.atleast_1d(bad)].tolist(),
                 np.flatnonzero(bad).tolist(),
             )
+        return self._panels.integral(values, power)
 
 
 @final
@@ -223,7 +211,7 @@ class TabulatedElasticity(Elasticity):
         # ∫ F dε = F ε − ∫ ε dF
         return self._curve.antiderivative()
 
-    @property
+    @cached_property
     def domain(self) -> Domain:
         """[first, last] tension of the points."""
         return Domain(self.tensions[0], self.tensions[-1])
@@ -231,6 +219,12 @@ class TabulatedElasticity(Elasticity):
     def rigidity(self, tension: ArrayLike) -> Array:
         """1/(dε/dF) [N]; see :meth:`Elasticity.rigidity`."""
         return np.asarray(1.0 / self._curve(self.domain.check(tension), 1))
+
+    def rigidity_slope(self, tension: ArrayLike) -> Array:
+        """−ε″/ε′² [-], at a point that of the piece below; see :meth:`Elasticity.rigidity_slope`."""
+        values = self.domain.check(tension)
+        below = np.maximum(np.nextafter(values, -np.inf), self.domain.first)
+        return np.asarray(-self._curve(below, 2) / self._curve(below, 1) ** 2)
 
     def strain(self, tension: ArrayLike) -> Array:
         """ε [-] of the curve; see :meth:`Elasticity.strain`."""
