@@ -12,17 +12,21 @@ SI units throughout; base frame with x along the straight arm.
 from importlib.metadata import version as _version
 
 from cdsm import presets
+from cdsm.buckling import CriticalLoad, CriticalTension, critical_load, critical_tension
 from cdsm.cable import Cable, Site, in_series, serpentine_cables
 from cdsm.elasticity import Domain, Elasticity, LinearElasticity
+from cdsm.equilibrium import Equilibrium, equilibrium
 from cdsm.errors import (
     CableError,
     CdsmError,
     ElasticityRangeError,
+    EquilibriumError,
     FileError,
     GeometryError,
     InfeasibleTension,
     InvalidInput,
     JointLimitError,
+    SingularMass,
     SingularStiffness,
     SolverError,
     TensileTestError,
@@ -31,13 +35,21 @@ from cdsm.errors import (
 )
 from cdsm.geometry import Geometry
 from cdsm.identification import Identification, Measurement, identify
+from cdsm.kinematics import (
+    JointSolution,
+    KinematicSolution,
+    inverse_kinematics,
+    solve_joint_angles,
+)
 from cdsm.manipulator import Manipulator, Posture
+from cdsm.modes import Modes, modes
 from cdsm.parts import CableRoute, Joint, Link
 from cdsm.stiffness import Shares, Stiffness, stiffness
 from cdsm.tensile import TensileFit, fit_tensile_test
 from cdsm.tensile_data import TensileTest, read_tensile_csv
 from cdsm.tension import Tension, distribute_tension
 from cdsm.urdf import to_urdf, write_urdf
+from cdsm.weight import LinearPrediction, WeightTest, weight_test
 from cdsm.wire import StrandElasticity, TabulatedElasticity
 from cdsm.wire_file import read_elasticity, write_elasticity
 
@@ -48,9 +60,13 @@ __all__ = [
     "CableError",
     "CableRoute",
     "CdsmError",
+    "CriticalLoad",
+    "CriticalTension",
     "Domain",
     "Elasticity",
     "ElasticityRangeError",
+    "Equilibrium",
+    "EquilibriumError",
     "FileError",
     "Geometry",
     "GeometryError",
@@ -59,12 +75,17 @@ __all__ = [
     "InvalidInput",
     "Joint",
     "JointLimitError",
+    "JointSolution",
+    "KinematicSolution",
     "LinearElasticity",
+    "LinearPrediction",
     "Link",
     "Manipulator",
     "Measurement",
+    "Modes",
     "Posture",
     "Shares",
+    "SingularMass",
     "SingularStiffness",
     "Site",
     "SolverError",
@@ -77,16 +98,24 @@ __all__ = [
     "Tension",
     "UnknownName",
     "UrdfError",
+    "WeightTest",
+    "critical_load",
+    "critical_tension",
     "distribute_tension",
+    "equilibrium",
     "fit_tensile_test",
     "identify",
     "in_series",
+    "inverse_kinematics",
+    "modes",
     "presets",
     "read_elasticity",
     "read_tensile_csv",
     "serpentine_cables",
+    "solve_joint_angles",
     "stiffness",
     "to_urdf",
+    "weight_test",
     "write_elasticity",
     "write_urdf",
 ]

@@ -116,6 +116,12 @@ class RigidBody:
         placement: Array = pin.updateFramePlacement(model, data, frame).homogeneous
         return placement
 
+    def mass_matrix(self, q: Array) -> Array:
+        """Joint-space mass matrix M (nv, nv) [kg m²] at the joint angles (nv,) [rad]."""
+        # some versions of Pinocchio fill the upper triangle alone
+        upper = np.triu(np.array(pin.crba(self._model, self._data(), q)).reshape(self.nv, self.nv))
+        return upper + np.triu(upper, 1).T
+
     def _frame(self, link: str) -> int:
         if not isinstance(link, str) or not self._model.existFrame(link, pin.FrameType.BODY):
             raise UnknownName("link", link, self.link_names)
@@ -127,3 +133,11 @@ class RigidBody:
         if not hasattr(self._scratch, "data"):
             self._scratch.data = self._model.createData()
         return self._scratch.data
+
+
+def rotation_vector(rotation: Array) -> tuple[Array, Array]:
+    """Rotation vector φ (3,) [rad] of a rotation (3, 3), and its derivative (3, 3).
+
+    The derivative is that by a further turn in base axes: φ changes by it times ω.
+    """
+    return pin.log3(rotation), pin.Jlog3(rotation).T

@@ -238,3 +238,36 @@ class SingularStiffness(CdsmError, ArithmeticError):
     def __init__(self, problem: str, direction: NDArray[np.float64]) -> None:
         super().__init__(problem)
         self.direction = direction
+
+
+class SingularMass(CdsmError, ArithmeticError):
+    """A joint motion that moves no mass, and so has no natural frequency.
+
+    Attributes:
+        direction: The motion (nv,), unit length.
+    """
+
+    def __init__(self, problem: str, direction: NDArray[np.float64]) -> None:
+        super().__init__(problem)
+        self.direction = direction
+
+
+class EquilibriumError(CdsmError, ArithmeticError):
+    """A loaded arm that finds no place to rest, or buckles on the way.
+
+    Attributes:
+        residual: Torque out of balance at the last iterate (nv,) [N m].
+        load_factor: Part of the load [-] under which the arm still stood.
+        joint: Name of the joint furthest from balance, or that gives way first.
+    """
+
+    def __init__(
+        self, problem: str, residual: NDArray[np.float64], load_factor: float, joint: str
+    ) -> None:
+        super().__init__(
+            f"{problem}. Reduce the load, or stiffen the arm: raise the tensions, or take stiffer "
+            "cables or springs."
+        )
+        self.residual = residual
+        self.load_factor = load_factor
+        self.joint = joint

@@ -12,7 +12,7 @@ from functools import cached_property
 from typing import final
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from cdsm import _kernels
 from cdsm._checks import (
@@ -174,27 +174,11 @@ class Manipulator:
             JointLimitError: An angle is beyond its limit, and ``check_limits`` is set.
             CableError: Two neighbouring sites of a cable coincide at this posture.
         """
-        q = vector("q", q, self.nv, self._meaning_of_q)
-        if check_limits:
-            beyond = (q < self._lowest) | (q > self._highest)
-            if np.count_nonzero(beyond):
-                raise JointLimitError(
-                    [self.joint_names[i] for i in np.flatnonzero(beyond)],
-                    q[beyond].tolist(),
-                    list(zip(self.lower[beyond], self.upper[beyond], strict=True)),
-                )
+        q = self._angles(q, check_limits)
         state = self._body.state(q)
         # Pinocchio hands out placements one Python object per joint, 14 µs for ten joints; the
         # kernel places joints and cable sites itself in 2 µs. A test holds the two equal.
-        origin, axis, site, lengths, length_jacobian, coincident = _kernels.evaluate(
-            *self._constants, q
-        )
-        if coincident >= 0:
-            raise CableError(
-                self._cables[self._segments[0][coincident, 0]].name,
-                f"two neighbouring sites coincide at q = {q.tolist()}, so the cable has no "
-                "direction there. Move a site, or change the posture.",
-            )
+        origin, axis, site, lengths, length_jacobian = self._routed(q)
         return Posture(
             arm=self,
             q=q,
@@ -206,6 +190,50 @@ class Manipulator:
             gravity_stiffness=frozen(state.gravity_stiffness),
             _frames=_kernels.Frames(frozen(origin), frozen(axis), frozen(site)),
         )
+
+    def cable_lengths(self, q: ArrayLike, *, check_limits: bool = True) -> Array:
+        """L(q) (C,) [m], lead included (Eq. 8): ``at(q).cable_lengths`` and nothing else.
+
+        Args:
+            q: Joint angles (nv,) [rad], in the order of :attr:`joint_names`.
+            check_limits: Refuse angles beyond the joint limits.
+
+        Raises:
+            InvalidInput: q is not (nv,) finite real numbers.
+            JointLimitError: An angle is beyond its limit, and ``check_limits`` is set.
+            CableError: Two neighbouring sites of a cable coincide at this posture.
+        """
+        return frozen(self._routed(self._angles(q, check_limits))[3])
+
+    def _angles(self, q: ArrayLike, check_limits: bool) -> Array:
+        """Joint angles (nv,) [rad], checked and read-only."""
+        q = vector("q", q, self.nv, self._meaning_of_q)
+        if check_limits:
+            beyond = (q < self._lowest) | (q > self._highest)
+            if np.count_nonzero(beyond):
+                raise JointLimitError(
+                    [self.joint_names[i] for i in np.flatnonzero(beyond)],
+                    q[beyond].tolist(),
+                    list(zip(self.lower[beyond], self.upper[beyond], strict=True)),
+                )
+        return q
+
+    def _routed(self, q: Array) -> tuple[Array, Array, Array, Array, Array]:
+        """Origin and axis of the joints, cable sites, L and J_L at checked joint angles.
+
+        Raises:
+            CableError: Two neighbouring sites of a cable coincide at this posture.
+        """
+        origin, axis, site, lengths, length_jacobian, coincident = _kernels.evaluate(
+            *self._constants, q
+        )
+        if coincident >= 0:
+            raise CableError(
+                self._cables[self._segments[0][coincident, 0]].name,
+                f"two neighbouring sites coincide at q = {q.tolist()}, so the cable has no "
+                "direction there. Move a site, or change the posture.",
+            )
+        return origin, axis, site, lengths, length_jacobian
 
     def _cable_stiffness(self, lengths: Array, tension: Array) -> Array:
         """Diagonal of K_L (C,) [N/m]: 1/(l_0/EA(F) + 1/k_series), 0 for force-controlled cables.
@@ -223,9 +251,7 @@ class Manipulator:
             try:
                 rigidity = np.asarray(law.rigidity(pulled))
             except ElasticityRangeError as error:
-                outside = np.arange(len(self._cables))[held][list(error.indices)].tolist()
-                names = [self._cables[c].name for c in outside]
-                raise ElasticityRangeError(error.problem, error.tension, outside, names) from None
+                raise self._naming_cables(error, held) from None
             usable = (rigidity >= SMALLEST) & (rigidity <= LARGEST)  # false for NaN too
             if rigidity.shape != pulled.shape or np.count_nonzero(usable) < pulled.size:
                 raise InvalidInput(
@@ -236,6 +262,39 @@ class Manipulator:
             compliance = lengths[held] / rigidity + self._series_compliance[held]
             stiffness[held] = 1.0 / compliance
         return frozen(stiffness)
+
+    def _cable_stiffness_slope(self, tension: Array, stiffness: Array) -> Array:
+        """dk/dF (C,) [1/m] where the cables have the stiffness k (C,) [N/m] under F (C,) [N].
+
+        (k² l_0/EA) EA′/EA = k (1 − k/k_series) EA′/EA: the free length need not be known.
+
+        Raises:
+            ElasticityRangeError: As for :meth:`_cable_stiffness`.
+            InvalidInput: An elasticity of the user's own gives no finite slope.
+        """
+        slope = np.zeros(len(self._cables))
+        for law, held in self._held_by_law:
+            pulled, k = tension[held], stiffness[held]
+            try:
+                growth = law.rigidity_slope(pulled) / law.rigidity(pulled)
+            except ElasticityRangeError as error:
+                raise self._naming_cables(error, held) from None
+            if growth.shape != pulled.shape or not np.isfinite(growth).all():
+                raise InvalidInput(
+                    "elasticity",
+                    f"{law!r} gives the relative slope of rigidity {growth} 1/N at tensions "
+                    f"{pulled} N; one finite number for each is needed.",
+                )
+            slope[held] = k * (1.0 - k * self._series_compliance[held]) * growth
+        return frozen(slope)
+
+    def _naming_cables(
+        self, error: ElasticityRangeError, held: slice | NDArray[np.intp]
+    ) -> ElasticityRangeError:
+        """The error of a law at the tensions of some cables, with their names and numbers."""
+        outside = np.arange(len(self._cables))[held][list(error.indices)].tolist()
+        names = [self._cables[c].name for c in outside]
+        return ElasticityRangeError(error.problem, error.tension, outside, names)
 
 
 @final

@@ -85,6 +85,59 @@ def test_table_shows_tensions_and_stiffness_with_units(geometry: Path) -> None:
         assert text in result.output
 
 
+def test_weigh_json_holds_the_numbers_of_the_api(geometry: Path, tmp_path: Path) -> None:
+    png = tmp_path / "weigh.png"
+    result = call(
+        *("weigh", geometry, "--angles", 8, "--force", "0,0,-3", "--steps", 3),
+        *("--min-tension", 30, "--figure", png, "--json"),
+    )
+    assert result.exit_code == 0, result.output
+    told = json.loads(result.stdout)
+    arm = cdsm.Manipulator(cdsm.Geometry.read(geometry), cdsm.presets.STRAND_1X19)
+    pose = arm.at(np.full(6, np.deg2rad(8.0)))
+    pull = cdsm.distribute_tension(pose, 30.0)
+    test = cdsm.weight_test(pose, pull, [0.0, 0.0, -3.0], steps=3)
+    np.testing.assert_array_equal(told["tip_displacements_m"], test.displacements)
+    np.testing.assert_array_equal(told["tensions_N"], test.tensions)
+    assert told["stiffness_N_per_m"] == test.stiffness
+    assert png.read_bytes().startswith(b"\x89PNG")
+
+
+def test_weigh_shows_every_step_and_the_cables(geometry: Path) -> None:
+    result = call("weigh", geometry, "--angles", 8, "--force", "0,0,-3", "--min-tension", 30)
+    assert result.exit_code == 0, result.output
+    for text in ("load [N]", "linear", "tip moved by", "cable3_3", "N/mm"):
+        assert text in result.output
+
+
+def test_buckle_finds_tension_and_load_of_the_api(geometry: Path, tmp_path: Path) -> None:
+    png = tmp_path / "buckle.png"
+    options = ("--angles", 5, "--rigidity", 1e9, "--spring", 2.5, "--min-tension", 3)
+    result = call("buckle", geometry, *options, "--load", "-1,0,0,0,0,0", "--figure", png, "--json")
+    assert result.exit_code == 0, result.output
+    told = json.loads(result.stdout)
+    described = cdsm.Geometry.read(geometry)
+    cables = cdsm.serpentine_cables(described, cdsm.LinearElasticity(1e9), series_stiffness=2500.0)
+    pose = cdsm.Manipulator(described, cables=cables).at(np.full(6, np.deg2rad(5.0)))
+    assert told["critical_minimum_tension_N"] == cdsm.critical_tension(pose).minimum
+    load = cdsm.critical_load(pose, [-1.0, 0.0, 0.0, 0.0, 0.0, 0.0], 3.0)
+    assert (told["critical_load_factor"], told["limit"]) == (load.factor, load.limit)
+    assert png.read_bytes().startswith(b"\x89PNG")
+    text = call("buckle", geometry, *options, "--load", "-1,0,0,0,0,0").output
+    assert "buckles at a lower bound of" in text
+    assert "there it buckles" in text
+
+
+def test_wire_file_is_the_elasticity_of_the_cables(geometry: Path, tmp_path: Path) -> None:
+    wire = cdsm.write_elasticity(cdsm.LinearElasticity(48e3), tmp_path / "wire.toml")
+    by_file = call("stiffness", geometry, "--angles", 5, "--wire", wire, "--json")
+    by_number = call("stiffness", geometry, "--angles", 5, "--rigidity", 48e3, "--json")
+    assert by_file.stdout == by_number.stdout
+    both = call("stiffness", geometry, "--wire", wire, "--rigidity", 1.0)
+    assert both.exit_code == 2
+    assert "not both" in both.stderr
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
@@ -96,6 +149,10 @@ def test_table_shows_tensions_and_stiffness_with_units(geometry: Path) -> None:
             ("stiffness", "{geometry}", "--max-tension", "10", "--wrench", "0,0,-90,0,0,0"),
             "N m are",
         ),
+        (("weigh", "{geometry}", "--force", "0,0,0"), "force: is zero"),
+        (("weigh", "{geometry}", "--force", "0,0,-1", "--steps", "0"), "steps"),
+        (("weigh", "{geometry}", "--force", "0,0,-900"), "810 N"),
+        (("buckle", "{geometry}", "--load", "0,0,0,0,0,0"), "wrench: is zero"),
         (("urdf", "{geometry}", "-o", "absent/arm.urdf"), "folder absent does not exist"),
         (("reproduce", "--out", "{geometry}"), "cannot be made a folder"),
     ],

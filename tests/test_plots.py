@@ -1,6 +1,7 @@
 """Figures draw what they are given; how they look was looked at."""
 
 import numpy as np
+import pytest
 from matplotlib.lines import Line2D
 from mpl_toolkits.mplot3d.art3d import Line3D  # type: ignore[import-untyped]
 
@@ -76,6 +77,35 @@ def test_prototype_figure_shows_a_dot_for_every_number_that_counted(results: Res
     np.testing.assert_allclose(_shown(everything)[0], 100.0 * result.fit.residuals)
     assert [_shown(line).shape[1] for line in others] == [15, 15]
     assert len(axes.get_yticklabels()) == 20
+
+
+def test_weight_test_shows_its_displacements_in_mm_and_all_tensions() -> None:
+    pose = random_posture(mixed_arm(), 3)
+    test = cdsm.weight_test(pose, cdsm.distribute_tension(pose, 30.0), [0.0, 0.3, -1.0], steps=4)
+    figure = plots.plot_weight_test(test)
+    figure.draw_without_rendering()
+    left, right = figure.axes
+    for axis, (curve, linear) in enumerate(
+        zip(left.get_lines()[::2], left.get_lines()[1::2], strict=True)
+    ):
+        np.testing.assert_allclose(_shown(curve)[0, 1:], 1e3 * test.displacements[:, axis])
+        np.testing.assert_allclose(_shown(curve)[1, 1:], test.loads)
+        np.testing.assert_allclose(_shown(linear)[0, 1], 1e3 * test.linear.displacement[axis])
+    assert len(right.get_lines()) == len(pose.arm.cables)
+
+
+@pytest.mark.parametrize("spring", [2e3, 1e7])
+def test_critical_tension_shows_where_the_arm_is_unstable(spring: float) -> None:
+    geometry = cdsm.presets.experimental_prototype_geometry()
+    cables = cdsm.serpentine_cables(geometry, cdsm.LinearElasticity(1e9), series_stiffness=spring)
+    pose = cdsm.Manipulator(geometry, cables=cables).at(np.zeros(3))
+    critical = cdsm.critical_tension(pose)
+    figure = plots.plot_critical_tension(critical)
+    figure.draw_without_rendering()
+    (axes,) = figure.axes
+    np.testing.assert_allclose(_shown(axes.get_lines()[0]), [critical.bounds, critical.margins])
+    assert axes.get_xlim()[1] == pytest.approx(min(2.0 * critical.minimum, critical.examined[1]))
+    assert any("buckles at" in text.get_text() for text in axes.texts)
 
 
 def _shown(line: Line2D) -> Array:

@@ -61,7 +61,8 @@ FUNCTIONS = {name: thing for name, thing in PUBLIC.items() if inspect.isfunction
 CLASSES = {name: thing for name, thing in PUBLIC.items() if inspect.isclass(thing)}
 
 UNIT = re.compile(
-    r"\[(?:N|m|rad|kg|Pa|s|-|1)\b[^\]]*\]|\[-\]|\b(?:N|m|rad|kg)\b|[Uu]nit (?:vector|joint motion)"
+    r"\[(?:N|m|rad|kg|Pa|s|Hz|-|1)\b[^\]]*\]|\[-\]|\b(?:N|m|rad|kg)\b"
+    r"|[Uu]nit (?:vector|joint motion)"
 )
 SHAPE = re.compile(r"\((?:nv|C|S|P|n|\d|sites)(?:\s*[,+]\s*\w*)*\)|any shape|same shape")
 ARRAY = re.compile(r"\bArray\b|NDArray|ndarray")
@@ -215,7 +216,21 @@ POSE = random_posture(mixed_arm(), 2)
 PULL = cdsm.distribute_tension(POSE, minimum=10.0, wrench=random_wrench(2))
 K = cdsm.stiffness(POSE, PULL)
 SHARES = K.shares((0.0, 0.3, 1.0))
-RESULTS: dict[str, Any] = {"Posture": POSE, "Tension": PULL, "Stiffness": K, "Shares": SHARES}
+WEIGHT = cdsm.weight_test(POSE, PULL, (0.0, 0.0, -1.0), steps=2)
+RESULTS: dict[str, Any] = {
+    "Posture": POSE,
+    "Tension": PULL,
+    "Stiffness": K,
+    "Shares": SHARES,
+    "JointSolution": cdsm.solve_joint_angles(POSE.arm, POSE.cable_lengths),
+    "KinematicSolution": cdsm.inverse_kinematics(POSE.arm, POSE.tip),
+    "Modes": cdsm.modes(POSE, K),
+    "Equilibrium": cdsm.equilibrium(POSE, PULL, random_wrench(3)),
+    "WeightTest": WEIGHT,
+    "LinearPrediction": WEIGHT.linear,
+    "CriticalTension": cdsm.critical_tension(POSE),
+    "CriticalLoad": cdsm.critical_load(POSE, random_wrench(4), 10.0),
+}
 
 PLAIN: dict[str, Any] = {
     "Geometry": POSE.arm.geometry,
@@ -352,6 +367,8 @@ ERRORS: tuple[cdsm.CdsmError, ...] = (
     cdsm.InfeasibleTension(np.array([0.1, -0.2]), "joint2", 3.5, ["cable1_1"]),
     cdsm.SolverError("daqp", "failed."),
     cdsm.SingularStiffness("K_θ is singular.", np.array([0.6, 0.8])),
+    cdsm.SingularMass("moves no mass.", np.array([0.6, 0.8])),
+    cdsm.EquilibriumError("the arm buckles", np.array([0.1, -0.2]), 0.5, "joint2"),
 )
 
 

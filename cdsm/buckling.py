@@ -1,0 +1,306 @@
+"""Buckling: where tension or load makes the joint stiffness singular at a posture that is held.
+
+Cables stiffen an arm by their elasticity and mostly soften it by their tension (active part of
+Eq. 16). With stiff cables the first always wins; with soft ones there is a tension from which on
+K_θ is not positive definite and the arm gives way, whatever its load. Here the posture is held and
+the tensions are those of :func:`~cdsm.tension.distribute_tension`; what an arm with locked motors
+does beyond is :func:`~cdsm.equilibrium.equilibrium`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final, Literal, final
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.optimize import brentq
+
+from cdsm._checks import Array, ReadOnlyState, bound, frozen, instance, vector
+from cdsm.errors import ElasticityRangeError, InfeasibleTension, InvalidInput, SolverError
+from cdsm.manipulator import Posture
+from cdsm.stiffness import Stiffness, stiffness
+from cdsm.tension import distribute_tension
+
+SAMPLES: Final = 96
+"""Bounds or load factors that are looked at; a stable range narrower than a step is not seen."""
+
+_PRECISION: Final = 1e-12
+"""Relative precision of the point where stability is lost."""
+
+_NOWHERE: Final = 1e6
+"""A load factor up to which nothing happens counts as infinite."""
+
+_ABOVE: Final = 1.0 + 1e-9
+"""The low end of a domain may be excluded; this far above it everything is defined."""
+
+Limit = Literal["buckling", "infeasible", "elasticity", "none"]
+
+
+@final
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class CriticalTension(ReadOnlyState):
+    """The tension at which an arm buckles at a posture; made by :func:`critical_tension`.
+
+    Attributes:
+        posture: Where.
+        wrench: W (6,) at ``tool0``, base axes: force [N], then moment [N m].
+        minimum: The lower bound of tension [N] at which the arm, stable below, buckles: inf if it
+            is stable up to the end of :attr:`examined`, and its low end if it is stable nowhere.
+        mode: Unit joint motion (nv,) of the smallest eigenvalue of K_θ there, or where the arm is
+            softest if it does not buckle.
+        tension: F there (C,) [N].
+        stable: Ranges (low, high) [N] of the lower bound in which the arm is stable.
+        examined: Range [N] of the lower bound that was looked at: as far as tensions balance the
+            arm within the domains of the elasticities, and if these have no end, until the sign of
+            the active part has decided.
+        bounds: Lower bounds (n,) [N] that were looked at.
+        margins: Smallest eigenvalue of K_θ at each (n,) [N m/rad].
+    """
+
+    posture: Posture
+    wrench: Array
+    minimum: float
+    mode: Array
+    tension: Array
+    stable: tuple[tuple[float, float], ...]
+    examined: tuple[float, float]
+    bounds: Array
+    margins: Array
+
+    def __repr__(self) -> str:
+        return f"<CriticalTension {self.minimum:.4g} N>"
+
+    def __str__(self) -> str:
+        low, high = self.examined
+        if not self.stable:
+            verdict = f"unstable at every lower bound from {low:.4g} N to {high:.4g} N"
+        elif math.isinf(self.minimum):
+            verdict = f"does not buckle at any lower bound up to {high:.4g} N"
+        else:
+            verdict = f"buckles at a lower bound of {self.minimum:.6g} N"
+        spans = ", ".join(f"{a:.4g} to {b:.4g} N" for a, b in self.stable)
+        names = self.posture.arm.joint_names
+        lines = [verdict, f"stable from {spans}" if spans else "", _written(names, self.mode)]
+        return "\n".join(line for line in lines if line)
+
+
+@final
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class CriticalLoad(ReadOnlyState):
+    """The multiple of a load at which an arm fails at a posture; made by :func:`critical_load`.
+
+    Attributes:
+        posture: Where.
+        wrench: W (6,), of which the factor is the multiple: force [N], then moment [N m].
+        factor: The largest factor [-] up to which the arm holds; inf if it holds a million times W.
+        limit: Why no further: ``"buckling"``, ``"infeasible"`` (no tensions balance the load),
+            ``"elasticity"`` (a tension leaves its cable's domain) or ``"none"``.
+        mode: Unit joint motion (nv,) of the smallest eigenvalue of K_θ there.
+        tension: F (C,) [N] there.
+    """
+
+    posture: Posture
+    wrench: Array
+    factor: float
+    limit: Limit
+    mode: Array
+    tension: Array
+
+    def __repr__(self) -> str:
+        return f"<CriticalLoad factor {self.factor:.4g}, {self.limit}>"
+
+    def __str__(self) -> str:
+        reason = {
+            "buckling": "there it buckles",
+            "infeasible": "beyond, no tensions balance it",
+            "elasticity": "beyond, a tension leaves the domain of its cable's elasticity",
+            "none": "nothing happens that far",
+        }[self.limit]
+        mode = _written(self.posture.arm.joint_names, self.mode)
+        return f"holds the load up to a factor of {self.factor:.6g}; {reason}\n{mode}"
+
+
+def critical_tension(
+    pose: Posture,
+    wrench: ArrayLike = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+    solver: str = "daqp",
+) -> CriticalTension:
+    """The lower bound of tension at which least tensions make K_θ singular: det K_θ(F_min) = 0.
+
+    K_θ as in :func:`~cdsm.stiffness.stiffness`, its symmetric part judged, F by
+    :func:`~cdsm.tension.distribute_tension` with that bound on all cables.
+
+    Args:
+        pose: The posture, held.
+        wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m].
+        solver: As for :func:`~cdsm.tension.distribute_tension`.
+
+    Raises:
+        InvalidInput: The wrench has the wrong shape or is not finite.
+        InfeasibleTension: No tensions at all balance the arm.
+        ElasticityRangeError: Even the least tensions are outside the cables' elasticities.
+    """
+    arm = instance("pose", pose, Posture).arm
+    W = vector("wrench", wrench, 6, "force [N], then moment [N m], base axes")
+
+    def at(minimum: float) -> Stiffness:
+        return stiffness(pose, distribute_tension(pose, minimum, wrench=W, solver=solver))
+
+    low = max(cable.elasticity.domain.low for cable in arm.cables) * _ABOVE
+    at(low)  # if there is nothing to judge, its error says why
+    high = _reach(at, low, pose, W, solver)
+    places = np.unique([low, *np.geomspace(max(low, 1e-4 * high), high, SAMPLES)])
+    margins = [at(place).margin for place in places.tolist()]
+    edges, ends = [], []
+    for i in range(len(places)):
+        if margins[i] > 0.0 and (i == 0 or margins[i - 1] <= 0.0):
+            edges.append(places[i] if i == 0 else _crossing(at, places[i - 1], places[i]))
+        if margins[i] > 0.0 and (i + 1 == len(places) or margins[i + 1] <= 0.0):
+            last = i + 1 == len(places)
+            ends.append(places[i] if last else _crossing(at, places[i], places[i + 1]))
+    stable = tuple((float(a), float(b)) for a, b in zip(edges, ends, strict=True))
+    buckles = [b for _, b in stable if b < high]
+    if buckles:
+        minimum = where = buckles[0]
+    elif stable:
+        minimum, where = math.inf, float(places[int(np.argmin(margins))])
+    else:
+        minimum = where = low
+    there = at(where)
+    return CriticalTension(
+        posture=pose,
+        wrench=W,
+        minimum=minimum,
+        mode=_mode(there),
+        tension=there.tension,
+        stable=stable,
+        examined=(low, high),
+        bounds=frozen(places),
+        margins=frozen(np.array(margins)),
+    )
+
+
+def critical_load(
+    pose: Posture,
+    wrench: ArrayLike,
+    minimum: ArrayLike = 0.0,
+    maximum: ArrayLike = math.inf,
+    solver: str = "daqp",
+) -> CriticalLoad:
+    """The factor λ up to which the arm, holding this posture, stands the load λ W.
+
+    Args:
+        pose: The posture, held: the tensions are distributed anew for every load.
+        wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m]; not zero.
+        minimum: Lower bound of the tensions [N], for all cables or (C,).
+        maximum: Upper bound of the tensions [N], for all cables or (C,).
+        solver: As for :func:`~cdsm.tension.distribute_tension`.
+
+    Raises:
+        InvalidInput: The wrench is zero, or it or a bound is not what it must be.
+        InfeasibleTension: The arm does not even hold itself.
+        ElasticityRangeError: A tension is outside its cable's elasticity even without load.
+    """
+    count = len(instance("pose", pose, Posture).arm.cables)
+    W = vector("wrench", wrench, 6, "force [N], then moment [N m], base axes")
+    low, high = bound("minimum", minimum, count), bound("maximum", maximum, count)
+    if not W.any():
+        raise InvalidInput("wrench", "is zero, and so is any multiple of it; give a load.")
+
+    def at(factor: float) -> Stiffness:
+        return stiffness(pose, distribute_tension(pose, low, high, factor * W, solver))
+
+    factor, limit = 0.0, _reason(at, 0.0)
+    at(factor)  # if there is nothing to judge, its error says why
+    if limit == "none":
+        end = 1e-3
+        while end < _NOWHERE and _holds(at, end):
+            end *= 2.0
+        if end < _NOWHERE:
+            # the first failure: what the doubling has stepped over is sampled again, finer
+            places = np.linspace(0.0, end, SAMPLES).tolist()
+            first = next(i for i, place in enumerate(places) if not _holds(at, place))
+            factor = _edge(lambda x: _holds(at, x), places[first - 1], places[first])
+            limit = _reason(at, factor * (1.0 + 4.0 * _PRECISION))
+        else:
+            factor = math.inf
+    there = at(min(factor, _NOWHERE / 2.0))
+    return CriticalLoad(
+        posture=pose,
+        wrench=W,
+        factor=factor,
+        limit=limit,
+        mode=_mode(there),
+        tension=there.tension,
+    )
+
+
+def _reach(
+    at: Callable[[float], Stiffness], low: float, pose: Posture, wrench: Array, solver: str
+) -> float:
+    """How far the lower bound is looked at [N]."""
+    highest = min(cable.elasticity.domain.high for cable in pose.arm.cables)
+    if math.isinf(highest):
+        # far out, tensions grow in proportion to the bound, the passive part no more: if the
+        # active part is negative somewhere, that decides at the latest where it equals the rest
+        far = 1e9
+        if _exists(at, far):
+            active = np.linalg.eigvalsh(at(far).active)[0] / far
+            K = at(low)
+            rest = np.linalg.norm(K.joint, 2) + np.linalg.norm(K.active, 2)
+            highest = 2.0 * rest / abs(active) if active != 0.0 else far
+        else:
+            highest = far
+        highest = max(highest, 2.0 * low)
+        while _exists(at, highest) and at(highest).is_stable and highest < far:
+            highest *= 2.0  # an elasticity of the user's own may go on stiffening
+    return highest if _exists(at, highest) else _edge(lambda b: _exists(at, b), low, highest)
+
+
+def _exists(at: Callable[[float], Stiffness], place: float) -> bool:
+    """Whether tensions balance the arm within the domains of the elasticities."""
+    return _reason(at, place) in ("none", "buckling")
+
+
+def _reason(at: Callable[[float], Stiffness], place: float) -> Limit:
+    """What keeps the arm from holding at a place; ``"none"`` if it holds."""
+    try:
+        return "none" if at(place).is_stable else "buckling"
+    except (InfeasibleTension, SolverError):  # on the very edge a solver may find nothing either
+        return "infeasible"
+    except ElasticityRangeError:
+        return "elasticity"
+
+
+def _holds(at: Callable[[float], Stiffness], place: float) -> bool:
+    return _reason(at, place) == "none"
+
+
+def _crossing(at: Callable[[float], Stiffness], a: float, b: float) -> float:
+    """Where the smallest eigenvalue changes its sign between two places."""
+    root: float = brentq(lambda x: at(float(x)).margin, a, b, xtol=1e-300, rtol=_PRECISION)
+    return root
+
+
+def _edge(true: Callable[[float], bool], a: float, b: float) -> float:
+    """The last place from a, where something is true, to b, where it is not."""
+    while b - a > _PRECISION * b:
+        middle = (a + b) / 2.0
+        a, b = (middle, b) if true(middle) else (a, middle)
+    return a
+
+
+def _mode(there: Stiffness) -> Array:
+    """The softest joint motion, its largest entry positive: eigenvectors have no sign."""
+    mode = there.critical_direction
+    return frozen(mode * np.sign(mode[abs(mode).argmax()]))
+
+
+def _written(names: tuple[str, ...], mode: Array) -> str:
+    """The joints that take most part in a mode."""
+    order = np.argsort(-abs(mode))[:4]
+    shares = ", ".join(f"{names[i]} {mode[i]:+.2f}" for i in order)
+    return f"softest joint motion: {shares}" + (", …" if len(mode) > len(order) else "")

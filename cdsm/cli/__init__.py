@@ -1,0 +1,47 @@
+"""The command line. mm, degrees and N/mm exist here; plotting is imported when it is needed."""
+
+from __future__ import annotations
+
+import io
+import sys
+from typing import Annotated
+
+import typer
+
+import cdsm
+from cdsm.cli.arm import stiffness, urdf
+from cdsm.cli.loads import buckle, weigh
+from cdsm.cli.paper import reproduce
+from cdsm.cli.wire import fit
+
+app = typer.Typer(
+    name="cdsm",
+    help="Stiffness of cable-driven serpentine manipulators.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"cdsm {cdsm.__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def main(
+    version: Annotated[
+        bool,
+        typer.Option("--version", callback=_version, is_eager=True, help="Show it and exit."),
+    ] = False,
+) -> None:
+    """Stiffness of cable-driven serpentine manipulators."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # a terminal without Greek shows "?" for it
+            stream.reconfigure(errors="replace")
+
+
+for command in (urdf, stiffness, weigh, buckle, fit, reproduce):
+    app.command()(command)

@@ -1,0 +1,107 @@
+"""``cdsm urdf`` and ``cdsm stiffness``: an arm, and how stiff it is."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+
+from cdsm._checks import Array
+from cdsm.cli.options import (
+    DOWN,
+    NO_WRENCH,
+    Angles,
+    AsJson,
+    GeometryFile,
+    Gravity,
+    MaxTension,
+    MinTension,
+    Rigidity,
+    Solver,
+    Spring,
+    Wire,
+    Wrench,
+    numbers,
+    posture,
+    reported,
+    show_json,
+)
+from cdsm.errors import SingularStiffness
+from cdsm.geometry import Geometry
+from cdsm.stiffness import Stiffness
+from cdsm.stiffness import stiffness as evaluate
+from cdsm.tension import Tension, distribute_tension
+from cdsm.urdf import write_urdf
+
+
+def urdf(
+    geometry: GeometryFile,
+    output: Annotated[Path, typer.Option("--output", "-o", help="URDF file to write.")],
+) -> None:
+    """Write the URDF of an arm, checked by reading it back with two parsers."""
+    with reported():
+        arm = Geometry.read(geometry)
+        path = write_urdf(arm, output)
+        typer.echo(f"{arm}\nwritten: {path}")
+
+
+def stiffness(
+    geometry: GeometryFile,
+    angles: Angles = "0",
+    min_tension: MinTension = 10.0,
+    max_tension: MaxTension = math.inf,
+    rigidity: Rigidity = None,
+    wire: Wire = None,
+    spring: Spring = math.inf,
+    wrench: Wrench = NO_WRENCH,
+    gravity: Gravity = DOWN,
+    solver: Solver = "daqp",
+    as_json: AsJson = False,
+) -> None:
+    """Distribute the tensions at a posture, and print them and the stiffness."""
+    with reported():
+        pose = posture(
+            geometry, angles, rigidity=rigidity, wire=wire, spring=spring, gravity=gravity
+        )
+        load = numbers("--wrench", wrench, 6)
+        pull = distribute_tension(pose, min_tension, max_tension, load, solver)
+        K = evaluate(pose, pull)
+        if as_json:
+            show_json(_to_dict(pull, K))
+        else:
+            typer.echo(f"{pose.arm.geometry}\n\n{pull}\n\n{K}")
+
+
+def _to_dict(pull: Tension, K: Stiffness) -> dict[str, object]:
+    """Everything the table shows, in SI units; null where a stiffness is infinite."""
+
+    def matrix(read: Callable[[], Array]) -> list[list[float]] | None:
+        try:
+            values: list[list[float]] = read().tolist()
+        except SingularStiffness:
+            return None
+        return values
+
+    pose = pull.posture
+    along = [K.along(axis) for axis in np.eye(3)]
+    return {
+        "angles_rad": dict(zip(pose.arm.joint_names, pose.q.tolist(), strict=True)),
+        "tip_position_m": pose.tip[:3, 3].tolist(),
+        "tension_N": {
+            cable.name: value
+            for cable, value in zip(pose.arm.cables, pull.values.tolist(), strict=True)
+        },
+        "cable_length_m": pose.cable_lengths.tolist(),
+        "static_residual_Nm": K.residual.tolist(),
+        "along_N_per_m": [value if np.isfinite(value) else None for value in along],
+        "cartesian_N_per_m": matrix(lambda: K.cartesian),
+        "pseudoinverse_N_per_m": matrix(K.pseudoinverse),
+        "compliance": matrix(lambda: K.compliance),
+        "joint_stiffness_Nm_per_rad": K.joint.tolist(),
+        "margin_Nm_per_rad": K.margin,
+        "stable": K.is_stable,
+    }

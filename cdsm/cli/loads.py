@@ -1,0 +1,157 @@
+"""``cdsm weigh`` and ``cdsm buckle``: what a load does, and when the arm gives way."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated
+
+import typer
+
+from cdsm._files import write_file
+from cdsm.buckling import CriticalLoad, CriticalTension, critical_load, critical_tension
+from cdsm.cli.options import (
+    DOWN,
+    NO_WRENCH,
+    Angles,
+    AsJson,
+    GeometryFile,
+    Gravity,
+    MaxTension,
+    MinTension,
+    Picture,
+    Rigidity,
+    Solver,
+    Spring,
+    Wire,
+    Wrench,
+    numbers,
+    posture,
+    reported,
+    show_json,
+)
+from cdsm.tension import distribute_tension
+from cdsm.weight import WeightTest, weight_test
+
+
+def weigh(
+    geometry: GeometryFile,
+    force: Annotated[
+        str, typer.Option(help="The weight: FX,FY,FZ at the tip [N].", metavar="FX,FY,FZ")
+    ],
+    angles: Angles = "0",
+    steps: Annotated[int, typer.Option(help="Equal steps to hang it in.")] = 5,
+    min_tension: MinTension = 10.0,
+    max_tension: MaxTension = math.inf,
+    rigidity: Rigidity = None,
+    wire: Wire = None,
+    spring: Spring = math.inf,
+    wrench: Wrench = NO_WRENCH,
+    gravity: Gravity = DOWN,
+    solver: Solver = "daqp",
+    figure: Picture = None,
+    as_json: AsJson = False,
+) -> None:
+    """Hang a weight at the tip with the motors locked, and see how far it goes (Eq. 20)."""
+    with reported():
+        pose = posture(
+            geometry, angles, rigidity=rigidity, wire=wire, spring=spring, gravity=gravity
+        )
+        load = numbers("--wrench", wrench, 6)
+        pull = distribute_tension(pose, min_tension, max_tension, load, solver)
+        test = weight_test(pose, pull, numbers("--force", force, 3), steps=steps)
+        if as_json:
+            show_json(_weight_to_dict(test))
+        else:
+            typer.echo(f"{pose.arm.geometry}\n\n{test}\n\nat the full load:\n{test.loaded[-1]}")
+        if figure is not None:
+            from cdsm.plots import plot_weight_test  # matplotlib, only where it is wanted
+
+            path = write_file(figure, plot_weight_test(test).savefig)
+            typer.echo(f"written: {path}", err=as_json)
+
+
+def buckle(
+    geometry: GeometryFile,
+    angles: Angles = "0",
+    load: Annotated[
+        str | None,
+        typer.Option(
+            help="Also find the multiple of this load that the arm stands at --min-tension.",
+            metavar="FX,...,MZ",
+        ),
+    ] = None,
+    min_tension: MinTension = 10.0,
+    max_tension: MaxTension = math.inf,
+    rigidity: Rigidity = None,
+    wire: Wire = None,
+    spring: Spring = math.inf,
+    wrench: Wrench = NO_WRENCH,
+    gravity: Gravity = DOWN,
+    solver: Solver = "daqp",
+    figure: Picture = None,
+    as_json: AsJson = False,
+) -> None:
+    """Find the tension, and the load, at which the arm buckles."""
+    with reported():
+        pose = posture(
+            geometry, angles, rigidity=rigidity, wire=wire, spring=spring, gravity=gravity
+        )
+        tension = critical_tension(pose, numbers("--wrench", wrench, 6), solver)
+        most = None
+        if load is not None:
+            weight = numbers("--load", load, 6)
+            most = critical_load(pose, weight, min_tension, max_tension, solver)
+        if as_json:
+            show_json(_critical_to_dict(tension, most))
+        else:
+            typer.echo(f"{pose.arm.geometry}\n\n{tension}")
+            if most is not None:
+                typer.echo(f"\n{most}")
+        if figure is not None:
+            from cdsm.plots import plot_critical_tension  # matplotlib, only where it is wanted
+
+            path = write_file(figure, plot_critical_tension(tension).savefig)
+            typer.echo(f"written: {path}", err=as_json)
+
+
+def _weight_to_dict(test: WeightTest) -> dict[str, object]:
+    """Every step of a weight test, in SI units; null where the stiffness is infinite."""
+    last = test.loaded[-1]
+    return {
+        "force_N": test.force.tolist(),
+        "loads_N": test.loads.tolist(),
+        "tip_displacements_m": test.displacements.tolist(),
+        "linear_displacement_m": test.linear.displacement.tolist(),
+        "stiffness_N_per_m": _finite(test.stiffness),
+        "linear_stiffness_N_per_m": _finite(test.linear.stiffness),
+        "cables": [cable.name for cable in last.pose.arm.cables],
+        "tensions_N": test.tensions.tolist(),
+        "angles_rad": dict(zip(last.pose.arm.joint_names, last.pose.q.tolist(), strict=True)),
+        "slack": list(last.slack),
+        "at_limit": list(last.at_limit),
+        "stable": last.stable,
+    }
+
+
+def _critical_to_dict(tension: CriticalTension, load: CriticalLoad | None) -> dict[str, object]:
+    """Both answers, in SI units; null where nothing is critical."""
+    names = tension.posture.arm.joint_names
+    answer: dict[str, object] = {
+        "critical_minimum_tension_N": _finite(tension.minimum),
+        "stable_minimum_tension_N": [list(span) for span in tension.stable],
+        "examined_minimum_tension_N": list(tension.examined),
+        "mode": dict(zip(names, tension.mode.tolist(), strict=True)),
+        "tension_N": tension.tension.tolist(),
+    }
+    if load is not None:
+        answer |= {
+            "load": load.wrench.tolist(),
+            "critical_load_factor": _finite(load.factor),
+            "limit": load.limit,
+            "load_mode": dict(zip(names, load.mode.tolist(), strict=True)),
+        }
+    return answer
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None

@@ -1,0 +1,58 @@
+"""``cdsm reproduce``: the paper, recomputed."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import track
+from rich.table import Table
+
+from cdsm import paper
+from cdsm._files import make_folder, write_file, write_text
+from cdsm.cli.options import console, reported
+
+_WIDE = 110
+"""Columns from which the table of claims is legible; below, each claim is a few lines."""
+
+
+def reproduce(
+    out: Annotated[Path, typer.Option(help="Folder for the figures and tables.")] = Path(
+        "reproduction"
+    ),
+) -> None:
+    """Recompute Figs. 3 to 13 of the paper: pictures, table and numbers."""
+    with reported():
+        from cdsm.plots import plot_paper  # matplotlib, only where it is wanted
+
+        make_folder(out)
+        results, written = [], []
+        for compute in track(paper.FIGURES.values(), "recomputing the paper", console=console):
+            result = compute()
+            results.append(result)
+            written.append(write_file(out / f"{result.name}.png", plot_paper(result).savefig))
+        written.append(write_text(out / "reproduction.md", paper.to_markdown(results)))
+        numbers = json.dumps(paper.to_dict(results), indent=1, allow_nan=False)
+        written.append(write_text(out / "reproduction.json", numbers + "\n"))
+        _show(paper.HEADER, paper.to_rows(results))
+        typer.echo(paper.EXPLANATION)
+        typer.echo("written: " + ", ".join(map(str, written)))
+
+
+def _show(header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """A table where there is room for one, else a few lines for each row."""
+    screen = Console()
+    if screen.width >= _WIDE:
+        table = Table(*header)
+        for row in rows:
+            table.add_row(*row)
+        screen.print(table)
+        return
+    for figure, quantity, *cells in rows:
+        typer.echo(f"{figure}: {quantity}")
+        for name, cell in zip(header[2:], cells, strict=True):
+            typer.echo(f"    {name:<12} {cell}")

@@ -1,0 +1,239 @@
+"""Where a loaded arm comes to rest once its motors are locked.
+
+    r(q) = J_Lᵀ F(q) + g − J_Xᵀ W = 0,    ∂r/∂q = K_θ                       (Eqs. 13 and 16)
+
+At a reference the cables are pulled and their motors locked. Under another load the arm moves, and
+every position-controlled cable pulls with what its elongation gives, F(q), nonlinear elasticity and
+series springs included.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cdsm._checks import Array, ReadOnlyState, frozen, vector
+from cdsm._loaded_arm import Iterate, LoadedArm, rounding
+from cdsm._trust_region import FLAT, Settled, settle
+from cdsm.errors import EquilibriumError, InvalidInput
+from cdsm.manipulator import Posture
+from cdsm.stiffness import Stiffness, stiffness
+from cdsm.tension import Tension
+
+_SMALLEST_STEP = 2.0**-6
+"""Steps of the load smaller than this do not help either."""
+
+
+@final
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Equilibrium(ReadOnlyState):
+    """An arm at rest under a load, with the question it answers. All arrays are read-only.
+
+    Attributes:
+        reference: The posture at which the motors were locked; free lengths are L there.
+        reference_tension: F (C,) there [N].
+        wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m].
+        stiffness: K_θ at rest with the free lengths of the *reference*: ∂r/∂q, and for a pure force
+            the exact Hessian of the potential. :func:`~cdsm.stiffness.stiffness` at the same
+            posture would take the loaded lengths for free ones. The stops are no part of it.
+        reaction: Torque of the stops on the joints (nv,) [N m]: positive at a lower limit, negative
+            at an upper one, zero elsewhere.
+        residual: J_Lᵀ F + g − J_Xᵀ W − reaction (nv,) [N m]: what is left of the balance.
+        history: Largest residual [N m] at every accepted iterate of the last load step.
+        iterations: Number of steps taken, over all load steps.
+    """
+
+    reference: Posture
+    reference_tension: Array
+    wrench: Array
+    stiffness: Stiffness
+    reaction: Array
+    residual: Array
+    history: tuple[float, ...]
+    iterations: int
+
+    @property
+    def pose(self) -> Posture:
+        """The posture at rest."""
+        return self.stiffness.posture
+
+    @property
+    def tension(self) -> Array:
+        """F (C,) at rest [N]."""
+        return self.stiffness.tension
+
+    @property
+    def displacement(self) -> Array:
+        """Motion of the tip from the reference (3,) [m]."""
+        return frozen(self.pose.tip[:3, 3] - self.reference.tip[:3, 3])
+
+    @property
+    def converged(self) -> bool:
+        """Whether the residual is mere rounding, computed anew; anything else is an error."""
+        K = self.stiffness
+        return bool((abs(self.residual) <= rounding(K)).all())
+
+    @property
+    def stable(self) -> bool:
+        """Whether K_θ, its symmetric part, is positive definite for the joints off the stops.
+
+        False only for a neutral state, as of an arm whose cables are all slack: where the arm would
+        go further down, the search goes on.
+        """
+        free = np.flatnonzero(self.reaction == 0.0)
+        K = self.stiffness.joint[np.ix_(free, free)]
+        values = np.linalg.eigvalsh((K + K.T) / 2.0)
+        return bool((values > FLAT * abs(values).max(initial=0.0)).all())
+
+    @property
+    def slack(self) -> tuple[str, ...]:
+        """Names of the position-controlled cables that hang slack."""
+        pulled = zip(
+            self.pose.arm.cables, self.tension, self.stiffness.cable_stiffness, strict=True
+        )
+        return tuple(
+            cable.name for cable, F, k in pulled if cable.control == "position" and F == k == 0.0
+        )
+
+    @property
+    def at_limit(self) -> tuple[str, ...]:
+        """Names of the joints that rest on a stop."""
+        return tuple(self.pose.arm.joint_names[i] for i in np.flatnonzero(self.reaction))
+
+    def __repr__(self) -> str:
+        moved = float(np.linalg.norm(self.displacement)) * 1000.0
+        return f"<Equilibrium of {self.pose.arm.geometry.name}, tip moved by {moved:.4g} mm>"
+
+    def __str__(self) -> str:
+        arm = self.pose.arm
+        rows = [f"{'cable':<12}{'tension [N]':>14}{'reference':>12}"]
+        rows += [
+            f"{cable.name:<12}{F:>14.3f}{F0:>12.3f}{'  slack' if cable.name in self.slack else ''}"
+            for cable, F, F0 in zip(arm.cables, self.tension, self.reference_tension, strict=True)
+        ]
+        x, y, z = self.displacement * 1000.0
+        rows.append(f"tip moved by ({x:.4g}, {y:.4g}, {z:.4g}) mm")
+        rows += [
+            f"{name} rests on its stop, which pushes with {self.reaction[i]:.4g} N m"
+            for i, name in enumerate(arm.joint_names)
+            if name in self.at_limit
+        ]
+        state = "stable" if self.stable else "NEUTRAL: no torque brings every joint back"
+        return "\n".join([*rows, f"{state}, residual {abs(self.residual).max():.1e} N m"])
+
+
+def equilibrium(
+    pose: Posture, tension: Tension | ArrayLike, wrench: ArrayLike | None = None
+) -> Equilibrium:
+    """Where the arm comes to rest under a dead wrench, its motors locked at a reference.
+
+    r(q) = J_Lᵀ F(q) + g − J_Xᵀ W = 0 (Eq. 13), with F(q) of the elongation that each cable has at
+    the reference plus its change of length. For a pure force it is a minimum of the potential of
+    cables, weight and load. The arm goes down from the reference, off saddles too, so that beyond
+    buckling it comes to rest beside the posture that has become unstable. Joint limits are stops.
+
+    Args:
+        pose: The reference posture, within the joint limits.
+        tension: F there: the answer of :func:`~cdsm.tension.distribute_tension`, or tensions of
+            your own (C,) [N], which need not balance the arm.
+        wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m]. If not given, that
+            of the ``Tension``, or zero.
+
+    Raises:
+        InvalidInput: As for :func:`~cdsm.stiffness.stiffness`, or a posture beyond a joint limit.
+        ElasticityRangeError: A tension at the reference or at rest is outside the domain of the
+            elasticity of its cable: below where a law begins it does not say how a cable gets
+            slack, above its end not how it yields.
+        EquilibriumError: None was found. Says how much of the load the arm could be followed under.
+    """
+    reference = stiffness(pose, tension, None if isinstance(tension, Tension) else wrench)
+    W = reference.wrench
+    if wrench is not None:
+        W = vector("wrench", wrench, 6, "force [N], then moment [N m], base axes")
+    _require_between_stops(pose)
+    loaded = LoadedArm(pose, reference.tension, W)
+    here = loaded.at(pose, reference.tension)
+    imbalance, reached, step, iterations = here.torque, 0.0, 1.0, 0
+    while True:
+        goal = min(1.0, reached + step)
+        settled = _settle(loaded, here, (1.0 - goal) * imbalance)
+        iterations += settled.iterations
+        if settled.steady and goal == 1.0:
+            return _answer(loaded, settled, iterations)
+        if settled.steady:
+            here, reached, step = settled.point, goal, 2.0 * step
+        elif step > _SMALLEST_STEP:
+            step /= 2.0
+        else:
+            raise _no_rest(settled, reached)
+
+
+def follow(before: Equilibrium, wrench: Array) -> Equilibrium | None:
+    """The equilibrium that an earlier one turns into under another wrench (6,).
+
+    Returns:
+        None if there is none within reach of postures that are all stable: where the arm buckles,
+        or where the step from one wrench to the other is too large to tell.
+
+    Raises:
+        ElasticityRangeError: As for :func:`equilibrium`.
+    """
+    loaded = LoadedArm(before.reference, before.reference_tension, wrench)
+    settled = _settle(loaded, loaded.at(before.pose, before.tension), 0.0)
+    if not (settled.steady and settled.convex):
+        return None
+    return _answer(loaded, settled, settled.iterations)
+
+
+def _settle(loaded: LoadedArm, start: Iterate, held_back: Array | float) -> Settled[Iterate]:
+    """Where the arm goes from an iterate while a torque (nv,) keeps part of the load off it."""
+
+    def evaluate(q: Array, near: Iterate) -> Iterate:
+        return loaded.moved(q, near).holding_back(held_back)
+
+    return settle(evaluate, start.holding_back(held_back), *loaded.stops())
+
+
+def _require_between_stops(pose: Posture) -> None:
+    arm, q = pose.arm, pose.q
+    beyond = (q < arm._lowest) | (q > arm._highest)
+    if np.count_nonzero(beyond):
+        i = int(beyond.argmax())
+        stop = arm.lower[i] if q[i] < arm._lowest[i] else arm.upper[i]
+        raise InvalidInput(
+            "pose",
+            f"{arm.joint_names[i]} = {q[i]:.6g} rad is beyond its stop at {stop:.6g} rad, where no "
+            "motor can be locked; start within the joint limits, or widen joint_limit.",
+        )
+
+
+def _answer(loaded: LoadedArm, settled: Settled[Iterate], iterations: int) -> Equilibrium:
+    K = settled.point.K
+    loaded.cables.require_domains(K.tension)
+    reaction = np.where(settled.pressed, K.residual, 0.0)
+    return Equilibrium(
+        reference=loaded.reference,
+        reference_tension=loaded.tension,
+        wrench=loaded.wrench,
+        stiffness=K,
+        reaction=frozen(reaction),
+        residual=frozen(K.residual - reaction),
+        history=settled.history,
+        iterations=iterations,
+    )
+
+
+def _no_rest(settled: Settled[Iterate], reached: float) -> EquilibriumError:
+    here = settled.point
+    residual = np.where(settled.pressed, 0.0, here.torque)
+    joint = here.K.posture.arm.joint_names[int(abs(residual).argmax())]
+    return EquilibriumError(
+        f"the arm finds no stable place to rest beyond {100.0 * reached:.3g} % of the load; at the "
+        f"last iterate {abs(residual).max():.4g} N m are out of balance at {joint}",
+        residual=frozen(residual),
+        load_factor=reached,
+        joint=joint,
+    )

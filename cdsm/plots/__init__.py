@@ -1,0 +1,11 @@
+"""Figures: the arm with its cables, and the paper's figures recomputed. mm and N/mm live here.
+
+Every function returns a :class:`matplotlib.figure.Figure` that belongs to the caller: show it in a
+notebook or save it with ``savefig``. No global plotting state is touched.
+"""
+
+from cdsm.plots.arm import plot_arm
+from cdsm.plots.loads import plot_critical_tension, plot_weight_test
+from cdsm.plots.paper import plot_paper
+
+__all__ = ["plot_arm", "plot_critical_tension", "plot_paper", "plot_weight_test"]

@@ -1,0 +1,73 @@
+"""The arm in three dimensions."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from cdsm._checks import instance
+from cdsm.errors import InvalidInput
+from cdsm.manipulator import Posture
+from cdsm.plots.style import AXES, COLORS, MM
+from cdsm.tension import Tension
+
+
+def plot_arm(pose: Posture, tension: Tension | None = None) -> Figure:
+    """The arm in 3D: backbone, disks and cables, with equal axes in mm.
+
+    Args:
+        pose: The posture to draw.
+        tension: Colours the cables by their tension [N] if given.
+
+    Raises:
+        InvalidInput: Not a posture, or not a tension of its arm.
+    """
+    instance("pose", pose, Posture)
+    if tension is not None and instance("tension", tension, Tension).posture.arm != pose.arm:
+        raise InvalidInput("tension", "belongs to another arm than the posture.")
+    figure = Figure(figsize=(7.0, 5.0), layout="constrained")
+    axes: Any = figure.add_subplot(projection="3d")
+    draw_arm(axes, pose, tension)
+    if tension is not None:
+        figure.colorbar(
+            _tension_colors(tension), ax=axes, label="cable tension [N]", shrink=0.7, pad=0.12
+        )
+    figure.suptitle(str(pose.arm.geometry), fontsize=10)
+    return figure
+
+
+def draw_arm(axes: Any, pose: Posture, tension: Tension | None) -> None:
+    """Draw it on axes of three dimensions, for a figure of its own or part of another."""
+    geometry = pose.arm.geometry
+    circle = np.linspace(0.0, 2.0 * np.pi, 49)
+    ring = geometry.hole_radius * np.array([0.0 * circle, np.cos(circle), np.sin(circle)])
+    for link, places in geometry.disks:
+        placement = pose.link_pose(link)
+        for place in places:
+            center = placement[:3, 3:] + place * placement[:3, :1]
+            edge = center + placement[:3, :3] @ ring
+            axes.plot(*(MM * edge), color="0.35", linewidth=0.9)
+    joints = [np.zeros(3)]
+    joints += [pose.link_pose(link)[:3, 3] for link, _ in geometry.disks[1:]]
+    axes.plot(*(MM * np.array([*joints, pose.tip[:3, 3]]).T), color="0.1", linewidth=2.5)
+    colors = [COLORS[0]] * len(pose.cable_paths)
+    if tension is not None:
+        colors = _tension_colors(tension).to_rgba(tension.values).tolist()
+    for path, color in zip(pose.cable_paths, colors, strict=True):
+        axes.plot(*(MM * path.T), color=color, linewidth=1.1)
+    for name in AXES:
+        getattr(axes, f"set_{name}label")(f"{name} [mm]", fontsize=8)
+        getattr(axes, f"{name}axis").set_major_locator(MaxNLocator(4))
+    axes.tick_params(labelsize=7, pad=-1)
+    ranges = np.ptp([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()], axis=1)
+    axes.set_box_aspect(ranges, zoom=0.8)  # equal axes, and room for the labels
+
+
+def _tension_colors(tension: Tension) -> ScalarMappable:
+    low, high = tension.values.min(), tension.values.max()
+    return ScalarMappable(Normalize(low, max(high, low + 1e-9)), "viridis")

@@ -1,0 +1,97 @@
+"""What loads and tensions do to an arm: weight tests and buckling."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from cdsm._checks import instance
+from cdsm.buckling import CriticalTension
+from cdsm.plots.style import AXES, COLORS, MM
+from cdsm.weight import WeightTest
+
+
+def plot_weight_test(test: WeightTest) -> Figure:
+    """Load over the displacement of the tip, measured and linear, and tensions over the load.
+
+    Args:
+        test: What :func:`~cdsm.weight.weight_test` returns; of several steps, to see a curve.
+
+    Raises:
+        InvalidInput: Not a weight test.
+    """
+    instance("test", test, WeightTest)
+    figure = Figure(figsize=(10.0, 4.0), layout="constrained")
+    left: Any
+    right: Any
+    left, right = figure.subplots(1, 2)
+    loads = np.concatenate([[0.0], test.loads])
+    moved = np.vstack([np.zeros(3), test.displacements])
+    for axis, color, nonlinear, linear in zip(
+        AXES, COLORS, moved.T, test.linear.displacement, strict=True
+    ):
+        left.plot(MM * nonlinear, loads, "o-", color=color, markersize=3, label=axis)
+        left.plot([0.0, MM * linear], [0.0, loads[-1]], "--", color=color, linewidth=0.9)
+    left.set(xlabel="displacement of the tip [mm]", ylabel="load [N]")
+    left.legend(title="direction; dashed: linear", fontsize=8, title_fontsize=8)
+    tensions = np.vstack([test.without.tension, test.tensions])
+    right.plot(loads, tensions, color=COLORS[0], linewidth=0.9, alpha=0.7)
+    right.set(xlabel="load [N]", ylabel="tension of each cable [N]")
+    right.set_ylim(bottom=0.0)
+    for axes in (left, right):
+        axes.grid(alpha=0.3)
+    figure.suptitle(
+        f"{test.without.pose.arm.geometry.name}: weight of {np.linalg.norm(test.force):.4g} N"
+    )
+    return figure
+
+
+def plot_critical_tension(critical: CriticalTension) -> Figure:
+    """Stability margin over the lower bound of tension, unstable ranges shaded.
+
+    Args:
+        critical: What :func:`~cdsm.buckling.critical_tension` returns.
+
+    Raises:
+        InvalidInput: Not a critical tension.
+    """
+    instance("critical", critical, CriticalTension)
+    figure = Figure(figsize=(7.0, 4.0), layout="constrained")
+    axes: Any = figure.subplots()
+    axes.plot(critical.bounds, critical.margins, color=COLORS[0])
+    axes.axhline(0.0, color="0.2", linewidth=0.8)
+    low, high = critical.examined
+    shown = high if math.isinf(critical.minimum) or not critical.stable else 2.0 * critical.minimum
+    inside = critical.bounds <= shown
+    axes.set_xlim(low, min(shown, high))
+    axes.set_ylim(*_with_room([0.0, *critical.margins[inside]]))
+    edges = [critical.examined[0], *np.ravel(critical.stable), critical.examined[1]]
+    for start, end in zip(edges[::2], edges[1::2], strict=True):
+        axes.axvspan(start, end, color=COLORS[1], alpha=0.15, linewidth=0.0)
+    if math.isfinite(critical.minimum) and critical.stable:
+        axes.plot(critical.minimum, 0.0, "o", color=COLORS[1])
+        axes.annotate(
+            f"buckles at {critical.minimum:.4g} N",
+            (critical.minimum, 0.0),
+            xytext=(8, 10),
+            textcoords="offset points",
+            fontsize=9,
+        )
+    axes.set(
+        xlabel="lower bound of tension [N]",
+        ylabel="smallest joint stiffness [N m/rad]",
+        title=f"{critical.posture.arm.geometry.name}; shaded: unstable",
+    )
+    axes.grid(alpha=0.3)
+    return figure
+
+
+def _with_room(values: Sequence[float]) -> tuple[float, float]:
+    """Limits of an axis that shows all values."""
+    low, high = min(values), max(values)
+    room = 0.08 * (high - low)
+    return low - room, high + room

@@ -1,0 +1,195 @@
+"""The weight test of Section V: hang a weight at the tip, see how far it goes (Eq. 20)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cdsm._checks import Array, ReadOnlyState, frozen, vector
+from cdsm.equilibrium import Equilibrium, equilibrium, follow
+from cdsm.errors import EquilibriumError, InvalidInput
+from cdsm.manipulator import Posture
+from cdsm.tension import Tension
+
+_FINEST = 2.0**-12
+"""Part of the load to which a buckling load is found."""
+
+_STILL = 1e-13
+"""A tip displacement this part of the arm's length is rounding."""
+
+
+@final
+@dataclass(frozen=True, eq=False, kw_only=True)
+class LinearPrediction(ReadOnlyState):
+    """What the stiffness at the unloaded arm predicts of a weight test.
+
+    Attributes:
+        displacement: C_vv ΔF (3,) [m], C of :attr:`~cdsm.stiffness.Stiffness.compliance`.
+        stiffness: :meth:`~cdsm.stiffness.Stiffness.along` the force [N/m].
+    """
+
+    displacement: Array
+    stiffness: float
+
+
+@final
+@dataclass(frozen=True, eq=False, kw_only=True)
+class WeightTest(ReadOnlyState):
+    """A weight hung at the tip in equal steps, with every equilibrium on the way.
+
+    Attributes:
+        force: ΔF (3,), the dead force at the full load, base axes [N].
+        without: The arm before: at rest under the reference's wrench alone.
+        loaded: The arm at rest under each load, the last under the full one.
+    """
+
+    force: Array
+    without: Equilibrium
+    loaded: tuple[Equilibrium, ...]
+
+    @cached_property
+    def displacement(self) -> Array:
+        """ΔX (3,) [m]: the tip with the full weight minus the tip without."""
+        return frozen(self.displacements[-1].copy())
+
+    @cached_property
+    def stiffness(self) -> float:
+        """|ΔF|/(u·ΔX) [N/m] along the force, u = ΔF/|ΔF|: 1/C of Eq. 20, as it is measured.
+
+        inf where the tip does not give way along the force.
+        """
+        size = float(np.linalg.norm(self.force))
+        gives = float(self.displacement @ self.force) / size
+        length = self.without.pose.arm.geometry.length
+        return size / gives if abs(gives) > _STILL * length else math.inf
+
+    @cached_property
+    def linear(self) -> LinearPrediction:
+        """What the stiffness without the weight predicts.
+
+        Raises:
+            SingularStiffness: The arm without the weight is just about to buckle.
+        """
+        K = self.without.stiffness
+        return LinearPrediction(
+            displacement=frozen(K.compliance[:3, :3] @ self.force),
+            stiffness=K.along(self.force),
+        )
+
+    @cached_property
+    def loads(self) -> Array:
+        """Magnitude of the force at each step (n,) [N]."""
+        count = len(self.loaded)
+        return frozen(np.linalg.norm(self.force) * np.arange(1, count + 1) / count)
+
+    @cached_property
+    def tips(self) -> Array:
+        """Tip position at each step (n, 3) [m]."""
+        return frozen(np.array([each.pose.tip[:3, 3] for each in self.loaded]))
+
+    @cached_property
+    def displacements(self) -> Array:
+        """Tip at each step minus the tip without weight (n, 3) [m]."""
+        return frozen(self.tips - self.without.pose.tip[:3, 3])
+
+    @cached_property
+    def tensions(self) -> Array:
+        """Cable tensions at each step (n, C) [N]."""
+        return frozen(np.array([each.tension for each in self.loaded]))
+
+    def __repr__(self) -> str:
+        return (
+            f"<WeightTest with {np.linalg.norm(self.force):.4g} N on "
+            f"{self.without.pose.arm.geometry.name}: {self.stiffness / 1000.0:.4g} N/mm>"
+        )
+
+    def __str__(self) -> str:
+        rows = [f"{'load [N]':>10}{'x [mm]':>12}{'y [mm]':>12}{'z [mm]':>12}"]
+        for load, moved in zip(self.loads, self.displacements, strict=True):
+            rows.append(f"{load:>10.4g}" + "".join(f"{1000.0 * x:>12.4g}" for x in moved))
+        predicted = "".join(f"{1000.0 * x:>12.4g}" for x in self.linear.displacement)
+        rows.append(f"{'linear':>10}{predicted}")
+        return "\n".join(
+            [
+                *rows,
+                f"stiffness along the force: measured {self.stiffness / 1000.0:.4g} N/mm, "
+                f"linear {self.linear.stiffness / 1000.0:.4g} N/mm",
+            ]
+        )
+
+
+def weight_test(
+    pose: Posture,
+    tension: Tension | ArrayLike,
+    force: ArrayLike,
+    *,
+    steps: int = 1,
+    wrench: ArrayLike | None = None,
+) -> WeightTest:
+    """Hang a weight at the tip of an arm whose motors are locked: C = ΔX/ΔF (Eq. 20).
+
+    Nonlinear: the tensions follow their elongation, and the arm its new posture. What comes out for
+    a small force is 1/:meth:`~cdsm.stiffness.Stiffness.along`.
+
+    Args:
+        pose: The reference posture, at which the motors are locked.
+        tension: F there, as for :func:`~cdsm.equilibrium.equilibrium`. Tensions of your own need
+            not balance the arm: the test starts from the equilibrium that they lead to.
+        force: ΔF (3,) at ``tool0`` in base axes [N], on top of ``wrench``.
+        steps: Into how many equal steps to divide it.
+        wrench: What the arm carries without the weight (6,): force [N], then moment [N m]. If not
+            given, that of the ``Tension``, or zero.
+
+    Raises:
+        InvalidInput: As for :func:`~cdsm.equilibrium.equilibrium`, or a force of zero, or steps
+            that are no positive integer.
+        ElasticityRangeError: As for :func:`~cdsm.equilibrium.equilibrium`, at any step.
+        EquilibriumError: The arm buckles under the load; says at which part of it. Where it comes
+            to rest then, :func:`~cdsm.equilibrium.equilibrium` tells.
+    """
+    force = vector("force", force, 3, "a force in base axes [N]")
+    if not force.any():
+        raise InvalidInput("force", "is zero; nothing moves, and there is nothing to measure.")
+    if isinstance(steps, bool) or not isinstance(steps, (int, np.integer)) or steps < 1:
+        raise InvalidInput("steps", f"{steps!r} given; a positive whole number is needed.")
+    without = equilibrium(pose, tension, wrench)
+    added = np.append(force, np.zeros(3))
+    loaded, part = [without], 0.0
+    for step in range(1, int(steps) + 1):
+        loaded.append(_hang(loaded[-1], without.wrench, added, part, step / steps))
+        part = step / steps
+    return WeightTest(force=force, without=without, loaded=tuple(loaded[1:]))
+
+
+def _hang(
+    before: Equilibrium, wrench: Array, added: Array, reached: float, goal: float
+) -> Equilibrium:
+    """Follow the arm from one part of the load to a larger one.
+
+    Raises:
+        EquilibriumError: It loses its stability on the way.
+    """
+    step = goal - reached
+    while reached < goal:
+        part = min(goal, reached + step)
+        after = follow(before, frozen(wrench + part * added))
+        if after is not None:
+            before, reached, step = after, part, 2.0 * step
+        elif step > _FINEST:
+            step /= 2.0
+        else:
+            way = before.stiffness.critical_direction
+            joint = before.pose.arm.joint_names[int(abs(way).argmax())]
+            raise EquilibriumError(
+                f"the arm buckles at {100.0 * reached:.4g} % of the load, under "
+                f"{reached * float(np.linalg.norm(added)):.4g} N: {joint} gives way",
+                residual=before.residual,
+                load_factor=reached,
+                joint=joint,
+            )
+    return before
