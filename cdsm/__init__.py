@@ -31,6 +31,7 @@ from cdsm.errors import (
     SolverError,
     TensileTestError,
     UnknownName,
+    UnreachableStiffness,
     UrdfError,
 )
 from cdsm.geometry import Geometry
@@ -44,6 +45,16 @@ from cdsm.kinematics import (
 from cdsm.manipulator import Manipulator, Posture
 from cdsm.modes import Modes, modes
 from cdsm.parts import CableRoute, Joint, Link
+from cdsm.planning import (
+    Saturation,
+    StiffnessGradient,
+    StiffnessPlan,
+    StiffnessRange,
+    plan_stiffness,
+    saturation,
+    stiffness_gradient,
+    stiffness_range,
+)
 from cdsm.stiffness import Shares, Stiffness, stiffness
 from cdsm.tensile import TensileFit, fit_tensile_test
 from cdsm.tensile_data import TensileTest, read_tensile_csv
@@ -84,12 +95,16 @@ __all__ = [
     "Measurement",
     "Modes",
     "Posture",
+    "Saturation",
     "Shares",
     "SingularMass",
     "SingularStiffness",
     "Site",
     "SolverError",
     "Stiffness",
+    "StiffnessGradient",
+    "StiffnessPlan",
+    "StiffnessRange",
     "StrandElasticity",
     "TabulatedElasticity",
     "TensileFit",
@@ -97,6 +112,7 @@ __all__ = [
     "TensileTestError",
     "Tension",
     "UnknownName",
+    "UnreachableStiffness",
     "UrdfError",
     "WeightTest",
     "critical_load",
@@ -108,12 +124,16 @@ __all__ = [
     "in_series",
     "inverse_kinematics",
     "modes",
+    "plan_stiffness",
     "presets",
     "read_elasticity",
     "read_tensile_csv",
+    "saturation",
     "serpentine_cables",
     "solve_joint_angles",
     "stiffness",
+    "stiffness_gradient",
+    "stiffness_range",
     "to_urdf",
     "weight_test",
     "write_elasticity",

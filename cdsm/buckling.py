@@ -10,33 +10,21 @@ does beyond is :func:`~cdsm.equilibrium.equilibrium`.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final, Literal, final
+from typing import Final, final
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import brentq
 
 from cdsm._checks import Array, ReadOnlyState, bound, frozen, instance, vector
-from cdsm.errors import ElasticityRangeError, InfeasibleTension, InvalidInput, SolverError
+from cdsm._rising import ABOVE, PRECISION, SAMPLES, Limit, edge, reach, reason, stable_ranges
+from cdsm.errors import InvalidInput
 from cdsm.manipulator import Posture
 from cdsm.stiffness import Stiffness, stiffness
 from cdsm.tension import distribute_tension
 
-SAMPLES: Final = 96
-"""Bounds or load factors that are looked at; a stable range narrower than a step is not seen."""
-
-_PRECISION: Final = 1e-12
-"""Relative precision of the point where stability is lost."""
-
 _NOWHERE: Final = 1e6
 """A load factor up to which nothing happens counts as infinite."""
-
-_ABOVE: Final = 1.0 + 1e-9
-"""The low end of a domain may be excluded; this far above it everything is defined."""
-
-Limit = Literal["buckling", "infeasible", "elasticity", "none"]
 
 
 @final
@@ -149,19 +137,10 @@ def critical_tension(
     def at(minimum: float) -> Stiffness:
         return stiffness(pose, distribute_tension(pose, minimum, wrench=W, solver=solver))
 
-    low = max(cable.elasticity.domain.low for cable in arm.cables) * _ABOVE
+    low = max(cable.elasticity.domain.low for cable in arm.cables) * ABOVE
     at(low)  # if there is nothing to judge, its error says why
-    high = _reach(at, low, pose, W, solver)
-    places = np.unique([low, *np.geomspace(max(low, 1e-4 * high), high, SAMPLES)])
-    margins = [at(place).margin for place in places.tolist()]
-    edges, ends = [], []
-    for i in range(len(places)):
-        if margins[i] > 0.0 and (i == 0 or margins[i - 1] <= 0.0):
-            edges.append(places[i] if i == 0 else _crossing(at, places[i - 1], places[i]))
-        if margins[i] > 0.0 and (i + 1 == len(places) or margins[i + 1] <= 0.0):
-            last = i + 1 == len(places)
-            ends.append(places[i] if last else _crossing(at, places[i], places[i + 1]))
-    stable = tuple((float(a), float(b)) for a, b in zip(edges, ends, strict=True))
+    high = reach(at, low, min(cable.elasticity.domain.high for cable in arm.cables))
+    places, margins, stable = stable_ranges(at, low, high)
     buckles = [b for _, b in stable if b < high]
     if buckles:
         minimum = where = buckles[0]
@@ -179,7 +158,7 @@ def critical_tension(
         stable=stable,
         examined=(low, high),
         bounds=frozen(places),
-        margins=frozen(np.array(margins)),
+        margins=frozen(margins),
     )
 
 
@@ -213,18 +192,18 @@ def critical_load(
     def at(factor: float) -> Stiffness:
         return stiffness(pose, distribute_tension(pose, low, high, factor * W, solver))
 
-    factor, limit = 0.0, _reason(at, 0.0)
+    factor, limit = 0.0, reason(at, 0.0)
     at(factor)  # if there is nothing to judge, its error says why
     if limit == "none":
         end = 1e-3
-        while end < _NOWHERE and _holds(at, end):
+        while end < _NOWHERE and reason(at, end) == "none":
             end *= 2.0
         if end < _NOWHERE:
             # the first failure: what the doubling has stepped over is sampled again, finer
             places = np.linspace(0.0, end, SAMPLES).tolist()
-            first = next(i for i, place in enumerate(places) if not _holds(at, place))
-            factor = _edge(lambda x: _holds(at, x), places[first - 1], places[first])
-            limit = _reason(at, factor * (1.0 + 4.0 * _PRECISION))
+            first = next(i for i, place in enumerate(places) if reason(at, place) != "none")
+            factor = edge(lambda x: reason(at, x) == "none", places[first - 1], places[first])
+            limit = reason(at, factor * (1.0 + 4.0 * PRECISION))
         else:
             factor = math.inf
     there = at(min(factor, _NOWHERE / 2.0))
@@ -236,61 +215,6 @@ def critical_load(
         mode=_mode(there),
         tension=there.tension,
     )
-
-
-def _reach(
-    at: Callable[[float], Stiffness], low: float, pose: Posture, wrench: Array, solver: str
-) -> float:
-    """How far the lower bound is looked at [N]."""
-    highest = min(cable.elasticity.domain.high for cable in pose.arm.cables)
-    if math.isinf(highest):
-        # far out, tensions grow in proportion to the bound, the passive part no more: if the
-        # active part is negative somewhere, that decides at the latest where it equals the rest
-        far = 1e9
-        if _exists(at, far):
-            active = np.linalg.eigvalsh(at(far).active)[0] / far
-            K = at(low)
-            rest = np.linalg.norm(K.joint, 2) + np.linalg.norm(K.active, 2)
-            highest = 2.0 * rest / abs(active) if active != 0.0 else far
-        else:
-            highest = far
-        highest = max(highest, 2.0 * low)
-        while _exists(at, highest) and at(highest).is_stable and highest < far:
-            highest *= 2.0  # an elasticity of the user's own may go on stiffening
-    return highest if _exists(at, highest) else _edge(lambda b: _exists(at, b), low, highest)
-
-
-def _exists(at: Callable[[float], Stiffness], place: float) -> bool:
-    """Whether tensions balance the arm within the domains of the elasticities."""
-    return _reason(at, place) in ("none", "buckling")
-
-
-def _reason(at: Callable[[float], Stiffness], place: float) -> Limit:
-    """What keeps the arm from holding at a place; ``"none"`` if it holds."""
-    try:
-        return "none" if at(place).is_stable else "buckling"
-    except (InfeasibleTension, SolverError):  # on the very edge a solver may find nothing either
-        return "infeasible"
-    except ElasticityRangeError:
-        return "elasticity"
-
-
-def _holds(at: Callable[[float], Stiffness], place: float) -> bool:
-    return _reason(at, place) == "none"
-
-
-def _crossing(at: Callable[[float], Stiffness], a: float, b: float) -> float:
-    """Where the smallest eigenvalue changes its sign between two places."""
-    root: float = brentq(lambda x: at(float(x)).margin, a, b, xtol=1e-300, rtol=_PRECISION)
-    return root
-
-
-def _edge(true: Callable[[float], bool], a: float, b: float) -> float:
-    """The last place from a, where something is true, to b, where it is not."""
-    while b - a > _PRECISION * b:
-        middle = (a + b) / 2.0
-        a, b = (middle, b) if true(middle) else (a, middle)
-    return a
 
 
 def _mode(there: Stiffness) -> Array:

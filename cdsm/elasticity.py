@@ -18,7 +18,6 @@ from numpy.typing import ArrayLike
 from cdsm._checks import LARGEST, SMALLEST, Array, number_array, scalar
 from cdsm.errors import ElasticityRangeError, InvalidInput
 
-
 _STEP = 6e-6
 """Relative step of central differences: the cube root of the rounding of float64."""
 
@@ -119,7 +118,7 @@ class Elasticity(ABC):
             tension: F [N], any shape.
 
         Raises:
-            ElasticityRangeError: As for :meth:`rigidity`.
+            ElasticityRangeError: A tension outside :attr:`domain`.
         """
         values = self.domain.check(tension)
         piece = np.searchsorted(self.jumps, values, side="left")

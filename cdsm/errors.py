@@ -271,3 +271,46 @@ class EquilibriumError(CdsmError, ArithmeticError):
         self.residual = residual
         self.load_factor = load_factor
         self.joint = joint
+
+
+class UnreachableStiffness(CdsmError):
+    """A stiffness that no admissible cable tensions give.
+
+    Attributes:
+        direction: u (3,), unit length, base axes.
+        target: What was wanted [N/m].
+        low: Smallest attainable stiffness along u [N/m].
+        high: Largest attainable stiffness along u [N/m]; inf if tension raises it without end.
+        nearest: What is attainable next to it [N/m]: an end of the range, or both sides of a gap.
+    """
+
+    def __init__(
+        self,
+        direction: NDArray[np.float64],
+        target: float,
+        low: float,
+        high: float,
+        nearest: Sequence[float],
+    ) -> None:
+        self.direction = direction
+        self.target = target
+        self.low = low
+        self.high = high
+        self.nearest = tuple(float(value) for value in nearest)
+        along = ", ".join(f"{x:.4g}" for x in direction)
+        message = (
+            f"no admissible tensions give {target:.8g} N/m along ({along}): the range is "
+            f"{low:.8g} to {high:.8g} N/m"
+        )
+        if low <= target <= high:
+            sides = " and ".join(f"{value:.8g}" for value in self.nearest)
+            message += (
+                f", but where a cable's rigidity jumps it has gaps, and {sides} N/m is the nearest "
+                "found. Ask for that, or change the bounds or the posture."
+            )
+        else:
+            message += (
+                ". Ask for a stiffness within it, or widen it: change minimum, maximum, margin, "
+                "the load or the posture, or take other cables."
+            )
+        super().__init__(message)

@@ -44,6 +44,9 @@ GRAVITY = (0.0, 0.0, -9.81)
 _LIMIT_SLACK = 1e-9
 """Angles this far [rad] beyond a limit are rounding, as of a conversion from degrees."""
 
+_STEP = 1e-5
+"""Relative step of the difference of dEA/dF."""
+
 
 @final
 class Manipulator:
@@ -263,30 +266,38 @@ class Manipulator:
             stiffness[held] = 1.0 / compliance
         return frozen(stiffness)
 
-    def _cable_stiffness_slope(self, tension: Array, stiffness: Array) -> Array:
-        """dk/dF (C,) [1/m] where the cables have the stiffness k (C,) [N/m] under F (C,) [N].
+    def _cable_stiffness_slopes(self, tension: Array, stiffness: Array) -> tuple[Array, Array]:
+        """dk/dF (C,) [1/m] and d²k/dF² (C,) [1/(N m)] of cables of stiffness k under F (C,) [N].
 
-        (k² l_0/EA) EA′/EA = k (1 − k/k_series) EA′/EA: the free length need not be known.
+        k′ = (k² l_0/EA) EA′/EA = k (1 − k/k_series) EA′/EA: the free length need not be known. EA″
+        is a difference, good for some five digits.
 
         Raises:
             ElasticityRangeError: As for :meth:`_cable_stiffness`.
             InvalidInput: An elasticity of the user's own gives no finite slope.
         """
-        slope = np.zeros(len(self._cables))
+        first, second = np.zeros_like(stiffness), np.zeros_like(stiffness)
         for law, held in self._held_by_law:
-            pulled, k = tension[held], stiffness[held]
+            F, k = tension[held], stiffness[held]
+            last = np.array([*law.jumps, law.domain.high])[np.searchsorted(law.jumps, F)]
+            step = _STEP * np.maximum(F, 1.0)
+            beside = np.where(F + step <= last, F + step, F - step)
             try:
-                growth = law.rigidity_slope(pulled) / law.rigidity(pulled)
+                slopes = np.asarray(law.rigidity_slope(np.stack([F, beside])))
+                EA = law.rigidity(F)
             except ElasticityRangeError as error:
                 raise self._naming_cables(error, held) from None
-            if growth.shape != pulled.shape or not np.isfinite(growth).all():
+            if slopes.shape != (2, F.size) or not np.isfinite(slopes).all():
                 raise InvalidInput(
                     "elasticity",
-                    f"{law!r} gives the relative slope of rigidity {growth} 1/N at tensions "
-                    f"{pulled} N; one finite number for each is needed.",
+                    f"{law!r} gives the slopes {slopes} of its rigidity at tensions {F} N and "
+                    "beside them; one finite number for each is needed.",
                 )
-            slope[held] = k * (1.0 - k * self._series_compliance[held]) * growth
-        return frozen(slope)
+            growth, wire = slopes[0] / EA, 1.0 - k * self._series_compliance[held]
+            bend = (slopes[1] - slopes[0]) / (beside - F) / EA - growth**2
+            first[held] = k * wire * growth
+            second[held] = first[held] * growth * (2.0 * wire - 1.0) + k * wire * bend
+        return frozen(first), frozen(second)
 
     def _naming_cables(
         self, error: ElasticityRangeError, held: slice | NDArray[np.intp]

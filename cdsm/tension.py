@@ -19,7 +19,7 @@ from typing import Any, NoReturn, final
 
 import numpy as np
 import qpsolvers
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import linprog
 from scipy.sparse import csc_matrix
 
@@ -121,12 +121,13 @@ def distribute_tension(
         wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m].
         solver: ``"daqp"`` (exact), ``"osqp"``, or any other that qpsolvers finds installed.
         fixed: Tensions [N] given by name of the cable, as of motors that control force; the rest
-            is solved for. They stand in place of that cable's bounds.
+            is solved for. They stand in place of that cable's bounds, and no advice widens them.
 
     Raises:
         InvalidInput: A bound, a fixed tension or the wrench has the wrong shape or is not a
             number, or the bounds contradict each other.
-        InfeasibleTension: No tension within the bounds balances the arm; says what is missing.
+        InfeasibleTension: No tension within the bounds balances the arm; says what is missing, and
+            how far the bounds of the cables that are not fixed would have to widen, if that helps.
         UnknownName: No such solver is installed, or no such cable.
         SolverError: The solver's answer does not satisfy the optimality conditions.
     """
@@ -140,7 +141,8 @@ def distribute_tension(
     problem = _balance.Scaled(*_balance.scaled_balance(pose.length_jacobian, torque, low, high))
     solution = _solve(problem, solver)
     if solution is None:
-        _explain(pose, problem, solver)
+        free = np.array([cable.name not in (fixed or {}) for cable in pose.arm.cables])
+        _explain(pose, problem, solver, free)
     # within OPTIMALITY of the bounds already; a bound that is active is not crossed by rounding
     values = np.minimum(np.maximum(solution * problem.force, low), high)
     return Tension(
@@ -255,12 +257,20 @@ def _polished(problem: _balance.Scaled, point: tuple[Array, ...]) -> tuple[Array
     return x, y, z
 
 
-def _explain(pose: Posture, problem: _balance.Scaled, solver: str) -> NoReturn:
+def _explain(
+    pose: Posture, problem: _balance.Scaled, solver: str, free: NDArray[np.bool_]
+) -> NoReturn:
     """Settle by linear programs why a solver found no tensions, and raise it.
+
+    Args:
+        pose: The posture.
+        problem: What was asked.
+        solver: What found nothing.
+        free: The cables (C,) whose bounds may widen: all but those of fixed tension.
 
     Raises:
         InfeasibleTension: There are none. Carries the least missing torque Σ|τ − J_Lᵀ F| within
-            the bounds, and the least widening of all bounds that leaves none missing.
+            the bounds, and the least widening of all free bounds that leaves none missing.
         SolverError: There are some, so it is the solver that failed; or the linear program did.
     """
     A, b, lower, upper, arm_scale, force_scale = problem
@@ -285,13 +295,14 @@ def _explain(pose: Posture, problem: _balance.Scaled, solver: str) -> NoReturn:
             "hold. Change the posture, the load or the bounds, or try another solver.",
         )
 
-    # variables: F, then the widening t: low − t <= F <= high + t, and F >= 0 all the same
+    # variables: F, then the widening t: low − t <= F <= high + t, and F >= 0 all the same; a fixed
+    # tension does not widen
     rows = np.vstack([-np.eye(count), np.eye(count)])
     sides = np.concatenate([-lower, upper])
     finite = np.isfinite(sides)
     widening = linprog(
         np.concatenate([np.zeros(count), [1.0]]),
-        A_ub=np.hstack([rows, -np.ones((2 * count, 1))])[finite],
+        A_ub=np.hstack([rows, -1.0 * np.tile(free, 2)[:, None]])[finite],
         b_ub=sides[finite],
         A_eq=np.hstack([A, np.zeros((nv, 1))]),
         b_eq=b,
@@ -299,7 +310,7 @@ def _explain(pose: Posture, problem: _balance.Scaled, solver: str) -> NoReturn:
         method="highs",
     )
     missing = (b - A @ values) * arm_scale * force_scale
-    tight = np.minimum(values - lower, upper - values) <= OPTIMALITY
+    tight = free & (np.minimum(values - lower, upper - values) <= OPTIMALITY)
     raise InfeasibleTension(
         missing=frozen(missing),
         joint=pose.arm.joint_names[int(abs(missing).argmax())],

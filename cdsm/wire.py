@@ -124,7 +124,6 @@ class StrandElasticity(Elasticity):
     def rigidity_slope(self, tension: ArrayLike) -> Array:
         """Derivative of the polynomials [-]; see :meth:`Elasticity.rigidity_slope`."""
         values = self.domain.check(tension)
-        self.rigidity(values)  # refuses tensions at which it is not positive
         return horner(self._slopes, np.searchsorted(self.joins, values, side="left"), values)
 
     @property
@@ -221,7 +220,10 @@ class TabulatedElasticity(Elasticity):
         return np.asarray(1.0 / self._curve(self.domain.check(tension), 1))
 
     def rigidity_slope(self, tension: ArrayLike) -> Array:
-        """−ε″/ε′² [-], at a point that of the piece below; see :meth:`Elasticity.rigidity_slope`."""
+        """−ε″/ε′² [-], at a point of the table that of the piece below.
+
+        See :meth:`Elasticity.rigidity_slope`.
+        """
         values = self.domain.check(tension)
         below = np.maximum(np.nextafter(values, -np.inf), self.domain.first)
         return np.asarray(-self._curve(below, 2) / self._curve(below, 1) ** 2)

@@ -140,6 +140,57 @@ def test_fixed_tension_stands_in_place_of_the_bounds() -> None:
     assert np.delete(pull.values, 1).min() >= 5.0
 
 
+@pytest.mark.parametrize(
+    ("bounds", "given"),
+    [
+        ((5.0, 30.0), {"cable1_2": 40.0, "cable2_2": 45.0, "cable3_2": 50.0}),
+        ((60.0, 90.0), {"cable1_2": 70.0, "cable2_2": 2.5, "cable3_2": 65.0}),
+        ((5.0, 90.0), {"cable1_2": 300.0, "cable2_2": 10.0, "cable3_2": 10.0}),
+    ],
+)
+def test_advice_widens_the_bounds_of_cables_that_are_not_fixed(
+    bounds: tuple[float, float], given: dict[str, float]
+) -> None:
+    low, high = bounds
+    pose = presets.experimental_prototype().at(np.deg2rad([-12.0, -18.0, -20.0]))
+    # one unknown per joint is left, so the widening it needs is known: solve it independently
+    J = pose.length_jacobian
+    load = -pose.gravity_torque - J[1::2].T @ np.array(list(given.values()))
+    rest = np.linalg.solve(J[::2].T, load)
+    assert rest.min() > 0.0
+    needed = max(float((rest - high).max()), float((low - rest).max()))
+    with pytest.raises(cdsm.InfeasibleTension) as caught:
+        cdsm.distribute_tension(pose, low, high, fixed=given)
+    error = caught.value
+    assert error.relaxation == pytest.approx(needed, rel=1e-9)
+    assert not set(error.binding) & set(given)
+    for widening, enough in ((needed * (1.0 + 1e-6), True), (0.9 * needed, False)):
+        wider = (max(low - widening, 0.0), high + widening)
+        if enough:
+            pull = cdsm.distribute_tension(pose, *wider, fixed=given)
+            np.testing.assert_array_equal(pull.values[1::2], list(given.values()))
+        else:
+            with pytest.raises(cdsm.InfeasibleTension):
+                cdsm.distribute_tension(pose, *wider, fixed=given)
+
+
+@pytest.mark.parametrize("others", [{}, {"cable1_1": 20.0, "cable1_2": 20.0}])
+def test_no_widening_helps_where_the_fixed_tensions_alone_miss_the_balance(
+    others: dict[str, float],
+) -> None:
+    pose = presets.experimental_prototype().at(np.zeros(3))
+    # nothing but its own pair of cables reaches the last joint
+    given = {"cable3_1": 20.0, "cable3_2": 60.0, **others}
+    with pytest.raises(cdsm.InfeasibleTension, match="No bounds would help") as caught:
+        cdsm.distribute_tension(pose, 5.0, 800.0, fixed=given)
+    assert caught.value.relaxation == math.inf
+    np.testing.assert_allclose(
+        caught.value.missing[2],
+        (-pose.gravity_torque - pose.length_jacobian[4:].T @ [20.0, 60.0])[2],
+        rtol=1e-9,
+    )
+
+
 def test_force_controlled_pair_member_adds_no_passive_stiffness() -> None:
     arm = presets.experimental_prototype(cdsm.LinearElasticity(48e3))
     both = cdsm.Manipulator(

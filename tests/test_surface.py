@@ -228,6 +228,12 @@ RESULTS: dict[str, Any] = {
     "Equilibrium": cdsm.equilibrium(POSE, PULL, random_wrench(3)),
     "WeightTest": WEIGHT,
     "LinearPrediction": WEIGHT.linear,
+    "StiffnessGradient": cdsm.stiffness_gradient(K),
+    "StiffnessRange": cdsm.stiffness_range(POSE, (0.0, 0.3, 1.0), 10.0, 200.0),
+    "StiffnessPlan": cdsm.plan_stiffness(
+        POSE, np.eye(3)[1:], [K.along(u) for u in np.eye(3)[1:]], 10.0, 200.0
+    ),
+    "Saturation": cdsm.saturation(POSE, (0.0, 0.3, 1.0), 10.0, 200.0),
     "CriticalTension": cdsm.critical_tension(POSE),
     "CriticalLoad": cdsm.critical_load(POSE, random_wrench(4), 10.0),
 }
@@ -369,6 +375,7 @@ ERRORS: tuple[cdsm.CdsmError, ...] = (
     cdsm.SingularStiffness("K_θ is singular.", np.array([0.6, 0.8])),
     cdsm.SingularMass("moves no mass.", np.array([0.6, 0.8])),
     cdsm.EquilibriumError("the arm buckles", np.array([0.1, -0.2]), 0.5, "joint2"),
+    cdsm.UnreachableStiffness(np.array([0.0, 0.6, 0.8]), 9e4, 1e3, 8e4, [8e4]),
 )
 
 

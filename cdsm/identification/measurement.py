@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, final
+from typing import final
 
 import numpy as np
 
@@ -16,9 +16,6 @@ from cdsm._checks import (
     vector,
 )
 from cdsm.errors import InvalidInput
-
-if TYPE_CHECKING:
-    pass
 
 
 @final

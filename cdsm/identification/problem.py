@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,14 +14,10 @@ from cdsm._checks import (
     Array,
 )
 from cdsm.errors import CdsmError, InvalidInput, SingularStiffness
+from cdsm.identification.measurement import Measurement, label
 from cdsm.manipulator import Manipulator, Posture
 from cdsm.stiffness import stiffness
 from cdsm.tension import Tension, distribute_tension
-
-if TYPE_CHECKING:
-    pass
-
-from cdsm.identification.measurement import Measurement, label
 
 _DECADES = 100.0
 """Ratio of positive bounds beyond which a parameter is searched by its logarithm."""

@@ -18,12 +18,11 @@ from cdsm._checks import (
     scalar,
 )
 from cdsm.errors import InvalidInput
+from cdsm.identification.measurement import Measurement, label
 from cdsm.manipulator import Manipulator
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-from cdsm.identification.measurement import Measurement, label
 
 SAME = 1e-6
 """Smallest singular value of the Jacobian, columns of unit length, that counts for the rank.

@@ -14,7 +14,6 @@ import inspect
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -29,15 +28,11 @@ from cdsm._checks import (
     vector,
 )
 from cdsm.errors import InvalidInput, UnknownName
-from cdsm.manipulator import Manipulator
-from cdsm.tension import Tension
-
-if TYPE_CHECKING:
-    pass
-
 from cdsm.identification.measurement import Measurement
 from cdsm.identification.problem import NoStiffnessError, Problem, UserFaultError
 from cdsm.identification.result import SAME, Identification
+from cdsm.manipulator import Manipulator
+from cdsm.tension import Tension
 
 CORRELATED = 0.95
 """Correlation of two parameters beyond which a warning names them."""

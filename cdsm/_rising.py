@@ -1,0 +1,101 @@
+"""What becomes of the least tensions of a held posture as a bound or a load on them rises."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Final, Literal
+
+import numpy as np
+from scipy.optimize import brentq
+
+from cdsm._checks import Array
+from cdsm.errors import ElasticityRangeError, InfeasibleTension, SolverError
+from cdsm.stiffness import Stiffness
+
+SAMPLES: Final = 96
+"""Bounds or load factors that are looked at; a stable range narrower than a step is not seen."""
+
+PRECISION: Final = 1e-12
+"""Relative precision of a place that is found between two others."""
+
+ABOVE: Final = 1.0 + 1e-9
+"""The low end of a domain may be excluded; this far above it everything is defined."""
+
+Limit = Literal["buckling", "infeasible", "elasticity", "none"]
+
+At = Callable[[float], Stiffness]
+"""The stiffness under the least tensions at a bound [N] or load factor."""
+
+
+def reason(at: At, place: float) -> Limit:
+    """What keeps the arm from holding at a place; ``"none"`` if it holds."""
+    try:
+        return "none" if at(place).is_stable else "buckling"
+    except (InfeasibleTension, SolverError):  # on the very edge a solver may find nothing either
+        return "infeasible"
+    except ElasticityRangeError:
+        return "elasticity"
+
+
+def exists(at: At, place: float) -> bool:
+    """Whether tensions balance the arm within the domains of the elasticities."""
+    return reason(at, place) in ("none", "buckling")
+
+
+def edge(true: Callable[[float], bool], a: float, b: float) -> float:
+    """The last place from a, where something is true, to b, where it is not."""
+    while b - a > PRECISION * b:
+        middle = (a + b) / 2.0
+        a, b = (middle, b) if true(middle) else (a, middle)
+    return a
+
+
+def reach(at: At, low: float, highest: float) -> float:
+    """How far a lower bound from ``low`` on is to be looked at [N], at most to ``highest``.
+
+    As far as tensions balance the arm within the domains of the elasticities, and if nothing ends
+    them, until the sign of the active part has decided.
+    """
+    if math.isinf(highest):
+        # far out, tensions grow in proportion to the bound, the passive part no more: if the
+        # active part is negative somewhere, that decides at the latest where it equals the rest
+        far = 1e9
+        if exists(at, far):
+            active = np.linalg.eigvalsh(at(far).active)[0] / far
+            K = at(low)
+            rest = np.linalg.norm(K.joint, 2) + np.linalg.norm(K.active, 2)
+            highest = float(2.0 * rest / abs(active)) if active != 0.0 else far
+        else:
+            highest = far
+        highest = max(highest, 2.0 * low)
+        while exists(at, highest) and at(highest).is_stable and highest < far:
+            highest *= 2.0  # an elasticity of the user's own may go on stiffening
+    return highest if exists(at, highest) else edge(lambda b: exists(at, b), low, highest)
+
+
+def sampled(low: float, high: float) -> Array:
+    """Bounds (N,) [N] from low to high, evenly spread on a logarithmic scale of four decades."""
+    return np.unique([low, *np.geomspace(max(low, 1e-4 * high), high, SAMPLES)])
+
+
+def stable_ranges(
+    at: At, low: float, high: float
+) -> tuple[Array, Array, tuple[tuple[float, float], ...]]:
+    """Bounds looked at (N,) [N], margin at each (N,) [N m/rad], and where the arm is stable."""
+    places = sampled(low, high)
+    margins = np.array([at(place).margin for place in places.tolist()])
+    edges, ends = [], []
+    for i in range(len(places)):
+        if margins[i] > 0.0 and (i == 0 or margins[i - 1] <= 0.0):
+            edges.append(places[i] if i == 0 else _crossing(at, places[i - 1], places[i]))
+        if margins[i] > 0.0 and (i + 1 == len(places) or margins[i + 1] <= 0.0):
+            last = i + 1 == len(places)
+            ends.append(places[i] if last else _crossing(at, places[i], places[i + 1]))
+    return places, margins, tuple((float(a), float(b)) for a, b in zip(edges, ends, strict=True))
+
+
+def _crossing(at: At, a: float, b: float) -> float:
+    """Where the smallest eigenvalue changes its sign between two places."""
+    root: float = brentq(lambda x: at(float(x)).margin, a, b, xtol=1e-300, rtol=PRECISION)
+    return root

@@ -1,0 +1,122 @@
+"""How stiffness changes with tension: exact derivatives of what a :class:`Stiffness` says.
+
+    ∂K_θ/∂F_c = H_c + k′_c J_c J_cᵀ,    k = 1/(l_0/EA(F) + 1/k_series)
+
+with H_c the Hessian of the length of cable c and J_c its gradient (Eq. 16). The tip stiffness
+X = (R K_θ⁻¹ Rᵀ)⁻¹ seen through the rows R of the Jacobian changes by Mᵀ ∂K_θ M, M = K_θ⁻¹ Rᵀ X
+being the joint motion per unit motion of the tip.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cdsm._checks import Array, ReadOnlyState, frozen, instance, unit_direction
+from cdsm.errors import SingularStiffness
+from cdsm.manipulator import Posture
+from cdsm.planning._kernels import by_tension
+from cdsm.stiffness import Stiffness
+
+
+@final
+@dataclass(frozen=True, eq=False, kw_only=True)
+class StiffnessGradient(ReadOnlyState):
+    """Derivatives by the cable tensions; each is named as in :class:`~cdsm.stiffness.Stiffness`.
+
+    The posture and the wrench are held: of balance (Eq. 13) nothing is asked, so that it is for the
+    caller to move within the tensions that balance the arm.
+
+    Attributes:
+        stiffness: Where.
+        cable_stiffness: dk/dF (C,) of each cable by its own tension [1/m]; 0 under force control.
+    """
+
+    stiffness: Stiffness
+    cable_stiffness: Array
+
+    @cached_property
+    def joint(self) -> Array:
+        """∂K_θ/∂F (C, nv, nv) [m/rad²]: a symmetric matrix for each cable."""
+        pose = self.stiffness.posture
+        identity = np.eye(pose.arm.nv)
+        return frozen(_by_tension(pose, self.cable_stiffness, identity, identity))
+
+    @cached_property
+    def margin(self) -> Array:
+        """∂λ_min/∂F = vᵀ ∂K_θ/∂F v (C,) [m/rad²], v the critical direction.
+
+        A multiple eigenvalue has no gradient; this is then that of vᵀ K_θ v for one v of its
+        eigenspace, a bound from above on how the smallest eigenvalue changes.
+        """
+        v = self.stiffness.critical_direction[:, None]
+        return frozen(_by_tension(self.stiffness.posture, self.cable_stiffness, v, v)[:, 0, 0])
+
+    @cached_property
+    def cartesian(self) -> Array:
+        """∂(C_vv)⁻¹/∂F (C, 3, 3) [1/m].
+
+        Raises:
+            SingularStiffness: As for :attr:`~cdsm.stiffness.Stiffness.cartesian`.
+        """
+        return frozen(self._through(self.stiffness.posture.jacobian[:3], self.stiffness.cartesian))
+
+    def along(self, direction: ArrayLike) -> Array:
+        """∂(1/(uᵀ C_vv u))/∂F = along² wᵀ ∂K_θ/∂F w with w = K_θ⁻¹ J_vᵀ u, (C,) [1/m].
+
+        Args:
+            direction: u (3,) in base axes, any length.
+
+        Raises:
+            InvalidInput: Not a direction.
+            SingularStiffness: The stiffness along u is infinite, or K_θ is singular.
+        """
+        u = unit_direction("direction", direction)
+        value = self.stiffness.along(u)
+        require_finite(value, u)
+        rows = u[None] @ self.stiffness.posture.jacobian[:3]
+        return frozen(self._through(rows, np.array([[value]]))[:, 0, 0])
+
+    def _through(self, rows: Array, X: Array) -> Array:
+        """∂X/∂F (C, r, r) of the tip stiffness X (r, r) that the rows (r, nv) see."""
+        K = self.stiffness.joint
+        right = np.linalg.solve(K, rows.T) @ X
+        left = np.linalg.solve(K.T, rows.T) @ X.T  # another only where a moment acts
+        return _by_tension(self.stiffness.posture, self.cable_stiffness, left, right)
+
+
+def stiffness_gradient(stiffness: Stiffness) -> StiffnessGradient:
+    """Derivatives of a stiffness by the cable tensions, dEA/dF and series springs included.
+
+    ∂K_θ/∂F_c = H_c + k′_c J_c J_cᵀ; ``stiffness_gradient(K).along(u)`` is the gradient of
+    ``K.along(u)``, and so on. At a jump of an elasticity they are those of the range below it.
+
+    Args:
+        stiffness: K, the answer of :func:`~cdsm.stiffness.stiffness`.
+
+    Raises:
+        InvalidInput: No ``Stiffness``, or an elasticity of your own gives no finite slope.
+        ElasticityRangeError: A tension outside the domain of the elasticity of its cable.
+    """
+    K = instance("stiffness", stiffness, Stiffness)
+    slope, _ = K.posture.arm._cable_stiffness_slopes(K.tension, K.cable_stiffness)
+    return StiffnessGradient(stiffness=K, cable_stiffness=slope)
+
+
+def _by_tension(pose: Posture, slope: Array, left: Array, right: Array) -> Array:
+    """leftᵀ (∂K_θ/∂F_c) right for every cable, (C, a, b) of (nv, a) and (nv, b)."""
+    return by_tension(pose.length_hessian, pose.length_jacobian, slope, left, right)
+
+
+def require_finite(value: float, u: Array) -> None:
+    """Refuse a direction in which the tip cannot move."""
+    if not np.isfinite(value):
+        raise SingularStiffness(
+            f"the tip cannot move along ({', '.join(f'{x:.4g}' for x in u)}): the stiffness there "
+            "is infinite under any tension. Choose another direction, or bend the arm.",
+            u,
+        )

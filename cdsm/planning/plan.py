@@ -1,0 +1,197 @@
+"""Tensions that give an arm the stiffness that is wanted, with the least effort."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final, final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cdsm._checks import Array, ReadOnlyState, frozen, number_array
+from cdsm.errors import InvalidInput
+from cdsm.manipulator import Posture
+from cdsm.planning.attainable import MARGIN
+from cdsm.planning.planner import Planner
+from cdsm.planning.problem import (
+    Problem,
+    checked_direction,
+    checked_matrix,
+    checked_targets,
+    count,
+    problem,
+    wanted_along,
+    wanted_cartesian,
+)
+from cdsm.stiffness import Stiffness, stiffness
+from cdsm.tension import Tension
+
+REACHED: Final = 1e-6
+"""Largest relative miss with which a target counts as hit; what is found is mostly at rounding."""
+
+
+@final
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class StiffnessPlan(ReadOnlyState):
+    """Tensions for a wanted stiffness, with the question they answer.
+
+    Attributes:
+        tension: The tensions; of those that come as near the target the least, by ‖F‖.
+        stiffness: K_θ under them, and all that follows from it.
+        direction: Unit directions u in base axes, (3,) or (n, 3); None for a target of
+            ``cartesian``.
+        target: What was asked for [N/m]: a number, one per direction (n,), or (3, 3).
+        achieved: What ``stiffness.along`` or ``stiffness.cartesian`` says [N/m], likewise shaped.
+        floor: Smallest eigenvalue of K_θ that counted as stable [N m/rad].
+        efforts: ‖F‖ (S,) [N] where each search ended that hit the target, rising; the first is that
+            of ``tension``.
+        iterations: Steps of all searches.
+        evaluations: How often K_θ was evaluated.
+    """
+
+    tension: Tension
+    stiffness: Stiffness
+    direction: Array | None
+    target: float | Array
+    achieved: float | Array
+    floor: float
+    efforts: Array
+    iterations: int
+    evaluations: int
+
+    @property
+    def misfit(self) -> float:
+        """‖achieved/target − 1‖ [-], or for ``cartesian`` ‖achieved − target‖/‖target‖.
+
+        With a moment in the wrench ``cartesian`` is not symmetric: its symmetric part counts.
+        """
+        achieved, target = np.asarray(self.achieved), np.asarray(self.target)
+        if self.direction is None:
+            off = (achieved + achieved.T) / 2.0 - target
+            return float(np.linalg.norm(off) / np.linalg.norm(target))
+        return float(np.linalg.norm(achieved / target - 1.0))
+
+    @property
+    def reached(self) -> bool:
+        """Whether the target is hit within 1e-6; with one direction all else is an error."""
+        return self.misfit <= REACHED
+
+    @property
+    def spread(self) -> float:
+        """By how much the largest effort found exceeds the least [-]."""
+        return float(self.efforts[-1] / self.efforts[0] - 1.0) if self.efforts.size else 0.0
+
+    def __repr__(self) -> str:
+        pull = self.tension.values
+        state = "" if self.reached else f", missed by {self.misfit:.2g}"
+        return f"<StiffnessPlan {pull.min():.4g} to {pull.max():.4g} N{state}>"
+
+    def __str__(self) -> str:
+        rows = [str(self.tension)]
+        if self.direction is None:
+            rows.append(f"cartesian stiffness within {self.misfit:.2g} of the target")
+        else:
+            triples = zip(
+                self.direction.reshape(-1, 3),
+                np.atleast_1d(self.target),
+                np.atleast_1d(self.achieved),
+                strict=True,
+            )
+            rows += [
+                f"along ({', '.join(f'{x:.4g}' for x in u)}): {achieved / 1000.0:.6g} N/mm "
+                f"({target / 1000.0:.6g} N/mm wanted)"
+                for u, target, achieved in triples
+            ]
+        return "\n".join(rows)
+
+
+def plan_stiffness(
+    pose: Posture,
+    direction: ArrayLike | None,
+    target: ArrayLike,
+    minimum: ArrayLike = 0.0,
+    maximum: ArrayLike = np.inf,
+    wrench: ArrayLike = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+    *,
+    margin: float = MARGIN,
+    starts: int = 3,
+    seed: int = 0,
+) -> StiffnessPlan:
+    """Least tensions with a wanted stiffness: min ‖F‖² so that along(u) = target (Eqs. 13, 17, 20).
+
+    Over F with J_Lᵀ F = J_Xᵀ W − g, the bounds, the domains of the elasticities of position-
+    controlled cables, and λ_min(K_θ), symmetric part, not below ``margin``. One direction is hit
+    within 1e-6, or it is an error. Several directions, or ``cartesian``, are hit too if that is
+    possible; if not, their relative misses are least in the sum of squares, and ``reached`` of the
+    answer is false.
+
+    Args:
+        pose: The posture.
+        direction: u (3,) in base axes, any length; several (n, 3); or None for ``cartesian``.
+        target: The stiffness [N/m] along u; one per direction (n,); or (3, 3).
+        minimum: Lower bound of the tensions [N], for all cables or (C,).
+        maximum: Upper bound of the tensions [N], for all cables or (C,); inf for none but the end
+            of the elasticity's domain, and buckling.
+        wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m].
+        margin: From which part of the largest eigenvalue of K_θ under the least tensions on the
+            smallest one counts as stable [-].
+        starts: From how many tensions to search.
+        seed: Of the random ones among them.
+
+    Raises:
+        InvalidInput: No direction, a target that is not positive, bounds the wrong way, or another
+            argument out of place.
+        UnreachableStiffness: No admissible tensions give this stiffness along the one direction;
+            carries what they do give.
+        InfeasibleTension: No tension within the bounds and domains balances the arm.
+        ElasticityRangeError: The bounds leave nothing of the domain of a cable's elasticity.
+        SingularStiffness: The tip cannot move along a direction, or no admissible tension holds the
+            arm.
+    """
+    question = problem(pose, minimum, maximum, wrench, margin)
+    number, seed = count("starts", starts, 1), count("seed", seed, 0)
+    directions = None if direction is None else _directions(question, direction)
+    if directions is None:
+        targets = checked_matrix(target)
+        _ = stiffness(pose, question.region.least).cartesian  # where there is none, it says so
+        reading = wanted_cartesian(question, targets)
+    else:
+        targets = checked_targets(directions, target)
+        reading = wanted_along(question, directions.reshape(-1, 3), targets.reshape(-1))
+
+    planner = Planner(question, reading, number, seed)
+    found = planner.least()
+    if found is None and directions is not None and targets.ndim == 0:
+        found = planner.within_range(directions, float(targets))
+    elif found is None:
+        found = planner.nearest()
+
+    tension = question.region.tension(found.sight.point.F)
+    K = stiffness(pose, tension)
+    achieved: float | Array
+    if directions is None:
+        achieved = K.cartesian
+    elif targets.ndim == 0:
+        achieved = K.along(directions)
+    else:
+        achieved = frozen(np.array([K.along(u) for u in directions]))
+    return StiffnessPlan(
+        tension=tension,
+        stiffness=K,
+        direction=directions,
+        target=float(targets) if targets.ndim == 0 else targets,
+        achieved=achieved,
+        floor=question.field.floor,
+        efforts=frozen(np.array(planner.efforts)),
+        iterations=planner.iterations,
+        evaluations=question.field.evaluations,
+    )
+
+
+def _directions(question: Problem, direction: ArrayLike) -> Array:
+    given = number_array("direction", direction)
+    if given.ndim == 2 and given.shape[1] == 3 and len(given):
+        return frozen(np.array([checked_direction(question, u) for u in given]))
+    if given.ndim == 2:
+        raise InvalidInput("direction", f"shape {given.shape} given; (3,) or (n, 3) is needed.")
+    return checked_direction(question, given)

@@ -1,0 +1,152 @@
+"""What is asked of a planner, checked: an arm at a posture, its bounds, and the stiffness meant."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cdsm._checks import Array, frozen, instance, number_array, scalar, unit_direction
+from cdsm.errors import InvalidInput, SingularStiffness
+from cdsm.manipulator import Manipulator, Posture
+from cdsm.planning.admissible import Admissible, admissible
+from cdsm.planning.field import Field, Part, Reading
+from cdsm.planning.gradient import require_finite
+from cdsm.stiffness import stiffness
+
+_SYMMETRIC = 1e-9
+"""Largest part of a matrix that may be skew by rounding."""
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """An arm at a posture, with what limits its tensions.
+
+    Attributes:
+        pose: The posture.
+        region: The admissible tensions.
+        field: K_θ over them.
+    """
+
+    pose: Posture
+    region: Admissible
+    field: Field
+
+
+def problem(
+    pose: Posture, minimum: ArrayLike, maximum: ArrayLike, wrench: ArrayLike, margin: float
+) -> Problem:
+    """Check what all planners share.
+
+    Raises:
+        InvalidInput: A bound, the wrench or the margin is not what it must be.
+        InfeasibleTension: No tension within the bounds and domains balances the arm.
+        ElasticityRangeError: The bounds leave nothing of the domain of a cable's elasticity.
+    """
+    instance("pose", pose, Posture)
+    region = admissible(pose, minimum, maximum, wrench)
+    part = scalar("margin", margin)
+    if not 0.0 < part < 1.0:
+        raise InvalidInput(
+            "margin",
+            f"{part:g} given; it is a part of the largest eigenvalue of K_θ: 0 < margin < 1.",
+        )
+    return Problem(pose, region, Field(region, part))
+
+
+def count(name: str, value: object, least: int) -> int:
+    """Return a whole number that is not below the least one allowed."""
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
+        raise InvalidInput(name, f"{value!r} given; a whole number from {least} on is needed.")
+    return int(value)
+
+
+def checked_direction(question: Problem, direction: ArrayLike) -> Array:
+    """A unit direction (3,) in which the tip can move.
+
+    Raises:
+        InvalidInput: Not a direction.
+        SingularStiffness: The tip cannot move along it.
+    """
+    u = unit_direction("direction", direction)
+    # whether it moves depends on the posture alone: any tensions will do to ask
+    if stiffness(question.pose, question.region.least)._torque(u) is None:
+        require_finite(np.inf, u)
+    return u
+
+
+def unstable(arm: Manipulator, problem: str, mode: Array) -> SingularStiffness:
+    """The error of an arm that no tensions hold, with the joint motion (nv,) that is softest."""
+    mode = mode * np.sign(mode[abs(mode).argmax()])
+    remedy = "Change the bounds, the posture or the load, take stiffer cables, or lower margin."
+    if all(cable.control == "force" for cable in arm.cables):
+        remedy = "All motors control force, so that no cable resists by its elasticity: have some "
+        remedy += 'hold their length (control="position").'
+    joint = arm.joint_names[int(abs(mode).argmax())]
+    return SingularStiffness(f"{problem}; it gives way mostly in {joint}. {remedy}", frozen(mode))
+
+
+def along(question: Problem, direction: Array, unit: float) -> Part:
+    """The stiffness along a unit direction (3,) over a unit [N/m]."""
+    rows = direction[None] @ question.pose.jacobian[:3]
+    return Part(rows, np.full((1, 1, 1), 1.0 / unit))
+
+
+def wanted_along(question: Problem, directions: Array, targets: Array) -> Reading:
+    """along/target − 1 for directions (m, 3) and targets (m,) [N/m]."""
+    pairs = zip(directions, targets.tolist(), strict=True)
+    return Reading(tuple(along(question, u, t) for u, t in pairs), np.ones(targets.size))
+
+
+def wanted_cartesian(question: Problem, target: Array) -> Reading:
+    """The entries of (cartesian − target)/‖target‖, such that their squares sum to its square.
+
+    With a moment in the wrench ``cartesian`` is not symmetric; it is its symmetric part then.
+    """
+    weights = []
+    for i in range(3):
+        for j in range(i, 3):
+            E = np.zeros((3, 3))
+            E[i, j] = E[j, i] = 1.0 if i == j else np.sqrt(0.5)
+            weights.append(E)
+    E = np.array(weights) / np.linalg.norm(target)
+    part = Part(question.pose.jacobian[:3].copy(), E)
+    return Reading((part,), np.tensordot(E, target))
+
+
+def checked_targets(directions: Array, target: ArrayLike) -> Array:
+    """One positive target for each direction, () or (m,) [N/m].
+
+    Raises:
+        InvalidInput: Not positive numbers, or not as many as directions.
+    """
+    targets = number_array("target", target)
+    if targets.shape != directions.shape[:-1]:
+        raise InvalidInput(
+            "target",
+            f"shape {targets.shape} given for {directions.size // 3} direction(s) of shape "
+            f"{directions.shape}; give one stiffness [N/m] for each, {directions.shape[:-1]}, or "
+            "direction=None with the (3, 3) of cartesian.",
+        )
+    if not (targets > 0.0).all():
+        raise InvalidInput("target", f"{targets.min():g} N/m given; stiffness is positive.")
+    return frozen(targets)
+
+
+def checked_matrix(target: ArrayLike) -> Array:
+    """A symmetric, positive definite target (3, 3) [N/m].
+
+    Raises:
+        InvalidInput: It is not.
+    """
+    matrix = number_array("target", target)
+    if matrix.shape != (3, 3):
+        raise InvalidInput(
+            "target", f"shape {matrix.shape} given without a direction; (3, 3) is needed [N/m]."
+        )
+    if abs(matrix - matrix.T).max() > _SYMMETRIC * abs(matrix).max():
+        raise InvalidInput("target", "is not symmetric, which a stiffness matrix is.")
+    if not np.linalg.eigvalsh(matrix)[0] > 0.0:
+        raise InvalidInput("target", "is not positive definite, which a stiffness matrix is.")
+    return frozen(matrix)

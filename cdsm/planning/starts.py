@@ -1,0 +1,164 @@
+"""Where searches begin, and from where they go on: stable tensions far apart, and across jumps."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from cdsm._checks import Array
+from cdsm.planning.admissible import Admissible, solve
+from cdsm.planning.field import Field, Point, drawn_back
+from cdsm.planning.problem import unstable
+from cdsm.planning.search import Found, Task, search
+
+_FAR = 1e4
+"""How much further than the largest tension a corner is looked for."""
+
+_SAME = 1e-6
+"""Corners nearer to each other than this part of their size are one."""
+
+_NEAR = 0.05
+"""A tension this part of a jump from it is tried on the other side."""
+
+_ROUNDS = 60
+"""How often a better place may be stepped to."""
+
+_MODES = 24
+"""How many bounds on the reserve are kept."""
+
+_NO_GAIN = 1e-9
+"""A reserve, over the scale of K_θ, that is not worth a step."""
+
+
+class Ground:
+    """Stable tensions to begin from.
+
+    Args:
+        region: The admissible tensions, bounded.
+        field: K_θ over them.
+        directions: How many random directions to look for corners in, beside those of the cables.
+        seed: Of these directions.
+
+    Raises:
+        SingularStiffness: No admissible tension was found that holds the arm stable.
+    """
+
+    def __init__(self, region: Admissible, field: Field, directions: int, seed: int) -> None:
+        least = region.least.values
+        size = max(region.scale, float(region.high.max()))
+        random = np.random.default_rng(seed).normal(size=(directions, least.size))
+        corners = least[None]
+        for direction in (*np.eye(least.size), *-np.eye(least.size), *random):
+            step = region.null @ (direction @ region.null)
+            length = float(np.linalg.norm(step))
+            if length <= _SAME:
+                continue
+            far = least + _FAR * size / length * step
+            corner = region.nearest(far, region.low, region.high)
+            if corner is not None and (abs(corners - corner).max(axis=1) > _SAME * size).all():
+                corners = np.vstack([corners, corner])
+        points = [field.at(F) for F in (corners.mean(axis=0), *corners)]
+        self.anchor = points[0]
+        if self.anchor.reserve <= 0.0:
+            self.anchor = max(points, key=lambda point: point.reserve)
+        if self.anchor.reserve <= 0.0:
+            self.anchor = _stabilised(region, field, self.anchor)
+        drawn = (
+            point if point.reserve >= 0.0 else drawn_back(field, point.F, self.anchor)
+            for point in points[1:]
+        )
+        self.points = [self.anchor, *(point for point in drawn if point is not None)]
+
+    def between(self, count: int, seed: int) -> Iterator[Point]:
+        """Random stable points among the corners, count of them if they are found."""
+        shares = np.random.default_rng(seed).dirichlet(np.ones(len(self.points)), count)
+        for F in shares @ np.array([point.F for point in self.points]):
+            point = drawn_back(self.anchor.field, F, self.anchor)
+            if point is not None:
+                yield point
+
+
+def settled(task: Task, found: Found) -> Found:
+    """The optimum found by a search, or a better one that crossing jumps of rigidities leads to.
+
+    Within the ranges between the jumps a search is smooth. Cables that end at a jump or near one
+    are tried on its other side: all those at one together, then each.
+    """
+    iterations = found.iterations
+    for _ in range(_ROUNDS):
+        for F in beyond_jumps(task.region, found.sight.point.F):
+            point = drawn_back(task.field, F, task.anchor)
+            if point is None:
+                continue
+            other = search(task, point, confined=True)
+            iterations += other.iterations
+            if task.better(other.sight, found.sight):
+                found = other
+                break
+        else:
+            break
+    return Found(found.sight, iterations)
+
+
+def beyond_jumps(region: Admissible, F: Array) -> Iterator[Array]:
+    """The nearest tensions (C,) [N] beyond the jumps that tensions F (C,) [N] are near."""
+    near = sorted(
+        (abs(F[c] - jump) / jump, c, jump)
+        for c, jumps in enumerate(region.jumps)
+        for jump in jumps
+        if abs(F[c] - jump) <= _NEAR * jump
+    )
+    at = [(c, jump) for distance, c, jump in near if distance <= _SAME]
+    for group in ([at] if len(at) > 1 else []) + [[(c, jump)] for _, c, jump in near]:
+        beyond = F.copy()
+        for c, jump in group:
+            beyond[c] = np.nextafter(jump, np.inf) if F[c] <= jump else jump
+        there = region.nearest(F, *region.piece(beyond))
+        if there is not None:
+            yield there
+
+
+def _stabilised(region: Admissible, field: Field, start: Point) -> Point:
+    """The stable point with about the largest reserve, by cutting planes in a trust region.
+
+    Each mode of an iterate bounds the reserve of all others from above, so they are kept.
+    """
+    here, radius, unit = start, 1.0, field.scale
+    modes: list[Array] = []
+    count = start.F.size
+    A = np.hstack([region.rows, np.zeros((len(region.rows), 1))])
+    # variables: the step, and the reserve that it leads to as far as the modes can tell
+    P, q = 1e-4 * np.eye(count + 1), np.append(np.zeros(count), -1.0)
+    for _ in range(_ROUNDS):
+        modes = [*modes, *(here.vectors[:, [i]] for i in range(min(2, len(here.vectors))))][
+            -_MODES:
+        ]
+        size = max(region.scale, float(here.F.max()))
+        rates = np.array([here.along_slope(v) for v in modes]) * size / unit
+        values = np.array([(v.T @ here.K @ v).item() - field.floor for v in modes]) / unit
+        low = np.append(np.maximum((region.low - here.F) / size, -radius), -np.inf)
+        high = np.append(np.minimum((region.high - here.F) / size, radius), np.inf)
+        cuts = np.hstack([-rates, np.ones((len(modes), 1))]), values
+        found = solve(P, q, (A, region.imbalance(here.F) / size), (low, high), cuts)
+        if found is None:
+            break
+        there = field.at(here.F + size * found.x[:count])
+        expected = float(found.x[count]) - here.reserve / unit
+        gain = (there.reserve - here.reserve) / unit
+        if expected <= _NO_GAIN or radius <= _NO_GAIN:
+            break
+        if gain > 0.0:
+            here = there
+        if gain > 0.5 * expected:
+            radius *= 2.0
+        elif gain < 0.1 * expected:
+            radius = float(abs(found.x[:count]).max()) / 2.0
+    if here.reserve > 0.0:
+        return here
+    raise unstable(
+        field.pose.arm,
+        "no admissible tensions hold the arm stable: at best the smallest eigenvalue of K_θ is "
+        f"{here.values[0]:.4g} N m/rad, and {field.floor:.4g} N m/rad is asked for",
+        here.vectors[:, 0],
+    )
