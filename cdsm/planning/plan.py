@@ -41,7 +41,8 @@ class StiffnessPlan(ReadOnlyState):
         direction: Unit directions u in base axes, (3,) or (n, 3); None for a target of
             ``cartesian``.
         target: What was asked for [N/m]: a number, one per direction (n,), or (3, 3).
-        achieved: What ``stiffness.along`` or ``stiffness.cartesian`` says [N/m], likewise shaped.
+        achieved: What ``stiffness.along`` or ``stiffness.cartesian`` says [N/m]: a number, (n,) or
+            (3, 3) as the target.
         floor: Smallest eigenvalue of K_θ that counted as stable [N m/rad].
         efforts: ‖F‖ (S,) [N] where each search ended that hit the target, rising; the first is that
             of ``tension``.
