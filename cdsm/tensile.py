@@ -49,7 +49,11 @@ class Stage:
 @final
 @dataclass(frozen=True, eq=False)
 class Band(ReadOnlyState):
-    """Where EA lies with 95 % confidence, tension by tension.
+    """Where EA lies with 95 % confidence, tension by tension, as far as the scatter tells.
+
+    It knows nothing of what a method smooths over. Of tests made of Eq. 19 with 0.5 N of noise, the
+    band of ``monotone`` held EA at 95 % of the tensions from 50 to 780 N and at 85 % of those from
+    15 N, where EA jumps; that of ``polynomial`` only at 55 %.
 
     Attributes:
         tensions: F, shape (n,) [N].
