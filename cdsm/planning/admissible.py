@@ -91,12 +91,14 @@ class Admissible:
         return replace(self, high=np.minimum(self.high, limit))
 
     def tension(self, F: Array) -> Tension:
-        """Tensions F (C,) [N] with the question they answer."""
+        """Tensions F (C,) [N], their balance exact again, with the question they answer."""
         least = self.least
+        exact = self.nearest(F, *self.piece(F))  # steps far shorter than F leave a rounding of F
+        F = F if exact is None else exact
         torque = least.values @ least.posture.length_jacobian - least.residual
         return replace(
             least,
-            values=frozen(F.copy()),
+            values=frozen(F),
             minimum=self.asked[0],
             maximum=self.asked[1],
             residual=frozen(F @ least.posture.length_jacobian - torque),

@@ -125,9 +125,10 @@ class Planner:
         met = [each for each in found if task.met(each.sight)]
         if not met:
             return None
-        efforts = [float(np.linalg.norm(each.sight.point.F)) for each in met]
-        self.efforts = sorted(efforts)
-        return met[efforts.index(self.efforts[0])]
+        met.sort(key=lambda each: float(np.linalg.norm(each.sight.point.F)))
+        met[0] = self._settled(met[0], task, near=math.inf)
+        self.efforts = [float(np.linalg.norm(each.sight.point.F)) for each in met]
+        return met[0]
 
     def _begin(self) -> Iterator[Point]:
         """Where to begin: least tensions, where one target is hit between corners, and anywhere."""
@@ -145,6 +146,8 @@ class Planner:
         field = self.question.field
 
         def miss(point: Point) -> float:
+            if point.reserve < 0.0:
+                return -1.0  # on the way through buckling, where there is no stiffness
             return float(self.reading.of(point).values[0])
 
         here, guesses = miss(hub), []
@@ -172,7 +175,7 @@ class Planner:
         self.iterations += found.iterations
         return found
 
-    def _settled(self, found: Found, task: Task) -> Found:
-        better = settled(task, found)
+    def _settled(self, found: Found, task: Task, near: float | None = None) -> Found:
+        better = settled(task, found) if near is None else settled(task, found, near=near)
         self.iterations += better.iterations - found.iterations
         return better

@@ -36,6 +36,9 @@ _ROUNDING = 1e-15
 _ARRIVED = 1e-10
 """A step this small, of tensions and of c, ends a search: the next would be its square."""
 
+_DOUBT = 1.02
+"""An effort foreseen, squared, is trusted to this factor."""
+
 _PREMIUM = 3.0
 """The price of c over its multiplier: above one it is exact, and the lower the longer the steps."""
 
@@ -184,6 +187,22 @@ def search(task: Task, start: Point, *, confined: bool = False) -> Found:
         else:
             radius = step.length / 4.0
     return Found(here, steps)
+
+
+def promises(task: Task, start: Point, best: Sight) -> bool:
+    """Whether a search confined to the range of a point may end with less effort than the best.
+
+    Judged by one quadratic program. Where the stiffness is concave it is optimistic about targets
+    that are stiffer; of others, and of other goals, it says yes in doubt.
+    """
+    if not (task.goal.constrained and task.met(best)):
+        return True
+    here = task.look(start)
+    model = _model(task, here, np.zeros(here.values.size), 0.0)
+    limits = _Limits(_FIRST_REGION, *task.region.piece(start.F))
+    d = _step(task, here, model, _PENALTIES[1], limits)[0].d
+    ahead = task.merit(here, 0.0) + float(model.g @ d + 0.5 * d @ model.W @ d)
+    return ahead <= _DOUBT * task.merit(best, 0.0)
 
 
 def _model(task: Task, here: Sight, y: Array, z: float) -> _Model:

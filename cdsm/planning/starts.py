@@ -10,7 +10,7 @@ from cdsm._checks import Array
 from cdsm.planning.admissible import Admissible, solve
 from cdsm.planning.field import Field, Point, drawn_back
 from cdsm.planning.problem import unstable
-from cdsm.planning.search import Found, Task, search
+from cdsm.planning.search import Found, Task, promises, search
 
 _FAR = 1e4
 """How much further than the largest tension a corner is looked for."""
@@ -19,7 +19,7 @@ _SAME = 1e-6
 """Corners nearer to each other than this part of their size are one."""
 
 _NEAR = 0.05
-"""A tension this part of a jump from it is tried on the other side."""
+"""Tensions this part of a jump from it are tried on its other side first."""
 
 _ROUNDS = 60
 """How often a better place may be stepped to."""
@@ -79,17 +79,22 @@ class Ground:
                 yield point
 
 
-def settled(task: Task, found: Found) -> Found:
+def settled(task: Task, found: Found, *, near: float = _NEAR) -> Found:
     """The optimum found by a search, or a better one that crossing jumps of rigidities leads to.
 
     Within the ranges between the jumps a search is smooth. Cables that end at a jump or near one
     are tried on its other side: all those at one together, then each.
+
+    Args:
+        task: What is sought.
+        found: Where a search has ended.
+        near: How near to a jump, as a part of it.
     """
     iterations = found.iterations
     for _ in range(_ROUNDS):
-        for F in beyond_jumps(task.region, found.sight.point.F):
+        for F in beyond_jumps(task.region, found.sight.point.F, near):
             point = drawn_back(task.field, F, task.anchor)
-            if point is None:
+            if point is None or not promises(task, point, found.sight):
                 continue
             other = search(task, point, confined=True)
             iterations += other.iterations
@@ -101,16 +106,16 @@ def settled(task: Task, found: Found) -> Found:
     return Found(found.sight, iterations)
 
 
-def beyond_jumps(region: Admissible, F: Array) -> Iterator[Array]:
+def beyond_jumps(region: Admissible, F: Array, near: float = _NEAR) -> Iterator[Array]:
     """The nearest tensions (C,) [N] beyond the jumps that tensions F (C,) [N] are near."""
-    near = sorted(
+    found = sorted(
         (abs(F[c] - jump) / jump, c, jump)
         for c, jumps in enumerate(region.jumps)
         for jump in jumps
-        if abs(F[c] - jump) <= _NEAR * jump
+        if abs(F[c] - jump) <= near * jump
     )
-    at = [(c, jump) for distance, c, jump in near if distance <= _SAME]
-    for group in ([at] if len(at) > 1 else []) + [[(c, jump)] for _, c, jump in near]:
+    at = [(c, jump) for distance, c, jump in found if distance <= _SAME]
+    for group in ([at] if len(at) > 1 else []) + [[(c, jump)] for _, c, jump in found]:
         beyond = F.copy()
         for c, jump in group:
             beyond[c] = np.nextafter(jump, np.inf) if F[c] <= jump else jump

@@ -1,0 +1,316 @@
+"""The attainable range against brute force on small null spaces, and against closed forms."""
+
+import itertools
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import ArrayLike
+
+import cdsm
+from cdsm import presets
+from cdsm._checks import Array
+from tests import arms
+from tests.locked import EA, LENGTH, STRAND, H, R, hinge
+
+DOWN = (0.0, 0.0, 1.0)
+
+
+def corners(pose: cdsm.Posture, low: float, high: float, wrench: Array) -> Array:
+    """Every tension in balance that has as many cables at a bound as the null space dimensions."""
+    A, torque = pose.length_jacobian.T, pose.jacobian.T @ wrench - pose.gravity_torque
+    nv, count = A.shape
+    found = []
+    for free in itertools.combinations(range(count), nv):
+        at = [c for c in range(count) if c not in free]
+        if abs(np.linalg.det(A[:, free])) < 1e-12 * abs(A).max() ** nv:
+            continue
+        for sides in itertools.product((low, high), repeat=len(at)):
+            F = np.empty(count)
+            F[at] = sides
+            F[list(free)] = np.linalg.solve(A[:, free], torque - A[:, at] @ sides)
+            if (low - 1e-9 <= F).all() and (high + 1e-9 >= F).all():
+                found.append(np.clip(F, low, high))
+    return np.unique(np.round(found, 9), axis=0)
+
+
+def brute_force(
+    pose: cdsm.Posture, u: ArrayLike, low: float, high: float, wrench: Array, floor: float
+) -> tuple[float, float]:
+    """The extremes of ``along`` over dense samples: corners, mixtures, and ever nearer the best."""
+    rng = np.random.default_rng(1)
+    ends = corners(pose, low, high, wrench)
+    extremes = [math.inf, -math.inf]
+    places = [ends[0], ends[0]]
+
+    def judge(F: Array) -> None:
+        K = cdsm.stiffness(pose, np.clip(F, low, high), wrench)
+        if K.margin >= floor:
+            value = K.along(u)
+            for i, sign in enumerate((1.0, -1.0)):
+                if sign * value < sign * extremes[i]:
+                    extremes[i], places[i] = value, F
+
+    for F in ends:
+        judge(F)
+    # few shares large: along edges and faces too
+    for F in rng.dirichlet(np.full(len(ends), 0.3), 1200) @ ends:
+        judge(F)
+    for reach in (0.3, 0.1, 0.03, 0.01):
+        for i in range(2):
+            centre = places[i].copy()
+            for F in rng.dirichlet(np.full(len(ends), 0.3), 100) @ ends:
+                judge(centre + reach * (F - centre))
+    return extremes[0], extremes[1]
+
+
+CASES = {
+    "strand-0": (0, STRAND, 20.0, 300.0),
+    "strand-2": (2, STRAND, 40.0, 200.0),
+    "strand-3": (3, STRAND, 20.0, 300.0),
+    "linear-4": (4, cdsm.LinearElasticity(5e3), 20.0, 300.0),
+    "linear-5": (5, cdsm.LinearElasticity(50e3), 5.0, 400.0),
+}
+
+
+@pytest.mark.parametrize("moment", [False, True])
+@pytest.mark.parametrize("case", CASES)
+def test_brute_force_beats_neither_end_and_comes_near_both(case: str, moment: bool) -> None:
+    seed, law, low, high = CASES[case]
+    arm = arms.random_arm(seed, 3, "hinged", law)
+    pose = arms.random_posture(arm, seed, reach=0.4)
+    assert len(arm.cables) - arm.nv == 3
+    wrench = 0.3 * arms.random_wrench(seed, moment)
+    u = np.random.default_rng(seed).normal(size=3)
+    found = cdsm.stiffness_range(pose, u, low, high, wrench)
+    lowest, highest = brute_force(pose, u, low, high, wrench, found.floor)
+    assert found.low * (1.0 - 1e-9) <= lowest <= found.low * 1.01
+    assert found.high * 0.99 <= highest <= found.high * (1.0 + 1e-9)
+    for end, pull in ((found.low, found.low_tension), (found.high, found.high_tension)):
+        K = cdsm.stiffness(pose, pull)
+        assert K.along(u) == end
+        assert K.margin >= found.floor * (1.0 - 1e-9)
+        assert abs(pull.residual).max() < 1e-12 * high
+        assert (pull.values >= low).all()
+        assert (pull.values <= high).all()
+        np.testing.assert_array_equal(pull.wrench, wrench)
+
+
+def test_where_tension_buckles_the_arm_brute_force_along_rays_beats_neither_end() -> None:
+    """The softest tensions lie where λ_min is just what the margin asks for."""
+    arm = arms.random_arm(0, 3, "hinged", cdsm.LinearElasticity(5e3))
+    pose = arms.random_posture(arm, 0, reach=0.4)
+    low, high = 20.0, 300.0
+    u = np.random.default_rng(0).normal(size=3)
+    found = cdsm.stiffness_range(pose, u, low, high, margin=0.01)
+    assert cdsm.stiffness(pose, found.low_tension).margin == pytest.approx(found.floor, rel=1e-9)
+    ends = corners(pose, low, high, np.zeros(6))
+    start = cdsm.distribute_tension(pose, low).values
+    K = cdsm.stiffness(pose, start)
+    assert found.floor == pytest.approx(0.01 * np.linalg.norm(K.joint, 2), rel=1e-12)
+    # K_θ is affine in F, so a ray leaves the stable tensions once: where λ_min is the floor
+    values, softest = [K.along(u)], start
+
+    def judge(end: Array) -> None:
+        nonlocal softest
+        rate = cdsm.stiffness(pose, end).joint - K.joint
+        way = np.where(end == start, 1e-300, end - start)
+        a, b = 0.0, float(np.where(way > 0.0, (high - start) / way, (low - start) / way).min())
+        for _ in range(40):
+            middle = (a + b) / 2.0
+            stable = np.linalg.eigvalsh(K.joint + middle * rate)[0] >= found.floor
+            a, b = (middle, b) if stable else (a, middle)
+        values.append(cdsm.stiffness(pose, start + a * (end - start)).along(u))
+        softest = end if values[-1] == min(values) else softest
+
+    rng = np.random.default_rng(2)
+    for reach in (1.0, 0.3, 0.1, 0.03, 0.01, 0.003):
+        centre = softest
+        for end in rng.dirichlet(np.full(len(ends), 0.3), 100) @ ends:
+            judge(centre + reach * (end - centre))
+    assert found.low * (1.0 - 1e-9) <= min(values) <= 1.01 * found.low
+    assert found.high * 0.99 <= max(values) <= found.high * (1.0 + 1e-9)
+
+
+# --- one hinge: the null space is a line ----------------------------------------------------
+
+
+def straight(F: float) -> float:
+    """along(z) of the straight hinge, both cables at F: K = 2 k R² − F h over the lever squared."""
+    return (2.0 * EA / (2.0 * H) * R**2 - F * H) / LENGTH**2
+
+
+def test_hinge_has_its_closed_form_at_both_ends() -> None:
+    found = cdsm.stiffness_range(hinge().at([0.0]), DOWN, 10.0, 70.0)
+    assert found.low == pytest.approx(straight(70.0), rel=1e-12)
+    assert found.high == pytest.approx(straight(10.0), rel=1e-12)
+    np.testing.assert_allclose(found.low_tension.values, 70.0, rtol=1e-12)
+    np.testing.assert_allclose(found.high_tension.values, 10.0, rtol=1e-12)
+    assert straight(40.0) in found
+    assert straight(71.0) not in found
+
+
+def test_without_a_maximum_buckling_ends_the_range() -> None:
+    """K falls with F until it is the margin's part of what it is under the least tensions."""
+    found = cdsm.stiffness_range(hinge().at([0.0]), DOWN, 10.0, margin=0.02)
+    assert found.high == pytest.approx(straight(10.0), rel=1e-12)
+    assert found.low == pytest.approx(0.02 * straight(10.0), rel=1e-9)
+    buckling = 2.0 * EA / (2.0 * H) * R**2 / H
+    expected = buckling - 0.02 * (buckling - 10.0)
+    np.testing.assert_allclose(found.low_tension.values, expected, rtol=1e-9)
+
+
+def test_stiffness_that_tension_raises_without_end_asks_for_a_maximum() -> None:
+    """Cables from beyond the tip pull the arm straight, as a string is: K = Σ F H + const."""
+    arm = hinge()
+    cables = [
+        cdsm.Cable(
+            f"stay{side:+.0f}",
+            (
+                cdsm.Site("base_link", (0.4, 0.0, 0.3 * side)),
+                cdsm.Site("tool0", (0.0, 0.0, 0.01 * side)),
+            ),
+            cdsm.LinearElasticity(EA),
+        )
+        for side in (1.0, -1.0)
+    ]
+    pose = cdsm.Manipulator(arm.geometry, cables=cables, gravity=(0.0, 0.0, 0.0)).at([0.1])
+    with pytest.raises(cdsm.InvalidInput, match="maximum: none given"):
+        cdsm.stiffness_range(pose, DOWN, 10.0)
+    found = cdsm.stiffness_range(pose, DOWN, 10.0, 1e4)
+    assert found.high_tension.values.max() == pytest.approx(1e4, rel=1e-12)
+    plan = cdsm.plan_stiffness(pose, DOWN, 10.0 * found.high, 10.0)
+    assert plan.achieved == pytest.approx(10.0 * found.high, rel=1e-9)
+    with pytest.raises(cdsm.UnreachableStiffness, match="to inf N/m"):
+        cdsm.plan_stiffness(pose, DOWN, 0.9 * found.low, 10.0)
+
+
+def test_end_of_the_elasticity_bounds_the_tensions() -> None:
+    arm = presets.virtual_prototype()
+    pose = arm.at(np.full(arm.nv, presets.TEN_DEGREES))
+    found = cdsm.stiffness_range(pose, DOWN, 50.0)
+    assert found.high_tension.values.max() == pytest.approx(810.0, rel=1e-12)
+    # the strand stiffens as long as it is pulled; all searches for it end in one place
+    assert np.ptp(found.high_found) < 1e-9 * found.high
+    # what a search ended with balances to 1e-9 of the tensions, what is returned to rounding
+    assert found.low_found[0] == pytest.approx(found.low, rel=1e-8)
+    assert (np.diff(found.low_found) >= 0.0).all()
+    assert (np.diff(found.high_found) <= 0.0).all()
+
+
+def test_range_of_an_arm_without_redundancy_is_a_point() -> None:
+    """Bounds that pin one cable of each pair leave nothing to choose."""
+    arm = arms.random_arm(2, 3, "hinged", STRAND)
+    pose = arms.random_posture(arm, 2, reach=0.4)
+    pull = cdsm.distribute_tension(pose, 60.0)
+    pinned = np.array([cable.name.endswith("_1") for cable in arm.cables])
+    low = np.where(pinned, pull.values, 0.0)
+    high = np.where(pinned, pull.values, 800.0)
+    found = cdsm.stiffness_range(pose, DOWN, low, high)
+    expected = cdsm.stiffness(pose, pull).along(DOWN)
+    assert found.low == pytest.approx(expected, rel=1e-9)
+    assert found.high == pytest.approx(expected, rel=1e-9)
+    np.testing.assert_allclose(found.high_tension.values, pull.values, rtol=1e-9)
+
+
+def test_unstable_least_tensions_do_not_hide_stable_ones() -> None:
+    """Eq. 19 starts soft: an arm that stands on its joints needs tension to stand."""
+    geometry = presets.experimental_prototype_geometry(link_mass=0.6, lead=2.0)
+    arm = cdsm.Manipulator(geometry, STRAND, gravity=(-9.81, 0.0, 0.0))
+    pose = arm.at([0.05, -0.1, 0.05])
+    assert not cdsm.stiffness(pose, cdsm.distribute_tension(pose, 3.0)).is_stable
+    found = cdsm.stiffness_range(pose, DOWN, 3.0)
+    for pull in (found.low_tension, found.high_tension):
+        K = cdsm.stiffness(pose, pull)
+        assert K.margin >= found.floor * (1.0 - 1e-9)
+        assert K.is_stable
+    assert found.low < 0.01 * found.high
+
+
+@pytest.mark.parametrize("above", [-1e-6, 1e-6])
+def test_arm_is_held_exactly_as_long_as_some_tension_holds_it(above: float) -> None:
+    # from the critical tension on no tensions do: all are larger
+    critical = 2.0 * EA / (2.0 * H) * R**2 / H
+    pose = hinge().at([0.0])
+    minimum = critical * (1.0 + above)
+    if above < 0.0:
+        assert cdsm.stiffness_range(pose, DOWN, minimum).high > 0.0
+    else:
+        with pytest.raises(cdsm.SingularStiffness, match=r"hold the arm stable.*joint1"):
+            cdsm.stiffness_range(pose, DOWN, minimum)
+
+
+def test_arm_of_force_controlled_cables_is_told_why_nothing_holds_it() -> None:
+    arm = presets.virtual_prototype()
+    cables = [replace(cable, control="force") for cable in arm.cables]
+    pose = cdsm.Manipulator(arm.geometry, cables=cables, gravity=arm.gravity).at(np.full(10, 0.1))
+    for plan in (cdsm.stiffness_range, cdsm.saturation):
+        with pytest.raises(cdsm.SingularStiffness, match='control="position"') as caught:
+            plan(pose, DOWN, 50.0, 500.0)
+        assert caught.value.direction.shape == (10,)
+
+
+def test_domain_of_a_force_controlled_cable_bounds_nothing() -> None:
+    """Its elasticity does not matter; a tension beyond it is no fault."""
+    arm = presets.experimental_prototype(gravity=(0.0, 0.0, 9.81))
+    pose = arm.at(np.zeros(3))
+    held = np.array([cable.control == "position" for cable in arm.cables])
+    low = np.full(6, 50.0)
+    low[3] = 815.0
+    assert not held[3]
+    found = cdsm.stiffness_range(pose, DOWN, low, 1000.0)
+    for pull in (found.low_tension, found.high_tension):
+        assert pull.values[held].max() <= 810.0 < 815.0 <= pull.values[3]
+
+
+BAD: list[tuple[dict[str, Any], type[cdsm.CdsmError], str]] = [
+    ({"direction": (0.0, 0.0, 0.0)}, cdsm.InvalidInput, "direction: is the zero vector"),
+    ({"direction": (0.0, 1.0)}, cdsm.InvalidInput, "direction"),
+    ({"minimum": 80.0, "maximum": 70.0}, cdsm.InvalidInput, "maximum: 70 N given"),
+    ({"minimum": -1.0}, cdsm.InvalidInput, "minimum"),
+    ({"minimum": math.nan}, cdsm.InvalidInput, "minimum"),
+    ({"wrench": (1.0, 2.0)}, cdsm.InvalidInput, "wrench"),
+    ({"wrench": (0.0, 0.0, 1e5, 0.0, 0.0, 0.0)}, cdsm.InfeasibleTension, "balances the arm"),
+    ({"minimum": 50.0, "maximum": 50.1}, cdsm.InfeasibleTension, "balances the arm"),
+    ({"minimum": 1000.0, "maximum": 2e3}, cdsm.ElasticityRangeError, "between minimum and maximum"),
+    ({"maximum": 2.0}, cdsm.CdsmError, "minimum|balances"),
+    ({"margin": 0.0}, cdsm.InvalidInput, "margin"),
+    ({"margin": 1.0}, cdsm.InvalidInput, "margin"),
+    ({"starts": 0}, cdsm.InvalidInput, "starts"),
+    ({"starts": 2.5}, cdsm.InvalidInput, "starts"),
+    ({"seed": -1}, cdsm.InvalidInput, "seed"),
+    ({"pose": "here"}, cdsm.InvalidInput, "pose"),
+]
+
+
+@pytest.mark.parametrize(("change", "error", "message"), BAD)
+def test_bad_input_is_named(
+    change: dict[str, Any], error: type[cdsm.CdsmError], message: str
+) -> None:
+    arm = presets.virtual_prototype()
+    pose = arm.at(np.full(arm.nv, 0.1))
+    given = {"pose": pose, "direction": DOWN, "minimum": 50.0, "maximum": 500.0, **change}
+    with pytest.raises(error, match=message):
+        cdsm.stiffness_range(**given)
+    if "starts" not in change:
+        with pytest.raises(error, match=message):
+            cdsm.plan_stiffness(**given, target=1e5)
+
+
+def test_direction_in_which_the_tip_cannot_move_has_no_range() -> None:
+    pose = hinge().at([0.0])
+    for ask in (cdsm.stiffness_range, cdsm.saturation):
+        with pytest.raises(cdsm.SingularStiffness, match="cannot move along"):
+            ask(pose, (1.0, 0.0, 0.0), 10.0, 50.0)
+    with pytest.raises(cdsm.SingularStiffness, match="cannot move along"):
+        cdsm.plan_stiffness(pose, (1.0, 0.0, 0.0), 1e4, 10.0, 50.0)
+
+
+def test_what_is_printed_says_what_was_found() -> None:
+    found = cdsm.stiffness_range(hinge().at([0.0]), DOWN, 10.0, 70.0)
+    for part in ("along (0, 0, 1)", "N/mm", "softest with 70 to 70 N", "starts"):
+        assert part in str(found)
+    assert "StiffnessRange" in repr(found)
+    assert found.posture.arm.nv == 1
