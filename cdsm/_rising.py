@@ -11,6 +11,7 @@ from scipy.optimize import brentq
 
 from cdsm._checks import Array
 from cdsm.errors import ElasticityRangeError, InfeasibleTension, SolverError
+from cdsm.manipulator import Manipulator
 from cdsm.stiffness import Stiffness
 
 SAMPLES: Final = 96
@@ -19,7 +20,7 @@ SAMPLES: Final = 96
 PRECISION: Final = 1e-12
 """Relative precision of a place that is found between two others."""
 
-ABOVE: Final = 1.0 + 1e-9
+_ABOVE: Final = 1.0 + 1e-9
 """The low end of a domain may be excluded; this far above it everything is defined."""
 
 Limit = Literal["buckling", "infeasible", "elasticity", "none"]
@@ -43,12 +44,23 @@ def exists(at: At, place: float) -> bool:
     return reason(at, place) in ("none", "buckling")
 
 
-def edge(true: Callable[[float], bool], a: float, b: float) -> float:
-    """The last place from a, where something is true, to b, where it is not."""
-    while b - a > PRECISION * b:
+def domain(arm: Manipulator) -> tuple[float, float]:
+    """Tensions [N] of which the elasticities of all cables say something.
+
+    That of a cable whose motor holds the force is never asked.
+    """
+    domains = [each.elasticity.domain for each in arm.cables if each.control == "position"]
+    low = max((each.low for each in domains), default=0.0) * _ABOVE
+    return low, min((each.high for each in domains), default=math.inf)
+
+
+def edge(true: Callable[[float], bool], a: float, b: float) -> tuple[float, float]:
+    """The last place from a, where something is true, and the next to b, where it is not."""
+    nothing = PRECISION**2 * b  # a may be zero, and true nowhere above
+    while b - a > max(PRECISION * b, nothing):
         middle = (a + b) / 2.0
         a, b = (middle, b) if true(middle) else (a, middle)
-    return a
+    return a, b
 
 
 def reach(at: At, low: float, highest: float) -> float:
@@ -71,11 +83,13 @@ def reach(at: At, low: float, highest: float) -> float:
         highest = max(highest, 2.0 * low)
         while exists(at, highest) and at(highest).is_stable and highest < far:
             highest *= 2.0  # an elasticity of the user's own may go on stiffening
-    return highest if exists(at, highest) else edge(lambda b: exists(at, b), low, highest)
+    return highest if exists(at, highest) else edge(lambda b: exists(at, b), low, highest)[0]
 
 
 def sampled(low: float, high: float) -> Array:
     """Bounds (N,) [N] from low to high, evenly spread on a logarithmic scale of four decades."""
+    if high <= low:
+        return np.array([low])
     return np.unique([low, *np.geomspace(max(low, 1e-4 * high), high, SAMPLES)])
 
 

@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Generic, Protocol, TypeVar, final
+from typing import Generic, NamedTuple, Protocol, TypeVar, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,6 +79,28 @@ class Settled(Generic[_Point]):
     convex: bool
 
 
+class _View(NamedTuple):
+    """What is seen from a point.
+
+    Attributes:
+        pressed: Which coordinates a stop holds (nv,).
+        free: The others.
+        spectrum: Eigenvalues and eigenvectors of the symmetric part of K for these.
+        still: Whether their r is rounding.
+        flat: Eigenvalues up to this size are rounding.
+    """
+
+    pressed: NDArray[np.bool_]
+    free: NDArray[np.intp]
+    spectrum: tuple[Array, Array]
+    still: bool
+    flat: float
+
+    @property
+    def lowest(self) -> float:
+        return float(self.spectrum[0].min(initial=math.inf))
+
+
 def settle(
     evaluate: Callable[[Array, _Point], _Point], start: _Point, lower: Array, upper: Array
 ) -> Settled[_Point]:
@@ -91,35 +113,16 @@ def settle(
         lower: Lower stops (nv,).
         upper: Upper stops (nv,).
     """
-    here, radius, convex = start, _FIRST, True
-    history: list[float] = []
-    arrived = True
+    here, radius = start, _FIRST
+    view = _seen(here, lower, upper)
+    history, convex = [_largest(here, view)], view.lowest > view.flat
     for iteration in range(_ATTEMPTS):
-        if arrived:
-            pressed = _pressed(here, lower, upper)
-            free = np.flatnonzero(~pressed)
-            spectrum = _spectrum(here.stiffness, free)
-            lowest = spectrum[0].min(initial=math.inf)
-            bend = FLAT * abs(spectrum[0]).max(initial=0.0)
-            convex = convex and bool(lowest > bend)
-            still = bool((abs(here.torque[free]) <= here.rounding[free]).all())
-            history.append(float(abs(here.torque[free]).max(initial=0.0)))
-            if still and lowest >= -bend:
-                return Settled(here, pressed, tuple(history), iteration, True, convex)
-        # what is left of r at a saddle is rounding, and must not decide which way to leave it
-        torque, signs = (0.0 * here.torque, (1.0, -1.0)) if still else (here.torque, (1.0,))
-        q, expected = here.q, 0.0
-        for sign in signs:
-            end = _descend(here, torque, free, spectrum, lower, upper, radius, sign)
-            change = end - here.q
-            promise = float(change @ torque + change @ here.stiffness @ change / 2.0)
-            if promise < expected * (1.0 + 1e-9):  # of two that promise the same the first
-                q, expected = end, promise
+        done = view.still and view.lowest >= -view.flat
+        q, expected = (here.q, 0.0) if done else _way_down(here, view, lower, upper, radius)
+        if done or (view.still and expected == 0.0):  # or else only the stops are in the way
+            return Settled(here, view.pressed, tuple(history), iteration, True, convex)
         if expected == 0.0:
-            if still:  # only the stops are in the way
-                return Settled(here, pressed, tuple(history), iteration, True, convex)
             radius /= 4.0
-            arrived = False
             continue
         try:
             there = evaluate(q, here)
@@ -127,14 +130,46 @@ def settle(
         except CdsmError:  # sites of a cable coincide there, say
             quality = -math.inf
         length = float(np.linalg.norm(q - here.q))
-        arrived = quality > 0.05
-        if arrived:
-            here = there
         if quality < 0.25:
             radius = length / 4.0
         elif quality > 0.75 and length > 0.8 * radius:
             radius = min(2.0 * radius, _WIDEST)
-    return Settled(here, pressed, tuple(history), _ATTEMPTS, False, convex)
+        if quality > 0.05:
+            here, view = there, _seen(there, lower, upper)
+            history.append(_largest(here, view))
+            convex = convex and view.lowest > view.flat
+    return Settled(here, view.pressed, tuple(history), _ATTEMPTS, False, convex)
+
+
+def _seen(here: Point, lower: Array, upper: Array) -> _View:
+    pressed = _pressed(here, lower, upper)
+    free = np.flatnonzero(~pressed)
+    spectrum = _spectrum(here.stiffness, free)
+    still = bool((abs(here.torque[free]) <= here.rounding[free]).all())
+    return _View(pressed, free, spectrum, still, FLAT * abs(spectrum[0]).max(initial=0.0))
+
+
+def _largest(here: Point, view: _View) -> float:
+    return float(abs(here.torque[view.free]).max(initial=0.0))
+
+
+def _way_down(
+    here: Point, view: _View, lower: Array, upper: Array, radius: float
+) -> tuple[Array, float]:
+    """Where to go next (nv,), and the work that the quadratic model promises for it, negative.
+
+    Zero if it promises none.
+    """
+    # what is left of r at a saddle is rounding, and must not decide which way to leave it
+    torque, signs = (0.0 * here.torque, (1.0, -1.0)) if view.still else (here.torque, (1.0,))
+    q, expected = here.q, 0.0
+    for sign in signs:
+        end = _descend(here, torque, view.free, view.spectrum, lower, upper, radius, sign)
+        change = end - here.q
+        promise = float(change @ torque + change @ here.stiffness @ change / 2.0)
+        if promise < expected * (1.0 + 1e-9):  # of two that promise the same the first
+            q, expected = end, promise
+    return q, expected
 
 
 def _pressed(here: Point, lower: Array, upper: Array) -> NDArray[np.bool_]:
@@ -201,17 +236,18 @@ def _step(
         newton = -np.linalg.solve(stiffness, torque)
         if np.linalg.norm(newton) <= radius:
             return np.asarray(newton)
-    # p = −(K + σ)⁻¹ r with the σ that makes it as long as the radius
-    floor = max(0.0, -values[0])
-    lowest = floor + FLAT * max(largest, size / radius)
+    # p = −(K + σ)⁻¹ r with the σ that makes it as long as the radius, sought from the smallest σ
+    # allowed: near a saddle it is larger by a rounding of σ only
+    lifted = values + max(0.0, -values[0])
+    least = FLAT * max(largest, size / radius)
 
     def excess(shift: float) -> float:
-        return float(1.0 / radius - 1.0 / np.linalg.norm(along / (values + shift)))
+        return float(1.0 / radius - 1.0 / np.linalg.norm(along / (lifted + shift)))
 
-    if size > 0.0 and excess(lowest) > 0.0:
-        shift = brentq(excess, lowest, floor + 2.0 * size / radius, rtol=1e-6)
-        return np.asarray(vectors @ (-along / (values + shift)))
+    if size > 0.0 and excess(least) > 0.0:
+        shift = brentq(excess, least, 2.0 * size / radius, xtol=1e-300, rtol=1e-6)
+        return np.asarray(vectors @ (-along / (lifted + shift)))
     # r has no part along the lowest eigenvector, as on the ridge of a saddle
-    inner = vectors @ (-along / (values + lowest))
+    inner = vectors @ (-along / (lifted + least))
     down = vectors[:, 0] * np.sign(vectors[abs(vectors[:, 0]).argmax(), 0])
     return np.asarray(inner + sign * math.sqrt(max(radius**2 - inner @ inner, 0.0)) * down)

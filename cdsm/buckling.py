@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm._checks import Array, ReadOnlyState, bound, frozen, instance, vector
-from cdsm._rising import ABOVE, PRECISION, SAMPLES, Limit, edge, reach, reason, stable_ranges
+from cdsm._rising import SAMPLES, Limit, domain, edge, reach, reason, stable_ranges
 from cdsm.errors import InvalidInput
 from cdsm.manipulator import Posture
 from cdsm.stiffness import Stiffness, stiffness
@@ -69,7 +69,7 @@ class CriticalTension(ReadOnlyState):
             verdict = f"does not buckle at any lower bound up to {high:.4g} N"
         else:
             verdict = f"buckles at a lower bound of {self.minimum:.6g} N"
-        spans = ", ".join(f"{a:.4g} to {b:.4g} N" for a, b in self.stable)
+        spans = ", ".join(f"{a:.4g} to {b:.4g} N" for a, b in self.stable if a < b)
         names = self.posture.arm.joint_names
         lines = [verdict, f"stable from {spans}" if spans else "", _written(names, self.mode)]
         return "\n".join(line for line in lines if line)
@@ -83,6 +83,8 @@ class CriticalLoad(ReadOnlyState):
     Attributes:
         posture: Where.
         wrench: W (6,), of which the factor is the multiple: force [N], then moment [N m].
+        carried: Wrench (6,) that is there besides, whatever the factor: force [N], then moment
+            [N m].
         factor: The largest factor [-] up to which the arm holds; inf if it holds a million times W.
         limit: Why no further: ``"buckling"``, ``"infeasible"`` (no tensions balance the load),
             ``"elasticity"`` (a tension leaves its cable's domain) or ``"none"``.
@@ -92,6 +94,7 @@ class CriticalLoad(ReadOnlyState):
 
     posture: Posture
     wrench: Array
+    carried: Array
     factor: float
     limit: Limit
     mode: Array
@@ -137,9 +140,9 @@ def critical_tension(
     def at(minimum: float) -> Stiffness:
         return stiffness(pose, distribute_tension(pose, minimum, wrench=W, solver=solver))
 
-    low = max(cable.elasticity.domain.low for cable in arm.cables) * ABOVE
+    low, highest = domain(arm)
     at(low)  # if there is nothing to judge, its error says why
-    high = reach(at, low, min(cable.elasticity.domain.high for cable in arm.cables))
+    high = reach(at, low, highest)
     places, margins, stable = stable_ranges(at, low, high)
     buckles = [b for _, b in stable if b < high]
     if buckles:
@@ -168,8 +171,10 @@ def critical_load(
     minimum: ArrayLike = 0.0,
     maximum: ArrayLike = math.inf,
     solver: str = "daqp",
+    *,
+    carried: ArrayLike = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
 ) -> CriticalLoad:
-    """The factor λ up to which the arm, holding this posture, stands the load λ W.
+    """The factor λ up to which the arm, holding this posture, stands λ W on top of what it carries.
 
     Args:
         pose: The posture, held: the tensions are distributed anew for every load.
@@ -177,20 +182,22 @@ def critical_load(
         minimum: Lower bound of the tensions [N], for all cables or (C,).
         maximum: Upper bound of the tensions [N], for all cables or (C,).
         solver: As for :func:`~cdsm.tension.distribute_tension`.
+        carried: Another wrench (6,) at ``tool0`` that is always there, as of a tool.
 
     Raises:
-        InvalidInput: The wrench is zero, or it or a bound is not what it must be.
-        InfeasibleTension: The arm does not even hold itself.
+        InvalidInput: The wrench is zero, or it, what is carried or a bound is not what it must be.
+        InfeasibleTension: The arm does not even hold itself and what it carries.
         ElasticityRangeError: A tension is outside its cable's elasticity even without load.
     """
     count = len(instance("pose", pose, Posture).arm.cables)
     W = vector("wrench", wrench, 6, "force [N], then moment [N m], base axes")
+    always = vector("carried", carried, 6, "force [N], then moment [N m], base axes")
     low, high = bound("minimum", minimum, count), bound("maximum", maximum, count)
     if not W.any():
         raise InvalidInput("wrench", "is zero, and so is any multiple of it; give a load.")
 
     def at(factor: float) -> Stiffness:
-        return stiffness(pose, distribute_tension(pose, low, high, factor * W, solver))
+        return stiffness(pose, distribute_tension(pose, low, high, always + factor * W, solver))
 
     factor, limit = 0.0, reason(at, 0.0)
     at(factor)  # if there is nothing to judge, its error says why
@@ -202,14 +209,16 @@ def critical_load(
             # the first failure: what the doubling has stepped over is sampled again, finer
             places = np.linspace(0.0, end, SAMPLES).tolist()
             first = next(i for i, place in enumerate(places) if reason(at, place) != "none")
-            factor = edge(lambda x: reason(at, x) == "none", places[first - 1], places[first])
-            limit = reason(at, factor * (1.0 + 4.0 * PRECISION))
+            holds, fails = places[first - 1], places[first]
+            factor, beyond = edge(lambda x: reason(at, x) == "none", holds, fails)
+            limit = reason(at, beyond)
         else:
             factor = math.inf
     there = at(min(factor, _NOWHERE / 2.0))
     return CriticalLoad(
         posture=pose,
         wrench=W,
+        carried=always,
         factor=factor,
         limit=limit,
         mode=_mode(there),

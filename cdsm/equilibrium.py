@@ -9,22 +9,33 @@ series springs included.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import final
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from cdsm._checks import Array, ReadOnlyState, frozen, vector
 from cdsm._loaded_arm import Iterate, LoadedArm, rounding
 from cdsm._trust_region import FLAT, Settled, settle
-from cdsm.errors import EquilibriumError, InvalidInput
+from cdsm.errors import CableError, EquilibriumError, InvalidInput, SingularStiffness
 from cdsm.manipulator import Posture
 from cdsm.stiffness import Stiffness, stiffness
 from cdsm.tension import Tension
 
 _SMALLEST_STEP = 2.0**-6
 """Steps of the load smaller than this do not help either."""
+
+_CLOSE = 1e-3
+"""Sites this part of their distance apart have met: on the way round each other they would."""
+
+_FAR = 0.1
+"""An arm is followed in motions of no joint by more than this [rad]."""
+
+_DENSE = 0.02
+"""On its way it is looked at every so far [rad]: a shorter loss of stability is not seen."""
 
 
 @final
@@ -80,13 +91,45 @@ class Equilibrium(ReadOnlyState):
     def stable(self) -> bool:
         """Whether K_θ, its symmetric part, is positive definite for the joints off the stops.
 
-        False only for a neutral state, as of an arm whose cables are all slack: where the arm would
-        go further down, the search goes on.
+        False for a neutral state, as of an arm whose cables are all slack, and where the softest
+        way is barred by stops that do not push yet. Else the search goes on down.
         """
-        free = np.flatnonzero(self.reaction == 0.0)
+        free = self._off_stops
         K = self.stiffness.joint[np.ix_(free, free)]
         values = np.linalg.eigvalsh((K + K.T) / 2.0)
         return bool((values > FLAT * abs(values).max(initial=0.0)).all())
+
+    @cached_property
+    def compliance(self) -> Array:
+        """Tip motion per wrench (6, 6), its blocks [m/N] to [rad/(N m)], joints at stops held.
+
+        C = J_X K_θ⁻¹ J_Xᵀ of the joints that no stop pushes.
+
+        Raises:
+            SingularStiffness: K_θ of these joints is singular.
+        """
+        free = self._off_stops
+        if free.size == self.reaction.size:
+            return self.stiffness.compliance
+        K, J = self.stiffness.joint[np.ix_(free, free)], self.pose.jacobian[:, free]
+        if free.size == 0:
+            return frozen(np.zeros((6, 6)))
+        _, values, right = np.linalg.svd(K)
+        if not values[-1] > FLAT * values[0]:
+            mode = np.zeros(self.reaction.size)
+            mode[free] = right[-1]
+            raise SingularStiffness(
+                f"K_θ of the joints off their stops is singular, most at "
+                f"{self.pose.arm.joint_names[int(abs(mode).argmax())]}: the arm is about to give "
+                "way there.",
+                frozen(mode),
+            )
+        return frozen(J @ np.linalg.solve(K, J.T))
+
+    @property
+    def _off_stops(self) -> NDArray[np.intp]:
+        """The joints that no stop pushes."""
+        return np.flatnonzero(self.reaction == 0.0)
 
     @property
     def slack(self) -> tuple[str, ...]:
@@ -121,7 +164,7 @@ class Equilibrium(ReadOnlyState):
             for i, name in enumerate(arm.joint_names)
             if name in self.at_limit
         ]
-        state = "stable" if self.stable else "NEUTRAL: no torque brings every joint back"
+        state = "stable" if self.stable else "NEUTRAL: not every joint is brought back"
         return "\n".join([*rows, f"{state}, residual {abs(self.residual).max():.1e} N m"])
 
 
@@ -135,6 +178,9 @@ def equilibrium(
     cables, weight and load. The arm goes down from the reference, off saddles too, so that beyond
     buckling it comes to rest beside the posture that has become unstable. Joint limits are stops.
 
+    The whole load is there from the start, and is divided only if nothing is found: where several
+    places to rest exist, one reached by slow loading (:func:`~cdsm.weight.weight_test`) may differ.
+
     Args:
         pose: The reference posture, within the joint limits.
         tension: F there: the answer of :func:`~cdsm.tension.distribute_tension`, or tensions of
@@ -147,7 +193,8 @@ def equilibrium(
         ElasticityRangeError: A tension at the reference or at rest is outside the domain of the
             elasticity of its cable: below where a law begins it does not say how a cable gets
             slack, above its end not how it yields.
-        EquilibriumError: None was found. Says how much of the load the arm could be followed under.
+        EquilibriumError: None was found. Says how much of the load the arm could be followed under,
+            and if two sites of a cable meet on the way, as where disks overlap, which.
     """
     reference = stiffness(pose, tension, None if isinstance(tension, Tension) else wrench)
     W = reference.wrench
@@ -168,7 +215,7 @@ def equilibrium(
         elif step > _SMALLEST_STEP:
             step /= 2.0
         else:
-            raise _no_rest(settled, reached)
+            raise _no_rest(loaded, settled, reached)
 
 
 def follow(before: Equilibrium, wrench: Array) -> Equilibrium | None:
@@ -182,10 +229,32 @@ def follow(before: Equilibrium, wrench: Array) -> Equilibrium | None:
         ElasticityRangeError: As for :func:`equilibrium`.
     """
     loaded = LoadedArm(before.reference, before.reference_tension, wrench)
-    settled = _settle(loaded, loaded.at(before.pose, before.tension), 0.0)
-    if not (settled.steady and settled.convex):
+    start = loaded.at(before.pose, before.tension)
+    settled = _settle(loaded, start, 0.0)
+    if not (settled.steady and settled.convex and _held(loaded, start, settled)):
         return None
     return _answer(loaded, settled, settled.iterations)
+
+
+def _held(loaded: LoadedArm, start: Iterate, settled: Settled[Iterate]) -> bool:
+    """Whether the arm is held, off the stops, all along a short way to where it settled.
+
+    If it snaps through on the way, there K_θ is not positive definite, though the search may have
+    stepped over that.
+    """
+    way = settled.point.q - start.q
+    length = float(abs(way).max())
+    if length > _FAR:
+        return False
+    free = np.flatnonzero(~settled.pressed)
+    for part in np.arange(_DENSE, length, _DENSE) / max(length, _DENSE):
+        try:
+            K = loaded.moved(start.q + part * way, start).stiffness[np.ix_(free, free)]
+        except CableError:
+            return False
+        if np.linalg.eigvalsh((K + K.T) / 2.0)[:1].min(initial=math.inf) <= 0.0:
+            return False
+    return True
 
 
 def _settle(loaded: LoadedArm, start: Iterate, held_back: Array | float) -> Settled[Iterate]:
@@ -226,14 +295,33 @@ def _answer(loaded: LoadedArm, settled: Settled[Iterate], iterations: int) -> Eq
     )
 
 
-def _no_rest(settled: Settled[Iterate], reached: float) -> EquilibriumError:
+def _no_rest(loaded: LoadedArm, settled: Settled[Iterate], reached: float) -> EquilibriumError:
     here = settled.point
     residual = np.where(settled.pressed, 0.0, here.torque)
     joint = here.K.posture.arm.joint_names[int(abs(residual).argmax())]
-    return EquilibriumError(
+    problem = (
         f"the arm finds no stable place to rest beyond {100.0 * reached:.3g} % of the load; at the "
-        f"last iterate {abs(residual).max():.4g} N m are out of balance at {joint}",
-        residual=frozen(residual),
-        load_factor=reached,
-        joint=joint,
+        f"last iterate {abs(residual).max():.4g} N m are out of balance at {joint}"
     )
+    meeting = _meeting(loaded.reference, here.K.posture)
+    if meeting is None:
+        return EquilibriumError(problem, frozen(residual), reached, joint)
+    return EquilibriumError(
+        f"{problem}, where two neighbouring sites of {meeting} meet: disks touch there, and the "
+        "cable has no direction",
+        frozen(residual),
+        reached,
+        joint,
+        "Set joint_limit to where disks touch, or leave it out; then the joint rests on its stop.",
+    )
+
+
+def _meeting(reference: Posture, pose: Posture) -> str | None:
+    """The cable of which two sites have come far closer than at the reference, if there is one."""
+    for cable, before, after in zip(
+        pose.arm.cables, reference.cable_paths, pose.cable_paths, strict=True
+    ):
+        apart, left = (np.linalg.norm(np.diff(path, axis=0), axis=1) for path in (before, after))
+        if (left < _CLOSE * apart).any():
+            return cable.name
+    return None

@@ -262,12 +262,15 @@ class EquilibriumError(CdsmError, ArithmeticError):
     """
 
     def __init__(
-        self, problem: str, residual: NDArray[np.float64], load_factor: float, joint: str
+        self,
+        problem: str,
+        residual: NDArray[np.float64],
+        load_factor: float,
+        joint: str,
+        remedy: str = "Reduce the load, or stiffen the arm: raise the tensions, or take stiffer "
+        "cables or springs.",
     ) -> None:
-        super().__init__(
-            f"{problem}. Reduce the load, or stiffen the arm: raise the tensions, or take stiffer "
-            "cables or springs."
-        )
+        super().__init__(f"{problem}. {remedy}")
         self.residual = residual
         self.load_factor = load_factor
         self.joint = joint

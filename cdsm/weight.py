@@ -10,17 +10,26 @@ from typing import final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm._checks import Array, ReadOnlyState, frozen, vector
+from cdsm._checks import Array, ReadOnlyState, frozen, unit_direction, vector
 from cdsm.equilibrium import Equilibrium, equilibrium, follow
 from cdsm.errors import EquilibriumError, InvalidInput
 from cdsm.manipulator import Posture
 from cdsm.tension import Tension
 
 _FINEST = 2.0**-12
-"""Part of the load to which a buckling load is found."""
+"""Part of itself to which a buckling load is found."""
 
-_STILL = 1e-13
-"""A tip displacement this part of the arm's length is rounding."""
+_SLIGHT = 1e-9
+"""Part of the load below which it need not be found so precisely."""
+
+_MEASURED = 1e-12
+"""A tip displacement this part of the arm's length is known to some three digits."""
+
+_SETTLED = 1e-9
+"""One by more than this part is no rounding of the balance at the reference."""
+
+_IMMOBILE = 1e-14
+"""A compliance along the force this part of the largest is rounding."""
 
 
 @final
@@ -28,9 +37,11 @@ _STILL = 1e-13
 class LinearPrediction(ReadOnlyState):
     """What the stiffness at the unloaded arm predicts of a weight test.
 
+    Joints that rest on a stop stay there in it.
+
     Attributes:
-        displacement: C_vv ΔF (3,) [m], C of :attr:`~cdsm.stiffness.Stiffness.compliance`.
-        stiffness: :meth:`~cdsm.stiffness.Stiffness.along` the force [N/m].
+        displacement: C_vv ΔF (3,) [m], C of :attr:`~cdsm.equilibrium.Equilibrium.compliance`.
+        stiffness: 1/(uᵀ C_vv u) along the force [N/m].
     """
 
     displacement: Array
@@ -63,10 +74,13 @@ class WeightTest(ReadOnlyState):
 
         inf where the tip does not give way along the force.
         """
-        size = float(np.linalg.norm(self.force))
-        gives = float(self.displacement @ self.force) / size
-        length = self.without.pose.arm.geometry.length
-        return size / gives if abs(gives) > _STILL * length else math.inf
+        return float(np.linalg.norm(self.force)) / self._gives if self._gives else math.inf
+
+    @property
+    def _gives(self) -> float:
+        """How far the tip goes along the force [m]; zero if that is rounding."""
+        moved = float(self.displacement @ unit_direction("force", self.force))
+        return moved if abs(moved) > _MEASURED * self.without.pose.arm.geometry.length else 0.0
 
     @cached_property
     def linear(self) -> LinearPrediction:
@@ -75,11 +89,20 @@ class WeightTest(ReadOnlyState):
         Raises:
             SingularStiffness: The arm without the weight is just about to buckle.
         """
-        K = self.without.stiffness
-        return LinearPrediction(
-            displacement=frozen(K.compliance[:3, :3] @ self.force),
-            stiffness=K.along(self.force),
-        )
+        C = self.without.compliance[:3, :3]
+        u = unit_direction("force", self.force)
+        if self.without.at_limit:
+            gives = float(u @ C @ u)
+            stiff = 1.0 / gives if abs(gives) > _IMMOBILE * np.linalg.norm(C) else math.inf
+        else:
+            stiff = self.without.stiffness.along(u)
+        return LinearPrediction(displacement=frozen(C @ self.force), stiffness=stiff)
+
+    @property
+    def settled_first(self) -> bool:
+        """Whether the arm left its reference before the weight: unbalanced there, or unstable."""
+        moved = float(np.linalg.norm(self.without.displacement))
+        return moved > _SETTLED * self.without.pose.arm.geometry.length
 
     @cached_property
     def loads(self) -> Array:
@@ -113,14 +136,22 @@ class WeightTest(ReadOnlyState):
         for load, moved in zip(self.loads, self.displacements, strict=True):
             rows.append(f"{load:>10.4g}" + "".join(f"{1000.0 * x:>12.4g}" for x in moved))
         predicted = "".join(f"{1000.0 * x:>12.4g}" for x in self.linear.displacement)
-        rows.append(f"{'linear':>10}{predicted}")
-        return "\n".join(
-            [
-                *rows,
-                f"stiffness along the force: measured {self.stiffness / 1000.0:.4g} N/mm, "
-                f"linear {self.linear.stiffness / 1000.0:.4g} N/mm",
-            ]
-        )
+        rows += [
+            f"{'linear':>10}{predicted}",
+            f"stiffness along the force: measured {self.stiffness / 1000.0:.4g} N/mm, "
+            f"linear {self.linear.stiffness / 1000.0:.4g} N/mm",
+        ]
+        if self.settled_first:
+            x, y, z = 1000.0 * self.without.displacement
+            rows.append(
+                "before the weight the arm did not stay at its reference: the tip moved by "
+                f"({x:.4g}, {y:.4g}, {z:.4g}) mm, from where all this is measured"
+            )
+        if self.without.at_limit:
+            rows.append(f"before the weight at a stop: {', '.join(self.without.at_limit)}")
+        if not self.without.stable:
+            rows.append("before the weight the arm was NEUTRAL: not every joint is brought back")
+        return "\n".join(rows)
 
 
 def weight_test(
@@ -146,8 +177,8 @@ def weight_test(
             given, that of the ``Tension``, or zero.
 
     Raises:
-        InvalidInput: As for :func:`~cdsm.equilibrium.equilibrium`, or a force of zero, or steps
-            that are no positive integer.
+        InvalidInput: As for :func:`~cdsm.equilibrium.equilibrium`, or a force of zero or so small
+            that what it moves is rounding, or steps that are no positive integer.
         ElasticityRangeError: As for :func:`~cdsm.equilibrium.equilibrium`, at any step.
         EquilibriumError: The arm buckles under the load; says at which part of it. Where it comes
             to rest then, :func:`~cdsm.equilibrium.equilibrium` tells.
@@ -163,7 +194,14 @@ def weight_test(
     for step in range(1, int(steps) + 1):
         loaded.append(_hang(loaded[-1], without.wrench, added, part, step / steps))
         part = step / steps
-    return WeightTest(force=force, without=without, loaded=tuple(loaded[1:]))
+    test = WeightTest(force=force, without=without, loaded=tuple(loaded[1:]))
+    if not test._gives and math.isfinite(test.linear.stiffness):
+        raise InvalidInput(
+            "force",
+            f"{np.abs(force).max():.3g} N moves the tip by rounding only, and measures nothing; "
+            f"hang at least {_MEASURED * pose.arm.geometry.length * test.linear.stiffness:.1g} N.",
+        )
+    return test
 
 
 def _hang(
@@ -180,7 +218,7 @@ def _hang(
         after = follow(before, frozen(wrench + part * added))
         if after is not None:
             before, reached, step = after, part, 2.0 * step
-        elif step > _FINEST:
+        elif step > _FINEST * max(reached, _SLIGHT):
             step /= 2.0
         else:
             way = before.stiffness.critical_direction

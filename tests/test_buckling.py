@@ -64,12 +64,54 @@ def test_tip_force_along_the_link_buckles_it_at_its_closed_form(minimum: float) 
     assert (pulled.factor, pulled.limit) == (math.inf, "none")
 
 
+@pytest.mark.parametrize("push", [3.0, -4.0])
+def test_load_comes_on_top_of_what_is_carried(push: float) -> None:
+    pose = hinge().at([0.0])
+    left = 2.0 * SPRING * RADIUS**2 - 5.0 * OFFSET
+    found = cdsm.critical_load(
+        pose, [-2.0, 0.0, 0.0, 0.0, 0.0, 0.0], 5.0, carried=[-push, 0.0, 0.0, 0.0, 0.0, 0.0]
+    )
+    assert 2.0 * found.factor == pytest.approx(left / LENGTH - push, rel=1e-9)
+    np.testing.assert_array_equal(found.carried, [-push, 0, 0, 0, 0, 0])
+    with pytest.raises(cdsm.InvalidInput, match="carried"):
+        cdsm.critical_load(pose, [1.0] * 6, carried=[1.0])
+
+
 def test_side_load_ends_where_the_cable_can_pull_no_more() -> None:
     pose = hinge().at([0.0])
     found = cdsm.critical_load(pose, [0.0, 0.0, -1.0, 0.0, 0.0, 0.0], 1.0, 51.0)
     # the force −z turns the hinge by the moment P·LENGTH, which one cable more of 50 N holds
     assert found.limit == "infeasible"
     assert found.factor == pytest.approx(50.0 * RADIUS / LENGTH, rel=1e-9)
+
+
+@pytest.mark.parametrize(("side", "factor"), [(-1.0, 0.0), (1.0, 8000.0)])
+def test_one_cable_without_a_weight_stands_without_tension_only(side: float, factor: float) -> None:
+    """Any tension bends it, so nothing but zero balances it, and loads only to one side."""
+    geometry = hinge().geometry
+    cables = cdsm.serpentine_cables(
+        replace(geometry, cables=geometry.cables[:1]), cdsm.LinearElasticity(1e4)
+    )
+    pose = cdsm.Manipulator(geometry, cables=cables, gravity=(0.0, 0.0, 0.0)).at([0.0])
+    found = cdsm.critical_tension(pose)
+    assert found.examined == (0.0, 0.0)
+    assert math.isinf(found.minimum)
+    load = cdsm.critical_load(pose, [0.0, 0.0, -side, 0.0, 0.0, 0.0])
+    # K = EA R²/s − F s/4 over the segment s = 2h, with F = P LENGTH/R
+    assert load.limit == ("infeasible" if factor == 0.0 else "buckling")
+    expected = 0.0 if factor == 0.0 else 1e4 * RADIUS**3 / OFFSET**2 / LENGTH
+    assert load.factor == pytest.approx(expected, rel=1e-9, abs=1e-12)
+
+
+def test_law_of_a_cable_whose_motor_holds_the_force_ends_nothing() -> None:
+    arm = hinge()
+    short = cdsm.TabulatedElasticity((0.0, 20.0), (0.0, 1e-3))
+    held = replace(arm.cables[0], elasticity=short, control="force")
+    mixed = cdsm.Manipulator(arm.geometry, cables=[held, arm.cables[1]], gravity=(0.0, 0.0, 0.0))
+    # one spring less, and the force-controlled cable may be pulled beyond its 20 N
+    found = cdsm.critical_tension(mixed.at([0.0]))
+    assert found.minimum == pytest.approx(SPRING * RADIUS**2 / OFFSET, rel=1e-9)
+    assert found.minimum > 20.0
 
 
 def test_wire_at_the_end_of_its_elasticity_says_so() -> None:

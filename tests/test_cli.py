@@ -126,6 +126,13 @@ def test_buckle_finds_tension_and_load_of_the_api(geometry: Path, tmp_path: Path
     text = call("buckle", geometry, *options, "--load", "-1,0,0,0,0,0").output
     assert "buckles at a lower bound of" in text
     assert "there it buckles" in text
+    carried = call(
+        "buckle", geometry, *options, "--load", "-1,0,0,0,0,0", "--wrench", "-1,0,0,0,0,0"
+    )
+    assert f"{load.factor - 1.0:.6g}" in carried.output
+    without = call("buckle", geometry, "--min-tension", "20")
+    assert without.exit_code == 2
+    assert "under --load only" in without.stderr
 
 
 def test_wire_file_is_the_elasticity_of_the_cables(geometry: Path, tmp_path: Path) -> None:

@@ -21,6 +21,8 @@ from tests.locked import (
     SIZES,
     SOFT,
     STRAND,
+    H,
+    R,
     balanced,
     compressed,
     half,
@@ -113,7 +115,9 @@ def test_small_loads_move_the_arm_by_its_compliance(name: str, moment: bool) -> 
     assert_second_order(tip, scale * C, np.zeros(6), step=2.0**-6, size=10.0, tolerance=1e-8)
 
 
-@pytest.mark.parametrize("name", ["universal-3-8-all", "universal-5-9-strand", "mixed-3-0-all"])
+@pytest.mark.parametrize(
+    "name", ["universal-3-8-all", "universal-5-9-strand", "hinged-4-0-all", "mixed-3-0-all"]
+)
 def test_cartesian_stiffness_is_force_by_displacement(name: str) -> None:
     pose, pull = balanced(name)
     K = cdsm.stiffness(pose, pull)
@@ -317,6 +321,21 @@ def test_smallest_imperfection_decides_which_way_the_hinge_buckles() -> None:
     for side in (1.0, -1.0):
         W = np.array([-18.0, 0.0, 0.0, 0.0, side * 1e-6, 0.0])
         assert side * cdsm.equilibrium(pose, [20.0, 20.0], W).pose.q[0] > 0.1
+
+
+@pytest.mark.parametrize("push", [1e-12, 1e-10, 1e-8, 6e-8, 1e-6, 1e-5, 1e-3])
+def test_no_push_is_too_small_to_lead_off_a_ridge(push: float) -> None:
+    """Past buckling in all directions at once: the way down turns as the push does."""
+    sizes = {**SIZES, "joints": 1, "cables_per_joint": 3, "link_length": 0.04}
+    sizes.pop("twist")
+    arm = cdsm.Manipulator(
+        cdsm.Geometry.universal(**sizes), cdsm.LinearElasticity(100.0), gravity=(0.0, 0.0, 0.0)
+    )
+    pose = arm.at([0.0, 0.0])
+    rest = cdsm.equilibrium(pose, np.full(3, 675.0), [0.0, 0.6 * push, 0.8 * push, 0.0, 0.0, 0.0])
+    assert rest.stable
+    assert rest.iterations < 20
+    assert abs(rest.pose.q).max() > 0.1
 
 
 def test_reference_that_is_unstable_by_itself_comes_to_rest_elsewhere() -> None:
@@ -567,3 +586,30 @@ def test_disks_that_touch_are_stops_just_before() -> None:
     assert rest.at_limit == ("joint1",)
     assert rest.pose.q[0] == pytest.approx(arm.upper[0] - 1e-6, abs=1e-12)
     assert rest.reaction[0] == pytest.approx(restoring(rest.pose.q[0]) - 200.0, rel=1e-12)
+
+
+def test_sites_that_meet_are_what_the_error_speaks_of() -> None:
+    """A limit beyond where disks touch, and an arm that goes there: the potential has a cusp."""
+    touching = 2.0 * math.atan(H / R)
+    pose = hinge(limit=touching + 0.2, law=cdsm.LinearElasticity(SOFT)).at([0.0])
+    with pytest.raises(cdsm.EquilibriumError, match=r"cable\w+ meet.*joint_limit") as caught:
+        cdsm.equilibrium(pose, [200.0, 200.0])
+    assert caught.value.joint == "joint1"
+    within = hinge(law=cdsm.LinearElasticity(SOFT)).at([0.0])
+    assert cdsm.equilibrium(within, [200.0, 200.0]).at_limit == ("joint1",)
+
+
+def test_compliance_at_a_stop_is_that_of_the_other_joints() -> None:
+    """Of two hinges the second rests on its stop: the tip turns about the first alone."""
+    arm = hinge(joints=2)
+    first, second = arm.geometry.joints
+    geometry = replace(arm.geometry, joints=(first, replace(second, limit=0.02)))
+    stopped = cdsm.Manipulator(geometry, cables=arm.cables, gravity=(0.0, 0.0, 0.0))
+    moment = MOMENT
+    rest = cdsm.equilibrium(stopped.at([0.0, 0.0]), np.full(4, 20.0), moment)
+    assert rest.at_limit == ("joint2",)
+    J = rest.pose.jacobian[:, :1]
+    expected = J @ J.T / rest.stiffness.joint[0, 0]
+    np.testing.assert_allclose(rest.compliance, expected, rtol=1e-12, atol=1e-18)
+    free = cdsm.equilibrium(arm.at([0.0, 0.0]), np.full(4, 20.0), 0.1 * moment)
+    np.testing.assert_array_equal(free.compliance, free.stiffness.compliance)

@@ -1,6 +1,7 @@
 """The weight test: closed forms of one hinge, the linear prediction, and buckling on the way."""
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -159,6 +160,63 @@ def test_tension_beyond_the_law_on_the_way_names_the_cable() -> None:
     assert caught.value.cables
 
 
+@pytest.mark.parametrize("steps", [1, 2, 3, 7])
+def test_snapping_through_is_seen_however_few_the_steps(steps: int) -> None:
+    """At the full load the arm rests stably beyond: the way there is what tells."""
+    geometry = cdsm.Geometry.hinged(
+        joints=1,
+        twist=0.0,
+        link_length=0.05,
+        base_length=0.02,
+        disk_offset=0.01,
+        hole_radius=0.02,
+        link_mass=0.0,
+    )
+    arm = cdsm.Manipulator(geometry, cdsm.LinearElasticity(100.0), gravity=(0.0, 0.0, 0.0))
+    pose = arm.at([0.0])
+    force = np.array([-40.0, 0.0, 10.0])
+    assert cdsm.equilibrium(pose, [5.0, 5.0], np.append(force, np.zeros(3))).stable
+    with pytest.raises(cdsm.EquilibriumError, match="buckles at") as caught:
+        cdsm.weight_test(pose, [5.0, 5.0], force, steps=steps)
+
+    # the torque that the load must overcome, from the same closed forms as tests/locked.py
+    def load(angle: float) -> float:
+        lengths = [
+            2.0 * (0.01 * math.cos(angle / 2) + s * 0.02 * math.sin(angle / 2)) for s in (1, -1)
+        ]
+        slopes = [-0.01 * math.sin(angle / 2) + s * 0.02 * math.cos(angle / 2) for s in (1, -1)]
+        pull = [max(5.0 + 100.0 * (L / 0.02 - 1.0), 0.0) for L in lengths]
+        torque = pull[0] * slopes[0] + pull[1] * slopes[1]
+        # the tip is at (ℓ cos θ, −ℓ sin θ)
+        return torque / (0.05 * (40.0 * math.sin(angle) - 10.0 * math.cos(angle)))
+
+    parts = [load(angle) for angle in np.linspace(-0.9, -1e-3, 20001)]
+    assert caught.value.load_factor == pytest.approx(max(parts), rel=1e-3)
+
+
+def test_hardly_any_force_may_buckle_an_arm_that_hardly_stands() -> None:
+    """The part of the load is found to a part of itself, not of the load."""
+    pose = hinge(limit=1.2, law=cdsm.LinearElasticity(SOFT)).at([0.0])
+    with pytest.raises(cdsm.EquilibriumError, match="buckles at") as caught:
+        cdsm.weight_test(pose, [20.0, 20.0], [-1.6e8, 0.0, 0.0])
+    # K_θ = 1.6 − P/10 of the straight hinge
+    assert caught.value.load_factor == pytest.approx(1e-7, rel=2.0**-11)
+
+
+def test_joint_on_a_stop_takes_no_part_in_the_prediction() -> None:
+    arm = hinge(joints=2)
+    first, second = arm.geometry.joints
+    geometry = replace(arm.geometry, joints=(first, replace(second, limit=0.02)))
+    stopped = cdsm.Manipulator(geometry, cables=arm.cables, gravity=(0.0, 0.0, 0.0))
+    pose, moment = stopped.at([0.0, 0.0]), MOMENT
+    test = cdsm.weight_test(pose, np.full(4, 20.0), [0.0, 0.0, 1e-4], wrench=moment)
+    assert test.without.at_limit == ("joint2",)
+    assert test.linear.stiffness == pytest.approx(test.stiffness, rel=1e-4)
+    assert test.without.stiffness.along([0, 0, 1]) < 0.9 * test.stiffness
+    assert "at a stop: joint2" in str(test)
+    assert "did not stay at its reference" in str(test)
+
+
 # --- the question ---------------------------------------------------------------------------
 
 
@@ -175,6 +233,8 @@ def test_answer_prints_itself() -> None:
     ("force", "steps", "said"),
     [
         ([0.0, 0.0, 0.0], 1, "force"),
+        ([0.0, 0.0, 1e-300], 1, "rounding only"),
+        ([0.0, 0.0, 1e-14], 1, "hang at least"),
         ([0.0, 1.0], 1, "force"),
         ([0.0, 1.0, math.nan], 1, "force"),
         ([0.0, 0.0, 1.0], 0, "steps"),

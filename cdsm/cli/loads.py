@@ -59,15 +59,15 @@ def weigh(
         load = numbers("--wrench", wrench, 6)
         pull = distribute_tension(pose, min_tension, max_tension, load, solver)
         test = weight_test(pose, pull, numbers("--force", force, 3), steps=steps)
-        if as_json:
-            show_json(_weight_to_dict(test))
-        else:
-            typer.echo(f"{pose.arm.geometry}\n\n{test}\n\nat the full load:\n{test.loaded[-1]}")
         if figure is not None:
             from cdsm.plots import plot_weight_test  # matplotlib, only where it is wanted
 
             path = write_file(figure, plot_weight_test(test).savefig)
-            typer.echo(f"written: {path}", err=as_json)
+            typer.echo(f"written: {path}", err=True)
+        if as_json:
+            show_json(_weight_to_dict(test))
+        else:
+            typer.echo(f"{pose.arm.geometry}\n\n{test}\n\nat the full load:\n{test.loaded[-1]}")
 
 
 def buckle(
@@ -80,8 +80,12 @@ def buckle(
             metavar="FX,...,MZ",
         ),
     ] = None,
-    min_tension: MinTension = 10.0,
-    max_tension: MaxTension = math.inf,
+    min_tension: Annotated[
+        float | None, typer.Option(help="Lower bound of all tensions under the load [N]; 10.")
+    ] = None,
+    max_tension: Annotated[
+        float | None, typer.Option(help="Upper bound of all tensions under the load [N].")
+    ] = None,
     rigidity: Rigidity = None,
     wire: Wire = None,
     spring: Spring = math.inf,
@@ -92,32 +96,44 @@ def buckle(
     as_json: AsJson = False,
 ) -> None:
     """Find the tension, and the load, at which the arm buckles."""
+    for option, value in (("--min-tension", min_tension), ("--max-tension", max_tension)):
+        if value is not None and load is None:
+            raise typer.BadParameter("bounds the tensions under --load only.", param_hint=option)
     with reported():
         pose = posture(
             geometry, angles, rigidity=rigidity, wire=wire, spring=spring, gravity=gravity
         )
-        tension = critical_tension(pose, numbers("--wrench", wrench, 6), solver)
+        always = numbers("--wrench", wrench, 6)
+        tension = critical_tension(pose, always, solver)
         most = None
         if load is not None:
             weight = numbers("--load", load, 6)
-            most = critical_load(pose, weight, min_tension, max_tension, solver)
+            low = 10.0 if min_tension is None else min_tension
+            high = math.inf if max_tension is None else max_tension
+            most = critical_load(pose, weight, low, high, solver, carried=always)
+        if figure is not None:
+            from cdsm.plots import plot_critical_tension  # matplotlib, only where it is wanted
+
+            path = write_file(figure, plot_critical_tension(tension).savefig)
+            typer.echo(f"written: {path}", err=True)
         if as_json:
             show_json(_critical_to_dict(tension, most))
         else:
             typer.echo(f"{pose.arm.geometry}\n\n{tension}")
             if most is not None:
                 typer.echo(f"\n{most}")
-        if figure is not None:
-            from cdsm.plots import plot_critical_tension  # matplotlib, only where it is wanted
-
-            path = write_file(figure, plot_critical_tension(tension).savefig)
-            typer.echo(f"written: {path}", err=as_json)
 
 
 def _weight_to_dict(test: WeightTest) -> dict[str, object]:
     """Every step of a weight test, in SI units; null where the stiffness is infinite."""
-    last = test.loaded[-1]
+    last, before = test.loaded[-1], test.without
     return {
+        "before": {
+            "tip_displacement_m": before.displacement.tolist(),
+            "at_limit": list(before.at_limit),
+            "slack": list(before.slack),
+            "stable": before.stable,
+        },
         "force_N": test.force.tolist(),
         "loads_N": test.loads.tolist(),
         "tip_displacements_m": test.displacements.tolist(),

@@ -47,7 +47,7 @@ Spring = Annotated[
 Wrench = Annotated[
     str, typer.Option(help="At the tip: FX,FY,FZ,MX,MY,MZ [N, N m].", metavar="FX,...,MZ")
 ]
-Gravity = Annotated[str, typer.Option(help="In base axes: GX,GY,GZ [m/s²].", metavar="GX,GY,GZ")]
+Gravity = Annotated[str, typer.Option(help="In m/s², base axes: GX,GY,GZ.", metavar="GX,GY,GZ")]
 Solver = Annotated[str, typer.Option(help="Quadratic-programming solver.")]
 Picture = Annotated[Path | None, typer.Option(metavar="FILE.png", help="Picture to write.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print SI numbers as JSON.")]

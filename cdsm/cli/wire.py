@@ -18,7 +18,7 @@ def fit(
     test: Annotated[Path, typer.Argument(metavar="TEST.csv", help="Tensile test to read.")],
     gauge_length: Annotated[
         float | None,
-        typer.Option(help="Length of the tested wire [mm]; default: what the file says."),
+        typer.Option(help="Length of the tested wire in mm; default: what the file says."),
     ] = None,
     method: Annotated[str, typer.Option(help="monotone, or polynomial as in the paper.")] = (
         "monotone"

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq, minimize_scalar
 
 from cdsm._checks import Array, ReadOnlyState, bound, frozen, instance, scalar, unit_direction
-from cdsm._rising import ABOVE, PRECISION, At, reach, reason, sampled, stable_ranges
+from cdsm._rising import PRECISION, At, domain, reach, reason, sampled, stable_ranges
 from cdsm.errors import InvalidInput
 from cdsm.manipulator import Posture
 from cdsm.planning.gradient import require_finite, stiffness_gradient
@@ -149,11 +149,11 @@ def saturation(
     def at(lower: float) -> Stiffness:
         return stiffness(pose, pull(lower))
 
-    domains = [cable.elasticity.domain for cable in arm.cables]
-    low = max(start, max(domain.low for domain in domains) * ABOVE)
+    lowest, highest = domain(arm)
+    low = max(start, lowest)
     pull(start)  # of bounds that contradict each other it says so
     require_finite(math.inf if at(low)._torque(u) is None else 0.0, u)
-    top = min(*(domain.high for domain in domains), float(ceiling.min()))
+    top = min(highest, float(ceiling.min()))
     high = max(reach(at, low, max(top, low)), low)
     first, last = _stable(at, low, high)
 
