@@ -19,6 +19,7 @@ from scipy.optimize import least_squares
 from cdsm._checks import Array
 
 _INTERVALS = 48
+_NEAR = 41  # points over which the noise is taken to be the same
 _GRID = 1200  # quadrature error below 1e-4 of the strain where EA varies thousandfold
 
 
@@ -44,6 +45,11 @@ class Points:
     def part(self, kept: NDArray[np.bool_] | slice) -> Points:
         """The points at the given places."""
         return Points(self.strain[kept], self.force[kept], self.count[kept])
+
+
+def _least_variance(points: Points) -> float:
+    """Noise [N²] below which a test is as good as exact."""
+    return (1e-6 * float(np.ptp(points.force))) ** 2
 
 
 @dataclass(frozen=True)
@@ -81,11 +87,21 @@ class Basis:
 
 @dataclass(frozen=True)
 class Curve:
-    """A fitted curve: coefficients of log EA (k,), and the strain at its low end [-]."""
+    """A fitted curve: log EA, and the strain at one tension, on which the rest hangs.
+
+    Attributes:
+        basis: Of log EA.
+        coefficients: Of the splines (k,).
+        anchor: Where on the grid. Best where the wire is stiff: in a soft end, any change of EA
+            would shift all the rest, and the fit would creep.
+        strain_there: ε at the anchor [-].
+        smoothing: Weight of the roughness [N²].
+    """
 
     basis: Basis
     coefficients: Array
-    start: float
+    anchor: int
+    strain_there: float
     smoothing: float
 
     @cached_property
@@ -96,7 +112,8 @@ class Curve:
     @cached_property
     def strain(self) -> Array:
         """ε (g,) [-] on the grid, of the same origin as the points."""
-        return self.start + _running_integral(1.0 / self.rigidity, self.basis.tensions)
+        stretch = _running_integral(1.0 / self.rigidity, self.basis.tensions)
+        return np.asarray(self.strain_there + stretch - stretch[self.anchor])
 
     def force(self, strain: Array) -> Array:
         """Tension (n,) [N] at strains (n,); straight beyond the ends."""
@@ -106,7 +123,7 @@ class Curve:
         return np.asarray(inside + before + np.maximum(strain - grid[-1], 0.0) * rigidity[-1])
 
     def jacobian(self, strain: Array) -> Array:
-        """Derivative (n, k + 1) of :meth:`force` by the coefficients and the start."""
+        """Derivative (n, k + 1) of :meth:`force` by the coefficients and that strain."""
         tensions, grid = self.basis.tensions, self.strain
         inside = np.clip(strain, grid[0], grid[-1])
         at = np.clip(np.searchsorted(grid, inside) - 1, 0, len(grid) - 2)
@@ -114,6 +131,7 @@ class Curve:
         by_coefficients = _running_integral(
             self.basis.splines / self.rigidity[:, None], tensions, axis=0
         )
+        by_coefficients -= by_coefficients[self.anchor]
         stretch = (1.0 - share) * by_coefficients[at] + share * by_coefficients[at + 1]
         rigidity = (1.0 - share) * self.rigidity[at, None] + share * self.rigidity[at + 1, None]
         beyond = (self.force(strain) - np.interp(strain, grid, tensions))[:, None]
@@ -121,8 +139,8 @@ class Curve:
         slope = beyond * self.basis.splines[edge]  # the straight ends turn with their EA
         return np.hstack((rigidity * stretch + slope, -rigidity))
 
-    def refitted(self, points: Points, evaluations: int = 60) -> Curve:
-        """The curve of the same smoothing through other points, by Levenberg and Marquardt."""
+    def refitted(self, points: Points) -> Curve:
+        """The curve of the same smoothing that fits the points best (Levenberg and Marquardt)."""
         size = self.basis.splines.shape[1]
         weight = np.sqrt(points.count)
         rough = np.sqrt(self.smoothing) * np.diff(np.eye(size), 2, axis=0)
@@ -131,7 +149,9 @@ class Curve:
         unit = float(np.ptp(points.strain))
 
         def of(x: Array) -> Curve:
-            return replace(self, coefficients=np.clip(x[:-1], -30.0, 40.0), start=x[-1] * unit)
+            return replace(
+                self, coefficients=np.clip(x[:-1], -30.0, 40.0), strain_there=x[-1] * unit
+            )
 
         def residual(x: Array) -> Array:
             error = weight * (of(x).force(points.strain) - points.force)
@@ -142,33 +162,102 @@ class Curve:
             rows[:, -1] *= unit
             return np.vstack((rows, rough))
 
-        x = np.append(self.coefficients, self.start / unit)
-        found = least_squares(
-            residual, x, slope, method="lm", max_nfev=evaluations, xtol=1e-6, ftol=1e-6
-        )
+        x = np.append(self.coefficients, self.strain_there / unit)
+        found = least_squares(residual, x, slope, method="lm", max_nfev=60, xtol=1e-6, ftol=1e-6)
         return of(found.x)
 
-    def spread(self, points: Points) -> tuple[Array, float, Array]:
-        """Covariance (k + 1, k + 1) of the unknowns, noise of one point [N], leverages (n,)."""
-        rows = np.sqrt(points.count)[:, None] * self.jacobian(points.strain)
-        penalty = np.zeros((rows.shape[1], rows.shape[1]))
-        penalty[:-1, :-1] = self.smoothing * self.basis.roughness
-        normal = rows.T @ rows + penalty
-        # scaled to a unit diagonal: the start of the curve counts in other units
+    def spread(self, points: Points) -> Spread:
+        """How far the noise of the points may have moved the curve."""
+        rows, error = self._linearised(points)
+        factor, scale = self._factored(rows)
+        inverse = cho_solve(factor, np.eye(len(scale))) / np.outer(scale, scale)
+        leverage = np.clip(((rows @ inverse) * rows).sum(axis=1), 0.0, 1.0)
+        freedom = float(max(len(error) - leverage.sum(), 1.0))
+        variance = float((error**2).sum() / freedom)
+        # what a flexible curve takes up of the noise is missing from the residuals
+        error = error / np.sqrt(np.maximum(1.0 - leverage, 0.1))
+        near = min(_NEAR, len(error))
+        padded = np.pad(error**2, (near // 2, near - 1 - near // 2), mode="reflect")
+        local = np.convolve(padded, np.full(near, 1.0 / near), mode="valid")
+        # scatter, each point's own, and the prior of the smoothing seen from the fitted curve
+        moved = (inverse @ rows.T) * np.sqrt(local)
+        covariance = moved @ moved.T + variance * inverse @ self._penalty @ inverse
+        splines = self.basis.splines
+        deviation = np.sqrt(((splines @ covariance[:-1, :-1]) * splines).sum(axis=1))
+        return Spread(inverse, float(np.sqrt(variance)), freedom, error, deviation)
+
+    def loosest(self, points: Points) -> Curve:
+        """The curve with the least smoothing that its restricted likelihood allows.
+
+        That is one standard deviation below the most likely: −2 log likelihood is larger by 1.
+        Points that show no bend leave a curve no freedom to err; this gives back what they allow.
+        """
+        least, chosen = np.inf, self
+        for smoothing in self.smoothing * 10.0 ** np.arange(0.0, -6.0, -0.25):
+            curve = replace(self, smoothing=float(smoothing))
+            likelihood = curve._likelihood(points)
+            least = min(least, likelihood)
+            if likelihood > least + 1.0:
+                break
+            chosen = curve
+        return chosen
+
+    def _likelihood(self, points: Points) -> float:
+        """−2 log of the restricted likelihood of the smoothing, the curve linearised as it is."""
+        rows, error = self._linearised(points)
+        unknowns = np.append(self.coefficients, self.strain_there)
+        factor, scale = self._factored(rows)
+        bent = self._penalty @ unknowns
+        gradient = (rows.T @ error - bent) / scale
+        deviance = error @ error + unknowns @ bent - gradient @ cho_solve(factor, gradient)
+        # of the unknowns, the strain and the two of a straight log EA are free of the penalty
+        return float(
+            (len(error) - 3) * np.log(deviance + len(error) * _least_variance(points))
+            + 2.0 * np.log(np.diag(factor[0]) * scale).sum()
+            - (len(unknowns) - 3) * np.log(self.smoothing)
+        )
+
+    @property
+    def _penalty(self) -> Array:
+        """Of the unknowns (k + 1, k + 1)."""
+        return np.pad(self.smoothing * self.basis.roughness, (0, 1))
+
+    def _linearised(self, points: Points) -> tuple[Array, Array]:
+        """Jacobian (n, k + 1) and residual (n,), each point as one not averaged."""
+        weight = np.sqrt(points.count)
+        error = weight * (points.force - self.force(points.strain))
+        return weight[:, None] * self.jacobian(points.strain), error
+
+    def _factored(self, rows: Array) -> tuple[tuple[Array, bool], Array]:
+        """Cholesky factor of the normal matrix, scaled to a unit diagonal, and the scale."""
+        normal = rows.T @ rows + self._penalty
+        # the strain counts in other units
         scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
         regular = normal / np.outer(scale, scale) + 1e-10 * np.eye(len(scale))
-        inverse = cho_solve(cho_factor(regular), np.eye(len(scale))) / np.outer(scale, scale)
-        leverage = np.clip(((rows @ inverse) * rows).sum(axis=1), 0.0, 1.0)
-        error = points.force - self.force(points.strain)
-        freedom = max(len(error) - leverage.sum(), 1.0)
-        variance = float((points.count * error**2).sum() / freedom)
-        return inverse * variance, np.sqrt(variance), leverage
+        return cho_factor(regular), scale
 
-    def deviation(self, points: Points) -> Array:
-        """Standard deviation (g,) of log EA on the grid."""
-        splines = self.basis.splines
-        covariance = self.spread(points)[0][:-1, :-1]
-        return np.asarray(np.sqrt(((splines @ covariance) * splines).sum(axis=1)))
+
+@dataclass(frozen=True)
+class Spread:
+    """How well the points determine a curve.
+
+    Attributes:
+        inverse: Of the normal matrix, penalty included, by the unknowns (k + 1, k + 1).
+        noise: Standard deviation of one point [N].
+        freedom: Points less what the curve takes up of them.
+        errors: Of the points, each as one not averaged (n,) [N]: the residuals, enlarged by what
+            the curve takes up.
+        deviation: Standard deviation of log EA on the grid (g,): of the scatter, as large as it is
+            around each point, so that it may grow with the force; and of the smoothing, whose
+            squared bias is taken as that of a curve as rough as this one is on average (Nychka,
+            J. Am. Stat. Assoc. 83, 1988).
+    """
+
+    inverse: Array
+    noise: float
+    freedom: float
+    errors: Array
+    deviation: Array
 
 
 def fit_curve(points: Points, basis: Basis, noise: float) -> Curve:
@@ -183,22 +272,25 @@ def fit_curve(points: Points, basis: Basis, noise: float) -> Curve:
     size = basis.splines.shape[1]
     # start: secants between the points, coarse enough to be positive
     force = np.maximum.accumulate(points.force) + 1e-9 * tensions[-1] * np.arange(len(points.force))
-    places = tensions[:: _GRID // 12]
+    places = tensions[np.linspace(0, _GRID - 1, 13).astype(int)]
     secants = np.diff(places) / np.maximum(
         np.diff(np.interp(places, force, points.strain)), 1e-3 * np.ptp(points.strain) / 12
     )
     guess = np.interp(tensions, (places[1:] + places[:-1]) / 2.0, np.log(secants))
     ridge = basis.splines.T @ basis.splines + 1e-3 * basis.roughness + 1e-9 * np.eye(size)
     coefficients: Array = np.linalg.solve(ridge, basis.splines.T @ guess).astype(np.float64)
-    floor = (1e-6 * float(np.ptp(points.force))) ** 2
-    smoothing = 10.0 * max(noise**2, floor)
-    curve = Curve(basis, coefficients, float(points.strain[0]), smoothing)
+    floor = _least_variance(points)
+    # stiff at first, and looser step by step: a flexible curve can lose its way from a rough start
+    smoothing = 10.0 * max(noise**2, 1e8 * floor)
+    anchor = int((basis.splines @ coefficients).argmax())
+    strain = float(np.interp(tensions[anchor], force, points.strain))
+    curve = Curve(basis, coefficients, anchor, strain, smoothing)
     for _ in range(25):
         curve = curve.refitted(points)
-        covariance, sigma, _ = curve.spread(points)
-        variance = max(sigma**2, floor)
+        spread = curve.spread(points)
+        variance = max(spread.noise**2, floor)
         rough = float(curve.coefficients @ basis.roughness @ curve.coefficients)
-        known = np.trace(covariance[:-1, :-1] @ basis.roughness) / max(sigma**2, 1e-300)
+        known = np.trace(spread.inverse[:-1, :-1] @ basis.roughness)
         bends = max(size - 2 - curve.smoothing * known, 1e-3)
         wanted = variance * bends / max(rough, 1e-12)
         wanted = float(np.clip(wanted, 1e-6 * variance, 1e8 * variance))

@@ -195,23 +195,27 @@ def test_rupture_is_left_out() -> None:
 # --- band, report, figure -------------------------------------------------------------------
 
 
+@pytest.mark.parametrize("method", ["monotone", "polynomial"])
 @pytest.mark.parametrize("law", ["linear", "strand"])
-def test_band_covers_the_truth_about_as_often_as_it_says(law: str) -> None:
+def test_band_covers_the_truth_about_as_often_as_it_says(law: str, method: str) -> None:
     covered = []
-    for seed in range(20):
+    for seed in range(12):
         if law == "strand":
             displacement, force = strand_test(1.0, seed)
         else:
             displacement, force = linear_test(150, 0.0)
             force = force + np.random.default_rng(seed).normal(size=force.size)
-        band = cdsm.fit_tensile_test(displacement, force, GAUGE, samples=80).band
+        band = cdsm.fit_tensile_test(displacement, force, GAUGE, method, samples=80).band
         inner = (band.tensions > 15.0) & (band.tensions < 800.0)
         truth = np.full_like(band.tensions, EA)
         if law == "strand":
             truth[inner] = STRAND.rigidity(band.tensions[inner])
         covered.append(np.mean(((band.low <= truth) & (truth <= band.high))[inner]))
-    # 95 % are meant; the step of Eq. 19 at 31 N is smoothed over, which no bootstrap sees
-    assert 0.85 < np.mean(covered) <= 1.0
+        # a band as wide as that would cover anything
+        widest = ((band.high - band.low) / truth)[inner]
+        assert np.median(widest) < 0.15
+    # 95 % are meant; the corner of Eq. 19 at 31 N is rounded off, and a single test may lie off
+    assert 0.88 < np.mean(covered) <= 1.0
 
 
 def test_fit_is_reproducible_and_reports_itself() -> None:
@@ -347,7 +351,7 @@ NOISE = np.random.default_rng(0)
         (RAMP, -PULL, GAUGE, "compression"),
         (RAMP, PULL - 100.0, GAUGE, "compression"),
         (1e3 * RAMP, PULL, GAUGE, "in mm"),
-        (RAMP, PULL / 1e6, GAUGE, "kN"),
+        (RAMP, PULL / 1e6, GAUGE, "in MN"),
         (RAMP / 1e9, PULL, GAUGE, "rigidity would be"),
         (np.random.default_rng(0).permutation(RAMP), PULL, GAUGE, "order"),
         (0.0 * RAMP, PULL, GAUGE, "never changes"),
