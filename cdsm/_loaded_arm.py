@@ -109,4 +109,23 @@ def rounding(K: Stiffness) -> Array:
     pull = K.tension + K.cable_stiffness * pose.cable_lengths
     terms = pull @ abs(pose.length_jacobian) + abs(K.wrench) @ abs(pose.jacobian)
     turned = abs(K.joint) @ abs(pose.q)
-    return np.asarray(_ROUNDING * (terms + abs(pose.gravity_torque) + turned))
+    terms += abs(pose.gravity_torque) + turned + _tilts(pose, K.tension)
+    return np.asarray(_ROUNDING * terms)
+
+
+def _tilts(pose: Posture, tension: Array) -> Array:
+    """Torque (nv,) [N m] of cables (C,) [N] whose segments tilt as the places of their sites do.
+
+    The shorter a segment the more: between disks that all but touch it is most of the rounding.
+    """
+    segment, joint = pose.arm._segments
+    site, origin = pose._frames.site, pose._frames.origin
+    cable, start, end = segment[:-1, :3].T
+    apart = np.linalg.norm(site[end] - site[start], axis=1)
+    far = np.linalg.norm(site[end], axis=1)
+    over = np.repeat(np.arange(cable.size), np.diff(segment[:, 3]))
+    row = abs(joint)
+    arm = np.linalg.norm(site[end][over] - origin[row], axis=1)
+    pull = (tension[cable] * far / apart)[over] * arm
+    torque = np.bincount(row, pull, minlength=len(origin))[1:]
+    return np.asarray(torque, dtype=np.float64)

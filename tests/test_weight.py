@@ -203,6 +203,20 @@ def test_hardly_any_force_may_buckle_an_arm_that_hardly_stands() -> None:
     assert caught.value.load_factor == pytest.approx(1e-7, rel=2.0**-11)
 
 
+def test_arm_between_disks_that_all_but_touch_is_followed_by_any_steps() -> None:
+    """Buckled, four joints on their stops: segments of micrometres tilt by rounding alone."""
+    arm = arms.random_arm(313526, 4, "universal", cdsm.LinearElasticity(213.5))
+    pose = arms.random_posture(arm, 760486)
+    pull = cdsm.distribute_tension(pose, 18.0)
+    once, twice, often = (
+        cdsm.weight_test(pose, pull, [-0.9, 3.0, 2.4], steps=steps) for steps in (1, 2, 7)
+    )
+    assert len(once.without.at_limit) == 4
+    assert once.settled_first
+    for test in (twice, often):
+        np.testing.assert_allclose(test.tips[-1], once.tips[-1], atol=1e-9)
+
+
 def test_joint_on_a_stop_takes_no_part_in_the_prediction() -> None:
     arm = hinge(joints=2)
     first, second = arm.geometry.joints

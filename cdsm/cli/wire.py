@@ -32,7 +32,7 @@ def fit(
     with reported():
         length = None if gauge_length is None else gauge_length / 1000.0
         data = read_tensile_csv(test, gauge_length=length)
-        with console.status("fitting, with 200 bootstrap samples"):
+        with console.status("fitting"):
             found = fit_tensile_test(data.displacement, data.force, data.gauge_length, method)
         typer.echo(str(found))
         if out is not None:
