@@ -111,6 +111,9 @@ class CriticalLoad(ReadOnlyState):
             "none": "nothing happens that far",
         }[self.limit]
         mode = _written(self.posture.arm.joint_names, self.mode)
+        if self.factor == 0.0:
+            reason = reason.replace("there it buckles", "it buckles without the load already")
+            return f"holds no part of the load; {reason}\n{mode}"
         return f"holds the load up to a factor of {self.factor:.6g}; {reason}\n{mode}"
 
 

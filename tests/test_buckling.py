@@ -190,6 +190,7 @@ def test_arm_that_never_stands_is_said_to_be_unstable_throughout() -> None:
     assert "unstable at every lower bound" in str(found)
     load = cdsm.critical_load(arm.at([0.0]), [-1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     assert (load.factor, load.limit) == (0.0, "buckling")
+    assert "buckles without the load already" in str(load)
 
 
 @pytest.mark.parametrize("degrees", [-40.0, 7.0, 25.0])
