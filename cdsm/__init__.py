@@ -46,10 +46,13 @@ from cdsm.manipulator import Manipulator, Posture
 from cdsm.modes import Modes, modes
 from cdsm.parts import CableRoute, Joint, Link
 from cdsm.planning import (
+    InfeasibleSample,
+    PathPlan,
     Saturation,
     StiffnessGradient,
     StiffnessPlan,
     StiffnessRange,
+    plan_path,
     plan_stiffness,
     saturation,
     stiffness_gradient,
@@ -82,6 +85,7 @@ __all__ = [
     "Geometry",
     "GeometryError",
     "Identification",
+    "InfeasibleSample",
     "InfeasibleTension",
     "InvalidInput",
     "Joint",
@@ -94,6 +98,7 @@ __all__ = [
     "Manipulator",
     "Measurement",
     "Modes",
+    "PathPlan",
     "Posture",
     "Saturation",
     "Shares",
@@ -124,6 +129,7 @@ __all__ = [
     "in_series",
     "inverse_kinematics",
     "modes",
+    "plan_path",
     "plan_stiffness",
     "presets",
     "read_elasticity",

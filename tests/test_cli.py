@@ -1,9 +1,11 @@
 """The command line, as a user calls it."""
 
 import json
+import math
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -135,6 +137,102 @@ def test_buckle_finds_tension_and_load_of_the_api(geometry: Path, tmp_path: Path
     assert "under --load only" in without.stderr
 
 
+def test_plan_tells_range_and_plan_of_the_api(geometry: Path, tmp_path: Path) -> None:
+    png, motors = tmp_path / "plan.png", tmp_path / "motors.csv"
+    options = ("plan", geometry, "--angles", 8, "--direction", "0,0,2", "--min-tension", 30)
+    written = ("--figure", png, "--out", motors)
+    result = call(*options, "--target", 45, "--max-tension", 400, *written, "--json")
+    assert result.exit_code == 0, result.output
+    told = json.loads(result.stdout)
+    arm = cdsm.Manipulator(cdsm.Geometry.read(geometry), cdsm.presets.STRAND_1X19)
+    pose = arm.at(np.full(6, np.deg2rad(8.0)))
+    found = cdsm.stiffness_range(pose, [0.0, 0.0, 1.0], 30.0, 400.0)
+    assert (told["low_N_per_m"], told["high_N_per_m"]) == (found.low, found.high)
+    plan = cdsm.plan_stiffness(pose, [0.0, 0.0, 1.0], 45e3, 30.0, 400.0)
+    np.testing.assert_array_equal(list(told["tension_N"].values()), plan.tension.values)
+    assert told["achieved_N_per_m"] == plan.achieved == pytest.approx(45e3, rel=1e-9)
+    assert png.read_bytes().startswith(b"\x89PNG")
+    line = motors.read_text(encoding="utf-8").splitlines()[1].split(",")
+    np.testing.assert_array_equal([float(cell) for cell in line[8:17]], plan.tension.values)
+    text = call(*options, "--target", 45).output
+    for part in ("the stiffness can be", "tension [N]", "cable3_3", "45 N/mm wanted"):
+        assert part in text
+
+
+PATHS = {
+    "angles": "# soft to stiff\n"
+    + ",".join(f"joint{k}_{i} [{unit}]" for k, unit in ((1, "deg"), (2, "°")) for i in (1, 2))
+    + ",joint3_1 [rad], joint3_2 [rad], target [N/mm], remark\n"
+    + "".join(f"8,8,8,8,{math.radians(8)},{math.radians(8)},{K},x\n" for K in (30, 32, 4500, 34)),
+    "tips": "x [mm], y [mm], z [mm], target [N/m]\n160,10,-20,20e3\n160,10,-21,21e3\n",
+}
+
+
+@pytest.mark.parametrize("kind", PATHS)
+def test_plan_follows_a_path_as_the_api_does(kind: str, geometry: Path, tmp_path: Path) -> None:
+    path, png, motors = (tmp_path / name for name in ("path.csv", "plan.png", "motors.csv"))
+    path.write_text(PATHS[kind], encoding="utf-8")
+    options = ("plan", geometry, "--path", path, "--direction", "0,0,1", "--rate", 8)
+    result = call(*options, "--figure", png, "-o", motors, "--json")
+    assert result.exit_code == 0, result.output
+    told = json.loads(result.stdout)
+    arm = cdsm.Manipulator(cdsm.Geometry.read(geometry), cdsm.presets.STRAND_1X19)
+    given: dict[str, Any] = {"tips": 1e-3 * np.array([[160, 10, -20], [160, 10, -21]])}
+    targets = [20e3, 21e3]
+    if kind == "angles":
+        given, targets = {"angles": np.deg2rad(np.full((4, 6), 8.0))}, [30e3, 32e3, 4.5e6, 34e3]
+    plan = cdsm.plan_path(arm, [0.0, 0.0, 1.0], targets, 10.0, rate=8.0, **given)
+    np.testing.assert_allclose(told["tensions_N"], plan.tensions, rtol=1e-12)
+    assert told["planned"] == list(plan.planned)
+    np.testing.assert_allclose(told["achieved_N_per_m"], plan.achieved, rtol=1e-12)
+    assert png.read_bytes().startswith(b"\x89PNG")
+    assert len(motors.read_text(encoding="utf-8").splitlines()) == len(targets) + 1
+    text = call(*options).output
+    assert "samples planned" in text
+    assert ("sample 2: stiffness: no admissible tensions" in text) == (kind == "angles")
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("x [mm],y [mm],z [mm]\n", "holds no path"),
+        ("x [mm],y [mm]\n1,2\n", "has no column z; call it z [mm] or z [m]"),
+        ("x,y [mm],z [mm]\n1,2,3\n", "the column x has no unit that is known"),
+        ("x [mm],y [in],z [mm]\n1,2,3\n", "the column y has no unit that is known"),
+        ("a,b\n1,2\n", "has columns for neither of joint angles (joint1_1 [deg], …)"),
+        ("x [mm],x [mm],z [mm]\n1,2,3\n", "two columns called x"),
+        ("x [mm],y [mm],z [mm]\n1,2,3\n\n1,two,3\n", "line 4: 'two' is not a finite number"),
+        ("x [mm],y [mm],z [mm]\n1,2\n", "line 2: '' is not a finite number"),
+        ("x [mm],y [mm],z [mm],target [N/mm]\n1,2,3,-4\n", "target: -4000 N/m given"),
+    ],
+)
+def test_path_that_cannot_be_read_says_where(
+    text: str, said: str, geometry: Path, tmp_path: Path
+) -> None:
+    path = tmp_path / "path.csv"
+    path.write_text(text, encoding="utf-8")
+    given = () if "target" in text else ("--target", 20)
+    result = call("plan", geometry, "--path", path, "--direction", "0,0,1", *given)
+    assert result.exit_code == 1
+    assert result.stderr.startswith("error: ")
+    assert said in result.stderr
+
+
+def test_plan_asks_for_one_target_and_for_a_path_with_its_rate(
+    geometry: Path, tmp_path: Path
+) -> None:
+    path = tmp_path / "path.csv"
+    path.write_text(PATHS["tips"], encoding="utf-8")
+    for arguments, said in (
+        ((), "--path"),
+        (("--target", 20, "--rate", 3), "--path"),
+        (("--target", 20, "--path", path), "both"),
+    ):
+        result = call("plan", geometry, "--direction", "0,0,1", *arguments)
+        assert result.exit_code == 2
+        assert said in result.stderr
+
+
 def test_wire_file_is_the_elasticity_of_the_cables(geometry: Path, tmp_path: Path) -> None:
     wire = cdsm.write_elasticity(cdsm.LinearElasticity(48e3), tmp_path / "wire.toml")
     by_file = call("stiffness", geometry, "--angles", 5, "--wire", wire, "--json")
@@ -160,6 +258,9 @@ def test_wire_file_is_the_elasticity_of_the_cables(geometry: Path, tmp_path: Pat
         (("weigh", "{geometry}", "--force", "0,0,-1", "--steps", "0"), "steps"),
         (("weigh", "{geometry}", "--force", "0,0,-900"), "810 N"),
         (("buckle", "{geometry}", "--load", "0,0,0,0,0,0"), "wrench: is zero"),
+        (("plan", "{geometry}", "--direction", "0,0,0", "--target", "9"), "direction: is the"),
+        (("plan", "{geometry}", "--direction", "0,0,1", "--target", "9e9"), "the range is"),
+        (("plan", "{geometry}", "--direction", "0,0,1", "--path", "no.csv"), "does not exist"),
         (("urdf", "{geometry}", "-o", "absent/arm.urdf"), "folder absent does not exist"),
         (("reproduce", "--out", "{geometry}"), "cannot be made a folder"),
     ],

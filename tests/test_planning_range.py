@@ -162,8 +162,8 @@ def test_without_a_maximum_buckling_ends_the_range() -> None:
     np.testing.assert_allclose(found.low_tension.values, expected, rtol=1e-9)
 
 
-def test_stiffness_that_tension_raises_without_end_asks_for_a_maximum() -> None:
-    """Cables from beyond the tip pull the arm straight, as a string is: K = Σ F H + const."""
+def stayed() -> cdsm.Posture:
+    """A hinge whose cables pull from beyond the tip, straight as a string: K = Σ F H + const."""
     arm = hinge()
     cables = [
         cdsm.Cable(
@@ -176,7 +176,11 @@ def test_stiffness_that_tension_raises_without_end_asks_for_a_maximum() -> None:
         )
         for side in (1.0, -1.0)
     ]
-    pose = cdsm.Manipulator(arm.geometry, cables=cables, gravity=(0.0, 0.0, 0.0)).at([0.1])
+    return cdsm.Manipulator(arm.geometry, cables=cables, gravity=(0.0, 0.0, 0.0)).at([0.1])
+
+
+def test_stiffness_that_tension_raises_without_end_asks_for_a_maximum() -> None:
+    pose = stayed()
     with pytest.raises(cdsm.InvalidInput, match="maximum: none given"):
         cdsm.stiffness_range(pose, DOWN, 10.0)
     found = cdsm.stiffness_range(pose, DOWN, 10.0, 1e4)

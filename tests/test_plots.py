@@ -108,6 +108,45 @@ def test_critical_tension_shows_where_the_arm_is_unstable(spring: float) -> None
     assert any("buckles at" in text.get_text() for text in axes.texts)
 
 
+def test_plan_is_drawn_between_the_softest_and_the_stiffest_tensions() -> None:
+    pose = random_posture(mixed_arm(), 3)
+    found = cdsm.stiffness_range(pose, (0.0, 0.0, 1.0), 10.0, 200.0)
+    plan = cdsm.plan_stiffness(pose, (0.0, 0.0, 1.0), 0.5 * (found.low + found.high), 10.0, 200.0)
+    figure = plots.plot_stiffness_plan(plan, found)
+    figure.draw_without_rendering()
+    (axes,) = figure.axes
+    pulls = (found.low_tension, plan.tension, found.high_tension)
+    for line, pull in zip(axes.get_lines(), pulls, strict=True):
+        np.testing.assert_array_equal(line.get_ydata(), pull.values)
+    legend = axes.get_legend()
+    assert legend is not None
+    assert f"planned: {1e-3 * float(plan.achieved):.4g} N/mm" in legend.get_texts()[1].get_text()
+    other = cdsm.stiffness_range(pose, (0.0, 1.0, 1.0), 10.0, 200.0)
+    with pytest.raises(cdsm.InvalidInput, match="attainable: is not of the posture"):
+        plots.plot_stiffness_plan(plan, other)
+
+
+def test_path_is_drawn_with_gaps_where_nothing_is_planned() -> None:
+    arm = cdsm.presets.virtual_prototype()
+    targets = np.array([80e3, 82e3, 1e7, 86e3, 1e7])
+    q = np.full((5, 10), 0.15)
+    plan = cdsm.plan_path(arm, (0.0, 0.0, 1.0), targets, 50.0, angles=q)
+    assert plan.planned == (0, 1, 3)
+    figure = plots.plot_path_plan(plan)
+    figure.draw_without_rendering()
+    above, below = figure.axes
+    wanted, held = above.get_lines()
+    np.testing.assert_allclose(_shown(wanted)[1], 1e-3 * targets)
+    np.testing.assert_allclose(_shown(held)[1], [80.0, 82.0, np.nan, 86.0, np.nan])
+    assert len(below.get_lines()) == 15
+    np.testing.assert_array_equal(_shown(below.get_lines()[4])[1, [0, 1, 3]], plan.tensions[:, 4])
+    assert [len(axes.patches) for axes in (above, below)] == [2, 2]
+    matrix = cdsm.stiffness(arm.at(q[0]), cdsm.distribute_tension(arm.at(q[0]), 60.0)).cartesian
+    full = cdsm.plan_path(arm, None, (matrix + matrix.T) / 2.0, 50.0, angles=q[:1])
+    with pytest.raises(cdsm.InvalidInput, match="plan: is one of cartesian"):
+        plots.plot_path_plan(full)
+
+
 def _shown(line: Line2D) -> Array:
     """x and y of a line (2, N)."""
     return np.asarray(line.get_xydata(), dtype=np.float64).T

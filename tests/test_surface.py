@@ -233,6 +233,14 @@ RESULTS: dict[str, Any] = {
     "StiffnessPlan": cdsm.plan_stiffness(
         POSE, np.eye(3)[1:], [K.along(u) for u in np.eye(3)[1:]], 10.0, 200.0
     ),
+    "PathPlan": cdsm.plan_path(
+        POSE.arm,
+        (0.0, 0.3, 1.0),
+        K.along((0.0, 0.3, 1.0)),
+        10.0,
+        200.0,
+        angles=[POSE.q, 9.0 * POSE.q],
+    ),
     "Saturation": cdsm.saturation(POSE, (0.0, 0.3, 1.0), 10.0, 200.0),
     "CriticalTension": cdsm.critical_tension(POSE),
     "CriticalLoad": cdsm.critical_load(POSE, random_wrench(4), 10.0),
@@ -248,6 +256,7 @@ PLAIN: dict[str, Any] = {
     "Cable with all options": cdsm.Cable(
         "a", POSE.arm.cables[0].sites, STEEL, lead=0.1, series_stiffness=1890.0, control="force"
     ),
+    "InfeasibleSample": cdsm.InfeasibleSample(3, "rate", "too far."),
     "LinearElasticity": STEEL,
     "StrandElasticity": cdsm.presets.STRAND_1X19,
     "Domain": cdsm.presets.STRAND_1X19.domain,

@@ -12,6 +12,7 @@ import cdsm
 from cdsm.cli.arm import stiffness, urdf
 from cdsm.cli.loads import buckle, weigh
 from cdsm.cli.paper import reproduce
+from cdsm.cli.plan import plan
 from cdsm.cli.wire import fit
 
 app = typer.Typer(
@@ -43,5 +44,5 @@ def main(
             stream.reconfigure(errors="replace")
 
 
-for command in (urdf, stiffness, weigh, buckle, fit, reproduce):
+for command in (urdf, stiffness, weigh, buckle, plan, fit, reproduce):
     app.command()(command)

@@ -70,12 +70,32 @@ def posture(
     Raises:
         CdsmError: There is no such file, arm or posture.
     """
+    arm = manipulator(geometry, rigidity=rigidity, wire=wire, spring=spring, gravity=gravity)
+    return at_angles(arm, angles)
+
+
+def manipulator(
+    geometry: Path, *, rigidity: float | None, wire: Path | None, spring: float, gravity: str
+) -> Manipulator:
+    """The arm of the options.
+
+    Raises:
+        CdsmError: There is no such file or arm.
+    """
     cables = serpentine_cables(
         described := Geometry.read(geometry),
         _elasticity(rigidity, wire),
         series_stiffness=1000.0 * spring,
     )
-    arm = Manipulator(described, cables=cables, gravity=numbers("--gravity", gravity, 3))
+    return Manipulator(described, cables=cables, gravity=numbers("--gravity", gravity, 3))
+
+
+def at_angles(arm: Manipulator, angles: str) -> Posture:
+    """An arm at the angles of the options.
+
+    Raises:
+        JointLimitError: An angle is beyond its limit.
+    """
     degrees = numbers("--angles", angles)
     degrees = degrees * arm.nv if len(degrees) == 1 else degrees
     if len(degrees) != arm.nv:

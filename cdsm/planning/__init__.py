@@ -1,15 +1,23 @@
-"""Stiffness control: gradients, attainable range, tensions for a wanted stiffness, saturation."""
+"""Stiffness control: gradients, attainable range, saturation, and tensions for a wanted stiffness.
+
+At one posture, or along a path.
+"""
 
 from cdsm.planning.attainable import StiffnessRange, stiffness_range
 from cdsm.planning.gradient import StiffnessGradient, stiffness_gradient
+from cdsm.planning.path import plan_path
+from cdsm.planning.path_plan import InfeasibleSample, PathPlan
 from cdsm.planning.plan import StiffnessPlan, plan_stiffness
 from cdsm.planning.saturation import Saturation, saturation
 
 __all__ = [
+    "InfeasibleSample",
+    "PathPlan",
     "Saturation",
     "StiffnessGradient",
     "StiffnessPlan",
     "StiffnessRange",
+    "plan_path",
     "plan_stiffness",
     "saturation",
     "stiffness_gradient",

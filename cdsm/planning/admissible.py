@@ -90,6 +90,25 @@ class Admissible:
         """The same with no tension above a limit [N]."""
         return replace(self, high=np.minimum(self.high, limit))
 
+    def within(self, reach: Array, of: Array) -> Admissible | None:
+        """The same within a reach (C,) [N] of tensions (C,) [N], if any of them balance the arm."""
+        low, high = np.maximum(self.low, of - reach), np.minimum(self.high, of + reach)
+        least = self.nearest(np.zeros_like(of), low, high) if (low <= high).all() else None
+        if least is None:
+            return None
+        moved = (least - self.least.values) @ self.least.posture.length_jacobian
+        residual = frozen(self.least.residual + moved)
+        return replace(
+            self,
+            least=replace(self.least, values=frozen(least), residual=residual),
+            low=low,
+            high=high,
+            jumps=tuple(
+                tuple(jump for jump in jumps if a <= jump < b)
+                for jumps, a, b in zip(self.jumps, low, high, strict=True)
+            ),
+        )
+
     def tension(self, F: Array) -> Tension:
         """Tensions F (C,) [N], their balance exact again, with the question they answer."""
         least = self.least

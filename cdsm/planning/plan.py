@@ -8,20 +8,18 @@ from typing import Final, final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm._checks import Array, ReadOnlyState, frozen, number_array
-from cdsm.errors import InvalidInput
+from cdsm._checks import Array, ReadOnlyState, frozen
 from cdsm.manipulator import Posture
 from cdsm.planning.attainable import MARGIN
 from cdsm.planning.planner import Planner
 from cdsm.planning.problem import (
-    Problem,
-    checked_direction,
+    achieved,
     checked_matrix,
     checked_targets,
     count,
     problem,
-    wanted_along,
-    wanted_cartesian,
+    unit_directions,
+    wanted,
 )
 from cdsm.stiffness import Stiffness, stiffness
 from cdsm.tension import Tension
@@ -151,16 +149,13 @@ def plan_stiffness(
     """
     question = problem(pose, minimum, maximum, wrench, margin)
     number, seed = count("starts", starts, 1), count("seed", seed, 0)
-    directions = None if direction is None else _directions(question, direction)
-    if directions is None:
-        targets = checked_matrix(target)
-        _ = stiffness(pose, question.region.least).cartesian  # where there is none, it says so
-        reading = wanted_cartesian(question, targets)
+    if direction is None:
+        directions, targets = None, checked_matrix(target)
     else:
+        directions = unit_directions(direction)
         targets = checked_targets(directions, target)
-        reading = wanted_along(question, directions.reshape(-1, 3), targets.reshape(-1))
 
-    planner = Planner(question, reading, number, seed)
+    planner = Planner(question, wanted(question, directions, targets), number, seed)
     found = planner.least()
     if found is None and directions is not None and targets.ndim == 0:
         found = planner.within_range(directions, float(targets))
@@ -169,30 +164,15 @@ def plan_stiffness(
 
     tension = question.region.tension(found.sight.point.F)
     K = stiffness(pose, tension)
-    achieved: float | Array
-    if directions is None:
-        achieved = K.cartesian
-    elif targets.ndim == 0:
-        achieved = K.along(directions)
-    else:
-        achieved = frozen(np.array([K.along(u) for u in directions]))
+    value = achieved(K, directions)
     return StiffnessPlan(
         tension=tension,
         stiffness=K,
         direction=directions,
         target=float(targets) if targets.ndim == 0 else targets,
-        achieved=achieved,
+        achieved=float(value) if value.ndim == 0 else value,
         floor=question.field.floor,
         efforts=frozen(np.array(planner.efforts)),
         iterations=planner.iterations,
         evaluations=question.field.evaluations,
     )
-
-
-def _directions(question: Problem, direction: ArrayLike) -> Array:
-    given = number_array("direction", direction)
-    if given.ndim == 2 and given.shape[1] == 3 and len(given):
-        return frozen(np.array([checked_direction(question, u) for u in given]))
-    if given.ndim == 2:
-        raise InvalidInput("direction", f"shape {given.shape} given; (3,) or (n, 3) is needed.")
-    return checked_direction(question, given)

@@ -13,7 +13,7 @@ from cdsm.manipulator import Manipulator, Posture
 from cdsm.planning.admissible import Admissible, admissible
 from cdsm.planning.field import Field, Part, Reading
 from cdsm.planning.gradient import require_finite
-from cdsm.stiffness import stiffness
+from cdsm.stiffness import Stiffness, stiffness
 
 _SYMMETRIC = 1e-9
 """Largest part of a matrix that may be skew by rounding."""
@@ -74,6 +74,42 @@ def checked_direction(question: Problem, direction: ArrayLike) -> Array:
     if stiffness(question.pose, question.region.least)._torque(u) is None:
         require_finite(np.inf, u)
     return u
+
+
+def unit_directions(direction: ArrayLike) -> Array:
+    """One unit direction (3,), or several (n, 3), in base axes.
+
+    Raises:
+        InvalidInput: None of the two, or one that is zero.
+    """
+    given = number_array("direction", direction)
+    if given.ndim == 2 and given.shape[1] == 3 and len(given):
+        return frozen(np.array([unit_direction("direction", u) for u in given]))
+    if given.ndim == 2:
+        raise InvalidInput("direction", f"shape {given.shape} given; (3,) or (n, 3) is needed.")
+    return unit_direction("direction", given)
+
+
+def wanted(question: Problem, directions: Array | None, target: Array) -> Reading:
+    """What is to be zero for a checked target [N/m] along directions, or of ``cartesian``.
+
+    Raises:
+        SingularStiffness: The tip cannot move along a direction; or there is no ``cartesian``.
+    """
+    if directions is None:
+        _ = stiffness(question.pose, question.region.least).cartesian  # what is missing it says
+        return wanted_cartesian(question, target)
+    for u in directions.reshape(-1, 3):
+        checked_direction(question, u)
+    return wanted_along(question, directions.reshape(-1, 3), target.reshape(-1))
+
+
+def achieved(K: Stiffness, directions: Array | None) -> Array:
+    """What a stiffness says where a target was given: (), (n,) or (3, 3) [N/m]."""
+    if directions is None:
+        return K.cartesian
+    along = [K.along(u) for u in directions.reshape(-1, 3)]
+    return frozen(np.array(along).reshape(directions.shape[:-1]))
 
 
 def unstable(arm: Manipulator, problem: str, mode: Array) -> SingularStiffness:

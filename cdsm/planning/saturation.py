@@ -31,7 +31,7 @@ _JUST: Final = 1e-9
 """This part beyond a place is the other side of it."""
 
 _INSET: Final = 1e-6
-"""The curve keeps this part of its length away from where the arm buckles."""
+"""This part of its length the curve keeps away from an end without slope: buckling, or balance."""
 
 _ENDS: Final[dict[End, str]] = {
     "buckling": "where the arm buckles",
@@ -156,6 +156,9 @@ def saturation(
     top = min(highest, float(ceiling.min()))
     high = max(reach(at, low, max(top, low)), low)
     first, last = _stable(at, low, high)
+    limit = "buckling" if last < high else _limit(at, pull(high), high)
+    if limit in ("maximum", "infeasible"):
+        last -= _INSET * (last - first)
 
     def value(lower: float) -> float:
         return at(lower).along(u)
@@ -180,7 +183,7 @@ def saturation(
         steepest=steepest,
         steepest_slope=largest,
         stiffest=_stiffest(curve, value, slope),
-        limit="buckling" if last < high else _limit(at, pull(high), high),
+        limit=limit,
         curve=frozen(curve),
     )
 

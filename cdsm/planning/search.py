@@ -45,7 +45,7 @@ _PREMIUM = 3.0
 
 @dataclass(frozen=True)
 class Goal:
-    """f = effort·½‖F/unit‖² + linear·Σc + square·½‖c‖², and whether c = 0 is asked for."""
+    """f = effort·½‖(F − centre)/unit‖² + linear·Σc + square·½‖c‖², and whether c = 0 is asked."""
 
     effort: float = 0.0
     linear: float = 0.0
@@ -71,6 +71,7 @@ class Task:
         reading: c.
         goal: f.
         unit: What effort is counted in [N]: of the order of the tensions sought.
+        centre: Tensions (C,) [N] that effort is counted from, or 0.
     """
 
     region: Admissible
@@ -79,6 +80,7 @@ class Task:
     reading: Reading
     goal: Goal
     unit: float
+    centre: Array | float = 0.0
 
     def look(self, point: Point) -> Sight:
         """C at a point."""
@@ -87,7 +89,7 @@ class Task:
     def merit(self, sight: Sight, penalty: float) -> float:
         """f, and the price of c."""
         goal, c = self.goal, sight.values
-        x = sight.point.F / self.unit
+        x = (sight.point.F - self.centre) / self.unit
         merit = 0.5 * goal.effort * float(x @ x)
         if goal.constrained:
             return merit + penalty * _price(c)
@@ -211,7 +213,7 @@ def _model(task: Task, here: Sight, y: Array, z: float) -> _Model:
     relative = size / task.unit
     G = here.slopes * size
     weights = y if goal.constrained else goal.linear + goal.square * c
-    g = goal.effort * relative * point.F / task.unit
+    g = goal.effort * relative * (point.F - task.centre) / task.unit
     W = here.curvature(weights) * size**2
     W[np.diag_indices(len(W))] += goal.effort * relative**2
     if not goal.constrained:

@@ -1,0 +1,96 @@
+"""Paths from CSV files: joint angles or tip positions, and stiffness, with their units."""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from cdsm._checks import Array
+from cdsm._files import read_text
+from cdsm.errors import FileError
+
+_ANGLE: Final = {"deg": math.pi / 180.0, "°": math.pi / 180.0, "rad": 1.0}
+_LENGTH: Final = {"mm": 1e-3, "m": 1.0}
+_STIFFNESS: Final = {"N/mm": 1e3, "N/m": 1.0}
+
+
+class PathFile(NamedTuple):
+    """A path of S samples, in SI.
+
+    Attributes:
+        angles: Joint angles (S, nv) [rad], or None where there are tips.
+        tips: Tip positions (S, 3) [m], or None where there are angles.
+        target: Stiffness (S,) [N/m], or None if the file has none.
+    """
+
+    angles: Array | None
+    tips: Array | None
+    target: Array | None
+
+
+def read_path(path: Path, joints: Sequence[str]) -> PathFile:
+    """Read a path; the header names the columns and their units, and further ones are ignored.
+
+    Args:
+        path: The file: a header and a line for each sample, separated by commas; lines that begin
+            with # are comments.
+        joints: Names of the joints of the arm.
+
+    Raises:
+        FileError: It cannot be read, columns or units are missing, or an entry is not a number; the
+            line is named.
+    """
+    lines = [(k, line) for k, line in enumerate(read_text(path).splitlines(), 1) if line.strip()]
+    lines = [(k, line) for k, line in lines if not line.lstrip().startswith("#")]
+    rows = [(k, [cell.strip() for cell in next(csv.reader([line]))]) for k, line in lines]
+    if len(rows) < 2:
+        raise FileError(path, "holds no path; a header and one line per sample are needed.")
+    units: dict[str, tuple[int, str]] = {}
+    for at, cell in enumerate(rows[0][1]):
+        name, unit = re.fullmatch(r"(.*?)\s*(?:\[(.*)\])?", cell).groups()  # type: ignore[union-attr]
+        if name in units:
+            raise FileError(path, f"has two columns called {name}; give each once.")
+        units[name] = at, unit or ""
+
+    def columns(names: Sequence[str], known: dict[str, float]) -> Array | None:
+        if not any(name in units for name in names):
+            return None
+        found = []
+        for name in names:
+            at, unit = units.get(name, (-1, ""))
+            if unit not in known:
+                what = f"the column {name} has no unit that is known" if at >= 0 else ""
+                raise FileError(
+                    path,
+                    f"{what or f'has no column {name}'}; call it "
+                    f"{' or '.join(f'{name} [{each}]' for each in known)}.",
+                )
+            found.append([known[unit] * _number(path, k, row, at) for k, row in rows[1:]])
+        return np.array(found).T
+
+    angles, tips = columns(joints, _ANGLE), columns(("x", "y", "z"), _LENGTH)
+    if (angles is None) == (tips is None):
+        raise FileError(
+            path,
+            f"has columns for {'neither' if angles is None else 'both'} of joint angles "
+            f"({joints[0]} [deg], …) and tip positions (x [mm], y [mm], z [mm]); give one of them.",
+        )
+    target = columns(("target",), _STIFFNESS)
+    return PathFile(angles, tips, None if target is None else target[:, 0])
+
+
+def _number(path: Path, line: int, row: list[str], at: int) -> float:
+    cell = row[at] if at < len(row) else ""
+    try:
+        value = float(cell)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise FileError(path, f"line {line}: {cell!r} is not a finite number.")
+    return value

@@ -1,0 +1,197 @@
+"""``cdsm plan``: tensions for a wanted stiffness, at one posture or along a path."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, NamedTuple
+
+import typer
+
+from cdsm._files import write_file
+from cdsm.cli.options import (
+    DOWN,
+    NO_WRENCH,
+    Angles,
+    AsJson,
+    GeometryFile,
+    Gravity,
+    MaxTension,
+    MinTension,
+    Picture,
+    Rigidity,
+    Spring,
+    Wire,
+    Wrench,
+    at_angles,
+    manipulator,
+    numbers,
+    reported,
+    show_json,
+)
+from cdsm.cli.path_file import PathFile, read_path
+from cdsm.manipulator import Manipulator, Posture
+from cdsm.planning import (
+    PathPlan,
+    StiffnessPlan,
+    StiffnessRange,
+    plan_path,
+    plan_stiffness,
+    stiffness_range,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_Bounds = tuple[float, float, list[float]]
+"""Lower and upper bound of the tensions [N], and the wrench."""
+
+
+def plan(
+    geometry: GeometryFile,
+    direction: Annotated[
+        str, typer.Option(help="Along which the arm is to be so stiff.", metavar="X,Y,Z")
+    ],
+    target: Annotated[
+        float | None,
+        typer.Option(help="Wanted stiffness [N/mm]; PATH.csv can give it for every sample."),
+    ] = None,
+    angles: Angles = "0",
+    path: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="PATH.csv",
+            help="Instead of --angles, a line per sample. Columns, with the unit in brackets: the "
+            "joints in deg, or x, y, z of the tip in mm; and, if wanted, target in N/mm.",
+        ),
+    ] = None,
+    rate: Annotated[
+        float, typer.Option(help="How much a tension may change per sample of --path [N].")
+    ] = math.inf,
+    min_tension: MinTension = 10.0,
+    max_tension: MaxTension = math.inf,
+    rigidity: Rigidity = None,
+    wire: Wire = None,
+    spring: Spring = math.inf,
+    wrench: Wrench = NO_WRENCH,
+    gravity: Gravity = DOWN,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", "-o", metavar="FILE.csv", help="Tensions and cable lengths to write, in SI."
+        ),
+    ] = None,
+    figure: Picture = None,
+    as_json: AsJson = False,
+) -> None:
+    """Find the least tensions that make an arm as stiff as wanted, at a posture or along a path."""
+    with reported():
+        arm = manipulator(geometry, rigidity=rigidity, wire=wire, spring=spring, gravity=gravity)
+        u, load = numbers("--direction", direction, 3), numbers("--wrench", wrench, 6)
+        wanted = None if target is None else 1000.0 * target
+        bounds = min_tension, max_tension, load
+        if path is not None:
+            answer = _along_path(arm, read_path(path, arm.joint_names), u, wanted, bounds, rate)
+        elif wanted is None:
+            raise typer.BadParameter("give it, or --path.", param_hint="--target")
+        elif math.isfinite(rate):
+            raise typer.BadParameter("is of a path; give --path, too.", param_hint="--rate")
+        else:
+            answer = _at_posture(at_angles(arm, angles), u, wanted, bounds)
+        if as_json:
+            show_json(answer.numbers)
+        else:
+            typer.echo(f"{arm.geometry}\n\n{answer.text}")
+        if out is not None:
+            typer.echo(f"written: {answer.motors().write_csv(out)}", err=as_json)
+        if figure is not None:
+            typer.echo(f"written: {write_file(figure, answer.draw().savefig)}", err=as_json)
+
+
+class _Answer(NamedTuple):
+    """What is told, and what can be written."""
+
+    text: str
+    numbers: dict[str, object]
+    motors: Callable[[], PathPlan]
+    draw: Callable[[], Figure]
+
+
+def _at_posture(pose: Posture, u: list[float], target: float, bounds: _Bounds) -> _Answer:
+    """The plan at one posture, and the range."""
+    attainable = stiffness_range(pose, u, *bounds)
+    found = plan_stiffness(pose, u, target, *bounds)
+
+    def motors() -> PathPlan:  # the same search, as a path of one sample
+        return plan_path(pose.arm, u, target, *bounds, angles=[pose.q])
+
+    def draw() -> Figure:
+        from cdsm.plots import plot_stiffness_plan  # matplotlib, only where it is wanted
+
+        return plot_stiffness_plan(found, attainable)
+
+    return _Answer(f"{attainable}\n\n{found}", _plan_to_dict(found, attainable), motors, draw)
+
+
+def _along_path(
+    arm: Manipulator,
+    file: PathFile,
+    u: list[float],
+    target: float | None,
+    bounds: _Bounds,
+    rate: float,
+) -> _Answer:
+    """The plan of a path whose targets [N/m] are in its file, or all the same."""
+    wanted = file.target if target is None else target
+    if wanted is None or (target is not None and file.target is not None):
+        raise typer.BadParameter(
+            "give it, or a column target [N/mm] in the file of --path; "
+            f"{'neither was' if wanted is None else 'both were'} given.",
+            param_hint="--target",
+        )
+    path = plan_path(arm, u, wanted, *bounds, angles=file.angles, tips=file.tips, rate=rate)
+
+    def draw() -> Figure:
+        from cdsm.plots import plot_path_plan  # matplotlib, only where it is wanted
+
+        return plot_path_plan(path)
+
+    return _Answer(str(path), _path_to_dict(path), lambda: path, draw)
+
+
+def _plan_to_dict(plan: StiffnessPlan, attainable: StiffnessRange) -> dict[str, object]:
+    """Range and plan, in SI units."""
+    pose = plan.tension.posture
+    names = [cable.name for cable in pose.arm.cables]
+    return {
+        "direction": attainable.direction.tolist(),
+        "low_N_per_m": attainable.low,
+        "high_N_per_m": attainable.high,
+        "target_N_per_m": plan.target,
+        "achieved_N_per_m": plan.achieved,
+        "tension_N": dict(zip(names, plan.tension.values.tolist(), strict=True)),
+        "cable_length_m": dict(zip(names, pose.cable_lengths.tolist(), strict=True)),
+        "angles_rad": dict(zip(pose.arm.joint_names, pose.q.tolist(), strict=True)),
+        "margin_Nm_per_rad": plan.stiffness.margin,
+        "efforts_N": plan.efforts.tolist(),
+        "iterations": plan.iterations,
+    }
+
+
+def _path_to_dict(plan: PathPlan) -> dict[str, object]:
+    """Every sample of a path, in SI units."""
+    return {
+        "cables": [cable.name for cable in plan.arm.cables],
+        "target_N_per_m": plan.target.tolist(),
+        "planned": list(plan.planned),
+        "achieved_N_per_m": plan.achieved.tolist(),
+        "angles_rad": plan.angles.tolist(),
+        "tensions_N": plan.tensions.tolist(),
+        "cable_lengths_m": plan.cable_lengths.tolist(),
+        "infeasible": [
+            {"index": each.index, "status": each.status, "reason": each.reason}
+            for each in plan.infeasible
+        ],
+        "iterations": plan.iterations,
+    }

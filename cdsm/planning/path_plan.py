@@ -1,0 +1,191 @@
+"""What is planned along a path: tensions, stiffness, what the motors do, and what cannot be."""
+
+from __future__ import annotations
+
+import csv
+import io
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import groupby
+from pathlib import Path
+from typing import final
+
+import numpy as np
+
+from cdsm._checks import Array, ReadOnlyState, frozen
+from cdsm._files import write_text
+from cdsm.cable import Cable
+from cdsm.errors import CdsmError
+from cdsm.manipulator import Manipulator
+from cdsm.planning.follow import Status
+from cdsm.stiffness import Stiffness
+
+
+@final
+@dataclass(frozen=True)
+class InfeasibleSample:
+    """A sample of a path that cannot be planned.
+
+    Attributes:
+        index: Which one, from 0.
+        status: What stands against it: ``"posture"`` (a joint limit, a cable without direction, or
+            the tip does not reach), ``"balance"`` (no tensions within the bounds), ``"elasticity"``
+            (none within its domain), ``"singular"`` (none hold the arm, or the tip cannot move
+            along u), ``"stiffness"`` (none hit the target) or ``"rate"`` (some do, but too far from
+            those of the samples before).
+        reason: The same in words, with the remedy.
+        error: What a planner of this sample alone raises, with its data; None if it would not.
+    """
+
+    index: int
+    status: Status
+    reason: str
+    error: CdsmError | None = None
+
+
+@final
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class PathPlan(ReadOnlyState):
+    """Tensions along a path, with the question they answer; made by :func:`plan_path`.
+
+    Of S samples P are planned: arrays of the answer have a row for each of those.
+
+    Attributes:
+        arm: The arm.
+        direction: Unit directions u in base axes, (3,) or (n, 3); None for a target of
+            ``cartesian``.
+        target: What was asked for at every sample [N/m]: (S,), one per direction (S, n), or
+            (S, 3, 3).
+        rate: By how much a tension may change per step (C,) [N]; may hold inf.
+        planned: Which samples are planned, from 0.
+        angles: Joint angles (P, nv) [rad].
+        tensions: F (P, C) [N].
+        achieved: What ``stiffness.along`` or ``stiffness.cartesian`` says, (P,), (P, n) or
+            (P, 3, 3) [N/m].
+        stiffness: K_θ at each planned sample, with its posture and wrench.
+        infeasible: The other samples, each with its reason.
+        iterations: Steps of all searches.
+    """
+
+    arm: Manipulator
+    direction: Array | None
+    target: Array
+    rate: Array
+    planned: tuple[int, ...]
+    angles: Array
+    tensions: Array
+    achieved: Array
+    stiffness: tuple[Stiffness, ...]
+    infeasible: tuple[InfeasibleSample, ...]
+    iterations: int
+
+    @property
+    def complete(self) -> bool:
+        """Whether every sample is planned."""
+        return not self.infeasible
+
+    @cached_property
+    def steps(self) -> Array:
+        """Largest change of a tension per step since the planned sample before (P,) [N].
+
+        Zero for the first.
+        """
+        changes = np.zeros(len(self.planned))
+        moved = abs(np.diff(self.tensions, axis=0)).max(axis=1, initial=0.0)
+        changes[1:] = moved / np.diff(self.planned)
+        return frozen(changes)
+
+    @cached_property
+    def cable_lengths(self) -> Array:
+        """L (P, C) [m], lead included."""
+        lengths = [K.posture.cable_lengths for K in self.stiffness]
+        return frozen(np.array(lengths).reshape(self.tensions.shape))
+
+    @cached_property
+    def unstrained_lengths(self) -> Array:
+        """What the motors of the H position-controlled cables have paid out (P, H) [m].
+
+        The l_0 with l_0 + Δl(F, l_0) = L, Δl being :meth:`~cdsm.cable.Cable.elongation`: it counts
+        from the low end of the elasticity's domain, so that l_0 is the length at that tension, with
+        the series spring at rest.
+        """
+        columns = []
+        for c, cable in self._held:
+            F, L = self.tensions[:, c], self.cable_lengths[:, c]
+            spring = (F - cable.elasticity.domain.low) / cable.series_stiffness
+            columns.append((L - spring) / (1.0 + cable.elasticity.strain(F)))
+        rows = np.array(columns).reshape(len(columns), len(self.planned))
+        return frozen(rows.T.copy())
+
+    @property
+    def _held(self) -> list[tuple[int, Cable]]:
+        """The cables whose motors hold a length, with their numbers."""
+        return [(c, each) for c, each in enumerate(self.arm.cables) if each.control == "position"]
+
+    def write_csv(self, path: str | os.PathLike[str]) -> Path:
+        """Write what the motors have to do, a line for each sample, SI units; return the path.
+
+        The columns are ``sample``, ``status``, joint angles [rad], and for each cable its tension
+        [N], its length [m] and, if the motor holds that, the unstrained length [m]. Of an
+        infeasible sample there is only the status, and the reason in the last column.
+
+        Args:
+            path: The file; it is written whole or not at all.
+
+        Raises:
+            FileError: It cannot be written.
+        """
+        names = [cable.name for cable in self.arm.cables]
+        header = [
+            *("sample", "status"),
+            *(f"{name} [rad]" for name in self.arm.joint_names),
+            *(f"{name} tension [N]" for name in names),
+            *(f"{name} length [m]" for name in names),
+            *(f"{cable.name} unstrained length [m]" for _, cable in self._held),
+            "reason",
+        ]
+        numbers = np.hstack(
+            [self.angles, self.tensions, self.cable_lengths, self.unstrained_lengths]
+        )
+        rows: dict[int, list[object]] = {
+            i: [i, "planned", *row, ""]
+            for i, row in zip(self.planned, numbers.tolist(), strict=True)
+        }
+        empty = [""] * numbers.shape[1]
+        rows |= {
+            each.index: [each.index, each.status, *empty, each.reason] for each in self.infeasible
+        }
+        text = io.StringIO()
+        writer = csv.writer(text, lineterminator="\n")
+        writer.writerow(header)
+        writer.writerows(rows[i] for i in sorted(rows))
+        return write_text(path, text.getvalue())
+
+    def __repr__(self) -> str:
+        return f"<PathPlan of {len(self.planned)} of {len(self.target)} samples>"
+
+    def __str__(self) -> str:
+        lines = [f"{len(self.planned)} of {len(self.target)} samples planned"]
+        if self.planned:
+            F = self.tensions
+            lines[0] += f", with {F.min():.4g} to {F.max():.4g} N"
+        if len(self.planned) > 1:
+            lines[0] += f", which change by up to {self.steps.max():.4g} N per step"
+        for first, last in _runs(self.infeasible):
+            where = f"sample {first.index}"
+            if last is not first:
+                where = f"samples {first.index} to {last.index}"
+            lines.append(f"{where}: {first.status}: {first.reason}")
+        return "\n".join(lines)
+
+
+def _runs(
+    samples: tuple[InfeasibleSample, ...],
+) -> Iterator[tuple[InfeasibleSample, InfeasibleSample]]:
+    """First and last of infeasible samples that follow each other and have one status."""
+    numbered = enumerate(samples)
+    for _, run in groupby(numbered, key=lambda pair: (pair[1].index - pair[0], pair[1].status)):
+        together = [each for _, each in run]
+        yield together[0], together[-1]

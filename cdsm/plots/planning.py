@@ -1,0 +1,98 @@
+"""What the cables can make of an arm's stiffness, and what is planned with them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from cdsm._checks import Array, instance
+from cdsm.errors import InvalidInput
+from cdsm.planning import PathPlan, StiffnessPlan, StiffnessRange
+from cdsm.plots.style import COLORS, N_PER_MM
+
+_SAME = 1e-9
+"""Entries of unit directions this near to each other are of one."""
+
+
+def plot_stiffness_plan(plan: StiffnessPlan, attainable: StiffnessRange) -> Figure:
+    """Tensions of every cable where the arm is softest, as planned, and where it is stiffest.
+
+    Args:
+        plan: What :func:`~cdsm.planning.plan.plan_stiffness` returns for one direction.
+        attainable: The range along that direction at that posture.
+
+    Raises:
+        InvalidInput: Not a plan and a range, or not of one posture and direction.
+    """
+    instance("plan", plan, StiffnessPlan)
+    instance("attainable", attainable, StiffnessRange)
+    one, other = plan.tension.posture, attainable.posture
+    same = one.arm == other.arm and np.array_equal(one.q, other.q)
+    u = np.zeros(3) if plan.direction is None else plan.direction
+    if not same or not np.allclose(u, attainable.direction, rtol=0.0, atol=_SAME):
+        raise InvalidInput("attainable", "is not of the posture and the direction of the plan.")
+    figure = Figure(figsize=(8.0, 4.0), layout="constrained")
+    axes: Any = figure.subplots()
+    names = [cable.name for cable in attainable.posture.arm.cables]
+    for pull, value, name, color, marker in (
+        (attainable.low_tension, attainable.low, "softest", COLORS[2], "v"),
+        (plan.tension, float(plan.achieved), "planned", COLORS[0], "o"),
+        (attainable.high_tension, attainable.high, "stiffest", COLORS[1], "^"),
+    ):
+        label = f"{name}: {N_PER_MM * value:.4g} N/mm"
+        axes.plot(names, pull.values, marker, color=color, label=label, linestyle=":")
+    axes.set(ylabel="tension [N]", title=f"stiffness along {_named(attainable.direction)}")
+    axes.set_ylim(bottom=0.0)
+    axes.tick_params(axis="x", rotation=60)
+    axes.grid(alpha=0.3)
+    axes.legend(fontsize=8)
+    return figure
+
+
+def plot_path_plan(plan: PathPlan) -> Figure:
+    """Stiffness wanted and planned, and the tensions, over the samples; infeasible ones shaded.
+
+    Args:
+        plan: What :func:`~cdsm.planning.path.plan_path` returns for one direction or several.
+
+    Raises:
+        InvalidInput: Not a plan of a path, or one of ``cartesian``.
+    """
+    instance("plan", plan, PathPlan)
+    if plan.direction is None:
+        raise InvalidInput("plan", "is one of cartesian; only stiffness along directions is drawn.")
+    figure = Figure(figsize=(8.0, 5.5), layout="constrained")
+    above: Any
+    below: Any
+    above, below = figure.subplots(2, 1, sharex=True)
+    size = len(plan.target)
+    wanted = N_PER_MM * plan.target.reshape(size, -1)
+    # a line over a gap would be a claim about it
+    held, pulls = np.full(wanted.shape, np.nan), np.full((size, plan.tensions.shape[1]), np.nan)
+    rows = list(plan.planned)
+    held[rows] = N_PER_MM * plan.achieved.reshape(len(rows), -1)
+    pulls[rows] = plan.tensions
+    for k, u in enumerate(plan.direction.reshape(-1, 3)):
+        color = COLORS[k % len(COLORS)]
+        above.plot(wanted[:, k], color="0.6", linewidth=3.0, label="wanted" if k == 0 else None)
+        above.plot(held[:, k], ".-", color=color, linewidth=1.0, markersize=3, label=_named(u))
+    below.plot(pulls, ".-", color=COLORS[0], linewidth=0.9, markersize=2, alpha=0.7)
+    for axes in (above, below):
+        for each in plan.infeasible:
+            axes.axvspan(
+                each.index - 0.5, each.index + 0.5, color=COLORS[1], alpha=0.15, linewidth=0.0
+            )
+        axes.margins(y=0.1)
+        axes.set_ylim(bottom=0.0)
+        axes.grid(alpha=0.3)
+    above.set(ylabel="stiffness [N/mm]", title=f"{plan.arm.geometry.name}; shaded: infeasible")
+    above.legend(title="along", fontsize=8, title_fontsize=8)
+    below.set(xlabel="sample", ylabel="tension of each cable [N]")
+    return figure
+
+
+def _named(u: Array) -> str:
+    """A direction in words, what is rounding in it as zero."""
+    return f"({', '.join(f'{x:z.3g}' for x in np.round(u, 9))})"
