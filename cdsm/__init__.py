@@ -12,6 +12,7 @@ SI units throughout; base frame with x along the straight arm.
 from importlib.metadata import version as _version
 
 from cdsm import presets
+from cdsm.batch import Batch, Status, Tensions, distribute_tensions, evaluate
 from cdsm.buckling import CriticalLoad, CriticalTension, critical_load, critical_tension
 from cdsm.cable import Cable, Site, in_series, serpentine_cables
 from cdsm.elasticity import Domain, Elasticity, LinearElasticity
@@ -70,6 +71,7 @@ from cdsm.wire_file import read_elasticity, write_elasticity
 __version__ = _version("cdsm-stiffness")
 
 __all__ = [
+    "Batch",
     "Cable",
     "CableError",
     "CableRoute",
@@ -106,6 +108,7 @@ __all__ = [
     "SingularStiffness",
     "Site",
     "SolverError",
+    "Status",
     "Stiffness",
     "StiffnessGradient",
     "StiffnessPlan",
@@ -116,6 +119,7 @@ __all__ = [
     "TensileTest",
     "TensileTestError",
     "Tension",
+    "Tensions",
     "UnknownName",
     "UnreachableStiffness",
     "UrdfError",
@@ -123,7 +127,9 @@ __all__ = [
     "critical_load",
     "critical_tension",
     "distribute_tension",
+    "distribute_tensions",
     "equilibrium",
+    "evaluate",
     "fit_tensile_test",
     "identify",
     "in_series",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import fields
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,9 +16,10 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 _Kind = TypeVar("_Kind")
+_AnyArray = TypeVar("_AnyArray", bound=NDArray[Any])
 
 
-def frozen(array: Array) -> Array:
+def frozen(array: _AnyArray) -> _AnyArray:
     """Return the array itself, made read-only."""
     array.setflags(write=False)
     return array
@@ -94,22 +95,27 @@ def vector(name: str, value: ArrayLike, size: int, meaning: str) -> Array:
     return array
 
 
-def bound(name: str, value: ArrayLike, size: int) -> Array:
-    """Return a read-only vector (size,) from a scalar or a vector that may hold ±inf."""
+def bound(name: str, value: ArrayLike, size: int, rows: int | None = None) -> Array:
+    """Return a read-only vector (size,) from a scalar or a vector that may hold ±inf.
+
+    With ``rows`` it may be an array (rows, size) too, and is returned as such.
+    """
     # a float for all is the usual case, and a hot one
     array: Array = np.full(size, value) if isinstance(value, float) else _native(name, value)
     if array.ndim == 0:
         array = array.repeat(size)
-    if array.shape != (size,):
+    if array.shape != (size,) and (rows is None or array.shape != (rows, size)):
+        wanted = f"({size},)" if rows is None else f"({size},) or ({rows}, {size})"
         raise InvalidInput(
-            name, f"shape {array.shape} given; give one number, or ({size},): one per cable [N]."
+            name, f"shape {array.shape} given; give one number, or {wanted}: one per cable [N]."
         )
     usable = (abs(array) <= LARGEST) | np.isinf(array)
-    if np.count_nonzero(usable) < size:
-        bad = int(usable.argmin())
+    if np.count_nonzero(usable) < array.size:
+        bad = np.argwhere(~usable)[0]
         raise InvalidInput(
             name,
-            f"entry [{bad}] is {array[bad]:g}; give newtons up to {LARGEST:g}, or inf.",
+            f"entry [{', '.join(map(str, bad))}] is {array[tuple(bad)]:g}; give newtons up to "
+            f"{LARGEST:g}, or inf.",
         )
     return frozen(array)
 
@@ -158,4 +164,4 @@ def _native(name: str, value: ArrayLike) -> Array:
     if array.dtype == np.float64:
         return np.array(array, order="C")
     with np.errstate(over="ignore"):  # what exceeds float64 becomes inf, which is refused later
-        return array.astype(np.float64)
+        return array.astype(np.float64, order="C")

@@ -13,14 +13,13 @@ the same side the second derivative is z_i × d_j.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Any, NamedTuple, TypeVar, cast
+from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from cdsm._checks import Array
+from cdsm._checks import Array, frozen
+from cdsm._compiled import compiled, inlined
 
 Indices = NDArray[np.intp]
 
@@ -28,34 +27,35 @@ SHORTEST_SEGMENT = 1e-9
 """A segment shorter than this [m] has no direction: its two sites coincide."""
 
 
-_Function = TypeVar("_Function", bound=Callable[..., Any])
-
-
-def compiled(function: _Function) -> _Function:
-    """Compile for speed, once for all runs if there is a place to keep the result.
-
-    No fastmath: it may drop NaN. Divisions are not guarded: none here is by zero.
-    """
-    try:
-        return cast(_Function, njit(cache=True, error_model="numpy")(function))
-    except RuntimeError:  # neither the package's folder nor the user's cache can be written
-        return cast(_Function, njit(error_model="numpy")(function))
-
-
 class Tree(NamedTuple):
     """The kinematic tree as plain arrays; row 0 is the base, row i joint i.
 
     Attributes:
         parent: Row of the joint before, (nv+1,).
-        rotation: Joint frame in its parent joint's frame at q = 0, (nv+1, 3, 3).
-        translation: Likewise its origin, (nv+1, 3) [m].
-        axis: Unit axis in the joint's own frame, (nv+1, 3).
+        turn: Three matrices of each joint, (nv+1, 3, 3, 3): by Rodrigues' formula the first, plus
+            the second times cos q, plus the third times sin q, is the rotation of its frame in
+            that of the joint before.
+        translation: Origin in the frame of the joint before, (nv+1, 3) [m].
+        axis: Unit axis, likewise, (nv+1, 3).
     """
 
     parent: Indices
-    rotation: Array
+    turn: Array
     translation: Array
     axis: Array
+
+    @classmethod
+    def of(cls, parent: Indices, rotation: Array, translation: Array, axis: Array) -> Tree:
+        """From joint frames at q = 0 in the frames before, and axes in the joints' own."""
+        along = axis[:, :, None] * axis[:, None, :]
+        cross = np.cross(axis[:, None, :], np.eye(3)).transpose(0, 2, 1)
+        parts = np.stack([along, np.eye(3) - along, cross], axis=1)
+        return cls(
+            parent=frozen(parent),
+            turn=frozen(rotation[:, None] @ parts),
+            translation=frozen(translation),
+            axis=frozen((rotation @ axis[:, :, None])[:, :, 0].copy()),
+        )
 
 
 class Routing(NamedTuple):
@@ -66,10 +66,10 @@ class Routing(NamedTuple):
     Attributes:
         row: Row of the joint that moves each site, (P,).
         point: The site in the frame of that joint, (P, 3) [m].
-        segment: For each segment its cable, site a, site b, and where its joints begin in
-            ``joint``, (S+1, 4); the last row only says where the joints end.
-        joint: The joints between a and b, ancestors first on each side: the row with a plus on the
-            way to b, with a minus on the way to a.
+        segment: For each segment its cable, site a, site b, and where in ``joint`` its joints
+            begin and those on the way to b, (S+1, 5); the last row only says where they end.
+        joint: Rows of the joints between a and b: those on the way to a, then those on the way to
+            b, ancestors first.
         fixed: Length that joints do not change: lead and segments within one link, (C,) [m].
     """
 
@@ -96,62 +96,38 @@ class Frames(NamedTuple):
 
 @compiled
 def place(
-    parent: Indices,
-    rotation: Array,
-    translation: Array,
-    axis: Array,
-    row: Indices,
-    point: Array,
-    q: Array,
-) -> tuple[Array, Array, Array]:
-    """Forward kinematics: return the fields of :class:`Frames` at the joint angles q (nv,)."""
-    count = parent.shape[0]
-    R = np.zeros((count, 3, 3))
-    o = np.zeros((count, 3))
-    z = np.zeros((count, 3))
-    x = np.empty((row.shape[0], 3))
-    turn = np.empty((3, 3))
-    for d in range(3):
-        R[0, d, d] = 1.0
-    for i in range(1, count):
+    tree: Tree, row: Indices, point: Array, q: Array, rotation: Array, frames: Frames
+) -> None:
+    """Forward kinematics at q (nv,): fill the rotations of the joints (nv+1, 3, 3) and frames."""
+    parent, turn, translation, local_axis = tree
+    origin, axis, site = frames
+    for r in range(3):
+        origin[0, r] = axis[0, r] = 0.0
+        for c in range(3):
+            rotation[0, r, c] = 1.0 if r == c else 0.0
+    for i in range(1, parent.shape[0]):
         before = parent[i]
-        _axis_rotation(axis, i, q[i - 1], turn)
+        cosine, sine = math.cos(q[i - 1]), math.sin(q[i - 1])
         for r in range(3):
-            o[i, r] = o[before, r]
-            for k in range(3):
-                o[i, r] += R[before, r, k] * translation[i, k]
-                fixed = 0.0
-                for m in range(3):
-                    fixed += R[before, r, m] * rotation[i, m, k]
-                for c in range(3):
-                    R[i, r, c] += fixed * turn[k, c]
-        for r in range(3):
+            x, y, z = rotation[before, r, 0], rotation[before, r, 1], rotation[before, r, 2]
+            t, a = translation[i], local_axis[i]
+            origin[i, r] = origin[before, r] + (x * t[0] + y * t[1] + z * t[2])
+            axis[i, r] = x * a[0] + y * a[1] + z * a[2]
             for c in range(3):
-                z[i, r] += R[i, r, c] * axis[i, c]
+                rotation[i, r, c] = (
+                    x * (turn[i, 0, 0, c] + cosine * turn[i, 1, 0, c] + sine * turn[i, 2, 0, c])
+                    + y * (turn[i, 0, 1, c] + cosine * turn[i, 1, 1, c] + sine * turn[i, 2, 1, c])
+                    + z * (turn[i, 0, 2, c] + cosine * turn[i, 1, 2, c] + sine * turn[i, 2, 2, c])
+                )
     for p in range(row.shape[0]):
         i = row[p]
+        x, y, z = point[p, 0], point[p, 1], point[p, 2]
         for r in range(3):
-            x[p, r] = o[i, r] + (
-                R[i, r, 0] * point[p, 0] + R[i, r, 1] * point[p, 1] + R[i, r, 2] * point[p, 2]
-            )
-    return o, z, x
+            shift = rotation[i, r, 0] * x + rotation[i, r, 1] * y + rotation[i, r, 2] * z
+            site[p, r] = origin[i, r] + shift
 
 
-@compiled
-def _axis_rotation(axis: Array, row: int, angle: float, out: Array) -> None:
-    """Rodrigues' formula for one row of axes."""
-    s, c = math.sin(angle), math.cos(angle)
-    for i in range(3):
-        for j in range(3):
-            out[i, j] = (1.0 - c) * axis[row, i] * axis[row, j]
-        out[i, i] += c
-    for i in range(3):
-        j, m = (i + 1) % 3, (i + 2) % 3
-        out[j, i] += s * axis[row, m]
-        out[i, j] -= s * axis[row, m]
-
-
-@compiled
+@inlined
 def _direction(site: Array, a: int, b: int) -> tuple[float, float, float, float]:
     """Unit vector from site a to site b, and their distance; zeros if they coincide."""
     x = site[b, 0] - site[a, 0]
@@ -163,23 +139,133 @@ def _direction(site: Array, a: int, b: int) -> tuple[float, float, float, float]
     return x / length, y / length, z / length, length
 
 
+@inlined
+def _add_side(
+    side: float,
+    site: int,
+    joints: tuple[int, int, int],
+    joint: Indices,
+    frames: Frames,
+    direction: tuple[float, float, float, float],
+    weight: float,
+    bent: Array,
+    cable: int,
+    slopes: Array,
+    page: int,
+    curvature: Array,
+) -> None:
+    """Add what the joints on the way to one end of a segment do to J_L and H_L, for i ≤ j only.
+
+    Args:
+        side: +1 on the way to b, −1 on the way to a.
+        site: The site at that end.
+        joints: Where the joints of the segment begin, where those of this side, and where they end.
+        joint: Rows of the joints.
+        frames: Where they are.
+        direction: u and ℓ.
+        weight: Of ∂²ℓ/∂θ_i∂θ_j.
+        bent: For each joint of the segment what stands before d_j in that times the weight,
+            (1 − uuᵀ) d_i/ℓ, and, if on the same side, u × z_i: u·(z_i × d_j) = (u × z_i)·d_j.
+        cable: Row of the slopes.
+        slopes: J_L, or no rows.
+        page: Of the curvature.
+        curvature: H_L, or no pages.
+    """
+    first, begin, end = joints
+    ux, uy, uz, length = direction
+    inverse = 1.0 / length
+    for t in range(begin, end):
+        j = joint[t]
+        zx, zy, zz = frames.axis[j, 0], frames.axis[j, 1], frames.axis[j, 2]
+        rx = side * (frames.site[site, 0] - frames.origin[j, 0])
+        ry = side * (frames.site[site, 1] - frames.origin[j, 1])
+        rz = side * (frames.site[site, 2] - frames.origin[j, 2])
+        dx, dy, dz = zy * rz - zz * ry, zz * rx - zx * rz, zx * ry - zy * rx
+        along = ux * dx + uy * dy + uz * dz
+        if slopes.shape[0]:
+            slopes[cable, j - 1] += along
+        if curvature.shape[0]:
+            bent[t - first, 0] = weight * ((dx - along * ux) * inverse + uy * zz - uz * zy)
+            bent[t - first, 1] = weight * ((dy - along * uy) * inverse + uz * zx - ux * zz)
+            bent[t - first, 2] = weight * ((dz - along * uz) * inverse + ux * zy - uy * zx)
+            for other in range(first, t + 1):
+                i, k = joint[other], other - first
+                value = bent[k, 0] * dx + bent[k, 1] * dy + bent[k, 2] * dz
+                curvature[page, min(i, j) - 1, max(i, j) - 1] += value
+
+
+@inlined
+def _unbend(
+    joint: Indices,
+    first: int,
+    turn: int,
+    axis: Array,
+    direction: tuple[float, float, float, float],
+    weight: float,
+    bent: Array,
+) -> None:
+    """Take u × z_i away again, before the joints on the other side come."""
+    ux, uy, uz, _ = direction
+    for t in range(first, turn):
+        zx, zy, zz = axis[joint[t], 0], axis[joint[t], 1], axis[joint[t], 2]
+        bent[t - first, 0] -= weight * (uy * zz - uz * zy)
+        bent[t - first, 1] -= weight * (uz * zx - ux * zz)
+        bent[t - first, 2] -= weight * (ux * zy - uy * zx)
+
+
 @compiled
-def _derivative(
-    origin: Array, axis: Array, site: Array, joint: int, a: int, b: int
-) -> tuple[float, float, float]:
-    """∂(b − a)/∂θ = ±z × (x − o) by a joint on the way to site b (+) or to site a (−)."""
-    side, row, p = (1.0, joint, b) if joint > 0 else (-1.0, -joint, a)
-    rx = site[p, 0] - origin[row, 0]
-    ry = site[p, 1] - origin[row, 1]
-    rz = site[p, 2] - origin[row, 2]
-    zx, zy, zz = axis[row, 0], axis[row, 1], axis[row, 2]
-    return side * (zy * rz - zz * ry), side * (zz * rx - zx * rz), side * (zx * ry - zy * rx)
+def mirror(matrix: Array) -> None:
+    """Copy the upper triangle of a matrix onto the lower one."""
+    for i in range(matrix.shape[0]):
+        for j in range(i):
+            matrix[i, j] = matrix[j, i]
+
+
+@compiled
+def measure(
+    segment: Indices,
+    joint: Indices,
+    frames: Frames,
+    weight: Array,
+    page: Indices,
+    bent: Array,
+    lengths: Array,
+    slopes: Array,
+    curvature: Array,
+) -> int:
+    """Add all segments to L (C,), J_L (C, nv) and weight[c] H_L[c] at curvature[page[c]] (nv, nv).
+
+    J_L is left out if it has no rows, H_L if there are no pages for it; of H_L only i ≤ j is
+    filled. ``bent`` (nv, 3) is scratch.
+
+    Returns:
+        The first segment whose sites coincide, or −1; if there is one, all are unfinished.
+    """
+    for s in range(segment.shape[0] - 1):
+        cable, a, b = segment[s, 0], segment[s, 1], segment[s, 2]
+        first, turn, end = segment[s, 3], segment[s, 4], segment[s + 1, 3]
+        direction = _direction(frames.site, a, b)
+        if direction[3] == 0.0:
+            return s
+        lengths[cable] += direction[3]
+        w, k = 0.0, 0
+        if curvature.shape[0]:
+            w, k = weight[cable], page[cable]
+        for half in range(0 if turn > first else 1, 2):
+            side, site, begin, stop = (1.0, b, turn, end) if half else (-1.0, a, first, turn)
+            joints = first, begin, stop
+            _add_side(
+                side, site, joints, joint, frames, direction, w, bent, cable, slopes, k, curvature
+            )
+            if not half:
+                _unbend(joint, first, turn, frames.axis, direction, w, bent)
+    return -1
 
 
 @compiled
 def evaluate(
     parent: Indices,
-    rotation: Array,
+    turn: Array,
     translation: Array,
     local_axis: Array,
     row: Indices,
@@ -197,19 +283,14 @@ def evaluate(
         The fields of :class:`Frames`, L (C,), J_L (C, nv), and the first segment whose sites
         coincide, or −1; if there is one, L and J_L are unfinished.
     """
-    origin, axis, site = place(parent, rotation, translation, local_axis, row, point, q)
-    lengths = fixed.copy()
-    length_jacobian = np.zeros((lengths.shape[0], q.shape[0]))
-    for s in range(segment.shape[0] - 1):
-        cable, a, b, first = segment[s]
-        ux, uy, uz, length = _direction(site, a, b)
-        if length == 0.0:
-            return origin, axis, site, lengths, length_jacobian, s
-        lengths[cable] += length
-        for t in range(first, segment[s + 1, 3]):
-            dx, dy, dz = _derivative(origin, axis, site, joint[t], a, b)
-            length_jacobian[cable, abs(joint[t]) - 1] += ux * dx + uy * dy + uz * dz
-    return origin, axis, site, lengths, length_jacobian, -1
+    count, nv = parent.shape[0], q.shape[0]
+    tree = Tree(parent, turn, translation, local_axis)
+    frames = Frames(np.empty((count, 3)), np.empty((count, 3)), np.empty((row.shape[0], 3)))
+    place(tree, row, point, q, np.empty((count, 3, 3)), frames)
+    L, J, nothing = fixed.copy(), np.zeros((fixed.shape[0], nv)), np.empty((0, nv, nv))
+    page, bent = np.empty(0, dtype=np.intp), np.empty((nv, 3))
+    coincident = measure(segment, joint, frames, fixed, page, bent, L, J, nothing)
+    return frames.origin, frames.axis, frames.site, L, J, coincident
 
 
 @compiled
@@ -228,89 +309,8 @@ def add_length_hessian(
     All pages zero and weight = F gives H_L·F; page c for cable c and weight 1 the whole tensor.
     No two neighbouring sites may coincide; :func:`evaluate` has seen to that.
     """
-    for s in range(segment.shape[0] - 1):
-        cable, a, b, first = segment[s]
-        w, k = weight[cable], page[cable]
-        ux, uy, uz, length = _direction(site, a, b)
-        for t in range(first, segment[s + 1, 3]):
-            i = abs(joint[t])
-            ax, ay, az = _derivative(origin, axis, site, joint[t], a, b)
-            along = ux * ax + uy * ay + uz * az
-            # (1 − uuᵀ) d_i / ℓ, to which u × z_i is added for joints on the same side:
-            # u·(z_i × d_j) = (u × z_i)·d_j
-            vx = (ax - along * ux) / length
-            vy = (ay - along * uy) / length
-            vz = (az - along * uz) / length
-            cx = vx + uy * axis[i, 2] - uz * axis[i, 1]
-            cy = vy + uz * axis[i, 0] - ux * axis[i, 2]
-            cz = vz + ux * axis[i, 1] - uy * axis[i, 0]
-            for other in range(t, segment[s + 1, 3]):
-                j = abs(joint[other])
-                bx, by, bz = _derivative(origin, axis, site, joint[other], a, b)
-                if (joint[t] > 0) == (joint[other] > 0):
-                    value = w * (cx * bx + cy * by + cz * bz)
-                else:
-                    value = w * (vx * bx + vy * by + vz * bz)
-                hessian[k, i - 1, j - 1] += value
-                if other != t:
-                    hessian[k, j - 1, i - 1] += value
-
-
-@compiled
-def joint_stiffness(
-    segment: Indices,
-    joint: Indices,
-    origin: Array,
-    axis: Array,
-    site: Array,
-    jacobian: Array,
-    length_jacobian: Array,
-    gravity: Array,
-    tension: Array,
-    cable_stiffness: Array,
-    wrench: Array,
-) -> tuple[Array, Array, Array, Array]:
-    """Active, passive and load term of Eq. 16 and the sum of all four, (nv, nv) each."""
-    nv = jacobian.shape[1]
-    active = np.zeros((1, nv, nv))
-    page = np.zeros(tension.shape[0], dtype=np.intp)
-    add_length_hessian(segment, joint, origin, axis, site, tension, page, active)
-    passive = np.zeros((nv, nv))
-    for c in range(length_jacobian.shape[0]):
-        last = nv  # a cable moves only with the joints before its end
-        while last > 0 and length_jacobian[c, last - 1] == 0.0:
-            last -= 1
-        for i in range(last):
-            pull = cable_stiffness[c] * length_jacobian[c, i]
-            for j in range(i, last):
-                passive[i, j] += pull * length_jacobian[c, j]
-    for i in range(nv):
-        for j in range(i):
-            passive[i, j] = passive[j, i]
-    load = load_stiffness(jacobian, wrench)
-    return active[0], passive, load, active[0] + passive + gravity + load
-
-
-@compiled
-def load_stiffness(jacobian: Array, wrench: Array) -> Array:
-    """−∂(J_Xᵀ W)/∂θ (nv, nv) of a dead wrench W (6,): row torque, column angle.
-
-    From the columns of J_X alone: ∂v_i/∂θ_j = z_a × v_b with a the earlier and b the later of the
-    two joints, ∂z_i/∂θ_j = z_j × z_i where j comes before i and 0 otherwise.
-    """
-    nv = jacobian.shape[1]
-    result = np.zeros((nv, nv))
-    fx, fy, fz = wrench[0], wrench[1], wrench[2]
-    mx, my, mz = wrench[3], wrench[4], wrench[5]
-    for a in range(nv):
-        zx, zy, zz = jacobian[3, a], jacobian[4, a], jacobian[5, a]
-        # f·(z × v) = (f × z)·v, m·(z × z_b) = (m × z)·z_b
-        gx, gy, gz = fy * zz - fz * zy, fz * zx - fx * zz, fx * zy - fy * zx
-        hx, hy, hz = my * zz - mz * zy, mz * zx - mx * zz, mx * zy - my * zx
-        for b in range(a, nv):
-            force = gx * jacobian[0, b] + gy * jacobian[1, b] + gz * jacobian[2, b]
-            moment = hx * jacobian[3, b] + hy * jacobian[4, b] + hz * jacobian[5, b]
-            result[a, b] -= force
-            if b != a:
-                result[b, a] -= force + moment
-    return result
+    frames, nv = Frames(origin, axis, site), hessian.shape[1]
+    nothing, L = np.empty((0, nv)), np.zeros(weight.shape[0])
+    measure(segment, joint, frames, weight, page, np.empty((nv, 3)), L, nothing, hessian)
+    for k in range(hessian.shape[0]):
+        mirror(hessian[k])

@@ -12,8 +12,8 @@ from typing import final
 import numpy as np
 
 from cdsm._checks import Array, frozen
-from cdsm._kernels import load_stiffness
 from cdsm._rigid_body import rotation_vector
+from cdsm._stiffness_kernels import load_stiffness
 from cdsm.errors import CableError
 from cdsm.manipulator import Manipulator
 

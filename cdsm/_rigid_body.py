@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
+from cdsm._body_kernels import Masses
 from cdsm._checks import Array, frozen
 from cdsm._kernels import Tree
 from cdsm.errors import UnknownName, UrdfError
@@ -80,11 +81,23 @@ class RigidBody:
         axis = np.zeros((self.nv + 1, 3))
         for i in range(1, self.nv + 1):
             axis[i] = pin.getJointJacobian(model, data, i, pin.LOCAL).reshape(6, -1)[3:, i - 1]
-        return Tree(
+        return Tree.of(
             parent=np.array(model.parents, dtype=np.intp),
             rotation=np.array([placement.rotation for placement in model.jointPlacements]),
             translation=np.array([placement.translation for placement in model.jointPlacements]),
             axis=axis,
+        )
+
+    def masses(self) -> Masses:
+        """What the tree carries and where its tip is, as plain arrays."""
+        model, tip = self._model, self._model.frames[self._tip]
+        return Masses(
+            mass=np.array([inertia.mass for inertia in model.inertias]),
+            centre=np.array([inertia.lever for inertia in model.inertias]),
+            gravity=np.array(model.gravity.linear),
+            tip=int(tip.parentJoint),
+            rotation=tip.placement.rotation.copy(),
+            point=tip.placement.translation.copy(),
         )
 
     def state(self, q: Array) -> BodyState:

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from cdsm import _kernels
+from cdsm._checks import frozen
 from cdsm._rigid_body import RigidBody
 from cdsm.cable import Cable
 from cdsm.errors import CableError, UnknownName
@@ -16,7 +17,7 @@ from cdsm.errors import CableError, UnknownName
 def route(body: RigidBody, tree: _kernels.Tree, cables: Sequence[Cable]) -> _kernels.Routing:
     """Place the sites on the joints, and find for every segment the joints that change it."""
     row, point, fixed = [], [], np.array([cable.lead for cable in cables])
-    segments: list[tuple[int, int, int, int]] = []
+    segments: list[tuple[int, int, int, int, int]] = []
     joints: list[int] = []
     for c, cable in enumerate(cables):
         for i, site in enumerate(cable.sites):
@@ -30,21 +31,22 @@ def route(body: RigidBody, tree: _kernels.Tree, cables: Sequence[Cable]) -> _ker
                 continue
             if row[-2] != row[-1]:
                 to_a, to_b = _way(tree, row[-2]), _way(tree, row[-1])
-                segments.append((c, len(row) - 2, len(row) - 1, len(joints)))
-                joints += [-j for j in to_a if j not in to_b]
-                joints += [j for j in to_b if j not in to_a]
+                only_a = [j for j in to_a if j not in to_b]
+                first, turn = len(joints), len(joints) + len(only_a)
+                segments.append((c, len(row) - 2, len(row) - 1, first, turn))
+                joints += [*only_a, *(j for j in to_b if j not in to_a)]
                 continue
             length = math.dist(point[-2], point[-1])
             if length < _kernels.SHORTEST_SEGMENT:
                 raise CableError(cable.name, f"sites {i} and {i + 1} coincide; leave one out.")
             fixed[c] += length
-    segments.append((0, 0, 0, len(joints)))
+    segments.append((0, 0, 0, len(joints), len(joints)))
     return _kernels.Routing(
-        row=np.array(row, dtype=np.intp),
-        point=np.array(point),
-        segment=np.array(segments, dtype=np.intp),
-        joint=np.array(joints, dtype=np.intp),
-        fixed=fixed,
+        row=frozen(np.array(row, dtype=np.intp)),
+        point=frozen(np.array(point)),
+        segment=frozen(np.array(segments, dtype=np.intp)),
+        joint=frozen(np.array(joints, dtype=np.intp)),
+        fixed=frozen(fixed),
     )
 
 

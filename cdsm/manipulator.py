@@ -14,7 +14,7 @@ from typing import final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cdsm import _kernels
+from cdsm import _kernels, _stiffness_kernels
 from cdsm._checks import (
     LARGEST,
     SMALLEST,
@@ -87,6 +87,7 @@ class Manipulator:
         self._body = RigidBody(self._urdf, TIP, self._gravity)
         tree = self._body.tree()
         routing = route(self._body, tree, self._cables)
+        self._tree, self._routing, self._masses = tree, routing, self._body.masses()
         self._constants = (*tree, *routing)
         self._segments = routing.segment, routing.joint
 
@@ -252,16 +253,9 @@ class Manipulator:
         for law, held in self._held_by_law:
             pulled = tension[held]
             try:
-                rigidity = np.asarray(law.rigidity(pulled))
+                rigidity = checked_rigidity(law, pulled)
             except ElasticityRangeError as error:
                 raise self._naming_cables(error, held) from None
-            usable = (rigidity >= SMALLEST) & (rigidity <= LARGEST)  # false for NaN too
-            if rigidity.shape != pulled.shape or np.count_nonzero(usable) < pulled.size:
-                raise InvalidInput(
-                    "elasticity",
-                    f"{law!r} gives the rigidity {rigidity} N at tensions {pulled} N; one positive "
-                    "number for each is needed.",
-                )
             compliance = lengths[held] / rigidity + self._series_compliance[held]
             stiffness[held] = 1.0 / compliance
         return frozen(stiffness)
@@ -369,7 +363,7 @@ class Posture(ReadOnlyState):
         self, tension: Array, cable_stiffness: Array, wrench: Array
     ) -> tuple[Array, Array, Array, Array]:
         """Active, passive, load and K_θ (nv, nv); of checked, read-only vectors."""
-        active, passive, load, joint = _kernels.joint_stiffness(
+        active, passive, load, joint = _stiffness_kernels.joint_stiffness(
             *self.arm._segments,
             *self._frames,
             self.jacobian,
@@ -386,6 +380,24 @@ def _rebuild(
     geometry: Geometry, cables: tuple[Cable, ...], gravity: tuple[float, ...]
 ) -> Manipulator:
     return Manipulator(geometry, cables=cables, gravity=gravity)
+
+
+def checked_rigidity(law: Elasticity, tension: Array) -> Array:
+    """EA(F) [N] of a law, same shape as F [N], which need not be the library's own.
+
+    Raises:
+        ElasticityRangeError: A tension outside the domain of the law.
+        InvalidInput: The law gives no positive rigidity.
+    """
+    rigidity = np.asarray(law.rigidity(tension))
+    usable = (rigidity >= SMALLEST) & (rigidity <= LARGEST)  # false for NaN too
+    if rigidity.shape != tension.shape or np.count_nonzero(usable) < tension.size:
+        raise InvalidInput(
+            "elasticity",
+            f"{law!r} gives the rigidity {rigidity} N at tensions {tension} N; one positive "
+            "number for each is needed.",
+        )
+    return rigidity
 
 
 def _key(law: Elasticity) -> object:

@@ -31,10 +31,10 @@ _Value = TypeVar("_Value")
 
 _NO_WRENCH = frozen(np.zeros(6))
 
-_IMMOBILE = 1e-10
+UNMOVED = 1e-10
 """Joint torque of a tip force below this part of the largest is rounding: the tip cannot move."""
 
-_FLAT = 1e-6
+FLAT = 1e-6
 """Smallest ratio of the singular values of J for which a 3×3 stiffness still has 4 digits left.
 
 Its entries differ by the square of the ratio, and float64 holds 16 digits.
@@ -271,7 +271,7 @@ class Stiffness(ReadOnlyState):
         """J_vᵀ u (nv,): joint torque of a unit force along u; None if it moves no joint."""
         linear = self.posture.jacobian[:3]
         torque = u @ linear
-        return torque if abs(torque).max() > _IMMOBILE * abs(linear).max() else None
+        return torque if abs(torque).max() > UNMOVED * abs(linear).max() else None
 
     @cached_property
     def _motion(self) -> Array:
@@ -289,7 +289,7 @@ class Stiffness(ReadOnlyState):
     def _mobility(self, what: str) -> tuple[Array, Array, Array]:
         """Singular vectors and values of the linear rows of J; refuses a lack of motion."""
         left, values, right = np.linalg.svd(self.posture.jacobian[:3], full_matrices=False)
-        if values.size < 3 or values[2] <= _FLAT * values[0]:
+        if values.size < 3 or values[2] <= FLAT * values[0]:
             u = frozen(np.linalg.svd(self.posture.jacobian[:3])[0][:, 2].astype(np.float64))
             raise SingularStiffness(
                 f"{what} does not exist: the tip cannot move along {_written(u)}, where the "

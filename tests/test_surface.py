@@ -22,7 +22,7 @@ import numpy as np
 import pytest
 
 import cdsm
-from cdsm import _kernels, errors
+from cdsm import _kernels, _stiffness_kernels, errors
 from cdsm._checks import Array
 from tests.arms import STEEL, mixed_arm, random_arm, random_posture, random_tension, random_wrench
 
@@ -64,7 +64,7 @@ UNIT = re.compile(
     r"\[(?:N|m|rad|kg|Pa|s|Hz|-|1)\b[^\]]*\]|\[-\]|\b(?:N|m|rad|kg)\b"
     r"|[Uu]nit (?:vector|joint motion)"
 )
-SHAPE = re.compile(r"\((?:nv|C|S|P|n|\d|sites)(?:\s*[,+]\s*\w*)*\)|any shape|same shape")
+SHAPE = re.compile(r"\((?:nv|B|C|D|S|P|n|\d|sites)(?:\s*[,+]\s*[\w…]*)*\)|any shape|same shape")
 ARRAY = re.compile(r"\bArray\b|NDArray|ndarray")
 CHECKERS = {
     "bound",
@@ -217,6 +217,7 @@ PULL = cdsm.distribute_tension(POSE, minimum=10.0, wrench=random_wrench(2))
 K = cdsm.stiffness(POSE, PULL)
 SHARES = K.shares((0.0, 0.3, 1.0))
 WEIGHT = cdsm.weight_test(POSE, PULL, (0.0, 0.0, -1.0), steps=2)
+PULLS = cdsm.distribute_tensions(POSE.arm, [POSE.q, POSE.q / 2.0], minimum=10.0)
 RESULTS: dict[str, Any] = {
     "Posture": POSE,
     "Tension": PULL,
@@ -243,6 +244,10 @@ RESULTS: dict[str, Any] = {
     ),
     "Saturation": cdsm.saturation(POSE, (0.0, 0.3, 1.0), 10.0, 200.0),
     "CriticalTension": cdsm.critical_tension(POSE),
+    "Tensions": PULLS,
+    "Batch": cdsm.evaluate(
+        POSE.arm, [POSE.q, POSE.q / 2.0], PULLS, outputs=("tip", "along"), direction=(0, 0, 1)
+    ),
     "CriticalLoad": cdsm.critical_load(POSE, random_wrench(4), 10.0),
 }
 
@@ -550,7 +555,11 @@ def test_unpickled_posture_needs_no_new_compilation() -> None:
     pose = random_posture(mixed_arm(), 3)
     tension = random_tension(pose.arm, 3)
     cdsm.stiffness(pose, tension)
-    kernels = [_kernels.joint_stiffness, _kernels.add_length_hessian, _kernels.evaluate]
+    kernels = [
+        _stiffness_kernels.joint_stiffness,
+        _kernels.add_length_hessian,
+        _kernels.evaluate,
+    ]
     compiled = [len(kernel.signatures) for kernel in kernels]  # type: ignore[attr-defined]
     again = pickle.loads(pickle.dumps(pose))
     np.testing.assert_array_equal(

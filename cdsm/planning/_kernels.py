@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from cdsm._checks import Array
-from cdsm._kernels import compiled
+from cdsm._compiled import compiled
 
 
 @compiled

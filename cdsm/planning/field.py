@@ -9,7 +9,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from cdsm._checks import SMALLEST, Array
-from cdsm._kernels import load_stiffness
+from cdsm._stiffness_kernels import load_stiffness
 from cdsm.planning import _kernels
 from cdsm.planning.admissible import Admissible
 

@@ -1,0 +1,7 @@
+"""Many postures at once: stiffness and tension distribution, row by row in compiled kernels."""
+
+from cdsm.batch.distribution import Tensions, distribute_tensions
+from cdsm.batch.evaluation import Batch, evaluate
+from cdsm.batch.status import Status
+
+__all__ = ["Batch", "Status", "Tensions", "distribute_tensions", "evaluate"]

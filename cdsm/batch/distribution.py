@@ -1,0 +1,181 @@
+"""Tension distribution at many postures."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cdsm._checks import Array, ReadOnlyState, frozen, instance
+from cdsm.batch import record
+from cdsm.batch.blocks import blocks
+from cdsm.batch.chunks import checked_threads, run
+from cdsm.batch.inputs import bounds, given_wrench, kernel_arm, of_rows, postures
+from cdsm.batch.record import INFEASIBLE, OK, UNDECIDED, Codes, Flags
+from cdsm.batch.rows import evaluate_rows
+from cdsm.batch.status import Status, summary
+from cdsm.batch.tension_rows import distribute_rows
+from cdsm.errors import InfeasibleTension, SolverError
+from cdsm.manipulator import Manipulator
+from cdsm.tension import distribute_tension
+
+_NO_DIRECTIONS = frozen(np.zeros((0, 3)))
+
+
+@final
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class Tensions(ReadOnlyState):
+    """Cable tensions that balance an arm, posture by posture, with the question they answer.
+
+    Attributes:
+        arm: The arm.
+        q: Joint angles (B, nv) [rad].
+        values: F (B, C) [N], in the order of ``arm.cables``; 0 where there are none.
+        wrench: W (6,) for all, or (B, 6): force [N], then moment [N m].
+        minimum: Lower bounds (C,) for all, or (B, C) [N].
+        maximum: Upper bounds (C,) for all, or (B, C) [N].
+        status: A :class:`Status` for each row, (B,) [-].
+    """
+
+    arm: Manipulator
+    q: Array
+    values: Array
+    wrench: Array
+    minimum: Array
+    maximum: Array
+    status: Codes
+
+    @property
+    def ok(self) -> Flags:
+        """Where there are tensions, (B,) [-]."""
+        return frozen(self.status == OK)
+
+    def __len__(self) -> int:
+        return len(self.q)
+
+    def __repr__(self) -> str:
+        return f"<Tensions of {self.arm.geometry.name}, {summary(self.status)}>"
+
+
+def distribute_tensions(
+    arm: Manipulator,
+    q: ArrayLike,
+    minimum: ArrayLike = 0.0,
+    maximum: ArrayLike = math.inf,
+    wrench: ArrayLike | None = None,
+    *,
+    check_limits: bool = True,
+    threads: int | None = None,
+) -> Tensions:
+    """Smallest cable tensions in balance at many postures: min ‖F‖² of Eqs. 13 and 17, row by row.
+
+    The same as :func:`~cdsm.tension.distribute_tension` at each, and as exact: every row is guessed
+    or searched for, and accepted only if it meets the optimality conditions to 1e-11; as infeasible
+    only by a proof. That function decides the rows that neither can be shown of.
+
+    Args:
+        arm: The arm.
+        q: Joint angles (B, nv) [rad], a row for each posture.
+        minimum: Lower bound [N], for all cables, (C,), or (B, C); not negative.
+        maximum: Upper bound [N], likewise; inf for none.
+        wrench: W (6,) for all rows or (B, 6) at ``tool0`` in base axes: force [N], then moment
+            [N m]; zero if not given.
+        check_limits: Pass over angles beyond the joint limits.
+        threads: How many at most; by default as many as there are cores.
+
+    Raises:
+        InvalidInput: Something has the wrong shape or is not a number, or bounds contradict each
+            other. Whatever is wrong with single postures is said by :attr:`Tensions.status`.
+    """
+    instance("arm", arm, Manipulator)
+    angles = postures(arm, q)
+    low, high = bounds(arm, minimum, maximum, len(angles))
+    loads = given_wrench(wrench, len(angles))
+    values = np.empty((len(angles), len(arm.cables)))
+    status = np.zeros(len(angles), dtype=np.uint8)
+    distributor = Distributor(arm, angles, low, high, loads, check_limits)
+
+    def work(part: slice) -> None:
+        values[part], status[part] = distributor.at(part)
+
+    run(work, len(angles), distributor.width, checked_threads(threads))
+    return Tensions(
+        arm=arm,
+        q=angles,
+        values=frozen(values),
+        wrench=loads,
+        minimum=low,
+        maximum=high,
+        status=frozen(status),
+    )
+
+
+class Distributor:
+    """Distributes tension in slices of the rows; of checked arguments.
+
+    Args:
+        arm: The arm.
+        q: Joint angles (B, nv) [rad].
+        low: Lower bounds (C,) or (B, C) [N].
+        high: Upper bounds, likewise [N].
+        wrench: (6,) or (B, 6).
+        check_limits: Pass over angles beyond the joint limits.
+
+    Attributes:
+        width: Floats that come and go per row.
+    """
+
+    def __init__(
+        self,
+        arm: Manipulator,
+        q: Array,
+        low: Array,
+        high: Array,
+        wrench: Array,
+        check_limits: bool,
+    ) -> None:
+        self._arm, self._q, self._wrench = arm, q, wrench
+        self._low, self._high = low, high
+        self._kernel_arm = kernel_arm(arm, check_limits)
+        self._blocks = blocks(arm._routing, arm.nv)
+        self._start = record.starts(arm.nv, len(arm.cables), 0)
+        self._wanted = np.array(
+            [record.JACOBIAN, record.LENGTH_JACOBIAN, record.GRAVITY_TORQUE], dtype=np.intp
+        )
+        self.width = (7 + len(arm.cables)) * arm.nv + 3 * len(arm.cables)
+
+    def at(self, part: slice) -> tuple[Array, Codes]:
+        """Tensions (b, C) [N] and status (b,) of a slice of the rows."""
+        rows = len(self._q)
+        q = self._q[part]
+        low, high, wrench = (
+            of_rows(each, part, rows) for each in (self._low, self._high, self._wrench)
+        )
+        values, status = np.empty((len(q), low.shape[1])), np.zeros(len(q), dtype=np.uint8)
+        known = np.empty((len(q), (7 + low.shape[1]) * q.shape[1]))
+        evaluate_rows(
+            self._kernel_arm,
+            q,
+            low,
+            low,
+            wrench,
+            _NO_DIRECTIONS,
+            self._start,
+            self._wanted,
+            known,
+            status,
+        )
+        distribute_rows(self._blocks, known, low, high, wrench, values, status)
+        for r in np.flatnonzero(status == UNDECIDED).tolist():
+            pose = self._arm.at(q[r], check_limits=False)
+            try:
+                values[r] = distribute_tension(pose, low[r], high[r], wrench[r]).values
+                status[r] = OK
+            except InfeasibleTension:
+                status[r] = INFEASIBLE
+            except SolverError:
+                status[r] = Status.SOLVER_FAILED
+        return values, status

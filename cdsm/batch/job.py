@@ -1,0 +1,127 @@
+"""Fills the answers to a batch slice by slice; of checked arguments."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cdsm._checks import Array, frozen
+from cdsm.batch import record
+from cdsm.batch.distribution import Distributor
+from cdsm.batch.inputs import kernel_arm, of_rows
+from cdsm.batch.record import QUANTITIES, Codes
+from cdsm.batch.rigidity import rigidities
+from cdsm.batch.rows import evaluate_rows
+from cdsm.batch.status import Status
+from cdsm.errors import SingularStiffness
+from cdsm.manipulator import Manipulator
+from cdsm.stiffness import stiffness
+
+
+class Job:
+    """Evaluates slices of the rows.
+
+    Args:
+        arm: The arm.
+        q: Joint angles (B, nv) [rad].
+        tension: F (C,) or (B, C) [N]; None if they are distributed, or not needed.
+        wrench: W (6,) or (B, 6).
+        direction: Unit directions (3,) or (D, 3) of ``along``; or None.
+        names: What is wanted.
+        distributor: Of tensions, if they are not given.
+        check_limits: Pass over angles beyond the joint limits.
+
+    Attributes:
+        values: What is wanted, in its order; filled slice by slice.
+        width: Floats that come and go per row.
+    """
+
+    def __init__(
+        self,
+        arm: Manipulator,
+        q: Array,
+        tension: Array | None,
+        wrench: Array,
+        direction: Array | None,
+        names: tuple[str, ...],
+        distributor: Distributor | None,
+        check_limits: bool,
+    ) -> None:
+        self._arm, self._q, self._wrench, self._names = arm, q, wrench, names
+        self._tension, self._distributor = tension, distributor
+        nv, cables = arm.nv, len(arm.cables)
+        self._directions = frozen(
+            np.zeros((0, 3)) if direction is None else direction.reshape(-1, 3)
+        )
+        self._kernel_arm = kernel_arm(arm, check_limits)
+        count = len(self._directions)
+        self._start = record.starts(nv, cables, count)
+        wanted = sorted(QUANTITIES.index(name) for name in names if name != "tension")
+        self._wanted = np.array(wanted, dtype=np.intp)
+        ends = np.cumsum(self._start[self._wanted + 1] - self._start[self._wanted])
+        self._size = int(ends[-1]) if wanted else 0
+        self._place = {
+            QUANTITIES[number]: slice(end - (self._start[number + 1] - self._start[number]), end)
+            for number, end in zip(wanted, ends.tolist(), strict=True)
+        }
+        self.width = self._size + nv + 2 * cables
+        if distributor is not None:
+            self.width += distributor.width
+
+        shapes = dict(zip(QUANTITIES, record.shapes(nv, cables, count), strict=True))
+        shapes["tension"] = (cables,)
+        if direction is not None and direction.ndim == 1:
+            shapes["along"] = ()
+        self.values = [np.empty((len(q), *shapes[name])) for name in names]
+
+    def fill(self, part: slice, status: Codes) -> None:
+        """Fill the values and the status (B,) of a slice of the rows."""
+        rows, q, found = len(self._q), self._q[part], status[part]
+        wrench = of_rows(self._wrench, part, rows)
+        if self._distributor is not None:
+            tension, found[:] = self._distributor.at(part)
+            frozen(tension)
+        elif self._tension is not None:
+            tension = of_rows(self._tension, part, rows)
+        else:
+            tension = frozen(np.zeros((len(q), len(self._arm.cables))))
+        springs = self._wanted.size and self._wanted[-1] > record.LOAD
+        rigidity = rigidities(self._arm, tension, found == record.OK) if springs else tension
+        out = np.empty((len(q), self._size))
+        evaluate_rows(
+            self._kernel_arm,
+            q,
+            tension,
+            rigidity,
+            wrench,
+            self._directions,
+            self._start,
+            self._wanted,
+            out,
+            found,
+        )
+        for name, value in zip(self._names, self.values, strict=True):
+            source = tension if name == "tension" else out[:, self._place[name]]
+            value[part] = source.reshape(value[part].shape)
+        for r in np.flatnonzero(found == record.UNDECIDED).tolist():
+            found[r] = self._decide(part.start + r, tension[r], wrench[r])
+
+    def _decide(self, row: int, tension: Array, wrench: Array) -> Status:
+        """Let the single posture tell whether K_θ is singular, and fill what exists if not."""
+        K = stiffness(self._arm.at(self._q[row], check_limits=False), tension, wrench)
+        status = Status.OK
+        try:
+            found = {
+                "compliance": K.compliance,
+                "along": np.array([K.along(u) for u in self._directions]),
+            }
+        except SingularStiffness:
+            return Status.SINGULAR
+        if {"cartesian", "pseudoinverse"}.intersection(self._names):
+            try:
+                found["cartesian"] = K.cartesian
+            except SingularStiffness:
+                status = Status.IMMOBILE
+        for name, value in zip(self._names, self.values, strict=True):
+            if name in found:
+                value[row] = found[name].reshape(value[row].shape)
+        return status

@@ -1,0 +1,63 @@
+"""EA(F) of all cables at many tensions, and where there is none."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cdsm._checks import Array, frozen
+from cdsm.batch.record import Flags
+from cdsm.elasticity import Elasticity
+from cdsm.errors import ElasticityRangeError
+from cdsm.manipulator import Manipulator, checked_rigidity
+
+_NONE = -1.0
+
+
+def rigidities(arm: Manipulator, tension: Array, usable: Flags) -> Array:
+    """EA (b, C) [N] at tensions F (b, C) [N]: 0 for force-controlled cables, −1 where undefined.
+
+    Args:
+        arm: The arm.
+        tension: F.
+        usable: The rows (b,) to look at.
+
+    Raises:
+        InvalidInput: An elasticity of the user's own gives no positive rigidity.
+    """
+    pulled = tension if usable.all() else tension[usable]
+    rigidity = np.zeros_like(pulled)
+    for law, held in arm._held_by_law:
+        rigidity[:, held] = _where_defined(law, pulled[:, held])
+    if pulled is tension:
+        return frozen(rigidity)
+    result = np.zeros_like(tension)
+    result[usable] = rigidity
+    return frozen(result)
+
+
+def _where_defined(law: Elasticity, tension: Array) -> Array:
+    """EA [N] at tensions of any shape, −1 outside the domain."""
+    try:
+        return checked_rigidity(law, tension)
+    except ElasticityRangeError:
+        pass
+    result, values = np.full(tension.size, _NONE), tension.ravel()
+    left = np.arange(tension.size)
+    while left.size:
+        try:
+            result[left] = checked_rigidity(law, values[left])
+            break
+        except ElasticityRangeError as error:
+            if not error.indices:  # an elasticity of the user's own that does not say where
+                left = left[[_is_defined(law, value) for value in values[left]]]
+            else:
+                left = np.delete(left, error.indices)
+    return result.reshape(tension.shape)
+
+
+def _is_defined(law: Elasticity, tension: float) -> bool:
+    try:
+        law.rigidity(tension)
+    except ElasticityRangeError:
+        return False
+    return True
