@@ -21,7 +21,7 @@ def read_text(path: str | os.PathLike[str]) -> str:
     Raises:
         FileError: Missing, not readable, larger than :data:`MAXIMUM_BYTES`, or not UTF-8.
     """
-    path = _path(path)
+    path = as_path(path)
     try:
         with path.open("rb") as file:
             data = file.read(MAXIMUM_BYTES + 1)
@@ -55,7 +55,7 @@ def write_file(path: str | os.PathLike[str], fill: Callable[[Path], object]) -> 
         FileError: The folder is missing or not writable, the disk refuses, or something that is not
             a file stands there.
     """
-    path = _path(path)
+    path = as_path(path)
     aside: Path | None = None
     try:
         target = path.resolve()
@@ -85,7 +85,7 @@ def make_folder(path: str | os.PathLike[str]) -> Path:
     Raises:
         FileError: It cannot be created, or a file stands in its place.
     """
-    path = _path(path)
+    path = as_path(path)
     try:
         path.mkdir(parents=True, exist_ok=True)
     except (OSError, ValueError) as error:
@@ -93,7 +93,8 @@ def make_folder(path: str | os.PathLike[str]) -> Path:
     return path
 
 
-def _path(path: str | os.PathLike[str]) -> Path:
+def as_path(path: str | os.PathLike[str]) -> Path:
+    """Return the path, or raise :class:`InvalidInput` if it is none."""
     try:
         return Path(path)
     except TypeError:

@@ -77,6 +77,39 @@ class FileError(CdsmError, OSError):
         self.path = str(path)
 
 
+class StoreError(FileError):
+    """A store of a sweep that holds another one, or that another run is writing to.
+
+    Attributes:
+        differences: What the store holds and what was asked for, one difference each.
+    """
+
+    def __init__(self, path: object, problem: str, differences: Sequence[str] = ()) -> None:
+        super().__init__(path, problem)
+        self.differences = tuple(differences)
+
+
+class MissingExtra(CdsmError, ImportError):
+    """An optional package that is not installed.
+
+    Attributes:
+        package: Its name.
+        extra: The extra of ``cdsm-stiffness`` that brings it.
+    """
+
+    def __init__(self, package: str, extra: str) -> None:
+        super().__init__(
+            f"{package} is not installed, which this needs; run "
+            f"pip install 'cdsm-stiffness[{extra}]'."
+        )
+        self.package = package
+        self.extra = extra
+
+
+class ClusterError(CdsmError):
+    """A dask cluster that does not do its work."""
+
+
 class GeometryError(CdsmError, ValueError):
     """A geometry that cannot be built.
 

@@ -13,6 +13,7 @@ from cdsm.cli.arm import stiffness, urdf
 from cdsm.cli.loads import buckle, weigh
 from cdsm.cli.paper import reproduce
 from cdsm.cli.plan import plan
+from cdsm.cli.sweep import map_sweep, sweep
 from cdsm.cli.wire import fit
 
 app = typer.Typer(
@@ -44,5 +45,6 @@ def main(
             stream.reconfigure(errors="replace")
 
 
-for command in (urdf, stiffness, weigh, buckle, plan, fit, reproduce):
+for command in (urdf, stiffness, weigh, buckle, plan, fit, sweep, reproduce):
     app.command()(command)
+app.command("map")(map_sweep)  # the name of a function of Python's own

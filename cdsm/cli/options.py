@@ -56,6 +56,22 @@ NO_WRENCH = "0,0,0,0,0,0"
 DOWN = "0,0,-9.81"
 
 
+def manipulator(
+    geometry: Path, *, rigidity: float | None, wire: Path | None, spring: float, gravity: str
+) -> Manipulator:
+    """The arm of the options.
+
+    Raises:
+        CdsmError: There is no such file or arm.
+    """
+    cables = serpentine_cables(
+        described := Geometry.read(geometry),
+        _elasticity(rigidity, wire),
+        series_stiffness=1000.0 * spring,
+    )
+    return Manipulator(described, cables=cables, gravity=numbers("--gravity", gravity, 3))
+
+
 def posture(
     geometry: Path,
     angles: str,
@@ -72,22 +88,6 @@ def posture(
     """
     arm = manipulator(geometry, rigidity=rigidity, wire=wire, spring=spring, gravity=gravity)
     return at_angles(arm, angles)
-
-
-def manipulator(
-    geometry: Path, *, rigidity: float | None, wire: Path | None, spring: float, gravity: str
-) -> Manipulator:
-    """The arm of the options.
-
-    Raises:
-        CdsmError: There is no such file or arm.
-    """
-    cables = serpentine_cables(
-        described := Geometry.read(geometry),
-        _elasticity(rigidity, wire),
-        series_stiffness=1000.0 * spring,
-    )
-    return Manipulator(described, cables=cables, gravity=numbers("--gravity", gravity, 3))
 
 
 def at_angles(arm: Manipulator, angles: str) -> Posture:

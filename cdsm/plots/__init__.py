@@ -6,12 +6,14 @@ notebook or save it with ``savefig``. No global plotting state is touched.
 
 from cdsm.plots.arm import plot_arm
 from cdsm.plots.loads import plot_critical_tension, plot_weight_test
+from cdsm.plots.maps import plot_map
 from cdsm.plots.paper import plot_paper
 from cdsm.plots.planning import plot_path_plan, plot_stiffness_plan
 
 __all__ = [
     "plot_arm",
     "plot_critical_tension",
+    "plot_map",
     "plot_paper",
     "plot_path_plan",
     "plot_stiffness_plan",

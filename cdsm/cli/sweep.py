@@ -1,0 +1,195 @@
+"""``cdsm sweep`` and ``cdsm map``: stiffness over many postures, as a file and as a picture."""
+
+from __future__ import annotations
+
+import csv
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import numpy as np
+import typer
+
+from cdsm._files import read_text, write_file
+from cdsm.cli.options import (
+    DOWN,
+    NO_WRENCH,
+    GeometryFile,
+    Gravity,
+    MaxTension,
+    Rigidity,
+    Spring,
+    Wire,
+    Wrench,
+    manipulator,
+    numbers,
+    reported,
+)
+from cdsm.errors import FileError
+from cdsm.manipulator import Manipulator
+from cdsm.sweep import GridPoses, PathPoses, PoseSet, RandomPoses, read_sweep, write_sweep
+from cdsm.sweep import sweep as run
+from cdsm.sweep.export import check_target, status_names
+from cdsm.sweep.quantities import DEFAULT, QUANTITIES
+
+if TYPE_CHECKING:
+    import xarray
+
+
+def sweep(
+    geometry: GeometryFile,
+    out: Annotated[
+        Path, typer.Option("--out", "-o", help="File to write: .nc (NetCDF) or .csv, SI units.")
+    ],
+    grid: Annotated[
+        str | None,
+        typer.Option(
+            help="Joints with first and last angle and their number, or one angle, in degrees; "
+            "joints that are not named stay at 0.",
+            metavar="JOINT=LOW:HIGH:COUNT,JOINT=ANGLE,...",
+        ),
+    ] = None,
+    path: Annotated[
+        Path | None,
+        typer.Option(
+            help="Straight lines in joint space between these waypoints: a column of degrees for "
+            "each joint, its name above; joints that are not named stay at 0.",
+            metavar="WAYPOINTS.csv",
+        ),
+    ] = None,
+    count: Annotated[int | None, typer.Option(help="Postures along --path; default: its own.")] = (
+        None
+    ),
+    random: Annotated[
+        int | None, typer.Option(help="So many Sobol points within the joint limits.")
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Of --random.")] = 0,
+    min_tension: Annotated[
+        str, typer.Option(help="Lower bound of all tensions [N], or several.", metavar="N,N,...")
+    ] = "10",
+    max_tension: MaxTension = math.inf,
+    quantities: Annotated[
+        str,
+        typer.Option(help=f"What to compute, of {', '.join(QUANTITIES)}.", metavar="NAME,NAME,..."),
+    ] = ",".join(DEFAULT),
+    rigidity: Rigidity = None,
+    wire: Wire = None,
+    spring: Spring = math.inf,
+    wrench: Wrench = NO_WRENCH,
+    gravity: Gravity = DOWN,
+    resume: Annotated[
+        Path | None,
+        typer.Option(help="Folder to keep results in as they come; goes on from what is there."),
+    ] = None,
+) -> None:
+    """Stiffness over a grid, a path or random postures, under one or several tension bounds."""
+    with reported():
+        arm = manipulator(geometry, rigidity=rigidity, wire=wire, spring=spring, gravity=gravity)
+        if sum(given is not None for given in (grid, path, random)) != 1:
+            raise typer.BadParameter("give one of --grid, --path and --random.", param_hint="poses")
+        poses: PoseSet
+        if grid is not None:
+            poses = _grid(grid)
+        elif path is not None:
+            poses = PathPoses(np.array(_waypoints(path, arm)), count)
+        else:
+            poses = RandomPoses(random or 0, seed)
+        check_target(out)  # now, rather than when all is computed
+        low = numbers("--min-tension", min_tension)
+        found = run(
+            arm,
+            poses,
+            minimum=low[0] if len(low) == 1 else low,
+            maximum=max_tension,
+            wrench=numbers("--wrench", wrench, 6),
+            outputs=[name.strip() for name in quantities.split(",")],
+            store=resume,
+        )
+        typer.echo(_summary(found))
+        typer.echo(f"written: {write_sweep(found, out)}")
+
+
+def map_sweep(
+    sweep: Annotated[
+        Path, typer.Argument(metavar="SWEEP", help="Sweep to read: .nc, or a --resume folder.")
+    ],
+    out: Annotated[Path, typer.Option("--out", "-o", help="Picture to write.", metavar="FILE.png")],
+    quantity: Annotated[
+        str,
+        typer.Option(
+            help="What to show: softest, stiffest, anisotropy, margin, along, or another number."
+        ),
+    ] = "softest",
+    section: Annotated[
+        str | None,
+        typer.Option(
+            help="Show the tips within a slab: its normal, place and half thickness in mm.",
+            metavar="AXIS=PLACE:HALF",
+        ),
+    ] = None,
+) -> None:
+    """Colour the reachable workspace by a quantity of a sweep."""
+    with reported():
+        found = read_sweep(sweep)
+        from cdsm.plots import plot_map  # matplotlib, only where it is wanted
+
+        slab = None
+        if section is not None:
+            axis, _, rest = section.partition("=")
+            place, half = numbers("--section", rest.replace(":", " "), 2)
+            slab = (axis.strip(), place / 1000.0, half / 1000.0)
+        figure = plot_map(found, quantity, section=slab)
+        typer.echo(f"written: {write_file(out, figure.savefig)}")
+
+
+def _grid(text: str) -> GridPoses:
+    """The joints of ``joint1=-20:20:9,joint2=5``, in degrees."""
+    angles, rest = {}, {}
+    for part in text.split(","):
+        name, _, value = part.partition("=")
+        given = numbers("--grid", value.replace(":", " "))
+        if len(given) == 1:
+            rest[name.strip()] = math.radians(given[0])
+        elif len(given) == 3 and given[2] >= 1.0 and given[2].is_integer():
+            angles[name.strip()] = np.deg2rad(np.linspace(given[0], given[1], int(given[2])))
+        else:
+            raise typer.BadParameter(
+                f"{part!r} given; a joint is JOINT=LOW:HIGH:COUNT or JOINT=ANGLE.",
+                param_hint="--grid",
+            )
+    return GridPoses(angles, rest)
+
+
+def _waypoints(path: Path, arm: Manipulator) -> list[list[float]]:
+    """Waypoints (n, nv) [rad] of a table of degrees.
+
+    Raises:
+        FileError: It cannot be read, names a joint the arm does not have, or holds no numbers.
+    """
+    table = [row for row in csv.reader(read_text(path).splitlines()) if row]
+    names, rows = [cell.strip() for cell in table[0]] if table else [], table[1:]
+    unknown = [name for name in names if name not in arm.joint_names]
+    if unknown or not names or len(set(names)) < len(names):
+        raise FileError(
+            path,
+            f"the first line is {', '.join(names)}; it has to name joints, each once, of "
+            f"{', '.join(arm.joint_names)}.",
+        )
+    waypoints = []
+    for number, row in enumerate(rows, start=2):
+        try:
+            angles = dict(zip(names, map(float, row), strict=True))
+        except ValueError:
+            raise FileError(
+                path, f"row {number} is {','.join(row)!r}; it needs {len(names)} angles [degrees]."
+            ) from None
+        waypoints.append([math.radians(angles.get(name, 0.0)) for name in arm.joint_names])
+    return waypoints
+
+
+def _summary(found: xarray.Dataset) -> str:
+    """How many entries came to what."""
+    status = found["status"].values
+    counts = {word: int((status == value).sum()) for value, word in status_names(found).items()}
+    told = ", ".join(f"{count} {word}" for word, count in counts.items() if count)
+    return f"{found.attrs['title']}, {found.attrs['poses']}: {told}"

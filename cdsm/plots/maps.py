@@ -1,0 +1,269 @@
+"""Workspace maps: where the tip can be, coloured by how stiff the arm is there."""
+
+from __future__ import annotations
+
+import itertools
+import textwrap
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import LogNorm, Normalize
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
+
+from cdsm._checks import Array, one_of, scalar
+from cdsm.errors import InvalidInput
+from cdsm.plots.style import AXES, COLORS, MM, N_PER_MM
+from cdsm.sweep.export import check_sweep, status_names
+from cdsm.sweep.quantities import SweepStatus
+
+if TYPE_CHECKING:
+    import xarray
+
+_UNITS: Final = {"N m-1": (N_PER_MM, "N/mm"), "N m rad-1": (1.0, "N m/rad"), "1": (1.0, "-")}
+"""What the colour bar shows for the units of a Dataset."""
+
+_MOST_PANELS = 9
+_WIDE = 30.0
+"""Ratio of largest to smallest value from which the colours are logarithmic."""
+
+_FLAT = 1e-9
+"""Extent along an axis, over the whole, up to which the tips count as in one plane."""
+
+_MARKS: Final[dict[str, tuple[str, str, float]]] = {
+    "unstable": ("x", COLORS[1], 18.0),
+    "infeasible": (".", "0.75", 8.0),
+    "outside_elasticity": ("+", "0.55", 18.0),
+}
+"""Marker, colour and size of entries without the quantity; all others are as the last."""
+
+
+def plot_map(
+    dataset: xarray.Dataset,
+    quantity: str = "softest",
+    *,
+    section: tuple[str, float, float] | None = None,
+) -> Figure:
+    """The tips of a sweep in mm, equal axes, coloured by a quantity; a panel for each case.
+
+    Tips in a plane, and sections, are shown in two dimensions, others in three. Entries without the
+    quantity are marked with their status: infeasible, …; so are unstable ones, whose stiffness
+    means nothing, unless it is the margin that is shown. Where values are infinite, the colours end
+    at the 99th percentile of the others, and the bar in an arrow.
+
+    Args:
+        dataset: What :func:`~cdsm.sweep.run.sweep` returns, with ``tip_position`` among its
+            outputs; use ``sel`` on one with more than 9 panels.
+        quantity: One number per entry: ``"softest"``, ``"stiffest"``, ``"anisotropy"``,
+            ``"margin"``, ``"along"`` (a panel for each direction).
+        section: Axis, place and half thickness [m] of a slab: tips outside it are left out.
+
+    Raises:
+        InvalidInput: Not a sweep, one without tip positions or with too many panels, a quantity
+            with more than one number per entry, or a section without any tip.
+        UnknownName: The sweep has no such quantity, or there is no such axis.
+        MissingExtra: xarray is not installed.
+    """
+    check_sweep(dataset)
+    one_of("quantity", quantity, [str(name) for name in dataset.data_vars])
+    one_of("quantity", "tip_position", [str(name) for name in dataset.data_vars])
+    tips = MM * dataset["tip_position"].transpose(..., "axis")
+    poses = [str(dim) for dim in tips.dims[:-1]]
+    panels = list(_panels(dataset, quantity, poses))
+    points = np.asarray(tips.values, dtype=np.float64).reshape(-1, 3)
+    shown = np.asarray(np.isfinite(points).all(axis=1))
+    where = ""
+    if section is not None:
+        inside, where = _slab(points, section)
+        shown &= inside
+    if not shown.any():
+        raise InvalidInput(
+            "section" if section is not None else "dataset",
+            "has no tip to show; widen the section, or sweep over other postures.",
+        )
+    points = points[shown]
+    plane = _plane(points, section)
+    factor, unit = _UNITS.get(dataset[quantity].units, (1.0, dataset[quantity].units))
+    panels = [panel.part(shown, factor) for panel in panels]
+    colors = _colors(np.concatenate([panel.values for panel in panels]))
+
+    columns = 2 if len(panels) == 4 else min(len(panels), 3)
+    rows = -(-len(panels) // columns)
+    figure = Figure(figsize=(1.5 + 3.6 * columns, 0.9 + 3.2 * rows), layout="constrained")
+    options: dict[str, Any] = {} if plane else {"subplot_kw": {"projection": "3d"}}
+    grid = figure.subplots(rows, columns, squeeze=False, **options)
+    words = status_names(dataset)
+    for axes, panel in itertools.zip_longest(grid.ravel(), panels):
+        if panel is None:
+            axes.set_axis_off()
+            continue
+        _draw(axes, points, panel, plane, colors, words)
+        axes.set_title(panel.title, fontsize=9)
+    name = dataset[quantity].long_name.split(",")[0]
+    bar = figure.colorbar(colors.mappable, ax=grid, shrink=0.8, extend=colors.extend)
+    sign = "; below 0: unstable" if quantity == "margin" else ""
+    bar.set_label(f"{name} [{unit}]{sign}", fontsize=9)
+    bar.ax.tick_params(labelsize=8)
+    _legend(figure, panels, words)
+    told = ", ".join([dataset.attrs["title"], dataset.attrs["poses"], *([where] if where else [])])
+    figure.suptitle(textwrap.fill(told, 30 + 45 * columns), fontsize=9)
+    return figure
+
+
+@dataclass(frozen=True)
+class _Panel:
+    title: str
+    values: Array
+    status: NDArray[np.int8]
+
+    def part(self, shown: NDArray[np.bool_], factor: float) -> _Panel:
+        return _Panel(self.title, factor * self.values[shown], self.status[shown])
+
+
+@dataclass(frozen=True)
+class _Colors:
+    mappable: ScalarMappable
+    beyond: float
+    extend: str
+
+
+def _panels(dataset: xarray.Dataset, quantity: str, poses: list[str]) -> Iterator[_Panel]:
+    """One for each combination of the dimensions that are not of the poses."""
+    status = dataset["status"]
+    allowed = {*map(str, status.dims), "direction"}
+    dims = [str(dim) for dim in dataset[quantity].dims]
+    if not set(dims) <= allowed or set(poses) - set(dims):
+        raise InvalidInput(
+            "quantity",
+            f"{quantity} has the dimensions {', '.join(dims)}; a map shows one number per entry, "
+            "such as softest, stiffest, anisotropy, margin or along.",
+        )
+    # status has every case the quantity has, and may have more: those that do not matter to it
+    cases = [dim for dim in dims if dim not in poses]
+    sizes = [dataset.sizes[dim] for dim in cases]
+    if (count := int(np.prod(sizes))) > _MOST_PANELS:
+        listed = ", ".join(f"{dim} ({dataset.sizes[dim]})" for dim in cases)
+        raise InvalidInput(
+            "dataset",
+            f"makes {count} panels, of {listed}; choose up to {_MOST_PANELS}, as in "
+            f"dataset.isel({cases[0]}=[0]).",
+        )
+    rest = {dim: 0 for dim in status.dims if dim not in dims}
+    means_nothing = [] if quantity == "margin" else [SweepStatus.UNSTABLE]
+    for place in np.ndindex(*sizes):
+        at = dict(zip(cases, place, strict=True))
+        values = dataset[quantity].isel(at).transpose(*poses).values.ravel()
+        own = {dim: i for dim, i in at.items() if dim in status.dims}
+        told = status.isel({**own, **rest}).transpose(*poses).values.ravel()
+        values = np.where(np.isin(told, means_nothing), np.nan, values)
+        yield _Panel(", ".join(_title(dataset, dim, i) for dim, i in at.items()), values, told)
+
+
+def _title(dataset: xarray.Dataset, dim: str, place: int) -> str:
+    value = dataset[dim].values[place]
+    if isinstance(value, str):
+        return f"{dim} {value}"
+    units = dataset[dim].attrs.get("units", "1")
+    return f"{dim} {value:g}" + (f" {units}" if units != "1" else "")
+
+
+def _slab(points: Array, section: tuple[str, float, float]) -> tuple[NDArray[np.bool_], str]:
+    if not isinstance(section, (tuple, list)) or len(section) != 3:
+        raise InvalidInput(
+            "section", f"{section!r} given; an axis, its place and the half thickness [m] needed."
+        )
+    axis = AXES.index(one_of("axis", section[0], AXES))
+    place, half = scalar("section", section[1]), scalar("section", section[2])
+    inside = abs(points[:, axis] - MM * place) <= MM * half
+    told = f"{section[0]} = {MM * place:g} ± {MM * half:g} mm"
+    return inside, told.replace(" ", "\xa0")  # not to be broken across lines
+
+
+def _plane(points: Array, section: tuple[str, float, float] | None) -> tuple[int, int] | None:
+    """The two axes to show: of the section, or of the plane in which all tips are."""
+    if section is not None:
+        normal = AXES.index(section[0])
+    else:
+        extent = np.ptp(np.vstack([points, np.zeros(3)]), axis=0)  # the base is at the origin
+        normal = int(extent.argmin())
+        if extent[normal] > _FLAT * extent.max():
+            return None
+    first, second = (axis for axis in range(3) if axis != normal)
+    return first, second
+
+
+def _colors(values: Array) -> _Colors:
+    """Colours of finite values; up to the 99th percentile of them where some are infinite."""
+    finite = values[np.isfinite(values)]
+    endless = bool(np.isposinf(values).any())
+    if not finite.size:
+        finite = np.array([0.0, 1.0])
+    low = float(finite.min())
+    high = float(np.quantile(finite, 0.99) if endless else finite.max())
+    scale = Normalize
+    if low > 0.0 and high > _WIDE * low:
+        scale = LogNorm
+    elif low < 0.0 < high:  # a margin: its sign matters most
+        low, high = -max(-low, high), max(-low, high)
+    name = "coolwarm_r" if low < 0.0 < high else "viridis"
+    high = max(high, low + 1e-12 * abs(low))
+    return _Colors(
+        ScalarMappable(scale(low, high), name),
+        high + abs(high),  # what is infinite is drawn as this
+        "max" if endless else "neither",
+    )
+
+
+def _draw(
+    axes: Any,
+    points: Array,
+    panel: _Panel,
+    plane: tuple[int, int] | None,
+    colors: _Colors,
+    words: Mapping[int, str],
+) -> None:
+    shown = plane or (0, 1, 2)
+    there = ~np.isnan(panel.values)
+    for value in np.unique(panel.status[~there]).tolist():
+        mark, color, size = _MARKS.get(words[value], _MARKS["outside_elasticity"])
+        some = points[~there & (panel.status == value)][:, shown]
+        axes.scatter(*some.T, marker=mark, c=color, s=size, linewidths=0.7)
+    order = np.flatnonzero(there)
+    axes.scatter(
+        *points[order][:, shown].T,
+        c=np.minimum(panel.values[order], colors.beyond),
+        norm=colors.mappable.norm,
+        cmap=colors.mappable.cmap,
+        s=14.0,
+        linewidths=0.0,
+    )
+    axes.scatter(*np.zeros((len(shown), 1)), marker="s", c="0.1", s=28.0)
+    for letter, axis in zip(AXES, shown, strict=False):
+        getattr(axes, f"set_{letter}label")(f"{AXES[axis]} [mm]", fontsize=8)
+        getattr(axes, f"{letter}axis").set_major_locator(MaxNLocator(5))
+    axes.tick_params(labelsize=7)
+    if plane:
+        axes.set_aspect("equal", adjustable="datalim")
+        axes.grid(alpha=0.3)
+    else:
+        ranges = np.ptp([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()], axis=1)
+        axes.set_box_aspect(ranges, zoom=0.8)  # equal axes, and room for the labels
+
+
+def _legend(figure: Figure, panels: list[_Panel], words: Mapping[int, str]) -> None:
+    """The markers, and how many entries of all they stand for."""
+    from matplotlib.lines import Line2D
+
+    status = np.concatenate([panel.status[np.isnan(panel.values)] for panel in panels])
+    total = sum(panel.status.size for panel in panels)
+    handles = [Line2D([], [], marker="s", color="0.1", linestyle="", label="base")]
+    for value, count in zip(*np.unique(status, return_counts=True), strict=True):
+        word = words[int(value)]
+        mark, color, _ = _MARKS.get(word, _MARKS["outside_elasticity"])
+        label = f"{word.replace('_', ' ')}: {100.0 * count / total:.3g} %"
+        handles.append(Line2D([], [], marker=mark, color=color, linestyle="", label=label))
+    figure.legend(handles=handles, loc="outside lower center", ncols=5, fontsize=8)

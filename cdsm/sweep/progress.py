@@ -1,0 +1,43 @@
+"""A progress bar with rate and time left, on a terminal and if wanted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    ProgressColumn,
+    Task,
+    TextColumn,
+    TimeRemainingColumn,
+)
+from rich.text import Text
+
+
+class _Rate(ProgressColumn):
+    """Evaluations per second, over the last half minute."""
+
+    def render(self, task: Task) -> Text:
+        return Text("" if task.speed is None else f"{task.speed:,.0f}/s")
+
+
+@contextmanager
+def progress_bar(total: int, done: int, *, wanted: bool) -> Iterator[Callable[[int], None]]:
+    """Give a function that counts evaluations; what was done before does not count in the rate."""
+    console = Console(stderr=True)
+    bar = Progress(
+        TextColumn("sweep"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        _Rate(),
+        TimeRemainingColumn(),
+        console=console,
+        disable=not (wanted and console.is_terminal),
+    )
+    with bar:
+        task = bar.add_task("sweep", total=total, completed=done)
+        yield lambda count: bar.advance(task, count)

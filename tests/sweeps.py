@@ -1,0 +1,74 @@
+"""Arms, postures and elasticities that the tests of sweeps share."""
+
+import os
+import signal
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+import cdsm
+from cdsm._checks import Array
+from cdsm.sweep.quantities import QUANTITIES
+
+EVERYTHING = tuple(QUANTITIES)
+STEEL = cdsm.LinearElasticity(48e3)
+LAWS = {"strand": cdsm.presets.STRAND_1X19, "steel": STEEL}
+WRENCHES = {"none": np.zeros(6), "pulled": np.array([1.0, 0.5, -2.0, 0.0, 0.05, 0.1])}
+
+
+def short_arm(elasticity: cdsm.Elasticity = STEEL, spring: float = np.inf) -> cdsm.Manipulator:
+    """Three universal joints, and limits that a grid can go beyond."""
+    geometry = cdsm.Geometry.universal(
+        joints=3,
+        cables_per_joint=3,
+        link_length=0.05,
+        base_length=0.02,
+        disk_offset=0.01,
+        hole_radius=0.02,
+        link_mass=0.1,
+    )
+    cables = cdsm.serpentine_cables(geometry, elasticity, series_stiffness=spring)
+    return cdsm.Manipulator(geometry, cables=cables, gravity=(0.0, -2.0, -9.0))
+
+
+GRID = cdsm.GridPoses(
+    {"joint1_1": [-0.4, 0.1, 2.0], "joint3_2": np.linspace(-0.3, 0.3, 4)}, {"joint2_1": 0.2}
+)
+CASES: dict[str, Any] = {"minimum": [1.0, 20.0, 60.0], "elasticity": LAWS, "wrench": WRENCHES}
+"""Postures within and beyond the limits, bounds below and in the domain of the strand."""
+
+
+@dataclass(frozen=True)
+class Deadly(cdsm.Elasticity):
+    """A wire that kills the process that asks for its rigidity, once it comes to a file "die…".
+
+    Attributes:
+        folder: Its files are taken away one by one, in the order of their names.
+        low: Only under tensions above it [N].
+    """
+
+    folder: str
+    low: float = 0.0
+
+    def rigidity(self, tension: ArrayLike) -> Array:
+        if np.max(tension, initial=0.0) > self.low:
+            for order in sorted(Path(self.folder).iterdir())[:1]:
+                with suppress(FileNotFoundError):  # another process was faster
+                    order.unlink()
+                    if order.name.startswith("die"):
+                        os.kill(os.getpid(), signal.SIGKILL)
+        return STEEL.rigidity(tension)
+
+    def strain(self, tension: ArrayLike) -> Array:
+        return STEEL.strain(tension)
+
+    def energy(self, tension: ArrayLike) -> Array:
+        return STEEL.energy(tension)
+
+    @property
+    def domain(self) -> cdsm.Domain:
+        return STEEL.domain
