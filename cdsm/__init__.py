@@ -15,6 +15,8 @@ from cdsm import presets
 from cdsm.batch import Batch, Status, Tensions, distribute_tensions, evaluate
 from cdsm.buckling import CriticalLoad, CriticalTension, critical_load, critical_tension
 from cdsm.cable import Cable, Site, in_series, serpentine_cables
+from cdsm.cable_file import read_cables, write_cables
+from cdsm.caspr import read_caspr
 from cdsm.elasticity import Domain, Elasticity, LinearElasticity
 from cdsm.equilibrium import Equilibrium, equilibrium
 from cdsm.errors import (
@@ -47,6 +49,7 @@ from cdsm.kinematics import (
     solve_joint_angles,
 )
 from cdsm.manipulator import Manipulator, Posture
+from cdsm.mjcf import to_mjcf, write_mjcf
 from cdsm.modes import Modes, modes
 from cdsm.parts import CableRoute, Joint, Link
 from cdsm.planning import (
@@ -159,6 +162,8 @@ __all__ = [
     "plan_path",
     "plan_stiffness",
     "presets",
+    "read_cables",
+    "read_caspr",
     "read_elasticity",
     "read_sweep",
     "read_tensile_csv",
@@ -169,9 +174,12 @@ __all__ = [
     "stiffness_gradient",
     "stiffness_range",
     "sweep",
+    "to_mjcf",
     "to_urdf",
     "weight_test",
+    "write_cables",
     "write_elasticity",
+    "write_mjcf",
     "write_sweep",
     "write_urdf",
 ]

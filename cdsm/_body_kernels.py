@@ -5,6 +5,8 @@ all the rest. A test holds both equal to rounding. With M and S = Σ m c of all 
 r_i = S − M o_i and gravity γ,
 
     g_i = −γ·(z_i × r_i),    ∂g_i/∂θ_j = −γ·(z_i × (z_j × r_j)) for i before or equal to j.
+
+Where joint j slides along s, M s stands for z_j × r_j.
 """
 
 from __future__ import annotations
@@ -46,7 +48,7 @@ def reach(
     jacobian: Array,
 ) -> None:
     """Fill the pose of the tip (4, 4), and J_X (6, nv) for the joints on the way to it."""
-    origin, axis, _ = frames
+    origin, axis, slide, _ = frames
     i = masses.tip
     for r in range(3):
         tip[3, r] = 0.0
@@ -61,9 +63,9 @@ def reach(
     while i > 0:
         rx, ry, rz = tip[0, 3] - origin[i, 0], tip[1, 3] - origin[i, 1], tip[2, 3] - origin[i, 2]
         zx, zy, zz = axis[i, 0], axis[i, 1], axis[i, 2]
-        jacobian[0, i - 1] = zy * rz - zz * ry
-        jacobian[1, i - 1] = zz * rx - zx * rz
-        jacobian[2, i - 1] = zx * ry - zy * rx
+        jacobian[0, i - 1] = zy * rz - zz * ry + slide[i, 0]
+        jacobian[1, i - 1] = zz * rx - zx * rz + slide[i, 1]
+        jacobian[2, i - 1] = zx * ry - zy * rx + slide[i, 2]
         jacobian[3, i - 1] = zx
         jacobian[4, i - 1] = zy
         jacobian[5, i - 1] = zz
@@ -75,7 +77,7 @@ def weigh(
     parent: Indices, masses: Masses, rotation: Array, frames: Frames, load: Array, torque: Array
 ) -> None:
     """Fill g (nv,), and M, z × r and γ × z of every joint, (nv+1, 7)."""
-    origin, axis, _ = frames
+    origin, axis, slide, _ = frames
     gx, gy, gz = masses.gravity[0], masses.gravity[1], masses.gravity[2]
     for i in range(parent.shape[0]):
         m = masses.mass[i]
@@ -94,9 +96,9 @@ def weigh(
         ry = load[i, 2] - M * origin[i, 1]
         rz = load[i, 3] - M * origin[i, 2]
         zx, zy, zz = axis[i, 0], axis[i, 1], axis[i, 2]
-        load[i, 1] = zy * rz - zz * ry
-        load[i, 2] = zz * rx - zx * rz
-        load[i, 3] = zx * ry - zy * rx
+        load[i, 1] = zy * rz - zz * ry + M * slide[i, 0]
+        load[i, 2] = zz * rx - zx * rz + M * slide[i, 1]
+        load[i, 3] = zx * ry - zy * rx + M * slide[i, 2]
         load[i, 4] = gy * zz - gz * zy
         load[i, 5] = gz * zx - gx * zz
         load[i, 6] = gx * zy - gy * zx

@@ -6,8 +6,9 @@ d_i = ∂(b − a)/∂θ_i,
     ∂ℓ/∂θ_i = u·d_i,    ∂²ℓ/∂θ_i∂θ_j = (d_i·d_j − (u·d_i)(u·d_j))/ℓ + u·∂²(b − a)/∂θ_i∂θ_j.
 
 Only the joints between the two links enter: those on the way to b with +, those on the way to a
-with −. For a joint with axis z through o, d = ±z × (x − o), and for a joint i not after joint j on
-the same side the second derivative is z_i × d_j.
+with −. For a joint that turns about z through o, d = ±z × (x − o), for one that slides along s,
+d = ±s; and for a joint i not after joint j on the same side the second derivative is z_i × d_j,
+with z = 0 where a joint slides.
 """
 
 from __future__ import annotations
@@ -36,18 +37,23 @@ class Tree(NamedTuple):
             the second times cos q, plus the third times sin q, is the rotation of its frame in
             that of the joint before.
         translation: Origin in the frame of the joint before, (nv+1, 3) [m].
-        axis: Unit axis, likewise, (nv+1, 3).
+        axis: Unit axis of a joint that turns, likewise, (nv+1, 3); zero if it slides.
+        slide: Unit direction of a joint that slides, likewise, (nv+1, 3); zero if it turns.
     """
 
     parent: Indices
     turn: Array
     translation: Array
     axis: Array
+    slide: Array
 
     @classmethod
-    def of(cls, parent: Indices, rotation: Array, translation: Array, axis: Array) -> Tree:
-        """From joint frames at q = 0 in the frames before, and axes in the joints' own."""
+    def of(
+        cls, parent: Indices, rotation: Array, translation: Array, axis: Array, slide: Array
+    ) -> Tree:
+        """From joint frames at q = 0 in the frames before; axes and slides in the joints' own."""
         along = axis[:, :, None] * axis[:, None, :]
+        along[~axis.any(axis=1)] = np.eye(3)  # it does not turn, so all of it stays
         cross = np.cross(axis[:, None, :], np.eye(3)).transpose(0, 2, 1)
         parts = np.stack([along, np.eye(3) - along, cross], axis=1)
         return cls(
@@ -55,6 +61,7 @@ class Tree(NamedTuple):
             turn=frozen(rotation[:, None] @ parts),
             translation=frozen(translation),
             axis=frozen((rotation @ axis[:, :, None])[:, :, 0].copy()),
+            slide=frozen((rotation @ slide[:, :, None])[:, :, 0].copy()),
         )
 
 
@@ -85,12 +92,14 @@ class Frames(NamedTuple):
 
     Attributes:
         origin: A point on each joint axis, (nv+1, 3) [m].
-        axis: Its unit direction, (nv+1, 3).
+        axis: Its unit direction, (nv+1, 3); zero if the joint slides.
+        slide: Where it slides to, (nv+1, 3); zero if it turns.
         site: The cable sites, (P, 3) [m].
     """
 
     origin: Array
     axis: Array
+    slide: Array
     site: Array
 
 
@@ -99,10 +108,10 @@ def place(
     tree: Tree, row: Indices, point: Array, q: Array, rotation: Array, frames: Frames
 ) -> None:
     """Forward kinematics at q (nv,): fill the rotations of the joints (nv+1, 3, 3) and frames."""
-    parent, turn, translation, local_axis = tree
-    origin, axis, site = frames
+    parent, turn, translation, local_axis, local_slide = tree
+    origin, axis, slide, site = frames
     for r in range(3):
-        origin[0, r] = axis[0, r] = 0.0
+        origin[0, r] = axis[0, r] = slide[0, r] = 0.0
         for c in range(3):
             rotation[0, r, c] = 1.0 if r == c else 0.0
     for i in range(1, parent.shape[0]):
@@ -110,8 +119,10 @@ def place(
         cosine, sine = math.cos(q[i - 1]), math.sin(q[i - 1])
         for r in range(3):
             x, y, z = rotation[before, r, 0], rotation[before, r, 1], rotation[before, r, 2]
-            t, a = translation[i], local_axis[i]
+            t, a, s = translation[i], local_axis[i], local_slide[i]
+            slide[i, r] = x * s[0] + y * s[1] + z * s[2]
             origin[i, r] = origin[before, r] + (x * t[0] + y * t[1] + z * t[2])
+            origin[i, r] += q[i - 1] * slide[i, r]
             axis[i, r] = x * a[0] + y * a[1] + z * a[2]
             for c in range(3):
                 rotation[i, r, c] = (
@@ -180,7 +191,9 @@ def _add_side(
         rx = side * (frames.site[site, 0] - frames.origin[j, 0])
         ry = side * (frames.site[site, 1] - frames.origin[j, 1])
         rz = side * (frames.site[site, 2] - frames.origin[j, 2])
-        dx, dy, dz = zy * rz - zz * ry, zz * rx - zx * rz, zx * ry - zy * rx
+        dx = zy * rz - zz * ry + side * frames.slide[j, 0]
+        dy = zz * rx - zx * rz + side * frames.slide[j, 1]
+        dz = zx * ry - zy * rx + side * frames.slide[j, 2]
         along = ux * dx + uy * dy + uz * dz
         if slopes.shape[0]:
             slopes[cable, j - 1] += along
@@ -268,13 +281,14 @@ def evaluate(
     turn: Array,
     translation: Array,
     local_axis: Array,
+    local_slide: Array,
     row: Indices,
     point: Array,
     segment: Indices,
     joint: Indices,
     fixed: Array,
     q: Array,
-) -> tuple[Array, Array, Array, Array, Array, int]:
+) -> tuple[Array, Array, Array, Array, Array, Array, int]:
     """From :class:`Tree`, :class:`Routing` and q (nv,) to everything that depends on q.
 
     Fields are handed over one by one: unpacking a tuple at the border costs a microsecond.
@@ -284,13 +298,14 @@ def evaluate(
         coincide, or −1; if there is one, L and J_L are unfinished.
     """
     count, nv = parent.shape[0], q.shape[0]
-    tree = Tree(parent, turn, translation, local_axis)
-    frames = Frames(np.empty((count, 3)), np.empty((count, 3)), np.empty((row.shape[0], 3)))
+    tree = Tree(parent, turn, translation, local_axis, local_slide)
+    origin, axis, slide = np.empty((count, 3)), np.empty((count, 3)), np.empty((count, 3))
+    frames = Frames(origin, axis, slide, np.empty((row.shape[0], 3)))
     place(tree, row, point, q, np.empty((count, 3, 3)), frames)
     L, J, nothing = fixed.copy(), np.zeros((fixed.shape[0], nv)), np.empty((0, nv, nv))
     page, bent = np.empty(0, dtype=np.intp), np.empty((nv, 3))
     coincident = measure(segment, joint, frames, fixed, page, bent, L, J, nothing)
-    return frames.origin, frames.axis, frames.site, L, J, coincident
+    return origin, axis, slide, frames.site, L, J, coincident
 
 
 @compiled
@@ -299,6 +314,7 @@ def add_length_hessian(
     joint: Indices,
     origin: Array,
     axis: Array,
+    slide: Array,
     site: Array,
     weight: Array,
     page: Indices,
@@ -309,7 +325,7 @@ def add_length_hessian(
     All pages zero and weight = F gives H_L·F; page c for cable c and weight 1 the whole tensor.
     No two neighbouring sites may coincide; :func:`evaluate` has seen to that.
     """
-    frames, nv = Frames(origin, axis, site), hessian.shape[1]
+    frames, nv = Frames(origin, axis, slide, site), hessian.shape[1]
     nothing, L = np.empty((0, nv)), np.zeros(weight.shape[0])
     measure(segment, joint, frames, weight, page, np.empty((nv, 3)), L, nothing, hessian)
     for k in range(hessian.shape[0]):

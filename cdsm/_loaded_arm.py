@@ -97,8 +97,7 @@ class LoadedArm:
     def stops(self) -> tuple[Array, Array]:
         """Lowest and highest angles (nv,) [rad], at which the joints rest on their stops."""
         arm, q = self.reference.arm, self.reference.q
-        touching = [joint.limit is None for joint in arm.geometry.joints for _ in joint.axes]
-        apart = np.where(touching, _APART, 0.0)
+        apart = np.where(arm._touching, _APART, 0.0)
         # the reference may stand nearer
         return np.minimum(arm.lower + apart, q), np.maximum(arm.upper - apart, q)
 

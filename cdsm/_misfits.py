@@ -32,12 +32,12 @@ class LengthMisfit:
     wanted: Array
 
     def misfit(self, q: Array) -> tuple[Array, Array]:
-        pose, size = self.arm.at(q, check_limits=False), self.arm.geometry.length
+        pose, size = self.arm.at(q, check_limits=False), self.arm.length
         return (pose.cable_lengths - self.wanted) / size, pose.length_jacobian / size
 
     def curvature(self, q: Array, weight: Array) -> Array:
         # H_L·F of tensions F = weight
-        tension = frozen(weight / self.arm.geometry.length)
+        tension = frozen(weight / self.arm.length)
         pose = self.arm.at(q, check_limits=False)
         return pose._joint_stiffness(tension, frozen(np.zeros(weight.size)), _NO_WRENCH)[0]
 
@@ -55,7 +55,7 @@ class TipMisfit:
     target: Array
 
     def misfit(self, q: Array) -> tuple[Array, Array]:
-        state, size = self.arm._body.state(q), self.arm.geometry.length
+        state, size = self.arm._body.state(q), self.arm.length
         linear, angular = state.jacobian[:3] / size, state.jacobian[3:]
         if self.target.ndim == 1:
             return (state.tip[:3, 3] - self.target) / size, linear
@@ -67,7 +67,7 @@ class TipMisfit:
         # ∂(J_Xᵀ W)/∂θ of a dead wrench W = weight: where r = 0, ∂r/∂q is J_X but for the size
         wrench = np.zeros(6)
         wrench[: weight.size] = weight
-        wrench[:3] /= self.arm.geometry.length
+        wrench[:3] /= self.arm.length
         return -load_stiffness(frozen(self.arm._body.state(q).jacobian), frozen(wrench))
 
     def hessian(self, q: Array) -> Array:

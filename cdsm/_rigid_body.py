@@ -29,7 +29,7 @@ class BodyState(NamedTuple):
 
 
 class RigidBody:
-    """A Pinocchio model of a tree of revolute joints, with one tip frame.
+    """A Pinocchio model of a tree of revolute and prismatic joints, with one tip frame.
 
     Args:
         urdf: Text of a URDF that has passed the checks of :mod:`cdsm.urdf`.
@@ -37,7 +37,7 @@ class RigidBody:
         gravity: Gravity in base axes, (3,) [m/s²].
 
     Raises:
-        UrdfError: Pinocchio does not accept it, or a joint is not revolute.
+        UrdfError: Pinocchio does not accept it, or a joint is neither revolute nor prismatic.
         UnknownName: There is no link called ``tip``.
     """
 
@@ -49,12 +49,18 @@ class RigidBody:
         model.gravity.linear = np.array(gravity)
         self.joint_names: tuple[str, ...] = tuple(model.names)[1:]
         if model.nq != len(self.joint_names) or model.nv != len(self.joint_names):
-            raise UrdfError("the URDF has a joint that is not revolute; cdsm takes revolute ones.")
+            raise UrdfError(
+                "the URDF has a joint with more than one coordinate; cdsm takes revolute and "
+                "prismatic ones."
+            )
         self.nv: int = model.nv
+        self.name: str = model.name
         self.lower = frozen(np.array(model.lowerPositionLimit))
         self.upper = frozen(np.array(model.upperPositionLimit))
         self._tip = self._frame(tip)
         self._scratch = threading.local()
+        self._twists = frozen(self._local_twists())
+        self.slides = frozen(np.asarray(~self._twists[:, 3:].any(axis=1)))
 
     @property
     def link_names(self) -> tuple[str, ...]:
@@ -76,16 +82,34 @@ class RigidBody:
 
     def tree(self) -> Tree:
         """The tree as plain arrays."""
-        model, data = self._model, self._data()
-        pin.computeJointJacobians(model, data, pin.neutral(model))
-        axis = np.zeros((self.nv + 1, 3))
-        for i in range(1, self.nv + 1):
-            axis[i] = pin.getJointJacobian(model, data, i, pin.LOCAL).reshape(6, -1)[3:, i - 1]
+        model = self._model
         return Tree.of(
             parent=np.array(model.parents, dtype=np.intp),
             rotation=np.array([placement.rotation for placement in model.jointPlacements]),
             translation=np.array([placement.translation for placement in model.jointPlacements]),
-            axis=axis,
+            axis=np.vstack([np.zeros(3), self._twists[:, 3:]]),
+            slide=np.vstack([np.zeros(3), self._twists[:, :3]]),
+        )
+
+    @property
+    def length(self) -> float:
+        """Way from the base over the joints to the tip, all joints at zero [m]."""
+        frame = self._model.frames[self._tip]
+        way, joint = float(np.linalg.norm(frame.placement.translation)), frame.parentJoint
+        while joint:
+            way += float(np.linalg.norm(self._model.jointPlacements[joint].translation))
+            joint = self._model.parents[joint]
+        return way
+
+    def _local_twists(self) -> Array:
+        """Motion of each joint in its own frame (nv, 6): linear [-], then angular [rad]."""
+        model, data = self._model, self._data()
+        pin.computeJointJacobians(model, data, pin.neutral(model))
+        return np.array(
+            [
+                pin.getJointJacobian(model, data, i, pin.LOCAL).reshape(6, -1)[:, i - 1]
+                for i in range(1, self.nv + 1)
+            ]
         )
 
     def masses(self) -> Masses:

@@ -15,6 +15,7 @@ def joint_stiffness(
     joint: Indices,
     origin: Array,
     axis: Array,
+    slide: Array,
     site: Array,
     jacobian: Array,
     length_jacobian: Array,
@@ -27,7 +28,7 @@ def joint_stiffness(
     nv = jacobian.shape[1]
     active, passive = np.zeros((1, nv, nv)), np.zeros((nv, nv))
     page = np.zeros(tension.shape[0], dtype=np.intp)
-    add_length_hessian(segment, joint, origin, axis, site, tension, page, active)
+    add_length_hessian(segment, joint, origin, axis, slide, site, tension, page, active)
     add_passive(length_jacobian, cable_stiffness, passive)
     mirror(passive)
     load = load_stiffness(jacobian, wrench)

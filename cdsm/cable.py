@@ -66,6 +66,8 @@ class Cable:
         lead: Straight cable between the actuator and the first site [m].
         series_stiffness: k_series of a spring or drive in series [N/m]; inf: none.
         control: ``"position"``: the motor holds the length; ``"force"``: it holds the tension.
+        minimum: Least tension the cable is to carry [N]; every distribution of tensions keeps it.
+        maximum: Largest tension it may carry [N], likewise; inf: any.
 
     Raises:
         CableError: Names the cable and what is wrong with it.
@@ -77,6 +79,8 @@ class Cable:
     lead: float = 0.0
     series_stiffness: float = math.inf
     control: Control = "position"
+    minimum: float = 0.0
+    maximum: float = math.inf
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name:
@@ -92,6 +96,9 @@ class Cable:
             series = self.series_stiffness
             if not (isinstance(series, float) and series == math.inf):
                 series = scalar("series_stiffness", series)
+            least, most = scalar("minimum", self.minimum), self.maximum
+            if not (isinstance(most, float) and most == math.inf):
+                most = scalar("maximum", most)
         except CdsmError as error:
             raise CableError(self.name, str(error)) from None
         if len(sites) < 2:
@@ -104,6 +111,13 @@ class Cable:
                 f"series_stiffness: {series:g} N/m given; it must be positive (at least "
                 f"{SMALLEST:g}), or inf for none.",
             )
+        if not 0.0 <= least <= most:
+            raise CableError(
+                self.name,
+                f"tensions from {least:g} to {most:g} N given; 0 <= minimum <= maximum is needed.",
+            )
+        object.__setattr__(self, "minimum", least)
+        object.__setattr__(self, "maximum", most)
         object.__setattr__(self, "sites", sites)
         object.__setattr__(self, "lead", lead)
         object.__setattr__(self, "series_stiffness", series)

@@ -148,7 +148,7 @@ class Equilibrium(ReadOnlyState):
 
     def __repr__(self) -> str:
         moved = float(np.linalg.norm(self.displacement)) * 1000.0
-        return f"<Equilibrium of {self.pose.arm.geometry.name}, tip moved by {moved:.4g} mm>"
+        return f"<Equilibrium of {self.pose.arm.name}, tip moved by {moved:.4g} mm>"
 
     def __str__(self) -> str:
         arm = self.pose.arm

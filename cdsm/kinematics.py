@@ -67,7 +67,7 @@ class JointSolution(ReadOnlyState):
     @property
     def reachable(self) -> bool:
         """Whether the root of the summed squares of :attr:`residual` is within the tolerance."""
-        misfit = float(np.linalg.norm(self.residual)) / self.arm.geometry.length
+        misfit = float(np.linalg.norm(self.residual)) / self.arm.length
         return misfit <= self.tolerance
 
     @cached_property
@@ -89,7 +89,7 @@ class JointSolution(ReadOnlyState):
         return _at_limit(self.arm, self.angles)
 
     def __repr__(self) -> str:
-        return f"<JointSolution of {self.arm.geometry.name}, {_reach(self.reachable)}>"
+        return f"<JointSolution of {self.arm.name}, {_reach(self.reachable)}>"
 
     def __str__(self) -> str:
         rows = [f"{'cable':<12}{'wanted [m]':>14}{'length [m]':>14}{'off [m]':>12}"]
@@ -147,7 +147,7 @@ class KinematicSolution(ReadOnlyState):
     @property
     def reachable(self) -> bool:
         """Whether √(position error²/arm length² + orientation error²) is within the tolerance."""
-        distance = self.position_error / self.arm.geometry.length
+        distance = self.position_error / self.arm.length
         return float(np.hypot(distance, self.orientation_error)) <= self.tolerance
 
     @cached_property
@@ -161,7 +161,7 @@ class KinematicSolution(ReadOnlyState):
         return _at_limit(self.arm, self.angles)
 
     def __repr__(self) -> str:
-        return f"<KinematicSolution of {self.arm.geometry.name}, {_reach(self.reachable)}>"
+        return f"<KinematicSolution of {self.arm.name}, {_reach(self.reachable)}>"
 
     def __str__(self) -> str:
         verdict = f"{_reach(self.reachable)}: the tip is {self.position_error:.2g} m"

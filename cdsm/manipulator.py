@@ -6,6 +6,7 @@ angles alone. A posture is frozen, and exists only once all of it is computed.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -37,6 +38,7 @@ from cdsm.errors import (
 )
 from cdsm.geometry import Geometry
 from cdsm.urdf import TIP, to_urdf
+from cdsm.urdf_reader import read_urdf
 
 GRAVITY = (0.0, 0.0, -9.81)
 """Default gravity in base axes [m/s²]."""
@@ -72,7 +74,7 @@ class Manipulator:
         cables: Sequence[Cable] | None = None,
         gravity: ArrayLike = GRAVITY,
     ) -> None:
-        self._geometry = instance("geometry", geometry, Geometry)
+        described = instance("geometry", geometry, Geometry)
         if elasticity is not None and cables is None:
             cables = serpentine_cables(geometry, elasticity)
         elif elasticity is not None or cables is None:
@@ -81,17 +83,62 @@ class Manipulator:
                 "give one of elasticity= (for the cables of the geometry) and cables=; "
                 + ("both were given." if cables is not None else "neither was."),
             )
+        self._build(described, to_urdf(described), cables, TIP, gravity)
+
+    @classmethod
+    def from_urdf(
+        cls,
+        urdf: str | os.PathLike[str],
+        cables: Sequence[Cable],
+        *,
+        tip: str,
+        gravity: ArrayLike = GRAVITY,
+        check_inertia: bool = True,
+    ) -> Manipulator:
+        """A robot of somebody else's: a tree of revolute, prismatic and fixed joints, and cables.
+
+        Where a joint slides, its coordinate is in m, its torque a force [N], and so on.
+
+        Args:
+            urdf: Path of the file, or the text itself.
+            cables: Its cables, as :func:`~cdsm.cable_file.read_cables` reads them.
+            tip: The link whose frame is the tip, ``tool0`` of other docstrings.
+            gravity: In base axes (3,) [m/s²]; (0, 0, 0) for none.
+            check_inertia: Refuse moments of inertia that no body has. Stiffness does not depend on
+                them, :func:`~cdsm.modes.modes` do.
+
+        Raises:
+            FileError: The file cannot be read.
+            UrdfError: It is no such robot; every fault is listed.
+            UnknownName: There is no link called ``tip``.
+            CableError: Two cables of one name, or one on a link that does not exist.
+        """
+        arm = cls.__new__(cls)
+        arm._build(None, read_urdf(urdf, check_inertia=check_inertia), cables, tip, gravity)
+        return arm
+
+    def _build(
+        self,
+        geometry: Geometry | None,
+        urdf: str,
+        cables: Sequence[Cable],
+        tip: str,
+        gravity: ArrayLike,
+    ) -> None:
+        """Set everything, once: from checked URDF text, and the geometry behind it if any."""
+        self._geometry = geometry
         self._cables = _checked_cables(cables)
         self._gravity = vector("gravity", gravity, 3, "gravity in base axes [m/s²]")
-        self._urdf = to_urdf(geometry)
-        self._body = RigidBody(self._urdf, TIP, self._gravity)
+        self._urdf, self._tip_link = urdf, tip
+        self._body = RigidBody(urdf, tip, self._gravity)
         tree = self._body.tree()
         routing = route(self._body, tree, self._cables)
         self._tree, self._routing, self._masses = tree, routing, self._body.masses()
         self._constants = (*tree, *routing)
         self._segments = routing.segment, routing.joint
 
-        self._meaning_of_q = f"one angle [rad] per joint, {', '.join(self.joint_names)}"
+        way = "angle [rad] or way [m]" if self._body.slides.any() else "angle [rad]"
+        self._meaning_of_q = f"one {way} per joint, {', '.join(self.joint_names)}"
         self._lowest = self._body.lower - _LIMIT_SLACK
         self._highest = self._body.upper + _LIMIT_SLACK
 
@@ -107,13 +154,52 @@ class Manipulator:
             )
             for cables in by_law.values()
         ]
+        self._least = frozen(np.array([cable.minimum for cable in self._cables]))
+        self._most = frozen(np.array([cable.maximum for cable in self._cables]))
+        self._bounded = bool(self._least.any() or np.isfinite(self._most).any())
         series = np.array([cable.series_stiffness for cable in self._cables])
         self._series_compliance = 1.0 / series
 
     @property
     def geometry(self) -> Geometry:
-        """The geometry it was made from."""
+        """The geometry it was made from.
+
+        Raises:
+            InvalidInput: It was made from a URDF.
+        """
+        if self._geometry is None:
+            raise InvalidInput(
+                "geometry", f"{self.name} was made from a URDF and has none; see arm.urdf."
+            )
         return self._geometry
+
+    @property
+    def is_serpentine(self) -> bool:
+        """Whether it was made from a :class:`~cdsm.geometry.Geometry`."""
+        return self._geometry is not None
+
+    @property
+    def name(self) -> str:
+        """Name of the robot."""
+        return self._body.name
+
+    @cached_property
+    def _touching(self) -> NDArray[np.bool_]:
+        """Which joints (nv,) are stopped by disks that touch."""
+        if self._geometry is None:
+            return np.zeros(self.nv, dtype=np.bool_)
+        joints = self._geometry.joints
+        return np.array([joint.limit is None for joint in joints for _ in joint.axes])
+
+    @cached_property
+    def length(self) -> float:
+        """Way from the base over the joints to the tip, all joints at zero [m]."""
+        return self._body.length if self._geometry is None else self._geometry.length
+
+    @property
+    def tip_link(self) -> str:
+        """Name of the link whose frame is the tip."""
+        return self._tip_link
 
     @property
     def urdf(self) -> str:
@@ -151,20 +237,40 @@ class Manipulator:
         return self._body.upper
 
     def __repr__(self) -> str:
-        return f"<Manipulator {self._geometry}>"
+        return f"<Manipulator {self}>"
+
+    def __str__(self) -> str:
+        if self._geometry is not None:
+            return str(self._geometry)
+        return (
+            f"{self.name}: {self.nv} degrees of freedom, {len(self._cables)} cables, "
+            f"{self.length:.4g} m long"
+        )
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Manipulator) and self._value == other._value
 
     def __hash__(self) -> int:
-        return hash(self._geometry)  # an elasticity of the user's own need not be hashable
+        return hash(self._urdf)  # an elasticity of the user's own need not be hashable
 
     @property
-    def _value(self) -> tuple[Geometry, tuple[Cable, ...], tuple[float, ...]]:
-        return self._geometry, self._cables, tuple(self._gravity.tolist())
+    def _value(self) -> tuple[Geometry | None, str, tuple[Cable, ...], str, tuple[float, ...]]:
+        gravity = tuple(self._gravity.tolist())
+        return self._geometry, self._urdf, self._cables, self._tip_link, gravity
 
     def __reduce__(self) -> tuple[object, ...]:
         return (_rebuild, self._value)
+
+    def with_cables(self, cables: Sequence[Cable]) -> Manipulator:
+        """The same robot with other cables.
+
+        Args:
+            cables: One or more.
+
+        Raises:
+            CableError: Two cables of one name, or one on a link that does not exist.
+        """
+        return _rebuild(self._geometry, self._urdf, tuple(cables), self._tip_link, self._gravity)
 
     def at(self, q: ArrayLike, *, check_limits: bool = True) -> Posture:
         """Evaluate the arm at joint angles q: kinematics, cable lengths and gravity.
@@ -182,17 +288,17 @@ class Manipulator:
         state = self._body.state(q)
         # Pinocchio hands out placements one Python object per joint, 14 µs for ten joints; the
         # kernel places joints and cable sites itself in 2 µs. A test holds the two equal.
-        origin, axis, site, lengths, length_jacobian = self._routed(q)
+        frames, lengths, length_jacobian = self._routed(q)
         return Posture(
             arm=self,
             q=q,
             tip=frozen(state.tip),
             jacobian=frozen(state.jacobian),
-            cable_lengths=frozen(lengths),
-            length_jacobian=frozen(length_jacobian),
+            cable_lengths=lengths,
+            length_jacobian=length_jacobian,
             gravity_torque=frozen(state.gravity_torque),
             gravity_stiffness=frozen(state.gravity_stiffness),
-            _frames=_kernels.Frames(frozen(origin), frozen(axis), frozen(site)),
+            _frames=frames,
         )
 
     def cable_lengths(self, q: ArrayLike, *, check_limits: bool = True) -> Array:
@@ -207,7 +313,7 @@ class Manipulator:
             JointLimitError: An angle is beyond its limit, and ``check_limits`` is set.
             CableError: Two neighbouring sites of a cable coincide at this posture.
         """
-        return frozen(self._routed(self._angles(q, check_limits))[3])
+        return self._routed(self._angles(q, check_limits))[1]
 
     def _angles(self, q: ArrayLike, check_limits: bool) -> Array:
         """Joint angles (nv,) [rad], checked and read-only."""
@@ -222,22 +328,20 @@ class Manipulator:
                 )
         return q
 
-    def _routed(self, q: Array) -> tuple[Array, Array, Array, Array, Array]:
-        """Origin and axis of the joints, cable sites, L and J_L at checked joint angles.
+    def _routed(self, q: Array) -> tuple[_kernels.Frames, Array, Array]:
+        """Where joints and cable sites are, L and J_L at checked joint angles.
 
         Raises:
             CableError: Two neighbouring sites of a cable coincide at this posture.
         """
-        origin, axis, site, lengths, length_jacobian, coincident = _kernels.evaluate(
-            *self._constants, q
-        )
+        *frames, lengths, length_jacobian, coincident = _kernels.evaluate(*self._constants, q)
         if coincident >= 0:
             raise CableError(
                 self._cables[self._segments[0][coincident, 0]].name,
                 f"two neighbouring sites coincide at q = {q.tolist()}, so the cable has no "
                 "direction there. Move a site, or change the posture.",
             )
-        return origin, axis, site, lengths, length_jacobian
+        return _kernels.Frames(*map(frozen, frames)), frozen(lengths), frozen(length_jacobian)
 
     def _cable_stiffness(self, lengths: Array, tension: Array) -> Array:
         """Diagonal of K_L (C,) [N/m]: 1/(l_0/EA(F) + 1/k_series), 0 for force-controlled cables.
@@ -332,7 +436,7 @@ class Posture(ReadOnlyState):
 
     def __repr__(self) -> str:
         x, y, z = self.tip[:3, 3]
-        return f"<Posture of {self.arm.geometry.name}, tip at ({x:.4g}, {y:.4g}, {z:.4g}) m>"
+        return f"<Posture of {self.arm.name}, tip at ({x:.4g}, {y:.4g}, {z:.4g}) m>"
 
     @cached_property
     def length_hessian(self) -> Array:
@@ -350,6 +454,15 @@ class Posture(ReadOnlyState):
         counts = [len(cable.sites) for cable in self.arm.cables]
         paths = np.split(self._frames.site, np.cumsum(counts)[:-1])
         return tuple(frozen(path.copy()) for path in paths)
+
+    @property
+    def bones(self) -> tuple[Array, ...]:
+        """Straight lines from joint to joint, and to the tip, (2, 3) each [m]: a stick figure."""
+        origin, parent = self._frames.origin, self.arm._tree.parent
+        tip = self.arm._masses.tip
+        lines = [np.array([origin[parent[i]], origin[i]]) for i in range(1, len(origin))]
+        lines.append(np.array([origin[tip], self.tip[:3, 3]]))
+        return tuple(frozen(line) for line in lines if (line[0] != line[1]).any())
 
     def link_pose(self, link: str) -> Array:
         """Pose of a link's frame in the base, (4, 4) [m].
@@ -377,9 +490,15 @@ class Posture(ReadOnlyState):
 
 
 def _rebuild(
-    geometry: Geometry, cables: tuple[Cable, ...], gravity: tuple[float, ...]
+    geometry: Geometry | None,
+    urdf: str,
+    cables: tuple[Cable, ...],
+    tip: str,
+    gravity: ArrayLike,
 ) -> Manipulator:
-    return Manipulator(geometry, cables=cables, gravity=gravity)
+    arm = Manipulator.__new__(Manipulator)
+    arm._build(geometry, urdf, cables, tip, gravity)
+    return arm
 
 
 def checked_rigidity(law: Elasticity, tension: Array) -> Array:

@@ -19,6 +19,9 @@ from cdsm.manipulator import Posture
 from cdsm.stiffness import Stiffness
 from cdsm.urdf import CROSS_INERTIA, CROSS_MASS
 
+_MASSLESS = 1e-12
+"""An eigenvalue of M this part of the largest is that of a motion without mass."""
+
 _STAND_IN = 0.02
 """Part of a motion's kinetic energy that may be in stand-in masses: 1 % of its frequency."""
 
@@ -55,7 +58,7 @@ class Modes(ReadOnlyState):
         return not self.growth_rates.size
 
     def __repr__(self) -> str:
-        name = self.stiffness.posture.arm.geometry.name
+        name = self.stiffness.posture.arm.name
         if not self.is_stable:
             return f"<Modes of {name}, UNSTABLE>"
         return f"<Modes of {name}, {self.frequencies[0]:.4g} to {self.frequencies[-1]:.4g} Hz>"
@@ -108,6 +111,14 @@ def modes(pose: Posture, stiffness: Stiffness) -> Modes:
     if there is not pose and not (there.arm == arm and np.array_equal(there.q, pose.q)):
         raise InvalidInput("stiffness", "was taken at another posture; take it at this one.")
     M = arm._body.mass_matrix(pose.q)
+    spectrum, motions = np.linalg.eigh(M)
+    if spectrum[0] <= _MASSLESS * spectrum[-1]:
+        motion = motions[:, 0]
+        raise SingularMass(
+            f"a motion of {arm.joint_names[int(abs(motion).argmax())]} moves no link of any mass. "
+            "Give the links a mass and moments of inertia.",
+            frozen(motion.copy()),
+        )
     shares, motions = eigh(_stand_in_mass(pose), M)
     if shares[-1] > _STAND_IN:
         motion = motions[:, -1] / np.linalg.norm(motions[:, -1])
@@ -134,6 +145,8 @@ def modes(pose: Posture, stiffness: Stiffness) -> Modes:
 def _stand_in_mass(pose: Posture) -> Array:
     """The part of M (nv, nv) that crosses and massless links have, so that simulators take them."""
     M = np.zeros((pose.arm.nv, pose.arm.nv))
+    if not pose.arm.is_serpentine:
+        return M
     origin, axis = pose._frames.origin[1:], pose._frames.axis[1:]
     for k, (joint, link) in enumerate(
         zip(pose.arm.geometry.joints, pose.arm.geometry.links, strict=True), start=1

@@ -224,7 +224,7 @@ class Stiffness(ReadOnlyState):
 
     def __repr__(self) -> str:
         state = "stable" if self.is_stable else "UNSTABLE"
-        return f"<Stiffness of {self.posture.arm.geometry.name}, {state}>"
+        return f"<Stiffness of {self.posture.arm.name}, {state}>"
 
     def __str__(self) -> str:
         lines = [f"{name:<24}{''.join(f'{cell:>12}' for cell in row)}" for name, *row in self._rows]

@@ -117,7 +117,8 @@ def distribute_tension(
     Args:
         pose: The posture.
         minimum: Lower bound [N], for all cables or (C,); not negative, since cables only pull.
-        maximum: Upper bound [N], for all cables or (C,); inf for none.
+        maximum: Upper bound [N], for all cables or (C,); inf for none. Bounds that a cable has of
+            its own hold as well.
         wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m].
         solver: ``"daqp"`` (exact), ``"osqp"``, or any other that qpsolvers finds installed.
         fixed: Tensions [N] given by name of the cable, as of motors that control force; the rest
@@ -166,6 +167,11 @@ def _checked_bounds(pose: Posture, low: Array, maximum: ArrayLike) -> tuple[Arra
             "minimum",
             f"{low[c]:g} N given for {cables[c].name}; cables only pull, so it must be finite "
             "and not negative.",
+        )
+    if pose.arm._bounded:
+        low, high = (
+            frozen(np.maximum(low, pose.arm._least)),
+            frozen(np.minimum(high, pose.arm._most)),
         )
     ordered = low <= high
     if np.count_nonzero(ordered) < low.size:

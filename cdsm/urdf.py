@@ -57,7 +57,6 @@ def to_urdf(geometry: Geometry) -> str:
         InvalidInput: Not a geometry.
     """
     import yourdfpy
-    from lxml import etree
 
     instance("geometry", geometry, Geometry)
     links = [yourdfpy.Link(name="base_link"), _link(geometry, 0)]
@@ -87,8 +86,16 @@ def to_urdf(geometry: Geometry) -> str:
             for name, rgba in _COLORS.items()
         ],
     )
+    return urdf_text(robot, _COMMENT)
+
+
+def urdf_text(robot: yourdfpy.Robot, comment: str) -> str:
+    """The text of a robot, indented, with a comment on top."""
+    import yourdfpy
+    from lxml import etree
+
     tree = yourdfpy.URDF(robot=robot, build_scene_graph=False).write_xml()
-    tree.getroot().insert(0, etree.Comment(_COMMENT))
+    tree.getroot().insert(0, etree.Comment(comment))
     etree.indent(tree, space="  ")
     text: str = etree.tostring(tree, xml_declaration=True, encoding="UTF-8").decode() + "\n"
     return text

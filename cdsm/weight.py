@@ -80,7 +80,7 @@ class WeightTest(ReadOnlyState):
     def _gives(self) -> float:
         """How far the tip goes along the force [m]; zero if that is rounding."""
         moved = float(self.displacement @ unit_direction("force", self.force))
-        return moved if abs(moved) > _MEASURED * self.without.pose.arm.geometry.length else 0.0
+        return moved if abs(moved) > _MEASURED * self.without.pose.arm.length else 0.0
 
     @cached_property
     def linear(self) -> LinearPrediction:
@@ -102,7 +102,7 @@ class WeightTest(ReadOnlyState):
     def settled_first(self) -> bool:
         """Whether the arm left its reference before the weight: unbalanced there, or unstable."""
         moved = float(np.linalg.norm(self.without.displacement))
-        return moved > _SETTLED * self.without.pose.arm.geometry.length
+        return moved > _SETTLED * self.without.pose.arm.length
 
     @cached_property
     def loads(self) -> Array:
@@ -128,7 +128,7 @@ class WeightTest(ReadOnlyState):
     def __repr__(self) -> str:
         return (
             f"<WeightTest with {np.linalg.norm(self.force):.4g} N on "
-            f"{self.without.pose.arm.geometry.name}: {self.stiffness / 1000.0:.4g} N/mm>"
+            f"{self.without.pose.arm.name}: {self.stiffness / 1000.0:.4g} N/mm>"
         )
 
     def __str__(self) -> str:
@@ -199,7 +199,7 @@ def weight_test(
         raise InvalidInput(
             "force",
             f"{np.abs(force).max():.3g} N moves the tip by rounding only, and measures nothing; "
-            f"hang at least {_MEASURED * pose.arm.geometry.length * test.linear.stiffness:.1g} N.",
+            f"hang at least {_MEASURED * pose.arm.length * test.linear.stiffness:.1g} N.",
         )
     return test
 

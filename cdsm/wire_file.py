@@ -55,16 +55,11 @@ _KINDS: dict[str, type[_Linear | _Strand | _Tabulated]] = {
 }
 
 
-def write_elasticity(elasticity: Elasticity, path: str | os.PathLike[str]) -> Path:
-    """Write an elasticity as TOML; :func:`read_elasticity` gives the same one back.
-
-    Args:
-        elasticity: Linear, strand or tabulated.
-        path: The file; replaced if it exists.
+def table_of(elasticity: Elasticity) -> list[str]:
+    """The lines of its TOML table.
 
     Raises:
         InvalidInput: An elasticity of another kind, which no file can hold.
-        FileError: The file cannot be written.
     """
     found: _Linear | _Strand | _Tabulated
     if isinstance(elasticity, LinearElasticity):
@@ -84,8 +79,35 @@ def write_elasticity(elasticity: Elasticity, path: str | os.PathLike[str]) -> Pa
             f"a {type(elasticity).__name__} given; files hold a LinearElasticity, "
             "StrandElasticity or TabulatedElasticity. Tabulate its strain to save it.",
         )
+    return toml_lines(found)
+
+
+def from_table(data: object) -> Elasticity:
+    """The elasticity of a TOML table.
+
+    Raises:
+        GeometryError: Lists every fault of the table.
+        InvalidInput: Its numbers make no elasticity.
+    """
+    kind = data.get("kind") if isinstance(data, dict) else data
+    if not isinstance(kind, str) or kind not in _KINDS:
+        raise GeometryError([f"kind: must be one of {', '.join(_KINDS)}, but is {kind!r}"])
+    return parse(_KINDS[kind], data).build()
+
+
+def write_elasticity(elasticity: Elasticity, path: str | os.PathLike[str]) -> Path:
+    """Write an elasticity as TOML; :func:`read_elasticity` gives the same one back.
+
+    Args:
+        elasticity: Linear, strand or tabulated.
+        path: The file; replaced if it exists.
+
+    Raises:
+        InvalidInput: An elasticity of another kind, which no file can hold.
+        FileError: The file cannot be written.
+    """
     units = "# Elasticity of a wire: tensions and rigidity in N, strains without unit\n"
-    return write_text(path, units + "\n".join(toml_lines(found)) + "\n")
+    return write_text(path, units + "\n".join(table_of(elasticity)) + "\n")
 
 
 def read_elasticity(path: str | os.PathLike[str]) -> Elasticity:
@@ -101,11 +123,7 @@ def read_elasticity(path: str | os.PathLike[str]) -> Elasticity:
     """
     text = read_text(path)
     try:
-        data = read_toml(text)
-        kind = data.get("kind")
-        if not isinstance(kind, str) or kind not in _KINDS:
-            raise GeometryError([f"kind: must be one of {', '.join(_KINDS)}, but is {kind!r}"])
-        return parse(_KINDS[kind], data).build()
+        return from_table(read_toml(text))
     except GeometryError as error:
         faults = error.faults
     except InvalidInput as error:

@@ -233,6 +233,24 @@ def test_plan_asks_for_one_target_and_for_a_path_with_its_rate(
         assert said in result.stderr
 
 
+def test_export_writes_what_the_api_writes(geometry: Path, tmp_path: Path) -> None:
+    model, cables = tmp_path / "arm.xml", tmp_path / "cables.toml"
+    result = call(
+        *("export", geometry, "--angles", 5, "--mjcf", model, "--cables", cables),
+        *("--min-tension", 20, "--rigidity", 48e3, "--damping", 0.1),
+    )
+    assert result.output.count("written: ") == 2
+    arm = cdsm.Manipulator(cdsm.Geometry.read(geometry), cdsm.LinearElasticity(48e3))
+    pose = arm.at(np.deg2rad(np.full(arm.nv, 5.0)))
+    pull = cdsm.distribute_tension(pose, 20.0)
+    text = cdsm.to_mjcf(arm, pose, pull, damping=0.1)
+    assert model.read_text(encoding="utf-8") == text
+    assert cdsm.read_cables(cables) == arm.cables
+    nothing = call("export", geometry)
+    assert nothing.exit_code == 2
+    assert "--mjcf, --cables or both" in nothing.stderr
+
+
 def test_wire_file_is_the_elasticity_of_the_cables(geometry: Path, tmp_path: Path) -> None:
     wire = cdsm.write_elasticity(cdsm.LinearElasticity(48e3), tmp_path / "wire.toml")
     by_file = call("stiffness", geometry, "--angles", 5, "--wire", wire, "--json")

@@ -174,13 +174,13 @@ class _Fork(NamedTuple):
     def evaluate(self, q: Array) -> tuple[Array, Array, Array]:
         """L, J_L and H_L of its one cable."""
         constants = (*self.tree, *self.routing)
-        *frames, lengths, jacobian, coincident = _kernels.evaluate(*constants, q)
+        *found, lengths, jacobian, coincident = _kernels.evaluate(*constants, q)
         assert coincident == -1
         hessian = np.zeros((1, q.size, q.size))
         page = np.zeros(1, dtype=np.intp)
-        origin, axis, site = frames
+        frames = _kernels.Frames(*found)
         segments = (self.routing.segment, self.routing.joint)
-        _kernels.add_length_hessian(*segments, origin, axis, site, np.ones(1), page, hessian)
+        _kernels.add_length_hessian(*segments, *frames, np.ones(1), page, hessian)
         return lengths, jacobian, hessian
 
 

@@ -18,10 +18,11 @@ def test_arm_is_drawn_with_disks_cables_and_equal_axes() -> None:
     axes = plots.plot_arm(pose, pull).axes[0]
     lines = [line for line in axes.get_lines() if isinstance(line, Line3D)]
     disks = sum(len(places) for _, places in pose.arm.geometry.disks)
-    assert len(lines) == disks + 1 + len(pose.arm.cables)
-    first = np.array(lines[disks + 1].get_data_3d())
+    before = disks + len(pose.bones)
+    assert len(lines) == before + len(pose.arm.cables)
+    first = np.array(lines[before].get_data_3d())
     np.testing.assert_allclose(first, 1e3 * pose.cable_paths[0].T)  # in mm
-    colors = {tuple(line.get_color()) for line in lines[disks + 1 :]}
+    colors = {tuple(line.get_color()) for line in lines[before:]}
     assert len(colors) > 2  # by tension
     limits = np.ptp([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()], axis=1)  # type: ignore[attr-defined]
     box = axes._box_aspect  # type: ignore[attr-defined]

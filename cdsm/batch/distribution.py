@@ -57,7 +57,7 @@ class Tensions(ReadOnlyState):
         return len(self.q)
 
     def __repr__(self) -> str:
-        return f"<Tensions of {self.arm.geometry.name}, {summary(self.status)}>"
+        return f"<Tensions of {self.arm.name}, {summary(self.status)}>"
 
 
 def distribute_tensions(

@@ -82,7 +82,7 @@ class Batch(ReadOnlyState):
         return len(self.q)
 
     def __repr__(self) -> str:
-        return f"<Batch of {self.arm.geometry.name}, {summary(self.status)}>"
+        return f"<Batch of {self.arm.name}, {summary(self.status)}>"
 
     def __str__(self) -> str:
         lines = [summary(self.status)]

@@ -106,6 +106,8 @@ def bounds(
             "minimum",
             f"{bad[0]:g} N given; cables only pull, so it must be finite and not negative.",
         )
+    if arm._bounded:
+        low, high = frozen(np.maximum(low, arm._least)), frozen(np.minimum(high, arm._most))
     if (low > high).any():
         *row, c = np.argwhere(low > high)[0]
         where = f" in row {row[0]}" if row else ""

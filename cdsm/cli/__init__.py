@@ -10,6 +10,7 @@ import typer
 
 import cdsm
 from cdsm.cli.arm import stiffness, urdf
+from cdsm.cli.export import export
 from cdsm.cli.loads import buckle, weigh
 from cdsm.cli.paper import reproduce
 from cdsm.cli.plan import plan
@@ -45,6 +46,6 @@ def main(
             stream.reconfigure(errors="replace")
 
 
-for command in (urdf, stiffness, weigh, buckle, plan, fit, sweep, reproduce):
+for command in (urdf, stiffness, weigh, buckle, plan, fit, sweep, export, reproduce):
     app.command()(command)
 app.command("map")(map_sweep)  # the name of a function of Python's own

@@ -73,7 +73,7 @@ def stiffness(
         if as_json:
             show_json(_to_dict(pull, K))
         else:
-            typer.echo(f"{pose.arm.geometry}\n\n{pull}\n\n{K}")
+            typer.echo(f"{pose.arm}\n\n{pull}\n\n{K}")
 
 
 def _to_dict(pull: Tension, K: Stiffness) -> dict[str, object]:

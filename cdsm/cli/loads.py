@@ -67,7 +67,7 @@ def weigh(
         if as_json:
             show_json(_weight_to_dict(test))
         else:
-            typer.echo(f"{pose.arm.geometry}\n\n{test}\n\nat the full load:\n{test.loaded[-1]}")
+            typer.echo(f"{pose.arm}\n\n{test}\n\nat the full load:\n{test.loaded[-1]}")
 
 
 def buckle(
@@ -119,7 +119,7 @@ def buckle(
         if as_json:
             show_json(_critical_to_dict(tension, most))
         else:
-            typer.echo(f"{pose.arm.geometry}\n\n{tension}")
+            typer.echo(f"{pose.arm}\n\n{tension}")
             if most is not None:
                 typer.echo(f"\n{most}")
 

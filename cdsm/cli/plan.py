@@ -102,7 +102,7 @@ def plan(
         if as_json:
             show_json(answer.numbers)
         else:
-            typer.echo(f"{arm.geometry}\n\n{answer.text}")
+            typer.echo(f"{arm}\n\n{answer.text}")
         if out is not None:
             typer.echo(f"written: {answer.motors().write_csv(out)}", err=as_json)
         if figure is not None:

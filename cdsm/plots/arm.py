@@ -16,6 +16,9 @@ from cdsm.manipulator import Posture
 from cdsm.plots.style import AXES, COLORS, MM
 from cdsm.tension import Tension
 
+_FLATTEST = 0.2
+"""Least range of an axis, as a part of the largest."""
+
 
 def plot_arm(pose: Posture, tension: Tension | None = None) -> Figure:
     """The arm in 3D: backbone, disks and cables, with equal axes in mm.
@@ -37,24 +40,16 @@ def plot_arm(pose: Posture, tension: Tension | None = None) -> Figure:
         figure.colorbar(
             _tension_colors(tension), ax=axes, label="cable tension [N]", shrink=0.7, pad=0.12
         )
-    figure.suptitle(str(pose.arm.geometry), fontsize=10)
+    figure.suptitle(str(pose.arm), fontsize=10)
     return figure
 
 
 def draw_arm(axes: Any, pose: Posture, tension: Tension | None) -> None:
     """Draw it on axes of three dimensions, for a figure of its own or part of another."""
-    geometry = pose.arm.geometry
-    circle = np.linspace(0.0, 2.0 * np.pi, 49)
-    ring = geometry.hole_radius * np.array([0.0 * circle, np.cos(circle), np.sin(circle)])
-    for link, places in geometry.disks:
-        placement = pose.link_pose(link)
-        for place in places:
-            center = placement[:3, 3:] + place * placement[:3, :1]
-            edge = center + placement[:3, :3] @ ring
-            axes.plot(*(MM * edge), color="0.35", linewidth=0.9)
-    joints = [np.zeros(3)]
-    joints += [pose.link_pose(link)[:3, 3] for link, _ in geometry.disks[1:]]
-    axes.plot(*(MM * np.array([*joints, pose.tip[:3, 3]]).T), color="0.1", linewidth=2.5)
+    if pose.arm.is_serpentine:
+        _draw_disks(axes, pose)
+    for bone in pose.bones:
+        axes.plot(*(MM * bone.T), color="0.1", linewidth=2.5)
     colors = [COLORS[0]] * len(pose.cable_paths)
     if tension is not None:
         colors = _tension_colors(tension).to_rgba(tension.values).tolist()
@@ -64,8 +59,24 @@ def draw_arm(axes: Any, pose: Posture, tension: Tension | None) -> None:
         getattr(axes, f"set_{name}label")(f"{name} [mm]", fontsize=8)
         getattr(axes, f"{name}axis").set_major_locator(MaxNLocator(4))
     axes.tick_params(labelsize=7, pad=-1)
-    ranges = np.ptp([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()], axis=1)
+    limits = np.array([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()])
+    ranges = np.ptp(limits, axis=1)
+    ranges = np.maximum(ranges, _FLATTEST * ranges.max())  # a flat arm is no sheet of paper
+    for name, middle, size in zip(AXES, limits.mean(axis=1), ranges, strict=True):
+        getattr(axes, f"set_{name}lim")(middle - size / 2.0, middle + size / 2.0)
     axes.set_box_aspect(ranges, zoom=0.8)  # equal axes, and room for the labels
+
+
+def _draw_disks(axes: Any, pose: Posture) -> None:
+    geometry = pose.arm.geometry
+    circle = np.linspace(0.0, 2.0 * np.pi, 49)
+    ring = geometry.hole_radius * np.array([0.0 * circle, np.cos(circle), np.sin(circle)])
+    for link, places in geometry.disks:
+        placement = pose.link_pose(link)
+        for place in places:
+            center = placement[:3, 3:] + place * placement[:3, :1]
+            edge = center + placement[:3, :3] @ ring
+            axes.plot(*(MM * edge), color="0.35", linewidth=0.9)
 
 
 def _tension_colors(tension: Tension) -> ScalarMappable:

@@ -44,9 +44,7 @@ def plot_weight_test(test: WeightTest) -> Figure:
     right.set_ylim(bottom=0.0)
     for axes in (left, right):
         axes.grid(alpha=0.3)
-    figure.suptitle(
-        f"{test.without.pose.arm.geometry.name}: weight of {np.linalg.norm(test.force):.4g} N"
-    )
+    figure.suptitle(f"{test.without.pose.arm.name}: weight of {np.linalg.norm(test.force):.4g} N")
     return figure
 
 
@@ -84,7 +82,7 @@ def plot_critical_tension(critical: CriticalTension) -> Figure:
     axes.set(
         xlabel="lower bound of tension [N]",
         ylabel="smallest joint stiffness [N m/rad]",
-        title=f"{critical.posture.arm.geometry.name}; shaded: unstable",
+        title=f"{critical.posture.arm.name}; shaded: unstable",
     )
     axes.grid(alpha=0.3)
     return figure

@@ -87,7 +87,7 @@ def plot_path_plan(plan: PathPlan) -> Figure:
         axes.margins(y=0.1)
         axes.set_ylim(bottom=0.0)
         axes.grid(alpha=0.3)
-    above.set(ylabel="stiffness [N/mm]", title=f"{plan.arm.geometry.name}; shaded: infeasible")
+    above.set(ylabel="stiffness [N/mm]", title=f"{plan.arm.name}; shaded: infeasible")
     above.legend(title="along", fontsize=8, title_fontsize=8)
     below.set(xlabel="sample", ylabel="tension of each cable [N]")
     return figure

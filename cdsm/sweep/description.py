@@ -18,9 +18,9 @@ def attributes_of(arm: Manipulator) -> dict[str, str]:
     laws = list(dict.fromkeys(law_text(cable.elasticity) for cable in arm.cables))
     return {
         "Conventions": "CF-1.11",
-        "title": f"stiffness sweep of {arm.geometry.name}",
+        "title": f"stiffness sweep of {arm.name}",
         "source": f"cdsm {version('cdsm-stiffness')}",
-        "geometry": arm.geometry.to_toml(),
+        **({"geometry": arm.geometry.to_toml()} if arm.is_serpentine else {"urdf": arm.urdf}),
         "cables": _json([_cable(cable, laws) for cable in arm.cables]),
         "cable_elasticities": _json(laws),
     }

@@ -123,4 +123,4 @@ def _spread(rows: Array, place: _Place, shape: tuple[int, ...]) -> Array:
 
 def _with(arm: Manipulator, law: Elasticity) -> Manipulator:
     cables = [replace(cable, elasticity=law) for cable in arm.cables]
-    return Manipulator(arm.geometry, cables=cables, gravity=arm.gravity)
+    return arm.with_cables(cables)

@@ -1,0 +1,198 @@
+"""Reading URDFs of strangers: what other parsers let through is refused here, by name.
+
+Pinocchio accepts a link with two parents, negative and impossible masses, axes of zero and limits
+the wrong way round; what it refuses it explains on the standard error only. So the text is checked
+first: the XML, the tree, the joints and what they carry.
+"""
+
+from __future__ import annotations
+
+import os
+
+import numpy as np
+from lxml import etree
+
+from cdsm._files import read_text
+from cdsm._xml import XmlFault, numbers, parse_xml
+from cdsm.errors import UrdfError
+from cdsm.parts import MAXIMUM_JOINTS
+
+TAKEN = ("revolute", "prismatic", "fixed")
+"""Joint types that cdsm takes."""
+
+_INSTEAD = {
+    "continuous": "write it as revolute with a <limit>; one angle per joint is needed",
+    "floating": "fix the base to the world; a floating base has no stiffness",
+    "planar": "write it as two prismatic and one revolute joint",
+    "spherical": "write it as three revolute joints",
+}
+
+_MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+
+_LOOSE = 1e-2
+"""Part of the largest moment of inertia by which rounded or estimated ones may miss each other."""
+
+
+def read_urdf(source: str | os.PathLike[str], *, check_inertia: bool = True) -> str:
+    """The text of a URDF, from a file or as it is, checked.
+
+    Args:
+        source: Path of the file, or the text itself, which begins with ``<``.
+        check_inertia: Refuse moments of inertia that no body has.
+
+    Raises:
+        FileError: The file cannot be read.
+        UrdfError: It is no URDF of a tree of revolute, prismatic and fixed joints; every fault is
+            listed.
+    """
+    inline = isinstance(source, str) and source.lstrip("\ufeff \t\r\n").startswith("<")
+    text = str(source).lstrip("\ufeff \t\r\n") if inline else read_text(source)
+    name = "the URDF" if inline else os.fspath(source)
+    try:
+        robot = parse_xml(text, "robot")
+    except XmlFault as error:
+        raise UrdfError(f"{name}: {error}.") from None
+    faults = _faults(robot, check_inertia)
+    if faults:
+        listed = "".join(f"\n  - {fault}" for fault in faults[:20])
+        more = f"\n  and {len(faults) - 20} more" if len(faults) > 20 else ""
+        raise UrdfError(f"{name} is no robot that cdsm takes, {len(faults)} found:{listed}{more}")
+    return text
+
+
+def _faults(robot: etree._Element, check_inertia: bool) -> list[str]:
+    links, joints = robot.findall("link"), robot.findall("joint")
+    faults = [*_names("link", links), *_names("joint", joints)]
+    if not robot.get("name"):
+        faults.append("<robot> has no name")
+    for link in links:
+        faults += _of_link(link, check_inertia)
+    for joint in joints:
+        faults += _of_joint(joint)
+    moving = sum(joint.get("type") in ("revolute", "prismatic") for joint in joints)
+    if not moving:
+        faults.append("has no joint that moves")
+    if moving > 2 * MAXIMUM_JOINTS:
+        faults.append(f"has {moving} joints that move; {2 * MAXIMUM_JOINTS} are taken at most")
+    return faults or _of_tree([str(link.get("name")) for link in links], joints)
+
+
+def _names(kind: str, elements: list[etree._Element]) -> list[str]:
+    names = [element.get("name") for element in elements]
+    faults = [
+        f"a <{kind}> on line {e.sourceline} has no name" for e in elements if not e.get("name")
+    ]
+    twice = sorted({str(name) for name in names if name and names.count(name) > 1})
+    return faults + [f"{kind} {name}: the name is used twice" for name in twice]
+
+
+def _of_link(link: etree._Element, check_inertia: bool) -> list[str]:
+    inertial = link.find("inertial")
+    if inertial is None:
+        return []
+    where = f"link {link.get('name')}"
+    faults: list[str] = []
+    mass = inertial.find("mass")
+    inertia = inertial.find("inertia")
+    value = _read(faults, f"{where}: mass", None if mass is None else mass.get("value"), 1)
+    if value is not None and value[0] < 0.0:
+        faults.append(f"{where}: mass {value[0]:g} kg; it cannot be negative")
+    faults += _of_origin(where, inertial)
+    if inertia is None:
+        return [*faults, f"{where}: <inertial> has no <inertia>"]
+    read = [_read(faults, f"{where}: {key}", inertia.get(key), 1) for key in _MOMENTS]
+    if check_inertia and None not in read:
+        xx, xy, xz, yy, yz, zz = (each[0] for each in read if each is not None)
+        moments = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        slack = _LOOSE * float(abs(moments).max())
+        if moments[0] < -slack or moments[2] > moments[0] + moments[1] + slack:
+            faults.append(
+                f"{where}: principal moments of inertia {', '.join(f'{m:g}' for m in moments)} "
+                "kg m², which no body has: none is negative, nor larger than the sum of the "
+                "others. Stiffness does not need them: check_inertia=False lets them pass"
+            )
+    return faults
+
+
+def _of_joint(joint: etree._Element) -> list[str]:
+    where, faults = f"joint {joint.get('name')}", []
+    kind = joint.get("type")
+    if kind not in TAKEN:
+        remedy = _INSTEAD.get(str(kind), f"one of {', '.join(TAKEN)} is needed")
+        faults.append(f"{where}: type {kind!r} is not taken; {remedy}")
+    if joint.find("mimic") is not None:
+        faults.append(
+            f"{where}: mimics another joint, which is not taken; remove <mimic> to let it move, or "
+            "make it fixed"
+        )
+    for end in ("parent", "child"):
+        element = joint.find(end)
+        if element is None or not element.get("link"):
+            faults.append(f"{where}: has no <{end} link=…>")
+    faults += _of_origin(where, joint)
+    if kind not in ("revolute", "prismatic"):
+        return faults
+    axis = joint.find("axis")
+    if axis is not None:
+        vector = _read(faults, f"{where}: axis", axis.get("xyz"), 3)
+        if vector is not None and float(np.linalg.norm(vector)) < 1e-6:
+            faults.append(f"{where}: axis {axis.get('xyz')!r} has no direction")
+    limit = joint.find("limit")
+    if limit is None:
+        return [*faults, f"{where}: has no <limit>, which a {kind} joint needs"]
+    ends = [
+        _read(faults, f"{where}: {key} limit", limit.get(key, "0"), 1) for key in ("lower", "upper")
+    ]
+    if ends[0] and ends[1] and ends[0][0] > ends[1][0]:
+        faults.append(f"{where}: lower limit {ends[0][0]:g} above the upper one {ends[1][0]:g}")
+    return faults
+
+
+def _of_origin(where: str, element: etree._Element) -> list[str]:
+    origin = element.find("origin")
+    faults: list[str] = []
+    if origin is not None:
+        for key in ("xyz", "rpy"):
+            _read(faults, f"{where}: origin {key}", origin.get(key, "0 0 0"), 3)
+    return faults
+
+
+def _read(faults: list[str], where: str, text: str | None, count: int) -> tuple[float, ...] | None:
+    """The numbers, or None and one fault more."""
+    try:
+        return numbers(where, text, count)
+    except XmlFault as error:
+        faults.append(str(error))
+        return None
+
+
+def _of_tree(links: list[str], joints: list[etree._Element]) -> list[str]:
+    """Of links (n,) with one parent each but for the root, and no way round."""
+    faults: list[str] = []
+    parents: dict[str, tuple[str, str]] = {}
+    for joint in joints:
+        name = str(joint.get("name"))
+        parent, child = (str(joint.find(end).get("link")) for end in ("parent", "child"))
+        for link in (parent, child):
+            if link not in links:
+                faults.append(f"joint {name}: there is no link {link}")
+        if parent == child:
+            faults.append(f"joint {name}: joins link {child} to itself")
+        elif child in parents:
+            faults.append(
+                f"link {child}: has two parents, by the joints {parents[child][1]} and {name}"
+            )
+        else:
+            parents[child] = parent, name
+    if faults:
+        return faults
+    roots = [link for link in links if link not in parents]
+    if len(roots) != 1:
+        listed = ", ".join(roots) or "none"
+        return [f"has the roots {listed}; one link that no joint carries is needed"]
+    reached, level = set(roots), set(roots)
+    while level:
+        level = {link for link, (parent, _) in parents.items() if parent in level}
+        reached |= level
+    lost = [link for link in links if link not in reached]
+    return [f"the links {', '.join(lost)} hang on each other in a circle"] if lost else []

@@ -1,0 +1,109 @@
+"""Robots that no Geometry describes: branches, slides, and cables between anything."""
+
+from typing import Any
+
+import numpy as np
+
+import cdsm
+from cdsm._checks import Array
+
+_INERTIAL = (
+    '<inertial><origin xyz="{1} 0.01 -0.02" rpy="0.3 0.2 0.1"/><mass value="{0}"/>'
+    '<inertia ixx="2e-3" iyy="3e-3" izz="4e-3" ixy="1e-4" ixz="2e-4" iyz="-3e-4"/></inertial>'
+)
+
+
+def _link(name: str, mass: float = 0.0) -> str:
+    inside = _INERTIAL.format(mass, 0.1 * mass) if mass else ""
+    return f'<link name="{name}">{inside}</link>'
+
+
+def _joint(name: str, kind: str, parent: str, child: str, xyz: str, rpy: str, axis: str) -> str:
+    limit = "" if kind == "fixed" else '<limit lower="-0.9" upper="1.1" effort="1" velocity="1"/>'
+    return (
+        f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
+        f'<origin xyz="{xyz}" rpy="{rpy}"/><axis xyz="{axis}"/>{limit}</joint>'
+    )
+
+
+TREE = "".join(
+    [
+        '<robot name="crab">',
+        _link("floor"),
+        _link("trunk", 0.8),
+        _link("slider", 0.4),
+        _link("arm", 0.3),
+        _link("hand", 0.2),
+        _link("tail", 0.5),
+        _link("fin", 0.1),
+        _link("tip"),
+        _joint("a", "revolute", "floor", "trunk", "0.1 0 0.2", "0.1 0 0.3", "0 1 0"),
+        _joint("b", "prismatic", "trunk", "slider", "0.2 0.05 0", "0 0.2 0", "1 0.5 0"),
+        _joint("c", "revolute", "slider", "arm", "0.15 0 0", "0 0 0.4", "0 0.6 0.8"),
+        _joint("d", "prismatic", "arm", "hand", "0.1 0 0", "0.2 0 0", "0 0 1"),
+        _joint("e", "revolute", "trunk", "tail", "-0.1 0 0.1", "0 0.5 0", "1 0 1"),
+        _joint("f", "prismatic", "tail", "fin", "-0.1 0.1 0", "0 0 0", "0 1 0"),
+        _joint("g", "fixed", "hand", "tip", "0.08 0 0.02", "0 0.3 0", "1 0 0"),
+        "</robot>",
+    ]
+)
+
+
+def cables(law: cdsm.Elasticity) -> tuple[cdsm.Cable, ...]:
+    """Cables along and across the branches, some over several links."""
+    ways = [
+        ("floor", "trunk"),
+        ("floor", "slider", "arm", "tip"),
+        ("tail", "hand"),
+        ("fin", "trunk", "arm"),
+        ("floor", "tail", "fin"),
+        ("trunk", "hand"),
+        ("fin", "tip"),
+        ("floor", "fin"),
+        ("slider", "arm", "hand"),
+    ]
+    rng = np.random.default_rng(3)
+    return tuple(
+        cdsm.Cable(
+            name=f"c{i}",
+            sites=tuple(cdsm.Site(link, tuple(rng.uniform(-0.08, 0.08, 3))) for link in way),
+            elasticity=law,
+            lead=0.1 * (i % 3),
+            series_stiffness=4e4 if i % 4 == 1 else np.inf,
+            control="force" if i == 7 else "position",
+        )
+        for i, way in enumerate(ways)
+    )
+
+
+def crab(law: cdsm.Elasticity | None = None, **options: Any) -> cdsm.Manipulator:
+    law = law or cdsm.LinearElasticity(3e4)
+    return cdsm.Manipulator.from_urdf(TREE, cables(law), tip="tip", **options)
+
+
+POSTURE = np.array([0.3, -0.2, 0.5, 0.1, -0.4, 0.2])
+TENSION = np.array([30.0, 25.0, 40.0, 15.0, 50.0, 22.0, 18.0, 35.0, 28.0])
+
+
+def energy(arm: cdsm.Manipulator, force: Array, reference: cdsm.Posture, F: Array) -> Any:
+    """Total potential of cables (linear laws), weight and tip force, by its parts."""
+    from lxml import etree
+
+    masses = []
+    for link in etree.fromstring(arm.urdf.encode()).findall("link"):
+        inertial = link.find("inertial")
+        if inertial is not None:
+            place = [float(x) for x in inertial.find("origin").get("xyz").split()]
+            masses.append((link.get("name"), float(inertial.find("mass").get("value")), place))
+    k = cdsm.stiffness(reference, F).cable_stiffness
+
+    def total(q: Array) -> Array:
+        pose = arm.at(q, check_limits=False)
+        longer = pose.cable_lengths - reference.cable_lengths
+        value = float(F @ longer + k @ longer**2 / 2.0) - float(force @ pose.tip[:3, 3])
+        for name, mass, place in masses:
+            frame = pose.link_pose(name)
+            value -= mass * float(arm.gravity @ (frame[:3, :3] @ place + frame[:3, 3]))
+        return np.array(value)
+
+    return total

@@ -1,0 +1,99 @@
+"""Cables as TOML: there and back, and every fault of a file by name."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+import cdsm
+from cdsm import presets
+
+TABLE = cdsm.TabulatedElasticity((0.0, 10.0, 30.0), (0.0, 1e-3, 2e-3))
+
+ONE = """
+[elasticities.wire]
+kind = "linear"
+rigidity = 48e3
+
+[[cables]]
+name = "left"
+elasticity = "wire"
+sites = [{link = "a", xyz = [0, 0.01, 0.0]}, {link = "b", xyz = [0.1, 0.01, 0.0]}]
+"""
+
+
+def test_what_is_written_is_read_back(tmp_path: Path) -> None:
+    cables = list(presets.virtual_prototype().cables)
+    cables[1] = replace(cables[1], elasticity=TABLE, series_stiffness=1.89e3, lead=0.25)
+    cables[2] = replace(cables[2], elasticity=cdsm.LinearElasticity(1e4), control="force")
+    cables[3] = replace(cables[3], minimum=2.5, maximum=310.0, name='odd "name"\\ü')
+    path = cdsm.write_cables(cables, tmp_path / "cables.toml")
+    assert cdsm.read_cables(path) == tuple(cables)
+    # one table per wire, not one per cable
+    assert path.read_text(encoding="utf-8").count("[elasticities.") == 3
+
+
+def test_what_is_left_out_is_nothing(tmp_path: Path) -> None:
+    path = tmp_path / "cables.toml"
+    path.write_text(ONE, encoding="utf-8")
+    (cable,) = cdsm.read_cables(path)
+    assert cable == cdsm.Cable(
+        "left",
+        (cdsm.Site("a", (0.0, 0.01, 0.0)), cdsm.Site("b", (0.1, 0.01, 0.0))),
+        cdsm.LinearElasticity(48e3),
+    )
+    assert (cable.lead, cable.series_stiffness, cable.minimum) == (0.0, math.inf, 0.0)
+    assert math.isinf(cable.maximum)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "said"),
+    [
+        ('elasticity = "wire"', 'elasticity = "rope"', "no [elasticities.rope]; there is wire"),
+        ('elasticity = "wire"', 'elastcity = "wire"', "did you mean elasticity?"),
+        ("48e3", "-1.0", "elasticities.wire.rigidity"),
+        ('kind = "linear"', 'kind = "rubber"', "elasticities.wire.kind: must be one of linear"),
+        ("[0, 0.01, 0.0]", "[0, 0.01]", "sites[1].xyz"),
+        ("[0, 0.01, 0.0]", "[0, nan, 0.0]", "sites[1].xyz[2]"),
+        (', {link = "b", xyz = [0.1, 0.01, 0.0]}', "", "sites"),
+        ('name = "left"', 'name = ""', "cables[1].name"),
+        ('name = "left"', 'name = "left"\nlead = -1.0', "cables[1].lead"),
+        ('name = "left"', 'name = "left"\ncontrol = "feel"', "cables[1].control"),
+        ('name = "left"', 'name = "left"\nminimum = 5.0\nmaximum = 2.0', "tensions from 5 to 2 N"),
+        ("[[cables]]", "[[cable]]", "cables: is missing"),
+        ("[elasticities.wire]", "elasticities = 3\n[other]", "elasticities: must be tables"),
+        ("[[cables]]", "[[cables]", "is not TOML"),
+    ],
+)
+def test_faults_are_named(before: str, after: str, said: str, tmp_path: Path) -> None:
+    assert before in ONE
+    path = tmp_path / "cables.toml"
+    path.write_text(ONE.replace(before, after, 1), encoding="utf-8")
+    with pytest.raises(cdsm.FileError) as caught:
+        cdsm.read_cables(path)
+    assert said in str(caught.value)
+    assert "cables.toml" in str(caught.value)
+
+
+def test_names_used_twice_are_a_fault(tmp_path: Path) -> None:
+    path = tmp_path / "cables.toml"
+    path.write_text(ONE + ONE[ONE.index("[[cables]]") :], encoding="utf-8")
+    with pytest.raises(cdsm.FileError, match="'left' is used twice"):
+        cdsm.read_cables(path)
+
+
+def test_nothing_and_strange_wires_cannot_be_written(tmp_path: Path) -> None:
+    path = tmp_path / "cables.toml"
+    with pytest.raises(cdsm.InvalidInput, match="none given"):
+        cdsm.write_cables([], path)
+    assert not path.exists()
+
+
+@pytest.mark.parametrize(
+    ("low", "high"), [(-1.0, 5.0), (5.0, 4.0), (0.0, math.nan), (math.inf, math.inf)]
+)
+def test_bounds_of_a_cable_that_cannot_be_are_refused(low: float, high: float) -> None:
+    cable = presets.virtual_prototype().cables[0]
+    with pytest.raises(cdsm.CableError, match="cable1_1"):
+        replace(cable, minimum=low, maximum=high)
