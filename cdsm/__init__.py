@@ -48,7 +48,7 @@ from cdsm.kinematics import (
     inverse_kinematics,
     solve_joint_angles,
 )
-from cdsm.manipulator import Manipulator, Posture
+from cdsm.manipulator import Manipulator
 from cdsm.mjcf import to_mjcf, write_mjcf
 from cdsm.modes import Modes, modes
 from cdsm.parts import CableRoute, Joint, Link
@@ -65,6 +65,7 @@ from cdsm.planning import (
     stiffness_gradient,
     stiffness_range,
 )
+from cdsm.posture import Posture
 from cdsm.stiffness import Shares, Stiffness, stiffness
 from cdsm.sweep import (
     GridPoses,

@@ -8,7 +8,7 @@ import numpy as np
 
 from cdsm._checks import Array
 from cdsm._locked_cables import LockedCables
-from cdsm.manipulator import Posture
+from cdsm.posture import Posture
 from cdsm.stiffness import Stiffness
 
 _ROUNDING = 16.0 * float(np.finfo(np.float64).eps)

@@ -87,13 +87,13 @@ class LockedCables:
         self._arm = arm
         self._tension = tension
         self._groups = []
-        for law, held in arm._held_by_law:
-            series = arm._series_compliance[held]
+        for law, held in arm._laws.held:
+            series = arm._laws.series[held]
             springs = _Springs(law, held, free_length[held], series, law.domain.low)
             try:
                 ends = _ends(springs, tension[held])
             except ElasticityRangeError as error:
-                raise arm._naming_cables(error, held) from None
+                raise arm._laws.naming(error, held) from None
             self._groups.append((springs, ends))
 
     def pull(self, lengths: Array, near: Array) -> tuple[Array, Array]:

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from cdsm._checks import Array, ReadOnlyState, bound, frozen, instance, vector
 from cdsm._rising import SAMPLES, Limit, domain, edge, reach, reason, stable_ranges
 from cdsm.errors import InvalidInput
-from cdsm.manipulator import Posture
+from cdsm.posture import Posture
 from cdsm.stiffness import Stiffness, stiffness
 from cdsm.tension import distribute_tension
 

@@ -21,7 +21,7 @@ from cdsm._checks import Array, ReadOnlyState, frozen, vector
 from cdsm._loaded_arm import Iterate, LoadedArm, rounding
 from cdsm._trust_region import FLAT, Settled, settle
 from cdsm.errors import CableError, EquilibriumError, InvalidInput, SingularStiffness
-from cdsm.manipulator import Posture
+from cdsm.posture import Posture
 from cdsm.stiffness import Stiffness, stiffness
 from cdsm.tension import Tension
 

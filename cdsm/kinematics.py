@@ -22,7 +22,8 @@ from cdsm._misfits import HAIR, LengthMisfit, TipMisfit, usable_limits
 from cdsm._nearest import Problem, nearest
 from cdsm._rigid_body import rotation_vector
 from cdsm.errors import InvalidInput
-from cdsm.manipulator import Manipulator, Posture
+from cdsm.manipulator import Manipulator
+from cdsm.posture import Posture
 
 _REACHED = 1e-9
 """Default tolerance: lengths and positions over the arm's length, and angles in rad."""

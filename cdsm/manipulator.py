@@ -8,19 +8,16 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cdsm import _kernels, _stiffness_kernels
+from cdsm import _kernels
+from cdsm._cable_laws import CableLaws
 from cdsm._checks import (
-    LARGEST,
-    SMALLEST,
     Array,
-    ReadOnlyState,
     frozen,
     instance,
     sequence_of,
@@ -32,11 +29,11 @@ from cdsm.cable import Cable, serpentine_cables
 from cdsm.elasticity import Elasticity
 from cdsm.errors import (
     CableError,
-    ElasticityRangeError,
     InvalidInput,
     JointLimitError,
 )
 from cdsm.geometry import Geometry
+from cdsm.posture import Posture
 from cdsm.urdf import TIP, to_urdf
 from cdsm.urdf_reader import read_urdf
 
@@ -45,9 +42,6 @@ GRAVITY = (0.0, 0.0, -9.81)
 
 _LIMIT_SLACK = 1e-9
 """Angles this far [rad] beyond a limit are rounding, as of a conversion from degrees."""
-
-_STEP = 1e-5
-"""Relative step of the difference of dEA/dF."""
 
 
 @final
@@ -142,23 +136,7 @@ class Manipulator:
         self._lowest = self._body.lower - _LIMIT_SLACK
         self._highest = self._body.upper + _LIMIT_SLACK
 
-        held = [c for c, cable in enumerate(self._cables) if cable.control == "position"]
-        by_law: dict[object, list[int]] = {}
-        for c in held:
-            by_law.setdefault(_key(self._cables[c].elasticity), []).append(c)
-        # one law for all is the usual case, and a slice costs less than indices
-        self._held_by_law = [
-            (
-                self._cables[cables[0]].elasticity,
-                slice(None) if len(cables) == len(self._cables) else np.array(cables),
-            )
-            for cables in by_law.values()
-        ]
-        self._least = frozen(np.array([cable.minimum for cable in self._cables]))
-        self._most = frozen(np.array([cable.maximum for cable in self._cables]))
-        self._bounded = bool(self._least.any() or np.isfinite(self._most).any())
-        series = np.array([cable.series_stiffness for cable in self._cables])
-        self._series_compliance = 1.0 / series
+        self._laws = CableLaws(self._cables)
 
     @property
     def geometry(self) -> Geometry:
@@ -343,151 +321,6 @@ class Manipulator:
             )
         return _kernels.Frames(*map(frozen, frames)), frozen(lengths), frozen(length_jacobian)
 
-    def _cable_stiffness(self, lengths: Array, tension: Array) -> Array:
-        """Diagonal of K_L (C,) [N/m]: 1/(l_0/EA(F) + 1/k_series), 0 for force-controlled cables.
-
-        Of checked free lengths (C,) [m] and tensions (C,) [N].
-
-        Raises:
-            ElasticityRangeError: Names the cables whose tension is outside their elasticity's
-                domain.
-            InvalidInput: An elasticity of the user's own gives no positive rigidity.
-        """
-        stiffness = np.zeros(len(self._cables))
-        for law, held in self._held_by_law:
-            pulled = tension[held]
-            try:
-                rigidity = checked_rigidity(law, pulled)
-            except ElasticityRangeError as error:
-                raise self._naming_cables(error, held) from None
-            compliance = lengths[held] / rigidity + self._series_compliance[held]
-            stiffness[held] = 1.0 / compliance
-        return frozen(stiffness)
-
-    def _cable_stiffness_slopes(self, tension: Array, stiffness: Array) -> tuple[Array, Array]:
-        """dk/dF (C,) [1/m] and d²k/dF² (C,) [1/(N m)] of cables of stiffness k under F (C,) [N].
-
-        k′ = (k² l_0/EA) EA′/EA = k (1 − k/k_series) EA′/EA: the free length need not be known. EA″
-        is a difference, good for some five digits.
-
-        Raises:
-            ElasticityRangeError: As for :meth:`_cable_stiffness`.
-            InvalidInput: An elasticity of the user's own gives no finite slope.
-        """
-        first, second = np.zeros_like(stiffness), np.zeros_like(stiffness)
-        for law, held in self._held_by_law:
-            F, k = tension[held], stiffness[held]
-            last = np.array([*law.jumps, law.domain.high])[np.searchsorted(law.jumps, F)]
-            step = _STEP * np.maximum(F, 1.0)
-            beside = np.where(F + step <= last, F + step, F - step)
-            try:
-                slopes = np.asarray(law.rigidity_slope(np.stack([F, beside])))
-                EA = law.rigidity(F)
-            except ElasticityRangeError as error:
-                raise self._naming_cables(error, held) from None
-            if slopes.shape != (2, F.size) or not np.isfinite(slopes).all():
-                raise InvalidInput(
-                    "elasticity",
-                    f"{law!r} gives the slopes {slopes} of its rigidity at tensions {F} N and "
-                    "beside them; one finite number for each is needed.",
-                )
-            growth, wire = slopes[0] / EA, 1.0 - k * self._series_compliance[held]
-            bend = (slopes[1] - slopes[0]) / (beside - F) / EA - growth**2
-            first[held] = k * wire * growth
-            second[held] = first[held] * growth * (2.0 * wire - 1.0) + k * wire * bend
-        return frozen(first), frozen(second)
-
-    def _naming_cables(
-        self, error: ElasticityRangeError, held: slice | NDArray[np.intp]
-    ) -> ElasticityRangeError:
-        """The error of a law at the tensions of some cables, with their names and numbers."""
-        outside = np.arange(len(self._cables))[held][list(error.indices)].tolist()
-        names = [self._cables[c].name for c in outside]
-        return ElasticityRangeError(error.problem, error.tension, outside, names)
-
-
-@final
-@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class Posture(ReadOnlyState):
-    """Everything that depends on the joint angles alone; made by :meth:`Manipulator.at`.
-
-    All arrays are read-only and in base axes.
-
-    Attributes:
-        arm: The arm.
-        q: Joint angles (nv,) [rad].
-        tip: Pose of ``tool0`` (4, 4), translation in m (Eqs. 3–4).
-        jacobian: J_X (6, nv): linear rows [m/rad] first, then angular, at ``tool0``.
-        cable_lengths: L (C,) [m], lead included (Eq. 8).
-        length_jacobian: J_L = ∂L/∂θ (C, nv) [m/rad].
-        gravity_torque: g = ∂V/∂θ (nv,) [N m], V the potential energy: J_Hᵀ G_g of Eq. 13.
-        gravity_stiffness: ∂g/∂θ (nv, nv) [N m/rad]: H_H G_g of Eq. 16.
-    """
-
-    arm: Manipulator
-    q: Array
-    tip: Array
-    jacobian: Array
-    cable_lengths: Array
-    length_jacobian: Array
-    gravity_torque: Array
-    gravity_stiffness: Array
-    _frames: _kernels.Frames
-
-    def __repr__(self) -> str:
-        x, y, z = self.tip[:3, 3]
-        return f"<Posture of {self.arm.name}, tip at ({x:.4g}, {y:.4g}, {z:.4g}) m>"
-
-    @cached_property
-    def length_hessian(self) -> Array:
-        """H_L[c, i, j] = ∂²L_c/∂θ_i∂θ_j, (C, nv, nv) [m/rad²], built on first use."""
-        count, nv = self.length_jacobian.shape
-        hessian = np.zeros((count, nv, nv))
-        _kernels.add_length_hessian(
-            *self.arm._segments, *self._frames, frozen(np.ones(count)), np.arange(count), hessian
-        )
-        return frozen(hessian)
-
-    @cached_property
-    def cable_paths(self) -> tuple[Array, ...]:
-        """The sites of each cable in base axes, one array (sites, 3) per cable [m]."""
-        counts = [len(cable.sites) for cable in self.arm.cables]
-        paths = np.split(self._frames.site, np.cumsum(counts)[:-1])
-        return tuple(frozen(path.copy()) for path in paths)
-
-    @property
-    def bones(self) -> tuple[Array, ...]:
-        """Straight lines from joint to joint, and to the tip, (2, 3) each [m]: a stick figure."""
-        origin, parent = self._frames.origin, self.arm._tree.parent
-        tip = self.arm._masses.tip
-        lines = [np.array([origin[parent[i]], origin[i]]) for i in range(1, len(origin))]
-        lines.append(np.array([origin[tip], self.tip[:3, 3]]))
-        return tuple(frozen(line) for line in lines if (line[0] != line[1]).any())
-
-    def link_pose(self, link: str) -> Array:
-        """Pose of a link's frame in the base, (4, 4) [m].
-
-        Raises:
-            UnknownName: There is no such link.
-        """
-        return frozen(self.arm._body.placement(self.q, link))
-
-    def _joint_stiffness(
-        self, tension: Array, cable_stiffness: Array, wrench: Array
-    ) -> tuple[Array, Array, Array, Array]:
-        """Active, passive, load and K_θ (nv, nv); of checked, read-only vectors."""
-        active, passive, load, joint = _stiffness_kernels.joint_stiffness(
-            *self.arm._segments,
-            *self._frames,
-            self.jacobian,
-            self.length_jacobian,
-            self.gravity_stiffness,
-            tension,
-            cable_stiffness,
-            wrench,
-        )
-        return frozen(active), frozen(passive), frozen(load), frozen(joint)
-
 
 def _rebuild(
     geometry: Geometry | None,
@@ -499,33 +332,6 @@ def _rebuild(
     arm = Manipulator.__new__(Manipulator)
     arm._build(geometry, urdf, cables, tip, gravity)
     return arm
-
-
-def checked_rigidity(law: Elasticity, tension: Array) -> Array:
-    """EA(F) [N] of a law, same shape as F [N], which need not be the library's own.
-
-    Raises:
-        ElasticityRangeError: A tension outside the domain of the law.
-        InvalidInput: The law gives no positive rigidity.
-    """
-    rigidity = np.asarray(law.rigidity(tension))
-    usable = (rigidity >= SMALLEST) & (rigidity <= LARGEST)  # false for NaN too
-    if rigidity.shape != tension.shape or np.count_nonzero(usable) < tension.size:
-        raise InvalidInput(
-            "elasticity",
-            f"{law!r} gives the rigidity {rigidity} N at tensions {tension} N; one positive "
-            "number for each is needed.",
-        )
-    return rigidity
-
-
-def _key(law: Elasticity) -> object:
-    """What equal laws share; an elasticity of the user's own need not be hashable."""
-    try:
-        hash(law)
-    except TypeError:
-        return id(law)
-    return law
 
 
 def _checked_cables(cables: Sequence[Cable]) -> tuple[Cable, ...]:

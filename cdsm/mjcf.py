@@ -21,7 +21,8 @@ from scipy.spatial.transform import Rotation
 from cdsm._checks import Array, instance, scalar
 from cdsm._files import write_text
 from cdsm.errors import InvalidInput
-from cdsm.manipulator import Manipulator, Posture
+from cdsm.manipulator import Manipulator
+from cdsm.posture import Posture
 from cdsm.stiffness import stiffness
 from cdsm.tension import Tension
 

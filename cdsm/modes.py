@@ -15,7 +15,7 @@ from scipy.linalg import eigh
 
 from cdsm._checks import Array, ReadOnlyState, frozen, instance
 from cdsm.errors import InvalidInput, SingularMass
-from cdsm.manipulator import Posture
+from cdsm.posture import Posture
 from cdsm.stiffness import Stiffness
 from cdsm.urdf import CROSS_INERTIA, CROSS_MASS
 

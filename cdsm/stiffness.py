@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike
 
 from cdsm._checks import Array, ReadOnlyState, frozen, instance, one_of, unit_direction, vector
 from cdsm.errors import InvalidInput, SingularStiffness
-from cdsm.manipulator import Posture
+from cdsm.posture import Posture
 from cdsm.tension import Tension
 
 Term = Literal["active", "passive", "gravity", "load", "joint"]
@@ -338,7 +338,7 @@ def stiffness(
             raise InvalidInput(
                 "tension", f"{F[c]:g} N given for {arm.cables[c].name}; cables only pull."
             )
-    k = arm._cable_stiffness(pose.cable_lengths, F)
+    k = arm._laws.stiffness(pose.cable_lengths, F)
     active, passive, load, joint = pose._joint_stiffness(F, k, W)
     return Stiffness(
         posture=pose,

@@ -26,7 +26,7 @@ from scipy.sparse import csc_matrix
 from cdsm import _balance
 from cdsm._checks import Array, ReadOnlyState, bound, frozen, instance, one_of, scalar, vector
 from cdsm.errors import InfeasibleTension, InvalidInput, SolverError
-from cdsm.manipulator import Posture
+from cdsm.posture import Posture
 
 OPTIMALITY = 1e-9
 """Largest accepted violation of balance, bounds and stationarity, dimensionless."""
@@ -168,11 +168,7 @@ def _checked_bounds(pose: Posture, low: Array, maximum: ArrayLike) -> tuple[Arra
             f"{low[c]:g} N given for {cables[c].name}; cables only pull, so it must be finite "
             "and not negative.",
         )
-    if pose.arm._bounded:
-        low, high = (
-            frozen(np.maximum(low, pose.arm._least)),
-            frozen(np.minimum(high, pose.arm._most)),
-        )
+    low, high = pose.arm._laws.narrowed(low, high)
     ordered = low <= high
     if np.count_nonzero(ordered) < low.size:
         c = int(ordered.argmin())

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from cdsm._checks import Array, ReadOnlyState, frozen, unit_direction, vector
 from cdsm.equilibrium import Equilibrium, equilibrium, follow
 from cdsm.errors import EquilibriumError, InvalidInput
-from cdsm.manipulator import Posture
+from cdsm.posture import Posture
 from cdsm.tension import Tension
 
 _FINEST = 2.0**-12

@@ -22,7 +22,7 @@ def kernel_arm(arm: Manipulator, check_limits: bool) -> Arm:
         arm._masses,
         frozen(lowest),
         frozen(highest),
-        frozen(arm._series_compliance),
+        frozen(arm._laws.series),
     )
 
 
@@ -106,8 +106,7 @@ def bounds(
             "minimum",
             f"{bad[0]:g} N given; cables only pull, so it must be finite and not negative.",
         )
-    if arm._bounded:
-        low, high = frozen(np.maximum(low, arm._least)), frozen(np.minimum(high, arm._most))
+    low, high = arm._laws.narrowed(low, high)
     if (low > high).any():
         *row, c = np.argwhere(low > high)[0]
         where = f" in row {row[0]}" if row else ""

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from cdsm._cable_laws import checked_rigidity
 from cdsm._checks import Array, frozen
 from cdsm.batch.record import Flags
 from cdsm.elasticity import Elasticity
 from cdsm.errors import ElasticityRangeError
-from cdsm.manipulator import Manipulator, checked_rigidity
+from cdsm.manipulator import Manipulator
 
 _NONE = -1.0
 
@@ -26,7 +27,7 @@ def rigidities(arm: Manipulator, tension: Array, usable: Flags) -> Array:
     """
     pulled = tension if usable.all() else tension[usable]
     rigidity = np.zeros_like(pulled)
-    for law, held in arm._held_by_law:
+    for law, held in arm._laws.held:
         rigidity[:, held] = _where_defined(law, pulled[:, held])
     if pulled is tension:
         return frozen(rigidity)

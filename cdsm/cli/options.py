@@ -16,7 +16,8 @@ from cdsm.cable import serpentine_cables
 from cdsm.elasticity import Elasticity, LinearElasticity
 from cdsm.errors import CdsmError
 from cdsm.geometry import Geometry
-from cdsm.manipulator import Manipulator, Posture
+from cdsm.manipulator import Manipulator
+from cdsm.posture import Posture
 from cdsm.presets import STRAND_1X19
 from cdsm.wire_file import read_elasticity
 

@@ -31,7 +31,7 @@ from cdsm.cli.options import (
     show_json,
 )
 from cdsm.cli.path_file import PathFile, read_path
-from cdsm.manipulator import Manipulator, Posture
+from cdsm.manipulator import Manipulator
 from cdsm.planning import (
     PathPlan,
     StiffnessPlan,
@@ -40,6 +40,7 @@ from cdsm.planning import (
     plan_stiffness,
     stiffness_range,
 )
+from cdsm.posture import Posture
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

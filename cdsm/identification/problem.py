@@ -15,7 +15,8 @@ from cdsm._checks import (
 )
 from cdsm.errors import CdsmError, InvalidInput, SingularStiffness
 from cdsm.identification.measurement import Measurement, label
-from cdsm.manipulator import Manipulator, Posture
+from cdsm.manipulator import Manipulator
+from cdsm.posture import Posture
 from cdsm.stiffness import stiffness
 from cdsm.tension import Tension, distribute_tension
 

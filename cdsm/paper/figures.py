@@ -17,7 +17,8 @@ from scipy.optimize import brentq
 from cdsm import presets
 from cdsm._checks import Array, frozen
 from cdsm.elasticity import LinearElasticity
-from cdsm.manipulator import Manipulator, Posture
+from cdsm.manipulator import Manipulator
+from cdsm.posture import Posture
 from cdsm.stiffness import Stiffness, stiffness
 from cdsm.tension import distribute_tension
 from cdsm.wire import StrandElasticity

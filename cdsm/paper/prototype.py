@@ -21,7 +21,7 @@ from cdsm import presets
 from cdsm._checks import Array, frozen
 from cdsm.elasticity import LinearElasticity
 from cdsm.errors import CdsmError, InvalidInput, SingularStiffness
-from cdsm.manipulator import Manipulator, Posture
+from cdsm.manipulator import Manipulator
 from cdsm.paper.section_v import (
     CHECK,
     DROPS,
@@ -32,6 +32,7 @@ from cdsm.paper.section_v import (
     TABLE_II,
     TENSIONS,
 )
+from cdsm.posture import Posture
 from cdsm.stiffness import stiffness
 from cdsm.tension import distribute_tension
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from cdsm._checks import Array, frozen
 from cdsm.errors import ElasticityRangeError
-from cdsm.manipulator import Posture
+from cdsm.posture import Posture
 from cdsm.tension import Tension, distribute_tension
 
 _TOLERANCE = 1e-12

@@ -10,11 +10,11 @@ from numpy.typing import ArrayLike
 
 from cdsm._checks import Array, ReadOnlyState, frozen
 from cdsm.errors import InvalidInput
-from cdsm.manipulator import Posture
 from cdsm.planning.field import Point, Reading
 from cdsm.planning.problem import Problem, along, checked_direction, count, problem
 from cdsm.planning.search import HIGHEST, LOWEST, Goal, Task, search
 from cdsm.planning.starts import Ground, settled
+from cdsm.posture import Posture
 from cdsm.stiffness import stiffness
 from cdsm.tension import Tension
 

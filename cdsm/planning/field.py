@@ -63,7 +63,7 @@ class Point:
         pose = field.pose
         self.field = field
         self.F = F
-        self._springs = pose.arm._cable_stiffness(pose.cable_lengths, F)
+        self._springs = pose.arm._laws.stiffness(pose.cable_lengths, F)
         self.K, self.values, self.vectors = _kernels.stiffness_at(
             field.constant, *field.geometry, F, self._springs
         )
@@ -71,7 +71,7 @@ class Point:
     @cached_property
     def slopes(self) -> tuple[Array, Array]:
         """dk/dF (C,) [1/m] and d²k/dF² (C,) [1/(N m)]."""
-        return self.field.pose.arm._cable_stiffness_slopes(self.F, self._springs)
+        return self.field.pose.arm._laws.slopes(self.F, self._springs)
 
     @property
     def reserve(self) -> float:

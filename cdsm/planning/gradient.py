@@ -18,8 +18,8 @@ from numpy.typing import ArrayLike
 
 from cdsm._checks import Array, ReadOnlyState, frozen, instance, unit_direction
 from cdsm.errors import SingularStiffness
-from cdsm.manipulator import Posture
 from cdsm.planning._kernels import by_tension
+from cdsm.posture import Posture
 from cdsm.stiffness import Stiffness
 
 
@@ -103,7 +103,7 @@ def stiffness_gradient(stiffness: Stiffness) -> StiffnessGradient:
         ElasticityRangeError: A tension outside the domain of the elasticity of its cable.
     """
     K = instance("stiffness", stiffness, Stiffness)
-    slope, _ = K.posture.arm._cable_stiffness_slopes(K.tension, K.cable_stiffness)
+    slope, _ = K.posture.arm._laws.slopes(K.tension, K.cable_stiffness)
     return StiffnessGradient(stiffness=K, cable_stiffness=slope)
 
 

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm._checks import Array, ReadOnlyState, frozen
-from cdsm.manipulator import Posture
 from cdsm.planning.attainable import MARGIN
 from cdsm.planning.planner import Planner
 from cdsm.planning.problem import (
@@ -21,6 +20,7 @@ from cdsm.planning.problem import (
     unit_directions,
     wanted,
 )
+from cdsm.posture import Posture
 from cdsm.stiffness import Stiffness, stiffness
 from cdsm.tension import Tension
 

@@ -9,10 +9,11 @@ from numpy.typing import ArrayLike
 
 from cdsm._checks import Array, frozen, instance, number_array, scalar, unit_direction
 from cdsm.errors import InvalidInput, SingularStiffness
-from cdsm.manipulator import Manipulator, Posture
+from cdsm.manipulator import Manipulator
 from cdsm.planning.admissible import Admissible, admissible
 from cdsm.planning.field import Field, Part, Reading
 from cdsm.planning.gradient import require_finite
+from cdsm.posture import Posture
 from cdsm.stiffness import Stiffness, stiffness
 
 _SYMMETRIC = 1e-9

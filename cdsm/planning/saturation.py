@@ -16,9 +16,9 @@ from scipy.optimize import brentq, minimize_scalar
 from cdsm._checks import Array, ReadOnlyState, bound, frozen, instance, scalar, unit_direction
 from cdsm._rising import PRECISION, At, domain, reach, reason, sampled, stable_ranges
 from cdsm.errors import InvalidInput
-from cdsm.manipulator import Posture
 from cdsm.planning.gradient import require_finite, stiffness_gradient
 from cdsm.planning.problem import unstable
+from cdsm.posture import Posture
 from cdsm.stiffness import Stiffness, stiffness
 from cdsm.tension import Tension, distribute_tension
 

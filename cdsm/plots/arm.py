@@ -12,8 +12,8 @@ from matplotlib.ticker import MaxNLocator
 
 from cdsm._checks import instance
 from cdsm.errors import InvalidInput
-from cdsm.manipulator import Posture
 from cdsm.plots.style import AXES, COLORS, MM
+from cdsm.posture import Posture
 from cdsm.tension import Tension
 
 _FLATTEST = 0.2
