@@ -1,5 +1,6 @@
 """The command line, as a user calls it."""
 
+import inspect
 import json
 import math
 import subprocess
@@ -298,6 +299,30 @@ def test_wrong_angles_are_a_usage_error(angles: str, said: str, geometry: Path) 
     result = call("stiffness", geometry, "--angles", angles)
     assert result.exit_code == 2
     assert said in result.stderr
+
+
+def test_every_command_tells_json_and_what_it_writes(geometry: Path, tmp_path: Path) -> None:
+    told = call("urdf", geometry, "-o", tmp_path / "arm.urdf", "--json")
+    assert json.loads(told.stdout)["written"] == [str(tmp_path / "arm.urdf")]
+    told = call("export", geometry, "--cables", tmp_path / "c.toml", "--json")
+    assert json.loads(told.stdout)["written"] == [str(tmp_path / "c.toml")]
+    test = tmp_path / "test.csv"
+    force = np.linspace(0.0, 400.0, 60)
+    rows = "".join(f"{1e3 * F / 48e3 * 0.5},{F}\n" for F in force)
+    test.write_text("displacement [mm],force [N]\n" + rows, encoding="utf-8")
+    told = call("fit", test, "--gauge-length", 500, "--json")
+    rigidity = json.loads(told.stdout)["rigidity_N"]
+    np.testing.assert_allclose(rigidity, 48e3, rtol=1e-3)
+    for command in app.registered_commands:
+        assert command.callback is not None
+        assert "as_json" in inspect.signature(command.callback).parameters
+
+
+def test_debug_shows_where_an_error_comes_from(geometry: Path) -> None:
+    quiet = call("stiffness", geometry, "--angles", 80)
+    assert isinstance(quiet.exception, SystemExit)
+    loud = call("--debug", "stiffness", geometry, "--angles", 80)
+    assert isinstance(loud.exception, cdsm.JointLimitError)
 
 
 def test_version_is_that_of_the_package() -> None:

@@ -12,6 +12,7 @@ import cdsm
 from cdsm.cli.arm import stiffness, urdf
 from cdsm.cli.export import export
 from cdsm.cli.loads import buckle, weigh
+from cdsm.cli.options import debug_wanted
 from cdsm.cli.paper import reproduce
 from cdsm.cli.plan import plan
 from cdsm.cli.sweep import map_sweep, sweep
@@ -21,7 +22,6 @@ app = typer.Typer(
     name="cdsm",
     help="Stiffness of cable-driven serpentine manipulators.",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
@@ -39,8 +39,12 @@ def main(
         bool,
         typer.Option("--version", callback=_version, is_eager=True, help="Show it and exit."),
     ] = False,
+    debug: Annotated[
+        bool, typer.Option("--debug", help="Show where an error comes from; before the command.")
+    ] = False,
 ) -> None:
     """Stiffness of cable-driven serpentine manipulators."""
+    debug_wanted.set(debug)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # a terminal without Greek shows "?" for it
             stream.reconfigure(errors="replace")

@@ -41,12 +41,16 @@ from cdsm.urdf import write_urdf
 def urdf(
     geometry: GeometryFile,
     output: Annotated[Path, typer.Option("--output", "-o", help="URDF file to write.")],
+    as_json: AsJson = False,
 ) -> None:
     """Write the URDF of an arm, checked by reading it back with two parsers."""
     with reported():
         arm = Geometry.read(geometry)
         path = write_urdf(arm, output)
-        typer.echo(f"{arm}\nwritten: {path}")
+        if as_json:
+            show_json({"name": arm.name, "length_m": arm.length, "written": [str(path)]})
+        else:
+            typer.echo(f"{arm}\nwritten: {path}")
 
 
 def stiffness(

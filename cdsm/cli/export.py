@@ -13,6 +13,7 @@ from cdsm.cli.options import (
     DOWN,
     NO_WRENCH,
     Angles,
+    AsJson,
     GeometryFile,
     Gravity,
     MaxTension,
@@ -25,6 +26,7 @@ from cdsm.cli.options import (
     numbers,
     posture,
     reported,
+    show_json,
 )
 from cdsm.mjcf import write_mjcf
 from cdsm.tension import distribute_tension
@@ -50,6 +52,7 @@ def export(
     wrench: Wrench = NO_WRENCH,
     gravity: Gravity = DOWN,
     solver: Solver = "daqp",
+    as_json: AsJson = False,
 ) -> None:
     """Write an arm for other programs: a MuJoCo model at a posture, or a file of its cables."""
     if mjcf is None and cables is None:
@@ -58,10 +61,14 @@ def export(
         pose = posture(
             geometry, angles, rigidity=rigidity, wire=wire, spring=spring, gravity=gravity
         )
-        typer.echo(str(pose.arm))
+        written = []
         if mjcf is not None:
             load = numbers("--wrench", wrench, 6)
             pull = distribute_tension(pose, min_tension, max_tension, load, solver)
-            typer.echo(f"written: {write_mjcf(pose.arm, mjcf, pose, pull, damping=damping)}")
+            written.append(str(write_mjcf(pose.arm, mjcf, pose, pull, damping=damping)))
         if cables is not None:
-            typer.echo(f"written: {write_cables(pose.arm.cables, cables)}")
+            written.append(str(write_cables(pose.arm.cables, cables)))
+        if as_json:
+            show_json({"name": pose.arm.name, "written": list(written)})
+        else:
+            typer.echo("\n".join([str(pose.arm), *(f"written: {path}" for path in written)]))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
 from typing import Annotated
 
@@ -52,6 +53,9 @@ Gravity = Annotated[str, typer.Option(help="In m/s², base axes: GX,GY,GZ.", met
 Solver = Annotated[str, typer.Option(help="Quadratic-programming solver.")]
 Picture = Annotated[Path | None, typer.Option(metavar="FILE.png", help="Picture to write.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print SI numbers as JSON.")]
+
+debug_wanted: ContextVar[bool] = ContextVar("debug_wanted", default=False)
+"""Whether this call of the command line is to show tracebacks."""
 
 NO_WRENCH = "0,0,0,0,0,0"
 DOWN = "0,0,-9.81"
@@ -136,9 +140,11 @@ def show_json(values: dict[str, object]) -> None:
 
 @contextmanager
 def reported() -> Iterator[None]:
-    """Turn a CdsmError into one message and exit code 1, without a traceback."""
+    """Turn a CdsmError into one message and exit code 1; with --debug leave it as it is."""
     try:
         yield
     except (CdsmError, OSError) as error:  # OSError: the terminal or pipe itself
+        if debug_wanted.get():
+            raise
         console.print(f"error: {error}", style="red", markup=False, highlight=False, soft_wrap=True)
         raise typer.Exit(1) from None

@@ -14,7 +14,7 @@ from rich.table import Table
 
 from cdsm import paper
 from cdsm._files import make_folder, write_file, write_text
-from cdsm.cli.options import console, reported
+from cdsm.cli.options import AsJson, console, reported
 
 _WIDE = 110
 """Columns from which the table of claims is legible; below, each claim is a few lines."""
@@ -24,6 +24,7 @@ def reproduce(
     out: Annotated[Path, typer.Option(help="Folder for the figures and tables.")] = Path(
         "reproduction"
     ),
+    as_json: AsJson = False,
 ) -> None:
     """Recompute Figs. 3 to 13 of the paper: pictures, table and numbers."""
     with reported():
@@ -38,6 +39,9 @@ def reproduce(
         written.append(write_text(out / "reproduction.md", paper.to_markdown(results)))
         numbers = json.dumps(paper.to_dict(results), indent=1, allow_nan=False)
         written.append(write_text(out / "reproduction.json", numbers + "\n"))
+        if as_json:
+            typer.echo(numbers)
+            return
         _show(paper.HEADER, paper.to_rows(results))
         typer.echo(paper.EXPLANATION)
         typer.echo("written: " + ", ".join(map(str, written)))

@@ -14,6 +14,7 @@ from cdsm._files import read_text, write_file
 from cdsm.cli.options import (
     DOWN,
     NO_WRENCH,
+    AsJson,
     GeometryFile,
     Gravity,
     MaxTension,
@@ -24,6 +25,7 @@ from cdsm.cli.options import (
     manipulator,
     numbers,
     reported,
+    show_json,
 )
 from cdsm.errors import FileError
 from cdsm.manipulator import Manipulator
@@ -81,6 +83,7 @@ def sweep(
         Path | None,
         typer.Option(help="Folder to keep results in as they come; goes on from what is there."),
     ] = None,
+    as_json: AsJson = False,
 ) -> None:
     """Stiffness over a grid, a path or random postures, under one or several tension bounds."""
     with reported():
@@ -105,8 +108,11 @@ def sweep(
             outputs=[name.strip() for name in quantities.split(",")],
             store=resume,
         )
-        typer.echo(_summary(found))
-        typer.echo(f"written: {write_sweep(found, out)}")
+        path = write_sweep(found, out)
+        if as_json:
+            show_json({"entries": _counts(found), "written": [str(path)]})
+        else:
+            typer.echo(f"{_summary(found)}\nwritten: {path}")
 
 
 def map_sweep(
@@ -127,6 +133,7 @@ def map_sweep(
             metavar="AXIS=PLACE:HALF",
         ),
     ] = None,
+    as_json: AsJson = False,
 ) -> None:
     """Colour the reachable workspace by a quantity of a sweep."""
     with reported():
@@ -139,7 +146,11 @@ def map_sweep(
             place, half = numbers("--section", rest.replace(":", " "), 2)
             slab = (axis.strip(), place / 1000.0, half / 1000.0)
         figure = plot_map(found, quantity, section=slab)
-        typer.echo(f"written: {write_file(out, figure.savefig)}")
+        picture = write_file(out, figure.savefig)
+        if as_json:
+            show_json({"entries": _counts(found), "written": [str(picture)]})
+        else:
+            typer.echo(f"written: {picture}")
 
 
 def _grid(text: str) -> GridPoses:
@@ -187,9 +198,12 @@ def _waypoints(path: Path, arm: Manipulator) -> list[list[float]]:
     return waypoints
 
 
-def _summary(found: xarray.Dataset) -> str:
+def _counts(found: xarray.Dataset) -> dict[str, int]:
     """How many entries came to what."""
     status = found["status"].values
-    counts = {word: int((status == value).sum()) for value, word in status_names(found).items()}
-    told = ", ".join(f"{count} {word}" for word, count in counts.items() if count)
+    return {word: int((status == value).sum()) for value, word in status_names(found).items()}
+
+
+def _summary(found: xarray.Dataset) -> str:
+    told = ", ".join(f"{count} {word}" for word, count in _counts(found).items() if count)
     return f"{found.attrs['title']}, {found.attrs['poses']}: {told}"

@@ -5,11 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
+import numpy as np
 import typer
 
 from cdsm._files import write_file
-from cdsm.cli.options import Picture, console, reported
-from cdsm.tensile import fit_tensile_test
+from cdsm.cli.options import AsJson, Picture, console, reported, show_json
+from cdsm.tensile import TensileFit, fit_tensile_test
 from cdsm.tensile_data import read_tensile_csv
 from cdsm.wire_file import write_elasticity
 
@@ -27,6 +28,7 @@ def fit(
         Path | None, typer.Option("--out", "-o", help="Elasticity to write, as TOML.")
     ] = None,
     figure: Picture = None,
+    as_json: AsJson = False,
 ) -> None:
     """Fit the rigidity of a wire to its tensile test: report, and if wanted figure and TOML."""
     with reported():
@@ -34,8 +36,27 @@ def fit(
         data = read_tensile_csv(test, gauge_length=length)
         with console.status("fitting"):
             found = fit_tensile_test(data.displacement, data.force, data.gauge_length, method)
-        typer.echo(str(found))
         if out is not None:
-            typer.echo(f"written: {write_elasticity(found.elasticity, out)}")
+            typer.echo(f"written: {write_elasticity(found.elasticity, out)}", err=True)
         if figure is not None:
-            typer.echo(f"written: {write_file(figure, found.plot().savefig)}")
+            typer.echo(f"written: {write_file(figure, found.plot().savefig)}", err=True)
+        if as_json:
+            show_json(_to_dict(found))
+        else:
+            typer.echo(str(found))
+
+
+def _to_dict(fit: TensileFit) -> dict[str, object]:
+    """What the report says, in SI units."""
+    return {
+        "method": fit.method,
+        "gauge_length_m": fit.test.gauge_length,
+        "domain_N": [fit.elasticity.domain.low, fit.elasticity.domain.high],
+        "rms_N": fit.rms,
+        "stages_N": {stage.name: [stage.low, stage.high] for stage in fit.stages},
+        "tension_N": fit.band.tensions.tolist(),
+        "rigidity_N": np.asarray(fit.elasticity.rigidity(fit.band.tensions)).tolist(),
+        "rigidity_low_N": fit.band.low.tolist(),
+        "rigidity_high_N": fit.band.high.tolist(),
+        "notes": list(fit.notes),
+    }
