@@ -10,6 +10,9 @@ import numpy as np
 from cdsm._checks import Array
 from cdsm._compiled import compiled
 
+NO_ARM = 1e-15
+"""A moment arm this part of the arm's length is rounding, as of a cable that meets the axis."""
+
 
 class Scaled(NamedTuple):
     """The balance of an arm, J_Lᵀ F = J_Xᵀ W − g with low ≤ F ≤ high, made dimensionless.
@@ -33,15 +36,17 @@ class Scaled(NamedTuple):
 
 @compiled
 def scaled_balance(
-    length_jacobian: Array, torque: Array, low: Array, high: Array
+    length_jacobian: Array, torque: Array, low: Array, high: Array, reach: float
 ) -> tuple[Array, Array, Array, Array, float, float]:
-    """Return the fields of :class:`Scaled`."""
+    """Return the fields of :class:`Scaled`; moment arms that are rounding of ``reach`` are none."""
     count, nv = length_jacobian.shape
     largest = 0.0
     A = np.empty((nv, count))
     for c in range(count):
         for i in range(nv):
             A[i, c] = length_jacobian[c, i]
+            if abs(A[i, c]) < NO_ARM * reach:
+                A[i, c] = 0.0
             largest = max(largest, abs(A[i, c]))
     arm = _power_of_two(largest)
     largest = 0.0

@@ -139,7 +139,9 @@ def distribute_tension(
     wrench = vector("wrench", wrench, 6, "force [N], then moment [N m], base axes")
     torque = pose.jacobian.T @ wrench - pose.gravity_torque
 
-    problem = _balance.Scaled(*_balance.scaled_balance(pose.length_jacobian, torque, low, high))
+    length = pose.arm.length
+    scaled = _balance.scaled_balance(pose.length_jacobian, torque, low, high, length)
+    problem = _balance.Scaled(*scaled)
     solution = _solve(problem, solver)
     if solution is None:
         free = np.array([cable.name not in (fixed or {}) for cable in pose.arm.cables])
@@ -209,25 +211,34 @@ def _solve(problem: _balance.Scaled, solver: str) -> Array | None:
             with warnings.catch_warnings(action="ignore"):
                 solution = qpsolvers.solve_problem(qp, solver, **settings)
     except Exception as error:  # each backend has its own kinds
-        raise SolverError(solver, f"failed: {error}. Use solver='daqp'.") from error
+        raise SolverError(solver, f"failed: {error}. {_instead(solver)}") from error
     x = solution.x
     if not solution.found or x is None:
         return None
     if solution.y is None or solution.z_box is None:
-        raise SolverError(solver, "returns no multipliers to verify it by. Use solver='daqp'.")
+        raise SolverError(solver, f"returns no multipliers to verify it by. {_instead(solver)}")
     # the same as the solution's primal_residual, dual_residual and duality_gap, ten times faster
     point = tuple(np.asarray(each, dtype=np.float64) for each in (x, solution.y, solution.z_box))
     if not np.isfinite(point[0]).all():
-        raise SolverError(solver, f"calls {x.tolist()} optimal. Use solver='daqp'.")
+        raise SolverError(solver, f"calls {x.tolist()} optimal. {_instead(solver)}")
     if _shortfall(problem, point):
         # a first-order or interior-point answer: near the optimum, with its active bounds known
         point = _polished(problem, point)
         shortfall = _shortfall(problem, point)
         if shortfall:
+            held = abs(A).max(axis=1, initial=0.0)
+            if (abs(b[held == 0.0]) > OPTIMALITY).any():
+                return None  # a joint that no cable turns: there is nothing to solve
             raise SolverError(
-                solver, f"calls a point optimal that is not: {shortfall}. Use solver='daqp'."
+                solver, f"calls a point optimal that is not: {shortfall}. {_instead(solver)}"
             )
     return point[0]
+
+
+def _instead(solver: str) -> str:
+    if solver == "daqp":
+        return "Change the posture, the load or the bounds a little, or try another solver."
+    return "Use solver='daqp'."
 
 
 def _shortfall(problem: _balance.Scaled, point: tuple[Array, ...]) -> str:

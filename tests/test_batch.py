@@ -756,3 +756,34 @@ def test_defaults_are_outputs() -> None:
     pose = random_posture(ARM, 1)
     for name in POSED - {"gravity"}:
         assert hasattr(pose, name)
+
+
+class _Fussy(cdsm.Elasticity):
+    """A law that refuses arrays without saying where, or that takes no empty ones."""
+
+    def __init__(self, arrays: bool) -> None:
+        self.arrays = arrays
+
+    @property
+    def domain(self) -> cdsm.Domain:
+        return cdsm.Domain(0.0, 500.0)
+
+    def rigidity(self, tension: ArrayLike) -> Array:
+        F = np.asarray(tension, dtype=np.float64)
+        if not self.arrays and F.size > 1:
+            raise cdsm.ElasticityRangeError("one at a time", [1.0])
+        return 5e4 + 0.0 * F + 0.0 * float(F.min())
+
+    strain = rigidity
+    energy = rigidity
+
+
+@pytest.mark.parametrize("arrays", [True, False])
+def test_fussy_laws_end_and_are_asked_about_something(arrays: bool) -> None:
+    arm = cdsm.Manipulator(cdsm.presets.virtual_prototype_geometry(), _Fussy(arrays))
+    q = np.full((3, 10), 0.1)
+    rows = cdsm.evaluate(arm, q, minimum=20.0, outputs=("joint",), threads=np.int64(1))  # type: ignore[arg-type]
+    assert (rows.status == cdsm.Status.OK).all()
+    # no row has tensions, so there is nothing to ask
+    none = cdsm.evaluate(arm, q, minimum=20.0, maximum=20.0, outputs=("joint",))
+    assert (none.status == cdsm.Status.INFEASIBLE).all()

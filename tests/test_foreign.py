@@ -134,3 +134,22 @@ def test_modes_refuse_links_without_mass() -> None:
     pose = weightless.at(POSTURE)
     with pytest.raises(cdsm.SingularMass, match="no link of any mass"):
         cdsm.modes(pose, cdsm.stiffness(pose, TENSION))
+
+
+def test_cables_that_meet_the_axis_turn_nothing() -> None:
+    """Their moment arms are rounding, 1e-18 m, and no tension is asked of them."""
+    geometry = cdsm.Geometry(
+        name="flat",
+        base_length=0.02,
+        hole_radius=0.02,
+        joints=(cdsm.Joint(axes=((0.0, 1.0, 0.0),), disk_offset=0.01),),
+        links=(cdsm.Link(length=0.05, mass=0.2),),
+        cables=tuple(cdsm.CableRoute(joint=1, angle=angle) for angle in (0.0, np.pi)),
+    )
+    arm = cdsm.Manipulator(geometry, cdsm.LinearElasticity(1e4))
+    pose = arm.at([0.0])
+    assert 0.0 < abs(pose.length_jacobian).max() < 1e-16
+    with pytest.raises(cdsm.InfeasibleTension, match="cannot exert this torque"):
+        cdsm.distribute_tension(pose, 5.0)
+    rows = cdsm.distribute_tensions(arm, [[0.0]], 5.0)
+    assert rows.status[0] == cdsm.Status.INFEASIBLE

@@ -107,6 +107,31 @@ def test_failure_is_one_message(
     assert not (tmp_path / "s.nc").exists()
 
 
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--grid", "joint1_1=0:10:3,joint1_1=5"), "joint1_1 is given twice"),
+        (("--random", "5", "--count", "3"), "goes with --path only"),
+        (("--grid", "joint1_1=0:10:3", "--seed", "3"), "goes with --random only"),
+    ],
+)
+def test_options_that_say_nothing_are_refused(
+    arguments: tuple[str, ...], said: str, geometry: Path, tmp_path: Path
+) -> None:
+    result = call("sweep", geometry, "--out", tmp_path / "s.nc", *arguments)
+    assert result.exit_code == 2
+    assert said in " ".join(result.stderr.replace("│", " ").split())
+
+
+def test_folder_in_the_place_of_the_file_is_told_before_the_work(
+    geometry: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "s.nc").mkdir()
+    result = call("sweep", geometry, "--out", tmp_path / "s.nc", "--random", "5")
+    assert result.exit_code == 1
+    assert "is a folder" in result.stderr
+
+
 def test_map_of_no_sweep_is_one_message(tmp_path: Path) -> None:
     result = call("map", tmp_path / "absent.nc", "--out", tmp_path / "s.png")
     assert result.exit_code == 1

@@ -3,6 +3,7 @@
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -275,3 +276,43 @@ def test_a_disk_that_refuses_is_named(tmp_path: Path, monkeypatch: pytest.Monkey
     monkeypatch.setattr(run, "_write", full)
     with pytest.raises(cdsm.FileError, match=r"s\.zarr: cannot be written: .*No space left"):
         kept(tmp_path / "s.zarr")
+
+
+class Reticent(cdsm.Elasticity):
+    """A law of the user's own that prints less than it depends on."""
+
+    def __init__(self, rigidity: float) -> None:
+        self.value = rigidity
+
+    def __repr__(self) -> str:
+        return "Reticent()"
+
+    @property
+    def domain(self) -> cdsm.Domain:
+        return cdsm.Domain(0.0, 1e4)
+
+    def rigidity(self, tension: Any) -> Any:
+        return self.value + 0.0 * np.asarray(tension, dtype=np.float64)
+
+    strain = rigidity
+    energy = rigidity
+
+
+def test_a_law_that_prints_alike_is_another_question(tmp_path: Path) -> None:
+    path = tmp_path / "s.zarr"
+    geometry = short_arm().geometry
+    for rigidity in (1e5, 1e5):
+        cdsm.sweep(
+            cdsm.Manipulator(geometry, Reticent(rigidity)), GRID, outputs=["margin"], store=path
+        )
+    with pytest.raises(cdsm.StoreError):
+        cdsm.sweep(cdsm.Manipulator(geometry, Reticent(1e3)), GRID, outputs=["margin"], store=path)
+
+
+def test_bounds_of_a_cable_are_part_of_the_question(tmp_path: Path) -> None:
+    path = tmp_path / "s.zarr"
+    arm = short_arm()
+    cdsm.sweep(arm, GRID, outputs=["margin"], store=path)
+    tight = arm.with_cables([replace(cable, maximum=300.0) for cable in arm.cables])
+    with pytest.raises(cdsm.StoreError):
+        cdsm.sweep(tight, GRID, outputs=["margin"], store=path)

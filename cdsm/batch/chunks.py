@@ -6,6 +6,8 @@ import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
+import numpy as np
+
 from cdsm.errors import InvalidInput
 
 _NUMBERS = 2**17
@@ -50,6 +52,6 @@ def checked_threads(threads: int | None) -> int:
         if hasattr(os, "sched_getaffinity"):
             return len(os.sched_getaffinity(0))
         return os.cpu_count() or 1
-    if not isinstance(threads, int) or isinstance(threads, bool) or threads < 1:
+    if not isinstance(threads, (int, np.integer)) or isinstance(threads, bool) or threads < 1:
         raise InvalidInput("threads", f"{threads!r} given; a positive integer is needed, or None.")
-    return threads
+    return int(threads)

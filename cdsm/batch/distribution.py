@@ -9,6 +9,7 @@ from typing import final
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cdsm._balance import NO_ARM
 from cdsm._checks import Array, ReadOnlyState, frozen, instance
 from cdsm.batch import record
 from cdsm.batch.blocks import blocks
@@ -168,6 +169,8 @@ class Distributor:
             known,
             status,
         )
+        J = known[:, 6 * q.shape[1] : -q.shape[1]]
+        J[abs(J) < NO_ARM * self._arm.length] = 0.0
         distribute_rows(self._blocks, known, low, high, wrench, values, status)
         for r in np.flatnonzero(status == UNDECIDED).tolist():
             pose = self._arm.at(q[r], check_limits=False)

@@ -25,6 +25,8 @@ def rigidities(arm: Manipulator, tension: Array, usable: Flags) -> Array:
     Raises:
         InvalidInput: An elasticity of the user's own gives no positive rigidity.
     """
+    if not usable.any():  # a law of the user's own need not take empty arrays
+        return frozen(np.zeros_like(tension))
     pulled = tension if usable.all() else tension[usable]
     rigidity = np.zeros_like(pulled)
     for law, held in arm._laws.held:
@@ -50,15 +52,14 @@ def _where_defined(law: Elasticity, tension: Array) -> Array:
             break
         except ElasticityRangeError as error:
             if not error.indices:  # an elasticity of the user's own that does not say where
-                left = left[[_is_defined(law, value) for value in values[left]]]
-            else:
-                left = np.delete(left, error.indices)
+                result[left] = [_one(law, value) for value in values[left]]
+                break
+            left = np.delete(left, error.indices)
     return result.reshape(tension.shape)
 
 
-def _is_defined(law: Elasticity, tension: float) -> bool:
+def _one(law: Elasticity, tension: float) -> float:
     try:
-        law.rigidity(tension)
+        return float(checked_rigidity(law, np.array([tension]))[0])
     except ElasticityRangeError:
-        return False
-    return True
+        return _NONE

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 import typer
 
+from cdsm._checks import Array
 from cdsm._files import read_text, write_file
 from cdsm.cli.options import (
     DOWN,
@@ -65,7 +66,7 @@ def sweep(
     random: Annotated[
         int | None, typer.Option(help="So many Sobol points within the joint limits.")
     ] = None,
-    seed: Annotated[int, typer.Option(help="Of --random.")] = 0,
+    seed: Annotated[int | None, typer.Option(help="Of --random; 0.")] = None,
     min_tension: Annotated[
         str, typer.Option(help="Lower bound of all tensions [N], or several.", metavar="N,N,...")
     ] = "10",
@@ -90,13 +91,19 @@ def sweep(
         arm = manipulator(geometry, rigidity=rigidity, wire=wire, spring=spring, gravity=gravity)
         if sum(given is not None for given in (grid, path, random)) != 1:
             raise typer.BadParameter("give one of --grid, --path and --random.", param_hint="poses")
+        for option, value, needed, is_given in (
+            ("--count", count, "--path", path is not None),
+            ("--seed", seed, "--random", random is not None),
+        ):
+            if value is not None and not is_given:
+                raise typer.BadParameter(f"goes with {needed} only.", param_hint=option)
         poses: PoseSet
         if grid is not None:
             poses = _grid(grid)
         elif path is not None:
             poses = PathPoses(np.array(_waypoints(path, arm)), count)
         else:
-            poses = RandomPoses(random or 0, seed)
+            poses = RandomPoses(random or 0, seed or 0)
         check_target(out)  # now, rather than when all is computed
         low = numbers("--min-tension", min_tension)
         found = run(
@@ -155,10 +162,13 @@ def map_sweep(
 
 def _grid(text: str) -> GridPoses:
     """The joints of ``joint1=-20:20:9,joint2=5``, in degrees."""
-    angles, rest = {}, {}
+    angles: dict[str, Array] = {}
+    rest: dict[str, float] = {}
     for part in text.split(","):
         name, _, value = part.partition("=")
         given = numbers("--grid", value.replace(":", " "))
+        if name.strip() in (*angles, *rest):
+            raise typer.BadParameter(f"{name.strip()} is given twice.", param_hint="--grid")
         if len(given) == 1:
             rest[name.strip()] = math.radians(given[0])
         elif len(given) == 3 and given[2] >= 1.0 and given[2].is_integer():

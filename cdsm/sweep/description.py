@@ -29,8 +29,9 @@ def attributes_of(arm: Manipulator) -> dict[str, str]:
 def law_text(law: Elasticity) -> str:
     """An elasticity in one line: equal for equal ones, also in another process."""
     text = repr(law)
-    if type(law).__repr__ is not object.__repr__ and "..." not in text:  # numpy shortens arrays
+    if type(law).__module__.startswith("cdsm.") and "..." not in text:  # numpy shortens arrays
         return text
+    # what a class of the user's own prints need not be all that it depends on
     kind = f"{type(law).__module__}.{type(law).__qualname__}"
     try:
         return f"{kind} {hashlib.sha256(pickle.dumps(law)).hexdigest()[:16]}"
@@ -48,6 +49,8 @@ def _cable(cable: Cable, laws: list[str]) -> dict[str, object]:
         "elasticity": laws.index(law_text(cable.elasticity)),
         "series_stiffness": None if math.isinf(series) else series,
         "control": cable.control,
+        "minimum": cable.minimum,
+        "maximum": None if math.isinf(cable.maximum) else cable.maximum,
     }
 
 

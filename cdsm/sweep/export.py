@@ -86,6 +86,8 @@ def check_target(path: str | os.PathLike[str]) -> None:
         raise InvalidInput("path", f"{str(path)!r} ends neither in .nc (NetCDF) nor in .csv.")
     if kind == ".nc":
         need("sweep", "netCDF4")
+    if path.is_dir():
+        raise FileError(path, "is a folder; give the path of a file.")
     if not path.parent.is_dir():
         raise FileError(path, f"the folder {path.parent} does not exist; create it.")
 
