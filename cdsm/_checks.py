@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -25,7 +26,14 @@ def frozen(array: _AnyArray) -> _AnyArray:
     return array
 
 
-class ReadOnlyState:
+class Printed:
+    """For what prints itself as a table: a notebook shows that, in columns that stay in line."""
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{html.escape(str(self))}</pre>"
+
+
+class ReadOnlyState(Printed):
     """For frozen dataclasses of read-only arrays: unpickling and copying keep them read-only."""
 
     def __getstate__(self) -> dict[str, object]:

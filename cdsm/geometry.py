@@ -12,7 +12,7 @@ from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
-from cdsm._checks import instance
+from cdsm._checks import Printed, instance
 from cdsm._files import read_text, write_text
 from cdsm._records import (
     CrossFaults,
@@ -32,7 +32,7 @@ MAXIMUM_DEFAULT_LIMIT = math.radians(80.0)
 
 
 @record
-class Geometry:
+class Geometry(Printed):
     """A serpentine arm, joint by joint; frozen, checked, all in SI units.
 
     The general constructor: joints, links and cables may all differ. :meth:`universal` and

@@ -18,6 +18,7 @@ from cdsm import _kernels
 from cdsm._cable_laws import CableLaws
 from cdsm._checks import (
     Array,
+    Printed,
     frozen,
     instance,
     sequence_of,
@@ -45,7 +46,7 @@ _LIMIT_SLACK = 1e-9
 
 
 @final
-class Manipulator:
+class Manipulator(Printed):
     """A cable-driven arm: rigid links, revolute joints, frictionless cables.
 
     Args:

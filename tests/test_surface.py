@@ -3,6 +3,7 @@
 import ast
 import copy
 import dataclasses
+import html
 import inspect
 import json
 import os
@@ -295,6 +296,15 @@ WAYS: dict[str, Callable[[Any], Any]] = {
     "deeply copied": copy.deepcopy,
     "replaced": dataclasses.replace,
 }
+
+
+@pytest.mark.parametrize("name", RESULTS)
+def test_notebooks_show_what_is_printed(name: str) -> None:
+    thing = RESULTS[name]
+    shown = thing._repr_html_()
+    if not isinstance(thing, cdsm.Stiffness):  # which has a table of its own
+        assert html.unescape(shown) == f"<pre>{thing}</pre>"
+    assert shown.startswith(("<pre>", "<table>"))
 
 
 @pytest.mark.parametrize("way", WAYS)
