@@ -10,9 +10,9 @@ import pytest
 
 import cdsm
 from cdsm._checks import Array
-from cdsm.urdf import CROSS_INERTIA, CROSS_MASS
 from tests import arms
 from tests.differences import central_difference
+from tests.mujoco_arms import in_mujoco, tendon_jacobian
 
 ARMS: dict[str, Callable[[], cdsm.Manipulator]] = {
     **{
@@ -41,89 +41,21 @@ def pose(request: pytest.FixtureRequest) -> cdsm.Posture:
 # MuJoCo
 
 
-def _text(numbers: Array | tuple[float, ...]) -> str:
-    return " ".join(repr(float(x)) for x in numbers)
-
-
-@cache
-def _mujoco_model(arm: cdsm.Manipulator) -> mujoco.MjModel:
-    """The same arm written down for MuJoCo, from its geometry and its cables' sites."""
-    geometry = arm.geometry
-    sites: dict[str, list[str]] = {}
-    tendons = []
-    for c, cable in enumerate(arm.cables):
-        path = []
-        for i, site in enumerate(cable.sites):
-            name = f"site{c}_{i}"
-            sites.setdefault(site.link, []).append(
-                f'<site name="{name}" pos="{_text(site.position)}"/>'
-            )
-            path.append(f'<site site="{name}"/>')
-        tendons.append(f'<spatial name="{cable.name}">{"".join(path)}</spatial>')
-
-    def body(name: str, x: float, axes: tuple[tuple[float, ...], ...], inertia: str) -> str:
-        hinges = "".join(f'<joint type="hinge" axis="{_text(axis)}"/>' for axis in axes)
-        return f'<body name="{name}" pos="{x!r} 0 0">{hinges}{inertia}{"".join(sites[name])}'
-
-    def inertial(x: float, mass: float) -> str:
-        # gravity asks for the masses alone
-        moments = _text((CROSS_INERTIA,) * 3)
-        return f'<inertial pos="{x!r} 0 0" mass="{mass!r}" diaginertia="{moments}"/>'
-
-    start, bodies, depth = geometry.base_length, "", 0
-    sites.setdefault(f"link{len(geometry.links)}", []).append(
-        f'<site name="tool0" pos="{geometry.links[-1].length!r} 0 0"/>'
-    )
-    for k, (joint, link) in enumerate(zip(geometry.joints, geometry.links, strict=True), start=1):
-        sites.setdefault(f"link{k}", [])
-        sites.setdefault(f"cross{k}", [])
-        if len(joint.axes) == 2:
-            bodies += body(f"cross{k}", start, joint.axes[:1], inertial(0.0, CROSS_MASS))
-            start, depth = 0.0, depth + 1
-        weight = inertial(link.length / 2, link.mass or CROSS_MASS)
-        bodies += body(f"link{k}", start, joint.axes[-1:], weight)
-        start, depth = link.length, depth + 1
-    return mujoco.MjModel.from_xml_string(
-        f"""<mujoco>
-          <compiler angle="radian"/>
-          <option gravity="{_text(arm.gravity)}" jacobian="dense"/>
-          <worldbody>{"".join(sites["base_disk"])}{bodies}{"</body>" * depth}</worldbody>
-          <tendon>{"".join(tendons)}</tendon>
-        </mujoco>"""
-    )
-
-
-def _in_mujoco(pose: cdsm.Posture) -> tuple[mujoco.MjModel, mujoco.MjData]:
-    model = _mujoco_model(pose.arm)
-    data = mujoco.MjData(model)
-    data.qpos[:] = pose.q
-    mujoco.mj_forward(model, data)
-    return model, data
-
-
-def _tendon_jacobian(model: mujoco.MjModel, data: mujoco.MjData) -> Array:
-    dense = np.zeros((model.ntendon, model.nv))
-    for t, (start, count) in enumerate(zip(model.ten_J_rowadr, model.ten_J_rownnz, strict=True)):
-        entries = slice(start, start + count)
-        dense[t, model.ten_J_colind[entries]] = data.ten_J[entries]
-    return dense
-
-
 def test_mujoco_measures_the_same_cable_lengths(pose: cdsm.Posture) -> None:
-    _, data = _in_mujoco(pose)
+    _, data = in_mujoco(pose)
     lead = np.array([cable.lead for cable in pose.arm.cables])
     np.testing.assert_allclose(pose.cable_lengths, data.ten_length + lead, rtol=0.0, atol=1e-14)
 
 
 def test_mujoco_measures_the_same_length_jacobian(pose: cdsm.Posture) -> None:
-    model, data = _in_mujoco(pose)
-    theirs = _tendon_jacobian(model, data)
+    model, data = in_mujoco(pose)
+    theirs = tendon_jacobian(model, data)
     assert abs(theirs).max() > 1e-3
     np.testing.assert_allclose(pose.length_jacobian, theirs, rtol=0.0, atol=1e-14)
 
 
 def test_mujoco_sees_the_same_tip(pose: cdsm.Posture) -> None:
-    model, data = _in_mujoco(pose)
+    model, data = in_mujoco(pose)
     site = model.site("tool0").id
     linear, angular = np.zeros((3, model.nv)), np.zeros((3, model.nv))
     mujoco.mj_jacSite(model, data, linear, angular, site)
@@ -135,7 +67,7 @@ def test_mujoco_sees_the_same_tip(pose: cdsm.Posture) -> None:
 
 
 def test_mujoco_feels_the_same_gravity_torque(pose: cdsm.Posture) -> None:
-    _, data = _in_mujoco(pose)
+    _, data = in_mujoco(pose)
     # the bias force of an arm at rest is gravity alone; some newtons times some decimetres
     np.testing.assert_allclose(pose.gravity_torque, data.qfrc_bias, rtol=0.0, atol=1e-13)
 
