@@ -63,9 +63,12 @@ def reach(
     while i > 0:
         rx, ry, rz = tip[0, 3] - origin[i, 0], tip[1, 3] - origin[i, 1], tip[2, 3] - origin[i, 2]
         zx, zy, zz = axis[i, 0], axis[i, 1], axis[i, 2]
-        jacobian[0, i - 1] = zy * rz - zz * ry + slide[i, 0]
-        jacobian[1, i - 1] = zz * rx - zx * rz + slide[i, 1]
-        jacobian[2, i - 1] = zx * ry - zy * rx + slide[i, 2]
+        jacobian[0, i - 1] = zy * rz - zz * ry
+        jacobian[1, i - 1] = zz * rx - zx * rz
+        jacobian[2, i - 1] = zx * ry - zy * rx
+        if slide.shape[0]:
+            for r in range(3):
+                jacobian[r, i - 1] += slide[i, r]
         jacobian[3, i - 1] = zx
         jacobian[4, i - 1] = zy
         jacobian[5, i - 1] = zz
@@ -96,9 +99,12 @@ def weigh(
         ry = load[i, 2] - M * origin[i, 1]
         rz = load[i, 3] - M * origin[i, 2]
         zx, zy, zz = axis[i, 0], axis[i, 1], axis[i, 2]
-        load[i, 1] = zy * rz - zz * ry + M * slide[i, 0]
-        load[i, 2] = zz * rx - zx * rz + M * slide[i, 1]
-        load[i, 3] = zx * ry - zy * rx + M * slide[i, 2]
+        load[i, 1] = zy * rz - zz * ry
+        load[i, 2] = zz * rx - zx * rz
+        load[i, 3] = zx * ry - zy * rx
+        if slide.shape[0]:
+            for r in range(3):
+                load[i, 1 + r] += M * slide[i, r]
         load[i, 4] = gy * zz - gz * zy
         load[i, 5] = gz * zx - gx * zz
         load[i, 6] = gx * zy - gy * zx

@@ -38,7 +38,8 @@ class Tree(NamedTuple):
             that of the joint before.
         translation: Origin in the frame of the joint before, (nv+1, 3) [m].
         axis: Unit axis of a joint that turns, likewise, (nv+1, 3); zero if it slides.
-        slide: Unit direction of a joint that slides, likewise, (nv+1, 3); zero if it turns.
+        slide: Unit direction of a joint that slides, likewise, (nv+1, 3), zero if it turns; (0, 3)
+            if none slides, which is the usual case and costs nothing.
     """
 
     parent: Indices
@@ -61,7 +62,7 @@ class Tree(NamedTuple):
             turn=frozen(rotation[:, None] @ parts),
             translation=frozen(translation),
             axis=frozen((rotation @ axis[:, :, None])[:, :, 0].copy()),
-            slide=frozen((rotation @ slide[:, :, None])[:, :, 0].copy()),
+            slide=frozen((rotation @ slide[:, :, None])[: len(slide) * slide.any(), :, 0].copy()),
         )
 
 
@@ -93,7 +94,7 @@ class Frames(NamedTuple):
     Attributes:
         origin: A point on each joint axis, (nv+1, 3) [m].
         axis: Its unit direction, (nv+1, 3); zero if the joint slides.
-        slide: Where it slides to, (nv+1, 3); zero if it turns.
+        slide: Where it slides to, (nv+1, 3), zero if it turns; (0, 3) if none slides.
         site: The cable sites, (P, 3) [m].
     """
 
@@ -110,8 +111,11 @@ def place(
     """Forward kinematics at q (nv,): fill the rotations of the joints (nv+1, 3, 3) and frames."""
     parent, turn, translation, local_axis, local_slide = tree
     origin, axis, slide, site = frames
+    sliding = slide.shape[0] > 0
     for r in range(3):
-        origin[0, r] = axis[0, r] = slide[0, r] = 0.0
+        origin[0, r] = axis[0, r] = 0.0
+        if sliding:
+            slide[0, r] = 0.0
         for c in range(3):
             rotation[0, r, c] = 1.0 if r == c else 0.0
     for i in range(1, parent.shape[0]):
@@ -119,10 +123,12 @@ def place(
         cosine, sine = math.cos(q[i - 1]), math.sin(q[i - 1])
         for r in range(3):
             x, y, z = rotation[before, r, 0], rotation[before, r, 1], rotation[before, r, 2]
-            t, a, s = translation[i], local_axis[i], local_slide[i]
-            slide[i, r] = x * s[0] + y * s[1] + z * s[2]
+            t, a = translation[i], local_axis[i]
             origin[i, r] = origin[before, r] + (x * t[0] + y * t[1] + z * t[2])
-            origin[i, r] += q[i - 1] * slide[i, r]
+            if sliding:
+                s = local_slide[i]
+                slide[i, r] = x * s[0] + y * s[1] + z * s[2]
+                origin[i, r] += q[i - 1] * slide[i, r]
             axis[i, r] = x * a[0] + y * a[1] + z * a[2]
             for c in range(3):
                 rotation[i, r, c] = (
@@ -191,9 +197,11 @@ def _add_side(
         rx = side * (frames.site[site, 0] - frames.origin[j, 0])
         ry = side * (frames.site[site, 1] - frames.origin[j, 1])
         rz = side * (frames.site[site, 2] - frames.origin[j, 2])
-        dx = zy * rz - zz * ry + side * frames.slide[j, 0]
-        dy = zz * rx - zx * rz + side * frames.slide[j, 1]
-        dz = zx * ry - zy * rx + side * frames.slide[j, 2]
+        dx, dy, dz = zy * rz - zz * ry, zz * rx - zx * rz, zx * ry - zy * rx
+        if frames.slide.shape[0]:
+            dx += side * frames.slide[j, 0]
+            dy += side * frames.slide[j, 1]
+            dz += side * frames.slide[j, 2]
         along = ux * dx + uy * dy + uz * dz
         if slopes.shape[0]:
             slopes[cable, j - 1] += along
@@ -299,7 +307,7 @@ def evaluate(
     """
     count, nv = parent.shape[0], q.shape[0]
     tree = Tree(parent, turn, translation, local_axis, local_slide)
-    origin, axis, slide = np.empty((count, 3)), np.empty((count, 3)), np.empty((count, 3))
+    origin, axis, slide = np.empty((count, 3)), np.empty((count, 3)), np.empty(local_slide.shape)
     frames = Frames(origin, axis, slide, np.empty((row.shape[0], 3)))
     place(tree, row, point, q, np.empty((count, 3, 3)), frames)
     L, J, nothing = fixed.copy(), np.zeros((fixed.shape[0], nv)), np.empty((0, nv, nv))

@@ -38,8 +38,8 @@ def test_tree_that_branches_weighs_what_pinocchio_says() -> None:
         q = np.array([0.2, -0.3, 0.4, 0.5, -0.6])
         count = q.size + 1
         rotation = np.empty((count, 3, 3))
-        origin, axis, slide = np.empty((3, count, 3))
-        frames = _kernels.Frames(origin, axis, slide, np.empty((0, 3)))
+        origin, axis = np.empty((2, count, 3))
+        frames = _kernels.Frames(origin, axis, np.empty(tree.slide.shape), np.empty((0, 3)))
         row, point = np.empty(0, dtype=np.intp), np.empty((0, 3))
         _kernels.place(tree, row, point, q, rotation, frames)
         pose, jacobian = np.empty((4, 4)), np.zeros((6, q.size))

@@ -105,7 +105,8 @@ def evaluate_rows(
     parent, segment, joint, fixed = tree.parent, routing.segment, routing.joint, routing.fixed
     nv, count, bodies = q.shape[1], fixed.shape[0], parent.shape[0]
     site = np.empty((routing.row.shape[0], 3))
-    frames = Frames(np.empty((bodies, 3)), np.empty((bodies, 3)), np.empty((bodies, 3)), site)
+    slide = np.empty(tree.slide.shape)
+    frames = Frames(np.empty((bodies, 3)), np.empty((bodies, 3)), slide, site)
     rotation, bent, heavy = np.empty((bodies, 3, 3)), np.empty((nv, 3)), np.empty((bodies, 7))
     page = np.zeros(count, dtype=np.intp)
 
