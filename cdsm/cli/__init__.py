@@ -50,6 +50,17 @@ def main(
             stream.reconfigure(errors="replace")
 
 
-for command in (urdf, stiffness, weigh, buckle, plan, fit, sweep, export, reproduce):
-    app.command()(command)
-app.command("map")(map_sweep)  # the name of a function of Python's own
+_COMMANDS = {
+    "urdf": urdf,
+    "stiffness": stiffness,
+    "weigh": weigh,
+    "buckle": buckle,
+    "plan": plan,
+    "sweep": sweep,
+    "map": map_sweep,
+    "fit": fit,
+    "export": export,
+    "reproduce": reproduce,
+}
+for name, command in _COMMANDS.items():
+    app.command(name)(command)
