@@ -150,6 +150,7 @@ class JointLimitError(CdsmError, ValueError):
     """A joint angle beyond its limit.
 
     Attributes:
+        problem: Which angles are beyond which limits.
         joints: Names of the offending joints.
         angles: Their angles [rad].
         limits: Their (lower, upper) limits [rad].
@@ -164,12 +165,12 @@ class JointLimitError(CdsmError, ValueError):
         self.joints = tuple(joints)
         self.angles = tuple(float(angle) for angle in angles)
         self.limits = tuple((float(low), float(high)) for low, high in limits)
-        listed = "; ".join(
+        self.problem = "; ".join(
             f"{joint} = {angle:.6g} rad is outside [{low:.6g}, {high:.6g}] rad"
             for joint, angle, (low, high) in zip(self.joints, self.angles, self.limits, strict=True)
         )
         super().__init__(
-            f"{listed}. Stay inside the limits, widen joint_limit in the geometry, "
+            f"{self.problem}. Stay inside the limits, widen joint_limit in the geometry, "
             "or, in Python, pass check_limits=False to compute beyond them."
         )
 

@@ -26,6 +26,7 @@ from scipy.sparse import csc_matrix
 from cdsm import _balance
 from cdsm._checks import Array, ReadOnlyState, bound, frozen, instance, one_of, scalar, vector
 from cdsm.errors import InfeasibleTension, InvalidInput, SolverError
+from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 
 OPTIMALITY = 1e-9
@@ -132,8 +133,8 @@ def distribute_tension(
         UnknownName: No such solver is installed, or no such cable.
         SolverError: The solver's answer does not satisfy the optimality conditions.
     """
-    count = len(instance("pose", pose, Posture).arm.cables)
-    low, high = _checked_bounds(pose, bound("minimum", minimum, count), maximum)
+    instance("pose", pose, Posture)
+    low, high = checked_bounds(pose.arm, minimum, maximum)
     if fixed:
         low, high = _with_fixed(pose, low, high, fixed)
     wrench = vector("wrench", wrench, 6, "force [N], then moment [N m], base axes")
@@ -159,9 +160,15 @@ def distribute_tension(
     )
 
 
-def _checked_bounds(pose: Posture, low: Array, maximum: ArrayLike) -> tuple[Array, Array]:
-    high = bound("maximum", maximum, low.size)
-    cables = pose.arm.cables
+def checked_bounds(arm: Manipulator, minimum: ArrayLike, maximum: ArrayLike) -> tuple[Array, Array]:
+    """Bounds (C,) [N] of the tensions of an arm, those that its cables have of their own included.
+
+    Raises:
+        InvalidInput: Not bounds of what can only pull, or the wrong way round.
+    """
+    cables = arm.cables
+    low = bound("minimum", minimum, len(cables))
+    high = bound("maximum", maximum, len(cables))
     allowed = (low >= 0.0) & (low < math.inf)
     if np.count_nonzero(allowed) < low.size:
         c = int(allowed.argmin())
@@ -170,7 +177,7 @@ def _checked_bounds(pose: Posture, low: Array, maximum: ArrayLike) -> tuple[Arra
             f"{low[c]:g} N given for {cables[c].name}; cables only pull, so it must be finite "
             "and not negative.",
         )
-    low, high = pose.arm._laws.narrowed(low, high)
+    low, high = arm._laws.narrowed(low, high)
     ordered = low <= high
     if np.count_nonzero(ordered) < low.size:
         c = int(ordered.argmin())

@@ -279,6 +279,8 @@ def test_every_infeasible_sample_is_named_and_the_path_goes_on() -> None:
         6: "stiffness",
     }
     assert isinstance(told[2].error, cdsm.JointLimitError)
+    assert "widen joint_limit" in told[2].reason
+    assert "check_limits" not in told[2].reason  # which a path does not have
     assert isinstance(told[4].error, cdsm.InfeasibleTension)
     error = told[6].error
     assert isinstance(error, cdsm.UnreachableStiffness)
@@ -400,6 +402,22 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"seed": -1}, "seed"),
     ({"arm": "this one"}, "arm"),
 ]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"minimum": 5.0, "maximum": 1.0}, "maximum: 1 N given"),
+        ({"minimum": -1.0}, "minimum: -1 N given"),
+        ({"margin": 2.0}, "margin: 2 given"),
+    ],
+)
+def test_what_no_sample_could_do_is_refused_before_any(
+    change: dict[str, Any], message: str
+) -> None:
+    beyond = np.full((2, ARM.nv), 9.0)  # no posture is possible, so that no sample would notice
+    with pytest.raises(cdsm.InvalidInput, match=message):
+        cdsm.plan_path(ARM, DOWN, 8e4, angles=beyond, **change)
 
 
 @pytest.mark.parametrize(("change", "message"), BAD)

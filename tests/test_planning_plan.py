@@ -9,6 +9,9 @@ import pytest
 import cdsm
 from cdsm import presets
 from cdsm._checks import Array
+from cdsm.planning import planner
+from cdsm.planning.attainable import attainable
+from cdsm.planning.planner import Planner
 from tests import arms
 from tests.differences import central_difference
 from tests.locked import EA, LENGTH, STRAND, H, R, hinge, some_arm
@@ -294,6 +297,97 @@ def test_plan_of_a_hinge_has_its_closed_form() -> None:
     target = (2.0 * EA / (2.0 * H) * R**2 - 33.0 * H) / LENGTH**2
     plan = cdsm.plan_stiffness(hinge().at([0.0]), DOWN, target, 10.0)
     np.testing.assert_allclose(plan.tension.values, 33.0, rtol=1e-9)
+
+
+# --- next to the ends, and where there is nothing to choose ---------------------------------
+
+
+def strand_case(seed: int) -> tuple[cdsm.Posture, Array, float, float]:
+    """An arm of strands, any direction, and bounds that let tension nearly buckle it."""
+    rng = np.random.default_rng(seed)
+    kind, joints = ("hinged" if seed % 2 else "universal"), int(rng.integers(2, 5))
+    pose = arms.random_posture(arms.random_arm(seed, joints, kind, STRAND), seed, 0.4)
+    low, high = float(rng.choice([3.0, 10.0, 20.0])), float(rng.choice([60.0, 200.0, np.inf]))
+    return pose, rng.normal(size=3), low, high
+
+
+@pytest.mark.parametrize("seed", [111, 113, 127])
+def test_ends_of_the_range_and_all_beside_them_are_reached(seed: int) -> None:
+    """Next to buckling all that is left of the stiffness is a difference, and a piece is thin."""
+    pose, u, low, high = strand_case(seed)
+    found = cdsm.stiffness_range(pose, u, low, high)
+    for target in (found.low, 1.0001 * found.low, found.high):
+        plan = cdsm.plan_stiffness(pose, u, target, low, high)
+        assert cdsm.stiffness(pose, plan.tension).along(u) == pytest.approx(target, rel=1e-6)
+        assert (low <= plan.tension.values).all()
+        assert (high >= plan.tension.values).all()
+        # balance to the last bit moves an eigenvalue that is next to nothing
+        assert plan.stiffness.margin >= plan.floor * (1.0 - 1e-6)
+
+
+def test_end_of_the_range_that_a_crossing_meets_by_rounding_is_reached() -> None:
+    pose = arms.random_posture(arms.random_arm(3, 3, "hinged", STRAND), 3, 0.3)
+    u = (0.0, 1.0, 0.3)
+    found = cdsm.stiffness_range(pose, u, 10.0)
+    plan = cdsm.plan_stiffness(pose, u, found.low, 10.0)
+    assert plan.achieved == pytest.approx(found.low, rel=1e-6)
+    path = cdsm.plan_path(pose.arm, u, [3.0 * found.low, found.low], 10.0, angles=[pose.q] * 2)
+    assert path.complete
+
+
+def test_range_and_refusal_name_the_same_numbers() -> None:
+    pose, u, low, high = strand_case(113)
+    found = cdsm.stiffness_range(pose, u, low, high)
+    for target in (0.99 * found.low, 1.01 * found.high):
+        with pytest.raises(cdsm.UnreachableStiffness) as caught:
+            cdsm.plan_stiffness(pose, u, target, low, high)
+        assert (caught.value.low, caught.value.high) == (found.low, found.high)
+
+
+def test_what_a_search_has_met_beyond_the_range_widens_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """As if the range had been found far too narrow."""
+    pose, low, high = posture("hinged-3-strand")
+    found = cdsm.stiffness_range(pose, DOWN, low, high)
+    target = 0.5 * (found.low + found.high)
+    true = attainable
+
+    def narrow(*given: Any) -> Any:
+        ends = true(*given)
+        return ends._replace(high=ends.low)
+
+    monkeypatch.setattr(planner, "attainable", narrow)
+    monkeypatch.setattr(Planner, "least", lambda self: None)
+    plan = cdsm.plan_stiffness(pose, DOWN, target, low, high)
+    assert plan.achieved == pytest.approx(target, rel=1e-9)
+    with pytest.raises(cdsm.UnreachableStiffness) as caught:
+        cdsm.plan_stiffness(pose, DOWN, 1.1 * found.high, low, high)
+    assert found.low < target < caught.value.high <= found.high * (1.0 + 1e-9)
+
+
+def test_one_cable_on_one_hinge_has_one_stiffness() -> None:
+    geometry = cdsm.Geometry(
+        name="one",
+        base_length=0.02,
+        hole_radius=0.02,
+        joints=(cdsm.Joint(axes=((0.0, 1.0, 0.0),), disk_offset=0.01),),
+        links=(cdsm.Link(length=0.05, mass=0.2),),
+        cables=(cdsm.CableRoute(joint=1, angle=math.pi / 2.0),),
+    )
+    arm = cdsm.Manipulator(geometry, cdsm.LinearElasticity(2e5))
+    pose = arm.at([0.0])
+    only = cdsm.stiffness(pose, cdsm.distribute_tension(pose)).along(DOWN)
+    found = cdsm.stiffness_range(pose, DOWN)
+    assert found.low == found.high == pytest.approx(only, rel=1e-12)
+    plan = cdsm.plan_stiffness(pose, DOWN, found.low)
+    assert plan.achieved == pytest.approx(only, rel=1e-12)
+    with pytest.raises(cdsm.UnreachableStiffness) as caught:
+        cdsm.plan_stiffness(pose, DOWN, 1e4)
+    assert (caught.value.low, caught.value.high) == (found.low, found.high)
+    path = cdsm.plan_path(arm, DOWN, [found.low, 1e4, found.low], angles=np.zeros((3, 1)))
+    assert path.planned == (0, 2)
+    assert path.infeasible[0].status == "stiffness"
 
 
 # --- several targets ------------------------------------------------------------------------

@@ -12,6 +12,8 @@ from numpy.typing import ArrayLike
 import cdsm
 from cdsm import presets
 from cdsm._checks import Array
+from cdsm.planning.problem import problem
+from cdsm.planning.starts import Ground
 from tests import arms
 from tests.locked import EA, LENGTH, STRAND, H, R, hinge
 
@@ -318,3 +320,82 @@ def test_what_is_printed_says_what_was_found() -> None:
         assert part in str(found)
     assert "StiffnessRange" in repr(found)
     assert found.posture.arm.nv == 1
+
+
+# --- laws of which nothing is known ---------------------------------------------------------
+
+
+class Bump(cdsm.Elasticity):
+    """A law of one's own whose rigidity rises to 120 N and falls from there on."""
+
+    @property
+    def domain(self) -> cdsm.Domain:
+        return cdsm.Domain(0.0, 500.0)
+
+    def rigidity(self, tension: ArrayLike) -> Array:
+        F = self.domain.check(tension)
+        return np.asarray(5e3 + 2e4 * np.exp(-(((F - 120.0) / 40.0) ** 2)))
+
+    def strain(self, tension: ArrayLike) -> Array:
+        return self.domain.check(tension) / 5e3
+
+    def energy(self, tension: ArrayLike) -> Array:
+        return self.domain.check(tension) ** 2 / 1e4
+
+
+def measured_bump() -> cdsm.TabulatedElasticity:
+    """The same as a table of the library."""
+    F = np.array([0.0, 30.0, 60.0, 90.0, 120.0, 150.0, 180.0, 220.0, 300.0, 400.0, 500.0])
+    EA = Bump().rigidity(F)
+    strain = np.concatenate([[0.0], np.cumsum(2.0 * np.diff(F) / (EA[1:] + EA[:-1]))])
+    return cdsm.TabulatedElasticity(tuple(F), tuple(strain))
+
+
+@pytest.mark.parametrize("law", [Bump(), measured_bump()], ids=["own", "table"])
+def test_no_sample_is_stiffer_where_the_rigidity_falls_again(law: cdsm.Elasticity) -> None:
+    """The stiffest tensions lie inside, and many searches stop at others."""
+    pose = arms.random_posture(arms.random_arm(19, 3, "hinged", law), 19, 0.4)
+    u = np.array([1.0, -0.5, 0.3])
+    found = cdsm.stiffness_range(pose, u, 10.0, 400.0)
+    spread = found.high_found
+    assert spread[-1] < 0.9 * spread[0]
+    values = []
+    F = cdsm.distribute_tension(pose, 10.0, 400.0).values
+    null = np.linalg.svd(pose.length_jacobian.T)[2][pose.arm.nv :].T
+    rng = np.random.default_rng(0)
+    for _ in range(800):  # hit and run
+        way = null @ rng.normal(size=null.shape[1])
+        with np.errstate(divide="ignore"):
+            ends = np.sort([(10.0 - F) / way, (400.0 - F) / way], axis=0)
+        F = np.clip(F + rng.uniform(ends[0].max(), ends[1].min()) * way, 10.0, 400.0)
+        K = cdsm.stiffness(pose, F)
+        if K.margin >= found.floor:
+            values.append(K.along(u))
+    assert len(values) > 100
+    assert found.low * (1.0 - 1e-9) <= min(values)
+    assert max(values) <= found.high * (1.0 + 1e-9)
+
+
+@pytest.mark.parametrize("seed", [12, 27])
+def test_more_starts_are_never_worse(seed: int) -> None:
+    kind = "hinged" if seed % 2 else "universal"
+    pose = arms.random_posture(arms.random_arm(seed, 2, kind, Bump()), seed, 0.4)
+    found = [
+        cdsm.stiffness_range(pose, (1.0, -0.5, 0.3), 10.0, 400.0, starts=starts)
+        for starts in (1, 2, 5, 11, 24)
+    ]
+    for fewer, more in itertools.pairwise(found):
+        # the ends of searches that meet differ by their rounding
+        assert more.high >= fewer.high * (1.0 - 1e-9)
+        assert more.low <= fewer.low * (1.0 + 1e-9)
+
+
+def test_random_starts_go_on_from_fewer() -> None:
+    pose = arms.random_posture(arms.random_arm(12, 2, "universal", Bump()), 12, 0.4)
+    question = problem(pose, 10.0, 400.0, np.zeros(6), 1e-4)
+    few, many = (Ground(question.region, question.field, count, 0) for count in (6, 17))
+    np.testing.assert_array_equal(few.anchor.F, many.anchor.F)
+    starts = [each.F for each in few.points]
+    np.testing.assert_array_equal(starts, [each.F for each in many.points[: len(starts)]])
+    inside = [[each.F for each in ground.between(n, 0)] for ground, n in ((few, 4), (many, 9))]
+    np.testing.assert_array_equal(inside[0], inside[1][: len(inside[0])])

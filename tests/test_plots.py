@@ -137,15 +137,54 @@ def test_path_is_drawn_with_gaps_where_nothing_is_planned() -> None:
     figure.draw_without_rendering()
     above, below = figure.axes
     wanted, held = above.get_lines()
-    np.testing.assert_allclose(_shown(wanted)[1], 1e-3 * targets)
+    # upright half-way between samples where it jumps; 80 to 82 may be how it begins to rise
+    steps = [[0, 80.0], [1, 82.0], [1.5, 82.0], [1.5, 1e4], [2, 1e4], [2.5, 1e4], [2.5, 86.0]]
+    steps += [[3, 86.0], [3.5, 86.0], [3.5, 1e4], [4, 1e4]]
+    np.testing.assert_allclose(_shown(wanted).T, steps)
     np.testing.assert_allclose(_shown(held)[1], [80.0, 82.0, np.nan, 86.0, np.nan])
     assert len(below.get_lines()) == 15
     np.testing.assert_array_equal(_shown(below.get_lines()[4])[1, [0, 1, 3]], plan.tensions[:, 4])
+    assert len({line.get_color() for line in below.get_lines()}) == 15
+    legend = below.get_legend()
+    assert legend is not None
+    assert [text.get_text() for text in legend.get_texts()] == [each.name for each in arm.cables]
     assert [len(axes.patches) for axes in (above, below)] == [2, 2]
     matrix = cdsm.stiffness(arm.at(q[0]), cdsm.distribute_tension(arm.at(q[0]), 60.0)).cartesian
     full = cdsm.plan_path(arm, None, (matrix + matrix.T) / 2.0, 50.0, angles=q[:1])
     with pytest.raises(cdsm.InvalidInput, match="plan: is one of cartesian"):
         plots.plot_path_plan(full)
+
+
+def test_steps_and_ramps_of_a_path_are_drawn_as_what_they_are() -> None:
+    arm = cdsm.presets.virtual_prototype()
+    targets = 1e3 * np.array([80.0, 80.0, 90.0, 90.0, 91.0, 92.0, 93.0, 80.0])
+    plan = cdsm.plan_path(arm, (0.0, 0.0, 1.0), targets, 50.0, angles=np.full((8, 10), 0.15))
+    line: Line2D = plots.plot_path_plan(plan).axes[0].get_lines()[0]
+    x = [0.0, 1.0, 1.5, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 6.5, 6.5, 7.0]
+    y = [80.0, 80.0, 80.0, 90.0, 90.0, 90.0, 91.0, 92.0, 93.0, 93.0, 80.0, 80.0]
+    np.testing.assert_allclose(_shown(line), [x, y])
+
+
+def test_many_cables_are_not_told_apart_by_colour() -> None:
+    arm = cdsm.Manipulator(
+        cdsm.Geometry.universal(
+            joints=7,
+            cables_per_joint=3,
+            link_length=0.03,
+            base_length=0.02,
+            disk_offset=0.01,
+            hole_radius=0.03,
+            link_mass=0.02,
+        ),
+        cdsm.LinearElasticity(2e5),
+    )
+    q = np.full((1, arm.nv), 0.05)
+    K = cdsm.stiffness(arm.at(q[0]), cdsm.distribute_tension(arm.at(q[0]), 20.0))
+    u = (0.0, 0.0, 1.0)
+    plan = cdsm.plan_path(arm, u, K.along(u), 10.0, angles=q)
+    below = plots.plot_path_plan(plan).axes[1]
+    assert below.get_legend() is None
+    assert len({line.get_color() for line in below.get_lines()}) == 1
 
 
 def _shown(line: Line2D) -> Array:

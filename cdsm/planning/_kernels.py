@@ -144,7 +144,7 @@ def convex(W: Array, null: Array, held: Array, floor: float) -> Array:
     count, p = null.shape
     inner = np.dot(np.ascontiguousarray(null.T), np.dot(W, null))
     fixed = np.zeros((p, p))
-    if held.shape[0] > 0:
+    if held.shape[0] > 0 and p > 0:
         normal = np.ascontiguousarray(np.linalg.qr(np.ascontiguousarray(np.dot(held, null).T))[0])
         fixed = np.dot(normal, normal.T)
         free = np.eye(p) - fixed

@@ -9,7 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm._checks import Array, ReadOnlyState, frozen
-from cdsm.errors import InvalidInput
+from cdsm.elasticity import Elasticity, LinearElasticity
+from cdsm.errors import ElasticityRangeError, InvalidInput
+from cdsm.planning.admissible import Admissible
 from cdsm.planning.field import Point, Reading
 from cdsm.planning.problem import Problem, along, checked_direction, count, problem
 from cdsm.planning.search import HIGHEST, LOWEST, Goal, Task, search
@@ -17,15 +19,22 @@ from cdsm.planning.starts import Ground, settled
 from cdsm.posture import Posture
 from cdsm.stiffness import stiffness
 from cdsm.tension import Tension
+from cdsm.wire import StrandElasticity, TabulatedElasticity
 
 MARGIN = 1e-4
 """Default of the smallest eigenvalue of K_θ over its largest: arms of 40 joints reach 3e-4."""
 
 _UPWARD = 4
-"""Starts for the highest, of which with rigidities that level off there is one alone."""
+"""Starts for the highest where rigidities rise: where they level off, too, there is one alone."""
 
 _SETTLED = 3
-"""How many of the best ends of searches are tried beyond the jumps of rigidities."""
+"""How many of the best ends of searches are tried beyond the jumps of rigidities that rise."""
+
+_LAW_SAMPLES = 257
+"""Tensions at which the rigidity of a law is asked for, to see whether it rises."""
+
+_LAW_ROUNDING = 1e-12
+"""A rigidity that falls by no more than this part of it does not fall."""
 
 _LIMITS = (1e2, 1e4, 1e6)
 """How far unbounded tensions are followed, in least tensions."""
@@ -108,8 +117,11 @@ def stiffness_range(
     Over F with J_Lᵀ F = J_Xᵀ W − g, the bounds, the domains of the elasticities of position-
     controlled cables, and λ_min(K_θ), symmetric part, not below ``margin``. With constant rigidity,
     or one that levels off, ``along`` is a concave function of F: the largest is the only one there
-    is, the smallest one of many in the corners, so that it is sought from many starts. An arm that
-    tension can buckle is softest just before: then ``low`` depends on ``margin``.
+    is, the smallest one of many in the corners, so that it is sought from many starts. Of a law of
+    one's own, or one whose rigidity falls somewhere, nothing like that is known: both ends are
+    sought from many starts then, in the corners and between, and ``high_found`` tells how often
+    ``high`` was found. More starts go on from fewer. An arm that tension can buckle is softest just
+    before: then ``low`` depends on ``margin``.
 
     Args:
         pose: The posture.
@@ -120,7 +132,8 @@ def stiffness_range(
         wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m].
         margin: From which part of the largest eigenvalue of K_θ under the least tensions on the
             smallest one counts as stable [-].
-        starts: From how many tensions to search for ``low``; for ``high`` a few are enough.
+        starts: From how many tensions to search for ``low``, and for ``high`` unless the rigidity
+            of all cables is known to rise with the tension, where a few are enough.
         seed: Of the random ones among them.
 
     Raises:
@@ -139,13 +152,12 @@ def stiffness_range(
             f"none given, and tensions of {_LIMITS[-1]:g} times the least still change the "
             f"stiffness along ({', '.join(f'{x:.4g}' for x in u)}), which has no end; give one.",
         )
-    softest, stiffest = (question.region.tension(end.point.F) for end in (low, high))
     return StiffnessRange(
         direction=u,
-        low=stiffness(pose, softest).along(u),
-        high=stiffness(pose, stiffest).along(u),
-        low_tension=softest,
-        high_tension=stiffest,
+        low=low.value,
+        high=high.value,
+        low_tension=low.tension,
+        high_tension=high.tension,
         floor=question.field.floor,
         low_found=low.values,
         high_found=high.values,
@@ -158,12 +170,17 @@ class End(NamedTuple):
     """One end of the range.
 
     Attributes:
-        point: Where.
+        point: Where the best search ended.
+        tension: The tensions there, their balance exact.
+        value: The stiffness along the direction under them [N/m], a rounding off that of the
+            search; next to buckling, where all of it is left of a difference, more than that.
         values: What all searches for it ended with (S,) [N/m], its own first.
         open: Whether it is only as far as unbounded tensions were followed, and they lead on.
     """
 
     point: Point
+    tension: Tension
+    value: float
     values: Array
     open: bool = False
 
@@ -186,7 +203,7 @@ def attainable(question: Problem, u: Array, starts: int, seed: int) -> Ends:
         cap = limit * region.scale
         *ends, steps = _ends(replace(question, region=region.capped(cap)), u, starts, seed)
         iterations += steps
-        low, high = (end._replace(open=end.point.F.max() >= _CAPPED * cap) for end in ends)
+        low, high = (end._replace(open=end.tension.values.max() >= _CAPPED * cap) for end in ends)
         if not (low.open or high.open):
             break
     return Ends(low, high, iterations)
@@ -199,6 +216,9 @@ def _ends(question: Problem, u: Array, starts: int, seed: int) -> Ends:
     unit = float(plain.of(ground.anchor).values[0])
     reading = Reading((along(question, u, unit),), np.zeros(1))
     order = sorted(ground.points, key=lambda point: float(reading.of(point).values[0]))
+    rise = _rigidities_rise(region)
+    inside = [] if rise else list(ground.between(starts, seed))
+    most = _SETTLED if rise else len(order) + starts
     iterations = 0
 
     def end(goal: Goal, points: list[Point]) -> End:
@@ -206,12 +226,38 @@ def _ends(question: Problem, u: Array, starts: int, seed: int) -> Ends:
         task = Task(region, field, ground.anchor, reading, goal, region.scale)
         found = [search(task, point) for point in points]
         found.sort(key=lambda each: goal.linear * float(each.sight.values[0]))
-        found[:_SETTLED] = [settled(task, each) for each in found[:_SETTLED]]
+        found[:most] = [settled(task, each) for each in found[:most]]
         found.sort(key=lambda each: goal.linear * float(each.sight.values[0]))
         iterations += sum(each.iterations for each in found)
         values = unit * np.array([each.sight.values[0] for each in found])
-        return End(found[0].sight.point, frozen(values))
+        point = found[0].sight.point
+        tension = region.tension(point.F)
+        return End(point, tension, stiffness(question.pose, tension).along(u), frozen(values))
 
-    low = end(LOWEST, [*order[:starts], ground.anchor])
-    high = end(HIGHEST, [*order[: -_UPWARD // 2 - 1 : -1], order[0], ground.anchor])
+    low = end(LOWEST, [*order[:starts], *inside, ground.anchor])
+    upward = order[: -(_UPWARD // 2 if rise else starts) - 1 : -1]
+    high = end(HIGHEST, [*upward, order[0], *inside, ground.anchor])
     return Ends(low, high, iterations)
+
+
+def _rigidities_rise(region: Admissible) -> bool:
+    """Whether the rigidity of every cable is known not to fall where the tension rises."""
+    cables = region.least.posture.arm.cables
+    return all(
+        _rises(cable.elasticity, low, high)
+        for cable, low, high in zip(cables, region.low.tolist(), region.high.tolist(), strict=True)
+        if cable.control == "position"
+    )
+
+
+def _rises(law: Elasticity, low: float, high: float) -> bool:
+    """Whether a law is known not to fall between two tensions [N]."""
+    if isinstance(law, LinearElasticity):
+        return True
+    if not isinstance(law, (StrandElasticity, TabulatedElasticity)):
+        return False  # between places where it is looked at, a law of one's own may do anything
+    try:
+        rigidity = law.rigidity(np.linspace(low, high, _LAW_SAMPLES))
+    except ElasticityRangeError:
+        return False
+    return bool((np.diff(rigidity) >= -_LAW_ROUNDING * rigidity[1:]).all())

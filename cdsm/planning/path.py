@@ -28,8 +28,17 @@ from cdsm.manipulator import Manipulator
 from cdsm.planning.attainable import MARGIN
 from cdsm.planning.follow import Aim, Follower, Status
 from cdsm.planning.path_plan import InfeasibleSample, PathPlan
-from cdsm.planning.problem import achieved, checked_matrix, count, problem, unit_directions, wanted
+from cdsm.planning.problem import (
+    achieved,
+    checked_margin,
+    checked_matrix,
+    count,
+    problem,
+    unit_directions,
+    wanted,
+)
 from cdsm.stiffness import stiffness
+from cdsm.tension import checked_bounds
 
 _STATUS: Final[dict[type[CdsmError], Status]] = {
     JointLimitError: "posture",
@@ -114,6 +123,8 @@ def plan_path(
     limit = bound("rate", rate, len(arm.cables))
     if not (limit > 0.0).all():
         raise InvalidInput("rate", f"{limit.min():g} N given; it must be positive, or inf for any.")
+    checked_bounds(arm, minimum, maximum)  # at once, not at the first posture that is possible
+    checked_margin(margin)
     follower = Follower(limit, count("starts", starts, 1), count("seed", seed, 0))
 
     near = guess
@@ -134,7 +145,7 @@ def plan_path(
                 single = directions, float(targets[i])
             reason = follower.add(Aim(i, question, reading, single))
         except tuple(_STATUS) as error:
-            infeasible.append(InfeasibleSample(i, _status(error), str(error), error))
+            infeasible.append(InfeasibleSample(i, _status(error), _said(error), error))
         else:
             if reason is not None:
                 infeasible.append(InfeasibleSample(i, *reason))
@@ -210,6 +221,16 @@ def _shown(size: int, progress: bool) -> Iterable[int]:
 
 def _status(error: CdsmError) -> Status:
     return next(status for kind, status in _STATUS.items() if isinstance(error, kind))
+
+
+def _said(error: CdsmError) -> str:
+    """An error in words, with a remedy that a path has."""
+    if isinstance(error, JointLimitError):
+        return (
+            f"{error.problem}. Keep the path within the limits, or widen joint_limit in the "
+            "geometry."
+        )
+    return str(error)
 
 
 def _out_of_reach(solved: KinematicSolution) -> str:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final, final
+from typing import final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm._checks import Array, ReadOnlyState, frozen
 from cdsm.planning.attainable import MARGIN
-from cdsm.planning.planner import Planner
+from cdsm.planning.planner import REACHED, Planner
 from cdsm.planning.problem import (
     achieved,
     checked_matrix,
@@ -23,9 +23,6 @@ from cdsm.planning.problem import (
 from cdsm.posture import Posture
 from cdsm.stiffness import Stiffness, stiffness
 from cdsm.tension import Tension
-
-REACHED: Final = 1e-6
-"""Largest relative miss with which a target counts as hit; what is found is mostly at rounding."""
 
 
 @final
@@ -123,6 +120,12 @@ def plan_stiffness(
     within 1e-6, or it is an error. Several directions, or ``cartesian``, are hit too if that is
     possible; if not, their relative misses are least in the sum of squares, and ``reached`` of the
     answer is false.
+
+    The tensions are the least there are as far as the searches tell. With the laws of this library
+    all searches mostly end at one effort. With a law of one's own, above all one whose rigidity
+    jumps, they need not, and less effort than the least found may do, by a third and more: a
+    ``spread`` above zero warns of it, one of zero does not rule it out, and more ``starts`` find
+    more.
 
     Args:
         pose: The posture.

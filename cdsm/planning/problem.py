@@ -47,13 +47,22 @@ def problem(
     """
     instance("pose", pose, Posture)
     region = admissible(pose, minimum, maximum, wrench)
+    return Problem(pose, region, Field(region, checked_margin(margin)))
+
+
+def checked_margin(margin: float) -> float:
+    """A part between 0 and 1.
+
+    Raises:
+        InvalidInput: It is not.
+    """
     part = scalar("margin", margin)
     if not 0.0 < part < 1.0:
         raise InvalidInput(
             "margin",
             f"{part:g} given; it is a part of the largest eigenvalue of K_θ: 0 < margin < 1.",
         )
-    return Problem(pose, region, Field(region, part))
+    return part
 
 
 def count(name: str, value: object, least: int) -> int:

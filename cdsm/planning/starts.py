@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import pairwise
 
 import numpy as np
 
@@ -40,6 +41,11 @@ class Ground:
         directions: How many random directions to look for corners in, beside those of the cables.
         seed: Of these directions.
 
+    Attributes:
+        anchor: A stable point well inside.
+        points: It, and stable points towards the corners; those of more directions go on from
+            those of fewer.
+
     Raises:
         SingularStiffness: No admissible tension was found that holds the arm stable.
     """
@@ -48,8 +54,8 @@ class Ground:
         least = region.least.values
         size = max(region.scale, float(region.high.max()))
         random = np.random.default_rng(seed).normal(size=(directions, least.size))
-        corners = least[None]
-        for direction in (*np.eye(least.size), *-np.eye(least.size), *random):
+        corners, known = least[None], 1
+        for k, direction in enumerate((*np.eye(least.size), *-np.eye(least.size), *random)):
             step = region.null @ (direction @ region.null)
             length = float(np.linalg.norm(step))
             if length <= _SAME:
@@ -58,22 +64,26 @@ class Ground:
             corner = region.nearest(far, region.low, region.high)
             if corner is not None and (abs(corners - corner).max(axis=1) > _SAME * size).all():
                 corners = np.vstack([corners, corner])
-        points = [field.at(F) for F in (corners.mean(axis=0), *corners)]
+                known += k < 2 * least.size
+        # the random ones have no say in the anchor: with more of them the others stay what they are
+        points = [field.at(F) for F in (corners[:known].mean(axis=0), *corners)]
         self.anchor = points[0]
         if self.anchor.reserve <= 0.0:
-            self.anchor = max(points, key=lambda point: point.reserve)
+            self.anchor = max(points[: known + 1], key=lambda point: point.reserve)
         if self.anchor.reserve <= 0.0:
-            self.anchor = _stabilised(region, field, self.anchor)
-        drawn = (
+            stable = (point for point in points[known + 1 :] if point.reserve > 0.0)
+            self.anchor = next(stable, None) or _stabilised(region, field, self.anchor)
+        drawn = [
             point if point.reserve >= 0.0 else drawn_back(field, point.F, self.anchor)
             for point in points[1:]
-        )
-        self.points = [self.anchor, *(point for point in drawn if point is not None)]
+        ]
+        self._known = [self.anchor, *(point for point in drawn[:known] if point is not None)]
+        self.points = [*self._known, *(point for point in drawn[known:] if point is not None)]
 
     def between(self, count: int, seed: int) -> Iterator[Point]:
-        """Random stable points among the corners, count of them if they are found."""
-        shares = np.random.default_rng(seed).dirichlet(np.ones(len(self.points)), count)
-        for F in shares @ np.array([point.F for point in self.points]):
+        """Random stable points among the corners of the cables, count of them if found."""
+        shares = np.random.default_rng(seed).dirichlet(np.ones(len(self._known)), count)
+        for F in shares @ np.array([point.F for point in self._known]):
             point = drawn_back(self.anchor.field, F, self.anchor)
             if point is not None:
                 yield point
@@ -122,6 +132,25 @@ def beyond_jumps(region: Admissible, F: Array, near: float = _NEAR) -> Iterator[
         there = region.nearest(F, *region.piece(beyond))
         if there is not None:
             yield there
+
+
+def stretches(
+    region: Admissible, one: Array, other: Array
+) -> Iterator[tuple[float, float, tuple[Array, Array]]]:
+    """Parts of the way between two tensions (C,) [N] on which no rigidity jumps, with their piece.
+
+    A stretch is cut where a cable is at a jump; clipped to the bounds of the piece, both its ends
+    are on its own side.
+    """
+    way = other - one
+    cuts = {
+        float((jump - one[c]) / way[c])
+        for c, jumps in enumerate(region.jumps)
+        for jump in jumps
+        if min(one[c], other[c]) <= jump < max(one[c], other[c])
+    }
+    for a, b in pairwise(sorted({0.0, *cuts, 1.0})):
+        yield a, b, region.piece(one + 0.5 * (a + b) * way)
 
 
 def _stabilised(region: Admissible, field: Field, start: Point) -> Point:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from matplotlib import colormaps
+from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
 from cdsm._checks import Array, instance
@@ -14,6 +16,12 @@ from cdsm.plots.style import COLORS, N_PER_MM
 
 _SAME = 1e-9
 """Entries of unit directions this near to each other are of one."""
+
+_JUMP = 3.0
+"""A target jumps where it changes by more than this many times what it goes on before and after."""
+
+_NAMED = 20
+"""More cables than these cannot be told apart by their colours, and are not named."""
 
 
 def plot_stiffness_plan(plan: StiffnessPlan, attainable: StiffnessRange) -> Figure:
@@ -54,6 +62,8 @@ def plot_stiffness_plan(plan: StiffnessPlan, attainable: StiffnessRange) -> Figu
 def plot_path_plan(plan: PathPlan) -> Figure:
     """Stiffness wanted and planned, and the tensions, over the samples; infeasible ones shaded.
 
+    Where the target jumps it is drawn as a step. Up to 20 cables have a colour each, and a legend.
+
     Args:
         plan: What :func:`~cdsm.planning.path.plan_path` returns for one direction or several.
 
@@ -76,9 +86,17 @@ def plot_path_plan(plan: PathPlan) -> Figure:
     pulls[rows] = plan.tensions
     for k, u in enumerate(plan.direction.reshape(-1, 3)):
         color = COLORS[k % len(COLORS)]
-        above.plot(wanted[:, k], color="0.6", linewidth=3.0, label="wanted" if k == 0 else None)
+        label = "wanted" if k == 0 else None
+        above.plot(*_stepped(wanted[:, k]), color="0.6", linewidth=3.0, label=label)
         above.plot(held[:, k], ".-", color=color, linewidth=1.0, markersize=3, label=_named(u))
-    below.plot(pulls, ".-", color=COLORS[0], linewidth=0.9, markersize=2, alpha=0.7)
+    names = [cable.name for cable in plan.arm.cables]
+    told = len(names) <= _NAMED
+    for c, name in enumerate(names):
+        color = to_hex(colormaps["tab20"](c)) if told else COLORS[0]
+        below.plot(pulls[:, c], ".-", color=color, linewidth=0.9, markersize=2, label=name)
+    if told:
+        beside = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5), "frameon": False}
+        below.legend(fontsize=7, ncols=1 + (len(names) > _NAMED // 2), **beside)
     for axes in (above, below):
         for each in plan.infeasible:
             axes.axvspan(
@@ -91,6 +109,22 @@ def plot_path_plan(plan: PathPlan) -> Figure:
     above.legend(title="along", fontsize=8, title_fontsize=8)
     below.set(xlabel="sample", ylabel="tension of each cable [N]")
     return figure
+
+
+def _stepped(values: Array) -> tuple[Array, Array]:
+    """Numbers (S,) of samples as a line, which is upright half-way between two where they jump."""
+    changes = np.diff(values)
+    around = np.pad(changes, 1)
+    # there and back is two jumps: only what goes the same way makes a ramp
+    ramp = np.maximum(around[:-2] * np.sign(changes), around[2:] * np.sign(changes))
+    last = np.flatnonzero(abs(changes) > _JUMP * np.maximum(ramp, 0.0))
+    places = np.insert(np.arange(values.size, dtype=float), np.repeat(last + 1, 2), 0.0)
+    line = np.insert(values, np.repeat(last + 1, 2), 0.0)
+    for k, i in enumerate(last.tolist()):
+        first = i + 2 * k + 1
+        places[first : first + 2] = i + 0.5
+        line[first : first + 2] = values[i : i + 2]
+    return places, line
 
 
 def _named(u: Array) -> str:
