@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from matplotlib.lines import Line2D
-from mpl_toolkits.mplot3d.art3d import Line3D  # type: ignore[import-untyped]
+from mpl_toolkits.mplot3d.art3d import Line3D, Line3DCollection  # type: ignore[import-untyped]
 
 import cdsm
 from cdsm import paper, plots
@@ -27,6 +27,27 @@ def test_arm_is_drawn_with_disks_cables_and_equal_axes() -> None:
     limits = np.ptp([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()], axis=1)  # type: ignore[attr-defined]
     box = axes._box_aspect  # type: ignore[attr-defined]
     np.testing.assert_allclose(limits / box, (limits / box)[0])
+
+
+def test_ellipsoid_shows_where_forces_move_the_tip() -> None:
+    pose = random_posture(mixed_arm(), 3)
+    K = cdsm.stiffness(pose, cdsm.distribute_tension(pose, 10.0))
+    axes = plots.plot_arm(pose, stiffness=K).axes[0]
+    (wires,) = [each for each in axes.collections if isinstance(each, Line3DCollection)]
+    points = np.concatenate(wires._segments3d) / 1e3 - pose.tip[:3, 3]
+    C = K.compliance[:3, :3]
+    size = 0.2 * pose.arm.length / np.linalg.norm(C, 2)
+    # all are moved there by forces of one size
+    np.testing.assert_allclose(np.linalg.norm(np.linalg.solve(size * C, points.T), axis=0), 1.0)
+    with pytest.raises(cdsm.InvalidInput, match="another posture"):
+        plots.plot_arm(random_posture(mixed_arm(), 4), stiffness=K)
+    soft = cdsm.serpentine_cables(
+        pose.arm.geometry, cdsm.LinearElasticity(1e9), series_stiffness=10.0
+    )
+    loose = pose.arm.with_cables(soft).at(pose.q)
+    unstable = plots.plot_arm(loose, stiffness=cdsm.stiffness(loose, np.full(9, 300.0)))
+    assert "UNSTABLE" in unstable.get_suptitle()
+    assert not list(unstable.axes[0].collections)
 
 
 def test_paper_figures_show_both_readings_in_newton_per_millimetre(

@@ -14,34 +14,67 @@ from cdsm._checks import instance
 from cdsm.errors import InvalidInput
 from cdsm.plots.style import AXES, COLORS, MM
 from cdsm.posture import Posture
+from cdsm.stiffness import Stiffness
 from cdsm.tension import Tension
 
 _FLATTEST = 0.2
 """Least range of an axis, as a part of the largest."""
 
 
-def plot_arm(pose: Posture, tension: Tension | None = None) -> Figure:
+def plot_arm(
+    pose: Posture, tension: Tension | None = None, stiffness: Stiffness | None = None
+) -> Figure:
     """The arm in 3D: backbone, disks and cables, with equal axes in mm.
 
     Args:
         pose: The posture to draw.
-        tension: Colours the cables by their tension [N] if given.
+        tension: Colours the cables, if given.
+        stiffness: Draws at the tip how far it goes under a force of any direction, if given: the
+            ellipsoid C_vv f, |f| = 1, its longest half axis a fifth of the arm's length. Not drawn
+            where the arm is unstable, which the title says.
 
     Raises:
-        InvalidInput: Not a posture, or not a tension of its arm.
+        InvalidInput: The tension or stiffness is of another arm or posture.
+        SingularStiffness: K_θ is singular, so there is no ellipsoid.
     """
     instance("pose", pose, Posture)
     if tension is not None and instance("tension", tension, Tension).posture.arm != pose.arm:
         raise InvalidInput("tension", "belongs to another arm than the posture.")
+    if stiffness is not None:
+        there = instance("stiffness", stiffness, Stiffness).posture
+        if there is not pose and not (there.arm == pose.arm and (there.q == pose.q).all()):
+            raise InvalidInput("stiffness", "was taken at another posture; take it at this one.")
     figure = Figure(figsize=(7.0, 5.0), layout="constrained")
     axes: Any = figure.add_subplot(projection="3d")
+    if stiffness is not None and stiffness.is_stable:
+        _draw_ellipsoid(axes, stiffness)
     draw_arm(axes, pose, tension)
     if tension is not None:
         figure.colorbar(
             _tension_colors(tension), ax=axes, label="cable tension [N]", shrink=0.7, pad=0.12
         )
-    figure.suptitle(str(pose.arm), fontsize=10)
+    unstable = stiffness is not None and not stiffness.is_stable
+    figure.suptitle(f"{pose.arm}{'; UNSTABLE' if unstable else ''}", fontsize=10)
     return figure
+
+
+def _draw_ellipsoid(axes: Any, stiffness: Stiffness) -> None:
+    C = stiffness.compliance[:3, :3]
+    longest = float(np.linalg.norm(C, 2))
+    if longest == 0.0:
+        return
+    around, down = np.meshgrid(np.linspace(0.0, 2.0 * np.pi, 25), np.linspace(0.0, np.pi, 13))
+    force = np.stack([np.sin(down) * np.cos(around), np.sin(down) * np.sin(around), np.cos(down)])
+    size = 0.2 * stiffness.posture.arm.length / longest
+    moved = size * np.einsum("ij,j...->i...", C, force)
+    places = MM * (moved + stiffness.posture.tip[:3, 3, None, None])
+    axes.plot_wireframe(
+        *places,
+        color=COLORS[1],
+        linewidth=0.5,
+        label=f"where 1 N moves the tip: longest {MM * longest:.3g} mm",
+    )
+    axes.legend(loc="upper left", fontsize=8)
 
 
 def draw_arm(axes: Any, pose: Posture, tension: Tension | None) -> None:
