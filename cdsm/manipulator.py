@@ -172,8 +172,15 @@ class Manipulator(Printed):
 
     @cached_property
     def length(self) -> float:
-        """Way from the base over the joints to the tip, all joints at zero [m]."""
-        return self._body.length if self._geometry is None else self._geometry.length
+        """Way from the base over the joints to the tip, all joints at zero [m].
+
+        Of a robot from a URDF at least the largest distance of a cable's site from its joint: the
+        tip may sit on a joint, and a length that errors are compared with is not zero.
+        """
+        if self._geometry is not None:
+            return self._geometry.length
+        reach = float(np.linalg.norm(self._routing.point, axis=1).max())
+        return max(self._body.length, reach)
 
     @property
     def tip_link(self) -> str:

@@ -153,3 +153,30 @@ def test_cables_that_meet_the_axis_turn_nothing() -> None:
         cdsm.distribute_tension(pose, 5.0)
     rows = cdsm.distribute_tensions(arm, [[0.0]], 5.0)
     assert rows.status[0] == cdsm.Status.INFEASIBLE
+
+
+def test_gate_whose_tip_is_its_hinge_has_a_length() -> None:
+    """What errors are compared with must not be zero."""
+    gate = (
+        '<robot name="gate"><link name="post"/><link name="leaf"/><joint name="hinge" '
+        'type="revolute"><parent link="post"/><child link="leaf"/><axis xyz="0 0 1"/>'
+        '<limit lower="-1.5" upper="1.5" effort="1" velocity="1"/></joint></robot>'
+    )
+    ropes = [
+        cdsm.Cable(
+            name,
+            (cdsm.Site("post", (0.0, y, 0.0)), cdsm.Site("leaf", (0.5, 0.0, 0.0))),
+            cdsm.LinearElasticity(1e4),
+        )
+        for name, y in (("left", 0.3), ("right", -0.3))
+    ]
+    arm = cdsm.Manipulator.from_urdf(gate, ropes, tip="leaf")
+    assert arm.length == 0.5
+    pose = arm.at([0.2])
+    found = cdsm.solve_joint_angles(arm, pose.cable_lengths)
+    np.testing.assert_allclose(found.angles, [0.2], atol=1e-9)
+    pull = cdsm.distribute_tension(pose, 20.0)
+    # L² = a² + b² ∓ 2ab sin q: the balance of two ropes of known arms
+    arms = 0.15 * np.cos(0.2) / np.sqrt(0.34 - np.array([1.0, -1.0]) * 0.3 * np.sin(0.2))
+    assert pull.values[0] * arms[0] == pytest.approx(pull.values[1] * arms[1], rel=1e-12)
+    assert cdsm.equilibrium(pose, pull, [0.0, 0.0, 0.0, 0.0, 0.0, 2.0]).stable
