@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm._checks import Array
-from cdsm._files import read_text
+from cdsm._files import as_path, read_text
 from cdsm._xml import XmlFault, numbers, parse_xml
 from cdsm.cable import Cable, Site
 from cdsm.elasticity import Elasticity
@@ -136,13 +136,13 @@ def read_caspr(
 def _files(
     bodies: str | os.PathLike[str], cables: str | os.PathLike[str] | None
 ) -> tuple[Path, Path]:
-    first = Path(bodies)
+    first = as_path(bodies)
     if not first.is_dir():
         if cables is None:
             raise InvalidInput(
                 "cables", "not given; give the file of the cables too, or the folder of both."
             )
-        return first, Path(cables)
+        return first, as_path(cables)
     found = []
     for kind in ("bodies", "cables"):
         files = sorted(first.glob(f"*_{kind}.xml"))

@@ -270,5 +270,7 @@ def test_folder_must_hold_one_of_each(tmp_path: Path) -> None:
         cdsm.read_caspr(tmp_path, elasticity=LAW)
     with pytest.raises(cdsm.FileError, match="does not exist"):
         cdsm.read_caspr(tmp_path / "absent.xml", tmp_path / "b.xml", elasticity=LAW)
+    with pytest.raises(cdsm.InvalidInput, match="path of a file"):
+        cdsm.read_caspr(None, elasticity=LAW)  # type: ignore[arg-type]
     with pytest.raises(cdsm.InvalidInput, match="Elasticity is needed"):
         cdsm.read_caspr(tmp_path, elasticity=3.0)  # type: ignore[arg-type]
