@@ -169,9 +169,8 @@ class Distributor:
             known,
             status,
         )
-        J = known[:, 6 * q.shape[1] : -q.shape[1]]
-        J[abs(J) < NO_ARM * self._arm.length] = 0.0
-        distribute_rows(self._blocks, known, low, high, wrench, values, status)
+        nothing = NO_ARM * self._arm.length
+        distribute_rows(self._blocks, known, low, high, wrench, nothing, values, status)
         for r in np.flatnonzero(status == UNDECIDED).tolist():
             pose = self._arm.at(q[r], check_limits=False)
             try:

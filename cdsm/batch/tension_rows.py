@@ -23,6 +23,7 @@ def distribute_rows(
     low: Array,
     high: Array,
     wrench: Array,
+    nothing: float,
     tension: Array,
     status: Codes,
 ) -> None:
@@ -34,6 +35,7 @@ def distribute_rows(
         low: Lower bounds (b, C) [N].
         high: Upper bounds (b, C) [N].
         wrench: W (b, 6).
+        nothing: Moment arms below this are rounding [m], and are made zero.
         tension: What is wanted.
         status: Rows that are not OK are passed over; UNDECIDED where nothing could be certified.
     """
@@ -50,6 +52,10 @@ def distribute_rows(
             continue
         JX = postures[r, : 6 * nv].reshape((6, nv))
         J = postures[r, 6 * nv : (6 + count) * nv].reshape((count, nv))
+        for c in range(count):
+            for i in range(nv):
+                if abs(J[c, i]) < nothing:
+                    J[c, i] = 0.0
         for i in range(nv):
             b[i] = -postures[r, (6 + count) * nv + i]
             for a in range(6):
