@@ -20,6 +20,7 @@ from scipy.spatial.transform import Rotation
 
 from cdsm._checks import Array, instance, scalar
 from cdsm._files import write_text
+from cdsm._xml import parse_xml
 from cdsm.errors import InvalidInput
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
@@ -125,7 +126,7 @@ def write_mjcf(
 
 def _bodies(root: etree._Element, arm: Manipulator, damping: float) -> list[str]:
     """Add the tree of links; return the joints in the order that MuJoCo gives them."""
-    robot = etree.fromstring(arm.urdf.encode())
+    robot = parse_xml(arm.urdf, "robot")
     links = {str(link.get("name")): link for link in robot.findall("link")}
     joints = robot.findall("joint")
     below: dict[str, list[etree._Element]] = {name: [] for name in links}

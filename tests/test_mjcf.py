@@ -168,3 +168,16 @@ def test_bad_input_is_named() -> None:
         cdsm.to_mjcf(mixed_arm(), pose, pull)
     with pytest.raises(cdsm.InvalidInput, match="damping"):
         cdsm.to_mjcf(arm, damping=-1.0)
+
+
+def test_names_are_those_of_the_text_whatever_its_declaration_says() -> None:
+    """A declaration speaks of bytes on a disk; the text has been decoded already."""
+    urdf = (
+        '<?xml version="1.0" encoding="ISO-8859-1"?><robot name="r"><link name="ä"/>'
+        '<link name="ö"/><joint name="j" type="revolute"><parent link="ä"/><child link="ö"/>'
+        '<axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>'
+    )
+    sites = cdsm.Site("ä", (0.0, 0.0, 0.1)), cdsm.Site("ö", (0.1, 0.0, 0.1))
+    rope = cdsm.Cable("c", sites, cdsm.LinearElasticity(1e4))
+    model, _ = loaded(cdsm.Manipulator.from_urdf(urdf, [rope], tip="ö"))
+    assert {"ä", "ö"} <= set(names(model))
