@@ -123,8 +123,7 @@ def _tilts(pose: Posture, tension: Array) -> Array:
     apart = np.linalg.norm(site[end] - site[start], axis=1)
     far = np.linalg.norm(site[end], axis=1)
     over = np.repeat(np.arange(cable.size), np.diff(segment[:, 3]))
-    row = abs(joint)
-    arm = np.linalg.norm(site[end][over] - origin[row], axis=1)
+    arm = np.linalg.norm(site[end][over] - origin[joint], axis=1)
     pull = (tension[cable] * far / apart)[over] * arm
-    torque = np.bincount(row, pull, minlength=len(origin))[1:]
+    torque = np.bincount(joint, pull, minlength=len(origin))[1:]
     return np.asarray(torque, dtype=np.float64)

@@ -97,19 +97,23 @@ def stable_ranges(
     at: At, low: float, high: float
 ) -> tuple[Array, Array, tuple[tuple[float, float], ...]]:
     """Bounds looked at (N,) [N], margin at each (N,) [N m/rad], and where the arm is stable."""
+
+    def margin(place: float) -> float:
+        return at(place).margin
+
     places = sampled(low, high)
-    margins = np.array([at(place).margin for place in places.tolist()])
+    margins = np.array([margin(place) for place in places.tolist()])
     edges, ends = [], []
     for i in range(len(places)):
         if margins[i] > 0.0 and (i == 0 or margins[i - 1] <= 0.0):
-            edges.append(places[i] if i == 0 else _crossing(at, places[i - 1], places[i]))
+            edges.append(places[i] if i == 0 else crossing(margin, places[i - 1], places[i]))
         if margins[i] > 0.0 and (i + 1 == len(places) or margins[i + 1] <= 0.0):
             last = i + 1 == len(places)
-            ends.append(places[i] if last else _crossing(at, places[i], places[i + 1]))
+            ends.append(places[i] if last else crossing(margin, places[i], places[i + 1]))
     return places, margins, tuple((float(a), float(b)) for a, b in zip(edges, ends, strict=True))
 
 
-def _crossing(at: At, a: float, b: float) -> float:
-    """Where the smallest eigenvalue changes its sign between two places."""
-    root: float = brentq(lambda x: at(float(x)).margin, a, b, xtol=1e-300, rtol=PRECISION)
+def crossing(f: Callable[[float], float], a: float, b: float) -> float:
+    """Where a function changes its sign between two places, be it by a jump."""
+    root: float = brentq(lambda x: f(float(x)), a, b, xtol=1e-300, rtol=PRECISION)
     return root

@@ -105,14 +105,15 @@ class CriticalLoad(ReadOnlyState):
 
     def __str__(self) -> str:
         reason = {
-            "buckling": "there it buckles",
+            "buckling": "there it buckles"
+            if self.factor
+            else "it buckles without the load already",
             "infeasible": "beyond, no tensions balance it",
             "elasticity": "beyond, a tension leaves the domain of its cable's elasticity",
             "none": "nothing happens that far",
         }[self.limit]
         mode = _written(self.posture.arm.joint_names, self.mode)
         if self.factor == 0.0:
-            reason = reason.replace("there it buckles", "it buckles without the load already")
             return f"holds no part of the load; {reason}\n{mode}"
         return f"holds the load up to a factor of {self.factor:.6g}; {reason}\n{mode}"
 

@@ -24,7 +24,7 @@ from cdsm._records import (
 )
 from cdsm.cable import Cable, Control, Site
 from cdsm.elasticity import Elasticity
-from cdsm.errors import CableError, FileError, GeometryError, InvalidInput
+from cdsm.errors import CableError, FileError, GeometryError, InvalidInput, listed
 from cdsm.wire_file import from_table, table_of
 
 _HEAD = """\
@@ -75,15 +75,13 @@ def write_cables(cables: Sequence[Cable], path: str | os.PathLike[str]) -> Path:
     cables = sequence_of("cables", cables, Cable)
     if not cables:
         raise InvalidInput("cables", "none given; there is nothing to write.")
-    names: dict[str, str] = {}
-    for cable in cables:
-        table = "\n".join(table_of(cable.elasticity))
-        names.setdefault(table, f"wire{len(names) + 1}")
+    tables = ["\n".join(table_of(cable.elasticity)) for cable in cables]
+    names = {table: f"wire{i}" for i, table in enumerate(dict.fromkeys(tables), start=1)}
     lines = [_HEAD]
     for table, name in names.items():
         lines += [f"[elasticities.{name}]", table, ""]
-    for cable in cables:
-        lines += ["[[cables]]", *_lines(cable, names["\n".join(table_of(cable.elasticity))]), ""]
+    for cable, table in zip(cables, tables, strict=True):
+        lines += ["[[cables]]", *_lines(cable, names[table]), ""]
     return write_text(path, "\n".join(lines))
 
 
@@ -111,8 +109,7 @@ def read_cables(path: str | os.PathLike[str]) -> tuple[Cable, ...]:
         return _built(parse(_Entries, data), _wires(wires))
     except GeometryError as error:
         faults = error.faults
-    listed = "".join(f"\n  - {fault}" for fault in faults)
-    raise FileError(path, f"cannot be read as cables, {len(faults)} faults:{listed}")
+    raise FileError(path, f"cannot be read as cables, {len(faults)} faults:{listed(faults)}")
 
 
 def _wires(tables: dict[str, object]) -> dict[str, Elasticity]:

@@ -21,7 +21,7 @@ from cdsm._files import as_path, read_text
 from cdsm._xml import XmlFault, numbers, parse_xml
 from cdsm.cable import Cable, Site
 from cdsm.elasticity import Elasticity
-from cdsm.errors import CableError, FileError, InvalidInput, UnknownName
+from cdsm.errors import CableError, FileError, InvalidInput, UnknownName, listed
 from cdsm.manipulator import GRAVITY, Manipulator
 from cdsm.urdf import TIP, urdf_text
 
@@ -414,8 +414,6 @@ def _whole(where: str, text: str | None) -> int:
 
 def _refuse(path: Path, faults: Sequence[str]) -> None:
     if faults:
-        listed = "".join(f"\n  - {fault}" for fault in faults[:20])
-        more = f"\n  and {len(faults) - 20} more" if len(faults) > 20 else ""
         raise FileError(
-            path, f"cannot be read as a CASPR model, {len(faults)} faults:{listed}{more}"
+            path, f"cannot be read as a CASPR model, {len(faults)} faults:{listed(faults, most=20)}"
         )

@@ -16,6 +16,12 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
+def listed(faults: Sequence[str], most: int | None = None) -> str:
+    """Faults on lines of their own, at most so many of them."""
+    more = "" if most is None or len(faults) <= most else f"\n  and {len(faults) - most} more"
+    return "".join(f"\n  - {fault}" for fault in faults[:most]) + more
+
+
 class CdsmError(Exception):
     """Root of all errors raised by cdsm."""
 

@@ -14,7 +14,7 @@ from lxml import etree
 
 from cdsm._files import read_text
 from cdsm._xml import XmlFault, numbers, parse_xml
-from cdsm.errors import UrdfError
+from cdsm.errors import UrdfError, listed
 from cdsm.parts import MAXIMUM_JOINTS
 
 TAKEN = ("revolute", "prismatic", "fixed")
@@ -54,9 +54,8 @@ def read_urdf(source: str | os.PathLike[str], *, check_inertia: bool = True) -> 
         raise UrdfError(f"{name}: {error}.") from None
     faults = _faults(robot, check_inertia)
     if faults:
-        listed = "".join(f"\n  - {fault}" for fault in faults[:20])
-        more = f"\n  and {len(faults) - 20} more" if len(faults) > 20 else ""
-        raise UrdfError(f"{name} is no robot that cdsm takes, {len(faults)} found:{listed}{more}")
+        told = listed(faults, most=20)
+        raise UrdfError(f"{name} is no robot that cdsm takes, {len(faults)} found:{told}")
     return text
 
 

@@ -11,7 +11,7 @@ from pydantic import Field
 from cdsm._files import read_text, write_text
 from cdsm._records import Number, Positive, parse, read_toml, record, toml_lines
 from cdsm.elasticity import Elasticity, LinearElasticity
-from cdsm.errors import FileError, GeometryError, InvalidInput
+from cdsm.errors import FileError, GeometryError, InvalidInput, listed
 from cdsm.wire import StrandElasticity, TabulatedElasticity
 
 _Row = Annotated[tuple[Number, ...], Field(strict=False)]
@@ -128,5 +128,4 @@ def read_elasticity(path: str | os.PathLike[str]) -> Elasticity:
         faults = error.faults
     except InvalidInput as error:
         faults = (str(error),)
-    listed = "".join(f"\n  - {fault}" for fault in faults)
-    raise FileError(path, f"is not an elasticity, {len(faults)} found:{listed}")
+    raise FileError(path, f"is not an elasticity, {len(faults)} found:{listed(faults)}")

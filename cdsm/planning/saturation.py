@@ -11,10 +11,10 @@ from typing import Final, Literal, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import brentq, minimize_scalar
+from scipy.optimize import minimize_scalar
 
 from cdsm._checks import Array, ReadOnlyState, bound, frozen, instance, scalar, unit_direction
-from cdsm._rising import PRECISION, At, domain, reach, reason, sampled, stable_ranges
+from cdsm._rising import At, crossing, domain, reach, reason, sampled, stable_ranges
 from cdsm.errors import InvalidInput
 from cdsm.planning.gradient import require_finite, stiffness_gradient
 from cdsm.planning.problem import unstable
@@ -270,7 +270,7 @@ def _falls(curve: Array, slope: Callable[[float], float], start: float, level: f
     for place, _, there in curve.tolist():
         if place > start:
             if there < level:
-                return _crossing(lambda x: slope(x) - level, before, place)
+                return crossing(lambda x: slope(x) - level, before, place)
             before = place
     return math.inf
 
@@ -282,16 +282,10 @@ def _stiffest(
     best = int(curve[:, 1].argmax())
     place = float(curve[best, 0])
     if 0 < best < len(curve) - 1 and curve[best - 1, 2] > 0.0 > curve[best + 1, 2]:
-        top = _crossing(slope, float(curve[best - 1, 0]), float(curve[best + 1, 0]))
+        top = crossing(slope, float(curve[best - 1, 0]), float(curve[best + 1, 0]))
         if value(top) >= curve[best, 1]:
             place = top
     return place
-
-
-def _crossing(f: Callable[[float], float], a: float, b: float) -> float:
-    """Where a function changes its sign between two places, be it by a jump."""
-    root: float = brentq(lambda x: f(float(x)), a, b, xtol=1e-300, rtol=PRECISION)
-    return root
 
 
 def _limit(at: At, last: Tension, high: float) -> End:
