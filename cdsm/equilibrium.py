@@ -160,12 +160,14 @@ class Equilibrium(ReadOnlyState):
         x, y, z = self.displacement * 1000.0
         rows.append(f"tip moved by ({x:.4g}, {y:.4g}, {z:.4g}) mm")
         rows += [
-            f"{name} rests on its stop, which pushes with {self.reaction[i]:.4g} N m"
+            f"{name} rests on its stop, which pushes with {self.reaction[i]:.4g} "
+            f"{arm.torque_unit(i)}"
             for i, name in enumerate(arm.joint_names)
             if name in self.at_limit
         ]
         state = "stable" if self.stable else "NEUTRAL: not every joint is brought back"
-        return "\n".join([*rows, f"{state}, residual {abs(self.residual).max():.1e} N m"])
+        residual = f"{abs(self.residual).max():.1e} {arm.torque_unit()}"
+        return "\n".join([*rows, f"{state}, residual {residual}"])
 
 
 def equilibrium(
@@ -298,10 +300,12 @@ def _answer(loaded: LoadedArm, settled: Settled[Iterate], iterations: int) -> Eq
 def _no_rest(loaded: LoadedArm, settled: Settled[Iterate], reached: float) -> EquilibriumError:
     here = settled.point
     residual = np.where(settled.pressed, 0.0, here.torque)
-    joint = here.K.posture.arm.joint_names[int(abs(residual).argmax())]
+    arm, worst = here.K.posture.arm, int(abs(residual).argmax())
+    joint = arm.joint_names[worst]
     problem = (
         f"the arm finds no stable place to rest beyond {100.0 * reached:.3g} % of the load; at the "
-        f"last iterate {abs(residual).max():.4g} N m are out of balance at {joint}"
+        f"last iterate {abs(residual[worst]):.4g} {arm.torque_unit(worst)} are out of balance at "
+        f"{joint}"
     )
     meeting = _meeting(loaded.reference, here.K.posture)
     if meeting is None:

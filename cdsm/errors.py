@@ -212,8 +212,8 @@ class InfeasibleTension(CdsmError):
     """No admissible cable tension balances the arm at this posture.
 
     Attributes:
-        missing: Torque that no admissible tension supplies, per joint, shape (nv,) [N m]; the
-            smallest in the sum of magnitudes.
+        missing: Torque that no admissible tension supplies, per joint, shape (nv,) [N m] ([N] where
+            it slides); the smallest in the sum of magnitudes.
         joint: Name of the joint that lacks most.
         relaxation: By how much all bounds would have to widen [N]; inf if no bounds would do.
         binding: Names of the cables that stand at a bound in the closest attempt.
@@ -225,6 +225,7 @@ class InfeasibleTension(CdsmError):
         joint: str,
         relaxation: float,
         binding: Sequence[str],
+        units: tuple[str, str] = ("N m", "N m"),
     ) -> None:
         self.missing = missing
         self.joint = joint
@@ -233,8 +234,8 @@ class InfeasibleTension(CdsmError):
         total = float(abs(missing).sum())
         worst = float(abs(missing).max())
         message = (
-            f"no tension within the bounds balances the arm: {total:.4g} N m are missing, "
-            f"most of it ({worst:.4g} N m) at {joint}. "
+            f"no tension within the bounds balances the arm: {total:.4g} {units[0]} are "
+            f"missing, most of it ({worst:.4g} {units[1]}) at {joint}. "
         )
         if relaxation == float("inf"):
             message += (

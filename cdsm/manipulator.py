@@ -132,7 +132,7 @@ class Manipulator(Printed):
         self._constants = (*tree, *routing)
         self._segments = routing.segment, routing.joint
 
-        way = "angle [rad] or way [m]" if self._body.slides.any() else "angle [rad]"
+        way = "angle [rad] or way [m]" if self.slides.any() else "angle [rad]"
         self._meaning_of_q = f"one {way} per joint, {', '.join(self.joint_names)}"
         self._lowest = self._body.lower - _LIMIT_SLACK
         self._highest = self._body.upper + _LIMIT_SLACK
@@ -213,13 +213,25 @@ class Manipulator(Printed):
         return self._body.joint_names
 
     @property
+    def slides(self) -> NDArray[np.bool_]:
+        """Whether each joint slides (nv,): its coordinate is a way [m], not an angle [rad]."""
+        return self._body.slides
+
+    def torque_unit(self, joint: int | None = None) -> str:
+        """Unit of the torque of a joint: N where it slides; or that of all of them together."""
+        slides = self.slides if joint is None else self.slides[joint : joint + 1]
+        if slides.all():
+            return "N"
+        return "N m or N" if slides.any() else "N m"
+
+    @property
     def lower(self) -> Array:
-        """Lower joint limits (nv,) [rad]."""
+        """Lower joint limits (nv,) [rad]; [m] where a joint slides."""
         return self._body.lower
 
     @property
     def upper(self) -> Array:
-        """Upper joint limits (nv,) [rad]."""
+        """Upper joint limits (nv,) [rad]; [m] where a joint slides."""
         return self._body.upper
 
     def __repr__(self) -> str:

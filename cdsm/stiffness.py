@@ -260,7 +260,9 @@ class Stiffness(ReadOnlyState):
     @property
     def _verdict(self) -> str:
         state = "stable" if self.is_stable else "UNSTABLE: K_θ is not positive definite"
-        return f"{state}, smallest joint stiffness {self.margin:.4g} N m/rad"
+        slides = self.posture.arm.slides
+        unit = "N/m" if slides.all() else "N m/rad or N/m" if slides.any() else "N m/rad"
+        return f"{state}, smallest joint stiffness {self.margin:.4g} {unit}"
 
     @cached_property
     def _spectrum(self) -> tuple[Array, Array]:

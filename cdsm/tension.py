@@ -101,7 +101,8 @@ class Tension(ReadOnlyState):
             f"{cable.name:<12}{value:>14.3f}"
             for cable, value in zip(self.posture.arm.cables, self.values, strict=True)
         ]
-        return "\n".join([*rows, f"static residual: {abs(self.residual).max():.1e} N m"])
+        unit = self.posture.arm.torque_unit()
+        return "\n".join([*rows, f"static residual: {abs(self.residual).max():.1e} {unit}"])
 
 
 def distribute_tension(
@@ -331,9 +332,11 @@ def _explain(
     )
     missing = (b - A @ values) * arm_scale * force_scale
     tight = free & (np.minimum(values - lower, upper - values) <= OPTIMALITY)
+    worst = int(abs(missing).argmax())
     raise InfeasibleTension(
         missing=frozen(missing),
-        joint=pose.arm.joint_names[int(abs(missing).argmax())],
+        joint=pose.arm.joint_names[worst],
         relaxation=float(widening.x[-1]) * force_scale if widening.status == 0 else math.inf,
         binding=[pose.arm.cables[c].name for c in np.flatnonzero(tight)],
+        units=(pose.arm.torque_unit(), pose.arm.torque_unit(worst)),
     )

@@ -14,6 +14,7 @@ from typer.testing import CliRunner, Result
 
 import cdsm
 from cdsm.cli import app
+from tests.test_caspr import cable, folder, link
 
 SHORT = """
 [universal]
@@ -237,7 +238,7 @@ def test_plan_asks_for_one_target_and_for_a_path_with_its_rate(
 def test_export_writes_what_the_api_writes(geometry: Path, tmp_path: Path) -> None:
     model, cables = tmp_path / "arm.xml", tmp_path / "cables.toml"
     result = call(
-        *("export", geometry, "--angles", 5, "--mjcf", model, "--cables", cables),
+        *("export", geometry, "--angles", 5, "--mjcf", model, "--cables-out", cables),
         *("--min-tension", 20, "--rigidity", 48e3, "--damping", 0.1),
     )
     assert result.output.count("written: ") == 2
@@ -249,7 +250,7 @@ def test_export_writes_what_the_api_writes(geometry: Path, tmp_path: Path) -> No
     assert cdsm.read_cables(cables) == arm.cables
     nothing = call("export", geometry)
     assert nothing.exit_code == 2
-    assert "--mjcf, --cables or both" in nothing.stderr
+    assert "--mjcf, --cables-out or both" in nothing.stderr
 
 
 def test_wire_file_is_the_elasticity_of_the_cables(geometry: Path, tmp_path: Path) -> None:
@@ -304,7 +305,7 @@ def test_wrong_angles_are_a_usage_error(angles: str, said: str, geometry: Path) 
 def test_every_command_tells_json_and_what_it_writes(geometry: Path, tmp_path: Path) -> None:
     told = call("urdf", geometry, "-o", tmp_path / "arm.urdf", "--json")
     assert json.loads(told.stdout)["written"] == [str(tmp_path / "arm.urdf")]
-    told = call("export", geometry, "--cables", tmp_path / "c.toml", "--json")
+    told = call("export", geometry, "--cables-out", tmp_path / "c.toml", "--json")
     assert json.loads(told.stdout)["written"] == [str(tmp_path / "c.toml")]
     test = tmp_path / "test.csv"
     force = np.linspace(0.0, 400.0, 60)
@@ -358,3 +359,114 @@ def test_fit_of_a_bad_file_is_one_message(tmp_path: Path) -> None:
     result = call("fit", path)
     assert result.exit_code == 1
     assert result.stderr.startswith("error: ")
+
+
+RAIL = """<robot name="rail"><link name="floor"/><link name="car"><inertial><mass value="0.3"/>
+<inertia ixx="1e-4" iyy="1e-4" izz="1e-4" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="way" type="prismatic"><parent link="floor"/><child link="car"/><axis xyz="1 0 0"/>
+<limit lower="-0.1" upper="0.1" effort="1" velocity="1"/></joint></robot>"""
+"""One slide between two cables of 2 N/mm each."""
+
+
+@pytest.fixture
+def rail(tmp_path: Path) -> tuple[object, ...]:
+    law = cdsm.LinearElasticity(400.0)
+    cables = [
+        cdsm.Cable(
+            name=name,
+            sites=(cdsm.Site("floor", (x, 0.0, 0.0)), cdsm.Site("car", (0.0, 0.0, 0.0))),
+            elasticity=law,
+        )
+        for name, x in (("left", -0.2), ("right", 0.2))
+    ]
+    (tmp_path / "rail.urdf").write_text(RAIL, encoding="utf-8")
+    file = cdsm.write_cables(cables, tmp_path / "rail.toml")
+    return tmp_path / "rail.urdf", "--cables", file, "--tip", "car"
+
+
+def test_arm_as_urdf_and_cables_is_the_same_arm(geometry: Path, tmp_path: Path) -> None:
+    urdf, cables = tmp_path / "arm.urdf", tmp_path / "cables.toml"
+    assert call("urdf", geometry, "-o", urdf).exit_code == 0
+    assert call("export", geometry, "--cables-out", cables).exit_code == 0
+    given = ("--angles", "10,-5,8,0,3,12", "--min-tension", 30, "--json")
+    first = call("stiffness", geometry, *given)
+    assert first.exit_code == 0, first.output
+    for arm in ((geometry,), (urdf, "--tip", "tool0")):
+        other = call("stiffness", *arm, "--cables", cables, *given)
+        assert other.exit_code == 0, other.output
+        assert other.stdout == first.stdout
+
+
+def test_robot_that_slides_is_asked_for_and_told_in_millimetres(
+    rail: tuple[object, ...], tmp_path: Path
+) -> None:
+    told = json.loads(call("stiffness", *rail, "--angles", 20, "--json").stdout)
+    assert told["ways_m"] == {"way": 0.02}
+    assert told["angles_rad"] == {}
+    # k = EA/l of both cables, 0.22 and 0.18 m long
+    np.testing.assert_allclose(told["along_N_per_m"][0], 400 / 0.22 + 400 / 0.18, rtol=1e-12)
+    text = call("stiffness", *rail, "--angles", 20).stdout
+    assert "static residual: 0.0e+00 N\n" in text
+    assert "smallest joint stiffness 4040 N/m" in text
+    pulled = call("stiffness", *rail, "--max-tension", 20, "--wrench", "30,0,0,0,0,0")
+    assert "20 N are missing, most of it (20 N) at way" in pulled.stderr
+
+
+def test_sweep_along_a_slide(rail: tuple[object, ...], tmp_path: Path) -> None:
+    out, path = tmp_path / "s.nc", tmp_path / "path.csv"
+    result = call("sweep", *rail, "--grid", "way=-20:20:3", "--quantities", "along", "-o", out)
+    assert result.exit_code == 0, result.output
+    found = cdsm.read_sweep(out)
+    np.testing.assert_allclose(found.way, [-0.02, 0.0, 0.02], rtol=1e-15)
+    assert found.way.attrs["units"] == "m"
+    k = [400 / 0.22 + 400 / 0.18, 4000.0, 400 / 0.22 + 400 / 0.18]
+    np.testing.assert_allclose(found.along.sel(direction="x").values.ravel(), k, rtol=1e-12)
+    path.write_text("way [mm]\n-20\n0.0\n20\n", encoding="utf-8")
+    result = call("sweep", *rail, "--path", path, "--quantities", "along", "-o", out)
+    assert result.exit_code == 0, result.output
+    found = cdsm.read_sweep(out)
+    np.testing.assert_allclose(found.q.values.ravel(), [-0.02, 0.0, 0.02], rtol=1e-15)
+    assert found.q.attrs["units"] == "rad or m"
+    path.write_text("way [deg]\n-20\n20\n", encoding="utf-8")
+    result = call("sweep", *rail, "--path", path, "-o", out)
+    assert "call it way [mm] or way [m]" in result.stderr
+
+
+def test_folder_of_a_caspr_model_is_an_arm(tmp_path: Path) -> None:
+    model = folder(
+        tmp_path, link(1, "R_Z") + link(2, "U_XY"), "".join(cable(name=f"c{i}") for i in range(2))
+    )
+    result = call("sweep", model, "--random", 4, "--rigidity", 2e4, "-o", tmp_path / "s.csv")
+    assert result.exit_code == 0, result.output
+    assert "stiffness sweep of toy" in result.output
+
+
+@pytest.mark.parametrize(
+    ("arguments", "option", "said"),
+    [
+        (("rail.urdf",), "--cables", "a robot in a .urdf needs it"),
+        (("rail.urdf", "--cables", "rail.toml"), "--tip", "a robot in a .urdf needs it"),
+        (("probe.toml", "--tip", "car"), "--tip", "leave it out"),
+        (("probe.toml", "--cables", "rail.toml", "--spring", "2"), "--spring", "leave it out"),
+        ((".", "--cables", "rail.toml"), "--cables", "a CASPR model has its own cables"),
+        (
+            ("rail.urdf", "--cables", "rail.toml", "--tip", "car", "--rigidity", "9"),
+            "--rigidity",
+            "the file of --cables has the wires",
+        ),
+    ],
+)
+def test_options_that_this_kind_of_arm_does_not_heed_are_refused(
+    arguments: tuple[str, ...],
+    option: str,
+    said: str,
+    rail: tuple[object, ...],
+    geometry: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    result = call("stiffness", *arguments)
+    assert result.exit_code == 2
+    assert option in result.stderr
+    assert said in " ".join(result.stderr.replace("│", " ").split())

@@ -53,7 +53,9 @@ def test_random_postures_and_chosen_quantities_as_a_table(geometry: Path, tmp_pa
 
 def test_path_goes_through_its_waypoints_in_degrees(geometry: Path, tmp_path: Path) -> None:
     table, out = tmp_path / "path.csv", tmp_path / "s.nc"
-    table.write_text("joint3_1, joint1_2\n0,0\n30,0\n\n30,-40\n", encoding="utf-8")
+    names = ", ".join(f"{name} [deg]" for name in arm().joint_names)
+    rows = "0,0,0,0,0,0\n0,0,0,0,30,0\n\n0,-40,0,0,30,0\n"
+    table.write_text(f"{names}\n{rows}", encoding="utf-8")
     result = call("sweep", geometry, "--path", table, "--count", 8, *ARM, "--out", out)
     assert result.exit_code == 0, result.output
     q = cdsm.read_sweep(out).q
@@ -85,9 +87,10 @@ def test_map_draws_a_sweep(tmp_path: Path) -> None:
         (("--grid", "joint1_1=a"), 2, "could not convert"),
         (("--grid", "joint1_1=3"), 1, "angles: is empty"),
         (("--path", "{folder}/absent.csv"), 1, "absent.csv: does not exist"),
-        (("--path", "{folder}/names.csv"), 1, "the first line is a, b; it has to name joints"),
-        (("--path", "{folder}/empty.csv"), 1, "it has to name joints"),
-        (("--path", "{folder}/short.csv"), 1, "row 3 is '1'; it needs 2 angles"),
+        (("--path", "{folder}/names.csv"), 1, "has columns for neither of joint angles"),
+        (("--path", "{folder}/empty.csv"), 1, "holds no path"),
+        (("--path", "{folder}/short.csv"), 1, "has no column joint1_2"),
+        (("--path", "{folder}/tips.csv"), 1, "a sweep goes along joint angles"),
         (("--random", "8", "--grid", "joint1_1=0:1:2"), 2, "give one of --grid, --path"),
         ((), 2, "give one of --grid, --path"),
         (("--random", "8", "--quantities", "marign"), 1, "did you mean 'margin'"),
@@ -98,7 +101,8 @@ def test_failure_is_one_message(
 ) -> None:
     (tmp_path / "names.csv").write_text("a,b\n0,0\n1,1\n", encoding="utf-8")
     (tmp_path / "empty.csv").write_text("\n", encoding="utf-8")
-    (tmp_path / "short.csv").write_text("joint1_1,joint1_2\n0,0\n1\n", encoding="utf-8")
+    (tmp_path / "short.csv").write_text("joint1_1 [deg]\n0\n1\n", encoding="utf-8")
+    (tmp_path / "tips.csv").write_text("x [mm],y [mm],z [mm]\n1,2,3\n", encoding="utf-8")
     given = ["--out", str(tmp_path / "s.nc"), *arguments]
     result = call("sweep", geometry, *(each.format(folder=tmp_path) for each in given))
     assert result.exit_code == code

@@ -13,7 +13,7 @@ import cdsm
 from cdsm.cli.arm import stiffness, urdf
 from cdsm.cli.export import export
 from cdsm.cli.loads import buckle, weigh
-from cdsm.cli.options import debug_wanted
+from cdsm.cli.options import debug_wanted, grouped
 from cdsm.cli.paper import reproduce
 from cdsm.cli.plan import plan
 from cdsm.cli.sweep import map_sweep, sweep
@@ -64,4 +64,4 @@ _COMMANDS: dict[str, Callable[..., None]] = {
     "reproduce": reproduce,
 }
 for name, command in _COMMANDS.items():
-    app.command(name)(command)
+    app.command(name)(grouped(command))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
@@ -12,21 +11,11 @@ import typer
 
 from cdsm._checks import Array
 from cdsm.cli.options import (
-    DOWN,
-    NO_WRENCH,
     Angles,
+    ArmOptions,
     AsJson,
-    GeometryFile,
-    Gravity,
-    MaxTension,
-    MinTension,
-    Rigidity,
-    Solver,
-    Spring,
-    Wire,
-    Wrench,
-    numbers,
-    posture,
+    TensionOptions,
+    joints_to_dict,
     reported,
     show_json,
 )
@@ -34,12 +23,12 @@ from cdsm.errors import SingularStiffness
 from cdsm.geometry import Geometry
 from cdsm.stiffness import Stiffness
 from cdsm.stiffness import stiffness as evaluate
-from cdsm.tension import Tension, distribute_tension
+from cdsm.tension import Tension
 from cdsm.urdf import write_urdf
 
 
 def urdf(
-    geometry: GeometryFile,
+    geometry: Annotated[Path, typer.Argument(metavar="GEOMETRY.toml", help="Geometry to read.")],
     output: Annotated[Path, typer.Option("--output", "-o", help="URDF file to write.")],
     as_json: AsJson = False,
 ) -> None:
@@ -54,25 +43,15 @@ def urdf(
 
 
 def stiffness(
-    geometry: GeometryFile,
+    arm: ArmOptions,
+    tensions: TensionOptions,
     angles: Angles = "0",
-    min_tension: MinTension = 10.0,
-    max_tension: MaxTension = math.inf,
-    rigidity: Rigidity = None,
-    wire: Wire = None,
-    spring: Spring = math.inf,
-    wrench: Wrench = NO_WRENCH,
-    gravity: Gravity = DOWN,
-    solver: Solver = "daqp",
     as_json: AsJson = False,
 ) -> None:
     """Distribute the tensions at a posture, and print them and the stiffness."""
     with reported():
-        pose = posture(
-            geometry, angles, rigidity=rigidity, wire=wire, spring=spring, gravity=gravity
-        )
-        load = numbers("--wrench", wrench, 6)
-        pull = distribute_tension(pose, min_tension, max_tension, load, solver)
+        pose = arm.at(angles)
+        pull = tensions.distribute(pose)
         K = evaluate(pose, pull)
         if as_json:
             show_json(_to_dict(pull, K))
@@ -93,7 +72,7 @@ def _to_dict(pull: Tension, K: Stiffness) -> dict[str, object]:
     pose = pull.posture
     along = [K.along(axis) for axis in np.eye(3)]
     return {
-        "angles_rad": dict(zip(pose.arm.joint_names, pose.q.tolist(), strict=True)),
+        **joints_to_dict(pose.arm, pose.q),
         "tip_position_m": pose.tip[:3, 3].tolist(),
         "tension_N": {
             cable.name: value

@@ -10,54 +10,37 @@ import typer
 from cdsm._files import write_file
 from cdsm.buckling import CriticalLoad, CriticalTension, critical_load, critical_tension
 from cdsm.cli.options import (
-    DOWN,
     NO_WRENCH,
     Angles,
+    ArmOptions,
     AsJson,
-    GeometryFile,
-    Gravity,
-    MaxTension,
-    MinTension,
     Picture,
-    Rigidity,
     Solver,
-    Spring,
-    Wire,
+    TensionOptions,
     Wrench,
+    joints_to_dict,
     numbers,
-    posture,
     reported,
     show_json,
 )
-from cdsm.tension import distribute_tension
 from cdsm.weight import WeightTest, weight_test
 
 
 def weigh(
-    geometry: GeometryFile,
+    arm: ArmOptions,
+    tensions: TensionOptions,
     force: Annotated[
         str, typer.Option(help="The weight: FX,FY,FZ at the tip [N].", metavar="FX,FY,FZ")
     ],
     angles: Angles = "0",
     steps: Annotated[int, typer.Option(help="Equal steps to hang it in.")] = 5,
-    min_tension: MinTension = 10.0,
-    max_tension: MaxTension = math.inf,
-    rigidity: Rigidity = None,
-    wire: Wire = None,
-    spring: Spring = math.inf,
-    wrench: Wrench = NO_WRENCH,
-    gravity: Gravity = DOWN,
-    solver: Solver = "daqp",
     figure: Picture = None,
     as_json: AsJson = False,
 ) -> None:
     """Hang a weight at the tip with the motors locked, and see how far it goes (Eq. 20)."""
     with reported():
-        pose = posture(
-            geometry, angles, rigidity=rigidity, wire=wire, spring=spring, gravity=gravity
-        )
-        load = numbers("--wrench", wrench, 6)
-        pull = distribute_tension(pose, min_tension, max_tension, load, solver)
+        pose = arm.at(angles)
+        pull = tensions.distribute(pose)
         test = weight_test(pose, pull, numbers("--force", force, 3), steps=steps)
         if figure is not None:
             from cdsm.plots import plot_weight_test  # matplotlib, only where it is wanted
@@ -71,7 +54,7 @@ def weigh(
 
 
 def buckle(
-    geometry: GeometryFile,
+    arm: ArmOptions,
     angles: Angles = "0",
     load: Annotated[
         str | None,
@@ -86,11 +69,7 @@ def buckle(
     max_tension: Annotated[
         float | None, typer.Option(help="Upper bound of all tensions under the load [N].")
     ] = None,
-    rigidity: Rigidity = None,
-    wire: Wire = None,
-    spring: Spring = math.inf,
     wrench: Wrench = NO_WRENCH,
-    gravity: Gravity = DOWN,
     solver: Solver = "daqp",
     figure: Picture = None,
     as_json: AsJson = False,
@@ -100,9 +79,7 @@ def buckle(
         if value is not None and load is None:
             raise typer.BadParameter("bounds the tensions under --load only.", param_hint=option)
     with reported():
-        pose = posture(
-            geometry, angles, rigidity=rigidity, wire=wire, spring=spring, gravity=gravity
-        )
+        pose = arm.at(angles)
         always = numbers("--wrench", wrench, 6)
         tension = critical_tension(pose, always, solver)
         most = None
@@ -142,7 +119,7 @@ def _weight_to_dict(test: WeightTest) -> dict[str, object]:
         "linear_stiffness_N_per_m": _finite(test.linear.stiffness),
         "cables": [cable.name for cable in last.pose.arm.cables],
         "tensions_N": test.tensions.tolist(),
-        "angles_rad": dict(zip(last.pose.arm.joint_names, last.pose.q.tolist(), strict=True)),
+        **joints_to_dict(last.pose.arm, last.pose.q),
         "slack": list(last.slack),
         "at_limit": list(last.at_limit),
         "stable": last.stable,

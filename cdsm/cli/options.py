@@ -2,55 +2,67 @@
 
 from __future__ import annotations
 
+import inspect
 import json
-from collections.abc import Iterator
+import math
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from dataclasses import dataclass, fields, is_dataclass
+from functools import wraps
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, TypeVar, get_type_hints
 
 import numpy as np
 import typer
 from rich.console import Console
 
+from cdsm._checks import Array
 from cdsm.cable import serpentine_cables
+from cdsm.cable_file import read_cables
+from cdsm.caspr import read_caspr
 from cdsm.elasticity import Elasticity, LinearElasticity
 from cdsm.errors import CdsmError
 from cdsm.geometry import Geometry
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.presets import STRAND_1X19
+from cdsm.tension import Tension, distribute_tension
 from cdsm.wire_file import read_elasticity
+
+_Value = TypeVar("_Value")
 
 console = Console(stderr=True)
 """For progress and errors; answers go to the standard output."""
 
-GeometryFile = Annotated[Path, typer.Argument(metavar="GEOMETRY.toml", help="Geometry to read.")]
+_ARM = "The arm"
+_TENSIONS = "Tensions and load"
+
 Angles = Annotated[
     str,
     typer.Option(
-        help="Joint angles in degrees, separated by commas; or one for all joints.",
+        help="Joint angles in degrees (mm where a joint slides), separated by commas; or one for "
+        "all joints.",
         metavar="DEG,DEG,...",
     ),
 ]
-MinTension = Annotated[float, typer.Option(help="Lower bound of all tensions [N].")]
-MaxTension = Annotated[float, typer.Option(help="Upper bound of all tensions [N].")]
-Rigidity = Annotated[
-    float | None,
-    typer.Option(help="Constant EA of all cables [N]; default: the 1x19 strand of Eq. 19."),
+MinTension = Annotated[
+    float, typer.Option(help="Lower bound of all tensions [N].", rich_help_panel=_TENSIONS)
 ]
-Wire = Annotated[
-    Path | None,
-    typer.Option(metavar="WIRE.toml", help="Elasticity of all cables, as `cdsm fit` writes it."),
-]
-Spring = Annotated[
-    float, typer.Option(help="Stiffness of a spring in series with every cable [N/mm].")
+MaxTension = Annotated[
+    float, typer.Option(help="Upper bound of all tensions [N].", rich_help_panel=_TENSIONS)
 ]
 Wrench = Annotated[
-    str, typer.Option(help="At the tip: FX,FY,FZ,MX,MY,MZ [N, N m].", metavar="FX,...,MZ")
+    str,
+    typer.Option(
+        help="At the tip: FX,FY,FZ,MX,MY,MZ [N, N m].",
+        metavar="FX,...,MZ",
+        rich_help_panel=_TENSIONS,
+    ),
 ]
-Gravity = Annotated[str, typer.Option(help="In m/s², base axes: GX,GY,GZ.", metavar="GX,GY,GZ")]
-Solver = Annotated[str, typer.Option(help="Quadratic-programming solver.")]
+Solver = Annotated[
+    str, typer.Option(help="Quadratic-programming solver.", rich_help_panel=_TENSIONS)
+]
 Picture = Annotated[Path | None, typer.Option(metavar="FILE.png", help="Picture to write.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print SI numbers as JSON.")]
 
@@ -58,66 +70,195 @@ debug_wanted: ContextVar[bool] = ContextVar("debug_wanted", default=False)
 """Whether this call of the command line is to show tracebacks."""
 
 NO_WRENCH = "0,0,0,0,0,0"
-DOWN = "0,0,-9.81"
 
 
-def manipulator(
-    geometry: Path, *, rigidity: float | None, wire: Path | None, spring: float, gravity: str
-) -> Manipulator:
-    """The arm of the options.
+@dataclass(frozen=True)
+class ArmOptions:
+    """Which arm a command is about."""
 
-    Raises:
-        CdsmError: There is no such file or arm.
+    arm: Annotated[
+        Path,
+        typer.Argument(
+            metavar="ARM",
+            help="Geometry (.toml); or a robot (.urdf), with --cables and --tip; or the folder of "
+            "a CASPR model.",
+        ),
+    ]
+    cables: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="CABLES.toml", help="Its cables, and their wires.", rich_help_panel=_ARM
+        ),
+    ] = None
+    tip: Annotated[
+        str | None,
+        typer.Option(help="The link of a .urdf that is its tip.", rich_help_panel=_ARM),
+    ] = None
+    rigidity: Annotated[
+        float | None,
+        typer.Option(
+            help="Constant EA of all cables [N]; default: the 1x19 strand of Eq. 19.",
+            rich_help_panel=_ARM,
+        ),
+    ] = None
+    wire: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="WIRE.toml",
+            help="Elasticity of all cables, as `cdsm fit` writes it.",
+            rich_help_panel=_ARM,
+        ),
+    ] = None
+    spring: Annotated[
+        float,
+        typer.Option(
+            help="Stiffness of a spring in series with every cable [N/mm].", rich_help_panel=_ARM
+        ),
+    ] = math.inf
+    gravity: Annotated[
+        str,
+        typer.Option(
+            help="In m/s², base axes: GX,GY,GZ.", metavar="GX,GY,GZ", rich_help_panel=_ARM
+        ),
+    ] = "0,0,-9.81"
+
+    def read(self) -> Manipulator:
+        """The arm.
+
+        Raises:
+            CdsmError: There is no such file or arm.
+            typer.BadParameter: An option that this kind of arm needs is missing, or has no effect.
+        """
+        gravity = numbers("--gravity", self.gravity, 3)
+        if self.arm.suffix.lower() == ".urdf":
+            cables = read_cables(_needed("--cables", self.cables))
+            tip = _needed("--tip", self.tip)
+            self._refuse("the file of --cables has the wires", "rigidity", "wire", "spring")
+            return Manipulator.from_urdf(self.arm, cables, tip=tip, gravity=gravity)
+        self._refuse("the tip of a .urdf is free, that of others is not", "tip")
+        if self.arm.is_dir():
+            self._refuse("a CASPR model has its own cables", "cables", "spring")
+            return read_caspr(self.arm, elasticity=self._elasticity(), gravity=gravity)
+        geometry = Geometry.read(self.arm)
+        if self.cables is not None:
+            self._refuse("the file of --cables has the wires", "rigidity", "wire", "spring")
+            return Manipulator(geometry, cables=read_cables(self.cables), gravity=gravity)
+        routed = serpentine_cables(
+            geometry, self._elasticity(), series_stiffness=1000.0 * self.spring
+        )
+        return Manipulator(geometry, cables=routed, gravity=gravity)
+
+    def at(self, angles: str) -> Posture:
+        """The arm at joint angles [degrees] and ways [mm].
+
+        Raises:
+            CdsmError: There is no such file, arm or posture.
+            typer.BadParameter: As :meth:`read`, or another number of angles than joints.
+        """
+        return at_angles(self.read(), angles)
+
+    def _refuse(self, why: str, *names: str) -> None:
+        """Refuse options that this kind of arm would not heed."""
+        for field in fields(self):
+            if field.name in names and getattr(self, field.name) != field.default:
+                raise typer.BadParameter(f"{why}; leave it out.", param_hint=f"--{field.name}")
+
+    def _elasticity(self) -> Elasticity:
+        if self.rigidity is not None and self.wire is not None:
+            raise typer.BadParameter("give it or --wire, not both.", param_hint="--rigidity")
+        if self.wire is not None:
+            return read_elasticity(self.wire)
+        return STRAND_1X19 if self.rigidity is None else LinearElasticity(self.rigidity)
+
+
+@dataclass(frozen=True)
+class TensionOptions:
+    """How the cables of an arm are pulled."""
+
+    min_tension: MinTension = 10.0
+    max_tension: MaxTension = math.inf
+    wrench: Wrench = NO_WRENCH
+    solver: Solver = "daqp"
+
+    def distribute(self, pose: Posture) -> Tension:
+        """The tensions at a posture.
+
+        Raises:
+            CdsmError: There are none.
+        """
+        load = numbers("--wrench", self.wrench, 6)
+        return distribute_tension(pose, self.min_tension, self.max_tension, load, self.solver)
+
+
+def _needed(option: str, value: _Value | None) -> _Value:
+    if value is None:
+        raise typer.BadParameter("a robot in a .urdf needs it.", param_hint=option)
+    return value
+
+
+def grouped(command: Callable[..., None]) -> Callable[..., None]:
+    """A command for typer, with an option for each field of its parameters that are dataclasses.
+
+    typer reads options from the signature alone; so groups of them that many commands share are
+    declared once, as a dataclass, and put in here.
     """
-    cables = serpentine_cables(
-        described := Geometry.read(geometry),
-        _elasticity(rigidity, wire),
-        series_stiffness=1000.0 * spring,
-    )
-    return Manipulator(described, cables=cables, gravity=numbers("--gravity", gravity, 3))
+    hints = get_type_hints(command, include_extras=True)
+    own = inspect.signature(command).parameters
+    groups = {name: hints[name] for name in own if is_dataclass(hints[name])}
+    shown: list[inspect.Parameter] = []
+    for name, parameter in own.items():
+        if name in groups:
+            inner = get_type_hints(groups[name], include_extras=True)
+            shown += [
+                item.replace(annotation=inner[item.name], kind=inspect.Parameter.KEYWORD_ONLY)
+                for item in inspect.signature(groups[name]).parameters.values()
+            ]
+        else:
+            shown.append(
+                parameter.replace(annotation=hints[name], kind=inspect.Parameter.KEYWORD_ONLY)
+            )
 
+    @wraps(command)
+    def flat(**given: Any) -> None:
+        for name, group in groups.items():
+            given[name] = group(**{field.name: given.pop(field.name) for field in fields(group)})
+        command(**given)
 
-def posture(
-    geometry: Path,
-    angles: str,
-    *,
-    rigidity: float | None,
-    wire: Path | None,
-    spring: float,
-    gravity: str,
-) -> Posture:
-    """The arm of the options at the angles of the options.
-
-    Raises:
-        CdsmError: There is no such file, arm or posture.
-    """
-    arm = manipulator(geometry, rigidity=rigidity, wire=wire, spring=spring, gravity=gravity)
-    return at_angles(arm, angles)
+    flat.__signature__ = inspect.Signature(shown)  # type: ignore[attr-defined]
+    flat.__annotations__ = {parameter.name: parameter.annotation for parameter in shown}
+    return flat
 
 
 def at_angles(arm: Manipulator, angles: str) -> Posture:
-    """An arm at the angles of the options.
+    """An arm at joint angles [degrees] and ways [mm].
 
     Raises:
         JointLimitError: An angle is beyond its limit.
+        typer.BadParameter: Another number of angles than joints.
     """
-    degrees = numbers("--angles", angles)
-    degrees = degrees * arm.nv if len(degrees) == 1 else degrees
-    if len(degrees) != arm.nv:
+    given = numbers("--angles", angles)
+    given = given * arm.nv if len(given) == 1 else given
+    if len(given) != arm.nv:
         names = ", ".join(arm.joint_names)
         raise typer.BadParameter(
-            f"{len(degrees)} given; give one angle, or one for each of {names}.",
+            f"{len(given)} given; give one angle, or one for each of {names}.",
             param_hint="--angles",
         )
-    return arm.at(np.deg2rad(degrees))
+    return arm.at(np.array(given) * joint_units(arm))
 
 
-def _elasticity(rigidity: float | None, wire: Path | None) -> Elasticity:
-    if rigidity is not None and wire is not None:
-        raise typer.BadParameter("give it or --wire, not both.", param_hint="--rigidity")
-    if wire is not None:
-        return read_elasticity(wire)
-    return STRAND_1X19 if rigidity is None else LinearElasticity(rigidity)
+def joint_units(arm: Manipulator) -> Array:
+    """The unit in which the command line takes each joint (nv,): degree or mm, in SI."""
+    return np.where(arm.slides, 1e-3, np.deg2rad(1.0))
+
+
+def joints_to_dict(arm: Manipulator, q: Array) -> dict[str, object]:
+    """Coordinates q (..., nv) by joint, angles and ways apart since their units differ."""
+    told: dict[str, object] = {}
+    for key, chosen in (("angles_rad", ~arm.slides), ("ways_m", arm.slides)):
+        if chosen.any() or key == "angles_rad":
+            told[key] = {arm.joint_names[i]: q[..., i].tolist() for i in np.flatnonzero(chosen)}
+    return told
 
 
 def numbers(option: str, text: str, count: int | None = None) -> list[float]:

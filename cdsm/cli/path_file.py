@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import math
 import re
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -14,6 +13,7 @@ import numpy as np
 from cdsm._checks import Array
 from cdsm._files import read_text
 from cdsm.errors import FileError
+from cdsm.manipulator import Manipulator
 
 _ANGLE: Final = {"deg": math.pi / 180.0, "°": math.pi / 180.0, "rad": 1.0}
 _LENGTH: Final = {"mm": 1e-3, "m": 1.0}
@@ -24,7 +24,7 @@ class PathFile(NamedTuple):
     """A path of S samples, in SI.
 
     Attributes:
-        angles: Joint angles (S, nv) [rad], or None where there are tips.
+        angles: Joint angles (S, nv) [rad] ([m] where a joint slides), or None where there are tips.
         tips: Tip positions (S, 3) [m], or None where there are angles.
         target: Stiffness (S,) [N/m], or None if the file has none.
     """
@@ -34,13 +34,13 @@ class PathFile(NamedTuple):
     target: Array | None
 
 
-def read_path(path: Path, joints: Sequence[str]) -> PathFile:
+def read_path(path: Path, arm: Manipulator) -> PathFile:
     """Read a path; the header names the columns and their units, and further ones are ignored.
 
     Args:
         path: The file: a header and a line for each sample, separated by commas; lines that begin
             with # are comments.
-        joints: Names of the joints of the arm.
+        arm: Whose joints the columns may be named for.
 
     Raises:
         FileError: It cannot be read, columns or units are missing, or an entry is not a number; the
@@ -58,11 +58,12 @@ def read_path(path: Path, joints: Sequence[str]) -> PathFile:
             raise FileError(path, f"has two columns called {name}; give each once.")
         units[name] = at, unit or ""
 
-    def columns(names: Sequence[str], known: dict[str, float]) -> Array | None:
-        if not any(name in units for name in names):
+    def columns(wanted: dict[str, dict[str, float]]) -> Array | None:
+        """The columns of these names, each in one of its units; None if there is none of them."""
+        if not wanted.keys() & units.keys():
             return None
         found = []
-        for name in names:
+        for name, known in wanted.items():
             at, unit = units.get(name, (-1, ""))
             if unit not in known:
                 what = f"the column {name} has no unit that is known" if at >= 0 else ""
@@ -74,14 +75,19 @@ def read_path(path: Path, joints: Sequence[str]) -> PathFile:
             found.append([known[unit] * _number(path, k, row, at) for k, row in rows[1:]])
         return np.array(found).T
 
-    angles, tips = columns(joints, _ANGLE), columns(("x", "y", "z"), _LENGTH)
+    joints = {
+        name: _LENGTH if slides else _ANGLE
+        for name, slides in zip(arm.joint_names, arm.slides, strict=True)
+    }
+    angles, tips = columns(joints), columns(dict.fromkeys("xyz", _LENGTH))
     if (angles is None) == (tips is None):
+        first = f"{arm.joint_names[0]} [{'mm' if arm.slides[0] else 'deg'}]"
         raise FileError(
             path,
-            f"has columns for {'neither' if angles is None else 'both'} of joint angles "
-            f"({joints[0]} [deg], …) and tip positions (x [mm], y [mm], z [mm]); give one of them.",
+            f"has columns for {'neither' if angles is None else 'both'} of joint angles ({first}, "
+            "…) and tip positions (x [mm], y [mm], z [mm]); give one of them.",
         )
-    target = columns(("target",), _STIFFNESS)
+    target = columns({"target": _STIFFNESS})
     return PathFile(angles, tips, None if target is None else target[:, 0])
 
 

@@ -11,21 +11,16 @@ import typer
 
 from cdsm._files import write_file
 from cdsm.cli.options import (
-    DOWN,
     NO_WRENCH,
     Angles,
+    ArmOptions,
     AsJson,
-    GeometryFile,
-    Gravity,
     MaxTension,
     MinTension,
     Picture,
-    Rigidity,
-    Spring,
-    Wire,
     Wrench,
     at_angles,
-    manipulator,
+    joints_to_dict,
     numbers,
     reported,
     show_json,
@@ -50,7 +45,7 @@ _Bounds = tuple[float, float, list[float]]
 
 
 def plan(
-    geometry: GeometryFile,
+    arm: ArmOptions,
     direction: Annotated[
         str, typer.Option(help="Along which the arm is to be so stiff.", metavar="X,Y,Z")
     ],
@@ -64,7 +59,8 @@ def plan(
         typer.Option(
             metavar="PATH.csv",
             help="Instead of --angles, a line per sample. Columns, with the unit in brackets: the "
-            "joints in deg, or x, y, z of the tip in mm; and, if wanted, target in N/mm.",
+            "joints in deg (mm where they slide), or x, y, z of the tip in mm; and, if wanted, "
+            "target in N/mm.",
         ),
     ] = None,
     rate: Annotated[
@@ -72,11 +68,7 @@ def plan(
     ] = math.inf,
     min_tension: MinTension = 10.0,
     max_tension: MaxTension = math.inf,
-    rigidity: Rigidity = None,
-    wire: Wire = None,
-    spring: Spring = math.inf,
     wrench: Wrench = NO_WRENCH,
-    gravity: Gravity = DOWN,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -88,22 +80,22 @@ def plan(
 ) -> None:
     """Find the least tensions that make an arm as stiff as wanted, at a posture or along a path."""
     with reported():
-        arm = manipulator(geometry, rigidity=rigidity, wire=wire, spring=spring, gravity=gravity)
+        robot = arm.read()
         u, load = numbers("--direction", direction, 3), numbers("--wrench", wrench, 6)
         wanted = None if target is None else 1000.0 * target
         bounds = min_tension, max_tension, load
         if path is not None:
-            answer = _along_path(arm, read_path(path, arm.joint_names), u, wanted, bounds, rate)
+            answer = _along_path(robot, read_path(path, robot), u, wanted, bounds, rate)
         elif wanted is None:
             raise typer.BadParameter("give it, or --path.", param_hint="--target")
         elif math.isfinite(rate):
             raise typer.BadParameter("is of a path; give --path, too.", param_hint="--rate")
         else:
-            answer = _at_posture(at_angles(arm, angles), u, wanted, bounds)
+            answer = _at_posture(at_angles(robot, angles), u, wanted, bounds)
         if as_json:
             show_json(answer.numbers)
         else:
-            typer.echo(f"{arm}\n\n{answer.text}")
+            typer.echo(f"{robot}\n\n{answer.text}")
         if out is not None:
             typer.echo(f"written: {answer.motors().write_csv(out)}", err=as_json)
         if figure is not None:
@@ -173,7 +165,7 @@ def _plan_to_dict(plan: StiffnessPlan, attainable: StiffnessRange) -> dict[str, 
         "achieved_N_per_m": plan.achieved,
         "tension_N": dict(zip(names, plan.tension.values.tolist(), strict=True)),
         "cable_length_m": dict(zip(names, pose.cable_lengths.tolist(), strict=True)),
-        "angles_rad": dict(zip(pose.arm.joint_names, pose.q.tolist(), strict=True)),
+        **joints_to_dict(pose.arm, pose.q),
         "margin_Nm_per_rad": plan.stiffness.margin,
         "efforts_N": plan.efforts.tolist(),
         "iterations": plan.iterations,
@@ -187,7 +179,7 @@ def _path_to_dict(plan: PathPlan) -> dict[str, object]:
         "target_N_per_m": plan.target.tolist(),
         "planned": list(plan.planned),
         "achieved_N_per_m": plan.achieved.tolist(),
-        "angles_rad": plan.angles.tolist(),
+        **joints_to_dict(plan.arm, plan.angles),
         "tensions_N": plan.tensions.tolist(),
         "cable_lengths_m": plan.cable_lengths.tolist(),
         "infeasible": [

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -11,23 +10,19 @@ import numpy as np
 import typer
 
 from cdsm._checks import Array
-from cdsm._files import read_text, write_file
+from cdsm._files import write_file
 from cdsm.cli.options import (
-    DOWN,
     NO_WRENCH,
+    ArmOptions,
     AsJson,
-    GeometryFile,
-    Gravity,
     MaxTension,
-    Rigidity,
-    Spring,
-    Wire,
     Wrench,
-    manipulator,
+    joint_units,
     numbers,
     reported,
     show_json,
 )
+from cdsm.cli.path_file import read_path
 from cdsm.errors import FileError
 from cdsm.manipulator import Manipulator
 from cdsm.sweep import GridPoses, PathPoses, PoseSet, RandomPoses, read_sweep, write_sweep
@@ -40,23 +35,23 @@ if TYPE_CHECKING:
 
 
 def sweep(
-    geometry: GeometryFile,
+    arm: ArmOptions,
     out: Annotated[
         Path, typer.Option("--out", "-o", help="File to write: .nc (NetCDF) or .csv, SI units.")
     ],
     grid: Annotated[
         str | None,
         typer.Option(
-            help="Joints with first and last angle and their number, or one angle, in degrees; "
-            "joints that are not named stay at 0.",
+            help="Joints with first and last angle and their number, or one angle, in degrees (mm "
+            "where they slide); joints that are not named stay at 0.",
             metavar="JOINT=LOW:HIGH:COUNT,JOINT=ANGLE,...",
         ),
     ] = None,
     path: Annotated[
         Path | None,
         typer.Option(
-            help="Straight lines in joint space between these waypoints: a column of degrees for "
-            "each joint, its name above; joints that are not named stay at 0.",
+            help="Straight lines in joint space between these waypoints: a column for each joint, "
+            "headed by its name and unit, as in joint1_1 [deg].",
             metavar="WAYPOINTS.csv",
         ),
     ] = None,
@@ -75,11 +70,7 @@ def sweep(
         str,
         typer.Option(help=f"What to compute, of {', '.join(QUANTITIES)}.", metavar="NAME,NAME,..."),
     ] = ",".join(DEFAULT),
-    rigidity: Rigidity = None,
-    wire: Wire = None,
-    spring: Spring = math.inf,
     wrench: Wrench = NO_WRENCH,
-    gravity: Gravity = DOWN,
     resume: Annotated[
         Path | None,
         typer.Option(help="Folder to keep results in as they come; goes on from what is there."),
@@ -88,7 +79,7 @@ def sweep(
 ) -> None:
     """Stiffness over a grid, a path or random postures, under one or several tension bounds."""
     with reported():
-        arm = manipulator(geometry, rigidity=rigidity, wire=wire, spring=spring, gravity=gravity)
+        robot = arm.read()
         if sum(given is not None for given in (grid, path, random)) != 1:
             raise typer.BadParameter("give one of --grid, --path and --random.", param_hint="poses")
         for option, value, needed, is_given in (
@@ -99,15 +90,15 @@ def sweep(
                 raise typer.BadParameter(f"goes with {needed} only.", param_hint=option)
         poses: PoseSet
         if grid is not None:
-            poses = _grid(grid)
+            poses = _grid(grid, robot)
         elif path is not None:
-            poses = PathPoses(np.array(_waypoints(path, arm)), count)
+            poses = PathPoses(_waypoints(path, robot), count)
         else:
             poses = RandomPoses(random or 0, seed or 0)
         check_target(out)  # now, rather than when all is computed
         low = numbers("--min-tension", min_tension)
         found = run(
-            arm,
+            robot,
             poses,
             minimum=low[0] if len(low) == 1 else low,
             maximum=max_tension,
@@ -160,19 +151,21 @@ def map_sweep(
             typer.echo(f"written: {picture}")
 
 
-def _grid(text: str) -> GridPoses:
-    """The joints of ``joint1=-20:20:9,joint2=5``, in degrees."""
+def _grid(text: str, arm: Manipulator) -> GridPoses:
+    """The joints of ``joint1=-20:20:9,joint2=5``, in degrees, or mm where they slide."""
+    units = dict(zip(arm.joint_names, joint_units(arm), strict=True))
     angles: dict[str, Array] = {}
     rest: dict[str, float] = {}
     for part in text.split(","):
         name, _, value = part.partition("=")
         given = numbers("--grid", value.replace(":", " "))
+        unit = units.get(name.strip(), 1.0)  # a name that is none is refused with the grid
         if name.strip() in (*angles, *rest):
             raise typer.BadParameter(f"{name.strip()} is given twice.", param_hint="--grid")
         if len(given) == 1:
-            rest[name.strip()] = math.radians(given[0])
+            rest[name.strip()] = unit * given[0]
         elif len(given) == 3 and given[2] >= 1.0 and given[2].is_integer():
-            angles[name.strip()] = np.deg2rad(np.linspace(given[0], given[1], int(given[2])))
+            angles[name.strip()] = unit * np.linspace(given[0], given[1], int(given[2]))
         else:
             raise typer.BadParameter(
                 f"{part!r} given; a joint is JOINT=LOW:HIGH:COUNT or JOINT=ANGLE.",
@@ -181,31 +174,16 @@ def _grid(text: str) -> GridPoses:
     return GridPoses(angles, rest)
 
 
-def _waypoints(path: Path, arm: Manipulator) -> list[list[float]]:
-    """Waypoints (n, nv) [rad] of a table of degrees.
+def _waypoints(path: Path, arm: Manipulator) -> Array:
+    """Waypoints (n, nv) in SI of a file as ``cdsm plan --path`` reads it.
 
     Raises:
-        FileError: It cannot be read, names a joint the arm does not have, or holds no numbers.
+        FileError: It cannot be read, or holds tips or targets.
     """
-    table = [row for row in csv.reader(read_text(path).splitlines()) if row]
-    names, rows = [cell.strip() for cell in table[0]] if table else [], table[1:]
-    unknown = [name for name in names if name not in arm.joint_names]
-    if unknown or not names or len(set(names)) < len(names):
-        raise FileError(
-            path,
-            f"the first line is {', '.join(names)}; it has to name joints, each once, of "
-            f"{', '.join(arm.joint_names)}.",
-        )
-    waypoints = []
-    for number, row in enumerate(rows, start=2):
-        try:
-            angles = dict(zip(names, map(float, row), strict=True))
-        except ValueError:
-            raise FileError(
-                path, f"row {number} is {','.join(row)!r}; it needs {len(names)} angles [degrees]."
-            ) from None
-        waypoints.append([math.radians(angles.get(name, 0.0)) for name in arm.joint_names])
-    return waypoints
+    file = read_path(path, arm)
+    if file.angles is None or file.target is not None:
+        raise FileError(path, "holds tips or targets; a sweep goes along joint angles.")
+    return file.angles
 
 
 def _counts(found: xarray.Dataset) -> dict[str, int]:

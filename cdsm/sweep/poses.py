@@ -140,11 +140,11 @@ class GridPoses(PoseSet):
         joints = tuple(names.index(one_of("joint", name, names)) for name, _ in self.swept)
         values = tuple(frozen(np.array(each)) for _, each in self.swept)
         labels = {
-            names[joint]: Label((names[joint],), each, f"angle of {names[joint]}", "rad")
+            names[joint]: Label((names[joint],), each, *_meaning(arm, joint))
             for joint, each in zip(joints, values, strict=True)
         }
         labels |= {
-            name: Label((), float(rest[joint]), f"angle of {name}", "rad")
+            name: Label((), float(rest[joint]), *_meaning(arm, joint))
             for joint, name in enumerate(names)
             if joint not in joints
         }
@@ -199,7 +199,7 @@ class PathPoses(ReadOnlyState, PoseSet):
         if self.count is not None:
             way = np.linspace(0.0, known[-1], self.count)
             q = np.column_stack([np.interp(way, known, column) for column in q.T])
-        distance = Label(("pose",), way, "way along the path in joint space", "rad")
+        distance = Label(("pose",), way, "way along the path in joint space", _unit(arm))
         return _listed(q, arm, f"path of {len(known)} waypoints", {"distance": distance})
 
 
@@ -264,9 +264,20 @@ def checked_angles(name: str, q: ArrayLike, arm: Manipulator) -> Array:
     return angles
 
 
+def _unit(arm: Manipulator) -> str:
+    """Of joint angles, or of what is mixed of angles and ways."""
+    return "rad or m" if arm.slides.any() else "rad"
+
+
+def _meaning(arm: Manipulator, joint: int) -> tuple[str, str]:
+    """What the coordinate of a joint is, and its unit."""
+    what, unit = ("way", "m") if arm.slides[joint] else ("angle", "rad")
+    return f"{what} of {arm.joint_names[joint]}", unit
+
+
 def _listed(q: Array, arm: Manipulator, told: str, labels: dict[str, Label]) -> Listed:
     labels["pose"] = Label(("pose",), np.arange(len(q)), "number of the posture", "1")
-    labels["q"] = Label(("pose", "joint"), q, "joint angles", "rad")
+    labels["q"] = Label(("pose", "joint"), q, "joint angles", _unit(arm))
     return Listed(q=frozen(q), labels=labels, told=told)
 
 
