@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdsm._checks import LARGEST, SMALLEST, Array, frozen
+from cdsm._stiffness_kernels import cable_stiffness
 from cdsm.cable import Cable
-from cdsm.elasticity import Elasticity
+from cdsm.elasticity import Elasticity, LinearElasticity
 from cdsm.errors import ElasticityRangeError, InvalidInput
 
 _STEP = 1e-5
@@ -44,6 +45,14 @@ class CableLaws:
         self._bounded = bool(self._least.any() or np.isfinite(self._most).any())
         series = np.array([cable.series_stiffness for cable in self._cables])
         self.series = frozen(1.0 / series)
+        # EA of the cables where it is always the same; laws that have to be asked
+        constant, self._asked = np.zeros(len(self._cables)), []
+        for law, of in self.held:
+            if isinstance(law, LinearElasticity):
+                constant[of] = law.rigidity(0.0)
+            else:
+                self._asked.append((law, of))
+        self._constant = frozen(constant)
 
     def narrowed(self, low: Array, high: Array) -> tuple[Array, Array]:
         """Bounds of tension (…, C) [N], and those that the cables have of their own."""
@@ -54,23 +63,22 @@ class CableLaws:
     def stiffness(self, lengths: Array, tension: Array) -> Array:
         """Diagonal of K_L (C,) [N/m]: 1/(l_0/EA(F) + 1/k_series), 0 for force-controlled cables.
 
-        Of checked free lengths (C,) [m] and tensions (C,) [N].
+        Of checked free lengths (C,) [m] and tensions (C,) [N], which are not negative.
 
         Raises:
             ElasticityRangeError: Names the cables whose tension is outside their elasticity's
                 domain.
             InvalidInput: An elasticity of the user's own gives no positive rigidity.
         """
-        stiffness = np.zeros(len(self._cables))
-        for law, held in self.held:
-            pulled = tension[held]
-            try:
-                rigidity = checked_rigidity(law, pulled)
-            except ElasticityRangeError as error:
-                raise self.naming(error, held) from None
-            compliance = lengths[held] / rigidity + self.series[held]
-            stiffness[held] = 1.0 / compliance
-        return frozen(stiffness)
+        rigidity = self._constant
+        if self._asked:
+            rigidity = rigidity.copy()
+            for law, held in self._asked:
+                try:
+                    rigidity[held] = checked_rigidity(law, tension[held])
+                except ElasticityRangeError as error:
+                    raise self.naming(error, held) from None
+        return frozen(cable_stiffness(lengths, rigidity, self.series))
 
     def slopes(self, tension: Array, stiffness: Array) -> tuple[Array, Array]:
         """dk/dF (C,) [1/m] and d²k/dF² (C,) [1/(N m)] of cables of stiffness k under F (C,) [N].

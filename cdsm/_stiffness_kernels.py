@@ -10,6 +10,23 @@ from cdsm._kernels import Indices, add_length_hessian, mirror
 
 
 @compiled
+def cable_stiffness(length: Array, rigidity: Array, series: Array) -> Array:
+    """Stiffness k of each cable (C,) [N/m], as a new array; see :func:`set_cable_stiffness`."""
+    stiffness = np.empty(length.shape[0])
+    set_cable_stiffness(length, rigidity, series, stiffness)
+    return stiffness
+
+
+@compiled
+def set_cable_stiffness(length: Array, rigidity: Array, series: Array, stiffness: Array) -> None:
+    """Fill k = 1/(l_0/EA + 1/k_series) (C,); 0 where EA is 0: there the motor holds the force."""
+    for c in range(length.shape[0]):
+        stiffness[c] = 0.0
+        if rigidity[c] > 0.0:
+            stiffness[c] = 1.0 / (length[c] / rigidity[c] + series[c])
+
+
+@compiled
 def joint_stiffness(
     segment: Indices,
     joint: Indices,

@@ -14,7 +14,7 @@ from cdsm._body_kernels import Masses, add_gravity, reach, weigh
 from cdsm._checks import Array
 from cdsm._compiled import compiled, inlined, threaded
 from cdsm._kernels import Frames, Indices, Routing, Tree, measure, mirror, place
-from cdsm._stiffness_kernels import add_load, add_passive
+from cdsm._stiffness_kernels import add_load, add_passive, set_cable_stiffness
 from cdsm.batch.record import (
     ACTIVE,
     ALONG,
@@ -167,10 +167,11 @@ def evaluate_rows(
                 _imbalance(tension[b], J, wrench[b], JX, g, residual)
                 mirror(active[0])
                 add_load(JX, wrench[b], load)
-                if last > LOAD and not _springs(L, rigidity[b], series, k):
+                if last > LOAD and (rigidity[b] < 0.0).any():
                     status[b] = OUTSIDE_ELASTICITY
                 elif last > LOAD:
                     known = CARTESIAN + 1
+                    set_cable_stiffness(L, rigidity[b], series, k)
                     add_passive(J, k, passive)
                     mirror(passive)
                     for i in range(nv):
@@ -208,18 +209,6 @@ def _imbalance(
     for c in range(J.shape[0]):
         for i in range(g.shape[0]):
             residual[i] += tension[c] * J[c, i]
-
-
-@compiled
-def _springs(lengths: Array, rigidity: Array, series: Array, stiffness: Array) -> bool:
-    """Fill k = 1/(l_0/EA + 1/k_series) (C,), and tell whether all cables have a rigidity."""
-    for c in range(lengths.shape[0]):
-        if rigidity[c] < 0.0:
-            return False
-        stiffness[c] = 0.0
-        if rigidity[c] > 0.0:
-            stiffness[c] = 1.0 / (lengths[c] / rigidity[c] + series[c])
-    return True
 
 
 @compiled

@@ -36,7 +36,7 @@ def problem(joints: int) -> tuple[cdsm.Manipulator, np.ndarray[Any, Any], np.nda
     return one, rng.uniform(-0.17, 0.17, one.nv), rng.uniform(20.0, 90.0, len(one.cables))
 
 
-def test_posture_and_stiffness_are_a_thousand_times_faster_than_differences() -> None:
+def test_posture_and_stiffness_are_1500_times_faster_than_differences() -> None:
     one, q, tension = problem(5)
     wrench = np.array([1.0, -2.0, 3.0, 0.1, 0.2, -0.1])
     naive = NaiveArm(5, gravity=GRAVITY, **SIZES)
@@ -49,10 +49,10 @@ def test_posture_and_stiffness_are_a_thousand_times_faster_than_differences() ->
     ratio = speed_ratio(
         lambda: naive_joint_stiffness(naive, q, tension, wrench, RIGIDITY),
         lambda: cdsm.stiffness(one.at(q), tension, wrench=wrench).joint,
-        lambda ratio: ratio >= 1000.0,
+        lambda ratio: ratio >= 1500.0,
     )
     print(f"\nposture + stiffness, n = 5: {ratio:.0f} times faster than differences")
-    assert ratio >= 1000.0
+    assert ratio >= 1500.0
 
 
 def test_cost_grows_less_than_fourfold_from_5_to_20_joints() -> None:
