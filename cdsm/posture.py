@@ -65,13 +65,39 @@ class Posture(ReadOnlyState):
         return tuple(frozen(path.copy()) for path in paths)
 
     @property
+    def joint_positions(self) -> Array:
+        """Where the joints are, (nv, 3) [m]: a point of each axis."""
+        return self._frames.origin[1:]
+
+    @property
     def bones(self) -> tuple[Array, ...]:
         """Straight lines from joint to joint, and to the tip, (2, 3) each [m]: a stick figure."""
+        return tuple(bone for bones in self._bones for bone in bones)
+
+    @property
+    def brackets(self) -> tuple[Array, ...]:
+        """Straight lines from each cable site to the bones of its link, (2, 3) each [m]."""
+        lines = []
+        for row, site in zip(self.arm._routing.row, self._frames.site, strict=True):
+            feet = [_foot(site, bone) for bone in self._bones[row]] or [self._frames.origin[row]]
+            nearest = min(feet, key=lambda foot: float(np.linalg.norm(foot - site)))
+            lines.append(frozen(np.array([site, nearest])))
+        return tuple(lines)
+
+    @cached_property
+    def _bones(self) -> tuple[tuple[Array, ...], ...]:
+        """The bones that start at each joint, the base first."""
         origin, parent = self._frames.origin, self.arm._tree.parent
-        tip = self.arm._masses.tip
-        lines = [np.array([origin[parent[i]], origin[i]]) for i in range(1, len(origin))]
-        lines.append(np.array([origin[tip], self.tip[:3, 3]]))
-        return tuple(frozen(line) for line in lines if (line[0] != line[1]).any())
+        ends = [(parent[i], origin[i]) for i in range(1, len(origin))]
+        ends.append((self.arm._masses.tip, self.tip[:3, 3]))
+        return tuple(
+            tuple(
+                frozen(np.array([start, end]))
+                for row, end in ends
+                if row == joint and (start != end).any()
+            )
+            for joint, start in enumerate(origin)
+        )
 
     def link_pose(self, link: str) -> Array:
         """Pose of a link's frame in the base, (4, 4) [m].
@@ -96,3 +122,9 @@ class Posture(ReadOnlyState):
             wrench,
         )
         return frozen(active), frozen(passive), frozen(load), frozen(joint)
+
+
+def _foot(point: Array, line: Array) -> Array:
+    """The point of a straight line (2, 3) that is nearest to a point (3,)."""
+    way = line[1] - line[0]
+    return np.asarray(line[0] + np.clip((point - line[0]) @ way / (way @ way), 0.0, 1.0) * way)

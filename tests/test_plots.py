@@ -10,6 +10,7 @@ from cdsm import paper, plots
 from cdsm._checks import Array
 from tests.arms import mixed_arm, random_posture
 from tests.conftest import Results
+from tests.foreign import POSTURE, crab
 
 
 def test_arm_is_drawn_with_disks_cables_and_equal_axes() -> None:
@@ -27,6 +28,35 @@ def test_arm_is_drawn_with_disks_cables_and_equal_axes() -> None:
     limits = np.ptp([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()], axis=1)  # type: ignore[attr-defined]
     box = axes._box_aspect  # type: ignore[attr-defined]
     np.testing.assert_allclose(limits / box, (limits / box)[0])
+
+
+def test_foreign_robot_shows_its_joints_and_what_guides_its_cables() -> None:
+    pose = crab().at(POSTURE)
+    sites = np.concatenate(pose.cable_paths)
+    links = [site.link for cable in pose.arm.cables for site in cable.sites]
+    assert len(pose.brackets) == len(sites)
+    for bracket, site, link in zip(pose.brackets, sites, links, strict=True):
+        np.testing.assert_array_equal(bracket[0], site)
+        # of all points of the bones that move with the link none is nearer than the foot
+        way = float(np.linalg.norm(bracket[1] - bracket[0]))
+        start = pose.link_pose("hand" if link == "tip" else link)[:3, 3]
+        own = [bone for bone in pose.bones if np.allclose(bone[0], start, atol=1e-12)]
+        along = np.linspace(0.0, 1.0, 401)[:, None]
+        points = np.concatenate(
+            [bone[0] + along * (bone[1] - bone[0]) for bone in own] or [[start]]
+        )
+        assert np.linalg.norm(points - site, axis=1).min() == pytest.approx(way, abs=1e-3)
+    axes = plots.plot_arm(pose).axes[0]
+    marked = [line for line in axes.get_lines() if line.get_marker() in ("o", "s")]
+    shown = [np.array(line.get_data_3d()).T for line in marked if line.get_label()[0] == "_"]  # type: ignore[attr-defined,index]
+    turning, sliding = (
+        1e3 * pose.joint_positions[each] for each in (~pose.arm.slides, pose.arm.slides)
+    )
+    np.testing.assert_allclose(shown[0], turning)
+    np.testing.assert_allclose(shown[1], sliding)
+    legend = axes.get_legend()
+    assert legend is not None
+    assert [text.get_text() for text in legend.get_texts()] == ["turns", "slides"]
 
 
 def test_ellipsoid_shows_where_forces_move_the_tip() -> None:

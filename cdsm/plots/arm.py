@@ -26,6 +26,9 @@ def plot_arm(
 ) -> Figure:
     """The arm in 3D: backbone, disks and cables, with equal axes in mm.
 
+    Of a robot from a URDF the joints are drawn, those that slide as squares, and thin lines from
+    where a cable passes to the link that guides it there.
+
     Args:
         pose: The posture to draw.
         tension: Colours the cables, if given.
@@ -81,6 +84,8 @@ def draw_arm(axes: Any, pose: Posture, tension: Tension | None) -> None:
     """Draw it on axes of three dimensions, for a figure of its own or part of another."""
     if pose.arm.is_serpentine:
         _draw_disks(axes, pose)
+    else:
+        _draw_joints(axes, pose)
     for bone in pose.bones:
         axes.plot(*(MM * bone.T), color="0.1", linewidth=2.5)
     colors = [COLORS[0]] * len(pose.cable_paths)
@@ -98,6 +103,19 @@ def draw_arm(axes: Any, pose: Posture, tension: Tension | None) -> None:
     for name, middle, size in zip(AXES, limits.mean(axis=1), ranges, strict=True):
         getattr(axes, f"set_{name}lim")(middle - size / 2.0, middle + size / 2.0)
     axes.set_box_aspect(ranges, zoom=0.8)  # equal axes, and room for the labels
+
+
+def _draw_joints(axes: Any, pose: Posture) -> None:
+    """What turns, what slides, and which link each cable site belongs to."""
+    for bracket in pose.brackets:
+        axes.plot(*(MM * bracket.T), color="0.5", linewidth=0.8)
+    for chosen, marker in ((~pose.arm.slides, "o"), (pose.arm.slides, "s")):
+        places = MM * pose.joint_positions[chosen]
+        axes.plot(*places.T, marker, color="0.1", markerfacecolor="white", markersize=5, zorder=5)
+    if pose.arm.slides.any():
+        axes.plot([], [], [], "o", color="0.1", markerfacecolor="white", label="turns")
+        axes.plot([], [], [], "s", color="0.1", markerfacecolor="white", label="slides")
+        axes.legend(loc="upper left", fontsize=8)
 
 
 def _draw_disks(axes: Any, pose: Posture) -> None:
