@@ -66,6 +66,7 @@ from cdsm.planning import (
     stiffness_range,
 )
 from cdsm.posture import Posture
+from cdsm.report import Report, SelfCheck
 from cdsm.stiffness import Shares, Stiffness, stiffness
 from cdsm.sweep import (
     GridPoses,
@@ -125,7 +126,9 @@ __all__ = [
     "PoseSet",
     "Posture",
     "RandomPoses",
+    "Report",
     "Saturation",
+    "SelfCheck",
     "Shares",
     "SingularMass",
     "SingularStiffness",

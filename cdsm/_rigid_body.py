@@ -153,6 +153,10 @@ class RigidBody:
         placement: Array = pin.updateFramePlacement(model, data, frame).homogeneous
         return placement
 
+    def potential_energy(self, q: Array) -> float:
+        """V of the weight of all links [J] at the joint angles (nv,) [rad], from their places."""
+        return float(pin.computePotentialEnergy(self._model, self._data(), q))
+
     def mass_matrix(self, q: Array) -> Array:
         """Joint-space mass matrix M (nv, nv) [kg m²] at the joint angles (nv,) [rad]."""
         # some versions of Pinocchio fill the upper triangle alone

@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike
 from cdsm._checks import Array, ReadOnlyState, frozen, instance, one_of, unit_direction, vector
 from cdsm.errors import InvalidInput, SingularStiffness
 from cdsm.posture import Posture
+from cdsm.report import Report, report_on
 from cdsm.tension import Tension
 
 Term = Literal["active", "passive", "gravity", "load", "joint"]
@@ -88,6 +89,9 @@ class Stiffness(ReadOnlyState):
         gravity: ∂g/∂θ (nv, nv) [N m/rad].
         load: −∂(J_Xᵀ W)/∂θ (nv, nv) [N m/rad]; not symmetric if W has a moment.
         joint: K_θ, their sum (nv, nv) [N m/rad]: rows torque, columns angle.
+        free_length: l_0 (C,) [m] where it is not L at the posture, as of an
+            :class:`~cdsm.equilibrium.Equilibrium`, whose motors were locked elsewhere; else None.
+        distribution: The :class:`~cdsm.tension.Tension` it is of; None for bare tensions.
     """
 
     posture: Posture
@@ -99,6 +103,13 @@ class Stiffness(ReadOnlyState):
     gravity: Array
     load: Array
     joint: Array
+    free_length: Array | None = None
+    distribution: Tension | None = None
+
+    @property
+    def free_lengths(self) -> Array:
+        """l_0 (C,) [m] that :attr:`cable_stiffness` is of: mostly L at the posture."""
+        return self.posture.cable_lengths if self.free_length is None else self.free_length
 
     @cached_property
     def residual(self) -> Array:
@@ -221,6 +232,15 @@ class Stiffness(ReadOnlyState):
             gravity=float(motion @ self.gravity @ motion),
             load=float(motion @ self.load @ motion),
         )
+
+    def report(self) -> Report:
+        """Whether this stiffness can be trusted: facts, warnings, and a second derivation of it.
+
+        K_θ is derived anew, by central differences of the potential and of the torque at this very
+        posture, which takes some tenths of a second. Nothing that is wrong with the stiffness is
+        raised; the report says so.
+        """
+        return report_on(self)
 
     def __repr__(self) -> str:
         state = "stable" if self.is_stable else "UNSTABLE"
@@ -352,6 +372,7 @@ def stiffness(
         gravity=pose.gravity_stiffness,
         load=load,
         joint=joint,
+        distribution=tension if isinstance(tension, Tension) else None,
     )
 
 

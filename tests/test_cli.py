@@ -76,6 +76,43 @@ def test_stiffness_json_holds_the_numbers_of_the_api(geometry: Path) -> None:
     assert told["stable"] is True
 
 
+def test_check_tells_the_report_of_the_api_and_writes_it_as_a_page(
+    geometry: Path, tmp_path: Path
+) -> None:
+    page = tmp_path / "report.html"
+    options = ("check", geometry, "--angles", 8, "--min-tension", 40, "--html", page)
+    result = call(*options, "--json")
+    assert result.exit_code == 0, result.output
+    told = json.loads(result.stdout)
+    arm = cdsm.Manipulator(cdsm.Geometry.read(geometry), cdsm.presets.STRAND_1X19)
+    pose = arm.at(np.full(6, np.deg2rad(8.0)))
+    report = cdsm.stiffness(pose, cdsm.distribute_tension(pose, 40.0)).report()
+    assert told == report.to_dict()
+    assert page.read_text(encoding="utf-8") == report.to_html()
+    assert [path.name for path in tmp_path.iterdir() if "report" in path.name] == ["report.html"]
+    assert str(report) in call(*options).output
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--min-tension", 31), "jump of its tangent rigidity"),
+        (("--min-tension", 0, "--rigidity", 48e3, "--gravity", "0,0,0"), "slack (0 N)"),
+        (("--min-tension", 20, "--rigidity", 1e9, "--spring", 1.0), "UNSTABLE"),
+    ],
+)
+def test_check_of_what_cannot_be_trusted_says_why_and_exits_with_3(
+    options: tuple[object, ...], said: str, geometry: Path
+) -> None:
+    result = call("check", geometry, "--angles", 5, *options)
+    assert result.exit_code == 3
+    assert "NOT to be trusted" in result.stdout
+    assert said in " ".join(result.stdout.split())
+    told = call("check", geometry, "--angles", 5, *options, "--json")
+    assert told.exit_code == 3
+    assert json.loads(told.stdout)["trustworthy"] is False
+
+
 def test_straight_arm_has_null_for_what_is_infinite(geometry: Path) -> None:
     told = json.loads(call("stiffness", geometry, "--json").stdout)
     assert told["along_N_per_m"][0] is None
@@ -282,6 +319,8 @@ def test_wire_file_is_the_elasticity_of_the_cables(geometry: Path, tmp_path: Pat
         (("plan", "{geometry}", "--direction", "0,0,1", "--target", "9e9"), "the range is"),
         (("plan", "{geometry}", "--direction", "0,0,1", "--path", "no.csv"), "does not exist"),
         (("urdf", "{geometry}", "-o", "absent/arm.urdf"), "folder absent does not exist"),
+        (("check", "{geometry}", "--html", "absent/r.html"), "folder absent does not exist"),
+        (("check", "{geometry}", "--min-tension", "1"), "domain (2.2 N, 810 N]"),
         (("reproduce", "--out", "{geometry}"), "cannot be made a folder"),
     ],
 )

@@ -250,6 +250,7 @@ RESULTS: dict[str, Any] = {
         POSE.arm, [POSE.q, POSE.q / 2.0], PULLS, outputs=("tip", "along"), direction=(0, 0, 1)
     ),
     "CriticalLoad": cdsm.critical_load(POSE, random_wrench(4), 10.0),
+    "Report": K.report(),
 }
 
 PLAIN: dict[str, Any] = {
@@ -266,6 +267,7 @@ PLAIN: dict[str, Any] = {
     "LinearElasticity": STEEL,
     "StrandElasticity": cdsm.presets.STRAND_1X19,
     "Domain": cdsm.presets.STRAND_1X19.domain,
+    "SelfCheck": K.report().self_check,
 }
 
 
@@ -302,9 +304,9 @@ WAYS: dict[str, Callable[[Any], Any]] = {
 def test_notebooks_show_what_is_printed(name: str) -> None:
     thing = RESULTS[name]
     shown = thing._repr_html_()
-    if not isinstance(thing, cdsm.Stiffness):  # which has a table of its own
+    if not isinstance(thing, (cdsm.Stiffness, cdsm.Report)):  # which have tables of their own
         assert html.unescape(shown) == f"<pre>{thing}</pre>"
-    assert shown.startswith(("<pre>", "<table>"))
+    assert shown.startswith(("<pre>", "<table>", "<section>"))
 
 
 @pytest.mark.parametrize("way", WAYS)

@@ -11,6 +11,7 @@ import typer
 
 import cdsm
 from cdsm.cli.arm import stiffness, urdf
+from cdsm.cli.check import check
 from cdsm.cli.export import export
 from cdsm.cli.loads import buckle, weigh
 from cdsm.cli.options import debug_wanted, grouped
@@ -54,6 +55,7 @@ def main(
 _COMMANDS: dict[str, Callable[..., None]] = {
     "urdf": urdf,
     "stiffness": stiffness,
+    "check": check,
     "weigh": weigh,
     "buckle": buckle,
     "plan": plan,

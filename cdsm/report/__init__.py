@@ -1,0 +1,19 @@
+"""The truth report: whether a stiffness can be trusted, with what a user can check it by."""
+
+from cdsm.report.facts import CableState, Rank, Readings
+from cdsm.report.optimality import Optimality
+from cdsm.report.report import Report, report_on
+from cdsm.report.self_check import Agreement, Difference, SelfCheck, self_check
+
+__all__ = [
+    "Agreement",
+    "CableState",
+    "Difference",
+    "Optimality",
+    "Rank",
+    "Readings",
+    "Report",
+    "SelfCheck",
+    "report_on",
+    "self_check",
+]
