@@ -8,6 +8,7 @@ built, so that callers hand over checked arrays and receive their own copies.
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -162,6 +163,34 @@ class RigidBody:
         # some versions of Pinocchio fill the upper triangle alone
         upper = np.triu(np.array(pin.crba(self._model, self._data(), q)).reshape(self.nv, self.nv))
         return upper + np.triu(upper, 1).T
+
+    def visualizer(self, urdf: str, server: object, node: str) -> Callable[[Array], None] | None:
+        """Draw the shapes of the URDF below a node of a viser server.
+
+        Returns:
+            What moves them to joint angles (nv,) [rad]; None if the URDF has no shapes.
+
+        Raises:
+            UrdfError: A shape, a mesh perhaps, cannot be read; nothing is drawn.
+        """
+        from pinocchio.visualize import ViserVisualizer
+
+        model = self._model.copy()  # a visualiser may write into what it is given
+        try:
+            shapes = pin.buildGeomFromUrdfString(model, urdf, pin.GeometryType.VISUAL)
+            if not shapes.ngeoms:
+                return None
+            drawn = ViserVisualizer(model, pin.GeometryModel(), shapes)
+            drawn.initViewer(viewer=server)
+            drawn.loadViewerModel(node)
+        except Exception as error:  # whatever the loader of some mesh format raises
+            server.scene.remove_by_name(node)  # type: ignore[attr-defined]
+            raise UrdfError(
+                f"the shapes of the URDF cannot be drawn: {str(error).strip().rstrip('.')}. Meshes "
+                "of a package:// are looked for in the folders of ROS_PACKAGE_PATH."
+            ) from None
+        display: Callable[[Array], None] = drawn.display
+        return display
 
     def _frame(self, link: str) -> int:
         if not isinstance(link, str) or not self._model.existFrame(link, pin.FrameType.BODY):

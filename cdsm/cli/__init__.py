@@ -18,6 +18,7 @@ from cdsm.cli.options import debug_wanted, grouped
 from cdsm.cli.paper import reproduce
 from cdsm.cli.plan import plan
 from cdsm.cli.sweep import map_sweep, sweep
+from cdsm.cli.view import view
 from cdsm.cli.wire import fit
 
 app = typer.Typer(
@@ -61,6 +62,7 @@ _COMMANDS: dict[str, Callable[..., None]] = {
     "plan": plan,
     "sweep": sweep,
     "map": map_sweep,
+    "view": view,
     "fit": fit,
     "export": export,
     "reproduce": reproduce,

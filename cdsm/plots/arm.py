@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.cm import ScalarMappable
@@ -10,7 +10,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from cdsm._checks import instance
+from cdsm._checks import Array, instance
 from cdsm.errors import InvalidInput
 from cdsm.plots.style import AXES, COLORS, MM
 from cdsm.posture import Posture
@@ -54,28 +54,49 @@ def plot_arm(
     draw_arm(axes, pose, tension)
     if tension is not None:
         figure.colorbar(
-            _tension_colors(tension), ax=axes, label="cable tension [N]", shrink=0.7, pad=0.12
+            tension_colors(tension), ax=axes, label="cable tension [N]", shrink=0.7, pad=0.12
         )
     unstable = stiffness is not None and not stiffness.is_stable
     figure.suptitle(f"{pose.arm}{'; UNSTABLE' if unstable else ''}", fontsize=10)
     return figure
 
 
-def _draw_ellipsoid(axes: Any, stiffness: Stiffness) -> None:
+class Ellipsoid(NamedTuple):
+    """Where forces of one size move the tip: the surface (3, 13, 25) [m], and its scale [m/N].
+
+    The scale is the longest half axis of C_vv f, |f| = 1; it is drawn a fifth of the arm long.
+    """
+
+    surface: Array
+    longest: float
+
+
+def ellipsoid(stiffness: Stiffness) -> Ellipsoid | None:
+    """The ellipsoid C_vv f, |f| = 1, at the tip; None where no force moves it.
+
+    Raises:
+        SingularStiffness: K_θ is singular, so there is none.
+    """
     C = stiffness.compliance[:3, :3]
     longest = float(np.linalg.norm(C, 2))
     if longest == 0.0:
-        return
+        return None
     around, down = np.meshgrid(np.linspace(0.0, 2.0 * np.pi, 25), np.linspace(0.0, np.pi, 13))
     force = np.stack([np.sin(down) * np.cos(around), np.sin(down) * np.sin(around), np.cos(down)])
     size = 0.2 * stiffness.posture.arm.length / longest
     moved = size * np.einsum("ij,j...->i...", C, force)
-    places = MM * (moved + stiffness.posture.tip[:3, 3, None, None])
+    return Ellipsoid(moved + stiffness.posture.tip[:3, 3, None, None], longest)
+
+
+def _draw_ellipsoid(axes: Any, stiffness: Stiffness) -> None:
+    drawn = ellipsoid(stiffness)
+    if drawn is None:
+        return
     axes.plot_wireframe(
-        *places,
+        *(MM * drawn.surface),
         color=COLORS[1],
         linewidth=0.5,
-        label=f"where 1 N moves the tip: longest {MM * longest:.3g} mm",
+        label=f"where 1 N moves the tip: longest {MM * drawn.longest:.3g} mm",
     )
     axes.legend(loc="upper left", fontsize=8)
 
@@ -90,7 +111,7 @@ def draw_arm(axes: Any, pose: Posture, tension: Tension | None) -> None:
         axes.plot(*(MM * bone.T), color="0.1", linewidth=2.5)
     colors = [COLORS[0]] * len(pose.cable_paths)
     if tension is not None:
-        colors = _tension_colors(tension).to_rgba(tension.values).tolist()
+        colors = tension_colors(tension).to_rgba(tension.values).tolist()
     for path, color in zip(pose.cable_paths, colors, strict=True):
         axes.plot(*(MM * path.T), color=color, linewidth=1.1)
     for name in AXES:
@@ -130,6 +151,7 @@ def _draw_disks(axes: Any, pose: Posture) -> None:
             axes.plot(*(MM * edge), color="0.35", linewidth=0.9)
 
 
-def _tension_colors(tension: Tension) -> ScalarMappable:
+def tension_colors(tension: Tension) -> ScalarMappable:
+    """Colours from the smallest to the largest tension."""
     low, high = tension.values.min(), tension.values.max()
     return ScalarMappable(Normalize(low, max(high, low + 1e-9)), "viridis")

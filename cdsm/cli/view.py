@@ -1,0 +1,73 @@
+"""``cdsm view``: an arm in the browser, with sliders."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import webbrowser
+from typing import Annotated
+
+import typer
+
+from cdsm.cli.options import (
+    Angles,
+    ArmOptions,
+    AsJson,
+    MaxTension,
+    MinTension,
+    Solver,
+    numbers,
+    reported,
+    show_json,
+)
+
+
+def view(
+    arm: ArmOptions,
+    angles: Angles = "0",
+    min_tension: MinTension = 10.0,
+    max_tension: MaxTension = math.inf,
+    force: Annotated[
+        str, typer.Option(help="At the tip, to begin with: FX,FY,FZ [N].", metavar="FX,FY,FZ")
+    ] = "0,0,0",
+    solver: Solver = "daqp",
+    largest_tension: Annotated[
+        float, typer.Option(help="Right end of the slider of the least tension [N].")
+    ] = 200.0,
+    largest_force: Annotated[
+        float, typer.Option(help="Ends of the sliders of the force [N].")
+    ] = 20.0,
+    host: Annotated[
+        str, typer.Option(help="Address to listen at; the default is this machine alone.")
+    ] = "127.0.0.1",
+    port: Annotated[int, typer.Option(help="Port to listen at; 0 for any free one.")] = 8080,
+    browser: Annotated[
+        bool, typer.Option("--browser", help="Open the page in a browser, too.")
+    ] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Show an arm in the browser, live: move joints, tension and load; see how stiff it is."""
+    # Ctrl-C is how it ends, and may come while it is still beginning
+    with reported(), contextlib.suppress(KeyboardInterrupt):
+        from cdsm.view import serve  # matplotlib and, if it is installed, viser
+
+        pose = arm.at(angles)
+        with serve(
+            pose.arm,
+            host=host,
+            port=port,
+            q=pose.q,
+            minimum=min_tension,
+            maximum=max_tension,
+            force=numbers("--force", force, 3),
+            solver=solver,
+            largest_tension=largest_tension,
+            largest_force=largest_force,
+        ) as page:
+            if as_json:
+                show_json({"name": pose.arm.name, "url": page.url})
+            else:
+                typer.echo(f"{pose.arm}\n\nshown at {page.url}; Ctrl-C ends it")
+            if browser:
+                webbrowser.open(page.url)
+            page.wait()

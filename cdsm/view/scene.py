@@ -1,0 +1,150 @@
+"""The arm in three dimensions: nodes made once in a viser server, then moved and recoloured."""
+
+from __future__ import annotations
+
+import logging
+import math
+from itertools import product
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cdsm.errors import CableError, UrdfError
+from cdsm.manipulator import Manipulator
+from cdsm.view.state import GREY, Condition, Shown
+
+if TYPE_CHECKING:
+    import viser
+
+_LOG = logging.getLogger(__name__)
+
+_BODY = "/arm"
+_STICK: Final = (40, 40, 45)
+_ELLIPSOID: Final = (200, 85, 61)
+_FORCE: Final = (59, 111, 182)
+_NOTHING: Final = np.zeros((1, 2, 3))
+_ABOVE = 0.1
+"""Height of the label over the tip, as a part of the arm's length."""
+
+
+class Scene:
+    """An arm in a viser server.
+
+    Links are drawn by Pinocchio's visualiser from the shapes in the URDF; where it has none, or
+    one of its meshes cannot be read, straight sticks join the joints instead.
+
+    Args:
+        server: The server, whose scene is empty.
+        arm: The arm.
+        largest_force: Force [N] whose arrow is half as long as the arm.
+    """
+
+    def __init__(self, server: viser.ViserServer, arm: Manipulator, largest_force: float) -> None:
+        length, scene = arm.length, server.scene
+        self._server, self._reach = server, 0.5 * length / largest_force
+        self._up = np.array([0.0, 0.0, _ABOVE * length])
+        body = scene.add_frame(_BODY, show_axes=False)
+        cables = scene.add_frame("/cables", show_axes=False)
+        try:
+            self._place = arm._body.visualizer(arm.urdf, server, _BODY)
+        except UrdfError as error:
+            _LOG.warning("%s Sticks are drawn instead.", error)
+            self._place = None
+        # light of a picture and shadows take seconds where no GPU helps
+        scene.configure_environment_map(hdri=None)
+        scene.configure_default_lights(cast_shadow=False)
+        scene.add_light_ambient("/light", intensity=2.0)
+        scene.add_frame("/base", axes_length=0.15 * length, axes_radius=0.004 * length)
+        for axis, name in zip(0.17 * length * np.eye(3), "xyz", strict=True):
+            scene.add_label(f"/base/{name}", name, position=axis)
+        self._sticks = scene.add_line_segments(
+            "/sticks", _NOTHING, _STICK, thickness=0.012 * length, visible=False
+        )
+        # a node for each: where the points of one have their own colours, viser takes those for
+        # linear light, and they would not be the colours of the bar
+        self._cables = [
+            scene.add_line_segments(
+                f"/cables/{i}", _NOTHING, GREY, thickness=2.5, thickness_units="screen"
+            )
+            for i in range(len(arm.cables))
+        ]
+        # what is hidden where there is no posture
+        self._parts = (body if self._place is not None else self._sticks, cables)
+        self._ellipsoid = scene.add_mesh_simple(
+            "/ellipsoid",
+            np.zeros((13 * 25, 3)),
+            _faces(13, 25),
+            color=_ELLIPSOID,
+            opacity=0.45,
+            side="double",
+            cast_shadow=False,
+            receive_shadow=False,
+            visible=False,
+        )
+        self._force = scene.add_arrows(
+            "/force",
+            _NOTHING,
+            _FORCE,
+            shaft_radius=0.006 * length,
+            head_radius=0.016 * length,
+            head_length=0.04 * length,
+            visible=False,
+        )
+        self._label = scene.add_label("/condition", "", anchor="bottom-center", visible=False)
+        self._look(arm)
+
+    def update(self, shown: Shown) -> None:
+        """Show this, and nothing of what was shown before."""
+        pose = shown.posture
+        for part in self._parts:
+            part.visible = pose is not None
+        self._ellipsoid.visible = shown.ellipsoid is not None
+        # a force that no force can be has no arrow
+        force = shown.setting.force
+        pushed = pose is not None and shown.condition is not Condition.INVALID
+        self._force.visible = pushed and bool(force.any())
+        self._label.visible = pose is not None and shown.condition is not Condition.STABLE
+        self._label.text = shown.condition.value
+        if pose is None or shown.cable_colors is None:
+            return
+        tip = pose.tip[:3, 3]
+        if self._place is not None:
+            self._place(pose.q)
+        else:
+            self._sticks.points = np.array(pose.bones, dtype=np.float32)
+        for cable, path, color in zip(
+            self._cables, pose.cable_paths, shown.cable_colors, strict=True
+        ):
+            cable.points = np.stack([path[:-1], path[1:]], axis=1).astype(np.float32)
+            cable.colors = color
+        if shown.ellipsoid is not None:
+            self._ellipsoid.vertices = shown.ellipsoid.reshape(3, -1).T.astype(np.float32)
+        if self._force.visible:
+            ends = np.array([[tip, tip + self._reach * force]])
+            self._force.points = ends.astype(np.float32)
+        self._label.position = tip + self._up
+
+    def _look(self, arm: Manipulator) -> None:
+        """Where a browser looks from first: at the side of the arm, a little from above."""
+        try:
+            straight = arm.at(np.clip(np.zeros(arm.nv), arm.lower, arm.upper))
+            points = np.concatenate([*straight.bones, *straight.cable_paths])
+        except CableError:  # a cable whose sites meet just there
+            points = np.array([[0.0, 0.0, 0.0], [arm.length, 0.0, 0.0]])
+        middle = (points.min(axis=0) + points.max(axis=0)) / 2.0
+        size = max(float(np.ptp(points, axis=0).max()), arm.length)
+        camera = self._server.initial_camera
+        camera.look_at = middle
+        camera.position = middle + size * np.array([0.2, -1.6, 0.6])
+        camera.fov = math.radians(45.0)
+        camera.near, camera.far = size / 100.0, 100.0 * size
+
+
+def _faces(rows: int, columns: int) -> NDArray[np.uint32]:
+    """Two triangles for each cell of a grid of points, whose numbers run along its rows."""
+    faces = []
+    for i, j in product(range(rows - 1), range(columns - 1)):
+        a, b = columns * i + j, columns * (i + 1) + j
+        faces += [(a, b, a + 1), (a + 1, b, b + 1)]
+    return np.array(faces, dtype=np.uint32)

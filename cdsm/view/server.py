@@ -1,0 +1,237 @@
+"""The server of the live view: one page for as many browsers as come."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import math
+import socket
+import threading
+from collections.abc import Iterator
+from types import TracebackType
+from typing import TYPE_CHECKING, Self, final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cdsm._checks import Array, bound, frozen, instance, scalar, vector
+from cdsm._extras import need
+from cdsm.errors import InvalidInput
+from cdsm.manipulator import Manipulator
+from cdsm.view.controls import Controls
+from cdsm.view.newest import Newest
+from cdsm.view.scene import Scene
+from cdsm.view.state import Condition, Setting, Shown, show
+
+if TYPE_CHECKING:
+    import viser
+
+_LOG = logging.getLogger(__name__)
+
+_PANEL = 390
+"""Width of the panel in pixels: its longest row takes one line."""
+
+
+def serve(
+    arm: Manipulator,
+    *,
+    host: str = "127.0.0.1",
+    port: int = 8080,
+    q: ArrayLike | None = None,
+    minimum: float = 10.0,
+    maximum: float = math.inf,
+    force: ArrayLike = (0.0, 0.0, 0.0),
+    solver: str = "daqp",
+    largest_tension: float = 200.0,
+    largest_force: float = 20.0,
+) -> View:
+    """Serve a live view of an arm: sliders, the arm in three dimensions, its stiffness.
+
+    It runs in threads of its own until it is closed. All browsers see and move the same sliders.
+
+    Args:
+        arm: The arm; nothing is written into it.
+        host: Address to listen at; the default is this machine alone.
+        port: Port to listen at; 0 for any free one.
+        q: Joint angles (nv,) [rad] to begin with; zero, or the limit next to it, if not given.
+        minimum: Lower bound of all tensions [N] to begin with.
+        maximum: Upper bound of all tensions [N].
+        force: At the tip, in base axes (3,) [N], to begin with.
+        solver: Of :func:`~cdsm.tension.distribute_tension`.
+        largest_tension: Right end of the slider of the lower bound [N].
+        largest_force: Ends of the sliders of the force [N]; more if ``force`` is.
+
+    Raises:
+        MissingExtra: viser is not installed: the extra ``[view]``.
+        InvalidInput: A value of the wrong type or shape, or the port cannot be had.
+        JointLimitError: An angle is beyond its limit.
+    """
+    need("view", "viser")
+    start = Setting(
+        q=_first_angles(instance("arm", arm, Manipulator), q),
+        minimum=_positive("minimum", minimum, zero=True),
+        maximum=float(bound("maximum", maximum, 1)[0]),
+        force=vector("force", force, 3, "force at the tip [N], base axes"),
+        solver=solver,
+    )
+    tension = _positive("largest_tension", largest_tension)
+    push = max(_positive("largest_force", largest_force), float(abs(start.force).max()))
+    return View(arm, start, _server(host, port), tension, push)
+
+
+@final
+class View:
+    """A live view that is being served, by :func:`serve`; close it, or use it in ``with``.
+
+    Attributes:
+        arm: The arm.
+    """
+
+    def __init__(
+        self,
+        arm: Manipulator,
+        start: Setting,
+        server: viser.ViserServer,
+        largest_tension: float,
+        largest_force: float,
+    ) -> None:
+        self.arm = arm
+        self._server = server
+        self._closed = threading.Event()
+        self._worker = Newest(self._refresh)
+        try:
+            self._scene = Scene(server, arm, largest_force)
+            self._controls = Controls(
+                server, arm, start, largest_tension, largest_force, self._worker.ask
+            )
+            self._refresh()
+        except BaseException:
+            self.close()
+            raise
+
+    @property
+    def url(self) -> str:
+        """Address of the page."""
+        host = self._server.get_host()
+        return f"http://{f'[{host}]' if ':' in host else host}:{self._server.get_port()}"
+
+    @property
+    def shown(self) -> Shown:
+        """What the page shows, once all that was moved so far is computed."""
+        self._worker.settle()
+        return self._shown
+
+    def wait(self) -> None:
+        """Wait until somebody closes it, or for Ctrl-C."""
+        self._closed.wait()
+
+    def close(self) -> None:
+        """Stop serving; a second call does nothing."""
+        if self._closed.is_set():
+            return
+        self._worker.close()
+        with _quiet():
+            self._server.stop()
+        self._closed.set()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        return f"<View of {self.arm.name} at {self.url}>"
+
+    def _refresh(self) -> None:
+        setting = self._controls.setting
+        try:
+            self._put(show(self.arm, setting))
+        except Exception as error:  # a fault of ours may not leave numbers that are not true
+            _LOG.exception("the view cannot show %s", setting)
+            problem = f"{type(error).__name__}: {error}"
+            self._put(Shown(setting=setting, condition=Condition.FAILED, problem=problem))
+
+    def _put(self, shown: Shown) -> None:
+        with self._server.atomic():
+            self._scene.update(shown)
+            self._controls.update(shown)
+        self._shown = shown
+
+
+def _first_angles(arm: Manipulator, q: ArrayLike | None) -> Array:
+    if q is None:
+        return frozen(np.clip(np.zeros(arm.nv), arm.lower, arm.upper))
+    return arm._angles(q, check_limits=True)
+
+
+def _positive(name: str, value: object, *, zero: bool = False) -> float:
+    number = scalar(name, value)
+    if number < 0.0 or (number == 0.0 and not zero):
+        allowed = "zero or more" if zero else "more than zero"
+        raise InvalidInput(name, f"{number:g} N given; {allowed} is needed.")
+    return number
+
+
+def _server(host: object, port: object) -> viser.ViserServer:
+    """A viser server at this address and no other, with a page of its own design."""
+    import viser
+
+    if not isinstance(host, str):
+        raise InvalidInput("host", f"{host!r} given; an address is needed, such as '127.0.0.1'.")
+    if isinstance(port, bool) or not isinstance(port, int) or not 0 <= port <= 65535:
+        raise InvalidInput("port", f"{port!r} given; a whole number from 0 to 65535 is needed.")
+    _check_free(host, port)
+    with _quiet():
+        server = viser.ViserServer(host=host, port=port, label="cdsm view", verbose=False)
+        if port not in (0, taken := server.get_port()):
+            server.stop()
+            raise InvalidInput("port", f"{port} was taken meanwhile ({taken} is free); try again.")
+    # nothing may leave this machine: viser's share button opens a tunnel to a server of others
+    server.gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
+    server.gui.main_panel.dock_right()
+    server.gui.main_panel.set_width(_PANEL)  # or browsers differ in what "large" is when docked
+    return server
+
+
+def _check_free(host: str, port: int) -> None:
+    """Raise what is wrong with an address: viser takes the next port, or waits for ever.
+
+    Raises:
+        InvalidInput: There is no such address, or the port is taken.
+    """
+    remedy = "Give another port, or 0 for any free one."
+    try:
+        with contextlib.ExitStack() as sockets:
+            for family, kind, protocol, _, address in socket.getaddrinfo(
+                host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
+            ):
+                probe = sockets.enter_context(socket.socket(family, kind, protocol))
+                probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # as viser will
+                if family == socket.AF_INET6:
+                    probe.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_V6ONLY, 1)
+                probe.bind(address)
+    except (socket.gaierror, UnicodeError) as error:
+        raise InvalidInput("host", f"{host!r} is no address of this machine: {error}.") from None
+    except OSError as error:
+        raise InvalidInput(
+            "port", f"{port} on {host} cannot be had: {error.strerror}. {remedy}"
+        ) from None
+
+
+@contextlib.contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep viser from printing on the standard output, which it does whatever it is told."""
+    import rich
+
+    console = rich.get_console()
+    before, console.quiet = console.quiet, True
+    try:
+        yield
+    finally:
+        console.quiet = before
