@@ -35,6 +35,13 @@ _NO_WRENCH = frozen(np.zeros(6))
 UNMOVED = 1e-10
 """Joint torque of a tip force below this part of the largest is rounding: the tip cannot move."""
 
+REGULAR = 1e-8
+"""Smallest singular value of K_θ, over what it is a sum of, that leaves its inverse 6 digits.
+
+Near buckling the parts of K_θ cancel, so that its own entries may be too small to be compared with;
+and each joint is measured in units of its own, a slide beside a hinge.
+"""
+
 FLAT = 1e-6
 """Smallest ratio of the singular values of J for which a 3×3 stiffness still has 4 digits left.
 
@@ -298,9 +305,13 @@ class Stiffness(ReadOnlyState):
     @cached_property
     def _motion(self) -> Array:
         """K_θ⁻¹ J_Xᵀ (nv, 6): joint motion per wrench at the tip; refuses a singular K_θ."""
-        _, values, right = np.linalg.svd(self.joint)
-        if not values[-1] > 1e-14 * values[0]:
-            direction = frozen(right[-1].astype(np.float64))
+        parts = abs(self.active) + abs(self.passive) + abs(self.gravity) + abs(self.load)
+        unit = np.sqrt(parts.diagonal())
+        unit = np.where(unit > 0.0, unit, 1.0)
+        _, values, right = np.linalg.svd(self.joint / unit / unit[:, None])
+        if not values[-1] > REGULAR * (parts / unit / unit[:, None]).max():
+            direction = right[-1] / unit
+            direction = frozen(direction / np.linalg.norm(direction))
             raise SingularStiffness(
                 "K_θ is singular: the arm is just about to buckle in the joint motion "
                 f"{_written(direction)}. Change the tensions or the posture.",

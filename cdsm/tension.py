@@ -35,6 +35,9 @@ OPTIMALITY = 1e-9
 DISTANCE = 1e-6
 """Largest accepted distance from the optimum, as the duality gap bounds it, relative to max F."""
 
+# by default HiGHS calls feasible what misses up to 1e-7, and so would not see less missing torque
+_TIGHT = {"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10}
+
 # qpsolvers' defaults miss OPTIMALITY by orders of magnitude for these, and OSQP's polishing step
 # can spoil a solution while it reports success
 _SETTINGS: dict[str, dict[str, Any]] = {
@@ -304,6 +307,7 @@ def _explain(
         b_eq=b,
         bounds=[*zip(lower, upper, strict=True), *[(0.0, None)] * (2 * nv)],
         method="highs",
+        options=_TIGHT,
     )
     if nearest.status != 0:  # it is feasible and bounded by construction
         raise SolverError("highs", f"cannot tell whether tensions exist: {nearest.message}")
@@ -329,6 +333,7 @@ def _explain(
         b_eq=b,
         bounds=(0.0, None),
         method="highs",
+        options=_TIGHT,
     )
     missing = (b - A @ values) * arm_scale * force_scale
     tight = free & (np.minimum(values - lower, upper - values) <= OPTIMALITY)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 import qpsolvers
+import scipy.linalg
 from scipy.optimize import linprog
 
 import cdsm
@@ -851,6 +852,66 @@ def test_stiffness_on_the_brink_of_buckling_is_singular_and_still_prints() -> No
     assert "nan" not in str(brittle)
     assert "nan" not in brittle._repr_html_()
     assert np.isfinite(brittle.pseudoinverse()).all()
+
+
+def test_one_joint_on_the_brink_is_singular_though_its_stiffness_is_the_largest_there_is() -> None:
+    """The parts of its K_θ cancel to some digits, and no more of its inverse is known."""
+    arm = random_arm(3, 1, "hinged", cdsm.LinearElasticity(50.0))
+    pose = cdsm.Manipulator(arm.geometry, arm.cables[0].elasticity, gravity=np.zeros(3)).at([0.1])
+    unit = cdsm.stiffness(pose, np.ones(2))
+    critical = -float(unit.passive[0, 0] / unit.active[0, 0])
+    for off, digits in ((1e-10, 6), (1e-5, 11)):
+        F = np.full((1, 2), critical * (1.0 - off))
+        K = cdsm.stiffness(pose, F[0])
+        assert K.margin == pytest.approx(off * float(K.passive[0, 0]), rel=1e-4)
+        batch = cdsm.evaluate(pose.arm, [pose.q], F, outputs=("compliance",))
+        if digits > 6:
+            assert batch.ok.all()
+            np.testing.assert_array_equal(batch["compliance"][0], K.compliance)
+            continue
+        assert batch.status[0] == cdsm.Status.SINGULAR
+        with pytest.raises(cdsm.SingularStiffness, match="just about to buckle"):
+            _ = K.compliance
+
+
+def test_batch_finds_every_singular_stiffness_that_the_single_posture_does() -> None:
+    """Though pivots need not be small where K_θ is singular."""
+    for seed in range(12):
+        arm = random_arm(seed, 5, "hinged", cdsm.LinearElasticity(50.0))
+        pose = random_posture(arm, seed)
+        unit = random_tension(arm, seed)
+        rest = cdsm.stiffness(pose, 0.0 * unit).joint
+        active = cdsm.stiffness(pose, unit).active
+        factors = scipy.linalg.eigvals(rest, -active)
+        scale = float(factors.real[abs(factors.imag) < 1e-9 * abs(factors)].max())
+        F = scale * (1.0 + 1e-10) * unit
+        with pytest.raises(cdsm.SingularStiffness):
+            _ = cdsm.stiffness(pose, F).compliance
+        batch = cdsm.evaluate(arm, [pose.q], F, outputs=("compliance",))
+        assert batch.status[0] == cdsm.Status.SINGULAR
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_torque_missing_by_less_than_linear_programs_care_for_is_named(seed: int) -> None:
+    """Nobody claims then that there are tensions after all."""
+    pose = random_posture(random_arm(seed, 3), seed)
+    J, count = pose.length_jacobian, len(pose.arm.cables)
+    size = abs(J).max()
+    # the least upper bound of all cables that balances the arm
+    found = linprog(
+        np.append(np.zeros(count), 1.0),
+        A_ub=np.column_stack([np.eye(count), -np.ones(count)]),
+        b_ub=np.zeros(count),
+        A_eq=np.column_stack([J.T / size, np.zeros(pose.arm.nv)]),
+        b_eq=-pose.gravity_torque / size,
+        bounds=[*[(20.0, None)] * count, (0.0, None)],
+    )
+    bound = float(found.x[-1])
+    assert cdsm.distribute_tension(pose, 20.0, bound * (1.0 + 1e-8)).values.max() <= bound * 1.1
+    with pytest.raises(cdsm.InfeasibleTension) as caught:
+        cdsm.distribute_tension(pose, 20.0, bound * (1.0 - 1e-8))
+    assert 0.0 < abs(caught.value.missing).max() < 1e-6
+    assert caught.value.relaxation == pytest.approx(1e-8 * bound, rel=1.0)
 
 
 def test_unstable_stiffness_says_so() -> None:

@@ -174,11 +174,14 @@ def evaluate_rows(
                     set_cable_stiffness(L, rigidity[b], series, k)
                     add_passive(J, k, passive)
                     mirror(passive)
+                    size = 0.0
                     for i in range(nv):
                         for j in range(nv):
                             K[i, j] = active[0, i, j] + passive[i, j] + gravity[i, j] + load[i, j]
+                            parts = abs(active[0, i, j]) + abs(passive[i, j])
+                            size = max(size, parts + abs(gravity[i, j]) + abs(load[i, j]))
                     if last > JOINT:
-                        status[b] = solve_row(K, JX, directions, work, asked, answers)
+                        status[b] = solve_row(K, size, JX, directions, work, asked, answers)
                         if status[b] == UNDECIDED or status[b] == SINGULAR:
                             known = PSEUDOINVERSE + 1
         _keep(record, start, known, wanted, b, out)

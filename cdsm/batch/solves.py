@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cdsm._checks import Array
-from cdsm._compiled import compiled
+from cdsm._compiled import compiled, inlined
 from cdsm.batch.dense import eliminate, singular_values, smallest_eigenvalue
 from cdsm.batch.record import (
     CARTESIAN,
@@ -26,8 +26,10 @@ from cdsm.batch.record import (
 )
 from cdsm.stiffness import FLAT, UNMOVED
 
-_DOUBT = 1e-10
-"""Smallest over largest pivot below which singular values have to tell whether K_θ is regular."""
+_DOUBT = 1e5
+"""Motion under a probing torque, over torque over the size of what K_θ sums, beyond which singular
+values have to tell whether K_θ is regular: it estimates them from one side, so this is decades off
+the inverse of :data:`~cdsm.stiffness.REGULAR`."""
 
 
 class Answers(NamedTuple):
@@ -54,8 +56,8 @@ class Workspace(NamedTuple):
     Attributes:
         symmetric: The symmetric part of K_θ (nv, nv).
         vectors: For its eigenvalue (4, nv).
-        system: K_θ, and right of it, as far as wanted, J_vᵀu of each direction, J_Xᵀ, and the
-            orthonormal rows of J_v.
+        system: K_θ, and right of it, if anything is, a probing torque, and as far as wanted J_vᵀu
+            of each direction, J_Xᵀ, and the orthonormal rows of J_v.
         left: Left singular vectors of J_v (3, 3), over its singular values.
         values: These values (3,).
         right: Its orthonormal rows (3, nv).
@@ -80,7 +82,7 @@ def workspace(nv: int, directions: int, asked: Flags) -> Workspace:
     return Workspace(
         np.empty((nv, nv)),
         np.empty((4, nv)),
-        np.empty((nv, nv + columns)),
+        np.empty((nv, nv + columns + (1 if columns > 0 else 0))),
         np.empty((3, 3)),
         np.empty(3),
         np.empty((3, nv)),
@@ -91,9 +93,17 @@ def workspace(nv: int, directions: int, asked: Flags) -> Workspace:
 
 @compiled
 def solve_row(
-    K: Array, JX: Array, directions: Array, work: Workspace, asked: Flags, answers: Answers
+    K: Array,
+    size: float,
+    JX: Array,
+    directions: Array,
+    work: Workspace,
+    asked: Flags,
+    answers: Answers,
 ) -> int:
-    """Fill the quantities asked for from K_θ (nv, nv), J_X (6, nv) and u (D, 3).
+    """Fill the quantities asked for from K_θ (nv, nv) and its size, J_X (6, nv) and u (D, 3).
+
+    The size is the largest entry of K_θ, every part of its sum taken absolutely.
 
     Returns:
         A status. UNDECIDED where it takes singular values to tell whether K_θ is regular; of what
@@ -125,12 +135,12 @@ def solve_row(
     if system.shape[1] == nv:
         return status
     _assemble(K, JX, directions, right, asked, system)
-    if eliminate(system) < _DOUBT:
+    if eliminate(system) == 0.0 or _yields(system, size):
         return UNDECIDED
     for u in range(count):
         along[u] = _weight_test(JX, directions, system, u)
     if asked[COMPLIANCE]:
-        _product(JX, system, nv + count, compliance)
+        _product(JX, system, nv + 1 + count, compliance)
     if asked[CARTESIAN] and mobile:
         _product(right, system, system.shape[1] - 3, inner)
         for a in range(3):
@@ -170,14 +180,30 @@ def _assemble(
     for i in range(nv):
         for j in range(nv):
             system[i, j] = K[i, j]
+        system[i, nv] = _probe(i)
         for u in range(count):
-            system[i, nv + u] = _moved(JX, directions, u, i)
+            system[i, nv + 1 + u] = _moved(JX, directions, u, i)
         if asked[COMPLIANCE]:
             for c in range(6):
-                system[i, nv + count + c] = JX[c, i]
+                system[i, nv + 1 + count + c] = JX[c, i]
         if asked[CARTESIAN]:
             for c in range(3):
                 system[i, width - 3 + c] = right[c, i]
+
+
+@inlined
+def _probe(i: int) -> float:
+    """Torque on joint i, from 1 to 2 and so irregular that hardly a motion is free of it."""
+    return 1.0 + (0.6180339887498949 * i) % 1.0
+
+
+@compiled
+def _yields(system: Array, size: float) -> bool:
+    """Whether the probing torque moves a joint so far that K_θ may be singular."""
+    moved = 0.0
+    for i in range(system.shape[0]):
+        moved = max(moved, abs(system[i, system.shape[0]]))
+    return not moved * size < _DOUBT
 
 
 @compiled
@@ -195,7 +221,7 @@ def _weight_test(JX: Array, directions: Array, system: Array, u: int) -> float:
     torque = linear = compliance = 0.0
     for i in range(nv):
         moved = _moved(JX, directions, u, i)
-        compliance += moved * system[i, nv + u]
+        compliance += moved * system[i, nv + 1 + u]
         torque = max(torque, abs(moved))
         for a in range(3):
             linear = max(linear, abs(JX[a, i]))

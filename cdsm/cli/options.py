@@ -281,9 +281,17 @@ def show_json(values: dict[str, object]) -> None:
 
 @contextmanager
 def reported() -> Iterator[None]:
-    """Turn a CdsmError into one message and exit code 1; with --debug leave it as it is."""
+    """Turn a CdsmError into one message and exit code 1; with --debug leave it as it is.
+
+    Ctrl-C likewise, with the exit code that shells give it.
+    """
     try:
         yield
+    except KeyboardInterrupt:
+        if debug_wanted.get():
+            raise
+        console.print("interrupted: no file is half-written, and what --resume keeps stays")
+        raise typer.Exit(130) from None
     except (CdsmError, OSError) as error:  # OSError: the terminal or pipe itself
         if debug_wanted.get():
             raise

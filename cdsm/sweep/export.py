@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import os
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -42,7 +43,7 @@ def write_sweep(dataset: xarray.Dataset, path: str | os.PathLike[str]) -> Path:
     check_target(path)
     if as_path(path).suffix.lower() == ".csv":
         return write_file(path, lambda aside: _write_table(dataset, aside))
-    return write_file(path, lambda aside: dataset.to_netcdf(aside, engine="netcdf4"))
+    return write_file(path, lambda aside: _write_netcdf(dataset, aside))
 
 
 def read_sweep(path: str | os.PathLike[str]) -> xarray.Dataset:
@@ -126,6 +127,14 @@ def _read_netcdf(path: Path) -> xarray.Dataset:
             return found.load()
     except Exception as error:  # whatever netCDF4 and xarray raise
         raise FileError(path, f"cannot be read as NetCDF: {error}.") from None
+
+
+def _write_netcdf(dataset: xarray.Dataset, path: Path) -> None:
+    try:
+        dataset.to_netcdf(path, engine="netcdf4")
+    except (RuntimeError, PermissionError) as error:  # HDF5 does not tell that a disk is full
+        free = shutil.disk_usage(path.parent).free
+        raise OSError(f"{error} ({free} bytes are free there)") from None
 
 
 def _write_table(dataset: xarray.Dataset, path: Path) -> None:
