@@ -28,6 +28,9 @@ _NEAREST = 6.0
 _ROUNDING = 1e-14
 """A polynomial this small beside the sum of its terms' magnitudes is zero."""
 
+_NEGLIGIBLE = 1e-30
+"""A term of a polynomial this part of its largest one leaves no trace."""
+
 _NARROWEST = 4
 """Panels shrink towards a root at their end; this many units in the last place are none."""
 
@@ -92,7 +95,7 @@ def panels(rows: Sequence[Sequence[float]], edges: Sequence[float]) -> Panels:
     piece: list[int] = []
     end = np.inf
     for index, (row, (low, high)) in enumerate(zip(rows, pairwise(edges), strict=True)):
-        p = Polynomial(row).trim()
+        p = Polynomial(_significant(row, high))
         stop = _positive_until(p, low, high)
         inner = _divided(np.asarray(p.roots(), dtype=np.complex128), low, min(stop, high))
         ends += inner
@@ -109,6 +112,16 @@ def panels(rows: Sequence[Sequence[float]], edges: Sequence[float]) -> Panels:
     every = np.arange(len(piece))
     whole = np.array([table._rule(table.edges[1:], every, power) for power in _POWERS])
     return table._replace(before=np.cumsum(whole, axis=1) - whole)
+
+
+def _significant(row: Sequence[float], high: float) -> list[float]:
+    """The coefficients without highest ones that add nothing up to ``high``.
+
+    Those have roots too, so far away that they are not even numbers.
+    """
+    sizes = abs(np.array(row)) * high ** np.arange(len(row))
+    last = np.flatnonzero(sizes > _NEGLIGIBLE * sizes.max()).max(initial=0)
+    return list(row[: last + 1])
 
 
 def _divided(roots: NDArray[np.complex128], low: float, high: float) -> list[float]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import json
+import re
 import tomllib
 from collections.abc import Callable, Iterable
 from dataclasses import fields, is_dataclass
@@ -31,6 +32,16 @@ Positive = Annotated[Number, Field(gt=0)]
 NotNegative = Annotated[Number, Field(ge=0)]
 Direction = Annotated[tuple[Number, Number, Number], Field(strict=False), BeforeValidator(_plain)]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$", max_length=64)]
+
+
+_DEEPEST = 64
+"""Parts of a dotted key; no description of an arm has more than two."""
+
+_PART = r"""[ \t]*+(?:"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+'|[^\s.=\[\]{},#"']++)[ \t]*+"""
+_DEEP_KEY = re.compile(rf"(?:\.{_PART}){{{_DEEPEST}}}")
+
+_HINTED = 20
+"""Unknown keys for which a known one is looked for."""
 
 
 class CrossFaults(ValueError):
@@ -61,10 +72,14 @@ def record(cls: type[_Record]) -> type[_Record]:
 
 def read_toml(text: str) -> dict[str, Any]:
     """Parse TOML, or raise a :class:`GeometryError` that says where it breaks off."""
+    if _DEEP_KEY.search(text) is not None:  # for which the parser would need gigabytes
+        raise GeometryError([f"is not TOML that is read here: a key has over {_DEEPEST} parts"])
     try:
-        return tomllib.loads(text)
+        data = tomllib.loads(text)
+        json.dumps(data, default=str)
     except (ValueError, RecursionError) as error:  # also integers of too many digits
         raise GeometryError([f"is not TOML: {error}"]) from None
+    return data
 
 
 def parse(kind: type[_Record], data: object) -> _Record:
@@ -109,6 +124,7 @@ def _keys(kind: type) -> list[str]:
 def _faults(error: ValidationError, kind: type) -> list[str]:
     known = _keys(kind)
     listed: list[str] = []
+    hinted = 0
     faults = error.errors()
     for fault in faults:
         # joints[2].limit counts from 1, as the joints' and cables' names do
@@ -126,7 +142,9 @@ def _faults(error: ValidationError, kind: type) -> list[str]:
         elif fault["type"] == "missing":
             listed.append(f"{where}: is missing")
         elif fault["type"] == "unexpected_keyword_argument":
-            near = difflib.get_close_matches(str(fault["loc"][-1]), known, n=1)
+            key = str(fault["loc"][-1])
+            hinted += 1
+            near = difflib.get_close_matches(key[:100], known, n=1) if hinted <= _HINTED else []
             hint = f"; did you mean {near[0]}?" if near else ""
             listed.append(f"{where}: is not a key that is known here{hint}")
         else:

@@ -45,13 +45,14 @@ def exists(at: At, place: float) -> bool:
 
 
 def domain(arm: Manipulator) -> tuple[float, float]:
-    """Tensions [N] of which the elasticities of all cables say something.
+    """Tensions [N] that all cables may carry and of which their elasticities say something.
 
     That of a cable whose motor holds the force is never asked.
     """
     domains = [each.elasticity.domain for each in arm.cables if each.control == "position"]
     low = max((each.low for each in domains), default=0.0) * _ABOVE
-    return low, min((each.high for each in domains), default=math.inf)
+    ends = [*(each.high for each in domains), *(each.maximum for each in arm.cables)]
+    return low, min(ends)
 
 
 def edge(true: Callable[[float], bool], a: float, b: float) -> tuple[float, float]:

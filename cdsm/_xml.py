@@ -16,6 +16,10 @@ DEEPEST = 100
 _LONGEST = 10_000
 """Characters of a name or number; none is longer."""
 
+_WIDEST = 100_000
+"""Characters of a tag with what follows it, or of a comment; libxml2 compares all attributes of an
+element with each other."""
+
 _SHOWN = 40
 
 
@@ -38,6 +42,11 @@ def parse_xml(text: str, root: str, doctype: str | None = None) -> etree._Elemen
     """
     if len(text) > MAXIMUM_BYTES:
         raise XmlFault(f"is larger than the {MAXIMUM_BYTES} characters that are read")
+    widest = max(map(len, text.split("<")))
+    if widest > _WIDEST:
+        raise XmlFault(
+            f"holds a tag, text or comment of {widest} characters; {_WIDEST} are read at most"
+        )
     parser = etree.XMLParser(
         encoding="utf-8",
         resolve_entities=False,

@@ -22,8 +22,16 @@ def listed(faults: Sequence[str], most: int | None = None) -> str:
     return "".join(f"\n  - {fault}" for fault in faults[:most]) + more
 
 
+LONGEST = 8000
+"""Characters of a message; a file can hold a name of megabytes, and the rest helps nobody."""
+
+
 class CdsmError(Exception):
     """Root of all errors raised by cdsm."""
+
+    def __init__(self, message: str = "") -> None:
+        more = len(message) - LONGEST
+        super().__init__(message if more <= 0 else f"{message[:LONGEST]}… ({more} characters more)")
 
     def __reduce__(self) -> tuple[object, ...]:
         # the children take keyword data, which Exception's own pickling would lose
@@ -63,7 +71,7 @@ class UnknownName(CdsmError, LookupError):
     def __init__(self, kind: str, name: object, known: Iterable[str], remedy: str = "") -> None:
         self.name = name
         self.known = tuple(known)
-        near = difflib.get_close_matches(str(name), self.known, n=3)
+        near = difflib.get_close_matches(str(name)[:100], self.known[:1000], n=3)
         listed = self.known if len(self.known) <= 12 else (*self.known[:12], "…")
         message = f"no {kind} is called {name!r}"
         message += f"; did you mean {' or '.join(map(repr, near))}?" if near else "."

@@ -7,6 +7,7 @@ angles alone. A posture is frozen, and exists only once all of it is computed.
 from __future__ import annotations
 
 import os
+from collections import Counter
 from collections.abc import Sequence
 from functools import cached_property
 from typing import final
@@ -358,8 +359,8 @@ def _checked_cables(cables: Sequence[Cable]) -> tuple[Cable, ...]:
     cables = sequence_of("cables", cables, Cable)
     if not cables:
         raise InvalidInput("cables", "none given; an arm needs at least one.")
-    names = [cable.name for cable in cables]
-    for name in names:
-        if names.count(name) > 1:
+    counts = Counter(cable.name for cable in cables)
+    for name, count in counts.items():
+        if count > 1:
             raise CableError(name, "the name is used twice; every cable needs its own.")
     return cables

@@ -177,7 +177,7 @@ class Stiffness(ReadOnlyState):
             direction: u (3,) in base axes, any length.
 
         Returns:
-            The stiffness; inf where no joint moves the tip in this direction. Where the arm is
+            The stiffness; inf where the tip does not give way in this direction. Where the arm is
             unstable it may be negative: see :attr:`is_stable`.
 
         Raises:
@@ -188,7 +188,8 @@ class Stiffness(ReadOnlyState):
         torque = self._torque(u)
         if torque is None:
             return math.inf
-        return float(1.0 / (torque @ self._motion[:, :3] @ u))
+        compliance = float(torque @ self._motion[:, :3] @ u)
+        return 1.0 / compliance if compliance else math.inf
 
     def pseudoinverse(self, term: Term = "joint") -> Array:
         """J⁺ᵀ K J⁺ (3, 3) [N/m] with J the linear rows of J_X: the paper's K_R read literally.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import os
 import re
 from dataclasses import dataclass
@@ -11,7 +10,7 @@ from typing import Final, NoReturn, final
 import numpy as np
 
 from cdsm._checks import Array, ReadOnlyState, frozen, number_array, scalar
-from cdsm._files import read_text
+from cdsm._files import csv_cells, read_text
 from cdsm.errors import TensileTestError
 
 _UNITS: Final = {
@@ -22,7 +21,9 @@ _WORDS: Final = {
     "displacement": ("displacement", "extension", "elongation", "stroke"),
     "force": ("force", "load", "tension"),
 }
-_GAUGE = re.compile(r"gauge[ _-]?length\s*[=:]?\s*([-+\d.,eE]+)\s*[\[(]?([^\W\d]*)", re.IGNORECASE)
+_GAUGE = re.compile(
+    r"gauge[ _-]?length\s*+[=:]?\s*+([-+\d.,eE]+)\s*[\[(]?([^\W\d]*)", re.IGNORECASE
+)
 
 
 @final
@@ -98,7 +99,7 @@ def read_tensile_csv(
         _refuse(path, "holds no data; a header and one line per point are needed.")
     first = lines[0][1]
     delimiter = next((each for each in "\t;" if each in first), ",")
-    rows = [(k, [c.strip() for c in next(csv.reader([x], delimiter=delimiter))]) for k, x in lines]
+    rows = [(k, csv_cells(path, k, line, delimiter)) for k, line in lines]
     header, body = rows[0][1], rows[1:]
     if all(_number(cell, delimiter) is not None for cell in header):
         _refuse(
@@ -143,8 +144,8 @@ def _name(cell: str) -> str:
 
 def _unit(cell: str) -> str | None:
     """What stands in brackets, or after the last underscore, blank or slash."""
-    found = re.search(r"[\[(]\s*(.*?)\s*[\])]", cell) or re.search(r"[_/\s]\s*([^\s_/]+)$", cell)
-    return found[1] if found else None
+    found = re.search(r"[\[(]([^\])]*)[\])]", cell) or re.search(r"[_/\s]([^\s_/]+)$", cell)
+    return found[1].strip() if found else None
 
 
 def _factor(path: object, kind: str, found: str | None, given: str | None) -> float:

@@ -148,9 +148,9 @@ def distribute_tension(
     scaled = _balance.scaled_balance(pose.length_jacobian, torque, low, high, length)
     problem = _balance.Scaled(*scaled)
     solution = _solve(problem, solver)
-    if solution is None:
+    if isinstance(solution, str):
         free = np.array([cable.name not in (fixed or {}) for cable in pose.arm.cables])
-        _explain(pose, problem, solver, free)
+        _explain(pose, problem, solver, solution, free)
     # within OPTIMALITY of the bounds already; a bound that is active is not crossed by rounding
     values = np.minimum(np.maximum(solution * problem.force, low), high)
     return Tension(
@@ -207,8 +207,12 @@ def _with_fixed(
     return frozen(low), frozen(high)
 
 
-def _solve(problem: _balance.Scaled, solver: str) -> Array | None:
-    """Return the verified optimum; None if the solver finds no solution."""
+def _solve(problem: _balance.Scaled, solver: str) -> Array | str:
+    """Return the verified optimum, or what is wrong with the solver's answer: there may be none.
+
+    Raises:
+        SolverError: It fails, or says too little to be verified.
+    """
     one_of("installed solver", solver, qpsolvers.available_solvers)
     A, b, low, high, *_ = problem
     sparse = csc_matrix if solver in qpsolvers.sparse_solvers else np.asarray
@@ -225,7 +229,7 @@ def _solve(problem: _balance.Scaled, solver: str) -> Array | None:
         raise SolverError(solver, f"failed: {error}. {_instead(solver)}") from error
     x = solution.x
     if not solution.found or x is None:
-        return None
+        return "found no solution"
     if solution.y is None or solution.z_box is None:
         raise SolverError(solver, f"returns no multipliers to verify it by. {_instead(solver)}")
     # the same as the solution's primal_residual, dual_residual and duality_gap, ten times faster
@@ -237,12 +241,7 @@ def _solve(problem: _balance.Scaled, solver: str) -> Array | None:
         point = _polished(problem, point)
         shortfall = _shortfall(problem, point)
         if shortfall:
-            held = abs(A).max(axis=1, initial=0.0)
-            if (abs(b[held == 0.0]) > OPTIMALITY).any():
-                return None  # a joint that no cable turns: there is nothing to solve
-            raise SolverError(
-                solver, f"calls a point optimal that is not: {shortfall}. {_instead(solver)}"
-            )
+            return f"calls a point optimal that is not: {shortfall}"
     return point[0]
 
 
@@ -282,14 +281,15 @@ def _polished(problem: _balance.Scaled, point: tuple[Array, ...]) -> tuple[Array
 
 
 def _explain(
-    pose: Posture, problem: _balance.Scaled, solver: str, free: NDArray[np.bool_]
+    pose: Posture, problem: _balance.Scaled, solver: str, fault: str, free: NDArray[np.bool_]
 ) -> NoReturn:
     """Settle by linear programs why a solver found no tensions, and raise it.
 
     Args:
         pose: The posture.
         problem: What was asked.
-        solver: What found nothing.
+        solver: What found none.
+        fault: What it did instead.
         free: The cables (C,) whose bounds may widen: all but those of fixed tension.
 
     Raises:
@@ -315,9 +315,8 @@ def _explain(
     if nearest.fun <= OPTIMALITY:
         raise SolverError(
             solver,
-            "found no solution, though one exists with tensions of up to "
-            f"{values.max() * force_scale:.2g} N: the arm is at the edge of what its cables can "
-            "hold. Change the posture, the load or the bounds, or try another solver.",
+            f"{fault}, though one exists with tensions of up to {values.max() * force_scale:.2g} N:"
+            f" the arm is at the edge of what its cables can hold. {_instead(solver)}",
         )
 
     # variables: F, then the widening t: low − t <= F <= high + t, and F >= 0 all the same; a fixed

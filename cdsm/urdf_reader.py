@@ -8,6 +8,7 @@ first: the XML, the tree, the joints and what they carry.
 from __future__ import annotations
 
 import os
+from collections import Counter
 
 import numpy as np
 from lxml import etree
@@ -28,6 +29,12 @@ _INSTEAD = {
 }
 
 _MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+
+_MOST_LINKS = 2000
+"""Pinocchio compares the name of each link with all others."""
+
+_LONGEST_CHAIN = 400
+"""Joints one behind the other, moving or not; ten times as many overflow Pinocchio's stack."""
 
 _LOOSE = 1e-2
 """Part of the largest moment of inertia by which rounded or estimated ones may miss each other."""
@@ -71,17 +78,19 @@ def _faults(robot: etree._Element, check_inertia: bool) -> list[str]:
     moving = sum(joint.get("type") in ("revolute", "prismatic") for joint in joints)
     if not moving:
         faults.append("has no joint that moves")
+    if len(links) > _MOST_LINKS:
+        faults.append(f"has {len(links)} links; {_MOST_LINKS} are taken at most")
     if moving > 2 * MAXIMUM_JOINTS:
         faults.append(f"has {moving} joints that move; {2 * MAXIMUM_JOINTS} are taken at most")
     return faults or _of_tree([str(link.get("name")) for link in links], joints)
 
 
 def _names(kind: str, elements: list[etree._Element]) -> list[str]:
-    names = [element.get("name") for element in elements]
+    counts = Counter(element.get("name") for element in elements)
     faults = [
         f"a <{kind}> on line {e.sourceline} has no name" for e in elements if not e.get("name")
     ]
-    twice = sorted({str(name) for name in names if name and names.count(name) > 1})
+    twice = sorted(str(name) for name, count in counts.items() if name and count > 1)
     return faults + [f"{kind} {name}: the name is used twice" for name in twice]
 
 
@@ -168,12 +177,14 @@ def _read(faults: list[str], where: str, text: str | None, count: int) -> tuple[
 def _of_tree(links: list[str], joints: list[etree._Element]) -> list[str]:
     """Of links (n,) with one parent each but for the root, and no way round."""
     faults: list[str] = []
+    known = set(links)
     parents: dict[str, tuple[str, str]] = {}
+    children: dict[str, list[str]] = {}
     for joint in joints:
         name = str(joint.get("name"))
         parent, child = (str(joint.find(end).get("link")) for end in ("parent", "child"))
         for link in (parent, child):
-            if link not in links:
+            if link not in known:
                 faults.append(f"joint {name}: there is no link {link}")
         if parent == child:
             faults.append(f"joint {name}: joins link {child} to itself")
@@ -183,15 +194,19 @@ def _of_tree(links: list[str], joints: list[etree._Element]) -> list[str]:
             )
         else:
             parents[child] = parent, name
+            children.setdefault(parent, []).append(child)
     if faults:
         return faults
     roots = [link for link in links if link not in parents]
     if len(roots) != 1:
         listed = ", ".join(roots) or "none"
         return [f"has the roots {listed}; one link that no joint carries is needed"]
-    reached, level = set(roots), set(roots)
+    reached, level, depth = set(roots), roots, -1
     while level:
-        level = {link for link, (parent, _) in parents.items() if parent in level}
-        reached |= level
+        depth += 1
+        level = [child for link in level for child in children.get(link, ())]
+        reached.update(level)
+    if depth > _LONGEST_CHAIN:
+        return [f"has {depth} joints one behind the other; {_LONGEST_CHAIN} are taken at most"]
     lost = [link for link in links if link not in reached]
     return [f"the links {', '.join(lost)} hang on each other in a circle"] if lost else []

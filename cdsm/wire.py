@@ -11,10 +11,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import PchipInterpolator, PPoly
 
-from cdsm._checks import Array, number_array, scalar
+from cdsm._checks import LARGEST, Array, number_array, scalar
 from cdsm._panels import Panels, coefficient_table, horner, panels
 from cdsm.elasticity import Domain, Elasticity
 from cdsm.errors import ElasticityRangeError, InvalidInput
+
+_LEVEL = 1e-13
+"""A slope of strain over tension this part of the steepest is rounding."""
 
 
 @final
@@ -197,13 +200,22 @@ class TabulatedElasticity(Elasticity):
             raise InvalidInput("strains", f"{len(rows[1])} given for {len(rows[0])} tensions.")
         if rows[0][0] < 0.0:
             raise InvalidInput("tensions", f"{rows[0][0]:g} N is negative; cables only pull.")
-        if not (self._curve.derivative()(rows[0]) > 0.0).all():
+        if not self._flattest > max(_LEVEL * self._curve(rows[0], 1).max(), 1.0 / LARGEST):
             raise InvalidInput("strains", "rise so unevenly that the rigidity is not finite.")
 
     @cached_property
     def _curve(self) -> PchipInterpolator:
         strains = np.array(self.strains)
         return PchipInterpolator(self.tensions, strains - strains[0], extrapolate=False)
+
+    @property
+    def _flattest(self) -> float:
+        """Smallest dε/dF [1/N]: at a point of the table, or where a piece between two turns."""
+        cubic, square = self._curve.c[:2]
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            turns = self._curve.x[:-1] - square / (3.0 * cubic)
+        turns = turns[(turns > self._curve.x[:-1]) & (turns < self._curve.x[1:])]
+        return float(self._curve(np.concatenate([self._curve.x, turns]), 1).min())
 
     @cached_property
     def _energy(self) -> PPoly:

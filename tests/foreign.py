@@ -13,12 +13,14 @@ _INERTIAL = (
 )
 
 
-def _link(name: str, mass: float = 0.0) -> str:
+def link_element(name: str, mass: float = 0.0) -> str:
     inside = _INERTIAL.format(mass, 0.1 * mass) if mass else ""
     return f'<link name="{name}">{inside}</link>'
 
 
-def _joint(name: str, kind: str, parent: str, child: str, xyz: str, rpy: str, axis: str) -> str:
+def joint_element(
+    name: str, kind: str, parent: str, child: str, xyz: str, rpy: str, axis: str
+) -> str:
     limit = "" if kind == "fixed" else '<limit lower="-0.9" upper="1.1" effort="1" velocity="1"/>'
     return (
         f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
@@ -29,21 +31,21 @@ def _joint(name: str, kind: str, parent: str, child: str, xyz: str, rpy: str, ax
 TREE = "".join(
     [
         '<robot name="crab">',
-        _link("floor"),
-        _link("trunk", 0.8),
-        _link("slider", 0.4),
-        _link("arm", 0.3),
-        _link("hand", 0.2),
-        _link("tail", 0.5),
-        _link("fin", 0.1),
-        _link("tip"),
-        _joint("a", "revolute", "floor", "trunk", "0.1 0 0.2", "0.1 0 0.3", "0 1 0"),
-        _joint("b", "prismatic", "trunk", "slider", "0.2 0.05 0", "0 0.2 0", "1 0.5 0"),
-        _joint("c", "revolute", "slider", "arm", "0.15 0 0", "0 0 0.4", "0 0.6 0.8"),
-        _joint("d", "prismatic", "arm", "hand", "0.1 0 0", "0.2 0 0", "0 0 1"),
-        _joint("e", "revolute", "trunk", "tail", "-0.1 0 0.1", "0 0.5 0", "1 0 1"),
-        _joint("f", "prismatic", "tail", "fin", "-0.1 0.1 0", "0 0 0", "0 1 0"),
-        _joint("g", "fixed", "hand", "tip", "0.08 0 0.02", "0 0.3 0", "1 0 0"),
+        link_element("floor"),
+        link_element("trunk", 0.8),
+        link_element("slider", 0.4),
+        link_element("arm", 0.3),
+        link_element("hand", 0.2),
+        link_element("tail", 0.5),
+        link_element("fin", 0.1),
+        link_element("tip"),
+        joint_element("a", "revolute", "floor", "trunk", "0.1 0 0.2", "0.1 0 0.3", "0 1 0"),
+        joint_element("b", "prismatic", "trunk", "slider", "0.2 0.05 0", "0 0.2 0", "1 0.5 0"),
+        joint_element("c", "revolute", "slider", "arm", "0.15 0 0", "0 0 0.4", "0 0.6 0.8"),
+        joint_element("d", "prismatic", "arm", "hand", "0.1 0 0", "0.2 0 0", "0 0 1"),
+        joint_element("e", "revolute", "trunk", "tail", "-0.1 0 0.1", "0 0.5 0", "1 0 1"),
+        joint_element("f", "prismatic", "tail", "fin", "-0.1 0.1 0", "0 0 0", "0 1 0"),
+        joint_element("g", "fixed", "hand", "tip", "0.08 0 0.02", "0 0.3 0", "1 0 0"),
         "</robot>",
     ]
 )

@@ -1147,3 +1147,27 @@ def test_own_elasticity_without_a_positive_rigidity_is_refused(
 def test_domain_and_rigidity_must_be_usable(make: Callable[[], object]) -> None:
     with pytest.raises(cdsm.InvalidInput):
         make()
+
+
+def test_a_solver_that_calls_the_infeasible_optimal_is_not_believed() -> None:
+    """One cable for two axes: DAQP finds an optimum, which balances nothing."""
+    sizes = {"link_length": 0.1, "base_length": 0.02, "disk_offset": 0.01, "hole_radius": 0.03}
+    geometry = cdsm.Geometry.universal(joints=1, cables_per_joint=1, link_mass=0.1, **sizes)  # type: ignore[arg-type]
+    for y, z in ((-0.0955, -0.4484), (0.1, 0.2), (-0.3, 0.05), (0.2, -0.6)):
+        with pytest.raises(cdsm.InfeasibleTension):
+            cdsm.distribute_tension(cdsm.Manipulator(geometry, STEEL).at([y, z]))
+
+
+def test_a_slight_torque_that_no_cable_exerts_is_missing_all_the_same() -> None:
+    """Less than HiGHS takes for nothing, 1e-7 of the largest, and more than is ever left over."""
+    geometry = cdsm.Geometry(
+        base_length=0.0,
+        hole_radius=0.01,
+        joints=(cdsm.Joint(axes=((0.0, 1.0, 0.0),), disk_offset=0.005),),
+        links=(cdsm.Link(length=0.016, mass=0.0),),
+        cables=(cdsm.CableRoute(joint=1, angle=0.0),),
+    )
+    pose = cdsm.Manipulator(geometry, STEEL).at([0.0])
+    with pytest.raises(cdsm.InfeasibleTension) as caught:
+        cdsm.distribute_tension(pose, minimum=1.0)
+    np.testing.assert_allclose(caught.value.missing, -pose.gravity_torque, rtol=1e-9)

@@ -348,3 +348,22 @@ def test_a_proof_of_infeasibility_is_accepted_and_its_opposite_refused() -> None
     high = frozen(np.array([math.inf, 10.0, 10.0, 10.0]))
     assert not certificates.is_infeasible(J2, np.array([1e6, 0.0]), low, high, v)
     assert certificates.is_infeasible(J2, np.array([-1e6, 0.0]), low, high, -v)
+
+
+def test_rounding_on_a_joint_that_no_cable_turns_is_no_missing_torque() -> None:
+    """A twist about x moves no hole apart: what gravity does there is 1e-20 N m, and nothing."""
+    twist = cdsm.Joint(axes=((1.0, 1e-18, 0.0),), disk_offset=0.01)
+    bend = cdsm.Joint(axes=((0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), disk_offset=0.01)
+    geometry = cdsm.Geometry(
+        base_length=0.05,
+        hole_radius=0.03,
+        joints=(bend, twist),
+        links=(cdsm.Link(length=0.05, mass=0.5),) * 2,
+        cables=tuple(cdsm.CableRoute(joint=k, angle=2.1 * j) for k in (1, 2) for j in range(3)),
+    )
+    arm = cdsm.Manipulator(geometry, cdsm.LinearElasticity(1e5), gravity=(-1.0, 9.0, -0.3))
+    q = np.zeros(3)
+    single = cdsm.distribute_tension(arm.at(q), 5.0)
+    batch = cdsm.distribute_tensions(arm, [q], 5.0)
+    assert batch.status.tolist() == [cdsm.Status.OK]
+    np.testing.assert_allclose(batch.values[0], single.values, rtol=1e-9)

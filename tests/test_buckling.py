@@ -8,7 +8,7 @@ import pytest
 
 import cdsm
 from cdsm._checks import Array
-from tests.arms import mixed_arm, random_posture
+from tests.arms import mixed_arm, random_arm, random_posture
 
 SPRING, RADIUS, OFFSET, LENGTH = 1890.0, 0.02, 0.01, 0.1
 
@@ -253,3 +253,12 @@ def test_one_cable_holds_a_weight_on_one_side_only(up: float) -> None:
         # its tension is what statics say, so the bound can rise no further than that
         weight = 9.81 * LENGTH / 2.0 / RADIUS
         assert found.examined[1] == pytest.approx(weight, rel=1e-6)
+
+
+def test_what_the_cables_may_carry_ends_what_is_examined() -> None:
+    geometry = random_arm(3, 2).geometry
+    cables = cdsm.serpentine_cables(geometry, cdsm.LinearElasticity(1e5))
+    bounded = [replace(cable, maximum=80.0 + c) for c, cable in enumerate(cables)]
+    arm = cdsm.Manipulator(geometry, cables=bounded, gravity=(0.0, 0.0, 0.0))
+    found = cdsm.critical_tension(arm.at(np.zeros(arm.nv)))
+    assert found.examined[1] == pytest.approx(80.0, rel=1e-9)

@@ -5,7 +5,6 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-import hypothesis.strategies as st
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -13,6 +12,7 @@ from hypothesis import given, settings
 import cdsm
 from cdsm._files import MAXIMUM_BYTES
 from tests.arms import mixed_arm
+from tests.strategies import geometries
 
 SIZES: dict[str, Any] = {
     "link_length": 0.04,
@@ -134,51 +134,9 @@ def test_equal_geometries_are_equal_and_hash_alike() -> None:
 
 # --- TOML -----------------------------------------------------------------------------------
 
-lengths = st.floats(1e-6, 1e3)
-angles = st.floats(-1e3, 1e3)
-
-
-@st.composite
-def geometries(draw: st.DrawFn) -> cdsm.Geometry:
-    """Any valid geometry of up to four joints."""
-    components = st.tuples(*[st.floats(-10.0, 10.0)] * 3)
-    hinge = components.filter(lambda axis: math.hypot(*axis) > 1e-3).map(lambda axis: (axis,))
-    two = st.tuples(components, components).filter(lambda pair: math.hypot(*np.cross(*pair)) > 1e-3)
-    axes: st.SearchStrategy[tuple[tuple[float, float, float], ...]] = st.one_of(hinge, two)
-    count = draw(st.integers(1, 4))
-    joints = [
-        cdsm.Joint(
-            axes=draw(axes),
-            disk_offset=draw(lengths),
-            limit=draw(st.none() | st.floats(1e-6, math.pi)),
-        )
-        for _ in range(count)
-    ]
-    offsets = [*(joint.disk_offset for joint in joints), 0.0]
-    return cdsm.Geometry(
-        name=draw(st.from_regex(r"[A-Za-z][A-Za-z0-9_]{0,63}", fullmatch=True)),
-        base_length=draw(st.floats(0.0, 1e3)),
-        hole_radius=draw(lengths),
-        joints=tuple(joints),
-        links=tuple(
-            cdsm.Link(
-                length=offsets[k] + offsets[k + 1] + draw(lengths), mass=draw(st.floats(0.0, 1e3))
-            )
-            for k in range(count)
-        ),
-        cables=tuple(
-            cdsm.CableRoute(
-                joint=draw(st.integers(1, count)),
-                angle=draw(angles),
-                lead=draw(st.floats(0.0, 1e3)),
-            )
-            for _ in range(draw(st.integers(1, 4)))
-        ),
-    )
-
 
 @settings(max_examples=60, deadline=None, database=None)
-@given(geometry=geometries())
+@given(geometry=geometries(4))
 def test_toml_round_trip_is_exact_and_stable(geometry: cdsm.Geometry) -> None:
     text = geometry.to_toml()
     again = cdsm.Geometry.from_toml(text)

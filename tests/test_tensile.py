@@ -376,3 +376,11 @@ def test_other_bad_arguments_are_refused() -> None:
     bent = 500.0 * (RAMP / RAMP[-1]) ** 0.2  # softens from the first point on: never elastic
     with pytest.raises(cdsm.TensileTestError, match="Sample more finely"):
         cdsm.fit_tensile_test(RAMP, bent, GAUGE)
+
+
+@pytest.mark.parametrize("cell", ["1" * 200_000, "1" * 2000, '"' + "1" * 200_000])
+def test_a_cell_longer_than_any_number_is_refused_with_its_line(cell: str, tmp_path: Path) -> None:
+    path = tmp_path / "test.csv"
+    path.write_text(f"displacement [mm],force [N]\n{cell},2\n", encoding="utf-8")
+    with pytest.raises(cdsm.FileError, match="line 2"):
+        cdsm.read_tensile_csv(path, gauge_length=0.5)

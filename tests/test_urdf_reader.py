@@ -163,3 +163,15 @@ def test_two_hundred_joints_are_too_many_only_above_the_cap() -> None:
     read_urdf(arm(200))
     with pytest.raises(cdsm.UrdfError, match="201 joints that move; 200 are taken"):
         read_urdf(arm(201))
+
+
+def test_a_chain_that_would_overflow_the_stack_is_refused() -> None:
+    links = "".join(f'<link name="l{i}"/>' for i in range(1001))
+    joint = '<joint name="j{0}" type="{2}"><parent link="l{0}"/><child link="l{1}"/>{3}</joint>'
+    limit = '<limit lower="-1" upper="1" effort="1" velocity="1"/>'
+    joints = "".join(
+        joint.format(i, i + 1, "fixed" if i else "revolute", "" if i else limit)
+        for i in range(1000)
+    )
+    with pytest.raises(cdsm.UrdfError, match="1000 joints one behind the other; 400 are taken"):
+        read_urdf(f'<robot name="r">{links}{joints}</robot>')

@@ -17,6 +17,12 @@ OPTIMALITY = 1e-11
 _PROOF = 1e-8
 """What a proof of infeasibility has to leave over, relative to the terms it is the sum of."""
 
+_SLIGHT = 1e-8
+"""A missing torque this part of the largest arm times the largest force may be rounding.
+
+Ten times what :func:`~cdsm.tension.distribute_tension` accepts, so that it decides what is near.
+"""
+
 _NOTHING = 1e-11
 """A torque this part of the largest is rounding, where a cable may pull as much as it likes."""
 
@@ -60,12 +66,17 @@ def is_optimal(J: Array, b: Array, low: Array, high: Array, F: Array, y: Array) 
 @compiled
 def is_infeasible(J: Array, b: Array, low: Array, high: Array, v: Array) -> bool:
     """Whether v (nv,) proves that no F balances: vᵀb is above vᵀJ_Lᵀ F for all F within bounds."""
-    largest = left = size = 0.0
+    largest = left = size = steepest = arm = torques = force = 0.0
     for c in range(J.shape[0]):
         largest = max(largest, abs(torque_of(J, c, v)))
+        force = max(force, low[c])
+        for i in range(b.shape[0]):
+            arm = max(arm, abs(J[c, i]))
     for i in range(b.shape[0]):
         left += v[i] * b[i]
         size += abs(v[i] * b[i])
+        steepest = max(steepest, abs(v[i]))
+        torques = max(torques, abs(b[i]))
     for c in range(J.shape[0]):
         torque = torque_of(J, c, v)
         bound = high[c] if torque > 0.0 else low[c]
@@ -75,4 +86,6 @@ def is_infeasible(J: Array, b: Array, low: Array, high: Array, v: Array) -> bool
             continue
         left -= torque * bound
         size += abs(torque * bound)
-    return left > _PROOF * size
+    if not arm > 0.0:
+        arm = 1.0  # no cable turns any joint: as distribute_tension does
+    return left > max(_PROOF * size, _SLIGHT * steepest * max(torques, arm * force))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -84,9 +85,10 @@ def read_bodies(path: Path) -> tuple[Body, ...]:
     holders = root.findall("links")
     elements = [element for holder in holders for element in holder]
     names = [str(element.get("name") or "") for element in elements]
+    counts = Counter(names)
     bodies = []
     for element, name in zip(elements, names, strict=True):
-        unique = name and names.count(name) == 1 and name not in (BASE, TIP)
+        unique = name and counts[name] == 1 and name not in (BASE, TIP)
         try:
             bodies.append(_body(element, name if unique else f"link{element.get('num')}"))
         except XmlFault as error:

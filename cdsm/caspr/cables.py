@@ -40,7 +40,7 @@ def read_cables(
         raise UnknownName("set of cables", name, tuple(sets))
     faults: list[str] = []
     cables: list[Cable] = []
-    used: set[str] = set()
+    used: dict[str, int] = {}
     for element in sets[name]:
         label = _unique(str(element.get("name") or f"cable{len(cables) + 1}"), used)
         try:
@@ -54,13 +54,19 @@ def read_cables(
     return tuple(cables)
 
 
-def _unique(name: str, used: set[str]) -> str:
-    """The name, with a number behind it if it has been used; CASPR lets names repeat."""
-    label, count = name, 1
+def _unique(name: str, used: dict[str, int]) -> str:
+    """The name, with a number behind it if it has been used; CASPR lets names repeat.
+
+    Args:
+        name: As it stands in the file.
+        used: The highest number behind each label so far; filled.
+    """
+    label, count = name, used.get(name, 1)
     while label in used:
         count += 1
         label = f"{name} #{count}"
-    used.add(label)
+    used[name] = count
+    used[label] = 1 if label != name else count
     return label
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import math
 import re
 from pathlib import Path
@@ -11,7 +10,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from cdsm._checks import Array
-from cdsm._files import read_text
+from cdsm._files import csv_cells, read_text
 from cdsm.errors import FileError
 from cdsm.manipulator import Manipulator
 
@@ -48,7 +47,7 @@ def read_path(path: Path, arm: Manipulator) -> PathFile:
     """
     lines = [(k, line) for k, line in enumerate(read_text(path).splitlines(), 1) if line.strip()]
     lines = [(k, line) for k, line in lines if not line.lstrip().startswith("#")]
-    rows = [(k, [cell.strip() for cell in next(csv.reader([line]))]) for k, line in lines]
+    rows = [(k, csv_cells(path, k, line)) for k, line in lines]
     if len(rows) < 2:
         raise FileError(path, "holds no path; a header and one line per sample are needed.")
     units: dict[str, tuple[int, str]] = {}

@@ -122,6 +122,8 @@ def _read_netcdf(path: Path) -> xarray.Dataset:
 
     if not path.exists():
         raise FileError(path, f"does not exist (looked in {Path.cwd()}).")
+    if not path.is_file():  # a pipe that nobody writes to would be waited for
+        raise FileError(path, "is not a regular file; give the path of a file.")
     try:
         with xarray.open_dataset(path, engine="netcdf4") as found:
             return found.load()

@@ -77,6 +77,9 @@ def read(path: Path) -> xarray.Dataset:
     """
     import xarray
 
+    for described in (path / "zarr.json", *path.glob("*/zarr.json")):
+        if described.exists() and not described.is_file():  # a pipe would be waited for
+            raise FileError(path, f"is not a sweep's store: {described.name} is not a file.")
     try:
         found: xarray.Dataset = xarray.open_zarr(path, chunks=None, consolidated=False)
     except Exception as error:  # whatever zarr, its codecs or the file system raise
