@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from cdsm._checks import Array, ReadOnlyState, frozen
 from cdsm.elasticity import Elasticity, LinearElasticity
-from cdsm.errors import ElasticityRangeError, InvalidInput
+from cdsm.errors import ElasticityRangeError, InvalidInput, SingularStiffness
 from cdsm.planning.admissible import Admissible
 from cdsm.planning.field import Point, Reading
 from cdsm.planning.problem import Problem, along, checked_direction, count, problem
@@ -173,7 +173,8 @@ class End(NamedTuple):
         point: Where the best search ended.
         tension: The tensions there, their balance exact.
         value: The stiffness along the direction under them [N/m], a rounding off that of the
-            search; next to buckling, where all of it is left of a difference, more than that.
+            search; next to buckling, where all of it is left of a difference, more than that, or
+            that of the search.
         values: What all searches for it ended with (S,) [N/m], its own first.
         open: Whether it is only as far as unbounded tensions were followed, and they lead on.
     """
@@ -232,7 +233,11 @@ def _ends(question: Problem, u: Array, starts: int, seed: int) -> Ends:
         values = unit * np.array([each.sight.values[0] for each in found])
         point = found[0].sight.point
         tension = region.tension(point.F)
-        return End(point, tension, stiffness(question.pose, tension).along(u), frozen(values))
+        try:
+            value = stiffness(question.pose, tension).along(u)
+        except SingularStiffness:  # so near to buckling that an inverse has hardly a digit
+            value = float(values[0])
+        return End(point, tension, value, frozen(values))
 
     low = end(LOWEST, [*order[:starts], *inside, ground.anchor])
     upward = order[: -(_UPWARD // 2 if rise else starts) - 1 : -1]
