@@ -109,7 +109,8 @@ def read_cables(path: str | os.PathLike[str]) -> tuple[Cable, ...]:
         return _built(parse(_Entries, data), _wires(wires))
     except GeometryError as error:
         faults = error.faults
-    raise FileError(path, f"cannot be read as cables, {len(faults)} faults:{listed(faults)}")
+    count = f"{len(faults)} faults" if len(faults) != 1 else "1 fault"
+    raise FileError(path, f"cannot be read as cables, {count}:{listed(faults)}")
 
 
 def _wires(tables: dict[str, object]) -> dict[str, Elasticity]:

@@ -22,6 +22,9 @@ def listed(faults: Sequence[str], most: int | None = None) -> str:
     return "".join(f"\n  - {fault}" for fault in faults[:most]) + more
 
 
+_NAMED = 4
+"""Joints or cables that a message names; all are in the data of its error."""
+
 LONGEST = 8000
 """Characters of a message; a file can hold a name of megabytes, and the rest helps nobody."""
 
@@ -164,10 +167,10 @@ class JointLimitError(CdsmError, ValueError):
     """A joint angle beyond its limit.
 
     Attributes:
-        problem: Which angles are beyond which limits.
+        problem: Which angles are beyond which limits, the first few of them.
         joints: Names of the offending joints.
-        angles: Their angles [rad].
-        limits: Their (lower, upper) limits [rad].
+        angles: Their angles [rad]; [m] where a joint slides.
+        limits: Their (lower, upper) limits [rad]; [m] where a joint slides.
     """
 
     def __init__(
@@ -175,17 +178,23 @@ class JointLimitError(CdsmError, ValueError):
         joints: Sequence[str],
         angles: Sequence[float],
         limits: Sequence[tuple[float, float]],
+        slides: Sequence[bool] = (),
     ) -> None:
         self.joints = tuple(joints)
         self.angles = tuple(float(angle) for angle in angles)
         self.limits = tuple((float(low), float(high)) for low, high in limits)
-        self.problem = "; ".join(
-            f"{joint} = {angle:.6g} rad is outside [{low:.6g}, {high:.6g}] rad"
-            for joint, angle, (low, high) in zip(self.joints, self.angles, self.limits, strict=True)
-        )
+        units = ["m" if slide else "rad" for slide in slides or [False] * len(self.joints)]
+        said = [
+            f"{joint} = {angle:.6g} {unit} is outside [{low:.6g}, {high:.6g}] {unit}"
+            for joint, angle, (low, high), unit in zip(
+                self.joints, self.angles, self.limits, units, strict=True
+            )
+        ]
+        more = len(said) - _NAMED
+        self.problem = "; ".join(said[:_NAMED]) + (f"; and {more} joints more" if more > 0 else "")
         super().__init__(
-            f"{self.problem}. Stay inside the limits, widen joint_limit in the geometry, "
-            "or, in Python, pass check_limits=False to compute beyond them."
+            f"{self.problem}. Stay inside the limits, widen joint_limit in the geometry (limit "
+            "in a URDF), or, in Python, pass check_limits=False to compute beyond them."
         )
 
 
@@ -210,10 +219,9 @@ class ElasticityRangeError(CdsmError, ValueError):
         self.tension = tuple(float(value) for value in tension)
         self.indices = tuple(int(index) for index in indices)
         self.cables = tuple(cables)
-        names = f" (cable {', '.join(self.cables)})" if self.cables else ""
-        values = ", ".join(f"{value:.6g}" for value in self.tension[:8])
-        more = ", …" if len(self.tension) > 8 else ""
-        super().__init__(f"tension {values}{more} N{names}: {problem}")
+        names = f" (cable {_first(self.cables)})" if self.cables else ""
+        values = _first([f"{value:.6g}" for value in self.tension])
+        super().__init__(f"tension {values} N{names}: {problem}")
 
 
 class InfeasibleTension(CdsmError):
@@ -257,6 +265,10 @@ class InfeasibleTension(CdsmError):
                 "maximum, or reduce the load."
             )
         super().__init__(message)
+
+
+def _first(words: Sequence[str]) -> str:
+    return ", ".join(words[:_NAMED]) + (", …" if len(words) > _NAMED else "")
 
 
 def _rounded_up(value: float) -> str:

@@ -271,11 +271,17 @@ class Geometry(Printed):
                 raise GeometryError(
                     [f"holds {found}; give a table [universal] or [hinged], or the full form"]
                 )
+            if kind is None and not data.keys() & {"joints", "links"}:
+                raise GeometryError(
+                    ["holds cables but no joints: give a file of cables beside the arm it is for"]
+                )
             if kind is None:
                 return parse(cls, data)
             if len(data) > 1:
                 others = ", ".join(key for key in data if key != kind)
-                raise GeometryError([f"{others}: not known beside [{kind}], which says it all"])
+                raise GeometryError(
+                    [f"{others}: stands outside [{kind}], which says it all; move it in, or away"]
+                )
             return cls(**parse(short[kind], data[kind]).fields())
         except GeometryError as error:
             raise GeometryError(error.faults, source) from None

@@ -225,6 +225,12 @@ class Manipulator(Printed):
             return "N"
         return "N m or N" if slides.any() else "N m"
 
+    def stiffness_unit(self) -> str:
+        """Unit of the diagonal of K_θ and of its eigenvalues: N/m where joints slide."""
+        if self.slides.all():
+            return "N/m"
+        return "N m/rad or N/m" if self.slides.any() else "N m/rad"
+
     @property
     def lower(self) -> Array:
         """Lower joint limits (nv,) [rad]; [m] where a joint slides."""
@@ -324,6 +330,7 @@ class Manipulator(Printed):
                     [self.joint_names[i] for i in np.flatnonzero(beyond)],
                     q[beyond].tolist(),
                     list(zip(self.lower[beyond], self.upper[beyond], strict=True)),
+                    self.slides[beyond].tolist(),
                 )
         return q
 

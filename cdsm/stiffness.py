@@ -288,8 +288,7 @@ class Stiffness(ReadOnlyState):
     @property
     def _verdict(self) -> str:
         state = "stable" if self.is_stable else "UNSTABLE: K_θ is not positive definite"
-        slides = self.posture.arm.slides
-        unit = "N/m" if slides.all() else "N m/rad or N/m" if slides.any() else "N m/rad"
+        unit = self.posture.arm.stiffness_unit()
         return f"{state}, smallest joint stiffness {self.margin:.4g} {unit}"
 
     @cached_property

@@ -207,13 +207,22 @@ def _with_fixed(
     return frozen(low), frozen(high)
 
 
+def installed_solver(solver: str) -> str:
+    """The name of a solver, checked.
+
+    Raises:
+        UnknownName: No such solver is installed.
+    """
+    return one_of("installed solver", solver, qpsolvers.available_solvers)
+
+
 def _solve(problem: _balance.Scaled, solver: str) -> Array | str:
     """Return the verified optimum, or what is wrong with the solver's answer: there may be none.
 
     Raises:
         SolverError: It fails, or says too little to be verified.
     """
-    one_of("installed solver", solver, qpsolvers.available_solvers)
+    installed_solver(solver)
     A, b, low, high, *_ = problem
     sparse = csc_matrix if solver in qpsolvers.sparse_solvers else np.asarray
     identity, nothing = np.eye(low.size), np.zeros(low.size)

@@ -16,6 +16,7 @@ import cdsm
 from cdsm import _balance
 from cdsm._checks import Array
 from cdsm.tension import _shortfall
+from tests import foreign
 from tests.arms import STEEL, mixed_arm, random_arm, random_posture, random_tension, random_wrench
 
 Case = tuple[Callable[[], object], type[cdsm.CdsmError], tuple[str, ...]]
@@ -634,6 +635,24 @@ def test_angles_beyond_their_limits_are_an_error_with_data() -> None:
     for part in ("joint1_2 = 2 rad", "joint3_1 = -0.41 rad", "[-0.4, 0.4]", "check_limits=False"):
         assert part in str(caught.value)
     assert np.isfinite(arm.at(q, check_limits=False).tip).all()
+
+
+def test_only_the_first_joints_beyond_their_limits_are_named() -> None:
+    q = np.full(ARM.nv, 3.0)
+    with pytest.raises(cdsm.JointLimitError) as caught:
+        ARM.at(q)
+    assert len(caught.value.joints) == ARM.nv
+    assert str(caught.value).count("is outside") == 4
+    assert f"; and {ARM.nv - 4} joints more." in str(caught.value)
+
+
+def test_ways_beyond_their_limits_are_in_metres() -> None:
+    q = foreign.POSTURE.copy()
+    q[[0, 1]] = 2.0
+    with pytest.raises(cdsm.JointLimitError) as caught:
+        foreign.crab().at(q)
+    for part in ("a = 2 rad is outside [-0.9, 1.1] rad", "b = 2 m is outside [-0.9, 1.1] m"):
+        assert part in str(caught.value)
 
 
 def test_angles_at_their_limits_are_inside_even_through_degrees() -> None:

@@ -444,6 +444,13 @@ def test_robot_that_slides_is_asked_for_and_told_in_millimetres(
     assert told["angles_rad"] == {}
     # k = EA/l of both cables, 0.22 and 0.18 m long
     np.testing.assert_allclose(told["along_N_per_m"][0], 400 / 0.22 + 400 / 0.18, rtol=1e-12)
+    # two ways through the same sum of two cables
+    np.testing.assert_allclose(told["margin_N_per_m"], told["along_N_per_m"][0], rtol=1e-12)
+    assert "static_residual_N" in told
+    assert told["joint_stiffness_N_per_m"] == [[told["margin_N_per_m"]]]
+    checked = call("check", *rail, "--angles", 20)
+    assert "eigenvalue of the symmetric part of K_θ: 4040 N/m, stable" in checked.stdout
+    assert "counts with the arm's length, 0.2 m, as lever" in " ".join(checked.stdout.split())
     text = call("stiffness", *rail, "--angles", 20).stdout
     assert "static residual: 0.0e+00 N\n" in text
     assert "smallest joint stiffness 4040 N/m" in text
@@ -453,9 +460,11 @@ def test_robot_that_slides_is_asked_for_and_told_in_millimetres(
 
 def test_sweep_along_a_slide(rail: tuple[object, ...], tmp_path: Path) -> None:
     out, path = tmp_path / "s.nc", tmp_path / "path.csv"
-    result = call("sweep", *rail, "--grid", "way=-20:20:3", "--quantities", "along", "-o", out)
+    names = "along,margin,gravity_torque"
+    result = call("sweep", *rail, "--grid", "way=-20:20:3", "--quantities", names, "-o", out)
     assert result.exit_code == 0, result.output
     found = cdsm.read_sweep(out)
+    assert (found.margin.units, found.gravity_torque.units) == ("N m-1", "N")
     np.testing.assert_allclose(found.way, [-0.02, 0.0, 0.02], rtol=1e-15)
     assert found.way.attrs["units"] == "m"
     k = [400 / 0.22 + 400 / 0.18, 4000.0, 400 / 0.22 + 400 / 0.18]
@@ -469,6 +478,19 @@ def test_sweep_along_a_slide(rail: tuple[object, ...], tmp_path: Path) -> None:
     path.write_text("way [deg]\n-20\n20\n", encoding="utf-8")
     result = call("sweep", *rail, "--path", path, "-o", out)
     assert "call it way [mm] or way [m]" in result.stderr
+
+
+def test_path_along_a_slide_of_which_nothing_can_be_planned(
+    rail: tuple[object, ...], tmp_path: Path
+) -> None:
+    path, out, picture = tmp_path / "path.csv", tmp_path / "motors.csv", tmp_path / "path.png"
+    path.write_text("way [mm]\n-20\n20\n", encoding="utf-8")
+    wanted = ("--direction", "1,0,0", "--target", 9e3, "--max-tension", 100)
+    result = call("plan", *rail, *wanted, "--path", path, "-o", out, "--figure", picture)
+    assert result.exit_code == 0, result.output
+    assert "0 of 2 samples planned" in result.stdout
+    assert out.read_text(encoding="utf-8").startswith("sample,status,way [m],left tension [N]")
+    assert picture.read_bytes().startswith(b"\x89PNG")
 
 
 def test_folder_of_a_caspr_model_is_an_arm(tmp_path: Path) -> None:

@@ -355,6 +355,8 @@ NOT_A_GEOMETRY = {
     "nested 300 deep": "joints = " + "[" * 300 + "]" * 300,
     "nested tables": "\n".join(f"[{'.'.join(['a'] * n)}]" for n in range(1, 400)),
     "short form that is no table": "universal = 3",
+    "outside the table": 'name = "a"\n[universal]\njoints = 3\n',
+    "a file of cables": '[[cables]]\nname = "a"\n',
     "two short forms": "[universal]\n[hinged]\n",
     "short form empty": "[hinged]",
     "joints a number": "joints = 3",
@@ -369,6 +371,15 @@ def test_text_that_is_no_geometry_is_a_geometry_error(case: str) -> None:
     assert str(caught.value).startswith("arm.toml: ")
     assert caught.value.source == "arm.toml"
     assert len(str(caught.value)) < 2000
+
+
+def test_what_is_no_geometry_says_what_to_do() -> None:
+    for case, said in (
+        ("outside the table", r"name: stands outside \[universal\].*move it in"),
+        ("a file of cables", "holds cables but no joints"),
+    ):
+        with pytest.raises(cdsm.GeometryError, match=said):
+            cdsm.Geometry.from_toml(NOT_A_GEOMETRY[case])
 
 
 def test_broken_toml_says_where() -> None:

@@ -437,7 +437,7 @@ def test_what_is_printed_sums_up_and_names(
     lines = str(plan).splitlines()
     assert lines[0].startswith("3 of 6 samples planned, with 50 to ")
     assert "N per step" in lines[0]
-    assert lines[1].startswith("samples 2 to 3: stiffness: no admissible tensions")
+    assert lines[1].startswith("samples 2 to 3: stiffness, the first of them: no admissible")
     assert lines[2].startswith("sample 5: stiffness")
     assert len(lines) == 3
     assert repr(plan) == "<PathPlan of 3 of 6 samples>"

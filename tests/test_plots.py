@@ -178,6 +178,28 @@ def test_plan_is_drawn_between_the_softest_and_the_stiffest_tensions() -> None:
         plots.plot_stiffness_plan(plan, other)
 
 
+def test_path_of_which_nothing_is_planned_is_drawn() -> None:
+    arm = cdsm.presets.virtual_prototype()
+    plan = cdsm.plan_path(arm, (0.0, 0.0, 1.0), [1e7, 2e7], 50.0, angles=np.full((2, 10), 0.15))
+    assert plan.planned == ()
+    above, below = plots.plot_path_plan(plan).axes
+    wanted, held = above.get_lines()
+    assert np.nanmax(_shown(wanted)[1]) == 2e4
+    assert np.isnan(_shown(held)[1]).all()
+    assert all(np.isnan(_shown(line)[1]).all() for line in below.get_lines())
+    # the reason is that of the first alone: the ranges and targets of the others differ
+    assert "samples 0 to 1: stiffness, the first of them: no admissible" in str(plan)
+
+
+def test_a_single_bound_of_joints_that_slide_is_a_point_with_both_units() -> None:
+    critical = cdsm.critical_tension(crab(gravity=(0.0, 0.0, 0.0)).at(POSTURE))
+    assert critical.examined == (0.0, 0.0)  # its cables balance it slack, and no other way
+    (axes,) = plots.plot_critical_tension(critical).axes
+    assert axes.get_ylabel() == "smallest joint stiffness [N m/rad or N/m]"
+    assert axes.get_xlim() == (0.0, 1.0)
+    assert axes.get_lines()[0].get_marker() == "o"
+
+
 def test_path_is_drawn_with_gaps_where_nothing_is_planned() -> None:
     arm = cdsm.presets.virtual_prototype()
     targets = np.array([80e3, 82e3, 1e7, 86e3, 1e7])

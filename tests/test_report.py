@@ -423,6 +423,19 @@ def test_tensions_out_of_balance_are_a_fault_with_the_joint_and_the_torque() -> 
     assert "0.3 N m are left, most at joint1" in report.faults[0]
 
 
+def test_joints_that_slide_are_compared_by_their_lever_where_balance_is_missed() -> None:
+    # out of balance by 84.7 N at f, the largest number; by more torque, 66.7 N m, at a
+    K = cdsm.stiffness(
+        foreign.crab().at(foreign.POSTURE), foreign.TENSION, wrench=(0, 0, 0, 0, 75.0, 0)
+    )
+    arm = K.posture.arm
+    assert arm.joint_names[int(abs(K.residual).argmax())] == "f"
+    report = K.report()
+    assert (report.residual_joint, report.residual) == ("a", abs(K.residual[0]))
+    assert abs(K.residual[5]) * arm.length < report.residual
+    assert "left, most at a," in next(each for each in report.faults if "balance" in each)
+
+
 # --- ranks, stability, laws, readings ---------------------------------------------------------
 
 

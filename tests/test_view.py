@@ -25,7 +25,7 @@ from cdsm.view import Condition, Setting, View, serve, show
 from cdsm.view.newest import Newest
 from cdsm.view.ranges import joint_sliders, slider
 from cdsm.view.state import GREY
-from cdsm.view.text import page_text
+from cdsm.view.text import _direction, page_text
 from tests import foreign
 from tests.arms import mixed_arm, random_posture
 
@@ -197,6 +197,19 @@ def test_names_and_messages_are_text_and_not_markup() -> None:
     weightless = show(arm, Setting(q=foreign.POSTURE, minimum=0.0, force=np.zeros(3)))
     assert weightless.tension is not None
     assert "&lt;b&gt;c" in page_text(weightless)
+
+
+def test_units_are_those_of_joints_that_slide() -> None:
+    arm = foreign.crab(gravity=(0.0, 0.0, 0.0))
+    shown = show(arm, Setting(q=foreign.POSTURE, minimum=0.0, force=np.zeros(3)))
+    assert shown.stiffness is not None
+    assert "N m/rad or N/m</td>" in page_text(shown)
+    turning = show(soft_arm(), setting(soft_arm()))
+    assert "N m/rad</td>" in page_text(turning)
+
+
+def test_no_direction_has_a_negative_zero() -> None:
+    assert _direction(np.array([-1e-9, 1.0, -0.004])) == "(0.00, 1.00, 0.00)"
 
 
 # --- sliders ------------------------------------------------------------------------------------
@@ -386,6 +399,7 @@ def test_a_port_in_use_is_named_and_nothing_is_left_running() -> None:
         ({"largest_force": math.nan}, "largest_force"),
         ({"q": np.full(6, 3.0)}, "joint1_1"),
         ({"q": [0.0]}, "q: shape"),
+        ({"solver": "no such"}, "no installed solver is called 'no such'"),
     ],
 )
 @needs_viser

@@ -10,6 +10,7 @@ import numpy as np
 import typer
 
 from cdsm._checks import Array
+from cdsm._units import key
 from cdsm.cli.options import (
     Angles,
     ArmOptions,
@@ -28,7 +29,7 @@ from cdsm.urdf import write_urdf
 
 
 def urdf(
-    geometry: Annotated[Path, typer.Argument(metavar="GEOMETRY.toml", help="Geometry to read.")],
+    geometry: Annotated[Path, typer.Argument(metavar="ARM.toml", help="Geometry to read.")],
     output: Annotated[Path, typer.Option("--output", "-o", help="URDF file to write.")],
     as_json: AsJson = False,
 ) -> None:
@@ -70,6 +71,7 @@ def _to_dict(pull: Tension, K: Stiffness) -> dict[str, object]:
         return values
 
     pose = pull.posture
+    unit = pose.arm.stiffness_unit()
     along = [K.along(axis) for axis in np.eye(3)]
     return {
         **joints_to_dict(pose.arm, pose.q),
@@ -79,12 +81,12 @@ def _to_dict(pull: Tension, K: Stiffness) -> dict[str, object]:
             for cable, value in zip(pose.arm.cables, pull.values.tolist(), strict=True)
         },
         "cable_length_m": pose.cable_lengths.tolist(),
-        "static_residual_Nm": K.residual.tolist(),
+        key("static_residual", pose.arm.torque_unit()): K.residual.tolist(),
         "along_N_per_m": [value if np.isfinite(value) else None for value in along],
         "cartesian_N_per_m": matrix(lambda: K.cartesian),
         "pseudoinverse_N_per_m": matrix(K.pseudoinverse),
         "compliance": matrix(lambda: K.compliance),
-        "joint_stiffness_Nm_per_rad": K.joint.tolist(),
-        "margin_Nm_per_rad": K.margin,
+        key("joint_stiffness", unit): K.joint.tolist(),
+        key("margin", unit): K.margin,
         "stable": K.is_stable,
     }

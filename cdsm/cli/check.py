@@ -33,8 +33,8 @@ def check(
 ) -> None:
     """Check a stiffness: derive it anew by differences, and report all that speaks against it.
 
-    The options are those of `cdsm stiffness`. Exit code 0: it can be trusted; 3: it cannot, and the
-    report says why.
+    The options are those of `cdsm stiffness`.
+    Exit code 0: it can be trusted; 3: it cannot, and the report says why.
     """
     with reported():
         pose = arm.at(angles)

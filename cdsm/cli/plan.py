@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 import typer
 
 from cdsm._files import write_file
+from cdsm._units import key
 from cdsm.cli.options import (
     NO_WRENCH,
     Angles,
@@ -166,7 +167,7 @@ def _plan_to_dict(plan: StiffnessPlan, attainable: StiffnessRange) -> dict[str, 
         "tension_N": dict(zip(names, plan.tension.values.tolist(), strict=True)),
         "cable_length_m": dict(zip(names, pose.cable_lengths.tolist(), strict=True)),
         **joints_to_dict(pose.arm, pose.q),
-        "margin_Nm_per_rad": plan.stiffness.margin,
+        key("margin", pose.arm.stiffness_unit()): plan.stiffness.margin,
         "efforts_N": plan.efforts.tolist(),
         "iterations": plan.iterations,
     }

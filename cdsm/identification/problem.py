@@ -110,7 +110,8 @@ class Problem:
             problem = (
                 "the tip cannot move in its direction, so the stiffness is infinite."
                 if K.is_stable
-                else f"the arm buckles: the smallest stiffness is {K.margin:.3g} N m/rad."
+                else f"the arm buckles: the smallest stiffness is {K.margin:.3g} "
+                f"{arm.stiffness_unit()}."
             )
             raise SingularStiffness(problem, K.critical_direction)
         return value

@@ -228,7 +228,7 @@ def _said(error: CdsmError) -> str:
     if isinstance(error, JointLimitError):
         return (
             f"{error.problem}. Keep the path within the limits, or widen joint_limit in the "
-            "geometry."
+            "geometry (limit in a URDF)."
         )
     return str(error)
 

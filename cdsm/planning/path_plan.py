@@ -60,7 +60,7 @@ class PathPlan(ReadOnlyState):
             (S, 3, 3).
         rate: By how much a tension may change per step (C,) [N]; may hold inf.
         planned: Which samples are planned, from 0.
-        angles: Joint angles (P, nv) [rad].
+        angles: Joint angles (P, nv) [rad]; [m] where a joint slides.
         tensions: F (P, C) [N].
         achieved: What ``stiffness.along`` or ``stiffness.cartesian`` says, (P,), (P, n) or
             (P, 3, 3) [N/m].
@@ -127,9 +127,10 @@ class PathPlan(ReadOnlyState):
     def write_csv(self, path: str | os.PathLike[str]) -> Path:
         """Write what the motors have to do, a line for each sample, SI units; return the path.
 
-        The columns are ``sample``, ``status``, joint angles [rad], and for each cable its tension
-        [N], its length [m] and, if the motor holds that, the unstrained length [m]. Of an
-        infeasible sample there is only the status, and the reason in the last column.
+        The columns are ``sample``, ``status``, joint angles [rad] ([m] where a joint slides), and
+        for each cable its tension [N], its length [m] and, if the motor holds that, the unstrained
+        length [m]. Of an infeasible sample there is only the status, and the reason in the last
+        column.
 
         Args:
             path: The file; it is written whole or not at all.
@@ -140,7 +141,10 @@ class PathPlan(ReadOnlyState):
         names = [cable.name for cable in self.arm.cables]
         header = [
             *("sample", "status"),
-            *(f"{name} [rad]" for name in self.arm.joint_names),
+            *(
+                f"{name} [{'m' if slides else 'rad'}]"
+                for name, slides in zip(self.arm.joint_names, self.arm.slides, strict=True)
+            ),
             *(f"{name} tension [N]" for name in names),
             *(f"{name} length [m]" for name in names),
             *(f"{cable.name} unstrained length [m]" for _, cable in self._held),
@@ -173,19 +177,19 @@ class PathPlan(ReadOnlyState):
             lines[0] += f", with {F.min():.4g} to {F.max():.4g} N"
         if len(self.planned) > 1:
             lines[0] += f", which change by up to {self.steps.max():.4g} N per step"
-        for first, last in _runs(self.infeasible):
+        for run in _runs(self.infeasible):
+            first, last = run[0], run[-1]
             where = f"sample {first.index}"
             if last is not first:
                 where = f"samples {first.index} to {last.index}"
-            lines.append(f"{where}: {first.status}: {first.reason}")
+            alike = all(each.reason == first.reason for each in run)
+            status = first.status if alike else f"{first.status}, the first of them"
+            lines.append(f"{where}: {status}: {first.reason}")
         return "\n".join(lines)
 
 
-def _runs(
-    samples: tuple[InfeasibleSample, ...],
-) -> Iterator[tuple[InfeasibleSample, InfeasibleSample]]:
-    """First and last of infeasible samples that follow each other and have one status."""
+def _runs(samples: tuple[InfeasibleSample, ...]) -> Iterator[list[InfeasibleSample]]:
+    """Infeasible samples that follow each other and have one status."""
     numbered = enumerate(samples)
     for _, run in groupby(numbered, key=lambda pair: (pair[1].index - pair[0], pair[1].status)):
-        together = [each for _, each in run]
-        yield together[0], together[-1]
+        yield [each for _, each in run]

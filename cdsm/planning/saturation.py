@@ -196,7 +196,7 @@ def _stable(at: At, low: float, high: float) -> tuple[float, float]:
         raise unstable(
             best.posture.arm,
             f"the arm is stable at no lower bound from {low:.4g} to {high:.4g} N: at best the "
-            f"smallest eigenvalue of K_θ is {best.margin:.4g} N m/rad",
+            f"smallest eigenvalue of K_θ is {best.margin:.4g} {best.posture.arm.stiffness_unit()}",
             best.critical_direction,
         )
     first, last = stable[0]

@@ -190,9 +190,10 @@ def _stabilised(region: Admissible, field: Field, start: Point) -> Point:
             radius = float(abs(found.x[:count]).max()) / 2.0
     if here.reserve > 0.0:
         return here
+    of = field.pose.arm.stiffness_unit()
     raise unstable(
         field.pose.arm,
         "no admissible tensions hold the arm stable: at best the smallest eigenvalue of K_θ is "
-        f"{here.values[0]:.4g} N m/rad, and {field.floor:.4g} N m/rad is asked for",
+        f"{here.values[0]:.4g} {of}, and {field.floor:.4g} {of} is asked for",
         here.vectors[:, 0],
     )

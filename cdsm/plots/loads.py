@@ -60,12 +60,14 @@ def plot_critical_tension(critical: CriticalTension) -> Figure:
     instance("critical", critical, CriticalTension)
     figure = Figure(figsize=(7.0, 4.0), layout="constrained")
     axes: Any = figure.subplots()
-    axes.plot(critical.bounds, critical.margins, color=COLORS[0])
+    mark = "o" if critical.bounds.size == 1 else ""
+    axes.plot(critical.bounds, critical.margins, color=COLORS[0], marker=mark)
     axes.axhline(0.0, color="0.2", linewidth=0.8)
     low, high = critical.examined
     shown = high if math.isinf(critical.minimum) or not critical.stable else 2.0 * critical.minimum
     inside = critical.bounds <= shown
-    axes.set_xlim(low, min(shown, high))
+    # where no tension can be raised by itself one bound is all there is: a point
+    axes.set_xlim(low, min(shown, high) if high > low else low + 1.0)
     axes.set_ylim(*_with_room([0.0, *critical.margins[inside]]))
     edges = [critical.examined[0], *np.ravel(critical.stable), critical.examined[1]]
     for start, end in zip(edges[::2], edges[1::2], strict=True):
@@ -81,7 +83,7 @@ def plot_critical_tension(critical: CriticalTension) -> Figure:
         )
     axes.set(
         xlabel="lower bound of tension [N]",
-        ylabel="smallest joint stiffness [N m/rad]",
+        ylabel=f"smallest joint stiffness [{critical.posture.arm.stiffness_unit()}]",
         title=f"{critical.posture.arm.name}; shaded: unstable",
     )
     axes.grid(alpha=0.3)

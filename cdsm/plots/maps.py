@@ -24,10 +24,16 @@ from cdsm.sweep.quantities import SweepStatus
 if TYPE_CHECKING:
     import xarray
 
-_UNITS: Final = {"N m-1": (N_PER_MM, "N/mm"), "N m rad-1": (1.0, "N m/rad"), "1": (1.0, "-")}
+_UNITS: Final = {
+    "N m-1": (N_PER_MM, "N/mm"),
+    "N m rad-1": (1.0, "N m/rad"),
+    "N m rad-1 or N m-1": (1.0, "N m/rad or N/m"),
+    "1": (1.0, "-"),
+}
 """What the colour bar shows for the units of a Dataset."""
 
 _MOST_PANELS = 9
+_TICKS = 5
 _WIDE = 30.0
 """Ratio of largest to smallest value from which the colours are logarithmic."""
 
@@ -244,7 +250,7 @@ def _draw(
     axes.scatter(*np.zeros((len(shown), 1)), marker="s", c="0.1", s=28.0)
     for letter, axis in zip(AXES, shown, strict=False):
         getattr(axes, f"set_{letter}label")(f"{AXES[axis]} [mm]", fontsize=8)
-        getattr(axes, f"{letter}axis").set_major_locator(MaxNLocator(5))
+        getattr(axes, f"{letter}axis").set_major_locator(MaxNLocator(_TICKS))
     axes.tick_params(labelsize=7)
     if plane:
         axes.set_aspect("equal", adjustable="datalim")
@@ -252,6 +258,9 @@ def _draw(
     else:
         ranges = np.ptp([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()], axis=1)
         axes.set_box_aspect(ranges, zoom=0.8)  # equal axes, and room for the labels
+        for letter, part in zip(AXES, ranges / ranges.max(), strict=True):
+            ticks = MaxNLocator(max(1, round(_TICKS * part)))  # a short axis has room for few
+            getattr(axes, f"{letter}axis").set_major_locator(ticks)
 
 
 def _legend(figure: Figure, panels: list[_Panel], words: Mapping[int, str]) -> None:

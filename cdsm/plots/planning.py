@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib import colormaps
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from cdsm._checks import Array, instance
 from cdsm.errors import InvalidInput
@@ -82,7 +83,7 @@ def plot_path_plan(plan: PathPlan) -> Figure:
     # a line over a gap would be a claim about it
     held, pulls = np.full(wanted.shape, np.nan), np.full((size, plan.tensions.shape[1]), np.nan)
     rows = list(plan.planned)
-    held[rows] = N_PER_MM * plan.achieved.reshape(len(rows), -1)
+    held[rows] = N_PER_MM * plan.achieved.reshape(len(rows), wanted.shape[1])
     pulls[rows] = plan.tensions
     for k, u in enumerate(plan.direction.reshape(-1, 3)):
         color = COLORS[k % len(COLORS)]
@@ -107,6 +108,7 @@ def plot_path_plan(plan: PathPlan) -> Figure:
         axes.grid(alpha=0.3)
     above.set(ylabel="stiffness [N/mm]", title=f"{plan.arm.name}; shaded: infeasible")
     above.legend(title="along", fontsize=8, title_fontsize=8)
+    below.xaxis.set_major_locator(MaxNLocator(integer=True))
     below.set(xlabel="sample", ylabel="tension of each cable [N]")
     return figure
 

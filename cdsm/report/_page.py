@@ -108,7 +108,8 @@ def _stability(report: Report) -> Section:
     order = np.argsort(-abs(way), kind="stable")[:4]
     rows += [(names[i], f"{way[i]:+.3f}") for i in order]
     lines = (
-        f"Smallest eigenvalue of the symmetric part of K_θ: {K.margin:.4g} N m/rad, "
+        f"Smallest eigenvalue of the symmetric part of K_θ: {K.margin:.4g} "
+        f"{K.posture.arm.stiffness_unit()}, "
         + ("stable." if K.is_stable else "UNSTABLE.")
         + f" Condition of K_θ: {report.condition:.3g}.",
     )
@@ -170,8 +171,14 @@ def _conventions(report: Report) -> Section:
     arm = K.posture.arm
     along = " x along the straight arm," if arm.is_serpentine else ""
     written = [", ".join(f"{x:g}" for x in each) for each in (arm.gravity, K.wrench)]
-    angles = zip(arm.joint_names, K.posture.q, arm._body.slides, strict=True)
+    angles = zip(arm.joint_names, K.posture.q, arm.slides, strict=True)
     posture = ", ".join(f"{name} {q:.6g} {'m' if s else 'rad'}" for name, q, s in angles)
+    lever = (
+        f" A joint that slides counts with the arm's length, {arm.length:.4g} m, as lever in the "
+        "residual, the self-check, ranks and conditions, but not in the smallest eigenvalue."
+        if arm.slides.any()
+        else ""
+    )
     free = "at this posture" if K.free_length is None else "where the motors were locked"
     return Section(
         "Units, frame and signs",
@@ -181,7 +188,8 @@ def _conventions(report: Report) -> Section:
             f"{along} tip is the frame of {arm.tip_link}. Gravity ({written[0]}) m/s².",
             "F is tension, never negative; the cables' torque is −J_Lᵀ F. The wrench W acts on the "
             f"tip and is dead, constant in base axes: ({written[1]}), force [N], then moment "
-            "[N m]. K_θ = ∂(J_Lᵀ F + g − J_Xᵀ W)/∂θ: rows torque, columns angle, positive holds.",
+            "[N m]. K_θ = ∂(J_Lᵀ F + g − J_Xᵀ W)/∂θ: rows torque, columns angle, positive holds."
+            f"{lever}",
             f"Posture: {posture}.",
             f"Position-controlled cables keep their free length, l_0 = L {free}; force-controlled "
             "ones their tension.",

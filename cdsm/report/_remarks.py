@@ -46,21 +46,21 @@ def faults(report: Report) -> tuple[str, ...]:
         for reason, names in unchecked.items()
     ]
     if report.imbalance > BALANCED:
-        worst = K.posture.arm.joint_names[int(abs(K.residual).argmax())]
         said.append(
             f"the tensions do not balance the arm: {report.residual:.3g} N m are left, most at "
-            f"{worst}, {report.imbalance:.1e} of the torques ({BALANCED:g} is allowed). K_θ is "
-            "that of an arm held here by something else; distribute_tension balances it."
+            f"{report.residual_joint}, {report.imbalance:.1e} of the torques ({BALANCED:g} is "
+            "allowed). K_θ is that of an arm held here by something else; distribute_tension "
+            "balances it."
         )
-    spectrum = np.linalg.norm(K.joint, 2)
+    spectrum, unit = np.linalg.norm(K.joint, 2), K.posture.arm.stiffness_unit()
     if not K.is_stable:
         said.append(
-            f"the arm is UNSTABLE: the smallest eigenvalue of K_θ is {K.margin:.4g} N m/rad, "
+            f"the arm is UNSTABLE: the smallest eigenvalue of K_θ is {K.margin:.4g} {unit}, "
             f"moving {_motion(report)}. It buckles; change tensions, posture or load."
         )
     elif K.margin <= _SINGULAR * spectrum:
         said.append(
-            f"the arm is about to buckle: the smallest eigenvalue of K_θ, {K.margin:.2g} N m/rad, "
+            f"the arm is about to buckle: the smallest eigenvalue of K_θ, {K.margin:.2g} {unit}, "
             "is rounding."
         )
     found = report.optimality

@@ -169,11 +169,15 @@ def closure(K: Stiffness) -> float:
     return value if value > RANK else 0.0
 
 
-def imbalance(K: Stiffness) -> tuple[float, float]:
-    """Largest residual of the statics [N m], and over the torques that it is a sum of [-]."""
-    whole = torque_size(K)
-    residual = float(abs(K.residual * joint_unit(K.posture.arm)).max())
-    return residual, residual / whole if whole > 0.0 else 0.0
+def imbalance(K: Stiffness) -> tuple[float, str, float]:
+    """Largest residual of the statics [N m], its joint, and that over the torques it is a sum of.
+
+    A joint that slides counts with the arm's length as lever.
+    """
+    arm, whole = K.posture.arm, torque_size(K)
+    left = abs(K.residual * joint_unit(arm))
+    worst = int(left.argmax())
+    return float(left[worst]), arm.joint_names[worst], left[worst] / whole if whole > 0.0 else 0.0
 
 
 def torque_size(K: Stiffness) -> float:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, final
 import numpy as np
 
 from cdsm._checks import Array, ReadOnlyState
+from cdsm._units import key
 from cdsm.errors import SingularStiffness
 from cdsm.report import _layout, _remarks, facts
 from cdsm.report._page import page
@@ -30,7 +31,9 @@ class Report(ReadOnlyState):
     Attributes:
         stiffness: The one in question.
         self_check: It and its terms against central differences at this very posture.
-        residual: Largest |J_Lᵀ F + g − J_Xᵀ W| [N m], what is left of Eq. 13.
+        residual: Largest |J_Lᵀ F + g − J_Xᵀ W| [N m], what is left of Eq. 13; a joint that slides
+            counts with the arm's length as lever.
+        residual_joint: Name of the joint where it is.
         imbalance: That over the torques it is a sum of [-].
         optimality: How well the tensions meet Eq. 17; None if they were given, not distributed.
         cables: Where each cable stands in its law.
@@ -44,6 +47,7 @@ class Report(ReadOnlyState):
     stiffness: Stiffness
     self_check: SelfCheck
     residual: float
+    residual_joint: str
     imbalance: float
     optimality: Optimality | None
     cables: tuple[CableState, ...]
@@ -81,7 +85,7 @@ class Report(ReadOnlyState):
 
     @property
     def margin(self) -> float:
-        """Smallest eigenvalue of the symmetric part of K_θ [N m/rad]."""
+        """Smallest eigenvalue of the symmetric part of K_θ [N m/rad]; [N/m] where joints slide."""
         return self.stiffness.margin
 
     @property
@@ -124,7 +128,7 @@ class Report(ReadOnlyState):
             "optimality": None if self.optimality is None else _told(self.optimality),
             "stability": {
                 "stable": K.is_stable,
-                "margin_Nm_per_rad": self.margin,
+                key("margin", arm.stiffness_unit()): self.margin,
                 "critical_direction": self.critical_direction,
                 "condition": self.condition,
             },
@@ -140,7 +144,7 @@ class Report(ReadOnlyState):
             "closure": self.closure,
             "readings_N_per_m": None if self.readings is None else asdict(self.readings),
         }
-        return {key: _plain(value) for key, value in told.items()}
+        return {name: _plain(value) for name, value in told.items()}
 
     def to_html(self) -> str:
         """The report as an HTML file that needs no other."""
@@ -163,7 +167,7 @@ def report_on(K: Stiffness) -> Report:
     Args:
         K: The stiffness in question.
     """
-    residual, imbalance = facts.imbalance(K)
+    residual, joint, imbalance = facts.imbalance(K)
     try:
         readings = facts.readings(K)
     except SingularStiffness:
@@ -173,6 +177,7 @@ def report_on(K: Stiffness) -> Report:
         stiffness=K,
         self_check=self_check(K),
         residual=residual,
+        residual_joint=joint,
         imbalance=imbalance,
         optimality=None if pull is None else optimality(K, pull),
         cables=facts.cable_states(K),
@@ -207,7 +212,7 @@ def _told(found: Optimality) -> dict[str, object]:
 def _plain(value: object) -> object:
     """As JSON has it: lists for tuples and arrays, null for what is not finite."""
     if isinstance(value, dict):
-        return {key: _plain(each) for key, each in value.items()}
+        return {name: _plain(each) for name, each in value.items()}
     if isinstance(value, np.ndarray):
         return _plain(value.tolist())
     if isinstance(value, (list, tuple)):

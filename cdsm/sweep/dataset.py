@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 
     import xarray
 
+_OF_SLIDES = {"N m": "N", "N m rad-1": "N m-1"}
+"""Units of torque and joint stiffness, and what they are where joints slide."""
+
 EMPTY = {"status": np.int8(SweepStatus.PENDING)}
 """What stands where nothing is computed yet; NaN in all outputs."""
 
@@ -59,7 +62,8 @@ def variable_attributes(question: Question, name: str) -> dict[str, Any]:
     """What an output or ``status`` says of itself."""
     if name != "status":
         quantity = QUANTITIES[name]
-        return {"long_name": quantity.long_name, "units": quantity.units}
+        units = _units(quantity.units, question.problem.arm.slides)
+        return {"long_name": quantity.long_name, "units": units}
     outputs = question.problem.outputs
     lost = {
         kind: [name for name in outputs if QUANTITIES[name].stage in LOST[kind]]
@@ -73,3 +77,11 @@ def variable_attributes(question: Question, name: str) -> dict[str, Any]:
         "flag_meanings": " ".join(kind.name.lower() for kind in SweepStatus),
         "comment": f"NaN stands only where the status says so, in: {told or 'nothing'}",
     }
+
+
+def _units(turning: str, slides: NDArray[np.bool_]) -> str:
+    """Units of a quantity of an arm, some of whose joints may slide."""
+    sliding = _OF_SLIDES.get(turning)
+    if sliding is None or not slides.any():
+        return turning
+    return sliding if slides.all() else f"{turning} or {sliding}"

@@ -96,7 +96,7 @@ _JOINTS = ("joint", "joint_column")
 _AXES = ("axis", "axis_column")
 
 QUANTITIES: Final[dict[str, Quantity]] = {
-    "tip_position": Quantity("position of tool0 in base axes", "m", "pose", ("axis",)),
+    "tip_position": Quantity("position of the tip in base axes", "m", "pose", ("axis",)),
     "cable_lengths": Quantity("cable lengths L, lead included (Eq. 8)", "m", "pose", ("cable",)),
     "gravity_torque": Quantity("gravity torque g = dV/dq", "N m", "pose", ("joint",)),
     "gravity_stiffness": Quantity("gravity part of K, dg/dq", "N m rad-1", "pose", _JOINTS),

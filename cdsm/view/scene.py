@@ -76,8 +76,8 @@ class Scene:
             np.zeros((13 * 25, 3)),
             _faces(13, 25),
             color=_ELLIPSOID,
-            opacity=0.45,
-            side="double",
+            opacity=0.65,
+            side="front",  # both sides of one that is flat would flicker through each other
             cast_shadow=False,
             receive_shadow=False,
             visible=False,

@@ -18,6 +18,7 @@ from cdsm._checks import Array, bound, frozen, instance, scalar, vector
 from cdsm._extras import need
 from cdsm.errors import InvalidInput
 from cdsm.manipulator import Manipulator
+from cdsm.tension import installed_solver
 from cdsm.view.controls import Controls
 from cdsm.view.newest import Newest
 from cdsm.view.scene import Scene
@@ -65,6 +66,7 @@ def serve(
         MissingExtra: viser is not installed: the extra ``[view]``.
         InvalidInput: A value of the wrong type or shape, or the port cannot be had.
         JointLimitError: An angle is beyond its limit.
+        UnknownName: No such solver is installed.
     """
     need("view", "viser")
     start = Setting(
@@ -72,7 +74,7 @@ def serve(
         minimum=_positive("minimum", minimum, zero=True),
         maximum=float(bound("maximum", maximum, 1)[0]),
         force=vector("force", force, 3, "force at the tip [N], base axes"),
-        solver=solver,
+        solver=installed_solver(solver),
     )
     tension = _positive("largest_tension", largest_tension)
     push = max(_positive("largest_force", largest_force), float(abs(start.force).max()))

@@ -62,7 +62,8 @@ def _stiffness_rows(shown: Shown) -> list[str]:
             rows.append(_row(f"{name}: {direction}", _stiffness(value), "N/mm", name))
         most = f"{MM / shown.principal['softest']:.3g}"
         rows.append(_row("1 N moves the tip at most", most, "mm", "most"))
-    return [*rows, _row("smallest joint stiffness", f"{K.margin:.4g}", "N m/rad", "margin")]
+    unit = K.posture.arm.stiffness_unit()
+    return [*rows, _row("smallest joint stiffness", f"{K.margin:.4g}", unit, "margin")]
 
 
 def _posture_rows(shown: Shown) -> list[str]:
@@ -116,4 +117,4 @@ def _stiffness(value: float) -> str:
 
 
 def _direction(u: Array) -> str:
-    return f"({', '.join(f'{x:.2f}' for x in u)})"
+    return f"({', '.join(f'{x:z.2f}' for x in u)})"
