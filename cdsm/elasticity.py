@@ -262,6 +262,9 @@ class LinearElasticity(Elasticity):
         return np.asarray(self.domain.check(tension) ** 2 / (2.0 * self._rigidity))
 
 
+_ROUNDING = 1e-15
+"""Relative rounding of a strain: a few units in the last place."""
+
 # denser at the low end, where most laws are soft; ends exactly at 0 and 1
 _GRID = np.linspace(0.0, 1.0, 25) ** 3
 
@@ -291,8 +294,10 @@ def tension_at(
         while float(stretch(np.array(high))) < wanted.max(initial=0.0) and high < LARGEST:
             high = min(2.0 * high, LARGEST)
     grid = np.maximum(low + (high - low) * _GRID, domain.first)
+    grid[-1] = high  # which low + (high - low) may miss by rounding
     reached = stretch(grid)
-    outside = (wanted < 0.0) | (wanted > reached[-1])
+    # one tension alone may give another last digit than among many, and the end belongs to it
+    outside = (wanted < 0.0) | (wanted > reached[-1] * (1.0 + _ROUNDING))
     if outside.any():
         first = np.atleast_1d(wanted)[np.atleast_1d(outside)][0]
         raise ElasticityRangeError(
@@ -319,16 +324,21 @@ def rising_root(
     Newton's method inside a shrinking bracket, so that it converges for every rising law. All
     arrays have one shape; an upper bound may be infinite.
     """
-    first, last = lower, upper
+    first, last, previous = lower, upper, np.full(np.shape(wanted), math.inf)
     guess = np.minimum(np.maximum(guess, first), last)
     for _ in range(200):  # bisection alone would take 60
         error, rise = np.asarray(stretch(guess)) - wanted, slope(guess)
         step = error / rise
-        if (abs(step) <= 1e-13 * np.maximum(guess, 1.0)).all():  # rounding is near
+        settled = abs(step) <= 1e-13 * np.maximum(guess, 1.0)  # rounding is near
+        if settled.all():
             break
         lower = np.where(error <= 0.0, guess, lower)
         upper = np.where(error >= 0.0, guess, upper)
-        guess = guess - step
-        guess = np.where((guess < lower) | (guess > upper), (lower + upper) / 2.0, guess)
-        guess = np.minimum(np.maximum(guess, first), last)
+        newton = guess - step
+        # where the law is nearly upright, Newton's method goes round in circles inside the bracket
+        circling = ~settled & (abs(step) > previous / 2.0) & np.isfinite(upper)
+        halve = circling | (newton < lower) | (newton > upper)
+        following = np.where(halve, (lower + upper) / 2.0, newton)
+        previous = abs(following - guess)
+        guess = np.minimum(np.maximum(following, first), last)
     return np.asarray(guess), np.asarray(rise)

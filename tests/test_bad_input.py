@@ -4,6 +4,7 @@ import math
 import re
 import warnings
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from scipy.optimize import linprog
 import cdsm
 from cdsm import _balance
 from cdsm._checks import Array
-from cdsm.tension import _shortfall
+from cdsm.tension import DISTANCE, _shortfall
 from tests import foreign
 from tests.arms import STEEL, mixed_arm, random_arm, random_posture, random_tension, random_wrench
 
@@ -745,6 +746,18 @@ def test_bounds_too_tight_say_what_is_missing_and_how_far_to_widen(seed: int) ->
     refused(pose, np.maximum(low - less, 0.0), high + less, wrench)
 
 
+def test_cables_that_stand_at_either_bound_are_named() -> None:
+    arm = cdsm.Manipulator(cdsm.presets.experimental_prototype_geometry(), STEEL)
+    pose = arm.at(np.zeros(3))
+    # nothing but its own pair reaches the last joint, and nearly the same tension balances it
+    low, high = np.full(6, 20.0), np.full(6, 400.0)
+    low[4], high[5] = 300.0, 30.0
+    with pytest.raises(cdsm.InfeasibleTension) as caught:
+        cdsm.distribute_tension(pose, low, high)
+    assert set(caught.value.binding) >= {"cable3_1", "cable3_2"}
+    assert "cable3_1" in str(caught.value)
+
+
 @pytest.mark.parametrize("seed", range(8))
 def test_widening_by_the_number_in_the_message_is_enough(seed: int) -> None:
     pose = random_posture(random_arm(seed, 3), seed)
@@ -963,6 +976,12 @@ def test_direction_the_tip_cannot_move_in_is_infinitely_stiff() -> None:
     assert "nan" not in str(stiff)
 
 
+def test_however_little_negative_a_stiffness_is_the_arm_is_unstable() -> None:
+    for margin, stable in ((-1e-9, False), (0.0, False), (1e-9, True)):
+        stiff = replace(K, joint=margin * np.eye(ARM.nv))
+        assert (stiff.margin, stiff.is_stable) == (margin, stable)
+
+
 # --- lying solvers --------------------------------------------------------------------------
 
 Lie = Callable[[qpsolvers.Solution], qpsolvers.Solution]
@@ -1029,6 +1048,37 @@ def test_every_optimality_condition_is_checked() -> None:
     solution.y = y + 1e-3
     theirs = (solution.primal_residual(), solution.dual_residual(), solution.duality_gap())
     np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-12)
+
+
+def slightly_off(excess: float) -> tuple[_balance.Scaled, tuple[Array, ...]]:
+    """Two cables that share 10; the one has a little more, and multipliers that hide it.
+
+    Constraints and stationarity hold exactly. The gap is 2e² + 9e; the optimum is √2 e away, but to
+    know that one would have to know the optimum.
+    """
+    A, b = np.ones((1, 2)), np.array([10.0])
+    problem = _balance.Scaled(A, b, np.ones(2), np.full(2, 10.0), 1.0, 1.0)
+    e = excess
+    return problem, (np.array([5.0 - e, 5.0 + e]), np.array([-5.0]), np.array([e, -e]))
+
+
+def test_duality_gap_bounds_the_distance_from_the_optimum() -> None:
+    # √(2·9e) of 5: e from 1e-6 of it; rounding of a gap of 1e-11 is some 1e-14
+    edge = (DISTANCE * 5.0) ** 2 / 18.0
+    assert _shortfall(*slightly_off(0.9 * edge)) == ""
+    assert "1.0e-06 away (1e-06 is allowed" in _shortfall(*slightly_off(1.1 * edge))
+
+
+def test_what_is_missed_is_told_relative_to_the_largest_tension() -> None:
+    problem, (x, y, z) = slightly_off(1.0)
+    # 0.5 too much of 6.5; of the multipliers 1 is missing; the gap is 16 + 42.25 − 50 + 10 − 2.5
+    said = _shortfall(problem, (x + np.array([0.0, 0.5]), y, z - np.array([0.0, 1.5])))
+    for part in (
+        f"balance and bounds are missed by {0.5 / 6.5:.1e}",
+        f"stationarity by {1.0 / 6.5:.1e} (1e-09 is allowed)",
+        f"may be {math.sqrt(2.0 * 15.75) / 6.5:.1e} away (1e-06 is allowed",
+    ):
+        assert part in said
 
 
 @pytest.mark.parametrize("lie", LIES)

@@ -2,13 +2,16 @@
 
 import dataclasses
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 
 import cdsm
 from cdsm import presets
-from tests.arms import random_posture, random_wrench
+from cdsm._cable_laws import checked_rigidity
+from cdsm._checks import LARGEST, SMALLEST
+from tests.arms import random_arm, random_posture, random_wrench
 
 STRAND = presets.STRAND_1X19
 SITES = (cdsm.Site("base_disk", (0.0, 0.02, 0.0)), cdsm.Site("link1", (0.01, 0.02, 0.0)))
@@ -48,6 +51,43 @@ def test_energy_by_elongation_is_tension_and_tension_by_elongation_is_stiffness(
     coarse, fine = (abs(np.array(error)).max(axis=1) for error in errors)
     assert np.all(coarse < 1e-2)
     assert np.all(fine < np.maximum(0.3 * coarse, 1e-8))  # second order, or rounding
+
+
+def test_cable_is_straight_to_its_motor_rigid_and_unbounded_unless_told() -> None:
+    cable = cdsm.Cable("plain", SITES, STRAND)
+    bounds = (cable.minimum, cable.maximum)
+    assert (cable.lead, cable.series_stiffness, cable.control) == (0.0, math.inf, "position")
+    assert bounds == (0.0, math.inf)
+
+
+@pytest.mark.parametrize(("name", "spring"), CASES)
+def test_elongation_and_energy_begin_at_the_low_end(name: str, spring: float) -> None:
+    cable = hybrid(spring, LAWS[name])
+    first = LAWS[name].domain.first
+    # the next number above 2.2 N, and rounding of 2.2² N² over twice the spring
+    assert float(cable.elongation(first, LENGTH)) == pytest.approx(0.0, abs=1e-15)
+    assert float(cable.energy(first, LENGTH)) == pytest.approx(0.0, abs=1e-15)
+
+
+def test_limits_are_allowed_and_what_is_beyond_them_is_named() -> None:
+    assert hybrid(SMALLEST).series_stiffness == SMALLEST
+    assert cdsm.in_series(SMALLEST, math.inf) == SMALLEST
+    assert cdsm.Cable("a", SITES, STRAND, maximum=LARGEST).maximum == LARGEST
+    assert cdsm.Cable("a", SITES, STRAND, minimum=7.0, maximum=7.0).maximum == 7.0
+    too_much: dict[str, Any] = dict.fromkeys(
+        ("series_stiffness", "minimum", "maximum"), 2.0 * LARGEST
+    )
+    for option, value in too_much.items():
+        with pytest.raises(cdsm.CableError, match=rf"{option}.*up to 1e\+15"):
+            cdsm.Cable("a", SITES, STRAND, **{option: value})
+    with pytest.raises(cdsm.CableError, match="0 <= minimum"):
+        cdsm.Cable("a", SITES, STRAND, minimum=-1.0)
+
+
+@pytest.mark.parametrize("rigidity", [SMALLEST, LARGEST])
+def test_smallest_and_largest_rigidity_of_ones_own_are_usable(rigidity: float) -> None:
+    law, tension = cdsm.LinearElasticity(rigidity), np.array([1.0, 2.0])
+    np.testing.assert_array_equal(checked_rigidity(law, tension), rigidity)
 
 
 def test_series_limits() -> None:
@@ -138,6 +178,24 @@ def test_fixed_tension_stands_in_place_of_the_bounds() -> None:
     pull = cdsm.distribute_tension(pose, minimum=5.0, fixed={"cable1_2": 2.5})
     assert pull.values[1] == 2.5
     assert np.delete(pull.values, 1).min() >= 5.0
+
+
+def test_bounds_of_a_cable_hold_as_if_they_had_been_asked_for() -> None:
+    arm = random_arm(12, 3)
+    low, high = np.full(len(arm.cables), 12.0), np.full(len(arm.cables), 300.0)
+    pull = cdsm.distribute_tension(random_posture(arm, 0), low, high)
+    least, strongest = int(pull.values.argmin()), int(pull.values.argmax())
+    low[least], high[strongest] = 13.0, 0.98 * pull.values[strongest]
+    cables = [
+        dataclasses.replace(cable, minimum=low[c], maximum=high[c])
+        for c, cable in enumerate(arm.cables)
+    ]
+    asked = cdsm.distribute_tension(random_posture(arm, 0), low, high)
+    own = cdsm.distribute_tension(random_posture(arm.with_cables(cables), 0), 12.0)
+    assert arm.cables[least].name in asked.at_minimum
+    assert asked.at_maximum == (arm.cables[strongest].name,)
+    for name in ("values", "minimum", "maximum"):
+        np.testing.assert_array_equal(getattr(own, name), getattr(asked, name))
 
 
 @pytest.mark.parametrize(

@@ -7,10 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike
 from scipy.integrate import quad
 
 import cdsm
-from cdsm.elasticity import Domain
+from cdsm._checks import LARGEST, SMALLEST, Array
+from cdsm.elasticity import Domain, rising_root
 
 STEEL = cdsm.LinearElasticity(226_195.0)
 STRAND = cdsm.StrandElasticity.eq19_repaired()
@@ -152,6 +154,98 @@ def test_secant_tends_to_the_tangent_at_the_low_end(name: str) -> None:
     assert float(law.secant_rigidity(F)) == pytest.approx(float(law.rigidity(F)), rel=1e-4)
 
 
+@pytest.mark.parametrize("name", LAWS)
+def test_tension_inverts_strain_both_ends_included(name: str) -> None:
+    law = LAWS[name]
+    low, high = law.domain.first, min(law.domain.high, 1e4)
+    F = np.array([low, *samples(law), high])
+    # rounding of the strain, which is of that of the largest one, over its slope
+    np.testing.assert_allclose(law.tension(law.strain(F)), F, rtol=1e-11, atol=1e-11)
+    assert float(law.tension(0.0)) == pytest.approx(low, rel=1e-12, abs=1e-300)
+    assert float(law.tension(law.strain(high))) == pytest.approx(high, rel=1e-12)
+
+
+@pytest.mark.parametrize(("low", "high"), [(2.3, 11.4), (2.2, 11.4)], ids=["over", "under"])
+def test_end_is_found_though_low_and_the_width_do_not_sum_to_it(low: float, high: float) -> None:
+    assert low + (high - low) != high
+    law = cdsm.StrandElasticity(((5e3,),), (), low, high)
+    for F in (7.0, high):
+        assert float(law.tension(law.strain(F))) == pytest.approx(F, rel=1e-12)
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_strain_out_of_reach_is_refused_with_the_reach(name: str) -> None:
+    law = LAWS[name]
+    largest = float(law.strain(min(law.domain.high, LARGEST)))
+    beyond = largest * (1.0 + 1e-9)
+    for strain, said in ((-1e-9, "it reaches"), (beyond, f"it reaches {largest:.6g}.")):
+        with pytest.raises(cdsm.ElasticityRangeError) as caught:
+            law.tension([0.0, strain])
+        assert f"gives the strain {strain:.6g}; {said}" in str(caught.value)
+        assert caught.value.indices == (1,)
+
+
+class Upright(cdsm.Elasticity):
+    """Hardly any rigidity at one tension: ε = (√c ± √|F − c|)/EA, with an upright tangent at c."""
+
+    def __init__(self, place: float) -> None:
+        self.place = place
+
+    @property
+    def domain(self) -> Domain:
+        return Domain(0.0, 100.0)
+
+    def rigidity(self, tension: ArrayLike) -> Array:
+        F = self.domain.check(tension)
+        return np.asarray(2e3 * np.maximum(np.sqrt(abs(F - self.place)), 1e-9))
+
+    def strain(self, tension: ArrayLike) -> Array:
+        away = self.domain.check(tension) - self.place
+        root = math.sqrt(self.place) + np.sign(away) * np.sqrt(abs(away))
+        return np.asarray(root / 1e3)
+
+    def energy(self, tension: ArrayLike) -> Array:
+        raise NotImplementedError
+
+
+@pytest.mark.parametrize("place", [3.0, 17.3, 50.0, 88.8])
+def test_tension_is_found_where_newtons_method_goes_round_in_circles(place: float) -> None:
+    """Of √|F − c| Newton's step from c + d is to c − d, and back, for any d."""
+    law = Upright(place)
+    F = np.array([0.5 * place, place, 0.5 * (place + 100.0)])
+    np.testing.assert_allclose(law.tension(law.strain(F)), F, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("stretch", "slope"),
+    [
+        # from afar Newton's step leaves the bracket
+        (np.arctan, lambda F: 1.0 / (1.0 + F * F)),
+        # everywhere but at the root it goes twice too far
+        (np.cbrt, lambda F: np.cbrt(np.maximum(abs(F), 1e-300)) ** -2.0 / 3.0),
+        # it makes but two thirds of the way
+        (lambda F: F**3, lambda F: 3.0 * F * F + 1e-300),
+    ],
+    ids=["arctan", "cube root", "cube"],
+)
+def test_every_rising_law_has_its_root_found_from_anywhere(
+    stretch: Callable[[Array], Array], slope: Callable[[Array], Array]
+) -> None:
+    root = np.linspace(1.0, 99.0, 15)
+    for start in (0.0, 1.0, 42.0, 100.0):
+        found, rise = rising_root(
+            np.zeros(15),
+            np.full(15, start),
+            np.zeros(15),
+            np.full(15, 100.0),
+            lambda F: stretch(F - root),
+            lambda F: slope(F - root),
+        )
+        # error over slope is what settles it, of the cube a third of the distance
+        np.testing.assert_allclose(found, root, rtol=1e-10)
+        np.testing.assert_array_equal(rise, slope(found - root))
+
+
 @pytest.mark.parametrize("name", ["linear", "Eq. 19 repaired"])
 @pytest.mark.parametrize(
     "bad",
@@ -232,7 +326,20 @@ def test_domain_checks_and_iterates() -> None:
         domain.check(1.0)
 
 
+def test_domain_is_of_more_than_one_tension() -> None:
+    for tension in (0.0, 5.0):
+        with pytest.raises(cdsm.InvalidInput, match="low < high"):
+            Domain(tension, tension)
+
+
 # --- constructors ---------------------------------------------------------------------------
+
+
+def test_smallest_and_largest_rigidity_are_allowed() -> None:
+    for rigidity in (SMALLEST, LARGEST):
+        assert float(cdsm.LinearElasticity(rigidity).rigidity(1.0)) == rigidity
+    with pytest.raises(cdsm.InvalidInput, match="at least 1e-12 N"):
+        cdsm.LinearElasticity(math.nextafter(SMALLEST, 0.0))
 
 
 @pytest.mark.parametrize("diameter", [1e-4, 1.2e-3, 0.05])

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 import cdsm
 from cdsm._checks import Array
+from cdsm.tension import OPTIMALITY
 from tests import arms
 
 # the same examples every time, and no files; numba compiles during the first one
@@ -244,6 +245,24 @@ def test_eq17_tensions_satisfy_the_optimality_conditions(seed: int, name: str) -
     assert excess[at_high].max(initial=-np.inf) < 1e-9 * scale
     assert set(pull.at_minimum) == {pose.arm.cables[c].name for c in np.flatnonzero(at_low)}
     assert set(pull.at_maximum) == {pose.arm.cables[c].name for c in np.flatnonzero(at_high)}
+
+
+def test_cables_that_nothing_pulls_stand_at_their_minimum() -> None:
+    weightless = cdsm.Manipulator(arms.mixed_arm().geometry, arms.STEEL, gravity=(0.0, 0.0, 0.0))
+    pull = cdsm.distribute_tension(weightless.at(np.zeros(5)))
+    np.testing.assert_array_equal(pull.values, 0.0)
+    assert pull.at_minimum == tuple(cable.name for cable in weightless.cables)
+    assert pull.at_maximum == ()
+
+
+def test_at_a_bound_means_to_a_billionth_of_the_largest_tension() -> None:
+    pose = arms.random_posture(arms.mixed_arm(), 3)
+    pull = cdsm.distribute_tension(pose, 10.0)
+    names = tuple(cable.name for cable in pose.arm.cables)
+    for part, count in ((0.9, len(names)), (1.1, 0)):
+        away = part * OPTIMALITY * pull.values.max()
+        beside = replace(pull, minimum=pull.values - away, maximum=pull.values + away)
+        assert beside.at_minimum == beside.at_maximum == names[:count]
 
 
 @given(

@@ -9,6 +9,7 @@ import pytest
 from numpy.typing import ArrayLike
 
 import cdsm
+from cdsm._cable_laws import CableLaws
 from cdsm._checks import Array
 from tests import arms
 from tests.differences import assert_second_order, central_difference
@@ -190,6 +191,39 @@ def test_multiple_eigenvalue_has_bounds_for_gradients() -> None:
         assert change <= slope @ step + 1e-12 * K.margin
         fell.append(slope @ step - change)
     assert max(fell) > 1e-3 * K.margin
+
+
+@pytest.mark.parametrize("own", [False, True], ids=["known", "by differences"])
+def test_second_slope_of_cable_stiffness_is_the_derivative_of_the_first(own: bool) -> None:
+    arm = some_arm("universal-3-8-all")
+    cables = list(arm.cables)
+    if own:
+        cables = [replace(cable, elasticity=Plain(cable.elasticity)) for cable in cables]
+    laws, lengths = CableLaws(tuple(cables)), np.linspace(0.2, 0.5, len(cables))
+    assert {cable.control for cable in cables} == {"position", "force"}
+    assert {cable.series_stiffness for cable in cables} > {math.inf}
+
+    def slopes(F: Array) -> tuple[Array, Array]:
+        return laws.slopes(F, laws.stiffness(lengths, F))
+
+    # away from 31 and 250 N, where Eq. 19 and the table bend
+    F = np.random.default_rng(3).uniform(60.0, 200.0, len(cables))
+    first, second = slopes(F)
+    # Eq. 19 is curved above 31 N, and a spring bends the stiffness of any law
+    assert np.count_nonzero(second) > len(cables) / 2
+    step = 2.0**-2
+    np.testing.assert_allclose(
+        central_difference(lambda x: slopes(x)[0], F, step),
+        np.diag(second),
+        rtol=1e-4,
+        atol=1e-4 * abs(second).max(),
+    )
+    np.testing.assert_allclose(
+        central_difference(lambda x: laws.stiffness(lengths, x), F, step),
+        np.diag(first),
+        rtol=1e-5,
+        atol=1e-5 * abs(first).max(),
+    )
 
 
 def test_where_the_tip_cannot_move_there_is_no_gradient() -> None:

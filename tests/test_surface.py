@@ -351,6 +351,17 @@ def test_assigning_or_deleting_an_attribute_raises(name: str) -> None:
         delattr(thing, dataclasses.fields(thing)[0].name)
 
 
+@pytest.mark.parametrize("name", RESULTS)
+def test_results_are_made_by_name_and_equal_to_nothing_but_themselves(name: str) -> None:
+    result = RESULTS[name]
+    assert all(field.kw_only for field in dataclasses.fields(result) if field.init)
+    with pytest.raises(TypeError, match="positional"):
+        type(result)(*(getattr(result, field.name) for field in dataclasses.fields(result)))
+    # arrays have no one truth value to compare by
+    assert result != copy.copy(result)
+    assert len({result, copy.copy(result)}) == 2
+
+
 def test_properties_of_an_arm_cannot_be_assigned() -> None:
     names = [name for name, part in vars(cdsm.Manipulator).items() if isinstance(part, property)]
     assert "geometry" in names
