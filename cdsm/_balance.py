@@ -55,13 +55,14 @@ def scaled_balance(
     for c in range(count):
         largest = max(largest, low[c])
     force = _power_of_two(largest)
-    return A / arm, torque / (arm * force), low / force, high / force, arm, force
+    # one after the other: their product may be less than any number
+    return A / arm, torque / arm / force, low / force, high / force, arm, force
 
 
 @compiled
 def _power_of_two(value: float) -> float:
-    """The power of two next above a magnitude; 1 for zero."""
-    return 2.0 ** math.ceil(math.log2(value)) if value > 0.0 else 1.0
+    """The power of two next above a magnitude, and that can be divided by; 1 for zero."""
+    return 2.0 ** max(math.ceil(math.log2(value)), -1022) if value > 0.0 else 1.0
 
 
 @compiled

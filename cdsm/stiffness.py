@@ -42,6 +42,9 @@ Near buckling the parts of K_θ cancel, so that its own entries may be too small
 and each joint is measured in units of its own, a slide beside a hinge.
 """
 
+SOFTEST = 1e-100
+"""A joint stiffness below this is that of nothing real, and its inverse may overflow."""
+
 FLAT = 1e-6
 """Smallest ratio of the singular values of J for which a 3×3 stiffness still has 4 digits left.
 
@@ -310,13 +313,10 @@ class Stiffness(ReadOnlyState):
         unit = np.where(unit > 0.0, unit, 1.0)
         _, values, right = np.linalg.svd(self.joint / unit / unit[:, None])
         if not values[-1] > REGULAR * (parts / unit / unit[:, None]).max():
-            direction = right[-1] / unit
-            direction = frozen(direction / np.linalg.norm(direction))
-            raise SingularStiffness(
-                "K_θ is singular: the arm is just about to buckle in the joint motion "
-                f"{_written(direction)}. Change the tensions or the posture.",
-                direction,
-            )
+            raise _singular("the arm is just about to buckle", right[-1] / unit)
+        if not parts.diagonal().min() > SOFTEST:
+            softest = np.eye(len(parts))[parts.diagonal().argmin()]
+            raise _singular("next to nothing holds the arm", softest)
         return frozen(np.linalg.solve(self.joint, self.posture.jacobian.T).astype(np.float64))
 
     def _mobility(self, what: str) -> tuple[Array, Array, Array]:
@@ -405,3 +405,12 @@ def _millimetres(stiffness: float | None) -> str:
 
 def _written(direction: Array) -> str:
     return f"({', '.join(f'{x:.4g}' for x in direction)})"
+
+
+def _singular(why: str, motion: Array) -> SingularStiffness:
+    direction = frozen(motion / np.linalg.norm(motion))
+    return SingularStiffness(
+        f"K_θ is singular: {why} in the joint motion {_written(direction)}. Change the tensions or "
+        "the posture.",
+        direction,
+    )

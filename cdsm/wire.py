@@ -200,6 +200,10 @@ class TabulatedElasticity(Elasticity):
             raise InvalidInput("strains", f"{len(rows[1])} given for {len(rows[0])} tensions.")
         if rows[0][0] < 0.0:
             raise InvalidInput("tensions", f"{rows[0][0]:g} N is negative; cables only pull.")
+        with np.errstate(over="ignore"):
+            steepest = (np.diff(rows[1]) / np.diff(rows[0])).max()
+        if not steepest < LARGEST:
+            raise InvalidInput("strains", "rise so steeply that there is no rigidity left.")
         if not self._flattest > max(_LEVEL * self._curve(rows[0], 1).max(), 1.0 / LARGEST):
             raise InvalidInput("strains", "rise so unevenly that the rigidity is not finite.")
 

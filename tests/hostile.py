@@ -385,14 +385,19 @@ def _too_long(*_: object) -> None:
     raise TimeoutError(f"not read after {SECONDS} s")
 
 
+def limit_memory() -> None:
+    """Leave this process 1 GB to spare."""
+    size = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
+    limit = size * os.sysconf("SC_PAGE_SIZE") + 2**30
+    resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
+
+
 def main(where: str, largest: str, *names: str) -> None:
     """Read all attacks on some readers, and tell what became of each as a line of JSON."""
     warnings.simplefilter("error")
     path = Path(where)
     signal.signal(signal.SIGPROF, _too_long)
-    size = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
-    limit = size * os.sysconf("SC_PAGE_SIZE") + 2**30
-    resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
+    limit_memory()
     for name in names or tuple(READERS):
         reader = READERS[name]
         whole = (path / reader.file).read_bytes()

@@ -1,12 +1,14 @@
 """Hypothesis strategies: arms of every kind, what is asked of them, and what is broken by name."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import cache
 from typing import Any, NamedTuple, TypeVar, cast
 
 import numpy as np
 from hypothesis import strategies as st
+from scipy.optimize import linprog
+from scipy.spatial.transform import Rotation
 
 import cdsm
 from cdsm._checks import Array
@@ -49,7 +51,7 @@ PLAUSIBLE = Sizes(
     length=st.floats(0.01, 0.2),
     disk_offset=st.floats(0.003, 0.02),
     hole_radius=st.floats(0.005, 0.06),
-    mass=st.just(0.0) | st.floats(0.001, 1.0),
+    mass=st.just(0.0) | decades(1e-3, 1.0),
     lead=st.just(0.0) | st.floats(0.0, 2.0),
 )
 EXTREME = Sizes(*[decades(1e-4, 10.0)] * 3, *[st.just(0.0) | decades(1e-6, 100.0)] * 2)
@@ -67,7 +69,7 @@ def uniform_geometries(
     offset = draw(sizes.disk_offset)
     keywords: dict[str, Any] = {
         "joints": draw(st.integers(1, most_joints)),
-        "cables_per_joint": draw(st.sampled_from([1, 2, 3, 3, 3, 4, 4])),
+        "cables_per_joint": draw(st.sampled_from([1, 2, 3, 3, 3, 3, 3, 3, 4, 4])),
         "link_length": 2.0 * offset + draw(sizes.length),
         "base_length": draw(st.just(0.0) | sizes.length),
         "disk_offset": offset,
@@ -87,9 +89,11 @@ def mixed_geometries(
 ) -> cdsm.Geometry:
     """Every joint, link and cable another one; some joints may have no cable of their own."""
     count = draw(st.integers(1, most_joints))
+    usual = st.just(UNIVERSAL_AXES)
+    axes = draw(st.sampled_from([usual, usual, usual | hinges | crosses]))
     joints = [
         cdsm.Joint(
-            axes=draw(st.just(UNIVERSAL_AXES) | hinges | crosses),
+            axes=draw(axes),
             disk_offset=draw(sizes.disk_offset),
             limit=draw(st.none() | st.floats(1e-6, math.pi)),
         )
@@ -119,7 +123,7 @@ def mixed_geometries(
         joints=tuple(joints),
         links=tuple(links),
         cables=tuple(draw(st.lists(route, min_size=1, max_size=4 * count)))
-        + draw(st.just(()) | st.just(spread)),
+        + draw(st.sampled_from([(), spread, spread, spread])),
     )
 
 
@@ -271,6 +275,8 @@ def _routed_arms(draw: st.DrawFn, shapes: Strategy[cdsm.Geometry]) -> cdsm.Manip
     geometry = draw(shapes)
     links = ("base_link", "tool0", *(name for name, _ in geometry.disks))
     routed = draw(cables(links, size=geometry.hole_radius))
+    if draw(st.sampled_from([True, True, True, False])):  # most can be balanced then
+        routed += cdsm.serpentine_cables(geometry, draw(elasticities()))
     gravity = draw(gravities)
     return _unless_sites_coincide(
         lambda: cdsm.Manipulator(geometry, cables=routed, gravity=gravity)
@@ -278,15 +284,37 @@ def _routed_arms(draw: st.DrawFn, shapes: Strategy[cdsm.Geometry]) -> cdsm.Manip
 
 
 def routed_arms(shapes: Strategy[cdsm.Geometry]) -> Strategy[cdsm.Manipulator]:
-    """Arms with cables from anywhere to anywhere."""
+    """Arms with cables from anywhere to anywhere, most beside those of their geometry."""
     return _present(_routed_arms(shapes))
+
+
+def _antagonists(
+    kind: str,
+    parent: str,
+    child: str,
+    place: str,
+    turn: str,
+    axis: tuple[float, ...],
+    law: cdsm.Elasticity,
+) -> Iterator[cdsm.Cable]:
+    """Two cables across one joint of a URDF, which pull it one way and the other."""
+    origin = np.array(place.split(), dtype=np.float64)
+    turned = Rotation.from_euler("xyz", np.array(turn.split(), dtype=np.float64))
+    along = np.array(axis) / math.hypot(*axis)
+    across = np.cross(along, np.eye(3)[abs(along).argmin()])
+    across /= np.linalg.norm(across)
+    way = 0.2 * along if kind == "prismatic" else 0.1 * np.cross(along, across)
+    for name, sign in (("forth", 1.0), ("back", -1.0)):
+        start, end = origin + turned.apply(0.1 * across + sign * way), 0.1 * across
+        sites = (cdsm.Site(parent, tuple(start.tolist())), cdsm.Site(child, tuple(end.tolist())))
+        yield cdsm.Cable(name=f"{child} {name}", sites=sites, elasticity=law)
 
 
 @st.composite
 def _trees(draw: st.DrawFn) -> cdsm.Manipulator | None:
     count = draw(st.integers(1, 8))
     triple = st.tuples(*[st.floats(-0.3, 0.3)] * 3)
-    parts = [link_element("l0")]
+    parts, pairs = [link_element("l0")], []
     kinds = draw(
         st.lists(
             st.sampled_from(["revolute", "revolute", "prismatic", "fixed"]),
@@ -297,17 +325,23 @@ def _trees(draw: st.DrawFn) -> cdsm.Manipulator | None:
     for i, kind in enumerate(kinds, start=1):
         parent = draw(st.integers(0, i - 1))
         place, turn = (" ".join(map(repr, draw(triple))) for _ in "xr")
-        axis = " ".join(map(repr, draw(hinges)[0]))
+        direction = draw(hinges)[0]
+        axis = " ".join(map(repr, direction))
         parts += [
             link_element(f"l{i}", draw(PLAUSIBLE.mass)),
             joint_element(f"j{i}", kind, f"l{parent}", f"l{i}", place, turn, axis),
         ]
+        if kind != "fixed":
+            pairs.append((kind, f"l{parent}", f"l{i}", place, turn, direction))
     links = tuple(f"l{i}" for i in range(count + 1))
     routed, tip, gravity = (
         draw(cables(links, size=0.2)),
         draw(st.sampled_from(links)),
         draw(gravities),
     )
+    if draw(st.sampled_from([True, True, True, False])):  # most can be balanced then
+        law = draw(elasticities())
+        routed += tuple(cable for pair in pairs for cable in _antagonists(*pair, law))
     urdf = f'<robot name="tree">{"".join(parts)}</robot>'
     return _unless_sites_coincide(
         lambda: cdsm.Manipulator.from_urdf(urdf, routed, tip=tip, gravity=gravity)
@@ -365,6 +399,74 @@ def bounds(draw: st.DrawFn) -> tuple[float, float]:
     """A lower and an upper bound of all tensions [N]."""
     low = draw(st.sampled_from([0.0, 5.0, 50.0]) | decades(1e-3, 1e3))
     return low, low + draw(st.sampled_from([math.inf, math.inf]) | decades(1.0, 1e4))
+
+
+class Question(NamedTuple):
+    """An arm, and what its tensions are to hold.
+
+    Attributes:
+        arm: The arm.
+        q: Joint angles (nv,) [rad].
+        minimum: Lower bounds of the tensions (C,) [N].
+        maximum: Upper bounds (C,) [N].
+        wrench: W (6,): force [N], then moment [N m].
+    """
+
+    arm: cdsm.Manipulator
+    q: Array
+    minimum: Array
+    maximum: Array
+    wrench: Array
+
+
+@st.composite
+def questions(draw: st.DrawFn, arms: Strategy[cdsm.Manipulator]) -> Question:
+    """Any load and bounds for any arm; most times no more than it can hold, often just so much.
+
+    Gravity and wrench are then a share of what a linear program finds to be the most that the
+    cables hold within their bounds and elasticities, if they hold anything.
+    """
+    arm = draw(arms)
+    q, (low, high), W = draw(angles(arm)), draw(bounds()), draw(wrenches())
+    count = len(arm.cables)
+    as_it_is = Question(arm, q, np.full(count, low), np.full(count, high), W)
+    if not draw(st.sampled_from([True, True, True, True, True, False])):
+        return as_it_is
+    above, share = 1.0 + draw(decades(1e-3, 1.0)), draw(st.sampled_from([0.5, 0.9, 1 - 1e-9, 1.0]))
+    own = np.array([(cable.minimum, cable.maximum) for cable in arm.cables])
+    domains = [cable.elasticity.domain for cable in arm.cables]
+    lows = np.maximum(own[:, 0], [above * domain.first for domain in domains])
+    highs = np.minimum(own[:, 1], [domain.high for domain in domains])
+    highs = np.maximum(lows, highs)
+    for nearer in (1.0, 0.3, 0.05):  # what is not balanced when bent may be when almost straight
+        angle = np.clip(nearer * q, arm.lower, arm.upper)
+        try:
+            pose = arm.at(angle)
+        except cdsm.CdsmError:
+            continue
+        unit = max(float(abs(pose.length_jacobian).max()), 1e-12 * arm.length)
+        torque = (pose.jacobian.T @ W - pose.gravity_torque) / unit
+        size = float(abs(torque).max()) or 1.0
+        # J_Lᵀ F = s (J_Xᵀ W − g) for the largest s, which is in units that make it near one
+        found = linprog(
+            np.append(np.zeros(count), -1.0),
+            A_eq=np.column_stack([pose.length_jacobian.T / unit, -torque / size]),
+            b_eq=np.zeros(arm.nv),
+            bounds=[*zip(lows, highs, strict=True), (0.0, size)],
+            method="highs",
+        )
+        if found.status == 0:
+            share *= float(found.x[-1]) / size
+            return Question(_lighter(arm, share), angle, lows, highs, share * W)
+    return as_it_is
+
+
+def _lighter(arm: cdsm.Manipulator, share: float) -> cdsm.Manipulator:
+    """The same arm under a share of the gravity."""
+    gravity = share * arm.gravity
+    if arm.is_serpentine:
+        return cdsm.Manipulator(arm.geometry, cables=arm.cables, gravity=gravity)
+    return cdsm.Manipulator.from_urdf(arm.urdf, arm.cables, tip=arm.tip_link, gravity=gravity)
 
 
 @st.composite

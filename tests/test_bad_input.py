@@ -906,6 +906,37 @@ def test_one_joint_on_the_brink_is_singular_though_its_stiffness_is_the_largest_
             _ = K.compliance
 
 
+def test_a_joint_held_by_next_to_nothing_has_no_compliance() -> None:
+    """Its inverse would overflow."""
+    geometry = cdsm.Geometry(
+        name="flat",
+        base_length=0.02,
+        hole_radius=0.03,
+        joints=(cdsm.Joint(axes=((0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), disk_offset=0.01),),
+        links=(cdsm.Link(length=0.04, mass=0.0),),
+        cables=(cdsm.CableRoute(joint=1, angle=0.0),),
+    )
+    pose = cdsm.Manipulator(geometry, STEEL).at([0.0, 0.0])
+    F = np.array([1e-305])
+    stiff = cdsm.stiffness(pose, F)
+    with pytest.raises(cdsm.SingularStiffness, match="next to nothing holds the arm") as caught:
+        _ = stiff.compliance
+    np.testing.assert_array_equal(caught.value.direction, [1.0, 0.0])
+    batch = cdsm.evaluate(pose.arm, [pose.q], F[None], outputs=("compliance",))
+    assert batch.status[0] == cdsm.Status.SINGULAR
+
+
+@pytest.mark.parametrize("force", [1e-310, 1e-300, 1e-160])
+def test_the_least_of_all_loads_is_balanced(force: float) -> None:
+    weightless = cdsm.Manipulator(GEOMETRY, STEEL, gravity=(0.0, 0.0, 0.0))
+    wrench = [0.0, force, 0.0, 0.0, 0.0, 0.0]
+    pull = cdsm.distribute_tension(weightless.at(POSE.q), wrench=wrench)
+    unit = cdsm.distribute_tension(weightless.at(POSE.q), wrench=np.array(wrench) / force)
+    np.testing.assert_allclose(pull.values, force * unit.values, rtol=0.0, atol=1e-9 * force)
+    batch = cdsm.distribute_tensions(weightless, [POSE.q], wrench=wrench)
+    np.testing.assert_allclose(batch.values[0], pull.values, rtol=0.0, atol=1e-9 * force)
+
+
 def test_batch_finds_every_singular_stiffness_that_the_single_posture_does() -> None:
     """Though pivots need not be small where K_θ is singular."""
     for seed in range(12):

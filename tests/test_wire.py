@@ -60,6 +60,7 @@ def test_table_passes_through_its_points() -> None:
         ((1.0, 2.0), (0.0, 1.0, 2.0)),
         ((-1.0, 2.0), (0.0, 1.0)),
         ((1.0, float("nan")), (0.0, 1.0)),
+        ((0.0, 5e-324, 100.0), (0.0, 0.002, 0.005)),  # a slope beyond float64
     ],
 )
 def test_table_that_does_not_rise_is_refused(

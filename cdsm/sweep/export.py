@@ -35,7 +35,7 @@ def write_sweep(dataset: xarray.Dataset, path: str | os.PathLike[str]) -> Path:
             the status, written as a word, says that there is nothing.
 
     Raises:
-        InvalidInput: Not a sweep, or a path of neither kind.
+        InvalidInput: Not a sweep, a status without a meaning, or a path of neither kind.
         MissingExtra: xarray or netCDF4 is not installed.
         FileError: The file cannot be written.
     """
@@ -110,10 +110,19 @@ def check_sweep(dataset: object) -> None:
 
 
 def status_names(dataset: xarray.Dataset) -> dict[int, str]:
-    """The words for the numbers of ``status``, as the Dataset itself has them."""
+    """The words for the numbers of ``status``, as the Dataset itself has them.
+
+    Raises:
+        InvalidInput: They are not one word for each number.
+    """
     told = dataset["status"].attrs
-    values = np.atleast_1d(told["flag_values"]).tolist()
-    return dict(zip(values, told["flag_meanings"].split(), strict=True))
+    try:
+        values = np.atleast_1d(told["flag_values"]).tolist()
+        return dict(zip(values, told["flag_meanings"].split(), strict=True))
+    except (KeyError, AttributeError, TypeError, ValueError):
+        raise InvalidInput(
+            "dataset", "its status has no word for each number; the Dataset of a sweep is needed."
+        ) from None
 
 
 def _read_netcdf(path: Path) -> xarray.Dataset:
@@ -165,6 +174,13 @@ def _table(dataset: xarray.Dataset) -> pandas.DataFrame:
         for suffix, component in _components(variable, status):
             columns[f"{name}{suffix}{units}"] = component
     words = status_names(dataset)
+    unknown = ~np.isin(status.values, list(words))
+    if unknown.any():
+        raise InvalidInput(
+            "dataset",
+            f"its status holds {status.values[unknown][0].item()!r}, which is none of {words}; the "
+            "file it was read from may be damaged.",
+        )
     columns["status"] = np.array([words[int(value)] for value in status.values.ravel()])
     return pandas.DataFrame(columns)
 
