@@ -564,7 +564,7 @@ CASES: dict[str, tuple[Callable[[], object], type[cdsm.CdsmError], tuple[str, ..
     "tension out of the domain": (
         lambda: identify(prototype, [replace(EXACT[0], tension=(900.0,) * 6)], ONE),
         cdsm.InvalidInput,
-        ("posture 1", "900 N", "810 N"),
+        ("posture 1", "tension 900", "810 N"),
     ),
     "direction that does not move": (
         lambda: identify(
