@@ -56,6 +56,10 @@ SMALLEST = 1e-12
 """No stiffness or rigidity of a real cable is this small; below, quotients overflow."""
 
 
+_LEAST = 1e-100
+"""No bound of a tension is this small, unless it is zero; below, products vanish."""
+
+
 def number_array(name: str, value: ArrayLike) -> Array:
     """Return a fresh native float64 array of finite numbers, or raise :class:`InvalidInput`."""
     array = _native(name, value)
@@ -120,13 +124,14 @@ def bound(name: str, value: ArrayLike, size: int, rows: int | None = None) -> Ar
         raise InvalidInput(
             name, f"shape {array.shape} given; give one number, or {wanted}: one per cable [N]."
         )
-    usable = (abs(array) <= LARGEST) | np.isinf(array)
+    force = abs(array)
+    usable = ((force <= LARGEST) & (force >= _LEAST)) | (force == 0.0) | np.isinf(force)
     if np.count_nonzero(usable) < array.size:
         bad = np.argwhere(~usable)[0]
         raise InvalidInput(
             name,
-            f"entry [{', '.join(map(str, bad))}] is {array[tuple(bad)]:g}; give newtons up to "
-            f"{LARGEST:g}, or inf.",
+            f"entry [{', '.join(map(str, bad))}] is {array[tuple(bad)]:g}; give newtons from "
+            f"{_LEAST:g} to {LARGEST:g}, 0 or inf.",
         )
     return frozen(array)
 

@@ -33,6 +33,9 @@ _FIRST, _WIDEST = 0.2, 0.5
 FLAT = 1e-12
 """Eigenvalues of K this part of the largest are rounding: the state is neutral."""
 
+_TINY = 1e-290
+"""Where all of K is smaller than float64 has digits for, a shift to divide by all the same."""
+
 
 class Point(Protocol):
     """What is known where the body has been."""
@@ -239,7 +242,7 @@ def _step(
     # p = −(K + σ)⁻¹ r with the σ that makes it as long as the radius, sought from the smallest σ
     # allowed: near a saddle it is larger by a rounding of σ only
     lifted = values + max(0.0, -values[0])
-    least = FLAT * max(largest, size / radius)
+    least = max(FLAT * max(largest, size / radius), _TINY)
 
     def excess(shift: float) -> float:
         return float(1.0 / radius - 1.0 / np.linalg.norm(along / (lifted + shift)))

@@ -311,12 +311,12 @@ class Stiffness(ReadOnlyState):
         parts = abs(self.active) + abs(self.passive) + abs(self.gravity) + abs(self.load)
         unit = np.sqrt(parts.diagonal())
         unit = np.where(unit > 0.0, unit, 1.0)
-        _, values, right = np.linalg.svd(self.joint / unit / unit[:, None])
-        if not values[-1] > REGULAR * (parts / unit / unit[:, None]).max():
-            raise _singular("the arm is just about to buckle", right[-1] / unit)
         if not parts.diagonal().min() > SOFTEST:
             softest = np.eye(len(parts))[parts.diagonal().argmin()]
             raise _singular("next to nothing holds the arm", softest)
+        _, values, right = np.linalg.svd(self.joint / unit / unit[:, None])
+        if not values[-1] > REGULAR * (parts / unit / unit[:, None]).max():
+            raise _singular("the arm is just about to buckle", right[-1] / unit)
         return frozen(np.linalg.solve(self.joint, self.posture.jacobian.T).astype(np.float64))
 
     def _mobility(self, what: str) -> tuple[Array, Array, Array]:

@@ -1271,3 +1271,10 @@ def test_a_slight_torque_that_no_cable_exerts_is_missing_all_the_same() -> None:
     with pytest.raises(cdsm.InfeasibleTension) as caught:
         cdsm.distribute_tension(pose, minimum=1.0)
     np.testing.assert_allclose(caught.value.missing, -pose.gravity_torque, rtol=1e-9)
+
+
+def test_bound_that_vanishes_in_products_is_refused() -> None:
+    pose = mixed_arm().at(np.zeros(mixed_arm().nv))
+    with pytest.raises(cdsm.InvalidInput, match=r"minimum: .* is 4.94066e-324; give newtons"):
+        cdsm.distribute_tension(pose, minimum=5e-324)
+    assert cdsm.distribute_tension(pose, minimum=0.0).values.min() >= 0.0
