@@ -24,7 +24,7 @@ from cdsm._records import (
 )
 from cdsm.cable import Cable, Control, Site
 from cdsm.elasticity import Elasticity
-from cdsm.errors import CableError, FileError, GeometryError, InvalidInput, listed
+from cdsm.errors import CableError, FileError, GeometryError, InvalidInput, counted
 from cdsm.wire_file import from_table, table_of
 
 _HEAD = """\
@@ -109,8 +109,7 @@ def read_cables(path: str | os.PathLike[str]) -> tuple[Cable, ...]:
         return _built(parse(_Entries, data), _wires(wires))
     except GeometryError as error:
         faults = error.faults
-    count = f"{len(faults)} faults" if len(faults) != 1 else "1 fault"
-    raise FileError(path, f"cannot be read as cables, {count}:{listed(faults)}")
+    raise FileError(path, f"cannot be read as cables, {counted(faults)}")
 
 
 def _wires(tables: dict[str, object]) -> dict[str, Elasticity]:

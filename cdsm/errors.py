@@ -22,6 +22,18 @@ def listed(faults: Sequence[str], most: int | None = None) -> str:
     return "".join(f"\n  - {fault}" for fault in faults[:most]) + more
 
 
+def counted(faults: Sequence[str], most: int | None = None) -> str:
+    """How many faults there are, and :func:`listed` below it."""
+    count = "1 fault" if len(faults) == 1 else f"{len(faults)} faults"
+    return f"{count}:{listed(faults, most)}"
+
+
+def first_of(said: Sequence[str], most: int, what: str) -> str:
+    """The first of some sentences, and how many there are beyond: ``…; and 3 joints more``."""
+    more = len(said) - most
+    return "; ".join(said[:most]) + (f"; and {more} {what} more" if more > 0 else "")
+
+
 _NAMED = 4
 """Joints or cables that a message names; all are in the data of its error."""
 
@@ -139,8 +151,7 @@ class GeometryError(CdsmError, ValueError):
         self.faults = tuple(faults)
         self.source = source
         where = f"{source}: " if source else ""
-        count = f"{len(self.faults)} faults" if len(self.faults) != 1 else "1 fault"
-        super().__init__("\n  - ".join([f"{where}invalid geometry, {count}:", *self.faults]))
+        super().__init__(f"{where}invalid geometry, {counted(self.faults)}")
 
 
 class UrdfError(CdsmError, ValueError):
@@ -178,20 +189,18 @@ class JointLimitError(CdsmError, ValueError):
         joints: Sequence[str],
         angles: Sequence[float],
         limits: Sequence[tuple[float, float]],
-        slides: Sequence[bool] = (),
+        units: Sequence[str] = (),
     ) -> None:
         self.joints = tuple(joints)
         self.angles = tuple(float(angle) for angle in angles)
         self.limits = tuple((float(low), float(high)) for low, high in limits)
-        units = ["m" if slide else "rad" for slide in slides or [False] * len(self.joints)]
         said = [
             f"{joint} = {angle:.6g} {unit} is outside [{low:.6g}, {high:.6g}] {unit}"
             for joint, angle, (low, high), unit in zip(
-                self.joints, self.angles, self.limits, units, strict=True
+                self.joints, self.angles, self.limits, units or ["rad"] * len(joints), strict=True
             )
         ]
-        more = len(said) - _NAMED
-        self.problem = "; ".join(said[:_NAMED]) + (f"; and {more} joints more" if more > 0 else "")
+        self.problem = first_of(said, _NAMED, "joints")
         super().__init__(
             f"{self.problem}. Stay inside the limits, widen joint_limit in the geometry (limit "
             "in a URDF), or, in Python, pass check_limits=False to compute beyond them."

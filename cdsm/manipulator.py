@@ -218,6 +218,11 @@ class Manipulator(Printed):
         """Whether each joint slides (nv,): its coordinate is a way [m], not an angle [rad]."""
         return self._body.slides
 
+    @property
+    def joint_units(self) -> tuple[str, ...]:
+        """Unit of each joint's coordinate (nv,): rad, or m where it slides."""
+        return tuple("m" if slides else "rad" for slides in self.slides)
+
     def torque_unit(self, joint: int | None = None) -> str:
         """Unit of the torque of a joint: N where it slides; or that of all of them together."""
         slides = self.slides if joint is None else self.slides[joint : joint + 1]
@@ -330,7 +335,7 @@ class Manipulator(Printed):
                     [self.joint_names[i] for i in np.flatnonzero(beyond)],
                     q[beyond].tolist(),
                     list(zip(self.lower[beyond], self.upper[beyond], strict=True)),
-                    self.slides[beyond].tolist(),
+                    [self.joint_units[i] for i in np.flatnonzero(beyond)],
                 )
         return q
 

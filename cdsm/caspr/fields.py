@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from cdsm._xml import XmlFault, numbers
-from cdsm.errors import FileError, listed
+from cdsm.errors import FileError, counted
 
 if TYPE_CHECKING:
     from lxml import etree
@@ -38,6 +38,4 @@ def whole(where: str, text: str | None) -> int:
 def refuse(path: Path, faults: Sequence[str]) -> None:
     """Raise a FileError of all faults, if there are any."""
     if faults:
-        raise FileError(
-            path, f"cannot be read as a CASPR model, {len(faults)} faults:{listed(faults, most=20)}"
-        )
+        raise FileError(path, f"cannot be read as a CASPR model, {counted(faults, most=20)}")

@@ -244,10 +244,10 @@ def at_angles(arm: Manipulator, angles: str) -> Posture:
             f"{len(given)} given; give one angle, or one for each of {names}.",
             param_hint="--angles",
         )
-    return arm.at(np.array(given) * joint_units(arm))
+    return arm.at(np.array(given) * joint_scales(arm))
 
 
-def joint_units(arm: Manipulator) -> Array:
+def joint_scales(arm: Manipulator) -> Array:
     """The unit in which the command line takes each joint (nv,): degree or mm, in SI."""
     return np.where(arm.slides, 1e-3, np.deg2rad(1.0))
 

@@ -17,7 +17,7 @@ from cdsm.cli.options import (
     AsJson,
     MaxTension,
     Wrench,
-    joint_units,
+    joint_scales,
     numbers,
     reported,
     show_json,
@@ -153,7 +153,7 @@ def map_sweep(
 
 def _grid(text: str, arm: Manipulator) -> GridPoses:
     """The joints of ``joint1=-20:20:9,joint2=5``, in degrees, or mm where they slide."""
-    units = dict(zip(arm.joint_names, joint_units(arm), strict=True))
+    units = dict(zip(arm.joint_names, joint_scales(arm), strict=True))
     angles: dict[str, Array] = {}
     rest: dict[str, float] = {}
     for part in text.split(","):

@@ -142,8 +142,8 @@ class PathPlan(ReadOnlyState):
         header = [
             *("sample", "status"),
             *(
-                f"{name} [{'m' if slides else 'rad'}]"
-                for name, slides in zip(self.arm.joint_names, self.arm.slides, strict=True)
+                f"{name} [{unit}]"
+                for name, unit in zip(self.arm.joint_names, self.arm.joint_units, strict=True)
             ),
             *(f"{name} tension [N]" for name in names),
             *(f"{name} length [m]" for name in names),

@@ -61,6 +61,10 @@ def plot_arm(
     return figure
 
 
+ELLIPSOID_GRID = 13, 25
+"""Points down and around an ellipsoid."""
+
+
 class Ellipsoid(NamedTuple):
     """Where forces of one size move the tip: the surface (3, 13, 25) [m], and its scale [m/N].
 
@@ -81,7 +85,10 @@ def ellipsoid(stiffness: Stiffness) -> Ellipsoid | None:
     longest = float(np.linalg.norm(C, 2))
     if longest == 0.0:
         return None
-    around, down = np.meshgrid(np.linspace(0.0, 2.0 * np.pi, 25), np.linspace(0.0, np.pi, 13))
+    rows, columns = ELLIPSOID_GRID
+    around, down = np.meshgrid(
+        np.linspace(0.0, 2.0 * np.pi, columns), np.linspace(0.0, np.pi, rows)
+    )
     force = np.stack([np.sin(down) * np.cos(around), np.sin(down) * np.sin(around), np.cos(down)])
     size = 0.2 * stiffness.posture.arm.length / longest
     moved = size * np.einsum("ij,j...->i...", C, force)

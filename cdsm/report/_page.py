@@ -171,8 +171,8 @@ def _conventions(report: Report) -> Section:
     arm = K.posture.arm
     along = " x along the straight arm," if arm.is_serpentine else ""
     written = [", ".join(f"{x:g}" for x in each) for each in (arm.gravity, K.wrench)]
-    angles = zip(arm.joint_names, K.posture.q, arm.slides, strict=True)
-    posture = ", ".join(f"{name} {q:.6g} {'m' if s else 'rad'}" for name, q, s in angles)
+    angles = zip(arm.joint_names, K.posture.q, arm.joint_units, strict=True)
+    posture = ", ".join(f"{name} {q:.6g} {unit}" for name, q, unit in angles)
     lever = (
         f" A joint that slides counts with the arm's length, {arm.length:.4g} m, as lever in the "
         "residual, the self-check, ranks and conditions, but not in the smallest eigenvalue."

@@ -163,7 +163,7 @@ class Neighbourhood:
         apart = np.linalg.norm(site[end] - site[start], axis=1)
         over = np.repeat(np.arange(apart.size), np.diff(segment[:, 3]))
         lever = np.linalg.norm(site[end][over] - origin[joint], axis=1)
-        slides = pose.arm._body.slides[joint - 1]
+        slides = pose.arm.slides[joint - 1]
         return float((apart[over] / np.where(slides, pose.arm.length, lever)).min(initial=1.0))
 
     # --- rounding -----------------------------------------------------------------------------
@@ -203,4 +203,4 @@ class Neighbourhood:
 
 def joint_unit(arm: Manipulator) -> Array:
     """1 rad for a joint that turns, the arm's length [m] for one that slides (nv,)."""
-    return np.where(arm._body.slides, arm.length, 1.0)
+    return np.where(arm.slides, arm.length, 1.0)

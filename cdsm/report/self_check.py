@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple, final
 import numpy as np
 
 from cdsm._checks import Array, ReadOnlyState
-from cdsm.errors import CdsmError
+from cdsm.errors import CdsmError, first_of
 from cdsm.report._differences import Estimates, gradients, hessians
 from cdsm.report._potential import Neighbourhood
 from cdsm.report.facts import torque_size
@@ -159,8 +159,7 @@ def _terms_anew(near: Neighbourhood) -> tuple[list[_Anew], list[_Anew]]:
         lambda: gradients(near.kinematic_torques, size, step, near.kinematic_torque_noise)
     )
     if one_sided := near.laws.one_sided():
-        more = len(one_sided) - _NAMED
-        named = "; ".join(one_sided[:_NAMED]) + (f"; and {more} cables more" if more > 0 else "")
+        named = first_of(one_sided, _NAMED, "cables")
         stored = pulled = f"K_θ has another value on either side: {named}."
     else:
         step = near.first_elastic_step

@@ -271,8 +271,8 @@ def _unit(arm: Manipulator) -> str:
 
 def _meaning(arm: Manipulator, joint: int) -> tuple[str, str]:
     """What the coordinate of a joint is, and its unit."""
-    what, unit = ("way", "m") if arm.slides[joint] else ("angle", "rad")
-    return f"{what} of {arm.joint_names[joint]}", unit
+    what = "way" if arm.slides[joint] else "angle"
+    return f"{what} of {arm.joint_names[joint]}", arm.joint_units[joint]
 
 
 def _listed(q: Array, arm: Manipulator, told: str, labels: dict[str, Label]) -> Listed:

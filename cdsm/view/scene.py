@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from cdsm.errors import CableError, UrdfError
 from cdsm.manipulator import Manipulator
+from cdsm.plots.arm import ELLIPSOID_GRID
 from cdsm.view.state import GREY, Condition, Shown
 
 if TYPE_CHECKING:
@@ -73,8 +74,8 @@ class Scene:
         self._parts = (body if self._place is not None else self._sticks, cables)
         self._ellipsoid = scene.add_mesh_simple(
             "/ellipsoid",
-            np.zeros((13 * 25, 3)),
-            _faces(13, 25),
+            np.zeros((math.prod(ELLIPSOID_GRID), 3)),
+            _faces(*ELLIPSOID_GRID),
             color=_ELLIPSOID,
             opacity=0.65,
             side="front",  # both sides of one that is flat would flicker through each other
