@@ -106,3 +106,21 @@ def optimality(
         else:
             dual = max(dual, z[j])  # a bound that is not there has no multiplier
     return primal, dual, abs(gap)
+
+
+@compiled
+def settled(x: Array, z: Array, low: Array, high: Array, rounding: float) -> Array:
+    """The point x (n,) with what is pressed against a bound, or outside of it, exactly on it.
+
+    What is pressed, the multipliers z (n,) tell: negative at low, positive at high. A solver leaves
+    it there but for ``rounding``, and to a law that begins above zero, almost zero is not zero.
+    """
+    point = np.empty_like(x)
+    for j in range(x.shape[0]):
+        if x[j] - low[j] <= (rounding if z[j] < 0.0 else 0.0):
+            point[j] = low[j]
+        elif high[j] - x[j] <= (rounding if z[j] > 0.0 else 0.0):
+            point[j] = high[j]
+        else:
+            point[j] = x[j]
+    return point

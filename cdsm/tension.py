@@ -151,8 +151,7 @@ def distribute_tension(
     if isinstance(solution, str):
         free = np.array([cable.name not in (fixed or {}) for cable in pose.arm.cables])
         _explain(pose, problem, solver, solution, free)
-    # within OPTIMALITY of the bounds already; a bound that is active is not crossed by rounding
-    values = np.minimum(np.maximum(solution * problem.force, low), high)
+    values = solution * problem.force
     return Tension(
         posture=pose,
         values=frozen(values),
@@ -251,7 +250,9 @@ def _solve(problem: _balance.Scaled, solver: str) -> Array | str:
         shortfall = _shortfall(problem, point)
         if shortfall:
             return f"calls a point optimal that is not: {shortfall}"
-    return point[0]
+    # only now: at the edge of the feasible, multipliers are so large that the last bit of x counts
+    x, _, z = point
+    return _balance.settled(x, z, low, high, OPTIMALITY * max(1.0, float(abs(x).max())))
 
 
 def _instead(solver: str) -> str:

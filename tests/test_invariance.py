@@ -217,6 +217,22 @@ def test_eq17_solvers_agree(seed: int, name: str, solver: str) -> None:
     np.testing.assert_allclose(theirs.values, ours.values, rtol=0.0, atol=1e-6)
 
 
+@pytest.mark.parametrize("solver", ["daqp", "osqp", "clarabel"])
+def test_zero_tension_is_zero_to_a_law_that_begins_above_it(solver: str) -> None:
+    law = cdsm.StrandElasticity(((100.0, 2.0),), (), 0.0, 1e6)  # not at 0 N: EA would be 0 there
+    for seed in range(6):
+        pose, _, _, W = _problem(seed, "universal-3")
+        geometry = pose.arm.geometry
+        assert geometry is not None
+        pose = cdsm.Manipulator(geometry, law).at(pose.q)
+        pull = cdsm.distribute_tension(pose, 0.0, np.inf, W, solver=solver)
+        zero = pull.values == 0.0
+        assert zero.any()
+        assert pull.values[~zero].min() > 1e-9
+        with pytest.raises(cdsm.ElasticityRangeError):
+            cdsm.stiffness(pose, pull)
+
+
 @pytest.mark.parametrize(("seed", "name"), PROBLEMS)
 def test_eq17_tensions_satisfy_the_optimality_conditions(seed: int, name: str) -> None:
     pose, low, high, W = _problem(seed, name)
@@ -233,6 +249,8 @@ def test_eq17_tensions_satisfy_the_optimality_conditions(seed: int, name: str) -
     at_low, at_high = above < 1e-7, below < 1e-7
     free = ~at_low & ~at_high
     assert at_low.any()
+    # and what stands there has its value, not one beside it
+    np.testing.assert_array_equal(np.where(at_low, low, high)[~free], F[~free])
     assert at_high.any() == (high < 200.0).any()  # as the least tensions break each such maximum
     # F = J_L λ + μ with μ = 0 on free cables, which settle λ, μ >= 0 at the lower bound, <= 0 at
     # the upper one
