@@ -8,16 +8,15 @@ import numpy as np
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 
 from cdsm._checks import Array, instance
 from cdsm.errors import InvalidInput
-from cdsm.plots.style import AXES, COLORS, MM
+from cdsm.plots.style import AXES, COLORS, MM, equal_axes
 from cdsm.posture import Posture
 from cdsm.stiffness import Stiffness
 from cdsm.tension import Tension
 
-_FLATTEST = 0.2
+_FLATTEST = 0.35
 """Least range of an axis, as a part of the largest."""
 
 
@@ -123,14 +122,13 @@ def draw_arm(axes: Any, pose: Posture, tension: Tension | None) -> None:
         axes.plot(*(MM * path.T), color=color, linewidth=1.1)
     for name in AXES:
         getattr(axes, f"set_{name}label")(f"{name} [mm]", fontsize=8)
-        getattr(axes, f"{name}axis").set_major_locator(MaxNLocator(4))
     axes.tick_params(labelsize=7, pad=-1)
     limits = np.array([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()])
     ranges = np.ptp(limits, axis=1)
     ranges = np.maximum(ranges, _FLATTEST * ranges.max())  # a flat arm is no sheet of paper
     for name, middle, size in zip(AXES, limits.mean(axis=1), ranges, strict=True):
         getattr(axes, f"set_{name}lim")(middle - size / 2.0, middle + size / 2.0)
-    axes.set_box_aspect(ranges, zoom=0.8)  # equal axes, and room for the labels
+    equal_axes(axes)
 
 
 def _draw_joints(axes: Any, pose: Posture) -> None:

@@ -12,12 +12,11 @@ import numpy as np
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from cdsm._checks import Array, one_of, scalar
 from cdsm.errors import InvalidInput
-from cdsm.plots.style import AXES, COLORS, MM, N_PER_MM
+from cdsm.plots.style import AXES, COLORS, MM, N_PER_MM, TICKS, equal_axes
 from cdsm.sweep.export import check_sweep, status_names
 from cdsm.sweep.quantities import SweepStatus
 
@@ -33,7 +32,6 @@ _UNITS: Final = {
 """What the colour bar shows for the units of a Dataset."""
 
 _MOST_PANELS = 9
-_TICKS = 5
 _WIDE = 30.0
 """Ratio of largest to smallest value from which the colours are logarithmic."""
 
@@ -250,17 +248,13 @@ def _draw(
     axes.scatter(*np.zeros((len(shown), 1)), marker="s", c="0.1", s=28.0)
     for letter, axis in zip(AXES, shown, strict=False):
         getattr(axes, f"set_{letter}label")(f"{AXES[axis]} [mm]", fontsize=8)
-        getattr(axes, f"{letter}axis").set_major_locator(MaxNLocator(_TICKS))
     axes.tick_params(labelsize=7)
     if plane:
+        axes.locator_params(nbins=TICKS)
         axes.set_aspect("equal", adjustable="datalim")
         axes.grid(alpha=0.3)
     else:
-        ranges = np.ptp([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()], axis=1)
-        axes.set_box_aspect(ranges, zoom=0.8)  # equal axes, and room for the labels
-        for letter, part in zip(AXES, ranges / ranges.max(), strict=True):
-            ticks = MaxNLocator(max(1, round(_TICKS * part)))  # a short axis has room for few
-            getattr(axes, f"{letter}axis").set_major_locator(ticks)
+        equal_axes(axes)
 
 
 def _legend(figure: Figure, panels: list[_Panel], words: Mapping[int, str]) -> None:
