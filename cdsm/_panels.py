@@ -149,6 +149,10 @@ def _positive_until(p: Polynomial, low: float, high: float) -> float:
     before = low
     for point in (low, *turns[(turns > low) & (turns < high)].tolist(), high):
         if p(point) <= rounding(point):
-            return float(brentq(p - rounding, before, point)) if point > low else low
+            if point == low:
+                return low
+            # what is found may lie beyond by xtol and rtol together, where p can be nothing
+            found = brentq(p - rounding, before, point, xtol=1e-15 * point, rtol=1e-15)
+            return max(low, float(found - 2e-15 * point))
         before = point
     return np.inf

@@ -81,6 +81,24 @@ def test_parts_add_up_and_shapes_are_kept() -> None:
     assert (np.diff(together) > 0.0).all()
 
 
+def test_strain_is_a_number_up_to_the_very_last_tension_that_has_one() -> None:
+    # Eq. 19 with a coefficient written twice, as found by spoiling files: it is zero near 8.4 N
+    row = (-556.89, 377.99, -70.49, 8.74, 1.12e-2, -0.46, 1.12e-2, -1e-4)
+    rng = np.random.default_rng(0)
+    laws = [one(*row, low=2.2, high=31.0)]
+    for _ in range(200):  # a zero anywhere, of any slope
+        zero, a, b = rng.uniform(5.0, 50.0), 10.0 ** rng.uniform(-6, 6), rng.uniform(0.0, 1.0)
+        laws.append(one(a * zero, a * (b * zero - 1.0), -a * b))
+    for law in laws:
+        end = law._panels.end
+        F = end * (1.0 - np.geomspace(1e-15, 1e-2, 80)[::-1])
+        for values in (law.strain(F), law.energy(F), law.strain([end])):
+            assert np.isfinite(values).all()
+            assert np.diff(values).min(initial=0.0) >= 0.0
+        with pytest.raises(cdsm.ElasticityRangeError, match="not positive everywhere"):
+            law.strain(end * (1.0 + 1e-13))
+
+
 @pytest.mark.parametrize(
     ("law", "end"),
     [
