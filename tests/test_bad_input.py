@@ -1034,8 +1034,9 @@ def other_feasible(solution: qpsolvers.Solution) -> Array:
     return np.asarray(point(solution) + 1e-3 * step)
 
 
-def without_duals(solution: qpsolvers.Solution) -> qpsolvers.Solution:
-    solution.y = solution.z = solution.z_box = None
+def without_duals(solution: qpsolvers.Solution, *names: str) -> qpsolvers.Solution:
+    for name in names:
+        setattr(solution, name, None)
     return solution
 
 
@@ -1047,7 +1048,9 @@ LIES: dict[str, Lie] = {
     "infinite": lambda s: with_x(s, point(s) + INF),
     "zero": lambda s: with_x(s, point(s) * 0.0),
     "no point": lambda s: with_x(s, None),
-    "no multipliers": without_duals,
+    "no multipliers": lambda s: without_duals(s, "y", "z", "z_box"),
+    "no multipliers of the balance": lambda s: without_duals(s, "y"),
+    "no multipliers of the bounds": lambda s: without_duals(s, "z_box"),
 }
 
 

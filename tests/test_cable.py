@@ -178,6 +178,14 @@ def test_fixed_tension_stands_in_place_of_the_bounds() -> None:
     pull = cdsm.distribute_tension(pose, minimum=5.0, fixed={"cable1_2": 2.5})
     assert pull.values[1] == 2.5
     assert np.delete(pull.values, 1).min() >= 5.0
+    # a motor may as well let go
+    assert cdsm.distribute_tension(pose, minimum=5.0, fixed={"cable1_2": 0.0}).values[1] == 0.0
+
+
+def test_all_tensions_may_be_given() -> None:
+    pose = presets.experimental_prototype().at(np.deg2rad([-12.0, -18.0, -20.0]))
+    F = cdsm.distribute_tension(pose, minimum=5.0).values
+    np.testing.assert_array_equal(cdsm.distribute_tension(pose, F, F).values, F)
 
 
 def test_bounds_of_a_cable_hold_as_if_they_had_been_asked_for() -> None:
@@ -269,6 +277,7 @@ def test_force_controlled_pair_member_adds_no_passive_stiffness() -> None:
     [
         ({"cable1_3": 5.0}, cdsm.UnknownName, "did you mean"),
         ({"cable1_2": -5.0}, cdsm.InvalidInput, "only pull"),
+        ({"cable1_2": -0.5}, cdsm.InvalidInput, "-0.5 N given"),
         ({"cable1_2": math.nan}, cdsm.InvalidInput, "fixed"),
         ({"cable1_2": 4000.0}, cdsm.InfeasibleTension, "joint1"),
     ],
