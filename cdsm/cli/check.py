@@ -9,6 +9,7 @@ import typer
 
 from cdsm._files import write_text
 from cdsm.cli.options import (
+    UNMET,
     Angles,
     ArmOptions,
     AsJson,
@@ -17,9 +18,6 @@ from cdsm.cli.options import (
     show_json,
 )
 from cdsm.stiffness import stiffness
-
-NOT_TRUSTED = 3
-"""Exit code where something fails; 1 is an error, 2 a wrong option."""
 
 
 def check(
@@ -47,4 +45,4 @@ def check(
         else:
             typer.echo(f"{pose.arm}\n\n{report}")
     if not report.trustworthy:
-        raise typer.Exit(NOT_TRUSTED)
+        raise typer.Exit(UNMET)

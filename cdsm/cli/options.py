@@ -279,6 +279,10 @@ def show_json(values: dict[str, object]) -> None:
     typer.echo(json.dumps(values, indent=1, allow_nan=False))
 
 
+UNMET = 3
+"""Exit code where the answer is not what one wants; 1 is an error, 2 a wrong option."""
+
+
 @contextmanager
 def reported() -> Iterator[None]:
     """Turn a CdsmError into one message and exit code 1; with --debug leave it as it is.

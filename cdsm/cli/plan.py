@@ -13,6 +13,7 @@ from cdsm._files import write_file
 from cdsm._units import key
 from cdsm.cli.options import (
     NO_WRENCH,
+    UNMET,
     Angles,
     ArmOptions,
     AsJson,
@@ -79,7 +80,10 @@ def plan(
     figure: Picture = None,
     as_json: AsJson = False,
 ) -> None:
-    """Find the least tensions that make an arm as stiff as wanted, at a posture or along a path."""
+    """Find the least tensions that make an arm as stiff as wanted, at a posture or along a path.
+
+    Exit code 3: some samples of the path cannot be planned; all that can is written all the same.
+    """
     with reported():
         robot = arm.read()
         u, load = numbers("--direction", direction, 3), numbers("--wrench", wrench, 6)
@@ -101,6 +105,8 @@ def plan(
             typer.echo(f"written: {answer.motors().write_csv(out)}", err=as_json)
         if figure is not None:
             typer.echo(f"written: {write_file(figure, answer.draw().savefig)}", err=as_json)
+    if not answer.complete:
+        raise typer.Exit(UNMET)
 
 
 class _Answer(NamedTuple):
@@ -110,6 +116,7 @@ class _Answer(NamedTuple):
     numbers: dict[str, object]
     motors: Callable[[], PathPlan]
     draw: Callable[[], Figure]
+    complete: bool = True
 
 
 def _at_posture(pose: Posture, u: list[float], target: float, bounds: _Bounds) -> _Answer:
@@ -151,7 +158,7 @@ def _along_path(
 
         return plot_path_plan(path)
 
-    return _Answer(str(path), _path_to_dict(path), lambda: path, draw)
+    return _Answer(str(path), _path_to_dict(path), lambda: path, draw, not path.infeasible)
 
 
 def _plan_to_dict(plan: StiffnessPlan, attainable: StiffnessRange) -> dict[str, object]:
