@@ -16,7 +16,7 @@ from scipy.optimize import linprog
 import cdsm
 from cdsm import _balance
 from cdsm._checks import Array
-from cdsm.tension import DISTANCE, _shortfall
+from cdsm.tension import DISTANCE, OPTIMALITY, _polished, _shortfall
 from tests import foreign
 from tests.arms import STEEL, mixed_arm, random_arm, random_posture, random_tension, random_wrench
 
@@ -1114,6 +1114,33 @@ def test_what_is_missed_is_told_relative_to_the_largest_tension() -> None:
     ):
         assert part in said
 
+    # and to 1 where all tensions are less: then the torque or the lower bounds set the scale
+    small = problem._replace(b=0.1 * problem.b, low=0.1 * problem.low, high=0.1 * problem.high)
+    said = _shortfall(small, (0.1 * x + np.array([0.0, 0.05]), 0.1 * y, 0.1 * z))
+    assert "balance and bounds are missed by 5.0e-02" in said
+
+
+def test_stationarity_is_asked_for_to_a_billionth_of_the_largest_tension() -> None:
+    # two cables held at 5, so that multipliers of opposite sign leave no gap
+    fixed = np.full(2, 5.0)
+    problem = _balance.Scaled(np.ones((1, 2)), np.array([10.0]), fixed, fixed, 1.0, 1.0)
+    for part, accepted in ((0.9, True), (1.1, False)):
+        off = part * OPTIMALITY * 5.0
+        said = _shortfall(problem, (fixed, np.array([-5.0]), np.array([off, -off])))
+        assert (said == "") == accepted
+
+
+def test_polishing_makes_a_near_optimum_the_optimum_at_either_bound() -> None:
+    # the first cable may pull 4, the third has a weak arm and stands at 1; y = −6 frees the second
+    A, b = np.array([[1.0, 1.0, 0.1]]), np.array([10.1])
+    problem = _balance.Scaled(A, b, np.ones(3), np.array([4.0, INF, INF]), 1.0, 1.0)
+    x, y, z = np.array([4.0, 6.0, 1.0]), np.array([-6.0]), np.array([2.0, 0.0, -0.4])
+    assert _shortfall(problem, (x, y, z)) == ""
+    near = x + np.array([-1e-6, 2e-6, 1e-6]), y, z
+    assert _shortfall(problem, near)
+    for got, exact in zip(_polished(problem, near), (x, y, z), strict=True):
+        np.testing.assert_allclose(got, exact, rtol=1e-15, atol=1e-15)
+
 
 @pytest.mark.parametrize("lie", LIES)
 def test_solver_that_calls_a_wrong_point_optimal_is_caught(
@@ -1134,8 +1161,10 @@ def test_solver_that_calls_a_wrong_point_optimal_is_caught(
         )
     else:
         with pytest.raises(cdsm.SolverError, match="solver 'daqp'") as caught:
-            cdsm.distribute_tension(POSE, minimum=10.0)
+            cdsm.distribute_tension(POSE, minimum=10.0, maximum=500.0)
         assert caught.value.solver == "daqp"
+        if found := re.search(r"tensions of up to (\S+) N", str(caught.value)):
+            assert 10.0 <= float(found[1]) <= 500.0
 
 
 def test_solver_that_raises_is_reported_with_its_reason(monkeypatch: pytest.MonkeyPatch) -> None:
