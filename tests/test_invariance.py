@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 import cdsm
 from cdsm._checks import Array
+from cdsm.stiffness import UNMOVED
 from cdsm.tension import OPTIMALITY
 from tests import arms
 
@@ -505,3 +506,54 @@ def test_straight_arm_cannot_move_along_itself(name: str) -> None:
         with pytest.raises(cdsm.SingularStiffness, match="cannot move") as caught:
             cartesian()
         np.testing.assert_allclose(abs(caught.value.direction), (1.0, 0.0, 0.0), atol=1e-15)
+
+
+@pytest.mark.parametrize("size", [0.01, 1.0, 100.0])
+def test_where_the_tip_cannot_move_does_not_depend_on_the_size_of_the_arm(size: float) -> None:
+    geometry = cdsm.Geometry.hinged(
+        joints=2,
+        twist=0.0,
+        base_length=0.0,
+        link_length=size,
+        disk_offset=0.1 * size,
+        hole_radius=0.2 * size,
+        link_mass=0.1,
+    )
+    arm = cdsm.Manipulator(geometry, arms.STEEL)
+    K = cdsm.stiffness(arm.at(np.zeros(2)), arms.random_tension(arm, 0))
+    way = K.posture.jacobian[:3]
+    across = np.eye(3)[int(abs(way).sum(axis=1).argmax())]
+    for part, moves in ((0.9 * UNMOVED, False), (1.1 * UNMOVED, True)):
+        assert (K.along((1.0, *(part * across)[1:])) < math.inf) == moves
+
+
+def test_pendulum_is_held_by_its_load_alone() -> None:
+    """No elasticity, no weight, no tension: K_θ = fℓ of the force f that pulls along the link."""
+    arm = arms.random_arm(1, 1, "hinged")
+    assert arm.geometry is not None
+    free = [replace(cable, control="force") for cable in arm.cables]
+    pose = cdsm.Manipulator(arm.geometry, cables=free, gravity=(0.0, 0.0, 0.0)).at([0.0])
+    K = cdsm.stiffness(pose, np.zeros(len(free)), wrench=(5.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+    length = float(np.linalg.norm(pose.jacobian[:3]))
+    np.testing.assert_array_equal(K.passive + K.active, 0.0)
+    assert K.joint[0, 0] == pytest.approx(5.0 * length, rel=1e-15)
+    assert K.along(pose.jacobian[:3, 0]) == pytest.approx(5.0 / length, rel=1e-14)
+
+
+def test_what_is_printed_is_each_reading_in_its_own_row() -> None:
+    pose = arms.random_posture(arms.mixed_arm(), 3)
+    K = cdsm.stiffness(pose, arms.random_tension(pose.arm, 3))
+    np.testing.assert_array_equal(K.wrench, np.zeros(6))
+    rows = {line[:24].strip(): line[24:].split() for line in str(K).splitlines()}
+    shares = [K.shares(u) for u in np.eye(3)]
+    expected: dict[str, list[float]] = {
+        "along": [K.along(u) for u in np.eye(3)],
+        "of it passive": [share.passive.sum() for share in shares],
+        "of it active": [share.active.sum() for share in shares],
+        "of it gravity": [share.gravity for share in shares],
+        "of it load": [share.load for share in shares],
+        "cartesian, diagonal": K.cartesian.diagonal().tolist(),
+        "pseudoinverse, diagonal": K.pseudoinverse().diagonal().tolist(),
+    }
+    for name, values in expected.items():
+        assert rows[name] == [f"{value / 1000.0:.4g}" for value in values]
