@@ -309,11 +309,10 @@ class Stiffness(ReadOnlyState):
     def _motion(self) -> Array:
         """K_θ⁻¹ J_Xᵀ (nv, 6): joint motion per wrench at the tip; refuses a singular K_θ."""
         parts = abs(self.active) + abs(self.passive) + abs(self.gravity) + abs(self.load)
-        unit = np.sqrt(parts.diagonal())
-        unit = np.where(unit > 0.0, unit, 1.0)
         if not parts.diagonal().min() > SOFTEST:
             softest = np.eye(len(parts))[parts.diagonal().argmin()]
             raise _singular("next to nothing holds the arm", softest)
+        unit = np.sqrt(parts.diagonal())
         _, values, right = np.linalg.svd(self.joint / unit / unit[:, None])
         if not values[-1] > REGULAR * (parts / unit / unit[:, None]).max():
             raise _singular("the arm is just about to buckle", right[-1] / unit)

@@ -557,3 +557,35 @@ def test_what_is_printed_is_each_reading_in_its_own_row() -> None:
     }
     for name, values in expected.items():
         assert rows[name] == [f"{value / 1000.0:.4g}" for value in values]
+
+
+@pytest.mark.parametrize("units", [1.0, 1e-7, 1e9])
+def test_what_is_singular_does_not_depend_on_the_units_of_a_joint(units: float) -> None:
+    pose = arms.random_posture(arms.random_arm(1, 2, "hinged"), 1)
+    K, nothing = cdsm.stiffness(pose, arms.random_tension(pose.arm, 1)), np.zeros((2, 2))
+    scale = np.diag([1.0, units])
+    for coupling, regular in ((0.5, True), (1.0 - 3e-8, True), (1.0 - 3e-9, False)):
+        matrix = scale @ np.array([[1.0, coupling], [coupling, 1.0]]) @ scale
+        other = replace(
+            K, active=nothing, passive=matrix, gravity=nothing, load=nothing, joint=matrix
+        )
+        if regular:
+            moved = np.linalg.solve(matrix, pose.jacobian.T)
+            np.testing.assert_allclose(other.compliance, pose.jacobian @ moved, rtol=1e-6)
+        else:
+            with pytest.raises(cdsm.SingularStiffness, match="about to buckle") as caught:
+                _ = other.compliance
+            way = scale @ caught.value.direction
+            np.testing.assert_allclose(way[0], -way[1], rtol=1e-6)
+
+
+@pytest.mark.parametrize("rigidity", [0.01, 1.0, 1e6])
+def test_passive_stiffness_is_proportional_to_the_rigidity(rigidity: float) -> None:
+    arm = arms.random_arm(2, 3)
+    assert arm.geometry is not None
+    pose = arms.random_posture(arm, 2)
+    soft = cdsm.Manipulator(arm.geometry, cdsm.LinearElasticity(rigidity)).at(pose.q)
+    K = cdsm.stiffness(soft, arms.random_tension(arm, 2))
+    k = rigidity / soft.cable_lengths
+    _close(K.cable_stiffness, k, 1e-15)
+    _close(K.passive, soft.length_jacobian.T @ np.diag(k) @ soft.length_jacobian, 1e-14)
