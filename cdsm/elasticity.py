@@ -110,8 +110,8 @@ class Elasticity(ABC):
     def rigidity_slope(self, tension: ArrayLike) -> Array:
         r"""dEA/dF [-]: how the tangent rigidity grows with tension.
 
-        Unless a law knows better, the central difference over F (1 ± 6e-6), good for some ten
-        digits; beside an end of :attr:`domain` or one of :attr:`jumps` it is taken on the side
+        Unless a law knows better, the central difference over F ± 6e-6 max(F, 1 N), good for some
+        ten digits; beside an end of :attr:`domain` or one of :attr:`jumps` it is taken on the side
         there is, at a jump below it.
 
         Args:

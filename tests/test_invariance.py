@@ -579,13 +579,27 @@ def test_what_is_singular_does_not_depend_on_the_units_of_a_joint(units: float) 
             np.testing.assert_allclose(way[0], -way[1], rtol=1e-6)
 
 
-@pytest.mark.parametrize("rigidity", [0.01, 1.0, 1e6])
-def test_passive_stiffness_is_proportional_to_the_rigidity(rigidity: float) -> None:
+@pytest.mark.parametrize("count", range(1, 8))
+@pytest.mark.parametrize("rigidity", [0.01, 1e6])
+def test_passive_stiffness_is_that_of_each_cable_whatever_their_number(
+    rigidity: float, count: int
+) -> None:
+    # as soft as no cable is: nothing that is added besides is small beside it
+    law = cdsm.LinearElasticity(rigidity)
     arm = arms.random_arm(2, 3)
     assert arm.geometry is not None
-    pose = arms.random_posture(arm, 2)
-    soft = cdsm.Manipulator(arm.geometry, cdsm.LinearElasticity(rigidity)).at(pose.q)
-    K = cdsm.stiffness(soft, arms.random_tension(arm, 2))
-    k = rigidity / soft.cable_lengths
-    _close(K.cable_stiffness, k, 1e-15)
-    _close(K.passive, soft.length_jacobian.T @ np.diag(k) @ soft.length_jacobian, 1e-14)
+    idle = cdsm.Cable(
+        "idle",
+        (cdsm.Site("base_link", (0.0, 0.0, 0.0)), cdsm.Site("base_link", (1.0, 0.0, 0.0))),
+        law,
+    )
+    some = [replace(cable, elasticity=law) for cable in arm.cables[:count]]
+    fixed = [replace(idle, name=f"idle{c}") for c in range(3)]
+    q = arms.random_posture(arm, 2).q
+    for cables in (some, [*fixed, *some], [*some, *fixed]):
+        pose = cdsm.Manipulator(arm.geometry, cables=cables).at(q)
+        K = cdsm.stiffness(pose, np.full(len(cables), 3.0))
+        k = rigidity / pose.cable_lengths
+        _close(K.cable_stiffness, k, 1e-15)
+        J = pose.length_jacobian
+        _close(K.passive, np.sum([k[c] * np.outer(J[c], J[c]) for c in range(len(k))], 0), 1e-14)
