@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike
 
-from cdsm import _body_kernels, _kernels
+from cdsm import _body_kernels, _kernels, _stiffness_kernels
 from cdsm._checks import Array
 from cdsm._rigid_body import RigidBody
 from cdsm.batch import dense
@@ -37,14 +37,18 @@ def test_tree_that_branches_weighs_what_pinocchio_says() -> None:
         tree, masses = body.tree(), body.masses()
         q = np.array([0.2, -0.3, 0.4, 0.5, -0.6])
         count = q.size + 1
-        rotation = np.empty((count, 3, 3))
-        origin, axis = np.empty((2, count, 3))
+        rotation = np.full((count, 3, 3), np.nan)  # nothing may stay as it was
+        origin, axis = np.full((2, count, 3), np.nan)
         frames = _kernels.Frames(origin, axis, np.empty(tree.slide.shape), np.empty((0, 3)))
         row, point = np.empty(0, dtype=np.intp), np.empty((0, 3))
         _kernels.place(tree, row, point, q, rotation, frames)
-        pose, jacobian = np.empty((4, 4)), np.zeros((6, q.size))
+        for filled, of_base in ((origin, 0.0), (axis, 0.0), (rotation, np.eye(3))):
+            assert np.isfinite(filled).all()
+            np.testing.assert_array_equal(filled[0], of_base)
+        pose, jacobian = np.full((4, 4), np.nan), np.zeros((6, q.size))
         _body_kernels.reach(tree.parent, masses, rotation, frames, pose, jacobian)
-        heavy, torque, slope = np.empty((count, 7)), np.empty(q.size), np.zeros((q.size, q.size))
+        heavy, torque = np.full((count, 7), np.nan), np.full(q.size, np.nan)
+        slope = np.zeros((q.size, q.size))
         _body_kernels.weigh(tree.parent, masses, rotation, frames, heavy, torque)
         _body_kernels.add_gravity(tree.parent, heavy, slope)
         _kernels.mirror(slope)
@@ -55,6 +59,19 @@ def test_tree_that_branches_weighs_what_pinocchio_says() -> None:
         np.testing.assert_allclose(jacobian, state.jacobian, rtol=0.0, atol=1e-15)
         np.testing.assert_allclose(torque, state.gravity_torque, rtol=0.0, atol=1e-14)
         np.testing.assert_allclose(slope, state.gravity_stiffness, rtol=0.0, atol=1e-14)
+
+
+def test_passive_term_is_a_sum_over_cables_however_sparse_their_moment_arms() -> None:
+    rng = np.random.default_rng(0)
+    for _ in range(300):
+        J = rng.normal(size=rng.integers(1, [9, 7])) * 10.0 ** rng.integers(-3, 3)
+        J[rng.random(J.shape) < rng.random()] = 0.0
+        k = rng.uniform(0.0, 1e-2, len(J))
+        before = rng.normal(size=(J.shape[1],) * 2)
+        got = before.copy()
+        _stiffness_kernels.add_passive(J, k, got)
+        expected = before + np.triu(np.einsum("c,ci,cj->ij", k, J, J))
+        np.testing.assert_allclose(got, expected, rtol=1e-13, atol=1e-15)
 
 
 def symmetric(values: ArrayLike, seed: int = 0) -> Array:
