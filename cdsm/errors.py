@@ -242,6 +242,7 @@ class InfeasibleTension(CdsmError):
         joint: Name of the joint that lacks most.
         relaxation: By how much all bounds would have to widen [N]; inf if no bounds would do.
         binding: Names of the cables that stand at a bound in the closest attempt.
+        fixed: Names of the cables whose fixed tensions are in the way; empty if they are not.
     """
 
     def __init__(
@@ -251,18 +252,25 @@ class InfeasibleTension(CdsmError):
         relaxation: float,
         binding: Sequence[str],
         units: tuple[str, str] = ("N m", "N m"),
+        fixed: Sequence[str] = (),
     ) -> None:
         self.missing = missing
         self.joint = joint
         self.relaxation = relaxation
         self.binding = tuple(binding)
+        self.fixed = tuple(fixed)
         total = float(abs(missing).sum())
         worst = float(abs(missing).max())
         message = (
             f"no tension within the bounds balances the arm: {total:.4g} {units[0]} are "
             f"missing, most of it ({worst:.4g} {units[1]}) at {joint}. "
         )
-        if relaxation == float("inf"):
+        if fixed:
+            message += (
+                f"Beside the fixed tensions no bounds of the other cables help: change or free "
+                f"{', '.join(fixed)}."
+            )
+        elif relaxation == float("inf"):
             message += (
                 "No bounds would help: the cables cannot exert this torque at all. Change the "
                 "posture, the load, or the routing."

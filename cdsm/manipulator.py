@@ -250,12 +250,10 @@ class Manipulator(Printed):
         return f"<Manipulator {self}>"
 
     def __str__(self) -> str:
+        free = f"{self.nv} degrees of freedom"
         if self._geometry is not None:
-            return str(self._geometry)
-        return (
-            f"{self.name}: {self.nv} degrees of freedom, {len(self._cables)} cables, "
-            f"{self.length:.4g} m long"
-        )
+            free = f"{len(self._geometry.joints)} joints ({free})"
+        return f"{self.name}: {free}, {len(self._cables)} cables, {self.length:.6g} m long"
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Manipulator) and self._value == other._value

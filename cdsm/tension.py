@@ -1,4 +1,4 @@
-"""Tension distribution: the least cable tensions that balance the arm. Only qpsolvers user.
+"""Tension distribution: the least cable tensions that balance the arm.
 
 A redundant arm leaves the tensions of Eq. 17 undetermined; as is usual, the smallest are taken:
 
@@ -68,6 +68,7 @@ class Tension(ReadOnlyState):
         maximum: Upper bounds (C,) [N].
         solver: Name of the solver that found them.
         residual: J_Lᵀ F − (J_Xᵀ W − g), what is left of Eq. 13, (nv,) [N m].
+        least: Whether they are the smallest; False of those chosen for a stiffness.
     """
 
     posture: Posture
@@ -77,6 +78,7 @@ class Tension(ReadOnlyState):
     maximum: Array
     solver: str
     residual: Array
+    least: bool = True
 
     @property
     def at_minimum(self) -> tuple[str, ...]:
@@ -139,6 +141,7 @@ def distribute_tension(
     """
     instance("pose", pose, Posture)
     low, high = checked_bounds(pose.arm, minimum, maximum)
+    fixed = {} if fixed is None else fixed
     if fixed:
         low, high = _with_fixed(pose, low, high, fixed)
     wrench = vector("wrench", wrench, 6, "force [N], then moment [N m], base axes")
@@ -149,7 +152,7 @@ def distribute_tension(
     problem = _balance.Scaled(*scaled)
     solution = _solve(problem, solver)
     if isinstance(solution, str):
-        free = np.array([cable.name not in (fixed or {}) for cable in pose.arm.cables])
+        free = np.array([cable.name not in fixed for cable in pose.arm.cables])
         _explain(pose, problem, solver, solution, free)
     values = solution * problem.force
     return Tension(
@@ -180,22 +183,25 @@ def checked_bounds(arm: Manipulator, minimum: ArrayLike, maximum: ArrayLike) -> 
             f"{low[c]:g} N given for {cables[c].name}; cables only pull, so it must be finite "
             "and not negative.",
         )
-    low, high = arm._laws.narrowed(low, high)
-    ordered = low <= high
-    if np.count_nonzero(ordered) < low.size:
+    least, most = arm._laws.narrowed(low, high)
+    ordered = least <= most
+    if np.count_nonzero(ordered) < least.size:
         c = int(ordered.argmin())
+        given, own = "given" if most[c] == high[c] else "of its own", least[c] > low[c]
         raise InvalidInput(
             "maximum",
-            f"{high[c]:g} N given for {cables[c].name}, below its minimum of {low[c]:g} N; raise "
-            "maximum or lower minimum.",
+            f"{most[c]:g} N {given} for {cables[c].name}, below {'its own' if own else 'its'} "
+            f"minimum of {least[c]:g} N; raise maximum or lower minimum.",
         )
-    return low, high
+    return least, most
 
 
 def _with_fixed(
     pose: Posture, low: Array, high: Array, fixed: Mapping[str, float]
 ) -> tuple[Array, Array]:
     """The bounds with those of named cables replaced by one value."""
+    if not isinstance(fixed, Mapping):
+        raise InvalidInput("fixed", f"{fixed!r} given; give a dict of tensions [N] by cable.")
     names = [cable.name for cable in pose.arm.cables]
     low, high = low.copy(), high.copy()
     for name, value in fixed.items():
@@ -240,7 +246,6 @@ def _solve(problem: _balance.Scaled, solver: str) -> Array | str:
         return "found no solution"
     if solution.y is None or solution.z_box is None:
         raise SolverError(solver, f"returns no multipliers to verify it by. {_instead(solver)}")
-    # the same as the solution's primal_residual, dual_residual and duality_gap, ten times faster
     point = tuple(np.asarray(each, dtype=np.float64) for each in (x, solution.y, solution.z_box))
     if not np.isfinite(point[0]).all():
         raise SolverError(solver, f"calls {x.tolist()} optimal. {_instead(solver)}")
@@ -329,12 +334,32 @@ def _explain(
             f" the arm is at the edge of what its cables can hold. {_instead(solver)}",
         )
 
+    widening = _widening(problem, free)
+    # if it is the fixed tensions that are in the way
+    blocking = math.isinf(widening) and math.isfinite(_widening(problem, np.ones_like(free)))
+    missing = (b - A @ values) * arm_scale * force_scale
+    tight = free & (np.minimum(values - lower, upper - values) <= OPTIMALITY)
+    worst = int(abs(missing).argmax())
+    raise InfeasibleTension(
+        missing=frozen(missing),
+        joint=pose.arm.joint_names[worst],
+        relaxation=widening,
+        binding=[pose.arm.cables[c].name for c in np.flatnonzero(tight)],
+        fixed=[pose.arm.cables[c].name for c in np.flatnonzero(~free)] if blocking else (),
+        units=(pose.arm.torque_unit(), pose.arm.torque_unit(worst)),
+    )
+
+
+def _widening(problem: _balance.Scaled, free: NDArray[np.bool_]) -> float:
+    """By how much the bounds of free cables (C,) must widen [N]; inf if that does not help."""
+    A, b, lower, upper, _, force_scale = problem
+    nv, count = A.shape
     # variables: F, then the widening t: low − t <= F <= high + t, and F >= 0 all the same; a fixed
     # tension does not widen
     rows = np.vstack([-np.eye(count), np.eye(count)])
     sides = np.concatenate([-lower, upper])
     finite = np.isfinite(sides)
-    widening = linprog(
+    found = linprog(
         np.concatenate([np.zeros(count), [1.0]]),
         A_ub=np.hstack([rows, -1.0 * np.tile(free, 2)[:, None]])[finite],
         b_ub=sides[finite],
@@ -344,13 +369,4 @@ def _explain(
         method="highs",
         options=_TIGHT,
     )
-    missing = (b - A @ values) * arm_scale * force_scale
-    tight = free & (np.minimum(values - lower, upper - values) <= OPTIMALITY)
-    worst = int(abs(missing).argmax())
-    raise InfeasibleTension(
-        missing=frozen(missing),
-        joint=pose.arm.joint_names[worst],
-        relaxation=float(widening.x[-1]) * force_scale if widening.status == 0 else math.inf,
-        binding=[pose.arm.cables[c].name for c in np.flatnonzero(tight)],
-        units=(pose.arm.torque_unit(), pose.arm.torque_unit(worst)),
-    )
+    return float(found.x[-1]) * force_scale if found.status == 0 else math.inf

@@ -247,14 +247,47 @@ def test_no_widening_helps_where_the_fixed_tensions_alone_miss_the_balance(
     pose = presets.experimental_prototype().at(np.zeros(3))
     # nothing but its own pair of cables reaches the last joint
     given = {"cable3_1": 20.0, "cable3_2": 60.0, **others}
-    with pytest.raises(cdsm.InfeasibleTension, match="No bounds would help") as caught:
+    with pytest.raises(cdsm.InfeasibleTension, match="Beside the fixed tensions no") as caught:
         cdsm.distribute_tension(pose, 5.0, 800.0, fixed=given)
     assert caught.value.relaxation == math.inf
+    assert set(caught.value.fixed) == set(given)
+    cdsm.distribute_tension(pose, 5.0, 800.0)  # without them there are some
     np.testing.assert_allclose(
         caught.value.missing[2],
         (-pose.gravity_torque - pose.length_jacobian[4:].T @ [20.0, 60.0])[2],
         rtol=1e-9,
     )
+
+
+def test_fixed_tensions_are_not_blamed_for_a_torque_that_no_cable_exerts() -> None:
+    arm = presets.experimental_prototype()
+    assert arm.geometry is not None
+    pose = cdsm.Manipulator(arm.geometry, cables=arm.cables[:4]).at(np.zeros(3))
+    with pytest.raises(cdsm.InfeasibleTension, match="cannot exert this torque") as caught:
+        cdsm.distribute_tension(pose, fixed={arm.cables[0].name: 20.0})
+    assert caught.value.fixed == ()
+
+
+def test_own_bound_of_a_cable_is_called_its_own() -> None:
+    arm = presets.experimental_prototype()
+    assert arm.geometry is not None
+    cases: tuple[tuple[dict[str, Any], tuple[float, float], str], ...] = (
+        ({"maximum": 30.0}, (40.0, math.inf), "30 N of its own for cable1_1, below its minimum of"),
+        ({"minimum": 50.0}, (0.0, 40.0), "40 N given for cable1_1, below its own minimum of 50 N"),
+    )
+    for own, asked, said in cases:
+        cables = [dataclasses.replace(arm.cables[0], **own), *arm.cables[1:]]
+        pose = cdsm.Manipulator(arm.geometry, cables=cables).at(np.zeros(3))
+        with pytest.raises(cdsm.InvalidInput, match=said):
+            cdsm.distribute_tension(pose, *asked)
+
+
+def test_summary_counts_the_cables_there_are() -> None:
+    arm = presets.experimental_prototype()
+    assert arm.geometry is not None
+    assert str(arm) == str(arm.geometry)
+    some = cdsm.Manipulator(arm.geometry, cables=arm.cables[:2])
+    assert "3 joints (3 degrees of freedom), 2 cables" in str(some)
 
 
 def test_force_controlled_pair_member_adds_no_passive_stiffness() -> None:
@@ -279,6 +312,7 @@ def test_force_controlled_pair_member_adds_no_passive_stiffness() -> None:
         ({"cable1_2": -5.0}, cdsm.InvalidInput, "only pull"),
         ({"cable1_2": -0.5}, cdsm.InvalidInput, "-0.5 N given"),
         ({"cable1_2": math.nan}, cdsm.InvalidInput, "fixed"),
+        ([5.0, 5.0], cdsm.InvalidInput, "give a dict of tensions"),
         ({"cable1_2": 4000.0}, cdsm.InfeasibleTension, "joint1"),
     ],
 )

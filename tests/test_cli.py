@@ -266,6 +266,7 @@ def test_plan_asks_for_one_target_and_for_a_path_with_its_rate(
         ((), "--path"),
         (("--target", 20, "--rate", 3), "--path"),
         (("--target", 20, "--path", path), "both"),
+        (("--path", path, "--angles", "1,2"), "--angles"),
     ):
         result = call("plan", geometry, "--direction", "0,0,1", *arguments)
         assert result.exit_code == 2

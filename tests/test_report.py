@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from dataclasses import fields, replace
 from html.parser import HTMLParser
 from pathlib import Path
@@ -376,6 +377,7 @@ def test_distributed_tensions_are_found_optimal(solver: str) -> None:
     found = report.optimality
     assert found is not None
     assert found.optimal
+    assert found.stationarity is not None
     assert max(found.feasibility, found.stationarity) < 1e-9
     assert found.at_minimum == pull.at_minimum
     assert found.at_maximum == pull.at_maximum == (pose.arm.cables[first].name,)
@@ -390,6 +392,7 @@ def test_balanced_tensions_that_are_not_the_least_are_found() -> None:
     report = cdsm.stiffness(pose, given).report()
     assert report.imbalance < 1e-12
     assert report.optimality is not None
+    assert report.optimality.stationarity is not None
     assert report.optimality.stationarity > 1e-3
     assert [fault for fault in report.faults if "not what daqp was asked for" in fault]
     # bare, they claim nothing
@@ -624,3 +627,90 @@ def test_report_says_what_it_is_in_one_line() -> None:
     assert repr(hybrid(3).report()).endswith("NOT TO BE TRUSTED>")
     assert str(K.report().self_check).count("agrees") == 7
     assert K.report().warnings == K.report().faults + K.report().notes
+
+
+# --- what a stranger stumbled over --------------------------------------------------------------
+
+
+@settings(max_examples=25, deadline=None, derandomize=True)
+@given(seed=st.integers(0, 10_000))
+def test_table_that_bends_at_each_of_its_points_is_no_reason_for_distrust(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    points = np.cumsum([0.0, *rng.uniform(0.5, 5.0, 60)])
+    strains = np.cumsum([0.0, *np.diff(0.01 * np.log1p(points / 10.0)) * rng.uniform(1.0, 1.3, 60)])
+    law = cdsm.TabulatedElasticity(tuple(points), tuple(strains))
+    arm = arms.random_arm(seed, 1 + seed % 4, ("universal", "hinged")[seed % 2], law)
+    K = cdsm.stiffness(arms.random_posture(arm, seed), rng.uniform(15.0, 60.0, len(arm.cables)))
+    for each in K.report().self_check.compared:
+        assert each.verdict != "DIFFERS", each.reason
+
+
+def test_planned_tensions_are_not_asked_to_be_the_least() -> None:
+    pose = virtual()
+    attainable = cdsm.stiffness_range(pose, (0.0, 0.0, 1.0), 15.0, 300.0)
+    target = 0.5 * (attainable.low + attainable.high)
+    plan = cdsm.plan_stiffness(pose, (0.0, 0.0, 1.0), target, 15.0, 300.0)
+    assert not plan.tension.least
+    report = plan.stiffness.report()
+    assert report.trustworthy, report.faults
+    assert report.optimality is not None
+    assert report.optimality.stationarity is None
+    assert report.optimality.feasibility < 1e-12
+    assert "the tensions were chosen for a stiffness: they are not the least." in report.notes
+    assert "Tensions, chosen for a stiffness within their bounds" in str(report)
+    assert "KKT" not in str(report)
+    told: Any = report.to_dict()
+    assert told["optimality"]["stationarity"] is None
+    # but to balance the arm within the bounds
+    off = replace(plan.tension, values=1.001 * plan.tension.values)
+    (_, fault) = cdsm.stiffness(pose, off).report().faults
+    assert "not what daqp was asked for" in fault
+    assert "stationarity" not in fault
+
+
+def test_bounds_are_called_active_as_the_tension_calls_them() -> None:
+    pose = virtual()
+    free = cdsm.distribute_tension(pose, 15.0)
+    near = cdsm.distribute_tension(pose, 15.0, free.values * (1.0 + 1e-7))
+    report = cdsm.stiffness(pose, near).report()
+    assert report.optimality is not None
+    assert report.optimality.at_maximum == near.at_maximum
+    assert report.trustworthy, report.faults
+
+
+def test_what_slides_is_told_in_metres_and_every_number_has_its_unit() -> None:
+    arm = foreign.crab()
+    K = cdsm.stiffness(arm.at(foreign.POSTURE), foreign.TENSION)
+    told: Any = K.report().to_dict()
+    sliding = {arm.joint_names[i] for i in np.flatnonzero(arm.slides)}
+    assert set(told["conventions"]["ways_m"]) == sliding
+    assert not set(told["conventions"]["angles_rad"]) & sliding
+    units = {each["name"]: each["unit"] for each in told["self_check"]["terms"]}
+    assert units == {**dict.fromkeys(TERMS, "N m/rad"), "torque": "N m", "lengths": "m"}
+    # nothing pulls, nothing weighs
+    bare = cdsm.Manipulator(arms.random_arm(1, 1).geometry, arms.STEEL, gravity=(0.0, 0.0, 0.0))
+    slack = cdsm.stiffness(bare.at(np.zeros(2)), np.zeros(len(bare.cables))).report()
+    assert named(slack, "torque").largest == 0.0
+    row = next(line for line in str(slack).splitlines() if line.startswith("  torque "))
+    assert "N m/rad" not in row
+    wrong = replace(K, passive=frozen(1.001 * K.passive)).report()
+    assert re.search(r"off by \S+ N m/rad, with \S+ N m/rad its largest", wrong.faults[0])
+
+
+def test_arm_written_in_millimetres_is_noticed() -> None:
+    arm = cdsm.Manipulator(
+        cdsm.Geometry.hinged(
+            joints=1,
+            twist=0.0,
+            link_length=60.0,
+            base_length=0.0,
+            disk_offset=8.0,
+            hole_radius=25.0,
+            link_mass=0.1,
+        ),
+        arms.STEEL,
+    )
+    report = cdsm.stiffness(arm.at([0.1]), np.full(2, 50.0)).report()
+    assert [
+        note for note in report.notes if "60 m long: it looks as if its lengths are in mm" in note
+    ]

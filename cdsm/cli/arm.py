@@ -10,13 +10,12 @@ import numpy as np
 import typer
 
 from cdsm._checks import Array
-from cdsm._units import key
+from cdsm._units import joints_to_dict, key
 from cdsm.cli.options import (
     Angles,
     ArmOptions,
     AsJson,
     TensionOptions,
-    joints_to_dict,
     reported,
     show_json,
 )

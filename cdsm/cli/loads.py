@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from cdsm._files import write_file
+from cdsm._units import joints_to_dict
 from cdsm.buckling import CriticalLoad, CriticalTension, critical_load, critical_tension
 from cdsm.cli.options import (
     NO_WRENCH,
@@ -18,7 +19,6 @@ from cdsm.cli.options import (
     Solver,
     TensionOptions,
     Wrench,
-    joints_to_dict,
     numbers,
     reported,
     show_json,

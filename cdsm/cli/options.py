@@ -38,14 +38,13 @@ console = Console(stderr=True)
 _ARM = "The arm"
 _TENSIONS = "Tensions and load"
 
-Angles = Annotated[
-    str,
-    typer.Option(
-        help="Joint angles in degrees (mm where a joint slides), separated by commas; or one for "
-        "all joints.",
-        metavar="DEG,DEG,...",
-    ),
-]
+ANGLES = typer.Option(
+    help="Joint angles in degrees (mm where a joint slides), separated by commas; or one for all "
+    "joints. [default: 0]",
+    metavar="DEG,DEG,...",
+    show_default=False,
+)
+Angles = Annotated[str, ANGLES]
 MinTension = Annotated[
     float, typer.Option(help="Lower bound of all tensions [N].", rich_help_panel=_TENSIONS)
 ]
@@ -250,15 +249,6 @@ def at_angles(arm: Manipulator, angles: str) -> Posture:
 def joint_scales(arm: Manipulator) -> Array:
     """The unit in which the command line takes each joint (nv,): degree or mm, in SI."""
     return np.where(arm.slides, 1e-3, np.deg2rad(1.0))
-
-
-def joints_to_dict(arm: Manipulator, q: Array) -> dict[str, object]:
-    """Coordinates q (..., nv) by joint, angles and ways apart since their units differ."""
-    told: dict[str, object] = {}
-    for key, chosen in (("angles_rad", ~arm.slides), ("ways_m", arm.slides)):
-        if chosen.any() or key == "angles_rad":
-            told[key] = {arm.joint_names[i]: q[..., i].tolist() for i in np.flatnonzero(chosen)}
-    return told
 
 
 def numbers(option: str, text: str, count: int | None = None) -> list[float]:

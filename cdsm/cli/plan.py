@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 import typer
 
 from cdsm._files import write_file
-from cdsm._units import key
+from cdsm._units import joints_to_dict, key
 from cdsm.cli.options import (
+    ANGLES,
     NO_WRENCH,
     UNMET,
-    Angles,
     ArmOptions,
     AsJson,
     MaxTension,
@@ -22,7 +22,6 @@ from cdsm.cli.options import (
     Picture,
     Wrench,
     at_angles,
-    joints_to_dict,
     numbers,
     reported,
     show_json,
@@ -55,7 +54,7 @@ def plan(
         float | None,
         typer.Option(help="Wanted stiffness [N/mm]; PATH.csv can give it for every sample."),
     ] = None,
-    angles: Angles = "0",
+    angles: Annotated[str | None, ANGLES] = None,
     path: Annotated[
         Path | None,
         typer.Option(
@@ -89,6 +88,10 @@ def plan(
         u, load = numbers("--direction", direction, 3), numbers("--wrench", wrench, 6)
         wanted = None if target is None else 1000.0 * target
         bounds = min_tension, max_tension, load
+        if path is not None and angles is not None:
+            raise typer.BadParameter(
+                "is of one posture; --path has its own.", param_hint="--angles"
+            )
         if path is not None:
             answer = _along_path(robot, read_path(path, robot), u, wanted, bounds, rate)
         elif wanted is None:
@@ -96,7 +99,7 @@ def plan(
         elif math.isfinite(rate):
             raise typer.BadParameter("is of a path; give --path, too.", param_hint="--rate")
         else:
-            answer = _at_posture(at_angles(robot, angles), u, wanted, bounds)
+            answer = _at_posture(at_angles(robot, angles or "0"), u, wanted, bounds)
         if as_json:
             show_json(answer.numbers)
         else:

@@ -124,6 +124,7 @@ class Admissible:
             minimum=self.asked[0],
             maximum=self.asked[1],
             residual=frozen(F @ least.posture.length_jacobian - torque),
+            least=False,
         )
 
 

@@ -213,6 +213,7 @@ def _breaks(pull: Callable[[float], Tension], places: Array) -> Array:
     """
     found: list[float] = []
     todo = list(pairwise(places.tolist()))
+    nothing = _JUST**2 * float(places.max(initial=0.0))  # what happens at zero has nothing below it
     while todo:
         a, b = todo.pop()
         one, other = pull(a), pull(b)
@@ -221,7 +222,7 @@ def _breaks(pull: Callable[[float], Tension], places: Array) -> Array:
                 jumps = cable.elasticity.jumps if cable.control == "position" else ()
                 passed = (jump for jump in jumps if min(F, G) <= jump < max(F, G))
                 found += [a + (jump - F) / (G - F) * (b - a) for jump in passed]
-        elif b - a <= _JUST * b:
+        elif b - a <= max(_JUST * b, nothing):
             found.append((a + b) / 2.0)
         else:
             todo += [(a, (a + b) / 2.0), ((a + b) / 2.0, b)]

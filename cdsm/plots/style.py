@@ -1,4 +1,4 @@
-"""What all figures share: names, colours and the units of their axes."""
+"""What all figures share: names, colours, units and scales of their axes."""
 
 from __future__ import annotations
 

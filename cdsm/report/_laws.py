@@ -10,12 +10,16 @@ import numpy as np
 from cdsm._checks import Array
 from cdsm.cable import Cable
 from cdsm.errors import CdsmError, InvalidInput
+from cdsm.wire import TabulatedElasticity
 
 if TYPE_CHECKING:
     from cdsm.stiffness import Stiffness
 
 ONE_SIDED = 1e-4
 """A tension this part of itself from where its law ends or jumps has a law on one side alone."""
+
+_BESIDE = 1e-6
+"""A point of a table this part of a tension beside it is at that tension."""
 
 _KINK = 5e-3
 """Stiffnesses of a cable beside each other that differ by more have a jump between them."""
@@ -70,10 +74,14 @@ class LockedLaws:
         return np.asarray(more - F * longer)
 
     def room(self, c: int, cable: Cable) -> float:
-        """How far its tension may go [N] until its law ends or jumps."""
-        law = cable.elasticity
-        edges = (law.domain.low, law.domain.high, *law.jumps)
-        return min(abs(float(self._tension[c]) - edge) for edge in edges)
+        """How far its tension may go [N] until its law ends, jumps or bends."""
+        F, law = float(self._tension[c]), cable.elasticity
+        edges = [law.domain.low, law.domain.high, *law.jumps]
+        if isinstance(law, TabulatedElasticity):
+            # at its points the rigidity bends; so near to one that no step would be left, the
+            # bend stays in the middle, and the differences settle all the same
+            edges += [point for point in law.tensions if abs(F - point) > _BESIDE * F]
+        return min(abs(F - edge) for edge in edges)
 
     def one_sided(self) -> list[str]:
         """Why there is no law on both sides of the tensions, cable by cable; mostly nothing."""

@@ -16,6 +16,7 @@ table{border-collapse:collapse;font-size:.93em}
 th,td{padding:.2em .8em;text-align:right;border-bottom:1px solid #ddd;
 font-variant-numeric:tabular-nums}
 th:first-child,td:first-child{text-align:left}
+td{white-space:nowrap}.wide{overflow-x:auto}
 .good,.bad{padding:.6em 1em;border-left:.4em solid;font-weight:600}
 .good{background:#e9f5ec;border-color:#2a7d46}.bad{background:#fbeaea;border-color:#b3261e}
 li.fault{color:#b3261e}
@@ -84,7 +85,7 @@ def to_fragment(page: Page) -> str:
         if section.rows:
             head, *body = section.rows
             rows = [_row("th", head), *(_row("td", row) for row in body)]
-            parts.append(f"<table>{''.join(rows)}</table>")
+            parts.append(f'<div class="wide"><table>{"".join(rows)}</table></div>')
         parts += [f"<p>{html.escape(line)}</p>" for line in section.lines]
     return f"<section><h1>{html.escape(page.title)}</h1>{''.join(parts)}</section>"
 
@@ -93,6 +94,7 @@ def to_document(page: Page) -> str:
     """The page as an HTML file that needs no other."""
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         f"<title>{html.escape(page.title)}</title>\n<style>\n{_STYLE}\n</style>\n</head>\n"
         f"<body>\n{to_fragment(page)}\n</body>\n</html>\n"
     )

@@ -9,13 +9,10 @@ import numpy as np
 
 from cdsm.report._layout import Page, Section
 from cdsm.report.facts import RANK, Rank
-from cdsm.report.self_check import Difference
+from cdsm.report.self_check import Agreement, Difference
 
 if TYPE_CHECKING:
     from cdsm.report.report import Report
-
-
-_UNITS = {"torque": "N m", "lengths": "m"}
 
 
 def page(report: Report) -> Page:
@@ -59,9 +56,9 @@ def _self_check(report: Report) -> Section:
     rows += [
         (
             "sum, K_θ" if each.name == "joint" else each.name,
-            f"{each.largest:.4g} {_UNITS.get(each.name, 'N m/rad')}",
-            _off(each.potential, each.largest),
-            _off(each.torque, each.largest),
+            f"{each.largest:.4g} {each.unit}",
+            _off(each.potential, each),
+            _off(each.torque, each),
             each.verdict,
         )
         for each in report.self_check.compared
@@ -91,13 +88,16 @@ def _statics(report: Report) -> Section:
     rows += [
         ("solver", found.solver),
         ("violation of balance and bounds", f"{found.feasibility:.1e}"),
-        ("KKT residual, multipliers found anew", f"{found.stationarity:.1e}"),
     ]
+    title = "Tensions, chosen for a stiffness within their bounds"
+    if found.stationarity is not None:
+        rows.append(("KKT residual, multipliers found anew", f"{found.stationarity:.1e}"))
+        title = "Tensions, the least that balance the arm (Eq. 17)"
     lines = [
         f"At their {which} bound: {', '.join(names) or 'none'}."
         for which, names in (("lower", found.at_minimum), ("upper", found.at_maximum))
     ]
-    return Section("Tensions, the least that balance the arm (Eq. 17)", rows, lines)
+    return Section(title, rows, lines)
 
 
 def _stability(report: Report) -> Section:
@@ -197,12 +197,12 @@ def _conventions(report: Report) -> Section:
     )
 
 
-def _off(difference: Difference | None, largest: float) -> str:
+def _off(difference: Difference | None, of: Agreement) -> str:
     if difference is None:
         return "-"
-    if largest == 0.0:
-        return f"{difference.found:.1e} N m/rad"
-    return f"{difference.found / largest:.1e} ({difference.expected / largest:.0e})"
+    if of.largest == 0.0:
+        return f"{difference.found:.1e} {of.unit}"
+    return f"{difference.found / of.largest:.1e} ({difference.expected / of.largest:.0e})"
 
 
 def _share(room: float, F: float) -> str:

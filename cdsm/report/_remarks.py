@@ -27,6 +27,9 @@ _SINGULAR = 1e-12
 _DIGITS = 1e10
 """Condition of K_θ from which on its inverse has less than six digits."""
 
+_LONGEST = 30.0
+"""An arm longer than this [m] was most likely written in millimetres."""
+
 _NAMED = 4
 
 
@@ -65,16 +68,25 @@ def faults(report: Report) -> tuple[str, ...]:
         )
     found = report.optimality
     if found is not None and not found.optimal:
+        least = found.stationarity
         said.append(
             f"the tensions are not what {found.solver} was asked for: bounds and balance are "
-            f"missed by {found.feasibility:.1e}, stationarity by {found.stationarity:.1e}."
+            f"missed by {found.feasibility:.1e}"
+            + ("." if least is None else f", stationarity by {least:.1e}.")
         )
     return tuple(said)
 
 
 def notes(report: Report) -> tuple[str, ...]:
     """What to know beside a stiffness that may be right."""
-    return (*_of_tensions(report), *_of_ranks(report), *_of_readings(report))
+    return (*_of_size(report), *_of_tensions(report), *_of_ranks(report), *_of_readings(report))
+
+
+def _of_size(report: Report) -> list[str]:
+    length = report.stiffness.posture.arm.length
+    if length <= _LONGEST:
+        return []
+    return [f"the arm is {length:.4g} m long: it looks as if its lengths are in mm; give metres."]
 
 
 def _of_tensions(report: Report) -> list[str]:
@@ -82,6 +94,8 @@ def _of_tensions(report: Report) -> list[str]:
     if report.optimality is None:
         came = "were given" if K.free_length is None else "follow from an equilibrium"
         said.append(f"the tensions {came}, not distributed: nothing says they are the least.")
+    elif report.optimality.stationarity is None:
+        said.append("the tensions were chosen for a stiffness: they are not the least.")
     held = [each for each in report.cables if each.control == "position"]
     slack = [each.name for each in held if each.is_slack]
     if slack:

@@ -21,7 +21,10 @@ if TYPE_CHECKING:
 @final
 @dataclass(frozen=True, kw_only=True)
 class Optimality:
-    """How well distributed tensions meet what they were distributed for (Eq. 17).
+    """How well distributed tensions meet what they were distributed for.
+
+    They balance the arm within their bounds, and are the least that do (Eq. 17) unless chosen for a
+    stiffness.
 
     All dimensionless, relative to the largest tension and moment arm. The multipliers are found
     anew, whatever the solver said: by least squares, those of the bounds with the sign they need.
@@ -31,19 +34,20 @@ class Optimality:
         at_minimum: Names of the cables at their lower bound.
         at_maximum: Names of the cables at their upper bound.
         feasibility: Largest violation of balance and bounds [-].
-        stationarity: Largest entry of F + J_L λ + μ, the KKT residual [-].
+        stationarity: Largest entry of F + J_L λ + μ, the KKT residual [-]; None if they are not
+            meant to be the least.
     """
 
     solver: str
     at_minimum: tuple[str, ...]
     at_maximum: tuple[str, ...]
     feasibility: float
-    stationarity: float
+    stationarity: float | None
 
     @property
     def optimal(self) -> bool:
         """Whether both are within :data:`~cdsm.tension.DISTANCE`."""
-        return max(self.feasibility, self.stationarity) <= DISTANCE
+        return max(self.feasibility, self.stationarity or 0.0) <= DISTANCE
 
 
 def optimality(K: Stiffness, pull: Tension) -> Optimality:
@@ -62,13 +66,12 @@ def optimality(K: Stiffness, pull: Tension) -> Optimality:
     z = _bound_multipliers(problem.A, x, at_low, at_high)
     y = np.asarray(np.linalg.lstsq(problem.A.T, -x - z, rcond=None)[0])
     primal, dual, _ = _balance.optimality(*problem[:4], x, y, z)
-    names = [cable.name for cable in pose.arm.cables]
     return Optimality(
         solver=pull.solver,
-        at_minimum=tuple(names[c] for c in np.flatnonzero(at_low)),
-        at_maximum=tuple(names[c] for c in np.flatnonzero(at_high)),
+        at_minimum=pull.at_minimum,
+        at_maximum=pull.at_maximum,
         feasibility=primal / size,
-        stationarity=dual / size,
+        stationarity=dual / size if pull.least else None,
     )
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, final
 import numpy as np
 
 from cdsm._checks import Array, ReadOnlyState
-from cdsm._units import key
+from cdsm._units import joints_to_dict, key
 from cdsm.errors import SingularStiffness
 from cdsm.report import _layout, _remarks, facts
 from cdsm.report._page import page
@@ -118,7 +118,7 @@ class Report(ReadOnlyState):
                 "tip": arm.tip_link,
                 "gravity_m_per_s2": arm.gravity,
                 "wrench_N_Nm": K.wrench,
-                "angles_rad": dict(zip(arm.joint_names, K.posture.q, strict=True)),
+                **joints_to_dict(arm, K.posture.q),
             },
             "self_check": {
                 "passed": self.self_check.passed,

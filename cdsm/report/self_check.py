@@ -33,6 +33,8 @@ _NEGLIGIBLE = 1e-8
 
 _TERMS = ("active", "passive", "gravity", "load")
 
+_UNITS = {"torque": "N m", "lengths": "m"}
+
 _UNSETTLED = (
     "the differences do not settle: what they are taken of is not smooth, segments of cable are "
     "too short, or cables so stiff that they leave their law within the rounding of their length."
@@ -50,9 +52,11 @@ _SUM = 16.0 * float(np.finfo(np.float64).eps)
 class Difference:
     """What is given against what differences say, the largest entry of it.
 
+    In the unit of what is compared.
+
     Attributes:
-        found: |given − by differences| [N m/rad].
-        expected: What truncation and rounding of the differences may make of it [N m/rad].
+        found: |given − by differences|.
+        expected: What truncation and rounding of the differences may make of it.
     """
 
     found: float
@@ -64,13 +68,13 @@ class Difference:
 class Agreement:
     """How one term of K_θ, or what else is derived a second time, compares.
 
-    Entries of joints that slide are taken with the arm's length, so that all are in N m.
+    Entries of joints that slide are taken with the arm's length, so that all have one unit.
 
     Attributes:
         name: Which: ``"active"``, ``"passive"``, ``"gravity"``, ``"load"``, ``"joint"`` (their
             sum); ``"torque"``, what is out of balance itself; ``"lengths"`` of the cables.
-        largest: Its largest entry [N m/rad]; of the torque that of its parts [N m], of the lengths
-            the longest [m].
+        unit: ``"N m/rad"``; of the torque ``"N m"``, of the lengths ``"m"``.
+        largest: Its largest entry; of the torque that of its parts, of the lengths the longest.
         potential: Against differences of the potential; None where there is none.
         torque: Against differences of the torque, or None.
         verdict: ``"agrees"``: at least one of the two resolves :data:`RESOLVED` of the largest
@@ -80,6 +84,7 @@ class Agreement:
     """
 
     name: str
+    unit: str
     largest: float
     potential: Difference | None
     torque: Difference | None
@@ -230,6 +235,7 @@ def _compare(
     name: str, given: Array, largest: float, potential: _Anew, torque: _Anew, of_all: float
 ) -> Agreement:
     """What is given against both estimates."""
+    unit = _UNITS.get(name, "N m/rad")
     enough = max(RESOLVED * largest, _NEGLIGIBLE * of_all)
     differences = [_difference(given, each) for each in (potential, torque)]
     known = [each for each in differences if each is not None]
@@ -238,7 +244,7 @@ def _compare(
     if not np.isfinite(given).all() or any(each.found > each.expected for each in known):
         verdict = "DIFFERS"
         worst = max((each.found for each in known), default=np.nan)
-        reason = f"is off by {worst:.2g}, with {largest:.4g} its largest entry"
+        reason = f"is off by {worst:.2g} {unit}, with {largest:.4g} {unit} its largest entry"
     elif not any(each.expected <= enough for each in known):
         verdict = "not possible"
         # a moment that has no potential is no reason, if the torque resolves too little
@@ -246,6 +252,7 @@ def _compare(
         reason = torque.reason or alone or _UNSETTLED
     return Agreement(
         name=name,
+        unit=unit,
         largest=float(largest),
         potential=differences[0],
         torque=differences[1],
@@ -265,4 +272,4 @@ def _adds_up(found: Agreement, matrix: Array, parts: Array, what: str) -> Agreem
     off = float(abs(matrix - parts.sum(axis=0)).max())
     if off <= _SUM * float(abs(parts).sum(axis=0).max()) or found.verdict == "DIFFERS":
         return found
-    return replace(found, verdict="DIFFERS", reason=f"is not {what}, by {off:.2g}")
+    return replace(found, verdict="DIFFERS", reason=f"is not {what}, by {off:.2g} {found.unit}")
