@@ -39,8 +39,8 @@ _ARM = "The arm"
 _TENSIONS = "Tensions and load"
 
 ANGLES = typer.Option(
-    help="Joint angles in degrees (mm where a joint slides), separated by commas; or one for all "
-    "joints. [default: 0]",
+    help="Joint angles in degrees (mm where a joint slides), separated by commas, or one for all "
+    "joints; 0 if left out.",
     metavar="DEG,DEG,...",
     show_default=False,
 )
