@@ -428,6 +428,11 @@ CASES |= {
         cdsm.InvalidInput,
         ("tension: -2.5 N", ARM.cables[5].name, "only pull"),
     ),
+    "tension a little negative": (
+        lambda: cdsm.stiffness(POSE, except_at(C, 2, -1e-3, 1.0)),
+        cdsm.InvalidInput,
+        ("tension: -0.001 N", ARM.cables[2].name, "only pull"),
+    ),
     "tension of another posture": (
         lambda: cdsm.stiffness(ARM.at(0.5 * POSE.q), PULL),
         cdsm.InvalidInput,

@@ -12,7 +12,7 @@ from scipy.integrate import quad
 
 import cdsm
 from cdsm._checks import LARGEST, SMALLEST, Array
-from cdsm.elasticity import Domain, rising_root
+from cdsm.elasticity import Domain, rising_root, tension_at
 
 STEEL = cdsm.LinearElasticity(226_195.0)
 STRAND = cdsm.StrandElasticity.eq19_repaired()
@@ -183,6 +183,28 @@ def test_strain_out_of_reach_is_refused_with_the_reach(name: str) -> None:
             law.tension([0.0, strain])
         assert f"gives the strain {strain:.6g}; {said}" in str(caught.value)
         assert caught.value.indices == (1,)
+    with pytest.raises(cdsm.ElasticityRangeError, match="strain -1;") as caught:  # the first of two
+        law.tension([0.0, -1.0, 0.0, -2.0])
+    assert caught.value.indices == (1, 3)
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_tension_at_a_strain_takes_a_handful_of_steps(name: str) -> None:
+    """Newton's method doubles the digits each time; bisection alone would take fifty."""
+    law, asked = LAWS[name], []
+
+    def stretch(F: Array) -> Array:
+        asked.append(F.size)
+        return law.strain(F)
+
+    F = samples(law)
+    found = tension_at(
+        law.strain(F), law.domain, stretch, lambda F: 1.0 / law.rigidity(F), "strain"
+    )
+    np.testing.assert_allclose(found, F, rtol=1e-11, atol=1e-11)
+    # as many more as an unbounded domain is looked at, and the grid
+    doublings = math.log2(F.max()) + 1.0 if math.isinf(law.domain.high) else 0.0
+    assert len(asked) <= 8 + doublings
 
 
 class Upright(cdsm.Elasticity):

@@ -557,6 +557,9 @@ def test_what_is_printed_is_each_reading_in_its_own_row() -> None:
     }
     for name, values in expected.items():
         assert rows[name] == [f"{value / 1000.0:.4g}" for value in values]
+    flat = str(cdsm.stiffness(pose.arm.at(np.zeros(5)), K.tension)).splitlines()
+    absent = {line[:24].strip(): line[24:].split() for line in flat}
+    assert absent["cartesian, diagonal"] == absent["pseudoinverse, diagonal"] == ["-"] * 3
 
 
 @pytest.mark.parametrize("units", [1.0, 1e-7, 1e9])
