@@ -1135,6 +1135,15 @@ def test_stationarity_is_asked_for_to_a_billionth_of_the_largest_tension() -> No
         assert (said == "") == accepted
 
 
+def test_gap_counts_a_small_multiplier_at_the_bound_it_belongs_to() -> None:
+    # two cables that share 10, of which the first may pull 4.75: z = 5.25 − 4.75
+    problem = _balance.Scaled(
+        np.ones((1, 2)), np.array([10.0]), np.ones(2), np.array([4.75, INF]), 1.0, 1.0
+    )
+    point = np.array([4.75, 5.25]), np.array([-5.25]), np.array([0.5, 0.0])
+    assert _balance.optimality(*problem[:4], *point) == (0.0, 0.0, 0.0)
+
+
 def test_polishing_makes_a_near_optimum_the_optimum_at_either_bound() -> None:
     # the first cable may pull 4, the third has a weak arm and stands at 1; y = −6 frees the second
     A, b = np.array([[1.0, 1.0, 0.1]]), np.array([10.1])
