@@ -194,17 +194,27 @@ class JointLimitError(CdsmError, ValueError):
         self.joints = tuple(joints)
         self.angles = tuple(float(angle) for angle in angles)
         self.limits = tuple((float(low), float(high)) for low, high in limits)
+        units = units or ["rad"] * len(joints)
         said = [
-            f"{joint} = {angle:.6g} {unit} is outside [{low:.6g}, {high:.6g}] {unit}"
-            for joint, angle, (low, high), unit in zip(
-                self.joints, self.angles, self.limits, units or ["rad"] * len(joints), strict=True
-            )
+            _beyond(*each)
+            for each in zip(self.joints, self.angles, self.limits, units, strict=True)
         ]
         self.problem = first_of(said, _NAMED, "joints")
         super().__init__(
             f"{self.problem}. Stay inside the limits, widen joint_limit in the geometry (limit "
-            "in a URDF), or, in Python, pass check_limits=False to compute beyond them."
+            "in a full description or a URDF), or, in Python, pass check_limits=False to compute "
+            "beyond them."
         )
+
+
+def _beyond(joint: str, angle: float, limits: tuple[float, float], unit: str) -> str:
+    """Where a joint is and may be; in degrees too, if it turns."""
+    low, high = limits
+    said = f"{joint} = {angle:.6g} {unit} is outside [{low:.6g}, {high:.6g}] {unit}"
+    if unit != "rad":
+        return said
+    degrees = [f"{math.degrees(value):.4g}°" for value in (angle, low, high)]
+    return f"{said} ({degrees[0]} of {degrees[1]} to {degrees[2]})"
 
 
 class ElasticityRangeError(CdsmError, ValueError):

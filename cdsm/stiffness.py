@@ -131,7 +131,10 @@ class Stiffness(ReadOnlyState):
 
     @cached_property
     def margin(self) -> float:
-        """Smallest eigenvalue of the symmetric part of K_θ [N m/rad]; negative: it buckles."""
+        """Smallest eigenvalue of the symmetric part of K_θ [N m/rad]; negative: it buckles.
+
+        Where some joints slide and some turn, only its sign does not depend on the unit of length.
+        """
         return float(self._spectrum[0][0])
 
     @cached_property

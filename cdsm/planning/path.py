@@ -228,7 +228,7 @@ def _said(error: CdsmError) -> str:
     if isinstance(error, JointLimitError):
         return (
             f"{error.problem}. Keep the path within the limits, or widen joint_limit in the "
-            "geometry (limit in a URDF)."
+            "geometry (limit in a full description or a URDF)."
         )
     return str(error)
 
