@@ -250,3 +250,17 @@ def test_slope_of_ones_own_that_is_no_number_is_refused() -> None:
     pose = cdsm.Manipulator(arm.geometry, cables=bad).at([0.1, 0.2])
     with pytest.raises(cdsm.InvalidInput, match="one finite number"):
         cdsm.stiffness_gradient(cdsm.stiffness(pose, np.full(4, 50.0)))
+
+
+@pytest.mark.parametrize("place", [31.0, 810.0], ids=["jump", "end"])
+def test_second_slope_is_taken_on_the_side_that_belongs_to_the_place(place: float) -> None:
+    """Below a jump and below the end of the domain, where there is no tension beyond."""
+    arm = cdsm.Manipulator(arms.random_arm(1, 2).geometry, STRAND)
+    lengths = arm.at(np.zeros(arm.nv)).cable_lengths
+
+    def slopes(F: float) -> tuple[Array, Array]:
+        tension = np.full(lengths.size, F)
+        return arm._laws.slopes(tension, arm._laws.stiffness(lengths, tension))
+
+    for there, below in zip(slopes(place), slopes(place * (1.0 - 1e-4)), strict=True):
+        np.testing.assert_allclose(there, below, rtol=1e-2)
