@@ -170,6 +170,16 @@ def test_smallest_eigenvalue_of_random_matrices() -> None:
         assert abs(found - expected) <= 2e-14 * np.linalg.norm(A, 2)
 
 
+@pytest.mark.parametrize("exponent", range(-323, 1, 7))
+def test_smallest_eigenvalue_of_nearly_diagonal_matrices(exponent: int) -> None:
+    rng = np.random.default_rng(5)
+    for n in (2, 3, 4, 9):
+        A = np.diag(rng.normal(size=n)) + float(f"1e{exponent}") * symmetric(rng.normal(size=n))
+        A = (A + A.T) / 2.0
+        found = dense.smallest_eigenvalue(A.copy(), np.empty((4, n)))
+        assert abs(found - np.linalg.eigvalsh(A)[0]) <= 2e-14 * np.linalg.norm(A, 2)
+
+
 def test_singular_values_of_three_rows() -> None:
     rng = np.random.default_rng(4)
     for n in (1, 2, 3, 10, 31):

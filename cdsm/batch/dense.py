@@ -19,6 +19,9 @@ _STEPS = 200
 
 _ROUNDING = 2.0**-52
 
+_NOTHING = 1e-30
+"""What stands beside the diagonal of a matrix of this part of its size moves no eigenvalue."""
+
 
 @compiled
 def eliminate(M: Array) -> float:
@@ -107,7 +110,10 @@ def smallest_eigenvalue(A: Array, scratch: Array) -> float:
 
 @compiled
 def _tridiagonalise(A: Array, d: Array, e: Array, v: Array, w: Array) -> None:
-    """Fill the diagonal d (n,) of a similar tridiagonal matrix, and e (n,) beside it; e[0] is 0."""
+    """Fill the diagonal d (n,) of a similar tridiagonal matrix, and e (n,) beside it; e[0] is 0.
+
+    The largest entry of A is 1.
+    """
     n = A.shape[0]
     e[0] = 0.0
     for k in range(n - 2):
@@ -116,7 +122,7 @@ def _tridiagonalise(A: Array, d: Array, e: Array, v: Array, w: Array) -> None:
         for i in range(k + 1, n):
             norm += A[k, i] * A[k, i]
         norm = math.sqrt(norm)
-        if norm == 0.0:
+        if norm < _NOTHING:  # its square may be too small to divide by
             e[k + 1] = 0.0
             continue
         alpha = -norm if A[k, k + 1] > 0.0 else norm
