@@ -335,8 +335,9 @@ def _explain(
         )
 
     widening = _widening(problem, free)
-    # if it is the fixed tensions that are in the way
-    blocking = math.isinf(widening) and math.isfinite(_widening(problem, np.ones_like(free)))
+    blocking = False  # whether it is the fixed tensions that are in the way
+    if math.isinf(widening) and not free.all():
+        blocking = math.isfinite(_widening(problem, np.ones_like(free)))
     missing = (b - A @ values) * arm_scale * force_scale
     tight = free & (np.minimum(values - lower, upper - values) <= OPTIMALITY)
     worst = int(abs(missing).argmax())

@@ -20,7 +20,7 @@ _STEPS = 200
 _ROUNDING = 2.0**-52
 
 _NOTHING = 1e-30
-"""What stands beside the diagonal of a matrix of this part of its size moves no eigenvalue."""
+"""Entries beside the diagonal that are this part of the largest move no eigenvalue."""
 
 
 @compiled

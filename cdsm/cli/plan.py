@@ -99,7 +99,9 @@ def plan(
         elif math.isfinite(rate):
             raise typer.BadParameter("is of a path; give --path, too.", param_hint="--rate")
         else:
-            answer = _at_posture(at_angles(robot, angles or "0"), u, wanted, bounds)
+            answer = _at_posture(
+                at_angles(robot, "0" if angles is None else angles), u, wanted, bounds
+            )
         if as_json:
             show_json(answer.numbers)
         else:

@@ -20,12 +20,9 @@ from cdsm.planning.gradient import require_finite, stiffness_gradient
 from cdsm.planning.problem import unstable
 from cdsm.posture import Posture
 from cdsm.stiffness import Stiffness, stiffness
-from cdsm.tension import Tension, distribute_tension
+from cdsm.tension import OPTIMALITY, Tension, distribute_tension
 
 End = Literal["buckling", "maximum", "infeasible", "elasticity", "none"]
-
-_AT_BOUND: Final = 1e-9
-"""A tension this part of the largest from its bound is at it, as in :class:`Tension`."""
 
 _JUST: Final = 1e-9
 """This part beyond a place is the other side of it."""
@@ -231,7 +228,7 @@ def _breaks(pull: Callable[[float], Tension], places: Array) -> Array:
 
 def _active(pull: Tension) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Which cables (C,) rise with the lower bound, and which stay at their maximum."""
-    tight = _AT_BOUND * float(pull.values.max())
+    tight = OPTIMALITY * float(pull.values.max())
     stays = pull.maximum - pull.values <= tight
     return (pull.values - pull.minimum <= tight) & ~stays, stays
 

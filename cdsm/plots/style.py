@@ -13,7 +13,7 @@ STYLES: Final = ("-", "--", "-.", ":")
 MM: Final = 1e3
 N_PER_MM: Final = 1e-3
 TICKS: Final = 5
-"""Most intervals between the ticks of an axis of a picture in space."""
+"""Most intervals between the ticks of an axis of a map or of a picture in space."""
 
 
 def equal_axes(axes: Any) -> None:
