@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cdsm._checks import Array
-
-if TYPE_CHECKING:
-    from cdsm.manipulator import Manipulator
 
 
 def key(name: str, unit: str) -> str:
@@ -18,10 +16,10 @@ def key(name: str, unit: str) -> str:
     return "_".join([name, *words])
 
 
-def joints_to_dict(arm: Manipulator, q: Array) -> dict[str, object]:
+def joints_to_dict(names: Sequence[str], slides: NDArray[np.bool_], q: Array) -> dict[str, object]:
     """Coordinates q (..., nv) by joint, angles and ways apart since their units differ."""
     told: dict[str, object] = {}
-    for name, chosen in (("angles_rad", ~arm.slides), ("ways_m", arm.slides)):
+    for name, chosen in (("angles_rad", ~slides), ("ways_m", slides)):
         if chosen.any() or name == "angles_rad":
-            told[name] = {arm.joint_names[i]: q[..., i].tolist() for i in np.flatnonzero(chosen)}
+            told[name] = {names[i]: q[..., i].tolist() for i in np.flatnonzero(chosen).tolist()}
     return told

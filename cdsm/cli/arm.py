@@ -73,7 +73,7 @@ def _to_dict(pull: Tension, K: Stiffness) -> dict[str, object]:
     unit = pose.arm.stiffness_unit()
     along = [K.along(axis) for axis in np.eye(3)]
     return {
-        **joints_to_dict(pose.arm, pose.q),
+        **joints_to_dict(pose.arm.joint_names, pose.arm.slides, pose.q),
         "tip_position_m": pose.tip[:3, 3].tolist(),
         "tension_N": {
             cable.name: value

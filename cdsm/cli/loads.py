@@ -119,7 +119,7 @@ def _weight_to_dict(test: WeightTest) -> dict[str, object]:
         "linear_stiffness_N_per_m": _finite(test.linear.stiffness),
         "cables": [cable.name for cable in last.pose.arm.cables],
         "tensions_N": test.tensions.tolist(),
-        **joints_to_dict(last.pose.arm, last.pose.q),
+        **joints_to_dict(last.pose.arm.joint_names, last.pose.arm.slides, last.pose.q),
         "slack": list(last.slack),
         "at_limit": list(last.at_limit),
         "stable": last.stable,

@@ -118,7 +118,7 @@ class Report(ReadOnlyState):
                 "tip": arm.tip_link,
                 "gravity_m_per_s2": arm.gravity,
                 "wrench_N_Nm": K.wrench,
-                **joints_to_dict(arm, K.posture.q),
+                **joints_to_dict(arm.joint_names, arm.slides, K.posture.q),
             },
             "self_check": {
                 "passed": self.self_check.passed,
