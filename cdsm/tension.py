@@ -316,17 +316,20 @@ def _explain(
     nv, count = A.shape
     # variables: F, then missing torque as its positive and negative part
     identity = np.eye(nv)
+    # HiGHS drops entries below 1e-9, so each cable is measured by its own largest moment arm
+    lever = abs(A).max(axis=0)
+    lever = np.where(lever > 0.0, lever, 1.0)
     nearest = linprog(
         np.concatenate([np.zeros(count), np.ones(2 * nv)]),
-        A_eq=np.hstack([A, identity, -identity]),
+        A_eq=np.hstack([A / lever, identity, -identity]),
         b_eq=b,
-        bounds=[*zip(lower, upper, strict=True), *[(0.0, None)] * (2 * nv)],
+        bounds=[*zip(lower * lever, upper * lever, strict=True), *[(0.0, None)] * (2 * nv)],
         method="highs",
         options=_TIGHT,
     )
     if nearest.status != 0:  # it is feasible and bounded by construction
         raise SolverError("highs", f"cannot tell whether tensions exist: {nearest.message}")
-    values = nearest.x[:count]
+    values = nearest.x[:count] / lever
     if nearest.fun <= OPTIMALITY:
         raise SolverError(
             solver,

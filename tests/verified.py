@@ -193,12 +193,14 @@ def infeasible(
     )  # rounding, which no force makes a torque
     A, b = J / arm, torque / (arm * force)
     count, nv = J.shape
+    # each cable by its own moment arm, as HiGHS drops entries below 1e-9
+    lever = np.maximum(abs(A).max(axis=1), 1e-300)
     # y, then p and n with J y = p − n: what the bounds let the cables do is high p − low n
     finite_high = np.isfinite(high)
-    cost = np.concatenate([-b, np.where(finite_high, high, 0.0) / force, -low / force])
+    top, bottom = lever * np.where(finite_high, high, 0.0) / force, lever * low / force
     found = linprog(
-        cost,
-        A_eq=np.hstack([A, -np.eye(count), np.eye(count)]),
+        np.concatenate([-b, top, -bottom]),
+        A_eq=np.hstack([A / lever[:, None], -np.eye(count), np.eye(count)]),
         b_eq=np.zeros(count),
         bounds=[
             *[(-1.0, 1.0)] * nv,
