@@ -1,6 +1,12 @@
-"""The cables of an arm, law by law: how stiff they are, and what they may carry."""
+"""The cables of an arm, law by law: how stiff they are, and what they may carry.
+
+A locked motor holds the original length l_0 of its wire. Under tension the wire is ℓ = l_0 (1 + ε)
+long, so that its stiffness EA/l_0 is EA (1 + ε)/ℓ.
+"""
 
 from __future__ import annotations
+
+from typing import Literal, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,8 +17,13 @@ from cdsm.cable import Cable
 from cdsm.elasticity import Elasticity, LinearElasticity
 from cdsm.errors import ElasticityRangeError, InvalidInput
 
+OriginalLength = Literal["unstrained", "stretched"]
+
 _STEP = 1e-5
-"""Relative step of the difference of dEA/dF."""
+"""Relative step of the difference of the slope of EA (1 + ε)."""
+
+_WIRE_LEFT = 1e-6
+"""Part of a cable that its series spring leaves to the wire, at least."""
 
 
 class CableLaws:
@@ -20,14 +31,18 @@ class CableLaws:
 
     Args:
         cables: Those of an arm.
+        original_length: ``"unstrained"``: a wire's original length is ℓ/(1 + ε); ``"stretched"``:
+            it is ℓ itself, as in the paper.
 
     Attributes:
         held: Each law of the position-controlled cables, and which cables have it.
         series: 1/k_series of all cables (C,) [m/N].
+        rest: Tension at which their springs are at rest (C,) [N]: the low end of each law.
     """
 
-    def __init__(self, cables: tuple[Cable, ...]) -> None:
+    def __init__(self, cables: tuple[Cable, ...], original_length: OriginalLength) -> None:
         self._cables = cables
+        self._unstrained = original_length == "unstrained"
         held = [c for c, cable in enumerate(self._cables) if cable.control == "position"]
         by_law: dict[object, list[int]] = {}
         for c in held:
@@ -45,14 +60,15 @@ class CableLaws:
         self._bounded = bool(self._least.any() or np.isfinite(self._most).any())
         series = np.array([cable.series_stiffness for cable in self._cables])
         self.series = frozen(1.0 / series)
+        self.rest = frozen(np.array([cable.elasticity.domain.low for cable in self._cables]))
         # EA of the cables where it is always the same; laws that have to be asked
-        constant, self._asked = np.zeros(len(self._cables)), []
+        constant, linear, self._asked = np.zeros(len(self._cables)), np.zeros(len(self._cables)), []
         for law, of in self.held:
             if isinstance(law, LinearElasticity):
-                constant[of] = law.rigidity(0.0)
+                constant[of], linear[of] = law.rigidity(0.0), float(self._unstrained)
             else:
                 self._asked.append((law, of))
-        self._constant = frozen(constant)
+        self._constant, self._linear = frozen(constant), frozen(linear)
 
     def narrowed(self, low: Array, high: Array) -> tuple[Array, Array]:
         """Bounds of tension (…, C) [N], and those that the cables have of their own."""
@@ -63,28 +79,90 @@ class CableLaws:
     def stiffness(self, lengths: Array, tension: Array) -> Array:
         """Diagonal of K_L (C,) [N/m]: 1/(l_0/EA(F) + 1/k_series), 0 for force-controlled cables.
 
-        Of checked free lengths (C,) [m] and tensions (C,) [N], which are not negative.
+        Of checked lengths L (C,) [m] and tensions (C,) [N], which are not negative.
 
         Raises:
             ElasticityRangeError: Names the cables whose tension is outside their elasticity's
-                domain.
-            InvalidInput: An elasticity of the user's own gives no positive rigidity.
+                domain, or whose series spring leaves no wire.
+            InvalidInput: An elasticity of the user's own gives no positive rigidity, or no strain.
         """
-        rigidity = self._constant
-        if self._asked:
-            rigidity = rigidity.copy()
-            for law, held in self._asked:
+        rigidity = self._constant + self._linear * tension  # EA (1 + F/EA)
+        for law, held in self._asked:
+            try:
+                rigidity[held] = self.stretched_rigidity(law, tension[held])
+            except ElasticityRangeError as error:
+                raise self.naming(error, held) from None
+        k, exists = cable_stiffness(lengths, tension, rigidity, self.series, self.rest)
+        if not exists:
+            self._refuse_long_springs(lengths, tension)
+        return frozen(k)
+
+    def stretched_rigidity(self, law: Elasticity, tension: Array) -> Array:
+        """EA (1 + ε) [N] of a law, or EA where the stretched length counts; same shape as F [N].
+
+        Raises:
+            ElasticityRangeError: A tension outside the domain of the law.
+            InvalidInput: The law gives no positive rigidity, or no strain.
+        """
+        if isinstance(law, LinearElasticity):
+            rigidity = law.rigidity(tension)
+            return rigidity + tension if self._unstrained else rigidity
+        rigidity = _checked_rigidity(law, tension)
+        return rigidity * (1.0 + _checked_strain(law, tension)) if self._unstrained else rigidity
+
+    def original_lengths(self, lengths: Array, tension: Array) -> Array:
+        """l_0 (C,) [m] of cables that are L (C,) [m] long under F (C,) [N].
+
+        Of a force-controlled cable, whose motor holds no length, L itself.
+
+        Raises:
+            ElasticityRangeError: As for :meth:`stiffness`.
+            InvalidInput: As for :meth:`stiffness`.
+        """
+        wire = np.array(lengths)
+        for law, held in self.held:
+            F = tension[held]
+            wire[held] -= self.series[held] * (F - self.rest[held])
+            if self._unstrained:
                 try:
-                    rigidity[held] = checked_rigidity(law, tension[held])
+                    wire[held] /= 1.0 + _checked_strain(law, F)
                 except ElasticityRangeError as error:
                     raise self.naming(error, held) from None
-        return frozen(cable_stiffness(lengths, rigidity, self.series))
+        if wire.min() <= 0.0:
+            self._refuse_long_springs(lengths, tension)
+        return frozen(wire)
+
+    def longest_springs(self, lengths: Array) -> Array:
+        """Tensions (C,) [N] at which series springs leave next to nothing of L (C,) [m] to wires.
+
+        Infinite where there is no spring.
+        """
+        with np.errstate(divide="ignore"):
+            return np.asarray(self.rest + (1.0 - _WIRE_LEFT) * lengths / self.series)
+
+    def _refuse_long_springs(self, lengths: Array, tension: Array) -> NoReturn:
+        springs = self.series * (tension - self.rest)
+        bad = np.flatnonzero(springs >= lengths)
+        c = int(bad[0])
+        raise ElasticityRangeError(
+            f"stretches the series spring of {self._cables[c].name} by {springs[c]:.4g} m, and the "
+            f"whole cable is {lengths[c]:.4g} m long: no wire is left. Give the cable a lead that "
+            "holds its spring, a stiffer spring or less tension.",
+            tension[bad].tolist(),
+            bad.tolist(),
+            [self._cables[i].name for i in bad],
+        )
 
     def slopes(self, tension: Array, stiffness: Array) -> tuple[Array, Array]:
         """dk/dF (C,) [1/m] and d²k/dF² (C,) [1/(N m)] of cables of stiffness k under F (C,) [N].
 
-        k′ = (k² l_0/EA) EA′/EA = k (1 − k/k_series) EA′/EA: the free length need not be known. EA″
-        is a difference, good for some five digits.
+        Both at a posture, where l_0 changes with F. With R = EA (1 + ε), G = R′/R and w = 1 −
+        k/k_series, the part of the wire in the cable's compliance,
+
+            k′ = k A,  k″ = k (A² + A′),  A = (1 − w)/R + w G,
+            A′ = (1 − w) (A/R − G/R − A G) + w G′.
+
+        G′ is a difference, good for some five digits.
 
         Raises:
             ElasticityRangeError: As for :meth:`stiffness`.
@@ -96,9 +174,12 @@ class CableLaws:
             last = np.array([*law.jumps, law.domain.high])[np.searchsorted(law.jumps, F)]
             step = _STEP * np.maximum(F, 1.0)
             beside = np.where(F + step <= last, F + step, F - step)
+            both = np.stack([F, beside])
             try:
-                slopes = np.asarray(law.rigidity_slope(np.stack([F, beside])))
-                EA = law.rigidity(F)
+                slopes = np.asarray(law.rigidity_slope(both))
+                R = self.stretched_rigidity(law, F)
+                if self._unstrained:  # (EA (1 + ε))′ = EA′ (1 + ε) + 1
+                    slopes = slopes * (1.0 + _checked_strain(law, both)) + 1.0
             except ElasticityRangeError as error:
                 raise self.naming(error, held) from None
             if slopes.shape != (2, F.size) or not np.isfinite(slopes).all():
@@ -107,10 +188,12 @@ class CableLaws:
                     f"{law!r} gives the slopes {slopes} of its rigidity at tensions {F} N and "
                     "beside them; one finite number for each is needed.",
                 )
-            growth, wire = slopes[0] / EA, 1.0 - k * self.series[held]
-            bend = (slopes[1] - slopes[0]) / (beside - F) / EA - growth**2
-            first[held] = k * wire * growth
-            second[held] = first[held] * growth * (2.0 * wire - 1.0) + k * wire * bend
+            G, spring = slopes[0] / R, k * self.series[held]
+            bend = (slopes[1] - slopes[0]) / (beside - F) / R - G**2
+            A = spring / R + (1.0 - spring) * G
+            first[held] = k * A
+            change = spring * (A / R - G / R - A * G) + (1.0 - spring) * bend
+            second[held] = k * (A**2 + change)
         return frozen(first), frozen(second)
 
     def naming(
@@ -122,7 +205,7 @@ class CableLaws:
         return ElasticityRangeError(error.problem, error.tension, outside, names)
 
 
-def checked_rigidity(law: Elasticity, tension: Array) -> Array:
+def _checked_rigidity(law: Elasticity, tension: Array) -> Array:
     """EA(F) [N] of a law, same shape as F [N], which need not be the library's own.
 
     Raises:
@@ -138,6 +221,24 @@ def checked_rigidity(law: Elasticity, tension: Array) -> Array:
             "number for each is needed.",
         )
     return rigidity
+
+
+def _checked_strain(law: Elasticity, tension: Array) -> Array:
+    """ε(F) [-] of a law, same shape as F [N], which need not be the library's own.
+
+    Raises:
+        ElasticityRangeError: A tension outside the domain of the law.
+        InvalidInput: The law gives no strain.
+    """
+    strain = np.asarray(law.strain(tension))
+    usable = (strain > -1.0) & (strain <= LARGEST)  # false for NaN too
+    if strain.shape != tension.shape or np.count_nonzero(usable) < tension.size:
+        raise InvalidInput(
+            "elasticity",
+            f"{law!r} gives the strain {strain} at tensions {tension} N; one number for each, "
+            "zero at the low end of its domain and rising, is needed.",
+        )
+    return strain
 
 
 def _key(law: Elasticity) -> object:

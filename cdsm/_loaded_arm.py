@@ -80,7 +80,7 @@ class LoadedArm:
             gravity=pose.gravity_stiffness,
             load=load,
             joint=joint,
-            free_length=self.reference.cable_lengths,
+            free_length=self.cables.free_length,
         )
         return Iterate(K, K.residual, rounding(K))
 

@@ -67,31 +67,36 @@ class _Ends(NamedTuple):
 class LockedCables:
     """Tension F(L) of the cables of an arm, each motor left as it is at a reference.
 
-    A position-controlled cable keeps its free length l_0: its elongation is that at the reference
-    plus the change of its length. A force-controlled one keeps its tension. Below the tension where
+    A position-controlled cable keeps its original length l_0: its elongation is that at the
+    reference plus the change of its length. A force-controlled one keeps its tension. Below the tension where
     its law begins a cable goes on with the stiffness it has there, down to zero, from where on it
     is slack; above the law's end it goes on with the stiffness it has there. Both are for iterates
     to pass through: :meth:`require_domains` refuses them as answers.
 
     Args:
         arm: The arm.
-        free_length: l_0 (C,) [m], which is L at the reference.
+        lengths: L at the reference (C,) [m].
         tension: F at the reference (C,) [N]; of position-controlled cables inside their laws.
 
+    Attributes:
+        free_length: l_0 (C,) [m].
+
     Raises:
-        ElasticityRangeError: A law gives no strain; names the cables.
-        InvalidInput: An elasticity of the user's own gives no finite one.
+        ElasticityRangeError: A law gives no strain, or a series spring leaves no wire; names the
+            cables.
+        InvalidInput: An elasticity of the user's own gives no finite strain.
     """
 
-    def __init__(self, arm: Manipulator, free_length: Array, tension: Array) -> None:
+    def __init__(self, arm: Manipulator, lengths: Array, tension: Array) -> None:
         self._arm = arm
         self._tension = tension
         self._groups = []
+        self.free_length = arm._laws.original_lengths(lengths, tension)
         for law, held in arm._laws.held:
             series = arm._laws.series[held]
-            springs = _Springs(law, held, free_length[held], series, law.domain.low)
+            springs = _Springs(law, held, self.free_length[held], series, law.domain.low)
             try:
-                ends = _ends(springs, tension[held])
+                ends = _ends(springs, lengths[held], tension[held])
             except ElasticityRangeError as error:
                 raise arm._laws.naming(error, held) from None
             self._groups.append((springs, ends))
@@ -142,8 +147,8 @@ class LockedCables:
                 )
 
 
-def _ends(springs: _Springs, tension: Array) -> _Ends:
-    """From the law and F at the reference."""
+def _ends(springs: _Springs, lengths: Array, tension: Array) -> _Ends:
+    """From the law, and L and F at the reference."""
     domain, size = springs.law.domain, tension.shape
     first, last = np.full(size, domain.first), np.full(size, domain.high)
     before = 1.0 / springs.compliance(first)
@@ -155,4 +160,4 @@ def _ends(springs: _Springs, tension: Array) -> _Ends:
         raise InvalidInput(
             "elasticity", f"{springs.law!r} gives strains or rigidities that are not finite."
         )
-    return _Ends(springs.free_length - elongation, span, first, last, before, after)
+    return _Ends(lengths - elongation, span, first, last, before, after)

@@ -18,6 +18,7 @@ from numpy.polynomial.legendre import leggauss
 from numpy.typing import NDArray
 
 from cdsm._checks import Array
+from cdsm._compiled import compiled
 
 _NODES, _WEIGHTS = (leggauss(12)[0] + 1.0) / 2.0, leggauss(12)[1] / 2.0
 _POWERS = (0, 1)
@@ -41,12 +42,40 @@ def coefficient_table(rows: Sequence[Sequence[float]]) -> Array:
     return np.array([[*row, *[0.0] * (longest - len(row))] for row in rows]).T
 
 
-def horner(table: Array, which: NDArray[np.intp], F: Array) -> Array:
-    """p(F) of the polynomials of a table that are numbered ``which``, same shape as F."""
-    result = np.zeros(F.shape)
-    for row in table[::-1]:
-        result *= F
-        result += row[which]
+def piecewise(joins: Array, table: Array, F: Array) -> Array:
+    """Polynomials of a table in a row, each up to its join, at F; same shape as F."""
+    return np.asarray(_polynomials(joins, table, F.ravel()).reshape(F.shape))
+
+
+@compiled
+def _polynomials(joins: Array, table: Array, F: Array) -> Array:
+    result = np.empty(F.shape[0])
+    for i in range(F.shape[0]):
+        result[i] = _horner(table, np.searchsorted(joins, F[i]), F[i])
+    return result
+
+
+@compiled
+def _horner(table: Array, column: int, F: float) -> float:
+    value = 0.0
+    for row in range(table.shape[0] - 1, -1, -1):
+        value = value * F + table[row, column]
+    return value
+
+
+@compiled
+def _integrals(edges: Array, table: Array, before: Array, power: int, F: Array) -> Array:
+    """∫ Fⁿ dF/p from the low end to each of F (N,); see :class:`Panels`."""
+    result = np.empty(F.shape[0])
+    for i in range(F.shape[0]):
+        panel = np.searchsorted(edges[1:-1], F[i])  # an edge belongs to the panel below it
+        start = edges[panel]
+        width, total = F[i] - start, 0.0
+        for node in range(_NODES.shape[0]):
+            x = start + width * _NODES[node]
+            part = _WEIGHTS[node] / _horner(table, panel, x)
+            total += part * x if power else part
+        result[i] = before[power, panel] + width * total
     return result
 
 
@@ -67,21 +96,8 @@ class Panels(NamedTuple):
 
     def integral(self, F: Array, power: int) -> Array:
         """∫ Fⁿ dF/p from the low end to each of F, any shape, none above :attr:`end`."""
-        flat = F.ravel()
-        # an edge belongs to the panel below it
-        panel = np.searchsorted(self.edges[1:-1], flat, side="left")
-        inside = self._rule(flat, panel, power)
-        return np.asarray((self.before[power][panel] + inside).reshape(F.shape))
-
-    def _rule(self, upper: Array, panel: NDArray[np.intp], power: int) -> Array:
-        """∫ Fⁿ dF/p from the beginning of a panel to somewhere in it."""
-        start = self.edges[panel]
-        width = upper - start
-        F = start[:, None] + width[:, None] * _NODES
-        values = 1.0 / horner(self.coefficients, panel[:, None], F)
-        if power:
-            values *= F
-        return np.asarray(width * (values @ _WEIGHTS))
+        found = _integrals(self.edges, self.coefficients, self.before, power, F.ravel())
+        return np.asarray(found.reshape(F.shape))
 
 
 def panels(rows: Sequence[Sequence[float]], edges: Sequence[float]) -> Panels:
@@ -109,8 +125,7 @@ def panels(rows: Sequence[Sequence[float]], edges: Sequence[float]) -> Panels:
         before=np.zeros((len(_POWERS), len(piece))),
         end=end,
     )
-    every = np.arange(len(piece))
-    whole = np.array([table._rule(table.edges[1:], every, power) for power in _POWERS])
+    whole = np.array([table.integral(table.edges[1:], power) for power in _POWERS])
     return table._replace(before=np.cumsum(whole, axis=1) - whole)
 
 

@@ -44,12 +44,13 @@ class Equilibrium(ReadOnlyState):
     """An arm at rest under a load, with the question it answers. All arrays are read-only.
 
     Attributes:
-        reference: The posture at which the motors were locked; free lengths are L there.
+        reference: The posture at which the motors were locked.
         reference_tension: F (C,) there [N].
         wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m].
-        stiffness: K_θ at rest with the free lengths of the *reference*: ∂r/∂q, and for a pure force
-            the exact Hessian of the potential. :func:`~cdsm.stiffness.stiffness` at the same
-            posture would take the loaded lengths for free ones. The stops are no part of it.
+        stiffness: K_θ at rest with the original lengths of the *reference*: ∂r/∂q, and for a pure
+            force the exact Hessian of the potential. Where no cable is slack it equals
+            :func:`~cdsm.stiffness.stiffness` of this posture and tension. The stops are no part of
+            it.
         reaction: Torque of the stops on the joints (nv,) [N m]: positive at a lower limit, negative
             at an upper one, zero elsewhere.
         residual: J_Lᵀ F + g − J_Xᵀ W − reaction (nv,) [N m]: what is left of the balance.

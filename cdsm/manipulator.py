@@ -10,18 +10,19 @@ import os
 from collections import Counter
 from collections.abc import Sequence
 from functools import cached_property
-from typing import final
+from typing import final, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cdsm import _kernels
-from cdsm._cable_laws import CableLaws
+from cdsm._cable_laws import CableLaws, OriginalLength
 from cdsm._checks import (
     Array,
     Printed,
     frozen,
     instance,
+    one_of,
     sequence_of,
     vector,
 )
@@ -42,6 +43,8 @@ from cdsm.urdf_reader import read_urdf
 GRAVITY = (0.0, 0.0, -9.81)
 """Default gravity in base axes [m/s²]."""
 
+_Value = tuple[Geometry | None, str, tuple[Cable, ...], str, tuple[float, ...], OriginalLength]
+
 _LIMIT_SLACK = 1e-9
 """Angles this far [rad] beyond a limit are rounding, as of a conversion from degrees."""
 
@@ -56,10 +59,15 @@ class Manipulator(Printed):
             :func:`~cdsm.cable.serpentine_cables`.
         cables: The cables, instead of ``elasticity``: any sites on any links of :attr:`urdf`.
         gravity: In base axes (3,) [m/s²]; (0, 0, 0) for none.
+        original_length: Of which length of a locked wire EA/l_0 is taken: ``"unstrained"``, what
+            the motor holds, ℓ/(1 + ε(F)) of a wire that is ℓ long under F; or ``"stretched"``, ℓ
+            itself, as in the paper's figures, which makes K too low by the strain, 3–5 % for
+            Eq. 19.
 
     Raises:
         InvalidInput: Both or neither of ``elasticity`` and ``cables``; gravity not three numbers.
         CableError: Two cables of one name, or one on a link that does not exist.
+        UnknownName: No such ``original_length``.
     """
 
     def __init__(
@@ -69,6 +77,7 @@ class Manipulator(Printed):
         *,
         cables: Sequence[Cable] | None = None,
         gravity: ArrayLike = GRAVITY,
+        original_length: OriginalLength = "unstrained",
     ) -> None:
         described = instance("geometry", geometry, Geometry)
         if elasticity is not None and cables is None:
@@ -79,7 +88,7 @@ class Manipulator(Printed):
                 "give one of elasticity= (for the cables of the geometry) and cables=; "
                 + ("both were given." if cables is not None else "neither was."),
             )
-        self._build(described, to_urdf(described), cables, TIP, gravity)
+        self._build(described, to_urdf(described), cables, TIP, gravity, original_length)
 
     @classmethod
     def from_urdf(
@@ -90,6 +99,7 @@ class Manipulator(Printed):
         tip: str,
         gravity: ArrayLike = GRAVITY,
         check_inertia: bool = True,
+        original_length: OriginalLength = "unstrained",
     ) -> Manipulator:
         """A robot of somebody else's: a tree of revolute, prismatic and fixed joints, and cables.
 
@@ -102,15 +112,17 @@ class Manipulator(Printed):
             gravity: In base axes (3,) [m/s²]; (0, 0, 0) for none.
             check_inertia: Refuse moments of inertia that no body has. Stiffness does not depend on
                 them, :func:`~cdsm.modes.modes` do.
+            original_length: As for :class:`Manipulator`.
 
         Raises:
             FileError: The file cannot be read.
             UrdfError: It is no such robot; every fault is listed.
-            UnknownName: There is no link called ``tip``.
+            UnknownName: There is no link called ``tip``, or no such ``original_length``.
             CableError: Two cables of one name, or one on a link that does not exist.
         """
         arm = cls.__new__(cls)
-        arm._build(None, read_urdf(urdf, check_inertia=check_inertia), cables, tip, gravity)
+        text = read_urdf(urdf, check_inertia=check_inertia)
+        arm._build(None, text, cables, tip, gravity, original_length)
         return arm
 
     def _build(
@@ -120,12 +132,15 @@ class Manipulator(Printed):
         cables: Sequence[Cable],
         tip: str,
         gravity: ArrayLike,
+        original_length: OriginalLength,
     ) -> None:
         """Set everything, once: from checked URDF text, and the geometry behind it if any."""
         self._geometry = geometry
         self._cables = _checked_cables(cables)
         self._gravity = vector("gravity", gravity, 3, "gravity in base axes [m/s²]")
         self._urdf, self._tip_link = urdf, tip
+        one_of("original_length", original_length, get_args(OriginalLength))
+        self._original_length: OriginalLength = original_length
         self._body = RigidBody(urdf, tip, self._gravity)
         tree = self._body.tree()
         routing = route(self._body, tree, self._cables)
@@ -138,7 +153,7 @@ class Manipulator(Printed):
         self._lowest = self._body.lower - _LIMIT_SLACK
         self._highest = self._body.upper + _LIMIT_SLACK
 
-        self._laws = CableLaws(self._cables)
+        self._laws = CableLaws(self._cables, self._original_length)
 
     @property
     def geometry(self) -> Geometry:
@@ -204,6 +219,11 @@ class Manipulator(Printed):
         return self._gravity
 
     @property
+    def original_length(self) -> OriginalLength:
+        """Of which length of a locked wire EA/l_0 is taken; see :class:`Manipulator`."""
+        return self._original_length
+
+    @property
     def nv(self) -> int:
         """Degrees of freedom."""
         return self._body.nv
@@ -262,9 +282,16 @@ class Manipulator(Printed):
         return hash(self._urdf)  # an elasticity of the user's own need not be hashable
 
     @property
-    def _value(self) -> tuple[Geometry | None, str, tuple[Cable, ...], str, tuple[float, ...]]:
+    def _value(self) -> _Value:
         gravity = tuple(self._gravity.tolist())
-        return self._geometry, self._urdf, self._cables, self._tip_link, gravity
+        return (
+            self._geometry,
+            self._urdf,
+            self._cables,
+            self._tip_link,
+            gravity,
+            self._original_length,
+        )
 
     def __reduce__(self) -> tuple[object, ...]:
         return (_rebuild, self._value)
@@ -278,7 +305,8 @@ class Manipulator(Printed):
         Raises:
             CableError: Two cables of one name, or one on a link that does not exist.
         """
-        return _rebuild(self._geometry, self._urdf, tuple(cables), self._tip_link, self._gravity)
+        geometry, urdf, _, tip, gravity, original_length = self._value
+        return _rebuild(geometry, urdf, tuple(cables), tip, gravity, original_length)
 
     def at(self, q: ArrayLike, *, check_limits: bool = True) -> Posture:
         """Evaluate the arm at joint angles q: kinematics, cable lengths and gravity.
@@ -359,9 +387,10 @@ def _rebuild(
     cables: tuple[Cable, ...],
     tip: str,
     gravity: ArrayLike,
+    original_length: OriginalLength,
 ) -> Manipulator:
     arm = Manipulator.__new__(Manipulator)
-    arm._build(geometry, urdf, cables, tip, gravity)
+    arm._build(geometry, urdf, cables, tip, gravity, original_length)
     return arm
 
 

@@ -99,8 +99,8 @@ class Stiffness(ReadOnlyState):
         gravity: ∂g/∂θ (nv, nv) [N m/rad].
         load: −∂(J_Xᵀ W)/∂θ (nv, nv) [N m/rad]; not symmetric if W has a moment.
         joint: K_θ, their sum (nv, nv) [N m/rad]: rows torque, columns angle.
-        free_length: l_0 (C,) [m] where it is not L at the posture, as of an
-            :class:`~cdsm.equilibrium.Equilibrium`, whose motors were locked elsewhere; else None.
+        free_length: l_0 (C,) [m] of an :class:`~cdsm.equilibrium.Equilibrium`, whose motors were
+            locked at its reference; None where they are locked here.
         distribution: The :class:`~cdsm.tension.Tension` it is of; None for bare tensions.
     """
 
@@ -118,8 +118,14 @@ class Stiffness(ReadOnlyState):
 
     @property
     def free_lengths(self) -> Array:
-        """l_0 (C,) [m] that :attr:`cable_stiffness` is of: mostly L at the posture."""
-        return self.posture.cable_lengths if self.free_length is None else self.free_length
+        """Original lengths l_0 (C,) [m] of the wires, which :attr:`cable_stiffness` is of.
+
+        What the locked motors hold: (L − ΔF/k_series)/(1 + ε(F)). Of a force-controlled cable L.
+        """
+        if self.free_length is not None:
+            return self.free_length
+        pose = self.posture
+        return pose.arm._laws.original_lengths(pose.cable_lengths, self.tension)
 
     @cached_property
     def residual(self) -> Array:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import PchipInterpolator, PPoly
 
 from cdsm._checks import LARGEST, Array, number_array, scalar
-from cdsm._panels import Panels, coefficient_table, horner, panels
+from cdsm._panels import Panels, coefficient_table, panels, piecewise
 from cdsm.elasticity import Domain, Elasticity
 from cdsm.errors import ElasticityRangeError, InvalidInput
 
@@ -108,7 +108,7 @@ class StrandElasticity(Elasticity):
             InvalidInput: Not finite numbers.
         """
         values = number_array("tension", tension)
-        return horner(self._table, np.searchsorted(self.joins, values, side="left"), values)
+        return piecewise(self._joins, self._table, values)
 
     def rigidity(self, tension: ArrayLike) -> Array:
         """EA(F) [N] of Eq. 19; see :meth:`Elasticity.rigidity`."""
@@ -127,7 +127,7 @@ class StrandElasticity(Elasticity):
     def rigidity_slope(self, tension: ArrayLike) -> Array:
         """Derivative of the polynomials [-]; see :meth:`Elasticity.rigidity_slope`."""
         values = self.domain.check(tension)
-        return horner(self._slopes, np.searchsorted(self.joins, values, side="left"), values)
+        return piecewise(self._joins, self._slopes, values)
 
     @property
     def jumps(self) -> tuple[float, ...]:
@@ -141,6 +141,10 @@ class StrandElasticity(Elasticity):
     def energy(self, tension: ArrayLike) -> Array:
         """∫ F dF/EA(F) [N], to rounding; see :meth:`Elasticity.energy`."""
         return self._integral(tension, power=1)
+
+    @cached_property
+    def _joins(self) -> Array:
+        return np.array(self.joins)
 
     @cached_property
     def _table(self) -> Array:

@@ -9,7 +9,7 @@ import pytest
 
 import cdsm
 from cdsm import presets
-from cdsm._cable_laws import checked_rigidity
+from cdsm._cable_laws import _checked_rigidity
 from cdsm._checks import LARGEST, SMALLEST
 from tests.arms import random_arm, random_posture, random_wrench
 
@@ -87,7 +87,7 @@ def test_limits_are_allowed_and_what_is_beyond_them_is_named() -> None:
 @pytest.mark.parametrize("rigidity", [SMALLEST, LARGEST])
 def test_smallest_and_largest_rigidity_of_ones_own_are_usable(rigidity: float) -> None:
     law, tension = cdsm.LinearElasticity(rigidity), np.array([1.0, 2.0])
-    np.testing.assert_array_equal(checked_rigidity(law, tension), rigidity)
+    np.testing.assert_array_equal(_checked_rigidity(law, tension), rigidity)
 
 
 def test_series_limits() -> None:

@@ -199,7 +199,7 @@ def test_second_slope_of_cable_stiffness_is_the_derivative_of_the_first(own: boo
     cables = list(arm.cables)
     if own:
         cables = [replace(cable, elasticity=Plain(cable.elasticity)) for cable in cables]
-    laws, lengths = CableLaws(tuple(cables)), np.linspace(0.2, 0.5, len(cables))
+    laws, lengths = CableLaws(tuple(cables), "unstrained"), np.linspace(0.2, 0.5, len(cables))
     assert {cable.control for cable in cables} == {"position", "force"}
     assert {cable.series_stiffness for cable in cables} > {math.inf}
 

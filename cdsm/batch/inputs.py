@@ -22,7 +22,8 @@ def kernel_arm(arm: Manipulator, check_limits: bool) -> Arm:
         arm._masses,
         frozen(lowest),
         frozen(highest),
-        frozen(arm._laws.series),
+        arm._laws.series,
+        arm._laws.rest,
     )
 
 

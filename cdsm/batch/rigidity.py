@@ -1,10 +1,10 @@
-"""EA(F) of all cables at many tensions, and where there is none."""
+"""EA (1 + ε) of all cables at many tensions, and where there is none."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from cdsm._cable_laws import checked_rigidity
+from cdsm._cable_laws import CableLaws
 from cdsm._checks import Array, frozen
 from cdsm.batch.record import Flags
 from cdsm.elasticity import Elasticity
@@ -15,7 +15,7 @@ _NONE = -1.0
 
 
 def rigidities(arm: Manipulator, tension: Array, usable: Flags) -> Array:
-    """EA (b, C) [N] at tensions F (b, C) [N]: 0 for force-controlled cables, −1 where undefined.
+    """EA (1 + ε) (b, C) [N] at tensions F (b, C) [N]; 0 under force control, −1 where undefined.
 
     Args:
         arm: The arm.
@@ -30,7 +30,7 @@ def rigidities(arm: Manipulator, tension: Array, usable: Flags) -> Array:
     pulled = tension if usable.all() else tension[usable]
     rigidity = np.zeros_like(pulled)
     for law, held in arm._laws.held:
-        rigidity[:, held] = _where_defined(law, pulled[:, held])
+        rigidity[:, held] = _where_defined(arm._laws, law, pulled[:, held])
     if pulled is tension:
         return frozen(rigidity)
     result = np.zeros_like(tension)
@@ -38,28 +38,28 @@ def rigidities(arm: Manipulator, tension: Array, usable: Flags) -> Array:
     return frozen(result)
 
 
-def _where_defined(law: Elasticity, tension: Array) -> Array:
-    """EA [N] at tensions of any shape, −1 outside the domain."""
+def _where_defined(laws: CableLaws, law: Elasticity, tension: Array) -> Array:
+    """EA (1 + ε) [N] at tensions of any shape, −1 outside the domain."""
     try:
-        return checked_rigidity(law, tension)
+        return laws.stretched_rigidity(law, tension)
     except ElasticityRangeError:
         pass
     result, values = np.full(tension.size, _NONE), tension.ravel()
     left = np.arange(tension.size)
     while left.size:
         try:
-            result[left] = checked_rigidity(law, values[left])
+            result[left] = laws.stretched_rigidity(law, values[left])
             break
         except ElasticityRangeError as error:
             if not error.indices:  # an elasticity of the user's own that does not say where
-                result[left] = [_one(law, value) for value in values[left]]
+                result[left] = [_one(laws, law, value) for value in values[left]]
                 break
             left = np.delete(left, error.indices)
     return result.reshape(tension.shape)
 
 
-def _one(law: Elasticity, tension: float) -> float:
+def _one(laws: CableLaws, law: Elasticity, tension: float) -> float:
     try:
-        return float(checked_rigidity(law, np.array([tension]))[0])
+        return float(laws.stretched_rigidity(law, np.array([tension]))[0])
     except ElasticityRangeError:
         return _NONE

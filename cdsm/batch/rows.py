@@ -54,6 +54,7 @@ class Arm(NamedTuple):
         lowest: Lower joint limits (nv,) [rad].
         highest: Upper joint limits (nv,) [rad].
         series: 1/k_series of the cables (C,) [m/N].
+        rest: Tension at which these springs are at rest (C,) [N].
     """
 
     tree: Tree
@@ -62,6 +63,7 @@ class Arm(NamedTuple):
     lowest: Array
     highest: Array
     series: Array
+    rest: Array
 
 
 @compiled
@@ -92,7 +94,7 @@ def evaluate_rows(
         arm: The arm.
         q: Joint angles (b, nv) [rad].
         tension: F (b, C) [N].
-        rigidity: EA(F) (b, C) [N]; 0 for force-controlled cables, negative where there is none.
+        rigidity: EA (1 + ε) (b, C) [N]; 0 under force control, negative where there is none.
         wrench: W (b, 6).
         directions: Unit vectors (D, 3) of ``along``.
         start: Where the quantities begin in a record.
@@ -101,7 +103,7 @@ def evaluate_rows(
         status: As it is known beforehand: OK, or that there are no tensions; then as it is found.
             UNDECIDED where singular values have to tell whether K_θ is regular.
     """
-    tree, routing, masses, lowest, highest, series = arm
+    tree, routing, masses, lowest, highest, series, rest = arm
     parent, segment, joint, fixed = tree.parent, routing.segment, routing.joint, routing.fixed
     nv, count, bodies = q.shape[1], fixed.shape[0], parent.shape[0]
     site = np.empty((routing.row.shape[0], 3))
@@ -167,11 +169,13 @@ def evaluate_rows(
                 _imbalance(tension[b], J, wrench[b], JX, g, residual)
                 mirror(active[0])
                 add_load(JX, wrench[b], load)
-                if last > LOAD and (rigidity[b] < 0.0).any():
+                if last > LOAD and (
+                    (rigidity[b] < 0.0).any()
+                    or not set_cable_stiffness(L, tension[b], rigidity[b], series, rest, k)
+                ):
                     status[b] = OUTSIDE_ELASTICITY
                 elif last > LOAD:
                     known = CARTESIAN + 1
-                    set_cable_stiffness(L, rigidity[b], series, k)
                     add_passive(J, k, passive)
                     mirror(passive)
                     size = 0.0

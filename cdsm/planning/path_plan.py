@@ -107,17 +107,14 @@ class PathPlan(ReadOnlyState):
     def unstrained_lengths(self) -> Array:
         """What the motors of the H position-controlled cables have paid out (P, H) [m].
 
-        The l_0 with l_0 + Δl(F, l_0) = L, Δl being :meth:`~cdsm.cable.Cable.elongation`: it counts
-        from the low end of the elasticity's domain, so that l_0 is the length at that tension, with
-        the series spring at rest.
+        The l_0 of :attr:`Stiffness.free_lengths <cdsm.stiffness.Stiffness.free_lengths>`, with l_0
+        + Δl(F, l_0) = L, Δl being :meth:`~cdsm.cable.Cable.elongation`: it counts from the low end
+        of the elasticity's domain, so that l_0 is the length at that tension, with the series
+        spring at rest.
         """
-        columns = []
-        for c, cable in self._held:
-            F, L = self.tensions[:, c], self.cable_lengths[:, c]
-            spring = (F - cable.elasticity.domain.low) / cable.series_stiffness
-            columns.append((L - spring) / (1.0 + cable.elasticity.strain(F)))
-        rows = np.array(columns).reshape(len(columns), len(self.planned))
-        return frozen(rows.T.copy())
+        rows = [K.free_lengths for K in self.stiffness]
+        every = np.array(rows).reshape(self.tensions.shape)
+        return frozen(every[:, [c for c, _ in self._held]])
 
     @property
     def _held(self) -> list[tuple[int, Cable]]:

@@ -21,6 +21,7 @@ def attributes_of(arm: Manipulator) -> dict[str, str]:
         "title": f"stiffness sweep of {arm.name}",
         "source": f"cdsm {version('cdsm-stiffness')}",
         **({"geometry": arm.geometry.to_toml()} if arm.is_serpentine else {"urdf": arm.urdf}),
+        "original_length": arm.original_length,
         "cables": _json([_cable(cable, laws) for cable in arm.cables]),
         "cable_elasticities": _json(laws),
     }
