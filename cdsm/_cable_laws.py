@@ -6,7 +6,7 @@ long, so that its stiffness EA/l_0 is EA (1 + ε)/ℓ.
 
 from __future__ import annotations
 
-from typing import Literal, NoReturn
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,9 +21,6 @@ OriginalLength = Literal["unstrained", "stretched"]
 
 _STEP = 1e-5
 """Relative step of the difference of the slope of EA (1 + ε)."""
-
-_WIRE_LEFT = 1e-6
-"""Part of a cable that its series spring leaves to the wire, at least."""
 
 
 class CableLaws:
@@ -83,7 +80,7 @@ class CableLaws:
 
         Raises:
             ElasticityRangeError: Names the cables whose tension is outside their elasticity's
-                domain, or whose series spring leaves no wire.
+                domain.
             InvalidInput: An elasticity of the user's own gives no positive rigidity, or no strain.
         """
         rigidity = self._constant + self._linear * tension  # EA (1 + F/EA)
@@ -92,10 +89,7 @@ class CableLaws:
                 rigidity[held] = self.stretched_rigidity(law, tension[held])
             except ElasticityRangeError as error:
                 raise self.naming(error, held) from None
-        k, exists = cable_stiffness(lengths, tension, rigidity, self.series, self.rest)
-        if not exists:
-            self._refuse_long_springs(lengths, tension)
-        return frozen(k)
+        return frozen(cable_stiffness(lengths, tension, rigidity, self.series, self.rest))
 
     def stretched_rigidity(self, law: Elasticity, tension: Array) -> Array:
         """EA (1 + ε) [N] of a law, or EA where the stretched length counts; same shape as F [N].
@@ -113,7 +107,8 @@ class CableLaws:
     def original_lengths(self, lengths: Array, tension: Array) -> Array:
         """l_0 (C,) [m] of cables that are L (C,) [m] long under F (C,) [N].
 
-        Of a force-controlled cable, whose motor holds no length, L itself.
+        The series spring counts into the cable: l_0 is negative where it stretches by more than the
+        whole cable is long. Of a force-controlled cable, whose motor holds no length, L itself.
 
         Raises:
             ElasticityRangeError: As for :meth:`stiffness`.
@@ -128,30 +123,7 @@ class CableLaws:
                     wire[held] /= 1.0 + _checked_strain(law, F)
                 except ElasticityRangeError as error:
                     raise self.naming(error, held) from None
-        if wire.min() <= 0.0:
-            self._refuse_long_springs(lengths, tension)
         return frozen(wire)
-
-    def longest_springs(self, lengths: Array) -> Array:
-        """Tensions (C,) [N] at which series springs leave next to nothing of L (C,) [m] to wires.
-
-        Infinite where there is no spring.
-        """
-        with np.errstate(divide="ignore"):
-            return np.asarray(self.rest + (1.0 - _WIRE_LEFT) * lengths / self.series)
-
-    def _refuse_long_springs(self, lengths: Array, tension: Array) -> NoReturn:
-        springs = self.series * (tension - self.rest)
-        bad = np.flatnonzero(springs >= lengths)
-        c = int(bad[0])
-        raise ElasticityRangeError(
-            f"stretches the series spring of {self._cables[c].name} by {springs[c]:.4g} m, and the "
-            f"whole cable is {lengths[c]:.4g} m long: no wire is left. Give the cable a lead that "
-            "holds its spring, a stiffer spring or less tension.",
-            tension[bad].tolist(),
-            bad.tolist(),
-            [self._cables[i].name for i in bad],
-        )
 
     def slopes(self, tension: Array, stiffness: Array) -> tuple[Array, Array]:
         """dk/dF (C,) [1/m] and d²k/dF² (C,) [1/(N m)] of cables of stiffness k under F (C,) [N].

@@ -68,10 +68,10 @@ class LockedCables:
     """Tension F(L) of the cables of an arm, each motor left as it is at a reference.
 
     A position-controlled cable keeps its original length l_0: its elongation is that at the
-    reference plus the change of its length. A force-controlled one keeps its tension. Below the tension where
-    its law begins a cable goes on with the stiffness it has there, down to zero, from where on it
-    is slack; above the law's end it goes on with the stiffness it has there. Both are for iterates
-    to pass through: :meth:`require_domains` refuses them as answers.
+    reference plus the change of its length. A force-controlled one keeps its tension. Below the
+    tension where its law begins a cable goes on with the stiffness it has there, down to zero, from
+    where on it is slack; above the law's end it goes on with the stiffness it has there. Both are
+    for iterates to pass through: :meth:`require_domains` refuses them as answers.
 
     Args:
         arm: The arm.
@@ -82,8 +82,8 @@ class LockedCables:
         free_length: l_0 (C,) [m].
 
     Raises:
-        ElasticityRangeError: A law gives no strain, or a series spring leaves no wire; names the
-            cables.
+        ElasticityRangeError: A law gives no strain, or a series spring stretches by so much more
+            than the cable is long that no wire explains its tension; names the cables.
         InvalidInput: An elasticity of the user's own gives no finite strain.
     """
 
@@ -151,7 +151,16 @@ def _ends(springs: _Springs, lengths: Array, tension: Array) -> _Ends:
     """From the law, and L and F at the reference."""
     domain, size = springs.law.domain, tension.shape
     first, last = np.full(size, domain.first), np.full(size, domain.high)
-    before = 1.0 / springs.compliance(first)
+    softest = springs.compliance(first)
+    if (softest <= 0.0).any():
+        which = np.flatnonzero(softest <= 0.0).tolist()
+        raise ElasticityRangeError(
+            "stretches the series spring by more than the whole cable is long, so that no wire is "
+            "left. Give the cable a lead that holds its spring, a stiffer spring or less tension.",
+            tension[which].tolist(),
+            which,
+        )
+    before = 1.0 / softest
     after, span = np.zeros(size), last
     if math.isfinite(domain.high):
         after, span = 1.0 / springs.compliance(last), springs.elongation(last)

@@ -12,17 +12,17 @@ from cdsm._kernels import Indices, add_length_hessian, mirror
 @compiled
 def cable_stiffness(
     length: Array, tension: Array, rigidity: Array, series: Array, rest: Array
-) -> tuple[Array, bool]:
+) -> Array:
     """Stiffness k of each cable (C,) [N/m], as a new array; see :func:`set_cable_stiffness`."""
     stiffness = np.empty(length.shape[0])
-    exists = set_cable_stiffness(length, tension, rigidity, series, rest, stiffness)
-    return stiffness, exists
+    set_cable_stiffness(length, tension, rigidity, series, rest, stiffness)
+    return stiffness
 
 
 @compiled
 def set_cable_stiffness(
     length: Array, tension: Array, rigidity: Array, series: Array, rest: Array, stiffness: Array
-) -> bool:
+) -> None:
     """Fill k = 1/(l_0/EA + 1/k_series) (C,) [N/m]; 0 where EA is 0: there the motor holds force.
 
     The wire is as long as what the series spring leaves of the cable, ℓ = L − (F − F_0)/k_series,
@@ -35,18 +35,12 @@ def set_cable_stiffness(
         series: 1/k_series (C,) [m/N].
         rest: F_0 (C,) [N], at which the springs are at rest.
         stiffness: To be filled.
-
-    Returns:
-        Whether every spring leaves some wire.
     """
-    exists = True
     for c in range(length.shape[0]):
         stiffness[c] = 0.0
         if rigidity[c] > 0.0:
             wire = length[c] - series[c] * (tension[c] - rest[c])
-            exists = exists and wire > 0.0
             stiffness[c] = 1.0 / (wire / rigidity[c] + series[c])
-    return exists
 
 
 @compiled

@@ -56,8 +56,10 @@ class Site:
 class Cable:
     """A frictionless cable through an ordered list of sites, actuator side first.
 
-    Its length is ``lead`` plus the straight segments between neighbouring sites, and its stiffness
-    k = 1/(l_0/EA(F) + 1/k_series), or 0 where the motor controls force.
+    Its length L is ``lead`` plus the straight segments between neighbouring sites, its stiffness k =
+    1/(l_0/EA(F) + 1/k_series), or 0 where the motor controls force. The original length of the wire
+    is l_0 = (L − ΔF/k_series)/(1 + ε(F)), strain and ΔF counted from the low end of the
+    elasticity's domain: a series spring is part of the cable, so give it a lead that holds it.
 
     Attributes:
         name: Unique name within an arm.

@@ -12,6 +12,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cdsm._cable_laws import OriginalLength
 from cdsm.cable import serpentine_cables
 from cdsm.elasticity import Elasticity, LinearElasticity
 from cdsm.geometry import Geometry
@@ -20,7 +21,7 @@ from cdsm.parts import Link
 from cdsm.wire import StrandElasticity
 
 STRAND_1X19: Final = StrandElasticity.eq19_repaired()
-"""The 1×19 steel strand of 1.2 mm of Section IV-C: Eq. 19, repaired."""
+"""The 1×19 steel strand of 1.2 mm of Section IV-C: Eq. 19, repaired and continuous."""
 
 STRAND_DIAMETER: Final = 1.2e-3
 """Its diameter [m]."""
@@ -35,7 +36,7 @@ TEN_DEGREES: Final = np.deg2rad(10.0)
 """All joint angles of the virtual prototype in Sections IV-A, B and D [rad]."""
 
 
-def virtual_prototype_geometry(link_mass: float = 0.5) -> Geometry:
+def virtual_prototype_geometry(link_mass: float = 0.5, lead: float = 0.0) -> Geometry:
     """Geometry of Section IV: five universal joints, R = 30 mm, disks every 20 mm.
 
     The paper gives the joints, the hole radius and the disk spacing. Assumed: three cables per
@@ -43,6 +44,7 @@ def virtual_prototype_geometry(link_mass: float = 0.5) -> Geometry:
 
     Args:
         link_mass: Mass of every link [kg].
+        lead: Of every cable, before the base disk [m].
     """
     return Geometry.universal(
         name="virtual_prototype",
@@ -53,7 +55,7 @@ def virtual_prototype_geometry(link_mass: float = 0.5) -> Geometry:
         disk_offset=0.01,
         hole_radius=0.03,
         link_mass=link_mass,
-        lead=0.0,
+        lead=lead,
     )
 
 
@@ -61,16 +63,22 @@ def virtual_prototype(
     elasticity: Elasticity = STRAND_1X19,
     *,
     link_mass: float = 0.5,
+    lead: float = 0.0,
     gravity: ArrayLike = (0.0, -9.81, 0.0),
+    original_length: OriginalLength = "unstrained",
 ) -> Manipulator:
     """The virtual prototype of Section IV.
 
     Args:
         elasticity: Of all cables; the repaired Eq. 19 by default.
         link_mass: Mass of every link [kg]; assumed.
+        lead: Of every cable, before the base disk [m]; assumed.
         gravity: In base axes (3,) [m/s²]; along −y by assumption.
+        original_length: As for :class:`~cdsm.manipulator.Manipulator`; ``"stretched"`` is what the
+            paper computes with.
     """
-    return Manipulator(virtual_prototype_geometry(link_mass), elasticity, gravity=gravity)
+    geometry = virtual_prototype_geometry(link_mass, lead)
+    return Manipulator(geometry, elasticity, gravity=gravity, original_length=original_length)
 
 
 def experimental_prototype_geometry(

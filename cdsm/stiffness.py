@@ -120,7 +120,8 @@ class Stiffness(ReadOnlyState):
     def free_lengths(self) -> Array:
         """Original lengths l_0 (C,) [m] of the wires, which :attr:`cable_stiffness` is of.
 
-        What the locked motors hold: (L − ΔF/k_series)/(1 + ε(F)). Of a force-controlled cable L.
+        What the locked motors hold: (L − ΔF/k_series)/(1 + ε(F)). Negative where the series spring
+        stretches by more than the whole cable is long. Of a force-controlled cable L.
         """
         if self.free_length is not None:
             return self.free_length

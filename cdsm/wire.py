@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import final
+from typing import Final, final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,6 +18,22 @@ from cdsm.errors import ElasticityRangeError, InvalidInput
 
 _LEVEL = 1e-13
 """A slope of strain over tension this part of the steepest is rounding."""
+
+
+EQ19_PRINTED: Final = (
+    (-556.89, 377.99, -70.49, 8.74, -0.46, 1.12e-2, -1e-4),
+    (-1924.5, 493.35, -2.26, 0.0054, -6.94e-6, 4.58e-9, -1.22e-12),
+)
+"""Coefficients of Eq. 19 in the digits that are printed, but for the first, −1e-3 in the paper."""
+
+EQ19: Final = (
+    (-556.89, 377.99, -70.49, 8.74, -0.46, 1.12e-2, -9.946263022943622e-05),
+    (-1924.5, 493.34505, -2.26495, 5.38168e-3, -6.93505e-6, 4.58495e-9, -1.21505e-12),
+)
+"""Coefficients of the same digits whose branches meet; see StrandElasticity.eq19_repaired."""
+
+_MET = 1e-9
+"""Branches that differ by less than this part of the rigidity meet: it is rounding."""
 
 
 @final
@@ -64,14 +80,18 @@ class StrandElasticity(Elasticity):
 
     @classmethod
     def eq19_repaired(cls) -> StrandElasticity:
-        """Eq. 19 with its first coefficient read as −1e-4: a 1×19 strand of 1.2 mm.
+        """Eq. 19 of a 1×19 strand of 1.2 mm, with digits that the paper did not print filled in.
 
-        The printed −1e-3 gives −787 884 N at 31 N, where the other branch gives 11 352 N; −1e-4
-        gives 10 870 N and rises all the way, so it is almost surely what was meant. Even so the
-        polynomial is negative below 2.11 N and steps up by 4.4 % at 31 N, and it keeps rising to
-        810 N and beyond, where the text says the strand yields: hence the domain (2.2 N, 810 N].
+        The first coefficient is read as −1e-4: the printed −1e-3 gives −787 884 N at 31 N, where
+        the other branch gives 11 352 N. Every coefficient then keeps the printed digits, which
+        leave EA(31 N) open by 6 kN and EA(810 N) by 35 kN. Within them this law is continuous, most
+        level from 400 to 810 N, where the text calls EA near-constant, and else nearest to what is
+        printed: :func:`cdsm.paper.digits.most_level` finds it by linear programs. Its slope still
+        falls from 1022 to 368 at 31 N: no law of these digits has one slope there, and the least
+        fall, from 662, takes every other digit to the end of its rounding. The
+        polynomial is negative below 2.11 N: the domain is (2.2 N, 810 N].
         """
-        return cls._eq19(-1e-4)
+        return cls(EQ19, joins=(31.0,), low=2.2, high=810.0)
 
     @classmethod
     def eq19_as_printed(cls) -> StrandElasticity:
@@ -79,19 +99,8 @@ class StrandElasticity(Elasticity):
 
         See :meth:`eq19_repaired`, which is the one to compute with.
         """
-        return cls._eq19(-1e-3)
-
-    @classmethod
-    def _eq19(cls, first: float) -> StrandElasticity:
-        return cls(
-            coefficients=(
-                (-556.89, 377.99, -70.49, 8.74, -0.46, 1.12e-2, first),
-                (-1924.5, 493.35, -2.26, 0.0054, -6.94e-6, 4.58e-9, -1.22e-12),
-            ),
-            joins=(31.0,),
-            low=2.2,
-            high=810.0,
-        )
+        lower, upper = EQ19_PRINTED
+        return cls(((*lower[:-1], -1e-3), upper), joins=(31.0,), low=2.2, high=810.0)
 
     @cached_property
     def domain(self) -> Domain:
@@ -129,10 +138,13 @@ class StrandElasticity(Elasticity):
         values = self.domain.check(tension)
         return piecewise(self._joins, self._slopes, values)
 
-    @property
+    @cached_property
     def jumps(self) -> tuple[float, ...]:
-        """The :attr:`joins` [N]."""
-        return self.joins
+        """The :attr:`joins` [N] at which the ranges do not meet."""
+        below = self.polynomial(self.joins)
+        above = self.polynomial(np.nextafter(self.joins, np.inf))
+        apart = abs(above - below) > _MET * abs(below)
+        return tuple(np.array(self.joins)[apart].tolist())
 
     def strain(self, tension: ArrayLike) -> Array:
         """∫ dF/EA(F) [-], to rounding; see :meth:`Elasticity.strain`."""

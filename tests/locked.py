@@ -6,14 +6,18 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from scipy.optimize import brentq
 
 import cdsm
 from cdsm import presets
 from cdsm._checks import Array
+from cdsm.wire import EQ19_PRINTED
 from tests import arms
 from tests.differences import gravity_energy
 
 STRAND = presets.STRAND_1X19
+# the same with a jump at 31 N: the printed digits alone
+JUMPING = cdsm.StrandElasticity(EQ19_PRINTED, (31.0,), 2.2, 810.0)
 # a strand from zero on, EA from 3 kN up; few points, since its third derivative jumps at them
 POINTS = np.array([0.0, 30.0, 250.0, 600.0, 900.0])
 TABLE = cdsm.TabulatedElasticity(
@@ -60,22 +64,36 @@ ARMS = [
 ]
 
 
+def original_length(cable: cdsm.Cable, F: float, L: float) -> float:
+    """l_0 of a cable that is L long under F, from what a Cable says of its elongation alone."""
+    return float(
+        brentq(lambda l0: l0 + float(cable.elongation(F, l0)) - L, 1e-9, 2.0 * L, xtol=1e-15)
+    )
+
+
+def original_lengths(pose: cdsm.Posture, tension: Array) -> Array:
+    """l_0 of the position-controlled cables, L of the others (C,)."""
+    return np.array(
+        [
+            original_length(cable, F, L) if cable.control == "position" else L
+            for cable, F, L in zip(pose.arm.cables, tension, pose.cable_lengths, strict=True)
+        ]
+    )
+
+
 def potential(pose: cdsm.Posture, tension: Array, force: Array) -> Callable[[cdsm.Posture], float]:
     """Π = Σ E_c(F_c) + Σ F_0 L_c + V − f·x, cable by cable, from what a Cable says alone."""
     cables = pose.arm.cables
-    starts = [
-        float(cable.elongation(F, l0)) if cable.control == "position" else 0.0
-        for cable, F, l0 in zip(cables, tension, pose.cable_lengths, strict=True)
-    ]
+    free = original_lengths(pose, tension)
 
     def energy(there: cdsm.Posture) -> float:
         total = gravity_energy(there) - float(force @ there.tip[:3, 3])
-        longer = there.cable_lengths - pose.cable_lengths
+        longer = there.cable_lengths - free
         for c, cable in enumerate(cables):
             if cable.control == "force":
                 total += tension[c] * longer[c]
                 continue
-            l0, elongation = pose.cable_lengths[c], starts[c] + longer[c]
+            l0, elongation = free[c], longer[c]
             if elongation > 0.0 or cable.elasticity.domain.low > 0.0:
                 total += float(cable.energy(cable.tension(elongation, l0), l0))
         return total
@@ -125,7 +143,8 @@ def half(side: float, angle: float) -> tuple[float, float]:
 def pulls(angle: float, locked: float = 0.0) -> tuple[float, float]:
     """F of the cables above and below, locked at an angle with 20 N each."""
     lengths = [(half(side, locked)[0], half(side, angle)[0]) for side in (1.0, -1.0)]
-    above, below = (max(20.0 + EA * (L / l0 - 1.0), 0.0) for l0, L in lengths)
+    # l_0 = L/(1 + 20 N/EA) where they were locked
+    above, below = (max(EA * (L * (1.0 + 20.0 / EA) / start - 1.0), 0.0) for start, L in lengths)
     return above, below
 
 
@@ -138,16 +157,23 @@ def restoring(angle: float, locked: float = 0.0) -> float:
 MOMENT = np.array([0.0, 0.0, 0.0, 0.0, 1.0, 0.0])
 
 
-SOFT = 20.0
-"""EA [N] of cables that let the hinge buckle: K_θ = EA R²/h − F h − P ℓ = 1.8 − 0.2 − P/10."""
+SOFT, LEAD = 980.0, 0.98
+"""EA [N] and lead [m] of cables that let the hinge buckle.
+
+K_θ = 2 (EA + F) R²/(LEAD + 2h) − F h − P ℓ = 1.8 − 0.2 − P/10 at 20 N. Without a lead no linear law
+could: EA/l_0 is more than F/L.
+"""
 
 
-def compressed(
-    angle: float, load: float, pretension: float = 20.0, rigidity: float = SOFT
-) -> float:
-    """Potential of the hinge, locked straight, under a force along its axis."""
+def soft_hinge(**sizes: Any) -> cdsm.Manipulator:
+    return hinge(law=cdsm.LinearElasticity(SOFT), lead=LEAD, **sizes)
+
+
+def compressed(angle: float, load: float, pretension: float = 20.0) -> float:
+    """Potential of the soft hinge, locked straight, under a force along its axis."""
     energy = load * LENGTH * math.cos(angle)
+    free = (LEAD + 2.0 * H) / (1.0 + pretension / SOFT)
     for side in (1.0, -1.0):
-        stretched = pretension / rigidity + half(side, angle)[0] / (2.0 * H) - 1.0
-        energy += rigidity * 2.0 * H * max(stretched, 0.0) ** 2 / 2.0
+        stretched = (LEAD + half(side, angle)[0]) / free - 1.0
+        energy += SOFT * free * max(stretched, 0.0) ** 2 / 2.0
     return energy

@@ -10,7 +10,9 @@ from tests.benchmarks import honesty
 from tests.benchmarks.exact import (
     EXTENDED,
     ExactArm,
+    _gauss,
     eq19,
+    eq19_strain,
     least_tension,
     smallest_eigenvalue,
     wide,
@@ -109,6 +111,24 @@ def test_eq19_of_the_truth_is_that_of_the_strand() -> None:
     np.testing.assert_allclose(
         eq19(F).astype(float), cdsm.presets.STRAND_1X19.rigidity(F), rtol=1e-11
     )
+    # the coefficients of float64 are those decimal digits to 1e-16, which cancel down to EA
+    np.testing.assert_allclose(
+        eq19_strain(F).astype(float), cdsm.presets.STRAND_1X19.strain(F), rtol=1e-11
+    )
+
+
+def test_strain_of_the_truth_is_that_of_any_division_into_panels() -> None:
+    F = np.array([2.2001, 2.3, 7.0, 31.0, 60.0, 810.0])
+    fine = []
+    for tension in F:
+        edges = np.concatenate(
+            [
+                np.geomspace(2.2, min(tension, 31.0), 200),
+                np.linspace(31.0, tension, 200) if tension > 31.0 else [],
+            ]
+        )
+        fine.append(_gauss(wide(edges[:-1]), wide(edges[1:])).sum())
+    np.testing.assert_allclose((eq19_strain(F) / wide(fine) - 1).astype(float), 0.0, atol=1e-16)
 
 
 # --- the judge ------------------------------------------------------------------------------

@@ -1,10 +1,11 @@
 """The law that certifies Eq. 16 whole: K_θ is the Hessian of the total potential.
 
-    U(q) = Σ_c [F_c (L_c − L_c0) + k_c (L_c − L_c0)²/2] + V(q) − f·x(q)
+    U(q) = Σ_c k_c (L_c − l_c)²/2 + Σ_c F_c L_c + V(q) − f·x(q)
 
-for cables whose motors are locked (k_c > 0) or hold their tension (k_c = 0), weight and a dead
-force f at the tip. Nothing but lengths and places enters, so every sign in K_θ is settled by it. A
-moment has no potential; with one, K_θ is the derivative of the torque that is out of balance.
+for springs that are l_c long at rest, whose motors are locked, cables whose motors hold their
+tension F_c, weight and a dead force f at the tip. Nothing but lengths and places enters, so every
+sign in K_θ is settled by it, and l_c by the tension that the spring has. A moment has no potential;
+with one, K_θ is the derivative of the torque that is out of balance.
 """
 
 from collections.abc import Callable
@@ -12,6 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 import cdsm
 from cdsm._checks import Array
@@ -60,22 +62,30 @@ def _stiffness(name: str, control: str, moment: bool = False) -> cdsm.Stiffness:
     return cdsm.stiffness(pose, arms.random_tension(arm, 4), wrench=wrench)
 
 
-def _spring_constants(K: cdsm.Stiffness) -> Array:
-    """K of each cable, l_0/EA and the series compliance one after the other."""
-    cables = K.posture.arm.cables
-    lengths = K.posture.cable_lengths
-    return np.array(
-        [
-            0.0 if cable.control == "force" else 1.0 / (l0 / EA + 1.0 / cable.series_stiffness)
-            for cable, l0 in zip(cables, lengths, strict=True)
-        ]
-    )
+def _springs(K: cdsm.Stiffness) -> tuple[Array, Array]:
+    """Constant k of each cable and its length at rest l (C,), so that k (L − l) = F.
+
+    A wire of original length l_0 behind a spring: l = l_0, 1/k = l_0/EA + 1/k_s, one equation for
+    l_0. Under force control k = 0.
+    """
+    L = K.posture.cable_lengths
+    k, rest = np.zeros(L.size), L.copy()
+    for c, cable in enumerate(K.posture.arm.cables):
+        if cable.control == "position":
+
+            def missing(l0: float, c: int = c, cable: cdsm.Cable = cable) -> float:
+                compliance = l0 / EA + 1.0 / cable.series_stiffness
+                return float(L[c]) - l0 - float(K.tension[c]) * compliance
+
+            rest[c] = brentq(missing, 0.0, float(L[c]), xtol=1e-16)
+            k[c] = 1.0 / (rest[c] / EA + 1.0 / cable.series_stiffness)
+    return k, rest
 
 
 def _energies(K: cdsm.Stiffness) -> dict[str, Callable[[Array], Array]]:
     """The potential that each part of K_θ is the Hessian of."""
     start = K.posture.cable_lengths
-    k = _spring_constants(K)
+    k, _ = _springs(K)
 
     def at(q: Array) -> cdsm.Posture:
         return K.posture.arm.at(q, check_limits=False)
@@ -89,8 +99,18 @@ def _energies(K: cdsm.Stiffness) -> dict[str, Callable[[Array], Array]]:
 
 
 def _total(K: cdsm.Stiffness) -> Callable[[Array], Array]:
-    energies = _energies(K).values()
-    return lambda q: np.sum([energy(q) for energy in energies], axis=0)
+    """U but for a constant: of locked springs their energy, not what Eq. 16 makes of it."""
+    parts, start = _energies(K), K.posture.cable_lengths
+    k, rest = _springs(K)
+    held, free = k > 0.0, np.where(k > 0.0, 0.0, K.tension)
+
+    def total(q: Array) -> Array:
+        L = K.posture.arm.at(q, check_limits=False).cable_lengths
+        # (L − l)² − (L_0 − l)², lest the constant take digits
+        springs = k[held] @ ((L - start) * (L + start - 2.0 * rest))[held] / 2.0
+        return np.array(springs + free @ (L - start) + parts["gravity"](q) + parts["load"](q))
+
+    return total
 
 
 def _assert_hessian(
@@ -109,7 +129,7 @@ def test_master_law_joint_stiffness_is_hessian_of_total_potential(name: str, con
     K = _stiffness(name, control)
     _assert_hessian(_total(K), K.joint, K.posture.q)
     np.testing.assert_array_equal(K.joint, K.active + K.passive + K.gravity + K.load)
-    np.testing.assert_allclose(K.cable_stiffness, _spring_constants(K), rtol=1e-15)
+    np.testing.assert_allclose(K.cable_stiffness, _springs(K)[0], rtol=1e-12)
 
 
 @pytest.mark.parametrize("part", SIZES)
@@ -137,7 +157,7 @@ def test_force_controlled_cables_have_no_passive_part() -> None:
 
 def _unbalanced_torque(K: cdsm.Stiffness, wrench: Array) -> Callable[[cdsm.Posture], Array]:
     """∂U/∂q at other postures; with a moment, which has no U, what stands in its place."""
-    k, start = _spring_constants(K), K.posture.cable_lengths
+    k, start = _springs(K)[0], K.posture.cable_lengths
 
     def torque(pose: cdsm.Posture) -> Array:
         tension = K.tension + k * (pose.cable_lengths - start)
@@ -164,7 +184,7 @@ def test_joint_stiffness_is_derivative_of_unbalanced_torque_with_a_moment(
 def _equilibrium(K: cdsm.Stiffness, extra: Array) -> cdsm.Posture:
     """Where the arm comes to rest under an extra wrench, with its motors left as they are."""
     torque = _unbalanced_torque(K, K.wrench + extra)
-    k = _spring_constants(K)
+    k, _ = _springs(K)
     pose = K.posture
     for _ in range(20):
         tension = K.tension + k * (pose.cable_lengths - K.posture.cable_lengths)

@@ -169,13 +169,11 @@ def evaluate_rows(
                 _imbalance(tension[b], J, wrench[b], JX, g, residual)
                 mirror(active[0])
                 add_load(JX, wrench[b], load)
-                if last > LOAD and (
-                    (rigidity[b] < 0.0).any()
-                    or not set_cable_stiffness(L, tension[b], rigidity[b], series, rest, k)
-                ):
+                if last > LOAD and (rigidity[b] < 0.0).any():
                     status[b] = OUTSIDE_ELASTICITY
                 elif last > LOAD:
                     known = CARTESIAN + 1
+                    set_cable_stiffness(L, tension[b], rigidity[b], series, rest, k)
                     add_passive(J, k, passive)
                     mirror(passive)
                     size = 0.0

@@ -22,6 +22,7 @@ from cdsm.paper.figures import (
     figure_7,
     figure_8,
 )
+from cdsm.paper.lead import LeadFigure, figure_lead
 from cdsm.paper.prototype import BOUNDS, Prototype, PrototypeFit, identify_prototype
 from cdsm.paper.report import EXPLANATION, HEADER, Result, to_dict, to_markdown, to_rows
 from cdsm.paper.strand import StrandFigure, figure_5
@@ -29,6 +30,7 @@ from cdsm.paper.strand import StrandFigure, figure_5
 FIGURES: Final[dict[str, Callable[[], Result]]] = {
     "fig3": figure_3,
     "fig4": figure_4,
+    "lead": figure_lead,
     "fig5": figure_5,
     "fig6": figure_6,
     "fig7": figure_7,
@@ -49,6 +51,7 @@ __all__ = [
     "Curve",
     "ExperimentFigure",
     "Figure",
+    "LeadFigure",
     "Prototype",
     "PrototypeFigure",
     "PrototypeFit",

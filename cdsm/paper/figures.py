@@ -1,35 +1,38 @@
 """Figs. 3, 4, 6, 7 and 8 of the paper, recomputed.
 
 What the paper leaves open is filled in by :mod:`cdsm.presets` and by the assumptions that each
-claim carries. Every number is given in the paper's reading of K_R, ``pseudoinverse``, and as the
-stiffness that a weight hung at the tip would measure, ``along``.
+claim carries, which also says which of them were searched to meet the paper's number. Every number
+is given thrice: as the paper computes it, K_R read as ``pseudoinverse`` and a cable's original
+length as its stretched one; the same with the original length; and as the stiffness that a small
+weight hung at the tip would measure, ``along``, with the original length.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Final, Literal, final
+from typing import Final, Literal, NamedTuple, final
 
 import numpy as np
 from scipy.optimize import brentq
 
 from cdsm import presets
+from cdsm._cable_laws import OriginalLength
 from cdsm._checks import Array, frozen
-from cdsm.elasticity import LinearElasticity
+from cdsm.elasticity import Elasticity, LinearElasticity
 from cdsm.manipulator import Manipulator
+from cdsm.paper.digits import LEVEL
 from cdsm.posture import Posture
 from cdsm.stiffness import Stiffness, stiffness
 from cdsm.tension import distribute_tension
-from cdsm.wire import StrandElasticity
 
 Part = Literal["active", "passive"]
 
 STRAND_END: Final = presets.STRAND_1X19.high
 """Tension [N] at which the strand's elastic stage ends, by the text of Section IV-C."""
 
-_LEVEL = 400.0
-"""Tension [N] from which the text calls EA near-constant (Section IV-C)."""
+STRETCHED: Final[OriginalLength] = "stretched"
+UNSTRAINED: Final[OriginalLength] = "unstrained"
 
 _POINTS = 25
 
@@ -41,6 +44,7 @@ class Curve:
 
     Attributes:
         label: What distinguishes this curve in its figure.
+        original_length: As of its :class:`~cdsm.manipulator.Manipulator`.
         swept: The swept quantity (N,): Young's modulus [Pa] or lower bound of tension [N].
         tension: Smallest, mean and largest cable tension (N, 3) [N].
         pseudoinverse: Diagonal of the paper's K_R (N, 3) [N/m].
@@ -50,6 +54,7 @@ class Curve:
     """
 
     label: str
+    original_length: OriginalLength
     swept: Array
     tension: Array
     pseudoinverse: Array
@@ -68,9 +73,12 @@ class Claim:
         quantity: What is compared.
         unit: Unit of all numbers.
         paper: The paper's numbers, x, y, z or one; None where it gives words only.
-        computed: Ours, in the paper's reading.
-        along: Ours, for a weight hung at the tip; empty where no arm is involved.
+        computed: Ours, in the paper's reading: pseudo-inverse, and l_0 = L.
+        original: Ours, the pseudo-inverse with the original length; empty where no cable strains.
+        along: Ours, for a small weight hung at the tip, with the original length; empty where no
+            arm is involved.
         assumption: What the paper leaves open and we chose.
+        searched: Which of these assumptions were searched for the paper's number; empty: none.
         at_most: Whether the paper's number is an upper bound.
     """
 
@@ -79,8 +87,10 @@ class Claim:
     unit: str
     paper: tuple[float, ...] | None
     computed: tuple[float, ...]
+    original: tuple[float, ...]
     along: tuple[float, ...]
     assumption: str
+    searched: str = ""
     at_most: bool = False
 
     @property
@@ -101,7 +111,8 @@ class Figure:
         title: What it shows.
         swept: Name of the swept quantity: ``"young_modulus"`` or ``"tension"``.
         part: Name of the term of K_θ shown beside the total.
-        curves: Its curves.
+        curves: Its curves, original lengths taken as the stretched ones, as in the paper.
+        original: The same curves with the original lengths.
         postures: Where each curve was computed.
         claims: What the paper says of it.
     """
@@ -111,52 +122,68 @@ class Figure:
     swept: Literal["young_modulus", "tension"]
     part: Part
     curves: tuple[Curve, ...]
+    original: tuple[Curve, ...]
     postures: tuple[Posture, ...]
     claims: tuple[Claim, ...]
+
+
+PROTOTYPE: Final = "three cables a joint, 0.5 kg a link, gravity along −y, no lead"
+"""What the virtual prototype of all these figures assumes besides the stated dimensions."""
+
+SEARCHED: Final = (
+    "cables, link, mass, gravity, hole phase, lower bound and reading of K_R, for this row"
+)
+"""What was searched for Fig. 6."""
+
+KEPT: Final = "prototype searched for Fig. 6"
+"""What the other figures take over from it."""
 
 
 def figure_3() -> Figure:
     """Passive and total stiffness over Young's modulus, 160 to 320 GPa, at equal tensions."""
     moduli = np.linspace(160e9, 320e9, _POINTS)
-    arms = [presets.virtual_prototype(_wire(modulus)) for modulus in moduli]
-    curves = [
-        _curve(
-            f"lower bound {minimum:g} N",
-            "passive",
-            moduli,
-            [_at_minimum(arm, _TEN, minimum) for arm in arms],
-        )
-        for minimum in (50.0, 800.0)
-    ]
+
+    def pair(minimum: float) -> _Pair:
+        def curve(length: OriginalLength) -> Curve:
+            arms = [_prototype(_wire(modulus), length) for modulus in moduli]
+            results = [_at_minimum(arm, _TEN, minimum) for arm in arms]
+            return _curve(f"lower bound {minimum:g} N", length, "passive", moduli, results)
+
+        return _pair(curve)
+
+    pairs = [pair(50.0), pair(800.0)]
     return Figure(
         name="fig3",
         title="Fig. 3: stiffness over Young's modulus, cable tension constant",
         swept="young_modulus",
         part="passive",
-        curves=tuple(curves),
-        postures=(arms[0].at(_TEN),) * len(curves),
+        curves=tuple(pair.stretched for pair in pairs),
+        original=tuple(pair.unstrained for pair in pairs),
+        postures=(presets.virtual_prototype().at(_TEN),) * len(pairs),
         claims=(
             _claim(
-                curves[0],
+                pairs[0],
                 _ratio,
                 figure="Fig. 3",
                 quantity="stiffness at 320 GPa over stiffness at 160 GPa (proportional: 2)",
                 unit="-",
                 paper=(2.0, 2.0, 2.0),
                 assumption="solid wire of 1.2 mm, lower bound 50 N",
+                searched=KEPT,
             ),
             *(
                 _claim(
-                    curve,
+                    pair,
                     _largest_gap,
                     figure="Fig. 3",
                     quantity="largest difference of passive and total stiffness",
                     unit="%",
                     paper=(1.5,),
-                    assumption=f"solid wire of 1.2 mm, {curve.label}",
+                    assumption=f"solid wire of 1.2 mm, {pair.stretched.label}",
+                    searched=KEPT,
                     at_most=True,
                 )
-                for curve in curves
+                for pair in pairs
             ),
         ),
     )
@@ -167,54 +194,56 @@ def figure_4() -> Figure:
     minima = np.linspace(100.0, 800.0, _POINTS)
     laws = {
         "EA = 48 kN (the strand in its elastic stage)": presets.ELASTIC_STAGE,
-        "EA = 226 kN (solid wire, 200 GPa)": presets.STEEL_WIRE_200GPA,
+        "EA = 226 kN (solid wire, the stated 200 GPa)": presets.STEEL_WIRE_200GPA,
     }
-    curves = [
-        _over_minimum(label, presets.virtual_prototype(law), _TEN, minima)
-        for label, law in laws.items()
-    ]
+    pairs = [_over_minimum(label, law, _TEN, minima) for label, law in laws.items()]
     return Figure(
         name="fig4",
-        title=f"Fig. 4: stiffness over cable tension, {curves[0].label}",
+        title="Fig. 4: stiffness over cable tension, cable elasticity constant",
         swept="tension",
         part="active",
-        curves=(curves[0],),
-        postures=(presets.virtual_prototype(presets.ELASTIC_STAGE).at(_TEN),),
+        curves=tuple(pair.stretched for pair in pairs),
+        original=tuple(pair.unstrained for pair in pairs),
+        postures=(presets.virtual_prototype().at(_TEN),) * len(pairs),
         claims=tuple(
             _claim(
-                curve,
+                pair,
                 _percent,
                 figure="Fig. 4",
                 quantity="change of stiffness with tension",
                 unit="%",
                 paper=(-1.46, -1.04, -1.43),
-                assumption=f"{curve.label}, lower bound 100 to 800 N",
+                assumption=f"{pair.stretched.label}, lower bound 100 to 800 N",
+                searched=searched,
             )
-            for curve in curves
+            for pair, searched in zip(
+                pairs, ("EA; range of tension", "range of tension"), strict=True
+            )
         ),
     )
 
 
 def figure_6() -> Figure:
     """Stiffness over tension in the pre-tensioning stage, with Eq. 19."""
-    arm = presets.virtual_prototype()
-    curve = _over_minimum("Eq. 19, repaired", arm, _TEN, np.linspace(15.0, 120.0, _POINTS))
+    pair = _over_minimum("Eq. 19", presets.STRAND_1X19, _TEN, np.linspace(15.0, 120.0, _POINTS))
     return Figure(
         name="fig6",
         title="Fig. 6: stiffness over cable tension in the pre-tensioning stage, Eq. 19",
         swept="tension",
         part="active",
-        curves=(curve,),
-        postures=(arm.at(_TEN),),
+        curves=(pair.stretched,),
+        original=(pair.unstrained,),
+        postures=(presets.virtual_prototype().at(_TEN),),
         claims=(
             _claim(
-                curve,
+                pair,
                 _increment,
                 figure="Fig. 6",
                 quantity="increment of stiffness, (last − first)/first",
                 unit="times",
                 paper=(4.24, 2.9, 4.57),
-                assumption="Eq. 19 repaired, lower bound 15 to 120 N",
+                assumption=f"{PROTOTYPE}; Eq. 19 repaired, lower bound 15 to 120 N",
+                searched=SEARCHED,
             ),
         ),
     )
@@ -222,26 +251,29 @@ def figure_6() -> Figure:
 
 def figure_7() -> Figure:
     """Stiffness over tension in the elastic stage, EA constant."""
-    arm = presets.virtual_prototype(presets.ELASTIC_STAGE)
-    highest = _highest_minimum(arm.at(_TEN))
-    curve = _over_minimum("EA = 48 kN", arm, _TEN, np.linspace(120.0, highest, _POINTS))
+    highest = _highest_minimum(presets.virtual_prototype().at(_TEN))
+    pair = _over_minimum(
+        "EA = 48 kN", presets.ELASTIC_STAGE, _TEN, np.linspace(120.0, highest, _POINTS)
+    )
     return Figure(
         name="fig7",
         title="Fig. 7: stiffness over cable tension in the elastic stage, EA constant",
         swept="tension",
         part="active",
-        curves=(curve,),
-        postures=(arm.at(_TEN),),
+        curves=(pair.stretched,),
+        original=(pair.unstrained,),
+        postures=(presets.virtual_prototype().at(_TEN),),
         claims=(
             _claim(
-                curve,
+                pair,
                 _percent,
                 figure="Fig. 7",
-                quantity="change of stiffness with tension",
+                quantity="change in the elastic stage",
                 unit="%",
                 paper=(-1.5, -0.6, -1.6),
                 assumption=f"EA = 48 kN, tensions from 120 N to {STRAND_END:g} N "
                 f"(lower bound to {highest:.0f} N)",
+                searched=f"EA, for Fig. 4; {KEPT}",
             ),
         ),
     )
@@ -250,46 +282,43 @@ def figure_7() -> Figure:
 def figure_8() -> Figure:
     """Stiffness over the whole range of tension, at three postures."""
     arm = presets.virtual_prototype()
-    laws = {
-        "Eq. 19 repaired": presets.STRAND_1X19,
-        f"EA constant from {_LEVEL:g} N on": _levelled(_LEVEL),
-    }
-    curves, claims = [], []
+    pairs, claims = [], []
     for label, q in FIGURE_8_POSTURES.items():
         highest = _highest_minimum(arm.at(q))
         # dense where the pre-tensioning stage is steep
-        curve = _over_minimum(label, arm, q, np.geomspace(5.0, highest, 2 * _POINTS))
-        curves.append(curve)
-        claims.append(
+        minima = np.geomspace(5.0, highest, 2 * _POINTS)
+        pair = _over_minimum(label, presets.STRAND_1X19, q, minima)
+        pairs.append(pair)
+        claims += [
             _claim(
-                curve,
+                pair,
                 _increment,
                 figure="Fig. 8",
                 quantity="rise of stiffness over the whole range, (last − first)/first",
                 unit="times",
                 paper=None,
                 assumption=f"{label}; Eq. 19 repaired, lower bound 5 to {highest:.0f} N",
-            )
-        )
-        for name, law in laws.items():
-            ends = np.array([_LEVEL, highest])
-            claims.append(
-                _claim(
-                    _over_minimum(name, presets.virtual_prototype(law), q, ends),
-                    _percent,
-                    figure="Fig. 8",
-                    quantity="change at the end of the range (paper: a slight decrease)",
-                    unit="%",
-                    paper=None,
-                    assumption=f"{label}; {name}, lower bound {_LEVEL:g} to {highest:.0f} N",
-                )
-            )
+                searched=KEPT,
+            ),
+            _claim(
+                _over_minimum(label, presets.STRAND_1X19, q, np.array([LEVEL[0], highest])),
+                _percent,
+                figure="Fig. 8",
+                quantity="change at the end of the range (paper: a slight decrease)",
+                unit="%",
+                paper=None,
+                assumption=f"{label}; Eq. 19 most level within its digits, lower bound "
+                f"{LEVEL[0]:g} to {highest:.0f} N",
+                searched=KEPT,
+            ),
+        ]
     return Figure(
         name="fig8",
         title="Fig. 8: stiffness over the whole range of tension, Eq. 19, three postures",
         swept="tension",
         part="active",
-        curves=tuple(curves),
+        curves=tuple(pair.stretched for pair in pairs),
+        original=tuple(pair.unstrained for pair in pairs),
         postures=tuple(arm.at(q) for q in FIGURE_8_POSTURES.values()),
         claims=tuple(claims),
     )
@@ -305,15 +334,23 @@ FIGURE_8_POSTURES: Final = {
 """Postures of Fig. 8 [rad]: assumed, since the paper shows them as pictures only."""
 
 
+class _Pair(NamedTuple):
+    """A curve in both readings of the original length."""
+
+    stretched: Curve
+    unstrained: Curve
+
+
+def _pair(curve: Callable[[OriginalLength], Curve]) -> _Pair:
+    return _Pair(curve(STRETCHED), curve(UNSTRAINED))
+
+
+def _prototype(law: Elasticity, length: OriginalLength) -> Manipulator:
+    return presets.virtual_prototype(law, original_length=length)
+
+
 def _wire(modulus: float) -> LinearElasticity:
     return LinearElasticity.of_wire(modulus, presets.STRAND_DIAMETER)
-
-
-def _levelled(tension: float) -> StrandElasticity:
-    """Eq. 19 with EA held constant from a tension on, as the text describes the elastic stage."""
-    law = presets.STRAND_1X19
-    level = float(law.rigidity(tension))
-    return StrandElasticity((*law.coefficients, (level,)), (*law.joins, tension), law.low, law.high)
 
 
 def _at_minimum(arm: Manipulator, q: Array, minimum: float) -> Stiffness:
@@ -321,14 +358,22 @@ def _at_minimum(arm: Manipulator, q: Array, minimum: float) -> Stiffness:
     return stiffness(pose, distribute_tension(pose, minimum))
 
 
-def _over_minimum(label: str, arm: Manipulator, q: Array, minima: Array) -> Curve:
-    return _curve(label, "active", minima, [_at_minimum(arm, q, minimum) for minimum in minima])
+def _over_minimum(label: str, law: Elasticity, q: Array, minima: Array) -> _Pair:
+    def curve(length: OriginalLength) -> Curve:
+        arm = _prototype(law, length)
+        results = [_at_minimum(arm, q, minimum) for minimum in minima]
+        return _curve(label, length, "active", minima, results)
+
+    return _pair(curve)
 
 
-def _curve(label: str, part: Part, swept: Array, results: Sequence[Stiffness]) -> Curve:
+def _curve(
+    label: str, length: OriginalLength, part: Part, swept: Array, results: Sequence[Stiffness]
+) -> Curve:
     axes = np.eye(3)
     return Curve(
         label=label,
+        original_length=length,
         swept=frozen(np.array(swept)),
         tension=_table([(K.tension.min(), K.tension.mean(), K.tension.max()) for K in results]),
         pseudoinverse=_table([np.diag(K.pseudoinverse()) for K in results]),
@@ -355,7 +400,7 @@ def _highest_minimum(pose: Posture) -> float:
 
 
 def _claim(
-    curve: Curve,
+    pair: _Pair,
     measure: Callable[[Array, Array], Array],
     *,
     figure: str,
@@ -363,17 +408,21 @@ def _claim(
     unit: str,
     paper: tuple[float, ...] | None,
     assumption: str,
+    searched: str = "",
     at_most: bool = False,
 ) -> Claim:
-    """A claim about one curve, measured alike in both readings."""
+    """A claim about one curve, measured alike in all readings."""
+    ours, true = pair
     return Claim(
         figure=figure,
         quantity=quantity,
         unit=unit,
         paper=paper,
-        computed=tuple(measure(curve.pseudoinverse, curve.pseudoinverse_part).tolist()),
-        along=tuple(measure(curve.along, curve.along_part).tolist()),
+        computed=tuple(measure(ours.pseudoinverse, ours.pseudoinverse_part).tolist()),
+        original=tuple(measure(true.pseudoinverse, true.pseudoinverse_part).tolist()),
+        along=tuple(measure(true.along, true.along_part).tolist()),
         assumption=assumption,
+        searched=searched,
         at_most=at_most,
     )
 

@@ -2,15 +2,14 @@
 
 The paper prints 20 numbers of its prototype and not one dimension of it. Everything it leaves open
 is a parameter here, within the bounds of :data:`BOUNDS`, and the parameters that explain the
-numbers best are searched for. A stiffness misfits by factors, so its residual is the logarithm
-ln(model/paper); that of a drop or rise is (model − paper)/paper.
+numbers best are searched for, in steps that free more of them. A stiffness misfits by factors, so
+its residual is the logarithm ln(model/paper); that of a drop or rise is (model − paper)/paper.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, replace
 from typing import Final, final
 
 import numpy as np
@@ -30,11 +29,13 @@ from cdsm.paper.section_v import (
     POSTURE,
     RISES,
     TABLE_II,
+    TABLE_II_SWAPPED,
     TENSIONS,
 )
 from cdsm.posture import Posture
-from cdsm.stiffness import stiffness
+from cdsm.stiffness import Stiffness, stiffness
 from cdsm.tension import distribute_tension
+from cdsm.weight import weight_test
 
 _RIGID = LinearElasticity(1e12)  # a hybrid cable's stiffness is given as a whole
 
@@ -49,7 +50,7 @@ class Prototype:
     Attributes:
         link_length: Of the links between the joints [m].
         tool_length: From the last joint to where the weights hang [m].
-        hole_radius: R [m]. The disk offset is R tan 15°: disks touch at ±30°, the stated limit.
+        hole_radius: R [m].
         lead: Of all cables, before the base disk [m].
         link_mass: Of every link [kg].
         drive_stiffness: In series with every strand [N/m].
@@ -63,6 +64,14 @@ class Prototype:
         hybrid_tension: At which Fig. 13 and the accuracy check were made [N]. The check's cables
             are not named either; they are assumed to be the hybrid ones of 1.89 N/mm.
         highest_hybrid_tension: Up to which Fig. 12 goes [N]; from 3 N, as Table II.
+        disk_ratio: Disk offset over hole radius [-]; at tan 15° disks touch at ±30°, the stated
+            limit.
+        level_2: Tension of the second row of Table II [N]; the first is at 3 N, the last at 86 N.
+        level_3: Of the third row [N].
+        level_4: Of the fourth row [N].
+        weight_x: Weight that Table II was measured with along x [N]; 0: next to none.
+        weight_y: Along y [N].
+        weight_z: Along −z, as it hangs [N].
     """
 
     link_length: float
@@ -78,6 +87,23 @@ class Prototype:
     spring_ratio: float
     hybrid_tension: float
     highest_hybrid_tension: float
+    disk_ratio: float = math.tan(_LIMIT / 2.0)
+    level_2: float = float(TENSIONS[1])
+    level_3: float = float(TENSIONS[2])
+    level_4: float = float(TENSIONS[3])
+    weight_x: float = 0.0
+    weight_y: float = 0.0
+    weight_z: float = 0.0
+
+    @property
+    def levels(self) -> Array:
+        """Tensions of the rows of Table II (5,) [N]."""
+        return np.array([TENSIONS[0], self.level_2, self.level_3, self.level_4, TENSIONS[-1]])
+
+    @property
+    def weights(self) -> Array:
+        """Forces that Table II was measured with (3, 3) [N], one a row."""
+        return np.diag([self.weight_x, self.weight_y, -self.weight_z])
 
     @property
     def configurations(self) -> tuple[Array, Array]:
@@ -96,7 +122,7 @@ class Prototype:
             link_length=self.link_length,
             tool_length=self.tool_length,
             hole_radius=self.hole_radius,
-            disk_offset=self.hole_radius * math.tan(_LIMIT / 2.0),
+            disk_offset=self.hole_radius * self.disk_ratio,
             lead=self.lead,
             link_mass=self.link_mass,
         )
@@ -108,9 +134,34 @@ class Prototype:
             CdsmError: No tension of the position-controlled cables balances the arm, or it leaves
                 the domain of their elasticity, or the arm is unstable.
         """
-        rows = []
-        for tension in np.atleast_1d(np.asarray(tensions, dtype=np.float64)):
-            actual = float(tension) + self.tension_offset
+        return np.array(
+            [
+                [K.along(axis) for axis in np.eye(3)]
+                for K in self._held(pose, np.atleast_1d(np.asarray(tensions, dtype=np.float64)))
+            ]
+        )
+
+    def weigh(self, pose: Posture, tensions: ArrayLike) -> Array:
+        """As :meth:`measure`, with the weights of Table II: force over displacement (N, 3) [N/m].
+
+        Raises:
+            CdsmError: As for :meth:`measure`, with the weights on it.
+        """
+        return np.array(
+            [
+                [
+                    weight_test(pose, K.tension, force).stiffness if force.any() else K.along(axis)
+                    for axis, force in zip(np.eye(3), self.weights, strict=True)
+                ]
+                for K in self._held(pose, np.atleast_1d(np.asarray(tensions, dtype=np.float64)))
+            ]
+        )
+
+    def _held(self, pose: Posture, tensions: Array) -> list[Stiffness]:
+        """K_θ with the force-controlled cables at each tension as reported [N]."""
+        results = []
+        for tension in tensions.tolist():
+            actual = tension + self.tension_offset
             held = {c.name: actual for c in pose.arm.cables if c.control == "force"}
             K = stiffness(pose, distribute_tension(pose, fixed=held))
             if not K.is_stable:
@@ -119,16 +170,21 @@ class Prototype:
                     f"{K.margin:.3g} N m/rad. Lower the tension, or take stiffer cables.",
                     K.critical_direction,
                 )
-            rows.append([K.along(axis) for axis in np.eye(3)])
-        return np.array(rows)
+            results.append(K)
+        return results
 
-    def predict(self) -> Predicted:
+    def predict(self, table_alone: bool = False) -> Predicted:
         """What this prototype would have shown.
+
+        Args:
+            table_alone: Only in Table II, not in the other experiments.
 
         Raises:
             CdsmError: It cannot hold itself in one of the experiments; see :meth:`measure`.
         """
-        table = self.measure(self.arm().at(POSTURE), TENSIONS)
+        table = self.weigh(self.arm().at(POSTURE), self.levels)
+        if table_alone:
+            return Predicted(table=frozen(table))
         soft, stiff = self.arm(HYBRID), self.arm(HYBRID * self.spring_ratio)
         drops, rises = [], []
         for q in self.configurations:
@@ -148,25 +204,32 @@ class Prototype:
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Predicted:
-    """The 20 numbers of Section V.
+    """The 20 numbers of Section V, or the 15 of Table II alone.
 
     Attributes:
         table: Table II (5, 3) [N/m].
-        drops: Of Fig. 12 (2,) [-].
-        rises: Of Fig. 13 (2,) [-].
-        check: Of Section V-B [N/m].
+        drops: Of Fig. 12 (2,) [-], or empty.
+        rises: Of Fig. 13 (2,) [-], or empty.
+        check: Of Section V-B [N/m], or None.
     """
 
     table: Array
-    drops: tuple[float, ...]
-    rises: tuple[float, ...]
-    check: float
+    drops: tuple[float, ...] = ()
+    rises: tuple[float, ...] = ()
+    check: float | None = None
 
-    def residuals(self) -> Array:
-        """ln(model/paper) of each stiffness, (model − paper)/paper of each drop and rise (20,)."""
+    def residuals(self, table: Array) -> Array:
+        """ln(model/paper) of each stiffness, (model − paper)/paper of drops and rises (20,), (15,).
+
+        Args:
+            table: Table II (5, 3) [N/m], as printed or not.
+        """
+        of_table = np.log(self.table / table).ravel()
+        if self.check is None:
+            return np.asarray(of_table)
         return np.concatenate(
             [
-                np.log(self.table / TABLE_II).ravel(),
+                of_table,
                 np.divide(self.drops, DROPS) - 1.0,
                 np.divide(self.rises, RISES) - 1.0,
                 [math.log(self.check / CHECK)],
@@ -188,6 +251,13 @@ BOUNDS: Final[dict[str, tuple[float, float]]] = {
     "spring_ratio": (5.0, 15.0),
     "hybrid_tension": (3.0, 86.0),
     "highest_hybrid_tension": (10.0, 86.0),
+    "disk_ratio": (0.05, 1.0),
+    "level_2": (3.0, 40.0),
+    "level_3": (3.0, 60.0),
+    "level_4": (3.0, 86.0),
+    "weight_x": (0.0, 20.0),
+    "weight_y": (0.0, 20.0),
+    "weight_z": (0.0, 20.0),
 }
 """What a prototype of that kind can be, in SI units; the tensions as far as Table II goes."""
 
@@ -208,6 +278,112 @@ START: Final = Prototype(
 )
 """Near where searches over the whole of :data:`BOUNDS` end; a search from here is short."""
 
+UNEVEN_START: Final = replace(
+    START,
+    link_length=0.0305,
+    lead=0.062,
+    link_mass=0.947,
+    tension_offset=15.0,
+    angle_1=-0.505,
+    angle_2=0.084,
+    angle_3=-0.1155,
+    spring_ratio=8.54,
+    highest_hybrid_tension=37.4,
+    disk_ratio=0.261,
+    level_2=12.3,
+    level_3=18.4,
+    level_4=43.8,
+)
+"""The same where the tensions of Table II and the disk offset are free."""
+
+WEIGHTED_START: Final = replace(
+    UNEVEN_START,
+    lead=0.0711,
+    link_mass=0.815,
+    tension_offset=10.3,
+    angle_1=-0.515,
+    angle_2=0.103,
+    angle_3=-0.035,
+    spring_ratio=8.82,
+    highest_hybrid_tension=38.6,
+    disk_ratio=0.28,
+    level_2=14.0,
+    level_3=19.7,
+    level_4=47.2,
+    weight_x=4.6,
+    weight_y=2.5,
+    weight_z=15.4,
+)
+"""The same where the weights of Table II are free, too."""
+
+TABLE_START: Final = WEIGHTED_START
+"""The same where Table II alone counts."""
+
+
+@final
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Step:
+    """One way of reading Section V.
+
+    Attributes:
+        label: What it is called in tables and figures.
+        table: Table II (5, 3) [N/m], as printed or not.
+        free: Names of the parameters that are searched.
+        start: Where the search starts; the other parameters stay as they are here.
+        table_alone: Whether Figs. 12, 13 and Section V-B do not count.
+    """
+
+    label: str
+    table: Array
+    free: tuple[str, ...]
+    start: Prototype
+    table_alone: bool = False
+
+    @property
+    def numbers(self) -> tuple[str, ...]:
+        """Names of the numbers that count."""
+        return NAMES[: TABLE_II.size] if self.table_alone else NAMES
+
+    @property
+    def count(self) -> str:
+        """How many parameters are free for how many numbers."""
+        return f"{len(self.free)} free parameters for {len(self.numbers)} numbers"
+
+
+_DIMENSIONS = tuple(BOUNDS)[:13]
+_LEVELS = ("disk_ratio", "level_2", "level_3", "level_4")
+_WEIGHTS = ("weight_x", "weight_y", "weight_z")
+
+STEPS: Final = (
+    Step(label="as printed", table=TABLE_II, free=_DIMENSIONS, start=START),
+    Step(
+        label="x and y exchanged in rows 2 to 4",
+        table=TABLE_II_SWAPPED,
+        free=_DIMENSIONS,
+        start=START,
+    ),
+    Step(
+        label="exchanged, uneven tensions",
+        table=TABLE_II_SWAPPED,
+        free=_DIMENSIONS + _LEVELS,
+        start=UNEVEN_START,
+    ),
+    Step(
+        label="exchanged, uneven tensions, finite weights",
+        table=TABLE_II_SWAPPED,
+        free=_DIMENSIONS + _LEVELS + _WEIGHTS,
+        start=WEIGHTED_START,
+    ),
+    Step(
+        label="Table II alone, exchanged, uneven tensions, finite weights",
+        table=TABLE_II_SWAPPED,
+        free=_DIMENSIONS[:7] + _LEVELS + _WEIGHTS,
+        start=TABLE_START,
+        table_alone=True,
+    ),
+)
+"""Readings of Section V, each with more freedom than the one before; none is proven by its fit."""
+
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -215,68 +391,73 @@ class PrototypeFit:
     """The prototype that explains the numbers best, and how well.
 
     Attributes:
+        step: What was searched, and against which table.
         prototype: The parameters found.
         predicted: Its numbers.
-        residuals: As :meth:`Predicted.residuals` (20,), in the order of :data:`NAMES`.
-        without: Names that did not count in the search.
-        at_bound: Names of parameters on a bound: the numbers want them there or beyond.
+        residuals: As :meth:`Predicted.residuals`, in the order of the step's numbers.
+        at_bound: Names of searched parameters on a bound: the numbers want them there or beyond.
     """
 
+    step: Step
     prototype: Prototype
     predicted: Predicted
     residuals: Array
-    without: tuple[str, ...]
     at_bound: tuple[str, ...]
 
     @property
     def cost(self) -> float:
-        """Sum of the squared residuals that counted [-]."""
-        counted = [name not in self.without for name in NAMES]
-        return float(np.sum(self.residuals[counted] ** 2))
+        """Sum of the squared residuals [-]."""
+        return float(self.residuals @ self.residuals)
+
+    @property
+    def misfit(self) -> Array:
+        """Root mean square of ln(model/paper) over the columns of Table II (3,) [-]."""
+        table = self.residuals[: TABLE_II.size].reshape(TABLE_II.shape)
+        return np.asarray(np.sqrt(np.mean(table**2, axis=0)))
 
 
-def identify_prototype(start: Prototype = START, *, without: Collection[str] = ()) -> PrototypeFit:
-    """Search the parameters within :data:`BOUNDS` that explain Section V best: min Σ r².
+def identify_prototype(step: Step) -> PrototypeFit:
+    """Search the free parameters within :data:`BOUNDS` that explain Section V best: min Σ r².
 
     Args:
-        start: Where to start.
-        without: Names in :data:`NAMES` that shall not count.
+        step: What is free, where to start, and against which table.
 
     Raises:
         InvalidInput: A start out of bounds, or an arm there that cannot hold itself.
     """
-    low, high = np.array([_scaled(name, limits) for name, limits in BOUNDS.items()]).T
-    counted = np.array([name not in without for name in NAMES])
+    bounds = {name: BOUNDS[name] for name in step.free}
+    low, high = np.array([_scaled(name, limits) for name, limits in bounds.items()]).T
 
     def prototype(point: Array) -> Prototype:
-        values = dict(zip(BOUNDS, (low + point * (high - low)).tolist(), strict=True))
-        values[_DECADES] = math.exp(values[_DECADES])
-        return Prototype(**values)
+        values = dict(zip(bounds, (low + point * (high - low)).tolist(), strict=True))
+        if _DECADES in values:
+            values[_DECADES] = math.exp(values[_DECADES])
+        return replace(step.start, **values)
 
     def residuals(point: Array) -> Array:
         try:
-            return np.asarray(prototype(point).predict().residuals()[counted])
+            return prototype(point).predict(step.table_alone).residuals(step.table)
         except CdsmError:  # no such arm: the search steps back from infinite residuals
-            return np.full(int(counted.sum()), math.inf)
+            return np.full(len(step.numbers), math.inf)
 
-    given = np.array([_scaled(name, value) for name, value in asdict(start).items()])
+    given = np.array([_scaled(name, getattr(step.start, name)) for name in bounds])
     point = (given - low) / (high - low)
     if not ((point > 0.0) & (point < 1.0)).all():
-        raise InvalidInput("start", f"{start} is not within {BOUNDS}.")
+        raise InvalidInput("start", f"{step.start} is not within {bounds}.")
     if not np.isfinite(residuals(point)).all():
-        raise InvalidInput("start", f"{start} cannot hold itself. Start elsewhere.")
+        raise InvalidInput("start", f"{step.start} cannot hold itself. Start elsewhere.")
     found = least_squares(
         residuals, point, bounds=(0.0, 1.0), diff_step=1e-5, ftol=1e-6, xtol=1e-5, max_nfev=60
     )
     best = prototype(found.x)
-    predicted = best.predict()
+    predicted = best.predict(step.table_alone)
     at_bound = (found.x < _NEAR) | (found.x > 1.0 - _NEAR)
     return PrototypeFit(
+        step=step,
         prototype=best,
         predicted=predicted,
-        residuals=frozen(predicted.residuals()),
-        without=tuple(without),
-        at_bound=tuple(name for name, on in zip(asdict(best), at_bound, strict=True) if on),
+        residuals=frozen(predicted.residuals(step.table)),
+        at_bound=tuple(name for name, on in zip(bounds, at_bound, strict=True) if on),
     )
 
 

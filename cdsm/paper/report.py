@@ -7,20 +7,25 @@ from dataclasses import asdict
 
 from cdsm.paper.experiments import ExperimentFigure, PrototypeFigure
 from cdsm.paper.figures import Figure
+from cdsm.paper.lead import LeadFigure
 from cdsm.paper.prototype import BOUNDS, PrototypeFit
-from cdsm.paper.section_v import NAMES
 from cdsm.paper.strand import StrandFigure
 
-Result = Figure | StrandFigure | ExperimentFigure | PrototypeFigure
+Result = Figure | LeadFigure | StrandFigure | ExperimentFigure | PrototypeFigure
 """What any part of the paper recomputed is."""
 
-HEADER = ("figure", "quantity", "paper", "computed", "difference", "hung weight", "assumption")
+HEADER = (
+    *("figure", "quantity", "paper", "computed", "difference", "original length", "hung weight"),
+    *("assumption", "searched"),
+)
 
 EXPLANATION = (
-    "Three numbers are x, y, z. computed: K_R read as the paper writes it, with the pseudo-inverse "
-    "of the Jacobian; hung weight: the same for the stiffness that a weight at the tip measures. "
-    "Section V was measured with weights: there computed is that, on one prototype identified from "
-    "the same data within stated bounds."
+    "Three numbers are x, y, z. computed: K_R as the paper writes it, with the pseudo-inverse of "
+    "the Jacobian, and with the stretched length of the cables in EA/l_0; original length: the "
+    "same with the unstrained length, which locked motors hold; hung weight: with that, the "
+    "stiffness that a small weight at the tip measures. searched: what was chosen to meet the "
+    "paper's number. Section V was measured with weights: there computed is that, on one prototype "
+    "identified from the same data within stated bounds. All of it is frictionless, links rigid."
 )
 
 
@@ -37,8 +42,10 @@ def to_rows(results: Sequence[Result]) -> list[tuple[str, ...]]:
             ("≤ " if claim.at_most else "") + _numbers(claim.paper, ".4g"),
             _numbers(claim.computed, ".3g"),
             _numbers(claim.difference, "+.2g"),
+            _numbers(claim.original, ".3g"),
             _numbers(claim.along, ".3g"),
             claim.assumption,
+            claim.searched or "–",
         )
         for figure in results
         for claim in figure.claims
@@ -54,17 +61,26 @@ def to_markdown(results: Sequence[Result]) -> str:
     lines = [HEADER, ("---",) * len(HEADER), *to_rows(results)]
     table = "\n".join(f"| {' | '.join(cells)} |" for cells in lines)
     sections = [table, EXPLANATION]
-    sections += [_prototype(each.fit) for each in results if isinstance(each, PrototypeFigure)]
+    for each in results:
+        if isinstance(each, PrototypeFigure):
+            sections.append(_prototypes(each.fits))
     return "\n\n".join(sections) + "\n"
 
 
-def _prototype(fit: PrototypeFit) -> str:
-    """The parameters of the identified prototype as a Markdown table."""
-    rows = [("parameter of the identified prototype [SI]", "value", "from", "to", ""), ("---",) * 5]
-    for name, value in asdict(fit.prototype).items():
-        low, high = BOUNDS[name]
-        on_bound = "at a bound" if name in fit.at_bound else ""
-        rows.append((name, f"{value:.4g}", f"{low:.4g}", f"{high:.4g}", on_bound))
+def _prototypes(fits: Sequence[PrototypeFit]) -> str:
+    """Parameters of the identified prototypes as a Markdown table; * where one is at a bound."""
+    rows = [
+        ("parameter [SI]", "from", "to", *(fit.step.label for fit in fits)),
+        ("---",) * (3 + len(fits)),
+    ]
+    for name, (low, high) in BOUNDS.items():
+        cells = [
+            "–"
+            if name not in fit.step.free
+            else f"{getattr(fit.prototype, name):.4g}" + ("*" if name in fit.at_bound else "")
+            for fit in fits
+        ]
+        rows.append((name, f"{low:.4g}", f"{high:.4g}", *cells))
     return "\n".join(f"| {' | '.join(cells)} |" for cells in rows)
 
 
@@ -87,6 +103,8 @@ def to_dict(results: Sequence[Result]) -> dict[str, object]:
 def _numbers_of(figure: Result) -> dict[str, object]:
     if isinstance(figure, StrandFigure):
         return _strand(figure)
+    if isinstance(figure, LeadFigure):
+        return _lead(figure)
     if isinstance(figure, ExperimentFigure):
         return _experiment(figure)
     return _fits(figure) if isinstance(figure, PrototypeFigure) else _stiffness(figure)
@@ -99,7 +117,19 @@ def _strand(figure: StrandFigure) -> dict[str, object]:
         "displacement_m": figure.displacement.tolist(),
         "tangent_rigidity_N": figure.tangent.tolist(),
         "secant_rigidity_N": figure.secant.tolist(),
+        "least_rigidity_N": figure.low.tolist(),
+        "largest_rigidity_N": figure.high.tolist(),
         "as_printed_N": figure.printed.tolist(),
+    }
+
+
+def _lead(figure: LeadFigure) -> dict[str, object]:
+    return {
+        "lead_m": figure.leads.tolist(),
+        **{
+            f"{name}_change_xyz_percent": getattr(figure, name).tolist()
+            for name in ("pseudoinverse", "along", "stretched_pseudoinverse", "stretched_along")
+        },
     }
 
 
@@ -109,6 +139,7 @@ def _stiffness(figure: Figure) -> dict[str, object]:
         "curves": [
             {
                 "label": curve.label,
+                "original_length": curve.original_length,
                 _SWEPT[figure.swept]: curve.swept.tolist(),
                 "tension_min_mean_max_N": curve.tension.tolist(),
                 "pseudoinverse_xyz_N_per_m": curve.pseudoinverse.tolist(),
@@ -118,7 +149,7 @@ def _stiffness(figure: Figure) -> dict[str, object]:
                     "along_xyz_N_per_m": curve.along_part.tolist(),
                 },
             }
-            for curve in figure.curves
+            for curve in (*figure.curves, *figure.original)
         ],
     }
 
@@ -145,12 +176,16 @@ def _fits(figure: PrototypeFigure) -> dict[str, object]:
         "bounds_SI": BOUNDS,
         "fits": [
             {
-                "left_out": left_out,
+                "step": fit.step.label,
+                "free": fit.step.free,
+                "numbers": len(fit.step.numbers),
+                "table_N_per_m": fit.step.table.tolist(),
                 "parameters_SI": asdict(fit.prototype),
                 "at_bound": fit.at_bound,
-                "residuals": dict(zip(NAMES, fit.residuals.tolist(), strict=True)),
+                "misfit_xyz": fit.misfit.tolist(),
+                "residuals": dict(zip(fit.step.numbers, fit.residuals.tolist(), strict=True)),
             }
-            for left_out, fit in {"": figure.fit, **figure.without}.items()
+            for fit in figure.fits
         ],
     }
 

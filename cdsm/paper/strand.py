@@ -9,6 +9,7 @@ import numpy as np
 
 from cdsm import presets
 from cdsm._checks import Array, frozen
+from cdsm.paper.digits import JOIN, LEVEL, band, least_bend
 from cdsm.paper.figures import Claim
 from cdsm.wire import StrandElasticity
 
@@ -29,6 +30,8 @@ class StrandFigure:
         displacement: Stretch of the wire from 2.2 N on, ∫ l_0 dF/EA (N,) [m].
         tangent: EA of the repaired Eq. 19 (N,) [N].
         secant: Its secant, Eq. 18 (N,) [N].
+        low: Least EA of all continuous laws of the printed digits (N,) [N].
+        high: Largest EA of them (N,) [N].
         printed: Eq. 19 as printed (N,) [N].
         claims: What the paper says of it.
     """
@@ -40,6 +43,8 @@ class StrandFigure:
     displacement: Array
     tangent: Array
     secant: Array
+    low: Array
+    high: Array
     printed: Array
     claims: tuple[Claim, ...]
 
@@ -51,9 +56,11 @@ def figure_5(gauge_length: float = GAUGE_LENGTH) -> StrandFigure:
         gauge_length: Length of the tested wire [m].
     """
     law, printed = presets.STRAND_1X19, StrandElasticity.eq19_as_printed()
-    tension = np.concatenate([np.linspace(2.25, 31.0, 80), np.linspace(31.01, law.high, 200)])
-    just_above = float(law.polynomial(np.nextafter(31.0, 32.0)))
-    level = law.rigidity([400.0, law.high])
+    tension = np.concatenate([np.linspace(2.25, JOIN, 80), np.linspace(31.01, law.high, 120)])
+    low, high = band(tension)
+    above = float(law.polynomial(JOIN))
+    flat = law.rigidity(np.linspace(*LEVEL, 400))
+    below_31, above_31 = least_bend()
     return StrandFigure(
         name="fig5",
         title="Fig. 5: tensile test of the 1×19 strand, as Eq. 19 implies it",
@@ -62,42 +69,63 @@ def figure_5(gauge_length: float = GAUGE_LENGTH) -> StrandFigure:
         displacement=frozen(gauge_length * law.strain(tension)),
         tangent=frozen(law.rigidity(tension)),
         secant=frozen(law.secant_rigidity(tension)),
+        low=low,
+        high=high,
         printed=frozen(printed.polynomial(tension)),
         claims=(
             _claim(
-                "EA at 31 N from the lower over that from the upper polynomial",
-                "-",
-                (1.0,),
-                float(law.polynomial(31.0)) / just_above,
-                "Eq. 19 with its first coefficient read as −1e-4",
+                "first coefficient for which the branches meet at 31 N, times 1e4",
+                "N⁻⁵",
+                (-10.0,),
+                (1e4 * law.coefficients[0][-1],),
+                "misprint: −1e-3 for −1e-4; all other digits as printed",
             ),
             _claim(
-                "the same, Eq. 19 as printed",
+                "EA at 31 N from the lower over that from the upper polynomial, as printed",
                 "-",
                 (1.0,),
-                float(printed.polynomial(31.0)) / just_above,
+                (float(printed.polynomial(JOIN)) / above,),
                 "none: a misprint",
             ),
             _claim(
-                "rise of EA from 400 to 810 N (paper: near-constant)",
+                "slope of EA below and above 31 N, where the least change is sought",
+                "-",
+                None,
+                (below_31, above_31),
+                "any first coefficient, the others within their printed digits",
+            ),
+            _claim(
+                "EA at 810 N, least and largest within the printed digits",
+                "kN",
+                None,
+                (1e-3 * float(low[-1]), 1e-3 * float(high[-1])),
+                "none",
+            ),
+            _claim(
+                "rise of EA from least to largest, 400 to 810 N (paper: near-constant)",
                 "%",
                 None,
-                100.0 * float(level[1] / level[0] - 1.0),
-                "Eq. 19",
+                (100.0 * float(flat.max() / flat.min() - 1.0),),
+                "Eq. 19 most level within its digits",
             ),
         ),
     )
 
 
 def _claim(
-    quantity: str, unit: str, paper: tuple[float, ...] | None, computed: float, assumption: str
+    quantity: str,
+    unit: str,
+    paper: tuple[float, ...] | None,
+    computed: tuple[float, ...],
+    assumption: str,
 ) -> Claim:
     return Claim(
         figure="Fig. 5",
         quantity=quantity,
         unit=unit,
         paper=paper,
-        computed=(computed,),
+        computed=computed,
+        original=(),
         along=(),
         assumption=assumption,
     )

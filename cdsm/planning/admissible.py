@@ -144,7 +144,6 @@ def admissible(
     held = np.array([cable.control == "position" for cable in cables])
     first = np.array([cable.elasticity.domain.first for cable in cables])
     last = np.array([cable.elasticity.domain.high for cable in cables])
-    last = np.minimum(last, pose.arm._laws.longest_springs(pose.cable_lengths))
     low = np.where(held, np.maximum(asked.minimum, first), asked.minimum)
     high = np.where(held, np.minimum(asked.maximum, last), asked.maximum)
     outside = np.flatnonzero(low > high).tolist()

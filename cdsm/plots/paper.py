@@ -13,23 +13,29 @@ from cdsm._checks import Array
 from cdsm.plots.arm import draw_arm
 from cdsm.plots.style import AXES, COLORS, MM, N_PER_MM, STYLES
 
+_LENGTHS = {"stretched": "$l_0 = L$ (paper)", "unstrained": "original $l_0$"}
+
 
 def plot_paper(result: paper.Result) -> Figure:
     """One recomputed figure of the paper.
 
-    Of a stiffness its own reading above, that of a hung weight below; the cable tension is the
-    mean, and the bars are the range over all cables, as in the paper.
+    Of a stiffness its own reading above, that of a hung weight below, each with the stretched
+    length in EA/l_0, as the paper has it, and with the original one; the cable tension is the mean,
+    and the bars are the range over all cables, as in the paper.
 
     Args:
         result: What a function in :data:`cdsm.paper.FIGURES` returns.
     """
     if isinstance(result, paper.StrandFigure):
         return _plot_strand(result)
+    if isinstance(result, paper.LeadFigure):
+        return _plot_lead(result)
     if isinstance(result, paper.ExperimentFigure):
         return _plot_experiment(result)
     if isinstance(result, paper.PrototypeFigure):
         return _plot_prototype(result)
-    return _plot_postures(result) if len(result.curves) == 3 else _plot_directions(result)
+    kinds = {"fig4": _plot_changes, "fig7": _plot_changes, "fig8": _plot_postures}
+    return kinds.get(result.name, _plot_directions)(result)
 
 
 def _plot_strand(result: paper.StrandFigure) -> Figure:
@@ -43,12 +49,28 @@ def _plot_strand(result: paper.StrandFigure) -> Figure:
         title="(a)",
     )
     kilo = 1e-3
+    right.fill_between(
+        result.tension,
+        kilo * result.low,
+        kilo * result.high,
+        color=COLORS[0],
+        alpha=0.15,
+        linewidth=0.0,
+        label="tangent, all laws of the printed digits",
+    )
     right.plot(result.tension, kilo * result.tangent, color=COLORS[0], label="tangent, repaired")
     right.plot(result.tension, kilo * result.secant, "--", color=COLORS[2], label="secant (Eq. 18)")
-    right.plot(result.tension, kilo * result.printed, ":", color=COLORS[1], label="as printed")
-    right.set_ylim(-5.0, 1.1 * kilo * result.tangent.max())  # as printed it falls to -788 kN
+    lower = result.tension <= paper.digits.JOIN  # above, as printed and repaired share their digits
+    right.plot(
+        result.tension[lower],
+        kilo * result.printed[lower],
+        ":",
+        color=COLORS[1],
+        label="as printed, below 31 N",
+    )
+    right.set_ylim(-5.0, 1.05 * kilo * result.high.max())  # as printed it falls to -788 kN
     right.set(xlabel="tension [N]", ylabel="rigidity EA [kN]", title="(b)")
-    right.legend(fontsize=8)
+    right.legend(fontsize=8, loc="upper left")
     for axes in (left, right):
         axes.grid(alpha=0.3)
     figure.suptitle(result.title)
@@ -61,20 +83,99 @@ def _plot_directions(result: paper.Figure) -> Figure:
         ("paper's reading", lambda curve: curve.pseudoinverse),
         ("hung weight", lambda curve: curve.along),
     ]
-    if result.name == "fig4":  # the only one whose original shows it
-        rows.insert(0, ("active part", lambda curve: curve.pseudoinverse_part))
+    curves = result.curves
+    if result.swept == "tension":
+        curves += result.original
     figure = Figure(figsize=(11.0, 2.7 * len(rows) + 0.6), layout="constrained")
     grid: Any = figure.subplots(len(rows), 3, sharex=True, squeeze=False)
     for row, (reading, values) in zip(grid, rows, strict=True):
         for i, axes in enumerate(row):
-            for curve, style in zip(result.curves, STYLES, strict=False):
-                _draw_curve(axes, result, curve, values(curve)[:, i], COLORS[i], style)
+            for curve, style in zip(curves, STYLES, strict=False):
+                label = (
+                    curve.label if result.swept != "tension" else _LENGTHS[curve.original_length]
+                )
+                _draw_curve(axes, result, curve, values(curve)[:, i], COLORS[i], style, label=label)
                 if result.part == "passive" and reading == "paper's reading":
                     x = _swept(result, curve)
                     axes.plot(x, N_PER_MM * curve.pseudoinverse_part[:, i], "k.", markersize=3)
             axes.set_ylabel(f"$K_{AXES[i]}$, {reading} [N/mm]")
             axes.grid(alpha=0.3)
     _finish(figure, grid, result)
+    return figure
+
+
+def _plot_changes(result: paper.Figure) -> Figure:
+    """A column for each direction: the active part, and the change of the stiffness from start."""
+    figure = Figure(figsize=(11.0, 9.0), layout="constrained")
+    grid: Any = figure.subplots(3, 3, sharex=True, sharey="row")
+    for i in range(3):
+        active, *others = grid[:, i]
+        _draw_curve(
+            active,
+            result,
+            result.curves[0],
+            result.curves[0].pseudoinverse_part[:, i],
+            COLORS[i],
+            "-",
+        )
+        active.set(title=AXES[i])
+        for axes, name in zip(others, ("pseudoinverse", "along"), strict=True):
+            for n, color in zip(range(len(result.curves)), (COLORS[i], "0.45"), strict=False):
+                for curve, style in ((result.curves[n], "-"), (result.original[n], "--")):
+                    values = getattr(curve, name)[:, i]
+                    rigidity = curve.label.split(" (")[0]
+                    axes.plot(
+                        curve.tension[:, 1],
+                        100.0 * (values / values[0] - 1.0),
+                        style,
+                        color=color,
+                        label=f"{rigidity}, {_LENGTHS[curve.original_length]}",
+                    )
+            axes.axhline(0.0, color="0.2", linewidth=0.6)
+        end = result.curves[0].tension[-1, 1]
+        stated = result.claims[0].paper
+        assert stated is not None
+        others[0].plot([end], [stated[i]], "ko", markersize=5, label="paper, at the end")
+        others[1].set_xlabel("cable tension, mean [N]")
+        for axes in grid[:, i]:
+            axes.grid(alpha=0.3)
+    grid[0, 0].set_ylabel(f"active part of $K_R$ [N/mm], {result.curves[0].label.split(' (')[0]}")
+    grid[1, 0].set_ylabel("change of $K_R$, paper's reading [%]")
+    grid[2, 0].set_ylabel("change of hung weight's [%]")
+    handles, labels = grid[1, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=9)
+    figure.suptitle(result.title)
+    return figure
+
+
+def _plot_lead(result: paper.LeadFigure) -> Figure:
+    """A panel for each reading, a colour for each direction."""
+    figure = Figure(figsize=(10.0, 4.6), layout="constrained")
+    panels: Any = figure.subplots(1, 2, sharey=True)
+    readings = {"paper's reading of $K_R$": "pseudoinverse", "hung weight": "along"}
+    for axes, (title, name) in zip(panels, readings.items(), strict=True):
+        for i, (axis, color) in enumerate(zip(AXES, COLORS, strict=True)):
+            for prefix, length, style in (
+                ("stretched_", "stretched", "-"),
+                ("", "unstrained", "--"),
+            ):
+                axes.plot(
+                    MM * result.leads,
+                    getattr(result, prefix + name)[:, i],
+                    style,
+                    color=color,
+                    label=f"{axis}, {_LENGTHS[length]}",
+                )
+        axes.axhline(0.0, color="0.2", linewidth=0.8)
+        axes.set_xscale("symlog", linthresh=10.0, linscale=0.6)
+        axes.set_xticks([0.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 400.0])
+        axes.xaxis.set_major_formatter(lambda x, _: f"{x:g}")
+        axes.set(title=title, xlabel="lead of all cables [mm]")
+        axes.grid(alpha=0.3)
+    panels[0].set_ylabel("change of stiffness [%]")
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=9)
+    figure.suptitle(result.title)
     return figure
 
 
@@ -91,13 +192,16 @@ def _plot_postures(result: paper.Figure) -> Figure:
             (("paper's reading", curve.pseudoinverse), ("hung weight", curve.along)), start=1
         ):
             axes: Any = figure.add_subplot(grid[row, i])
+            true = getattr(result.original[i], ("pseudoinverse", "along")[row - 1])
             for j, (name, color) in enumerate(zip(AXES, COLORS, strict=True)):
                 _draw_curve(axes, result, curve, values[:, j], color, "-", label=name)
+                axes.plot(_swept(result, curve), N_PER_MM * true[:, j], "k:", linewidth=0.8)
             axes.set_ylabel(f"stiffness, {reading} [N/mm]")
             axes.grid(alpha=0.3)
         bottom.append(axes)
     handles, labels = bottom[0].get_legend_handles_labels()
-    figure.legend(handles, labels, title="direction", ncols=3, loc="outside lower center")
+    title = "direction; solid: l_0 = L (paper), dotted: original length"
+    figure.legend(handles, labels, title=title, ncols=3, loc="outside lower center")
     _finish(figure, [bottom], result, legend=False)
     return figure
 
@@ -107,17 +211,19 @@ def _plot_experiment(result: paper.ExperimentFigure) -> Figure:
     scale = 1.0 if result.relative else N_PER_MM
     unit = "stiffness in y over the first [-]" if result.relative else "stiffness [N/mm]"
     tension = result.swept == "tension"
-    figure = Figure(figsize=(3.7 * len(result.traces) + 1.0, 3.8), layout="constrained")
-    grid: Any = figure.subplots(1, len(result.traces))
-    for axes, trace, color in zip(grid, result.traces, COLORS, strict=False):
+    rows, columns = -(-len(result.traces) // 3), min(len(result.traces), 3)
+    size = (3.7 * columns + 1.0, 3.3 * rows + 0.5)
+    figure = Figure(figsize=size, layout="constrained")
+    grid: Any = figure.subplots(rows, columns, squeeze=False, sharex="col", sharey="col")
+    for axes, trace, color in zip(grid.ravel(), result.traces, COLORS * rows, strict=False):
         across = 1.0 if tension else N_PER_MM
         axes.plot(across * trace.swept, scale * trace.computed, color=color, label="computed")
         axes.plot(across * trace.paper_at, scale * trace.paper, "ko", markersize=4, label="paper")
         axes.set(
-            title=trace.label,
             xlabel="tension as reported [N]" if tension else "cable stiffness [N/mm]",
             ylabel=unit,
         )
+        axes.set_title(trace.label, fontsize=9)
         axes.set_ylim(bottom=0.0)
         axes.grid(alpha=0.3)
         axes.legend(fontsize=8)
@@ -126,33 +232,27 @@ def _plot_experiment(result: paper.ExperimentFigure) -> Figure:
 
 
 def _plot_prototype(result: paper.PrototypeFigure) -> Figure:
-    """Residual number by number, with all data and with what contradicts them most left out."""
+    """Residual number by number, for each way of reading Table II."""
     names = paper.section_v.NAMES
-    best = sorted(result.without, key=lambda left_out: result.without[left_out].cost)[:2]
-    fits = {
-        "all data": result.fit,
-        **{f"without {left_out}": result.without[left_out] for left_out in best},
-    }
-    figure = Figure(figsize=(8.0, 7.0), layout="constrained")
+    figure = Figure(figsize=(8.5, 7.0), layout="constrained")
     axes: Any = figure.subplots()
     places = np.arange(len(names))
-    for (label, fit), marker, color in zip(fits.items(), "os^", COLORS, strict=True):
-        counted = np.array([name not in fit.without for name in names])
+    for fit, marker, color in zip(result.fits, "os^Dv", (*COLORS, "0.3", "0.6"), strict=True):
         axes.plot(
-            100.0 * fit.residuals[counted],
-            places[counted],
+            100.0 * fit.residuals,
+            places[: fit.residuals.size],
             marker,
             color=color,
             markersize=5,
             alpha=0.8,
-            label=label,
+            label=f"{fit.step.label}: {fit.step.count}",
         )
     axes.axvline(0.0, color="0.2", linewidth=0.8)
     axes.set_yticks(places, names, fontsize=8)
     axes.invert_yaxis()
     axes.set_xlabel("100 ln(model/paper); Figs. 12, 13: (model − paper)/paper [%]")
     axes.grid(alpha=0.3)
-    figure.legend(loc="outside lower center", ncols=3, fontsize=8)
+    figure.legend(loc="outside lower center", ncols=1, fontsize=8)
     figure.suptitle(result.title)
     return figure
 

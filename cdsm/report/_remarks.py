@@ -115,6 +115,12 @@ def _of_tensions(report: Report) -> list[str]:
                 "Beyond it nothing is known."
             )
     cables = {cable.name: cable for cable in K.posture.arm.cables}
+    lost = [name for name, l0 in zip(cables, K.free_lengths, strict=True) if l0 <= 0.0]
+    if lost:
+        said.append(
+            f"the series spring stretches by more than the whole cable is long: {_listed(lost)}. "
+            "Give a lead that holds the spring; until then K is off by up to F/EA."
+        )
     jumping: dict[str, list[str]] = {}
     for each in pulled:
         if each.jump is not None and abs(each.tension - each.jump) <= CLOSE * each.tension:

@@ -124,18 +124,50 @@ class ExactArm:
         return np.asarray(holes + (chain[:, :3, 3] + chain[:, :3, 0] * x)[:, None])
 
 
-# the coefficients as they are printed, and the first one as it is repaired, lowest power first
+# digits of Eq. 19 whose branches meet and are most level, lowest power first
 EQ19 = (
-    ("-556.89", "377.99", "-70.49", "8.74", "-0.46", "1.12e-2", "-1e-4"),
-    ("-1924.5", "493.35", "-2.26", "0.0054", "-6.94e-6", "4.58e-9", "-1.22e-12"),
+    ("-556.89", "377.99", "-70.49", "8.74", "-0.46", "1.12e-2", "-9.946263022943622e-5"),
+    ("-1924.5", "493.34505", "-2.26495", "5.38168e-3", "-6.93505e-6", "4.58495e-9", "-1.21505e-12"),
 )
+EQ19_LOW, JOIN = 2.2, 31.0
+
+# 1/EA is analytic but at the roots of EA, of which 2.109 N is the nearest: panels of half the
+# distance to it or less, on which 30 nodes are exact beyond the extended precision
+_EDGES = wide([EQ19_LOW, 2.24, 2.3, 2.4, 2.55, 2.8, 3.2, 4.0, 5.5, 8.0, 12.0, 18.0, 25.0, JOIN])
+_EDGES = np.concatenate([_EDGES, wide([45.0, 70.0, 110.0, 180.0, 300.0, 450.0, 600.0, 810.0])])
 
 
-def eq19(tension: Array) -> Wide:
-    """EA(F) [N] of Eq. 19, repaired, in its decimal digits; the join belongs to the lower range."""
+def eq19(tension: Array | Wide) -> Wide:
+    """EA(F) [N] of Eq. 19 in its decimal digits; the join belongs to the lower range."""
     F = wide(tension)
     low, high = (sum(np.longdouble(a) * F**i for i, a in enumerate(row)) for row in EQ19)
-    return wide(np.where(tension <= 31.0, wide(low), wide(high)))
+    return wide(np.where(F <= JOIN, wide(low), wide(high)))
+
+
+def eq19_strain(tension: Array) -> Wide:
+    """ε(F) = ∫ dF/EA(F) from 2.2 N on, of (N,) tensions."""
+    whole = np.concatenate([[np.longdouble(0)], np.cumsum(_gauss(_EDGES[:-1], _EDGES[1:]))])
+    panel = np.searchsorted(_EDGES[1:-1], wide(tension))
+    return wide(whole[panel] + _gauss(_EDGES[panel], wide(tension)))
+
+
+def _gauss(low: Wide, high: Wide) -> Wide:
+    """∫ dF/EA(F) over intervals (N,), each on one side of the join."""
+    x, weights = _nodes(30)
+    F = low[:, None] + (high - low)[:, None] * (x + 1) / 2
+    return wide((weights / eq19(F)).sum(axis=1) * (high - low) / 2)
+
+
+def _nodes(count: int) -> tuple[Wide, Wide]:
+    """Nodes and weights of Gauss and Legendre on [−1, 1], by Newton's method from float64's."""
+    x = wide(np.polynomial.legendre.leggauss(count)[0])
+    for _ in range(3):
+        before, p = np.ones_like(x), x
+        for n in range(1, count):
+            before, p = p, ((2 * n + 1) * x * p - n * before) / (n + 1)
+        slope = count * (x * p - before) / (x * x - 1)
+        x = x - p / slope
+    return x, 2 / ((1 - x * x) * slope * slope)
 
 
 def _moved(chain: Wide, orders: NDArray[np.intp], angles: int) -> Wide:

@@ -12,6 +12,7 @@ import warnings
 from collections import Counter
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import replace
 from multiprocessing import get_context
 from typing import NamedTuple
 
@@ -162,13 +163,16 @@ def pseudoinverse(group: Group) -> list[Reading]:
 
 
 def eq19_as_printed(group: Group) -> list[Reading]:
-    """K_θ with the rigidity of Eq. 19 as it is printed, wherever it is asked for."""
+    """K_θ with the first coefficient of Eq. 19 as it is printed, wherever it is asked for."""
     assert group.tension is not None
-    law, readings = cdsm.StrandElasticity.eq19_as_printed(), []
+    strand = cdsm.presets.STRAND_1X19
+    lower, upper = strand.coefficients
+    law = replace(strand, coefficients=((*lower[:-1], -1e-3), upper))
+    readings = []
     for q, F in zip(group.q, group.tension, strict=True):
         pose = group.arm.at(q)
         active = np.einsum("c,cij->ij", F, pose.length_hessian)
-        springs = law.polynomial(F) / pose.cable_lengths
+        springs = law.polynomial(F) / cdsm.stiffness(pose, F).free_lengths
         passive = (pose.length_jacobian.T * springs) @ pose.length_jacobian
         joint = active + passive + pose.gravity_stiffness
         least = np.linalg.eigvalsh(joint)[0]

@@ -15,7 +15,7 @@ from scipy.optimize import linprog
 
 import cdsm
 from cdsm._checks import Array
-from tests.benchmarks.exact import ExactArm, Wide, eq19, wide
+from tests.benchmarks.exact import EQ19_LOW, ExactArm, Wide, eq19, eq19_strain, wide
 
 ROWS = 10
 """Questions about one arm."""
@@ -45,11 +45,16 @@ class Group(NamedTuple):
     high: Array | None = None
 
     def springs(self, lengths: Wide, tension: Array) -> Wide:
-        """K_L (C,) of Eq. 16, from the numbers of the cables."""
+        """K_L (C,) of Eq. 16, from the numbers of the cables: EA/l_0, l_0 unstrained."""
         cable = self.arm.cables[0]
-        linear = isinstance(cable.elasticity, cdsm.LinearElasticity)
-        EA = wide(cable.elasticity.rigidity(1.0)) if linear else eq19(tension)
-        return np.asarray(1 / (lengths / EA + 1 / wide(cable.series_stiffness)))
+        series, F = 1 / wide(cable.series_stiffness), wide(tension)
+        if isinstance(cable.elasticity, cdsm.LinearElasticity):
+            EA = wide(cable.elasticity.rigidity(1.0))
+            free = (lengths - F * series) / (1 + F / EA)
+        else:
+            EA = eq19(tension)
+            free = (lengths - (F - wide(EQ19_LOW)) * series) / (1 + eq19_strain(tension))
+        return np.asarray(1 / (free / EA + series))
 
 
 Random = np.random.Generator
