@@ -56,9 +56,9 @@ class Site:
 class Cable:
     """A frictionless cable through an ordered list of sites, actuator side first.
 
-    Its length L is ``lead`` plus the straight segments between neighbouring sites, its stiffness k =
-    1/(l_0/EA(F) + 1/k_series), or 0 where the motor controls force. The original length of the wire
-    is l_0 = (L − ΔF/k_series)/(1 + ε(F)), strain and ΔF counted from the low end of the
+    Its length L is ``lead`` plus the straight segments between neighbouring sites. Its stiffness is
+    k = 1/(l_0/EA(F) + 1/k_series), or 0 where the motor controls force. The original length of the
+    wire is l_0 = (L − ΔF/k_series)/(1 + ε(F)), strain and ΔF counted from the low end of the
     elasticity's domain: a series spring is part of the cable, so give it a lead that holds it.
 
     Attributes:

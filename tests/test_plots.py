@@ -89,7 +89,10 @@ def test_paper_figures_show_both_readings_in_newton_per_millimetre(
         figure = plots.plot_paper(result)
         labels = [axes.get_ylabel() for axes in figure.axes]
         for reading in ("paper's reading", "hung weight"):
-            assert sum(reading in label and "[N/mm]" in label for label in labels) == 3
+            # of changes in per cent one label serves a row
+            changes = result.name in ("fig4", "fig7")
+            unit, count = ("[%]", 1) if changes else ("[N/mm]", 3)
+            assert sum(reading in label and unit in label for label in labels) == count
         figure.draw_without_rendering()
 
 
@@ -125,10 +128,44 @@ def test_prototype_figure_shows_a_dot_for_every_number_that_counted(results: Res
     figure = plots.plot_paper(result)
     figure.draw_without_rendering()
     (axes,) = figure.axes
-    everything, *others, _ = axes.get_lines()
-    np.testing.assert_allclose(_shown(everything)[0], 100.0 * result.fit.residuals)
-    assert [_shown(line).shape[1] for line in others] == [15, 15]
+    *lines, _ = axes.get_lines()
+    for line, fit in zip(lines, result.fits, strict=True):
+        np.testing.assert_allclose(_shown(line)[0], 100.0 * fit.residuals)
+    assert [_shown(line).shape[1] for line in lines] == [20, 20, 20, 15]
     assert len(axes.get_yticklabels()) == 20
+
+
+def test_changes_are_shown_in_both_readings_beside_the_papers_number(results: Results) -> None:
+    result = results["fig4"]
+    assert isinstance(result, paper.Figure)
+    figure = plots.plot_paper(result)
+    figure.draw_without_rendering()
+    assert len(figure.axes) == 9
+    for i, axes in enumerate(figure.axes[3:6]):
+        strand, original, wire, wire_original, zero, stated = axes.get_lines()
+        strand_claim, wire_claim = result.claims
+        assert _shown(strand)[1, -1] == pytest.approx(strand_claim.computed[i])
+        assert _shown(original)[1, -1] == pytest.approx(strand_claim.original[i])
+        assert _shown(wire)[1, -1] == pytest.approx(wire_claim.computed[i])
+        assert _shown(wire_original)[1, -1] == pytest.approx(wire_claim.original[i])
+        assert strand_claim.paper is not None
+        assert _shown(stated)[1, 0] == strand_claim.paper[i]
+        assert not np.any(_shown(zero)[1])
+
+
+def test_lead_is_shown_for_both_readings_of_k_and_of_the_length(results: Results) -> None:
+    result = results["lead"]
+    assert isinstance(result, paper.LeadFigure)
+    figure = plots.plot_paper(result)
+    figure.draw_without_rendering()
+    left, right = figure.axes
+    np.testing.assert_allclose(
+        _shown(left.get_lines()[0]), (1e3 * result.leads, result.stretched_pseudoinverse[:, 0])
+    )
+    np.testing.assert_allclose(
+        _shown(right.get_lines()[1]), (1e3 * result.leads, result.along[:, 0])
+    )
+    assert "[mm]" in left.get_xlabel()
 
 
 def test_weight_test_shows_its_displacements_in_mm_and_all_tensions() -> None:

@@ -23,7 +23,7 @@ from cdsm.paper.figures import (
     figure_8,
 )
 from cdsm.paper.lead import LeadFigure, figure_lead
-from cdsm.paper.prototype import BOUNDS, Prototype, PrototypeFit, identify_prototype
+from cdsm.paper.prototype import BOUNDS, STEPS, Prototype, PrototypeFit, Step, identify_prototype
 from cdsm.paper.report import EXPLANATION, HEADER, Result, to_dict, to_markdown, to_rows
 from cdsm.paper.strand import StrandFigure, figure_5
 
@@ -47,6 +47,7 @@ __all__ = [
     "EXPLANATION",
     "FIGURES",
     "HEADER",
+    "STEPS",
     "Claim",
     "Curve",
     "ExperimentFigure",
@@ -56,6 +57,7 @@ __all__ = [
     "PrototypeFigure",
     "PrototypeFit",
     "Result",
+    "Step",
     "StrandFigure",
     "Trace",
     "identify_prototype",

@@ -20,8 +20,8 @@ from cdsm.paper.figures import KEPT, STRETCHED, UNSTRAINED, Claim
 from cdsm.stiffness import Stiffness, stiffness
 from cdsm.tension import distribute_tension
 
-LEADS: Final = frozen(np.concatenate([[0.0], np.geomspace(0.003, 0.4, 30)]))
-"""Leads looked at [m]; with much longer ones the arm buckles below 800 N."""
+LEADS: Final = frozen(np.concatenate([[0.0], np.geomspace(0.003, 0.3, 30)]))
+"""Leads looked at [m]; from 0.33 m on the arm buckles below 800 N."""
 
 BOUNDS: Final = (100.0, 800.0)
 """Lower bounds of tension [N] between which the stiffness changes, as for Fig. 4."""
@@ -69,7 +69,7 @@ def figure_lead() -> LeadFigure:
         stretched_along=stretched[:, 1],
         claims=(
             Claim(
-                figure="lead",
+                figure="Fig. 4, lead",
                 quantity="lead from which stiffness falls with tension",
                 unit="mm",
                 paper=None,

@@ -251,7 +251,7 @@ BOUNDS: Final[dict[str, tuple[float, float]]] = {
     "spring_ratio": (5.0, 15.0),
     "hybrid_tension": (3.0, 86.0),
     "highest_hybrid_tension": (10.0, 86.0),
-    "disk_ratio": (0.05, 1.0),
+    "disk_ratio": (math.tan(_LIMIT / 2.0), 1.0),  # less, and disks touch before ±30°
     "level_2": (3.0, 40.0),
     "level_3": (3.0, 60.0),
     "level_4": (3.0, 86.0),
@@ -288,36 +288,31 @@ UNEVEN_START: Final = replace(
     angle_2=0.084,
     angle_3=-0.1155,
     spring_ratio=8.54,
-    highest_hybrid_tension=37.4,
-    disk_ratio=0.261,
+    highest_hybrid_tension=34.0,
+    disk_ratio=0.275,
     level_2=12.3,
     level_3=18.4,
     level_4=43.8,
 )
 """The same where the tensions of Table II and the disk offset are free."""
 
-WEIGHTED_START: Final = replace(
+TABLE_START: Final = replace(
     UNEVEN_START,
-    lead=0.0711,
-    link_mass=0.815,
-    tension_offset=10.3,
-    angle_1=-0.515,
-    angle_2=0.103,
-    angle_3=-0.035,
-    spring_ratio=8.82,
-    highest_hybrid_tension=38.6,
-    disk_ratio=0.28,
-    level_2=14.0,
-    level_3=19.7,
-    level_4=47.2,
-    weight_x=4.6,
-    weight_y=2.5,
-    weight_z=15.4,
+    link_length=0.0305,
+    tool_length=0.266,
+    hole_radius=0.0268,
+    lead=0.002,
+    link_mass=0.41,
+    tension_offset=6.45,
+    disk_ratio=0.275,
+    level_2=11.6,
+    level_3=17.7,
+    level_4=47.9,
+    weight_x=8.0,
+    weight_y=8.0,
+    weight_z=7.0,
 )
-"""The same where the weights of Table II are free, too."""
-
-TABLE_START: Final = WEIGHTED_START
-"""The same where Table II alone counts."""
+"""The same where Table II alone counts and its weights are free, too."""
 
 
 @final
@@ -367,12 +362,6 @@ STEPS: Final = (
         table=TABLE_II_SWAPPED,
         free=_DIMENSIONS + _LEVELS,
         start=UNEVEN_START,
-    ),
-    Step(
-        label="exchanged, uneven tensions, finite weights",
-        table=TABLE_II_SWAPPED,
-        free=_DIMENSIONS + _LEVELS + _WEIGHTS,
-        start=WEIGHTED_START,
     ),
     Step(
         label="Table II alone, exchanged, uneven tensions, finite weights",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Callable
 from typing import Any
 
@@ -139,9 +140,9 @@ def _plot_changes(result: paper.Figure) -> Figure:
         others[1].set_xlabel("cable tension, mean [N]")
         for axes in grid[:, i]:
             axes.grid(alpha=0.3)
-    grid[0, 0].set_ylabel(f"active part of $K_R$ [N/mm], {result.curves[0].label.split(' (')[0]}")
-    grid[1, 0].set_ylabel("change of $K_R$, paper's reading [%]")
-    grid[2, 0].set_ylabel("change of hung weight's [%]")
+    grid[0, 0].set_ylabel("active part, EA = 48 kN [N/mm]")
+    grid[1, 0].set_ylabel("change, paper's reading of $K_R$ [%]")
+    grid[2, 0].set_ylabel("change, hung weight [%]")
     handles, labels = grid[1, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=9)
     figure.suptitle(result.title)
@@ -168,7 +169,8 @@ def _plot_lead(result: paper.LeadFigure) -> Figure:
                 )
         axes.axhline(0.0, color="0.2", linewidth=0.8)
         axes.set_xscale("symlog", linthresh=10.0, linscale=0.6)
-        axes.set_xticks([0.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 400.0])
+        axes.set_xlim(0.0, MM * result.leads[-1])
+        axes.set_xticks([0.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 300.0])
         axes.xaxis.set_major_formatter(lambda x, _: f"{x:g}")
         axes.set(title=title, xlabel="lead of all cables [mm]")
         axes.grid(alpha=0.3)
@@ -223,7 +225,7 @@ def _plot_experiment(result: paper.ExperimentFigure) -> Figure:
             xlabel="tension as reported [N]" if tension else "cable stiffness [N/mm]",
             ylabel=unit,
         )
-        axes.set_title(trace.label, fontsize=9)
+        axes.set_title(textwrap.fill(trace.label, 44), fontsize=9)
         axes.set_ylim(bottom=0.0)
         axes.grid(alpha=0.3)
         axes.legend(fontsize=8)
@@ -237,7 +239,7 @@ def _plot_prototype(result: paper.PrototypeFigure) -> Figure:
     figure = Figure(figsize=(8.5, 7.0), layout="constrained")
     axes: Any = figure.subplots()
     places = np.arange(len(names))
-    for fit, marker, color in zip(result.fits, "os^Dv", (*COLORS, "0.3", "0.6"), strict=True):
+    for fit, marker, color in zip(result.fits, "os^D", (*COLORS, "0.3"), strict=True):
         axes.plot(
             100.0 * fit.residuals,
             places[: fit.residuals.size],
@@ -295,6 +297,6 @@ def _finish(figure: Figure, grid: Any, result: paper.Figure, *, legend: bool = T
     for axes in grid[-1]:
         axes.set_xlabel(label)
     note = "dots: passive part alone" if result.part == "passive" else ""
-    if legend and (note or len(result.curves) > 1):
+    if legend:
         grid[0][0].legend(fontsize=8, title=note or None, title_fontsize=8)
     figure.suptitle(result.title)
