@@ -611,10 +611,21 @@ def test_unstable_and_infeasible_are_said_and_drawn(page: Page, view: View) -> N
     for name in ("along-x", "softest", "margin", "largest-tension"):
         page.says_no(name)
     page.picture("view-infeasible.png")
-    page.type("joint1_1 [°]", 170.0)
-    page.says("condition", "NO POSTURE")
     page.page.get_by_role("button", name="Reset").click()
     page.says("condition", "STABLE")
+
+
+@needs_viser
+def test_beyond_its_end_a_slider_stands_at_its_end(page: Page, view: View) -> None:
+    from playwright.sync_api import expect
+
+    for _ in range(2):  # the second time it stands there already
+        page.type("joint1_1 [°]", 170.0)
+        for name, text in answers(view.arm, [61.9, *DEGREES[1:]], STABLE).items():
+            page.says(name, text)
+        expect(page.field("joint1_1 [°]")).to_have_value("61.9", timeout=PATIENCE)
+    page.page.get_by_role("button", name="Reset").click()
+    page.says("along-x", answers(view.arm, DEGREES, STABLE)["along-x"])
 
 
 @needs_viser
@@ -640,3 +651,47 @@ def test_the_page_asks_nobody_else_for_anything(page: Page, view: View) -> None:
     own = (view.url, f"blob:{view.url}", "data:")
     assert [url for url in page.requests if not url.startswith(own)] == []
     assert page.errors == []
+
+
+@needs_viser
+def test_the_guard_refuses_nothing_that_a_page_does(page: Page, view: View) -> None:
+    box = page.page.locator("canvas").first.bounding_box()
+    page.page.mouse.move(box["x"] + 300.0, box["y"] + 300.0)
+    page.page.mouse.down()
+    page.page.mouse.move(box["x"] + 400.0, box["y"] + 350.0, steps=5)  # turns the camera
+    page.page.mouse.up()
+    page.page.mouse.wheel(0.0, 100.0)
+    page.page.wait_for_timeout(500.0)
+    assert view._guard.refused == 0
+    assert page.errors == []
+
+
+@pytest.mark.parametrize("host", ["::1", "0.0.0.0"])
+@needs_viser
+def test_pages_of_other_addresses_work(browser: Any, host: str) -> None:
+    with serve(soft_arm(), host=host, port=0, q=np.deg2rad(DEGREES), minimum=STABLE) as view:
+        own = Page(browser, view.url.replace("0.0.0.0", "127.0.0.1"))
+        own.type("joint2_1 [°]", 14.5)
+        moved = [*DEGREES[:2], 14.5, *DEGREES[3:]]
+        own.says("along-x", answers(view.arm, moved, STABLE)["along-x"])
+        own.page.reload()
+        own.says("along-x", answers(view.arm, moved, STABLE)["along-x"])
+        assert view._guard.refused == 0
+        own.page.close()
+
+
+@needs_viser
+def test_a_link_does_not_lead_the_page_to_another_server(browser: Any, view: View) -> None:
+    sync = pytest.importorskip("websockets.sync.server")
+    led = threading.Event()
+    with sync.serve(lambda _: led.set(), "127.0.0.1", 0) as other:
+        threading.Thread(target=other.serve_forever, daemon=True).start()
+        address = f"ws://127.0.0.1:{other.socket.getsockname()[1]}"
+        page = browser.new_page()
+        page.set_default_timeout(PATIENCE)
+        with page.expect_console_message(lambda one: f"Connecting to: {address}" in one.text):
+            page.goto(f"{view.url}/?websocket={address}")
+        page.wait_for_timeout(3000.0)  # a page that may connect has done so at once
+        page.close()
+        other.shutdown()
+    assert not led.is_set()

@@ -38,7 +38,11 @@ def view(
         float, typer.Option(help="Ends of the sliders of the force [N].")
     ] = 20.0,
     host: Annotated[
-        str, typer.Option(help="Address to listen at; the default is this machine alone.")
+        str,
+        typer.Option(
+            help="Address to listen at; the default is this machine alone. With another, other "
+            "machines can connect; they need the token in the URL."
+        ),
     ] = "127.0.0.1",
     port: Annotated[int, typer.Option(help="Port to listen at; 0 for any free one.")] = 8080,
     browser: Annotated[

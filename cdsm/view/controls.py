@@ -18,6 +18,8 @@ from cdsm.view.text import page_text
 if TYPE_CHECKING:
     import viser
 
+    from cdsm.view.guard import Control
+
 _IN_FOLDER: Final = 10
 """Joints in one folder; only the first folder is open."""
 
@@ -52,6 +54,7 @@ class Controls:
         largest_tension: Right end of the slider of the lower bound [N].
         largest_force: Both ends of the sliders of the force [N].
         changed: Called, from any thread, when a slider has moved.
+        admit: Called with each control that browsers may use.
     """
 
     def __init__(
@@ -62,8 +65,9 @@ class Controls:
         largest_tension: float,
         largest_force: float,
         changed: Callable[[], None],
+        admit: Callable[[Control], None],
     ) -> None:
-        self._gui, self._start, self._changed = server.gui, start, changed
+        self._gui, self._start, self._changed, self._admit = server.gui, start, changed, admit
         self._text = server.gui.add_html("")
         with server.gui.add_folder("Load"):
             high = max(largest_tension, start.minimum)
@@ -77,6 +81,8 @@ class Controls:
         straight.on_click(lambda _: self._move(self._joints, np.zeros(arm.nv)))
         reset = server.gui.add_button("Reset", hint="All sliders as they were at the beginning.")
         reset.on_click(lambda _: self._reset())
+        for button in (straight, reset):
+            admit(button)
 
     @property
     def setting(self) -> Setting:
@@ -107,6 +113,7 @@ class Controls:
             range_.label, range_.low, range_.high, range_.step, range_.initial
         )
         handle.on_update(lambda _: self._changed())
+        self._admit(handle)
         return Slider(handle, range_)
 
     def _move(self, sliders: Sequence[Slider], values: Array) -> None:

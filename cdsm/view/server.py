@@ -27,6 +27,8 @@ from cdsm.view.state import Condition, Setting, Shown, show
 if TYPE_CHECKING:
     import viser
 
+    from cdsm.view.guard import Guard
+
 _LOG = logging.getLogger(__name__)
 
 _PANEL = 390
@@ -49,6 +51,8 @@ def serve(
     """Serve a live view of an arm: sliders, the arm in three dimensions, its stiffness.
 
     It runs in threads of its own until it is closed. All browsers see and move the same sliders.
+    Pages of other sites cannot connect. Other machines can only where ``host`` lets them, and only
+    with the token in the URL; a warning is logged then.
 
     Args:
         arm: The arm; nothing is written into it.
@@ -65,6 +69,7 @@ def serve(
     Raises:
         MissingExtra: viser is not installed: the extra ``[view]``.
         InvalidInput: A value of the wrong type or shape, or the port cannot be had.
+        CdsmError: The installed viser cannot be guarded.
         JointLimitError: An angle is beyond its limit.
         UnknownName: No such solver is installed.
     """
@@ -78,7 +83,8 @@ def serve(
     )
     tension = _positive("largest_tension", largest_tension)
     push = max(_positive("largest_force", largest_force), float(abs(start.force).max()))
-    return View(arm, start, _server(host, port), tension, push)
+    guard, server = _server(host, port)
+    return View(arm, start, guard, server, tension, push)
 
 
 @final
@@ -93,18 +99,19 @@ class View:
         self,
         arm: Manipulator,
         start: Setting,
+        guard: Guard,
         server: viser.ViserServer,
         largest_tension: float,
         largest_force: float,
     ) -> None:
         self.arm = arm
-        self._server = server
+        self._guard, self._server = guard, server
         self._closed = threading.Event()
         self._worker = Newest(self._refresh)
         try:
             self._scene = Scene(server, arm, largest_force)
             self._controls = Controls(
-                server, arm, start, largest_tension, largest_force, self._worker.ask
+                server, arm, start, largest_tension, largest_force, self._worker.ask, guard.admit
             )
             self._refresh()
         except BaseException:
@@ -113,9 +120,10 @@ class View:
 
     @property
     def url(self) -> str:
-        """Address of the page."""
-        host = self._server.get_host()
-        return f"http://{f'[{host}]' if ':' in host else host}:{self._server.get_port()}"
+        """Address of the page; with a token, where other machines can connect."""
+        host, token = self._server.get_host(), self._guard.token
+        place = f"{f'[{host}]' if ':' in host else host}:{self._server.get_port()}"
+        return f"http://{place}/{token}/" if token else f"http://{place}"
 
     @property
     def shown(self) -> Shown:
@@ -180,25 +188,26 @@ def _positive(name: str, value: object, *, zero: bool = False) -> float:
     return number
 
 
-def _server(host: object, port: object) -> viser.ViserServer:
-    """A viser server at this address and no other, with a page of its own design."""
-    import viser
+def _server(host: object, port: object) -> tuple[Guard, viser.ViserServer]:
+    """A viser server at this address and no other, guarded, with a page of its own design."""
+    from cdsm.view.guard import Guard
 
     if not isinstance(host, str):
         raise InvalidInput("host", f"{host!r} given; an address is needed, such as '127.0.0.1'.")
     if isinstance(port, bool) or not isinstance(port, int) or not 0 <= port <= 65535:
         raise InvalidInput("port", f"{port!r} given; a whole number from 0 to 65535 is needed.")
     _check_free(host, port)
+    guard = Guard(host)
     with _quiet():
-        server = viser.ViserServer(host=host, port=port, label="cdsm view", verbose=False)
+        server = guard.start(port, "cdsm view")
         if port not in (0, taken := server.get_port()):
             server.stop()
             raise InvalidInput("port", f"{port} was taken meanwhile ({taken} is free); try again.")
-    # nothing may leave this machine: viser's share button opens a tunnel to a server of others
+    # viser's share button opens a tunnel to a server of others, which the guard refuses
     server.gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
     server.gui.main_panel.dock_right()
     server.gui.main_panel.set_width(_PANEL)  # or browsers differ in what "large" is when docked
-    return server
+    return guard, server
 
 
 def _check_free(host: str, port: int) -> None:
