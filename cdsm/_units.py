@@ -1,13 +1,17 @@
-"""Units in the keys of JSON."""
+"""What stands beside numbers: units in the keys of JSON, and the model of every stiffness."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cdsm._checks import Array
+
+MODEL: Final = "frictionless, rigid links, tangent"
+"""What every stiffness in print is."""
 
 
 def key(name: str, unit: str) -> str:

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm._checks import Array, ReadOnlyState, frozen, instance, one_of, unit_direction, vector
+from cdsm._units import MODEL
 from cdsm.errors import InvalidInput, SingularStiffness
 from cdsm.posture import Posture
 from cdsm.report import Report, report_on
@@ -184,7 +185,10 @@ class Stiffness(ReadOnlyState):
         return frozen(outer @ np.linalg.inv(inner) @ outer.T)
 
     def along(self, direction: ArrayLike) -> float:
-        """1/(uᵀ C_vv u) [N/m]: what a weight hung at the tip measures in direction u (Eq. 20).
+        """1/(uᵀ C_vv u) [N/m]: the tangent of what a weight hung at the tip measures (Eq. 20).
+
+        A weight that is not small beside the tensions measures a secant, which with a stiffening
+        wire can be a multiple: see :func:`~cdsm.weight.weight_test`.
 
         Args:
             direction: u (3,) in base axes, any length.
@@ -302,7 +306,7 @@ class Stiffness(ReadOnlyState):
     def _verdict(self) -> str:
         state = "stable" if self.is_stable else "UNSTABLE: K_θ is not positive definite"
         unit = self.posture.arm.stiffness_unit()
-        return f"{state}, smallest joint stiffness {self.margin:.4g} {unit}"
+        return f"{state}, smallest joint stiffness {self.margin:.4g} {unit} ({MODEL})"
 
     @cached_property
     def _spectrum(self) -> tuple[Array, Array]:

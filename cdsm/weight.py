@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm._checks import Array, ReadOnlyState, frozen, unit_direction, vector
+from cdsm._units import MODEL
 from cdsm.equilibrium import Equilibrium, equilibrium, follow
 from cdsm.errors import EquilibriumError, InvalidInput
 from cdsm.posture import Posture
@@ -140,6 +141,7 @@ class WeightTest(ReadOnlyState):
             f"{'linear':>10}{predicted}",
             f"stiffness along the force: measured {self.stiffness / 1000.0:.4g} N/mm, "
             f"linear {self.linear.stiffness / 1000.0:.4g} N/mm",
+            f"(linear is {MODEL}; measured the secant over this weight)",
         ]
         if self.settled_first:
             x, y, z = 1000.0 * self.without.displacement

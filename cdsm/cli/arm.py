@@ -10,7 +10,7 @@ import numpy as np
 import typer
 
 from cdsm._checks import Array
-from cdsm._units import joints_to_dict, key
+from cdsm._units import MODEL, joints_to_dict, key
 from cdsm.cli.options import (
     Angles,
     ArmOptions,
@@ -81,6 +81,7 @@ def _to_dict(pull: Tension, K: Stiffness) -> dict[str, object]:
         },
         "cable_length_m": pose.cable_lengths.tolist(),
         key("static_residual", pose.arm.torque_unit()): K.residual.tolist(),
+        "model": MODEL,
         "along_N_per_m": [value if np.isfinite(value) else None for value in along],
         "cartesian_N_per_m": matrix(lambda: K.cartesian),
         "pseudoinverse_N_per_m": matrix(K.pseudoinverse),

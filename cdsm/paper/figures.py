@@ -217,7 +217,7 @@ def figure_4() -> Figure:
                 searched=searched,
             )
             for pair, searched in zip(
-                pairs, ("EA; range of tension", "range of tension"), strict=True
+                pairs, (f"EA, range of tension; {KEPT}", f"range of tension; {KEPT}"), strict=True
             )
         ),
     )

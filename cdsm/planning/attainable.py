@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm._checks import Array, ReadOnlyState, frozen
+from cdsm._units import MODEL
 from cdsm.elasticity import Elasticity, LinearElasticity
 from cdsm.errors import ElasticityRangeError, InvalidInput, SingularStiffness
 from cdsm.planning.admissible import Admissible
@@ -98,7 +99,7 @@ class StiffnessRange(ReadOnlyState):
                 f"{name} with {pull.min():.4g} to {pull.max():.4g} N, "
                 f"found from {same} of {found.size} starts"
             )
-        return "\n".join(lines)
+        return "\n".join([*lines, f"({MODEL})"])
 
 
 def stiffness_range(

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm._checks import Array, ReadOnlyState, frozen
+from cdsm._units import MODEL
 from cdsm.planning.attainable import MARGIN
 from cdsm.planning.planner import REACHED, Planner
 from cdsm.planning.problem import (
@@ -98,7 +99,7 @@ class StiffnessPlan(ReadOnlyState):
                 f"({target / 1000.0:.6g} N/mm wanted)"
                 for u, target, achieved in triples
             ]
-        return "\n".join(rows)
+        return "\n".join([*rows, f"({MODEL})"])
 
 
 def plan_stiffness(

@@ -15,6 +15,7 @@ from scipy.optimize import minimize_scalar
 
 from cdsm._checks import Array, ReadOnlyState, bound, frozen, instance, scalar, unit_direction
 from cdsm._rising import At, crossing, domain, reach, reason, sampled, stable_ranges
+from cdsm._units import MODEL
 from cdsm.errors import InvalidInput
 from cdsm.planning.gradient import require_finite, stiffness_gradient
 from cdsm.planning.problem import unstable
@@ -96,7 +97,9 @@ class Saturation(ReadOnlyState):
         lines = [first] if self.steepest_slope <= 0.0 else [first, second]
         if self.curve[0, 0] < self.stiffest < self.end:
             lines.append(f"above {self.stiffest:.6g} N tension makes the arm softer")
-        return "\n".join([*lines, f"looked at up to {self.end:.6g} N, {_ENDS[self.limit]}"])
+        return "\n".join(
+            [*lines, f"looked at up to {self.end:.6g} N, {_ENDS[self.limit]} ({MODEL})"]
+        )
 
 
 def saturation(

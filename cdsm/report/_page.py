@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cdsm._units import MODEL
 from cdsm.report._layout import Page, Section
 from cdsm.report.facts import RANK, Rank
 from cdsm.report.self_check import Agreement, Difference
@@ -179,7 +180,7 @@ def _conventions(report: Report) -> Section:
         if arm.slides.any()
         else ""
     )
-    free = "at this posture" if K.free_length is None else "where the motors were locked"
+    where = "here" if K.free_length is None else "at the reference of the equilibrium"
     return Section(
         "Units, frame and signs",
         (),
@@ -191,8 +192,8 @@ def _conventions(report: Report) -> Section:
             "[N m]. K_θ = ∂(J_Lᵀ F + g − J_Xᵀ W)/∂θ: rows torque, columns angle, positive holds."
             f"{lever}",
             f"Posture: {posture}.",
-            f"Position-controlled cables keep their free length, l_0 = L {free}; force-controlled "
-            "ones their tension.",
+            f"The stiffness is {MODEL}. Position-controlled cables keep the original length l_0 of "
+            f"their wire, locked {where}; force-controlled ones their tension.",
         ),
     )
 

@@ -167,7 +167,7 @@ def _of_readings(report: Report) -> list[str]:
         return []
     return [
         f"along, cartesian and pseudoinverse differ in {', '.join(apart)}, by up to "
-        f"{spread.max():.3g} times: use along, which is what a hung weight measures; cartesian "
+        f"{spread.max():.3g} times: use along, which is what a small weight measures; cartesian "
         "holds the other two translations, pseudoinverse is the paper's reading."
     ]
 

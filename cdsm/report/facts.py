@@ -104,7 +104,7 @@ class Readings(ReadOnlyState):
     """The three numbers behind "the stiffness in x", side by side.
 
     Attributes:
-        along: 1/(uᵀ C_vv u) along x, y, z (3,) [N/m]: what a hung weight measures.
+        along: 1/(uᵀ C_vv u) along x, y, z (3,) [N/m]: what a small hung weight measures.
         cartesian: Diagonal of (C_vv)⁻¹ (3,) [N/m]; NaN if it does not exist.
         pseudoinverse: Diagonal of J⁺ᵀ K J⁺ (3,) [N/m]; NaN if it does not exist.
     """

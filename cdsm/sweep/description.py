@@ -8,6 +8,7 @@ import math
 import pickle
 from importlib.metadata import version
 
+from cdsm._units import MODEL
 from cdsm.cable import Cable
 from cdsm.elasticity import Elasticity
 from cdsm.manipulator import Manipulator
@@ -21,6 +22,7 @@ def attributes_of(arm: Manipulator) -> dict[str, str]:
         "title": f"stiffness sweep of {arm.name}",
         "source": f"cdsm {version('cdsm-stiffness')}",
         **({"geometry": arm.geometry.to_toml()} if arm.is_serpentine else {"urdf": arm.urdf}),
+        "model": MODEL,
         "original_length": arm.original_length,
         "cables": _json([_cable(cable, laws) for cable in arm.cables]),
         "cable_elasticities": _json(laws),

@@ -10,6 +10,7 @@ from typing import Final
 import matplotlib
 
 from cdsm._checks import Array
+from cdsm._units import MODEL
 from cdsm.plots.style import AXES, MM, N_PER_MM
 from cdsm.tension import Tension
 from cdsm.view.state import Condition, Shown
@@ -35,6 +36,8 @@ def page_text(shown: Shown) -> str:
     rows = [*_stiffness_rows(shown), *_posture_rows(shown), *_tension_rows(shown.tension)]
     if rows:
         parts.append(f'<table style="width:100%;border-spacing:0 0.15em">{"".join(rows)}</table>')
+    if shown.stiffness is not None:
+        parts.append(f'<div style="color:gray">{MODEL}</div>')
     if shown.tension is not None:
         parts.append(_color_bar(shown.tension))
     return f'<div style="{_BOX}">{"".join(parts)}</div>'

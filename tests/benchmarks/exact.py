@@ -160,11 +160,11 @@ def _gauss(low: Wide, high: Wide) -> Wide:
 
 def _nodes(count: int) -> tuple[Wide, Wide]:
     """Nodes and weights of Gauss and Legendre on [−1, 1], by Newton's method from float64's."""
-    x: Wide = wide(np.polynomial.legendre.leggauss(count)[0])
+    x = wide(np.polynomial.legendre.leggauss(count)[0])
     for _ in range(3):
-        before, p = np.ones_like(x), x
+        before, p = wide(np.ones_like(x)), x
         for n in range(1, count):
-            before, p = p, ((2 * n + 1) * x * p - n * before) / (n + 1)
+            before, p = p, wide(((2 * n + 1) * x * p - n * before) / (n + 1))
         slope = count * (x * p - before) / (x * x - 1)
         x = wide(x - p / slope)
     return x, wide(2 / ((1 - x * x) * slope * slope))
