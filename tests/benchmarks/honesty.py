@@ -172,7 +172,8 @@ def eq19_as_printed(group: Group) -> list[Reading]:
     for q, F in zip(group.q, group.tension, strict=True):
         pose = group.arm.at(q)
         active = np.einsum("c,cij->ij", F, pose.length_hessian)
-        springs = law.polynomial(F) / cdsm.stiffness(pose, F).free_lengths
+        strain = strand.strain(np.clip(F, strand.domain.first, strand.high))
+        springs = law.polynomial(F) * (1.0 + strain) / pose.cable_lengths
         passive = (pose.length_jacobian.T * springs) @ pose.length_jacobian
         joint = active + passive + pose.gravity_stiffness
         least = np.linalg.eigvalsh(joint)[0]
