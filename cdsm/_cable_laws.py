@@ -16,6 +16,7 @@ from cdsm._stiffness_kernels import cable_stiffness
 from cdsm.cable import Cable
 from cdsm.elasticity import Elasticity, LinearElasticity
 from cdsm.errors import ElasticityRangeError, InvalidInput
+from cdsm.wire import StrandElasticity
 
 OriginalLength = Literal["unstrained", "stretched"]
 
@@ -143,7 +144,7 @@ class CableLaws:
         first, second = np.zeros_like(stiffness), np.zeros_like(stiffness)
         for law, held in self.held:
             F, k = tension[held], stiffness[held]
-            last = np.array([*law.jumps, law.domain.high])[np.searchsorted(law.jumps, F)]
+            last = np.array([*breaks(law), law.domain.high])[np.searchsorted(breaks(law), F)]
             step = _STEP * np.maximum(F, 1.0)
             beside = np.where(F + step <= last, F + step, F - step)
             both = np.stack([F, beside])
@@ -175,6 +176,14 @@ class CableLaws:
         outside = np.arange(len(self._cables))[held][list(error.indices)].tolist()
         names = [self._cables[c].name for c in outside]
         return ElasticityRangeError(error.problem, error.tension, outside, names)
+
+
+def breaks(law: Elasticity) -> tuple[float, ...]:
+    """Tensions [N], rising, at which the rigidity of a law jumps or sharply bends.
+
+    Each belongs to the range below it. The bends at the points of a table are not among them.
+    """
+    return law.joins if isinstance(law, StrandElasticity) else law.jumps
 
 
 def _checked_rigidity(law: Elasticity, tension: Array) -> Array:

@@ -68,21 +68,27 @@ def reach(at: At, low: float, highest: float) -> float:
     """How far a lower bound from ``low`` on is to be looked at [N], at most to ``highest``.
 
     As far as tensions balance the arm within the domains of the elasticities, and if nothing ends
-    them, until the sign of the active part has decided.
+    them, until the sign of what grows with the tension has decided.
     """
     if math.isinf(highest):
-        # far out, tensions grow in proportion to the bound, the passive part no more: if the
-        # active part is negative somewhere, that decides at the latest where it equals the rest
+        # far out, tensions grow in proportion to the bound, and so do the active part and, as wires
+        # get longer than their original lengths, the passive one: what is least of their sum
+        # decides at the latest where it equals the rest
         far = 1e9
+        growth = -math.inf
+        highest = far
         if exists(at, far):
-            active = np.linalg.eigvalsh(at(far).active)[0] / far
-            K = at(low)
-            rest = np.linalg.norm(K.joint, 2) + np.linalg.norm(K.active, 2)
-            highest = float(2.0 * rest / abs(active)) if active != 0.0 else far
-        else:
-            highest = far
+            there, K = at(far), at(low)
+            growth, active = (
+                float(np.linalg.eigvalsh((part + part.T) / 2.0)[0]) / far
+                for part in (there.joint, there.active)
+            )
+            rest = float(np.linalg.norm(K.joint, 2) + np.linalg.norm(K.active, 2))
+            # a passive part that grows faster may be small before: then the active one decides
+            slower = min(abs(growth), abs(active))
+            highest = min(2.0 * rest / slower, far) if slower > 0.0 else far
         highest = max(highest, 2.0 * low)
-        while exists(at, highest) and at(highest).is_stable and highest < far:
+        while growth < 0.0 and highest < far and exists(at, highest) and at(highest).is_stable:
             highest *= 2.0  # an elasticity of the user's own may go on stiffening
     return highest if exists(at, highest) else edge(lambda b: exists(at, b), low, highest)[0]
 

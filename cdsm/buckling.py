@@ -1,8 +1,8 @@
 """Buckling: where tension or load makes the joint stiffness singular at a posture that is held.
 
 Cables stiffen an arm by their elasticity and mostly soften it by their tension (active part of
-Eq. 16). With stiff cables the first always wins; with soft ones there is a tension from which on
-K_θ is not positive definite and the arm gives way, whatever its load. Here the posture is held and
+Eq. 16). With stiff cables the first always wins; behind soft springs or long leads there is a
+tension from which on K_θ is not positive definite and the arm gives way, whatever its load. Here the posture is held and
 the tensions are those of :func:`~cdsm.tension.distribute_tension`; what an arm with locked motors
 does beyond is :func:`~cdsm.equilibrium.equilibrium`.
 """
@@ -43,7 +43,7 @@ class CriticalTension(ReadOnlyState):
         stable: Ranges (low, high) [N] of the lower bound in which the arm is stable.
         examined: Range [N] of the lower bound that was looked at: as far as tensions balance the
             arm within the domains of the elasticities, and if these have no end, until the sign of
-            the active part has decided.
+            what grows with the tension has decided.
         bounds: Lower bounds (n,) [N] that were looked at.
         margins: Smallest eigenvalue of K_θ at each (n,) [N m/rad].
     """

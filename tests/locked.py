@@ -165,6 +165,15 @@ could: EA/l_0 is more than F/L.
 """
 
 
+def soft(F: float) -> float:
+    """K_θ [N m/rad] of the straight soft hinge, both cables at F."""
+    return 2.0 * (SOFT + F) * R**2 / (LEAD + 2.0 * H) - F * H
+
+
+BUCKLING = 2.0 * SOFT * R**2 / ((LEAD + 2.0 * H) * H - 2.0 * R**2)
+"""The tension [N] at which that is zero: 215 N."""
+
+
 def soft_hinge(**sizes: Any) -> cdsm.Manipulator:
     return hinge(law=cdsm.LinearElasticity(SOFT), lead=LEAD, **sizes)
 

@@ -14,7 +14,7 @@ from cdsm.planning.attainable import attainable
 from cdsm.planning.planner import Planner
 from tests import arms
 from tests.differences import central_difference
-from tests.locked import EA, LENGTH, STRAND, H, R, hinge, some_arm
+from tests.locked import JUMPING, LENGTH, STRAND, hinge, soft, soft_hinge, some_arm
 from tests.test_planning_range import DOWN, corners
 
 ARMS: dict[str, tuple[str, int, int, cdsm.Elasticity, float, float]] = {
@@ -191,13 +191,15 @@ def test_smaller_tensions_all_miss_the_target_on_the_same_side(name: str, part: 
         (1, 2, "universal", STRAND, 15.0),
         (3, 3, "universal", STRAND, 15.0),
         (2, 5, "universal", STRAND, 15.0),
+        (1, 2, "universal", JUMPING, 15.0),
+        (3, 3, "universal", JUMPING, 15.0),
         (0, 5, "universal", cdsm.LinearElasticity(20e3), 20.0),
     ],
 )
 def test_answer_does_not_depend_on_the_starts(
     seed: int, joints: int, kind: str, law: cdsm.Elasticity, low: float
 ) -> None:
-    """From 15 N on some cables are below the jump of Eq. 19 at 31 N, others above."""
+    """From 15 N on some cables are below the bend or jump of Eq. 19 at 31 N, others above."""
     pose = arms.random_posture(arms.random_arm(seed, joints, kind, law), seed, 0.4)
     u = np.random.default_rng(seed).normal(size=3)
     found = cdsm.stiffness_range(pose, u, low, 200.0, starts=12)
@@ -255,8 +257,8 @@ def test_unreachable_targets_are_refused_with_the_range(name: str) -> None:
 
 
 def jump(angle: float) -> tuple[cdsm.Posture, list[float]]:
-    """A hinge of Eq. 19, and the tensions of its first cable at which a cable is at 31 N."""
-    pose = hinge(law=STRAND, joint_limit=0.5).at([angle])
+    """A hinge of Eq. 19 as it jumps, and the tensions of its first cable with one at 31 N."""
+    pose = hinge(law=JUMPING, joint_limit=0.5).at([angle])
     above, below = pose.length_jacobian[:, 0]
     return pose, sorted([31.0, -31.0 * below / above])
 
@@ -293,9 +295,8 @@ def test_every_stiffness_of_a_hinge_beside_its_gaps_is_reached() -> None:
 
 
 def test_plan_of_a_hinge_has_its_closed_form() -> None:
-    # K = 2 k R² − F h
-    target = (2.0 * EA / (2.0 * H) * R**2 - 33.0 * H) / LENGTH**2
-    plan = cdsm.plan_stiffness(hinge().at([0.0]), DOWN, target, 10.0)
+    target = soft(33.0) / LENGTH**2
+    plan = cdsm.plan_stiffness(soft_hinge().at([0.0]), DOWN, target, 10.0)
     np.testing.assert_allclose(plan.tension.values, 33.0, rtol=1e-9)
 
 

@@ -15,7 +15,7 @@ from cdsm._checks import Array
 from cdsm.planning.problem import problem
 from cdsm.planning.starts import Ground
 from tests import arms
-from tests.locked import EA, LENGTH, STRAND, H, R, hinge
+from tests.locked import BUCKLING, EA, LENGTH, STRAND, H, R, hinge, soft, soft_hinge
 
 DOWN = (0.0, 0.0, 1.0)
 
@@ -140,12 +140,12 @@ def test_where_tension_buckles_the_arm_brute_force_along_rays_beats_neither_end(
 
 
 def straight(F: float) -> float:
-    """along(z) of the straight hinge, both cables at F: K = 2 k R² − F h over the lever squared."""
-    return (2.0 * EA / (2.0 * H) * R**2 - F * H) / LENGTH**2
+    """along(z) of the straight soft hinge, both cables at F: K over the lever squared."""
+    return soft(F) / LENGTH**2
 
 
 def test_hinge_has_its_closed_form_at_both_ends() -> None:
-    found = cdsm.stiffness_range(hinge().at([0.0]), DOWN, 10.0, 70.0)
+    found = cdsm.stiffness_range(soft_hinge().at([0.0]), DOWN, 10.0, 70.0)
     assert found.low == pytest.approx(straight(70.0), rel=1e-12)
     assert found.high == pytest.approx(straight(10.0), rel=1e-12)
     np.testing.assert_allclose(found.low_tension.values, 70.0, rtol=1e-12)
@@ -154,13 +154,21 @@ def test_hinge_has_its_closed_form_at_both_ends() -> None:
     assert straight(71.0) not in found
 
 
+def test_hinge_without_a_lead_has_its_ends_the_other_way_round() -> None:
+    """K = 2 k R² − F h, with k = (EA + F)/2h: R²/h is more than h, so that tension stiffens."""
+    found = cdsm.stiffness_range(hinge().at([0.0]), DOWN, 10.0, 70.0)
+    ends = [(2.0 * (EA + F) / (2.0 * H) * R**2 - F * H) / LENGTH**2 for F in (10.0, 70.0)]
+    np.testing.assert_allclose([found.low, found.high], ends, rtol=1e-12)
+    np.testing.assert_allclose(found.low_tension.values, 10.0, rtol=1e-12)
+    np.testing.assert_allclose(found.high_tension.values, 70.0, rtol=1e-12)
+
+
 def test_without_a_maximum_buckling_ends_the_range() -> None:
     """K falls with F until it is the margin's part of what it is under the least tensions."""
-    found = cdsm.stiffness_range(hinge().at([0.0]), DOWN, 10.0, margin=0.02)
+    found = cdsm.stiffness_range(soft_hinge().at([0.0]), DOWN, 10.0, margin=0.02)
     assert found.high == pytest.approx(straight(10.0), rel=1e-12)
     assert found.low == pytest.approx(0.02 * straight(10.0), rel=1e-9)
-    buckling = 2.0 * EA / (2.0 * H) * R**2 / H
-    expected = buckling - 0.02 * (buckling - 10.0)
+    expected = BUCKLING - 0.02 * (BUCKLING - 10.0)
     np.testing.assert_allclose(found.low_tension.values, expected, rtol=1e-9)
 
 
@@ -238,9 +246,8 @@ def test_unstable_least_tensions_do_not_hide_stable_ones() -> None:
 @pytest.mark.parametrize("above", [-1e-6, 1e-6])
 def test_arm_is_held_exactly_as_long_as_some_tension_holds_it(above: float) -> None:
     # from the critical tension on no tensions do: all are larger
-    critical = 2.0 * EA / (2.0 * H) * R**2 / H
-    pose = hinge().at([0.0])
-    minimum = critical * (1.0 + above)
+    pose = soft_hinge().at([0.0])
+    minimum = BUCKLING * (1.0 + above)
     if above < 0.0:
         assert cdsm.stiffness_range(pose, DOWN, minimum).high > 0.0
     else:
@@ -315,7 +322,7 @@ def test_direction_in_which_the_tip_cannot_move_has_no_range() -> None:
 
 
 def test_what_is_printed_says_what_was_found() -> None:
-    found = cdsm.stiffness_range(hinge().at([0.0]), DOWN, 10.0, 70.0)
+    found = cdsm.stiffness_range(soft_hinge().at([0.0]), DOWN, 10.0, 70.0)
     for part in ("along (0, 0, 1)", "N/mm", "softest with 70 to 70 N", "starts"):
         assert part in str(found)
     assert "StiffnessRange" in repr(found)

@@ -9,6 +9,7 @@ import numpy as np
 import qpsolvers
 from numpy.typing import ArrayLike
 
+from cdsm._cable_laws import breaks
 from cdsm._checks import Array, frozen
 from cdsm.errors import ElasticityRangeError
 from cdsm.posture import Posture
@@ -50,7 +51,7 @@ class Admissible:
         scale: A tension of the size of the least ones [N].
         rows: Orthonormal rows (r, C) that span those of J_Lᵀ.
         null: Orthonormal basis (C, p) of what changes no torque.
-        jumps: For each cable the tensions [N] above which its rigidity jumps.
+        jumps: For each cable the tensions [N] at which its rigidity jumps, or its slope does.
     """
 
     least: Tension
@@ -63,7 +64,7 @@ class Admissible:
     jumps: tuple[tuple[float, ...], ...]
 
     def piece(self, F: Array) -> tuple[Array, Array]:
-        """Bounds (C,) [N] around tensions F (C,) [N] between which no rigidity jumps."""
+        """Bounds (C,) [N] around tensions F (C,) [N] between which no rigidity jumps or bends."""
         low, high = self.low.copy(), self.high.copy()
         for c, jumps in enumerate(self.jumps):
             for jump in jumps:
@@ -163,7 +164,7 @@ def admissible(
         rows=right[:rank].copy(),
         null=right[rank:].T.copy(),
         jumps=tuple(
-            tuple(jump for jump in cable.elasticity.jumps if a <= jump < b) if fixed else ()
+            tuple(jump for jump in breaks(cable.elasticity) if a <= jump < b) if fixed else ()
             for cable, fixed, a, b in zip(cables, held, low, high, strict=True)
         ),
     )

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import minimize_scalar
 
+from cdsm._cable_laws import breaks
 from cdsm._checks import Array, ReadOnlyState, bound, frozen, instance, scalar, unit_direction
 from cdsm._rising import At, crossing, domain, reach, reason, sampled, stable_ranges
 from cdsm._units import MODEL
@@ -58,7 +59,7 @@ class Saturation(ReadOnlyState):
             between them a maximum beyond which tension softens the arm.
         limit: What ends the curve: ``"buckling"``, ``"maximum"`` (the bound ``maximum``),
             ``"elasticity"`` (a tension leaves its cable's domain), ``"infeasible"`` (statics bind
-            the tensions) or ``"none"`` (nothing; the sign of the active part has shown itself).
+            the tensions) or ``"none"`` (nothing; what tension adds far out has shown its sign).
         curve: Lower bound [N], stiffness along u [N/m] and its slope [1/m], (n, 3).
     """
 
@@ -118,7 +119,8 @@ def saturation(
     d along/db = ∂along/∂F · dF*/db, dF*/db following from which cables are at a bound. It is looked
     for from its largest value on: the first b at which it has fallen to ``fraction`` of that. With
     a strand that value is large, since strands start soft (Section IV-C); where the rigidity has
-    levelled off, the active part takes over and more tension softens.
+    levelled off, the active part takes over and more tension softens, if springs or leads keep the
+    wires from stiffening as they get longer than their original lengths.
 
     Args:
         pose: The posture, held.
@@ -207,8 +209,8 @@ def _stable(at: At, low: float, high: float) -> tuple[float, float]:
 def _breaks(pull: Callable[[float], Tension], places: Array) -> Array:
     """Lower bounds [N] among others, rising, where the slope jumps.
 
-    Where a cable reaches one of its bounds or leaves it, and where one passes a jump of its
-    rigidity. In between F*(b) is linear: the active bounds of such a program are the same all
+    Where a cable reaches one of its bounds or leaves it, and where one passes a jump or a sharp
+    bend of its rigidity. In between F*(b) is linear: the active bounds of such a program are the same all
     through, if they are at both ends.
     """
     found: list[float] = []
@@ -219,7 +221,7 @@ def _breaks(pull: Callable[[float], Tension], places: Array) -> Array:
         one, other = pull(a), pull(b)
         if all(np.array_equal(x, y) for x, y in zip(_active(one), _active(other), strict=True)):
             for cable, F, G in zip(one.posture.arm.cables, one.values, other.values, strict=True):
-                jumps = cable.elasticity.jumps if cable.control == "position" else ()
+                jumps = breaks(cable.elasticity) if cable.control == "position" else ()
                 passed = (jump for jump in jumps if min(F, G) <= jump < max(F, G))
                 found += [a + (jump - F) / (G - F) * (b - a) for jump in passed]
         elif b - a <= max(_JUST * b, nothing):
