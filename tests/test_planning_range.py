@@ -15,7 +15,7 @@ from cdsm._checks import Array
 from cdsm.planning.problem import problem
 from cdsm.planning.starts import Ground
 from tests import arms
-from tests.locked import BUCKLING, EA, LENGTH, STRAND, H, R, hinge, soft, soft_hinge
+from tests.locked import BUCKLING, EA, JUMPING, LENGTH, STRAND, H, R, hinge, soft, soft_hinge
 
 DOWN = (0.0, 0.0, 1.0)
 
@@ -202,7 +202,7 @@ def test_stiffness_that_tension_raises_without_end_asks_for_a_maximum() -> None:
 
 
 def test_end_of_the_elasticity_bounds_the_tensions() -> None:
-    arm = presets.virtual_prototype()
+    arm = presets.virtual_prototype(JUMPING)
     pose = arm.at(np.full(arm.nv, presets.TEN_DEGREES))
     found = cdsm.stiffness_range(pose, DOWN, 50.0)
     assert found.high_tension.values.max() == pytest.approx(810.0, rel=1e-12)
@@ -212,6 +212,20 @@ def test_end_of_the_elasticity_bounds_the_tensions() -> None:
     assert found.low_found[0] == pytest.approx(found.low, rel=1e-8)
     assert (np.diff(found.low_found) >= 0.0).all()
     assert (np.diff(found.high_found) <= 0.0).all()
+
+
+def test_strand_whose_rigidity_levels_off_is_stiffest_before_its_end() -> None:
+    """EA of Eq. 19, filled in, has its largest value between 400 N and 810 N."""
+    places = np.linspace(400.0, 810.0, 500)
+    assert 401.0 < places[STRAND.rigidity(places).argmax()] < 809.0
+    arm = presets.virtual_prototype(STRAND)
+    pose = arm.at(np.full(arm.nv, presets.TEN_DEGREES))
+    found = cdsm.stiffness_range(pose, DOWN, 50.0)
+    assert found.high_tension.values.max() < 809.0
+    for bound in np.linspace(50.0, 700.0, 60):
+        pull = cdsm.distribute_tension(pose, bound)
+        if pull.values.max() <= 810.0:
+            assert cdsm.stiffness(pose, pull).along(DOWN) < found.high
 
 
 def test_range_of_an_arm_without_redundancy_is_a_point() -> None:

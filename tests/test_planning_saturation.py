@@ -14,7 +14,7 @@ from cdsm import presets
 from cdsm._checks import Array
 from tests import arms
 from tests.differences import assert_second_order
-from tests.locked import EA, LENGTH, STRAND, H, R, hinge, some_arm
+from tests.locked import BUCKLING, EA, LEAD, LENGTH, STRAND, H, R, hinge, soft_hinge, some_arm
 from tests.test_planning_range import DOWN, stayed
 
 SPRING = 2e3
@@ -28,10 +28,17 @@ def springy() -> cdsm.Posture:
 
 
 def closed(F: float) -> tuple[float, float]:
-    """Its along(z), (2 k R² − F h)/lever², and the slope of that, by hand."""
+    """Its along(z), (2 k R² − F h)/lever², and the slope of that, by hand.
+
+    1/k = l_0/EA + 1/k_series with l_0 = (2h − x)/(1 + ε), the spring being x = (F − F_low)/k_series
+    longer than at rest; d l_0/dF = −1/(k_series (1 + ε)) − l_0/((1 + ε) EA).
+    """
     EA, rate = float(STRAND.rigidity(F)), float(STRAND.rigidity_slope(F))
-    k = 1.0 / (2.0 * H / EA + 1.0 / SPRING)
-    slope = k**2 * 2.0 * H / EA**2 * rate
+    stretched = 1.0 + float(STRAND.strain(F))
+    free = (2.0 * H - (F - STRAND.domain.low) / SPRING) / stretched
+    shorter = (1.0 / SPRING + free / EA) / stretched
+    k = 1.0 / (free / EA + 1.0 / SPRING)
+    slope = k**2 * (free / EA**2 * rate + shorter / EA)
     return (2.0 * k * R**2 - F * H) / LENGTH**2, (2.0 * slope * R**2 - H) / LENGTH**2
 
 
@@ -164,9 +171,9 @@ def test_maximum_inside_the_domain_beats_every_other_bound() -> None:
 def test_maximum_ends_the_curve_and_has_a_slope_there() -> None:
     """On the end itself no cable is free to balance the others; a hair before, they are."""
     pose = arms.random_posture(presets.virtual_prototype(), 5)
-    found = cdsm.saturation(pose, DOWN, maximum=300.0)
+    found = cdsm.saturation(pose, DOWN, maximum=300.0, fraction=0.01)
     assert found.limit == "maximum"
-    assert math.isinf(found.bound)  # it pays 10 % to the end
+    assert math.isinf(found.bound)  # it pays 1 % to the end
     with pytest.raises(cdsm.InfeasibleTension):
         cdsm.distribute_tension(pose, found.end * (1.0 + 1e-5), 300.0)
     pull = cdsm.distribute_tension(pose, found.end, 300.0)
@@ -196,11 +203,23 @@ def test_stiffness_that_tension_raises_without_end_never_saturates() -> None:
     assert "and goes on" in str(found)
 
 
-def test_tension_that_only_softens_saturates_at_once() -> None:
+def test_straight_wire_without_a_lead_never_saturates() -> None:
+    """K = 2 (EA + F)/2h R² − F h: the slope is R²/h − h over the lever squared, all the way."""
     found = cdsm.saturation(hinge().at([0.0]), DOWN, 10.0)
+    assert found.limit == "none"
+    assert math.isinf(found.bound)
+    np.testing.assert_allclose(found.curve[:, 2], (R**2 / H - H) / LENGTH**2, rtol=1e-9)
+    # far enough for what grows to be as large as what does not, and no further
+    assert EA < found.end < 100.0 * EA
+    assert math.isinf(cdsm.critical_tension(hinge().at([0.0])).minimum)
+
+
+def test_tension_that_only_softens_saturates_at_once() -> None:
+    found = cdsm.saturation(soft_hinge().at([0.0]), DOWN, 10.0)
     assert found.bound == found.stiffest == 10.0
-    assert found.steepest_slope == pytest.approx(-H / LENGTH**2, rel=1e-9)
-    assert found.end == pytest.approx(2.0 * EA / (2.0 * H) * R**2 / H, rel=2e-6)
+    slope = 2.0 * R**2 / (LEAD + 2.0 * H) - H
+    assert found.steepest_slope == pytest.approx(slope / LENGTH**2, rel=1e-9)
+    assert found.end == pytest.approx(BUCKLING, rel=2e-6)
     assert "nowhere raises" in str(found)
     assert "pays less" not in str(found)
 

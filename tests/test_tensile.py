@@ -78,13 +78,14 @@ def test_under_more_noise_polynomials_lose_and_the_curve_does_not() -> None:
 
 
 @pytest.mark.parametrize("seed", range(4))
-@pytest.mark.parametrize(("noise", "spread"), [(0.0, 0.05), (0.5, 0.15), (2.0, 0.3)])
+# a stage ends at one of tensions that are 3 % apart: without noise within two of them
+@pytest.mark.parametrize(("noise", "spread"), [(0.0, 0.06), (0.5, 0.15), (2.0, 0.3)])
 def test_stages_of_eq_19_against_the_paper(noise: float, spread: float, seed: int) -> None:
     fit = cdsm.fit_tensile_test(*strand_test(noise, seed), GAUGE, samples=40)
     first, second = fit.stages
     assert (first.name, second.name) == ("pre-tensioning", "elastic")
     assert first.high == second.low == pytest.approx(120.0, rel=spread)  # the paper's
-    # the paper's 400 N is no feature of Eq. 19: its EA goes on rising, so elastic begins at 120 N
+    # the paper's 400 N, from where EA is level, ends no stage: elastic begins at 120 N
     assert second.high == pytest.approx(810.0, abs=1.0 + 2.0 * noise)
 
 
