@@ -219,17 +219,23 @@ def infeasible(
 # --- stiffness ------------------------------------------------------------------------------
 
 
+def original_length(cable: cdsm.Cable, F: float, L: float) -> float:
+    """l_0 [m] of a cable that is L long under F: what its spring leaves of L, unstrained."""
+    spring = (F - cable.elasticity.domain.low) / cable.series_stiffness
+    return (L - spring) / (1.0 + float(cable.elasticity.strain(F)))
+
+
 def spring_constants(K: cdsm.Stiffness) -> Array:
     """k of each cable, one cable at a time: l_0/EA and the spring in series; 0 if held by force."""
     values = []
-    for cable, l0, F in zip(
+    for cable, L, F in zip(
         K.posture.arm.cables, K.posture.cable_lengths.tolist(), K.tension.tolist(), strict=True
     ):
         if cable.control == "force":
             values.append(0.0)
             continue
         EA = float(cable.elasticity.rigidity(F))
-        values.append(1.0 / (l0 / EA + 1.0 / cable.series_stiffness))
+        values.append(1.0 / (original_length(cable, F, L) / EA + 1.0 / cable.series_stiffness))
     return np.array(values)
 
 
@@ -425,14 +431,14 @@ def at_rest(pull: cdsm.Tension, wrench: Array) -> None:
     assert (pose.q >= np.minimum(arm.lower, start.q) - 1e-9).all()
     assert (pose.q <= np.maximum(arm.upper, start.q) + 1e-9).all()
     for c, cable in enumerate(arm.cables):
-        F0, F, l0 = pull.values[c], rest.tension[c], start.cable_lengths[c]
-        longer = pose.cable_lengths[c] - l0
+        F0, F, L = pull.values[c], rest.tension[c], start.cable_lengths[c]
+        longer = pose.cable_lengths[c] - L
         if cable.control == "force":
             assert abs(F - F0) <= 1e-12 * F0
             continue
         if cable.elasticity.domain.first >= F:
             continue  # slack, or at the end of what is known of it
-        F = min(F, cable.elasticity.domain.high)
+        F, l0 = min(F, cable.elasticity.domain.high), original_length(cable, F0, L)
         stretched = cable.elongation(F, l0) - cable.elongation(F0, l0)
         size = reach(arm) + start.cable_lengths[c] + abs(cable.elongation(F, l0))
         assert abs(stretched - longer) <= 1e-9 * size, f"{cable.name}: {stretched} for {longer}"
