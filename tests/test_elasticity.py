@@ -440,17 +440,6 @@ def test_bad_constructor_input_names_the_argument(case: str) -> None:
         make()
 
 
-def test_a_table_that_stands_upright_at_its_end_is_refused() -> None:
-    """Its curve keeps the shape of 1 cm/N beside 3 um/N, and ends with a slope of rounding."""
-    tensions = (0.0, 0.44446193577406395, 94.5336105048686, 95.53361051541444, 96.53361051541444)
-    strains = (0.0, 0.00010325664761125481, 0.002400270044057379, 0.012400039893654976)
-    with pytest.raises(cdsm.InvalidInput, match="unevenly"):
-        cdsm.TabulatedElasticity(
-            (*tensions, 97.53361051541444, 100.23332970004347),
-            (*strains, 0.012402937925515915, 0.022402707669657542, 0.022426557959026053),
-        )
-
-
 def test_a_coefficient_too_small_to_matter_does_not() -> None:
     whole = cdsm.StrandElasticity(((3e5, 700.0),), (), 0.0, 20.0)
     more = cdsm.StrandElasticity(((3e5, 700.0, 2.2250738585072014e-308),), (), 0.0, 20.0)
