@@ -65,8 +65,8 @@ class Band(ReadOnlyState):
     them, ``monotone`` covers 98 % and more of the tensions of a wire without corners. Where EA
     jumps, as at a kink of force over strain, the curve rounds it off, by 10 % and more: 84 to 95 %
     are covered, nothing next to the kink, and mostly no note says so. ``polynomial`` covers 83 to
-    100 % of smooth wires on average, 87 to 90 % of kinked ones, and in single tests half and less:
-    44 % of a softening wire.
+    100 % of smooth wires on average and 87 to 90 % of kinked ones, but in a single test it may be
+    half and less (44 % of a softening wire).
 
     Errors that neighbouring points share (drift, ripple, slip) are not in it; ``TensileFit.notes``
     tells of those it can see, which a drift as slow as the test is not. Nor are errors of

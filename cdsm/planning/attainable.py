@@ -51,7 +51,7 @@ class StiffnessRange(ReadOnlyState):
 
     Attributes:
         direction: u (3,), a unit direction in base axes.
-        low: Smallest attainable ``along(u)`` [N/m].
+        low: Smallest attainable ``along(u)`` [N/m], as far as the searches found it.
         high: Largest attainable ``along(u)`` [N/m].
         low_tension: Tensions that give ``low``.
         high_tension: Tensions that give ``high``.
@@ -123,6 +123,10 @@ def stiffness_range(
     sought from many starts then, in the corners and between, and ``high_found`` tells how often
     ``high`` was found. More starts go on from fewer. An arm that tension can buckle is softest just
     before: then ``low`` depends on ``margin``.
+
+    No number of starts proves that ``low`` is the smallest. With the default it was found too high
+    by up to 0.16 % with constant rigidity (15 cables), and by up to 5.5 % with a law of one's own
+    whose rigidity has a hump.
 
     Args:
         pose: The posture.

@@ -1,4 +1,7 @@
-"""The search for the least tensions that hit a target, from several starts."""
+"""The search for the least tensions that hit a target, from several starts.
+
+It is local: :func:`~cdsm.planning.plan.plan_stiffness` says how far above the least it has ended.
+"""
 
 from __future__ import annotations
 
