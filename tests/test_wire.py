@@ -161,7 +161,7 @@ def test_curve_meets_its_points_and_its_rigidity_the_bound(law: cdsm.TabulatedEl
     points, strains = np.array(law.tensions), np.array(law.strains)
     np.testing.assert_allclose(law.strain(points), strains - strains[0], rtol=1e-12, atol=1e-18)
     chords = np.diff(points) / np.diff(strains)
-    around = np.max([chords, [*chords[1:], 0.0], [0.0, *chords[:-1]]], axis=0)
+    around = np.max([chords, np.append(chords[1:], 0.0), np.append(0.0, chords[:-1])], axis=0)
     for low, high, most in zip(points, points[1:], around, strict=False):
         F = np.linspace(low, high, 60)
         assert (np.diff(law.strain(F)) > 0.0).all()
