@@ -53,6 +53,7 @@ from cdsm.mjcf import to_mjcf, write_mjcf
 from cdsm.modes import Modes, modes
 from cdsm.parts import CableRoute, Joint, Link
 from cdsm.planning import (
+    HalfWay,
     InfeasibleSample,
     PathPlan,
     Saturation,
@@ -106,6 +107,7 @@ __all__ = [
     "Geometry",
     "GeometryError",
     "GridPoses",
+    "HalfWay",
     "Identification",
     "InfeasibleSample",
     "InfeasibleTension",

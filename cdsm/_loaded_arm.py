@@ -54,17 +54,21 @@ class LoadedArm:
         reference: The posture at which they were locked.
         tension: F there (C,) [N].
         wrench: W (6,) that the arm carries: force [N], then moment [N m].
+        lengths: L (C,) [m] under which the cables have these tensions, if not those at the posture.
 
     Raises:
         ElasticityRangeError: As for :class:`LockedCables`.
         InvalidInput: As for :class:`LockedCables`.
     """
 
-    def __init__(self, reference: Posture, tension: Array, wrench: Array) -> None:
+    def __init__(
+        self, reference: Posture, tension: Array, wrench: Array, lengths: Array | None = None
+    ) -> None:
         self.reference = reference
         self.tension = tension
         self.wrench = wrench
-        self.cables = LockedCables(reference.arm, reference.cable_lengths, tension)
+        locked = reference.cable_lengths if lengths is None else lengths
+        self.cables = LockedCables(reference.arm, locked, tension)
 
     def at(self, pose: Posture, near: Array) -> Iterate:
         """The arm at a posture where the tensions are near the given ones (C,) [N]."""

@@ -243,6 +243,9 @@ RESULTS: dict[str, Any] = {
         200.0,
         angles=[POSE.q, 9.0 * POSE.q],
     ),
+    "HalfWay": cdsm.plan_path(
+        POSE.arm, (0.0, 0.3, 1.0), K.along((0.0, 0.3, 1.0)), 10.0, 200.0, angles=[POSE.q] * 2
+    ).between[0],
     "Saturation": cdsm.saturation(POSE, (0.0, 0.3, 1.0), 10.0, 200.0),
     "CriticalTension": cdsm.critical_tension(POSE),
     "Tensions": PULLS,

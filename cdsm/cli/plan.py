@@ -22,6 +22,7 @@ from cdsm.cli.options import (
     Picture,
     Wrench,
     at_angles,
+    console,
     numbers,
     reported,
     show_json,
@@ -157,6 +158,8 @@ def _along_path(
             param_hint="--target",
         )
     path = plan_path(arm, u, wanted, *bounds, angles=file.angles, tips=file.tips, rate=rate)
+    with console.status("looking half-way between the samples"):
+        _ = path.between
 
     def draw() -> Figure:
         from cdsm.plots import plot_path_plan  # matplotlib, only where it is wanted
@@ -195,6 +198,16 @@ def _path_to_dict(plan: PathPlan) -> dict[str, object]:
         **joints_to_dict(plan.arm.joint_names, plan.arm.slides, plan.angles),
         "tensions_N": plan.tensions.tolist(),
         "cable_lengths_m": plan.cable_lengths.tolist(),
+        "half_way": [
+            {
+                "after": each.index,
+                "target_N_per_m": each.target.tolist(),
+                "achieved_N_per_m": None if each.achieved is None else each.achieved.tolist(),
+                "misfit": each.misfit if math.isfinite(each.misfit) else None,
+                "reason": each.reason,
+            }
+            for each in plan.between
+        ],
         "infeasible": [
             {"index": each.index, "status": each.status, "reason": each.reason}
             for each in plan.infeasible

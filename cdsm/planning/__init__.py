@@ -5,12 +5,14 @@ At one posture, or along a path.
 
 from cdsm.planning.attainable import StiffnessRange, stiffness_range
 from cdsm.planning.gradient import StiffnessGradient, stiffness_gradient
+from cdsm.planning.half_way import HalfWay
 from cdsm.planning.path import plan_path
 from cdsm.planning.path_plan import InfeasibleSample, PathPlan
 from cdsm.planning.plan import StiffnessPlan, plan_stiffness
 from cdsm.planning.saturation import Saturation, saturation
 
 __all__ = [
+    "HalfWay",
     "InfeasibleSample",
     "PathPlan",
     "Saturation",

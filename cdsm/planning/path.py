@@ -85,6 +85,9 @@ def plan_path(
     is reached again as many samples later as the motors need. It is not approached in between,
     since that would miss the targets there; make the target a ramp if the arm is to follow one.
 
+    The targets are hit at the samples alone. What the stiffness is half-way between two of them
+    says ``between`` of the answer; its miss falls with the square of the step.
+
     Args:
         arm: The arm.
         direction: u (3,) in base axes, any length; several (n, 3), all of which are to be hit; or

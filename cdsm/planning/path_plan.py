@@ -20,6 +20,7 @@ from cdsm.cable import Cable
 from cdsm.errors import CdsmError
 from cdsm.manipulator import Manipulator
 from cdsm.planning.follow import Status
+from cdsm.planning.half_way import HalfWay, half_way
 from cdsm.stiffness import Stiffness
 
 
@@ -116,6 +117,28 @@ class PathPlan(ReadOnlyState):
         every = np.array(rows).reshape(self.tensions.shape)
         return frozen(every[:, [c for c, _ in self._held]])
 
+    @cached_property
+    def between(self) -> tuple[HalfWay, ...]:
+        """The arm half-way between each two planned samples that follow each other.
+
+        The targets are hit at the samples. In between the motors go on evenly, and this is how far
+        the stiffness is off there; half the step leaves a quarter of it. It takes some
+        milliseconds for each pair, when first asked for.
+        """
+        pairs = zip(self.planned, self.planned[1:], strict=False)
+        l_0, targets = self.unstrained_lengths, self.target
+        return tuple(
+            half_way(
+                i,
+                (self.stiffness[k], self.stiffness[k + 1]),
+                (l_0[k] + l_0[k + 1]) / 2.0,
+                frozen(np.asarray((targets[i] + targets[j]) / 2.0)),
+                self.direction,
+            )
+            for k, (i, j) in enumerate(pairs)
+            if j == i + 1
+        )
+
     @property
     def _held(self) -> list[tuple[int, Cable]]:
         """The cables whose motors hold a length, with their numbers."""
@@ -174,6 +197,18 @@ class PathPlan(ReadOnlyState):
             lines[0] += f", with {F.min():.4g} to {F.max():.4g} N"
         if len(self.planned) > 1:
             lines[0] += f", which change by up to {self.steps.max():.4g} N per step"
+        resting = [each for each in self.between if each.stiffness is not None]
+        if resting:
+            worst = max(resting, key=lambda each: each.misfit)
+            lines.append(
+                f"half-way between samples the stiffness is up to {100.0 * worst.misfit:.2g} % off "
+                f"(samples {worst.index} and {worst.index + 1})"
+            )
+        lines += [
+            f"half-way between samples {each.index} and {each.index + 1}: {each.reason}"
+            for each in self.between
+            if each.stiffness is None
+        ]
         for run in _runs(self.infeasible):
             first, last = run[0], run[-1]
             where = f"sample {first.index}"

@@ -17,6 +17,7 @@ from cdsm.planning.problem import (
     checked_matrix,
     checked_targets,
     count,
+    misfit,
     problem,
     unit_directions,
     wanted,
@@ -62,11 +63,7 @@ class StiffnessPlan(ReadOnlyState):
 
         With a moment in the wrench ``cartesian`` is not symmetric: its symmetric part counts.
         """
-        achieved, target = np.asarray(self.achieved), np.asarray(self.target)
-        if self.direction is None:
-            off = (achieved + achieved.T) / 2.0 - target
-            return float(np.linalg.norm(off) / np.linalg.norm(target))
-        return float(np.linalg.norm(achieved / target - 1.0))
+        return misfit(np.asarray(self.achieved), np.asarray(self.target), self.direction)
 
     @property
     def reached(self) -> bool:
@@ -124,9 +121,9 @@ def plan_stiffness(
 
     The tensions are the least there are as far as the searches tell. With the laws of this library
     all searches mostly end at one effort. With a law of one's own, above all one whose rigidity
-    jumps, they need not, and less effort than the least found may do, by a third and more: a
-    ``spread`` above zero warns of it, one of zero does not rule it out, and more ``starts`` find
-    more.
+    jumps, they need not: with one such law the effort found was 3.6 % above the least, and where
+    the rigidity jumps it may be a third and more. A ``spread`` above zero warns of it, one of zero
+    does not rule it out, and more ``starts`` find more.
 
     Args:
         pose: The posture.

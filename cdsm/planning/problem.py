@@ -122,6 +122,17 @@ def achieved(K: Stiffness, directions: Array | None) -> Array:
     return frozen(np.array(along).reshape(directions.shape[:-1]))
 
 
+def misfit(achieved: Array, target: Array, directions: Array | None) -> float:
+    """‖achieved/target − 1‖ [-], or for ``cartesian`` ‖achieved − target‖/‖target‖.
+
+    With a moment in the wrench ``cartesian`` is not symmetric: its symmetric part counts.
+    """
+    if directions is None:
+        off = (achieved + achieved.T) / 2.0 - target
+        return float(np.linalg.norm(off) / np.linalg.norm(target))
+    return float(np.linalg.norm(achieved / target - 1.0))
+
+
 def unstable(arm: Manipulator, problem: str, mode: Array) -> SingularStiffness:
     """The error of an arm that no tensions hold, with the joint motion (nv,) that is softest."""
     mode = mode * np.sign(mode[abs(mode).argmax()])

@@ -1,0 +1,119 @@
+"""How stiff an arm is half-way between two planned samples, its motors half-way, too."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import final
+
+from cdsm._checks import Array, ReadOnlyState, frozen
+from cdsm._loaded_arm import LoadedArm
+from cdsm._trust_region import settle
+from cdsm.errors import CdsmError, EquilibriumError
+from cdsm.planning.problem import achieved, misfit
+from cdsm.stiffness import Stiffness
+
+
+@final
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class HalfWay(ReadOnlyState):
+    """An arm half-way between a planned sample and the next.
+
+    Each motor that holds a length has paid out the mean of both ends' unstrained lengths l_0, each
+    that holds a force pulls with the mean of both, and the mean of both wrenches acts. The arm is
+    where it rests under that, r(q) = J_Lᵀ F(q) + g − J_Xᵀ W = 0 (Eq. 13), next to the mean of both
+    ends' joint angles. The misfit falls with the square of the step.
+
+    Attributes:
+        index: The sample before, from 0.
+        target: Mean of both targets [N/m]: (), (n,) or (3, 3).
+        stiffness: K_θ at rest; None if the arm does not come to rest there.
+        achieved: What ``along`` or ``cartesian`` of that says [N/m], (), (n,) or (3, 3); or None.
+        misfit: ‖achieved/target − 1‖ [-], or for ``cartesian`` ‖achieved − target‖/‖target‖; inf if
+            the arm does not come to rest.
+        reason: Why it does not; else empty.
+    """
+
+    index: int
+    target: Array
+    stiffness: Stiffness | None
+    achieved: Array | None
+    misfit: float
+    reason: str = ""
+
+    def __repr__(self) -> str:
+        return f"<HalfWay from sample {self.index} to {self.index + 1}, misfit {self.misfit:.2g}>"
+
+
+def half_way(
+    index: int,
+    ends: tuple[Stiffness, Stiffness],
+    unstrained: Array,
+    target: Array,
+    directions: Array | None,
+) -> HalfWay:
+    """The arm half-way between two samples.
+
+    Args:
+        index: The first of them.
+        ends: K_θ at both.
+        unstrained: Mean of both ends' l_0 of the H position-controlled cables (H,) [m].
+        target: Mean of both targets [N/m].
+        directions: Unit directions, (3,) or (n, 3); None for a target of ``cartesian``.
+    """
+    try:
+        K = _at_rest(ends, unstrained)
+        value = achieved(K, directions)
+    except CdsmError as error:
+        return HalfWay(
+            index=index,
+            target=target,
+            stiffness=None,
+            achieved=None,
+            misfit=math.inf,
+            reason=f"{error} Or take smaller steps.",
+        )
+    return HalfWay(
+        index=index,
+        target=target,
+        stiffness=K,
+        achieved=value,
+        misfit=misfit(value, target, directions),
+    )
+
+
+def _at_rest(ends: tuple[Stiffness, Stiffness], unstrained: Array) -> Stiffness:
+    """K_θ where the arm rests.
+
+    Raises:
+        EquilibriumError: From the mean posture on, no stable way leads to a place to rest.
+        ElasticityRangeError: A tension there is outside the domain of its cable's elasticity.
+    """
+    q, F, W = (
+        (a + b) / 2.0
+        for a, b in (
+            (ends[0].posture.q, ends[1].posture.q),
+            (ends[0].tension, ends[1].tension),
+            (ends[0].wrench, ends[1].wrench),
+        )
+    )
+    arm = ends[0].posture.arm
+    mean = arm.at(q)
+    # locked where every cable has its mean tension: at no posture, but in the domain of every law
+    lengths = mean.cable_lengths.copy()
+    held = [c for c, cable in enumerate(arm.cables) if cable.control == "position"]
+    for c, l_0 in zip(held, unstrained.tolist(), strict=True):
+        lengths[c] = l_0 + arm.cables[c].elongation(F[c], l_0)
+    loaded = LoadedArm(mean, F, W, lengths)
+    settled = settle(loaded.moved, loaded.at(mean, F), *loaded.stops())
+    K = settled.point.K
+    if not (settled.steady and settled.convex):
+        worst = int(abs(K.residual).argmax())
+        raise EquilibriumError(
+            "half-way the arm buckles, or finds no place to rest",
+            frozen(K.residual),
+            0.0,
+            arm.joint_names[worst],
+        )
+    loaded.cables.require_domains(K.tension)
+    return K
