@@ -16,7 +16,6 @@ from cdsm._rising_curve import RisingCurve
 from cdsm.elasticity import Domain, Elasticity
 from cdsm.errors import ElasticityRangeError, InvalidInput
 
-
 EQ19_PRINTED: Final = (
     (-556.89, 377.99, -70.49, 8.74, -0.46, 1.12e-2, -1e-4),
     (-1924.5, 493.35, -2.26, 0.0054, -6.94e-6, 4.58e-9, -1.22e-12),

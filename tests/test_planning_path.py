@@ -466,6 +466,25 @@ def test_half_the_step_leaves_a_quarter_of_the_error_half_way() -> None:
         assert 3.5 < coarse / fine < 4.5
 
 
+def test_motors_pay_out_the_unstrained_length_whatever_the_stiffness_takes_for_it() -> None:
+    s = np.linspace(0.0, math.pi, 9)
+    plans = [
+        cdsm.plan_path(
+            presets.virtual_prototype(original_length=name),
+            DOWN,
+            70e3 + 20e3 * np.sin(s),
+            50.0,
+            angles=waving(9),
+        )
+        for name in ("unstrained", "stretched")
+    ]
+    for plan in plans:
+        lengths = plan.unstrained_lengths * (1.0 + STRAND.strain(plan.tensions))
+        np.testing.assert_allclose(lengths, plan.cable_lengths, rtol=1e-14)
+    worst = [max(each.misfit for each in plan.between) for plan in plans]
+    assert worst[1] == pytest.approx(worst[0], rel=0.2)
+
+
 def test_only_neighbours_have_something_between_them() -> None:
     plan = cdsm.plan_path(ARM, DOWN, [80e3, 80e3, 1e7, 80e3], 50.0, angles=waving(4))
     assert [each.index for each in plan.between] == [0]

@@ -219,6 +219,22 @@ def test_band_covers_the_truth_about_as_often_as_it_says(law: str, method: str) 
     assert 0.88 < np.mean(covered) <= 1.0
 
 
+def test_band_misses_a_kink_and_what_lies_next_to_it() -> None:
+    """From 15 kN to 45 kN at 200 N, as the docstring says: 84 to 95 %, and nothing at the kink."""
+    covered, beside = [], []
+    for seed in range(6):
+        F = np.linspace(0.0, 840.0, 300)
+        strain = np.where(F < 200.0, F / 15e3, 200.0 / 15e3 + (F - 200.0) / 45e3)
+        force = F + np.random.default_rng(seed).normal(size=F.size)
+        band = cdsm.fit_tensile_test(GAUGE * strain, force, GAUGE).band
+        truth = np.where(band.tensions < 200.0, 15e3, 45e3)
+        inside = (band.low <= truth) & (truth <= band.high)
+        covered.append(inside[(band.tensions > 15.0) & (band.tensions < 800.0)].mean())
+        beside.append(inside[abs(band.tensions - 200.0) < 5.0].mean())
+    assert 0.84 < np.mean(covered) < 0.95
+    assert np.mean(beside) < 0.1
+
+
 def test_fit_is_reproducible_and_reports_itself() -> None:
     displacement, force = strand_test(0.5, 0)
     fit = cdsm.fit_tensile_test(displacement, force, GAUGE, samples=40, seed=3)

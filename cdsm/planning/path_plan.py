@@ -14,6 +14,7 @@ from typing import final
 
 import numpy as np
 
+from cdsm._cable_laws import CableLaws
 from cdsm._checks import Array, ReadOnlyState, frozen
 from cdsm._files import write_text
 from cdsm.cable import Cable
@@ -108,13 +109,15 @@ class PathPlan(ReadOnlyState):
     def unstrained_lengths(self) -> Array:
         """What the motors of the H position-controlled cables have paid out (P, H) [m].
 
-        The l_0 of :attr:`Stiffness.free_lengths <cdsm.stiffness.Stiffness.free_lengths>`, with l_0
-        + Δl(F, l_0) = L, Δl being :meth:`~cdsm.cable.Cable.elongation`: it counts from the low end
-        of the elasticity's domain, so that l_0 is the length at that tension, with the series
-        spring at rest.
+        The l_0 with l_0 + Δl(F, l_0) = L, Δl being :meth:`~cdsm.cable.Cable.elongation`: it counts
+        from the low end of the elasticity's domain, so that l_0 is the length at that tension, with
+        the series spring at rest. So it is for every ``original_length`` of the arm: what K_θ takes
+        for l_0 does not change what motors do.
         """
-        rows = [K.free_lengths for K in self.stiffness]
-        every = np.array(rows).reshape(self.tensions.shape)
+        motors = CableLaws(self.arm.cables, "unstrained")
+        pairs = zip(self.cable_lengths, self.tensions, strict=True)
+        rows = np.array([motors.original_lengths(L, F) for L, F in pairs])
+        every = rows.reshape(self.tensions.shape)
         return frozen(every[:, [c for c, _ in self._held]])
 
     @cached_property
