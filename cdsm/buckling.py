@@ -2,9 +2,9 @@
 
 Cables stiffen an arm by their elasticity and mostly soften it by their tension (active part of
 Eq. 16). With stiff cables the first always wins; behind soft springs or long leads there is a
-tension from which on K_θ is not positive definite and the arm gives way, whatever its load. Here the posture is held and
-the tensions are those of :func:`~cdsm.tension.distribute_tension`; what an arm with locked motors
-does beyond is :func:`~cdsm.equilibrium.equilibrium`.
+tension from which on K_θ is not positive definite and the arm gives way, whatever its load. Here
+the posture is held and the tensions are those of :func:`~cdsm.tension.distribute_tension`; what an
+arm with locked motors does beyond is :func:`~cdsm.equilibrium.equilibrium`.
 """
 
 from __future__ import annotations

@@ -18,8 +18,20 @@ from cdsm._checks import Array
 from cdsm.planning import follow
 from cdsm.planning.follow import Follower
 from tests import arms
-from tests.locked import BUCKLING, JUMPING, LENGTH, TABLE, soft, soft_hinge, some_arm
-from tests.locked import STRAND
+from tests.locked import (
+    BUCKLING,
+    EA,
+    JUMPING,
+    LENGTH,
+    STRAND,
+    TABLE,
+    H,
+    R,
+    hinge,
+    soft,
+    soft_hinge,
+    some_arm,
+)
 from tests.test_planning_range import DOWN
 
 ARM = presets.virtual_prototype()

@@ -210,8 +210,8 @@ def _breaks(pull: Callable[[float], Tension], places: Array) -> Array:
     """Lower bounds [N] among others, rising, where the slope jumps.
 
     Where a cable reaches one of its bounds or leaves it, and where one passes a jump or a sharp
-    bend of its rigidity. In between F*(b) is linear: the active bounds of such a program are the same all
-    through, if they are at both ends.
+    bend of its rigidity. In between F*(b) is linear: the active bounds of such a program are the
+    same all through, if they are at both ends.
     """
     found: list[float] = []
     todo = list(pairwise(places.tolist()))

@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cdsm._cable_laws import breaks
 from cdsm._checks import Array
 from cdsm.cable import Cable
 from cdsm.errors import CdsmError, InvalidInput
-from cdsm.wire import StrandElasticity, TabulatedElasticity
+from cdsm.wire import TabulatedElasticity
 
 if TYPE_CHECKING:
     from cdsm.stiffness import Stiffness
@@ -76,9 +77,7 @@ class LockedLaws:
     def room(self, c: int, cable: Cable) -> float:
         """How far its tension may go [N] until its law ends, jumps or bends."""
         F, law = float(self._tension[c]), cable.elasticity
-        edges = [law.domain.low, law.domain.high, *law.jumps]
-        if isinstance(law, StrandElasticity):
-            edges += law.joins
+        edges = [law.domain.low, law.domain.high, *breaks(law)]
         if isinstance(law, TabulatedElasticity):
             # at its points the rigidity bends; so near to one that no step would be left, the
             # bend stays in the middle, and the differences settle all the same
@@ -106,12 +105,11 @@ class LockedLaws:
             for jump in law.jumps
             if abs(F - jump) <= close
         ]
-        if isinstance(law, StrandElasticity):
-            said += [
-                f"{where} a sharp bend of its tangent rigidity, at {join:g} N"
-                for join in law.joins
-                if join not in law.jumps and abs(F - join) <= close
-            ]
+        said += [
+            f"{where} a sharp bend of its tangent rigidity, at {bend:g} N"
+            for bend in breaks(law)
+            if bend not in law.jumps and abs(F - bend) <= close
+        ]
         return said
 
     def _kink(self, c: int, cable: Cable) -> str:
