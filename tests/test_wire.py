@@ -169,7 +169,8 @@ def test_curve_meets_its_points_and_its_rigidity_the_bound(law: cdsm.TabulatedEl
         assert (law.rigidity(F) <= 2.1 * most).all()
     inside = points[1:-1]
     above = np.nextafter(inside, np.inf)
-    np.testing.assert_allclose(law.rigidity(above), law.rigidity(inside), rtol=1e-9)
+    # one unit in the last place can be 1e-13 of a piece along which EA changes ten-thousandfold
+    np.testing.assert_allclose(law.rigidity(above), law.rigidity(inside), rtol=1e-8)
 
 
 def test_bound_of_the_rigidity_is_nearly_reached() -> None:
