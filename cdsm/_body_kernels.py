@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 from cdsm._checks import Array
 from cdsm._compiled import compiled
-from cdsm._kernels import Frames, Indices
+from cdsm._kernels import Frames, Indices, Tree
 
 
 class Masses(NamedTuple):
@@ -26,6 +26,7 @@ class Masses(NamedTuple):
         centre: Their centre of mass in that frame, (nv+1, 3) [m].
         gravity: In base axes (3,) [m/s²].
         tip: Row of the joint that moves the tip.
+        way: Coordinates of the joints that move it, base first.
         rotation: Of the tip in that joint's frame, (3, 3).
         point: Its origin there, (3,) [m].
     """
@@ -34,6 +35,7 @@ class Masses(NamedTuple):
     centre: Array
     gravity: Array
     tip: int
+    way: Indices
     rotation: Array
     point: Array
 
@@ -77,9 +79,10 @@ def reach(
 
 @compiled
 def weigh(
-    parent: Indices, masses: Masses, rotation: Array, frames: Frames, load: Array, torque: Array
+    tree: Tree, masses: Masses, rotation: Array, frames: Frames, load: Array, torque: Array
 ) -> None:
     """Fill g (nv,), and M, z × r and γ × z of every joint, (nv+1, 7)."""
+    parent, order = tree.parent, tree.order
     origin, axis, slide, _ = frames
     gx, gy, gz = masses.gravity[0], masses.gravity[1], masses.gravity[2]
     for i in range(parent.shape[0]):
@@ -90,7 +93,8 @@ def weigh(
             for k in range(3):
                 centre += rotation[i, r, k] * masses.centre[i, k]
             load[i, 1 + r] = m * centre
-    for i in range(parent.shape[0] - 1, 0, -1):
+    for k in range(order.shape[0] - 1, -1, -1):
+        i = order[k]
         before = parent[i]
         for r in range(4):
             load[before, r] += load[i, r]
@@ -120,5 +124,5 @@ def add_gravity(parent: Indices, load: Array, gravity: Array) -> None:
         while i > 0:
             # γ·(z_i × w) = (γ × z_i)·w
             value = load[i, 4] * x + load[i, 5] * y + load[i, 6] * z
-            gravity[i - 1, j - 1] -= value
+            gravity[min(i, j) - 1, max(i, j) - 1] -= value
             i = parent[i]

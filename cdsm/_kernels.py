@@ -33,6 +33,8 @@ class Tree(NamedTuple):
 
     Attributes:
         parent: Row of the joint before, (nv+1,).
+        order: Rows of the joints, each after the joint before it, (nv,); the rows themselves are in
+            the order of q, whatever that is.
         turn: Three matrices of each joint, (nv+1, 3, 3, 3): by Rodrigues' formula the first, plus
             the second times cos q, plus the third times sin q, is the rotation of its frame in
             that of the joint before.
@@ -43,6 +45,7 @@ class Tree(NamedTuple):
     """
 
     parent: Indices
+    order: Indices
     turn: Array
     translation: Array
     axis: Array
@@ -50,7 +53,13 @@ class Tree(NamedTuple):
 
     @classmethod
     def of(
-        cls, parent: Indices, rotation: Array, translation: Array, axis: Array, slide: Array
+        cls,
+        parent: Indices,
+        order: Indices,
+        rotation: Array,
+        translation: Array,
+        axis: Array,
+        slide: Array,
     ) -> Tree:
         """From joint frames at q = 0 in the frames before; axes and slides in the joints' own."""
         along = axis[:, :, None] * axis[:, None, :]
@@ -59,6 +68,7 @@ class Tree(NamedTuple):
         parts = np.stack([along, np.eye(3) - along, cross], axis=1)
         return cls(
             parent=frozen(parent),
+            order=frozen(order),
             turn=frozen(rotation[:, None] @ parts),
             translation=frozen(translation),
             axis=frozen((rotation @ axis[:, :, None])[:, :, 0].copy()),
@@ -109,7 +119,7 @@ def place(
     tree: Tree, row: Indices, point: Array, q: Array, rotation: Array, frames: Frames
 ) -> None:
     """Forward kinematics at q (nv,): fill the rotations of the joints (nv+1, 3, 3) and frames."""
-    parent, turn, translation, local_axis, local_slide = tree
+    parent, order, turn, translation, local_axis, local_slide = tree
     origin, axis, slide, site = frames
     sliding = slide.shape[0] > 0
     for r in range(3):
@@ -118,9 +128,10 @@ def place(
             slide[0, r] = 0.0
         for c in range(3):
             rotation[0, r, c] = 1.0 if r == c else 0.0
-    for i in range(1, parent.shape[0]):
-        before = parent[i]
-        cosine, sine = math.cos(q[i - 1]), math.sin(q[i - 1])
+    for k in range(order.shape[0]):
+        i = np.uint64(order[k])  # see upwards
+        before, angle = np.uint64(parent[i]), q[i - np.uint64(1)]
+        cosine, sine = math.cos(angle), math.sin(angle)
         for r in range(3):
             x, y, z = rotation[before, r, 0], rotation[before, r, 1], rotation[before, r, 2]
             t, a = translation[i], local_axis[i]
@@ -128,7 +139,7 @@ def place(
             if sliding:
                 s = local_slide[i]
                 slide[i, r] = x * s[0] + y * s[1] + z * s[2]
-                origin[i, r] += q[i - 1] * slide[i, r]
+                origin[i, r] += angle * slide[i, r]
             axis[i, r] = x * a[0] + y * a[1] + z * a[2]
             for c in range(3):
                 rotation[i, r, c] = (
@@ -286,6 +297,7 @@ def measure(
 @compiled
 def evaluate(
     parent: Indices,
+    order: Indices,
     turn: Array,
     translation: Array,
     local_axis: Array,
@@ -306,7 +318,7 @@ def evaluate(
         coincide, or −1; if there is one, L and J_L are unfinished.
     """
     count, nv = parent.shape[0], q.shape[0]
-    tree = Tree(parent, turn, translation, local_axis, local_slide)
+    tree = Tree(parent, order, turn, translation, local_axis, local_slide)
     origin, axis, slide = np.empty((count, 3)), np.empty((count, 3)), np.empty(local_slide.shape)
     frames = Frames(origin, axis, slide, np.empty((row.shape[0], 3)))
     place(tree, row, point, q, np.empty((count, 3, 3)), frames)

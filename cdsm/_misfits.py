@@ -68,7 +68,8 @@ class TipMisfit:
         wrench = np.zeros(6)
         wrench[: weight.size] = weight
         wrench[:3] /= self.arm.length
-        return -load_stiffness(frozen(self.arm._body.state(q).jacobian), frozen(wrench))
+        jacobian, way = self.arm._body.state(q).jacobian, self.arm._masses.way
+        return -load_stiffness(frozen(jacobian), frozen(wrench), way)
 
     def hessian(self, q: Array) -> Array:
         # ∂(½φ²) = φ·ω exactly, so its second derivative needs that of φ once, not twice

@@ -8,16 +8,16 @@ built, so that callers hand over checked arrays and receive their own copies.
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
 from cdsm._body_kernels import Masses
-from cdsm._checks import Array, frozen
-from cdsm._kernels import Tree
-from cdsm.errors import UnknownName, UrdfError
+from cdsm._checks import Array, frozen, sequence_of
+from cdsm._kernels import Indices, Tree
+from cdsm.errors import InvalidInput, UnknownName, UrdfError
 
 
 class BodyState(NamedTuple):
@@ -36,28 +36,39 @@ class RigidBody:
         urdf: Text of a URDF that has passed the checks of :mod:`cdsm.urdf`.
         tip: Name of the link whose frame is the tip.
         gravity: Gravity in base axes, (3,) [m/s²].
+        joint_names: The joints that move, in the order of their coordinates. None: Pinocchio's
+            order, in which parents come first.
 
     Raises:
         UrdfError: Pinocchio does not accept it, or a joint is neither revolute nor prismatic.
         UnknownName: There is no link called ``tip``.
+        InvalidInput: The names are not those of the joints that move.
     """
 
-    def __init__(self, urdf: str, tip: str, gravity: Array) -> None:
+    def __init__(
+        self, urdf: str, tip: str, gravity: Array, joint_names: Sequence[str] | None = None
+    ) -> None:
         try:
             self._model = model = pin.buildModelFromXML(urdf)
         except ValueError as error:
             raise UrdfError(f"Pinocchio does not accept the URDF: {error}") from None
         model.gravity.linear = np.array(gravity)
-        self.joint_names: tuple[str, ...] = tuple(model.names)[1:]
-        if model.nq != len(self.joint_names) or model.nv != len(self.joint_names):
+        names = tuple(model.names)[1:]
+        if model.nq != len(names) or model.nv != len(names):
             raise UrdfError(
                 "the URDF has a joint with more than one coordinate; cdsm takes revolute and "
                 "prismatic ones."
             )
+        self.joint_names = names if joint_names is None else _reordered(names, joint_names)
+        # where Pinocchio has each of our coordinates, and where we have each of its
+        self._theirs = frozen(np.array([names.index(name) for name in self.joint_names]))
+        self._ours = frozen(np.argsort(self._theirs))
+        self._reordered = self.joint_names != names
+        self._ids: tuple[int, ...] = tuple((1 + self._theirs).tolist())
         self.nv: int = model.nv
         self.name: str = model.name
-        self.lower = frozen(np.array(model.lowerPositionLimit))
-        self.upper = frozen(np.array(model.upperPositionLimit))
+        self.lower: Array = frozen(np.array(model.lowerPositionLimit)[self._theirs])
+        self.upper: Array = frozen(np.array(model.upperPositionLimit)[self._theirs])
         self._tip = self._frame(tip)
         self._scratch = threading.local()
         self._twists = frozen(self._local_twists())
@@ -76,7 +87,7 @@ class RigidBody:
         """
         frame = self._model.frames[self._frame(link)]
         return (
-            frame.parentJoint,
+            self._row(frame.parentJoint),
             frame.placement.rotation.copy(),
             frame.placement.translation.copy(),
         )
@@ -84,10 +95,12 @@ class RigidBody:
     def tree(self) -> Tree:
         """The tree as plain arrays."""
         model = self._model
+        rows = (0, *self._ids)
         return Tree.of(
-            parent=np.array(model.parents, dtype=np.intp),
-            rotation=np.array([placement.rotation for placement in model.jointPlacements]),
-            translation=np.array([placement.translation for placement in model.jointPlacements]),
+            parent=np.array([self._row(model.parents[i]) for i in rows], dtype=np.intp),
+            order=1 + self._ours,
+            rotation=np.array([model.jointPlacements[i].rotation for i in rows]),
+            translation=np.array([model.jointPlacements[i].translation for i in rows]),
             axis=np.vstack([np.zeros(3), self._twists[:, 3:]]),
             slide=np.vstack([np.zeros(3), self._twists[:, :3]]),
         )
@@ -109,18 +122,20 @@ class RigidBody:
         return np.array(
             [
                 pin.getJointJacobian(model, data, i, pin.LOCAL).reshape(6, -1)[:, i - 1]
-                for i in range(1, self.nv + 1)
+                for i in self._ids
             ]
         )
 
     def masses(self) -> Masses:
         """What the tree carries and where its tip is, as plain arrays."""
         model, tip = self._model, self._model.frames[self._tip]
+        inertias = [model.inertias[i] for i in (0, *self._ids)]
         return Masses(
-            mass=np.array([inertia.mass for inertia in model.inertias]),
-            centre=np.array([inertia.lever for inertia in model.inertias]),
+            mass=np.array([inertia.mass for inertia in inertias]),
+            centre=np.array([inertia.lever for inertia in inertias]),
             gravity=np.array(model.gravity.linear),
-            tip=int(tip.parentJoint),
+            tip=self._row(tip.parentJoint),
+            way=self._way(tip.parentJoint),
             rotation=tip.placement.rotation.copy(),
             point=tip.placement.translation.copy(),
         )
@@ -131,17 +146,24 @@ class RigidBody:
         The Jacobian (6, nv) has linear rows first, in base axes, at the tip.
         """
         model, data = self._model, self._data()
+        q = q[self._ours]
         pin.computeJointJacobians(model, data, q)
         jacobian = pin.getFrameJacobian(model, data, self._tip, pin.LOCAL_WORLD_ALIGNED)
         tip = pin.updateFramePlacement(model, data, self._tip).homogeneous
         stiffness = pin.computeGeneralizedGravityDerivatives(model, data, q)
         # a model with one joint yields vectors for its matrices
-        return BodyState(
+        state = BodyState(
             tip,
             np.ascontiguousarray(jacobian).reshape(6, self.nv),
             data.g.copy(),
             np.ascontiguousarray(stiffness).reshape(self.nv, self.nv),
         )
+        return self._in_our_order(state) if self._reordered else state
+
+    def _in_our_order(self, state: BodyState) -> BodyState:
+        i = self._theirs
+        tip, jacobian, torque, stiffness = state
+        return BodyState(tip, jacobian.take(i, axis=1), torque[i], stiffness[np.ix_(i, i)])
 
     def placement(self, q: Array, link: str) -> Array:
         """Pose of a link's frame in the base, (4, 4).
@@ -150,19 +172,20 @@ class RigidBody:
             UnknownName: There is no such link.
         """
         model, data, frame = self._model, self._data(), self._frame(link)
-        pin.forwardKinematics(model, data, q)
+        pin.forwardKinematics(model, data, q[self._ours])
         placement: Array = pin.updateFramePlacement(model, data, frame).homogeneous
         return placement
 
     def potential_energy(self, q: Array) -> float:
         """V of the weight of all links [J] at the joint angles (nv,) [rad], from their places."""
-        return float(pin.computePotentialEnergy(self._model, self._data(), q))
+        return float(pin.computePotentialEnergy(self._model, self._data(), q[self._ours]))
 
     def mass_matrix(self, q: Array) -> Array:
         """Joint-space mass matrix M (nv, nv) [kg m²] at the joint angles (nv,) [rad]."""
-        # some versions of Pinocchio fill the upper triangle alone
-        upper = np.triu(np.array(pin.crba(self._model, self._data(), q)).reshape(self.nv, self.nv))
-        return upper + np.triu(upper, 1).T
+        M = np.array(pin.crba(self._model, self._data(), q[self._ours])).reshape(self.nv, self.nv)
+        upper = np.triu(M)  # some versions of Pinocchio fill that alone
+        whole: Array = (upper + np.triu(upper, 1).T)[np.ix_(self._theirs, self._theirs)]
+        return whole
 
     def visualizer(self, urdf: str, server: object, node: str) -> Callable[[Array], None] | None:
         """Draw the shapes of the URDF below a node of a viser server.
@@ -189,8 +212,19 @@ class RigidBody:
                 f"the shapes of the URDF cannot be drawn: {str(error).strip().rstrip('.')}. Meshes "
                 "of a package:// are looked for in the folders of ROS_PACKAGE_PATH."
             ) from None
-        display: Callable[[Array], None] = drawn.display
-        return display
+        return lambda q: drawn.display(q[self._ours])
+
+    def _way(self, joint: int) -> Indices:
+        """Our coordinates of the joints on the way to one of Pinocchio's, base first."""
+        way: list[int] = []
+        while joint:
+            way.insert(0, self._row(joint) - 1)
+            joint = self._model.parents[joint]
+        return np.array(way, dtype=np.intp)
+
+    def _row(self, joint: int) -> int:
+        """Our row of a joint of Pinocchio's; both call the base 0."""
+        return 1 + int(self._ours[joint - 1]) if joint else 0
 
     def _frame(self, link: str) -> int:
         if not isinstance(link, str) or not self._model.existFrame(link, pin.FrameType.BODY):
@@ -203,6 +237,21 @@ class RigidBody:
         if not hasattr(self._scratch, "data"):
             self._scratch.data = self._model.createData()
         return self._scratch.data
+
+
+def _reordered(names: tuple[str, ...], wanted: Sequence[str]) -> tuple[str, ...]:
+    """The wanted order, if it names every joint that moves once."""
+    wanted = sequence_of("joint_names", wanted, str)
+    if sorted(wanted) != sorted(names):
+        missing = [name for name in names if name not in wanted]
+        others = [name for name in wanted if name not in names or wanted.count(name) > 1]
+        told = ", ".join(
+            f"{what} {', '.join(map(repr, dict.fromkeys(some)))}"
+            for what, some in (("leaves out", missing), ("has too many of", others))
+            if some
+        )
+        raise InvalidInput("joint_names", f"{told}; name each joint that moves once.")
+    return wanted
 
 
 def rotation_vector(rotation: Array) -> tuple[Array, Array]:

@@ -57,6 +57,7 @@ def joint_stiffness(
     tension: Array,
     cable_stiffness: Array,
     wrench: Array,
+    way: Indices,
 ) -> tuple[Array, Array, Array, Array]:
     """Active, passive and load term of Eq. 16 and the sum of all four, (nv, nv) each."""
     nv = jacobian.shape[1]
@@ -65,7 +66,7 @@ def joint_stiffness(
     add_length_hessian(segment, joint, origin, axis, slide, site, tension, page, active)
     add_passive(length_jacobian, cable_stiffness, passive)
     mirror(passive)
-    load = load_stiffness(jacobian, wrench)
+    load = load_stiffness(jacobian, wrench, way)
     return active[0], passive, load, active[0] + passive + gravity + load
 
 
@@ -89,30 +90,32 @@ def add_passive(length_jacobian: Array, cable_stiffness: Array, passive: Array) 
 
 
 @compiled
-def load_stiffness(jacobian: Array, wrench: Array) -> Array:
+def load_stiffness(jacobian: Array, wrench: Array, way: Indices) -> Array:
     """−∂(J_Xᵀ W)/∂θ (nv, nv) of a dead wrench W (6,): row torque, column angle."""
     result = np.zeros((jacobian.shape[1], jacobian.shape[1]))
-    add_load(jacobian, wrench, result)
+    add_load(jacobian, wrench, way, result)
     return result
 
 
 @compiled
-def add_load(jacobian: Array, wrench: Array, load: Array) -> None:
+def add_load(jacobian: Array, wrench: Array, way: Indices, load: Array) -> None:
     """Add −∂(J_Xᵀ W)/∂θ to a matrix (nv, nv).
 
-    From the columns of J_X alone: ∂v_i/∂θ_j = z_a × v_b with a the earlier and b the later of the
-    two joints, ∂z_i/∂θ_j = z_j × z_i where j comes before i and 0 otherwise.
+    From J_X and the joints on the way to the tip, base first: ∂v_i/∂θ_j = z_a × v_b with a the
+    earlier and b the later of the two joints, ∂z_i/∂θ_j = z_j × z_i where j comes before i and 0
+    otherwise.
     """
-    nv = jacobian.shape[1]
     fx, fy, fz = wrench[0], wrench[1], wrench[2]
     mx, my, mz = wrench[3], wrench[4], wrench[5]
-    for a in range(nv):
+    for s in range(way.shape[0]):
+        a = np.uint64(way[s])
         zx, zy, zz = jacobian[3, a], jacobian[4, a], jacobian[5, a]
         # f·(z × v) = (f × z)·v, m·(z × z_b) = (m × z)·z_b
         gx, gy, gz = fy * zz - fz * zy, fz * zx - fx * zz, fx * zy - fy * zx
         hx, hy, hz = my * zz - mz * zy, mz * zx - mx * zz, mx * zy - my * zx
         load[a, a] -= gx * jacobian[0, a] + gy * jacobian[1, a] + gz * jacobian[2, a]
-        for b in upwards(a + 1, nv):
+        for t in upwards(s + 1, way.shape[0]):
+            b = np.uint64(way[t])
             force = gx * jacobian[0, b] + gy * jacobian[1, b] + gz * jacobian[2, b]
             moment = hx * jacobian[3, b] + hy * jacobian[4, b] + hz * jacobian[5, b]
             load[a, b] -= force

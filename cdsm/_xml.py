@@ -33,9 +33,9 @@ def parse_xml(text: str, root: str, doctype: str | None = None) -> etree._Elemen
     Args:
         text: The document.
         root: What its root element must be called.
-        doctype: A DOCTYPE whose system identifier matches this pattern as a whole, and with nothing
-            inside, is let pass, unread; any other is refused, since it can define entities or name
-            files to read.
+        doctype: A DOCTYPE whose system identifier matches this pattern as a whole, with an empty
+            public identifier or none, and with nothing inside, is let pass, unread; any other is
+            refused, since it can define entities or name files to read.
 
     Raises:
         XmlFault: Not well-formed, too large or too deep, a DOCTYPE, or another root.
@@ -62,13 +62,7 @@ def parse_xml(text: str, root: str, doctype: str | None = None) -> etree._Elemen
         document = etree.fromstring(text.encode(), parser).getroottree()
     except (etree.XMLSyntaxError, ValueError) as error:
         raise XmlFault(f"is not well-formed XML: {_short(str(error))}") from None
-    found = document.docinfo.internalDTD
-    if found is not None and (
-        doctype is None
-        or re.fullmatch(doctype, found.system_url or "") is None
-        or found.external_id is not None
-        or any(True for _ in (*found.iterentities(), *found.iterelements()))
-    ):
+    if document.docinfo.internalDTD is not None and not (doctype and _names_dtd(text, doctype)):
         raise XmlFault("has a DOCTYPE, which could define entities or name files; remove it")
     top = document.getroot()
     if top.tag != root:
@@ -87,6 +81,13 @@ def parse_xml(text: str, root: str, doctype: str | None = None) -> etree._Elemen
                     )
         level = [child for element in level for child in element]
     return top
+
+
+def _names_dtd(text: str, system: str) -> bool:
+    """Whether the one DOCTYPE of a text names such a DTD, and does nothing else."""
+    literal = rf"""(?:"{system}"|'{system}')"""
+    alone = rf"""<!DOCTYPE\s+[^\s"'<>\[]+\s+(?:SYSTEM|PUBLIC\s+(?:""|''))\s+{literal}\s*>"""
+    return text.count("<!DOCTYPE") == 1 and re.search(alone, text) is not None
 
 
 def numbers(where: str, text: str | None, count: int) -> tuple[float, ...]:

@@ -43,7 +43,15 @@ from cdsm.urdf_reader import read_urdf
 GRAVITY = (0.0, 0.0, -9.81)
 """Default gravity in base axes [m/s²]."""
 
-_Value = tuple[Geometry | None, str, tuple[Cable, ...], str, tuple[float, ...], OriginalLength]
+_Value = tuple[
+    Geometry | None,
+    str,
+    tuple[Cable, ...],
+    str,
+    tuple[float, ...],
+    OriginalLength,
+    tuple[str, ...],
+]
 
 _LIMIT_SLACK = 1e-9
 """Angles this far [rad] beyond a limit are rounding, as of a conversion from degrees."""
@@ -97,6 +105,7 @@ class Manipulator(Printed):
         cables: Sequence[Cable],
         *,
         tip: str,
+        joint_names: Sequence[str] | None = None,
         gravity: ArrayLike = GRAVITY,
         check_inertia: bool = True,
         original_length: OriginalLength = "unstrained",
@@ -109,6 +118,9 @@ class Manipulator(Printed):
             urdf: Path of the file, or the text itself.
             cables: Its cables, as :func:`~cdsm.cable_file.read_cables` reads them.
             tip: The link whose frame is the tip, ``tool0`` of other docstrings.
+            joint_names: The joints that move, in the order that q is to have. None: from the base
+                on, each branch to its end, branches in the order of their joints' names
+                (Pinocchio's order).
             gravity: In base axes (3,) [m/s²]; (0, 0, 0) for none.
             check_inertia: Refuse moments of inertia that no body has. Stiffness does not depend on
                 them, :func:`~cdsm.modes.modes` do.
@@ -118,12 +130,11 @@ class Manipulator(Printed):
             FileError: The file cannot be read.
             UrdfError: It is no such robot; every fault is listed.
             UnknownName: There is no link called ``tip``, or no such ``original_length``.
+            InvalidInput: ``joint_names`` does not name each joint that moves once.
             CableError: Two cables of one name, or one on a link that does not exist.
         """
-        arm = cls.__new__(cls)
         text = read_urdf(urdf, check_inertia=check_inertia)
-        arm._build(None, text, cables, tip, gravity, original_length)
-        return arm
+        return _rebuild(None, text, cables, tip, gravity, original_length, joint_names)
 
     def _build(
         self,
@@ -133,6 +144,7 @@ class Manipulator(Printed):
         tip: str,
         gravity: ArrayLike,
         original_length: OriginalLength,
+        joint_names: Sequence[str] | None = None,
     ) -> None:
         """Set everything, once: from checked URDF text, and the geometry behind it if any."""
         self._geometry = geometry
@@ -141,7 +153,7 @@ class Manipulator(Printed):
         self._urdf, self._tip_link = urdf, tip
         one_of("original_length", original_length, get_args(OriginalLength))
         self._original_length: OriginalLength = original_length
-        self._body = RigidBody(urdf, tip, self._gravity)
+        self._body = RigidBody(urdf, tip, self._gravity, joint_names)
         tree = self._body.tree()
         routing = route(self._body, tree, self._cables)
         self._tree, self._routing, self._masses = tree, routing, self._body.masses()
@@ -283,14 +295,14 @@ class Manipulator(Printed):
 
     @property
     def _value(self) -> _Value:
-        gravity = tuple(self._gravity.tolist())
         return (
             self._geometry,
             self._urdf,
             self._cables,
             self._tip_link,
-            gravity,
+            tuple(self._gravity.tolist()),
             self._original_length,
+            self.joint_names,
         )
 
     def __reduce__(self) -> tuple[object, ...]:
@@ -305,8 +317,8 @@ class Manipulator(Printed):
         Raises:
             CableError: Two cables of one name, or one on a link that does not exist.
         """
-        geometry, urdf, _, tip, gravity, original_length = self._value
-        return _rebuild(geometry, urdf, tuple(cables), tip, gravity, original_length)
+        geometry, urdf, _, tip, gravity, original_length, names = self._value
+        return _rebuild(geometry, urdf, tuple(cables), tip, gravity, original_length, names)
 
     def at(self, q: ArrayLike, *, check_limits: bool = True) -> Posture:
         """Evaluate the arm at joint angles q: kinematics, cable lengths and gravity.
@@ -384,13 +396,14 @@ class Manipulator(Printed):
 def _rebuild(
     geometry: Geometry | None,
     urdf: str,
-    cables: tuple[Cable, ...],
+    cables: Sequence[Cable],
     tip: str,
     gravity: ArrayLike,
     original_length: OriginalLength,
+    joint_names: Sequence[str] | None,
 ) -> Manipulator:
     arm = Manipulator.__new__(Manipulator)
-    arm._build(geometry, urdf, cables, tip, gravity, original_length)
+    arm._build(geometry, urdf, cables, tip, gravity, original_length, joint_names)
     return arm
 
 

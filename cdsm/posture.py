@@ -120,6 +120,7 @@ class Posture(ReadOnlyState):
             tension,
             cable_stiffness,
             wrench,
+            self.arm._masses.way,
         )
         return frozen(active), frozen(passive), frozen(load), frozen(joint)
 

@@ -51,7 +51,7 @@ def test_tree_that_branches_weighs_what_pinocchio_says() -> None:
         _body_kernels.reach(tree.parent, masses, rotation, frames, pose, jacobian)
         heavy, torque = np.full((count, 7), np.nan), np.full(q.size, np.nan)
         slope = np.zeros((q.size, q.size))
-        _body_kernels.weigh(tree.parent, masses, rotation, frames, heavy, torque)
+        _body_kernels.weigh(tree, masses, rotation, frames, heavy, torque)
         _body_kernels.add_gravity(tree.parent, heavy, slope)
         _kernels.mirror(slope)
 

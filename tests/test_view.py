@@ -305,6 +305,21 @@ def test_the_scene_holds_the_arm_where_the_api_has_it(view: View) -> None:
 
 
 @needs_viser
+def test_the_scene_holds_an_arm_whose_joints_are_told_in_another_order() -> None:
+    plain = soft_arm()
+    arm = cdsm.Manipulator.from_urdf(
+        plain.urdf, plain.cables, tip=plain.tip_link, joint_names=plain.joint_names[::-1]
+    )
+    q = np.deg2rad(DEGREES)
+    with serve(arm, port=0, q=q[::-1]) as view:
+        for link in ("link1", "link3"):
+            place = plain.at(q).link_pose(link)
+            middle = place[:3, 3] + 0.03 * place[:3, 0]
+            shape = node(view, f"/arm/visual/{link}_0")
+            np.testing.assert_allclose(shape.position, middle, atol=1e-12)
+
+
+@needs_viser
 def test_nothing_is_written_into_the_arm() -> None:
     arm = soft_arm()
     before = arm._body._model.copy()

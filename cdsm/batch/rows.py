@@ -160,7 +160,7 @@ def evaluate_rows(
         else:
             known = GRAVITY + 1
             reach(parent, masses, rotation, frames, tip, JX)
-            weigh(parent, masses, rotation, frames, heavy, g)
+            weigh(tree, masses, rotation, frames, heavy, g)
             if last >= GRAVITY:
                 add_gravity(parent, heavy, gravity)
                 mirror(gravity)
@@ -168,7 +168,7 @@ def evaluate_rows(
                 known = LOAD + 1
                 _imbalance(tension[b], J, wrench[b], JX, g, residual)
                 mirror(active[0])
-                add_load(JX, wrench[b], load)
+                add_load(JX, wrench[b], masses.way, load)
                 if last > LOAD and (rigidity[b] < 0.0).any():
                     status[b] = OUTSIDE_ELASTICITY
                 elif last > LOAD:

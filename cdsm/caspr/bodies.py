@@ -41,7 +41,10 @@ _JOINTS: Final[Mapping[str, tuple[tuple[str, str], ...]]] = {
 """Joint types of CASPR as single joints, from the parent on."""
 
 _ORDER: Final = {"S_FIXED_XYZ": (2, 1, 0)}
-"""Which of CASPR's coordinates each single joint is, where not in the same order."""
+"""Which of CASPR's coordinates each single joint is, where not in the same order.
+
+Turns about fixed axes X, then Y, then Z are turns about moving axes Z, then Y, then X.
+"""
 
 
 @dataclass(frozen=True)
@@ -51,7 +54,8 @@ class Body:
     Attributes:
         number: From 1; 0 is the base.
         name: Of the link, unique.
-        joints: Kind, axis and limits of each single joint, from the parent on.
+        joints: Kind, name, axis and limits of each single joint, from the parent on.
+        joint_names: Their names, in the order of CASPR's coordinates.
         parent: Number of the parent.
         place: Where the joint sits on the parent (3,) [m].
         mass: [kg].
@@ -63,6 +67,7 @@ class Body:
     number: int
     name: str
     joints: tuple[tuple[str, str, tuple[float, ...], float, float], ...]
+    joint_names: tuple[str, ...]
     parent: int
     place: Array
     mass: float
@@ -125,10 +130,13 @@ def _body(element: etree._Element, name: str) -> Body:
     )
     if mass < 0.0:
         raise XmlFault(f"{name}: <mass> {mass:g} kg given; it cannot be negative")
+    joints = _single_joints(name, str(kind), joint)
+    order = _ORDER.get(str(kind), range(len(joints)))
     return Body(
         number=whole(f"{name}: num", element.get("num")),
         name=name,
-        joints=_single_joints(name, str(kind), joint),
+        joints=joints,
+        joint_names=tuple(joints[i][1] for i in np.argsort(order)),
         parent=whole(f"{name}: parent", text_of(element, name, "parent/num")),
         place=place,
         mass=mass,

@@ -32,6 +32,9 @@ def read_caspr(
     twice), link 0 is called ``base``; a joint becomes single joints called after their link and
     axis: ``link 1_x`` turns about x, ``link 1_slide_x`` moves along it. ``tool0`` sits at the end
     of the link with the highest number. A cable whose name has been used gets ``#2`` behind it.
+    The joint coordinates q are CASPR's own, sign and order: link by link as the links are numbered,
+    and for each link as its joint type is named, ways first (``S_FIXED_XYZ``: the angles x, y, z;
+    ``PLANAR_XZ``: the ways x and z, then the angle). ``joint_names`` of the arm lists them.
     Force bounds become ``Cable.minimum`` and ``.maximum``.
     CASPR's cables do not stretch: their elasticity is up to you.
 
@@ -58,7 +61,12 @@ def read_caspr(
     routed = read_cables(cables_file, links, elasticity, cable_set)
     urdf = to_urdf(bodies_file.stem.removesuffix("_bodies"), links)
     return Manipulator.from_urdf(
-        urdf, routed, tip=TIP, gravity=gravity, check_inertia=check_inertia
+        urdf,
+        routed,
+        tip=TIP,
+        joint_names=[name for link in links for name in link.joint_names],
+        gravity=gravity,
+        check_inertia=check_inertia,
     )
 
 

@@ -36,7 +36,8 @@ class Field:
         self.evaluations = 0
         # products with the tensor, which is cached, beat going through the cables each time
         self.geometry = pose.length_hessian, pose.length_jacobian
-        self.constant = pose.gravity_stiffness + load_stiffness(pose.jacobian, region.least.wrench)
+        load = load_stiffness(pose.jacobian, region.least.wrench, pose.arm._masses.way)
+        self.constant = pose.gravity_stiffness + load
         self._bounds = region.low, region.high
         self.scale = max(float(abs(self.at(region.least.values).values).max()), SMALLEST)
         self.floor = margin * self.scale
