@@ -96,7 +96,7 @@ def test_check_tells_the_report_of_the_api_and_writes_it_as_a_page(
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (("--min-tension", 31), "jump of its tangent rigidity"),
+        (("--min-tension", 31), "sharp bend of its tangent rigidity, at 31 N"),
         (("--min-tension", 0, "--rigidity", 48e3, "--gravity", "0,0,0"), "slack (0 N)"),
         (("--min-tension", 20, "--rigidity", 1e9, "--spring", 1.0), "UNSTABLE"),
     ],
@@ -449,18 +449,18 @@ def test_robot_that_slides_is_asked_for_and_told_in_millimetres(
     told = json.loads(call("stiffness", *rail, "--angles", 20, "--json").stdout)
     assert told["ways_m"] == {"way": 0.02}
     assert told["angles_rad"] == {}
-    # k = EA/l of both cables, 0.22 and 0.18 m long
-    np.testing.assert_allclose(told["along_N_per_m"][0], 400 / 0.22 + 400 / 0.18, rtol=1e-12)
+    # k = EA/l_0 of both cables, 0.22 and 0.18 m long under 10 N: EA (1 + 10 N/EA) over the length
+    np.testing.assert_allclose(told["along_N_per_m"][0], 410 / 0.22 + 410 / 0.18, rtol=1e-12)
     # two ways through the same sum of two cables
     np.testing.assert_allclose(told["margin_N_per_m"], told["along_N_per_m"][0], rtol=1e-12)
     assert "static_residual_N" in told
     assert told["joint_stiffness_N_per_m"] == [[told["margin_N_per_m"]]]
     checked = call("check", *rail, "--angles", 20)
-    assert "eigenvalue of the symmetric part of K_θ: 4040 N/m, stable" in checked.stdout
+    assert "eigenvalue of the symmetric part of K_θ: 4141 N/m, stable" in checked.stdout
     assert "counts with the arm's length, 0.2 m, as lever" in " ".join(checked.stdout.split())
     text = call("stiffness", *rail, "--angles", 20).stdout
     assert "static residual: 0.0e+00 N\n" in text
-    assert "smallest joint stiffness 4040 N/m" in text
+    assert "smallest joint stiffness 4141 N/m" in text
     pulled = call("stiffness", *rail, "--max-tension", 20, "--wrench", "30,0,0,0,0,0")
     assert "20 N are missing, most of it (20 N) at way" in pulled.stderr
 
@@ -474,7 +474,7 @@ def test_sweep_along_a_slide(rail: tuple[object, ...], tmp_path: Path) -> None:
     assert (found.margin.units, found.gravity_torque.units) == ("N m-1", "N")
     np.testing.assert_allclose(found.way, [-0.02, 0.0, 0.02], rtol=1e-15)
     assert found.way.attrs["units"] == "m"
-    k = [400 / 0.22 + 400 / 0.18, 4000.0, 400 / 0.22 + 400 / 0.18]
+    k = [410 / 0.22 + 410 / 0.18, 4100.0, 410 / 0.22 + 410 / 0.18]  # EA/l_0 under 10 N
     np.testing.assert_allclose(found.along.sel(direction="x").values.ravel(), k, rtol=1e-12)
     path.write_text("way [mm]\n-20\n0.0\n20\n", encoding="utf-8")
     result = call("sweep", *rail, "--path", path, "--quantities", "along", "-o", out)
