@@ -253,10 +253,13 @@ def test_slope_of_ones_own_that_is_no_number_is_refused() -> None:
         cdsm.stiffness_gradient(cdsm.stiffness(pose, np.full(4, 50.0)))
 
 
-@pytest.mark.parametrize("place", [31.0, 810.0], ids=["jump", "end"])
-def test_second_slope_is_taken_on_the_side_that_belongs_to_the_place(place: float) -> None:
-    """Below a jump and below the end of the domain, where there is no tension beyond."""
-    arm = cdsm.Manipulator(arms.random_arm(1, 2).geometry, JUMPING)
+@pytest.mark.parametrize("law", [JUMPING, STRAND], ids=["jump", "bend"])
+@pytest.mark.parametrize("place", [31.0, 810.0], ids=["join", "end"])
+def test_second_slope_is_taken_on_the_side_that_belongs_to_the_place(
+    place: float, law: cdsm.Elasticity
+) -> None:
+    """Below a jump, a bend and the end of the domain, where there is no tension beyond."""
+    arm = cdsm.Manipulator(arms.random_arm(1, 2).geometry, law)
     lengths = arm.at(np.zeros(arm.nv)).cable_lengths
 
     def slopes(F: float) -> tuple[Array, Array]:
