@@ -90,7 +90,7 @@ def _at_rest(ends: tuple[Stiffness, Stiffness], unstrained: Array) -> Stiffness:
         ElasticityRangeError: A tension there is outside the domain of its cable's elasticity.
     """
     q, F, W = (
-        (a + b) / 2.0
+        frozen((a + b) / 2.0)
         for a, b in (
             (ends[0].posture.q, ends[1].posture.q),
             (ends[0].tension, ends[1].tension),
