@@ -7,11 +7,12 @@ definite a motion does not vibrate but grows, and has a rate instead of a freque
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import final
+from typing import NamedTuple, final
 
 import numpy as np
-from scipy.linalg import eigh
+from scipy.linalg import eigh, eigvalsh
 
 from cdsm._checks import Array, ReadOnlyState, frozen, instance
 from cdsm.errors import InvalidInput, SingularMass
@@ -113,12 +114,7 @@ def modes(pose: Posture, stiffness: Stiffness) -> Modes:
     M = arm._body.mass_matrix(pose.q)
     spectrum, motions = np.linalg.eigh(M)
     if spectrum[0] <= _MASSLESS * spectrum[-1]:
-        motion = motions[:, 0]
-        raise SingularMass(
-            f"a motion of {arm.joint_names[int(abs(motion).argmax())]} moves no link of any mass. "
-            "Give the links a mass and moments of inertia.",
-            frozen(motion.copy()),
-        )
+        raise _massless(pose, motions[:, 0])
     shares, motions = eigh(_stand_in_mass(pose), M)
     if shares[-1] > _STAND_IN:
         motion = motions[:, -1] / np.linalg.norm(motions[:, -1])
@@ -144,22 +140,83 @@ def modes(pose: Posture, stiffness: Stiffness) -> Modes:
 
 def _stand_in_mass(pose: Posture) -> Array:
     """The part of M (nv, nv) that crosses and massless links have, so that simulators take them."""
-    M = np.zeros((pose.arm.nv, pose.arm.nv))
     if not pose.arm.is_serpentine:
-        return M
-    origin, axis = pose._frames.origin[1:], pose._frames.axis[1:]
+        return np.zeros((pose.arm.nv, pose.arm.nv))
+    inertia, stand_ins = CROSS_INERTIA * np.eye(3), []
     for k, (joint, link) in enumerate(
         zip(pose.arm.geometry.joints, pose.arm.geometry.links, strict=True), start=1
     ):
-        stand_ins = {f"cross{k}": 0.0} if len(joint.axes) == 2 else {}
+        if len(joint.axes) == 2:
+            stand_ins.append(Carried(f"cross{k}", CROSS_MASS, np.zeros(3), inertia))
         if link.mass == 0.0:
-            stand_ins[f"link{k}"] = link.length / 2.0
-        for name, x in stand_ins.items():
-            place = pose.link_pose(name)
-            moved = pose.arm._body.locate(name)[0]
-            angular = axis[:moved]
-            linear = np.cross(angular, place[:3, 3] + x * place[:3, 0] - origin[:moved])
-            M[:moved, :moved] += (
-                CROSS_MASS * linear @ linear.T + CROSS_INERTIA * angular @ angular.T
-            )
+            centre = np.array([link.length / 2.0, 0.0, 0.0])
+            stand_ins.append(Carried(f"link{k}", CROSS_MASS, centre, inertia))
+    return mass_matrix(pose, stand_ins)
+
+
+def fastest(stiffness: Stiffness, M: Array) -> float:
+    """√|ω²| [1/s] of the motion K_θ φ = ω² M φ whose ω² is largest, be it growth or vibration.
+
+    Args:
+        stiffness: K_θ, taken by its symmetric part.
+        M: Mass matrix (nv, nv) [kg m²].
+
+    Raises:
+        SingularMass: A motion of the arm moves no link of any mass.
+    """
+    # in units of each joint: beside the mass of the arm that of its last link may be rounding
+    unit = 1.0 / np.sqrt(M.diagonal())
+    K, M = (matrix * unit * unit[:, None] for matrix in (stiffness.joint, M))
+    try:
+        return math.sqrt(abs(eigvalsh((K + K.T) / 2.0, M)).max())
+    except np.linalg.LinAlgError:  # M is not positive definite
+        raise _massless(stiffness.posture, unit * np.linalg.eigh(M)[1][:, 0]) from None
+
+
+def _massless(pose: Posture, motion: Array) -> SingularMass:
+    joint = pose.arm.joint_names[int(abs(motion).argmax())]
+    return SingularMass(
+        f"a motion of {joint} moves no link of any mass. "
+        "Give the links a mass and moments of inertia.",
+        frozen(motion / np.linalg.norm(motion)),
+    )
+
+
+class Carried(NamedTuple):
+    """What a link carries, in the frame of the link.
+
+    Attributes:
+        link: Name of the link.
+        mass: m [kg].
+        centre: Centre of mass (3,) [m].
+        inertia: I about the centre of mass (3, 3) [kg m²].
+    """
+
+    link: str
+    mass: float
+    centre: Array
+    inertia: Array
+
+
+def mass_matrix(pose: Posture, carried: Iterable[Carried]) -> Array:
+    """Joint-space mass matrix (nv, nv) [kg m²] of what the links carry.
+
+    M = Σ m J_vᵀ J_v + J_ωᵀ I J_ω, J_v of the centre of mass and J_ω of the turn of each link.
+    """
+    arm, frames = pose.arm, pose._frames
+    M = np.zeros((arm.nv, arm.nv))
+    for link, mass, centre, inertia in carried:
+        place, row = pose.link_pose(link), arm._body.locate(link)[0]
+        moved = []
+        while row:
+            moved.append(row)
+            row = int(arm._tree.parent[row])
+        R, joints = place[:3, :3], np.array(moved, dtype=np.intp)
+        angular = frames.axis[joints]
+        linear = np.cross(angular, R @ centre + place[:3, 3] - frames.origin[joints])
+        if len(frames.slide):
+            linear += frames.slide[joints]
+        M[np.ix_(joints - 1, joints - 1)] += (
+            mass * linear @ linear.T + angular @ R @ inertia @ R.T @ angular.T
+        )
     return M

@@ -297,6 +297,25 @@ def test_export_writes_what_the_api_writes(geometry: Path, tmp_path: Path) -> No
     assert "--mjcf, --cables-out or both" in nothing.stderr
 
 
+def test_export_of_an_unstable_arm_says_so_first(geometry: Path, tmp_path: Path) -> None:
+    model = tmp_path / "arm.xml"
+    asked = ("export", geometry, "--mjcf", model, "--angles", 5, "--min-tension")
+    soft = ("--rigidity", 1e9, "--spring", 0.2)
+    told = call(*asked, 60, *soft)
+    assert told.exit_code == 3
+    first, arm, written = told.stdout.splitlines()
+    assert first.startswith("UNSTABLE: the smallest eigenvalue of K_θ is -")
+    assert (arm.split(":")[0], written) == ("probe", f"written: {model}")
+    assert f"<!-- {first} -->" in model.read_text(encoding="utf-8")
+    as_json = call(*asked, 60, *soft, "--json")
+    assert as_json.exit_code == 3
+    assert json.loads(as_json.stdout)["stable"] is False
+    held = call(*asked, 5, "--rigidity", 48e3, "--json")
+    assert held.exit_code == 0
+    assert json.loads(held.stdout)["stable"] is True
+    assert "UNSTABLE" not in model.read_text(encoding="utf-8")
+
+
 def test_wire_file_is_the_elasticity_of_the_cables(geometry: Path, tmp_path: Path) -> None:
     wire = cdsm.write_elasticity(cdsm.LinearElasticity(48e3), tmp_path / "wire.toml")
     by_file = call("stiffness", geometry, "--angles", 5, "--wire", wire, "--json")

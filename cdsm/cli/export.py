@@ -9,6 +9,7 @@ import typer
 
 from cdsm.cable_file import write_cables
 from cdsm.cli.options import (
+    UNMET,
     Angles,
     ArmOptions,
     AsJson,
@@ -16,7 +17,8 @@ from cdsm.cli.options import (
     reported,
     show_json,
 )
-from cdsm.mjcf import write_mjcf
+from cdsm.mjcf import instability, write_mjcf
+from cdsm.stiffness import stiffness
 
 
 def export(
@@ -34,18 +36,29 @@ def export(
     ] = 0.0,
     as_json: AsJson = False,
 ) -> None:
-    """Write an arm for other programs: a MuJoCo model at a posture, or a file of its cables."""
+    """Write an arm for other programs: a MuJoCo model at a posture, or a file of its cables.
+
+    Exit code 0; 3 if the arm of the MuJoCo model is unstable: it is written all the same.
+    """
     if mjcf is None and cables_out is None:
         raise typer.BadParameter("give --mjcf, --cables-out or both.", param_hint="--mjcf")
     with reported():
         pose = arm.at(angles)
-        written = []
+        written: list[str] = []
+        said: dict[str, object] = {"name": pose.arm.name}
+        stable, lines = True, [str(pose.arm)]
         if mjcf is not None:
             pull = tensions.distribute(pose)
+            K = stiffness(pose, pull)
+            stable = said["stable"] = K.is_stable
+            if not stable:
+                lines.insert(0, instability(K))
             written.append(str(write_mjcf(pose.arm, mjcf, pose, pull, damping=damping)))
         if cables_out is not None:
             written.append(str(write_cables(pose.arm.cables, cables_out)))
         if as_json:
-            show_json({"name": pose.arm.name, "written": list(written)})
+            show_json(said | {"written": list(written)})
         else:
-            typer.echo("\n".join([str(pose.arm), *(f"written: {path}" for path in written)]))
+            typer.echo("\n".join([*lines, *(f"written: {path}" for path in written)]))
+    if not stable:
+        raise typer.Exit(UNMET)
