@@ -1,10 +1,32 @@
-"""What several test files share and is worth computing once."""
+"""What several test files share and is worth computing once; and which tests are quick."""
+
+import signal
 
 import pytest
+from hypothesis import HealthCheck, settings
 
 from cdsm import paper
 
 Results = dict[str, paper.Result]
+
+# a test is about numbers; how long it takes depends on what else the machine does
+settings.register_profile("cdsm", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("cdsm")
+
+# a shell that starts the tests in the background has Ctrl-C ignored, in what they start as well
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+
+NOT_QUICK = ("slow", "long", "speed")
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark ``quick`` every test that nothing else is said of; notebooks are not."""
+    for item in items:
+        marked = any(item.get_closest_marker(name) for name in NOT_QUICK)
+        if not marked and item.path.suffix == ".py":
+            item.add_marker("quick")
 
 
 @pytest.fixture(scope="session")

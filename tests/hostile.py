@@ -381,8 +381,8 @@ def outcome(reader: Reader, path: Path) -> str:
     return "read"
 
 
-SECONDS = 30
-"""Of the processor in which any file is to be read or refused; the slowest takes a quarter."""
+SECONDS = 120
+"""Of the processor in which any file is to be read or refused; the slowest takes a fifteenth."""
 
 
 def _too_long(*_: object) -> None:

@@ -26,15 +26,13 @@ from rich.console import Console
 from rich.progress import Progress
 
 from tests.hostile import MUTATIONS, READERS, limit_memory, outcome, shuffled, whole_files
+from tests.patience import HANGS
 
 SLOW = {"store": 20, "store of an array": 20, "netcdf": 10}
 """By how much less of some there are: each takes as much longer to read as a text."""
 
 BLOCK = 1000
 """Files of a text that one process reads."""
-
-HANGS = 60.0
-"""Seconds after which a file counts as hanging, and Python is ended."""
 
 
 def spoilt(name: str, folder: Path, files: int, seed: int) -> Iterator[str]:

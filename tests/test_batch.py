@@ -22,6 +22,7 @@ from cdsm.batch import chunks, evaluation, rows
 from cdsm.batch.evaluation import OUTPUTS
 from cdsm.batch.record import QUANTITIES
 from tests.arms import STEEL, mixed_arm, random_arm, random_posture
+from tests.patience import HANGS
 
 ROOT = Path(__file__).parents[1]
 
@@ -583,7 +584,7 @@ def test_kernels_give_the_same_without_compilation() -> None:
         env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=HANGS,
         check=False,
     )
     assert done.returncode == 0, done.stderr

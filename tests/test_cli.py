@@ -14,6 +14,7 @@ from typer.testing import CliRunner, Result
 
 import cdsm
 from cdsm.cli import app
+from tests.patience import HANGS
 from tests.test_caspr import cable, folder, link
 
 SHORT = """
@@ -397,7 +398,7 @@ def test_version_is_that_of_the_package() -> None:
 
 def test_module_is_the_command() -> None:
     command = [sys.executable, "-m", "cdsm", "--help"]
-    told = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
+    told = subprocess.run(command, capture_output=True, text=True, timeout=HANGS, check=True)
     assert "reproduce" in told.stdout
 
 

@@ -19,6 +19,7 @@ import pytest
 import xarray as xr
 
 import cdsm
+from tests.patience import HANGS
 from tests.sweeps import short_arm
 
 ROOT = Path(__file__).parents[1]
@@ -51,7 +52,7 @@ def refused(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[dict[str
         pytest.skip("needs Linux namespaces that can mount a small disk")
     command = [*NAMESPACE, sys.executable, "-W", "error", "-m", "tests.disks", str(folder)]
     done = subprocess.run(
-        command, cwd=ROOT, capture_output=True, text=True, timeout=600, check=False
+        command, cwd=ROOT, capture_output=True, text=True, timeout=HANGS, check=False
     )
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
@@ -186,7 +187,7 @@ def test_an_interrupted_command_says_so_in_one_line_and_goes_on(tmp_path: Path) 
     with running(*command) as process:
         wait_for(lambda: blocks_done(path) >= 1, process)
         process.send_signal(signal.SIGINT)
-        said, complained = process.communicate(timeout=120)
+        said, complained = process.communicate(timeout=HANGS)
     assert process.returncode == 130, complained
     assert said == ""
     assert [line.partition(":")[0] for line in complained.splitlines()] == ["interrupted"]
@@ -226,7 +227,7 @@ def test_of_two_runs_at_once_on_one_store_one_may_be_told_to_wait(
 ) -> None:
     path = tmp_path / "s.zarr"
     with running("-c", SWEEP, path) as first, running("-c", SWEEP, path) as second:
-        complaints = [each.communicate(timeout=300)[1] for each in (first, second)]
+        complaints = [each.communicate(timeout=HANGS)[1] for each in (first, second)]
         codes = [first.returncode, second.returncode]
     assert 0 in codes
     for code, complaint in zip(codes, complaints, strict=True):

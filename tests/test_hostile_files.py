@@ -19,6 +19,7 @@ import pytest
 import cdsm
 from tests.hostile import MUTATIONS, READERS, SECONDS, TEXTS, outcome, whole_files
 from tests.mutated import read, spoilt
+from tests.patience import HANGS
 
 SHORT = 25
 """Files of each kind and mutation; a store takes far longer to read than a text."""
@@ -66,7 +67,7 @@ def attacked(folder: Path, largest: int, *names: str) -> list[dict[str, str]]:
         cwd=Path(__file__).parents[1],
         capture_output=True,
         text=True,
-        timeout=600,
+        timeout=HANGS,
         check=False,
     )
     lines = [json.loads(line) for line in done.stdout.splitlines() if line.startswith("{")]
@@ -214,7 +215,7 @@ def test_robots_that_crash_pinocchio_are_refused() -> None:
         cwd=Path(__file__).parents[1],
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=HANGS,
         check=False,
     )
     assert done.returncode == 0, f"{done.returncode}\n{done.stdout}\n{done.stderr[-3000:]}"

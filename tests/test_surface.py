@@ -26,6 +26,7 @@ import cdsm
 from cdsm import _kernels, _stiffness_kernels, errors
 from cdsm._checks import Array
 from tests.arms import STEEL, mixed_arm, random_arm, random_posture, random_tension, random_wrench
+from tests.patience import HANGS
 
 ROOT = Path(__file__).parents[1]
 
@@ -542,7 +543,7 @@ def test_kernels_give_the_same_without_compilation() -> None:
         env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=HANGS,
         check=False,
     )
     assert done.returncode == 0, done.stderr
@@ -568,7 +569,7 @@ random_posture(mixed_arm(), 3)
 
 def test_kernels_compile_where_no_cache_can_be_written() -> None:
     command = [sys.executable, "-c", NO_CACHE]
-    subprocess.run(command, cwd=ROOT, timeout=120, check=True)
+    subprocess.run(command, cwd=ROOT, timeout=HANGS, check=True)
 
 
 def test_pickled_values_carry_their_fields_alone() -> None:

@@ -17,6 +17,7 @@ from cdsm.sweep import description, run, store
 from cdsm.sweep.blocks import extents
 from cdsm.sweep.evaluation import Answer, Problem, evaluate
 from cdsm.sweep.question import Question, ask
+from tests.patience import HANGS
 from tests.sweeps import CASES, GRID, STEEL, Deadly, short_arm
 
 ROOT = Path(__file__).parents[1]
@@ -112,7 +113,7 @@ def test_a_killed_run_goes_on_to_the_bits_of_one_that_was_not(tmp_path: Path) ->
     for order in ("0", "1", "2", "die"):  # at the fourth look at the rigidity
         (orders / order).touch()
     command = [sys.executable, "-c", KILLED, str(orders), str(path)]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, timeout=120, check=False)
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, timeout=HANGS, check=False)
     assert done.returncode == -9, done.stderr
     assert not list(orders.iterdir())  # or it would kill the tests themselves
     status = cdsm.read_sweep(path).status

@@ -18,6 +18,7 @@ import cdsm
 from cdsm._checks import Array
 from cdsm.urdf import CROSS_INERTIA, CROSS_MASS
 from tests.arms import mixed_arm, random_arm
+from tests.patience import HANGS
 
 ROOT = Path(__file__).parents[1]
 
@@ -346,7 +347,7 @@ def test_there_is_no_doctype_no_entity_and_no_collision_shape(name: str) -> None
 def check_urdf(path: Path) -> str:
     assert CHECK_URDF is not None
     done = subprocess.run(
-        [CHECK_URDF, str(path)], capture_output=True, text=True, timeout=30, check=False
+        [CHECK_URDF, str(path)], capture_output=True, text=True, timeout=HANGS, check=False
     )
     assert done.returncode == 0, done.stdout + done.stderr
     assert "Error" not in done.stderr

@@ -28,6 +28,7 @@ from cdsm.view.state import GREY
 from cdsm.view.text import _direction, page_text
 from tests import foreign
 from tests.arms import mixed_arm, random_posture
+from tests.patience import HANGS
 
 OUTPUT = Path(__file__).parents[1] / "test-output"
 GEOMETRY: dict[str, Any] = {
@@ -249,11 +250,11 @@ def test_what_is_asked_while_it_works_is_done_once_for_the_newest() -> None:
     def job() -> None:
         seen.append(state[0])
         started.set()
-        assert go_on.wait(60.0)
+        assert go_on.wait(HANGS)
 
     newest = Newest(job)
     newest.ask()
-    assert started.wait(60.0)
+    assert started.wait(HANGS)
     threads = [threading.Thread(target=newest.ask) for _ in range(20)]
     for thread in threads:
         thread.start()
@@ -456,7 +457,7 @@ def test_the_command_serves_until_ctrl_c(tmp_path: Path) -> None:
             assert line, "ended before it served"
             said += line
         process.send_signal(signal.SIGINT)
-        rest, wrong = process.communicate(timeout=60.0)
+        rest, wrong = process.communicate(timeout=HANGS)
     assert process.returncode == 0
     assert re.search(r"shown at http://127\.0\.0\.1:\d+; Ctrl-C ends it", said)
     assert not rest
@@ -479,7 +480,7 @@ CHROMIUM = next(
     ),
     None,
 )
-PATIENCE = 60_000.0
+PATIENCE = 1e3 * HANGS
 """Milliseconds that a condition may take to come; a busy machine draws a frame in seconds."""
 
 

@@ -33,13 +33,11 @@ from rich.table import Table
 import cdsm
 from cdsm._checks import Array
 from tests import strategies, verified
+from tests.patience import HANGS
 
 LOADED = 8
 """Of so many arms one is also brought to rest, one weighed, one buckled and one simulated: each
 takes as long as all the rest."""
-
-HANGS = 120.0
-"""Seconds after which an arm that takes a tenth of one counts as hanging, and Python is ended."""
 
 BLOCK = 400
 """Arms that one process tries."""

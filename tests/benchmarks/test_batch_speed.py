@@ -1,7 +1,4 @@
-"""Speed of the batch, as ratios in the same run; each compares the numbers first.
-
-pytest tests/benchmarks -s        prints what was measured
-"""
+"""Speed of the batch, as ratios in the same run; each compares the numbers first."""
 
 import ctypes
 import os
@@ -17,7 +14,7 @@ import cdsm
 from cdsm._checks import Array
 from tests.benchmarks.naive import NaiveArm, naive_joint_stiffness
 from tests.benchmarks.test_speed import GRAVITY, RIGIDITY, SIZES, arm
-from tests.benchmarks.timing import seconds, speed_ratio
+from tests.benchmarks.timing import Clock, seconds
 
 SCALAR = Path(__file__).parent / "scalar.c"
 
@@ -36,7 +33,7 @@ def per_posture(run: Callable[[], object], rows: int) -> float:
     return min(seconds(run, 1) for _ in range(30)) / rows * 1e6
 
 
-def test_batch_is_ten_thousand_times_faster_than_differences() -> None:
+def test_batch_is_ten_thousand_times_faster_than_differences(clock: Clock | None) -> None:
     rows = 4000
     one, q, tension, wrench = problem(5, rows)
     naive = NaiveArm(5, gravity=GRAVITY, **SIZES)
@@ -50,10 +47,9 @@ def test_batch_is_ten_thousand_times_faster_than_differences() -> None:
     K = batch()["joint"][0]
     # second differences with h = 1e-4 truncate at h² and round at 1e-16/h²; the crosses weigh 1e-6
     np.testing.assert_allclose(K, differences(), atol=1e-6 * abs(K).max())
-    ratio = rows * speed_ratio(
-        differences, batch, lambda ratio: rows * ratio >= 10_000.0, fast_repeat=1
-    )
-    print(f"\nbatch, n = 5, one core: {ratio:.0f} times faster than differences")
+    if clock is None:
+        return
+    print("\nbatch, n = 5:")
     for outputs in (("joint",), ("compliance",), ("joint", "margin")):
         cost = [per_posture(lambda t=t: batch(t, outputs), rows) for t in (1, 2)]  # type: ignore[misc]  # noqa: B023
         # not asserted: other work may hold the second core
@@ -61,12 +57,13 @@ def test_batch_is_ten_thousand_times_faster_than_differences() -> None:
             f"    {' and '.join(outputs)}: {cost[0]:.2f} us a posture, two threads "
             f"{cost[0] / cost[1]:.2f} times faster"
         )
-    assert ratio >= 10_000.0
+    what = "batch, n = 5, one core: faster than differences"
+    clock.race(what, differences, batch, least=10_000.0, rows=rows, fast_repeat=1)
 
 
 @pytest.mark.parametrize(("joints", "rows", "allowed"), [(5, 4000, 2.5), (40, 200, 3.0)])
 def test_batch_costs_little_more_than_scalar_c(
-    joints: int, rows: int, allowed: float, tmp_path: Path
+    joints: int, rows: int, allowed: float, tmp_path: Path, clock: Clock | None
 ) -> None:
     compiler = shutil.which("cc")
     if compiler is None or os.name != "posix":
@@ -97,13 +94,13 @@ def test_batch_costs_little_more_than_scalar_c(
 
     compiled()
     np.testing.assert_allclose(out, batch(), rtol=0.0, atol=1e-12 * abs(out).max())
-    ratio = speed_ratio(batch, compiled, lambda ratio: ratio <= allowed, fast_repeat=1)
-    cost = per_posture(compiled, rows)
-    print(f"\nbatch, n = {joints}: {ratio:.2f} times the {cost:.2f} us of scalar C")
-    assert ratio <= allowed
+    if clock:
+        print(f"\nbatch, n = {joints}: scalar C takes {per_posture(compiled, rows):.2f} us")
+        what = f"batch, n = {joints}: cost over scalar C"
+        clock.race(what, batch, compiled, most=allowed, fast_repeat=1)
 
 
-def test_batched_tension_is_fifteen_times_faster_than_one_by_one() -> None:
+def test_batched_tension_is_fifteen_times_faster_than_one_by_one(clock: Clock | None) -> None:
     rows = 4000
     one, q, _, _ = problem(5, rows)
     pose = one.at(q[0])
@@ -115,13 +112,14 @@ def test_batched_tension_is_fifteen_times_faster_than_one_by_one() -> None:
     assert pull.ok.all()
     single = cdsm.distribute_tension(pose, 5.0).values
     np.testing.assert_allclose(pull.values[0], single, rtol=0.0, atol=1e-9 * single.max())
-    ratio = rows * speed_ratio(
-        lambda: cdsm.distribute_tension(pose, 5.0),
-        batch,
-        lambda ratio: rows * ratio >= 15.0,
-        slow_repeat=50,
-        fast_repeat=1,
-    )
-    cost = per_posture(batch, rows)
-    print(f"\nbatched tension, n = 5: {cost:.2f} us, {ratio:.0f} times faster than one by one")
-    assert ratio >= 15.0
+    if clock:
+        print(f"\nbatched tension, n = 5: {per_posture(batch, rows):.2f} us")
+        clock.race(
+            "batched tension, n = 5: faster than one by one",
+            lambda: cdsm.distribute_tension(pose, 5.0),
+            batch,
+            least=15.0,
+            rows=rows,
+            slow_repeat=50,
+            fast_repeat=1,
+        )

@@ -1,7 +1,7 @@
 """The batch on one core, against other packages on the same core; each compares the numbers first.
 
 pip install 'cdsm-stiffness[bench]'     the other packages: who is absent is skipped by name
-pytest tests/benchmarks -s              prints what was measured
+pytest -m speed -s                      prints what was measured
 """
 
 import os
@@ -20,7 +20,7 @@ from tests.benchmarks.naive import NaiveArm
 from tests.benchmarks.peers import with_casadi, with_jax
 from tests.benchmarks.test_batch_speed import per_posture, problem
 from tests.benchmarks.test_speed import GRAVITY, RIGIDITY, SIZES
-from tests.benchmarks.timing import speed_ratio
+from tests.benchmarks.timing import Clock
 
 
 @pytest.fixture(autouse=True)
@@ -53,7 +53,7 @@ def told(peer: str, joints: int, theirs: float, ours: float) -> str:
     [(5, 4000, 256, 4.0), (10, 400, 64, 8.0), (20, 64, 16, 8.0)],
 )
 def test_batch_is_several_times_faster_than_jax(
-    joints: int, rows: int, chunk: int, needed: float
+    joints: int, rows: int, chunk: int, needed: float, clock: Clock | None
 ) -> None:
     """In chunks that fit the cache, where JAX is fastest: with 5 joints it takes 7 times as long.
 
@@ -71,18 +71,17 @@ def test_batch_is_several_times_faster_than_jax(
 
     # float64 in both: a mode of JAX that is off by default
     np.testing.assert_allclose(batch(), jax(rows), rtol=0.0, atol=1e-12 * abs(batch()).max())
-    ratio = speed_ratio(
-        lambda: jax(chunk), batch, lambda ratio: ratio * rows / chunk >= needed, fast_repeat=1
-    )
-    ratio *= rows / chunk
-    ours, whole = per_posture(batch, rows), per_posture(lambda: jax(rows), rows)
-    print("\n" + told(f"JAX, {chunk} postures at once,", joints, ratio * ours, ours))
-    print(told(f"JAX, {rows} at once,", joints, whole, ours))
-    assert ratio >= needed
+    if clock:
+        ours, whole = per_posture(batch, rows), per_posture(lambda: jax(rows), rows)
+        print("\n" + told(f"JAX, {rows} postures at once,", joints, whole, ours))
+        what = f"batch, n = {joints}: faster than JAX, {chunk} postures at once"
+        clock.race(what, lambda: jax(chunk), batch, least=needed, rows=rows / chunk, fast_repeat=1)
 
 
 @pytest.mark.parametrize(("joints", "rows"), [(5, 1000), (10, 100), (20, 20)])
-def test_batch_computes_what_casadi_does(joints: int, rows: int, tmp_path: Path) -> None:
+def test_batch_computes_what_casadi_does(
+    joints: int, rows: int, tmp_path: Path, clock: Clock | None
+) -> None:
     casadi = pytest.importorskip("casadi", reason="CasADi is not installed")
     one, q, tension, wrench = forces(joints, rows)
     function = with_casadi(NaiveArm(joints, gravity=GRAVITY, **SIZES), RIGIDITY)
@@ -111,11 +110,14 @@ def test_batch_computes_what_casadi_does(joints: int, rows: int, tmp_path: Path)
         out[:] = np.nan
         run()
         np.testing.assert_allclose(batch(), out, rtol=0.0, atol=1e-12 * abs(out).max())
-        print("\n" + told(way, joints, per_posture(run, rows), per_posture(batch, rows)))
+        if clock:
+            print("\n" + told(way, joints, per_posture(run, rows), per_posture(batch, rows)))
 
 
 @pytest.mark.parametrize(("joints", "rows"), [(5, 400), (10, 400), (20, 100)])
-def test_batch_measures_the_cables_as_mujoco_does(joints: int, rows: int) -> None:
+def test_batch_measures_the_cables_as_mujoco_does(
+    joints: int, rows: int, clock: Clock | None
+) -> None:
     """Kinematics and tendons alone: the lengths and their Jacobian are all that MuJoCo computes."""
     mujoco = pytest.importorskip("mujoco", reason="MuJoCo is not installed")
     from tests.mujoco_arms import in_mujoco, tendon_jacobian
@@ -142,5 +144,6 @@ def test_batch_measures_the_cables_as_mujoco_does(joints: int, rows: int) -> Non
         lengths, jacobian = found["cable_lengths"][row], found["length_jacobian"][row]
         np.testing.assert_allclose(lengths, data.ten_length, rtol=0.0, atol=1e-14)
         np.testing.assert_allclose(jacobian, tendon_jacobian(model, data), rtol=0.0, atol=1e-14)
-    cost = per_posture(each, rows), per_posture(batch, rows)
-    print("\n" + told("MuJoCo, lengths and Jacobian alone,", joints, *cost))
+    if clock:
+        cost = per_posture(each, rows), per_posture(batch, rows)
+        print("\n" + told("MuJoCo, lengths and Jacobian alone,", joints, *cost))

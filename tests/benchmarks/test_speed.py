@@ -1,7 +1,4 @@
-"""Speed, as ratios against naive baselines in the same run; each compares the numbers first.
-
-pytest tests/benchmarks -s        prints what was measured
-"""
+"""Speed, as ratios against naive baselines in the same run; each compares the numbers first."""
 
 from typing import Any
 
@@ -11,7 +8,7 @@ import qpsolvers
 
 import cdsm
 from tests.benchmarks.naive import NaiveArm, naive_joint_stiffness
-from tests.benchmarks.timing import speed_ratio
+from tests.benchmarks.timing import Clock
 
 RIGIDITY = 48e3
 GRAVITY = np.array([0.0, -9.81, 0.0])
@@ -36,7 +33,7 @@ def problem(joints: int) -> tuple[cdsm.Manipulator, np.ndarray[Any, Any], np.nda
     return one, rng.uniform(-0.17, 0.17, one.nv), rng.uniform(20.0, 90.0, len(one.cables))
 
 
-def test_posture_and_stiffness_are_1500_times_faster_than_differences() -> None:
+def test_posture_and_stiffness_are_1500_times_faster_than_differences(clock: Clock | None) -> None:
     one, q, tension = problem(5)
     wrench = np.array([1.0, -2.0, 3.0, 0.1, 0.2, -0.1])
     naive = NaiveArm(5, gravity=GRAVITY, **SIZES)
@@ -46,32 +43,35 @@ def test_posture_and_stiffness_are_1500_times_faster_than_differences() -> None:
     # second differences with h = 1e-4 truncate at h² and round at 1e-16/h²; the crosses weigh 1e-6
     np.testing.assert_allclose(fast, slow, atol=1e-6 * abs(fast).max())
 
-    ratio = speed_ratio(
-        lambda: naive_joint_stiffness(naive, q, tension, wrench, RIGIDITY),
-        lambda: cdsm.stiffness(one.at(q), tension, wrench=wrench).joint,
-        lambda ratio: ratio >= 1500.0,
-    )
-    print(f"\nposture + stiffness, n = 5: {ratio:.0f} times faster than differences")
-    assert ratio >= 1500.0
+    if clock:
+        clock.race(
+            "posture + stiffness, n = 5: faster than differences",
+            lambda: naive_joint_stiffness(naive, q, tension, wrench, RIGIDITY),
+            lambda: cdsm.stiffness(one.at(q), tension, wrench=wrench).joint,
+            least=1500.0,
+        )
 
 
-def test_cost_grows_less_than_fourfold_from_5_to_20_joints() -> None:
+@pytest.mark.speed
+@pytest.mark.parametrize("clock", ["speed"], indirect=True)
+def test_cost_grows_less_than_fourfold_from_5_to_20_joints(clock: Clock) -> None:
     small, q5, tension5 = problem(5)
     large, q20, tension20 = problem(20)
-    ratio = speed_ratio(
+    clock.race(
+        "posture + stiffness: cost of n = 20 over n = 5",
         lambda: cdsm.stiffness(large.at(q20), tension20),
         lambda: cdsm.stiffness(small.at(q5), tension5),
-        lambda ratio: ratio < 4.0,
+        most=4.0,
         slow_repeat=50,
     )
-    print(f"\nposture + stiffness: n = 20 costs {ratio:.2f} times n = 5")
-    assert ratio < 4.0
 
 
 # OSQP announces a change of its defaults at every call
 @pytest.mark.filterwarnings("ignore:The default value of raise_error")
 @pytest.mark.filterwarnings("ignore::qpsolvers.warnings.SparseConversionWarning")
-def test_tension_distribution_is_ten_times_faster_than_osqp_with_defaults() -> None:
+def test_tension_distribution_is_ten_times_faster_than_osqp_with_defaults(
+    clock: Clock | None,
+) -> None:
     one, q, _ = problem(5)
     pose = one.at(q)
     count = len(one.cables)
@@ -89,11 +89,11 @@ def test_tension_distribution_is_ten_times_faster_than_osqp_with_defaults() -> N
     # what the defaults are worth: within a few newtons
     np.testing.assert_allclose(approximate, exact, atol=3.0)
 
-    ratio = speed_ratio(
-        lambda: qpsolvers.solve_problem(qp, "osqp"),
-        lambda: cdsm.distribute_tension(pose, 20.0),
-        lambda ratio: ratio >= 10.0,
-        slow_repeat=5,
-    )
-    print(f"\ntension distribution, n = 5: {ratio:.1f} times faster than OSQP with its defaults")
-    assert ratio >= 10.0
+    if clock:
+        clock.race(
+            "tension distribution, n = 5: faster than OSQP with its defaults",
+            lambda: qpsolvers.solve_problem(qp, "osqp"),
+            lambda: cdsm.distribute_tension(pose, 20.0),
+            least=10.0,
+            slow_repeat=5,
+        )

@@ -3,35 +3,62 @@
 import math
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 
 
-def seconds(run: Callable[[], object], repeat: int) -> float:
+def seconds(
+    run: Callable[[], object], repeat: int, watch: Callable[[], float] = time.perf_counter
+) -> float:
     """Time per call over some calls."""
-    start = time.perf_counter()
+    start = watch()
     for _ in range(repeat):
         run()
-    return (time.perf_counter() - start) / repeat
+    return (watch() - start) / repeat
 
 
-def speed_ratio(
-    slow: Callable[[], object],
-    fast: Callable[[], object],
-    settled: Callable[[float], bool],
-    *,
-    slow_repeat: int = 1,
-    fast_repeat: int = 200,
-    rounds: int = 30,
-) -> float:
-    """How many times longer ``slow`` takes than ``fast``: best against best of alternating rounds.
+@dataclass(frozen=True)
+class Clock:
+    """Times what a benchmark has shown to be equal.
 
-    The best round is the one that nothing else on the machine disturbed. On a busy machine it may
-    take long to come: while the ratio is not ``settled``, up to four times the rounds are run.
+    Attributes:
+        tell: Takes a line of the table of ratios: what, the ratio, and the one that is wanted.
     """
-    slow(), fast()  # warm up: compile, fill caches
-    best_slow = best_fast = math.inf
-    for round_ in range(4 * rounds):
-        best_slow = min(best_slow, seconds(slow, slow_repeat))
-        best_fast = min(best_fast, seconds(fast, fast_repeat))
-        if round_ >= rounds and settled(best_slow / best_fast):
-            break
-    return best_slow / best_fast
+
+    tell: Callable[[tuple[str, str, str]], None]
+
+    def race(
+        self,
+        what: str,
+        slow: Callable[[], object],
+        fast: Callable[[], object],
+        *,
+        least: float = 0.0,
+        most: float = math.inf,
+        rows: float = 1.0,
+        slow_repeat: int = 1,
+        fast_repeat: int = 200,
+        rounds: int = 30,
+    ) -> float:
+        """How many times longer ``slow`` takes than ``fast``: best against best of some rounds.
+
+        Time is that of the processor, so that waiting for it does not count. The best round is the
+        one whose caches nothing else emptied. On a busy machine it may take long to come: while the
+        ratio is not what is wanted, up to four times the rounds are run. ``rows`` are the postures
+        of a call of ``fast`` for each of ``slow``.
+
+        Raises:
+            AssertionError: The ratio is below ``least`` or above ``most``.
+        """
+        slow(), fast()  # warm up: compile, fill caches
+        best_slow = best_fast = math.inf
+        ratio = math.nan
+        for round_ in range(4 * rounds):
+            best_slow = min(best_slow, seconds(slow, slow_repeat, time.process_time))
+            best_fast = min(best_fast, seconds(fast, fast_repeat, time.process_time))
+            ratio = rows * best_slow / best_fast
+            if round_ >= rounds and least <= ratio <= most:
+                break
+        wanted = f"at least {least:g}" if math.isinf(most) else f"at most {most:g}"
+        self.tell((what, f"{ratio:.3g}", wanted))
+        assert least <= ratio <= most, f"{what}: {ratio:.3g} times, wanted {wanted}"
+        return ratio
