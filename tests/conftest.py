@@ -22,10 +22,11 @@ NOT_QUICK = ("slow", "long", "speed")
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark ``quick`` every test that nothing else is said of; notebooks are not."""
+    """Mark ``quick`` every test that nothing else is said of; the paper and notebooks are slow."""
     for item in items:
-        marked = any(item.get_closest_marker(name) for name in NOT_QUICK)
-        if not marked and item.path.suffix == ".py":
+        if item.path.suffix == ".ipynb" or "results" in getattr(item, "fixturenames", ()):
+            item.add_marker("slow")
+        if not any(item.get_closest_marker(name) for name in NOT_QUICK):
             item.add_marker("quick")
 
 

@@ -19,6 +19,7 @@ SHORT = 24
 """Arms of each kind."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", strategies.ARMS)
 def test_arms_give_verified_numbers_or_an_error_of_ours(kind: str) -> None:
     counts = tried(kind, SHORT)

@@ -41,6 +41,7 @@ def geometry(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_reproduce_writes_figures_table_and_numbers(tmp_path: Path) -> None:
     result = call("reproduce", "--out", tmp_path / "new" / "folder")
     assert result.exit_code == 0, result.output

@@ -184,6 +184,7 @@ class _Fork(NamedTuple):
         return lengths, jacobian, hessian
 
 
+@pytest.mark.slow
 def test_segment_between_two_branches_of_a_tree() -> None:
     """No arm of a Geometry branches; the kernels take trees all the same."""
     rows = [

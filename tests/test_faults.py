@@ -22,6 +22,8 @@ import cdsm
 from tests.patience import HANGS
 from tests.sweeps import short_arm
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parents[1]
 
 NAMESPACE = (

@@ -46,6 +46,7 @@ def test_mutated_stores_are_refused_or_read(name: str, folder: Path) -> None:
     assert_some_are_read(Counter(spoilt(name, folder, SHORT // 2, seed=1)))
 
 
+@pytest.mark.slow
 def test_mutated_netcdf_is_refused_or_read_and_crashes_nothing() -> None:
     # a process of its own reads it: netCDF's library is C
     assert_some_are_read(read("netcdf", 1, SHORT))
@@ -82,6 +83,7 @@ def assert_refused_or_read(results: list[dict[str, str]]) -> None:
         assert float(each["seconds"]) < SECONDS, each
 
 
+@pytest.mark.slow
 def test_billion_laughs_entities_and_deep_nesting_are_refused(folder: Path) -> None:
     results = attacked(folder, 1_500_000, "linear wire", "urdf")
     assert_refused_or_read(results)
@@ -209,6 +211,7 @@ for name, inside in ROBOTS.items():
 """
 
 
+@pytest.mark.slow
 def test_robots_that_crash_pinocchio_are_refused() -> None:
     done = subprocess.run(
         [sys.executable, "-W", "error", "-c", _CRASH],

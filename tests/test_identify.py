@@ -99,6 +99,7 @@ def test_parameters_are_recovered_from_measurements_without_noise(minimum: bool)
     assert found.arm == prototype(**found.parameters)
 
 
+@pytest.mark.slow
 def test_intervals_hold_the_true_parameters_as_often_as_they_say() -> None:
     seeds = 64
     held = {level: dict.fromkeys(TRUE, 0) for level in (0.95, 0.68)}
@@ -155,6 +156,7 @@ def test_covariance_is_the_inverse_of_the_normal_matrix_and_grows_with_the_std()
         assert interval == pytest.approx(NOISY.confidence(scaled=True)[name], rel=1e-4)
 
 
+@pytest.mark.slow
 def test_every_start_and_order_of_parameters_leads_to_the_same_optimum() -> None:
     for start in (
         {"hole_radius": 0.021, "drive": 9e5, "lead": 0.06},
@@ -166,11 +168,13 @@ def test_every_start_and_order_of_parameters_leads_to_the_same_optimum() -> None
     assert turned.parameters == pytest.approx(NOISY.parameters, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_identification_gives_the_same_bits_twice() -> None:
     again = identify(prototype, NOISY.measurements, FREE)
     np.testing.assert_array_equal(again.values, NOISY.values)
 
 
+@pytest.mark.slow
 def test_a_tension_offset_is_found_through_tension_of() -> None:
     def tension_of(
         pose: cdsm.Posture, measurement: Measurement, *, offset: float, **rest: float
@@ -204,6 +208,7 @@ def test_tension_of_may_distribute() -> None:
     assert found.parameters["offset"] == pytest.approx(3.0, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_a_wrench_beside_measured_tensions_is_part_of_the_prediction() -> None:
     arm, wrench, pull = prototype(mass=0.5), (0.0, 0.0, -10.0, 0.0, 0.0, 0.0), (40.0,) * 6
     exact = []
@@ -228,6 +233,7 @@ def by_sum(tube: float, motor: float, drive: float = 4e4) -> cdsm.Manipulator:
     return prototype(lead=tube + motor, drive=drive)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("model_of", "true", "free", "pair"),
     [

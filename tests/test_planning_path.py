@@ -101,6 +101,7 @@ def test_path_of_tips_is_that_of_the_angles_that_lead_there() -> None:
     np.testing.assert_allclose(again.tensions, plan.tensions, rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_several_directions_and_matrices_are_hit_at_every_sample() -> None:
     q = waving(3)
     held = [cdsm.stiffness(ARM.at(a), cdsm.distribute_tension(ARM.at(a), 60.0)) for a in q]
@@ -152,6 +153,7 @@ def test_hung_weight_measures_what_was_planned_while_the_arm_carries_another() -
         assert 2.0 / sum(soft) == pytest.approx(plan.target[k], rel=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 5, 9])
 def test_random_arms_keep_to_their_targets_and_rates(seed: int) -> None:
     """Strands that jump at 31 N, tables and straight wires; wrenches with a moment."""
@@ -201,6 +203,7 @@ def test_target_that_jumps_is_hit_again_when_the_motors_are_there(rate: float, l
         assert f"{rate:g} N are allowed" in plan.infeasible[0].reason
 
 
+@pytest.mark.slow
 def test_ramp_is_anticipated_where_other_tensions_of_the_same_stiffness_lead_there(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -82,6 +82,7 @@ def random_target(seed: int) -> tuple[cdsm.Posture, Array, float] | None:
     return pose, found.direction, found.low + rng.uniform(0.05, 0.95) * (found.high - found.low)
 
 
+@pytest.mark.slow
 def test_fifty_random_arms_are_as_stiff_as_planned_under_a_hung_weight() -> None:
     """Measured by the nonlinear equilibrium with locked motors, up and down, within 1e-4."""
     reached = {"linear": 0, "strand": 0}
@@ -154,6 +155,7 @@ def test_tensions_satisfy_the_conditions_of_first_order(name: str, part: float) 
     assert z[at_high].max(initial=0.0) < 1e-6 * np.linalg.norm(F)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("part", [0.1, 0.5, 0.9])
 @pytest.mark.parametrize("name", [name for name in ARMS if name.startswith("hinged")])
 def test_smaller_tensions_all_miss_the_target_on_the_same_side(name: str, part: float) -> None:
@@ -183,6 +185,7 @@ def test_smaller_tensions_all_miss_the_target_on_the_same_side(name: str, part: 
     assert tried > 1000
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("seed", "joints", "kind", "law", "low"),
     [
@@ -312,6 +315,7 @@ def strand_case(seed: int) -> tuple[cdsm.Posture, Array, float, float]:
     return pose, rng.normal(size=3), low, high
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [111, 113, 127])
 def test_ends_of_the_range_and_all_beside_them_are_reached(seed: int) -> None:
     """Next to buckling all that is left of the stiffness is a difference, and a piece is thin."""

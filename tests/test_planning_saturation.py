@@ -55,6 +55,7 @@ def along(pose: cdsm.Posture, wrench: ArrayLike = (0.0,) * 6) -> Callable[[Array
 # --- the slope ------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["prototype", "universal-3-8-all", "hinged-4-0-all"])
 @pytest.mark.parametrize("moment", [False, True])
 def test_slope_of_the_curve_is_the_derivative(name: str, moment: bool) -> None:

@@ -650,6 +650,7 @@ def test_table_that_bends_at_each_of_its_points_is_no_reason_for_distrust(seed: 
         assert each.verdict != "DIFFERS", each.reason
 
 
+@pytest.mark.slow
 def test_planned_tensions_are_not_asked_to_be_the_least() -> None:
     pose = virtual()
     attainable = cdsm.stiffness_range(pose, (0.0, 0.0, 1.0), 15.0, 300.0)

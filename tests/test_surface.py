@@ -536,6 +536,7 @@ json.dump(answer, sys.stdout)
 """
 
 
+@pytest.mark.slow
 def test_kernels_give_the_same_without_compilation() -> None:
     done = subprocess.run(
         [sys.executable, "-c", PLAIN_PYTHON],
@@ -567,6 +568,7 @@ random_posture(mixed_arm(), 3)
 """
 
 
+@pytest.mark.slow
 def test_kernels_compile_where_no_cache_can_be_written() -> None:
     command = [sys.executable, "-c", NO_CACHE]
     subprocess.run(command, cwd=ROOT, timeout=HANGS, check=True)

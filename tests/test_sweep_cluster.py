@@ -15,6 +15,8 @@ from cdsm.sweep import cluster, run
 from tests.sweeps import CASES, EVERYTHING, GRID, Deadly, short_arm
 from tests.test_sweep import Plain
 
+pytestmark = pytest.mark.slow
+
 POSES = cdsm.RandomPoses(64, 1)
 
 

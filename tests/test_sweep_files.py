@@ -113,6 +113,7 @@ def test_what_is_no_sweep_is_named(tmp_path: Path, everything: xr.Dataset) -> No
         cdsm.read_sweep(tmp_path / "other.nc")
 
 
+@pytest.mark.slow
 def test_a_status_without_a_meaning_is_named(tmp_path: Path, everything: xr.Dataset) -> None:
     damaged = everything.copy(deep=True)
     damaged["status"].values.flat[3] = 64

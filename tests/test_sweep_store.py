@@ -107,6 +107,7 @@ cdsm.sweep(short_arm(Deadly(sys.argv[1])), poses, minimum=20.0, store=sys.argv[2
 """
 
 
+@pytest.mark.slow
 def test_a_killed_run_goes_on_to_the_bits_of_one_that_was_not(tmp_path: Path) -> None:
     orders, path = tmp_path / "orders", tmp_path / "s.zarr"
     orders.mkdir()

@@ -196,6 +196,7 @@ def test_rupture_is_left_out() -> None:
 # --- band, report, figure -------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["monotone", "polynomial"])
 @pytest.mark.parametrize("law", ["linear", "strand"])
 def test_band_covers_the_truth_about_as_often_as_it_says(law: str, method: str) -> None:

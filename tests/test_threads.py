@@ -70,6 +70,7 @@ def test_two_arms_in_turn_in_one_thread_give_the_bits_of_each_alone() -> None:
         assert [list(column) for column in zip(*turns, strict=True)] == alone
 
 
+@pytest.mark.slow
 def test_processes_with_a_pickled_arm_give_the_same_bits() -> None:
     arm, seeds = mixed_arm(), range(20)
     pool: Executor

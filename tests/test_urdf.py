@@ -368,6 +368,7 @@ def test_check_urdf_accepts_the_shipped_file(name: str) -> None:
     check_urdf(ROOT / "urdf" / f"{name}.urdf")
 
 
+@pytest.mark.slow
 def test_hundred_universal_joints_survive_the_parsers(tmp_path: Path) -> None:
     geometry = cdsm.Geometry.universal(
         joints=100,

@@ -441,6 +441,7 @@ def test_the_server_prints_nothing_and_closes_twice(capfd: pytest.CaptureFixture
     assert capfd.readouterr() == ("", "")
 
 
+@pytest.mark.slow
 @needs_viser
 def test_the_command_serves_until_ctrl_c(tmp_path: Path) -> None:
     lines = [f"{name} = {value}" for name, value in GEOMETRY.items()]
@@ -570,6 +571,7 @@ def answers(
 
 
 # first of those with a page: the keys that move a slider turn viser's camera, too
+@pytest.mark.slow
 @needs_viser
 def test_the_picture_shows_the_arm_and_the_ellipsoid(page: Page) -> None:
     page.says("condition", "STABLE")
