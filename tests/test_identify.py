@@ -99,7 +99,7 @@ def test_parameters_are_recovered_from_measurements_without_noise(minimum: bool)
     assert found.arm == prototype(**found.parameters)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_intervals_hold_the_true_parameters_as_often_as_they_say() -> None:
     seeds = 64
     held = {level: dict.fromkeys(TRUE, 0) for level in (0.95, 0.68)}
@@ -359,6 +359,7 @@ def test_no_freedom_left_leaves_scaled_intervals_without_end() -> None:
     assert found.freedom == 0
     assert found.reduced_chi_square == math.inf
     assert found.confidence(scaled=True)["lead"] == (-math.inf, math.inf)
+    assert all(map(math.isfinite, found.confidence()["lead"]))
 
 
 # --- the result -----------------------------------------------------------------------------

@@ -1,7 +1,8 @@
 """Parameters of an arm from stiffnesses measured on it."""
 
 from cdsm.identification.measurement import Measurement
+from cdsm.identification.profile import Profile
 from cdsm.identification.result import Identification
 from cdsm.identification.search import identify
 
-__all__ = ["Identification", "Measurement", "identify"]
+__all__ = ["Identification", "Measurement", "Profile", "identify"]

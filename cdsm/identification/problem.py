@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -14,14 +15,12 @@ from cdsm._checks import (
     Array,
 )
 from cdsm.errors import CdsmError, InvalidInput, SingularStiffness
+from cdsm.identification.box import Box
 from cdsm.identification.measurement import Measurement, label
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.stiffness import stiffness
 from cdsm.tension import Tension, distribute_tension
-
-_DECADES = 100.0
-"""Ratio of positive bounds beyond which a parameter is searched by its logarithm."""
 
 
 class NoStiffnessError(Exception):
@@ -53,33 +52,9 @@ class Problem:
         self._value = np.array([each.value for each in measurements])
         self._std = np.array([each.std for each in measurements])
         self.names = names
-        self.low, self.high = bounds.T
-        self._by_log = (self.low > 0.0) & (self.high > _DECADES * self.low)
-        self._ratio = np.where(self._by_log, self.high / np.where(self._by_log, self.low, 1), 1.0)
-        self._last: tuple[bytes, Array] = (b"", self._value)
-
-    def parameters(self, point: Array) -> Array:
-        """Parameters (P,) in own units at a point of the unit cube."""
-        values = np.where(
-            self._by_log,
-            self.low * self._ratio**point,
-            self.low + point * (self.high - self.low),
-        )
-        # the bounds themselves at 0 and 1, whatever rounding says
-        values = np.where(point == 1.0, self.high, values)
-        return np.asarray(np.clip(values, self.low, self.high), dtype=np.float64)
-
-    def point(self, values: Array) -> Array:
-        """Inverse of :meth:`parameters`."""
-        linear = (values - self.low) / (self.high - self.low)
-        safe = np.where(self._by_log, values / np.where(self._by_log, self.low, 1.0), 1.0)
-        by_log = np.log(safe) / np.where(self._by_log, np.log(self._ratio), 1.0)
-        return np.asarray(np.clip(np.where(self._by_log, by_log, linear), 0.0, 1.0))
-
-    def stretch(self, point: Array) -> Array:
-        """Derivative of :meth:`parameters` (P,)."""
-        by_log = self.parameters(point) * np.log(self._ratio)
-        return np.where(self._by_log, by_log, self.high - self.low)
+        self.box = Box(bounds)
+        # the searches come back to a point after the differences around it
+        self._residuals = lru_cache(maxsize=64)(self._evaluated)
 
     def predict(self, point: Array) -> tuple[Manipulator, Array]:
         """The arm and its stiffnesses (n,) [N/m].
@@ -87,7 +62,7 @@ class Problem:
         Raises:
             NoStiffnessError: It has none for a measurement.
         """
-        given = dict(zip(self.names, self.parameters(point).tolist(), strict=True))
+        given = dict(zip(self.names, self.box.parameters(point).tolist(), strict=True))
         try:
             arm = _called("model_of", self._model_of, given)
         except CdsmError as error:
@@ -129,32 +104,34 @@ class Problem:
 
     def residuals(self, point: Array) -> Array:
         """Residuals r (n,) in σ; inf, from which the searches step back, if there are none."""
-        key = point.tobytes()
-        if self._last[0] != key:
-            try:
-                r = (self.predict(point)[1] - self._value) / self._std
-            except NoStiffnessError:
-                r = np.full(self._value.shape, math.inf)
-            self._last = key, r
-        return self._last[1].copy()
+        return self._residuals(point.tobytes()).copy()
+
+    def _evaluated(self, point: bytes) -> Array:
+        try:
+            r = (self.predict(np.frombuffer(point))[1] - self._value) / self._std
+        except NoStiffnessError:
+            r = np.full(self._value.shape, math.inf)
+        return np.asarray(r)
 
     def cost(self, point: Array) -> float:
         """χ² at a point."""
         r = self.residuals(point)
         return float(r @ r)
 
-    def slopes(self, point: Array) -> Array:
-        """∂r/∂point (n, P) by one-sided differences."""
-        return self._differences(point, 1e-7, central=False)
+    def slopes(self, point: Array, over: Sequence[int] | None = None) -> Array:
+        """∂r/∂point (n, P) by one-sided differences; of some parameters alone, if given."""
+        return self._differences(point, 1e-7, over, central=False)
 
     def central_slopes(self, point: Array) -> Array:
         """∂r/∂point (n, P) by differences of second order."""
-        return self._differences(point, 1e-5, central=True)
+        return self._differences(point, 1e-5, None, central=True)
 
-    def _differences(self, point: Array, step: float, *, central: bool) -> Array:
+    def _differences(
+        self, point: Array, step: float, over: Sequence[int] | None, *, central: bool
+    ) -> Array:
         here = self.residuals(point)
         columns = []
-        for i, name in enumerate(self.names):
+        for i in range(len(self.names)) if over is None else over:
 
             def at(k: int, i: int = i) -> Array | None:
                 """Residuals k steps off; None beyond the bounds or where there are none."""
@@ -183,14 +160,15 @@ class Problem:
                 raise InvalidInput(
                     "free",
                     f"at {self.written(point)} the model has a stiffness for all measurements, "
-                    f"but beside it, in {name}, it has none either way. Change the bounds.",
+                    f"but beside it, in {self.names[i]}, it has none either way. Change the "
+                    "bounds.",
                 )
             columns.append(column)
         return np.column_stack(columns)
 
     def written(self, point: Array) -> str:
         """A point in own units, for a sentence."""
-        values = self.parameters(point)
+        values = self.box.parameters(point)
         return ", ".join(f"{n} = {x:.6g}" for n, x in zip(self.names, values, strict=True))
 
 

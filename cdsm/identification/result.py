@@ -19,16 +19,11 @@ from cdsm._checks import (
 )
 from cdsm.errors import InvalidInput
 from cdsm.identification.measurement import Measurement, label
+from cdsm.identification.profile import LOWER, SAME, Profile, Side
 from cdsm.manipulator import Manipulator
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-SAME = 1e-6
-"""Smallest singular value of the Jacobian, columns of unit length, that counts for the rank.
-
-The central differences behind it leave some 1e-10.
-"""
 
 
 @final
@@ -48,6 +43,8 @@ class Identification(ReadOnlyState):
         jacobian: J = ∂r/∂p (n, P), r in standard deviations [-], p in own units (m, kg, N/m, …).
         arm: The model with these values.
         warnings: What not to trust, a sentence each, naming the parameters; empty if all is well.
+        profiles: How χ² rises as each parameter leaves its value and the others follow, one
+            :class:`Profile` each; None where a parameter is not determined.
     """
 
     names: tuple[str, ...]
@@ -58,6 +55,7 @@ class Identification(ReadOnlyState):
     jacobian: Array
     arm: Manipulator
     warnings: tuple[str, ...]
+    profiles: tuple[Profile | None, ...]
 
     @property
     def parameters(self) -> dict[str, float]:
@@ -128,30 +126,31 @@ class Identification(ReadOnlyState):
     def confidence(
         self, level: float = 0.95, *, scaled: bool = False
     ) -> dict[str, tuple[float, float]]:
-        """Intervals value ± z·std that hold each true parameter with this probability.
+        """Intervals that hold each true parameter with this probability, in own units (m, kg, …).
 
-        Linear about the optimum, and blind to the bounds. In own units (m, kg, N/m, …).
+        By profile likelihood: the values p_i where the best fit with p_i held, the other parameters
+        within their bounds, has Δχ² ≤ q², with q the quantile of a normal variable. For a linear
+        model that is value ± q·std; else it need not be symmetric. An end is -inf or inf where Δχ²
+        stays below q² up to the parameter's own bound, or up to where the model ends: there the
+        measurements set no end, and :attr:`warnings` say so at 95 %.
 
         Args:
             level: The probability, between 0 and 1.
-            scaled: Take the σ as known up to a common factor, which χ² tells: z is Student's, and
-                std grows by √(reduced χ²).
+            scaled: Take the σ as known up to a common factor, which χ² tells: q is the quantile of
+                Student's t times √(reduced χ²).
 
         Raises:
-            InvalidInput: The level is not between 0 and 1.
+            InvalidInput: The level is not between 0 and 1, or so near to 1 that the profiles do not
+                reach there.
         """
         level = scalar("level", level)
         if not 0.0 < level < 1.0:
             raise InvalidInput("level", f"{level:g} given; it must lie between 0 and 1, as 0.95.")
-        half = (1.0 + level) / 2.0
-        if not scaled:
-            width = ndtri(half) * self.std
-        elif self.freedom:
-            width = stdtrit(self.freedom, half) * math.sqrt(self.reduced_chi_square) * self.std
-        else:
-            width = np.full(self.std.shape, math.inf)
-        low, high = (self.values - width).tolist(), (self.values + width).tolist()
-        return dict(zip(self.names, zip(low, high, strict=True), strict=True))
+        rise = self._rise(level, scaled=scaled)
+        return {
+            name: (self._end(i, rise, -1, level), self._end(i, rise, 1, level))
+            for i, name in enumerate(self.names)
+        }
 
     def plot(self) -> Figure:
         """Predicted over measured [N/mm], and every residual in standard deviations."""
@@ -226,6 +225,38 @@ class Identification(ReadOnlyState):
             f"rank {self.rank} of {len(self.names)}"
         )
 
+    def _rise(self, level: float, *, scaled: bool) -> float:
+        """Δχ² [-] at the ends of an interval."""
+        half = (1.0 + level) / 2.0
+        if not scaled:
+            return float(ndtri(half) ** 2)
+        if not self.freedom:
+            return math.inf
+        return float(stdtrit(self.freedom, half) ** 2) * self.reduced_chi_square
+
+    def _end(self, i: int, rise: float, side: Side, level: float) -> float:
+        profile = self.profiles[i]
+        if profile is None or math.isinf(rise):
+            return side * math.inf
+        end = profile.crossing(rise, side)
+        if end is None:
+            raise InvalidInput(
+                "level",
+                f"{level:.10g} given; the profile of {self.names[i]} does not reach there. Give a "
+                "level farther from 1.",
+            )
+        return end
+
+    @property
+    def _goals(self) -> tuple[list[float], float]:
+        """Δχ² [-] at the ends of 95 % intervals, rising, and how far profiles go for others."""
+        exact, far = [self._rise(0.95, scaled=False)], self._rise(0.999, scaled=False)
+        if self.freedom:
+            exact.append(self._rise(0.95, scaled=True))
+            far = max(far, self._rise(0.99, scaled=True))
+        # of measurements without noise χ² is rounding, and what it scales
+        return sorted(rise for rise in exact if rise > LOWER), far
+
     @cached_property
     def _lengths(self) -> Array:
         """Lengths of the columns of J (P,), and 1 for a column of nothing."""
@@ -252,6 +283,12 @@ class Identification(ReadOnlyState):
         projector: Array = loose.T @ loose
         return np.where(abs(projector) > 1e-8, projector, 0.0)
 
+    @cached_property
+    def _leading(self) -> Any:
+        """A parameter for each combination not determined: without them the others are."""
+        loose = self._spectrum[2][~self._kept]
+        return qr(loose, mode="r", pivoting=True)[1][: len(loose)]
+
     @property
     def _undetermined(self) -> list[str]:
         """The combinations that change no prediction, written out: "a by +1 and b by -0.3"."""
@@ -259,7 +296,7 @@ class Identification(ReadOnlyState):
         if not len(loose):
             return []
         # one leading parameter to each combination, and to no other, reads best
-        leading = qr(loose, mode="r", pivoting=True)[1][: len(loose)]
+        leading = self._leading
         loose = np.linalg.solve(loose[:, leading], loose)
         scale = np.where(np.isinf(self._lengths), 1.0, self._lengths)
         written = []

@@ -18,7 +18,6 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import least_squares
-from scipy.special import chdtrc
 
 from cdsm._checks import (
     Array,
@@ -28,20 +27,13 @@ from cdsm._checks import (
     vector,
 )
 from cdsm.errors import InvalidInput, UnknownName
+from cdsm.identification.doubts import doubts, unfinished
 from cdsm.identification.measurement import Measurement
 from cdsm.identification.problem import NoStiffnessError, Problem, UserFaultError
-from cdsm.identification.result import SAME, Identification
+from cdsm.identification.profile import LowerError, Profile, Profiler
+from cdsm.identification.result import Identification
 from cdsm.manipulator import Manipulator
 from cdsm.tension import Tension
-
-CORRELATED = 0.95
-"""Correlation of two parameters beyond which a warning names them."""
-
-_UNLIKELY = 1e-3
-"""Probability of the χ² found, below which the model does not explain the measurements."""
-
-_UNFINISHED = 1e-3
-"""Fall of χ² that a search may leave to be had; 1 would be one standard deviation."""
 
 _ON_BOUND = 1e-9
 """A parameter this near to a bound, as part of their distance, is on it."""
@@ -63,6 +55,9 @@ def identify(
     K_i(p) = ``stiffness(arm.at(angles), tension, wrench).along(direction)`` with
     ``arm = model_of(**p)``. Where the model has no stable stiffness, or a tension leaves the domain
     of an elasticity, the search turns back.
+
+    A prediction of all measurements is what takes time. The search takes some 50 P of them, the
+    profiles of :meth:`Identification.confidence` some 20 P².
 
     ::
 
@@ -106,7 +101,11 @@ def identify(
     problem = Problem(model_of, tension_of, measurements, names, bounds)
     try:
         best = _optimum(problem, _starts(problem, start))
-        return _result(problem, best)
+        while True:
+            try:
+                return _result(problem, best)
+            except LowerError as lower:  # a profile has led to a deeper valley
+                best = min(_optimum(problem, [lower.point]), lower.point, key=problem.cost)
     except UserFaultError as fault:
         raise InvalidInput(
             fault.name,
@@ -173,7 +172,7 @@ def _starts(problem: Problem, start: Mapping[str, float] | None) -> list[Array]:
         spread = qmc.Halton(count, scramble=False).random(_CANDIDATES)[1:]
         points = [np.full(count, 0.5), *spread]
     else:
-        points = [problem.point(_checked_start(problem, start))]
+        points = [problem.box.point(_checked_start(problem, start))]
     # a search that starts on a bound may take it for the optimum
     points = [np.clip(point, 1e-6, 1.0 - 1e-6) for point in points]
     usable = [point for point in points if math.isfinite(problem.cost(point))]
@@ -198,7 +197,7 @@ def _checked_start(problem: Problem, start: Mapping[str, float]) -> Array:
         )
     values = np.array([scalar(f"start[{name!r}]", start[name]) for name in problem.names])
     for name, value, low, high in zip(
-        problem.names, values, problem.low, problem.high, strict=True
+        problem.names, values, problem.box.low, problem.box.high, strict=True
     ):
         if not low <= value <= high:
             raise InvalidInput(
@@ -241,85 +240,38 @@ def _search(
     return np.asarray(found.x, dtype=np.float64)
 
 
-def _sentences(result: Identification, at_bound: Array) -> list[str]:
-    """What not to trust in a result."""
-    sentences = [
-        f"not identifiable (rank {result.rank} of {len(result.names)}): no prediction changes with "
-        f"{combination}, so their values are one choice of many. Fix one, or measure what tells "
-        "them apart."
-        for combination in result._undetermined
-    ]
-    correlation, std = result.correlation, result.std
-    for i, name in enumerate(result.names):
-        for j in range(i):
-            if abs(correlation[i, j]) > CORRELATED and math.isfinite(std[i]):
-                sentences.append(
-                    f"{result.names[j]} and {name} are correlated at {correlation[i, j]:+.4f}: "
-                    "mostly a combination of them is determined. Measure at other postures, "
-                    "directions or tensions."
-                )
-    for i, name in enumerate(result.names):
-        low, high = result.bounds[i]
-        if at_bound[i]:
-            side, limit = ("lower", low) if result.values[i] == low else ("upper", high)
-            sentences.append(
-                f"{name} is at its {side} bound, {limit:g}: the optimum lies there or beyond, and "
-                "its interval does not hold. Widen the bounds, or doubt the model."
-            )
-        if high - low < std[i] < math.inf:
-            sentences.append(
-                f"{name} is known to ±{std[i]:.2g} only, more than its bounds are apart: it is the "
-                "bounds that determine it, not the measurements."
-            )
-    if result.freedom and chdtrc(result.freedom, result.chi_square) < _UNLIKELY:
-        worst = int(abs(result.residuals).argmax())
-        sentences.append(
-            f"the model does not explain the measurements within their σ: χ² = "
-            f"{result.chi_square:.4g} with {result.freedom} degrees of freedom, worst at "
-            f"{result._labels[worst]} with {result.residuals[worst]:+.3g} σ. The intervals hold "
-            "for a right model only."
-        )
-    return sentences
-
-
-def _unfinished(problem: Problem, point: Array, slopes: Array) -> list[str]:
-    """Say so if χ² could fall further, as where the model ends on the way to the optimum."""
-    r = problem.residuals(point)
-    gradient = r @ slopes
-    held = ((point == 0.0) & (gradient >= 0.0)) | ((point == 1.0) & (gradient <= 0.0))
-    if held.all():
-        return []
-    step = np.zeros_like(point)
-    step[~held] = np.linalg.lstsq(slopes[:, ~held], -r, rcond=SAME)[0]
-    fall = float(np.sum((slopes @ step) ** 2))
-    if fall < _UNFINISHED:
-        return []
-    reason = "Give another start."
-    # the edge of the model is near if the search stopped for it
-    try:
-        size = 1e-3 / max(1e-3, float(abs(step).max()))
-        problem.predict(np.clip(point + size * step, 0.0, 1.0))
-    except NoStiffnessError as error:
-        reason = f"It lies beyond the edge of the model: {error}"
-    return [
-        f"no optimum within the bounds: χ² would still fall by about {fall:.3g} on the way from "
-        f"{problem.written(point)}. {reason}"
-    ]
-
-
 def _result(problem: Problem, best: Array) -> Identification:
     arm, predicted = problem.predict(best)
     slopes = problem.central_slopes(best)
     result = Identification(
         names=problem.names,
-        values=frozen(problem.parameters(best)),
-        bounds=frozen(np.column_stack([problem.low, problem.high])),
+        values=frozen(problem.box.parameters(best)),
+        bounds=frozen(problem.box.bounds),
         measurements=problem.measurements,
         predicted=frozen(predicted),
-        jacobian=frozen(slopes / problem.stretch(best)),
+        jacobian=frozen(slopes / problem.box.stretch(best)),
         arm=arm,
         warnings=(),
+        profiles=(),
     )
-    at_bound = (best == 0.0) | (best == 1.0)
-    sentences = _sentences(result, at_bound) + _unfinished(problem, best, slopes)
-    return replace(result, warnings=tuple(sentences))
+    result = replace(result, profiles=_profiles(problem, best, slopes, result))
+    return replace(result, warnings=(*doubts(result), *unfinished(problem, best, slopes)))
+
+
+def _profiles(
+    problem: Problem, best: Array, slopes: Array, result: Identification
+) -> tuple[Profile | None, ...]:
+    """The profile of each parameter that is determined.
+
+    Raises:
+        LowerError: One leads below the optimum.
+    """
+    follow = [i for i in range(best.size) if i not in result._leading]
+    profiles: list[Profile | None] = []
+    for i in range(best.size):
+        others = [j for j in follow if j != i]
+        known = math.isfinite(result.std[i])
+        profiles.append(
+            Profiler(problem, best, slopes, i, others, *result._goals).profile() if known else None
+        )
+    return tuple(profiles)

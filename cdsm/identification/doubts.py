@@ -1,0 +1,111 @@
+"""What not to trust in an identification, in sentences."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from scipy.special import chdtrc
+
+from cdsm._checks import Array
+from cdsm.identification.problem import NoStiffnessError, Problem
+from cdsm.identification.profile import LOWER, SAME
+from cdsm.identification.result import Identification
+
+_CORRELATED = 0.95
+"""Correlation of two parameters beyond which a warning names them."""
+
+_UNLIKELY = 1e-3
+"""Probability of the χ² found, below which the model does not explain the measurements."""
+
+
+def doubts(result: Identification) -> list[str]:
+    """What not to trust in a result."""
+    sentences = [
+        f"not identifiable (rank {result.rank} of {len(result.names)}): no prediction changes with "
+        f"{combination}, so their values are one choice of many. Fix one, or measure what tells "
+        "them apart."
+        for combination in result._undetermined
+    ]
+    correlation, std = result.correlation, result.std
+    for i, name in enumerate(result.names):
+        for j in range(i):
+            if abs(correlation[i, j]) > _CORRELATED and math.isfinite(std[i]):
+                sentences.append(
+                    f"{result.names[j]} and {name} are correlated at {correlation[i, j]:+.4f}: "
+                    "mostly a combination of them is determined. Measure at other postures, "
+                    "directions or tensions."
+                )
+    for i in range(len(result.names)):
+        sentences += _at_bound(result, i) + _open(result, i)
+    if result.freedom and chdtrc(result.freedom, result.chi_square) < _UNLIKELY:
+        worst = int(abs(result.residuals).argmax())
+        sentences.append(
+            f"the model does not explain the measurements within their σ: χ² = "
+            f"{result.chi_square:.4g} with {result.freedom} degrees of freedom, worst at "
+            f"{result._labels[worst]} with {result.residuals[worst]:+.3g} σ. The intervals hold "
+            "for a right model only."
+        )
+    return sentences
+
+
+def _at_bound(result: Identification, i: int) -> list[str]:
+    """Say so if a parameter is on a bound."""
+    name, value = result.names[i], result.values[i]
+    return [
+        f"{name} is at its {side} bound, {limit:g}: the optimum lies there or beyond, and the "
+        "intervals are those of a value within the bounds. Widen the bounds, or doubt the model."
+        for side, limit in zip(("lower", "upper"), result.bounds[i], strict=True)
+        if value == limit
+    ]
+
+
+def _open(result: Identification, i: int) -> list[str]:
+    """Say so if the measurements set no end to an interval."""
+    name, profile, limits = result.names[i], result.profiles[i], result.bounds[i]
+    interval = result.confidence()[name]
+    ends = [k for k in (0, 1) if math.isinf(interval[k])]
+    if profile is None:
+        return []
+    if len(ends) == 2 and profile.ends == ("bound", "bound"):
+        return [
+            f"{name} may be anything within its bounds at 95 %: they determine it, not the "
+            "measurements."
+        ]
+    sentences = []
+    for k in ends:
+        if result.values[i] == limits[k]:
+            continue  # said already
+        reach = f"its bound, {limits[k]:g}."
+        if profile.ends[k] != "bound":
+            reach = f"{profile.values[(0, -1)[k]]:.4g}, where the model ends: {profile.ends[k]}"
+        sentences.append(
+            f"{name} has no {('lower', 'upper')[k]} end at 95 %: the measurements agree with "
+            f"everything up to {reach}"
+        )
+    return sentences
+
+
+def unfinished(problem: Problem, point: Array, slopes: Array) -> list[str]:
+    """Say so if χ² could fall further, as where the model ends on the way to the optimum."""
+    r = problem.residuals(point)
+    gradient = r @ slopes
+    held = ((point == 0.0) & (gradient >= 0.0)) | ((point == 1.0) & (gradient <= 0.0))
+    if held.all():
+        return []
+    step = np.zeros_like(point)
+    step[~held] = np.linalg.lstsq(slopes[:, ~held], -r, rcond=SAME)[0]
+    fall = float(np.sum((slopes @ step) ** 2))
+    if fall < LOWER:
+        return []
+    reason = "Give another start."
+    # the edge of the model is near if the search stopped for it
+    try:
+        size = 1e-3 / max(1e-3, float(abs(step).max()))
+        problem.predict(np.clip(point + size * step, 0.0, 1.0))
+    except NoStiffnessError as error:
+        reason = f"It lies beyond the edge of the model: {error}"
+    return [
+        f"no optimum within the bounds: χ² would still fall by about {fall:.3g} on the way from "
+        f"{problem.written(point)}. {reason}"
+    ]

@@ -1,0 +1,271 @@
+"""Profiles: how χ² rises as one parameter leaves its best value and the others follow.
+
+    Δχ²(p_i) = min over the other parameters of χ² − least χ²
+
+The interval of p_i is where Δχ² stays below the square of a quantile (Bates and Watts, Nonlinear
+Regression Analysis, 1988, chapter 6). For a linear model that is value ± quantile · std. In a
+nonlinear one it does not depend on how the parameter is written, as itself or as its logarithm.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal, NamedTuple, final
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.optimize import brentq, least_squares
+
+from cdsm._checks import Array, ReadOnlyState, frozen
+from cdsm.errors import InvalidInput
+from cdsm.identification.box import Box
+from cdsm.identification.problem import NoStiffnessError, Problem
+
+SAME = 1e-6
+"""Smallest singular value of the Jacobian, columns of unit length, that counts for the rank.
+
+The central differences behind it leave some 1e-10.
+"""
+
+LOWER = 1e-3
+"""Fall of χ² that a search may leave to be had; 1 would be one standard deviation."""
+
+Side = Literal[-1, 1]
+
+_LONGEST = 0.25
+"""Longest step, as part of the range of the parameter."""
+
+_HALVINGS = 8
+"""How often a step is halved before the model is said to end."""
+
+_NEAR, _REFINEMENTS = 0.25, 4
+"""How near to a goal a knot must be, as part of it, and how many more knots to spend on that."""
+
+
+class LowerError(Exception):
+    """χ² is lower at this point than at what was taken for the optimum."""
+
+    def __init__(self, point: Array) -> None:
+        self.point = point
+
+
+@final
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Profile(ReadOnlyState):
+    """χ² of the best fit with one parameter held, over the value it is held at.
+
+    Attributes:
+        values: Values of the parameter (n,), rising, in own units (m, kg, N/m, …).
+        rise: Δχ² (n,) [-]: least χ² with the parameter held there, less the least of all.
+        slope: Derivative of Δχ² by the value (n,), in [-] per own unit.
+        best: Which of the values is the optimum.
+        ends: Why it goes no farther down and up: ``""`` as no interval needs more of it,
+            ``"bound"``, or what the model says where it ends.
+        bounds: Of the parameter (2,), in own units (m, kg, N/m, …).
+    """
+
+    values: Array
+    rise: Array
+    slope: Array
+    best: int
+    ends: tuple[str, str]
+    bounds: Array
+
+    def crossing(self, rise: float, side: Side) -> float | None:
+        """The farthest value to one side, in own units, where Δχ² is no more than this.
+
+        Between the values that were looked at Δχ² is a cubic in what the search moves: the value,
+        or its logarithm. It is infinite where Δχ² stays below up to the bound or the model's end.
+        It is None where the profile was not followed that far.
+        """
+        outward = slice(self.best, None, side)
+        values, height = self.values[outward], self.rise[outward]
+        last = int(np.flatnonzero(height <= rise)[-1])
+        if last + 1 == height.size:
+            return side * math.inf if self.ends[side > 0] else None
+        box, pair = Box(self.bounds[None, :]), slice(last, last + 2)
+        u = box.point(values[pair])
+        slope = self.slope[outward][pair] * box.stretch(u)
+        return float(box.parameters(np.array([_crossing(u, height[pair], slope, rise)]))[0])
+
+
+def _crossing(u: ArrayLike, height: ArrayLike, slope: ArrayLike, rise: float) -> float:
+    """Where a cubic of two heights and slopes at two places reaches a rise between the two."""
+    (start, end), (low, high) = np.asarray(u), np.asarray(height)
+    first, last = (end - start) * np.asarray(slope)
+
+    def above(t: float) -> float:
+        way = t * t * (3.0 - 2.0 * t)
+        bend = t * (1.0 - t) * ((1.0 - t) * first - t * last)
+        return float(low - rise + way * (high - low) + bend)
+
+    return float(start + brentq(above, 0.0, 1.0, xtol=1e-12) * (end - start))
+
+
+class _Knot(NamedTuple):
+    """A place on a profile.
+
+    Attributes:
+        point: In the unit cube (P,).
+        rise: Δχ² there [-].
+        slope: Its derivative by the coordinate of the parameter.
+        curvature: Its second derivative, by Gauss and Newton.
+        tangent: How the point moves with that coordinate (P,).
+    """
+
+    point: Array
+    rise: float
+    slope: float
+    curvature: float
+    tangent: Array
+
+
+class Profiler:
+    """Follows the profile of one parameter from the optimum.
+
+    Args:
+        problem: What was searched.
+        best: The optimum (P,), in the unit cube.
+        slopes: ∂r/∂point there (n, P).
+        i: The parameter.
+        others: Those that follow it.
+        exact: Values of Δχ² that it is exact at, rising.
+        far: Larger one that it is followed up to.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        best: Array,
+        slopes: Array,
+        i: int,
+        others: Sequence[int],
+        exact: Sequence[float],
+        far: float,
+    ) -> None:
+        self._problem = problem
+        self._least = problem.cost(best)
+        self._i = i
+        self._others = list(others)
+        self._exact, self._far = exact, far
+        self._start = self._knot(best, slopes[:, i], slopes[:, self._others])
+
+    def profile(self) -> Profile:
+        """The profile to both sides.
+
+        Raises:
+            LowerError: It leads below the optimum.
+        """
+        (down, first), (up, last) = self._follow(-1), self._follow(1)
+        knots = [*reversed(down), *up[1:]]
+        box, u = self._problem.box.only(self._i), np.array([k.point[self._i] for k in knots])
+        return Profile(
+            values=frozen(box.parameters(u)),
+            rise=frozen(np.array([knot.rise for knot in knots])),
+            slope=frozen(np.array([knot.slope for knot in knots]) / box.stretch(u)),
+            best=len(down) - 1,
+            ends=(first, last),
+            bounds=frozen(box.bounds[0].copy()),
+        )
+
+    def _follow(self, side: Side) -> tuple[list[_Knot], str]:
+        """Knots to one side, rising from the optimum, and why they end."""
+        knots = [self._start]
+        for goal in (*self._exact, self._far):
+            while knots[-1].rise < goal:
+                there = self._next(knots[-1], side, goal)
+                if isinstance(there, str):
+                    return knots, there
+                knots.append(there)
+            if goal < self._far:
+                self._refine(knots, goal)
+        return knots, ""
+
+    def _next(self, here: _Knot, side: Side, goal: float) -> _Knot | str:
+        """A knot farther out, about where Δχ² reaches a goal, or why there is none."""
+        u = float(here.point[self._i])
+        room = 1.0 - u if side > 0 else u
+        if room == 0.0:
+            return "bound"
+        need, slope = 1.05 * goal - here.rise, side * here.slope
+        rate = slope + math.sqrt(max(slope**2 + 2.0 * here.curvature * need, 0.0))
+        step = min(2.0 * need / rate if rate > 0.0 else math.inf, _LONGEST, room)
+        for _ in range(_HALVINGS):
+            there = self._moved(here, side * step)
+            if isinstance(there, _Knot):
+                break
+            step /= 2.0
+        return there
+
+    def _refine(self, knots: list[_Knot], goal: float) -> None:
+        """Add knots until one is so near to a goal that the cubic beside it is exact enough."""
+        for _ in range(_REFINEMENTS):
+            last = max(k for k, knot in enumerate(knots) if knot.rise < goal)
+            pair = knots[last : last + 2]
+            near = min(pair, key=lambda knot: abs(knot.rise - goal))
+            if abs(near.rise - goal) < _NEAR * goal:
+                return
+            u = [float(knot.point[self._i]) for knot in pair]
+            place = _crossing(u, [k.rise for k in pair], [k.slope for k in pair], goal)
+            between = self._moved(near, place - float(near.point[self._i]))
+            if isinstance(between, str):  # a hole in the model
+                return
+            knots.insert(last + 1, between)
+
+    def _moved(self, here: _Knot, step: float) -> _Knot | str:
+        """The knot a step further on, or why the model has none there."""
+        problem, others, i = self._problem, self._others, self._i
+        point = np.clip(here.point + step * here.tangent, 0.0, 1.0)
+
+        def at(x: Array) -> Array:
+            moved = point.copy()
+            moved[others] = x
+            return moved
+
+        if not math.isfinite(problem.cost(point)):
+            try:
+                problem.predict(point)
+            except NoStiffnessError as error:
+                return str(error)
+        try:
+            beside = np.empty((len(problem.measurements), 0))
+            if others:
+                found = least_squares(
+                    lambda x: problem.residuals(at(x)),
+                    point[others],
+                    lambda x: problem.slopes(at(x), others),
+                    bounds=(0.0, 1.0),
+                    method="dogbox",  # it goes exactly onto a bound
+                    x_scale="jac",
+                    ftol=1e-4,
+                    xtol=1e-6,
+                    gtol=1e-8,
+                    max_nfev=50,
+                )
+                point, beside = at(found.x), found.jac
+            along = problem.slopes(point, [i])[:, 0]
+        except InvalidInput as error:
+            return str(error)
+        knot = self._knot(point, along, beside)
+        if knot.rise < -LOWER:
+            raise LowerError(point)
+        return knot
+
+    def _knot(self, point: Array, along: Array, beside: Array) -> _Knot:
+        r = self._problem.residuals(point)
+        x = point[self._others]
+        free = (x > 0.0) & (x < 1.0)
+        follow = np.linalg.lstsq(beside[:, free], -along, rcond=SAME)[0]
+        across = along + beside[:, free] @ follow
+        tangent = np.zeros_like(point)
+        tangent[self._i] = 1.0
+        tangent[np.array(self._others, dtype=int)[free]] = follow
+        return _Knot(
+            point=point,
+            rise=float(r @ r) - self._least,
+            slope=2.0 * float(r @ across),
+            curvature=2.0 * float(across @ across),
+            tangent=tangent,
+        )

@@ -1,0 +1,274 @@
+"""Intervals by profile likelihood: where they can be written down, and how often they hold."""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import binom, norm, t
+
+import cdsm
+from cdsm._checks import Array
+from cdsm.identification import Identification, Measurement, Profile, identify
+
+GEOMETRY = cdsm.Geometry.hinged(
+    joints=1,
+    twist=0.0,
+    link_length=0.1,
+    base_length=0.05,
+    disk_offset=0.02,
+    hole_radius=0.03,
+    link_mass=2.0,
+    lead=0.3,
+)
+ANGLES = np.linspace(-0.5, 0.5, 8)
+
+
+def hinge(softness: float = 2e-3, gravity: float = 9.81) -> cdsm.Manipulator:
+    """One hinge with slack cables of EA = 1/softness: its stiffness is A/softness + B·gravity."""
+    return cdsm.Manipulator(
+        GEOMETRY, cdsm.LinearElasticity(1.0 / softness), gravity=(0.0, 0.0, -gravity)
+    )
+
+
+def stiffnesses(arm: cdsm.Manipulator) -> Array:
+    along = [cdsm.stiffness(arm.at([q]), [0.0, 0.0]).along([0, 0, 1]) for q in ANGLES]
+    return np.array(along)
+
+
+def readings(noise: float, seed: int = 0) -> list[Measurement]:
+    true = stiffnesses(hinge())
+    z = np.random.default_rng(seed).normal(size=true.size)
+    return [
+        Measurement(
+            value=float(K * (1.0 + noise * e)),
+            direction=(0.0, 0.0, 1.0),
+            angles=(float(q),),
+            tension=(0.0, 0.0),
+            std=float(noise * K),
+        )
+        for K, e, q in zip(true, z, ANGLES, strict=True)
+    ]
+
+
+def line(measured: list[Measurement]) -> tuple[Array, Array, float]:
+    """Rigidity and gravity by linear least squares, their covariance, and χ²: closed forms."""
+    base, double = stiffnesses(hinge(2e-3, 0.0)), stiffnesses(hinge(1e-3, 0.0))
+    passive = (double - base) / 500.0
+    weight = stiffnesses(hinge(2e-3, 1.0)) - base
+    sigma = np.array([each.std for each in measured])
+    A = np.column_stack([passive, weight]) / sigma[:, None]
+    b = np.array([each.value for each in measured]) / sigma
+    best = np.linalg.solve(A.T @ A, A.T @ b)
+    return best, np.linalg.inv(A.T @ A), float(np.sum((A @ best - b) ** 2))
+
+
+BOUNDS = {"softness": (1e-4, 1e-1), "gravity": (-500.0, 500.0)}
+
+
+@pytest.mark.parametrize("noise", [0.05, 0.3])
+@pytest.mark.parametrize("scaled", [False, True])
+@pytest.mark.parametrize("level", [0.95, 0.68, 0.99])
+def test_interval_of_a_reciprocal_is_the_reciprocal_of_the_interval(
+    noise: float, scaled: bool, level: float
+) -> None:
+    measured = readings(noise)
+    (rigidity, gravity), covariance, chi_square = line(measured)
+    found = identify(hinge, measured, BOUNDS)
+    assert found.chi_square == pytest.approx(chi_square, rel=1e-8)
+    half = (1.0 + level) / 2.0
+    z = t.ppf(half, 6) * math.sqrt(chi_square / 6) if scaled else norm.ppf(half)
+    width = z * np.sqrt(np.diag(covariance))
+    intervals = found.confidence(level, scaled=scaled)
+    # a cubic between the places looked at, which at 95 % are near
+    near = 2e-3 if level == 0.95 else 2e-2
+    assert intervals["gravity"] == pytest.approx(
+        (gravity - width[1], gravity + width[1]), abs=near * width[1]
+    )
+    low, high = intervals["softness"]
+    assert 1.0 / high == pytest.approx(rigidity - width[0], abs=near * width[0])
+    assert 1.0 / low == pytest.approx(rigidity + width[0], abs=near * width[0])
+    # the covariance is that of the tangent: symmetric
+    assert found.std[0] == pytest.approx(math.sqrt(covariance[0, 0]) / rigidity**2, rel=1e-4)
+
+
+def test_profile_is_the_least_of_chi_square_with_the_parameter_held() -> None:
+    measured = readings(0.3)
+    (rigidity, _), covariance, _ = line(measured)
+    found = identify(hinge, measured, BOUNDS)
+    profile = found.profiles[0]
+    assert isinstance(profile, Profile)
+    assert profile.values[profile.best] == found.values[0]
+    assert (np.diff(profile.values) > 0.0).all()
+    away = 1.0 / profile.values - rigidity
+    np.testing.assert_allclose(profile.rise, away**2 / covariance[0, 0], rtol=1e-4, atol=1e-6)
+    slope = -2.0 * away / covariance[0, 0] / profile.values**2
+    np.testing.assert_allclose(profile.slope, slope, rtol=1e-3, atol=1e-5 * abs(slope).max())
+    for array in (profile.values, profile.rise, profile.slope):
+        assert not array.flags.writeable
+
+
+def test_interval_that_the_measurements_do_not_end_is_open_and_said() -> None:
+    measured = readings(0.3)
+    (rigidity, _), covariance, _ = line(measured)
+    least = rigidity - norm.ppf(0.975) * math.sqrt(covariance[0, 0])
+    found = identify(hinge, measured, {**BOUNDS, "softness": (1e-4, 0.9 / least)})
+    low, high = found.confidence()["softness"]
+    assert high == math.inf
+    assert 0.0 < low < found.values[0]
+    (said,) = (each for each in found.warnings if each.startswith("softness"))
+    assert "softness has no upper end at 95 %" in said
+    assert f"its bound, {0.9 / least:g}" in said
+    assert "inf" in str(found)
+    # with less asked the end is within the bounds
+    assert math.isfinite(found.confidence(0.6)["softness"][1])
+    # and both ends can be missing
+    narrow = identify(hinge, measured, {"softness": (1.0 / rigidity, 1.01 / rigidity)})
+    assert narrow.confidence()["softness"] == (-math.inf, math.inf)
+    assert any("softness may be anything within its bounds" in each for each in narrow.warnings)
+
+
+def test_interval_that_the_model_ends_is_open_and_says_why() -> None:
+    def model_of(softness: float) -> cdsm.Manipulator:
+        if softness > 2.05e-3:
+            raise cdsm.InvalidInput("softness", "no such wire is sold.")
+        return hinge(softness)
+
+    found = identify(model_of, readings(0.3), {"softness": (1e-4, 1e-1)})
+    assert found.confidence()["softness"][1] == math.inf
+    (said,) = (each for each in found.warnings if "no upper end" in each)
+    assert "where the model ends" in said
+    assert "no such wire is sold" in said
+
+
+def test_optimum_on_a_bound_leaves_the_interval_of_the_values_within() -> None:
+    measured = readings(0.1)
+    (rigidity, _), _, _ = line(measured)
+    beyond = 1.2 / rigidity
+    alone = {"softness": (beyond, 1e-1)}
+    found = identify(lambda softness: hinge(softness), measured, alone)
+    low, high = found.confidence()["softness"]
+    assert found.values[0] == beyond
+    assert low == -math.inf
+    profile = found.profiles[0]
+    assert profile is not None
+    # Δχ² from the bound on, where it already rises
+    passive, sigma = stiffnesses(hinge(2e-3, 0.0)) / 500.0, [each.std for each in measured]
+    weight = stiffnesses(hinge()) - 500.0 * passive
+    values = np.array([each.value for each in measured])
+
+    def chi_square(softness: float) -> float:
+        return float(np.sum(((passive / softness + weight - values) / sigma) ** 2))
+
+    assert chi_square(high) - chi_square(beyond) == pytest.approx(norm.ppf(0.975) ** 2, rel=5e-3)
+    assert any(each.startswith("softness is at its lower bound") for each in found.warnings)
+    assert not any("no lower end" in each for each in found.warnings)
+
+
+def test_profile_that_leads_to_a_deeper_valley_moves_the_optimum_there() -> None:
+    measured = readings(0.1)
+    best, covariance, chi_square = line(measured)
+    root = np.linalg.cholesky(covariance)
+
+    def rise(x: float) -> float:
+        """Δχ²: valleys of 0 at −1.6 and of 0.9 near 4.5, a ridge of 2.8 between."""
+        return float((0.8 + 0.8 * np.sin(x)) ** 2 + (0.15 * (x + np.pi / 2.0)) ** 2)
+
+    def valleys(x: float) -> cdsm.Manipulator:
+        away = 0.8 + 0.8 * np.sin(x), 0.15 * (x + np.pi / 2.0)
+        rigidity, gravity = best + root @ away
+        return hinge(1.0 / rigidity, gravity)
+
+    found = identify(valleys, measured, {"x": (-6.0, 8.0)}, start={"x": 4.6})
+    assert found.parameters["x"] == pytest.approx(-np.pi / 2.0, abs=1e-3)
+    assert found.chi_square == pytest.approx(chi_square, rel=1e-6)
+    # the interval reaches over both valleys
+    low, high = found.confidence()["x"]
+    assert low == -math.inf
+    assert high > 4.6
+    assert rise(high) == pytest.approx(norm.ppf(0.975) ** 2, rel=3e-2)
+
+
+def test_level_beyond_the_profiles_is_refused() -> None:
+    found = identify(hinge, readings(0.05), BOUNDS)
+    with pytest.raises(
+        cdsm.InvalidInput, match=r"level: 0\.9999999 given; the profile of softness"
+    ):
+        found.confidence(0.9999999)
+
+
+def test_profiles_cost_about_as_many_predictions_as_stated() -> None:
+    calls = 0
+
+    def counted(softness: float, gravity: float) -> cdsm.Manipulator:
+        nonlocal calls
+        calls += 1
+        return hinge(softness, gravity)
+
+    start = {"softness": 2e-3, "gravity": 9.81}
+    identify(counted, readings(0.1), BOUNDS, start=start)
+    assert calls < 50 + 20 * 2**2
+
+
+# --- how often they hold --------------------------------------------------------------------
+
+
+def strand_arm(hole_radius: float, drive: float, lead: float) -> cdsm.Manipulator:
+    """Of universal joints; its three parameters correlate at 0.99."""
+    geometry = cdsm.Geometry.universal(
+        joints=4,
+        cables_per_joint=3,
+        link_length=0.06,
+        base_length=0.03,
+        disk_offset=0.012,
+        hole_radius=hole_radius,
+        link_mass=0.12,
+        lead=lead,
+    )
+    cables = cdsm.serpentine_cables(geometry, cdsm.presets.STRAND_1X19, series_stiffness=drive)
+    return cdsm.Manipulator(geometry, cables=cables)
+
+
+def coverage(
+    model_of: Callable[..., cdsm.Manipulator],
+    true: dict[str, float],
+    free: dict[str, tuple[float, float]],
+    exact: list[Measurement],
+    held: Callable[[Identification], dict[str, tuple[float, float]]],
+    seeds: int,
+) -> Array:
+    """How many of the intervals hold each true parameter (P,)."""
+    counts = np.zeros(len(true), dtype=int)
+    for seed in range(seeds):
+        z = np.random.default_rng([seed, 7]).normal(size=len(exact))
+        noisy = [replace(m, value=m.value + m.std * e) for m, e in zip(exact, z, strict=True)]
+        intervals = held(identify(model_of, noisy, free, start=true))
+        counts += [low <= true[name] <= high for name, (low, high) in intervals.items()]
+    return counts
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("noise", "stated"), [(0.02, 1.0), (0.1, 1.0), (0.02, 1.0 / 3.3)])
+def test_intervals_of_correlated_parameters_hold_as_often_as_they_say(
+    noise: float, stated: float
+) -> None:
+    true = {"hole_radius": 0.025, "drive": 4e4, "lead": 0.3}
+    free = {"hole_radius": (0.01, 0.06), "drive": (1e3, 1e6), "lead": (0.0, 3.0)}
+    arm, rng, exact = strand_arm(**true), np.random.default_rng([0, 14]), []
+    for _ in range(14):
+        q, level = rng.uniform(-0.35, 0.35, arm.nv), rng.uniform(20.0, 120.0)
+        pull, u = level * rng.uniform(0.8, 1.2, 12), rng.normal(size=3)
+        K = cdsm.stiffness(arm.at(q), pull).along(u)
+        exact.append(Measurement(K, tuple(u), tuple(q), tuple(pull), std=noise * K))
+    seeds = 200
+
+    def held(found: Identification) -> dict[str, tuple[float, float]]:
+        if stated == 1.0:
+            return found.confidence()
+        short = [replace(m, std=stated * m.std) for m in found.measurements]
+        return identify(strand_arm, short, free, start=found.parameters).confidence(scaled=True)
+
+    counts = coverage(strand_arm, true, free, exact, held, seeds)
+    fewest, most = binom.interval(0.998, seeds, 0.95)
+    assert ((fewest <= counts) & (counts <= most)).all(), counts / seeds
