@@ -221,8 +221,14 @@ def equilibrium(
             raise _no_rest(loaded, settled, reached)
 
 
-def follow(before: Equilibrium, wrench: Array) -> Equilibrium | None:
+def follow(before: Equilibrium, wrench: Array, start: Array | None = None) -> Equilibrium | None:
     """The equilibrium that an earlier one turns into under another wrench (6,).
+
+    Args:
+        before: The earlier one.
+        wrench: The other wrench.
+        start: Joint angles (nv,) [rad] to search from, where an arm that differs little came to
+            rest under that wrench; if not given, those of the earlier one.
 
     Returns:
         None if there is none within reach of postures that are all stable: where the arm buckles,
@@ -232,9 +238,14 @@ def follow(before: Equilibrium, wrench: Array) -> Equilibrium | None:
         ElasticityRangeError: As for :func:`equilibrium`.
     """
     loaded = LoadedArm(before.reference, before.reference_tension, wrench)
-    start = loaded.at(before.pose, before.tension)
-    settled = _settle(loaded, start, 0.0)
-    if not (settled.steady and settled.convex and _held(loaded, start, settled)):
+    here = loaded.at(before.pose, before.tension)
+    if start is not None:
+        try:
+            here = loaded.moved(start, here)
+        except CableError:
+            return None
+    settled = _settle(loaded, here, 0.0)
+    if not (settled.steady and settled.convex and _held(loaded, here, settled)):
         return None
     return _answer(loaded, settled, settled.iterations)
 

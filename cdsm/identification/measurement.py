@@ -24,15 +24,20 @@ class Measurement:
     """A stiffness measured at the tip of a real arm, and the conditions it was measured in.
 
     Attributes:
-        value: Stiffness along the direction [N/m], as a weight hung at the tip measures it.
-        direction: The direction of force and displacement (3,), base axes, any length.
+        value: Stiffness along the direction [N/m]: the force over how far the tip goes along it.
+        direction: The direction of force and displacement (3,), base axes, any length. With a
+            ``force`` its sign counts: (0, 0, -1) hangs a weight, (0, 0, 1) lifts the tip.
         angles: Joint angles (nv,) [rad].
         tension: Cable tensions (C,) [N]; or None, and ``minimum`` is given.
         minimum: Instead of tensions, the lower bound [N], one or (C,), from which
             :func:`~cdsm.tension.distribute_tension` balances the model at these angles.
         std: Standard deviation of the value [N/m].
-        wrench: W (6,) at ``tool0`` in base axes while it was measured: force [N], moment [N m].
+        wrench: W (6,) at ``tool0`` in base axes that the arm carried already, without the force
+            that measured: force [N], moment [N m].
         label: What reports and figures call it.
+        force: How large the force was [N], which came on top of ``wrench``: the value is then the
+            secant that :func:`~cdsm.weight.weight_test` measures with it, the motors locked at the
+            angles and tensions. 0: so small that the value is the tangent.
 
     Raises:
         InvalidInput: Names the field and what is wrong with it.
@@ -46,6 +51,7 @@ class Measurement:
     std: float = math.nan
     wrench: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     label: str = ""
+    force: float = 0.0
 
     def __post_init__(self) -> None:
         value = scalar("value", self.value)
@@ -60,6 +66,13 @@ class Measurement:
         std = scalar("std", self.std)
         if std < SMALLEST:
             raise InvalidInput("std", f"{std:g} N/m given; it must be positive.")
+        force = scalar("force", self.force)
+        if force < 0.0:
+            raise InvalidInput(
+                "force",
+                f"{force:g} N given; it must be positive, or 0 for the tangent. Turn the direction "
+                "round instead.",
+            )
         if (self.tension is None) == (self.minimum is None):
             raise InvalidInput(
                 "tension",
@@ -74,6 +87,7 @@ class Measurement:
         checked: dict[str, object] = {
             "value": value,
             "std": std,
+            "force": force,
             "direction": tuple(direction.tolist()),
             "wrench": tuple(wrench.tolist()),
             "angles": _numbers("angles", self.angles, "one angle [rad] per joint"),

@@ -13,14 +13,18 @@ from numpy.typing import ArrayLike
 from cdsm._checks import (
     SMALLEST,
     Array,
+    frozen,
+    unit_direction,
 )
+from cdsm.equilibrium import equilibrium, follow
 from cdsm.errors import CdsmError, InvalidInput, SingularStiffness
 from cdsm.identification.box import Box
 from cdsm.identification.measurement import Measurement, label
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
-from cdsm.stiffness import stiffness
+from cdsm.stiffness import Stiffness, stiffness
 from cdsm.tension import Tension, distribute_tension
+from cdsm.weight import WeightTest, weight_test
 
 
 class NoStiffnessError(Exception):
@@ -53,6 +57,7 @@ class Problem:
         self._std = np.array([each.std for each in measurements])
         self.names = names
         self.box = Box(bounds)
+        self._hung: dict[Measurement, Array] = {}
         # the searches come back to a point after the differences around it
         self._residuals = lru_cache(maxsize=64)(self._evaluated)
 
@@ -79,28 +84,51 @@ class Problem:
 
     def _along(self, arm: Manipulator, each: Measurement, given: dict[str, float]) -> float:
         pose = arm.at(each.angles)
-        K = stiffness(pose, *self._tension(pose, each, given))
-        value = K.along(each.direction)
-        if not (K.is_stable and value < 1.0 / SMALLEST):
-            problem = (
-                "the tip cannot move in its direction, so the stiffness is infinite."
-                if K.is_stable
-                else f"the arm buckles: the smallest stiffness is {K.margin:.3g} "
-                f"{arm.stiffness_unit()}."
+        tension, wrench = self._tension(pose, each, given)
+        K = stiffness(pose, tension, wrench)
+        if not K.is_stable:
+            raise SingularStiffness(
+                f"the arm buckles: the smallest stiffness is {K.margin:.3g} "
+                f"{arm.stiffness_unit()}.",
+                K.critical_direction,
             )
-            raise SingularStiffness(problem, K.critical_direction)
+        value = self._secant(each, pose, K) if each.force else K.along(each.direction)
+        if not value < 1.0 / SMALLEST:
+            raise SingularStiffness(
+                "the tip cannot move in its direction, so the stiffness is infinite.",
+                K.critical_direction,
+            )
         return value
+
+    def _secant(self, each: Measurement, pose: Posture, K: Stiffness) -> float:
+        """What :func:`~cdsm.weight.weight_test` measures.
+
+        To follow the arm from rest to rest takes it ten times as long as to search from where the
+        arm of the last parameters hung.
+        """
+        force = each.force * unit_direction("direction", each.direction)
+        hung, test = self._hung.get(each), None
+        if hung is not None:
+            without = equilibrium(pose, K.tension, K.wrench)
+            loaded = follow(without, frozen(K.wrench + np.append(force, np.zeros(3))), hung)
+            if loaded is not None:
+                test = WeightTest(force=force, without=without, loaded=(loaded,))
+        if test is None:
+            test = weight_test(pose, K.tension, force, wrench=K.wrench)
+        self._hung[each] = test.loaded[-1].pose.q
+        return test.stiffness
 
     def _tension(
         self, pose: Posture, each: Measurement, given: dict[str, float]
-    ) -> tuple[Tension] | tuple[ArrayLike, ArrayLike]:
+    ) -> tuple[Tension, None] | tuple[ArrayLike, ArrayLike]:
+        """The tensions, and the wrench if they do not bring their own."""
         if self._tension_of is not None:
             pull = _called("tension_of", self._tension_of, given, pose, each)
-            return (pull,) if isinstance(pull, Tension) else (pull, each.wrench)
+            return (pull, None) if isinstance(pull, Tension) else (pull, each.wrench)
         if each.tension is not None:
             return each.tension, each.wrench
         assert each.minimum is not None
-        return (distribute_tension(pose, each.minimum, wrench=each.wrench),)
+        return distribute_tension(pose, each.minimum, wrench=each.wrench), None
 
     def residuals(self, point: Array) -> Array:
         """Residuals r (n,) in σ; inf, from which the searches step back, if there are none."""

@@ -3,7 +3,8 @@
     min Σ r_i²,   r_i = (K_i(p) − K_i) / σ_i,   low ≤ p ≤ high
 
 with K_i measured, K_i(p) what the model with parameters p predicts by
-:meth:`~cdsm.stiffness.Stiffness.along`, and σ_i the standard deviation of the measurement. The
+:meth:`~cdsm.stiffness.Stiffness.along` or, for a force that is not small, by
+:func:`~cdsm.weight.weight_test`, and σ_i the standard deviation of the measurement. The
 parameters are whatever a constructor of the user's own takes: dimensions, masses, springs, leads.
 What the measurements cannot tell apart is said by name in :attr:`Identification.warnings`.
 """
@@ -53,11 +54,13 @@ def identify(
     """Parameters p of an arm from measured stiffnesses: min Σ ((K_i(p) − K_i)/σ_i)² in bounds.
 
     K_i(p) = ``stiffness(arm.at(angles), tension, wrench).along(direction)`` with
-    ``arm = model_of(**p)``. Where the model has no stable stiffness, or a tension leaves the domain
-    of an elasticity, the search turns back.
+    ``arm = model_of(**p)``; or, of a measurement with a ``force``, ``weight_test(arm.at(angles),
+    tension, force, wrench=wrench).stiffness``. Where the model has no stable stiffness, buckles
+    under the force, or a tension leaves the domain of an elasticity, the search turns back.
 
     A prediction of all measurements is what takes time. The search takes some 50 P of them, the
-    profiles of :meth:`Identification.confidence` some 20 P².
+    profiles of :meth:`Identification.confidence` some 20 P². A measurement with a force takes ten
+    times as long as one without, and more where the arm moves far.
 
     ::
 
