@@ -154,6 +154,39 @@ def unit_direction(name: str, value: ArrayLike) -> Array:
     return frozen(scaled / np.linalg.norm(scaled))
 
 
+def flag(name: str, value: object) -> bool:
+    """Return True or False, or raise :class:`InvalidInput`: many an object is neither."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise InvalidInput(name, f"{value!r} given; True or False is needed.")
+    return bool(value)
+
+
+def whole_number(name: str, value: object, least: int, most: int | None = None) -> int:
+    """Return a whole number within its bounds, or raise :class:`InvalidInput`."""
+    if (
+        isinstance(value, bool)
+        or not isinstance(value, (int, np.integer))
+        or value < least
+        or (most is not None and value > most)
+    ):
+        to = "on" if most is None else f"to {most}"
+        raise InvalidInput(name, f"{value!r} given; a whole number from {least} {to} is needed.")
+    return int(value)
+
+
+def text(name: str, value: object) -> str:
+    """Return a name that every file can hold, or raise :class:`InvalidInput`."""
+    if not isinstance(value, str) or not value:
+        raise InvalidInput(name, f"{value!r} given; a name is needed, a text that is not empty.")
+    try:
+        value.encode()
+    except UnicodeEncodeError as error:
+        raise InvalidInput(
+            name, f"{value!r} given; character {error.start + 1} is a lone surrogate, not text."
+        ) from None
+    return value
+
+
 def one_of(kind: str, name: object, known: Iterable[str]) -> str:
     """Return the name if it is known, else raise :class:`UnknownName` with near matches."""
     known = tuple(known)

@@ -123,11 +123,23 @@ def make_folder(path: str | os.PathLike[str]) -> Path:
 
 
 def as_path(path: str | os.PathLike[str]) -> Path:
-    """Return the path, or raise :class:`InvalidInput` if it is none."""
+    """Return the path, of something that exists or could be made.
+
+    Raises:
+        InvalidInput: It is no path.
+        FileError: The system cannot look there: too long, no text, forbidden.
+    """
     try:
-        return Path(path)
+        found = Path(path)
     except TypeError:
         raise InvalidInput("path", f"{path!r} given; the path of a file is needed.") from None
+    try:
+        found.lstat()
+    except (FileNotFoundError, NotADirectoryError):
+        pass
+    except (OSError, ValueError) as error:
+        raise FileError(path, f"is no path that can be used: {_reason(error)}.") from None
+    return found
 
 
 def _reason(error: Exception) -> str:

@@ -15,9 +15,9 @@ import numpy as np
 import pinocchio as pin
 
 from cdsm._body_kernels import Masses
-from cdsm._checks import Array, frozen, sequence_of
+from cdsm._checks import Array, frozen, one_of, sequence_of
 from cdsm._kernels import Indices, Tree
-from cdsm.errors import InvalidInput, UnknownName, UrdfError
+from cdsm.errors import InvalidInput, UrdfError
 
 
 class BodyState(NamedTuple):
@@ -69,6 +69,11 @@ class RigidBody:
         self.name: str = model.name
         self.lower: Array = frozen(np.array(model.lowerPositionLimit)[self._theirs])
         self.upper: Array = frozen(np.array(model.upperPositionLimit)[self._theirs])
+        self._frames = {
+            frame.name: index
+            for index, frame in enumerate(model.frames)
+            if frame.type == pin.FrameType.BODY
+        }
         self._tip = self._frame(tip)
         self._scratch = threading.local()
         self._twists = frozen(self._local_twists())
@@ -77,7 +82,7 @@ class RigidBody:
     @property
     def link_names(self) -> tuple[str, ...]:
         """Names of all links."""
-        return tuple(f.name for f in self._model.frames if f.type == pin.FrameType.BODY)
+        return tuple(self._frames)
 
     def locate(self, link: str) -> tuple[int, Array, Array]:
         """Row of the joint that moves a link, and the link's frame in it as (3,3) and (3,).
@@ -227,10 +232,8 @@ class RigidBody:
         return 1 + int(self._ours[joint - 1]) if joint else 0
 
     def _frame(self, link: str) -> int:
-        if not isinstance(link, str) or not self._model.existFrame(link, pin.FrameType.BODY):
-            raise UnknownName("link", link, self.link_names)
-        index: int = self._model.getFrameId(link, pin.FrameType.BODY)
-        return index
+        # Pinocchio cannot even be asked for a name that is no UTF-8
+        return self._frames[one_of("link", link, self._frames)]
 
     def _data(self) -> pin.Data:
         # one per thread, made once: it is scratch memory, and costs milliseconds for long arms

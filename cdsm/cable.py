@@ -19,6 +19,7 @@ from cdsm._checks import (
     one_of,
     scalar,
     sequence_of,
+    text,
     vector,
 )
 from cdsm.elasticity import Elasticity, tension_at
@@ -45,8 +46,7 @@ class Site:
     position: tuple[float, float, float]
 
     def __post_init__(self) -> None:
-        if not isinstance(self.link, str):
-            raise InvalidInput("link", f"{self.link!r} given; the name of a link is needed.")
+        text("link", self.link)
         position = vector("position", self.position, 3, f"a point on {self.link} [m]")
         object.__setattr__(self, "position", tuple(position.tolist()))
 
@@ -85,8 +85,10 @@ class Cable:
     maximum: float = math.inf
 
     def __post_init__(self) -> None:
-        if not isinstance(self.name, str) or not self.name:
-            raise CableError(str(self.name), "needs a name, a text that is not empty.")
+        try:
+            text("name", self.name)
+        except InvalidInput as error:
+            raise CableError(str(self.name), str(error)) from None
         if not isinstance(self.elasticity, Elasticity):
             raise CableError(
                 self.name, f"elasticity: {self.elasticity!r} given; an Elasticity is needed."

@@ -15,7 +15,7 @@ from typing import final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm._checks import LARGEST, SMALLEST, Array, number_array, scalar
+from cdsm._checks import LARGEST, SMALLEST, Array, flag, number_array, scalar
 from cdsm.errors import ElasticityRangeError, InvalidInput
 
 _STEP = 6e-6
@@ -33,7 +33,7 @@ class Domain:
         low_included: Whether ``low`` itself belongs to the domain.
 
     Raises:
-        InvalidInput: Not two numbers with 0 <= low < high.
+        InvalidInput: Not two numbers with 0 <= low < high, or ``low_included`` no flag.
     """
 
     low: float
@@ -44,6 +44,7 @@ class Domain:
         high = self.high
         if not (isinstance(high, float) and high == math.inf):
             high = scalar("high", high)
+        flag("low_included", self.low_included)
         if not 0.0 <= scalar("low", self.low) < high:
             raise InvalidInput("low", f"0 <= low < high needed, but are {self.low}, {self.high} N.")
 

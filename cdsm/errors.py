@@ -94,6 +94,10 @@ class UnknownName(CdsmError, LookupError):
         super().__init__(f"{message} {remedy}".rstrip())
 
 
+_PATH = 1000
+"""Characters of a path that a message shows."""
+
+
 class FileError(CdsmError, OSError):
     """A file cannot be read or written.
 
@@ -102,8 +106,9 @@ class FileError(CdsmError, OSError):
     """
 
     def __init__(self, path: object, problem: str) -> None:
-        super().__init__(f"{path}: {problem}")
         self.path = str(path)
+        shown = self.path if len(self.path) <= _PATH else f"{self.path[:_PATH]}…"
+        super().__init__(f"{shown}: {problem}")
 
 
 class StoreError(FileError):

@@ -20,6 +20,7 @@ from cdsm._cable_laws import CableLaws, OriginalLength
 from cdsm._checks import (
     Array,
     Printed,
+    flag,
     frozen,
     instance,
     one_of,
@@ -315,10 +316,11 @@ class Manipulator(Printed):
             cables: One or more.
 
         Raises:
+            InvalidInput: Not a list or tuple of cables.
             CableError: Two cables of one name, or one on a link that does not exist.
         """
         geometry, urdf, _, tip, gravity, original_length, names = self._value
-        return _rebuild(geometry, urdf, tuple(cables), tip, gravity, original_length, names)
+        return _rebuild(geometry, urdf, cables, tip, gravity, original_length, names)
 
     def at(self, q: ArrayLike, *, check_limits: bool = True) -> Posture:
         """Evaluate the arm at joint angles q: kinematics, cable lengths and gravity.
@@ -328,7 +330,7 @@ class Manipulator(Printed):
             check_limits: Refuse angles beyond the joint limits.
 
         Raises:
-            InvalidInput: q is not (nv,) finite real numbers.
+            InvalidInput: q is not (nv,) finite real numbers, or ``check_limits`` no flag.
             JointLimitError: An angle is beyond its limit, and ``check_limits`` is set.
             CableError: Two neighbouring sites of a cable coincide at this posture.
         """
@@ -357,7 +359,7 @@ class Manipulator(Printed):
             check_limits: Refuse angles beyond the joint limits.
 
         Raises:
-            InvalidInput: q is not (nv,) finite real numbers.
+            InvalidInput: q is not (nv,) finite real numbers, or ``check_limits`` no flag.
             JointLimitError: An angle is beyond its limit, and ``check_limits`` is set.
             CableError: Two neighbouring sites of a cable coincide at this posture.
         """
@@ -366,7 +368,7 @@ class Manipulator(Printed):
     def _angles(self, q: ArrayLike, check_limits: bool) -> Array:
         """Joint angles (nv,) [rad], checked and read-only."""
         q = vector("q", q, self.nv, self._meaning_of_q)
-        if check_limits:
+        if flag("check_limits", check_limits):
             beyond = (q < self._lowest) | (q > self._highest)
             if np.count_nonzero(beyond):
                 raise JointLimitError(

@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import ndtri, stdtrit
 
-from cdsm._checks import Array, ReadOnlyState, frozen, one_of, scalar
+from cdsm._checks import Array, ReadOnlyState, frozen, one_of, scalar, whole_number
 from cdsm._loading import FEWEST, loading
 from cdsm._polynomials import miss, polynomials
 from cdsm._rigidity_curve import Basis, Curve, Points, fit_curve
 from cdsm._stages import doubts, refuse_jumps, settled, yield_onset
 from cdsm.elasticity import Elasticity
-from cdsm.errors import InvalidInput, TensileTestError
+from cdsm.errors import TensileTestError
 from cdsm.tensile_data import TensileTest
 from cdsm.wire import TabulatedElasticity
 
@@ -197,11 +197,11 @@ def fit_tensile_test(
         gauge_length: l_0 [m].
         method: ``monotone`` or ``polynomial``.
         join: Tension at which the two polynomials meet [N].
-        samples: Of the bootstrap of ``polynomial``, at least 40.
+        samples: Of the bootstrap of ``polynomial``, from 40 to 10 000.
         seed: Of the same.
 
     Raises:
-        InvalidInput: Not finite numbers.
+        InvalidInput: Not finite numbers, or samples or a seed out of place.
         UnknownName: No such method.
         TensileTestError: Arrays of different length, fewer than 8 points, a gauge length that is
             not positive, compression, a force that does not rise or jumps, units that cannot be
@@ -210,8 +210,7 @@ def fit_tensile_test(
     """
     one_of("method", method, METHODS)
     join = scalar("join", join)
-    if type(samples) is not int or samples < 40 or type(seed) is not int or seed < 0:
-        raise InvalidInput("samples", "an integer of at least 40 is needed, and a seed >= 0.")
+    samples, seed = whole_number("samples", samples, 40, 10_000), whole_number("seed", seed, 0)
     test = TensileTest(displacement, force, gauge_length)  # type: ignore[arg-type]
     points, noise, notes = loading(test)
     curve = _curve(points, noise)

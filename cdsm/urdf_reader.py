@@ -13,6 +13,7 @@ from collections import Counter
 import numpy as np
 from lxml import etree
 
+from cdsm._checks import flag
 from cdsm._files import read_text
 from cdsm._xml import XmlFault, numbers, parse_xml
 from cdsm.errors import UrdfError, listed
@@ -48,10 +49,12 @@ def read_urdf(source: str | os.PathLike[str], *, check_inertia: bool = True) -> 
         check_inertia: Refuse moments of inertia that no body has.
 
     Raises:
+        InvalidInput: ``check_inertia`` is no flag.
         FileError: The file cannot be read.
         UrdfError: It is no URDF of a tree of revolute, prismatic and fixed joints; every fault is
             listed.
     """
+    flag("check_inertia", check_inertia)
     inline = isinstance(source, str) and source.lstrip("\ufeff \t\r\n").startswith("<")
     text = str(source).lstrip("\ufeff \t\r\n") if inline else read_text(source)
     name = "the URDF" if inline else os.fspath(source)

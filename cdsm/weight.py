@@ -10,12 +10,15 @@ from typing import final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm._checks import Array, ReadOnlyState, frozen, unit_direction, vector
+from cdsm._checks import Array, ReadOnlyState, frozen, unit_direction, vector, whole_number
 from cdsm._units import MODEL
 from cdsm.equilibrium import Equilibrium, equilibrium, follow
 from cdsm.errors import EquilibriumError, InvalidInput
 from cdsm.posture import Posture
 from cdsm.tension import Tension
+
+MOST_STEPS = 1000
+"""A curve of more points looks no smoother, and is computed for long."""
 
 _FINEST = 2.0**-12
 """Part of itself to which a buckling load is found."""
@@ -174,13 +177,13 @@ def weight_test(
         tension: F there, as for :func:`~cdsm.equilibrium.equilibrium`. Tensions of your own need
             not balance the arm: the test starts from the equilibrium that they lead to.
         force: ΔF (3,) at ``tool0`` in base axes [N], on top of ``wrench``.
-        steps: Into how many equal steps to divide it.
+        steps: Into how many equal steps to divide it, at most 1000.
         wrench: What the arm carries without the weight (6,): force [N], then moment [N m]. If not
             given, that of the ``Tension``, or zero.
 
     Raises:
         InvalidInput: As for :func:`~cdsm.equilibrium.equilibrium`, or a force of zero or so small
-            that what it moves is rounding, or steps that are no positive integer.
+            that what it moves is rounding, or steps that are no whole number from 1 to 1000.
         ElasticityRangeError: As for :func:`~cdsm.equilibrium.equilibrium`, at any step.
         EquilibriumError: The arm buckles under the load; says at which part of it. Where it comes
             to rest then, :func:`~cdsm.equilibrium.equilibrium` tells.
@@ -188,12 +191,11 @@ def weight_test(
     force = vector("force", force, 3, "a force in base axes [N]")
     if not force.any():
         raise InvalidInput("force", "is zero; nothing moves, and there is nothing to measure.")
-    if isinstance(steps, bool) or not isinstance(steps, (int, np.integer)) or steps < 1:
-        raise InvalidInput("steps", f"{steps!r} given; a positive whole number is needed.")
+    steps = whole_number("steps", steps, 1, MOST_STEPS)
     without = equilibrium(pose, tension, wrench)
     added = np.append(force, np.zeros(3))
     loaded, part = [without], 0.0
-    for step in range(1, int(steps) + 1):
+    for step in range(1, steps + 1):
         loaded.append(_hang(loaded[-1], without.wrench, added, part, step / steps))
         part = step / steps
     test = WeightTest(force=force, without=without, loaded=tuple(loaded[1:]))

@@ -188,7 +188,7 @@ CASES |= {
     "site link a number": (
         lambda: cdsm.Site(3, (0.0, 0.0, 0.0)),  # type: ignore[arg-type]
         cdsm.InvalidInput,
-        ("link: 3", "name of a link"),
+        ("link: 3", "a name is needed"),
     ),
     "site of two numbers": (
         lambda: cdsm.Site("link1", (0.0, 0.0)),  # type: ignore[arg-type]
@@ -204,12 +204,12 @@ CASES |= {
     "cable without a name": (
         lambda: cdsm.Cable("", (BASE, END), STEEL),
         cdsm.CableError,
-        ("needs a name",),
+        ("name: ", "a name is needed"),
     ),
     "cable name a number": (
         lambda: cdsm.Cable(3, (BASE, END), STEEL),  # type: ignore[arg-type]
         cdsm.CableError,
-        ("needs a name",),
+        ("name: ", "a name is needed"),
     ),
     "cable of one site": (
         lambda: cdsm.Cable("a", (BASE,), STEEL),

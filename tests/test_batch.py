@@ -699,7 +699,7 @@ BAD: dict[str, tuple[Callable[[], object], tuple[str, ...]]] = {
         lambda: cdsm.evaluate(ARM, Q, F, outputs=("along",), direction=np.zeros((0, 3))),
         ("direction: shape (0, 3)",),
     ),
-    "no threads": (lambda: cdsm.evaluate(ARM, Q, F, threads=0), ("threads: 0", "positive integer")),
+    "no threads": (lambda: cdsm.evaluate(ARM, Q, F, threads=0), ("threads: 0", "from 1 on")),
     "threads true": (lambda: cdsm.evaluate(ARM, Q, F, threads=True), ("threads: True",)),
     "minimum negative": (
         lambda: cdsm.distribute_tensions(ARM, Q, -1.0),

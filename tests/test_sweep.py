@@ -332,7 +332,7 @@ Q = np.zeros((2, 6))
         ({"maximum": np.array([80.0, 90.0])}, "maximum: shape"),
         ({"elasticity": 48e3}, "elasticity: 48000.0 given; give an Elasticity, or a mapping"),
         ({"elasticity": {}}, "elasticity: is empty"),
-        ({"elasticity": {1: STEEL}}, "name of elasticity: 1 given; a str is needed"),
+        ({"elasticity": {1: STEEL}}, "name of elasticity: 1 given; a name is needed"),
         ({"wrench": np.zeros(3)}, r"wrench: shape \(3,\) given, \(6,\) needed"),
         ({"wrench": {"a": np.zeros(3)}}, r"wrench\['a'\]: shape"),
         ({"direction": np.zeros((0, 3))}, "direction: is empty"),
@@ -346,7 +346,7 @@ Q = np.zeros((2, 6))
             "tip_position has 1000000 x .* more than fits into memory; .* or give store=",
         ),
         ({"store": 3}, "path: 3 given; the path of a file is needed"),
-        ({"chunk": 0}, "chunk: 0 given; a positive whole number"),
+        ({"chunk": 0}, "chunk: 0 given; a whole number from 1 on"),
         ({"client": "here"}, "client: 'here' given; a synchronous dask Client"),
     ],
 )
@@ -366,8 +366,8 @@ def test_bad_input_is_named(arguments: dict[str, Any], said: str) -> None:
         (lambda: cdsm.GridPoses({"joint1_1": 0.1}, {"joint1_1": 0.0}), "rest: joint1_1 is swept"),
         (lambda: cdsm.PathPoses(np.zeros((1, 6))), "two or more postures"),
         (lambda: cdsm.PathPoses(np.zeros((2, 6)), 5), "are all the same posture"),
-        (lambda: cdsm.PathPoses(np.eye(6), 1), "count: 1 given; a path has two or more"),
-        (lambda: cdsm.RandomPoses(0), "count: 0 given; 1 to"),
+        (lambda: cdsm.PathPoses(np.eye(6), 1), "count: 1 given; a whole number from 2 to"),
+        (lambda: cdsm.RandomPoses(0), "count: 0 given; a whole number from 1 to"),
         (lambda: cdsm.RandomPoses(8.0), "count: 8.0 given; a whole number"),  # type: ignore[arg-type]
         (lambda: cdsm.RandomPoses(8, -1), "seed: -1 given"),
     ],

@@ -6,9 +6,7 @@ import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
-import numpy as np
-
-from cdsm.errors import InvalidInput
+from cdsm._checks import whole_number
 
 _NUMBERS = 2**17
 """Floats per chunk: one megabyte."""
@@ -52,6 +50,4 @@ def checked_threads(threads: int | None) -> int:
         if hasattr(os, "sched_getaffinity"):
             return len(os.sched_getaffinity(0))
         return os.cpu_count() or 1
-    if not isinstance(threads, (int, np.integer)) or isinstance(threads, bool) or threads < 1:
-        raise InvalidInput("threads", f"{threads!r} given; a positive integer is needed, or None.")
-    return int(threads)
+    return whole_number("threads", threads, 1)

@@ -5,16 +5,20 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm._checks import Array, bound, frozen, number_array, unit_direction
+from cdsm._checks import Array, bound, flag, frozen, number_array, unit_direction
 from cdsm.batch.rows import Arm
 from cdsm.errors import InvalidInput
 from cdsm.manipulator import Manipulator
 
 
 def kernel_arm(arm: Manipulator, check_limits: bool) -> Arm:
-    """The arm as plain arrays."""
+    """The arm as plain arrays.
+
+    Raises:
+        InvalidInput: ``check_limits`` is no flag.
+    """
     lowest, highest = arm._lowest, arm._highest
-    if not check_limits:
+    if not flag("check_limits", check_limits):
         lowest, highest = np.full_like(lowest, -np.inf), np.full_like(highest, np.inf)
     return Arm(
         arm._tree,

@@ -14,6 +14,7 @@ from scipy.special import ndtri, stdtrit
 from cdsm._checks import (
     Array,
     ReadOnlyState,
+    flag,
     frozen,
     scalar,
 )
@@ -141,12 +142,12 @@ class Identification(ReadOnlyState):
 
         Raises:
             InvalidInput: The level is not between 0 and 1, or so near to 1 that the profiles do not
-                reach there.
+                reach there, or ``scaled`` no flag.
         """
         level = scalar("level", level)
         if not 0.0 < level < 1.0:
             raise InvalidInput("level", f"{level:g} given; it must lie between 0 and 1, as 0.95.")
-        rise = self._rise(level, scaled=scaled)
+        rise = self._rise(level, scaled=flag("scaled", scaled))
         return {
             name: (self._end(i, rise, -1, level), self._end(i, rise, 1, level))
             for i, name in enumerate(self.names)

@@ -14,7 +14,7 @@ from cdsm.elasticity import Elasticity, LinearElasticity
 from cdsm.errors import ElasticityRangeError, InvalidInput, SingularStiffness
 from cdsm.planning.admissible import Admissible
 from cdsm.planning.field import Point, Reading
-from cdsm.planning.problem import Problem, along, checked_direction, count, problem
+from cdsm.planning.problem import Problem, along, checked_direction, checked_starts, problem
 from cdsm.planning.search import HIGHEST, LOWEST, Goal, Task, search
 from cdsm.planning.starts import Ground, settled
 from cdsm.posture import Posture
@@ -136,9 +136,9 @@ def stiffness_range(
             of the elasticity's domain, and buckling.
         wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m].
         margin: From which part of the largest eigenvalue of K_θ under the least tensions on the
-            smallest one counts as stable [-].
+            smallest one counts as stable [-], 1e-9 or more.
         starts: From how many tensions to search for ``low``, and for ``high`` unless the rigidity
-            of all cables is known to rise with the tension, where a few are enough.
+            of all cables is known to rise with the tension, where a few are enough; at most 1000.
         seed: Of the random ones among them.
 
     Raises:
@@ -150,7 +150,7 @@ def stiffness_range(
     """
     question = problem(pose, minimum, maximum, wrench, margin)
     u = checked_direction(question, direction)
-    low, high, steps = attainable(question, u, count("starts", starts, 1), count("seed", seed, 0))
+    low, high, steps = attainable(question, u, *checked_starts(starts, seed))
     if low.open or high.open:
         raise InvalidInput(
             "maximum",

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from rich.console import Console
 from rich.progress import track
 
-from cdsm._checks import Array, bound, frozen, instance, number_array
+from cdsm._checks import Array, bound, flag, frozen, instance, number_array
 from cdsm.errors import (
     CableError,
     CdsmError,
@@ -32,7 +32,8 @@ from cdsm.planning.problem import (
     achieved,
     checked_margin,
     checked_matrix,
-    count,
+    checked_positive,
+    checked_starts,
     problem,
     unit_directions,
     wanted,
@@ -106,8 +107,8 @@ def plan_path(
             if not given.
         rate: By how much a tension may change per step [N], for all cables or (C,); inf for any.
         margin: From which part of the largest eigenvalue of K_θ under the least tensions on the
-            smallest one counts as stable [-].
-        starts: From how many tensions to search where there are none to go on from.
+            smallest one counts as stable [-], 1e-9 or more.
+        starts: From how many tensions to search where there are none to go on from, at most 1000.
         seed: Of the random ones among them.
         progress: Show a bar on the standard error, if that is a terminal.
 
@@ -128,7 +129,8 @@ def plan_path(
         raise InvalidInput("rate", f"{limit.min():g} N given; it must be positive, or inf for any.")
     checked_bounds(arm, minimum, maximum)  # at once, not at the first posture that is possible
     checked_margin(margin)
-    follower = Follower(limit, count("starts", starts, 1), count("seed", seed, 0))
+    follower = Follower(limit, *checked_starts(starts, seed))
+    flag("progress", progress)
 
     near = guess
     infeasible: list[InfeasibleSample] = []
@@ -198,8 +200,8 @@ def _checked_targets(directions: Array | None, target: ArrayLike, size: int) -> 
     if directions is None:
         for matrix in targets:
             checked_matrix(matrix)
-    elif not (targets > 0.0).all():
-        raise InvalidInput("target", f"{targets.min():g} N/m given; stiffness is positive.")
+    else:
+        checked_positive(targets)
     return targets
 
 

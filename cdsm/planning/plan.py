@@ -15,8 +15,8 @@ from cdsm.planning.planner import REACHED, Planner
 from cdsm.planning.problem import (
     achieved,
     checked_matrix,
+    checked_starts,
     checked_targets,
-    count,
     misfit,
     problem,
     unit_directions,
@@ -134,8 +134,8 @@ def plan_stiffness(
             of the elasticity's domain, and buckling.
         wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m].
         margin: From which part of the largest eigenvalue of K_θ under the least tensions on the
-            smallest one counts as stable [-].
-        starts: From how many tensions to search.
+            smallest one counts as stable [-], 1e-9 or more.
+        starts: From how many tensions to search, at most 1000.
         seed: Of the random ones among them.
 
     Raises:
@@ -149,7 +149,7 @@ def plan_stiffness(
             arm.
     """
     question = problem(pose, minimum, maximum, wrench, margin)
-    number, seed = count("starts", starts, 1), count("seed", seed, 0)
+    number, seed = checked_starts(starts, seed)
     if direction is None:
         directions, targets = None, checked_matrix(target)
     else:

@@ -7,7 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm._checks import Array, frozen, instance, number_array, scalar, unit_direction
+from cdsm._checks import (
+    SMALLEST,
+    Array,
+    frozen,
+    instance,
+    number_array,
+    scalar,
+    unit_direction,
+    whole_number,
+)
 from cdsm.errors import InvalidInput, SingularStiffness
 from cdsm.manipulator import Manipulator
 from cdsm.planning.admissible import Admissible, admissible
@@ -15,6 +24,12 @@ from cdsm.planning.field import Field, Part, Reading
 from cdsm.planning.gradient import require_finite
 from cdsm.posture import Posture
 from cdsm.stiffness import Stiffness, stiffness
+
+_LEAST_MARGIN = 1e-9
+"""Tensions balanced to rounding tell the smallest eigenvalue to some 1e-11 of the largest."""
+
+_MOST_STARTS = 1000
+"""A minute of searches, of which the best is seldom one of the last."""
 
 _SYMMETRIC = 1e-9
 """Largest part of a matrix that may be skew by rounding."""
@@ -51,25 +66,28 @@ def problem(
 
 
 def checked_margin(margin: float) -> float:
-    """A part between 0 and 1.
+    """A part between rounding and 1.
 
     Raises:
         InvalidInput: It is not.
     """
     part = scalar("margin", margin)
-    if not 0.0 < part < 1.0:
+    if not _LEAST_MARGIN <= part < 1.0:
         raise InvalidInput(
             "margin",
-            f"{part:g} given; it is a part of the largest eigenvalue of K_θ: 0 < margin < 1.",
+            f"{part:g} given; it is a part of the largest eigenvalue of K_θ: "
+            f"{_LEAST_MARGIN:g} <= margin < 1. Less is rounding.",
         )
     return part
 
 
-def count(name: str, value: object, least: int) -> int:
-    """Return a whole number that is not below the least one allowed."""
-    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
-        raise InvalidInput(name, f"{value!r} given; a whole number from {least} on is needed.")
-    return int(value)
+def checked_starts(starts: object, seed: object) -> tuple[int, int]:
+    """From how many tensions to search, and the seed of the random ones among them.
+
+    Raises:
+        InvalidInput: Not whole numbers, too few or too many.
+    """
+    return whole_number("starts", starts, 1, _MOST_STARTS), whole_number("seed", seed, 0)
 
 
 def checked_direction(question: Problem, direction: ArrayLike) -> Array:
@@ -186,9 +204,21 @@ def checked_targets(directions: Array, target: ArrayLike) -> Array:
             f"{directions.shape}; give one stiffness [N/m] for each, {directions.shape[:-1]}, or "
             "direction=None with the (3, 3) of cartesian.",
         )
-    if not (targets > 0.0).all():
-        raise InvalidInput("target", f"{targets.min():g} N/m given; stiffness is positive.")
-    return frozen(targets)
+    return frozen(checked_positive(targets))
+
+
+def checked_positive(targets: Array) -> Array:
+    """The same targets [N/m], all positive and none so small that quotients overflow.
+
+    Raises:
+        InvalidInput: They are not.
+    """
+    if not (targets >= SMALLEST).all():
+        raise InvalidInput(
+            "target",
+            f"{targets.min():g} N/m given; stiffness is positive, at least {SMALLEST:g} N/m.",
+        )
+    return targets
 
 
 def checked_matrix(target: ArrayLike) -> Array:
@@ -204,6 +234,6 @@ def checked_matrix(target: ArrayLike) -> Array:
         )
     if abs(matrix - matrix.T).max() > _SYMMETRIC * abs(matrix).max():
         raise InvalidInput("target", "is not symmetric, which a stiffness matrix is.")
-    if not np.linalg.eigvalsh(matrix)[0] > 0.0:
+    if not np.linalg.eigvalsh(matrix)[0] >= SMALLEST:
         raise InvalidInput("target", "is not positive definite, which a stiffness matrix is.")
     return frozen(matrix)

@@ -10,7 +10,7 @@ from typing import Generic, TypeVar, final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cdsm._checks import Array, frozen, instance, number_array, scalar, unit_direction, vector
+from cdsm._checks import Array, frozen, number_array, scalar, text, unit_direction, vector
 from cdsm.elasticity import Elasticity
 from cdsm.errors import InvalidInput
 from cdsm.sweep.labels import Label
@@ -156,4 +156,4 @@ def _rows(name: str, rows: list[Array]) -> Array:
 def _names(name: str, values: Mapping[str, object]) -> NDArray[np.str_]:
     if not values:
         raise InvalidInput(name, "is empty; give at least one name and value.")
-    return np.array([instance(f"name of {name}", key, str) for key in values])
+    return np.array([text(f"name of {name}", key) for key in values])

@@ -15,14 +15,14 @@ from typing import final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm._checks import Array, ReadOnlyState, frozen, number_array, one_of, scalar
+from cdsm._checks import Array, ReadOnlyState, frozen, number_array, one_of, scalar, whole_number
 from cdsm.errors import InvalidInput
 from cdsm.manipulator import Manipulator
 from cdsm.sweep.choices import distinct
 from cdsm.sweep.labels import Label
 
-MAXIMUM_RANDOM = 2**30
-"""scipy's Sobol sequence has 30 bits."""
+MAXIMUM_POSES = 2**30
+"""Of a path or drawn; the Sobol sequence of scipy has 30 bits."""
 
 _DRAWN = 2**16
 """Points drawn at once."""
@@ -168,7 +168,8 @@ class PathPoses(ReadOnlyState, PoseSet):
             the waypoints themselves.
 
     Raises:
-        InvalidInput: Not two or more postures, a path without length, or a count below 2.
+        InvalidInput: Not two or more postures, a path without length, or a count below 2 or above
+            2³⁰.
     """
 
     waypoints: Array
@@ -181,8 +182,8 @@ class PathPoses(ReadOnlyState, PoseSet):
                 "waypoints",
                 f"shape {waypoints.shape} given, (n, nv) needed: two or more postures [rad].",
             )
-        if self.count is not None and _whole("count", self.count) < 2:
-            raise InvalidInput("count", f"{self.count} given; a path has two or more postures.")
+        if self.count is not None:
+            whole_number("count", self.count, 2, MAXIMUM_POSES)
         object.__setattr__(self, "waypoints", frozen(waypoints))
         if self.count is not None and not self._distances[-1] > 0.0:
             raise InvalidInput("waypoints", "are all the same posture; give two different ones.")
@@ -220,10 +221,8 @@ class RandomPoses(PoseSet):
     seed: int = 0
 
     def __post_init__(self) -> None:
-        if not 1 <= _whole("count", self.count) <= MAXIMUM_RANDOM:
-            raise InvalidInput("count", f"{self.count} given; 1 to {MAXIMUM_RANDOM} can be drawn.")
-        if _whole("seed", self.seed) < 0:
-            raise InvalidInput("seed", f"{self.seed} given; it cannot be negative.")
+        whole_number("count", self.count, 1, MAXIMUM_POSES)
+        whole_number("seed", self.seed, 0)
 
     def _of(self, arm: Manipulator) -> Listed:
         from scipy.stats import qmc  # takes half a second to import
@@ -279,9 +278,3 @@ def _listed(q: Array, arm: Manipulator, told: str, labels: dict[str, Label]) -> 
     labels["pose"] = Label(("pose",), np.arange(len(q)), "number of the posture", "1")
     labels["q"] = Label(("pose", "joint"), q, "joint angles", _unit(arm))
     return Listed(q=frozen(q), labels=labels, told=told)
-
-
-def _whole(name: str, value: object) -> int:
-    if isinstance(value, bool) or not isinstance(value, (int, np.integer)):
-        raise InvalidInput(name, f"{value!r} given; a whole number is needed.")
-    return int(value)

@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cdsm._checks import flag, whole_number
 from cdsm._extras import need
 from cdsm._files import as_path
 from cdsm.elasticity import Elasticity
-from cdsm.errors import FileError, InvalidInput
+from cdsm.errors import FileError
 from cdsm.manipulator import Manipulator
 from cdsm.sweep.blocks import Block, blocks, extents
 from cdsm.sweep.cluster import checked_client, on_cluster
@@ -92,6 +93,7 @@ def sweep(
         ClusterError: The scheduler is gone, or a worker cannot compute.
     """
     need("sweep", "xarray", *(["zarr"] if store is not None else []))
+    flag("progress", progress)
     if client is not None:
         checked_client(client)
     question = ask(
@@ -123,9 +125,7 @@ def _postures(question: Question, chunk: int | None) -> int:
     """How many postures make a block."""
     if chunk is None:
         return _NUMBERS // (question.problem.arm.nv * question.problem.cases)
-    if isinstance(chunk, bool) or not isinstance(chunk, (int, np.integer)) or chunk < 1:
-        raise InvalidInput("chunk", f"{chunk!r} given; a positive whole number is needed.")
-    return int(chunk) // question.problem.cases
+    return whole_number("chunk", chunk, 1) // question.problem.cases
 
 
 def _run(
