@@ -86,6 +86,7 @@ def naive_joint_stiffness(
     J = jacobians(q)
     H = difference(jacobians, q, step)
     active = np.einsum("c,cij->ij", tension, H[:c])
-    passive = J[:c].T @ np.diag(rigidity / arm.state(q)[0]) @ J[:c]
+    original = arm.state(q)[0] / (1.0 + tension / rigidity)
+    passive = J[:c].T @ np.diag(rigidity / original) @ J[:c]
     load = np.einsum("a,aij->ij", wrench, H[c + 1 :])
     return np.asarray(active + passive + H[c] - load)

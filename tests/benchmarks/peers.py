@@ -66,9 +66,9 @@ def with_jax(arm: NaiveArm, rigidity: float) -> Callable[[Array, Array, Array], 
 
     def potential(q: Any, tension: Any, force: Any) -> Any:
         lengths, energy, tip = state(arm, q, jnp.zeros(arm.n * arm.m), tools)
-        free = jax.lax.stop_gradient(lengths)
-        stretched = lengths - free
-        cables = tension @ lengths + (rigidity / free * stretched**2).sum() / 2.0
+        here = jax.lax.stop_gradient(lengths)
+        springs = (rigidity + tension) / here  # EA/l_0
+        cables = tension @ lengths + (springs * (lengths - here) ** 2).sum() / 2.0
         return cables + energy - force @ tip[:, 0]
 
     compiled: Callable[[Array, Array, Array], Any] = jax.jit(jax.vmap(jax.hessian(potential)))
@@ -90,9 +90,10 @@ def with_casadi(arm: NaiveArm, rigidity: float) -> Any:
     tools = Tools(ca.cos, ca.sin, matrix, lambda columns: ca.sqrt(ca.sum1(columns**2)), add, ca.dot)
     count = arm.n * arm.m
     q, force = ca.SX.sym("q", 2 * arm.n), ca.SX.sym("force", 3)
-    tension, free = ca.SX.sym("tension", 1, count), ca.SX.sym("free", 1, count)
+    tension, here = ca.SX.sym("tension", 1, count), ca.SX.sym("here", 1, count)
     lengths, energy, tip = state(arm, q, ca.SX.zeros(1, count), tools)
-    cables = ca.dot(tension, lengths) + ca.sum2(rigidity / free * (lengths - free) ** 2) / 2.0
+    springs = (rigidity + tension) / here  # EA/l_0
+    cables = ca.dot(tension, lengths) + ca.sum2(springs * (lengths - here) ** 2) / 2.0
     hessian, _ = ca.hessian(cables + energy - ca.dot(force, tip), q)
-    joint = ca.densify(ca.substitute(hessian, free, lengths))
+    joint = ca.densify(ca.substitute(hessian, here, lengths))
     return ca.Function("joint_stiffness", [q, tension, force], [joint])
