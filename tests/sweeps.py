@@ -46,6 +46,8 @@ CASES: dict[str, Any] = {"minimum": [1.0, 20.0, 60.0], "elasticity": LAWS, "wren
 class Deadly(cdsm.Elasticity):
     """A wire that kills the process that asks for its rigidity, once it comes to a file "die…".
 
+    Not if one tension is asked for: that is how it is described, before a sweep begins.
+
     Attributes:
         folder: Its files are taken away one by one, in the order of their names.
         low: Only under tensions above it [N].
@@ -55,7 +57,7 @@ class Deadly(cdsm.Elasticity):
     low: float = 0.0
 
     def rigidity(self, tension: ArrayLike) -> Array:
-        if np.max(tension, initial=0.0) > self.low:
+        if np.size(tension) > 1 and np.max(tension, initial=0.0) > self.low:
             for order in sorted(Path(self.folder).iterdir())[:1]:
                 with suppress(FileNotFoundError):  # another process was faster
                     order.unlink()

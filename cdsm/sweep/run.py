@@ -74,7 +74,9 @@ def sweep(
             :data:`~cdsm.sweep.quantities.QUANTITIES`.
         store: A Zarr folder that the entries are written to as they are computed. Asked again, the
             run goes on from what is there, entries of lost workers first among it, to the same bits
-            as without a stop. The Dataset then reads from it what is looked at.
+            as without a stop. The Dataset then reads from it what is looked at. A law of your own
+            is known by its class, its state, and EA and strain at up to 185 tensions: if its code
+            has changed there since, that is another sweep.
         client: Of a dask cluster whose workers compute, and are waited for while there are none;
             None: the threads of this machine.
         chunk: How many stiffnesses are computed, sent and stored at once; a store keeps the one it
@@ -89,7 +91,8 @@ def sweep(
         UnknownName: No such joint or output.
         MissingExtra: xarray, zarr or distributed is not installed.
         FileError: The store cannot be made, read or written.
-        StoreError: The store holds another sweep, or another run is writing to it.
+        StoreError: The store holds another sweep, a law of your own has changed since, or another
+            run is writing to it.
         ClusterError: The scheduler is gone, or a worker cannot compute.
     """
     need("sweep", "xarray", *(["zarr"] if store is not None else []))

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from cdsm.errors import FileError, StoreError
 from cdsm.sweep.dataset import EMPTY, to_dataset, variable_attributes
+from cdsm.sweep.description import changed_laws
 from cdsm.sweep.question import Question
 
 if TYPE_CHECKING:
@@ -158,7 +159,13 @@ def _check(path: Path, question: Question) -> None:
             different += _difference(str(name), stored[name].values, wanted[name].values)
     for name in {**stored.attrs, **wanted.attrs}:
         theirs, ours = (str(each.attrs.get(name, "nothing")) for each in (stored, wanted))
-        if theirs != ours:  # told from a little before they part
+        if changed := changed_laws(theirs, ours):
+            different += [
+                f"{name}: {law} answers otherwise than when the store was made; its code has "
+                "changed, and what the store holds is not what it gives now"
+                for law in changed
+            ]
+        elif theirs != ours:  # told from a little before they part
             same = itertools.takewhile(
                 lambda pair: pair[0] == pair[1], zip(theirs, ours, strict=False)
             )
