@@ -130,7 +130,7 @@ void joint_stiffness(long rows, long nv, long cables, long sites, long segments,
         weigh(nv, parent, mass, centre, gravity, R, o, z, heavy, K);
         for (long c = 0; c < cables; c++) {
             /* EA/l_0, the wire as long as L under F */
-            const double k = (rigidity[c] + F[c]) / L[c], *own = J + c * nv;
+            const double k = (rigidity[c] + F[b * cables + c]) / L[c], *own = J + c * nv;
             long last = nv;
             while (last > 0 && own[last - 1] == 0.0)
                 last--;
