@@ -7,7 +7,7 @@ does::
     pytest -m speed -s         and what was measured besides
 """
 
-from collections.abc import Callable
+from typing import Any
 
 import pytest
 
@@ -15,16 +15,15 @@ from tests.benchmarks.timing import Clock
 
 
 @pytest.fixture(params=["numbers", pytest.param("speed", marks=pytest.mark.speed)])
-def clock(
-    request: pytest.FixtureRequest, record_property: Callable[[str, object], None]
-) -> Clock | None:
+def clock(request: pytest.FixtureRequest) -> Clock | None:
     """None where the numbers alone are compared."""
     if request.param == "numbers":
         return None
-    return Clock(lambda line: record_property("ratio", line))
+    said = request.node.user_properties
+    return Clock(lambda line: said.append(("ratio", line)))
 
 
-def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+def pytest_terminal_summary(terminalreporter: Any) -> None:
     reports = [report for found in terminalreporter.stats.values() for report in found]
     lines = [
         value
