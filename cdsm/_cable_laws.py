@@ -84,13 +84,16 @@ class CableLaws:
                 domain.
             InvalidInput: An elasticity of the user's own gives no positive rigidity, or no strain.
         """
-        rigidity = self._constant + self._linear * tension  # EA (1 + F/EA)
-        for law, held in self._asked:
-            try:
-                rigidity[held] = self.stretched_rigidity(law, tension[held])
-            except ElasticityRangeError as error:
-                raise self.naming(error, held) from None
-        return frozen(cable_stiffness(lengths, tension, rigidity, self.series, self.rest))
+        rigidity = self._constant
+        if self._asked:
+            rigidity = rigidity.copy()
+            for law, held in self._asked:
+                try:
+                    rigidity[held] = self.stretched_rigidity(law, tension[held])
+                except ElasticityRangeError as error:
+                    raise self.naming(error, held) from None
+        k = cable_stiffness(lengths, tension, rigidity, self._linear, self.series, self.rest)
+        return frozen(k)
 
     def stretched_rigidity(self, law: Elasticity, tension: Array) -> Array:
         """EA (1 + ε) [N] of a law, or EA where the stretched length counts; same shape as F [N].

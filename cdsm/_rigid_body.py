@@ -151,7 +151,8 @@ class RigidBody:
         The Jacobian (6, nv) has linear rows first, in base axes, at the tip.
         """
         model, data = self._model, self._data()
-        q = q[self._ours]
+        if self._reordered:
+            q = q[self._ours]
         pin.computeJointJacobians(model, data, q)
         jacobian = pin.getFrameJacobian(model, data, self._tip, pin.LOCAL_WORLD_ALIGNED)
         tip = pin.updateFramePlacement(model, data, self._tip).homogeneous

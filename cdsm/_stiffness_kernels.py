@@ -11,11 +11,16 @@ from cdsm._kernels import Indices, add_length_hessian, mirror
 
 @compiled
 def cable_stiffness(
-    length: Array, tension: Array, rigidity: Array, series: Array, rest: Array
+    length: Array, tension: Array, rigidity: Array, linear: Array, series: Array, rest: Array
 ) -> Array:
-    """Stiffness k of each cable (C,) [N/m], as a new array; see :func:`set_cable_stiffness`."""
-    stiffness = np.empty(length.shape[0])
-    set_cable_stiffness(length, tension, rigidity, series, rest, stiffness)
+    """Stiffness k of each cable (C,) [N/m], as a new array; see :func:`set_cable_stiffness`.
+
+    EA (1 + ε) is the rigidity, and where ``linear`` (C,) is one that and the tension: EA + F.
+    """
+    stretched, stiffness = np.empty(length.shape[0]), np.empty(length.shape[0])
+    for c in range(length.shape[0]):
+        stretched[c] = rigidity[c] + linear[c] * tension[c]
+    set_cable_stiffness(length, tension, stretched, series, rest, stiffness)
     return stiffness
 
 
