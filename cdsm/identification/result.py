@@ -18,6 +18,7 @@ from cdsm._checks import (
     frozen,
     scalar,
 )
+from cdsm._units import MODEL
 from cdsm.errors import InvalidInput
 from cdsm.identification.measurement import Measurement, label
 from cdsm.identification.profile import LOWER, SAME, Profile, Side
@@ -211,9 +212,8 @@ class Identification(ReadOnlyState):
             lines.append(
                 f"{name:<22}{measured / 1e3:>12.4g}{predicted / 1e3:>12.4g}{residual:>12.2f}"
             )
-        return "\n".join(
-            [*lines, "", self._verdict, *(f"warning: {sentence}" for sentence in self.warnings)]
-        )
+        lines += [f"({MODEL}; secant where a force is given)", "", self._verdict]
+        return "\n".join([*lines, *(f"warning: {sentence}" for sentence in self.warnings)])
 
     @property
     def _labels(self) -> list[str]:
