@@ -211,7 +211,7 @@ class Stiffness(ReadOnlyState):
     def pseudoinverse(self, term: Term = "joint") -> Array:
         """J⁺ᵀ K J⁺ (3, 3) [N/m] with J the linear rows of J_X: the paper's K_R read literally.
 
-        It reproduces the paper's figures, and overestimates: in it the arm is stiffer than in
+        The paper's figures are read with it, and it overestimates: the arm is stiffer than in
         :attr:`cartesian`, by 4 % to over 100 %, since only the joint motion of least norm happens.
 
         Args:
