@@ -49,7 +49,7 @@ class Curve:
         tension: Smallest, mean and largest cable tension (N, 3) [N].
         pseudoinverse: Diagonal of the paper's K_R (N, 3) [N/m].
         pseudoinverse_part: The same of one term of K_θ alone, the figure's ``part``.
-        along: Stiffness that a weight measures along x, y, z (N, 3) [N/m].
+        along: Stiffness that a small weight measures along x, y, z (N, 3) [N/m].
         along_part: What that term carries of it.
     """
 
