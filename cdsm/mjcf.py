@@ -39,7 +39,7 @@ and its weight is taken off again."""
 _SMALLEST = 1e-12
 """Mass [kg] below which a body counts as having none; and moment of inertia [kg m²], likewise."""
 
-_FLAT = 1.0 - 1e-9
+_FLAT = 1.0 - 1e-6
 """Largest moment of inertia over the sum of the others at which MuJoCo still takes a body: that of
 a plate has 1, and rounding carries it beyond."""
 

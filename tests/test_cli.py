@@ -53,7 +53,7 @@ def test_reproduce_writes_figures_table_and_numbers(tmp_path: Path) -> None:
     assert set(written) == figures | {"reproduction.json", "reproduction.md"}
     assert all(written[name].read_bytes().startswith(b"\x89PNG") for name in figures)
     assert "Fig. 6" in result.output
-    assert "4.2, 2.91, 4.58" in written["reproduction.md"].read_text(encoding="utf-8")
+    assert "4.17, 2.89, 4.53" in written["reproduction.md"].read_text(encoding="utf-8")
     json.loads(written["reproduction.json"].read_text(encoding="utf-8"))
 
 
