@@ -180,6 +180,8 @@ BODIES = {
     "none": "",
     "of a rod": '<inertia ixx="0" iyy="2e-4" izz="2e-4" ixy="0" ixz="0" iyz="0"/>',
     "of a plate": '<inertia ixx="3e-4" iyy="1e-4" izz="2e-4" ixy="0" ixz="0" iyz="0"/>',
+    "of a needle": '<inertia ixx="1e-15" iyy="7e-2" izz="7.00001e-2" ixy="0" ixz="0" iyz="0"/>',
+    "of a long needle": '<inertia ixx="1e-9" iyy="7" izz="7" ixy="0" ixz="0" iyz="0"/>',
     "of nothing real": '<inertia ixx="1e-4" iyy="1e-4" izz="9e-4" ixy="0" ixz="0" iyz="2e-5"/>',
     "negative": '<inertia ixx="-1e-4" iyy="1e-4" izz="2e-4" ixy="0" ixz="0" iyz="0"/>',
 }
@@ -360,6 +362,16 @@ def test_mass_matrix_is_that_of_mujoco(body: str) -> None:
     theirs = mass(model, data)[np.ix_(place, place)]
     units = np.sqrt(np.outer(theirs.diagonal(), theirs.diagonal()))
     np.testing.assert_allclose(mass_matrix(pose, masses) / units, theirs / units, atol=1e-12)
+
+
+@pytest.mark.parametrize("body", ["of a rod", "of a plate", "of a needle", "of a long needle"])
+def test_real_bodies_keep_their_moments_of_inertia(body: str) -> None:
+    """MuJoCo wants no moment above the sum of the others, which rounding leaves of thin bodies."""
+    arm = two_links(BODIES[body])
+    inertia = etree.fromstring(arm.urdf).find(".//inertia")
+    wanted = sorted(float(inertia.get(key)) for key in ("ixx", "iyy", "izz"))
+    found = sorted(loaded(arm)[0].body("hand").inertia)
+    np.testing.assert_allclose(found, wanted, rtol=1e-8, atol=1e-5 * wanted[-1])
 
 
 def test_motion_without_any_mass_is_named() -> None:
