@@ -13,12 +13,8 @@ from importlib.metadata import version as _version
 
 from cdsm import presets
 from cdsm.batch import Batch, Status, Tensions, distribute_tensions, evaluate
-from cdsm.buckling import CriticalLoad, CriticalTension, critical_load, critical_tension
 from cdsm.cable import Cable, Site, in_series, serpentine_cables
-from cdsm.cable_file import read_cables, write_cables
-from cdsm.caspr import read_caspr
 from cdsm.elasticity import Domain, Elasticity, LinearElasticity
-from cdsm.equilibrium import Equilibrium, equilibrium
 from cdsm.errors import (
     CableError,
     CdsmError,
@@ -42,15 +38,16 @@ from cdsm.errors import (
 )
 from cdsm.geometry import Geometry
 from cdsm.identification import Identification, Measurement, identify
-from cdsm.kinematics import (
+from cdsm.interchange.cable_file import read_cables, write_cables
+from cdsm.interchange.caspr import read_caspr
+from cdsm.interchange.mjcf import to_mjcf, write_mjcf
+from cdsm.kinematics.maps import (
     JointSolution,
     KinematicSolution,
     inverse_kinematics,
     solve_joint_angles,
 )
 from cdsm.manipulator import Manipulator
-from cdsm.mjcf import to_mjcf, write_mjcf
-from cdsm.modes import Modes, modes
 from cdsm.parts import CableRoute, Joint, Link
 from cdsm.planning import (
     HalfWay,
@@ -68,8 +65,12 @@ from cdsm.planning import (
 )
 from cdsm.posture import Posture
 from cdsm.report import Report, SelfCheck
-from cdsm.stiffness import Shares, Stiffness, stiffness
-from cdsm.sweep import (
+from cdsm.statics.buckling import CriticalLoad, CriticalTension, critical_load, critical_tension
+from cdsm.statics.equilibrium import Equilibrium, equilibrium
+from cdsm.statics.natural_modes import Modes, modes
+from cdsm.statics.weight_test import LinearPrediction, WeightTest, weight_test
+from cdsm.stiffness_matrix import Shares, Stiffness, stiffness
+from cdsm.sweeps import (
     GridPoses,
     PathPoses,
     PoseSet,
@@ -79,13 +80,12 @@ from cdsm.sweep import (
     sweep,
     write_sweep,
 )
-from cdsm.tensile import TensileFit, fit_tensile_test
-from cdsm.tensile_data import TensileTest, read_tensile_csv
 from cdsm.tension import Tension, distribute_tension
 from cdsm.urdf import to_urdf, write_urdf
-from cdsm.weight import LinearPrediction, WeightTest, weight_test
-from cdsm.wire import StrandElasticity, TabulatedElasticity
-from cdsm.wire_file import read_elasticity, write_elasticity
+from cdsm.wires.files import read_elasticity, write_elasticity
+from cdsm.wires.laws import StrandElasticity, TabulatedElasticity
+from cdsm.wires.tensile.fit import TensileFit, fit_tensile_test
+from cdsm.wires.tensile.record import TensileTest, read_tensile_csv
 
 __version__ = _version("cdsm-stiffness")
 

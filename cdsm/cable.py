@@ -10,7 +10,10 @@ from typing import Literal, final, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm._checks import (
+from cdsm.elasticity import Elasticity, tension_at
+from cdsm.errors import CableError, CdsmError, InvalidInput
+from cdsm.geometry import Geometry
+from cdsm.support.validation import (
     SMALLEST,
     Array,
     bound,
@@ -22,9 +25,6 @@ from cdsm._checks import (
     text,
     vector,
 )
-from cdsm.elasticity import Elasticity, tension_at
-from cdsm.errors import CableError, CdsmError, InvalidInput
-from cdsm.geometry import Geometry
 
 Control = Literal["position", "force"]
 

@@ -15,8 +15,8 @@ from typing import final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm._checks import LARGEST, SMALLEST, Array, flag, number_array, scalar
 from cdsm.errors import ElasticityRangeError, InvalidInput
+from cdsm.support.validation import LARGEST, SMALLEST, Array, flag, number_array, scalar
 
 _STEP = 6e-6
 """Relative step of central differences: the cube root of the rounding of float64."""
@@ -134,7 +134,7 @@ class Elasticity(ABC):
         """Tensions [N], rising, beyond which the rigidity starts from another value; mostly none.
 
         A jump belongs to the range below it. A law of your own has to name its jumps if
-        :func:`~cdsm.planning.plan_stiffness` and its kin are to look on both sides of them.
+        :func:`~cdsm.plan_stiffness` and its kin are to look on both sides of them.
         """
         return ()
 

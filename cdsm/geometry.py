@@ -12,9 +12,10 @@ from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
-from cdsm._checks import Printed, instance
-from cdsm._files import read_text, write_text
-from cdsm._records import (
+from cdsm.errors import GeometryError
+from cdsm.parts import MAXIMUM_JOINTS, CableRoute, Joint, Link
+from cdsm.support.files import read_text, write_text
+from cdsm.support.records import (
     CrossFaults,
     Name,
     NotNegative,
@@ -24,9 +25,8 @@ from cdsm._records import (
     record,
     toml_lines,
 )
-from cdsm._uniform import Hinged, Universal
-from cdsm.errors import GeometryError
-from cdsm.parts import MAXIMUM_JOINTS, CableRoute, Joint, Link
+from cdsm.support.validation import Printed, instance
+from cdsm.uniform import Hinged, Universal
 
 MAXIMUM_DEFAULT_LIMIT = math.radians(80.0)
 

@@ -15,9 +15,20 @@ from typing import final, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cdsm import _kernels
-from cdsm._cable_laws import CableLaws, OriginalLength
-from cdsm._checks import (
+from cdsm.arm_model import CableLaws, OriginalLength
+from cdsm.cable import Cable, serpentine_cables
+from cdsm.elasticity import Elasticity
+from cdsm.errors import (
+    CableError,
+    InvalidInput,
+    JointLimitError,
+)
+from cdsm.geometry import Geometry
+from cdsm.kernels import segments
+from cdsm.posture import Posture
+from cdsm.rigid_body import RigidBody
+from cdsm.routing import route
+from cdsm.support.validation import (
     Array,
     Printed,
     flag,
@@ -27,17 +38,6 @@ from cdsm._checks import (
     sequence_of,
     vector,
 )
-from cdsm._rigid_body import RigidBody
-from cdsm._routing import route
-from cdsm.cable import Cable, serpentine_cables
-from cdsm.elasticity import Elasticity
-from cdsm.errors import (
-    CableError,
-    InvalidInput,
-    JointLimitError,
-)
-from cdsm.geometry import Geometry
-from cdsm.posture import Posture
 from cdsm.urdf import TIP, to_urdf
 from cdsm.urdf_reader import read_urdf
 
@@ -65,7 +65,7 @@ class Manipulator(Printed):
     Args:
         geometry: The arm.
         elasticity: Of all cables, or one per cable; the cables are then those of
-            :func:`~cdsm.cable.serpentine_cables`.
+            :func:`~cdsm.serpentine_cables`.
         cables: The cables, instead of ``elasticity``: any sites on any links of :attr:`urdf`.
         gravity: In base axes (3,) [m/s²]; (0, 0, 0) for none.
         original_length: Of which length of a locked wire EA/l_0 is taken: ``"unstrained"``, what
@@ -117,14 +117,14 @@ class Manipulator(Printed):
 
         Args:
             urdf: Path of the file, or the text itself.
-            cables: Its cables, as :func:`~cdsm.cable_file.read_cables` reads them.
+            cables: Its cables, as :func:`~cdsm.read_cables` reads them.
             tip: The link whose frame is the tip, ``tool0`` of other docstrings.
             joint_names: The joints that move, in the order that q is to have. None: from the base
                 on, each branch to its end, branches in the order of their joints' names
                 (Pinocchio's order).
             gravity: In base axes (3,) [m/s²]; (0, 0, 0) for none.
             check_inertia: Refuse moments of inertia that no body has. Stiffness does not depend on
-                them, :func:`~cdsm.modes.modes` do.
+                them, :func:`~cdsm.modes` do.
             original_length: As for :class:`Manipulator`.
 
         Raises:
@@ -183,7 +183,7 @@ class Manipulator(Printed):
 
     @property
     def is_serpentine(self) -> bool:
-        """Whether it was made from a :class:`~cdsm.geometry.Geometry`."""
+        """Whether it was made from a :class:`~cdsm.Geometry`."""
         return self._geometry is not None
 
     @property
@@ -379,20 +379,20 @@ class Manipulator(Printed):
                 )
         return q
 
-    def _routed(self, q: Array) -> tuple[_kernels.Frames, Array, Array]:
+    def _routed(self, q: Array) -> tuple[segments.Frames, Array, Array]:
         """Where joints and cable sites are, L and J_L at checked joint angles.
 
         Raises:
             CableError: Two neighbouring sites of a cable coincide at this posture.
         """
-        *frames, lengths, length_jacobian, coincident = _kernels.evaluate(*self._constants, q)
+        *frames, lengths, length_jacobian, coincident = segments.evaluate(*self._constants, q)
         if coincident >= 0:
             raise CableError(
                 self._cables[self._segments[0][coincident, 0]].name,
                 f"two neighbouring sites coincide at q = {q.tolist()}, so the cable has no "
                 "direction there. Move a site, or change the posture.",
             )
-        return _kernels.Frames(*map(frozen, frames)), frozen(lengths), frozen(length_jacobian)
+        return segments.Frames(*map(frozen, frames)), frozen(lengths), frozen(length_jacobian)
 
 
 def _rebuild(

@@ -8,7 +8,7 @@ from typing import Annotated, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from cdsm._records import (
+from cdsm.support.records import (
     CrossFaults,
     Direction,
     Integer,

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, final
 
 import numpy as np
 
-from cdsm import _kernels, _stiffness_kernels
-from cdsm._checks import Array, ReadOnlyState, frozen
+from cdsm.kernels import segments
+from cdsm.kernels import stiffness as stiffness_kernels
+from cdsm.support.validation import Array, ReadOnlyState, frozen
 
 if TYPE_CHECKING:
     from cdsm.manipulator import Manipulator
@@ -41,7 +42,7 @@ class Posture(ReadOnlyState):
     length_jacobian: Array
     gravity_torque: Array
     gravity_stiffness: Array
-    _frames: _kernels.Frames
+    _frames: segments.Frames
 
     def __repr__(self) -> str:
         x, y, z = self.tip[:3, 3]
@@ -52,7 +53,7 @@ class Posture(ReadOnlyState):
         """H_L[c, i, j] = ∂²L_c/∂θ_i∂θ_j, (C, nv, nv) [m/rad²], built on first use."""
         count, nv = self.length_jacobian.shape
         hessian = np.zeros((count, nv, nv))
-        _kernels.add_length_hessian(
+        segments.add_length_hessian(
             *self.arm._segments, *self._frames, frozen(np.ones(count)), np.arange(count), hessian
         )
         return frozen(hessian)
@@ -111,7 +112,7 @@ class Posture(ReadOnlyState):
         self, tension: Array, cable_stiffness: Array, wrench: Array
     ) -> tuple[Array, Array, Array, Array]:
         """Active, passive, load and K_θ (nv, nv); of checked, read-only vectors."""
-        active, passive, load, joint = _stiffness_kernels.joint_stiffness(
+        active, passive, load, joint = stiffness_kernels.joint_stiffness(
             *self.arm._segments,
             *self._frames,
             self.jacobian,

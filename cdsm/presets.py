@@ -12,13 +12,13 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm._cable_laws import OriginalLength
+from cdsm.arm_model import OriginalLength
 from cdsm.cable import serpentine_cables
 from cdsm.elasticity import Elasticity, LinearElasticity
 from cdsm.geometry import Geometry
 from cdsm.manipulator import Manipulator
 from cdsm.parts import Link
-from cdsm.wire import StrandElasticity
+from cdsm.wires.laws import StrandElasticity
 
 STRAND_1X19: Final = StrandElasticity.eq19_repaired()
 """The 1×19 steel strand of 1.2 mm of Section IV-C: Eq. 19, repaired and continuous."""
@@ -40,7 +40,7 @@ def virtual_prototype_geometry(link_mass: float = 0.5, lead: float = 0.0) -> Geo
     """Geometry of Section IV: five universal joints, R = 30 mm, disks every 20 mm.
 
     The paper gives the joints, the hole radius and the disk spacing. Assumed: three cables per
-    joint, ending as in :class:`~cdsm.geometry.CableRoute`; no lead; 0.5 kg per link.
+    joint, ending as in :class:`~cdsm.CableRoute`; no lead; 0.5 kg per link.
 
     Args:
         link_mass: Mass of every link [kg].
@@ -74,7 +74,7 @@ def virtual_prototype(
         link_mass: Mass of every link [kg]; assumed.
         lead: Of every cable, before the base disk [m]; assumed.
         gravity: In base axes (3,) [m/s²]; along −y by assumption.
-        original_length: As for :class:`~cdsm.manipulator.Manipulator`; ``"stretched"`` is what the
+        original_length: As for :class:`~cdsm.Manipulator`; ``"stretched"`` is what the
             paper computes with.
     """
     geometry = virtual_prototype_geometry(link_mass, lead)
@@ -138,7 +138,7 @@ def experimental_prototype(
 
     The first of each pair (``cable1_1`` …) holds its length, the second (``cable1_2`` …) its
     tension, so that the second contributes no passive stiffness; give its tension to
-    :func:`~cdsm.tension.distribute_tension` as ``fixed``.
+    :func:`~cdsm.distribute_tension` as ``fixed``.
 
     Args:
         elasticity: Of all cables; the repaired Eq. 19 by default.

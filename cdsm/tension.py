@@ -23,11 +23,20 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import linprog
 from scipy.sparse import csc_matrix
 
-from cdsm import _balance
-from cdsm._checks import Array, ReadOnlyState, bound, frozen, instance, one_of, scalar, vector
 from cdsm.errors import InfeasibleTension, InvalidInput, SolverError
+from cdsm.kernels import tension as tension_kernels
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
+from cdsm.support.validation import (
+    Array,
+    ReadOnlyState,
+    bound,
+    frozen,
+    instance,
+    one_of,
+    scalar,
+    vector,
+)
 
 OPTIMALITY = 1e-9
 """Largest accepted violation of balance, bounds and stationarity, dimensionless."""
@@ -148,8 +157,8 @@ def distribute_tension(
     torque = pose.jacobian.T @ wrench - pose.gravity_torque
 
     length = pose.arm.length
-    scaled = _balance.scaled_balance(pose.length_jacobian, torque, low, high, length)
-    problem = _balance.Scaled(*scaled)
+    scaled = tension_kernels.scaled_balance(pose.length_jacobian, torque, low, high, length)
+    problem = tension_kernels.Scaled(*scaled)
     solution = _solve(problem, solver)
     if isinstance(solution, str):
         free = np.array([cable.name not in fixed for cable in pose.arm.cables])
@@ -221,7 +230,7 @@ def installed_solver(solver: str) -> str:
     return one_of("installed solver", solver, qpsolvers.available_solvers)
 
 
-def _solve(problem: _balance.Scaled, solver: str) -> Array | str:
+def _solve(problem: tension_kernels.Scaled, solver: str) -> Array | str:
     """Return the verified optimum, or what is wrong with the solver's answer: there may be none.
 
     Raises:
@@ -257,7 +266,7 @@ def _solve(problem: _balance.Scaled, solver: str) -> Array | str:
             return f"calls a point optimal that is not: {shortfall}"
     # only now: at the edge of the feasible, multipliers are so large that the last bit of x counts
     x, _, z = point
-    return _balance.settled(x, z, low, high, OPTIMALITY * max(1.0, float(abs(x).max())))
+    return tension_kernels.settled(x, z, low, high, OPTIMALITY * max(1.0, float(abs(x).max())))
 
 
 def _instead(solver: str) -> str:
@@ -266,10 +275,10 @@ def _instead(solver: str) -> str:
     return "Use solver='daqp'."
 
 
-def _shortfall(problem: _balance.Scaled, point: tuple[Array, ...]) -> str:
+def _shortfall(problem: tension_kernels.Scaled, point: tuple[Array, ...]) -> str:
     """What keeps a point and its multipliers from being the optimum; nothing if they are."""
     # the same as the solution's primal_residual, dual_residual and duality_gap, ten times faster
-    primal, dual, gap = _balance.optimality(*problem[:4], *point)
+    primal, dual, gap = tension_kernels.optimality(*problem[:4], *point)
     size = max(1.0, float(abs(point[0]).max()))
     distance = math.sqrt(2.0 * gap)  # ½‖x − x*‖² is at most the gap
     if max(primal, dual) <= OPTIMALITY * size and distance <= DISTANCE * size:
@@ -281,7 +290,7 @@ def _shortfall(problem: _balance.Scaled, point: tuple[Array, ...]) -> str:
     )
 
 
-def _polished(problem: _balance.Scaled, point: tuple[Array, ...]) -> tuple[Array, ...]:
+def _polished(problem: tension_kernels.Scaled, point: tuple[Array, ...]) -> tuple[Array, ...]:
     """Solve the optimality conditions exactly for the bounds that a near-optimum makes active."""
     A, b, low, high, *_ = problem
     x, _, z = point
@@ -296,7 +305,7 @@ def _polished(problem: _balance.Scaled, point: tuple[Array, ...]) -> tuple[Array
 
 
 def _explain(
-    pose: Posture, problem: _balance.Scaled, solver: str, fault: str, free: NDArray[np.bool_]
+    pose: Posture, problem: tension_kernels.Scaled, solver: str, fault: str, free: NDArray[np.bool_]
 ) -> NoReturn:
     """Settle by linear programs why a solver found no tensions, and raise it.
 
@@ -354,7 +363,7 @@ def _explain(
     )
 
 
-def _widening(problem: _balance.Scaled, free: NDArray[np.bool_]) -> float:
+def _widening(problem: tension_kernels.Scaled, free: NDArray[np.bool_]) -> float:
     """By how much the bounds of free cables (C,) must widen [N]; inf if that does not help."""
     A, b, lower, upper, _, force_scale = problem
     nv, count = A.shape

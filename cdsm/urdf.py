@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cdsm._checks import Array, instance
-from cdsm._files import write_file
-from cdsm._rigid_body import RigidBody
 from cdsm.errors import UrdfError
 from cdsm.geometry import Geometry
 from cdsm.parts import Link
+from cdsm.rigid_body import RigidBody
+from cdsm.support.files import write_file
+from cdsm.support.validation import Array, instance
 
 if TYPE_CHECKING:
     import yourdfpy

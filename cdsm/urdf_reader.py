@@ -13,11 +13,11 @@ from collections import Counter
 import numpy as np
 from lxml import etree
 
-from cdsm._checks import flag
-from cdsm._files import read_text
-from cdsm._xml import XmlFault, numbers, parse_xml
 from cdsm.errors import UrdfError, listed
 from cdsm.parts import MAXIMUM_JOINTS
+from cdsm.support.files import read_text
+from cdsm.support.validation import flag
+from cdsm.support.xml import XmlFault, numbers, parse_xml
 
 TAKEN = ("revolute", "prismatic", "fixed")
 """Joint types that cdsm takes."""

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 import cdsm
-from cdsm._checks import Array
+from cdsm.support.validation import Array
 
 STEEL = cdsm.LinearElasticity.of_wire(200e9, 1.2e-3)
 

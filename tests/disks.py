@@ -181,7 +181,7 @@ def refused(fault: str, folder: Path) -> list[dict[str, Any]]:
 
 
 def _stopped(sweep: Callable[[], object]) -> None:
-    from cdsm.sweep import run
+    from cdsm.sweeps import run
 
     write = Mock(side_effect=[run._write, KeyboardInterrupt])
     with patch.object(run, "_write", lambda *given: write()(*given)):

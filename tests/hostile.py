@@ -24,8 +24,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import cdsm
-from cdsm._files import MAXIMUM_BYTES
 from cdsm.cli.path_file import read_path
+from cdsm.support.files import MAXIMUM_BYTES
 from tests.arms import mixed_arm
 from tests.foreign import TREE, crab
 from tests.sweeps import short_arm

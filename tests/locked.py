@@ -10,8 +10,8 @@ from scipy.optimize import brentq
 
 import cdsm
 from cdsm import presets
-from cdsm._checks import Array
-from cdsm.wire import EQ19_PRINTED
+from cdsm.support.validation import Array
+from cdsm.wires.laws import EQ19_PRINTED
 from tests import arms
 from tests.differences import gravity_energy
 

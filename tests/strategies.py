@@ -11,8 +11,8 @@ from scipy.optimize import linprog
 from scipy.spatial.transform import Rotation
 
 import cdsm
-from cdsm._checks import Array
 from cdsm.cable import Control
+from cdsm.support.validation import Array
 from tests.foreign import joint_element, link_element
 
 Strategy = st.SearchStrategy

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 import cdsm
-from cdsm._checks import Array
-from cdsm.sweep.quantities import QUANTITIES
+from cdsm.support.validation import Array
+from cdsm.sweeps.quantities import QUANTITIES
 
 EVERYTHING = tuple(QUANTITIES)
 STEEL = cdsm.LinearElasticity(48e3)

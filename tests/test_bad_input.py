@@ -14,8 +14,8 @@ import scipy.linalg
 from scipy.optimize import linprog
 
 import cdsm
-from cdsm import _balance
-from cdsm._checks import Array
+from cdsm.kernels import tension as tension_kernels
+from cdsm.support.validation import Array
 from cdsm.tension import DISTANCE, OPTIMALITY, _polished, _shortfall
 from tests import foreign
 from tests.arms import STEEL, mixed_arm, random_arm, random_posture, random_tension, random_wrench
@@ -1078,7 +1078,7 @@ MENDABLE = ("balance is broken", "not the least")
 def test_every_optimality_condition_is_checked() -> None:
     A = POSE.length_jacobian.T
     low, high = np.full(A.shape[1], 10.0), np.full(A.shape[1], INF)
-    problem = _balance.Scaled(A / 0.01, -POSE.gravity_torque / 0.01, low, high, 0.01, 1.0)
+    problem = tension_kernels.Scaled(A / 0.01, -POSE.gravity_torque / 0.01, low, high, 0.01, 1.0)
     qp = qpsolvers.Problem(
         np.eye(low.size), np.zeros(low.size), A=problem.A, b=problem.b, lb=low, ub=high
     )
@@ -1095,20 +1095,20 @@ def test_every_optimality_condition_is_checked() -> None:
     ):
         assert _shortfall(problem, wrong)
     # and as qpsolvers itself measures
-    ours = _balance.optimality(*problem[:4], x, y + 1e-3, z)
+    ours = tension_kernels.optimality(*problem[:4], x, y + 1e-3, z)
     solution.y = y + 1e-3
     theirs = (solution.primal_residual(), solution.dual_residual(), solution.duality_gap())
     np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-12)
 
 
-def slightly_off(excess: float) -> tuple[_balance.Scaled, tuple[Array, ...]]:
+def slightly_off(excess: float) -> tuple[tension_kernels.Scaled, tuple[Array, ...]]:
     """Two cables that share 10; the one has a little more, and multipliers that hide it.
 
     Constraints and stationarity hold exactly. The gap is 2e² + 9e; the optimum is √2 e away, but to
     know that one would have to know the optimum.
     """
     A, b = np.ones((1, 2)), np.array([10.0])
-    problem = _balance.Scaled(A, b, np.ones(2), np.full(2, 10.0), 1.0, 1.0)
+    problem = tension_kernels.Scaled(A, b, np.ones(2), np.full(2, 10.0), 1.0, 1.0)
     e = excess
     return problem, (np.array([5.0 - e, 5.0 + e]), np.array([-5.0]), np.array([e, -e]))
 
@@ -1140,7 +1140,7 @@ def test_what_is_missed_is_told_relative_to_the_largest_tension() -> None:
 def test_stationarity_is_asked_for_to_a_billionth_of_the_largest_tension() -> None:
     # two cables held at 5, so that multipliers of opposite sign leave no gap
     fixed = np.full(2, 5.0)
-    problem = _balance.Scaled(np.ones((1, 2)), np.array([10.0]), fixed, fixed, 1.0, 1.0)
+    problem = tension_kernels.Scaled(np.ones((1, 2)), np.array([10.0]), fixed, fixed, 1.0, 1.0)
     for part, accepted in ((0.9, True), (1.1, False)):
         off = part * OPTIMALITY * 5.0
         said = _shortfall(problem, (fixed, np.array([-5.0]), np.array([off, -off])))
@@ -1149,17 +1149,17 @@ def test_stationarity_is_asked_for_to_a_billionth_of_the_largest_tension() -> No
 
 def test_gap_counts_a_small_multiplier_at_the_bound_it_belongs_to() -> None:
     # two cables that share 10, of which the first may pull 4.75: z = 5.25 − 4.75
-    problem = _balance.Scaled(
+    problem = tension_kernels.Scaled(
         np.ones((1, 2)), np.array([10.0]), np.ones(2), np.array([4.75, INF]), 1.0, 1.0
     )
     point = np.array([4.75, 5.25]), np.array([-5.25]), np.array([0.5, 0.0])
-    assert _balance.optimality(*problem[:4], *point) == (0.0, 0.0, 0.0)
+    assert tension_kernels.optimality(*problem[:4], *point) == (0.0, 0.0, 0.0)
 
 
 def test_polishing_makes_a_near_optimum_the_optimum_at_either_bound() -> None:
     # the first cable may pull 4, the third has a weak arm and stands at 1; y = −6 frees the second
     A, b = np.array([[1.0, 1.0, 0.1]]), np.array([10.1])
-    problem = _balance.Scaled(A, b, np.ones(3), np.array([4.0, INF, INF]), 1.0, 1.0)
+    problem = tension_kernels.Scaled(A, b, np.ones(3), np.array([4.0, INF, INF]), 1.0, 1.0)
     x, y, z = np.array([4.0, 6.0, 1.0]), np.array([-6.0]), np.array([2.0, 0.0, -0.4])
     assert _shortfall(problem, (x, y, z)) == ""
     near = x + np.array([-1e-6, 2e-6, 1e-6]), y, z

@@ -17,10 +17,10 @@ import pytest
 from numpy.typing import ArrayLike
 
 import cdsm
-from cdsm._checks import Array
-from cdsm.batch import chunks, evaluation, rows
+from cdsm.batch import chunks, evaluation, fused_kernel
 from cdsm.batch.evaluation import OUTPUTS
-from cdsm.batch.record import QUANTITIES
+from cdsm.batch.layout import QUANTITIES
+from cdsm.support.validation import Array
 from tests.arms import STEEL, mixed_arm, random_arm, random_posture
 from tests.patience import HANGS
 
@@ -290,7 +290,7 @@ def test_foreign_memory_layouts_give_the_same_and_compile_nothing_new() -> None:
         each.astype(np.float32).astype(np.float64) for each in (q, tension, wrench)
     )
     plain = cdsm.evaluate(arm, q, tension, wrench)
-    signatures = list(rows.evaluate_rows.signatures)  # type: ignore[attr-defined]
+    signatures = list(fused_kernel.evaluate_rows.signatures)  # type: ignore[attr-defined]
     layouts: dict[str, Callable[[Array], Any]] = {
         "columns": np.asfortranarray,
         "columns of float32": lambda a: np.asfortranarray(a.astype(np.float32)),
@@ -305,7 +305,7 @@ def test_foreign_memory_layouts_give_the_same_and_compile_nothing_new() -> None:
             np.testing.assert_array_equal(value, expected, err_msg=name)
         pulled = cdsm.distribute_tensions(arm, change(q), change(0.1 * tension), wrench=wrench)
         assert pulled.ok.all(), name
-    assert rows.evaluate_rows.signatures == signatures  # type: ignore[attr-defined]
+    assert fused_kernel.evaluate_rows.signatures == signatures  # type: ignore[attr-defined]
 
 
 def test_memory_beyond_the_outputs_is_bounded() -> None:

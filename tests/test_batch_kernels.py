@@ -6,10 +6,13 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike
 
-from cdsm import _balance, _body_kernels, _kernels, _stiffness_kernels
-from cdsm._checks import Array
-from cdsm._rigid_body import RigidBody
-from cdsm.batch import dense
+from cdsm.batch import linear_algebra
+from cdsm.kernels import bodies as body_kernels
+from cdsm.kernels import segments
+from cdsm.kernels import stiffness as stiffness_kernels
+from cdsm.kernels import tension as tension_kernels
+from cdsm.rigid_body import RigidBody
+from cdsm.support.validation import Array
 from tests.test_derivatives import BRANCH_JOINT, BRANCHES
 
 
@@ -41,19 +44,19 @@ def test_tree_that_branches_weighs_what_pinocchio_says() -> None:
         count = q.size + 1
         rotation = np.full((count, 3, 3), np.nan)  # nothing may stay as it was
         origin, axis = np.full((2, count, 3), np.nan)
-        frames = _kernels.Frames(origin, axis, np.empty(tree.slide.shape), np.empty((0, 3)))
+        frames = segments.Frames(origin, axis, np.empty(tree.slide.shape), np.empty((0, 3)))
         row, point = np.empty(0, dtype=np.intp), np.empty((0, 3))
-        _kernels.place(tree, row, point, q, rotation, frames)
+        segments.place(tree, row, point, q, rotation, frames)
         for filled, of_base in ((origin, 0.0), (axis, 0.0), (rotation, np.eye(3))):
             assert np.isfinite(filled).all()
             np.testing.assert_array_equal(filled[0], of_base)
         pose, jacobian = np.full((4, 4), np.nan), np.zeros((6, q.size))
-        _body_kernels.reach(tree.parent, masses, rotation, frames, pose, jacobian)
+        body_kernels.reach(tree.parent, masses, rotation, frames, pose, jacobian)
         heavy, torque = np.full((count, 7), np.nan), np.full(q.size, np.nan)
         slope = np.zeros((q.size, q.size))
-        _body_kernels.weigh(tree, masses, rotation, frames, heavy, torque)
-        _body_kernels.add_gravity(tree.parent, heavy, slope)
-        _kernels.mirror(slope)
+        body_kernels.weigh(tree, masses, rotation, frames, heavy, torque)
+        body_kernels.add_gravity(tree.parent, heavy, slope)
+        segments.mirror(slope)
 
         state = body.state(q)
         assert abs(state.gravity_torque).min() > 0.01
@@ -71,7 +74,7 @@ def test_passive_term_is_a_sum_over_cables_however_sparse_their_moment_arms() ->
         k = rng.uniform(0.0, 1e-2, len(J))
         before = rng.normal(size=(J.shape[1],) * 2)
         got = before.copy()
-        _stiffness_kernels.add_passive(J, k, got)
+        stiffness_kernels.add_passive(J, k, got)
         expected = before + np.triu(np.einsum("c,ci,cj->ij", k, J, J))
         np.testing.assert_allclose(got, expected, rtol=1e-13, atol=1e-15)
 
@@ -80,10 +83,15 @@ def test_balance_is_scaled_by_powers_of_two_and_so_without_rounding() -> None:
     rng = np.random.default_rng(0)
     for lever, pull, reach in itertools.product((3e-9, 0.02, 40.0), (0.0, 1e-4, 7e5), (0.3, 30.0)):
         J = lever * rng.uniform(0.1, 1.0, (5, 3)) * rng.choice([-1.0, 1.0], (5, 3))
-        J[0, 0], J[1, 1] = -0.9 * _balance.NO_ARM * reach, 1.1 * _balance.NO_ARM * reach
+        J[0, 0], J[1, 1] = (
+            -0.9 * tension_kernels.NO_ARM * reach,
+            1.1 * tension_kernels.NO_ARM * reach,
+        )
         torque = rng.normal(size=3) * lever
         low, high = pull * rng.uniform(0.0, 1.0, 5), np.full(5, np.inf)
-        scaled = _balance.Scaled(*_balance.scaled_balance(J, torque, low, high, reach))
+        scaled = tension_kernels.Scaled(
+            *tension_kernels.scaled_balance(J, torque, low, high, reach)
+        )
         assert scaled.arm == 2.0 ** np.ceil(np.log2(abs(J).max()))
         largest = max((abs(torque) / scaled.arm).max(), low.max())
         assert scaled.force == 2.0 ** np.ceil(np.log2(largest))
@@ -92,7 +100,9 @@ def test_balance_is_scaled_by_powers_of_two_and_so_without_rounding() -> None:
         np.testing.assert_array_equal(scaled.b * scaled.arm * scaled.force, torque)
         np.testing.assert_array_equal(scaled.low * scaled.force, low)
         np.testing.assert_array_equal(scaled.high, high)
-    nothing = _balance.scaled_balance(np.zeros((2, 1)), np.zeros(1), np.zeros(2), np.ones(2), 1.0)
+    nothing = tension_kernels.scaled_balance(
+        np.zeros((2, 1)), np.zeros(1), np.zeros(2), np.ones(2), 1.0
+    )
     assert nothing[4:] == (1.0, 1.0)
 
 
@@ -118,7 +128,7 @@ def test_only_what_is_pressed_against_a_bound_or_outside_is_set_onto_it() -> Non
     )
     x, z, expected = np.array(cases).T
     bounds = np.full(x.size, low), np.full(x.size, high)
-    np.testing.assert_array_equal(_balance.settled(x, z, *bounds, r), expected)
+    np.testing.assert_array_equal(tension_kernels.settled(x, z, *bounds, r), expected)
 
 
 def symmetric(values: ArrayLike, seed: int = 0) -> Array:
@@ -154,7 +164,7 @@ def test_smallest_eigenvalue(name: str, turned: bool) -> None:
     values = np.asarray(SPECTRA[name])
     A = symmetric(values) if turned else np.diag(values[::-1])
     expected = np.linalg.eigvalsh((A + A.T) / 2.0)[0]
-    found = dense.smallest_eigenvalue((A + A.T) / 2.0, np.empty((4, len(values))))
+    found = linear_algebra.smallest_eigenvalue((A + A.T) / 2.0, np.empty((4, len(values))))
     # what rounding the matrix can change: some units in the last place of its norm
     assert abs(found - expected) <= 1e-14 * max(1, len(values) / 4) * abs(values).max()
 
@@ -166,7 +176,7 @@ def test_smallest_eigenvalue_of_random_matrices() -> None:
         A = rng.normal(size=(n, n)) * 10.0 ** rng.integers(-5, 6)
         A = A + A.T
         expected = np.linalg.eigvalsh(A)[0]
-        found = dense.smallest_eigenvalue(A.copy(), np.empty((4, n)))
+        found = linear_algebra.smallest_eigenvalue(A.copy(), np.empty((4, n)))
         assert abs(found - expected) <= 2e-14 * np.linalg.norm(A, 2)
 
 
@@ -176,7 +186,7 @@ def test_smallest_eigenvalue_of_nearly_diagonal_matrices(exponent: int) -> None:
     for n in (2, 3, 4, 9):
         A = np.diag(rng.normal(size=n)) + float(f"1e{exponent}") * symmetric(rng.normal(size=n))
         A = (A + A.T) / 2.0
-        found = dense.smallest_eigenvalue(A.copy(), np.empty((4, n)))
+        found = linear_algebra.smallest_eigenvalue(A.copy(), np.empty((4, n)))
         assert abs(found - np.linalg.eigvalsh(A)[0]) <= 2e-14 * np.linalg.norm(A, 2)
 
 
@@ -186,7 +196,7 @@ def test_singular_values_of_three_rows() -> None:
         for scale in ((1.0, 1.0, 1.0), (1.0, 1e-3, 1e-7), (1e6, 0.0, 1.0)):
             A = rng.normal(size=(3, 3)) @ np.diag(scale) @ rng.normal(size=(3, n))
             rows_, left, values = A.copy(), np.empty((3, 3)), np.empty(3)
-            dense.singular_values(rows_, left, values)
+            linear_algebra.singular_values(rows_, left, values)
             expected = np.linalg.svd(A, compute_uv=False)
             size = expected.max()
             np.testing.assert_allclose(
@@ -204,8 +214,8 @@ def test_elimination_solves_and_tells_of_singular_matrices() -> None:
         A, B = rng.normal(size=(n, n)), rng.normal(size=(n, 4))
         A[0, 0] = 0.0 if n > 1 else 2.0  # rows have to be exchanged
         M = np.hstack([A, B])
-        ratio = dense.eliminate(M)
+        ratio = linear_algebra.eliminate(M)
         assert 0.0 < ratio <= 1.0
         np.testing.assert_allclose(M[:, n:], np.linalg.solve(A, B), rtol=1e-10)
-    assert dense.eliminate(np.array([[1.0, 2.0, 1.0], [2.0, 4.0, 1.0]])) == 0.0
-    assert dense.eliminate(np.zeros((3, 4))) == 0.0
+    assert linear_algebra.eliminate(np.array([[1.0, 2.0, 1.0], [2.0, 4.0, 1.0]])) == 0.0
+    assert linear_algebra.eliminate(np.zeros((3, 4))) == 0.0

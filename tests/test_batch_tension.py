@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import cdsm
-from cdsm._checks import Array, frozen
-from cdsm.batch import active_set, blocks, certificates, distribution
+from cdsm.batch import active_set, certificates, distribution, serpentine_guess
+from cdsm.support.validation import Array, frozen
 from tests.arms import STEEL, mixed_arm, random_arm
 from tests.test_batch import custom_arm, one_hinge
 
@@ -269,7 +269,7 @@ def test_search_alone_finds_the_optimum_or_a_proof(name: str) -> None:
 
 def test_guess_is_mostly_the_optimum_and_what_it_proves_is_so() -> None:
     arm = shallow_arm(5)
-    parts = blocks.blocks(arm._routing, arm.nv)
+    parts = serpentine_guess.blocks(arm._routing, arm.nv)
     count, nv = len(arm.cables), arm.nv
     assert parts.row_start.tolist() == [0, 2, 4, 6, 8, 10]
     low, high = frozen(np.full(count, 5.0)), frozen(np.full(count, np.inf))
@@ -281,16 +281,18 @@ def test_guess_is_mostly_the_optimum_and_what_it_proves_is_so() -> None:
         state = state_of(count, nv)
         found = active_set.search(J, b, low, high, state) == active_set.FOUND
         feasible, infeasible = feasible + found, infeasible + (not found)
-        k = blocks.guess(parts, J, b, low, high, F, free, rest)
+        k = serpentine_guess.guess(parts, J, b, low, high, F, free, rest)
         if k < 0:
-            blocks.multipliers(parts, J, F, free, 0, y)
+            serpentine_guess.multipliers(parts, J, F, free, 0, y)
             np.testing.assert_allclose(J.T @ F, b, rtol=0.0, atol=1e-12 * F.max())
             np.testing.assert_allclose((J @ y)[free], F[free], rtol=1e-6)
             if certificates.is_optimal(J, b, low, high, F, y):
                 assert found
                 np.testing.assert_allclose(F, state.F, rtol=0.0, atol=EXACT * F.max())
                 guessed += 1
-        elif blocks.is_beyond_reach(parts, J, b, low, high, free, rest, k, np.zeros(count), y):
+        elif serpentine_guess.is_beyond_reach(
+            parts, J, b, low, high, free, rest, k, np.zeros(count), y
+        ):
             assert not found
             proved += 1
     assert infeasible > 5
@@ -299,13 +301,13 @@ def test_guess_is_mostly_the_optimum_and_what_it_proves_is_so() -> None:
 
 
 def test_blocks_are_those_of_the_geometry() -> None:
-    parts = blocks.blocks(mixed_arm()._routing, 5)
+    parts = serpentine_guess.blocks(mixed_arm()._routing, 5)
     assert parts.row.tolist() == [0, 1, 2, 3, 4]
     assert parts.row_start.tolist() == [0, 2, 3, 5]
     assert parts.cable_start.tolist() == [0, 3, 5, 9]
     # from anywhere to anywhere there are none
     own = custom_arm()
-    assert not blocks.blocks(own._routing, own.nv).row.size
+    assert not serpentine_guess.blocks(own._routing, own.nv).row.size
 
 
 # --- certificates ---------------------------------------------------------------------------

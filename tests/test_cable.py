@@ -9,8 +9,8 @@ import pytest
 
 import cdsm
 from cdsm import presets
-from cdsm._cable_laws import _checked_rigidity
-from cdsm._checks import LARGEST, SMALLEST
+from cdsm.arm_model import _checked_rigidity
+from cdsm.support.validation import LARGEST, SMALLEST
 from tests.arms import random_arm, random_posture, random_wrench
 from tests.locked import original_length
 

@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import cdsm
-from cdsm._checks import Array
+from cdsm.support.validation import Array
 from tests import caspr_models
 from tests.differences import assert_second_order
 

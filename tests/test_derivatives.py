@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 import cdsm
-from cdsm import _kernels
-from cdsm._checks import Array
-from cdsm._rigid_body import RigidBody
-from cdsm._routing import route
+from cdsm.kernels import segments
+from cdsm.rigid_body import RigidBody
+from cdsm.routing import route
+from cdsm.support.validation import Array
 from tests import arms
 from tests.differences import assert_second_order, gravity_energy
 
@@ -168,19 +168,19 @@ BRANCH_JOINT = """<joint name="{child}" type="revolute">
 
 
 class _Fork(NamedTuple):
-    tree: _kernels.Tree
-    routing: _kernels.Routing
+    tree: segments.Tree
+    routing: segments.Routing
 
     def evaluate(self, q: Array) -> tuple[Array, Array, Array]:
         """L, J_L and H_L of its one cable."""
         constants = (*self.tree, *self.routing)
-        *found, lengths, jacobian, coincident = _kernels.evaluate(*constants, q)
+        *found, lengths, jacobian, coincident = segments.evaluate(*constants, q)
         assert coincident == -1
         hessian = np.zeros((1, q.size, q.size))
         page = np.zeros(1, dtype=np.intp)
-        frames = _kernels.Frames(*found)
-        segments = (self.routing.segment, self.routing.joint)
-        _kernels.add_length_hessian(*segments, *frames, np.ones(1), page, hessian)
+        frames = segments.Frames(*found)
+        of_cables = (self.routing.segment, self.routing.joint)
+        segments.add_length_hessian(*of_cables, *frames, np.ones(1), page, hessian)
         return lengths, jacobian, hessian
 
 

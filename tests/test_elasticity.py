@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 from scipy.integrate import quad
 
 import cdsm
-from cdsm._checks import LARGEST, SMALLEST, Array
 from cdsm.elasticity import Domain, rising_root, tension_at
+from cdsm.support.validation import LARGEST, SMALLEST, Array
 
 STEEL = cdsm.LinearElasticity(226_195.0)
 STRAND = cdsm.StrandElasticity.eq19_repaired()

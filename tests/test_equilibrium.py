@@ -9,9 +9,9 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 import cdsm
-from cdsm import _trust_region
-from cdsm._checks import Array
-from cdsm._loaded_arm import LoadedArm
+from cdsm.statics import trust_region
+from cdsm.statics.loaded_arm import LoadedArm
+from cdsm.support.validation import Array
 from tests import arms
 from tests.differences import assert_second_order
 from tests.locked import (
@@ -181,7 +181,7 @@ def test_last_steps_converge_quadratically(name: str, moment: bool) -> None:
     first = []
     for distance in (2.0**-10, 2.0**-12, 2.0**-13):
         start = loaded.at(pose.arm.at(rest.pose.q + distance * way), rest.tension)
-        settled = _trust_region.settle(loaded.moved, start, *loaded.stops())
+        settled = trust_region.settle(loaded.moved, start, *loaded.stops())
         assert settled.steady
         np.testing.assert_allclose(settled.point.q, rest.pose.q, atol=1e-10)
         first.append(settled.history[:2])
@@ -389,7 +389,7 @@ def test_the_work_of_steps_is_the_change_of_potential() -> None:
         q = pose.q + size * np.random.default_rng(2).normal(size=pose.arm.nv)
         there = loaded.moved(q, start)
         change = energy(there.K.posture) - energy(pose)
-        errors.append(abs(_trust_region.work(start, there) - change))
+        errors.append(abs(trust_region.work(start, there) - change))
     # the fifth power of the step is left
     assert (np.log2(np.divide(errors[:-1], errors[1:])) > 4.5).all()
     assert errors[-1] < 1e-5 * abs(change)
@@ -509,7 +509,7 @@ def test_load_steps_lead_to_the_same_place(monkeypatch: pytest.MonkeyPatch) -> N
     pose, pull = balanced("universal-5-9-strand")
     W = pull.wrench + arms.random_wrench(6)
     whole = cdsm.equilibrium(pose, pull, W)
-    monkeypatch.setattr(_trust_region, "_ATTEMPTS", whole.iterations)
+    monkeypatch.setattr(trust_region, "_ATTEMPTS", whole.iterations)
     stepped = cdsm.equilibrium(pose, pull, W)
     assert stepped.iterations > 2 * whole.iterations
     np.testing.assert_allclose(stepped.pose.q, whole.pose.q, atol=1e-11)
@@ -517,7 +517,7 @@ def test_load_steps_lead_to_the_same_place(monkeypatch: pytest.MonkeyPatch) -> N
 
 def test_no_place_to_rest_is_an_error_with_data(monkeypatch: pytest.MonkeyPatch) -> None:
     pose, pull = balanced("universal-3-8-all")
-    monkeypatch.setattr(_trust_region, "_ATTEMPTS", 2)
+    monkeypatch.setattr(trust_region, "_ATTEMPTS", 2)
     W = pull.wrench + 2.0 * arms.random_wrench(6)
     with pytest.raises(cdsm.EquilibriumError, match="no stable place to rest") as caught:
         cdsm.equilibrium(pose, pull, W)

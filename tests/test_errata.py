@@ -8,10 +8,10 @@ import pytest
 from numpy.polynomial import Polynomial
 
 import cdsm
-from cdsm._checks import Array
 from cdsm.paper import digits
 from cdsm.paper.section_v import TABLE_II, TABLE_II_SWAPPED
-from cdsm.wire import EQ19_PRINTED
+from cdsm.support.validation import Array
+from cdsm.wires.laws import EQ19_PRINTED
 from tests.arms import random_arm, random_posture, random_wrench
 from tests.test_urdf import eq1, eq2, eq3, table1
 

@@ -7,10 +7,10 @@ import pytest
 
 import cdsm
 from cdsm import paper
-from cdsm._checks import Array
 from cdsm.paper import section_v
 from cdsm.paper.prototype import BOUNDS, START, STEPS, Prototype
 from cdsm.paper.section_v import HYBRID, NAMES, TABLE_II
+from cdsm.support.validation import Array
 from tests.conftest import Results
 
 

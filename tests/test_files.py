@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import cdsm
-from cdsm._files import write_text
+from cdsm.support.files import write_text
 
 
 def test_link_is_followed_and_mode_is_kept(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import cdsm
-from cdsm._checks import Array
+from cdsm.support.validation import Array
 from tests.differences import assert_second_order
 from tests.foreign import POSTURE, TENSION, TREE, crab, energy
 

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 
 import cdsm
-from cdsm._files import MAXIMUM_BYTES
+from cdsm.support.files import MAXIMUM_BYTES
 from tests.arms import mixed_arm
 from tests.strategies import geometries
 

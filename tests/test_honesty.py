@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import cdsm
-from cdsm._checks import Array
+from cdsm.support.validation import Array
 from tests import arms
 from tests.benchmarks import honesty
 from tests.benchmarks.exact import (

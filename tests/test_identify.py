@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 from scipy.stats import binom, chi2
 
 import cdsm
-from cdsm._checks import Array
 from cdsm.identification import Identification, Measurement, identify
+from cdsm.support.validation import Array
 
 STRAND = cdsm.presets.STRAND_1X19
 TRUE = {"hole_radius": 0.031, "drive": 4e4, "lead": 0.35}

@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import cdsm
-from cdsm._checks import Array
-from cdsm.stiffness import UNMOVED
+from cdsm.stiffness_matrix import UNMOVED
+from cdsm.support.validation import Array
 from cdsm.tension import OPTIMALITY
 from tests import arms
 

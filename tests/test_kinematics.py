@@ -10,9 +10,9 @@ from scipy.optimize import minimize, minimize_scalar
 from scipy.spatial.transform import Rotation
 
 import cdsm
-from cdsm._checks import Array
-from cdsm._misfits import LengthMisfit, TipMisfit
-from cdsm._nearest import Question
+from cdsm.kinematics.nearest import Question
+from cdsm.kinematics.residuals import LengthMisfit, TipMisfit
+from cdsm.support.validation import Array
 from tests.arms import STEEL, mixed_arm, random_arm, random_posture
 from tests.differences import assert_second_order
 

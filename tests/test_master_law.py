@@ -16,7 +16,7 @@ import pytest
 from scipy.optimize import brentq
 
 import cdsm
-from cdsm._checks import Array
+from cdsm.support.validation import Array
 from tests import arms
 from tests.differences import assert_second_order, gravity_energy
 

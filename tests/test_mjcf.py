@@ -11,9 +11,9 @@ from lxml import etree
 from scipy.linalg import eigh
 
 import cdsm
-from cdsm._checks import Array
-from cdsm.mjcf import _bodies
-from cdsm.modes import mass_matrix
+from cdsm.interchange.mjcf import _bodies
+from cdsm.statics.natural_modes import mass_matrix
+from cdsm.support.validation import Array
 from tests.arms import mixed_arm, random_arm, random_posture, random_wrench
 from tests.foreign import POSTURE, TENSION, crab
 

@@ -10,8 +10,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import cdsm
-from cdsm._checks import Array
-from cdsm.modes import _stand_in_mass
+from cdsm.statics.natural_modes import _stand_in_mass
+from cdsm.support.validation import Array
 from tests.arms import STEEL, mixed_arm, random_arm, random_posture, random_tension, random_wrench
 from tests.differences import assert_second_order
 

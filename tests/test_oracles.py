@@ -9,7 +9,7 @@ import pinocchio as pin
 import pytest
 
 import cdsm
-from cdsm._checks import Array
+from cdsm.support.validation import Array
 from tests import arms
 from tests.differences import central_difference
 from tests.mujoco_arms import in_mujoco, tendon_jacobian

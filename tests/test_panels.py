@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import quad
 
 import cdsm
-from cdsm._checks import Array
+from cdsm.support.validation import Array
 
 STRAND = cdsm.StrandElasticity.eq19_repaired()
 PRINTED = cdsm.StrandElasticity.eq19_as_printed()

@@ -9,8 +9,8 @@ import pytest
 from numpy.typing import ArrayLike
 
 import cdsm
-from cdsm._cable_laws import CableLaws
-from cdsm._checks import Array
+from cdsm.arm_model import CableLaws
+from cdsm.support.validation import Array
 from tests import arms
 from tests.differences import assert_second_order, central_difference
 from tests.locked import ARMS, JUMPING, STRAND, TABLE, balanced, original_lengths, some_arm

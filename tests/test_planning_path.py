@@ -14,9 +14,9 @@ from scipy.optimize import root
 
 import cdsm
 from cdsm import presets
-from cdsm._checks import Array
 from cdsm.planning import follow
 from cdsm.planning.follow import Follower
+from cdsm.support.validation import Array
 from tests import arms
 from tests.locked import (
     BUCKLING,

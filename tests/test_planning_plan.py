@@ -8,10 +8,10 @@ import pytest
 
 import cdsm
 from cdsm import presets
-from cdsm._checks import Array
 from cdsm.planning import planner
-from cdsm.planning.attainable import attainable
 from cdsm.planning.planner import Planner
+from cdsm.planning.range import attainable
+from cdsm.support.validation import Array
 from tests import arms
 from tests.differences import central_difference
 from tests.locked import JUMPING, LENGTH, STRAND, hinge, soft, soft_hinge, some_arm

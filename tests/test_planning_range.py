@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike
 
 import cdsm
 from cdsm import presets
-from cdsm._checks import Array
-from cdsm.planning.problem import problem
+from cdsm.planning.objectives import problem
 from cdsm.planning.starts import Ground
+from cdsm.support.validation import Array
 from tests import arms
 from tests.locked import BUCKLING, EA, JUMPING, LENGTH, STRAND, H, R, hinge, soft, soft_hinge
 

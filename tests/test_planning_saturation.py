@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 
 import cdsm
 from cdsm import presets
-from cdsm._checks import Array
+from cdsm.support.validation import Array
 from tests import arms
 from tests.differences import assert_second_order
 from tests.locked import BUCKLING, EA, LEAD, LENGTH, STRAND, H, R, hinge, soft_hinge, some_arm

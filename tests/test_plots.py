@@ -7,7 +7,7 @@ from mpl_toolkits.mplot3d.art3d import Line3D, Line3DCollection  # type: ignore[
 
 import cdsm
 from cdsm import paper, plots
-from cdsm._checks import Array
+from cdsm.support.validation import Array
 from tests.arms import mixed_arm, random_posture
 from tests.conftest import Results
 from tests.foreign import POSTURE, crab

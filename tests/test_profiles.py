@@ -8,8 +8,8 @@ import pytest
 from scipy.stats import binom, norm, t
 
 import cdsm
-from cdsm._checks import Array
 from cdsm.identification import Measurement, Profile, identify
+from cdsm.support.validation import Array
 
 GEOMETRY = cdsm.Geometry.hinged(
     joints=1,

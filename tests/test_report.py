@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 from numpy.typing import ArrayLike
 
 import cdsm
-from cdsm._checks import Array, frozen
 from cdsm.report import Agreement, Report
-from cdsm.report._differences import gradients, hessians
+from cdsm.report.differences import gradients, hessians
+from cdsm.support.validation import Array, frozen
 from tests import arms, foreign, locked
 from tests.test_caspr import toy
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import cdsm
-from cdsm._checks import Array
+from cdsm.support.validation import Array
 from tests.differences import assert_second_order
 
 data: Any = pytest.importorskip("example_robot_data", reason="the extra [robots] is not installed")

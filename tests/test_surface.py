@@ -23,8 +23,10 @@ import numpy as np
 import pytest
 
 import cdsm
-from cdsm import _kernels, _stiffness_kernels, errors
-from cdsm._checks import Array
+from cdsm import errors
+from cdsm.kernels import segments
+from cdsm.kernels import stiffness as stiffness_kernels
+from cdsm.support.validation import Array
 from tests.arms import STEEL, mixed_arm, random_arm, random_posture, random_tension, random_wrench
 from tests.patience import HANGS
 
@@ -588,9 +590,9 @@ def test_unpickled_posture_needs_no_new_compilation() -> None:
     tension = random_tension(pose.arm, 3)
     cdsm.stiffness(pose, tension)
     kernels = [
-        _stiffness_kernels.joint_stiffness,
-        _kernels.add_length_hessian,
-        _kernels.evaluate,
+        stiffness_kernels.joint_stiffness,
+        segments.add_length_hessian,
+        segments.evaluate,
     ]
     compiled = [len(kernel.signatures) for kernel in kernels]  # type: ignore[attr-defined]
     again = pickle.loads(pickle.dumps(pose))

@@ -11,12 +11,12 @@ import pytest
 import xarray as xr
 
 import cdsm
-from cdsm._checks import Array
-from cdsm.sweep.blocks import blocks, extents
-from cdsm.sweep.description import law_text
-from cdsm.sweep.principal import principal
-from cdsm.sweep.quantities import LOST, QUANTITIES
-from cdsm.sweep.rows import _BATCH_NAMES
+from cdsm.support.validation import Array
+from cdsm.sweeps.blocks import blocks, extents
+from cdsm.sweeps.description import law_text
+from cdsm.sweeps.principal import principal
+from cdsm.sweeps.quantities import LOST, QUANTITIES
+from cdsm.sweeps.rows import _BATCH_NAMES
 from tests.sweeps import CASES, EVERYTHING, GRID, LAWS, STEEL, WRENCHES, short_arm
 
 Status = cdsm.SweepStatus

@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 import cdsm
-from cdsm.sweep import progress
+from cdsm.sweeps import progress
 from tests.sweeps import short_arm
 from tests.test_cli import SHORT, call, geometry
 

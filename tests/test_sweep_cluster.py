@@ -11,7 +11,7 @@ import xarray as xr
 from distributed import Client, LocalCluster
 
 import cdsm
-from cdsm.sweep import cluster, run
+from cdsm.sweeps import cluster, run
 from tests.sweeps import CASES, EVERYTHING, GRID, Deadly, short_arm
 from tests.test_sweep import Plain
 

@@ -8,8 +8,8 @@ import pytest
 import xarray as xr
 
 import cdsm
-from cdsm._checks import Array
-from cdsm.sweep import export
+from cdsm.support.validation import Array
+from cdsm.sweeps import export
 from tests.sweeps import CASES, EVERYTHING, GRID, short_arm
 
 

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 import cdsm
 from cdsm import plots
-from cdsm._checks import Array
+from cdsm.support.validation import Array
 from tests.sweeps import short_arm
 
 PLANAR = cdsm.GridPoses(

@@ -15,10 +15,10 @@ import xarray as xr
 import zarr
 
 import cdsm
-from cdsm.sweep import description, run, store
-from cdsm.sweep.blocks import extents
-from cdsm.sweep.evaluation import Answer, Problem, evaluate
-from cdsm.sweep.question import Question, ask
+from cdsm.sweeps import description, run, store
+from cdsm.sweeps.blocks import extents
+from cdsm.sweeps.evaluation import Answer, Problem, evaluate
+from cdsm.sweeps.specification import Question, ask
 from tests.patience import HANGS
 from tests.sweeps import CASES, GRID, STEEL, Deadly, short_arm
 
@@ -392,7 +392,7 @@ def test_a_law_of_ones_own_is_described_alike_in_every_process(
     here = description.law_text(own_law(tmp_path, monkeypatch))
     script = (
         f"import sys; sys.path.insert(0, {str(tmp_path)!r})\n"
-        "from own_law import Own; from cdsm.sweep.description import law_text\n"
+        "from own_law import Own; from cdsm.sweeps.description import law_text\n"
         "print(law_text(Own()))"
     )
     for seed in ("1", "2"):

@@ -15,7 +15,7 @@ import pytest
 import yourdfpy
 
 import cdsm
-from cdsm._checks import Array
+from cdsm.support.validation import Array
 from cdsm.urdf import CROSS_INERTIA, CROSS_MASS
 from tests.arms import mixed_arm, random_arm
 from tests.patience import HANGS

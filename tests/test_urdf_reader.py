@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 import cdsm
-from cdsm._xml import DEEPEST
+from cdsm.support.xml import DEEPEST
 from cdsm.urdf_reader import read_urdf
 
 LINK = (

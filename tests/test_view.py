@@ -19,8 +19,8 @@ import numpy as np
 import pytest
 
 import cdsm
-from cdsm._checks import Array
 from cdsm.plots.arm import ellipsoid, tension_colors
+from cdsm.support.validation import Array
 from cdsm.view import Condition, Setting, View, serve, show
 from cdsm.view.newest import Newest
 from cdsm.view.ranges import joint_sliders, slider

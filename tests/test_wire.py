@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from scipy.integrate import quad
 
 import cdsm
-from cdsm._checks import Array
-from cdsm._rising_curve import slopes_at_points
+from cdsm.support.validation import Array
+from cdsm.wires.rising_curve import slopes_at_points
 from tests.strategies import tabulated_elasticities
 
 STRAND = cdsm.StrandElasticity.eq19_repaired()

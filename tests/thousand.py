@@ -31,7 +31,7 @@ from rich.progress import Progress
 from rich.table import Table
 
 import cdsm
-from cdsm._checks import Array
+from cdsm.support.validation import Array
 from tests import strategies, verified
 from tests.patience import HANGS
 

@@ -13,8 +13,8 @@ import numpy as np
 from scipy.optimize import linprog
 
 import cdsm
-from cdsm._checks import Array
-from cdsm.stiffness import REGULAR, SOFTEST
+from cdsm.stiffness_matrix import REGULAR, SOFTEST
+from cdsm.support.validation import Array
 from tests.differences import EPSILON
 
 

@@ -15,11 +15,11 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from cdsm._checks import Array
-from cdsm._compiled import compiled
-from cdsm._kernels import Indices
 from cdsm.batch.certificates import torque_of
-from cdsm.batch.dense import eliminate
+from cdsm.batch.linear_algebra import eliminate
+from cdsm.kernels.compiling import compiled
+from cdsm.kernels.segments import Indices
+from cdsm.support.validation import Array
 
 FOUND, IMPOSSIBLE, LOST = range(3)
 """F and y are the optimum; y proves there is none; neither."""

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import math
 
-from cdsm._checks import Array
-from cdsm._compiled import compiled
+from cdsm.kernels.compiling import compiled
+from cdsm.support.validation import Array
 
 OPTIMALITY = 1e-11
 """Largest accepted violation of balance, bounds and multipliers, relative to the largest force."""
@@ -20,7 +20,7 @@ _PROOF = 1e-8
 _SLIGHT = 1e-8
 """A missing torque this part of the largest arm times the largest force may be rounding.
 
-Ten times what :func:`~cdsm.tension.distribute_tension` accepts, so that it decides what is near.
+Ten times what :func:`~cdsm.distribute_tension` accepts, so that it decides what is near.
 """
 
 _NOTHING = 1e-11

@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
-from cdsm._checks import whole_number
+from cdsm.support.validation import whole_number
 
 _NUMBERS = 2**17
 """Floats per chunk: one megabyte."""

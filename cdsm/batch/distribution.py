@@ -9,18 +9,18 @@ from typing import final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm._balance import NO_ARM
-from cdsm._checks import Array, ReadOnlyState, frozen, instance
-from cdsm.batch import record
-from cdsm.batch.blocks import blocks
+from cdsm.batch import layout
 from cdsm.batch.chunks import checked_threads, run
+from cdsm.batch.fused_kernel import evaluate_rows
 from cdsm.batch.inputs import bounds, given_wrench, kernel_arm, of_rows, postures
-from cdsm.batch.record import INFEASIBLE, OK, UNDECIDED, Codes, Flags
-from cdsm.batch.rows import evaluate_rows
+from cdsm.batch.layout import INFEASIBLE, OK, UNDECIDED, Codes, Flags
+from cdsm.batch.serpentine_guess import blocks
 from cdsm.batch.status import Status, summary
-from cdsm.batch.tension_rows import distribute_rows
+from cdsm.batch.tension_kernel import distribute_rows
 from cdsm.errors import InfeasibleTension, SolverError
+from cdsm.kernels.tension import NO_ARM
 from cdsm.manipulator import Manipulator
+from cdsm.support.validation import Array, ReadOnlyState, frozen, instance
 from cdsm.tension import distribute_tension
 
 _NO_DIRECTIONS = frozen(np.zeros((0, 3)))
@@ -73,7 +73,7 @@ def distribute_tensions(
 ) -> Tensions:
     """Smallest cable tensions in balance at many postures: min ‖F‖² of Eqs. 13 and 17, row by row.
 
-    The same as :func:`~cdsm.tension.distribute_tension` at each, and as exact: every row is guessed
+    The same as :func:`~cdsm.distribute_tension` at each, and as exact: every row is guessed
     or searched for, and accepted only if it meets the optimality conditions to 1e-11; as infeasible
     only by a proof. That function decides the rows that neither can be shown of.
 
@@ -142,9 +142,9 @@ class Distributor:
         self._low, self._high = low, high
         self._kernel_arm = kernel_arm(arm, check_limits)
         self._blocks = blocks(arm._routing, arm.nv)
-        self._start = record.starts(arm.nv, len(arm.cables), 0)
+        self._start = layout.starts(arm.nv, len(arm.cables), 0)
         self._wanted = np.array(
-            [record.JACOBIAN, record.LENGTH_JACOBIAN, record.GRAVITY_TORQUE], dtype=np.intp
+            [layout.JACOBIAN, layout.LENGTH_JACOBIAN, layout.GRAVITY_TORQUE], dtype=np.intp
         )
         self.width = (7 + len(arm.cables)) * arm.nv + 3 * len(arm.cables)
 

@@ -11,16 +11,16 @@ from typing import final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm._checks import Array, ReadOnlyState, frozen, instance, one_of
-from cdsm.batch import record
+from cdsm.batch import layout
 from cdsm.batch.chunks import checked_threads, run
 from cdsm.batch.distribution import Distributor, Tensions
 from cdsm.batch.inputs import bounds, given_tension, given_wrench, postures, unit_directions
 from cdsm.batch.job import Job
-from cdsm.batch.record import QUANTITIES, Codes, Flags
+from cdsm.batch.layout import QUANTITIES, Codes, Flags
 from cdsm.batch.status import summary
 from cdsm.errors import InvalidInput, UnknownName
 from cdsm.manipulator import Manipulator
+from cdsm.support.validation import Array, ReadOnlyState, frozen, instance, one_of
 
 OUTPUTS = (*QUANTITIES, "tension")
 """Names of all that :func:`evaluate` can be asked for."""
@@ -34,8 +34,8 @@ DEFAULT_OUTPUTS = ("tip", "compliance", "margin")
 class Batch(ReadOnlyState):
     """What was asked of many postures, row by row: ``batch["joint"]`` is K_θ (B, nv, nv).
 
-    A quantity has the name, shape and unit it has in :class:`~cdsm.manipulator.Posture` and
-    :class:`~cdsm.stiffness.Stiffness`, with one more axis in front; what does not exist is 0 there,
+    A quantity has the name, shape and unit it has in :class:`~cdsm.Posture` and
+    :class:`~cdsm.Stiffness`, with one more axis in front; what does not exist is 0 there,
     and :attr:`status` says why.
 
     Attributes:
@@ -76,7 +76,7 @@ class Batch(ReadOnlyState):
     @cached_property
     def ok(self) -> Flags:
         """Where everything asked for exists, (B,) [-]."""
-        return frozen(self.status == record.OK)
+        return frozen(self.status == layout.OK)
 
     def __len__(self) -> int:
         return len(self.q)
@@ -152,14 +152,14 @@ def evaluate(
         distributor = Distributor(arm, angles, low, high, loads, check_limits)
     elif maximum is not None:
         raise InvalidInput("maximum", "belongs to minimum=: give both, or neither.")
-    needy = [name for name in names if name not in QUANTITIES[: record.RESIDUAL]]
+    needy = [name for name in names if name not in QUANTITIES[: layout.RESIDUAL]]
     if needy and given is None and minimum is None:
         raise InvalidInput(
             "tension",
             f"{needy[0]!r} depends on it: give tension=, or minimum= to have it distributed.",
         )
     if not needy:
-        status[:] = record.OK
+        status[:] = layout.OK
     u = None if direction is None else unit_directions(direction)
     job = Job(arm, angles, given, loads, u, names, distributor if needy else None, check_limits)
     run(lambda part: job.fill(part, status), rows, job.width, checked_threads(threads))

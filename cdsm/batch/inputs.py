@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm._checks import Array, bound, flag, frozen, number_array, unit_direction
-from cdsm.batch.rows import Arm
+from cdsm.batch.fused_kernel import Arm
 from cdsm.errors import InvalidInput
 from cdsm.manipulator import Manipulator
+from cdsm.support.validation import Array, bound, flag, frozen, number_array, unit_direction
 
 
 def kernel_arm(arm: Manipulator, check_limits: bool) -> Arm:

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from cdsm._checks import Array, frozen
-from cdsm.batch import record
+from cdsm.batch import layout
 from cdsm.batch.distribution import Distributor
+from cdsm.batch.fused_kernel import evaluate_rows
 from cdsm.batch.inputs import kernel_arm, of_rows
-from cdsm.batch.record import QUANTITIES, Codes
+from cdsm.batch.layout import QUANTITIES, Codes
 from cdsm.batch.rigidity import rigidities
-from cdsm.batch.rows import evaluate_rows
 from cdsm.batch.status import Status
 from cdsm.errors import SingularStiffness
 from cdsm.manipulator import Manipulator
-from cdsm.stiffness import stiffness
+from cdsm.stiffness_matrix import stiffness
+from cdsm.support.validation import Array, frozen
 
 
 class Job:
@@ -54,7 +54,7 @@ class Job:
         )
         self._kernel_arm = kernel_arm(arm, check_limits)
         count = len(self._directions)
-        self._start = record.starts(nv, cables, count)
+        self._start = layout.starts(nv, cables, count)
         wanted = sorted(QUANTITIES.index(name) for name in names if name != "tension")
         self._wanted = np.array(wanted, dtype=np.intp)
         ends = np.cumsum(self._start[self._wanted + 1] - self._start[self._wanted])
@@ -67,7 +67,7 @@ class Job:
         if distributor is not None:
             self.width += distributor.width
 
-        shapes = dict(zip(QUANTITIES, record.shapes(nv, cables, count), strict=True))
+        shapes = dict(zip(QUANTITIES, layout.shapes(nv, cables, count), strict=True))
         shapes["tension"] = (cables,)
         if direction is not None and direction.ndim == 1:
             shapes["along"] = ()
@@ -84,8 +84,8 @@ class Job:
             tension = of_rows(self._tension, part, rows)
         else:
             tension = frozen(np.zeros((len(q), len(self._arm.cables))))
-        springs = self._wanted.size and self._wanted[-1] > record.LOAD
-        rigidity = rigidities(self._arm, tension, found == record.OK) if springs else tension
+        springs = self._wanted.size and self._wanted[-1] > layout.LOAD
+        rigidity = rigidities(self._arm, tension, found == layout.OK) if springs else tension
         out = np.empty((len(q), self._size))
         evaluate_rows(
             self._kernel_arm,
@@ -102,7 +102,7 @@ class Job:
         for name, value in zip(self._names, self.values, strict=True):
             source = tension if name == "tension" else out[:, self._place[name]]
             value[part] = source.reshape(value[part].shape)
-        for r in np.flatnonzero(found == record.UNDECIDED).tolist():
+        for r in np.flatnonzero(found == layout.UNDECIDED).tolist():
             found[r] = self._decide(part.start + r, tension[r], wrench[r])
 
     def _decide(self, row: int, tension: Array, wrench: Array) -> Status:

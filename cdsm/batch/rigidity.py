@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from cdsm._cable_laws import CableLaws
-from cdsm._checks import Array, frozen
-from cdsm.batch.record import Flags
+from cdsm.arm_model import CableLaws
+from cdsm.batch.layout import Flags
 from cdsm.elasticity import Elasticity
 from cdsm.errors import ElasticityRangeError
 from cdsm.manipulator import Manipulator
+from cdsm.support.validation import Array, frozen
 
 _NONE = -1.0
 

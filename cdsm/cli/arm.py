@@ -9,8 +9,6 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from cdsm._checks import Array
-from cdsm._units import MODEL, joints_to_dict, key
 from cdsm.cli.options import (
     Angles,
     ArmOptions,
@@ -21,8 +19,10 @@ from cdsm.cli.options import (
 )
 from cdsm.errors import SingularStiffness
 from cdsm.geometry import Geometry
-from cdsm.stiffness import Stiffness
-from cdsm.stiffness import stiffness as evaluate
+from cdsm.stiffness_matrix import Stiffness
+from cdsm.stiffness_matrix import stiffness as evaluate
+from cdsm.support.units import MODEL, joints_to_dict, key
+from cdsm.support.validation import Array
 from cdsm.tension import Tension
 from cdsm.urdf import write_urdf
 

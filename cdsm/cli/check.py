@@ -7,7 +7,6 @@ from typing import Annotated
 
 import typer
 
-from cdsm._files import write_text
 from cdsm.cli.options import (
     UNMET,
     Angles,
@@ -17,7 +16,8 @@ from cdsm.cli.options import (
     reported,
     show_json,
 )
-from cdsm.stiffness import stiffness
+from cdsm.stiffness_matrix import stiffness
+from cdsm.support.files import write_text
 
 
 def check(

@@ -7,7 +7,6 @@ from typing import Annotated
 
 import typer
 
-from cdsm.cable_file import write_cables
 from cdsm.cli.options import (
     UNMET,
     Angles,
@@ -17,8 +16,9 @@ from cdsm.cli.options import (
     reported,
     show_json,
 )
-from cdsm.mjcf import instability, write_mjcf
-from cdsm.stiffness import stiffness
+from cdsm.interchange.cable_file import write_cables
+from cdsm.interchange.mjcf import instability, write_mjcf
+from cdsm.stiffness_matrix import stiffness
 
 
 def export(

@@ -7,9 +7,6 @@ from typing import Annotated
 
 import typer
 
-from cdsm._files import write_file
-from cdsm._units import joints_to_dict
-from cdsm.buckling import CriticalLoad, CriticalTension, critical_load, critical_tension
 from cdsm.cli.options import (
     NO_WRENCH,
     Angles,
@@ -23,7 +20,10 @@ from cdsm.cli.options import (
     reported,
     show_json,
 )
-from cdsm.weight import WeightTest, weight_test
+from cdsm.statics.buckling import CriticalLoad, CriticalTension, critical_load, critical_tension
+from cdsm.statics.weight_test import WeightTest, weight_test
+from cdsm.support.files import write_file
+from cdsm.support.units import joints_to_dict
 
 
 def weigh(

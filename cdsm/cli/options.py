@@ -17,18 +17,18 @@ import numpy as np
 import typer
 from rich.console import Console
 
-from cdsm._checks import Array
 from cdsm.cable import serpentine_cables
-from cdsm.cable_file import read_cables
-from cdsm.caspr import read_caspr
 from cdsm.elasticity import Elasticity, LinearElasticity
 from cdsm.errors import CdsmError
 from cdsm.geometry import Geometry
+from cdsm.interchange.cable_file import read_cables
+from cdsm.interchange.caspr import read_caspr
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.presets import STRAND_1X19
+from cdsm.support.validation import Array
 from cdsm.tension import Tension, distribute_tension
-from cdsm.wire_file import read_elasticity
+from cdsm.wires.files import read_elasticity
 
 _Value = TypeVar("_Value")
 

@@ -13,8 +13,8 @@ from rich.progress import track
 from rich.table import Table
 
 from cdsm import paper
-from cdsm._files import make_folder, write_file, write_text
 from cdsm.cli.options import AsJson, console, reported
+from cdsm.support.files import make_folder, write_file, write_text
 
 _WIDE = 110
 """Columns from which the table of claims is legible; below, each claim is a few lines."""

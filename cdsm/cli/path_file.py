@@ -9,10 +9,10 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from cdsm._checks import Array
-from cdsm._files import csv_cells, read_text
 from cdsm.errors import FileError
 from cdsm.manipulator import Manipulator
+from cdsm.support.files import csv_cells, read_text
+from cdsm.support.validation import Array
 
 _ANGLE: Final = {"deg": math.pi / 180.0, "°": math.pi / 180.0, "rad": 1.0}
 _LENGTH: Final = {"mm": 1e-3, "m": 1.0}

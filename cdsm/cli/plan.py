@@ -9,8 +9,6 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
-from cdsm._files import write_file
-from cdsm._units import joints_to_dict, key
 from cdsm.cli.options import (
     ANGLES,
     NO_WRENCH,
@@ -38,6 +36,8 @@ from cdsm.planning import (
     stiffness_range,
 )
 from cdsm.posture import Posture
+from cdsm.support.files import write_file
+from cdsm.support.units import joints_to_dict, key
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

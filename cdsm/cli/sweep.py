@@ -9,8 +9,6 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 import typer
 
-from cdsm._checks import Array
-from cdsm._files import write_file
 from cdsm.cli.options import (
     NO_WRENCH,
     ArmOptions,
@@ -25,10 +23,12 @@ from cdsm.cli.options import (
 from cdsm.cli.path_file import read_path
 from cdsm.errors import FileError
 from cdsm.manipulator import Manipulator
-from cdsm.sweep import GridPoses, PathPoses, PoseSet, RandomPoses, read_sweep, write_sweep
-from cdsm.sweep import sweep as run
-from cdsm.sweep.export import check_target, status_names
-from cdsm.sweep.quantities import DEFAULT, QUANTITIES
+from cdsm.support.files import write_file
+from cdsm.support.validation import Array
+from cdsm.sweeps import GridPoses, PathPoses, PoseSet, RandomPoses, read_sweep, write_sweep
+from cdsm.sweeps import sweep as run
+from cdsm.sweeps.export import check_target, status_names
+from cdsm.sweeps.quantities import DEFAULT, QUANTITIES
 
 if TYPE_CHECKING:
     import xarray

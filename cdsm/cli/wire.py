@@ -8,11 +8,11 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from cdsm._files import write_file
 from cdsm.cli.options import AsJson, Picture, console, reported, show_json
-from cdsm.tensile import TensileFit, fit_tensile_test
-from cdsm.tensile_data import read_tensile_csv
-from cdsm.wire_file import write_elasticity
+from cdsm.support.files import write_file
+from cdsm.wires.files import write_elasticity
+from cdsm.wires.tensile.fit import TensileFit, fit_tensile_test
+from cdsm.wires.tensile.record import read_tensile_csv
 
 
 def fit(

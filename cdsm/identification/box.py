@@ -8,7 +8,7 @@ from typing import Any, final
 
 import numpy as np
 
-from cdsm._checks import Array
+from cdsm.support.validation import Array
 
 _DECADES = 100.0
 """Ratio of positive bounds beyond which a parameter is searched by its logarithm."""

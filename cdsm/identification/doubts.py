@@ -7,10 +7,10 @@ import math
 import numpy as np
 from scipy.special import chdtrc
 
-from cdsm._checks import Array
 from cdsm.identification.problem import NoStiffnessError, Problem
 from cdsm.identification.profile import LOWER, SAME
 from cdsm.identification.result import Identification
+from cdsm.support.validation import Array
 
 _CORRELATED = 0.95
 """Correlation of two parameters beyond which a warning names them."""

@@ -8,14 +8,14 @@ from typing import final
 
 import numpy as np
 
-from cdsm._checks import (
+from cdsm.errors import InvalidInput
+from cdsm.support.validation import (
     SMALLEST,
     number_array,
     scalar,
     unit_direction,
     vector,
 )
-from cdsm.errors import InvalidInput
 
 
 @final
@@ -30,13 +30,13 @@ class Measurement:
         angles: Joint angles (nv,) [rad].
         tension: Cable tensions (C,) [N]; or None, and ``minimum`` is given.
         minimum: Instead of tensions, the lower bound [N], one or (C,), from which
-            :func:`~cdsm.tension.distribute_tension` balances the model at these angles.
+            :func:`~cdsm.distribute_tension` balances the model at these angles.
         std: Standard deviation of the value [N/m].
         wrench: W (6,) at ``tool0`` in base axes that the arm carried already, without the force
             that measured: force [N], moment [N m].
         label: What reports and figures call it.
         force: How large the force was [N], which came on top of ``wrench``: the value is then the
-            secant that :func:`~cdsm.weight.weight_test` measures with it, the motors locked at the
+            secant that :func:`~cdsm.weight_test` measures with it, the motors locked at the
             angles and tensions. 0: so small that the value is the tangent.
 
     Raises:

@@ -10,21 +10,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm._checks import (
-    SMALLEST,
-    Array,
-    frozen,
-    unit_direction,
-)
-from cdsm.equilibrium import equilibrium, follow
 from cdsm.errors import CdsmError, InvalidInput, SingularStiffness
 from cdsm.identification.box import Box
 from cdsm.identification.measurement import Measurement, label
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
-from cdsm.stiffness import Stiffness, stiffness
+from cdsm.statics.equilibrium import equilibrium, follow
+from cdsm.statics.weight_test import WeightTest, weight_test
+from cdsm.stiffness_matrix import Stiffness, stiffness
+from cdsm.support.validation import (
+    SMALLEST,
+    Array,
+    frozen,
+    unit_direction,
+)
 from cdsm.tension import Tension, distribute_tension
-from cdsm.weight import WeightTest, weight_test
 
 
 class NoStiffnessError(Exception):
@@ -101,7 +101,7 @@ class Problem:
         return value
 
     def _secant(self, each: Measurement, pose: Posture, K: Stiffness) -> float:
-        """What :func:`~cdsm.weight.weight_test` measures.
+        """What :func:`~cdsm.weight_test` measures.
 
         To follow the arm from rest to rest takes it ten times as long as to search from where the
         arm of the last parameters hung.

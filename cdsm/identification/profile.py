@@ -18,10 +18,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import brentq, least_squares
 
-from cdsm._checks import Array, ReadOnlyState, frozen
 from cdsm.errors import InvalidInput
 from cdsm.identification.box import Box
 from cdsm.identification.problem import NoStiffnessError, Problem
+from cdsm.support.validation import Array, ReadOnlyState, frozen
 
 SAME = 1e-6
 """Smallest singular value of the Jacobian, columns of unit length, that counts for the rank.

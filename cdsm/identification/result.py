@@ -11,18 +11,18 @@ import numpy as np
 from scipy.linalg import qr
 from scipy.special import ndtri, stdtrit
 
-from cdsm._checks import (
+from cdsm.errors import InvalidInput
+from cdsm.identification.measurement import Measurement, label
+from cdsm.identification.profile import LOWER, SAME, Profile, Side
+from cdsm.manipulator import Manipulator
+from cdsm.support.units import MODEL
+from cdsm.support.validation import (
     Array,
     ReadOnlyState,
     flag,
     frozen,
     scalar,
 )
-from cdsm._units import MODEL
-from cdsm.errors import InvalidInput
-from cdsm.identification.measurement import Measurement, label
-from cdsm.identification.profile import LOWER, SAME, Profile, Side
-from cdsm.manipulator import Manipulator
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

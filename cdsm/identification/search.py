@@ -3,8 +3,8 @@
     min Σ r_i²,   r_i = (K_i(p) − K_i) / σ_i,   low ≤ p ≤ high
 
 with K_i measured, K_i(p) what the model with parameters p predicts by
-:meth:`~cdsm.stiffness.Stiffness.along` or, for a force that is not small, by
-:func:`~cdsm.weight.weight_test`, and σ_i the standard deviation of the measurement. The
+:meth:`~cdsm.Stiffness.along` or, for a force that is not small, by
+:func:`~cdsm.weight_test`, and σ_i the standard deviation of the measurement. The
 parameters are whatever a constructor of the user's own takes: dimensions, masses, springs, leads.
 What the measurements cannot tell apart is said by name in :attr:`Identification.warnings`.
 """
@@ -20,13 +20,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import least_squares
 
-from cdsm._checks import (
-    Array,
-    frozen,
-    scalar,
-    sequence_of,
-    vector,
-)
 from cdsm.errors import InvalidInput, UnknownName
 from cdsm.identification.doubts import doubts, unfinished
 from cdsm.identification.measurement import Measurement
@@ -34,6 +27,13 @@ from cdsm.identification.problem import NoStiffnessError, Problem, UserFaultErro
 from cdsm.identification.profile import LowerError, Profile, Profiler
 from cdsm.identification.result import Identification
 from cdsm.manipulator import Manipulator
+from cdsm.support.validation import (
+    Array,
+    frozen,
+    scalar,
+    sequence_of,
+    vector,
+)
 from cdsm.tension import Tension
 
 _ON_BOUND = 1e-9
@@ -80,7 +80,7 @@ def identify(
             Positive ones more than a factor of 100 apart are searched by the logarithm.
         start: Where to start, one value for each parameter. If not given, the best of several
             searches spread over the bounds is taken, the same ones every time.
-        tension_of: The tensions (C,) [N] or :class:`~cdsm.tension.Tension` of a measurement, as
+        tension_of: The tensions (C,) [N] or :class:`~cdsm.Tension` of a measurement, as
             ``tension_of(posture, measurement, **p)``, with all the free parameters. For parameters
             of the tensions, such as the offset of a load cell, which no arm holds; ``model_of``
             then gets all of them too. If not given, those of the measurement.

@@ -15,8 +15,8 @@ from numpy.typing import ArrayLike
 from scipy.optimize import linprog
 
 from cdsm import presets
-from cdsm._checks import Array, frozen, number_array
-from cdsm.wire import EQ19_PRINTED
+from cdsm.support.validation import Array, frozen, number_array
+from cdsm.wires.laws import EQ19_PRINTED
 
 JOIN: Final = 31.0
 """Where the two branches meet [N]."""

@@ -14,10 +14,10 @@ from typing import Final, Literal, final
 
 import numpy as np
 
-from cdsm._checks import Array, frozen
 from cdsm.paper.figures import Claim
 from cdsm.paper.prototype import STEPS, PrototypeFit, identify_prototype
 from cdsm.paper.section_v import AXES, CHECK, DROPS, HYBRID, MEASURED, RISES, TENSIONS
+from cdsm.support.validation import Array, frozen
 
 _POINTS: Final = 40
 

@@ -17,13 +17,13 @@ import numpy as np
 from scipy.optimize import brentq
 
 from cdsm import presets
-from cdsm._cable_laws import OriginalLength
-from cdsm._checks import Array, frozen
+from cdsm.arm_model import OriginalLength
 from cdsm.elasticity import Elasticity, LinearElasticity
 from cdsm.manipulator import Manipulator
 from cdsm.paper.digits import LEVEL
 from cdsm.posture import Posture
-from cdsm.stiffness import Stiffness, stiffness
+from cdsm.stiffness_matrix import Stiffness, stiffness
+from cdsm.support.validation import Array, frozen
 from cdsm.tension import distribute_tension
 
 Part = Literal["active", "passive"]
@@ -44,7 +44,7 @@ class Curve:
 
     Attributes:
         label: What distinguishes this curve in its figure.
-        original_length: As of its :class:`~cdsm.manipulator.Manipulator`.
+        original_length: As of its :class:`~cdsm.Manipulator`.
         swept: The swept quantity (N,): Young's modulus [Pa] or lower bound of tension [N].
         tension: Smallest, mean and largest cable tension (N, 3) [N].
         pseudoinverse: Diagonal of the paper's K_R (N, 3) [N/m].

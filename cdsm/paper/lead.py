@@ -14,10 +14,10 @@ import numpy as np
 from scipy.optimize import brentq
 
 from cdsm import presets
-from cdsm._cable_laws import OriginalLength
-from cdsm._checks import Array, frozen
+from cdsm.arm_model import OriginalLength
 from cdsm.paper.figures import KEPT, STRETCHED, UNSTRAINED, Claim
-from cdsm.stiffness import Stiffness, stiffness
+from cdsm.stiffness_matrix import Stiffness, stiffness
+from cdsm.support.validation import Array, frozen
 from cdsm.tension import distribute_tension
 
 LEADS: Final = frozen(np.concatenate([[0.0], np.geomspace(0.003, 0.3, 30)]))

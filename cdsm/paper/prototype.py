@@ -17,7 +17,6 @@ from numpy.typing import ArrayLike
 from scipy.optimize import least_squares
 
 from cdsm import presets
-from cdsm._checks import Array, frozen
 from cdsm.elasticity import LinearElasticity
 from cdsm.errors import CdsmError, InvalidInput, SingularStiffness
 from cdsm.manipulator import Manipulator
@@ -33,9 +32,10 @@ from cdsm.paper.section_v import (
     TENSIONS,
 )
 from cdsm.posture import Posture
-from cdsm.stiffness import Stiffness, stiffness
+from cdsm.statics.weight_test import weight_test
+from cdsm.stiffness_matrix import Stiffness, stiffness
+from cdsm.support.validation import Array, frozen
 from cdsm.tension import distribute_tension
-from cdsm.weight import weight_test
 
 _RIGID = LinearElasticity(1e12)  # a hybrid cable's stiffness is given as a whole
 

@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from cdsm._checks import frozen
+from cdsm.support.validation import frozen
 
 AXES: Final = ("x", "y", "z")
 

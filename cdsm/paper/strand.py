@@ -8,10 +8,10 @@ from typing import Final, final
 import numpy as np
 
 from cdsm import presets
-from cdsm._checks import Array, frozen
 from cdsm.paper.digits import JOIN, LEVEL, band, least_bend
 from cdsm.paper.figures import Claim
-from cdsm.wire import StrandElasticity
+from cdsm.support.validation import Array, frozen
+from cdsm.wires.laws import StrandElasticity
 
 GAUGE_LENGTH: Final = 0.5
 """Length of the tested wire [m]: assumed, since the paper does not give it."""

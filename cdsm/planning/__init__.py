@@ -3,13 +3,13 @@
 At one posture, or along a path.
 """
 
-from cdsm.planning.attainable import StiffnessRange, stiffness_range
 from cdsm.planning.gradient import StiffnessGradient, stiffness_gradient
 from cdsm.planning.half_way import HalfWay
 from cdsm.planning.path import plan_path
 from cdsm.planning.path_plan import InfeasibleSample, PathPlan
 from cdsm.planning.plan import StiffnessPlan, plan_stiffness
-from cdsm.planning.saturation import Saturation, saturation
+from cdsm.planning.range import StiffnessRange, stiffness_range
+from cdsm.planning.tension_growth import Saturation, saturation
 
 __all__ = [
     "HalfWay",

@@ -9,10 +9,10 @@ import numpy as np
 import qpsolvers
 from numpy.typing import ArrayLike
 
-from cdsm._cable_laws import breaks
-from cdsm._checks import Array, frozen
+from cdsm.arm_model import breaks
 from cdsm.errors import ElasticityRangeError
 from cdsm.posture import Posture
+from cdsm.support.validation import Array, frozen
 from cdsm.tension import Tension, distribute_tension
 
 _TOLERANCE = 1e-12
@@ -135,7 +135,7 @@ def admissible(
     """The admissible tensions of an arm at a posture.
 
     Raises:
-        InvalidInput: As for :func:`~cdsm.tension.distribute_tension`.
+        InvalidInput: As for :func:`~cdsm.distribute_tension`.
         InfeasibleTension: No tension within the bounds and domains balances the arm.
         ElasticityRangeError: The bounds leave nothing of the domain of a cable's elasticity.
     """

@@ -7,13 +7,13 @@ from typing import Final, Literal
 
 import numpy as np
 
-from cdsm._checks import Array
 from cdsm.planning.admissible import Admissible
-from cdsm.planning.field import Reading
+from cdsm.planning.objectives import Problem
 from cdsm.planning.planner import Planner
-from cdsm.planning.problem import Problem
-from cdsm.planning.search import EFFORT, Task, search
+from cdsm.planning.sqp import EFFORT, Task, search
 from cdsm.planning.starts import settled
+from cdsm.planning.stiffness_model import Reading
+from cdsm.support.validation import Array
 
 Status = Literal["posture", "balance", "elasticity", "singular", "stiffness", "rate"]
 

@@ -16,17 +16,17 @@ from typing import final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm._checks import Array, ReadOnlyState, frozen, instance, unit_direction
 from cdsm.errors import SingularStiffness
-from cdsm.planning._kernels import by_tension
+from cdsm.planning.kernels import by_tension
 from cdsm.posture import Posture
-from cdsm.stiffness import Stiffness
+from cdsm.stiffness_matrix import Stiffness
+from cdsm.support.validation import Array, ReadOnlyState, frozen, instance, unit_direction
 
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class StiffnessGradient(ReadOnlyState):
-    """Derivatives by the cable tensions; each is named as in :class:`~cdsm.stiffness.Stiffness`.
+    """Derivatives by the cable tensions; each is named as in :class:`~cdsm.Stiffness`.
 
     The posture and the wrench are held: of balance (Eq. 13) nothing is asked, so that it is for the
     caller to move within the tensions that balance the arm.
@@ -61,7 +61,7 @@ class StiffnessGradient(ReadOnlyState):
         """∂(C_vv)⁻¹/∂F (C, 3, 3) [1/m].
 
         Raises:
-            SingularStiffness: As for :attr:`~cdsm.stiffness.Stiffness.cartesian`.
+            SingularStiffness: As for :attr:`~cdsm.Stiffness.cartesian`.
         """
         return frozen(self._through(self.stiffness.posture.jacobian[:3], self.stiffness.cartesian))
 
@@ -96,7 +96,7 @@ def stiffness_gradient(stiffness: Stiffness) -> StiffnessGradient:
     ``K.along(u)``, and so on. At a jump of an elasticity they are those of the range below it.
 
     Args:
-        stiffness: K, the answer of :func:`~cdsm.stiffness.stiffness`.
+        stiffness: K, the answer of :func:`~cdsm.stiffness`.
 
     Raises:
         InvalidInput: No ``Stiffness``, or an elasticity of your own gives no finite slope.

@@ -6,12 +6,12 @@ import math
 from dataclasses import dataclass
 from typing import final
 
-from cdsm._checks import Array, ReadOnlyState, frozen
-from cdsm._loaded_arm import LoadedArm
-from cdsm._trust_region import settle
 from cdsm.errors import CdsmError, EquilibriumError
-from cdsm.planning.problem import achieved, misfit
-from cdsm.stiffness import Stiffness
+from cdsm.planning.objectives import achieved, misfit
+from cdsm.statics.loaded_arm import LoadedArm
+from cdsm.statics.trust_region import settle
+from cdsm.stiffness_matrix import Stiffness
+from cdsm.support.validation import Array, ReadOnlyState, frozen
 
 
 @final

@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike
 from rich.console import Console
 from rich.progress import track
 
-from cdsm._checks import Array, bound, flag, frozen, instance, number_array
 from cdsm.errors import (
     CableError,
     CdsmError,
@@ -23,12 +22,10 @@ from cdsm.errors import (
     SolverError,
     UnreachableStiffness,
 )
-from cdsm.kinematics import KinematicSolution, inverse_kinematics
+from cdsm.kinematics.maps import KinematicSolution, inverse_kinematics
 from cdsm.manipulator import Manipulator
-from cdsm.planning.attainable import MARGIN
 from cdsm.planning.follow import Aim, Follower, Status
-from cdsm.planning.path_plan import InfeasibleSample, PathPlan
-from cdsm.planning.problem import (
+from cdsm.planning.objectives import (
     achieved,
     checked_margin,
     checked_matrix,
@@ -38,7 +35,10 @@ from cdsm.planning.problem import (
     unit_directions,
     wanted,
 )
-from cdsm.stiffness import stiffness
+from cdsm.planning.path_plan import InfeasibleSample, PathPlan
+from cdsm.planning.range import MARGIN
+from cdsm.stiffness_matrix import stiffness
+from cdsm.support.validation import Array, bound, flag, frozen, instance, number_array
 from cdsm.tension import checked_bounds
 
 _STATUS: Final[dict[type[CdsmError], Status]] = {
@@ -102,7 +102,7 @@ def plan_path(
             [N m].
         angles: The path as joint angles (S, nv) [rad]; or else
         tips: the path as tip positions (S, 3) [m], solved for the angles nearest to those before by
-            :func:`~cdsm.kinematics.inverse_kinematics`.
+            :func:`~cdsm.inverse_kinematics`.
         guess: Angles (nv,) [rad] near which the first of ``tips`` is solved for; the straight arm
             if not given.
         rate: By how much a tension may change per step [N], for all cables or (C,); inf for any.

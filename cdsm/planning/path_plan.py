@@ -14,15 +14,15 @@ from typing import final
 
 import numpy as np
 
-from cdsm._cable_laws import CableLaws
-from cdsm._checks import Array, ReadOnlyState, frozen
-from cdsm._files import write_text
+from cdsm.arm_model import CableLaws
 from cdsm.cable import Cable
 from cdsm.errors import CdsmError
 from cdsm.manipulator import Manipulator
 from cdsm.planning.follow import Status
 from cdsm.planning.half_way import HalfWay, half_way
-from cdsm.stiffness import Stiffness
+from cdsm.stiffness_matrix import Stiffness
+from cdsm.support.files import write_text
+from cdsm.support.validation import Array, ReadOnlyState, frozen
 
 
 @final
@@ -109,7 +109,7 @@ class PathPlan(ReadOnlyState):
     def unstrained_lengths(self) -> Array:
         """What the motors of the H position-controlled cables have paid out (P, H) [m].
 
-        The l_0 with l_0 + Δl(F, l_0) = L, Δl being :meth:`~cdsm.cable.Cable.elongation`: it counts
+        The l_0 with l_0 + Δl(F, l_0) = L, Δl being :meth:`~cdsm.Cable.elongation`: it counts
         from the low end of the elasticity's domain, so that l_0 is the length at that tension, with
         the series spring at rest. So it is for every ``original_length`` of the arm: what K_θ takes
         for l_0 does not change what motors do.

@@ -8,11 +8,7 @@ from typing import final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm._checks import Array, ReadOnlyState, frozen
-from cdsm._units import MODEL
-from cdsm.planning.attainable import MARGIN
-from cdsm.planning.planner import REACHED, Planner
-from cdsm.planning.problem import (
+from cdsm.planning.objectives import (
     achieved,
     checked_matrix,
     checked_starts,
@@ -22,8 +18,12 @@ from cdsm.planning.problem import (
     unit_directions,
     wanted,
 )
+from cdsm.planning.planner import REACHED, Planner
+from cdsm.planning.range import MARGIN
 from cdsm.posture import Posture
-from cdsm.stiffness import Stiffness, stiffness
+from cdsm.stiffness_matrix import Stiffness, stiffness
+from cdsm.support.units import MODEL
+from cdsm.support.validation import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension
 
 

@@ -14,13 +14,13 @@ from typing import Final
 import numpy as np
 from scipy.optimize import brentq
 
-from cdsm._checks import Array
 from cdsm.errors import UnreachableStiffness
-from cdsm.planning.attainable import attainable
-from cdsm.planning.field import Point, Reading, Sight, drawn_back
-from cdsm.planning.problem import Problem
-from cdsm.planning.search import EFFORT, HIGHEST, LOWEST, MET, NEAREST, Found, Task, search
+from cdsm.planning.objectives import Problem
+from cdsm.planning.range import attainable
+from cdsm.planning.sqp import EFFORT, HIGHEST, LOWEST, MET, NEAREST, Found, Task, search
 from cdsm.planning.starts import Ground, beyond_jumps, settled, stretches
+from cdsm.planning.stiffness_model import Point, Reading, Sight, drawn_back
+from cdsm.support.validation import Array
 
 REACHED: Final = 1e-6
 """Largest relative miss with which a target counts as hit; what is found is mostly at rounding."""

@@ -7,11 +7,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from cdsm._checks import Array
 from cdsm.planning.admissible import Admissible, solve
-from cdsm.planning.field import Field, Point, drawn_back
-from cdsm.planning.problem import unstable
-from cdsm.planning.search import Found, Task, promises, search
+from cdsm.planning.objectives import unstable
+from cdsm.planning.sqp import Found, Task, promises, search
+from cdsm.planning.stiffness_model import Field, Point, drawn_back
+from cdsm.support.validation import Array
 
 _FAR = 1e4
 """How much further than the largest tension a corner is looked for."""

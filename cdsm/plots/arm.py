@@ -9,11 +9,11 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
-from cdsm._checks import Array, instance
 from cdsm.errors import InvalidInput
 from cdsm.plots.style import AXES, COLORS, MM, equal_axes
 from cdsm.posture import Posture
-from cdsm.stiffness import Stiffness
+from cdsm.stiffness_matrix import Stiffness
+from cdsm.support.validation import Array, instance
 from cdsm.tension import Tension
 
 _FLATTEST = 0.35

@@ -9,17 +9,17 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from cdsm._checks import instance
-from cdsm.buckling import CriticalTension
 from cdsm.plots.style import AXES, COLORS, MM
-from cdsm.weight import WeightTest
+from cdsm.statics.buckling import CriticalTension
+from cdsm.statics.weight_test import WeightTest
+from cdsm.support.validation import instance
 
 
 def plot_weight_test(test: WeightTest) -> Figure:
     """Load over the displacement of the tip, measured and linear, and tensions over the load.
 
     Args:
-        test: What :func:`~cdsm.weight.weight_test` returns; of several steps, to see a curve.
+        test: What :func:`~cdsm.weight_test` returns; of several steps, to see a curve.
 
     Raises:
         InvalidInput: Not a weight test.
@@ -52,7 +52,7 @@ def plot_critical_tension(critical: CriticalTension) -> Figure:
     """Stability margin over the lower bound of tension, unstable ranges shaded.
 
     Args:
-        critical: What :func:`~cdsm.buckling.critical_tension` returns.
+        critical: What :func:`~cdsm.critical_tension` returns.
 
     Raises:
         InvalidInput: Not a critical tension.

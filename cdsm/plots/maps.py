@@ -14,11 +14,11 @@ from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from cdsm._checks import Array, one_of, scalar
 from cdsm.errors import InvalidInput
 from cdsm.plots.style import AXES, COLORS, MM, N_PER_MM, TICKS, equal_axes
-from cdsm.sweep.export import check_sweep, status_names
-from cdsm.sweep.quantities import SweepStatus
+from cdsm.support.validation import Array, one_of, scalar
+from cdsm.sweeps.export import check_sweep, status_names
+from cdsm.sweeps.quantities import SweepStatus
 
 if TYPE_CHECKING:
     import xarray
@@ -60,7 +60,7 @@ def plot_map(
     at the 99th percentile of the others, and the bar in an arrow.
 
     Args:
-        dataset: What :func:`~cdsm.sweep.run.sweep` returns, with ``tip_position`` among its
+        dataset: What :func:`~cdsm.sweeps.run.sweep` returns, with ``tip_position`` among its
             outputs; use ``sel`` on one with more than 9 panels.
         quantity: One number per entry: ``"softest"``, ``"stiffest"``, ``"anisotropy"``,
             ``"margin"``, ``"along"`` (a panel for each direction).

@@ -10,9 +10,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from cdsm import paper
-from cdsm._checks import Array
 from cdsm.plots.arm import draw_arm
 from cdsm.plots.style import AXES, COLORS, MM, N_PER_MM, STYLES
+from cdsm.support.validation import Array
 
 _LENGTHS = {"stretched": "$l_0 = L$ (paper)", "unstrained": "original $l_0$"}
 

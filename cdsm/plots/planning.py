@@ -10,10 +10,10 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from cdsm._checks import Array, instance
 from cdsm.errors import InvalidInput
 from cdsm.planning import PathPlan, StiffnessPlan, StiffnessRange
 from cdsm.plots.style import COLORS, N_PER_MM
+from cdsm.support.validation import Array, instance
 
 _SAME = 1e-9
 """Entries of unit directions this near to each other are of one."""

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, final
 import numpy as np
 from scipy.optimize import linprog
 
-from cdsm._checks import Array, ReadOnlyState, frozen
 from cdsm.cable import Cable, Control
 from cdsm.errors import CdsmError, SingularStiffness
-from cdsm.report._laws import asked
-from cdsm.report._potential import joint_unit
+from cdsm.report.laws import asked
+from cdsm.report.potential import joint_unit
+from cdsm.support.validation import Array, ReadOnlyState, frozen
 
 if TYPE_CHECKING:
-    from cdsm.stiffness import Stiffness
+    from cdsm.stiffness_matrix import Stiffness
 
 RANK = 1e-9
 """A singular value below this part of the largest counts as zero."""

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 from scipy.linalg import null_space
 from scipy.optimize import lsq_linear
 
-from cdsm import _balance
-from cdsm._checks import Array
+from cdsm.kernels import tension as tension_kernels
+from cdsm.support.validation import Array
 from cdsm.tension import DISTANCE, Tension
 
 if TYPE_CHECKING:
-    from cdsm.stiffness import Stiffness
+    from cdsm.stiffness_matrix import Stiffness
 
 
 @final
@@ -54,8 +54,8 @@ def optimality(K: Stiffness, pull: Tension) -> Optimality:
     """The optimality conditions of tensions, evaluated anew."""
     pose = K.posture
     torque = pose.jacobian.T @ K.wrench - pose.gravity_torque
-    problem = _balance.Scaled(
-        *_balance.scaled_balance(
+    problem = tension_kernels.Scaled(
+        *tension_kernels.scaled_balance(
             pose.length_jacobian, torque, pull.minimum, pull.maximum, pose.arm.length
         )
     )
@@ -65,7 +65,7 @@ def optimality(K: Stiffness, pull: Tension) -> Optimality:
     at_high = problem.high - x <= DISTANCE * size
     z = _bound_multipliers(problem.A, x, at_low, at_high)
     y = np.asarray(np.linalg.lstsq(problem.A.T, -x - z, rcond=None)[0])
-    primal, dual, _ = _balance.optimality(*problem[:4], x, y, z)
+    primal, dual, _ = tension_kernels.optimality(*problem[:4], x, y, z)
     return Optimality(
         solver=pull.solver,
         at_minimum=pull.at_minimum,

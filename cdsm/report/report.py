@@ -9,18 +9,18 @@ from typing import TYPE_CHECKING, final
 
 import numpy as np
 
-from cdsm._checks import Array, ReadOnlyState
-from cdsm._units import joints_to_dict, key
 from cdsm.errors import SingularStiffness
-from cdsm.report import _layout, _remarks, facts
-from cdsm.report._page import page
-from cdsm.report._potential import joint_unit
+from cdsm.report import facts, layout, remarks
 from cdsm.report.facts import CableState, Rank, Readings
 from cdsm.report.optimality import Optimality, optimality
+from cdsm.report.page import page
+from cdsm.report.potential import joint_unit
 from cdsm.report.self_check import SelfCheck, self_check
+from cdsm.support.units import joints_to_dict, key
+from cdsm.support.validation import Array, ReadOnlyState
 
 if TYPE_CHECKING:
-    from cdsm.stiffness import Stiffness
+    from cdsm.stiffness_matrix import Stiffness
 
 
 @final
@@ -60,12 +60,12 @@ class Report(ReadOnlyState):
     @cached_property
     def faults(self) -> tuple[str, ...]:
         """Why the stiffness is not to be trusted, a sentence each; empty if it is."""
-        return _remarks.faults(self)
+        return remarks.faults(self)
 
     @cached_property
     def notes(self) -> tuple[str, ...]:
         """What to know beside it, a sentence each: slack cables, laws that end, readings apart."""
-        return _remarks.notes(self)
+        return remarks.notes(self)
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -148,17 +148,17 @@ class Report(ReadOnlyState):
 
     def to_html(self) -> str:
         """The report as an HTML file that needs no other."""
-        return _layout.to_document(page(self))
+        return layout.to_document(page(self))
 
     def __repr__(self) -> str:
         state = "trustworthy" if self.trustworthy else "NOT TO BE TRUSTED"
         return f"<Report on the stiffness of {self.stiffness.posture.arm.name}, {state}>"
 
     def __str__(self) -> str:
-        return _layout.to_text(page(self))
+        return layout.to_text(page(self))
 
     def _repr_html_(self) -> str:
-        return _layout.to_fragment(page(self))
+        return layout.to_fragment(page(self))
 
 
 def report_on(K: Stiffness) -> Report:

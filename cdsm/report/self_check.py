@@ -14,14 +14,14 @@ from typing import TYPE_CHECKING, Literal, NamedTuple, final
 
 import numpy as np
 
-from cdsm._checks import Array, ReadOnlyState
 from cdsm.errors import CdsmError, first_of
-from cdsm.report._differences import Estimates, gradients, hessians
-from cdsm.report._potential import Neighbourhood
+from cdsm.report.differences import Estimates, gradients, hessians
 from cdsm.report.facts import torque_size
+from cdsm.report.potential import Neighbourhood
+from cdsm.support.validation import Array, ReadOnlyState
 
 if TYPE_CHECKING:
-    from cdsm.stiffness import Stiffness
+    from cdsm.stiffness_matrix import Stiffness
 
 Verdict = Literal["agrees", "DIFFERS", "not possible"]
 

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Final, final
 
 import numpy as np
 
-from cdsm._checks import Array
 from cdsm.manipulator import Manipulator
 from cdsm.plots.style import AXES
+from cdsm.support.validation import Array
 from cdsm.view.ranges import Range, joint_sliders, slider
 from cdsm.view.state import Setting, Shown
 from cdsm.view.text import page_text

@@ -8,8 +8,8 @@ from typing import Final, final
 
 import numpy as np
 
-from cdsm._checks import Array
 from cdsm.manipulator import Manipulator
+from cdsm.support.validation import Array
 
 _STEPS = 500
 """A slider has this many steps at least: a browser shows some hundred pixels of it."""

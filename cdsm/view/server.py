@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, Self, final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm._checks import Array, bound, frozen, instance, scalar, vector
-from cdsm._extras import need
 from cdsm.errors import InvalidInput
 from cdsm.manipulator import Manipulator
+from cdsm.support.extras import need
+from cdsm.support.validation import Array, bound, frozen, instance, scalar, vector
 from cdsm.tension import installed_solver
 from cdsm.view.controls import Controls
 from cdsm.view.newest import Newest
@@ -62,7 +62,7 @@ def serve(
         minimum: Lower bound of all tensions [N] to begin with.
         maximum: Upper bound of all tensions [N].
         force: At the tip, in base axes (3,) [N], to begin with.
-        solver: Of :func:`~cdsm.tension.distribute_tension`.
+        solver: Of :func:`~cdsm.distribute_tension`.
         largest_tension: Right end of the slider of the lower bound [N].
         largest_force: Ends of the sliders of the force [N]; more if ``force`` is.
 

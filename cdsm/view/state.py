@@ -11,7 +11,6 @@ from typing import Final, final
 import numpy as np
 from numpy.typing import NDArray
 
-from cdsm._checks import Array, ReadOnlyState, frozen
 from cdsm.errors import (
     CableError,
     CdsmError,
@@ -24,8 +23,9 @@ from cdsm.errors import (
 from cdsm.manipulator import Manipulator
 from cdsm.plots.arm import ellipsoid, tension_colors
 from cdsm.posture import Posture
-from cdsm.stiffness import Stiffness, stiffness
-from cdsm.sweep.principal import principal
+from cdsm.stiffness_matrix import Stiffness, stiffness
+from cdsm.support.validation import Array, ReadOnlyState, frozen
+from cdsm.sweeps.principal import principal
 from cdsm.tension import Tension, distribute_tension
 
 GREY: Final = (150, 150, 150)

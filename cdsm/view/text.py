@@ -9,9 +9,9 @@ from typing import Final
 
 import matplotlib
 
-from cdsm._checks import Array
-from cdsm._units import MODEL
 from cdsm.plots.style import AXES, MM, N_PER_MM
+from cdsm.support.units import MODEL
+from cdsm.support.validation import Array
 from cdsm.tension import Tension
 from cdsm.view.state import Condition, Shown
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.optimize import linprog
 
 import cdsm
-from cdsm._checks import Array
+from cdsm.support.validation import Array
 from cdsm.urdf import CROSS_MASS
 
 Wide = NDArray[np.longdouble]

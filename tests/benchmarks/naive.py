@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from cdsm._checks import Array
+from cdsm.support.validation import Array
 
 
 class NaiveArm:

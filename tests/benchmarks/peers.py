@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from cdsm._checks import Array
+from cdsm.support.validation import Array
 from cdsm.urdf import CROSS_MASS
 from tests.benchmarks.naive import NaiveArm
 

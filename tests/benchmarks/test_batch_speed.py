@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import cdsm
-from cdsm._checks import Array
+from cdsm.support.validation import Array
 from tests.benchmarks.naive import NaiveArm, naive_joint_stiffness
 from tests.benchmarks.test_speed import GRAVITY, RIGIDITY, SIZES, arm
 from tests.benchmarks.timing import Clock, seconds

@@ -1,0 +1,234 @@
+"""The cables of an arm, law by law: how stiff they are, and what they may carry.
+
+A locked motor holds the original length l_0 of its wire. Under tension the wire is ℓ = l_0 (1 + ε)
+long, so that its stiffness EA/l_0 is EA (1 + ε)/ℓ.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cdsm.cable import Cable
+from cdsm.elasticity import Elasticity, LinearElasticity
+from cdsm.errors import ElasticityRangeError, InvalidInput
+from cdsm.kernels.stiffness import cable_stiffness
+from cdsm.support.validation import LARGEST, SMALLEST, Array, frozen
+from cdsm.wires.laws import StrandElasticity
+
+OriginalLength = Literal["unstrained", "stretched"]
+
+_STEP = 1e-5
+"""Relative step of the difference of the slope of EA (1 + ε)."""
+
+
+class CableLaws:
+    """What the stiffness of cables needs, gathered once.
+
+    Args:
+        cables: Those of an arm.
+        original_length: ``"unstrained"``: a wire's original length is ℓ/(1 + ε); ``"stretched"``:
+            it is ℓ itself, as in the paper.
+
+    Attributes:
+        held: Each law of the position-controlled cables, and which cables have it.
+        series: 1/k_series of all cables (C,) [m/N].
+        rest: Tension at which their springs are at rest (C,) [N]: the low end of each law.
+    """
+
+    def __init__(self, cables: tuple[Cable, ...], original_length: OriginalLength) -> None:
+        self._cables = cables
+        self._unstrained = original_length == "unstrained"
+        held = [c for c, cable in enumerate(self._cables) if cable.control == "position"]
+        by_law: dict[object, list[int]] = {}
+        for c in held:
+            by_law.setdefault(_key(self._cables[c].elasticity), []).append(c)
+        # one law for all is the usual case, and a slice costs less than indices
+        self.held = [
+            (
+                self._cables[cables[0]].elasticity,
+                slice(None) if len(cables) == len(self._cables) else np.array(cables),
+            )
+            for cables in by_law.values()
+        ]
+        self._least = frozen(np.array([cable.minimum for cable in self._cables]))
+        self._most = frozen(np.array([cable.maximum for cable in self._cables]))
+        self._bounded = bool(self._least.any() or np.isfinite(self._most).any())
+        series = np.array([cable.series_stiffness for cable in self._cables])
+        self.series = frozen(1.0 / series)
+        self.rest = frozen(np.array([cable.elasticity.domain.low for cable in self._cables]))
+        # EA of the cables where it is always the same; laws that have to be asked
+        constant, linear, self._asked = np.zeros(len(self._cables)), np.zeros(len(self._cables)), []
+        for law, of in self.held:
+            if isinstance(law, LinearElasticity):
+                constant[of], linear[of] = law.rigidity(0.0), float(self._unstrained)
+            else:
+                self._asked.append((law, of))
+        self._constant, self._linear = frozen(constant), frozen(linear)
+
+    def narrowed(self, low: Array, high: Array) -> tuple[Array, Array]:
+        """Bounds of tension (…, C) [N], and those that the cables have of their own."""
+        if not self._bounded:
+            return low, high
+        return frozen(np.maximum(low, self._least)), frozen(np.minimum(high, self._most))
+
+    def stiffness(self, lengths: Array, tension: Array) -> Array:
+        """Diagonal of K_L (C,) [N/m]: 1/(l_0/EA(F) + 1/k_series), 0 for force-controlled cables.
+
+        Of checked lengths L (C,) [m] and tensions (C,) [N], which are not negative.
+
+        Raises:
+            ElasticityRangeError: Names the cables whose tension is outside their elasticity's
+                domain.
+            InvalidInput: An elasticity of the user's own gives no positive rigidity, or no strain.
+        """
+        rigidity = self._constant
+        if self._asked:
+            rigidity = rigidity.copy()
+            for law, held in self._asked:
+                try:
+                    rigidity[held] = self.stretched_rigidity(law, tension[held])
+                except ElasticityRangeError as error:
+                    raise self.naming(error, held) from None
+        k = cable_stiffness(lengths, tension, rigidity, self._linear, self.series, self.rest)
+        return frozen(k)
+
+    def stretched_rigidity(self, law: Elasticity, tension: Array) -> Array:
+        """EA (1 + ε) [N] of a law, or EA where the stretched length counts; same shape as F [N].
+
+        Raises:
+            ElasticityRangeError: A tension outside the domain of the law.
+            InvalidInput: The law gives no positive rigidity, or no strain.
+        """
+        if isinstance(law, LinearElasticity):
+            rigidity = law.rigidity(tension)
+            return rigidity + tension if self._unstrained else rigidity
+        rigidity = _checked_rigidity(law, tension)
+        return rigidity * (1.0 + _checked_strain(law, tension)) if self._unstrained else rigidity
+
+    def original_lengths(self, lengths: Array, tension: Array) -> Array:
+        """l_0 (C,) [m] of cables that are L (C,) [m] long under F (C,) [N].
+
+        The series spring counts into the cable: l_0 is negative where it stretches by more than the
+        whole cable is long. Of a force-controlled cable, whose motor holds no length, L itself.
+
+        Raises:
+            ElasticityRangeError: As for :meth:`stiffness`.
+            InvalidInput: As for :meth:`stiffness`.
+        """
+        wire = np.array(lengths)
+        for law, held in self.held:
+            F = tension[held]
+            wire[held] -= self.series[held] * (F - self.rest[held])
+            if self._unstrained:
+                try:
+                    wire[held] /= 1.0 + _checked_strain(law, F)
+                except ElasticityRangeError as error:
+                    raise self.naming(error, held) from None
+        return frozen(wire)
+
+    def slopes(self, tension: Array, stiffness: Array) -> tuple[Array, Array]:
+        """dk/dF (C,) [1/m] and d²k/dF² (C,) [1/(N m)] of cables of stiffness k under F (C,) [N].
+
+        Both at a posture, where l_0 changes with F. With R = EA (1 + ε), G = R′/R and w = 1 −
+        k/k_series, the part of the wire in the cable's compliance,
+
+            k′ = k A,  k″ = k (A² + A′),  A = (1 − w)/R + w G,
+            A′ = (1 − w) (A/R − G/R − A G) + w G′.
+
+        G′ is a difference, good for some five digits.
+
+        Raises:
+            ElasticityRangeError: As for :meth:`stiffness`.
+            InvalidInput: An elasticity of the user's own gives no finite slope.
+        """
+        first, second = np.zeros_like(stiffness), np.zeros_like(stiffness)
+        for law, held in self.held:
+            F, k = tension[held], stiffness[held]
+            last = np.array([*breaks(law), law.domain.high])[np.searchsorted(breaks(law), F)]
+            step = _STEP * np.maximum(F, 1.0)
+            beside = np.where(F + step <= last, F + step, F - step)
+            both = np.stack([F, beside])
+            try:
+                slopes = np.asarray(law.rigidity_slope(both))
+                R = self.stretched_rigidity(law, F)
+                if self._unstrained:  # (EA (1 + ε))′ = EA′ (1 + ε) + 1
+                    slopes = slopes * (1.0 + _checked_strain(law, both)) + 1.0
+            except ElasticityRangeError as error:
+                raise self.naming(error, held) from None
+            if slopes.shape != (2, F.size) or not np.isfinite(slopes).all():
+                raise InvalidInput(
+                    "elasticity",
+                    f"{law!r} gives the slopes {slopes} of its rigidity at tensions {F} N and "
+                    "beside them; one finite number for each is needed.",
+                )
+            G, spring = slopes[0] / R, k * self.series[held]
+            bend = (slopes[1] - slopes[0]) / (beside - F) / R - G**2
+            A = spring / R + (1.0 - spring) * G
+            first[held] = k * A
+            change = spring * (A / R - G / R - A * G) + (1.0 - spring) * bend
+            second[held] = k * (A**2 + change)
+        return frozen(first), frozen(second)
+
+    def naming(
+        self, error: ElasticityRangeError, held: slice | NDArray[np.intp]
+    ) -> ElasticityRangeError:
+        """The error of a law at the tensions of some cables, with their names and numbers."""
+        outside = np.arange(len(self._cables))[held][list(error.indices)].tolist()
+        names = [self._cables[c].name for c in outside]
+        return ElasticityRangeError(error.problem, error.tension, outside, names)
+
+
+def breaks(law: Elasticity) -> tuple[float, ...]:
+    """Tensions [N], rising, at which the rigidity of a law jumps or sharply bends.
+
+    Each belongs to the range below it. The bends at the points of a table are not among them.
+    """
+    return law.joins if isinstance(law, StrandElasticity) else law.jumps
+
+
+def _checked_rigidity(law: Elasticity, tension: Array) -> Array:
+    """EA(F) [N] of a law, same shape as F [N], which need not be the library's own.
+
+    Raises:
+        ElasticityRangeError: A tension outside the domain of the law.
+        InvalidInput: The law gives no positive rigidity.
+    """
+    rigidity = np.asarray(law.rigidity(tension))
+    usable = (rigidity >= SMALLEST) & (rigidity <= LARGEST)  # false for NaN too
+    if rigidity.shape != tension.shape or np.count_nonzero(usable) < tension.size:
+        raise InvalidInput(
+            "elasticity",
+            f"{law!r} gives the rigidity {rigidity} N at tensions {tension} N; one positive "
+            "number for each is needed.",
+        )
+    return rigidity
+
+
+def _checked_strain(law: Elasticity, tension: Array) -> Array:
+    """ε(F) [-] of a law, same shape as F [N], which need not be the library's own.
+
+    Raises:
+        ElasticityRangeError: A tension outside the domain of the law.
+        InvalidInput: The law gives no strain.
+    """
+    strain = np.asarray(law.strain(tension))
+    usable = (strain > -1.0) & (strain <= LARGEST)  # false for NaN too
+    if strain.shape != tension.shape or np.count_nonzero(usable) < tension.size:
+        raise InvalidInput(
+            "elasticity",
+            f"{law!r} gives the strain {strain} at tensions {tension} N; one number for each, "
+            "zero at the low end of its domain and rising, is needed.",
+        )
+    return strain
+
+
+def _key(law: Elasticity) -> object:
+    """What equal laws share; an elasticity of the user's own need not be hashable."""
+    try:
+        hash(law)
+    except TypeError:
+        return id(law)
+    return law

@@ -1,0 +1,96 @@
+"""The kernel of tension distribution: guessed and certified, or searched and certified, row by row.
+
+min ½‖F‖²   so that   J_Lᵀ F = J_Xᵀ W − g   and   low ≤ F ≤ high.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cdsm.batch import active_set
+from cdsm.batch.active_set import FOUND, IMPOSSIBLE, State
+from cdsm.batch.certificates import is_infeasible, is_optimal
+from cdsm.batch.layout import INFEASIBLE, OK, UNDECIDED, Codes, Flags
+from cdsm.batch.serpentine_guess import Blocks, guess, is_beyond_reach, multipliers
+from cdsm.kernels.compiling import compiled, threaded
+from cdsm.support.validation import Array
+
+
+@threaded
+def distribute_rows(
+    blocks: Blocks,
+    postures: Array,
+    low: Array,
+    high: Array,
+    wrench: Array,
+    nothing: float,
+    tension: Array,
+    status: Codes,
+) -> None:
+    """Fill tensions (b, C) [N], zeros where there are none, and the status of every row.
+
+    Args:
+        blocks: Those of the arm.
+        postures: J_X, J_L and g of each row, one after the other, (b, 6 nv + C nv + nv).
+        low: Lower bounds (b, C) [N].
+        high: Upper bounds (b, C) [N].
+        wrench: W (b, 6).
+        nothing: Moment arms below this are rounding [m], and are made zero.
+        tension: What is wanted.
+        status: Rows that are not OK are passed over; UNDECIDED where nothing could be certified.
+    """
+    count = low.shape[1]
+    nv = postures.shape[1] // (count + 7)
+    b, rest, zero = np.empty(nv), np.empty(2), np.zeros(count)
+    free, side = np.empty(count, dtype=np.bool_), np.empty(count, dtype=np.intp)
+    system = np.empty((nv, nv + 1))
+    state = State(np.empty(count), np.empty(nv), side, np.empty(count), system, np.empty(nv))
+    for r in range(postures.shape[0]):
+        for c in range(count):
+            tension[r, c] = 0.0
+        if status[r] != OK:
+            continue
+        JX = postures[r, : 6 * nv].reshape((6, nv))
+        J = postures[r, 6 * nv : (6 + count) * nv].reshape((count, nv))
+        for c in range(count):
+            for i in range(nv):
+                if abs(J[c, i]) < nothing:
+                    J[c, i] = 0.0
+        for i in range(nv):
+            b[i] = -postures[r, (6 + count) * nv + i]
+            for a in range(6):
+                b[i] += wrench[r, a] * JX[a, i]
+        status[r] = _distribute(blocks, J, b, low[r], high[r], free, rest, zero, state)
+        if status[r] == OK:
+            for c in range(count):  # a bound that is active is not crossed by rounding
+                tension[r, c] = min(max(state.F[c], low[r, c]), high[r, c])
+
+
+@compiled
+def _distribute(
+    blocks: Blocks,
+    J: Array,
+    b: Array,
+    low: Array,
+    high: Array,
+    free: Flags,
+    rest: Array,
+    zero: Array,
+    state: State,
+) -> int:
+    """Fill the tensions of the state; OK, INFEASIBLE or UNDECIDED."""
+    F, y = state.F, state.y
+    if blocks.row.shape[0]:
+        k = guess(blocks, J, b, low, high, F, free, rest)
+        if k < 0:
+            multipliers(blocks, J, F, free, blocks.row_start[0], y)
+            if is_optimal(J, b, low, high, F, y):
+                return OK
+        elif is_beyond_reach(blocks, J, b, low, high, free, rest, k, zero, y):
+            return INFEASIBLE
+    outcome = active_set.search(J, b, low, high, state)
+    if outcome == FOUND and is_optimal(J, b, low, high, F, y):
+        return OK
+    if outcome == IMPOSSIBLE and is_infeasible(J, b, low, high, y):
+        return INFEASIBLE
+    return UNDECIDED

@@ -1,0 +1,185 @@
+"""Cables as TOML: where each passes, of what wire it is and how it is pulled."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import Field
+
+from cdsm.cable import Cable, Control, Site
+from cdsm.elasticity import Elasticity
+from cdsm.errors import CableError, FileError, GeometryError, InvalidInput, counted
+from cdsm.support.files import read_text, write_text
+from cdsm.support.records import (
+    Direction,
+    NotNegative,
+    Positive,
+    parse,
+    read_toml,
+    record,
+    toml_lines,
+)
+from cdsm.support.validation import sequence_of
+from cdsm.wires.files import from_table, table_of
+
+_HEAD = """\
+# cdsm cables. Units: m, N, N/m.
+# sites: links of the URDF with a point in each one's frame, from the actuator's side to the end.
+# lead: straight cable from the actuator to the first site. series_stiffness: of a spring in series;
+# none if left out. control: what the motor holds, "position" or "force". minimum, maximum: tensions
+# that the cable may carry; 0 and none if left out.
+"""
+
+_Label = Annotated[str, Field(min_length=1, max_length=200)]
+
+
+@record
+class _Site:
+    link: _Label
+    xyz: Direction
+
+
+@record
+class _Entry:
+    name: _Label
+    elasticity: _Label
+    lead: NotNegative = 0.0
+    series_stiffness: Positive | None = None
+    control: Control = "position"
+    minimum: NotNegative = 0.0
+    maximum: Positive | None = None
+    sites: Annotated[tuple[_Site, ...], Field(strict=False, min_length=2)]
+
+
+@record
+class _Entries:
+    cables: Annotated[tuple[_Entry, ...], Field(strict=False, min_length=1)]
+
+
+def write_cables(cables: Sequence[Cable], path: str | os.PathLike[str]) -> Path:
+    """Write cables as TOML; :func:`read_cables` gives equal ones back.
+
+    Args:
+        cables: One or more.
+        path: The file; replaced if it exists.
+
+    Raises:
+        InvalidInput: No cables, or an elasticity of a kind that no file can hold.
+        FileError: The file cannot be written.
+    """
+    cables = sequence_of("cables", cables, Cable)
+    if not cables:
+        raise InvalidInput("cables", "none given; there is nothing to write.")
+    tables = ["\n".join(table_of(cable.elasticity)) for cable in cables]
+    names = {table: f"wire{i}" for i, table in enumerate(dict.fromkeys(tables), start=1)}
+    lines = [_HEAD]
+    for table, name in names.items():
+        lines += [f"[elasticities.{name}]", table, ""]
+    for cable, table in zip(cables, tables, strict=True):
+        lines += ["[[cables]]", *_lines(cable, names[table]), ""]
+    return write_text(path, "\n".join(lines))
+
+
+def read_cables(path: str | os.PathLike[str]) -> tuple[Cable, ...]:
+    """Read the cables of an arm from a TOML file.
+
+    A table ``[elasticities.NAME]`` for every wire, as :func:`~cdsm.read_elasticity` reads
+    it, and a table ``[[cables]]`` for every cable: ``name``, ``elasticity`` (such a NAME),
+    ``sites`` (at least two of ``{link = "…", xyz = [x, y, z]}``, [m]), and if wanted ``lead`` [m],
+    ``series_stiffness`` [N/m], ``control`` (``"position"`` or ``"force"``), ``minimum`` and
+    ``maximum`` [N].
+
+    Args:
+        path: The file.
+
+    Raises:
+        FileError: The file cannot be read, or is no description of cables; every fault is listed.
+    """
+    text = read_text(path)
+    try:
+        data = read_toml(text)
+        wires = data.pop("elasticities", {})
+        if not isinstance(wires, dict):
+            raise GeometryError(["elasticities: must be tables, [elasticities.NAME]"])
+        return _built(parse(_Entries, data), _wires(wires))
+    except GeometryError as error:
+        faults = error.faults
+    raise FileError(path, f"cannot be read as cables, {counted(faults)}")
+
+
+def _wires(tables: dict[str, object]) -> dict[str, Elasticity]:
+    wires, faults = {}, []
+    for name, table in tables.items():
+        try:
+            wires[name] = from_table(table)
+        except GeometryError as error:
+            faults += [f"elasticities.{name}.{fault}" for fault in error.faults]
+        except InvalidInput as error:
+            faults.append(f"elasticities.{name}: {error}")
+    if faults:
+        raise GeometryError(faults)
+    return wires
+
+
+def _built(entries: _Entries, wires: dict[str, Elasticity]) -> tuple[Cable, ...]:
+    cables, faults = [], []
+    seen: set[str] = set()
+    for i, entry in enumerate(entries.cables, start=1):
+        if entry.name in seen:
+            faults.append(f"cables[{i}].name: {entry.name!r} is used twice")
+        seen.add(entry.name)
+        if entry.elasticity not in wires:
+            known = ", ".join(wires) or "no table at all"
+            faults.append(
+                f"cables[{i}].elasticity: there is no [elasticities.{entry.elasticity}]; there is "
+                f"{known}"
+            )
+            continue
+        try:
+            cables.append(_cable(entry, wires[entry.elasticity]))
+        except (CableError, InvalidInput) as error:
+            faults.append(f"cables[{i}]: {error}")
+    if faults:
+        raise GeometryError(faults)
+    return tuple(cables)
+
+
+def _cable(entry: _Entry, wire: Elasticity) -> Cable:
+    return Cable(
+        name=entry.name,
+        sites=tuple(Site(site.link, site.xyz) for site in entry.sites),
+        elasticity=wire,
+        lead=entry.lead,
+        series_stiffness=math.inf if entry.series_stiffness is None else entry.series_stiffness,
+        control=entry.control,
+        minimum=entry.minimum,
+        maximum=math.inf if entry.maximum is None else entry.maximum,
+    )
+
+
+def _lines(cable: Cable, wire: str) -> list[str]:
+    entry = _Entry(
+        name=cable.name,
+        elasticity=wire,
+        lead=cable.lead,
+        series_stiffness=None if math.isinf(cable.series_stiffness) else cable.series_stiffness,
+        control=cable.control,
+        minimum=cable.minimum,
+        maximum=None if math.isinf(cable.maximum) else cable.maximum,
+        sites=tuple(_Site(link=site.link, xyz=site.position) for site in cable.sites),
+    )
+    keys = ("name", "elasticity", "lead", "series_stiffness", "control", "minimum", "maximum")
+    return [
+        *toml_lines(entry, keys),
+        "sites = [",
+        *(
+            f"    {{link = {json.dumps(site.link)}, xyz = {list(site.position)}}},"
+            for site in cable.sites
+        ),
+        "]",
+    ]

@@ -1,0 +1,1 @@
+"""Compiled kernels of the single path: forward kinematics, gravity, stiffness, tensions."""

@@ -1,0 +1,128 @@
+"""Numba kernels of the rigid bodies: the tip, its Jacobian, and what the weight asks of the joints.
+
+For one posture Pinocchio answers these; for many at once its calls from Python would cost more than
+all the rest. A test holds both equal to rounding. With M and S = Σ m c of all that joint i moves,
+r_i = S − M o_i and gravity γ,
+
+    g_i = −γ·(z_i × r_i),    ∂g_i/∂θ_j = −γ·(z_i × (z_j × r_j)) for i before or equal to j.
+
+Where joint j slides along s, M s stands for z_j × r_j.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from cdsm.kernels.compiling import compiled
+from cdsm.kernels.segments import Frames, Indices, Tree
+from cdsm.support.validation import Array
+
+
+class Masses(NamedTuple):
+    """What moves with each joint, and where the tip is; rows as in a tree.
+
+    Attributes:
+        mass: Of the bodies fixed to each joint's frame, (nv+1,) [kg].
+        centre: Their centre of mass in that frame, (nv+1, 3) [m].
+        gravity: In base axes (3,) [m/s²].
+        tip: Row of the joint that moves the tip.
+        way: Coordinates of the joints that move it, base first.
+        rotation: Of the tip in that joint's frame, (3, 3).
+        point: Its origin there, (3,) [m].
+    """
+
+    mass: Array
+    centre: Array
+    gravity: Array
+    tip: int
+    way: Indices
+    rotation: Array
+    point: Array
+
+
+@compiled
+def reach(
+    parent: Indices,
+    masses: Masses,
+    rotation: Array,
+    frames: Frames,
+    tip: Array,
+    jacobian: Array,
+) -> None:
+    """Fill the pose of the tip (4, 4), and J_X (6, nv) for the joints on the way to it."""
+    origin, axis, slide, _ = frames
+    i = masses.tip
+    for r in range(3):
+        tip[3, r] = 0.0
+        for c in range(3):
+            tip[r, c] = 0.0
+            for k in range(3):
+                tip[r, c] += rotation[i, r, k] * masses.rotation[k, c]
+        tip[r, 3] = origin[i, r]
+        for k in range(3):
+            tip[r, 3] += rotation[i, r, k] * masses.point[k]
+    tip[3, 3] = 1.0
+    while i > 0:
+        rx, ry, rz = tip[0, 3] - origin[i, 0], tip[1, 3] - origin[i, 1], tip[2, 3] - origin[i, 2]
+        zx, zy, zz = axis[i, 0], axis[i, 1], axis[i, 2]
+        jacobian[0, i - 1] = zy * rz - zz * ry
+        jacobian[1, i - 1] = zz * rx - zx * rz
+        jacobian[2, i - 1] = zx * ry - zy * rx
+        if slide.shape[0]:
+            for r in range(3):
+                jacobian[r, i - 1] += slide[i, r]
+        jacobian[3, i - 1] = zx
+        jacobian[4, i - 1] = zy
+        jacobian[5, i - 1] = zz
+        i = parent[i]
+
+
+@compiled
+def weigh(
+    tree: Tree, masses: Masses, rotation: Array, frames: Frames, load: Array, torque: Array
+) -> None:
+    """Fill g (nv,), and M, z × r and γ × z of every joint, (nv+1, 7)."""
+    parent, order = tree.parent, tree.order
+    origin, axis, slide, _ = frames
+    gx, gy, gz = masses.gravity[0], masses.gravity[1], masses.gravity[2]
+    for i in range(parent.shape[0]):
+        m = masses.mass[i]
+        load[i, 0] = m
+        for r in range(3):
+            centre = origin[i, r]
+            for k in range(3):
+                centre += rotation[i, r, k] * masses.centre[i, k]
+            load[i, 1 + r] = m * centre
+    for k in range(order.shape[0] - 1, -1, -1):
+        i = order[k]
+        before = parent[i]
+        for r in range(4):
+            load[before, r] += load[i, r]
+        M = load[i, 0]
+        rx = load[i, 1] - M * origin[i, 0]
+        ry = load[i, 2] - M * origin[i, 1]
+        rz = load[i, 3] - M * origin[i, 2]
+        zx, zy, zz = axis[i, 0], axis[i, 1], axis[i, 2]
+        load[i, 1] = zy * rz - zz * ry
+        load[i, 2] = zz * rx - zx * rz
+        load[i, 3] = zx * ry - zy * rx
+        if slide.shape[0]:
+            for r in range(3):
+                load[i, 1 + r] += M * slide[i, r]
+        load[i, 4] = gy * zz - gz * zy
+        load[i, 5] = gz * zx - gx * zz
+        load[i, 6] = gx * zy - gy * zx
+        torque[i - 1] = -(gx * load[i, 1] + gy * load[i, 2] + gz * load[i, 3])
+
+
+@compiled
+def add_gravity(parent: Indices, load: Array, gravity: Array) -> None:
+    """Add ∂g/∂θ to a matrix (nv, nv), for i ≤ j only, from what :func:`weigh` left."""
+    for j in range(parent.shape[0] - 1, 0, -1):
+        x, y, z = load[j, 1], load[j, 2], load[j, 3]
+        i = j
+        while i > 0:
+            # γ·(z_i × w) = (γ × z_i)·w
+            value = load[i, 4] * x + load[i, 5] * y + load[i, 6] * z
+            gravity[min(i, j) - 1, max(i, j) - 1] -= value
+            i = parent[i]

@@ -1,0 +1,1 @@
+"""Joint angles from tip poses and from cable lengths."""

@@ -1,0 +1,205 @@
+"""Numba kernels of the planners: a dozen small products a step, each a microsecond, not ten.
+
+Shapes: C cables, nv joint angles, r rows through which the tip is seen, n numbers read from them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cdsm.kernels.compiling import compiled
+from cdsm.support.validation import Array
+
+
+@compiled
+def stiffness_at(
+    constant: Array, hessian: Array, length_jacobian: Array, tension: Array, springs: Array
+) -> tuple[Array, Array, Array]:
+    """K_θ = constant + Σ F_c H_c + k_c J_c J_cᵀ, eigenvalues and vectors of its symmetric part."""
+    K = constant.copy()
+    count, nv = length_jacobian.shape
+    for c in range(count):
+        for i in range(nv):
+            pull = springs[c] * length_jacobian[c, i]
+            for j in range(nv):
+                K[i, j] += tension[c] * hessian[c, i, j] + pull * length_jacobian[c, j]
+    values, vectors = np.linalg.eigh((K + K.T) / 2.0)
+    return K, values, np.ascontiguousarray(vectors)
+
+
+@compiled
+def tip_stiffness(K: Array, rows: Array) -> tuple[Array, Array, Array, Array]:
+    """X = (R K_θ⁻¹ Rᵀ)⁻¹, K_θ⁻¹ Rᵀ X, K_θ⁻ᵀ Rᵀ Xᵀ and K_θ⁻¹ of a K_θ that is not singular."""
+    inverse = np.empty_like(K)
+    inverse[:, :] = np.linalg.inv(K)
+    soft = np.dot(inverse, rows.T)
+    X: Array = np.linalg.inv(np.dot(rows, soft))
+    right: Array = np.dot(soft, X)
+    left: Array = np.dot(np.ascontiguousarray(np.dot(rows, inverse).T), np.ascontiguousarray(X.T))
+    return X, right, left, inverse
+
+
+@compiled
+def changed(hessian: Array, length_jacobian: Array, slope: Array, motion: Array) -> Array:
+    """(∂K_θ/∂F_c) m = (H_c + k′_c J_c J_cᵀ) m for the columns m of motion (nv, b): (C, nv, b)."""
+    count, nv = length_jacobian.shape
+    columns = motion.shape[1]
+    result = np.zeros((count, nv, columns))
+    for c in range(count):
+        for b in range(columns):
+            pulled = 0.0
+            for j in range(nv):
+                pulled += length_jacobian[c, j] * motion[j, b]
+            pulled *= slope[c]
+            for i in range(nv):
+                total = pulled * length_jacobian[c, i]
+                for j in range(nv):
+                    total += hessian[c, i, j] * motion[j, b]
+                result[c, i, b] = total
+    return result
+
+
+@compiled
+def by_tension(
+    hessian: Array, length_jacobian: Array, slope: Array, left: Array, right: Array
+) -> Array:
+    """leftᵀ (∂K_θ/∂F_c) right, (C, a, b) of (nv, a) and (nv, b)."""
+    pushed = changed(hessian, length_jacobian, slope, right)
+    return _through(left, pushed)
+
+
+@compiled
+def _through(left: Array, pushed: Array) -> Array:
+    """leftᵀ pushed_c (C, a, b) of (nv, a) and (C, nv, b)."""
+    count, nv, columns = pushed.shape
+    result = np.zeros((count, left.shape[1], columns))
+    for c in range(count):
+        for a in range(left.shape[1]):
+            for b in range(columns):
+                for i in range(nv):
+                    result[c, a, b] += left[i, a] * pushed[c, i, b]
+    return result
+
+
+@compiled
+def readings_by_tension(weights: Array, left: Array, pushed: Array) -> Array:
+    """E_j : leftᵀ pushed_c (n, C) of weights E (n, r, r)."""
+    rates = _through(left, pushed)
+    result = np.zeros((weights.shape[0], rates.shape[0]))
+    for n in range(weights.shape[0]):
+        for c in range(rates.shape[0]):
+            for a in range(rates.shape[1]):
+                for b in range(rates.shape[2]):
+                    result[n, c] += weights[n, a, b] * rates[c, a, b]
+    return result
+
+
+@compiled
+def tip_curvature(
+    Y: Array,
+    inverse: Array,
+    rows: Array,
+    left: Array,
+    right: Array,
+    pushed_left: Array,
+    pushed_right: Array,
+    length_jacobian: Array,
+    bend: Array,
+) -> Array:
+    """Second derivative of Y : X by the tensions (C, C)."""
+    count, nv, r = pushed_right.shape
+    held = inverse - np.dot(right, np.dot(rows, inverse))
+    one = np.zeros((count, nv, r))
+    other = np.zeros((count, nv, r))
+    for c in range(count):
+        for i in range(nv):
+            for b in range(r):
+                for a in range(r):
+                    one[c, i, b] += pushed_left[c, i, a] * Y[a, b]
+                for j in range(nv):
+                    other[c, i, b] += held[i, j] * pushed_right[c, j, b]
+    half = np.dot(one.reshape(count, nv * r), other.reshape(count, nv * r).T)
+    result: Array = -(half + half.T)
+    for c in range(count):
+        for a in range(r):
+            for b in range(r):
+                one_pull = other_pull = 0.0
+                for i in range(nv):
+                    one_pull += length_jacobian[c, i] * left[i, a]
+                    other_pull += length_jacobian[c, i] * right[i, b]
+                result[c, c] += bend[c] * Y[a, b] * one_pull * other_pull
+    return result
+
+
+@compiled
+def convex(W: Array, null: Array, held: Array, floor: float) -> Array:
+    """A convex matrix that is W, where W is so, on the steps that no equation or limit forbids.
+
+    Args:
+        W: Symmetric (C, C).
+        null: Orthonormal basis (C, p) of the steps that leave the torque alone.
+        held: Gradients (n, C) of what they should leave alone, too.
+        floor: Curvatures below this part of the largest are raised to it.
+    """
+    count, p = null.shape
+    inner = np.dot(np.ascontiguousarray(null.T), np.dot(W, null))
+    fixed = np.zeros((p, p))
+    if held.shape[0] > 0 and p > 0:
+        normal = np.ascontiguousarray(np.linalg.qr(np.ascontiguousarray(np.dot(held, null).T))[0])
+        fixed = np.dot(normal, normal.T)
+        free = np.eye(p) - fixed
+        inner = np.dot(free, np.dot(inner, free))
+    largest = 1.0
+    if p > 0:
+        values, vectors = np.linalg.eigh(inner)
+        largest = max(abs(values[0]), abs(values[p - 1]))
+        if largest == 0.0:
+            largest = 1.0
+        vectors = np.ascontiguousarray(vectors)
+        raised = vectors * np.maximum(values, floor * largest)
+        inner = np.dot(raised, np.ascontiguousarray(vectors.T)) + largest * fixed
+    # what the torque fixes only has to be positive
+    for i in range(p):
+        inner[i, i] -= largest
+    result: Array = np.dot(null, np.dot(inner, np.ascontiguousarray(null.T)))
+    for c in range(count):
+        result[c, c] += largest
+    return result
+
+
+@compiled
+def elastic_program(
+    rows: Array,
+    missing: Array,
+    G: Array,
+    c: Array,
+    cut: Array,
+    W: Array,
+    g: Array,
+    low: Array,
+    high: Array,
+) -> tuple[Array, Array, Array, Array, Array, Array, Array]:
+    """P, q, A, b, low, high and the cut of a step's quadratic program; its price is still zero.
+
+    Its variables are d (C,) and by how much each c (m,) is missed above and below: rows d = missing
+    and c + G d = above − below.
+    """
+    r, count = rows.shape
+    m = c.size
+    size = count + 2 * m
+    P, A = np.zeros((size, size)), np.zeros((r + m, size))
+    q, b, wide = np.zeros(size), np.zeros(r + m), np.zeros((1, size))
+    lowest, highest = np.zeros(size), np.full(size, np.inf)
+    P[:count, :count] = W
+    q[:count] = g
+    A[:r, :count] = rows
+    b[:r] = missing
+    wide[0, :count] = cut
+    lowest[:count] = low
+    highest[:count] = high
+    for j in range(m):
+        A[r + j, :count] = G[j]
+        A[r + j, count + j] = -1.0
+        A[r + j, count + m + j] = 1.0
+        b[r + j] = -c[j]
+    return P, q, A, b, lowest, highest, wide

@@ -1,0 +1,304 @@
+"""Where more tension stops paying: the least tensions as their lower bound rises."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from itertools import pairwise
+from typing import Final, Literal, final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import minimize_scalar
+
+from cdsm.arm_model import breaks
+from cdsm.errors import InvalidInput
+from cdsm.planning.gradient import require_finite, stiffness_gradient
+from cdsm.planning.objectives import unstable
+from cdsm.posture import Posture
+from cdsm.statics.bound_scan import At, crossing, domain, reach, reason, sampled, stable_ranges
+from cdsm.stiffness_matrix import Stiffness, stiffness
+from cdsm.support.units import MODEL
+from cdsm.support.validation import (
+    Array,
+    ReadOnlyState,
+    bound,
+    frozen,
+    instance,
+    scalar,
+    unit_direction,
+)
+from cdsm.tension import OPTIMALITY, Tension, distribute_tension
+
+End = Literal["buckling", "maximum", "infeasible", "elasticity", "none"]
+
+_JUST: Final = 1e-9
+"""This part beyond a place is the other side of it."""
+
+_INSET: Final = 1e-6
+"""This part of its length the curve keeps away from an end without slope: buckling, or balance."""
+
+_ENDS: Final[dict[End, str]] = {
+    "buckling": "where the arm buckles",
+    "maximum": "where the maximum leaves no tensions that balance the arm",
+    "infeasible": "beyond which no tensions balance the arm",
+    "elasticity": "where a tension reaches the end of its cable's elasticity",
+    "none": "and goes on",
+}
+
+
+@final
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class Saturation(ReadOnlyState):
+    """Stiffness over the lower bound of the least tensions; made by :func:`saturation`.
+
+    Attributes:
+        direction: u (3,), a unit direction in base axes.
+        fraction: Part of the largest slope [-] below which tension does not pay.
+        bound: The lower bound [N] at which the slope has fallen to that part of the largest: inf if
+            it has not up to the end, and the start if the stiffness nowhere rises.
+        tension: The least tensions with that bound, or with that of the end.
+        stiffness: K_θ under them.
+        steepest: The lower bound [N] at which the slope is largest.
+        steepest_slope: d along/d bound there [1/m].
+        stiffest: The lower bound [N] at which the stiffness is largest: an end of the curve, or
+            between them a maximum beyond which tension softens the arm.
+        limit: What ends the curve: ``"buckling"``, ``"maximum"`` (the bound ``maximum``),
+            ``"elasticity"`` (a tension leaves its cable's domain), ``"infeasible"`` (statics bind
+            the tensions) or ``"none"`` (nothing; what tension adds far out has shown its sign).
+        curve: Lower bound [N], stiffness along u [N/m] and its slope [1/m], (n, 3).
+    """
+
+    direction: Array
+    fraction: float
+    bound: float
+    tension: Tension
+    stiffness: Stiffness
+    steepest: float
+    steepest_slope: float
+    stiffest: float
+    limit: End
+    curve: Array
+
+    @property
+    def end(self) -> float:
+        """The lower bound [N] at which the curve ends; for the reason see ``limit``."""
+        return float(self.curve[-1, 0])
+
+    def __repr__(self) -> str:
+        return f"<Saturation at {self.bound:.4g} N>"
+
+    def __str__(self) -> str:
+        along = f"({', '.join(f'{x:.4g}' for x in self.direction)})"
+        if self.steepest_slope <= 0.0:
+            first = f"tension nowhere raises the stiffness along {along}"
+        else:
+            first = (
+                f"the stiffness along {along} rises most, by {self.steepest_slope / 1000.0:.4g} "
+                f"N/mm per N, at a lower bound of {self.steepest:.4g} N"
+            )
+        if math.isinf(self.bound):
+            second = f"it never pays less than {100.0 * self.fraction:.3g} % of that"
+        else:
+            second = f"above {self.bound:.6g} N it pays less than {100.0 * self.fraction:.3g} %"
+        lines = [first] if self.steepest_slope <= 0.0 else [first, second]
+        if self.curve[0, 0] < self.stiffest < self.end:
+            lines.append(f"above {self.stiffest:.6g} N tension makes the arm softer")
+        return "\n".join(
+            [*lines, f"looked at up to {self.end:.6g} N, {_ENDS[self.limit]} ({MODEL})"]
+        )
+
+
+def saturation(
+    pose: Posture,
+    direction: ArrayLike,
+    minimum: float = 0.0,
+    maximum: ArrayLike = math.inf,
+    wrench: ArrayLike = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+    *,
+    fraction: float = 0.1,
+    solver: str = "daqp",
+) -> Saturation:
+    """The lower bound of tension from which on more of it hardly stiffens an arm.
+
+    Along F*(b), the least tensions with the lower bound b (Eq. 17), the slope is
+    d along/db = ∂along/∂F · dF*/db, dF*/db following from which cables are at a bound. It is looked
+    for from its largest value on: the first b at which it has fallen to ``fraction`` of that. With
+    a strand that value is large, since strands start soft (Section IV-C); where the rigidity has
+    levelled off, the active part takes over and more tension softens, if springs or leads keep the
+    wires from stiffening as they get longer than their original lengths.
+
+    Args:
+        pose: The posture, held.
+        direction: u (3,) in base axes, any length.
+        minimum: Lower bound to begin with [N]; the low end of the elasticities if that is higher.
+        maximum: Upper bound of the tensions [N], for all cables or (C,); inf for none.
+        wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m].
+        fraction: Part of the largest slope, from 0 to below 1 [-].
+        solver: As for :func:`~cdsm.distribute_tension`.
+
+    Raises:
+        InvalidInput: Not a direction, bounds the wrong way, or another argument out of place.
+        InfeasibleTension: No tensions balance the arm even at the smallest lower bound.
+        ElasticityRangeError: There they are outside the elasticities of the cables.
+        SingularStiffness: The tip cannot move along u, or the arm is stable at no lower bound.
+    """
+    arm = instance("pose", pose, Posture).arm
+    u = unit_direction("direction", direction)
+    part, start = scalar("fraction", fraction), scalar("minimum", minimum)
+    if not 0.0 <= part < 1.0:
+        raise InvalidInput("fraction", f"{part:g} given; 0 <= fraction < 1 is needed.")
+    ceiling = bound("maximum", maximum, len(arm.cables))
+
+    @cache
+    def pull(lower: float) -> Tension:
+        return distribute_tension(pose, lower, ceiling, wrench, solver)
+
+    def at(lower: float) -> Stiffness:
+        return stiffness(pose, pull(lower))
+
+    lowest, highest = domain(arm)
+    low = max(start, lowest)
+    pull(start)  # of bounds that contradict each other it says so
+    require_finite(math.inf if at(low)._torque(u) is None else 0.0, u)
+    top = min(highest, float(ceiling.min()))
+    high = max(reach(at, low, max(top, low)), low)
+    first, last = _stable(at, low, high)
+    limit = "buckling" if last < high else _limit(at, pull(high), high)
+    if limit in ("maximum", "infeasible"):
+        last -= _INSET * (last - first)
+
+    def value(lower: float) -> float:
+        return at(lower).along(u)
+
+    def slope(lower: float) -> float:
+        return _slope(pull(lower), u)
+
+    places = sampled(first, last)
+    breaks = _breaks(pull, places[(places >= first) & (places <= last)])
+    beside = np.outer([1.0 - _JUST, 1.0 + _JUST], breaks).ravel()
+    places = np.unique(np.clip(np.concatenate([places, beside]), first, last))
+    curve = np.array([(place, value(place), slope(place)) for place in places.tolist()])
+    steepest, largest = _steepest(curve, slope)
+    where = _falls(curve, slope, steepest, part * largest) if largest > 0.0 else first
+    tension = pull(min(where, last))
+    return Saturation(
+        direction=u,
+        fraction=part,
+        bound=where,
+        tension=tension,
+        stiffness=stiffness(pose, tension),
+        steepest=steepest,
+        steepest_slope=largest,
+        stiffest=_stiffest(curve, value, slope),
+        limit=limit,
+        curve=frozen(curve),
+    )
+
+
+def _stable(at: At, low: float, high: float) -> tuple[float, float]:
+    """The first range of lower bounds [N] in which the arm is stable, its edges left out."""
+    places, margins, stable = stable_ranges(at, low, high)
+    if not stable:
+        best = at(float(places[int(margins.argmax())]))
+        raise unstable(
+            best.posture.arm,
+            f"the arm is stable at no lower bound from {low:.4g} to {high:.4g} N: at best the "
+            f"smallest eigenvalue of K_θ is {best.margin:.4g} {best.posture.arm.stiffness_unit()}",
+            best.critical_direction,
+        )
+    first, last = stable[0]
+    inset = _INSET * (last - first)  # on the edge K_θ is singular
+    return first + inset * (first > low), last - inset * (last < high)
+
+
+def _breaks(pull: Callable[[float], Tension], places: Array) -> Array:
+    """Lower bounds [N] among others, rising, where the slope jumps.
+
+    Where a cable reaches one of its bounds or leaves it, and where one passes a jump or a sharp
+    bend of its rigidity. In between F*(b) is linear: the active bounds of such a program are the
+    same all through, if they are at both ends.
+    """
+    found: list[float] = []
+    todo = list(pairwise(places.tolist()))
+    nothing = _JUST**2 * float(places.max(initial=0.0))  # what happens at zero has nothing below it
+    while todo:
+        a, b = todo.pop()
+        one, other = pull(a), pull(b)
+        if all(np.array_equal(x, y) for x, y in zip(_active(one), _active(other), strict=True)):
+            for cable, F, G in zip(one.posture.arm.cables, one.values, other.values, strict=True):
+                jumps = breaks(cable.elasticity) if cable.control == "position" else ()
+                passed = (jump for jump in jumps if min(F, G) <= jump < max(F, G))
+                found += [a + (jump - F) / (G - F) * (b - a) for jump in passed]
+        elif b - a <= max(_JUST * b, nothing):
+            found.append((a + b) / 2.0)
+        else:
+            todo += [(a, (a + b) / 2.0), ((a + b) / 2.0, b)]
+    return np.array(sorted(found))
+
+
+def _active(pull: Tension) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Which cables (C,) rise with the lower bound, and which stay at their maximum."""
+    tight = OPTIMALITY * float(pull.values.max())
+    stays = pull.maximum - pull.values <= tight
+    return (pull.values - pull.minimum <= tight) & ~stays, stays
+
+
+def _slope(pull: Tension, u: Array) -> float:
+    """D along/db [1/m] where the least tensions follow a rising lower bound b.
+
+    Cables at it rise with it, those at their maximum stay, and the rest balance them with least
+    norm, as the optimality conditions of Eq. 17 have it.
+    """
+    A = pull.posture.length_jacobian.T
+    rises, stays = _active(pull)
+    free = ~(rises | stays)
+    rate = rises.astype(np.float64)
+    rate[free] = np.linalg.lstsq(A[:, free], -A[:, rises].sum(axis=1), rcond=None)[0]
+    gradient = stiffness_gradient(stiffness(pull.posture, pull)).along(u)
+    return float(gradient @ rate)
+
+
+def _steepest(curve: Array, slope: Callable[[float], float]) -> tuple[float, float]:
+    """The lower bound [N] with the largest slope, and the slope [1/m]."""
+    best = int(curve[:, 2].argmax())
+    a, b = curve[max(best - 1, 0), 0], curve[min(best + 1, len(curve) - 1), 0]
+    place, value = float(curve[best, 0]), float(curve[best, 2])
+    if a < b:
+        found = minimize_scalar(
+            lambda x: -slope(float(x)), bounds=(a, b), method="bounded", options={"xatol": 1e-9 * b}
+        )
+        if -found.fun > value:
+            place, value = float(found.x), -float(found.fun)
+    return place, value
+
+
+def _falls(curve: Array, slope: Callable[[float], float], start: float, level: float) -> float:
+    """The first lower bound [N] after a start at which the slope [1/m] is below a level, or inf."""
+    before = start
+    for place, _, there in curve.tolist():
+        if place > start:
+            if there < level:
+                return crossing(lambda x: slope(x) - level, before, place)
+            before = place
+    return math.inf
+
+
+def _stiffest(
+    curve: Array, value: Callable[[float], float], slope: Callable[[float], float]
+) -> float:
+    """The lower bound [N] with the largest stiffness."""
+    best = int(curve[:, 1].argmax())
+    place = float(curve[best, 0])
+    if 0 < best < len(curve) - 1 and curve[best - 1, 2] > 0.0 > curve[best + 1, 2]:
+        top = crossing(slope, float(curve[best - 1, 0]), float(curve[best + 1, 0]))
+        if value(top) >= curve[best, 1]:
+            place = top
+    return place
+
+
+def _limit(at: At, last: Tension, high: float) -> End:
+    """Why the lower bound cannot rise above that of the last tensions."""
+    return "maximum" if last.at_maximum else reason(at, high * (1.0 + _JUST))

@@ -1,0 +1,216 @@
+"""What a report shows, section by section."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cdsm.report.facts import RANK, Rank
+from cdsm.report.layout import Page, Section
+from cdsm.report.self_check import Agreement, Difference
+from cdsm.support.units import MODEL
+
+if TYPE_CHECKING:
+    from cdsm.report.report import Report
+
+
+def page(report: Report) -> Page:
+    """The whole report."""
+    name = report.stiffness.posture.arm.name
+    good = report.trustworthy
+    verdict = (
+        "Trustworthy: derived a second time with the same result, in balance, and stable."
+        if good
+        else "NOT to be trusted as it stands, for the reasons that follow."
+    )
+    return Page(
+        title=f"Truth report: stiffness of {name}",
+        verdict=verdict,
+        good=good,
+        faults=report.faults,
+        notes=report.notes,
+        sections=(
+            _readings(report),
+            _self_check(report),
+            _statics(report),
+            _stability(report),
+            _cables(report),
+            _ranks(report),
+            _conventions(report),
+        ),
+    )
+
+
+def _readings(report: Report) -> Section:
+    rows: list[tuple[str, ...]] = [("", "x", "y", "z")]
+    if report.readings is not None:
+        for name in ("along", "cartesian", "pseudoinverse"):
+            values = getattr(report.readings, name)
+            rows.append((name, *(_number(value / 1000.0) for value in values)))
+    return Section("Stiffness at the tip [N/mm]", rows)
+
+
+def _self_check(report: Report) -> Section:
+    rows = [("", "largest entry", "off, by potential", "off, by torque", "verdict")]
+    rows += [
+        (
+            "sum, K_θ" if each.name == "joint" else each.name,
+            f"{each.largest:.4g} {each.unit}",
+            _off(each.potential, each),
+            _off(each.torque, each),
+            each.verdict,
+        )
+        for each in report.self_check.compared
+    ]
+    return Section(
+        "Self-check: each term derived anew by central differences at this posture",
+        rows,
+        (
+            "Potential: second differences of the cables' energy, the weight and the load's work. "
+            "Torque: first differences of the torque out of balance. Off by parts of the largest "
+            "entry; in brackets what truncation and rounding of the differences may come to. The "
+            "last rows: torque out of balance by first differences of the potential, lengths "
+            "between sites where Pinocchio places the links.",
+        ),
+    )
+
+
+def _statics(report: Report) -> Section:
+    rows = [
+        ("", "found"),
+        ("largest residual of the statics (Eq. 13)", f"{report.residual:.2g} N m"),
+        ("that over the torques it is a sum of", f"{report.imbalance:.1e}"),
+    ]
+    found = report.optimality
+    if found is None:
+        return Section("Tensions", rows, ("Not distributed: no optimality is claimed.",))
+    rows += [
+        ("solver", found.solver),
+        ("violation of balance and bounds", f"{found.feasibility:.1e}"),
+    ]
+    title = "Tensions, chosen for a stiffness within their bounds"
+    if found.stationarity is not None:
+        rows.append(("KKT residual, multipliers found anew", f"{found.stationarity:.1e}"))
+        title = "Tensions, the least that balance the arm (Eq. 17)"
+    lines = [
+        f"At their {which} bound: {', '.join(names) or 'none'}."
+        for which, names in (("lower", found.at_minimum), ("upper", found.at_maximum))
+    ]
+    return Section(title, rows, lines)
+
+
+def _stability(report: Report) -> Section:
+    K = report.stiffness
+    names = K.posture.arm.joint_names
+    rows = [("softest joint motion", "share")]
+    way = report.critical_direction
+    order = np.argsort(-abs(way), kind="stable")[:4]
+    rows += [(names[i], f"{way[i]:+.3f}") for i in order]
+    lines = (
+        f"Smallest eigenvalue of the symmetric part of K_θ: {K.margin:.4g} "
+        f"{K.posture.arm.stiffness_unit()}, "
+        + ("stable." if K.is_stable else "UNSTABLE.")
+        + f" Condition of K_θ: {report.condition:.3g}.",
+    )
+    return Section("Stability", rows, lines)
+
+
+def _cables(report: Report) -> Section:
+    rows = [("", "F [N]", "EA tangent [N]", "EA secant [N]", "law [N]", "down", "up", "k [N/mm]")]
+    for each in report.cables:
+        F = each.tension
+        force = each.control == "force"
+        rows.append(
+            (
+                each.name,
+                f"{F:.4g}" + (" held" if force else " slack" if each.is_slack else ""),
+                _number(each.tangent),
+                _number(each.secant),
+                f"{each.low:g} to {each.high:g}",
+                "-" if force else _share(each.below, F),
+                "-" if force else _share(each.above, F),
+                f"{each.stiffness / 1000.0:.4g}",
+            )
+        )
+    return Section(
+        "Cables",
+        rows,
+        (
+            "down, up: how far F may go before its law ends, in N and as a part of F. held: the "
+            "motor holds the force, and the cable gives no passive stiffness.",
+        ),
+    )
+
+
+def _ranks(report: Report) -> Section:
+    rows = [("", "rank", "of", "condition")]
+    ranks: dict[str, Rank] = {
+        "J_X, motion of the tip": report.jacobian_rank,
+        "its linear rows": report.translation_rank,
+        "J_Lᵀ, torque of the cables": report.cable_rank,
+    }
+    rows += [
+        (name, str(rank.rank), str(rank.full), _number(rank.condition))
+        for name, rank in ranks.items()
+    ]
+    return Section(
+        "Rank and condition",
+        rows,
+        (
+            f"Singular values below {RANK:g} of the largest count as zero; lengths in arm lengths.",
+            f"Tensions can grow without a torque, the least by {report.closure:.3g} of the largest."
+            if report.closure > 0.0
+            else "Tensions cannot all grow without a torque.",
+        ),
+    )
+
+
+def _conventions(report: Report) -> Section:
+    K = report.stiffness
+    arm = K.posture.arm
+    along = " x along the straight arm," if arm.is_serpentine else ""
+    written = [", ".join(f"{x:g}" for x in each) for each in (arm.gravity, K.wrench)]
+    angles = zip(arm.joint_names, K.posture.q, arm.joint_units, strict=True)
+    posture = ", ".join(f"{name} {q:.6g} {unit}" for name, q, unit in angles)
+    lever = (
+        f" A joint that slides counts with the arm's length, {arm.length:.4g} m, as lever in the "
+        "residual, the self-check, ranks and conditions, but not in the smallest eigenvalue."
+        if arm.slides.any()
+        else ""
+    )
+    where = "here" if K.free_length is None else "at the reference of the equilibrium"
+    return Section(
+        "Units, frame and signs",
+        (),
+        (
+            "SI but where a heading says otherwise: m, rad, N. All at the tip in base axes:"
+            f"{along} tip is the frame of {arm.tip_link}. Gravity ({written[0]}) m/s².",
+            "F is tension, never negative; the cables' torque is −J_Lᵀ F. The wrench W acts on the "
+            f"tip and is dead, constant in base axes: ({written[1]}), force [N], then moment "
+            "[N m]. K_θ = ∂(J_Lᵀ F + g − J_Xᵀ W)/∂θ: rows torque, columns angle, positive holds."
+            f"{lever}",
+            f"Posture: {posture}.",
+            f"The stiffness is {MODEL}. Position-controlled cables keep the original length l_0 of "
+            f"their wire, locked {where}; force-controlled ones their tension.",
+        ),
+    )
+
+
+def _off(difference: Difference | None, of: Agreement) -> str:
+    if difference is None:
+        return "-"
+    if of.largest == 0.0:
+        return f"{difference.found:.1e} {of.unit}"
+    return f"{difference.found / of.largest:.1e} ({difference.expected / of.largest:.0e})"
+
+
+def _share(room: float, F: float) -> str:
+    if math.isinf(room):
+        return "any"
+    return f"{room:.4g}" + (f" ({100.0 * room / F:.3g} %)" if room < 10.0 * F else "")
+
+
+def _number(value: float | None) -> str:
+    return "-" if value is None or math.isnan(value) else f"{value:.4g}"

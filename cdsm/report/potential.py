@@ -1,0 +1,206 @@
+"""The potential of an arm near a posture, term by term, and the torque out of balance there.
+
+    U(q) = Σ F_c (L_c − L_c0) + Σ [E_c(F_c(L_c)) − E_c(F_c) − F_c (L_c − L_c0)] + V(q) − f·x(q)
+           active               passive                                           gravity  load
+
+Nothing but lengths, places and the energies of the cables enters: no moment arm, no Hessian, no
+rigidity. A moment has no potential; it does the work m·ω.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cdsm.manipulator import Manipulator
+from cdsm.report.laws import LockedLaws
+from cdsm.support.validation import Array
+
+if TYPE_CHECKING:
+    from cdsm.stiffness_matrix import Stiffness
+
+_FIRST = 2.0**-4
+"""Largest step, in rad or lengths of the arm."""
+
+_ULPS = 2.0 * float(np.finfo(np.float64).eps)
+"""Relative rounding of a place or a length, a sum over the links."""
+
+_ROOT = 2e-13
+"""Relative error of a tension that is found by its elongation."""
+
+
+class Neighbourhood:
+    """The arm around a posture, its motors locked there.
+
+    Places are given as (P, nv): displacements of the joints from the posture in units of
+    :attr:`unit`, so that everything that is differenced by them is in N m.
+
+    Args:
+        K: The stiffness that is questioned. Posture, tensions, wrench and free lengths are taken
+            from it, its cable stiffnesses only to choose steps.
+
+    Attributes:
+        laws: Its position-controlled cables.
+        unit: 1 rad for a joint that turns, the length of the arm for one that slides (nv,).
+    """
+
+    def __init__(self, K: Stiffness) -> None:
+        self._pose, self._tension, self._wrench = K.posture, K.tension, K.wrench
+        self.laws = LockedLaws(K)
+        self.unit = joint_unit(K.posture.arm)
+        # chooses steps and tells rounding, no more
+        self._arms = abs(K.posture.length_jacobian * self.unit).max(axis=1)
+
+    # --- potentials ---------------------------------------------------------------------------
+
+    def kinematic(self, places: Array) -> Array:
+        """Active, gravity and load part of U (P, 3) [N m], of a force alone."""
+        return self._sampled(places, self._work_of_force)
+
+    def work(self, places: Array) -> Array:
+        """The same with the work of the moment, which is right to first order only."""
+        return self._sampled(places, self._work_of_wrench)
+
+    def elastic(self, places: Array) -> Array:
+        """Passive part of U (P, 1) [N m].
+
+        Raises:
+            ElasticityRangeError: A law does not reach that far.
+            InvalidInput: A law of the user's own fails.
+        """
+        arm = self._pose.arm
+        lengths = [arm.cable_lengths(q, check_limits=False) for q in self._angles(places)]
+        longer = np.array(lengths) - self._pose.cable_lengths
+        energies = [self.laws.stored(c, cable, longer[:, c]) for c, cable in self.laws.held]
+        return np.array(np.sum([np.zeros(len(places)), *energies], axis=0))[:, None]
+
+    def _sampled(self, places: Array, work: Callable[[Array], float]) -> Array:
+        pose, arm = self._pose, self._pose.arm
+        start = arm._body.potential_energy(pose.q)
+        rows = []
+        for q in self._angles(places):
+            longer = arm.cable_lengths(q, check_limits=False) - pose.cable_lengths
+            weight = arm._body.potential_energy(q) - start
+            tip = arm._body.placement(q, arm.tip_link)
+            rows.append([self._tension @ longer, weight, -work(tip)])
+        return np.array(rows)
+
+    def _work_of_force(self, tip: Array) -> float:
+        return float(self._wrench[:3] @ (tip[:3, 3] - self._pose.tip[:3, 3]))
+
+    def _work_of_wrench(self, tip: Array) -> float:
+        turn = tip[:3, :3] @ self._pose.tip[:3, :3].T
+        # the axis times the sine of the angle
+        twice = (turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1])
+        return self._work_of_force(tip) + float(self._wrench[3:] @ np.array(twice)) / 2.0
+
+    # --- torques and lengths ------------------------------------------------------------------
+
+    def kinematic_torques(self, places: Array) -> Array:
+        """J_Lᵀ F, g and −J_Xᵀ W (P, 3, nv) [N m] with the tensions of the posture."""
+        torques = []
+        for q in self._angles(places):
+            pose = self._pose.arm.at(q, check_limits=False)
+            active = self._tension @ pose.length_jacobian
+            torques.append([active, pose.gravity_torque, -self._wrench @ pose.jacobian])
+        return np.array(torques) * self.unit
+
+    def elastic_torques(self, places: Array) -> Array:
+        """J_Lᵀ (F(L) − F) (P, 1, nv) [N m].
+
+        Raises:
+            ElasticityRangeError: A law does not reach that far.
+            InvalidInput: A law of the user's own fails.
+        """
+        poses = [self._pose.arm.at(q, check_limits=False) for q in self._angles(places)]
+        longer = np.array([pose.cable_lengths for pose in poses]) - self._pose.cable_lengths
+        more = np.zeros_like(longer)
+        for c, cable in self.laws.held:
+            more[:, c] = self.laws.pulls(c, cable, longer[:, c]) - self._tension[c]
+        torques = [more[p] @ pose.length_jacobian for p, pose in enumerate(poses)]
+        return np.array(torques)[:, None] * self.unit
+
+    def measured_lengths(self) -> Array:
+        """L (C,) [m] once more: lead, and the ways between the sites where Pinocchio has them."""
+        pose = self._pose
+        links = {site.link for cable in pose.arm.cables for site in cable.sites}
+        frames = {link: pose.link_pose(link) for link in links}
+        ways = []
+        for cable in pose.arm.cables:
+            sites = [frames[site.link][:3] @ (*site.position, 1.0) for site in cable.sites]
+            ways.append(cable.lead + np.linalg.norm(np.diff(sites, axis=0), axis=1).sum())
+        return np.array(ways)
+
+    def _angles(self, places: Array) -> Array:
+        return self._pose.q + places * self.unit
+
+    # --- steps --------------------------------------------------------------------------------
+
+    @property
+    def first_step(self) -> float:
+        """A step on which no segment of cable loses more than half its length."""
+        return min(_FIRST, self._straightness / 4.0)
+
+    @property
+    def first_elastic_step(self) -> float:
+        """Such a one on which no tension goes more than half way to where its law ends."""
+        step = self.first_step
+        for c, cable in self.laws.held:
+            rise = self.laws.stiffness[c] * self._arms[c]
+            step = min(step, self.laws.room(c, cable) / (4.0 * rise) if rise > 0.0 else np.inf)
+        return float(step)
+
+    @cached_property
+    def _straightness(self) -> float:
+        """How far a joint may move, in its unit, until the shortest segment could have vanished."""
+        pose = self._pose
+        segment, joint = pose.arm._segments
+        site, origin = pose._frames.site, pose._frames.origin
+        start, end = segment[:-1, 1:3].T
+        apart = np.linalg.norm(site[end] - site[start], axis=1)
+        over = np.repeat(np.arange(apart.size), np.diff(segment[:, 3]))
+        lever = np.linalg.norm(site[end][over] - origin[joint], axis=1)
+        slides = pose.arm.slides[joint - 1]
+        return float((apart[over] / np.where(slides, pose.arm.length, lever)).min(initial=1.0))
+
+    # --- rounding -----------------------------------------------------------------------------
+
+    @property
+    def length_noise(self) -> Array:
+        """Rounding of the lengths of the cables (C,) [m]: of what is summed, and of the places."""
+        return np.asarray(_ULPS * (self._pose.cable_lengths + self._pose.arm.length))
+
+    def kinematic_noise(self, step: float) -> Array:
+        """Rounding of the kinematic parts of U (3,) [N m], whatever the step."""
+        pose, arm = self._pose, self._pose.arm
+        far = arm.length + float(np.linalg.norm(pose.tip[:3, 3]))
+        weight = float(arm._masses.mass.sum() * np.linalg.norm(arm.gravity)) * far
+        load = float(abs(self._wrench[:3]).sum()) * far + float(abs(self._wrench[3:]).sum())
+        return np.array([self._tension @ self.length_noise, _ULPS * weight, _ULPS * load])
+
+    def elastic_noise(self, step: float) -> Array:
+        """Rounding of the elastic part of U (1,) [N m]."""
+        k, F = self.laws.stiffness, self._tension
+        stored = np.divide(F * F, k, out=np.zeros_like(k), where=k > 0.0).sum()
+        return np.array([_ROOT * stored + 2.0 * step * (k * self._arms) @ self.length_noise])
+
+    def kinematic_torque_noise(self, step: float) -> Array:
+        """Rounding of the kinematic torques (3,) [N m]; the most where a segment is short."""
+        noise = self.kinematic_noise(step)
+        noise[0] *= 1.0 + 1.0 / self._straightness
+        return noise
+
+    def elastic_torque_noise(self, step: float) -> Array:
+        """Rounding of the elastic torques (1,) [N m]."""
+        k = self.laws.stiffness
+        errors = k * self.length_noise + _ROOT * self._tension * (k > 0.0)
+        tilted = 2.0 * step * (k * self._arms) @ self.length_noise
+        return np.array([errors @ self._arms + tilted / self._straightness])
+
+
+def joint_unit(arm: Manipulator) -> Array:
+    """1 rad for a joint that turns, the arm's length [m] for one that slides (nv,)."""
+    return np.where(arm.slides, arm.length, 1.0)

@@ -1,0 +1,266 @@
+"""The rigid-body model behind an arm. The only module that speaks Pinocchio.
+
+Pinocchio crashes on wrong ids, reads foreign memory layouts silently and keeps scratch data that
+two threads must not share; everything that could trip it is settled here, once, when a model is
+built, so that callers hand over checked arrays and receive their own copies.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+import pinocchio as pin
+
+from cdsm.errors import InvalidInput, UrdfError
+from cdsm.kernels.bodies import Masses
+from cdsm.kernels.segments import Indices, Tree
+from cdsm.support.validation import Array, frozen, one_of, sequence_of
+
+
+class BodyState(NamedTuple):
+    """What depends on q alone: tip pose, its Jacobian, gravity torque and its derivative."""
+
+    tip: Array
+    jacobian: Array
+    gravity_torque: Array
+    gravity_stiffness: Array
+
+
+class RigidBody:
+    """A Pinocchio model of a tree of revolute and prismatic joints, with one tip frame.
+
+    Args:
+        urdf: Text of a URDF that has passed the checks of :mod:`cdsm.urdf`.
+        tip: Name of the link whose frame is the tip.
+        gravity: Gravity in base axes, (3,) [m/s²].
+        joint_names: The joints that move, in the order of their coordinates. None: Pinocchio's
+            order, in which parents come first.
+
+    Raises:
+        UrdfError: Pinocchio does not accept it, or a joint is neither revolute nor prismatic.
+        UnknownName: There is no link called ``tip``.
+        InvalidInput: The names are not those of the joints that move.
+    """
+
+    def __init__(
+        self, urdf: str, tip: str, gravity: Array, joint_names: Sequence[str] | None = None
+    ) -> None:
+        try:
+            self._model = model = pin.buildModelFromXML(urdf)
+        except ValueError as error:
+            raise UrdfError(f"Pinocchio does not accept the URDF: {error}") from None
+        model.gravity.linear = np.array(gravity)
+        names = tuple(model.names)[1:]
+        if model.nq != len(names) or model.nv != len(names):
+            raise UrdfError(
+                "the URDF has a joint with more than one coordinate; cdsm takes revolute and "
+                "prismatic ones."
+            )
+        self.joint_names = names if joint_names is None else _reordered(names, joint_names)
+        # where Pinocchio has each of our coordinates, and where we have each of its
+        self._theirs = frozen(np.array([names.index(name) for name in self.joint_names]))
+        self._ours = frozen(np.argsort(self._theirs))
+        self._reordered = self.joint_names != names
+        self._ids: tuple[int, ...] = tuple((1 + self._theirs).tolist())
+        self.nv: int = model.nv
+        self.name: str = model.name
+        self.lower: Array = frozen(np.array(model.lowerPositionLimit)[self._theirs])
+        self.upper: Array = frozen(np.array(model.upperPositionLimit)[self._theirs])
+        self._frames = {
+            frame.name: index
+            for index, frame in enumerate(model.frames)
+            if frame.type == pin.FrameType.BODY
+        }
+        self._tip = self._frame(tip)
+        self._scratch = threading.local()
+        self._twists = frozen(self._local_twists())
+        self.slides = frozen(np.asarray(~self._twists[:, 3:].any(axis=1)))
+
+    @property
+    def link_names(self) -> tuple[str, ...]:
+        """Names of all links."""
+        return tuple(self._frames)
+
+    def locate(self, link: str) -> tuple[int, Array, Array]:
+        """Row of the joint that moves a link, and the link's frame in it as (3,3) and (3,).
+
+        Raises:
+            UnknownName: There is no such link.
+        """
+        frame = self._model.frames[self._frame(link)]
+        return (
+            self._row(frame.parentJoint),
+            frame.placement.rotation.copy(),
+            frame.placement.translation.copy(),
+        )
+
+    def tree(self) -> Tree:
+        """The tree as plain arrays."""
+        model = self._model
+        rows = (0, *self._ids)
+        return Tree.of(
+            parent=np.array([self._row(model.parents[i]) for i in rows], dtype=np.intp),
+            order=1 + self._ours,
+            rotation=np.array([model.jointPlacements[i].rotation for i in rows]),
+            translation=np.array([model.jointPlacements[i].translation for i in rows]),
+            axis=np.vstack([np.zeros(3), self._twists[:, 3:]]),
+            slide=np.vstack([np.zeros(3), self._twists[:, :3]]),
+        )
+
+    @property
+    def length(self) -> float:
+        """Way from the base over the joints to the tip, all joints at zero [m]."""
+        frame = self._model.frames[self._tip]
+        way, joint = float(np.linalg.norm(frame.placement.translation)), frame.parentJoint
+        while joint:
+            way += float(np.linalg.norm(self._model.jointPlacements[joint].translation))
+            joint = self._model.parents[joint]
+        return way
+
+    def _local_twists(self) -> Array:
+        """Motion of each joint in its own frame (nv, 6): linear [-], then angular [rad]."""
+        model, data = self._model, self._data()
+        pin.computeJointJacobians(model, data, pin.neutral(model))
+        return np.array(
+            [
+                pin.getJointJacobian(model, data, i, pin.LOCAL).reshape(6, -1)[:, i - 1]
+                for i in self._ids
+            ]
+        )
+
+    def masses(self) -> Masses:
+        """What the tree carries and where its tip is, as plain arrays."""
+        model, tip = self._model, self._model.frames[self._tip]
+        inertias = [model.inertias[i] for i in (0, *self._ids)]
+        return Masses(
+            mass=np.array([inertia.mass for inertia in inertias]),
+            centre=np.array([inertia.lever for inertia in inertias]),
+            gravity=np.array(model.gravity.linear),
+            tip=self._row(tip.parentJoint),
+            way=self._way(tip.parentJoint),
+            rotation=tip.placement.rotation.copy(),
+            point=tip.placement.translation.copy(),
+        )
+
+    def state(self, q: Array) -> BodyState:
+        """Evaluate everything that depends on the joint angles (nv,) [rad] alone.
+
+        The Jacobian (6, nv) has linear rows first, in base axes, at the tip.
+        """
+        model, data = self._model, self._data()
+        if self._reordered:
+            q = q[self._ours]
+        pin.computeJointJacobians(model, data, q)
+        jacobian = pin.getFrameJacobian(model, data, self._tip, pin.LOCAL_WORLD_ALIGNED)
+        tip = pin.updateFramePlacement(model, data, self._tip).homogeneous
+        stiffness = pin.computeGeneralizedGravityDerivatives(model, data, q)
+        # a model with one joint yields vectors for its matrices
+        state = BodyState(
+            tip,
+            np.ascontiguousarray(jacobian).reshape(6, self.nv),
+            data.g.copy(),
+            np.ascontiguousarray(stiffness).reshape(self.nv, self.nv),
+        )
+        return self._in_our_order(state) if self._reordered else state
+
+    def _in_our_order(self, state: BodyState) -> BodyState:
+        i = self._theirs
+        tip, jacobian, torque, stiffness = state
+        return BodyState(tip, jacobian.take(i, axis=1), torque[i], stiffness[np.ix_(i, i)])
+
+    def placement(self, q: Array, link: str) -> Array:
+        """Pose of a link's frame in the base, (4, 4).
+
+        Raises:
+            UnknownName: There is no such link.
+        """
+        model, data, frame = self._model, self._data(), self._frame(link)
+        pin.forwardKinematics(model, data, q[self._ours])
+        placement: Array = pin.updateFramePlacement(model, data, frame).homogeneous
+        return placement
+
+    def potential_energy(self, q: Array) -> float:
+        """V of the weight of all links [J] at the joint angles (nv,) [rad], from their places."""
+        return float(pin.computePotentialEnergy(self._model, self._data(), q[self._ours]))
+
+    def mass_matrix(self, q: Array) -> Array:
+        """Joint-space mass matrix M (nv, nv) [kg m²] at the joint angles (nv,) [rad]."""
+        M = np.array(pin.crba(self._model, self._data(), q[self._ours])).reshape(self.nv, self.nv)
+        upper = np.triu(M)  # some versions of Pinocchio fill that alone
+        whole: Array = (upper + np.triu(upper, 1).T)[np.ix_(self._theirs, self._theirs)]
+        return whole
+
+    def visualizer(self, urdf: str, server: object, node: str) -> Callable[[Array], None] | None:
+        """Draw the shapes of the URDF below a node of a viser server.
+
+        Returns:
+            What moves them to joint angles (nv,) [rad]; None if the URDF has no shapes.
+
+        Raises:
+            UrdfError: A shape, a mesh perhaps, cannot be read; nothing is drawn.
+        """
+        from pinocchio.visualize import ViserVisualizer
+
+        model = self._model.copy()  # a visualiser may write into what it is given
+        try:
+            shapes = pin.buildGeomFromUrdfString(model, urdf, pin.GeometryType.VISUAL)
+            if not shapes.ngeoms:
+                return None
+            drawn = ViserVisualizer(model, pin.GeometryModel(), shapes)
+            drawn.initViewer(viewer=server)
+            drawn.loadViewerModel(node)
+        except Exception as error:  # whatever the loader of some mesh format raises
+            server.scene.remove_by_name(node)  # type: ignore[attr-defined]
+            raise UrdfError(
+                f"the shapes of the URDF cannot be drawn: {str(error).strip().rstrip('.')}. Meshes "
+                "of a package:// are looked for in the folders of ROS_PACKAGE_PATH."
+            ) from None
+        return lambda q: drawn.display(q[self._ours])
+
+    def _way(self, joint: int) -> Indices:
+        """Our coordinates of the joints on the way to one of Pinocchio's, base first."""
+        way: list[int] = []
+        while joint:
+            way.insert(0, self._row(joint) - 1)
+            joint = self._model.parents[joint]
+        return np.array(way, dtype=np.intp)
+
+    def _row(self, joint: int) -> int:
+        """Our row of a joint of Pinocchio's; both call the base 0."""
+        return 1 + int(self._ours[joint - 1]) if joint else 0
+
+    def _frame(self, link: str) -> int:
+        # Pinocchio cannot even be asked for a name that is no UTF-8
+        return self._frames[one_of("link", link, self._frames)]
+
+    def _data(self) -> pin.Data:
+        # one per thread, made once: it is scratch memory, and costs milliseconds for long arms
+        if not hasattr(self._scratch, "data"):
+            self._scratch.data = self._model.createData()
+        return self._scratch.data
+
+
+def _reordered(names: tuple[str, ...], wanted: Sequence[str]) -> tuple[str, ...]:
+    """The wanted order, if it names every joint that moves once."""
+    wanted = sequence_of("joint_names", wanted, str)
+    if sorted(wanted) != sorted(names):
+        missing = [name for name in names if name not in wanted]
+        others = [name for name in wanted if name not in names or wanted.count(name) > 1]
+        told = ", ".join(
+            f"{what} {', '.join(map(repr, dict.fromkeys(some)))}"
+            for what, some in (("leaves out", missing), ("has too many of", others))
+            if some
+        )
+        raise InvalidInput("joint_names", f"{told}; name each joint that moves once.")
+    return wanted
+
+
+def rotation_vector(rotation: Array) -> tuple[Array, Array]:
+    """Rotation vector φ (3,) [rad] of a rotation (3, 3), and its derivative (3, 3).
+
+    The derivative is that by a further turn in base axes: φ changes by it times ω.
+    """
+    return pin.log3(rotation), pin.Jlog3(rotation).T

@@ -1,0 +1,1 @@
+"""The loaded arm: equilibrium, hung weights, buckling, modes."""

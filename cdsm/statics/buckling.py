@@ -1,0 +1,243 @@
+"""Buckling: where tension or load makes the joint stiffness singular at a posture that is held.
+
+Cables stiffen an arm by their elasticity and mostly soften it by their tension (active part of
+Eq. 16). With stiff cables the first always wins; behind soft springs or long leads there is a
+tension from which on K_θ is not positive definite and the arm gives way, whatever its load. Here
+the posture is held and the tensions are those of :func:`~cdsm.distribute_tension`; what an
+arm with locked motors does beyond is :func:`~cdsm.equilibrium`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final, final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cdsm.errors import InvalidInput
+from cdsm.posture import Posture
+from cdsm.statics.bound_scan import SAMPLES, Limit, domain, edge, reach, reason, stable_ranges
+from cdsm.stiffness_matrix import Stiffness, stiffness
+from cdsm.support.validation import Array, ReadOnlyState, bound, frozen, instance, vector
+from cdsm.tension import distribute_tension
+
+_NOWHERE: Final = 1e6
+"""A load factor up to which nothing happens counts as infinite."""
+
+
+@final
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class CriticalTension(ReadOnlyState):
+    """The tension at which an arm buckles at a posture; made by :func:`critical_tension`.
+
+    Attributes:
+        posture: Where.
+        wrench: W (6,) at ``tool0``, base axes: force [N], then moment [N m].
+        minimum: The lower bound of tension [N] at which the arm, stable below, buckles: inf if it
+            is stable up to the end of :attr:`examined`, and its low end if it is stable nowhere.
+        mode: Unit joint motion (nv,) of the smallest eigenvalue of K_θ there, or where the arm is
+            softest if it does not buckle.
+        tension: F there (C,) [N].
+        stable: Ranges (low, high) [N] of the lower bound in which the arm is stable.
+        examined: Range [N] of the lower bound that was looked at: as far as tensions balance the
+            arm within the domains of the elasticities, and if these have no end, until the sign of
+            what grows with the tension has decided.
+        bounds: Lower bounds (n,) [N] that were looked at.
+        margins: Smallest eigenvalue of K_θ at each (n,) [N m/rad].
+    """
+
+    posture: Posture
+    wrench: Array
+    minimum: float
+    mode: Array
+    tension: Array
+    stable: tuple[tuple[float, float], ...]
+    examined: tuple[float, float]
+    bounds: Array
+    margins: Array
+
+    def __repr__(self) -> str:
+        return f"<CriticalTension {self.minimum:.4g} N>"
+
+    def __str__(self) -> str:
+        low, high = self.examined
+        if not self.stable:
+            verdict = f"unstable at every lower bound from {low:.4g} N to {high:.4g} N"
+        elif math.isinf(self.minimum):
+            verdict = f"does not buckle at any lower bound up to {high:.4g} N"
+        else:
+            verdict = f"buckles at a lower bound of {self.minimum:.6g} N"
+        spans = ", ".join(f"{a:.4g} to {b:.4g} N" for a, b in self.stable if a < b)
+        names = self.posture.arm.joint_names
+        lines = [verdict, f"stable from {spans}" if spans else "", _written(names, self.mode)]
+        return "\n".join(line for line in lines if line)
+
+
+@final
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class CriticalLoad(ReadOnlyState):
+    """The multiple of a load at which an arm fails at a posture; made by :func:`critical_load`.
+
+    Attributes:
+        posture: Where.
+        wrench: W (6,), of which the factor is the multiple: force [N], then moment [N m].
+        carried: Wrench (6,) that is there besides, whatever the factor: force [N], then moment
+            [N m].
+        factor: The largest factor [-] up to which the arm holds; inf if it holds a million times W.
+        limit: Why no further: ``"buckling"``, ``"infeasible"`` (no tensions balance the load),
+            ``"elasticity"`` (a tension leaves its cable's domain) or ``"none"``.
+        mode: Unit joint motion (nv,) of the smallest eigenvalue of K_θ there.
+        tension: F (C,) [N] there.
+    """
+
+    posture: Posture
+    wrench: Array
+    carried: Array
+    factor: float
+    limit: Limit
+    mode: Array
+    tension: Array
+
+    def __repr__(self) -> str:
+        return f"<CriticalLoad factor {self.factor:.4g}, {self.limit}>"
+
+    def __str__(self) -> str:
+        reason = {
+            "buckling": "there it buckles"
+            if self.factor
+            else "it buckles without the load already",
+            "infeasible": "beyond, no tensions balance it",
+            "elasticity": "beyond, a tension leaves the domain of its cable's elasticity",
+            "none": "nothing happens that far",
+        }[self.limit]
+        mode = _written(self.posture.arm.joint_names, self.mode)
+        if self.factor == 0.0:
+            return f"holds no part of the load; {reason}\n{mode}"
+        return f"holds the load up to a factor of {self.factor:.6g}; {reason}\n{mode}"
+
+
+def critical_tension(
+    pose: Posture,
+    wrench: ArrayLike = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+    solver: str = "daqp",
+) -> CriticalTension:
+    """The lower bound of tension at which least tensions make K_θ singular: det K_θ(F_min) = 0.
+
+    K_θ as in :func:`~cdsm.stiffness`, its symmetric part judged, F by
+    :func:`~cdsm.distribute_tension` with that bound on all cables.
+
+    Args:
+        pose: The posture, held.
+        wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m].
+        solver: As for :func:`~cdsm.distribute_tension`.
+
+    Raises:
+        InvalidInput: The wrench has the wrong shape or is not finite.
+        InfeasibleTension: No tensions at all balance the arm.
+        ElasticityRangeError: Even the least tensions are outside the cables' elasticities.
+    """
+    arm = instance("pose", pose, Posture).arm
+    W = vector("wrench", wrench, 6, "force [N], then moment [N m], base axes")
+
+    def at(minimum: float) -> Stiffness:
+        return stiffness(pose, distribute_tension(pose, minimum, wrench=W, solver=solver))
+
+    low, highest = domain(arm)
+    at(low)  # if there is nothing to judge, its error says why
+    high = reach(at, low, highest)
+    places, margins, stable = stable_ranges(at, low, high)
+    buckles = [b for _, b in stable if b < high]
+    if buckles:
+        minimum = where = buckles[0]
+    elif stable:
+        minimum, where = math.inf, float(places[int(np.argmin(margins))])
+    else:
+        minimum = where = low
+    there = at(where)
+    return CriticalTension(
+        posture=pose,
+        wrench=W,
+        minimum=minimum,
+        mode=_mode(there),
+        tension=there.tension,
+        stable=stable,
+        examined=(low, high),
+        bounds=frozen(places),
+        margins=frozen(margins),
+    )
+
+
+def critical_load(
+    pose: Posture,
+    wrench: ArrayLike,
+    minimum: ArrayLike = 0.0,
+    maximum: ArrayLike = math.inf,
+    solver: str = "daqp",
+    *,
+    carried: ArrayLike = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+) -> CriticalLoad:
+    """The factor λ up to which the arm, holding this posture, stands λ W on top of what it carries.
+
+    Args:
+        pose: The posture, held: the tensions are distributed anew for every load.
+        wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m]; not zero.
+        minimum: Lower bound of the tensions [N], for all cables or (C,).
+        maximum: Upper bound of the tensions [N], for all cables or (C,).
+        solver: As for :func:`~cdsm.distribute_tension`.
+        carried: Another wrench (6,) at ``tool0`` that is always there, as of a tool.
+
+    Raises:
+        InvalidInput: The wrench is zero, or it, what is carried or a bound is not what it must be.
+        InfeasibleTension: The arm does not even hold itself and what it carries.
+        ElasticityRangeError: A tension is outside its cable's elasticity even without load.
+    """
+    count = len(instance("pose", pose, Posture).arm.cables)
+    W = vector("wrench", wrench, 6, "force [N], then moment [N m], base axes")
+    always = vector("carried", carried, 6, "force [N], then moment [N m], base axes")
+    low, high = bound("minimum", minimum, count), bound("maximum", maximum, count)
+    if not W.any():
+        raise InvalidInput("wrench", "is zero, and so is any multiple of it; give a load.")
+
+    def at(factor: float) -> Stiffness:
+        return stiffness(pose, distribute_tension(pose, low, high, always + factor * W, solver))
+
+    factor, limit = 0.0, reason(at, 0.0)
+    at(factor)  # if there is nothing to judge, its error says why
+    if limit == "none":
+        end = 1e-3
+        while end < _NOWHERE and reason(at, end) == "none":
+            end *= 2.0
+        if end < _NOWHERE:
+            # the first failure: what the doubling has stepped over is sampled again, finer
+            places = np.linspace(0.0, end, SAMPLES).tolist()
+            first = next(i for i, place in enumerate(places) if reason(at, place) != "none")
+            holds, fails = places[first - 1], places[first]
+            factor, beyond = edge(lambda x: reason(at, x) == "none", holds, fails)
+            limit = reason(at, beyond)
+        else:
+            factor = math.inf
+    there = at(min(factor, _NOWHERE / 2.0))
+    return CriticalLoad(
+        posture=pose,
+        wrench=W,
+        carried=always,
+        factor=factor,
+        limit=limit,
+        mode=_mode(there),
+        tension=there.tension,
+    )
+
+
+def _mode(there: Stiffness) -> Array:
+    """The softest joint motion, its largest entry positive: eigenvectors have no sign."""
+    mode = there.critical_direction
+    return frozen(mode * np.sign(mode[abs(mode).argmax()]))
+
+
+def _written(names: tuple[str, ...], mode: Array) -> str:
+    """The joints that take most part in a mode."""
+    order = np.argsort(-abs(mode))[:4]
+    shares = ", ".join(f"{names[i]} {mode[i]:+.2f}" for i in order)
+    return f"softest joint motion: {shares}" + (", …" if len(mode) > len(order) else "")

@@ -1,0 +1,222 @@
+"""Small vibrations of an arm about a posture: K_θ φ = ω² M φ.
+
+M is the joint-space mass matrix of the links; cables have no mass here. Where K_θ is not positive
+definite a motion does not vibrate but grows, and has a rate instead of a frequency.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import NamedTuple, final
+
+import numpy as np
+from scipy.linalg import eigh, eigvalsh
+
+from cdsm.errors import InvalidInput, SingularMass
+from cdsm.posture import Posture
+from cdsm.stiffness_matrix import Stiffness
+from cdsm.support.validation import Array, ReadOnlyState, frozen, instance
+from cdsm.urdf import CROSS_INERTIA, CROSS_MASS
+
+_MASSLESS = 1e-12
+"""An eigenvalue of M this part of the largest is that of a motion without mass."""
+
+_STAND_IN = 0.02
+"""Part of a motion's kinetic energy that may be in stand-in masses: 1 % of its frequency."""
+
+
+@final
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Modes(ReadOnlyState):
+    """Natural modes of an arm, with the stiffness they follow from; made by :func:`modes`.
+
+    Of the nv modes S vibrate and the others, none if the arm is stable, grow. All arrays are
+    read-only. Shapes are columns of joint angles, mass-normalised and orthogonal in M and K_θ:
+    φᵀMφ = 1 and φᵀK_θφ = ω², so their unit is rad/(√kg m); the largest entry is positive.
+
+    Attributes:
+        stiffness: K_θ with the posture, tensions and wrench it belongs to.
+        mass: M (nv, nv) [kg m²].
+        frequencies: ω/2π (S,) [Hz], the lowest first.
+        shapes: φ of the modes that vibrate (nv, S) [rad/(√kg m)].
+        growth_rates: √(−ω²) of the modes that do not (n,) [1/s], the fastest first: a deflection
+            grows by e in the inverse of it.
+        growth_shapes: φ of these (nv, n) [rad/(√kg m)].
+    """
+
+    stiffness: Stiffness
+    mass: Array
+    frequencies: Array
+    shapes: Array
+    growth_rates: Array
+    growth_shapes: Array
+
+    @property
+    def is_stable(self) -> bool:
+        """Whether all modes vibrate."""
+        return not self.growth_rates.size
+
+    def __repr__(self) -> str:
+        name = self.stiffness.posture.arm.name
+        if not self.is_stable:
+            return f"<Modes of {name}, UNSTABLE>"
+        return f"<Modes of {name}, {self.frequencies[0]:.4g} to {self.frequencies[-1]:.4g} Hz>"
+
+    def __str__(self) -> str:
+        rows = [f"{'mode':<6}{'frequency [Hz]':>16}  {'moves most':<12}"]
+        rows += [
+            f"{number:<6}{frequency:>16.4g}  {joint:<12}".rstrip()
+            for number, (frequency, joint) in enumerate(
+                zip(self.frequencies, self._leading(self.shapes), strict=True), start=1
+            )
+        ]
+        rows += [
+            f"UNSTABLE: a deflection, most of it at {joint}, grows by e in {1.0 / rate:.4g} s"
+            if rate
+            else f"UNSTABLE: a deflection, most of it at {joint}, meets no resistance"
+            for rate, joint in zip(
+                self.growth_rates.tolist(), self._leading(self.growth_shapes), strict=True
+            )
+        ]
+        return "\n".join(rows)
+
+    def _leading(self, shapes: Array) -> list[str]:
+        """Name of the joint that moves most in each shape."""
+        names = self.stiffness.posture.arm.joint_names
+        return [names[i] for i in abs(shapes).argmax(axis=0)]
+
+
+def modes(pose: Posture, stiffness: Stiffness) -> Modes:
+    """Natural frequencies and mode shapes at a posture: K_θ φ = ω² M φ.
+
+    K_θ is taken by its symmetric part, which it is but under a moment at the tip. The modes are
+    those of a small vibration about the posture if the tensions balance the arm there, see
+    :attr:`Stiffness.residual <cdsm.Stiffness.residual>`; friction and damping are left
+    out.
+
+    Args:
+        pose: The posture.
+        stiffness: K_θ there, the answer of :func:`~cdsm.stiffness` at this posture.
+
+    Returns:
+        The modes. An arm that buckles is an answer: its ``is_stable`` is false.
+
+    Raises:
+        InvalidInput: The stiffness is that of another posture.
+        SingularMass: A motion of the arm moves no link of any mass, so it has no frequency.
+    """
+    arm = instance("pose", pose, Posture).arm
+    there = instance("stiffness", stiffness, Stiffness).posture
+    if there is not pose and not (there.arm == arm and np.array_equal(there.q, pose.q)):
+        raise InvalidInput("stiffness", "was taken at another posture; take it at this one.")
+    M = arm._body.mass_matrix(pose.q)
+    spectrum, motions = np.linalg.eigh(M)
+    if spectrum[0] <= _MASSLESS * spectrum[-1]:
+        raise _massless(pose, motions[:, 0])
+    shares, motions = eigh(_stand_in_mass(pose), M)
+    if shares[-1] > _STAND_IN:
+        motion = motions[:, -1] / np.linalg.norm(motions[:, -1])
+        raise SingularMass(
+            f"a motion of {arm.joint_names[int(abs(motion).argmax())]} moves links of no mass, or "
+            f"of hardly any: {100.0 * shares[-1]:.3g} % of its kinetic energy is that of crosses "
+            "and massless links, whose mass only stands in. Give the links their link_mass.",
+            frozen(motion),
+        )
+    squares, shapes = eigh((stiffness.joint + stiffness.joint.T) / 2.0, M)
+    largest = np.take_along_axis(shapes, abs(shapes).argmax(axis=0)[None], axis=0)
+    shapes = shapes * np.sign(largest)
+    vibrates = squares > 0.0
+    return Modes(
+        stiffness=stiffness,
+        mass=frozen(M),
+        frequencies=frozen(np.sqrt(squares[vibrates]) / (2.0 * math.pi)),
+        shapes=frozen(shapes[:, vibrates]),
+        growth_rates=frozen(np.sqrt(-squares[~vibrates])),
+        growth_shapes=frozen(shapes[:, ~vibrates]),
+    )
+
+
+def _stand_in_mass(pose: Posture) -> Array:
+    """The part of M (nv, nv) that crosses and massless links have, so that simulators take them."""
+    if not pose.arm.is_serpentine:
+        return np.zeros((pose.arm.nv, pose.arm.nv))
+    inertia, stand_ins = CROSS_INERTIA * np.eye(3), []
+    for k, (joint, link) in enumerate(
+        zip(pose.arm.geometry.joints, pose.arm.geometry.links, strict=True), start=1
+    ):
+        if len(joint.axes) == 2:
+            stand_ins.append(Carried(f"cross{k}", CROSS_MASS, np.zeros(3), inertia))
+        if link.mass == 0.0:
+            centre = np.array([link.length / 2.0, 0.0, 0.0])
+            stand_ins.append(Carried(f"link{k}", CROSS_MASS, centre, inertia))
+    return mass_matrix(pose, stand_ins)
+
+
+def fastest(stiffness: Stiffness, M: Array) -> float:
+    """√|ω²| [1/s] of the motion K_θ φ = ω² M φ whose ω² is largest, be it growth or vibration.
+
+    Args:
+        stiffness: K_θ, taken by its symmetric part.
+        M: Mass matrix (nv, nv) [kg m²].
+
+    Raises:
+        SingularMass: A motion of the arm moves no link of any mass.
+    """
+    # in units of each joint: beside the mass of the arm that of its last link may be rounding
+    unit = 1.0 / np.sqrt(M.diagonal())
+    K, M = (matrix * unit * unit[:, None] for matrix in (stiffness.joint, M))
+    try:
+        return math.sqrt(abs(eigvalsh((K + K.T) / 2.0, M)).max())
+    except np.linalg.LinAlgError:  # M is not positive definite
+        raise _massless(stiffness.posture, unit * np.linalg.eigh(M)[1][:, 0]) from None
+
+
+def _massless(pose: Posture, motion: Array) -> SingularMass:
+    joint = pose.arm.joint_names[int(abs(motion).argmax())]
+    return SingularMass(
+        f"a motion of {joint} moves no link of any mass. "
+        "Give the links a mass and moments of inertia.",
+        frozen(motion / np.linalg.norm(motion)),
+    )
+
+
+class Carried(NamedTuple):
+    """What a link carries, in the frame of the link.
+
+    Attributes:
+        link: Name of the link.
+        mass: m [kg].
+        centre: Centre of mass (3,) [m].
+        inertia: I about the centre of mass (3, 3) [kg m²].
+    """
+
+    link: str
+    mass: float
+    centre: Array
+    inertia: Array
+
+
+def mass_matrix(pose: Posture, carried: Iterable[Carried]) -> Array:
+    """Joint-space mass matrix (nv, nv) [kg m²] of what the links carry.
+
+    M = Σ m J_vᵀ J_v + J_ωᵀ I J_ω, J_v of the centre of mass and J_ω of the turn of each link.
+    """
+    arm, frames = pose.arm, pose._frames
+    M = np.zeros((arm.nv, arm.nv))
+    for link, mass, centre, inertia in carried:
+        place, row = pose.link_pose(link), arm._body.locate(link)[0]
+        moved = []
+        while row:
+            moved.append(row)
+            row = int(arm._tree.parent[row])
+        R, joints = place[:3, :3], np.array(moved, dtype=np.intp)
+        angular = frames.axis[joints]
+        linear = np.cross(angular, R @ centre + place[:3, 3] - frames.origin[joints])
+        if len(frames.slide):
+            linear += frames.slide[joints]
+        M[np.ix_(joints - 1, joints - 1)] += (
+            mass * linear @ linear.T + angular @ R @ inertia @ R.T @ angular.T
+        )
+    return M

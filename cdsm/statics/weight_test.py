@@ -1,0 +1,244 @@
+"""The weight test of Section V: hang a weight at the tip, see how far it goes (Eq. 20)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cdsm.errors import EquilibriumError, InvalidInput
+from cdsm.posture import Posture
+from cdsm.statics.equilibrium import Equilibrium, equilibrium, follow
+from cdsm.support.units import MODEL
+from cdsm.support.validation import (
+    Array,
+    ReadOnlyState,
+    frozen,
+    unit_direction,
+    vector,
+    whole_number,
+)
+from cdsm.tension import Tension
+
+MOST_STEPS = 1000
+"""A curve of more points looks no smoother, and is computed for long."""
+
+_FINEST = 2.0**-12
+"""Part of itself to which a buckling load is found."""
+
+_SLIGHT = 1e-9
+"""Part of the load below which it need not be found so precisely."""
+
+_MEASURED = 1e-12
+"""A tip displacement this part of the arm's length is known to some three digits."""
+
+_SETTLED = 1e-9
+"""One by more than this part is no rounding of the balance at the reference."""
+
+_IMMOBILE = 1e-14
+"""A compliance along the force this part of the largest is rounding."""
+
+
+@final
+@dataclass(frozen=True, eq=False, kw_only=True)
+class LinearPrediction(ReadOnlyState):
+    """What the stiffness at the unloaded arm predicts of a weight test.
+
+    Joints that rest on a stop stay there in it.
+
+    Attributes:
+        displacement: C_vv ΔF (3,) [m], C of :attr:`~cdsm.Equilibrium.compliance`.
+        stiffness: 1/(uᵀ C_vv u) along the force [N/m].
+    """
+
+    displacement: Array
+    stiffness: float
+
+
+@final
+@dataclass(frozen=True, eq=False, kw_only=True)
+class WeightTest(ReadOnlyState):
+    """A weight hung at the tip in equal steps, with every equilibrium on the way.
+
+    Attributes:
+        force: ΔF (3,), the dead force at the full load, base axes [N].
+        without: The arm before: at rest under the reference's wrench alone.
+        loaded: The arm at rest under each load, the last under the full one.
+    """
+
+    force: Array
+    without: Equilibrium
+    loaded: tuple[Equilibrium, ...]
+
+    @cached_property
+    def displacement(self) -> Array:
+        """ΔX (3,) [m]: the tip with the full weight minus the tip without."""
+        return frozen(self.displacements[-1].copy())
+
+    @cached_property
+    def stiffness(self) -> float:
+        """|ΔF|/(u·ΔX) [N/m] along the force, u = ΔF/|ΔF|: 1/C of Eq. 20, as it is measured.
+
+        inf where the tip does not give way along the force.
+        """
+        return float(np.linalg.norm(self.force)) / self._gives if self._gives else math.inf
+
+    @property
+    def _gives(self) -> float:
+        """How far the tip goes along the force [m]; zero if that is rounding."""
+        moved = float(self.displacement @ unit_direction("force", self.force))
+        return moved if abs(moved) > _MEASURED * self.without.pose.arm.length else 0.0
+
+    @cached_property
+    def linear(self) -> LinearPrediction:
+        """What the stiffness without the weight predicts.
+
+        Raises:
+            SingularStiffness: The arm without the weight is just about to buckle.
+        """
+        C = self.without.compliance[:3, :3]
+        u = unit_direction("force", self.force)
+        if self.without.at_limit:
+            gives = float(u @ C @ u)
+            stiff = 1.0 / gives if abs(gives) > _IMMOBILE * np.linalg.norm(C) else math.inf
+        else:
+            stiff = self.without.stiffness.along(u)
+        return LinearPrediction(displacement=frozen(C @ self.force), stiffness=stiff)
+
+    @property
+    def settled_first(self) -> bool:
+        """Whether the arm left its reference before the weight: unbalanced there, or unstable."""
+        moved = float(np.linalg.norm(self.without.displacement))
+        return moved > _SETTLED * self.without.pose.arm.length
+
+    @cached_property
+    def loads(self) -> Array:
+        """Magnitude of the force at each step (n,) [N]."""
+        count = len(self.loaded)
+        return frozen(np.linalg.norm(self.force) * np.arange(1, count + 1) / count)
+
+    @cached_property
+    def tips(self) -> Array:
+        """Tip position at each step (n, 3) [m]."""
+        return frozen(np.array([each.pose.tip[:3, 3] for each in self.loaded]))
+
+    @cached_property
+    def displacements(self) -> Array:
+        """Tip at each step minus the tip without weight (n, 3) [m]."""
+        return frozen(self.tips - self.without.pose.tip[:3, 3])
+
+    @cached_property
+    def tensions(self) -> Array:
+        """Cable tensions at each step (n, C) [N]."""
+        return frozen(np.array([each.tension for each in self.loaded]))
+
+    def __repr__(self) -> str:
+        return (
+            f"<WeightTest with {np.linalg.norm(self.force):.4g} N on "
+            f"{self.without.pose.arm.name}: {self.stiffness / 1000.0:.4g} N/mm>"
+        )
+
+    def __str__(self) -> str:
+        rows = [f"{'load [N]':>10}{'x [mm]':>12}{'y [mm]':>12}{'z [mm]':>12}"]
+        for load, moved in zip(self.loads, self.displacements, strict=True):
+            rows.append(f"{load:>10.4g}" + "".join(f"{1000.0 * x:>12.4g}" for x in moved))
+        predicted = "".join(f"{1000.0 * x:>12.4g}" for x in self.linear.displacement)
+        rows += [
+            f"{'linear':>10}{predicted}",
+            f"stiffness along the force: measured {self.stiffness / 1000.0:.4g} N/mm, "
+            f"linear {self.linear.stiffness / 1000.0:.4g} N/mm",
+            f"(linear is {MODEL}; measured the secant over this weight)",
+        ]
+        if self.settled_first:
+            x, y, z = 1000.0 * self.without.displacement
+            rows.append(
+                "before the weight the arm did not stay at its reference: the tip moved by "
+                f"({x:.4g}, {y:.4g}, {z:.4g}) mm, from where all this is measured"
+            )
+        if self.without.at_limit:
+            rows.append(f"before the weight at a stop: {', '.join(self.without.at_limit)}")
+        if not self.without.stable:
+            rows.append("before the weight the arm was NEUTRAL: not every joint is brought back")
+        return "\n".join(rows)
+
+
+def weight_test(
+    pose: Posture,
+    tension: Tension | ArrayLike,
+    force: ArrayLike,
+    *,
+    steps: int = 1,
+    wrench: ArrayLike | None = None,
+) -> WeightTest:
+    """Hang a weight at the tip of an arm whose motors are locked: C = ΔX/ΔF (Eq. 20).
+
+    Nonlinear: the tensions follow their elongation, and the arm its new posture. What comes out for
+    a small force is 1/:meth:`~cdsm.Stiffness.along`.
+
+    Args:
+        pose: The reference posture, at which the motors are locked.
+        tension: F there, as for :func:`~cdsm.equilibrium`. Tensions of your own need
+            not balance the arm: the test starts from the equilibrium that they lead to.
+        force: ΔF (3,) at ``tool0`` in base axes [N], on top of ``wrench``.
+        steps: Into how many equal steps to divide it, at most 1000.
+        wrench: What the arm carries without the weight (6,): force [N], then moment [N m]. If not
+            given, that of the ``Tension``, or zero.
+
+    Raises:
+        InvalidInput: As for :func:`~cdsm.equilibrium`, or a force of zero or so small
+            that what it moves is rounding, or steps that are no whole number from 1 to 1000.
+        ElasticityRangeError: As for :func:`~cdsm.equilibrium`, at any step.
+        EquilibriumError: The arm buckles under the load; says at which part of it. Where it comes
+            to rest then, :func:`~cdsm.equilibrium` tells.
+    """
+    force = vector("force", force, 3, "a force in base axes [N]")
+    if not force.any():
+        raise InvalidInput("force", "is zero; nothing moves, and there is nothing to measure.")
+    steps = whole_number("steps", steps, 1, MOST_STEPS)
+    without = equilibrium(pose, tension, wrench)
+    added = np.append(force, np.zeros(3))
+    loaded, part = [without], 0.0
+    for step in range(1, steps + 1):
+        loaded.append(_hang(loaded[-1], without.wrench, added, part, step / steps))
+        part = step / steps
+    test = WeightTest(force=force, without=without, loaded=tuple(loaded[1:]))
+    if not test._gives and math.isfinite(test.linear.stiffness):
+        raise InvalidInput(
+            "force",
+            f"{np.abs(force).max():.3g} N moves the tip by rounding only, and measures nothing; "
+            f"hang at least {_MEASURED * pose.arm.length * test.linear.stiffness:.1g} N.",
+        )
+    return test
+
+
+def _hang(
+    before: Equilibrium, wrench: Array, added: Array, reached: float, goal: float
+) -> Equilibrium:
+    """Follow the arm from one part of the load to a larger one.
+
+    Raises:
+        EquilibriumError: It loses its stability on the way.
+    """
+    step = goal - reached
+    while reached < goal:
+        part = min(goal, reached + step)
+        after = follow(before, frozen(wrench + part * added))
+        if after is not None:
+            before, reached, step = after, part, 2.0 * step
+        elif step > _FINEST * max(reached, _SLIGHT):
+            step /= 2.0
+        else:
+            way = before.stiffness.critical_direction
+            joint = before.pose.arm.joint_names[int(abs(way).argmax())]
+            raise EquilibriumError(
+                f"the arm buckles at {100.0 * reached:.4g} % of the load, under "
+                f"{reached * float(np.linalg.norm(added)):.4g} N: {joint} gives way",
+                residual=before.residual,
+                load_factor=reached,
+                joint=joint,
+            )
+    return before

@@ -1,0 +1,437 @@
+"""Stiffness of an arm at a posture under given cable tensions.
+
+    K_θ = H_L·F + J_Lᵀ K_L J_L + ∂g/∂θ − ∂(J_Xᵀ W)/∂θ                          (Eq. 16)
+          active   passive       gravity   load
+
+The paper goes on to Cartesian space with J_X⁻¹, which does not exist for a redundant arm. Three
+different numbers hide behind "the stiffness in x", and each has its own name here:
+:meth:`Stiffness.along`, :attr:`Stiffness.cartesian` and :meth:`Stiffness.pseudoinverse`.
+"""
+
+from __future__ import annotations
+
+import html
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property, partial
+from typing import Literal, TypeVar, final, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cdsm.errors import InvalidInput, SingularStiffness
+from cdsm.posture import Posture
+from cdsm.report import Report, report_on
+from cdsm.support.units import MODEL
+from cdsm.support.validation import (
+    Array,
+    ReadOnlyState,
+    frozen,
+    instance,
+    one_of,
+    unit_direction,
+    vector,
+)
+from cdsm.tension import Tension
+
+Term = Literal["active", "passive", "gravity", "load", "joint"]
+
+_Value = TypeVar("_Value")
+
+_NO_WRENCH = frozen(np.zeros(6))
+
+UNMOVED = 1e-10
+"""Joint torque of a tip force below this part of the largest is rounding: the tip cannot move."""
+
+REGULAR = 1e-8
+"""Smallest singular value of K_θ, over what it is a sum of, that leaves its inverse 6 digits.
+
+Near buckling the parts of K_θ cancel, so that its own entries may be too small to be compared with;
+and each joint is measured in units of its own, a slide beside a hinge.
+"""
+
+SOFTEST = 1e-100
+"""A joint stiffness below this is that of nothing real, and its inverse may overflow."""
+
+FLAT = 1e-6
+"""Smallest ratio of the singular values of J for which a 3×3 stiffness still has 4 digits left.
+
+Its entries differ by the square of the ratio, and float64 holds 16 digits.
+"""
+
+
+@final
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Shares(ReadOnlyState):
+    """What carries the stiffness in one direction; the parts sum to :attr:`total`.
+
+    Attributes:
+        direction: The unit direction (3,), base axes.
+        passive: Elasticity of each cable, (C,) [N/m].
+        active: Tension of each cable, (C,) [N/m]; mostly negative.
+        gravity: Weight of the links [N/m].
+        load: The wrench at the tip [N/m].
+    """
+
+    direction: Array
+    passive: Array
+    active: Array
+    gravity: float
+    load: float
+
+    @property
+    def cables(self) -> Array:
+        """Passive plus active of each cable, (C,) [N/m]."""
+        return frozen(self.passive + self.active)
+
+    @property
+    def total(self) -> float:
+        """Sum of all parts [N/m]: the stiffness along the direction."""
+        return float(self.passive.sum() + self.active.sum() + self.gravity + self.load)
+
+
+@final
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Stiffness(ReadOnlyState):
+    """Joint and Cartesian stiffness, with the posture, tensions and wrench they belong to.
+
+    Cartesian quantities are at ``tool0`` in base axes. All arrays are read-only.
+
+    Attributes:
+        posture: Where.
+        tension: F (C,) [N].
+        wrench: W (6,): force [N], then moment [N m].
+        cable_stiffness: Diagonal of K_L (C,) [N/m]; 0 for force-controlled cables.
+        active: H_L·F (nv, nv) [N m/rad]; also called geometric.
+        passive: J_Lᵀ K_L J_L (nv, nv) [N m/rad]; also called material or elastic.
+        gravity: ∂g/∂θ (nv, nv) [N m/rad].
+        load: −∂(J_Xᵀ W)/∂θ (nv, nv) [N m/rad]; not symmetric if W has a moment.
+        joint: K_θ, their sum (nv, nv) [N m/rad]: rows torque, columns angle.
+        free_length: l_0 (C,) [m] of an :class:`~cdsm.Equilibrium`, whose motors were
+            locked at its reference; None where they are locked here.
+        distribution: The :class:`~cdsm.Tension` it is of; None for bare tensions.
+    """
+
+    posture: Posture
+    tension: Array
+    wrench: Array
+    cable_stiffness: Array
+    active: Array
+    passive: Array
+    gravity: Array
+    load: Array
+    joint: Array
+    free_length: Array | None = None
+    distribution: Tension | None = None
+
+    @property
+    def free_lengths(self) -> Array:
+        """Original lengths l_0 (C,) [m] of the wires, which :attr:`cable_stiffness` is of.
+
+        What the locked motors hold: (L − ΔF/k_series)/(1 + ε(F)). Negative where the series spring
+        stretches by more than the whole cable is long. Of a force-controlled cable L.
+        """
+        if self.free_length is not None:
+            return self.free_length
+        pose = self.posture
+        return pose.arm._laws.original_lengths(pose.cable_lengths, self.tension)
+
+    @cached_property
+    def residual(self) -> Array:
+        """J_Lᵀ F − (J_Xᵀ W − g) (nv,) [N m]: zero where the tensions balance the arm (Eq. 13)."""
+        pose = self.posture
+        return frozen(
+            self.tension @ pose.length_jacobian - self.wrench @ pose.jacobian + pose.gravity_torque
+        )
+
+    @cached_property
+    def margin(self) -> float:
+        """Smallest eigenvalue of the symmetric part of K_θ [N m/rad]; negative: it buckles.
+
+        Where some joints slide and some turn, only its sign does not depend on the unit of length.
+        """
+        return float(self._spectrum[0][0])
+
+    @cached_property
+    def critical_direction(self) -> Array:
+        """Unit joint motion (nv,) of the smallest eigenvalue: how the arm gives way first."""
+        return frozen(self._spectrum[1][:, 0].copy())
+
+    @property
+    def is_stable(self) -> bool:
+        """Whether the symmetric part of K_θ is positive definite."""
+        return self.margin > 0.0
+
+    @cached_property
+    def compliance(self) -> Array:
+        """C = J_X K_θ⁻¹ J_Xᵀ (6, 6): tip motion per wrench, what the arm really does.
+
+        Linear rows first: C_vv [m/N], C_vω [m/(N m)] = [rad/N], C_ωω [rad/(N m)].
+
+        Raises:
+            SingularStiffness: K_θ is singular: the arm is just about to buckle.
+        """
+        return frozen(self.posture.jacobian @ self._motion)
+
+    @cached_property
+    def cartesian(self) -> Array:
+        """(C_vv)⁻¹ (3, 3) [N/m]: force per tip displacement, the tip free to rotate.
+
+        Its diagonal is the stiffness while the other two translations are *held*, so it is never
+        below :meth:`along`, and often several times above.
+
+        Raises:
+            SingularStiffness: The tip can hardly move in some direction, which the error names; use
+                :meth:`along` for the others. Or K_θ is singular.
+        """
+        # through the singular values of J: C_vv itself is too ill-conditioned near a flat posture
+        left, values, right = self._mobility("the Cartesian stiffness matrix")
+        _ = self._motion  # refuses a singular K_θ
+        inner = right @ np.linalg.solve(self.joint, right.T)
+        outer = left / values
+        return frozen(outer @ np.linalg.inv(inner) @ outer.T)
+
+    def along(self, direction: ArrayLike) -> float:
+        """1/(uᵀ C_vv u) [N/m]: the tangent of what a weight hung at the tip measures (Eq. 20).
+
+        A weight that is not small beside the tensions measures a secant, which with a stiffening
+        wire can be a multiple: see :func:`~cdsm.weight_test`.
+
+        Args:
+            direction: u (3,) in base axes, any length.
+
+        Returns:
+            The stiffness; inf where the tip does not give way in this direction. Where the arm is
+            unstable it may be negative: see :attr:`is_stable`.
+
+        Raises:
+            InvalidInput: Not a direction.
+            SingularStiffness: K_θ is singular.
+        """
+        u = unit_direction("direction", direction)
+        torque = self._torque(u)
+        if torque is None:
+            return math.inf
+        compliance = float(torque @ self._motion[:, :3] @ u)
+        return 1.0 / compliance if compliance else math.inf
+
+    def pseudoinverse(self, term: Term = "joint") -> Array:
+        """J⁺ᵀ K J⁺ (3, 3) [N/m] with J the linear rows of J_X: the paper's K_R read literally.
+
+        The paper's figures are read with it, and it overestimates: the arm is stiffer than in
+        :attr:`cartesian`, by 4 % to over 100 %, since only the joint motion of least norm happens.
+
+        Args:
+            term: Which part of K_θ: ``"active"``, ``"passive"``, ``"gravity"``, ``"load"`` or the
+                sum, ``"joint"``.
+
+        Raises:
+            UnknownName: No such term.
+            SingularStiffness: The tip can hardly move in some direction, so J⁺ loses it.
+        """
+        matrix: Array = getattr(self, one_of("stiffness term", term, get_args(Term)))
+        left, values, right = self._mobility("the pseudo-inverse reading")
+        inverse = (left / values @ right).T
+        return frozen(inverse.T @ matrix @ inverse)
+
+    def shares(self, direction: ArrayLike) -> Shares:
+        """How much of :meth:`along` each cable carries, by elasticity and by tension.
+
+        With δθ the joint motion per unit tip displacement along u, along(u) = δθᵀ K_θ δθ, and K_θ
+        is a sum over cables, gravity and load.
+
+        Args:
+            direction: u (3,) in base axes, any length.
+
+        Raises:
+            InvalidInput: Not a direction.
+            SingularStiffness: The stiffness along u is infinite, or K_θ is singular.
+        """
+        u = unit_direction("direction", direction)
+        torque = self._torque(u)
+        if torque is None:
+            raise SingularStiffness(
+                f"the tip cannot move along {_written(u)}: nothing carries an infinite stiffness.",
+                u,
+            )
+        motion = self._motion[:, :3] @ u
+        motion = motion / (torque @ motion)
+        pose = self.posture
+        return Shares(
+            direction=u,
+            passive=frozen(self.cable_stiffness * (pose.length_jacobian @ motion) ** 2),
+            active=frozen(self.tension * (pose.length_hessian @ motion @ motion)),
+            gravity=float(motion @ self.gravity @ motion),
+            load=float(motion @ self.load @ motion),
+        )
+
+    def report(self) -> Report:
+        """Whether this stiffness can be trusted: facts, warnings, and a second derivation of it.
+
+        K_θ is derived anew, by central differences of the potential and of the torque at this very
+        posture, which takes some tenths of a second. Nothing that is wrong with the stiffness is
+        raised; the report says so.
+        """
+        return report_on(self)
+
+    def __repr__(self) -> str:
+        state = "stable" if self.is_stable else "UNSTABLE"
+        return f"<Stiffness of {self.posture.arm.name}, {state}>"
+
+    def __str__(self) -> str:
+        lines = [f"{name:<24}{''.join(f'{cell:>12}' for cell in row)}" for name, *row in self._rows]
+        return "\n".join([*lines, self._verdict])
+
+    def _repr_html_(self) -> str:
+        (_, *axes), *rows = (tuple(map(html.escape, row)) for row in self._rows)
+        head = "".join(f"<th>{axis}</th>" for axis in axes)
+        lines = [f"<tr><th>stiffness [N/mm]</th>{head}</tr>"]
+        lines += [f"<tr>{''.join(f'<td>{cell}</td>' for cell in row)}</tr>" for row in rows]
+        return f"<table>{''.join(lines)}</table><p>{html.escape(self._verdict)}</p>"
+
+    @property
+    def _rows(self) -> list[tuple[str, ...]]:
+        """The summary as a table: a header, then a name and three numbers a row."""
+        axes = np.eye(3)
+        shares = [_or_none(partial(self.shares, u)) for u in axes]
+        diagonals = [_or_none(lambda: self.cartesian), _or_none(self.pseudoinverse)]
+        rows: dict[str, list[float | None]] = {
+            "along": [_or_none(partial(self.along, u)) for u in axes],
+            "  of it passive": [None if share is None else share.passive.sum() for share in shares],
+            "  of it active": [None if share is None else share.active.sum() for share in shares],
+            "  of it gravity": [None if share is None else share.gravity for share in shares],
+            "  of it load": [None if share is None else share.load for share in shares],
+            "cartesian, diagonal": _diagonal(diagonals[0]),
+            "pseudoinverse, diagonal": _diagonal(diagonals[1]),
+        }
+        return [
+            ("stiffness [N/mm]", "x", "y", "z"),
+            *((name, *map(_millimetres, values)) for name, values in rows.items()),
+        ]
+
+    @property
+    def _verdict(self) -> str:
+        state = "stable" if self.is_stable else "UNSTABLE: K_θ is not positive definite"
+        unit = self.posture.arm.stiffness_unit()
+        return f"{state}, smallest joint stiffness {self.margin:.4g} {unit} ({MODEL})"
+
+    @cached_property
+    def _spectrum(self) -> tuple[Array, Array]:
+        values, vectors = np.linalg.eigh((self.joint + self.joint.T) / 2.0)
+        return values, vectors
+
+    def _torque(self, u: Array) -> Array | None:
+        """J_vᵀ u (nv,): joint torque of a unit force along u; None if it moves no joint."""
+        linear = self.posture.jacobian[:3]
+        torque = u @ linear
+        return torque if abs(torque).max() > UNMOVED * abs(linear).max() else None
+
+    @cached_property
+    def _motion(self) -> Array:
+        """K_θ⁻¹ J_Xᵀ (nv, 6): joint motion per wrench at the tip; refuses a singular K_θ."""
+        parts = abs(self.active) + abs(self.passive) + abs(self.gravity) + abs(self.load)
+        if not parts.diagonal().min() > SOFTEST:
+            softest = np.eye(len(parts))[parts.diagonal().argmin()]
+            raise _singular("next to nothing holds the arm", softest)
+        unit = np.sqrt(parts.diagonal())
+        _, values, right = np.linalg.svd(self.joint / unit / unit[:, None])
+        if not values[-1] > REGULAR * (parts / unit / unit[:, None]).max():
+            raise _singular("the arm is just about to buckle", right[-1] / unit)
+        return frozen(np.linalg.solve(self.joint, self.posture.jacobian.T).astype(np.float64))
+
+    def _mobility(self, what: str) -> tuple[Array, Array, Array]:
+        """Singular vectors and values of the linear rows of J; refuses a lack of motion."""
+        left, values, right = np.linalg.svd(self.posture.jacobian[:3], full_matrices=False)
+        if values.size < 3 or values[2] <= FLAT * values[0]:
+            u = frozen(np.linalg.svd(self.posture.jacobian[:3])[0][:, 2].astype(np.float64))
+            raise SingularStiffness(
+                f"{what} does not exist: the tip cannot move along {_written(u)}, where the "
+                "stiffness is infinite or nearly so. Use along(direction), or bend the arm.",
+                u,
+            )
+        return left, values, right
+
+
+def stiffness(
+    pose: Posture, tension: Tension | ArrayLike, wrench: ArrayLike | None = None
+) -> Stiffness:
+    """Joint stiffness of an arm and its four parts (Eq. 16), and through it the Cartesian one.
+
+    Args:
+        pose: The posture.
+        tension: The answer of :func:`~cdsm.distribute_tension` at this posture, or tensions
+            of your own (C,) [N], not negative. These need not balance the arm; see
+            :attr:`Stiffness.residual`.
+        wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m]; zero if not given.
+            Belongs to tensions of your own: a :class:`~cdsm.Tension` carries its wrench.
+
+    Raises:
+        InvalidInput: Wrong shape, not numbers, a negative tension, tensions of another posture, or
+            a wrench beside a ``Tension``.
+        ElasticityRangeError: A tension outside the domain of the elasticity of its cable.
+    """
+    arm = instance("pose", pose, Posture).arm
+    if isinstance(tension, Tension):
+        if tension.posture is not pose and not (
+            tension.posture.arm == arm and np.array_equal(tension.posture.q, pose.q)
+        ):
+            raise InvalidInput(
+                "tension", "was distributed at another posture; distribute it at this one."
+            )
+        if wrench is not None:
+            raise InvalidInput("wrench", "comes with the Tension; leave it out here.")
+        F, W = tension.values, tension.wrench
+    else:
+        F = vector("tension", tension, len(arm.cables), "one tension [N] per cable")
+        W = _NO_WRENCH
+        if wrench is not None:
+            W = vector("wrench", wrench, 6, "force [N], then moment [N m], base axes")
+        if np.count_nonzero(F < 0.0):
+            c = int(F.argmin())
+            raise InvalidInput(
+                "tension", f"{F[c]:g} N given for {arm.cables[c].name}; cables only pull."
+            )
+    k = arm._laws.stiffness(pose.cable_lengths, F)
+    active, passive, load, joint = pose._joint_stiffness(F, k, W)
+    return Stiffness(
+        posture=pose,
+        tension=F,
+        wrench=W,
+        cable_stiffness=k,
+        active=active,
+        passive=passive,
+        gravity=pose.gravity_stiffness,
+        load=load,
+        joint=joint,
+        distribution=tension if isinstance(tension, Tension) else None,
+    )
+
+
+def _or_none(read: Callable[[], _Value]) -> _Value | None:
+    """What is read, or None where it does not exist."""
+    try:
+        return read()
+    except SingularStiffness:
+        return None
+
+
+def _diagonal(matrix: Array | None) -> list[float | None]:
+    return [None] * 3 if matrix is None else np.diag(matrix).tolist()
+
+
+def _millimetres(stiffness: float | None) -> str:
+    return "-" if stiffness is None else f"{stiffness / 1000.0:.4g}"
+
+
+def _written(direction: Array) -> str:
+    return f"({', '.join(f'{x:.4g}' for x in direction)})"
+
+
+def _singular(why: str, motion: Array) -> SingularStiffness:
+    direction = frozen(motion / np.linalg.norm(motion))
+    return SingularStiffness(
+        f"K_θ is singular: {why} in the joint motion {_written(direction)}. Change the tensions or "
+        "the posture.",
+        direction,
+    )

@@ -1,0 +1,1 @@
+"""What every chapter uses: validation, frozen values, files, XML, units."""

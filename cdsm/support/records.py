@@ -1,0 +1,155 @@
+"""Strict frozen records: all faults of a description at once, and its TOML form."""
+
+from __future__ import annotations
+
+import difflib
+import json
+import re
+import tomllib
+from collections.abc import Callable, Iterable
+from dataclasses import fields, is_dataclass
+from functools import wraps
+from typing import Annotated, Any, TypeVar, dataclass_transform, get_args, get_type_hints
+
+import numpy as np
+from pydantic import BeforeValidator, ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic.dataclasses import dataclass
+
+from cdsm.errors import GeometryError
+from cdsm.support.validation import LARGEST
+
+_Record = TypeVar("_Record")
+
+
+def _plain(value: object) -> object:
+    """Turn numpy numbers and arrays into Python's own, which strict validation asks for."""
+    return value.tolist() if isinstance(value, (np.generic, np.ndarray)) else value
+
+
+Integer = Annotated[int, BeforeValidator(_plain)]
+Number = Annotated[float, BeforeValidator(_plain), Field(ge=-LARGEST, le=LARGEST)]
+Positive = Annotated[Number, Field(gt=0)]
+NotNegative = Annotated[Number, Field(ge=0)]
+Direction = Annotated[tuple[Number, Number, Number], Field(strict=False), BeforeValidator(_plain)]
+Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$", max_length=64)]
+
+
+_DEEPEST = 64
+"""Parts of a dotted key; no description of an arm has more than two."""
+
+_PART = r"""[ \t]*+(?:"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+'|[^\s.=\[\]{},#"']++)[ \t]*+"""
+_DEEP_KEY = re.compile(rf"(?:\.{_PART}){{{_DEEPEST}}}")
+
+_HINTED = 20
+"""Unknown keys for which a known one is looked for."""
+
+
+class CrossFaults(ValueError):
+    """Faults between the fields of a record, on their way through pydantic."""
+
+    def __init__(self, faults: Iterable[str]) -> None:
+        self.faults = tuple(faults)
+        super().__init__("; ".join(self.faults))
+
+
+@dataclass_transform(frozen_default=True, kw_only_default=True)
+def record(cls: type[_Record]) -> type[_Record]:
+    """Make a frozen, strict pydantic dataclass whose faults come as one :class:`GeometryError`."""
+    config = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
+    made: Any = dataclass(frozen=True, kw_only=True, config=config)(cls)
+    validate: Callable[..., None] = made.__init__
+
+    @wraps(validate)
+    def construct(self: object, *args: object, **values: object) -> None:
+        try:
+            validate(self, *args, **values)
+        except ValidationError as error:
+            raise GeometryError(_faults(error, type(self))) from None
+
+    made.__init__ = construct
+    return made  # type: ignore[no-any-return]
+
+
+def read_toml(text: str) -> dict[str, Any]:
+    """Parse TOML, or raise a :class:`GeometryError` that says where it breaks off."""
+    if _DEEP_KEY.search(text) is not None:  # for which the parser would need gigabytes
+        raise GeometryError([f"is not TOML that is read here: a key has over {_DEEPEST} parts"])
+    try:
+        data = tomllib.loads(text)
+        json.dumps(data, default=str)
+    except (ValueError, RecursionError) as error:  # also integers of too many digits
+        raise GeometryError([f"is not TOML: {error}"]) from None
+    return data
+
+
+def parse(kind: type[_Record], data: object) -> _Record:
+    """Build a record from parsed TOML, or raise a :class:`GeometryError` with every fault."""
+    # JSON is where pydantic's strict mode takes a table for a record and an array for a tuple;
+    # dates, which JSON lacks, become strings, which no field but the name is
+    try:
+        return TypeAdapter(kind).validate_json(json.dumps(data, default=str))
+    except ValidationError as error:
+        raise GeometryError(_faults(error, kind)) from None
+
+
+def toml_lines(record: object, keys: Iterable[str] | None = None) -> list[str]:
+    """One TOML line per field that is set."""
+    names = keys or [field.name for field in fields(record)]  # type: ignore[arg-type]
+    values = ((name, getattr(record, name)) for name in names)
+    return [f"{name} = {_toml(value)}" for name, value in values if value is not None]
+
+
+def _toml(value: object) -> str:
+    if isinstance(value, tuple):
+        return f"[{', '.join(map(_toml, value))}]"
+    # a name has no character that JSON and TOML would escape differently
+    return json.dumps(value) if isinstance(value, str) else repr(value)
+
+
+def _keys(kind: type) -> list[str]:
+    """Names of the fields of a record and of the records in its lists."""
+    hints = get_type_hints(kind)
+    entries = [entry for hint in hints.values() for entry in get_args(hint)]
+    return [
+        *hints,
+        *(
+            key
+            for entry in entries
+            if isinstance(entry, type) and is_dataclass(entry)
+            for key in _keys(entry)
+        ),
+    ]
+
+
+def _faults(error: ValidationError, kind: type) -> list[str]:
+    known = _keys(kind)
+    listed: list[str] = []
+    hinted = 0
+    faults = error.errors()
+    for fault in faults:
+        # joints[2].limit counts from 1, as the joints' and cables' names do
+        where = "".join(
+            f"[{part + 1}]" if isinstance(part, int) else f".{part}" for part in fault["loc"]
+        ).lstrip(".")
+        cause = fault.get("ctx", {}).get("error")
+        if isinstance(cause, CrossFaults):
+            listed += [f"{where}.{each}".lstrip(".") for each in cause.faults]
+        elif fault["type"] == "too_short" and any(
+            other["loc"][: len(fault["loc"])] == fault["loc"] and other is not fault
+            for other in faults
+        ):
+            continue  # the list is only short of the entries that are faulty themselves
+        elif fault["type"] == "missing":
+            listed.append(f"{where}: is missing")
+        elif fault["type"] == "unexpected_keyword_argument":
+            key = str(fault["loc"][-1])
+            hinted += 1
+            near = difflib.get_close_matches(key[:100], known, n=1) if hinted <= _HINTED else []
+            hint = f"; did you mean {near[0]}?" if near else ""
+            listed.append(f"{where}: is not a key that is known here{hint}")
+        else:
+            value = repr(fault["input"])
+            value = value if len(value) <= 60 else f"{value[:57]}..."
+            message = fault["msg"][0].lower() + fault["msg"][1:].replace("an object", "a table")
+            listed.append(f"{where}: {message}, but is {value}".removeprefix(": "))
+    return listed

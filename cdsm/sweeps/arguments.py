@@ -1,0 +1,167 @@
+"""The arguments of a sweep that may be one value, several, or several by name."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Generic, TypeVar, final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from cdsm.elasticity import Elasticity
+from cdsm.errors import InvalidInput
+from cdsm.support.validation import (
+    Array,
+    frozen,
+    number_array,
+    scalar,
+    text,
+    unit_direction,
+    vector,
+)
+from cdsm.sweeps.labels import Label
+
+_Values = TypeVar("_Values")
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Choice(Generic[_Values]):
+    """One value or several of something.
+
+    Attributes:
+        name: Of the argument, and of the dimension if there are several.
+        values: One entry each, also if there is one only.
+        names: Names or numbers along the dimension; None: one value, so no dimension.
+    """
+
+    name: str
+    values: _Values
+    names: NDArray[np.str_] | NDArray[np.int64] | None
+
+    @property
+    def labels(self) -> dict[str, Label]:
+        """The coordinate of the dimension, if there is one."""
+        if self.names is None:
+            return {}
+        kind = "name" if self.names.dtype.kind == "U" else "number"
+        units = "" if kind == "name" else "1"
+        return {self.name: Label((self.name,), self.names, f"{kind} of the {self.name}", units)}
+
+    def label(self, values: Array, dims: tuple[str, ...], long_name: str, units: str) -> Label:
+        """A coordinate with something of each value."""
+        if self.names is None:
+            return Label(dims, values[0], long_name, units)
+        return Label((self.name, *dims), values, long_name, units)
+
+
+def laws_of(
+    elasticity: Elasticity | Mapping[str, Elasticity] | None,
+) -> Choice[tuple[Elasticity | None, ...]]:
+    """The elasticities of all cables in turn; None stands for the arm's own.
+
+    Raises:
+        InvalidInput: Neither an elasticity nor a mapping of names to elasticities.
+    """
+    if elasticity is None or isinstance(elasticity, Elasticity):
+        return Choice("elasticity", (elasticity,), None)
+    if not isinstance(elasticity, Mapping) or not all(
+        isinstance(law, Elasticity) for law in elasticity.values()
+    ):
+        raise InvalidInput(
+            "elasticity",
+            f"{elasticity!r} given; give an Elasticity, or a mapping of names to several.",
+        )
+    return Choice("elasticity", tuple(elasticity.values()), _names("elasticity", elasticity))
+
+
+def wrenches_of(wrench: ArrayLike | Mapping[str, ArrayLike]) -> Choice[Array]:
+    """Wrenches (W, 6) at ``tool0`` in base axes: force [N], then moment [N m].
+
+    Raises:
+        InvalidInput: Not (6,), (W, 6) or a mapping of names to (6,).
+    """
+
+    def checked(name: str, value: ArrayLike) -> Array:
+        return vector(name, value, 6, "force [N], then moment [N m], base axes")
+
+    return _vectors("wrench", wrench, checked)
+
+
+def directions_of(direction: ArrayLike | Mapping[str, ArrayLike]) -> Choice[Array]:
+    """Unit directions (D, 3) in base axes.
+
+    Raises:
+        InvalidInput: Not (3,), (D, 3) or a mapping of names to (3,), or one of them is zero.
+    """
+    return _vectors("direction", direction, unit_direction)
+
+
+def bounds_of(minimum: ArrayLike, maximum: float) -> tuple[Choice[Array], float]:
+    """Lower bounds of tension (M,) [N] and the upper one.
+
+    Raises:
+        InvalidInput: Not numbers, negative, one given twice, or above the maximum.
+    """
+    several = np.ndim(number_array("minimum", minimum)) > 0
+    lows = distinct("minimum", minimum)
+    if lows.min() < 0.0:
+        raise InvalidInput(
+            "minimum", f"{lows.min():g} N given; cables only pull, so it cannot be negative."
+        )
+    unbounded = isinstance(maximum, (float, np.floating)) and maximum == math.inf
+    high = math.inf if unbounded else scalar("maximum", maximum)
+    if high < lows.max():
+        raise InvalidInput(
+            "maximum",
+            f"{high:g} N given, below a minimum of {lows.max():g} N; raise maximum or lower "
+            "minimum.",
+        )
+    return Choice("minimum", lows, np.arange(len(lows)) if several else None), high
+
+
+def distinct(name: str, values: ArrayLike) -> Array:
+    """Numbers (n,), one or more, none twice: the labels of a dimension.
+
+    Raises:
+        InvalidInput: They are not.
+    """
+    array = np.atleast_1d(number_array(name, values))
+    array = vector(name, array, array.size, "the values of a dimension")
+    if not array.size:
+        raise InvalidInput(name, "is empty; give at least one number.")
+    different, counts = np.unique(array, return_counts=True)
+    if counts.max() > 1:
+        raise InvalidInput(
+            name, f"holds {different[counts.argmax()]:g} twice; give each value once."
+        )
+    return array
+
+
+def _vectors(
+    name: str,
+    value: ArrayLike | Mapping[str, ArrayLike],
+    checked: Callable[[str, ArrayLike], Array],
+) -> Choice[Array]:
+    if isinstance(value, Mapping):
+        rows = [checked(f"{name}[{key!r}]", each) for key, each in value.items()]
+        return Choice(name, _rows(name, rows), _names(name, value))
+    array = number_array(name, value)
+    if array.ndim < 2:
+        return Choice(name, _rows(name, [checked(name, array)]), None)
+    rows = [checked(f"{name}[{i}]", each) for i, each in enumerate(array)]
+    return Choice(name, _rows(name, rows), np.arange(len(rows)))
+
+
+def _rows(name: str, rows: list[Array]) -> Array:
+    if not rows:
+        raise InvalidInput(name, "is empty; give at least one.")
+    return frozen(np.array(rows))
+
+
+def _names(name: str, values: Mapping[str, object]) -> NDArray[np.str_]:
+    if not values:
+        raise InvalidInput(name, "is empty; give at least one name and value.")
+    return np.array([text(f"name of {name}", key) for key in values])

@@ -1,0 +1,129 @@
+"""Blocks computed by the workers of a dask cluster; a worker that dies costs only its block."""
+
+from __future__ import annotations
+
+import itertools
+import secrets
+from collections.abc import Iterable, Iterator
+from functools import lru_cache
+from importlib.metadata import version
+from typing import TYPE_CHECKING
+
+from cdsm.errors import CdsmError, ClusterError, InvalidInput
+from cdsm.support.extras import need
+from cdsm.support.validation import Array
+from cdsm.sweeps.blocks import Block
+from cdsm.sweeps.evaluation import Answer, Problem, evaluate
+from cdsm.sweeps.specification import Question
+
+if TYPE_CHECKING:
+    from distributed import Client, Future
+
+_QUEUED = 2
+"""Blocks submitted for each thread of the cluster, so that the next is there when one is done."""
+
+_GO_ON = "What a store holds is kept: run the same again with store= to go on from there."
+
+
+def checked_client(client: object) -> None:
+    """Raise what is wrong with a client.
+
+    Raises:
+        MissingExtra: dask.distributed is not installed.
+        InvalidInput: Not a client, or one for asynchronous use.
+    """
+    need("dask", "distributed")
+    from distributed import Client
+
+    if not isinstance(client, Client) or client.asynchronous:
+        raise InvalidInput("client", f"{client!r} given; a synchronous dask Client is needed.")
+
+
+def on_cluster(
+    client: Client, question: Question, blocks: Iterable[Block]
+) -> Iterator[tuple[Block, Answer | None]]:
+    """Each block with its answer, in the order in which they finish; None: its workers died.
+
+    Dask hands a block whose worker died to another, ``allowed-failures`` times, and then gives it
+    up. As it also gives up blocks that only waited there, all of them are tried once more, alone.
+
+    Raises:
+        ClusterError: The scheduler is gone, or a worker cannot compute.
+    """
+    from distributed import as_completed
+    from distributed.protocol.pickle import dumps  # by value what a notebook defines
+
+    payload, ours = dumps(question.problem), version("cdsm-stiffness")
+
+    def submitted(block: Block) -> Future[Answer]:
+        q = question.poses.angles(block.start, block.stop)
+        key = f"cdsm-sweep-{secrets.token_hex(8)}"
+        return client.submit(_on_worker, payload, ours, q, key=key)
+
+    waiting, given_up = iter(blocks), []
+    running: dict[object, tuple[Future[Answer], Block]] = {}
+    finished = as_completed()
+    try:
+        while True:
+            room = _QUEUED * max(1, sum(client.ncores().values())) - len(running)
+            for block in itertools.islice(waiting, max(0, room)):
+                future = submitted(block)
+                running[future.key] = future, block
+                finished.add(future)
+            if not running:
+                break
+            future, block = running.pop(next(finished).key)
+            answer = _answer(future)
+            if answer is None:
+                given_up.append(block)
+            else:
+                yield block, answer
+        for block in given_up:
+            yield block, _answer(submitted(block))
+    except CdsmError:
+        raise
+    except Exception as error:
+        if client.status == "running":
+            raise
+        raise ClusterError(f"the client is {client.status} ({error}). {_GO_ON}") from error
+    finally:
+        if client.status == "running":
+            client.cancel([future for future, _ in running.values()])
+
+
+def _answer(future: Future[Answer]) -> Answer | None:
+    from distributed import CancelledError, KilledWorker
+
+    try:
+        answer: Answer = future.result()
+    except KilledWorker:
+        return None
+    except CdsmError:
+        raise
+    except (CancelledError, OSError) as error:
+        raise ClusterError(f"the scheduler has gone ({error}). {_GO_ON}") from error
+    except Exception as error:
+        raise ClusterError(
+            f"a worker failed: {error!r}. Workers need the same cdsm, and modules of your own that "
+            "define an elasticity, where they can import them."
+        ) from error
+    return answer
+
+
+def _on_worker(payload: bytes, client_version: str, q: Array) -> Answer:
+    ours = version("cdsm-stiffness")
+    if ours != client_version:
+        raise ClusterError(
+            f"a worker has cdsm {ours}, the client {client_version}; install the same."
+        )
+    # one thread: dask runs a task in each of its own
+    return evaluate(_problem(payload), q, threads=1)
+
+
+@lru_cache(maxsize=4)
+def _problem(payload: bytes) -> Problem:
+    """The problem as shipped, made once in each worker: an arm takes milliseconds to build."""
+    from distributed.protocol.pickle import loads
+
+    problem: Problem = loads(payload)
+    return problem

@@ -1,0 +1,87 @@
+"""A question and its answer as a labelled Dataset."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cdsm.errors import InvalidInput
+from cdsm.sweeps.quantities import LOST, QUANTITIES, SweepStatus
+from cdsm.sweeps.specification import Question
+
+if TYPE_CHECKING:
+    from typing import Any
+
+    import xarray
+
+_OF_SLIDES = {"N m": "N", "N m rad-1": "N m-1"}
+"""Units of torque and joint stiffness, and what they are where joints slide."""
+
+EMPTY = {"status": np.int8(SweepStatus.PENDING)}
+"""What stands where nothing is computed yet; NaN in all outputs."""
+
+
+def empty(question: Question, name: str) -> NDArray[Any]:
+    """An array for an output or ``status``, with nothing in it yet.
+
+    Raises:
+        InvalidInput: It does not fit into memory.
+    """
+    try:
+        return np.full(question.shape(name), EMPTY.get(name, np.float64(np.nan)))
+    except (MemoryError, ValueError):  # numpy's word for sizes beyond all memory
+        entries = " x ".join(map(str, question.shape(name)))
+        raise InvalidInput(
+            "outputs",
+            f"{name} has {entries} entries, more than fits into memory; ask for less, or give "
+            "store= a path.",
+        ) from None
+
+
+def to_dataset(question: Question, values: Mapping[str, NDArray[Any]]) -> xarray.Dataset:
+    """The coordinates of a question, and as many of its outputs as are given."""
+    import xarray
+
+    labels = question.labels.items()
+    found = xarray.Dataset(
+        coords={name: (label.dims, label.values, label.attributes) for name, label in labels},
+        attrs=dict(question.attributes),
+    )
+    return found.assign(
+        {
+            name: (question.dims(name), array, variable_attributes(question, name))
+            for name, array in values.items()
+        }
+    )
+
+
+def variable_attributes(question: Question, name: str) -> dict[str, Any]:
+    """What an output or ``status`` says of itself."""
+    if name != "status":
+        quantity = QUANTITIES[name]
+        units = _units(quantity.units, question.problem.arm.slides)
+        return {"long_name": quantity.long_name, "units": units}
+    outputs = question.problem.outputs
+    lost = {
+        kind: [name for name in outputs if QUANTITIES[name].stage in LOST[kind]]
+        for kind in SweepStatus
+    }
+    told = "; ".join(f"{kind.name.lower()}: {', '.join(lost[kind])}" for kind in lost if lost[kind])
+    return {
+        "long_name": "what became of the entry",
+        "units": "1",
+        "flag_values": [int(kind) for kind in SweepStatus],
+        "flag_meanings": " ".join(kind.name.lower() for kind in SweepStatus),
+        "comment": f"NaN stands only where the status says so, in: {told or 'nothing'}",
+    }
+
+
+def _units(turning: str, slides: NDArray[np.bool_]) -> str:
+    """Units of a quantity of an arm, some of whose joints may slide."""
+    sliding = _OF_SLIDES.get(turning)
+    if sliding is None or not slides.any():
+        return turning
+    return sliding if slides.all() else f"{turning} or {sliding}"

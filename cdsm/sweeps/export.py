@@ -1,0 +1,198 @@
+"""Sweeps as files: NetCDF, which holds everything, and CSV, a long table."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cdsm.errors import FileError, InvalidInput
+from cdsm.support.extras import need
+from cdsm.support.files import as_path, write_file
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
+_ROWS = 2**16
+"""Rows of a table made at once."""
+
+
+def write_sweep(dataset: xarray.Dataset, path: str | os.PathLike[str]) -> Path:
+    """Write a sweep, whole or not at all; return the path.
+
+    Args:
+        dataset: What :func:`~cdsm.sweeps.run.sweep` returns, or a part of it.
+        path: The file; replaced if it exists. ``.nc``: NetCDF, read back by :func:`read_sweep`
+            to the same bits. ``.csv``: a row for each posture and case, a column for each
+            coordinate and each component of an output, its unit [SI] in the header; empty where
+            the status, written as a word, says that there is nothing.
+
+    Raises:
+        InvalidInput: Not a sweep, a status without a meaning, or a path of neither kind.
+        MissingExtra: xarray or netCDF4 is not installed.
+        FileError: The file cannot be written.
+    """
+    check_sweep(dataset)
+    check_target(path)
+    if as_path(path).suffix.lower() == ".csv":
+        return write_file(path, lambda aside: _write_table(dataset, aside))
+    return write_file(path, lambda aside: _write_netcdf(dataset, aside))
+
+
+def read_sweep(path: str | os.PathLike[str]) -> xarray.Dataset:
+    """Read a sweep from NetCDF, or from the folder of its store.
+
+    Args:
+        path: What :func:`write_sweep` wrote as ``.nc``, or what was given as ``store=``, also
+            while its sweep is still running.
+
+    Raises:
+        MissingExtra: xarray, or netCDF4 or zarr, is not installed.
+        FileError: There is no such file, or it is no sweep.
+    """
+    need("sweep", "xarray")
+    path = as_path(path)
+    if path.is_dir():
+        need("sweep", "zarr")
+        from cdsm.sweeps import store  # needs zarr
+
+        found = store.read(path)
+    else:
+        found = _read_netcdf(path)
+    try:
+        check_sweep(found)
+    except InvalidInput:
+        raise FileError(path, "is not a sweep of cdsm: it has no status.") from None
+    return found
+
+
+def check_target(path: str | os.PathLike[str]) -> None:
+    """Raise what :func:`write_sweep` would, as far as that can be told before the sweep is there.
+
+    Raises:
+        InvalidInput: A path of neither kind.
+        MissingExtra: netCDF4 is needed and not installed.
+        FileError: Its folder does not exist.
+    """
+    path = as_path(path)
+    kind = path.suffix.lower()
+    if kind not in (".nc", ".csv"):
+        raise InvalidInput("path", f"{str(path)!r} ends neither in .nc (NetCDF) nor in .csv.")
+    if kind == ".nc":
+        need("sweep", "netCDF4")
+    if path.is_dir():
+        raise FileError(path, "is a folder; give the path of a file.")
+    if not path.parent.is_dir():
+        raise FileError(path, f"the folder {path.parent} does not exist; create it.")
+
+
+def check_sweep(dataset: object) -> None:
+    """Raise what is wrong with a sweep.
+
+    Raises:
+        MissingExtra: xarray is not installed.
+        InvalidInput: Not a Dataset with a status.
+    """
+    need("sweep", "xarray")
+    import xarray
+
+    if not isinstance(dataset, xarray.Dataset):
+        raise InvalidInput("dataset", f"{dataset!r} given; the Dataset of a sweep is needed.")
+    if "flag_meanings" not in dataset.get("status", xarray.DataArray()).attrs:
+        raise InvalidInput("dataset", "has no status; the Dataset of a sweep is needed.")
+
+
+def status_names(dataset: xarray.Dataset) -> dict[int, str]:
+    """The words for the numbers of ``status``, as the Dataset itself has them.
+
+    Raises:
+        InvalidInput: They are not one word for each number.
+    """
+    told = dataset["status"].attrs
+    try:
+        values = np.atleast_1d(told["flag_values"]).tolist()
+        return dict(zip(values, told["flag_meanings"].split(), strict=True))
+    except (KeyError, AttributeError, TypeError, ValueError):
+        raise InvalidInput(
+            "dataset", "its status has no word for each number; the Dataset of a sweep is needed."
+        ) from None
+
+
+def _read_netcdf(path: Path) -> xarray.Dataset:
+    need("sweep", "netCDF4")
+    import xarray
+
+    if not path.exists():
+        raise FileError(path, f"does not exist (looked in {Path.cwd()}).")
+    if not path.is_file():  # a pipe that nobody writes to would be waited for
+        raise FileError(path, "is not a regular file; give the path of a file.")
+    try:
+        with xarray.open_dataset(path, engine="netcdf4") as found:
+            return found.load()
+    except Exception as error:  # whatever netCDF4 and xarray raise
+        raise FileError(path, f"cannot be read as NetCDF: {error}.") from None
+
+
+def _write_netcdf(dataset: xarray.Dataset, path: Path) -> None:
+    try:
+        dataset.to_netcdf(path, engine="netcdf4")
+    except (RuntimeError, PermissionError) as error:  # HDF5 does not tell that a disk is full
+        free = shutil.disk_usage(path.parent).free
+        raise OSError(f"{error} ({free} bytes are free there)") from None
+
+
+def _write_table(dataset: xarray.Dataset, path: Path) -> None:
+    """A long table, some of its rows at a time."""
+    status = dataset["status"]
+    rest = status.size // max(1, status.shape[0]) if status.ndim else 1
+    step = max(1, _ROWS // max(1, rest))
+    first = status.dims[0] if status.ndim else None
+    starts = range(0, status.shape[0], step) if status.ndim else (0,)
+    with path.open("w", encoding="utf-8", newline="") as file:
+        for start in starts:
+            part = dataset if first is None else dataset.isel({first: slice(start, start + step)})
+            _table(part).to_csv(file, index=False, header=start == 0, lineterminator="\n")
+
+
+def _table(dataset: xarray.Dataset) -> pandas.DataFrame:
+    import pandas
+
+    status = dataset["status"]
+    columns: dict[str, NDArray[Any]] = {}
+    for name in (*dataset.coords, *dataset.data_vars):
+        variable = dataset[name]
+        if name == "status" or (variable.dims == (name,) and name not in status.dims):
+            continue  # a coordinate along the components is in the names of their columns
+        units = f" [{variable.units}]" if variable.attrs.get("units", "1") != "1" else ""
+        for suffix, component in _components(variable, status):
+            columns[f"{name}{suffix}{units}"] = component
+    words = status_names(dataset)
+    unknown = ~np.isin(status.values, list(words))
+    if unknown.any():
+        raise InvalidInput(
+            "dataset",
+            f"its status holds {status.values[unknown][0].item()!r}, which is none of {words}; the "
+            "file it was read from may be damaged.",
+        )
+    columns["status"] = np.array([words[int(value)] for value in status.values.ravel()])
+    return pandas.DataFrame(columns)
+
+
+def _components(
+    variable: xarray.DataArray, status: xarray.DataArray
+) -> Iterator[tuple[str, NDArray[Any]]]:
+    """Each component of a variable, with its name, as a column of one entry per status."""
+    inner = [dim for dim in variable.dims if dim not in status.dims]
+    names = [map(str, variable[dim].values.tolist()) for dim in inner]
+    for places in itertools.product(*(enumerate(each) for each in names)):
+        one = variable.isel({dim: i for dim, (i, _) in zip(inner, places, strict=True)})
+        # a dimension it lacks repeats it
+        full = one.broadcast_like(status).transpose(*status.dims)
+        yield "".join(f"_{name}" for _, name in places), full.values.ravel()

@@ -1,0 +1,288 @@
+"""Pose sets: grids over named joints, paths along a polyline, Sobol points within the limits.
+
+A pose set knows no arm. :func:`poses_of` puts it to one; what comes out knows its dimensions and
+labels, and makes the joint angles of any part of itself, so that a large grid is never held.
+"""
+
+from __future__ import annotations
+
+import itertools
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cdsm.errors import InvalidInput
+from cdsm.manipulator import Manipulator
+from cdsm.support.validation import (
+    Array,
+    ReadOnlyState,
+    frozen,
+    number_array,
+    one_of,
+    scalar,
+    whole_number,
+)
+from cdsm.sweeps.arguments import distinct
+from cdsm.sweeps.labels import Label
+
+MAXIMUM_POSES = 2**30
+"""Of a path or drawn; the Sobol sequence of scipy has 30 bits."""
+
+_DRAWN = 2**16
+"""Points drawn at once."""
+
+
+@final
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Listed:
+    """Postures one by one, along the dimension ``pose``.
+
+    Attributes:
+        q: Joint angles (N, nv) [rad].
+        labels: Its coordinates, by name.
+        told: What it is, in words.
+    """
+
+    q: Array
+    labels: Mapping[str, Label]
+    told: str
+
+    @property
+    def sizes(self) -> dict[str, int]:
+        """Its dimensions."""
+        return {"pose": len(self.q)}
+
+    def angles(self, start: int, stop: int) -> Array:
+        """Joint angles (stop − start, nv) [rad] of some of its postures."""
+        return self.q[start:stop]
+
+
+@final
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Product:
+    """All combinations of some joints' angles, the last joint fastest; the others stand still.
+
+    Attributes:
+        values: Angles [rad] of each joint of the grid.
+        joints: Which joints these are.
+        rest: Joint angles (nv,) [rad] of those that stand still.
+        labels: Its coordinates, by name: those of the grid first.
+        told: What it is, in words.
+    """
+
+    values: tuple[Array, ...]
+    joints: tuple[int, ...]
+    rest: Array
+    labels: Mapping[str, Label]
+    told: str
+
+    @property
+    def sizes(self) -> dict[str, int]:
+        """Its dimensions."""
+        return dict(zip(self.labels, map(len, self.values), strict=False))
+
+    def angles(self, start: int, stop: int) -> Array:
+        """Joint angles (stop − start, nv) [rad] of some of its postures, counted in C order."""
+        q = np.tile(self.rest, (stop - start, 1))
+        places = np.unravel_index(np.arange(start, stop), [len(each) for each in self.values])
+        for joint, values, place in zip(self.joints, self.values, places, strict=True):
+            q[:, joint] = values[place]
+        return frozen(q)
+
+
+class PoseSet(ABC):
+    """A set of postures to sweep over: a grid, a path or random ones."""
+
+    @abstractmethod
+    def _of(self, arm: Manipulator) -> Listed | Product:
+        """The set for this arm."""
+
+
+@final
+@dataclass(frozen=True, init=False)
+class GridPoses(PoseSet):
+    """All combinations of the angles given for some joints; each becomes a dimension of its name.
+
+    Args:
+        angles: Angles [rad] by name of the joint, each (n,) or one.
+        rest: Angles [rad] of joints that stand still, by name; 0 where none is given.
+
+    Attributes:
+        swept: Name of each joint of the grid with its angles [rad].
+        resting: Name of each joint that was given one angle, with it [rad].
+
+    Raises:
+        InvalidInput: No joint is named, one has no angles or one of them twice, or is in both.
+    """
+
+    swept: tuple[tuple[str, tuple[float, ...]], ...]
+    resting: tuple[tuple[str, float], ...]
+
+    def __init__(
+        self, angles: Mapping[str, ArrayLike], rest: Mapping[str, float] | None = None
+    ) -> None:
+        still = {} if rest is None else rest
+        for name, given in (("angles", angles), ("rest", still)):
+            if not isinstance(given, Mapping):
+                raise InvalidInput(name, f"{given!r} given; a mapping of joint names is needed.")
+        if not angles:
+            raise InvalidInput("angles", "is empty; name at least one joint and its angles [rad].")
+        for name in angles.keys() & still.keys():
+            raise InvalidInput("rest", f"{name} is swept over; leave it out here.")
+        swept = {name: distinct(f"angles[{name!r}]", each) for name, each in angles.items()}
+        resting = {name: scalar(f"rest[{name!r}]", angle) for name, angle in still.items()}
+        object.__setattr__(
+            self, "swept", tuple((name, tuple(each.tolist())) for name, each in swept.items())
+        )
+        object.__setattr__(self, "resting", tuple(resting.items()))
+
+    def _of(self, arm: Manipulator) -> Product:
+        names = arm.joint_names
+        rest = np.zeros(arm.nv)
+        for name, angle in self.resting:
+            rest[names.index(one_of("joint", name, names))] = angle
+        joints = tuple(names.index(one_of("joint", name, names)) for name, _ in self.swept)
+        values = tuple(frozen(np.array(each)) for _, each in self.swept)
+        labels = {
+            names[joint]: Label((names[joint],), each, *_meaning(arm, joint))
+            for joint, each in zip(joints, values, strict=True)
+        }
+        labels |= {
+            name: Label((), float(rest[joint]), *_meaning(arm, joint))
+            for joint, name in enumerate(names)
+            if joint not in joints
+        }
+        return Product(
+            values=values,
+            joints=joints,
+            rest=frozen(rest),
+            labels=labels,
+            told=f"grid over {', '.join(names[joint] for joint in joints)}",
+        )
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class PathPoses(ReadOnlyState, PoseSet):
+    """Postures along straight lines in joint space from one waypoint to the next.
+
+    Attributes:
+        waypoints: Joint angles (n, nv) [rad], two or more postures.
+        count: How many postures, evenly spaced in √Σδθ² along the path, both ends included; None:
+            the waypoints themselves.
+
+    Raises:
+        InvalidInput: Not two or more postures, a path without length, or a count below 2 or above
+            2³⁰.
+    """
+
+    waypoints: Array
+    count: int | None = None
+
+    def __post_init__(self) -> None:
+        waypoints = number_array("waypoints", self.waypoints)
+        if waypoints.ndim != 2 or len(waypoints) < 2:
+            raise InvalidInput(
+                "waypoints",
+                f"shape {waypoints.shape} given, (n, nv) needed: two or more postures [rad].",
+            )
+        if self.count is not None:
+            whole_number("count", self.count, 2, MAXIMUM_POSES)
+        object.__setattr__(self, "waypoints", frozen(waypoints))
+        if self.count is not None and not self._distances[-1] > 0.0:
+            raise InvalidInput("waypoints", "are all the same posture; give two different ones.")
+
+    @property
+    def _distances(self) -> Array:
+        """Way to each waypoint (K,) [rad]."""
+        steps = np.linalg.norm(np.diff(self.waypoints, axis=0), axis=1)
+        return np.concatenate([[0.0], np.cumsum(steps)])
+
+    def _of(self, arm: Manipulator) -> Listed:
+        known = self._distances
+        q, way = checked_angles("waypoints", self.waypoints, arm), known
+        if self.count is not None:
+            way = np.linspace(0.0, known[-1], self.count)
+            q = np.column_stack([np.interp(way, known, column) for column in q.T])
+        distance = Label(("pose",), way, "way along the path in joint space", _unit(arm))
+        return _listed(q, arm, f"path of {len(known)} waypoints", {"distance": distance})
+
+
+@final
+@dataclass(frozen=True)
+class RandomPoses(PoseSet):
+    """Points of a scrambled Sobol sequence, spread evenly within the joint limits.
+
+    Attributes:
+        count: How many; powers of two fill the space most evenly.
+        seed: The same seed gives the same postures.
+
+    Raises:
+        InvalidInput: A count below 1 or above 2³⁰, or a seed that is no whole number from 0 on.
+    """
+
+    count: int
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        whole_number("count", self.count, 1, MAXIMUM_POSES)
+        whole_number("seed", self.seed, 0)
+
+    def _of(self, arm: Manipulator) -> Listed:
+        from scipy.stats import qmc  # takes half a second to import
+
+        sequence = qmc.Sobol(arm.nv, seed=np.random.default_rng(self.seed))
+        q = np.empty((self.count, arm.nv))
+        # the first by itself: scipy warns of counts that are no power of two, which are meant here
+        edges = [0, *range(1, self.count, _DRAWN), self.count]
+        for start, stop in itertools.pairwise(edges):
+            q[start:stop] = sequence.random(stop - start)
+        q *= arm.upper - arm.lower
+        q += arm.lower
+        told = f"{self.count} Sobol points within the joint limits, seed {self.seed}"
+        return _listed(q, arm, told, {})
+
+
+def poses_of(arm: Manipulator, q: PoseSet | ArrayLike) -> Listed | Product:
+    """A pose set, or postures (N, nv) [rad] given as an array, put to an arm.
+
+    Raises:
+        InvalidInput: Neither, or not the joint angles of this arm.
+        UnknownName: A grid over a joint the arm does not have.
+    """
+    if isinstance(q, PoseSet):
+        return q._of(arm)
+    return _listed(checked_angles("q", q, arm), arm, "postures as given", {})
+
+
+def checked_angles(name: str, q: ArrayLike, arm: Manipulator) -> Array:
+    """Joint angles (N, nv) [rad], one or more postures of the arm."""
+    angles = number_array(name, q)
+    if angles.ndim != 2 or angles.shape[1] != arm.nv or not len(angles):
+        raise InvalidInput(
+            name,
+            f"shape {angles.shape} given, (N, {arm.nv}) needed: one or more postures, each one "
+            f"angle [rad] per joint, {', '.join(arm.joint_names)}.",
+        )
+    return angles
+
+
+def _unit(arm: Manipulator) -> str:
+    """Of joint angles, or of what is mixed of angles and ways."""
+    return "rad or m" if arm.slides.any() else "rad"
+
+
+def _meaning(arm: Manipulator, joint: int) -> tuple[str, str]:
+    """What the coordinate of a joint is, and its unit."""
+    what = "way" if arm.slides[joint] else "angle"
+    return f"{what} of {arm.joint_names[joint]}", arm.joint_units[joint]
+
+
+def _listed(q: Array, arm: Manipulator, told: str, labels: dict[str, Label]) -> Listed:
+    labels["pose"] = Label(("pose",), np.arange(len(q)), "number of the posture", "1")
+    labels["q"] = Label(("pose", "joint"), q, "joint angles", _unit(arm))
+    return Listed(q=frozen(q), labels=labels, told=told)

@@ -1,0 +1,189 @@
+"""A sweep from beginning to end: in memory or into a store, here or on a cluster."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cdsm.elasticity import Elasticity
+from cdsm.errors import FileError
+from cdsm.manipulator import Manipulator
+from cdsm.support.extras import need
+from cdsm.support.files import as_path
+from cdsm.support.validation import flag, whole_number
+from cdsm.sweeps.blocks import Block, blocks, extents
+from cdsm.sweeps.cluster import checked_client, on_cluster
+from cdsm.sweeps.dataset import empty, to_dataset
+from cdsm.sweeps.evaluation import Answer, evaluate
+from cdsm.sweeps.poses import PoseSet
+from cdsm.sweeps.quantities import DEFAULT, SweepStatus
+from cdsm.sweeps.specification import Question, ask
+
+if TYPE_CHECKING:
+    import xarray
+    from distributed import Client
+
+_NUMBERS = 2**18
+"""Joint angles in a block unless told otherwise: some tenths of a second of work."""
+
+_AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+_NO_WRENCH = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def sweep(
+    arm: Manipulator,
+    q: PoseSet | ArrayLike,
+    *,
+    minimum: ArrayLike = 0.0,
+    maximum: float = np.inf,
+    elasticity: Elasticity | Mapping[str, Elasticity] | None = None,
+    wrench: ArrayLike | Mapping[str, ArrayLike] = _NO_WRENCH,
+    direction: ArrayLike | Mapping[str, ArrayLike] = _AXES,
+    outputs: Iterable[str] = DEFAULT,
+    store: str | os.PathLike[str] | None = None,
+    client: Client | None = None,
+    chunk: int | None = None,
+    progress: bool = True,
+) -> xarray.Dataset:
+    """Stiffness over many postures, and every combination of what is given several of.
+
+    At each posture, least tensions F in balance (Eqs. 13, 17), and the stiffness under them (Eq.
+    16). No entry fails: each has a ``status``, see :class:`~cdsm.SweepStatus`, and
+    NaN stands only where that says so. Coordinates and variables carry ``long_name`` and ``units``
+    (SI); the attributes hold geometry, cables and version.
+
+    Args:
+        arm: The arm.
+        q: Postures: :class:`~cdsm.GridPoses` (a dimension for each joint of the grid),
+            :class:`~cdsm.PathPoses`, :class:`~cdsm.RandomPoses`, or joint
+            angles (N, nv) [rad] (dimension ``pose``).
+        minimum: Lower bound of all tensions [N]; several: dimension ``minimum``.
+        maximum: Upper bound of all tensions [N]; inf for none.
+        elasticity: Of all cables; several by name: dimension ``elasticity``. None: the arm's own.
+        wrench: At ``tool0`` in base axes (6,): force [N], then moment [N m]. Several, (W, 6) or by
+            name: dimension ``wrench``.
+        direction: Of ``along`` (3,), any length. Several, (D, 3) or by name: dimension
+            ``direction``.
+        outputs: Names of what is computed, from the keys of
+            :data:`~cdsm.sweeps.quantities.QUANTITIES`.
+        store: A Zarr folder that the entries are written to as they are computed. Asked again, the
+            run goes on from what is there, entries of lost workers first among it, to the same bits
+            as without a stop. The Dataset then reads from it what is looked at. A law of your own
+            is known by its class, its state, and EA and strain at up to 185 tensions: if its code
+            has changed there since, that is another sweep.
+        client: Of a dask cluster whose workers compute, and are waited for while there are none;
+            None: the threads of this machine.
+        chunk: How many stiffnesses are computed, sent and stored at once; a store keeps the one it
+            was made with.
+        progress: Show a bar with rate and time left, if there is a terminal.
+
+    Returns:
+        A Dataset of the outputs [SI] and ``status``, dimensions (poses, cases, the quantity's own).
+
+    Raises:
+        InvalidInput: Names the argument, and says what is wrong with it.
+        UnknownName: No such joint or output.
+        MissingExtra: xarray, zarr or distributed is not installed.
+        FileError: The store cannot be made, read or written.
+        StoreError: The store holds another sweep, a law of your own has changed since, or another
+            run is writing to it.
+        ClusterError: The scheduler is gone, or a worker cannot compute.
+    """
+    need("sweep", "xarray", *(["zarr"] if store is not None else []))
+    flag("progress", progress)
+    if client is not None:
+        checked_client(client)
+    question = ask(
+        arm,
+        q,
+        minimum=minimum,
+        maximum=maximum,
+        elasticity=elasticity,
+        wrench=wrench,
+        direction=direction,
+        outputs=outputs,
+    )
+    extent = extents(question.poses.sizes, _postures(question, chunk))
+    if store is None:
+        values = {name: empty(question, name) for name in (*question.problem.outputs, "status")}
+        _run(question, values, extent, client, progress)
+        return to_dataset(question, values)
+
+    from cdsm.sweeps import store as stores  # needs zarr
+
+    path = as_path(store)
+    with stores.opened(path, question, extent) as arrays:
+        kept = dict(zip(question.poses.sizes, arrays["status"].chunks, strict=False))
+        _run(question, arrays, kept, client, progress, path)
+    return stores.read(path)
+
+
+def _postures(question: Question, chunk: int | None) -> int:
+    """How many postures make a block."""
+    if chunk is None:
+        return _NUMBERS // (question.problem.arm.nv * question.problem.cases)
+    return whole_number("chunk", chunk, 1) // question.problem.cases
+
+
+def _run(
+    question: Question,
+    arrays: Mapping[str, Any],
+    extent: Mapping[str, int],
+    client: Client | None,
+    progress: bool,
+    path: Path | None = None,
+) -> None:
+    """Compute what is pending, and write it into arrays of numpy, or of zarr at that path."""
+    from cdsm.sweeps.progress import progress_bar  # rich takes a while to import
+
+    every = list(blocks(question.poses.sizes, extent))
+    todo = [block for block in every if _is_pending(question, arrays["status"], block)]
+    cases = question.problem.cases
+    total, left = (sum(b.stop - b.start for b in some) * cases for some in (every, todo))
+    answers: Iterator[tuple[Block, Answer | None]]
+    if client is None:
+        answers = (
+            (block, evaluate(question.problem, question.poses.angles(block.start, block.stop)))
+            for block in todo
+        )
+    else:
+        answers = on_cluster(client, question, todo)
+    with ExitStack() as stack:
+        advance = stack.enter_context(progress_bar(total, total - left, wanted=progress))
+        for block, answer in answers:
+            try:
+                _write(question, arrays, block, answer)
+            except OSError as error:
+                raise FileError(path, f"cannot be written: {error}.") from error
+            advance((block.stop - block.start) * cases)
+
+
+def _is_pending(question: Question, status: Any, block: Block) -> bool:
+    found = status[_region(question, "status", block)]
+    return bool(np.isin(found, (SweepStatus.PENDING, SweepStatus.WORKER_LOST)).any())
+
+
+def _write(
+    question: Question, arrays: Mapping[str, Any], block: Block, answer: Answer | None
+) -> None:
+    if answer is not None:
+        for name in question.problem.outputs:
+            shape = question.shape(name, block.slices)
+            arrays[name][_region(question, name, block)] = answer[name].reshape(shape)
+    # last: it says that the rest is there
+    region = _region(question, "status", block)
+    if answer is None:
+        arrays["status"][region] = np.int8(SweepStatus.WORKER_LOST)
+    else:
+        shape = question.shape("status", block.slices)
+        arrays["status"][region] = answer["status"].reshape(shape)
+
+
+def _region(question: Question, name: str, block: Block) -> tuple[slice, ...]:
+    return tuple(block.slices.get(dim, slice(None)) for dim in question.dims(name))

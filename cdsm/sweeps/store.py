@@ -1,0 +1,202 @@
+"""A sweep on disk, a Zarr folder: what is computed stays, and a run that was stopped goes on.
+
+Every block is a chunk of each array, and lands by writing aside and renaming. Its ``status`` is
+written last: where that says anything but pending, all the rest is there.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import itertools
+import os
+import secrets
+import shutil
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cdsm.errors import FileError, StoreError
+from cdsm.sweeps.dataset import EMPTY, to_dataset, variable_attributes
+from cdsm.sweeps.description import changed_laws
+from cdsm.sweeps.specification import Question
+
+if TYPE_CHECKING:
+    import xarray
+    import zarr
+
+_ORDER = "order"
+"""Attribute with the names of all variables, which a folder does not keep in order."""
+
+_TOLD = 8
+"""Differences an error lists."""
+
+
+@contextmanager
+def opened(
+    path: Path, question: Question, extent: Mapping[str, int]
+) -> Iterator[Mapping[str, zarr.Array[Any]]]:
+    """The arrays of a store, one per output and ``status``; made if there is none.
+
+    Nobody else can have it open for writing meanwhile, and the system lets go of it when the
+    process ends, however it ends.
+
+    Raises:
+        FileError: It cannot be made or read, or something else stands there.
+        StoreError: It holds another sweep, or another run has it open.
+    """
+    import zarr
+
+    if not path.exists():
+        _make(path, question, extent)
+    try:
+        folder = os.open(path, os.O_RDONLY | os.O_DIRECTORY)
+    except OSError as error:
+        raise FileError(path, f"cannot be opened as a store: {error.strerror}.") from None
+    try:
+        try:
+            fcntl.flock(folder, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise StoreError(path, "another run is writing to it; wait for it to end.") from None
+        except OSError as error:
+            raise FileError(path, f"cannot be locked: {error.strerror}.") from None
+        _check(path, question)
+        group = zarr.open_group(path, mode="r+", use_consolidated=False)
+        yield {name: _array(group, name) for name in (*question.problem.outputs, "status")}
+    finally:
+        os.close(folder)
+
+
+def read(path: Path) -> xarray.Dataset:
+    """What a store holds; numbers are read when they are looked at.
+
+    Raises:
+        FileError: It is no store that can be read.
+    """
+    import xarray
+
+    for described in (path / "zarr.json", *path.glob("*/zarr.json")):
+        if described.exists() and not described.is_file():  # a pipe would be waited for
+            raise FileError(path, f"is not a sweep's store: {described.name} is not a file.")
+    try:
+        found: xarray.Dataset = xarray.open_zarr(path, chunks=None, consolidated=False)
+    except Exception as error:  # whatever zarr, its codecs or the file system raise
+        raise FileError(path, f"is not a sweep's store: {error}.") from None
+    order = [name for name in found.attrs.pop(_ORDER, ()) if name in found.variables]
+    for name in order:
+        if found[name].dtype.kind in "OT":  # texts, of numpy's new kind or its oldest
+            texts = np.array(found[name].values.tolist())
+            found = found.assign_coords({name: (found[name].dims, texts, found[name].attrs)})
+        found[name].encoding = {}  # how it lies here is of no concern to a file it is written to
+    return found[order]
+
+
+def _array(group: zarr.Group, name: str) -> zarr.Array[Any]:
+    array: zarr.Array[Any] = group[name]  # type: ignore[assignment]
+    return array
+
+
+def _make(path: Path, question: Question, extent: Mapping[str, int]) -> None:
+    """Write a store with nothing in it aside, then rename it into place."""
+    import zarr
+
+    if not path.parent.is_dir():  # which zarr would make
+        raise FileError(path, f"the folder {path.parent} does not exist; create it.")
+    aside = path.with_name(f".{path.name}-{secrets.token_hex(4)}")
+    try:
+        names = (*question.problem.outputs, "status")
+        labels = to_dataset(question, {})
+        labels.attrs[_ORDER] = [*question.labels, *names]
+        for name, label in labels.coords.items():
+            if label.dtype.kind == "U":  # texts of one width have no place in the format
+                labels[name] = label.astype(object)
+        labels.to_zarr(aside, mode="w-", zarr_format=3, consolidated=False)
+        group = zarr.open_group(aside, mode="r+", use_consolidated=False)
+        for name in names:
+            dims, shape = question.dims(name), question.shape(name)
+            fill = EMPTY.get(name, np.float64(np.nan))
+            group.create_array(
+                name,
+                shape=shape,
+                chunks=tuple(extent.get(dim, size) for dim, size in zip(dims, shape, strict=True)),
+                dtype=fill.dtype,
+                fill_value=fill,
+                dimension_names=dims,
+                attributes=variable_attributes(question, name),
+            )
+        with suppress(FileExistsError):  # another run was faster; its store will be looked at
+            _rename(aside, path)
+    except (OSError, ValueError) as error:
+        raise FileError(path, f"cannot be made a store: {error}.") from None
+    finally:
+        shutil.rmtree(aside, ignore_errors=True)
+
+
+def _rename(aside: Path, path: Path) -> None:
+    try:
+        aside.rename(path)
+    except OSError:
+        if path.exists():
+            raise FileExistsError(path) from None
+        raise
+
+
+def _check(path: Path, question: Question) -> None:
+    """Raise what tells a store from one for this question."""
+    stored, wanted = read(path), to_dataset(question, {})
+    held, asked = {str(name) for name in stored.data_vars}, {*question.problem.outputs, "status"}
+    different = [f"outputs: {each} in the store alone" for each in sorted(held - asked)]
+    different += [f"outputs: {each} not in the store" for each in sorted(asked - held)]
+    for name in {**stored.coords, **wanted.coords}:
+        if name not in wanted.coords:
+            different.append(f"{name}: in the store alone")
+        elif name not in stored.coords:
+            different.append(f"{name}: not in the store")
+        else:
+            different += _difference(str(name), stored[name].values, wanted[name].values)
+    for name in {**stored.attrs, **wanted.attrs}:
+        theirs, ours = (str(each.attrs.get(name, "nothing")) for each in (stored, wanted))
+        if changed := changed_laws(theirs, ours):
+            different += [
+                f"{name}: {law} answers otherwise than when the store was made; its code has "
+                "changed, and what the store holds is not what it gives now"
+                for law in changed
+            ]
+        elif theirs != ours:  # told from a little before they part
+            same = itertools.takewhile(
+                lambda pair: pair[0] == pair[1], zip(theirs, ours, strict=False)
+            )
+            start = max(0, len(list(same)) - 30)
+            different.append(_told(str(name), theirs[start:], ours[start:]))
+    if different:
+        more = f"\n  - and {len(different) - _TOLD} more" if len(different) > _TOLD else ""
+        listed = "".join(f"\n  - {each}" for each in different[:_TOLD]) + more
+        raise StoreError(
+            path,
+            f"holds another sweep; ask the same again, or give another path to store=:{listed}",
+            different,
+        )
+
+
+def _difference(name: str, stored: NDArray[Any], wanted: NDArray[Any]) -> list[str]:
+    """The first difference of two arrays, in words, if there is one."""
+    if stored.shape != wanted.shape:
+        return [_told(name, stored, wanted)]
+    places = np.argwhere(stored != wanted)
+    if not len(places):
+        return []
+    place = tuple(places[0].tolist())
+    where = f"{name}{list(place)}" if place else name
+    return [_told(where, stored[place], wanted[place])]
+
+
+def _told(what: str, stored: object, wanted: object) -> str:
+    return f"{what}: {_short(stored)} in the store, {_short(wanted)} wanted"
+
+
+def _short(value: object) -> str:
+    text = " ".join(str(value).split())
+    return text if len(text) <= 80 else f"{text[:77]}..."

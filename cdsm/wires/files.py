@@ -1,0 +1,131 @@
+"""Elasticities as TOML: one file per wire, strict, read back to the last bit."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from cdsm.elasticity import Elasticity, LinearElasticity
+from cdsm.errors import FileError, GeometryError, InvalidInput, listed
+from cdsm.support.files import read_text, write_text
+from cdsm.support.records import Number, Positive, parse, read_toml, record, toml_lines
+from cdsm.wires.laws import StrandElasticity, TabulatedElasticity
+
+_Row = Annotated[tuple[Number, ...], Field(strict=False)]
+
+
+@record
+class _Linear:
+    kind: Literal["linear"] = "linear"
+    rigidity: Positive
+
+    def build(self) -> Elasticity:
+        return LinearElasticity(self.rigidity)
+
+
+@record
+class _Strand:
+    kind: Literal["strand"] = "strand"
+    low: Number
+    high: Number
+    joins: _Row
+    coefficients: Annotated[tuple[_Row, ...], Field(strict=False)]
+
+    def build(self) -> Elasticity:
+        return StrandElasticity(self.coefficients, self.joins, self.low, self.high)
+
+
+@record
+class _Tabulated:
+    kind: Literal["tabulated"] = "tabulated"
+    tensions: _Row
+    strains: _Row
+
+    def build(self) -> Elasticity:
+        return TabulatedElasticity(self.tensions, self.strains)
+
+
+_KINDS: dict[str, type[_Linear | _Strand | _Tabulated]] = {
+    "linear": _Linear,
+    "strand": _Strand,
+    "tabulated": _Tabulated,
+}
+
+
+def table_of(elasticity: Elasticity) -> list[str]:
+    """The lines of its TOML table.
+
+    Raises:
+        InvalidInput: An elasticity of another kind, which no file can hold.
+    """
+    found: _Linear | _Strand | _Tabulated
+    if isinstance(elasticity, LinearElasticity):
+        found = _Linear(rigidity=float(elasticity.rigidity(0.0)))
+    elif isinstance(elasticity, StrandElasticity):
+        found = _Strand(
+            low=float(elasticity.low),
+            high=float(elasticity.high),
+            joins=elasticity.joins,
+            coefficients=elasticity.coefficients,
+        )
+    elif isinstance(elasticity, TabulatedElasticity):
+        found = _Tabulated(tensions=elasticity.tensions, strains=elasticity.strains)
+    else:
+        raise InvalidInput(
+            "elasticity",
+            f"a {type(elasticity).__name__} given; files hold a LinearElasticity, "
+            "StrandElasticity or TabulatedElasticity. Tabulate its strain to save it.",
+        )
+    return toml_lines(found)
+
+
+def from_table(data: object) -> Elasticity:
+    """The elasticity of a TOML table.
+
+    Raises:
+        GeometryError: Lists every fault of the table.
+        InvalidInput: Its numbers make no elasticity.
+    """
+    kind = data.get("kind") if isinstance(data, dict) else data
+    if not isinstance(kind, str) or kind not in _KINDS:
+        raise GeometryError([f"kind: must be one of {', '.join(_KINDS)}, but is {kind!r}"])
+    return parse(_KINDS[kind], data).build()
+
+
+def write_elasticity(elasticity: Elasticity, path: str | os.PathLike[str]) -> Path:
+    """Write an elasticity as TOML; :func:`read_elasticity` gives the same one back.
+
+    Args:
+        elasticity: Linear, strand or tabulated.
+        path: The file; replaced if it exists.
+
+    Raises:
+        InvalidInput: An elasticity of another kind, which no file can hold.
+        FileError: The file cannot be written.
+    """
+    units = "# Elasticity of a wire: tensions and rigidity in N, strains without unit\n"
+    return write_text(path, units + "\n".join(table_of(elasticity)) + "\n")
+
+
+def read_elasticity(path: str | os.PathLike[str]) -> Elasticity:
+    """Read an elasticity that :func:`write_elasticity` wrote, or one written by hand.
+
+    Args:
+        path: TOML: ``kind`` is ``linear`` (``rigidity`` [N]), ``strand`` (``coefficients`` [N, 1,
+            1/N, …], ``joins``, ``low``, ``high`` [N]) or ``tabulated`` (``tensions`` [N],
+            ``strains`` [-]).
+
+    Raises:
+        FileError: The file cannot be read or is no elasticity; every fault is listed.
+    """
+    text = read_text(path)
+    try:
+        return from_table(read_toml(text))
+    except GeometryError as error:
+        faults = error.faults
+    except InvalidInput as error:
+        faults = (str(error),)
+    raise FileError(path, f"is not an elasticity, {len(faults)} found:{listed(faults)}")

@@ -1,0 +1,173 @@
+"""∫ Fⁿ dF/p(F) over piecewise polynomials p, to rounding and fast: panels, each with a Gauss rule.
+
+1/p is analytic but at the roots of p, and the error of a Gauss rule on an interval is set by how
+near they are: it falls by ρ² per node, where ρ is the sum of the half-axes (over the half-width) of
+the ellipse through the nearest root that has the ends of the interval for its foci. So the panels
+follow from the roots, and on a part of a panel the rule is better still.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.polynomial import Polynomial
+from numpy.polynomial.legendre import leggauss
+from numpy.typing import NDArray
+
+from cdsm.kernels.compiling import compiled
+from cdsm.support.validation import Array
+
+_NODES, _WEIGHTS = (leggauss(12)[0] + 1.0) / 2.0, leggauss(12)[1] / 2.0
+_POWERS = (0, 1)
+
+_NEAREST = 6.0
+"""ρ of the nearest root: ρ^-24 = 2e-19, which leaves a factor of 1000 to the growth of 1/p."""
+
+_ROUNDING = 1e-14
+"""A polynomial this small beside the sum of its terms' magnitudes is zero."""
+
+_NEGLIGIBLE = 1e-30
+"""A term of a polynomial this part of its largest one leaves no trace."""
+
+_NARROWEST = 4
+"""Panels shrink towards a root at their end; this many units in the last place are none."""
+
+
+def coefficient_table(rows: Sequence[Sequence[float]]) -> Array:
+    """Coefficients of several polynomials, lowest power first, (powers, polynomials)."""
+    longest = max(map(len, rows))
+    return np.array([[*row, *[0.0] * (longest - len(row))] for row in rows]).T
+
+
+def piecewise(joins: Array, table: Array, F: Array) -> Array:
+    """Polynomials of a table in a row, each up to its join, at F; same shape as F."""
+    return np.asarray(_polynomials(joins, table, F.ravel()).reshape(F.shape))
+
+
+@compiled
+def _polynomials(joins: Array, table: Array, F: Array) -> Array:
+    result = np.empty(F.shape[0])
+    for i in range(F.shape[0]):
+        result[i] = _horner(table, np.searchsorted(joins, F[i]), F[i])
+    return result
+
+
+@compiled
+def _horner(table: Array, column: int, F: float) -> float:
+    value = 0.0
+    for row in range(table.shape[0] - 1, -1, -1):
+        value = value * F + table[row, column]
+    return value
+
+
+@compiled
+def _integrals(edges: Array, table: Array, before: Array, power: int, F: Array) -> Array:
+    """∫ Fⁿ dF/p from the low end to each of F (N,); see :class:`Panels`."""
+    result = np.empty(F.shape[0])
+    for i in range(F.shape[0]):
+        panel = np.searchsorted(edges[1:-1], F[i])  # an edge belongs to the panel below it
+        start = edges[panel]
+        width, total = F[i] - start, 0.0
+        for node in range(_NODES.shape[0]):
+            x = start + width * _NODES[node]
+            part = _WEIGHTS[node] / _horner(table, panel, x)
+            total += part * x if power else part
+        result[i] = before[power, panel] + width * total
+    return result
+
+
+class Panels(NamedTuple):
+    """The panels from the low end up to :attr:`end`; made by :func:`panels`.
+
+    Attributes:
+        edges: Where they begin and end, (P+1,).
+        coefficients: Of the polynomial on each, lowest power first, (powers, P).
+        before: ∫ Fⁿ dF/p from the low end to the beginning of each, n = 0 and 1, (2, P).
+        end: Up to where p is positive; inf if it is all the way.
+    """
+
+    edges: Array
+    coefficients: Array
+    before: Array
+    end: float
+
+    def integral(self, F: Array, power: int) -> Array:
+        """∫ Fⁿ dF/p from the low end to each of F, any shape, none above :attr:`end`."""
+        found = _integrals(self.edges, self.coefficients, self.before, power, F.ravel())
+        return np.asarray(found.reshape(F.shape))
+
+
+def panels(rows: Sequence[Sequence[float]], edges: Sequence[float]) -> Panels:
+    """Divide piecewise polynomials into panels.
+
+    Args:
+        rows: Coefficients of each, lowest power first.
+        edges: Where the first begins and where each ends; rising, one more than the rows.
+    """
+    ends: list[float] = [edges[0]]
+    piece: list[int] = []
+    end = np.inf
+    for index, (row, (low, high)) in enumerate(zip(rows, pairwise(edges), strict=True)):
+        p = Polynomial(_significant(row, high))
+        stop = _positive_until(p, low, high)
+        inner = _divided(np.asarray(p.roots(), dtype=np.complex128), low, min(stop, high))
+        ends += inner
+        piece += [index] * len(inner)
+        if stop < np.inf:
+            end = stop
+            break
+    table = Panels(
+        edges=np.array(ends),
+        coefficients=coefficient_table(rows)[:, piece],
+        before=np.zeros((len(_POWERS), len(piece))),
+        end=end,
+    )
+    whole = np.array([table.integral(table.edges[1:], power) for power in _POWERS])
+    return table._replace(before=np.cumsum(whole, axis=1) - whole)
+
+
+def _significant(row: Sequence[float], high: float) -> list[float]:
+    """The coefficients without highest ones that add nothing up to ``high``.
+
+    Those have roots too, so far away that they are not even numbers.
+    """
+    sizes = abs(np.array(row)) * high ** np.arange(len(row))
+    last = np.flatnonzero(sizes > _NEGLIGIBLE * sizes.max()).max(initial=0)
+    return list(row[: last + 1])
+
+
+def _divided(roots: NDArray[np.complex128], low: float, high: float) -> list[float]:
+    """Ends of panels from low to high on which a Gauss rule is exact to rounding."""
+    narrowest = _NARROWEST * np.spacing(high)
+    ends: list[float] = []
+    todo = [(low, high)] if low < high else []
+    while todo:
+        a, b = todo.pop()
+        # |z − a| + |z − b| is ρ + 1/ρ half-widths, by the ellipse's definition
+        reach = (abs(roots - a) + abs(roots - b)).min(initial=np.inf) / (b - a)
+        if reach >= (_NEAREST + 1.0 / _NEAREST) / 2.0 or b - a <= narrowest:
+            ends.append(b)
+        else:
+            todo += [((a + b) / 2.0, b), (a, (a + b) / 2.0)]
+    return ends
+
+
+def _positive_until(p: Polynomial, low: float, high: float) -> float:
+    """Up to where p is larger than the rounding of its terms; inf if all the way to high."""
+    from scipy.optimize import brentq  # only where it is wanted: it imports slowly
+
+    rounding = Polynomial(_ROUNDING * abs(p.coef))  # high and low are not negative
+    turns = np.sort(p.deriv().roots().real)
+    before = low
+    for point in (low, *turns[(turns > low) & (turns < high)].tolist(), high):
+        if p(point) <= rounding(point):
+            if point == low:
+                return low
+            # what is found may lie beyond by xtol and rtol together, where p can be nothing
+            found = brentq(p - rounding, before, point, xtol=1e-15 * point, rtol=1e-15)
+            return max(low, float(found - 2e-15 * point))
+        before = point
+    return np.inf

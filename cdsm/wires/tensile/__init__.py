@@ -1,0 +1,1 @@
+"""Tensile tests: from forces and extensions to a law of rigidity."""

@@ -1,0 +1,252 @@
+"""What of a tensile test can be fitted: its loading, from the first load to the largest."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import isotonic_regression
+
+from cdsm.errors import TensileTestError
+from cdsm.support.validation import Array
+from cdsm.wires.tensile.record import TensileTest
+from cdsm.wires.tensile.spline import Points
+
+FEWEST = 8
+_MOST = 800  # more are averaged: their mean says as much, and is fitted faster
+_WILD = 5e-3  # share of the range that a single point must stand out by
+_AROUND = 25  # points over which the noise is taken to be the same
+_SURE = 3.0  # standard deviations
+_MISTAKEN = (  # what is given in another unit, and what turns force and strain right
+    ("the displacement is in mm", 1.0, 1e-3),
+    ("the displacement is in µm", 1.0, 1e-6),
+    ("the gauge length is in mm", 1.0, 1e3),
+    ("the force is in mN", 1e-3, 1.0),
+    ("the force is in kN", 1e3, 1.0),
+    ("the force is in MN", 1e6, 1.0),
+)
+_MAD = 1.4826  # standard deviation of normal noise by its median magnitude
+
+
+def loading(test: TensileTest) -> tuple[Points, float, tuple[str, ...]]:
+    """The points to be fitted, the noise of one of them [N], and what was left out and why.
+
+    Args:
+        test: In the order it was recorded.
+
+    Raises:
+        TensileTestError: Too few points, units that cannot be, compression, or a force that does
+            not rise with the displacement.
+    """
+    notes: list[str] = []
+    _enough(test.force.size, "points are given")
+    wild = _wild(test.force)
+    wild[1:-1] |= _wild(test.displacement)[1:-1]  # a soft wire moves far at its first load
+    if wild.any():
+        listed = [f"{f:.4g} N at {d:.4g} m" for d, f in zip(*_of(test, wild), strict=True)]
+        more = f" and {len(listed) - 3} more" if len(listed) > 3 else ""
+        notes.append(f"far from their neighbours and left out: {', '.join(listed[:3])}{more}")
+    _enough(int(np.count_nonzero(~wild)), "points are left that lie near their neighbours")
+    displacement, force = _of(test, ~wild)
+    strain = displacement / test.gauge_length
+    _check_span(strain, force)
+    kept = _is_loading(strain)
+    if not kept.all():
+        notes.append(f"points of unloading and reloading left out: {np.count_nonzero(~kept)}")
+    order = np.argsort(strain[kept], kind="stable")
+    points = _merged(strain[kept][order], force[kept][order], np.ones(len(order)))
+    _enough(
+        len(points.force),
+        "points of loading are left, each farther than all before it; give the points in the order "
+        "they were recorded, with the displacement growing under load",
+    )
+    noise = _noise(points)
+    span = float(np.ptp(points.force))
+    if (lowest := points.force.min()) < -max(6.0 * noise, 5e-3 * span):
+        raise TensileTestError(
+            f"a force of {lowest:.4g} N is compression, and a wire cannot be pushed. Tare the load "
+            "cell, or change the sign if the machine counts tension as negative."
+        )
+    peak = int(points.force.argmax())
+    fallen = points.force[peak:] < points.force[peak] - max(6.0 * noise, 0.02 * span)
+    if fallen.any():
+        end = peak + int(fallen.argmax())
+        notes.append(f"points after the largest force left out: {len(points.force) - end}")
+        points = points.part(slice(0, end))
+    rising = isotonic_regression(points.force, weights=points.count).x
+    scatter = float(np.sqrt(np.mean((points.force - rising) ** 2)))
+    if len(rising) < FEWEST or not scatter < 0.1 * np.ptp(rising):
+        raise TensileTestError(
+            f"the force does not rise with the displacement: {len(rising)} points up to the "
+            f"largest force, which scatter {scatter:.3g} N about a rise of {np.ptp(rising):.3g} N. "
+            "Check that the columns are not swapped and belong together."
+        )
+    notes += _slips(points, test.gauge_length, max(8.0 * noise, _WILD * span))
+    if count := _slack(points, noise, 1e-6 * span):
+        until = points.strain[count] * test.gauge_length
+        notes.append(
+            f"points before the first load left out: {count}, up to {until:.4g} m, where the force "
+            "does not rise beyond its noise"
+        )
+        points = points.part(slice(count, None))
+    _enough(len(points.force), "points are left after the slack")
+    _check_rigidity(points)
+    return _averaged(points), noise, tuple(notes)
+
+
+def _of(test: TensileTest, kept: NDArray[np.bool_]) -> tuple[Array, Array]:
+    return test.displacement[kept], test.force[kept]
+
+
+def _wild(values: Array) -> NDArray[np.bool_]:
+    """Single values far from those around them, in the order recorded.
+
+    What rises or falls lies between its neighbours, and a peak or the last value before a rupture
+    stands out by no more than a step.
+    """
+    # an end is judged by how the values next to it go on
+    first, last = 2.0 * values[1] - values[2], 2.0 * values[-2] - values[-3]
+    before, after = np.append(first, values[:-1]), np.append(values[1:], last)
+    size = abs(np.diff(values))
+    step = np.maximum(np.pad(size, (2, 0))[:-1], np.pad(size, (0, 2))[1:])  # not its own
+    noise = local_noise((values - (before + after) / 2.0) / np.sqrt(1.5))
+    reach = float(np.ptp(np.quantile(values, (0.1, 0.9))))  # not of the wild ones
+    beyond = np.maximum(values - np.maximum(before, after), np.minimum(before, after) - values)
+    limit = np.maximum(np.maximum(8.0 * noise, 2.0 * step), _WILD * reach)
+    return np.asarray(beyond > limit)
+
+
+def local_noise(errors: Array) -> Array:
+    """Standard deviation (n,) of errors (n,) around each, or of all if that is larger.
+
+    Wild ones do not count, and it may grow with the force.
+    """
+    width = min(_AROUND, len(errors))
+    near = np.pad(abs(errors), (width // 2, width - 1 - width // 2), mode="reflect")
+    local = np.median(np.lib.stride_tricks.sliding_window_view(near, width), axis=1)
+    return np.asarray(_MAD * np.maximum(local, np.median(abs(errors))))
+
+
+def _slips(points: Points, gauge_length: float, least: float) -> list[str]:
+    """Where the force falls though the displacement grows, and rises again."""
+    highest = np.maximum.accumulate(points.force)
+    fall = highest - points.force
+    notes = []
+    for peak in np.unique(highest[fall > least]):
+        below = np.flatnonzero((highest == peak) & (fall > least))
+        if len(below) > 1:
+            notes.append(
+                f"the force falls by {fall[below].max():.4g} N at "
+                f"{points.strain[below[0]] * gauge_length:.4g} m while the displacement grows, as "
+                f"when a grip slips: EA near {peak:.4g} N comes out too low"
+            )
+    return notes
+
+
+def _slack(points: Points, noise: float, least: float) -> int:
+    """How many points pass before the force begins to rise.
+
+    They show no trend beyond the noise, and the points after them rise faster beyond it: a wire
+    that rises evenly from the first point on has no slack, however noisy it is.
+    """
+    slope, error = _trends(points, noise, least)
+    flat = np.flatnonzero(slope <= _SURE * error)
+    count = int(flat[-1]) + 1 if len(flat) else 0
+    after = points.part(slice(count, 2 * count))
+    if count < 2 or len(after.force) < 2:
+        return 0
+    slope_after, error_after = (each[-1] for each in _trends(after, noise, least))
+    rises = slope_after - slope[count - 1] > _SURE * np.hypot(error_after, error[count - 1])
+    return count if rises else 0
+
+
+def _trends(points: Points, noise: float, least: float) -> tuple[Array, Array]:
+    """Rise [N] from point to point of the first 1, 2, … points, and its standard deviation.
+
+    The scatter about that rise counts if it is smaller than the noise, which in few points may be
+    the bend of a soft wire.
+    """
+    w, x, y = points.count, np.arange(len(points.force)), points.force - points.force[0]
+    total = np.cumsum(w)
+    xx, xy, yy = (
+        np.cumsum(w * a * b) - np.cumsum(w * a) * np.cumsum(w * b) / total
+        for a, b in ((x, x), (x, y), (y, y))
+    )
+    xx = np.maximum(xx, 1e-12)
+    scatter = np.sqrt(np.maximum(yy - xy**2 / xx, 0.0) / np.maximum(np.arange(len(x)) - 1, 1))
+    scatter[:2] = noise
+    return xy / xx, np.maximum(np.minimum(noise, scatter), least) / np.sqrt(xx)
+
+
+def _enough(count: int, what: str) -> None:
+    if count < FEWEST:
+        raise TensileTestError(f"only {count} {what}; a fit needs at least {FEWEST}.")
+
+
+def _check_span(strain: Array, force: Array) -> None:
+    reach = float(np.ptp(strain))
+    if reach == 0.0 or np.ptp(force) == 0.0:
+        raise TensileTestError("displacement or force never changes; give a test that loads.")
+    if reach > 1.0:
+        raise TensileTestError(
+            f"the displacements span {reach:.4g} times the gauge length, and no wire stretches so "
+            f"far. {_likely(float(np.ptp(force)) / reach, reach)}"
+        )
+
+
+def _check_rigidity(points: Points) -> None:
+    """Units that cannot be: EA over the upper half of the rise."""
+    upper = points.force >= (points.force[0] + points.force[-1]) / 2.0
+    rise, reach = np.ptp(points.force[upper]), np.ptp(points.strain[upper])
+    rigidity = float(rise / max(reach, 1e-30))
+    if not 1.0 <= rigidity <= 1e9:
+        raise TensileTestError(
+            f"the rigidity would be about {rigidity:.3g} N, which no wire has (1 N to 1e9 N). "
+            f"{_likely(rigidity, float(np.ptp(points.strain)))}"
+        )
+
+
+def _likely(rigidity: float, reach: float) -> str:
+    """Which unit, taken for another, would explain a rigidity [N] and a largest strain."""
+    found = [
+        unit
+        for unit, by_force, by_strain in _MISTAKEN
+        if 1e2 <= rigidity * by_force / by_strain <= 1e7 and 1e-4 <= reach * by_strain <= 1.0
+    ]
+    hint = f"It looks as if {' or '.join(found)}." if found else "Check all three."
+    return f"Displacement and gauge length are in m, force in N. {hint}"
+
+
+def _is_loading(strain: Array) -> NDArray[np.bool_]:
+    """Where the strain is, up to its noise, beyond all before it."""
+    jitter = 4.0 * _MAD * float(np.median(abs(np.diff(strain, 2)))) / np.sqrt(6.0)
+    jitter = min(jitter, 0.005 * float(np.ptp(strain)))
+    kept: NDArray[np.bool_] = strain >= np.maximum.accumulate(strain) - jitter
+    return kept
+
+
+def _merged(strain: Array, force: Array, count: Array) -> Points:
+    """Points of equal strain become their mean."""
+    unique, place = np.unique(strain, return_inverse=True)
+    total = np.asarray(np.bincount(place, count), np.float64)
+    return Points(unique, np.bincount(place, count * force) / total, total)
+
+
+def _averaged(points: Points) -> Points:
+    """At most so many points, each the mean of as many neighbours."""
+    if len(points.force) <= _MOST:
+        return points
+    group = np.arange(len(points.force)) * _MOST // len(points.force)
+    total = np.asarray(np.bincount(group, points.count), np.float64)
+    strain, force = (
+        np.bincount(group, points.count * each) / total for each in (points.strain, points.force)
+    )
+    return Points(strain, force, total)
+
+
+def _noise(points: Points) -> float:
+    """Standard deviation [N] of one point about the line through its neighbours."""
+    before, at, after = points.strain[:-2], points.strain[1:-1], points.strain[2:]
+    share = (at - before) / (after - before)
+    error = points.force[1:-1] - (1.0 - share) * points.force[:-2] - share * points.force[2:]
+    error /= np.sqrt(1.0 + share**2 + (1.0 - share) ** 2)
+    return float(_MAD * np.median(abs(error)))

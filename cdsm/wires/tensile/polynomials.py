@@ -1,0 +1,151 @@
+"""The paper's way from a tensile test to EA(F): two polynomials through measured slopes."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.polynomial import Polynomial
+
+from cdsm.errors import TensileTestError
+from cdsm.support.validation import Array
+from cdsm.wires.laws import StrandElasticity
+from cdsm.wires.tensile.spline import Curve, Points
+
+_DEGREE = 6
+_NARROW = 0.1  # share of its largest tension that a range must span
+_HALF = 3  # neighbours on each side that a slope is taken over
+_FEWEST = 2 * _HALF + 2 * (_DEGREE + 1)  # points: twice as many slopes as coefficients
+
+
+def polynomials(points: Points, join: float) -> tuple[StrandElasticity, tuple[str, ...]]:
+    """Two polynomials of degree 6 through the slopes, on the longest range they are positive on.
+
+    Args:
+        points: Of loading, strain rising.
+        join: Tension [N] at which they meet; one polynomial if either side has too few points.
+
+    Raises:
+        TensileTestError: Too few points, or they are positive on less than half the range.
+    """
+    if len(points.force) < _FEWEST:
+        raise TensileTestError(
+            f"only {len(points.force)} points are left, and polynomials of degree {_DEGREE} need "
+            f"at least {_FEWEST}. Use method='monotone', or sample more finely."
+        )
+    joins = joins_of(points, join)
+    rows = coefficients(points, joins)
+    low, high = max(float(points.force[0]), 0.0), float(points.force.max())
+    start, end = max(_positive(rows, (low, *joins, high)), key=lambda each: each[1] - each[0])
+    if end - start < (high - low) / 2.0:
+        raise TensileTestError(
+            "the polynomials give no positive rigidity on half of the range "
+            f"{low:.4g} N to {high:.4g} N. Use method='monotone', or another join."
+        )
+    inside = [k for k, each in enumerate(joins) if start < each < end]
+    pieces = (
+        rows[inside[0] : inside[-1] + 2]
+        if inside
+        else [rows[int(start >= max(joins, default=np.inf))]]
+    )
+    note = (
+        f"the polynomials are not positive beyond {start:.4g} N to {end:.4g} N: "
+        "the domain is cut to that"
+    )
+    law = StrandElasticity(
+        tuple(tuple(row) for row in pieces), tuple(joins[k] for k in inside), start, end
+    )
+    return law, () if (start, end) == (low, high) else (note,)
+
+
+def _positive(rows: list[list[float]], edges: tuple[float, ...]) -> list[tuple[float, float]]:
+    """Ranges of tension [N] on which the polynomials are positive; an empty one if there are none.
+
+    Each polynomial is positive or not between its roots: a grid would miss a dip between its lines.
+    """
+    tops = abs(evaluate(rows, edges[1:-1], np.linspace(edges[0], edges[-1], 400)))
+    margin = 1e-6 * float(tops.max())  # the strain is the integral of 1/EA
+    ranges = [(edges[0], edges[0])]
+    for row, low, high in zip(rows, edges[:-1], edges[1:], strict=True):
+        rounding = 1e-13 * float(Polynomial(np.abs(row))(high))  # of powers that cancel
+        above = Polynomial(row) - max(margin, rounding)
+        roots = above.roots()
+        real = np.sort(roots.real[abs(roots.imag) <= 1e-9 * abs(roots)])
+        cuts = [low, *real[(real > low) & (real < high)].tolist(), high]
+        for start, end in pairwise(cuts):
+            if above((start + end) / 2.0) <= 0.0:
+                continue
+            if ranges[-1][1] == start:
+                start = ranges.pop()[0]
+            ranges.append((start, end))
+    return ranges
+
+
+def joins_of(points: Points, join: float) -> tuple[float, ...]:
+    """The join, if both sides of it have points and width enough for a polynomial."""
+    below = int(np.count_nonzero(points.force <= join))
+    enough = 2 * (_DEGREE + 1)
+    low, high = float(points.force.min()), float(points.force.max())
+    # powers of tensions that are nearly equal cancel to nothing but rounding
+    wide = join - low >= _NARROW * join and high - join >= _NARROW * high
+    return (join,) if wide and min(below, len(points.force) - below) >= enough else ()
+
+
+def coefficients(points: Points, joins: tuple[float, ...]) -> list[list[float]]:
+    """Least-squares polynomials of the slopes over the force, lowest power first, one per range."""
+    slopes, forces = _slopes(points)
+    piece = np.searchsorted(joins, forces, side="left")
+    rows = []
+    for k in range(len(joins) + 1):
+        here = piece == k
+        if np.count_nonzero(here) <= _DEGREE:  # noise in a bootstrap sample can thin out a range
+            here = np.argsort(abs(forces - joins[0]))[: 2 * (_DEGREE + 1)]
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", np.exceptions.RankWarning)  # of few or close forces
+            fitted = Polynomial.fit(forces[here], slopes[here], _DEGREE)
+        rows.append(fitted.convert().coef.tolist())
+    return rows
+
+
+def miss(
+    curve: Curve, points: Points, join: float, samples: int, random: np.random.Generator
+) -> Callable[[Array], Array]:
+    """The rms (n,) [N] by which such polynomials miss EA at tensions (n,) [N].
+
+    By the wild bootstrap: as if the curve were the truth, tests are sampled that might as well have
+    been measured, with every residual of either sign. Unlike shuffled residuals, these keep noise
+    that grows with the force where it is.
+    """
+    joins = joins_of(points, join)
+    fitted = curve.force(points.strain)
+    errors = curve.spread(points).errors / np.sqrt(points.count)
+    signs = random.choice((-1.0, 1.0), (samples, len(errors)))
+    rows = [coefficients(replace(points, force=fitted + s * errors), joins) for s in signs]
+
+    def rms(tensions: Array) -> Array:
+        truth = np.interp(tensions, curve.basis.tensions, curve.rigidity)
+        missed = np.array([evaluate(each, joins, tensions) - truth for each in rows])
+        return np.asarray(np.sqrt(np.mean(missed**2, axis=0)))
+
+    return rms
+
+
+def evaluate(rows: list[list[float]], joins: tuple[float, ...], tensions: Array) -> Array:
+    """The polynomials at tensions (n,) [N], EA (n,) [N]."""
+    piece = np.searchsorted(joins, tensions, side="left")
+    values = np.array([np.polyval(row[::-1], tensions) for row in rows])
+    return np.asarray(values[piece, np.arange(len(tensions))])
+
+
+def _slopes(points: Points) -> tuple[Array, Array]:
+    """Slope dF/dε [N] of the line through each point and its neighbours, and its mean force [N]."""
+    window = 2 * _HALF + 1
+    strain, force = (
+        np.lib.stride_tricks.sliding_window_view(each, window)
+        for each in (points.strain, points.force)
+    )
+    offset = strain - strain.mean(axis=1, keepdims=True)
+    return (offset * force).sum(axis=1) / (offset**2).sum(axis=1), force.mean(axis=1)

@@ -1,0 +1,207 @@
+"""The force-displacement record of a tensile test: read from CSV, units named, checked."""
+
+from __future__ import annotations
+
+import os
+import re
+from dataclasses import dataclass
+from typing import Final, NoReturn, final
+
+import numpy as np
+
+from cdsm.errors import TensileTestError
+from cdsm.support.files import csv_cells, read_text
+from cdsm.support.validation import Array, ReadOnlyState, frozen, number_array, scalar
+
+_UNITS: Final = {
+    "displacement": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "μm": 1e-6},
+    "force": {"mN": 1e-3, "N": 1.0, "kN": 1e3, "MN": 1e6},
+}
+_WORDS: Final = {
+    "displacement": ("displacement", "extension", "elongation", "stroke"),
+    "force": ("force", "load", "tension"),
+}
+_GAUGE = re.compile(
+    r"gauge[ _-]?length\s*+[=:]?\s*+([-+\d.,eE]+)\s*[\[(]?([^\W\d]*)", re.IGNORECASE
+)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class TensileTest(ReadOnlyState):
+    """What a testing machine records, in the order it does.
+
+    Attributes:
+        displacement: Of the crosshead or extensometer, shape (n,) [m].
+        force: Shape (n,) [N], tension positive.
+        gauge_length: Free length of the wire between the grips or the clips [m].
+
+    Raises:
+        InvalidInput: Not finite numbers.
+        TensileTestError: The arrays are not of one length, or the gauge length is not positive.
+    """
+
+    displacement: Array
+    force: Array
+    gauge_length: float
+
+    def __post_init__(self) -> None:
+        for name in ("displacement", "force"):
+            array = number_array(name, getattr(self, name))
+            if array.ndim != 1:
+                raise TensileTestError(f"{name} has shape {array.shape}; a list (n,) is needed.")
+            object.__setattr__(self, name, frozen(array))
+        if self.displacement.shape != self.force.shape:
+            raise TensileTestError(
+                f"{self.displacement.size} displacements but {self.force.size} forces; "
+                "each point needs both."
+            )
+        length = scalar("gauge_length", self.gauge_length)
+        if length <= 0.0:
+            raise TensileTestError(
+                f"the gauge length is {length:g} m; it must be positive: the free length of the "
+                "wire between the grips [m]."
+            )
+        object.__setattr__(self, "gauge_length", length)
+
+
+def read_tensile_csv(
+    path: str | os.PathLike[str],
+    *,
+    displacement_unit: str | None = None,
+    force_unit: str | None = None,
+    gauge_length: float | None = None,
+) -> TensileTest:
+    """Read a tensile test; what the header leaves open is asked for by name, never guessed.
+
+    The first line that is no comment names the columns: one of displacement, extension, elongation
+    or stroke, and one of force, load or tension, each with its unit: ``displacement [mm]``,
+    ``Load (kN)``, ``force_N``, or on a line of its own below. Further columns are ignored. Commas,
+    semicolons (then with decimal commas, if any) or tabs separate. A comment may give the length:
+    ``# gauge_length = 500 mm``.
+
+    Args:
+        path: The file.
+        displacement_unit: ``m``, ``cm``, ``mm`` or ``um``, where the header has none.
+        force_unit: ``mN``, ``N``, ``kN`` or ``MN``, where the header has none.
+        gauge_length: l_0 [m], where no comment gives it.
+
+    Raises:
+        FileError: The file cannot be read.
+        TensileTestError: No header, a column or unit or the gauge length missing, given twice or
+            not understood, or entries that are not finite numbers; the line is named.
+    """
+    text = read_text(path)
+    lines = [(k, line) for k, line in enumerate(text.splitlines(), 1) if line.strip()]
+    comments = [line for _, line in lines if line.lstrip().startswith("#")]
+    lines = [(k, line) for k, line in lines if not line.lstrip().startswith("#")]
+    if not lines:
+        _refuse(path, "holds no data; a header and one line per point are needed.")
+    first = lines[0][1]
+    delimiter = next((each for each in "\t;" if each in first), ",")
+    rows = [(k, csv_cells(path, k, line, delimiter)) for k, line in lines]
+    header, body = rows[0][1], rows[1:]
+    if all(_number(cell, delimiter) is not None for cell in header):
+        _refuse(
+            path,
+            f"line {rows[0][0]}: there is no header. Begin with a line that names the columns and "
+            "their units, such as: displacement [mm], force [N]",
+        )
+    if body and all(re.fullmatch(r"[\[(]?\s*[^\W\d]*\s*[\])]?", cell) for cell in body[0][1]):
+        cells = (*body[0][1], *[""] * len(header))
+        header = [f"{a} [{b.strip('[]() ')}]" if b else a for a, b in zip(header, cells)]  # noqa: B905
+        body = body[1:]
+    columns = []
+    for kind, given in (("displacement", displacement_unit), ("force", force_unit)):
+        at = [k for k, cell in enumerate(header) if _name(cell) in _WORDS[kind]]
+        if len(at) != 1:
+            _refuse(
+                path,
+                f"{len(at) or 'no'} columns of {kind} in the header {header}; exactly one must be "
+                f"called {' or '.join(_WORDS[kind])}, with its unit, such as: {kind} "
+                f"[{'mm' if kind == 'displacement' else 'N'}]",
+            )
+        unit = _factor(path, kind, _unit(header[at[0]]), given)
+        columns.append(unit * _column(path, body, at[0], delimiter))
+    return TensileTest(columns[0], columns[1], _gauge_length(path, comments, gauge_length))
+
+
+def _refuse(path: object, problem: str) -> NoReturn:
+    raise TensileTestError(f"{path}: {problem}")
+
+
+def _number(cell: str, delimiter: str) -> float | None:
+    try:
+        return float(cell if delimiter == "," else cell.replace(",", "."))
+    except ValueError:
+        return None
+
+
+def _name(cell: str) -> str:
+    """The first word of a column's name, in lower case."""
+    return re.split(r"[\s\[(_/,]", cell.strip().lower(), maxsplit=1)[0]
+
+
+def _unit(cell: str) -> str | None:
+    """What stands in brackets, or after the last underscore, blank or slash."""
+    found = re.search(r"[\[(]([^\])]*)[\])]", cell) or re.search(r"[_/\s]([^\s_/]+)$", cell)
+    return found[1].strip() if found else None
+
+
+def _factor(path: object, kind: str, found: str | None, given: str | None) -> float:
+    """What turns the unit of a column into SI."""
+    known = _UNITS[kind]
+    keyword = f"{kind}_unit"
+    for unit in (found, given):
+        if unit is not None and unit not in known:
+            _refuse(
+                path,
+                f"the unit {unit!r} of the {kind} is not known; use {', '.join(known)}, in the "
+                f"header or as {keyword}=.",
+            )
+    if found is not None and given is not None and found != given:
+        _refuse(path, f"the header has the {kind} in {found}, but {keyword}={given!r}; drop one.")
+    unit = found or given
+    if unit is None:
+        _refuse(
+            path,
+            f"the {kind} has no unit. Put it into the header, such as {kind} "
+            f"[{'mm' if kind == 'displacement' else 'N'}], or pass {keyword}=.",
+        )
+    return known[unit]
+
+
+def _column(path: object, body: list[tuple[int, list[str]]], at: int, delimiter: str) -> Array:
+    numbers = []
+    for k, row in body:
+        cell = row[at] if at < len(row) else ""
+        number = _number(cell, delimiter)
+        if number is None or not np.isfinite(number):
+            _refuse(
+                path,
+                f"line {k}: {cell!r} is not a finite number; write one point per line, with a "
+                "decimal point (a comma only where semicolons or tabs separate).",
+            )
+        numbers.append(number)
+    return np.array(numbers)
+
+
+def _gauge_length(path: object, comments: list[str], given: float | None) -> float:
+    lengths = [] if given is None else [scalar("gauge_length", given)]
+    for number, unit in (found.groups() for line in comments for found in _GAUGE.finditer(line)):
+        value = _number(number, ";")
+        if value is None or unit not in _UNITS["displacement"]:
+            _refuse(
+                path,
+                f"the gauge length {number!r} {unit!r} is not understood; write it with its unit: "
+                "# gauge_length = 500 mm",
+            )
+        lengths.append(value * _UNITS["displacement"][unit])
+    if not lengths:
+        _refuse(
+            path,
+            "has no gauge length. Pass gauge_length= [m], or add a line: # gauge_length = 500 mm",
+        )
+    if max(lengths) - min(lengths) > 1e-9 * abs(max(lengths)):
+        _refuse(path, f"gauge lengths of {lengths} m are given; give one.")
+    return lengths[0]

@@ -1,0 +1,300 @@
+"""A smooth, positive rigidity curve through noisy points of force over strain.
+
+log EA is a cubic B-spline in a coordinate that spreads both small and large tensions, so EA > 0 and
+F(ε) is C1 whatever the data. What is fitted is the force at each strain, never a quotient of
+differences, which noise would swamp. How smooth: restricted likelihood, from the data themselves.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import BSpline
+from scipy.linalg import cho_factor, cho_solve
+from scipy.optimize import least_squares
+
+from cdsm.support.validation import Array
+
+_INTERVALS = 48
+_NEAR = 41  # points over which the noise is taken to be the same
+_GRID = 1200  # quadrature error below 1e-4 of the strain where EA varies thousandfold
+
+
+def _running_integral(values: Array, tensions: Array, axis: int = -1) -> Array:
+    """∫ values dF from the first tension to each, by the trapezoidal rule."""
+    from scipy.integrate import cumulative_trapezoid  # only where wanted: it imports slowly
+
+    integral: Array = cumulative_trapezoid(values, tensions, axis=axis, initial=0.0)
+    return integral
+
+
+@dataclass(frozen=True)
+class Points:
+    """Averaged points of a test, strain rising: strain [-], force [N], and how many each averages.
+
+    All three have shape (n,).
+    """
+
+    strain: Array
+    force: Array
+    count: Array
+
+    def part(self, kept: NDArray[np.bool_] | slice) -> Points:
+        """The points at the given places."""
+        return Points(self.strain[kept], self.force[kept], self.count[kept])
+
+
+def _least_variance(points: Points) -> float:
+    """Noise [N²] below which a test is as good as exact."""
+    return (1e-6 * float(np.ptp(points.force))) ** 2
+
+
+@dataclass(frozen=True)
+class Basis:
+    """B-splines (g, k) over a grid of tensions (g,) [N], and their roughness (k, k)."""
+
+    tensions: Array
+    splines: Array
+    roughness: Array
+
+    @classmethod
+    def over(cls, low: float, high: float, corner: float, points: int) -> Basis:
+        """Splines over [low, high] N, evenly spread in ½ log(F + corner) + ½ F, each scaled to 1.
+
+        Args:
+            low: Smallest tension [N].
+            high: Largest tension [N].
+            corner: Tension [N] below which the spacing is even.
+            points: Number of points to be fitted.
+        """
+        fine = low + corner * np.expm1(np.linspace(0.0, np.log1p((high - low) / corner), 8 * _GRID))
+        place = np.log1p((fine - low) / corner) / np.log1p((high - low) / corner)
+        place = (place + (fine - low) / (high - low)) / 2.0
+        t = np.linspace(0.0, 1.0, _GRID)
+        tensions = np.interp(t, place, fine)
+        intervals = int(np.clip(points // 2, 3, _INTERVALS))
+        knots = np.pad(np.linspace(0.0, 1.0, intervals + 1), 3, mode="edge")
+        # uniform knots beyond the ends make the difference penalty vanish for a straight log EA
+        knots[:3] = -np.arange(3, 0, -1) / intervals
+        knots[-3:] = 1.0 + np.arange(1, 4) / intervals
+        splines = BSpline.design_matrix(t, knots, 3).toarray()
+        second = np.diff(np.eye(splines.shape[1]), 2, axis=0)
+        return cls(tensions, splines, second.T @ second)
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A fitted curve: log EA, and the strain at one tension, on which the rest hangs.
+
+    Attributes:
+        basis: Of log EA.
+        coefficients: Of the splines (k,).
+        anchor: Where on the grid. Best where the wire is stiff: in a soft end, any change of EA
+            would shift all the rest, and the fit would creep.
+        strain_there: ε at the anchor [-].
+        smoothing: Weight of the roughness [N²].
+    """
+
+    basis: Basis
+    coefficients: Array
+    anchor: int
+    strain_there: float
+    smoothing: float
+
+    @cached_property
+    def rigidity(self) -> Array:
+        """EA (g,) [N] on the grid."""
+        return np.asarray(np.exp(self.basis.splines @ self.coefficients))
+
+    @cached_property
+    def strain(self) -> Array:
+        """ε (g,) [-] on the grid, of the same origin as the points."""
+        stretch = _running_integral(1.0 / self.rigidity, self.basis.tensions)
+        return np.asarray(self.strain_there + stretch - stretch[self.anchor])
+
+    def force(self, strain: Array) -> Array:
+        """Tension (n,) [N] at strains (n,); straight beyond the ends."""
+        tensions, rigidity, grid = self.basis.tensions, self.rigidity, self.strain
+        inside = np.interp(strain, grid, tensions)
+        before = np.minimum(strain - grid[0], 0.0) * rigidity[0]
+        return np.asarray(inside + before + np.maximum(strain - grid[-1], 0.0) * rigidity[-1])
+
+    def jacobian(self, strain: Array) -> Array:
+        """Derivative (n, k + 1) of :meth:`force` by the coefficients and that strain."""
+        tensions, grid = self.basis.tensions, self.strain
+        inside = np.clip(strain, grid[0], grid[-1])
+        at = np.clip(np.searchsorted(grid, inside) - 1, 0, len(grid) - 2)
+        share = ((inside - grid[at]) / (grid[at + 1] - grid[at]))[:, None]
+        by_coefficients = _running_integral(
+            self.basis.splines / self.rigidity[:, None], tensions, axis=0
+        )
+        by_coefficients -= by_coefficients[self.anchor]
+        stretch = (1.0 - share) * by_coefficients[at] + share * by_coefficients[at + 1]
+        rigidity = (1.0 - share) * self.rigidity[at, None] + share * self.rigidity[at + 1, None]
+        beyond = (self.force(strain) - np.interp(strain, grid, tensions))[:, None]
+        edge = np.where(strain < grid[0], 0, -1)
+        slope = beyond * self.basis.splines[edge]  # the straight ends turn with their EA
+        return np.hstack((rigidity * stretch + slope, -rigidity))
+
+    def refitted(self, points: Points) -> Curve:
+        """The curve of the same smoothing that fits the points best (Levenberg and Marquardt)."""
+        size = self.basis.splines.shape[1]
+        weight = np.sqrt(points.count)
+        rough = np.sqrt(self.smoothing) * np.diff(np.eye(size), 2, axis=0)
+        rough = np.hstack((rough, np.zeros((size - 2, 1))))
+        # strain and log EA are orders apart: the last unknown counts in the span of the strain
+        unit = float(np.ptp(points.strain))
+
+        def of(x: Array) -> Curve:
+            return replace(
+                self, coefficients=np.clip(x[:-1], -30.0, 40.0), strain_there=x[-1] * unit
+            )
+
+        def residual(x: Array) -> Array:
+            error = weight * (of(x).force(points.strain) - points.force)
+            return np.concatenate((np.clip(error, -1e12, 1e12), rough @ x))
+
+        def slope(x: Array) -> Array:
+            rows = weight[:, None] * of(x).jacobian(points.strain)
+            rows[:, -1] *= unit
+            return np.vstack((rows, rough))
+
+        x = np.append(self.coefficients, self.strain_there / unit)
+        found = least_squares(residual, x, slope, method="lm", max_nfev=60, xtol=1e-6, ftol=1e-6)
+        return of(found.x)
+
+    def spread(self, points: Points) -> Spread:
+        """How far the noise of the points may have moved the curve."""
+        rows, error = self._linearised(points)
+        factor, scale = self._factored(rows)
+        inverse = cho_solve(factor, np.eye(len(scale))) / np.outer(scale, scale)
+        leverage = np.clip(((rows @ inverse) * rows).sum(axis=1), 0.0, 1.0)
+        freedom = float(max(len(error) - leverage.sum(), 1.0))
+        variance = float((error**2).sum() / freedom)
+        # what a flexible curve takes up of the noise is missing from the residuals
+        error = error / np.sqrt(np.maximum(1.0 - leverage, 0.1))
+        near = min(_NEAR, len(error))
+        padded = np.pad(error**2, (near // 2, near - 1 - near // 2), mode="reflect")
+        local = np.convolve(padded, np.full(near, 1.0 / near), mode="valid")
+        # scatter, each point's own, and the prior of the smoothing seen from the fitted curve
+        moved = (inverse @ rows.T) * np.sqrt(local)
+        covariance = moved @ moved.T + variance * inverse @ self._penalty @ inverse
+        splines = self.basis.splines
+        deviation = np.sqrt(((splines @ covariance[:-1, :-1]) * splines).sum(axis=1))
+        return Spread(inverse, float(np.sqrt(variance)), freedom, error, deviation)
+
+    def loosest(self, points: Points) -> Curve:
+        """The curve with the least smoothing that its restricted likelihood allows.
+
+        That is one standard deviation below the most likely: −2 log likelihood is larger by 1.
+        Points that show no bend leave a curve no freedom to err; this gives back what they allow.
+        """
+        least, chosen = np.inf, self
+        for smoothing in self.smoothing * 10.0 ** np.arange(0.0, -6.0, -0.25):
+            curve = replace(self, smoothing=float(smoothing))
+            likelihood = curve._likelihood(points)
+            least = min(least, likelihood)
+            if likelihood > least + 1.0:
+                break
+            chosen = curve
+        return chosen
+
+    def _likelihood(self, points: Points) -> float:
+        """−2 log of the restricted likelihood of the smoothing, the curve linearised as it is."""
+        rows, error = self._linearised(points)
+        unknowns = np.append(self.coefficients, self.strain_there)
+        factor, scale = self._factored(rows)
+        bent = self._penalty @ unknowns
+        gradient = (rows.T @ error - bent) / scale
+        deviance = error @ error + unknowns @ bent - gradient @ cho_solve(factor, gradient)
+        # of the unknowns, the strain and the two of a straight log EA are free of the penalty
+        return float(
+            (len(error) - 3) * np.log(deviance + len(error) * _least_variance(points))
+            + 2.0 * np.log(np.diag(factor[0]) * scale).sum()
+            - (len(unknowns) - 3) * np.log(self.smoothing)
+        )
+
+    @property
+    def _penalty(self) -> Array:
+        """Of the unknowns (k + 1, k + 1)."""
+        return np.pad(self.smoothing * self.basis.roughness, (0, 1))
+
+    def _linearised(self, points: Points) -> tuple[Array, Array]:
+        """Jacobian (n, k + 1) and residual (n,), each point as one not averaged."""
+        weight = np.sqrt(points.count)
+        error = weight * (points.force - self.force(points.strain))
+        return weight[:, None] * self.jacobian(points.strain), error
+
+    def _factored(self, rows: Array) -> tuple[tuple[Array, bool], Array]:
+        """Cholesky factor of the normal matrix, scaled to a unit diagonal, and the scale."""
+        normal = rows.T @ rows + self._penalty
+        # the strain counts in other units
+        scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+        regular = normal / np.outer(scale, scale) + 1e-10 * np.eye(len(scale))
+        return cho_factor(regular), scale
+
+
+@dataclass(frozen=True)
+class Spread:
+    """How well the points determine a curve.
+
+    Attributes:
+        inverse: Of the normal matrix, penalty included, by the unknowns (k + 1, k + 1).
+        noise: Standard deviation of one point [N].
+        freedom: Points less what the curve takes up of them.
+        errors: Of the points, each as one not averaged (n,) [N]: the residuals, enlarged by what
+            the curve takes up.
+        deviation: Standard deviation of log EA on the grid (g,): of the scatter, as large as it is
+            around each point, so that it may grow with the force; and of the smoothing, whose
+            squared bias is taken as that of a curve as rough as this one is on average (Nychka,
+            J. Am. Stat. Assoc. 83, 1988).
+    """
+
+    inverse: Array
+    noise: float
+    freedom: float
+    errors: Array
+    deviation: Array
+
+
+def fit_curve(points: Points, basis: Basis, noise: float) -> Curve:
+    """Fit the curve, its smoothing by restricted likelihood (Fellner and Schall's iteration).
+
+    Args:
+        points: What to fit.
+        basis: Where log EA may bend.
+        noise: First estimate of the noise of one point [N], and a floor for it.
+    """
+    tensions = basis.tensions
+    size = basis.splines.shape[1]
+    # start: secants between the points, coarse enough to be positive
+    force = np.maximum.accumulate(points.force) + 1e-9 * tensions[-1] * np.arange(len(points.force))
+    places = tensions[np.linspace(0, _GRID - 1, 13).astype(int)]
+    secants = np.diff(places) / np.maximum(
+        np.diff(np.interp(places, force, points.strain)), 1e-3 * np.ptp(points.strain) / 12
+    )
+    guess = np.interp(tensions, (places[1:] + places[:-1]) / 2.0, np.log(secants))
+    ridge = basis.splines.T @ basis.splines + 1e-3 * basis.roughness + 1e-9 * np.eye(size)
+    coefficients: Array = np.linalg.solve(ridge, basis.splines.T @ guess).astype(np.float64)
+    floor = _least_variance(points)
+    # stiff at first, and looser step by step: a flexible curve can lose its way from a rough start
+    smoothing = 10.0 * max(noise**2, 1e8 * floor)
+    anchor = int((basis.splines @ coefficients).argmax())
+    strain = float(np.interp(tensions[anchor], force, points.strain))
+    curve = Curve(basis, coefficients, anchor, strain, smoothing)
+    for _ in range(25):
+        curve = curve.refitted(points)
+        spread = curve.spread(points)
+        variance = max(spread.noise**2, floor)
+        rough = float(curve.coefficients @ basis.roughness @ curve.coefficients)
+        known = np.trace(spread.inverse[:-1, :-1] @ basis.roughness)
+        bends = max(size - 2 - curve.smoothing * known, 1e-3)
+        wanted = variance * bends / max(rough, 1e-12)
+        wanted = float(np.clip(wanted, 1e-6 * variance, 1e8 * variance))
+        if abs(np.log(wanted / curve.smoothing)) < 0.05:
+            break
+        curve = replace(curve, smoothing=wanted)
+    return curve
