@@ -27,8 +27,15 @@ from cdsm import errors
 from cdsm.kernels import segments
 from cdsm.kernels import stiffness as stiffness_kernels
 from cdsm.support.validation import Array
-from tests.arms import STEEL, mixed_arm, random_arm, random_posture, random_tension, random_wrench
-from tests.patience import HANGS
+from tests.support.arms import (
+    STEEL,
+    mixed_arm,
+    random_arm,
+    random_posture,
+    random_tension,
+    random_wrench,
+)
+from tests.support.patience import HANGS
 
 ROOT = Path(__file__).parents[1]
 
@@ -527,7 +534,7 @@ PLAIN_PYTHON = """
 import json, sys
 import cdsm
 import numba
-from tests.arms import mixed_arm, random_posture, random_tension, random_wrench
+from tests.support.arms import mixed_arm, random_posture, random_tension, random_wrench
 assert numba.config.DISABLE_JIT, "the kernels are compiled"
 pose = random_posture(mixed_arm(), 3)
 K = cdsm.stiffness(pose, random_tension(pose.arm, 3), random_wrench(3))
@@ -565,7 +572,7 @@ from numba.core import caching
 for kind in (caching.CacheImpl, caching.CompileResultCacheImpl):
     kind._locator_classes = []  # no folder can be written
 import cdsm
-from tests.arms import mixed_arm, random_posture
+from tests.support.arms import mixed_arm, random_posture
 random_posture(mixed_arm(), 3)
 """
 

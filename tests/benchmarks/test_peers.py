@@ -120,7 +120,7 @@ def test_batch_measures_the_cables_as_mujoco_does(
 ) -> None:
     """Kinematics and tendons alone: the lengths and their Jacobian are all that MuJoCo computes."""
     mujoco = pytest.importorskip("mujoco", reason="MuJoCo is not installed")
-    from tests.mujoco_arms import in_mujoco, tendon_jacobian
+    from tests.support.mujoco_arms import in_mujoco, tendon_jacobian
 
     one, q, _, _ = problem(joints, rows)
     model, data = in_mujoco(one.at(q[0]))

@@ -1,0 +1,371 @@
+"""Tensions at many postures: each row the optimum of the single posture, or proof of none."""
+
+import itertools
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import cdsm
+from cdsm.batch import active_set, certificates, distribution, serpentine_guess
+from cdsm.support.validation import Array, frozen
+from tests.batch.test_evaluation import custom_arm, one_hinge
+from tests.support.arms import STEEL, mixed_arm, random_arm
+
+EXACT = 1e-9
+"""Of the largest tension: what the single posture's solver is verified to."""
+
+ARMS: dict[str, Callable[[], cdsm.Manipulator]] = {
+    "universal, three cables": lambda: random_arm(1, 4),
+    "universal, four cables": lambda: random_arm(4, 3),
+    "hinged": lambda: random_arm(2, 6, "hinged"),
+    "one hinge": one_hinge,
+    "one universal joint": lambda: random_arm(5, 1),
+    "mixed": mixed_arm,
+    "custom": custom_arm,
+    "strands": cdsm.presets.virtual_prototype,
+    "shallow": lambda: shallow_arm(5),
+}
+
+
+def shallow_arm(joints: int) -> cdsm.Manipulator:
+    """Disks so near the joints that many postures cannot be held."""
+    geometry = cdsm.Geometry.universal(
+        joints=joints,
+        cables_per_joint=3,
+        link_length=0.04,
+        base_length=0.02,
+        disk_offset=0.005,
+        hole_radius=0.03,
+        link_mass=0.5,
+    )
+    return cdsm.Manipulator(geometry, STEEL, gravity=(0.0, -9.81, 0.0))
+
+
+def postures(arm: cdsm.Manipulator, rows: int, reach: float, seed: int = 0) -> Array:
+    rng = np.random.default_rng([seed, arm.nv])
+    return rng.uniform(-reach, reach, (rows, arm.nv)) * arm.upper
+
+
+def loads(rows: int, seed: int = 0) -> Array:
+    rng = np.random.default_rng([seed, 3])
+    wrench: Array = rng.normal(0.0, 2.0, (rows, 6))
+    wrench[:, 3:] *= 0.05
+    return wrench
+
+
+def no_fallback(monkeypatch: pytest.MonkeyPatch) -> None:
+    def never(*_: Any) -> None:
+        raise AssertionError("a row was left to the single posture")
+
+    monkeypatch.setattr(distribution, "distribute_tension", never)
+
+
+def assert_same_as_alone(pull: cdsm.Tensions) -> tuple[int, int]:
+    """Compare with the single posture, row by row; how many are feasible, and how many not."""
+    arm, (rows, count) = pull.arm, pull.values.shape
+    low, high = (np.broadcast_to(each, (rows, count)) for each in (pull.minimum, pull.maximum))
+    wrench = np.broadcast_to(pull.wrench, (rows, 6))
+    counts = [0, 0]
+    for r in range(rows):
+        try:
+            single = cdsm.distribute_tension(arm.at(pull.q[r]), low[r], high[r], wrench[r]).values
+        except cdsm.InfeasibleTension:
+            assert pull.status[r] == cdsm.Status.INFEASIBLE, r
+            assert not pull.values[r].any()
+            counts[1] += 1
+            continue
+        assert pull.status[r] == cdsm.Status.OK, r
+        np.testing.assert_allclose(
+            pull.values[r], single, rtol=0.0, atol=EXACT * max(single.max(), 1e-6), err_msg=str(r)
+        )
+        counts[0] += 1
+    return counts[0], counts[1]
+
+
+# --- the same as the single posture ---------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_every_row_is_the_optimum_of_the_single_posture(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    arm = ARMS[name]()
+    no_fallback(monkeypatch)
+    q = postures(arm, 25, 0.5)
+    pull = cdsm.distribute_tensions(arm, q, 10.0, wrench=loads(25))
+    monkeypatch.undo()
+    feasible, _ = assert_same_as_alone(pull)
+    assert feasible
+
+
+@pytest.mark.parametrize("name", ["universal, three cables", "hinged", "mixed", "custom"])
+def test_bounds_of_all_kinds(name: str) -> None:
+    arm = ARMS[name]()
+    rng = np.random.default_rng(7)
+    rows, count = 20, len(arm.cables)
+    q, wrench = postures(arm, rows, 0.4), loads(rows, 1)
+    low = rng.uniform(0.0, 20.0, (rows, count))
+    free = cdsm.distribute_tensions(arm, q, low, wrench=wrench)
+    assert free.ok.any()
+    # upper bounds that bite: some cables at their minimum, fixed, and most under the largest of F
+    high = np.maximum(low, 0.9 * free.values.max(axis=1, keepdims=True))
+    bounded = cdsm.distribute_tensions(arm, q, low, high, wrench)
+    assert_same_as_alone(bounded)
+    if name != "hinged":  # where the other cable of the pair would have nothing left to choose
+        fixed = np.full_like(high, np.inf)
+        fixed[:, 0] = low[:, 0]
+        assert_same_as_alone(cdsm.distribute_tensions(arm, q, low, fixed, wrench))
+    # bounds that are one number, or one for each cable
+    assert_same_as_alone(cdsm.distribute_tensions(arm, q, 3.0, 500.0, wrench[0]))
+    assert_same_as_alone(cdsm.distribute_tensions(arm, q, low[0], high.max(axis=0)))
+
+
+def test_upper_bounds_bite_and_are_met_exactly() -> None:
+    arm = random_arm(1, 3)
+    q = postures(arm, 60, 0.4)
+    free = cdsm.distribute_tensions(arm, q, 5.0)
+    highest = 0.99 * free.values.max(axis=1)
+    high = np.repeat(highest[:, None], len(arm.cables), axis=1)
+    pull = cdsm.distribute_tensions(arm, q, 5.0, high)
+    feasible, _ = assert_same_as_alone(pull)
+    assert feasible > 5
+    held = pull.values[pull.ok]
+    np.testing.assert_array_equal(held.max(axis=1), highest[pull.ok])
+    np.testing.assert_array_equal(held.min(axis=1), 5.0)
+
+
+@pytest.mark.parametrize(("reach", "joints"), [(0.9, 3), (0.9, 5)])
+def test_rows_that_cannot_be_balanced_are_the_same(reach: float, joints: int) -> None:
+    arm = shallow_arm(joints)
+    pull = cdsm.distribute_tensions(arm, postures(arm, 120, reach), 5.0)
+    feasible, infeasible = assert_same_as_alone(pull)
+    assert feasible > 10
+    assert infeasible > 5
+
+
+def test_infeasible_by_too_low_a_maximum_or_too_great_a_load() -> None:
+    arm = random_arm(1, 3)
+    q = postures(arm, 10, 0.4)
+    least = cdsm.distribute_tensions(arm, q, 5.0).values.max()
+    for pull in (
+        cdsm.distribute_tensions(arm, q, 5.0, 6.0),
+        cdsm.distribute_tensions(arm, q, 5.0, 2.0 * least, 1e3 * loads(10)),
+    ):
+        _, infeasible = assert_same_as_alone(pull)
+        assert infeasible == 10
+
+
+def test_nothing_to_balance_is_balanced_by_the_least() -> None:
+    arm = cdsm.Manipulator(random_arm(1, 2).geometry, STEEL, gravity=(0.0, 0.0, 0.0))
+    q = postures(arm, 5, 0.5)
+    none = cdsm.distribute_tensions(arm, q)
+    assert none.ok.all()
+    assert not none.values.any()
+    assert_same_as_alone(cdsm.distribute_tensions(arm, q, 7.0))
+
+
+def test_tiny_and_huge_forces() -> None:
+    arm = cdsm.Manipulator(random_arm(1, 2).geometry, STEEL, gravity=(0.0, 0.0, 0.0))
+    q, wrench = postures(arm, 6, 0.4), loads(6)
+    reference = cdsm.distribute_tensions(arm, q, 1.0, wrench=wrench)
+    assert reference.ok.all()
+    for size in (1e-9, 1e9):  # the problem is homogeneous
+        pull = cdsm.distribute_tensions(arm, q, size, wrench=size * wrench)
+        np.testing.assert_allclose(pull.values, size * reference.values, rtol=1e-10)
+
+
+def test_no_perturbation_in_balance_and_bounds_pulls_less() -> None:
+    """By brute force: every feasible motion from the answer makes ‖F‖² larger."""
+    arm = random_arm(1, 2)
+    q = postures(arm, 4, 0.4)
+    pull = cdsm.distribute_tensions(arm, q, 5.0, wrench=loads(4))
+    rng = np.random.default_rng(2)
+    for r, F in enumerate(pull.values):
+        J = arm.at(q[r]).length_jacobian
+        null = np.linalg.svd(J.T)[2][J.shape[1] :]
+        tried = 0
+        for step in rng.normal(size=(20_000, len(null))):
+            other = F + step @ null
+            if (other >= 5.0).all():
+                tried += 1
+                assert other @ other > F @ F
+        assert tried > 20
+
+
+# --- who decides ----------------------------------------------------------------------------
+
+
+def test_rows_that_nothing_can_be_shown_of_go_to_the_single_posture(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    arm = shallow_arm(3)
+    q, wrench = postures(arm, 60, 0.9), 0.1 * loads(60)
+    expected = cdsm.distribute_tensions(arm, q, 5.0, wrench=wrench)
+    assert 5 < np.count_nonzero(expected.ok) < 55
+
+    def undecided(*arguments: Any) -> None:
+        arguments[-1][:] = 255
+        arguments[-2][:] = 0.0
+
+    monkeypatch.setattr(distribution, "distribute_rows", undecided)
+    found = cdsm.distribute_tensions(arm, q, 5.0, wrench=wrench)
+    np.testing.assert_array_equal(found.status, expected.status)
+    np.testing.assert_allclose(
+        found.values, expected.values, rtol=0.0, atol=EXACT * expected.values.max()
+    )
+
+    def failing(*_: Any) -> None:
+        raise cdsm.SolverError("daqp", "failed.")
+
+    monkeypatch.setattr(distribution, "distribute_tension", failing)
+    found = cdsm.distribute_tensions(arm, q, 5.0, wrench=wrench)
+    assert (found.status == cdsm.Status.SOLVER_FAILED).all()
+    assert not found.values.any()
+
+
+def balance(arm: cdsm.Manipulator, q: Array, wrench: Array) -> tuple[Array, Array]:
+    """J_L and the torque to balance."""
+    pose = arm.at(q)
+    return pose.length_jacobian.copy(), pose.jacobian.T @ wrench - pose.gravity_torque
+
+
+def state_of(count: int, nv: int) -> active_set.State:
+    return active_set.State(
+        np.empty(count),
+        np.empty(nv),
+        np.empty(count, dtype=np.intp),
+        np.empty(count),
+        np.empty((nv, nv + 1)),
+        np.empty(nv),
+    )
+
+
+@pytest.mark.parametrize("name", ["universal, four cables", "hinged", "mixed", "custom", "shallow"])
+def test_search_alone_finds_the_optimum_or_a_proof(name: str) -> None:
+    arm = ARMS[name]()
+    count = len(arm.cables)
+    low = frozen(np.full(count, 5.0))  # as in a batch: nothing new to compile
+    outcomes = set()
+    for seed, top in itertools.product(range(15), (np.inf, 60.0)):
+        q, wrench = postures(arm, 1, 0.8, seed)[0], loads(1, seed)[0]
+        J, b = balance(arm, q, wrench)
+        high, state = frozen(np.full(count, top)), state_of(count, arm.nv)
+        outcome = active_set.search(J, b, low, high, state)
+        outcomes.add(outcome)
+        try:
+            single = cdsm.distribute_tension(arm.at(q), low, high, wrench).values
+        except cdsm.InfeasibleTension:
+            assert outcome == active_set.IMPOSSIBLE
+            assert certificates.is_infeasible(J, b, low, high, state.y)
+            continue
+        assert outcome == active_set.FOUND
+        assert certificates.is_optimal(J, b, low, high, state.F, state.y)
+        np.testing.assert_allclose(state.F, single, rtol=0.0, atol=EXACT * single.max())
+    assert active_set.FOUND in outcomes
+
+
+def test_guess_is_mostly_the_optimum_and_what_it_proves_is_so() -> None:
+    arm = shallow_arm(5)
+    parts = serpentine_guess.blocks(arm._routing, arm.nv)
+    count, nv = len(arm.cables), arm.nv
+    assert parts.row_start.tolist() == [0, 2, 4, 6, 8, 10]
+    low, high = frozen(np.full(count, 5.0)), frozen(np.full(count, np.inf))
+    guessed = proved = feasible = infeasible = 0
+    for q in postures(arm, 150, 0.9):
+        J, b = balance(arm, q, np.zeros(6))
+        F, free, rest = np.empty(count), np.empty(count, dtype=np.bool_), np.empty(2)
+        y = np.empty(nv)
+        state = state_of(count, nv)
+        found = active_set.search(J, b, low, high, state) == active_set.FOUND
+        feasible, infeasible = feasible + found, infeasible + (not found)
+        k = serpentine_guess.guess(parts, J, b, low, high, F, free, rest)
+        if k < 0:
+            serpentine_guess.multipliers(parts, J, F, free, 0, y)
+            np.testing.assert_allclose(J.T @ F, b, rtol=0.0, atol=1e-12 * F.max())
+            np.testing.assert_allclose((J @ y)[free], F[free], rtol=1e-6)
+            if certificates.is_optimal(J, b, low, high, F, y):
+                assert found
+                np.testing.assert_allclose(F, state.F, rtol=0.0, atol=EXACT * F.max())
+                guessed += 1
+        elif serpentine_guess.is_beyond_reach(
+            parts, J, b, low, high, free, rest, k, np.zeros(count), y
+        ):
+            assert not found
+            proved += 1
+    assert infeasible > 5
+    assert guessed > 0.6 * feasible
+    assert proved > 0.8 * infeasible
+
+
+def test_blocks_are_those_of_the_geometry() -> None:
+    parts = serpentine_guess.blocks(mixed_arm()._routing, 5)
+    assert parts.row.tolist() == [0, 1, 2, 3, 4]
+    assert parts.row_start.tolist() == [0, 2, 3, 5]
+    assert parts.cable_start.tolist() == [0, 3, 5, 9]
+    # from anywhere to anywhere there are none
+    own = custom_arm()
+    assert not serpentine_guess.blocks(own._routing, own.nv).row.size
+
+
+# --- certificates ---------------------------------------------------------------------------
+
+J2 = np.array([[0.03, 0.0], [-0.03, 0.0], [0.0, 0.02], [0.01, -0.02]])
+
+
+def certified(F: Array, y: Array, low: Array, high: Array, b: Array | None = None) -> bool:
+    torque = J2.T @ F if b is None else b
+    return certificates.is_optimal(J2, torque, frozen(low.copy()), frozen(high.copy()), F, y)
+
+
+def test_an_optimum_is_accepted_and_every_fault_refused() -> None:
+    low, high = np.full(4, 5.0), np.array([np.inf, np.inf, 40.0, np.inf])
+    y = np.array([500.0, 2500.0])
+    F = np.clip(J2 @ y, low, high)  # the optimum for the torque it makes
+    assert F[1] == F[3] == 5.0
+    assert F[2] == 40.0
+    assert certified(F, y, low, high)
+    assert not certified(F, y + np.array([1e-3, 0.0]), low, high)  # free cable off J y
+    assert not certified(F, y, low, high, J2.T @ F + np.array([1e-9, 0.0]))  # out of balance
+    assert not certified(F, y, np.array([5.0, 5.1, 5.0, 5.0]), high)  # below a bound
+    assert not certified(F, y, low, np.full(4, 39.0))  # above one
+    # at a bound from which it would rather go
+    assert not certified(F, np.array([500.0, 1500.0]), low, high)
+    assert not certified(
+        F, np.array([500.0, 6e3]), np.array([5.0, 5.0, 40.0, 5.0]), np.full(4, 90.0)
+    )
+
+
+def test_a_proof_of_infeasibility_is_accepted_and_its_opposite_refused() -> None:
+    low, high = frozen(np.zeros(4)), frozen(np.full(4, 10.0))
+    reach = 0.03 * 10 + 0.01 * 10  # the most the cables turn the first joint
+    v = np.array([1.0, 0.0])
+    assert certificates.is_infeasible(J2, np.array([reach + 1e-6, 0.0]), low, high, v)
+    assert not certificates.is_infeasible(J2, np.array([reach - 1e-6, 0.0]), low, high, v)
+    assert not certificates.is_infeasible(J2, np.array([reach + 1e-6, 0.0]), low, high, -v)
+    assert not certificates.is_infeasible(J2, np.array([reach, 0.0]), low, high, v)
+    # a cable without a maximum pulls as much as is wanted
+    high = frozen(np.array([math.inf, 10.0, 10.0, 10.0]))
+    assert not certificates.is_infeasible(J2, np.array([1e6, 0.0]), low, high, v)
+    assert certificates.is_infeasible(J2, np.array([-1e6, 0.0]), low, high, -v)
+
+
+def test_rounding_on_a_joint_that_no_cable_turns_is_no_missing_torque() -> None:
+    """A twist about x moves no hole apart: what gravity does there is 1e-20 N m, and nothing."""
+    twist = cdsm.Joint(axes=((1.0, 1e-18, 0.0),), disk_offset=0.01)
+    bend = cdsm.Joint(axes=((0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), disk_offset=0.01)
+    geometry = cdsm.Geometry(
+        base_length=0.05,
+        hole_radius=0.03,
+        joints=(bend, twist),
+        links=(cdsm.Link(length=0.05, mass=0.5),) * 2,
+        cables=tuple(cdsm.CableRoute(joint=k, angle=2.1 * j) for k in (1, 2) for j in range(3)),
+    )
+    arm = cdsm.Manipulator(geometry, cdsm.LinearElasticity(1e5), gravity=(-1.0, 9.0, -0.3))
+    q = np.zeros(3)
+    single = cdsm.distribute_tension(arm.at(q), 5.0)
+    batch = cdsm.distribute_tensions(arm, [q], 5.0)
+    assert batch.status.tolist() == [cdsm.Status.OK]
+    np.testing.assert_allclose(batch.values[0], single.values, rtol=1e-9)

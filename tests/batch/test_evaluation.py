@@ -1,0 +1,790 @@
+"""Many postures at once give what each gives alone; and what becomes of those that give nothing."""
+
+import dataclasses
+import json
+import math
+import os
+import pickle
+import subprocess
+import sys
+import tracemalloc
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import ArrayLike
+
+import cdsm
+from cdsm.batch import chunks, evaluation, fused_kernel
+from cdsm.batch.evaluation import OUTPUTS
+from cdsm.batch.layout import QUANTITIES
+from cdsm.support.validation import Array
+from tests.support.arms import STEEL, mixed_arm, random_arm, random_posture
+from tests.support.patience import HANGS
+
+ROOT = Path(__file__).parents[2]
+
+ROUNDING = 1e-12
+"""Of the largest entry: other orders of summation, and what inverses make of them."""
+
+DIRECTIONS = np.array([[0.0, 0.3, 1.0], [1.0, -2.0, 0.1], [0.0, 1.0, 0.0]])
+
+
+class Hardening(cdsm.Elasticity):
+    """An elasticity of the user's own, which does not say which tensions are outside."""
+
+    def __eq__(self, other: object) -> bool:  # so it cannot be hashed
+        return self is other
+
+    @property
+    def domain(self) -> cdsm.Domain:
+        return cdsm.Domain(1.0, 500.0)
+
+    def rigidity(self, tension: ArrayLike) -> Array:
+        values = np.asarray(tension, dtype=np.float64)
+        if (values < 1.0).any() or (values > 500.0).any():
+            raise cdsm.ElasticityRangeError("too far.", values.ravel().tolist())
+        return 1e4 * (1.0 + values / 50.0)
+
+    def strain(self, tension: ArrayLike) -> Array:
+        return np.asarray(50.0 * np.log1p(np.asarray(tension) / 50.0) / 1e4)
+
+    def energy(self, tension: ArrayLike) -> Array:
+        return 50.0 * (np.asarray(tension) / 1e4 - self.strain(tension))
+
+
+def custom_arm() -> cdsm.Manipulator:
+    """Cables from anywhere to anywhere, past their own way back, of many kinds."""
+    base = random_arm(4, 3)
+    strand = cdsm.presets.STRAND_1X19
+
+    def cable(
+        name: str,
+        *where: tuple[str, float, float, float],
+        law: cdsm.Elasticity = STEEL,
+        **more: Any,
+    ) -> cdsm.Cable:
+        sites = tuple(cdsm.Site(link, (x, y, z)) for link, x, y, z in where)
+        return cdsm.Cable(name, sites, law, **more)
+
+    own = [
+        cable("there", ("link3", 0.01, 0.02, 0.0), ("base_disk", 0.0, 0.03, 0.01), law=strand),
+        cable(
+            "back",
+            ("base_disk", 0.0, -0.03, 0.0),
+            ("link3", 0.0, 0.0, 0.02),
+            ("link1", 0.0, 0.02, -0.03),
+            law=Hardening(),
+        ),
+        cable(
+            "spring", ("link1", 0.0, 0.03, 0.0), ("link2", 0.01, 0.03, 0.01), series_stiffness=2e3
+        ),
+        cable("motor", ("base_link", 0.0, 0.0, 0.04), ("link2", 0.0, 0.0, 0.03), control="force"),
+        cable("fixed", ("link2", 0.0, 0.01, 0.03), ("link2", 0.01, 0.01, 0.03), law=strand),
+    ]
+    return cdsm.Manipulator(base.geometry, cables=[*base.cables, *own], gravity=(2.0, -4.0, -8.0))
+
+
+def one_hinge() -> cdsm.Manipulator:
+    return random_arm(8, 1, "hinged")
+
+
+ARMS: dict[str, Callable[[], cdsm.Manipulator]] = {
+    "universal": lambda: random_arm(1, 4),
+    "hinged": lambda: random_arm(2, 5, "hinged"),
+    "three hinges": lambda: random_arm(3, 3, "hinged"),
+    "one hinge": one_hinge,
+    "one universal joint": lambda: random_arm(5, 1),
+    "mixed": mixed_arm,
+    "custom": custom_arm,
+    "strands": cdsm.presets.virtual_prototype,
+}
+
+
+def problem(arm: cdsm.Manipulator, rows: int, seed: int = 0) -> tuple[Array, Array, Array]:
+    """Joint angles, tensions and wrenches, none of which balance each other."""
+    rng = np.random.default_rng([seed, arm.nv])
+    wrench = rng.normal(0.0, 3.0, (rows, 6)) * np.array([1.0, 1.0, 1.0, 0.1, 0.1, 0.1])
+    return (
+        rng.uniform(-0.6, 0.6, (rows, arm.nv)) * arm.upper,
+        rng.uniform(20.0, 120.0, (rows, len(arm.cables))),
+        wrench,
+    )
+
+
+def alone(name: str, K: cdsm.Stiffness) -> Any:
+    """A quantity as the single posture gives it."""
+    if name == "along":
+        return [K.along(u) for u in DIRECTIONS]
+    if name == "pseudoinverse":
+        return K.pseudoinverse()
+    return getattr(K, name) if hasattr(K, name) else getattr(K.posture, name)
+
+
+# --- equal to the single posture ------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_every_quantity_of_every_row_is_that_of_the_single_posture(name: str) -> None:
+    arm = ARMS[name]()
+    q, tension, wrench = problem(arm, 7)
+    batch = cdsm.evaluate(arm, q, tension, wrench, OUTPUTS, direction=DIRECTIONS)
+    # fewer than three joints do not move the tip in all directions
+    expected = cdsm.Status.OK if arm.nv >= 3 else cdsm.Status.IMMOBILE
+    assert (batch.status == expected).all()
+    for r in range(len(batch)):
+        K = cdsm.stiffness(arm.at(q[r]), tension[r], wrench[r])
+        for output in OUTPUTS:
+            if expected == cdsm.Status.IMMOBILE and output in ("cartesian", "pseudoinverse"):
+                assert not batch[output].any()
+                continue
+            single = np.asarray(alone(output, K))
+            assert batch[output].shape == (7, *single.shape), output
+            scale = abs(single[np.isfinite(single)]).max(initial=0.0)
+            # a residual is a difference: its scale is that of its terms
+            if output == "residual":
+                scale = abs(tension[r] @ abs(K.posture.length_jacobian)).max()
+            np.testing.assert_allclose(
+                batch[output][r], single, rtol=0.0, atol=ROUNDING * scale, err_msg=output
+            )
+
+
+@pytest.mark.parametrize("output", OUTPUTS)
+def test_a_quantity_asked_for_alone_is_the_one_asked_for_with_all_others(output: str) -> None:
+    arm = mixed_arm()
+    q, tension, wrench = problem(arm, 3)
+    u = DIRECTIONS if output == "along" else None
+    one = cdsm.evaluate(arm, q, tension, wrench, [output], direction=u)
+    every = cdsm.evaluate(arm, q, tension, wrench, OUTPUTS[::-1], direction=DIRECTIONS)
+    np.testing.assert_allclose(
+        one[output], every[output], rtol=0.0, atol=1e-15 * abs(every[output]).max()
+    )
+    assert one.outputs == (output,)
+    assert one.values[0].dtype == np.float64
+
+
+def test_quantities_of_the_posture_need_no_tensions() -> None:
+    arm = mixed_arm()
+    q, tension, _ = problem(arm, 3)
+    names = QUANTITIES[: QUANTITIES.index("residual")]
+    batch = cdsm.evaluate(arm, q, outputs=names)
+    assert batch.tension is None
+    loaded = cdsm.evaluate(arm, q, tension, outputs=names)
+    for name in names:
+        np.testing.assert_array_equal(batch[name], loaded[name])
+
+
+def test_one_tension_and_one_wrench_serve_all_rows() -> None:
+    arm = random_arm(1, 2)
+    q, tension, wrench = problem(arm, 5)
+    once = cdsm.evaluate(arm, q, tension[2], wrench[1], ("joint", "residual"))
+    tiled = cdsm.evaluate(
+        arm, q, np.tile(tension[2], (5, 1)), np.tile(wrench[1], (5, 1)), ("joint", "residual")
+    )
+    for name in once.outputs:
+        np.testing.assert_array_equal(once[name], tiled[name])
+    assert once.tension is not None
+    assert once.tension.shape == (len(arm.cables),)
+    assert once.wrench.shape == (6,)
+
+
+def test_no_wrench_is_zero_wrench() -> None:
+    arm = random_arm(1, 2)
+    q, tension, _ = problem(arm, 2)
+    batch = cdsm.evaluate(arm, q, tension, outputs=("load", "joint"))
+    assert not batch["load"].any()
+    assert not batch.wrench.any()
+
+
+def test_one_direction_gives_a_number_a_row_and_several_give_a_row_of_them() -> None:
+    arm = random_arm(1, 3)
+    q, tension, _ = problem(arm, 4)
+    one = cdsm.evaluate(arm, q, tension, outputs=("along",), direction=5.0 * DIRECTIONS[1])
+    several = cdsm.evaluate(arm, q, tension, outputs=("along",), direction=DIRECTIONS)
+    assert one["along"].shape == (4,)
+    np.testing.assert_allclose(one["along"], several["along"][:, 1], rtol=1e-14)
+    assert one.direction is not None
+    np.testing.assert_allclose(np.linalg.norm(one.direction), 1.0, rtol=1e-15)
+
+
+def test_tensions_that_were_distributed_carry_their_wrench() -> None:
+    arm = random_arm(1, 3)
+    q, _, wrench = problem(arm, 6)
+    pull = cdsm.distribute_tensions(arm, q, 10.0, wrench=wrench)
+    assert pull.ok.all()
+    batch = cdsm.evaluate(arm, q, pull, outputs=("residual", "joint", "length_jacobian"))
+    np.testing.assert_array_equal(batch.wrench, wrench)
+    # Eq. 13, of terms as large as moment arm times tension
+    scale = abs(batch["length_jacobian"]).max() * pull.values.max()
+    np.testing.assert_allclose(batch["residual"], 0.0, atol=1e-11 * scale)
+    short = cdsm.evaluate(arm, q, None, wrench, ("residual", "joint", "tension"), minimum=10.0)
+    np.testing.assert_array_equal(short["tension"], pull.values)
+    np.testing.assert_array_equal(short["joint"], batch["joint"])
+    assert short.minimum is not None
+    assert short.tension is None
+
+
+# --- rows, chunks and threads ---------------------------------------------------------------
+
+
+def test_rows_do_not_know_of_each_other() -> None:
+    """The same bits whatever the chunk, the thread and the neighbours of a row."""
+    arm = random_arm(1, 2)
+    q, tension, wrench = problem(arm, 9000)
+    q[::7] *= 3.0  # some beyond their limits, in between
+    names = ("joint", "margin", "cartesian", "gravity")
+
+    def bits(part: Any, threads: int) -> list[bytes]:
+        batch = cdsm.evaluate(arm, q[part], tension[part], wrench[part], names, threads=threads)
+        return [batch.status.tobytes(), *(value.tobytes() for value in batch.values)]
+
+    whole = cdsm.evaluate(arm, q, tension, wrench, names, threads=1)
+    assert 1000 < np.count_nonzero(whole.status == cdsm.Status.BEYOND_LIMITS) < 2000
+    every = slice(None)
+    assert bits(every, 1) == bits(every, 2) == bits(every, 7)
+    picked = np.random.default_rng(1).permutation(9000)[:2500]
+    parts = bits(picked, 2)
+    assert parts == [whole.status[picked].tobytes(), *(v[picked].tobytes() for v in whole.values)]
+    low = cdsm.distribute_tensions(arm, q, 5.0, threads=1)
+    several = cdsm.distribute_tensions(arm, q, 5.0, threads=5)
+    np.testing.assert_array_equal(low.values, several.values)
+    np.testing.assert_array_equal(low.status, several.status)
+
+
+def test_slices_cover_all_rows_once_and_stay_small() -> None:
+    for count, width, threads in (
+        (0, 10, 2),
+        (1, 10, 2),
+        (17, 10, 4),
+        (9999, 1, 2),
+        (50, 10**6, 1),
+    ):
+        seen: list[slice] = []
+        chunks.run(seen.append, count, width, threads)
+        covered = sorted(r for part in seen for r in range(part.start, part.stop))
+        assert covered == list(range(count))
+        assert all(part.stop - part.start <= 4096 for part in seen)
+
+
+def test_no_rows_give_empty_results_of_the_right_shapes() -> None:
+    arm = mixed_arm()
+    q, tension, wrench = problem(arm, 4)
+    full = cdsm.evaluate(arm, q, tension, wrench, OUTPUTS, direction=DIRECTIONS)
+    none = cdsm.evaluate(arm, q[:0], tension[:0], wrench[:0], OUTPUTS, direction=DIRECTIONS)
+    assert len(none) == none.status.size == 0
+    for name in OUTPUTS:
+        assert none[name].shape == (0, *full[name].shape[1:])
+    assert "0 postures" in str(none)
+    pull = cdsm.distribute_tensions(arm, q[:0], 5.0)
+    assert pull.values.shape == (0, len(arm.cables))
+    assert cdsm.evaluate(arm, q[:0], pull).status.shape == (0,)
+    assert cdsm.evaluate(arm, q, tension, outputs=()).ok.all()
+
+
+def test_foreign_memory_layouts_give_the_same_and_compile_nothing_new() -> None:
+    arm = random_arm(1, 2)
+    q, tension, wrench = problem(arm, 6)
+    q, tension, wrench = (
+        each.astype(np.float32).astype(np.float64) for each in (q, tension, wrench)
+    )
+    plain = cdsm.evaluate(arm, q, tension, wrench)
+    signatures = list(fused_kernel.evaluate_rows.signatures)  # type: ignore[attr-defined]
+    layouts: dict[str, Callable[[Array], Any]] = {
+        "columns": np.asfortranarray,
+        "columns of float32": lambda a: np.asfortranarray(a.astype(np.float32)),
+        "strided": lambda a: np.repeat(a, 2, axis=0)[::2],
+        "backwards": lambda a: a[::-1, ::-1].copy()[::-1, ::-1],
+        "big-endian": lambda a: a.astype(">f8"),
+        "lists": lambda a: a.tolist(),
+    }
+    for name, change in layouts.items():
+        other = cdsm.evaluate(arm, change(q), change(tension), change(wrench))
+        for value, expected in zip(other.values, plain.values, strict=True):
+            np.testing.assert_array_equal(value, expected, err_msg=name)
+        pulled = cdsm.distribute_tensions(arm, change(q), change(0.1 * tension), wrench=wrench)
+        assert pulled.ok.all(), name
+    assert fused_kernel.evaluate_rows.signatures == signatures  # type: ignore[attr-defined]
+
+
+def test_memory_beyond_the_outputs_is_bounded() -> None:
+    """Whatever comes and goes, per thread a few chunks of a megabyte."""
+    arm = random_arm(1, 2)
+    q, _, _ = problem(arm, 40_000)
+    names = ("margin", "tension")
+    cdsm.evaluate(arm, q[:10], outputs=(*names, "joint"), minimum=5.0)
+    tracemalloc.start()
+    try:
+        batch = cdsm.evaluate(arm, q, outputs=names, minimum=5.0, threads=2)
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    kept = sum(value.nbytes for value in batch.values) + batch.q.nbytes + batch.status.nbytes
+    # the check that q is finite takes as much as q for a moment
+    assert peak < kept + q.nbytes + 8 * 2**20
+
+
+def test_arguments_may_change_afterwards() -> None:
+    arm = random_arm(1, 2)
+    q, tension, wrench = problem(arm, 3)
+    batch = cdsm.evaluate(arm, q, tension, wrench)
+    kept = batch.q.copy()
+    q[:] = tension[:] = wrench[:] = 0.0
+    np.testing.assert_array_equal(batch.q, kept)
+    assert batch.tension is not None
+    assert batch.tension.all()
+    assert batch.wrench.all()
+
+
+def test_a_batch_says_what_it_holds_and_survives_pickling() -> None:
+    arm = random_arm(1, 2)
+    q, tension, _ = problem(arm, 3)
+    q[1] = 9.0
+    batch = cdsm.evaluate(arm, q, tension)
+    assert repr(batch) == f"<Batch of {arm.geometry.name}, 3 postures: 2 OK, 1 BEYOND_LIMITS>"
+    assert str(batch).splitlines()[0] == "3 postures: 2 OK, 1 BEYOND_LIMITS"
+    assert "(3, 6, 6)" in str(batch)
+    np.testing.assert_array_equal(batch.ok, [True, False, True])
+    again = pickle.loads(pickle.dumps(batch))
+    np.testing.assert_array_equal(again["compliance"], batch["compliance"])
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        batch.q = q  # type: ignore[misc]
+    pull = cdsm.distribute_tensions(arm, q, 5.0)
+    assert repr(pull).endswith("3 postures: 2 OK, 1 BEYOND_LIMITS>")
+    assert len(pickle.loads(pickle.dumps(pull))) == 3
+
+
+def test_threads_can_call_it_at_the_same_time() -> None:
+    from concurrent.futures import ThreadPoolExecutor
+
+    arm = random_arm(1, 2)
+    q, tension, _ = problem(arm, 400)
+    expected = cdsm.evaluate(arm, q, tension)["compliance"]
+    with ThreadPoolExecutor(4) as pool:
+        jobs = [pool.submit(cdsm.evaluate, arm, q, tension) for _ in range(12)]
+        for job in jobs:
+            np.testing.assert_array_equal(job.result()["compliance"], expected)
+
+
+# --- statuses -------------------------------------------------------------------------------
+
+
+def assert_no_nan(batch: cdsm.Batch) -> None:
+    for value in batch.values:
+        assert not np.isnan(value).any()
+
+
+def only(batch: cdsm.Batch, row: int) -> set[str]:
+    """Which quantities of a row are not all zero."""
+    return {name for name in batch.outputs if np.any(batch[name][row])}
+
+
+def everything(arm: cdsm.Manipulator, q: Any, tension: Any = None, **more: Any) -> cdsm.Batch:
+    wrench = np.array([1.0, -2.0, 0.5, 0.1, 0.2, -0.1])
+    return cdsm.evaluate(arm, q, tension, wrench, OUTPUTS, direction=DIRECTIONS, **more)
+
+
+POSED = set(QUANTITIES[: QUANTITIES.index("residual")])
+PULLED = {*POSED, "residual", "active", "load", "tension"}
+
+
+def test_row_beyond_joint_limits_is_empty_and_its_neighbours_are_not() -> None:
+    arm = random_arm(1, 3)
+    q, tension, _ = problem(arm, 3)
+    q[1, 4] = arm.upper[4] + 1e-6
+    q[2] = arm.upper + 5e-10  # rounding, as of a conversion from degrees
+    batch = everything(arm, q, tension)
+    np.testing.assert_array_equal(batch.status, [0, cdsm.Status.BEYOND_LIMITS, 0])
+    assert only(batch, 1) == {"tension"}  # which were given
+    assert only(batch, 0) == set(OUTPUTS)
+    free = everything(arm, q, tension, check_limits=False)
+    assert free.ok.all()
+    pose = arm.at(q[1], check_limits=False)
+    np.testing.assert_allclose(free["tip"][1], pose.tip, rtol=0.0, atol=1e-15)
+
+
+def test_row_where_sites_coincide_is_empty() -> None:
+    geometry = cdsm.Geometry(
+        name="loop",
+        base_length=0.02,
+        hole_radius=0.03,
+        joints=(cdsm.Joint(axes=((0.0, 0.0, 1.0),), disk_offset=0.01, limit=3.0),) * 2,
+        links=(cdsm.Link(length=0.05, mass=0.1),) * 2,
+        cables=(cdsm.CableRoute(joint=1, angle=0.0),),
+    )
+    sites = (cdsm.Site("base_disk", (0.02, 0.02, 0.0)), cdsm.Site("link1", (0.02, 0.0, 0.0)))
+    arm = cdsm.Manipulator(geometry, cables=[cdsm.Cable("loop", sites, STEEL)])
+    q = np.array([[1.5, 0.0], [math.pi / 2, 0.0], [1.5, 0.0]])
+    batch = cdsm.evaluate(arm, q, [10.0], outputs=[*POSED, *PULLED - POSED, "passive"])
+    np.testing.assert_array_equal(batch.status, [0, cdsm.Status.COINCIDENT_SITES, 0])
+    assert only(batch, 1) == {"tension"}
+    # and leaves nothing behind for the next
+    for value in batch.values:
+        np.testing.assert_array_equal(value[0], value[2])
+    with pytest.raises(cdsm.CableError):
+        arm.at(q[1])
+    pull = cdsm.distribute_tensions(arm, q, 5.0)
+    assert pull.status[1] == cdsm.Status.COINCIDENT_SITES
+    assert not pull.values[1].any()
+
+
+def test_row_without_tensions_keeps_what_the_joint_angles_give() -> None:
+    arm = random_arm(1, 3)
+    q, _, _ = problem(arm, 3)
+    low = np.full((3, len(arm.cables)), 10.0)
+    high = np.full_like(low, np.inf)
+    high[1] = 10.0
+    batch = everything(arm, q, minimum=low, maximum=high)
+    np.testing.assert_array_equal(batch.status, [0, cdsm.Status.INFEASIBLE, 0])
+    assert only(batch, 1) == POSED
+    assert_no_nan(batch)
+    W = batch.wrench
+    with pytest.raises(cdsm.InfeasibleTension):
+        cdsm.distribute_tension(arm.at(q[1]), low[1], high[1], W)
+    # nothing that needs tensions is asked for: nothing fails
+    assert cdsm.evaluate(arm, q, outputs=("tip",), minimum=low, maximum=high).ok.all()
+    pull = cdsm.distribute_tensions(arm, q, low, high, W)
+    assert pull.status[1] == cdsm.Status.INFEASIBLE
+    assert cdsm.evaluate(arm, q, pull, outputs=("tip",)).ok.all()
+    carried = cdsm.evaluate(arm, q, pull, outputs=("joint", "gravity"))
+    np.testing.assert_array_equal(carried.status, pull.status)
+    assert only(carried, 1) == {"gravity"}
+
+
+@pytest.mark.parametrize("law", [cdsm.presets.STRAND_1X19, Hardening()], ids=["strand", "own"])
+def test_tension_outside_the_elasticity_leaves_what_needs_no_stiffness(
+    law: cdsm.Elasticity,
+) -> None:
+    arm = random_arm(1, 3, elasticity=law)
+    q, tension, _ = problem(arm, 4)
+    tension[1, 2] = 0.5
+    tension[3, 0] = 900.0
+    batch = everything(arm, q, tension)
+    outside = cdsm.Status.OUTSIDE_ELASTICITY
+    np.testing.assert_array_equal(batch.status, [0, outside, 0, outside])
+    assert only(batch, 1) == only(batch, 3) == PULLED
+    K = cdsm.stiffness(arm.at(q[2]), tension[2], batch.wrench)
+    np.testing.assert_allclose(batch["joint"][2], K.joint, rtol=0.0, atol=1e-12 * K.joint.max())
+    with pytest.raises(cdsm.ElasticityRangeError):
+        cdsm.stiffness(arm.at(q[1]), tension[1])
+    assert cdsm.evaluate(arm, q, tension, outputs=("active", "tip")).ok.all()
+
+
+def slack_arm(second: float) -> cdsm.Manipulator:
+    """Two hinges: steel by the first, and by the second motors that control force."""
+    arm = cdsm.Manipulator(random_arm(1, 2, "hinged").geometry, STEEL, gravity=(0.0, 0.0, 0.0))
+    cables = [
+        dataclasses.replace(cable, control="force" if c > 1 else "position")
+        for c, cable in enumerate(arm.cables)
+    ]
+    assert second >= 0.0
+    return cdsm.Manipulator(arm.geometry, cables=cables, gravity=(0.0, 0.0, 0.0))
+
+
+def test_singular_stiffness_is_no_error_but_a_status() -> None:
+    arm = slack_arm(0.0)
+    q = np.array([[0.1, 0.2], [0.1, 0.2]])
+    tension = np.array([[10.0, 10.0, 0.0, 0.0], [10.0, 10.0, 5.0, 5.0]])
+    batch = cdsm.evaluate(arm, q, tension, outputs=OUTPUTS, direction=DIRECTIONS)
+    # two joints: the tip is immobile in one direction
+    np.testing.assert_array_equal(batch.status, [cdsm.Status.SINGULAR, cdsm.Status.IMMOBILE])
+    assert not only(batch, 0) & {"along", "compliance", "cartesian"}
+    assert {"margin", "joint", "active"} <= only(batch, 1)
+    assert_no_nan(batch)
+    with pytest.raises(cdsm.SingularStiffness):
+        _ = cdsm.stiffness(arm.at(q[0]), tension[0]).compliance
+    assert cdsm.evaluate(arm, q, tension, outputs=("joint", "margin")).ok.all()
+
+
+def test_nearly_singular_stiffness_is_decided_as_for_the_single_posture() -> None:
+    """Not singular by its singular values, but by its pivots the kernel cannot tell."""
+    arm = slack_arm(1.0)
+    q = np.array([[0.1, 0.2]])
+    tension = np.array([[0.0, 0.0, 1e-7, 1e-7]])
+    K = cdsm.stiffness(arm.at(q[0]), tension[0])
+    values = np.linalg.svd(K.joint, compute_uv=False)
+    assert 1e-13 < values[-1] / values[0] < 1e-10
+    names = ("along", "compliance", "joint")
+    for u in (DIRECTIONS, DIRECTIONS[0]):
+        batch = cdsm.evaluate(arm, q, tension, outputs=names, direction=u)
+        assert batch.ok.all()
+        np.testing.assert_array_equal(batch["compliance"][0], K.compliance)
+        np.testing.assert_array_equal(
+            batch["along"][0], np.reshape([K.along(d) for d in np.atleast_2d(u)], u.shape[:-1])
+        )
+    immobile = cdsm.evaluate(arm, q, tension, outputs=("pseudoinverse", "compliance"))
+    assert immobile.status[0] == cdsm.Status.IMMOBILE
+    assert only(immobile, 0) == {"compliance"}
+
+
+def test_straight_arm_has_no_cartesian_matrix_and_is_infinitely_stiff_along_itself() -> None:
+    arm = random_arm(1, 3)
+    q, tension, _ = problem(arm, 2)
+    q[0] = 0.0
+    names = ("along", "cartesian", "pseudoinverse", "compliance", "margin")
+    batch = cdsm.evaluate(arm, q, tension, outputs=names, direction=(1.0, 0.0, 0.0))
+    np.testing.assert_array_equal(batch.status, [cdsm.Status.IMMOBILE, cdsm.Status.OK])
+    assert batch["along"][0] == math.inf
+    assert math.isfinite(batch["along"][1])
+    assert only(batch, 0) == {"along", "compliance", "margin"}
+    # what can be, is, and asking for no more makes it no failure
+    assert cdsm.evaluate(arm, q, tension, outputs=("along",), direction=(1.0, 0.0, 0.0)).ok.all()
+
+
+def test_buckled_arm_is_no_failure() -> None:
+    soft = random_arm(1, 3, elasticity=cdsm.LinearElasticity(20.0))
+    q, tension, _ = problem(soft, 5)
+    batch = cdsm.evaluate(soft, q, 20.0 * tension, outputs=("margin", "joint"))
+    assert batch.ok.all()
+    assert (batch["margin"] < 0.0).all()
+    np.testing.assert_allclose(
+        batch["margin"],
+        [cdsm.stiffness(soft.at(q[r]), 20.0 * tension[r]).margin for r in range(5)],
+        rtol=1e-12,
+    )
+
+
+def test_every_status_is_met_above() -> None:
+    """SOLVER_FAILED is with the tensions, in test_batch_tension."""
+    assert [status.name for status in cdsm.Status] == [
+        "OK",
+        "BEYOND_LIMITS",
+        "COINCIDENT_SITES",
+        "INFEASIBLE",
+        "SOLVER_FAILED",
+        "OUTSIDE_ELASTICITY",
+        "SINGULAR",
+        "IMMOBILE",
+    ]
+
+
+# --- without compilation --------------------------------------------------------------------
+
+PLAIN_PYTHON = """
+import json, sys
+import numba, numpy as np
+import cdsm
+from cdsm.batch.evaluation import OUTPUTS
+from tests.batch.test_evaluation import DIRECTIONS, custom_arm, problem
+assert numba.config.DISABLE_JIT, "the kernels are compiled"
+arm = custom_arm()
+q, tension, wrench = problem(arm, 2)
+batch = cdsm.evaluate(arm, q, tension, wrench, OUTPUTS, direction=DIRECTIONS)
+pull = cdsm.distribute_tensions(arm, q, 5.0, wrench=wrench)
+answer = {name: batch[name].tolist() for name in OUTPUTS}
+json.dump([answer, batch.status.tolist(), pull.values.tolist(), pull.status.tolist()], sys.stdout)
+"""
+
+
+def test_kernels_give_the_same_without_compilation() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", PLAIN_PYTHON],
+        cwd=ROOT,
+        env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
+        capture_output=True,
+        text=True,
+        timeout=HANGS,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    arm = custom_arm()
+    q, tension, wrench = problem(arm, 2)
+    batch = cdsm.evaluate(arm, q, tension, wrench, OUTPUTS, direction=DIRECTIONS)
+    pull = cdsm.distribute_tensions(arm, q, 5.0, wrench=wrench)
+    answer, status, values, pulled = json.loads(done.stdout)
+    assert status == batch.status.tolist()
+    assert pulled == pull.status.tolist()
+    np.testing.assert_allclose(values, pull.values, rtol=0.0, atol=1e-11 * pull.values.max())
+    for name in OUTPUTS:
+        scale = abs(batch[name]).max()
+        np.testing.assert_allclose(answer[name], batch[name], rtol=0.0, atol=ROUNDING * scale)
+
+
+# --- bad input ------------------------------------------------------------------------------
+
+ARM = random_arm(1, 2)
+Q, F, W = problem(ARM, 3)
+ANY: Any = None
+C = len(ARM.cables)
+
+
+def changed(array: Array, row: int, column: int, value: float) -> Array:
+    array = array.copy()
+    array[row, column] = value
+    return array
+
+
+BAD: dict[str, tuple[Callable[[], object], tuple[str, ...]]] = {
+    "no arm": (lambda: cdsm.evaluate(ANY, Q, F), ("arm: None", "Manipulator is needed")),
+    "one posture": (lambda: cdsm.evaluate(ARM, Q[0], F), ("q: shape (4,)", "(B, 4)", "joint1_1")),
+    "q too wide": (lambda: cdsm.evaluate(ARM, np.zeros((3, 5)), F), ("q: shape (3, 5)", "(B, 4)")),
+    "q of three axes": (lambda: cdsm.evaluate(ARM, Q[None], F), ("q: shape (1, 3, 4)",)),
+    "q NaN": (
+        lambda: cdsm.evaluate(ARM, changed(Q, 1, 2, math.nan), F),
+        ("q: entry [1, 2] is nan",),
+    ),
+    "q infinite": (lambda: cdsm.evaluate(ARM, changed(Q, 2, 0, math.inf), F), ("[2, 0] is inf",)),
+    "q ragged": (lambda: cdsm.evaluate(ARM, [[0.0], [0.0, 1.0]], F), ("q: is not an array",)),
+    "q masked": (lambda: cdsm.evaluate(ARM, np.ma.masked_array(Q, Q > 0), F), ("q: is a masked",)),
+    "q complex": (lambda: cdsm.evaluate(ARM, Q + 0j, F), ("q: holds complex128",)),
+    "q None": (lambda: cdsm.evaluate(ARM, ANY, F), ("q: holds object",)),
+    "tension short": (
+        lambda: cdsm.evaluate(ARM, Q, F[:2]),
+        (f"tension: shape (2, {C})", f"(3, {C})"),
+    ),
+    "tension scalar": (
+        lambda: cdsm.evaluate(ARM, Q, 5.0),
+        ("tension: shape ()", f"({C},) for all"),
+    ),
+    "tension negative": (
+        lambda: cdsm.evaluate(ARM, Q, changed(F, 2, 1, -1.5)),
+        ("tension: -1.5 N", ARM.cables[1].name, "in row 2", "only pull"),
+    ),
+    "one tension negative": (
+        lambda: cdsm.evaluate(ARM, Q, changed(F, 0, 3, -2.0)[0]),
+        ("tension: -2 N", ARM.cables[3].name, "only pull"),
+    ),
+    "tension NaN": (lambda: cdsm.evaluate(ARM, Q, changed(F, 0, 1, math.nan)), ("[0, 1] is nan",)),
+    "tension ragged": (lambda: cdsm.evaluate(ARM, Q, [[1.0], []]), ("tension: is not an array",)),
+    "no tension": (
+        lambda: cdsm.evaluate(ARM, Q, outputs=("tip", "margin")),
+        ("tension: 'margin' depends on it", "minimum="),
+    ),
+    "tension and minimum": (lambda: cdsm.evaluate(ARM, Q, F, minimum=1.0), ("minimum", "not both")),
+    "maximum alone": (lambda: cdsm.evaluate(ARM, Q, F, maximum=9.0), ("maximum: belongs to",)),
+    "wrench wide": (lambda: cdsm.evaluate(ARM, Q, F, np.zeros((3, 7))), ("wrench: shape (3, 7)",)),
+    "wrench NaN": (lambda: cdsm.evaluate(ARM, Q, F, [math.nan] * 6), ("wrench: entry [0] is nan",)),
+    "tensions of elsewhere": (
+        lambda: cdsm.evaluate(ARM, Q, cdsm.distribute_tensions(ARM, 0.5 * Q)),
+        ("tension: was distributed at other postures",),
+    ),
+    "tensions and wrench": (
+        lambda: cdsm.evaluate(ARM, Q, cdsm.distribute_tensions(ARM, Q), W),
+        ("wrench: comes with the Tensions",),
+    ),
+    "outputs a string": (
+        lambda: cdsm.evaluate(ARM, Q, F, outputs="tip"),
+        ("outputs: 'tip'", "list"),
+    ),
+    "outputs twice": (
+        lambda: cdsm.evaluate(ARM, Q, F, outputs=("tip", "tip")),
+        ("outputs: 'tip' is named twice",),
+    ),
+    "along without direction": (
+        lambda: cdsm.evaluate(ARM, Q, F, outputs=("along",)),
+        ("direction: belongs to the output 'along'", "give both"),
+    ),
+    "direction without along": (
+        lambda: cdsm.evaluate(ARM, Q, F, direction=(1, 0, 0)),
+        ("direction: belongs to the output 'along'",),
+    ),
+    "direction zero": (
+        lambda: cdsm.evaluate(ARM, Q, F, outputs=("along",), direction=(0, 0, 0)),
+        ("direction: is the zero vector",),
+    ),
+    "one direction zero": (
+        lambda: cdsm.evaluate(ARM, Q, F, outputs=("along",), direction=np.eye(3, k=1)),
+        ("direction[2]: is the zero vector",),
+    ),
+    "directions too wide": (
+        lambda: cdsm.evaluate(ARM, Q, F, outputs=("along",), direction=np.eye(4)),
+        ("direction: shape (4, 4)", "(D, 3)"),
+    ),
+    "directions ragged": (
+        lambda: cdsm.evaluate(ARM, Q, F, outputs=("along",), direction=[[1.0], []]),
+        ("direction: is not an array",),
+    ),
+    "no directions": (
+        lambda: cdsm.evaluate(ARM, Q, F, outputs=("along",), direction=np.zeros((0, 3))),
+        ("direction: shape (0, 3)",),
+    ),
+    "no threads": (lambda: cdsm.evaluate(ARM, Q, F, threads=0), ("threads: 0", "from 1 on")),
+    "threads true": (lambda: cdsm.evaluate(ARM, Q, F, threads=True), ("threads: True",)),
+    "minimum negative": (
+        lambda: cdsm.distribute_tensions(ARM, Q, -1.0),
+        ("minimum: -1 N", "not negative"),
+    ),
+    "minimum infinite": (lambda: cdsm.distribute_tensions(ARM, Q, math.inf), ("minimum: inf N",)),
+    "minimum NaN": (
+        lambda: cdsm.distribute_tensions(ARM, Q, changed(F, 1, 2, math.nan)),
+        ("minimum: entry [1, 2] is nan",),
+    ),
+    "minimum ragged": (
+        lambda: cdsm.distribute_tensions(ARM, Q, [[1.0], []]),
+        ("minimum: is not an array",),
+    ),
+    "minimum of other rows": (
+        lambda: cdsm.distribute_tensions(ARM, Q, F[:2]),
+        (f"minimum: shape (2, {C})", f"({C},) or (3, {C})"),
+    ),
+    "maximum below minimum": (
+        lambda: cdsm.distribute_tensions(ARM, Q, 5.0, changed(10.0 + 0.0 * F, 1, 2, 4.0)),
+        ("maximum: 4 N", ARM.cables[2].name, "in row 1", "minimum of 5 N", "raise maximum"),
+    ),
+    "own law that gives no rigidity": (
+        lambda: cdsm.evaluate(cdsm.Manipulator(ARM.geometry, Zero()), Q, F),
+        ("elasticity", "one positive number for each"),
+    ),
+}
+
+
+class Zero(Hardening):
+    def rigidity(self, tension: ArrayLike) -> Array:
+        return np.zeros(np.shape(tension))
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_bad_input_is_named(name: str) -> None:
+    call, said = BAD[name]
+    with pytest.raises(cdsm.InvalidInput) as caught:
+        call()
+    for part in said:
+        assert part in str(caught.value)
+
+
+def test_unknown_outputs_are_named_with_those_that_exist() -> None:
+    with pytest.raises(cdsm.UnknownName, match="'compliance'") as caught:
+        cdsm.evaluate(ARM, Q, F, outputs=("complience",))
+    assert caught.value.known == OUTPUTS
+    batch = cdsm.evaluate(ARM, Q, F, outputs=("tip",))
+    with pytest.raises(cdsm.UnknownName, match="outputs="):
+        batch["joint"]
+
+
+def test_defaults_are_outputs() -> None:
+    assert set(evaluation.DEFAULT_OUTPUTS) <= set(OUTPUTS)
+    pose = random_posture(ARM, 1)
+    for name in POSED - {"gravity"}:
+        assert hasattr(pose, name)
+
+
+class _Fussy(cdsm.Elasticity):
+    """A law that refuses arrays without saying where, or that takes no empty ones."""
+
+    def __init__(self, arrays: bool) -> None:
+        self.arrays = arrays
+
+    @property
+    def domain(self) -> cdsm.Domain:
+        return cdsm.Domain(0.0, 500.0)
+
+    def rigidity(self, tension: ArrayLike) -> Array:
+        F = np.asarray(tension, dtype=np.float64)
+        if not self.arrays and F.size > 1:
+            raise cdsm.ElasticityRangeError("one at a time", [1.0])
+        return 5e4 + 0.0 * F + 0.0 * float(F.min())
+
+    strain = rigidity
+    energy = rigidity
+
+
+@pytest.mark.parametrize("arrays", [True, False])
+def test_fussy_laws_end_and_are_asked_about_something(arrays: bool) -> None:
+    arm = cdsm.Manipulator(cdsm.presets.virtual_prototype_geometry(), _Fussy(arrays))
+    q = np.full((3, 10), 0.1)
+    rows = cdsm.evaluate(arm, q, minimum=20.0, outputs=("joint",), threads=np.int64(1))  # type: ignore[arg-type]
+    assert (rows.status == cdsm.Status.OK).all()
+    # no row has tensions, so there is nothing to ask
+    none = cdsm.evaluate(arm, q, minimum=20.0, maximum=20.0, outputs=("joint",))
+    assert (none.status == cdsm.Status.INFEASIBLE).all()

@@ -1,0 +1,157 @@
+"""``cdsm sweep`` and ``cdsm map``, as a user calls them."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import cdsm
+from cdsm.sweeps import progress
+from tests.cli.test_commands import SHORT, call, geometry
+from tests.support.sweeps import short_arm
+
+__all__ = ["geometry"]  # a fixture
+
+ARM = ("--rigidity", 48e3, "--gravity", "0,-2,-9", "--min-tension", "20,40")
+
+
+def arm() -> cdsm.Manipulator:
+    described = cdsm.Geometry.from_toml(SHORT)
+    return cdsm.Manipulator(described, cdsm.LinearElasticity(48e3), gravity=(0.0, -2.0, -9.0))
+
+
+def test_grid_is_what_the_api_computes(geometry: Path, tmp_path: Path) -> None:
+    out, store = tmp_path / "s.nc", tmp_path / "s.zarr"
+    grid = ("--grid", "joint1_1=-20:20:5, joint3_2 = 0:10:2,joint2_1=5")
+    result = call("sweep", geometry, *grid, *ARM, "--resume", store, "--out", out)
+    assert result.exit_code == 0, result.output
+    assert "20 ok" in result.output
+    assert str(out) in result.output
+    poses = cdsm.GridPoses(
+        {
+            "joint1_1": np.deg2rad(np.linspace(-20.0, 20.0, 5)),
+            "joint3_2": np.deg2rad([0.0, 10.0]),
+        },
+        {"joint2_1": np.deg2rad(5.0)},
+    )
+    expected = cdsm.sweep(arm(), poses, minimum=[20.0, 40.0])
+    xr.testing.assert_identical(cdsm.read_sweep(out), expected)
+    xr.testing.assert_identical(cdsm.read_sweep(store), expected)
+
+
+def test_random_postures_and_chosen_quantities_as_a_table(geometry: Path, tmp_path: Path) -> None:
+    out = tmp_path / "s.csv"
+    options = ("--random", 16, "--seed", 3, "--quantities", "tension, margin", "--min-tension", 9)
+    result = call("sweep", geometry, *options, "--rigidity", 48e3, "-o", out)
+    assert result.exit_code == 0, result.output
+    header, *rows = out.read_text(encoding="utf-8").splitlines()
+    assert len(rows) == 16
+    assert "tension_cable1_1 [N],tension_cable1_2 [N]" in header
+    assert "along" not in header
+
+
+def test_path_goes_through_its_waypoints_in_degrees(geometry: Path, tmp_path: Path) -> None:
+    table, out = tmp_path / "path.csv", tmp_path / "s.nc"
+    names = ", ".join(f"{name} [deg]" for name in arm().joint_names)
+    rows = "0,0,0,0,0,0\n0,0,0,0,30,0\n\n0,-40,0,0,30,0\n"
+    table.write_text(f"{names}\n{rows}", encoding="utf-8")
+    result = call("sweep", geometry, "--path", table, "--count", 8, *ARM, "--out", out)
+    assert result.exit_code == 0, result.output
+    q = cdsm.read_sweep(out).q
+    np.testing.assert_allclose(np.rad2deg(q.sel(joint="joint3_1")[:4]), [0, 10, 20, 30], atol=1e-9)
+    np.testing.assert_allclose(np.rad2deg(q.sel(joint="joint1_2")[-1]), -40.0, rtol=1e-12)
+    assert not q.sel(joint="joint2_1").any()
+
+
+def test_map_draws_a_sweep(tmp_path: Path) -> None:
+    poses = cdsm.RandomPoses(32)
+    found = cdsm.sweep(short_arm(), poses, minimum=20.0, store=tmp_path / "s.zarr")
+    cdsm.write_sweep(found, tmp_path / "s.nc")
+    for source, options in (("s.nc", ()), ("s.zarr", ("--section", "y=0:50"))):
+        out = tmp_path / f"{source}.png"
+        result = call("map", tmp_path / source, "--quantity", "along", "--out", out, *options)
+        assert result.exit_code == 0, result.output
+        assert out.read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "said"),
+    [
+        (("--random", "8", "--out", "{folder}/s.txt"), 1, "ends neither in .nc"),
+        (("--random", "8", "--out", "{folder}/absent/s.nc"), 1, "does not exist; create it"),
+        (("--random", "0"), 1, "count: 0 given"),
+        (("--grid", "joint9=0:1:2"), 1, "no joint is called 'joint9'"),
+        (("--grid", "joint1_1=0:1"), 2, "a joint is JOINT=LOW:HIGH:COUNT or JOINT=ANGLE"),
+        (("--grid", "joint1_1=0:1:2.5"), 2, "a joint is JOINT=LOW:HIGH:COUNT"),
+        (("--grid", "joint1_1=a"), 2, "could not convert"),
+        (("--grid", "joint1_1=3"), 1, "angles: is empty"),
+        (("--path", "{folder}/absent.csv"), 1, "absent.csv: does not exist"),
+        (("--path", "{folder}/names.csv"), 1, "has columns for neither of joint angles"),
+        (("--path", "{folder}/empty.csv"), 1, "holds no path"),
+        (("--path", "{folder}/short.csv"), 1, "has no column joint1_2"),
+        (("--path", "{folder}/tips.csv"), 1, "a sweep goes along joint angles"),
+        (("--random", "8", "--grid", "joint1_1=0:1:2"), 2, "give one of --grid, --path"),
+        ((), 2, "give one of --grid, --path"),
+        (("--random", "8", "--quantities", "marign"), 1, "did you mean 'margin'"),
+    ],
+)
+def test_failure_is_one_message(
+    arguments: tuple[str, ...], code: int, said: str, geometry: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "names.csv").write_text("a,b\n0,0\n1,1\n", encoding="utf-8")
+    (tmp_path / "empty.csv").write_text("\n", encoding="utf-8")
+    (tmp_path / "short.csv").write_text("joint1_1 [deg]\n0\n1\n", encoding="utf-8")
+    (tmp_path / "tips.csv").write_text("x [mm],y [mm],z [mm]\n1,2,3\n", encoding="utf-8")
+    given = ["--out", str(tmp_path / "s.nc"), *arguments]
+    result = call("sweep", geometry, *(each.format(folder=tmp_path) for each in given))
+    assert result.exit_code == code
+    assert said in " ".join(result.stderr.replace("│", " ").split())
+    assert "Traceback" not in result.output
+    assert not (tmp_path / "s.nc").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--grid", "joint1_1=0:10:3,joint1_1=5"), "joint1_1 is given twice"),
+        (("--random", "5", "--count", "3"), "goes with --path only"),
+        (("--grid", "joint1_1=0:10:3", "--seed", "3"), "goes with --random only"),
+    ],
+)
+def test_options_that_say_nothing_are_refused(
+    arguments: tuple[str, ...], said: str, geometry: Path, tmp_path: Path
+) -> None:
+    result = call("sweep", geometry, "--out", tmp_path / "s.nc", *arguments)
+    assert result.exit_code == 2
+    assert said in " ".join(result.stderr.replace("│", " ").split())
+
+
+def test_folder_in_the_place_of_the_file_is_told_before_the_work(
+    geometry: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "s.nc").mkdir()
+    result = call("sweep", geometry, "--out", tmp_path / "s.nc", "--random", "5")
+    assert result.exit_code == 1
+    assert "is a folder" in result.stderr
+
+
+def test_map_of_no_sweep_is_one_message(tmp_path: Path) -> None:
+    result = call("map", tmp_path / "absent.nc", "--out", tmp_path / "s.png")
+    assert result.exit_code == 1
+    assert "absent.nc: does not exist" in result.stderr
+
+
+def test_the_bar_counts_what_is_left_and_shows_only_on_a_terminal(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with progress.progress_bar(10, 0, wanted=True) as advance:
+        advance(10)
+    assert capsys.readouterr().err == ""
+    monkeypatch.setenv("FORCE_COLOR", "1")  # which rich takes for a terminal
+    with progress.progress_bar(1000, 400, wanted=True) as advance:
+        advance(600)
+    assert "1000/1000" in capsys.readouterr().err
+    with progress.progress_bar(10, 0, wanted=False) as advance:
+        advance(10)
+    assert capsys.readouterr().err == ""

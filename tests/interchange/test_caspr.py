@@ -1,0 +1,479 @@
+"""CASPR's model files: read into a manipulator, or refused by name."""
+
+import pickle
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import cdsm
+from cdsm.support.validation import Array
+from tests.support import caspr_models
+from tests.support.differences import assert_second_order
+
+LAW = cdsm.LinearElasticity(2e4)
+
+LINK = """
+<link_rigid num="{num}" name="{name}">
+  <joint type="{kind}" q_initial="0" q_min="{low}" q_max="{high}"{more}/>
+  <physical>
+    <mass>{mass}</mass>
+    <com_location>0.01 0.05 -0.02</com_location>
+    <end_location>0.0 0.12 0.0</end_location>
+    <inertia ref="{ref}">
+      <Ixx>0.003</Ixx><Iyy>0.002</Iyy><Izz>0.004</Izz><Ixy>0.0001</Ixy><Ixz>0</Ixz><Iyz>0</Iyz>
+    </inertia>
+  </physical>
+  <parent><num>{parent}</num><location>0.01 0.1 0.03</location></parent>
+</link_rigid>"""
+
+CABLE = """
+<cable_ideal name="{name}" attachment_reference="{ref}">
+  <properties><force_min>{low}</force_min><force_max>{high}</force_max></properties>
+  <attachments>
+    <attachment><link>0</link><location>0.05 0.0 0.04</location></attachment>
+    <attachment><link>1</link><location>0.04 0.06 0.03</location></attachment>
+    <attachment><link>2</link><location>-0.03 0.02 0.04</location></attachment>
+  </attachments>
+</cable_ideal>"""
+
+DOCTYPE = '<!DOCTYPE {0} SYSTEM "../../../templates/{1}.dtd">\n'
+
+
+def link(num: int, kind: str, parent: int | None = None, **changes: object) -> str:
+    count = {"R": 1, "U": 2, "S_": 3, "P_A": 1, "PL": 3, "T": 3, "SP": 6, "P_X": len(kind) - 2}
+    size = next(n for key, n in count.items() if kind.startswith(key) or key == "P_X")
+    fields = {
+        "num": num,
+        "name": f"part {num}",
+        "kind": kind,
+        "low": " ".join(["-0.5"] * size),
+        "high": " ".join(["0.6"] * size),
+        "more": "",
+        "mass": 0.3,
+        "ref": "com",
+        "parent": num - 1 if parent is None else parent,
+    }
+    return LINK.format(**{**fields, **changes})
+
+
+def cable(**changes: object) -> str:
+    return CABLE.format(**{"name": "one", "ref": "joint", "low": 1, "high": 80, **changes})
+
+
+def folder(path: Path, links: str, cables: str, doctype: bool = True) -> Path:
+    head = DOCTYPE if doctype else ""
+    (path / "toy_bodies.xml").write_text(
+        '<?xml version="1.0" encoding="utf-8"?>\n'
+        f"{head.format('bodies_system', 'bodies')}"
+        f"<bodies_system><links>{links}</links></bodies_system>",
+        encoding="utf-8",
+    )
+    (path / "toy_cables.xml").write_text(
+        f"{head.format('cables', 'cables')}"
+        f'<cables default_cable_set="all"><cable_set id="all">{cables}</cable_set>'
+        f'<cable_set id="none"></cable_set></cables>',
+        encoding="utf-8",
+    )
+    return path
+
+
+def toy(path: Path, second: str = "U_XZ", first: str = "R_Y") -> cdsm.Manipulator:
+    links = link(1, first) + link(2, second)
+    return cdsm.read_caspr(folder(path, links, cable()), elasticity=LAW)
+
+
+def rotation(axes: str, angles: Array) -> Array:
+    """Product of single turns, from the parent on."""
+    matrix = np.eye(3)
+    for axis, angle in zip(axes, angles, strict=True):
+        matrix = matrix @ Rotation.from_euler(axis.lower(), angle).as_matrix()
+    return matrix
+
+
+@pytest.mark.parametrize(
+    ("kind", "axes"),
+    [
+        ("R_X", "X"),
+        ("R_Z", "Z"),
+        ("U_XY", "XY"),
+        ("U_YZ", "YZ"),
+        ("U_XZ", "XZ"),
+        ("S_EULER_XYZ", "XYZ"),
+        ("S_FIXED_XYZ", "ZYX"),
+    ],
+)
+def test_turns_come_in_the_order_of_their_name(kind: str, axes: str, tmp_path: Path) -> None:
+    arm = toy(tmp_path, kind)
+    q = np.array([0.2, 0.3, -0.4, 0.5])[: arm.nv]
+    assert arm.joint_names == ("part 1_y", *(f"part 2_{a.lower()}" for a in sorted(axes)))
+    tip = arm.at(q).tip
+    angles = [q[arm.joint_names.index(f"part 2_{a.lower()}")] for a in axes]
+    first, second = rotation("Y", q[:1]), rotation(axes, np.array(angles))
+    np.testing.assert_allclose(tip[:3, :3], first @ second, atol=1e-15)
+    place = np.array([0.01, 0.1, 0.03])
+    end = place + first @ (place + second @ [0.0, 0.12, 0.0])
+    np.testing.assert_allclose(tip[:3, 3], end, atol=1e-15)
+    np.testing.assert_allclose(arm.upper, 0.6)
+    np.testing.assert_allclose(arm.lower, -0.5)
+
+
+@pytest.mark.parametrize(
+    ("kind", "slides", "axes"),
+    [
+        ("P_X", "X", ""),
+        ("P_XZ", "XZ", ""),
+        ("T_XYZ", "XYZ", ""),
+        ("PLANAR_YZ", "YZ", "X"),
+        ("SPATIAL_EULER_XYZ", "XYZ", "XYZ"),
+    ],
+)
+def test_slides_move_along_the_axes_of_the_parent(
+    kind: str, slides: str, axes: str, tmp_path: Path
+) -> None:
+    arm = toy(tmp_path, kind)
+    q = np.array([0.2, 0.3, -0.4, 0.5, 0.1, -0.2, 0.35])[: arm.nv]
+    ways, angles = q[1 : 1 + len(slides)], q[1 + len(slides) :]
+    first = rotation("Y", q[:1])
+    moved = np.zeros(3)
+    moved[["XYZ".index(a) for a in slides]] = ways
+    place = np.array([0.01, 0.1, 0.03])
+    end = place + first @ (place + moved + rotation(axes, angles) @ [0.0, 0.12, 0.0])
+    np.testing.assert_allclose(arm.at(q).tip[:3, 3], end, atol=1e-15)
+
+
+def test_any_axis_may_be_given(tmp_path: Path) -> None:
+    links = link(1, "R_Y") + link(2, "R_AXIS", more=' axis="1 2 2"')
+    arm = cdsm.read_caspr(folder(tmp_path, links, cable()), elasticity=LAW)
+    turn = Rotation.from_rotvec(0.3 * np.array([1.0, 2.0, 2.0]) / 3.0).as_matrix()
+    np.testing.assert_allclose(arm.at([0.0, 0.3]).tip[:3, :3], turn, atol=1e-15)
+
+
+# --- q is that of the file --------------------------------------------------------------------
+
+BRANCHES = (
+    ("trunk", "U_XZ", 0),
+    ("right", "S_FIXED_XYZ", 1),  # behind "left" by name
+    ("left", "S_EULER_XYZ", 1),
+    ("head", "S_FIXED_XYZ", 1),
+    ("right hand", "R_AXIS", 2),  # carried by the second, numbered after the fourth
+    ("left hand", "PLANAR_XZ", 3),
+    ("right finger", "S_FIXED_XYZ", 5),
+)
+"""Links with their joints and parents, numbered across the branches."""
+
+COORDINATES = {
+    "U_XY": 2, "U_YZ": 2, "U_XZ": 2, "R_X": 1, "R_Y": 1, "R_Z": 1, "R_AXIS": 1, "P_AXIS": 1,
+    "S_EULER_XYZ": 3, "S_FIXED_XYZ": 3, "P_X": 1, "P_XY": 2, "P_XZ": 2, "T_XYZ": 3,
+    "PLANAR_XY": 3, "PLANAR_YZ": 3, "PLANAR_XZ": 3, "SPATIAL_EULER_XYZ": 6,
+}  # fmt: skip
+
+
+def tree(path: Path, rows: tuple[tuple[str, str, int], ...]) -> Path:
+    """The folder of a model of such links, each with limits of its own, and six cables."""
+    rng = np.random.default_rng(len(rows))
+    links, at = "", 0
+    for number, (name, kind, parent) in enumerate(rows, start=1):
+        count = COORDINATES[kind]
+        low, high = (
+            " ".join(f"{side * (0.7 + 0.01 * i):g}" for i in range(at, at + count))
+            for side in (-1, 1)
+        )
+        more = ' axis="1 -2 0.5"' if kind.endswith("AXIS") else ""
+        links += link(number, kind, parent, name=name, low=low, high=high, more=more)
+        at += count
+    cables = ""
+    for c in range(6):
+        sites = sorted(rng.choice(len(rows) + 1, size=4, replace=False))
+        points = "".join(
+            f"<attachment><link>{site}</link>"
+            f"<location>{' '.join(f'{x:.4f}' for x in rng.uniform(-0.1, 0.1, 3))}</location>"
+            "</attachment>"
+            for site in sites
+        )
+        cables += (
+            f'<cable_ideal name="c{c}" attachment_reference="{"com" if c % 2 else "joint"}">'
+            "<properties><force_min>1</force_min><force_max>90</force_max></properties>"
+            f"<attachments>{points}</attachments></cable_ideal>"
+        )
+    return folder(path, links, cables)
+
+
+def assert_is_the_files(path: Path) -> cdsm.Manipulator:
+    """Assert that the lengths at any q, and the limits, are those of the XML in its order."""
+    arm = cdsm.read_caspr(path, elasticity=LAW)
+    bodies, cables = path / "toy_bodies.xml", path / "toy_cables.xml"
+    np.testing.assert_array_equal([arm.lower, arm.upper], caspr_models.limits(bodies))
+    rng = np.random.default_rng(arm.nv)
+    for _ in range(5):
+        q = rng.uniform(arm.lower, arm.upper)
+        expected = caspr_models.lengths(bodies, cables, q)
+        np.testing.assert_allclose(arm.at(q).cable_lengths, expected, rtol=1e-14, atol=0.0)
+        np.testing.assert_allclose(arm.cable_lengths(q), expected, rtol=1e-14, atol=0.0)
+    return arm
+
+
+@pytest.mark.parametrize("kind", COORDINATES)
+def test_coordinates_of_each_joint_type_are_the_files(kind: str, tmp_path: Path) -> None:
+    assert caspr_models.coordinates(kind) == COORDINATES[kind]
+    assert_is_the_files(tree(tmp_path, (("b", "U_YZ", 0), ("a", kind, 1), ("c", "R_Z", 2))))
+
+
+def test_coordinates_across_branches_are_the_files(tmp_path: Path) -> None:
+    arm = assert_is_the_files(tree(tmp_path, BRANCHES))
+    assert arm.joint_names[:8] == (
+        *("trunk_x", "trunk_z", "right_x", "right_y", "right_z", "left_x", "left_y", "left_z"),
+    )
+    assert arm.joint_names[11:15] == (
+        *("right hand_turn", "left hand_slide_x", "left hand_slide_z", "left hand_y"),
+    )
+
+
+@pytest.mark.parametrize("tip", ["right finger", "left hand", "head"])
+def test_derivatives_hold_whatever_the_order_of_q(tip: str, tmp_path: Path) -> None:
+    """Every term of Eq. 16 where parents come after children; the tip on each branch."""
+    last = next(i for i, row in enumerate(BRANCHES) if row[0] == tip) + 1
+    whole = cdsm.read_caspr(tree(tmp_path, BRANCHES), elasticity=LAW)
+    arm = cdsm.Manipulator.from_urdf(
+        whole.urdf,
+        whole.cables,
+        tip=BRANCHES[last - 1][0],
+        joint_names=whole.joint_names,
+        gravity=(1.0, -3.0, -9.0),
+    )
+    q = np.random.default_rng(last).uniform(arm.lower, arm.upper) / 2.0
+    W = np.array([3.0, -2.0, 5.0, 0.4, -0.3, 0.2])
+    F = np.linspace(20.0, 60.0, 6)
+    pose = arm.at(q)
+    K = cdsm.stiffness(pose, F, wrench=W)
+    assert_second_order(lambda y: arm.at(y).cable_lengths, pose.length_jacobian, q)
+    assert_second_order(lambda y: arm.at(y).length_jacobian.T @ F, K.active, q)
+    assert_second_order(lambda y: arm.at(y).gravity_torque, K.gravity, q)
+    assert_second_order(lambda y: -arm.at(y).jacobian.T @ W, K.load, q)
+    assert_second_order(lambda y: arm.at(y).tip[:3, 3], pose.jacobian[:3], q)
+    heights = np.array([arm._body.potential_energy(q)])
+    assert_second_order(
+        lambda y: np.array([arm._body.potential_energy(y)]),
+        pose.gravity_torque[None],
+        q,
+        size=float(abs(heights).max()),
+        tolerance=1e-9,
+    )
+    np.testing.assert_array_equal(pose.tip, pose.link_pose(tip))
+    of_pose = ("tip", "jacobian", "gravity_torque", "length_jacobian")
+    terms = ("active", "passive", "gravity", "load", "joint")
+    batch = cdsm.evaluate(arm, q[None], F[None], W[None], (*of_pose, *terms))
+    for name in of_pose:
+        np.testing.assert_allclose(batch[name][0], getattr(pose, name), rtol=0.0, atol=1e-14)
+    for name in terms:
+        term = getattr(K, name)
+        np.testing.assert_allclose(batch[name][0], term, rtol=0.0, atol=1e-13 * abs(term).max())
+
+
+def test_order_of_q_changes_the_order_of_answers_and_nothing_else(tmp_path: Path) -> None:
+    arm = cdsm.read_caspr(tree(tmp_path, BRANCHES), elasticity=LAW)
+    plain = cdsm.Manipulator.from_urdf(arm.urdf, arm.cables, tip="tool0")
+    assert plain != arm
+    assert sorted(plain.joint_names) == sorted(arm.joint_names)
+    place = [arm.joint_names.index(name) for name in plain.joint_names]
+    assert place != sorted(place)
+    q = np.random.default_rng(3).uniform(arm.lower, arm.upper) / 2.0
+    F, W = np.linspace(20.0, 60.0, 6), np.array([3.0, -2.0, 5.0, 0.4, -0.3, 0.2])
+    ours, theirs = arm.at(q), plain.at(q[place])
+    np.testing.assert_allclose(ours.joint_positions[place], theirs.joint_positions, atol=1e-15)
+    assert len(ours.bones) == len(theirs.bones)
+    assert len(ours.brackets) == len(theirs.brackets)
+    pairs = [
+        (ours.length_hessian[0], theirs.length_hessian[0]),
+        (cdsm.stiffness(ours, F, wrench=W).joint, cdsm.stiffness(theirs, F, wrench=W).joint),
+        (arm._body.mass_matrix(q), plain._body.mass_matrix(q[place])),
+    ]
+    for matrix, other in pairs:
+        matrix = matrix[np.ix_(place, place)]
+        np.testing.assert_allclose(matrix, other, rtol=0.0, atol=1e-13 * abs(other).max())
+    np.testing.assert_array_equal(arm.slides[place], plain.slides)
+
+    for same in (pickle.loads(pickle.dumps(arm)), arm.with_cables(arm.cables)):
+        assert same == arm
+        assert same.joint_names == arm.joint_names
+        np.testing.assert_array_equal(same.cable_lengths(q), arm.cable_lengths(q))
+
+
+@pytest.mark.parametrize(
+    ("names", "said"),
+    [
+        (("part 1_y", "part 2_x"), "leaves out 'part 2_z'"),
+        (("part 1_y", "part 2_x", "part 2_z", "part 3_x"), "has too many of 'part 3_x'"),
+        (("part 1_y", "part 2_x", "part 2_x"), "leaves out 'part 2_z', has too many of 'part 2_x'"),
+        (("part 1_y", "part 2_x", "part 2_z", "part 2_x"), "has too many of 'part 2_x'"),
+        ("part 1_y", "list or tuple"),
+        ((1, 2, 3), "list or tuple"),
+        ((), "leaves out"),
+    ],
+)
+def test_order_must_name_each_joint_once(names: Any, said: str, tmp_path: Path) -> None:
+    arm = toy(tmp_path)
+    with pytest.raises(cdsm.InvalidInput, match=f"joint_names.*{said}"):
+        cdsm.Manipulator.from_urdf(arm.urdf, arm.cables, tip="tool0", joint_names=names)
+
+
+@pytest.mark.parametrize("reference", ["joint", "com"])
+def test_cables_pass_the_points_of_their_reference(reference: str, tmp_path: Path) -> None:
+    links = link(1, "R_Y") + link(2, "R_X")
+    path = folder(tmp_path, links, cable(ref=reference) + cable(name="one", ref="joint"))
+    arm = cdsm.read_caspr(path, elasticity=LAW)
+    first, again = arm.cables
+    assert (first.name, again.name) == ("one", "one #2")
+    assert [site.link for site in first.sites] == ["base", "part 1", "part 2"]
+    centre = np.array([0.01, 0.05, -0.02]) if reference == "com" else np.zeros(3)
+    np.testing.assert_allclose(first.sites[0].position, [0.05, 0.0, 0.04])
+    np.testing.assert_allclose(first.sites[1].position, np.array([0.04, 0.06, 0.03]) + centre)
+    assert (first.minimum, first.maximum, first.elasticity) == (1.0, 80.0, LAW)
+
+
+def test_weight_acts_at_the_centres_of_mass(tmp_path: Path) -> None:
+    arm = toy(tmp_path)
+    q = np.array([0.2, 0.3, -0.4])
+    total = np.zeros(3)
+
+    def height(angles: Array) -> float:
+        pose = arm.at(angles)
+        value = 0.0
+        for name in ("part 1", "part 2"):
+            frame = pose.link_pose(name)
+            centre = frame[:3, 3] + frame[:3, :3] @ [0.01, 0.05, -0.02]
+            value += 0.3 * 9.81 * float(centre[2])
+        return value
+
+    h = 1e-5
+    for i, e in enumerate(h * np.eye(3)):
+        total[i] = (height(q + e) - height(q - e)) / (2.0 * h)
+    np.testing.assert_allclose(arm.at(q).gravity_torque, total, atol=1e-9)
+
+
+def test_inertia_about_the_joint_is_moved_to_the_centre(tmp_path: Path) -> None:
+    at_joint = link(1, "R_Y", ref="joint", mass=0.05)
+    arm = cdsm.read_caspr(
+        folder(tmp_path, at_joint + link(2, "R_X", mass=0), cable()), elasticity=LAW
+    )
+    # of one link about its joint's y axis that is what the file says
+    assert arm._body.mass_matrix(np.zeros(2))[0, 0] == pytest.approx(0.002, rel=1e-12)
+
+
+def test_stiffness_is_computed_like_that_of_any_arm(tmp_path: Path) -> None:
+    arm = toy(tmp_path)
+    K = cdsm.stiffness(arm.at(np.zeros(3)), [20.0])
+    assert np.isfinite(K.joint).all()
+    assert arm.name == "toy"
+
+
+def test_files_may_be_given_one_by_one(tmp_path: Path) -> None:
+    folder(tmp_path, link(1, "R_Y") + link(2, "R_X"), cable(), doctype=False)
+    arm = cdsm.read_caspr(
+        tmp_path / "toy_bodies.xml", tmp_path / "toy_cables.xml", elasticity=LAW, cable_set="all"
+    )
+    assert arm == cdsm.read_caspr(tmp_path, elasticity=LAW)
+    with pytest.raises(cdsm.InvalidInput, match="file of the cables"):
+        cdsm.read_caspr(tmp_path / "toy_bodies.xml", elasticity=LAW)
+    with pytest.raises(cdsm.UnknownName, match="set of cables"):
+        cdsm.read_caspr(tmp_path, elasticity=LAW, cable_set="al")
+    with pytest.raises(cdsm.FileError, match="holds no cables; sets with cables are 'all'"):
+        cdsm.read_caspr(tmp_path, elasticity=LAW, cable_set="none")
+
+
+@pytest.mark.parametrize(
+    ("links", "cables", "said"),
+    [
+        (link(1, "R_Y").replace("R_Y", "S_QUATERNION"), cable(), "'S_QUATERNION' is not taken"),
+        (link(1, "R_Y") + link(3, "R_X"), cable(), "numbered [1, 3], not 1 to 2"),
+        (link(1, "R_Y") + link(2, "R_X", parent=2), cable(), "its parent is link 2"),
+        (link(1, "R_Y", mass=-1), cable(), "<mass> -1 kg"),
+        (link(1, "R_Y", mass="heavy"), cable(), "<mass>"),
+        (link(1, "R_Y", ref="moon"), cable(), "com or joint is needed"),
+        (link(1, "R_Y", low="0.7"), cable(), "q_min 0.7 is above q_max 0.6"),
+        (link(1, "R_Y", low="0 0"), cable(), "joint q_min: '0 0' given; a number is needed"),
+        (link(1, "R_Y").replace("link_rigid", "link_soft"), cable(), "only <link_rigid> is taken"),
+        ("", cable(), "holds no link"),
+        (link(1, "R_Y"), cable(), "there is no link 2, but 0 to 1"),
+        (
+            link(1, "R_Y") + link(2, "R_X"),
+            cable().replace("cable_ideal", "cable_vsd_polynomial"),
+            "<cable_vsd_polynomial> one: only <cable_ideal>",
+        ),
+        (
+            link(1, "R_Y") + link(2, "R_X"),
+            cable()
+            .replace("<attachment><link>0", "<base_rotating_pulley><link>0")
+            .replace("</attachment>", "</base_rotating_pulley>", 1),
+            "<base_rotating_pulley> is not taken",
+        ),
+        (link(1, "R_Y") + link(2, "R_X"), cable(ref="sky"), "attachment_reference 'sky'"),
+        (link(1, "R_Y") + link(2, "R_X"), cable(low=9, high=4), "tensions from 9 to 4 N"),
+        (link(1, "R_Y") + link(2, "R_X"), cable(low="x"), "<force_min>: 'x' given"),
+    ],
+)
+def test_what_cannot_be_mapped_is_named(links: str, cables: str, said: str, tmp_path: Path) -> None:
+    with pytest.raises(cdsm.FileError) as caught:
+        cdsm.read_caspr(folder(tmp_path, links, cables), elasticity=LAW)
+    assert said in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "doctype",
+    [
+        '<!DOCTYPE bodies_system SYSTEM "file:///etc/passwd">',
+        '<!DOCTYPE bodies_system [<!ENTITY a "b">]>',
+        '<!DOCTYPE bodies_system SYSTEM "../../../templates/bodies.dtd" [<!ENTITY a "b">]>',
+        '<!DOCTYPE bodies_system SYSTEM "../../../templates/bodies.dtd" [<!ENTITY % a "b">]>',
+        '<!DOCTYPE bodies_system SYSTEM "../../../templates/bodies.dtd" []>',
+        '<!DOCTYPE bodies_system [<!ATTLIST link_rigid num CDATA "1">]>',
+        '<!DOCTYPE bodies_system SYSTEM "../../../templates/bodies.dtd" [<!ATTLIST a b ID "c">]>',
+        '<!DOCTYPE bodies_system PUBLIC "x" "../../../templates/bodies.dtd">',
+        '<!DOCTYPE bodies_system PUBLIC " " "../../../templates/bodies.dtd">',
+        '<!DOCTYPE bodies_system PUBLIC "" "/etc/passwd">',
+        '<!DOCTYPE bodies_system PUBLIC "" "https://example.org/templates/bodies.dtd">',
+        '<!DOCTYPE bodies_system PUBLIC "" "../../../templates/bodies.dtd" [<!ENTITY a "b">]>',
+        '<!-- <!DOCTYPE bodies_system PUBLIC "" "../templates/bodies.dtd"> -->'
+        '<!DOCTYPE bodies_system PUBLIC "" "/etc/passwd">',
+    ],
+)
+def test_no_other_doctype_is_let_pass(doctype: str, tmp_path: Path) -> None:
+    path = folder(tmp_path, link(1, "R_Y") + link(2, "R_X"), cable(), doctype=False)
+    file = path / "toy_bodies.xml"
+    text = file.read_text(encoding="utf-8").split("\n", 1)[1]
+    file.write_text(doctype + text, encoding="utf-8")
+    with pytest.raises(cdsm.FileError, match="DOCTYPE"):
+        cdsm.read_caspr(path, elasticity=LAW)
+
+
+@pytest.mark.parametrize(
+    "doctype",
+    [
+        '<!DOCTYPE {0} SYSTEM "../../../templates/{1}.dtd">\n',
+        '\n<!DOCTYPE {0}\n  PUBLIC "" "../../../templates/{1}.dtd">\n',
+        "<!DOCTYPE {0} PUBLIC '' 'templates/{1}.dtd' >",
+    ],
+)
+def test_doctypes_of_stock_models_are_let_pass(doctype: str, tmp_path: Path) -> None:
+    path = folder(tmp_path, link(1, "R_Y") + link(2, "R_X"), cable())
+    expected = cdsm.read_caspr(path, elasticity=LAW)
+    for kind, root in (("bodies", "bodies_system"), ("cables", "cables")):
+        file = path / f"toy_{kind}.xml"
+        text = file.read_text(encoding="utf-8")
+        assert text.count(DOCTYPE.format(root, kind)) == 1
+        text = text.replace(DOCTYPE.format(root, kind), doctype.format(root, kind))
+        file.write_text(text, encoding="utf-8")
+    assert cdsm.read_caspr(path, elasticity=LAW) == expected
+
+
+def test_folder_must_hold_one_of_each(tmp_path: Path) -> None:
+    with pytest.raises(cdsm.FileError, match=r"holds none where one \*_bodies.xml is needed"):
+        cdsm.read_caspr(tmp_path, elasticity=LAW)
+    with pytest.raises(cdsm.FileError, match="does not exist"):
+        cdsm.read_caspr(tmp_path / "absent.xml", tmp_path / "b.xml", elasticity=LAW)
+    with pytest.raises(cdsm.InvalidInput, match="path of a file"):
+        cdsm.read_caspr(None, elasticity=LAW)  # type: ignore[arg-type]
+    with pytest.raises(cdsm.InvalidInput, match="Elasticity is needed"):
+        cdsm.read_caspr(tmp_path, elasticity=3.0)  # type: ignore[arg-type]

@@ -1,0 +1,270 @@
+"""Derivatives of stiffness by the tensions, against central differences."""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import ArrayLike
+
+import cdsm
+from cdsm.arm_model import CableLaws
+from cdsm.support.validation import Array
+from tests.support import arms
+from tests.support.differences import assert_second_order, central_difference
+from tests.support.locked import ARMS, JUMPING, STRAND, TABLE, balanced, original_lengths, some_arm
+
+U = np.array([0.3, -0.5, 0.8])
+
+
+class Plain(cdsm.Elasticity):
+    """A law of one's own that says nothing of its slope: EA of another one, jumps included."""
+
+    def __init__(self, law: cdsm.Elasticity) -> None:
+        self.law = law
+
+    @property
+    def domain(self) -> cdsm.Domain:
+        return self.law.domain
+
+    @property
+    def jumps(self) -> tuple[float, ...]:
+        return self.law.jumps
+
+    def rigidity(self, tension: ArrayLike) -> Array:
+        return self.law.rigidity(tension)
+
+    def strain(self, tension: ArrayLike) -> Array:
+        return self.law.strain(tension)
+
+    def energy(self, tension: ArrayLike) -> Array:
+        return self.law.energy(tension)
+
+
+# --- dEA/dF ---------------------------------------------------------------------------------
+
+LAWS: dict[str, tuple[cdsm.Elasticity, Array]] = {
+    "linear": (cdsm.LinearElasticity(48e3), np.array([0.5, 30.0, 400.0])),
+    "strand below 31 N": (STRAND, np.array([4.0, 12.0, 29.0])),
+    "strand above 31 N": (STRAND, np.array([33.0, 90.0, 600.0])),
+    "table between its points": (TABLE, np.array([11.0, 100.0, 400.0, 800.0])),
+}
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_slope_of_rigidity_is_its_derivative(name: str) -> None:
+    law, F = LAWS[name]
+    slope = law.rigidity_slope(F)
+    size = float(law.rigidity(F).max())
+    assert_second_order(law.rigidity, np.diag(slope), F, step=2.0**-3, size=size, tolerance=1e-8)
+
+
+@pytest.mark.parametrize("law", [STRAND, TABLE], ids=["strand", "table"])
+def test_slope_at_a_join_is_that_of_the_range_below(law: cdsm.Elasticity) -> None:
+    join = TABLE.tensions[2] if law is TABLE else 31.0
+    step = 1e-4
+    a, b, c = law.rigidity([join, join - step, join - 2.0 * step])
+    # one-sided, second order: 1e-4² of a third derivative, and rounding of 1e4 N over 1e-4 N
+    assert float(law.rigidity_slope(join)) == pytest.approx(
+        (1.5 * a - 2.0 * b + 0.5 * c) / step, rel=1e-6
+    )
+    above = float(law.rigidity_slope(math.nextafter(join, math.inf)))
+    assert abs(above / float(law.rigidity_slope(join)) - 1.0) > 0.05
+
+
+@pytest.mark.parametrize("law", [STRAND, TABLE, cdsm.LinearElasticity(48e3)])
+def test_law_of_ones_own_has_the_slope_by_differences(law: cdsm.Elasticity) -> None:
+    domain = law.domain
+    high = min(domain.high, 900.0)
+    ends = [domain.first, high, *law.jumps, *np.nextafter(law.jumps, math.inf)]
+    inside = np.random.default_rng(1).uniform(domain.low + 1.0, high, 40)
+    own = Plain(law)
+    np.testing.assert_allclose(
+        own.rigidity_slope(inside), law.rigidity_slope(inside), rtol=1e-7, atol=1e-5
+    )
+    # on one side only the difference is of first order in 6e-6 F
+    np.testing.assert_allclose(own.rigidity_slope(ends), law.rigidity_slope(ends), rtol=1e-3)
+    assert own.rigidity_slope(inside.reshape(4, 10)).shape == (4, 10)
+    assert own.rigidity_slope(20.0).shape == ()
+
+
+@pytest.mark.parametrize("law", [STRAND, TABLE, Plain(STRAND)])
+def test_slope_outside_the_domain_is_refused(law: cdsm.Elasticity) -> None:
+    with pytest.raises(cdsm.ElasticityRangeError, match="outside the domain"):
+        law.rigidity_slope([20.0, 950.0])
+
+
+# --- stiffness ------------------------------------------------------------------------------
+
+
+def pulled(name: str, moment: bool) -> cdsm.Stiffness:
+    """An arm of all laws, springs and force-controlled cables, its tensions off all kinks."""
+    pose, pull = balanced(name, moment=moment)
+    F = pull.values + np.random.default_rng(3).uniform(5.0, 9.0, pull.values.size)
+    K = cdsm.stiffness(pose, F, pull.wrench)
+    assert abs(np.subtract.outer(F, [31.0, *TABLE.tensions])).min() > 0.5
+    assert K.is_stable
+    return K
+
+
+def assert_gradient(
+    K: cdsm.Stiffness, read: Callable[[cdsm.Stiffness], Array], analytic: Array
+) -> None:
+    def f(F: Array) -> Array:
+        return np.asarray(read(cdsm.stiffness(K.posture, F, K.wrench)))
+
+    # tables are C1 in strain only: differences stay on one side of their points, 0.5 N away
+    size = float(abs(f(K.tension)).max())
+    assert_second_order(
+        f, np.moveaxis(analytic, 0, -1), K.tension, step=0.25, size=10.0 * size, tolerance=1e-7
+    )
+
+
+@pytest.mark.parametrize("moment", [False, True])
+@pytest.mark.parametrize("name", ARMS)
+def test_gradients_are_derivatives(name: str, moment: bool) -> None:
+    K = pulled(name, moment)
+    gradient = cdsm.stiffness_gradient(K)
+    assert (abs(K.load - K.load.T).max() > 0.0) == (moment and K.posture.arm.nv > 1)
+    assert_gradient(K, lambda K: K.cable_stiffness, np.diag(gradient.cable_stiffness))
+    assert_gradient(K, lambda K: K.joint, gradient.joint)
+    assert_gradient(K, lambda K: np.array(K.along(U)), gradient.along(U))
+    assert_gradient(K, lambda K: np.array(K.margin), gradient.margin)
+
+
+@pytest.mark.parametrize("moment", [False, True])
+@pytest.mark.parametrize("name", [name for name in ARMS if "-1-" not in name and "-2-" not in name])
+def test_gradient_of_the_cartesian_matrix_is_its_derivative(name: str, moment: bool) -> None:
+    K = pulled(name, moment)
+    assert_gradient(K, lambda K: K.cartesian, cdsm.stiffness_gradient(K).cartesian)
+
+
+def test_force_controlled_cables_change_the_active_part_alone() -> None:
+    K = pulled("mixed-3-0-all", moment=False)
+    gradient = cdsm.stiffness_gradient(K)
+    force = np.array([cable.control == "force" for cable in K.posture.arm.cables])
+    assert force.any()
+    assert (gradient.cable_stiffness[force] == 0.0).all()
+    np.testing.assert_array_equal(gradient.joint[force], K.posture.length_hessian[force])
+
+
+def test_gradient_at_an_equilibrium_is_that_at_its_posture() -> None:
+    """The motors pay out what another tension there takes: l_0 changes with it, L does not."""
+    pose, pull = balanced("universal-3-8-all")
+    rest = cdsm.equilibrium(pose, pull, 2.0 * pull.wrench)
+    arm, there = pose.arm, rest.pose
+    assert abs(there.cable_lengths / pose.cable_lengths - 1.0).max() > 1e-5
+
+    def springs(F: Array) -> Array:
+        free = original_lengths(there, F)
+        k = [
+            float(cable.tangent_stiffness(f, l0)) if cable.control == "position" else 0.0
+            for cable, f, l0 in zip(arm.cables, F, free, strict=True)
+        ]
+        return np.array(k)
+
+    expected = np.diag(central_difference(springs, rest.tension, 2.0**-8))
+    slope = cdsm.stiffness_gradient(rest.stiffness).cable_stiffness
+    # second differences of a strand leave 1e-6 of its third derivative
+    np.testing.assert_allclose(slope, expected, rtol=1e-6, atol=1e-9 * abs(expected).max())
+
+
+def test_multiple_eigenvalue_has_bounds_for_gradients() -> None:
+    """Eq. 19 levels off above 31 N: λ_min is concave in F, with an edge where two are equal."""
+    geometry = cdsm.Geometry.universal(
+        joints=1,
+        cables_per_joint=4,
+        link_length=0.05,
+        base_length=0.02,
+        disk_offset=0.01,
+        hole_radius=0.03,
+        link_mass=0.0,
+    )
+    pose = cdsm.Manipulator(geometry, STRAND).at([0.0, 0.0])
+    F = np.full(4, 90.0)
+    K = cdsm.stiffness(pose, F)
+    assert np.ptp(np.linalg.eigvalsh(K.joint)) < 1e-12 * K.margin
+    slope = cdsm.stiffness_gradient(K).margin
+    fell = []
+    for step in np.random.default_rng(0).normal(0.0, 10.0, (30, 4)):
+        change = cdsm.stiffness(pose, F + step).margin - K.margin
+        assert change <= slope @ step + 1e-12 * K.margin
+        fell.append(slope @ step - change)
+    assert max(fell) > 1e-3 * K.margin
+
+
+@pytest.mark.parametrize("own", [False, True], ids=["known", "by differences"])
+def test_second_slope_of_cable_stiffness_is_the_derivative_of_the_first(own: bool) -> None:
+    arm = some_arm("universal-3-8-all")
+    cables = list(arm.cables)
+    if own:
+        cables = [replace(cable, elasticity=Plain(cable.elasticity)) for cable in cables]
+    laws, lengths = CableLaws(tuple(cables), "unstrained"), np.linspace(0.2, 0.5, len(cables))
+    assert {cable.control for cable in cables} == {"position", "force"}
+    assert {cable.series_stiffness for cable in cables} > {math.inf}
+
+    def slopes(F: Array) -> tuple[Array, Array]:
+        return laws.slopes(F, laws.stiffness(lengths, F))
+
+    # away from 31 and 250 N, where Eq. 19 and the table bend
+    F = np.random.default_rng(3).uniform(60.0, 200.0, len(cables))
+    first, second = slopes(F)
+    # Eq. 19 is curved above 31 N, and a spring bends the stiffness of any law
+    assert np.count_nonzero(second) > len(cables) / 2
+    step = 2.0**-2
+    np.testing.assert_allclose(
+        central_difference(lambda x: slopes(x)[0], F, step),
+        np.diag(second),
+        rtol=1e-4,
+        atol=1e-4 * abs(second).max(),
+    )
+    np.testing.assert_allclose(
+        central_difference(lambda x: laws.stiffness(lengths, x), F, step),
+        np.diag(first),
+        rtol=1e-5,
+        atol=1e-5 * abs(first).max(),
+    )
+
+
+def test_where_the_tip_cannot_move_there_is_no_gradient() -> None:
+    geometry = cdsm.presets.experimental_prototype_geometry()
+    pose = cdsm.Manipulator(geometry, arms.STEEL).at(np.zeros(3))
+    gradient = cdsm.stiffness_gradient(cdsm.stiffness(pose, np.full(6, 50.0)))
+    with pytest.raises(cdsm.SingularStiffness, match="cannot move along"):
+        gradient.along([1.0, 0.0, 0.0])
+    with pytest.raises(cdsm.SingularStiffness):
+        _ = gradient.cartesian
+    with pytest.raises(cdsm.InvalidInput, match="zero vector"):
+        gradient.along([0.0, 0.0, 0.0])
+    with pytest.raises(cdsm.InvalidInput, match="Stiffness"):
+        cdsm.stiffness_gradient("K")  # type: ignore[arg-type]
+
+
+def test_slope_of_ones_own_that_is_no_number_is_refused() -> None:
+    class Bad(Plain):
+        def rigidity_slope(self, tension: ArrayLike) -> Array:
+            return np.full_like(self.law.rigidity(tension), math.nan)
+
+    arm = some_arm("hinged-2-4-table")
+    bad = [replace(cable, elasticity=Bad(TABLE)) for cable in arm.cables]
+    pose = cdsm.Manipulator(arm.geometry, cables=bad).at([0.1, 0.2])
+    with pytest.raises(cdsm.InvalidInput, match="one finite number"):
+        cdsm.stiffness_gradient(cdsm.stiffness(pose, np.full(4, 50.0)))
+
+
+@pytest.mark.parametrize("law", [JUMPING, STRAND], ids=["jump", "bend"])
+@pytest.mark.parametrize("place", [31.0, 810.0], ids=["join", "end"])
+def test_second_slope_is_taken_on_the_side_that_belongs_to_the_place(
+    place: float, law: cdsm.Elasticity
+) -> None:
+    """Below a jump, a bend and the end of the domain, where there is no tension beyond."""
+    arm = cdsm.Manipulator(arms.random_arm(1, 2).geometry, law)
+    lengths = arm.at(np.zeros(arm.nv)).cable_lengths
+
+    def slopes(F: float) -> tuple[Array, Array]:
+        tension = np.full(lengths.size, F)
+        return arm._laws.slopes(tension, arm._laws.stiffness(lengths, tension))
+
+    for there, below in zip(slopes(place), slopes(place * (1.0 - 1e-4)), strict=True):
+        np.testing.assert_allclose(there, below, rtol=1e-2)

@@ -1,0 +1,511 @@
+"""Tensions for a wanted stiffness: hit, measured by a hung weight, least, and start-independent."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+import cdsm
+from cdsm import presets
+from cdsm.planning import planner
+from cdsm.planning.planner import Planner
+from cdsm.planning.range import attainable
+from cdsm.support.validation import Array
+from tests.planning.test_range import DOWN, corners
+from tests.support import arms
+from tests.support.differences import central_difference
+from tests.support.locked import JUMPING, LENGTH, STRAND, hinge, soft, soft_hinge, some_arm
+
+ARMS: dict[str, tuple[str, int, int, cdsm.Elasticity, float, float]] = {
+    "hinged-3-strand": ("hinged", 3, 0, STRAND, 40.0, 300.0),
+    "hinged-3-linear": ("hinged", 3, 2, cdsm.LinearElasticity(8e3), 20.0, 300.0),
+    "universal-2-strand": ("universal", 2, 3, STRAND, 40.0, 400.0),
+    "universal-3-linear": ("universal", 3, 1, cdsm.LinearElasticity(20e3), 10.0, 300.0),
+    "universal-5-strand": ("universal", 5, 5, STRAND, 50.0, 700.0),
+}
+
+
+def posture(name: str) -> tuple[cdsm.Posture, float, float]:
+    kind, joints, seed, law, low, high = ARMS[name]
+    return arms.random_posture(arms.random_arm(seed, joints, kind, law), seed, 0.4), low, high
+
+
+def assert_admissible(plan: cdsm.StiffnessPlan, low: float, high: float) -> None:
+    F, K = plan.tension.values, plan.stiffness
+    assert abs(plan.tension.residual).max() <= 1e-12 * high
+    np.testing.assert_allclose(K.residual, plan.tension.residual, atol=1e-15 * high)
+    assert (low <= F).all()
+    assert (high >= F).all()
+    assert K.margin >= plan.floor * (1.0 - 1e-9)
+
+
+# --- the target is hit ----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_ten_random_targets_are_hit_as_a_hung_weight_measures(name: str) -> None:
+    pose, low, high = posture(name)
+    rng = np.random.default_rng(len(name))
+    for _ in range(10):
+        u = rng.normal(size=3)
+        u /= np.linalg.norm(u)
+        found = cdsm.stiffness_range(pose, u, low, high, starts=6)
+        target = found.low + rng.uniform(0.02, 0.98) * (found.high - found.low)
+        plan = cdsm.plan_stiffness(pose, u, target, low, high)
+        assert plan.achieved == pytest.approx(target, rel=1e-9)
+        again = cdsm.stiffness(pose, plan.tension).along(u)
+        assert again == pytest.approx(plan.achieved, rel=1e-14)
+        assert plan.reached
+        assert_admissible(plan, low, high)
+        # micrometres, up and down: what is left of the curvature is of second order
+        force = 1e-6 * target * u
+        soft = [
+            1.0 / cdsm.weight_test(pose, plan.tension, sign * force).stiffness
+            for sign in (1.0, -1.0)
+        ]
+        assert 2.0 / sum(soft) == pytest.approx(target, rel=1e-4)
+
+
+def random_target(seed: int) -> tuple[cdsm.Posture, Array, float] | None:
+    """An arm, a direction and a stiffness that it can have along it; or none if it cannot stand."""
+    rng = np.random.default_rng([seed, 50])
+    kind = str(rng.choice(["universal", "hinged"]))
+    law = STRAND if seed % 2 else cdsm.LinearElasticity(float(10.0 ** rng.uniform(4.0, 5.0)))
+    arm = arms.random_arm(seed, int(rng.integers(2, 6)), kind, law)
+    pose = arms.random_posture(arm, seed, 0.4)
+    u = rng.normal(size=3)
+    try:
+        found = cdsm.stiffness_range(pose, u, 40.0, 500.0, starts=4)
+    except (cdsm.InfeasibleTension, cdsm.SingularStiffness):
+        return None
+    return pose, found.direction, found.low + rng.uniform(0.05, 0.95) * (found.high - found.low)
+
+
+@pytest.mark.slow
+def test_fifty_random_arms_are_as_stiff_as_planned_under_a_hung_weight() -> None:
+    """Measured by the nonlinear equilibrium with locked motors, up and down, within 1e-4."""
+    reached = {"linear": 0, "strand": 0}
+    for seed in range(80):
+        case = random_target(seed)
+        if case is None:
+            continue
+        pose, u, target = case
+        plan = cdsm.plan_stiffness(pose, u, target, 40.0, 500.0)
+        # a tenth of a micrometre: of the arm nearest to buckling the curvature leaves 5e-5 then,
+        # and a hundred times that of a micrometre
+        force = 1e-7 * target * u
+        soft = [
+            1.0 / cdsm.weight_test(pose, plan.tension, sign * force).stiffness
+            for sign in (1.0, -1.0)
+        ]
+        assert 2.0 / sum(soft) == pytest.approx(target, rel=1e-4), seed
+        reached["strand" if seed % 2 else "linear"] += 1
+        if min(reached.values()) >= 25:
+            break
+    assert min(reached.values()) >= 25
+    assert sum(reached.values()) >= 50
+
+
+@pytest.mark.parametrize("name", ["universal-3-8-all", "hinged-4-0-all", "mixed-3-0-all"])
+@pytest.mark.parametrize("moment", [False, True])
+def test_springs_force_controlled_cables_and_wrenches_take_part(name: str, moment: bool) -> None:
+    pose = arms.random_posture(some_arm(name), 11, reach=0.25)
+    W = arms.random_wrench(4, moment)
+    found = cdsm.stiffness_range(pose, DOWN, 40.0, 300.0, W, starts=6)
+    for part in (0.1, 0.6, 0.95):
+        target = found.low + part * (found.high - found.low)
+        plan = cdsm.plan_stiffness(pose, DOWN, target, 40.0, 300.0, W)
+        assert cdsm.stiffness(pose, plan.tension.values, W).along(DOWN) == pytest.approx(
+            target, rel=1e-9
+        )
+        assert_admissible(plan, 40.0, 300.0)
+        np.testing.assert_array_equal(plan.tension.wrench, W)
+
+
+# --- with the least effort ------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("part", [0.04, 0.3, 0.9])
+@pytest.mark.parametrize("name", ARMS)
+def test_tensions_satisfy_the_conditions_of_first_order(name: str, part: float) -> None:
+    """F = J_L λ + μ ∂along/∂F + z: z pushes up at lower bounds, down at upper ones, else not."""
+    pose, low, high = posture(name)
+    u = np.array([0.2, 0.5, -0.8])
+    found = cdsm.stiffness_range(pose, u, low, high, starts=6)
+    target = found.low + part * (found.high - found.low)
+    plan = cdsm.plan_stiffness(pose, u, target, low, high)
+    F = plan.tension.values
+    assert plan.stiffness.margin > 1.01 * plan.floor  # stability has no say
+
+    def along(F: Array) -> Array:
+        return np.array(cdsm.stiffness(pose, F).along(u))
+
+    # the bounds are no end of a domain, so there is something on both sides
+    slope = central_difference(along, F, 1e-3) / target
+    at_low, at_high = low * (1.0 + 1e-9) >= F, high * (1.0 - 1e-9) <= F
+    free = ~(at_low | at_high)
+    normals = np.column_stack([pose.length_jacobian, slope])
+    scaled = normals / np.linalg.norm(normals, axis=0)
+    multipliers = np.linalg.lstsq(scaled[free], F[free], rcond=None)[0]
+    z = F - scaled @ multipliers
+    # differences over 1e-3 N of a strand leave 1e-8 of its third derivative
+    assert abs(z[free]).max() < 1e-6 * np.linalg.norm(F)
+    assert z[at_low].min(initial=0.0) > -1e-6 * np.linalg.norm(F)
+    assert z[at_high].max(initial=0.0) < 1e-6 * np.linalg.norm(F)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("part", [0.1, 0.5, 0.9])
+@pytest.mark.parametrize("name", [name for name in ARMS if name.startswith("hinged")])
+def test_smaller_tensions_all_miss_the_target_on_the_same_side(name: str, part: float) -> None:
+    """They are a convex set, so if along met the target somewhere it would on the way there."""
+    pose, low, high = posture(name)
+    u = np.array([0.2, 0.5, -0.8])
+    found = cdsm.stiffness_range(pose, u, low, high)
+    target = found.low + part * (found.high - found.low)
+    plan = cdsm.plan_stiffness(pose, u, target, low, high)
+    F = plan.tension.values
+    effort = float(np.linalg.norm(F))
+    least = cdsm.distribute_tension(pose, low, high).values
+    side = cdsm.stiffness(pose, least).along(u) - target
+    ends = corners(pose, low, high, np.zeros(6))
+    rng = np.random.default_rng(0)
+    tried = 0
+    for mixture in rng.dirichlet(np.full(len(ends), 0.3), 4000) @ ends:
+        there = mixture
+        if np.linalg.norm(there) > effort:  # back to where the effort is just below
+            way = there - least
+            a, b, c = way @ way, 2.0 * (way @ least), least @ least - effort**2
+            there = least + 0.9999 * (-b + math.sqrt(b * b - 4.0 * a * c)) / (2.0 * a) * way
+        K = cdsm.stiffness(pose, np.clip(there, low, high))
+        if K.margin >= plan.floor:
+            assert (K.along(u) - target) * side > 0.0
+            tried += 1
+    assert tried > 1000
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("seed", "joints", "kind", "law", "low"),
+    [
+        (0, 3, "hinged", STRAND, 20.0),
+        (2, 3, "hinged", cdsm.LinearElasticity(5e3), 20.0),
+        (1, 2, "universal", STRAND, 15.0),
+        (3, 3, "universal", STRAND, 15.0),
+        (2, 5, "universal", STRAND, 15.0),
+        (1, 2, "universal", JUMPING, 15.0),
+        (3, 3, "universal", JUMPING, 15.0),
+        (0, 5, "universal", cdsm.LinearElasticity(20e3), 20.0),
+    ],
+)
+def test_answer_does_not_depend_on_the_starts(
+    seed: int, joints: int, kind: str, law: cdsm.Elasticity, low: float
+) -> None:
+    """From 15 N on some cables are below the bend or jump of Eq. 19 at 31 N, others above."""
+    pose = arms.random_posture(arms.random_arm(seed, joints, kind, law), seed, 0.4)
+    u = np.random.default_rng(seed).normal(size=3)
+    found = cdsm.stiffness_range(pose, u, low, 200.0, starts=12)
+    for part in (0.15, 0.55):
+        target = found.low + part * (found.high - found.low)
+        efforts = [
+            np.linalg.norm(
+                cdsm.plan_stiffness(
+                    pose, u, target, low, 200.0, starts=starts, seed=number
+                ).tension.values
+            )
+            for number, starts in ((0, 3), (1, 4), (2, 5), (3, 6))
+        ]
+        np.testing.assert_allclose(efforts, efforts[0], rtol=1e-6)
+
+
+def test_efforts_of_all_starts_are_told() -> None:
+    pose, low, high = posture("universal-5-strand")
+    found = cdsm.stiffness_range(pose, DOWN, low, high, starts=6)
+    plan = cdsm.plan_stiffness(pose, DOWN, 0.5 * (found.low + found.high), low, high, starts=5)
+    assert plan.efforts.size == 5
+    assert plan.efforts[0] == pytest.approx(np.linalg.norm(plan.tension.values), rel=1e-12)
+    assert plan.spread == pytest.approx(0.0, abs=1e-9)
+
+
+def test_few_evaluations_are_enough_at_five_joints() -> None:
+    arm = presets.virtual_prototype()
+    pose = arm.at(np.full(arm.nv, presets.TEN_DEGREES))
+    for target in (60e3, 80e3, 100e3, 120e3):
+        plan = cdsm.plan_stiffness(pose, DOWN, target, 50.0)
+        # 24 of them find out where to begin
+        assert plan.evaluations < 120
+        assert plan.iterations < 60
+
+
+# --- out of reach ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_unreachable_targets_are_refused_with_the_range(name: str) -> None:
+    pose, low, high = posture(name)
+    found = cdsm.stiffness_range(pose, DOWN, low, high)
+    for target, end in ((0.99 * found.low, found.low), (1.01 * found.high, found.high)):
+        with pytest.raises(cdsm.UnreachableStiffness, match="the range is") as caught:
+            cdsm.plan_stiffness(pose, DOWN, target, low, high)
+        error = caught.value
+        assert error.low == pytest.approx(found.low, rel=1e-9)
+        assert error.high == pytest.approx(found.high, rel=1e-9)
+        assert error.target == target
+        np.testing.assert_allclose(error.nearest, [end], rtol=1e-9)
+        np.testing.assert_array_equal(error.direction, DOWN)
+    for end in (found.low, found.high):
+        plan = cdsm.plan_stiffness(pose, DOWN, end, low, high)
+        assert plan.achieved == pytest.approx(end, rel=1e-6)
+
+
+def jump(angle: float) -> tuple[cdsm.Posture, list[float]]:
+    """A hinge of Eq. 19 as it jumps, and the tensions of its first cable with one at 31 N."""
+    pose = hinge(law=JUMPING, joint_limit=0.5).at([angle])
+    above, below = pose.length_jacobian[:, 0]
+    return pose, sorted([31.0, -31.0 * below / above])
+
+
+def along_hinge(pose: cdsm.Posture, F: float) -> float:
+    above, below = pose.length_jacobian[:, 0]
+    return cdsm.stiffness(pose, [F, -F * above / below]).along(DOWN)
+
+
+@pytest.mark.parametrize("angle", [0.2, -0.3])
+def test_target_in_the_gap_of_a_jump_is_refused_with_both_sides(angle: float) -> None:
+    """Two cables of a hinge pull in one ratio, so that K(F) jumps twice on a line."""
+    pose, places = jump(angle)
+    for place in places:
+        below, above = (along_hinge(pose, place * (1.0 + side * 1e-12)) for side in (-1.0, 1.0))
+        assert above > 1.01 * below
+        for part in (0.1, 0.5, 0.9):
+            target = below + part * (above - below)
+            with pytest.raises(cdsm.UnreachableStiffness, match="it has gaps") as caught:
+                cdsm.plan_stiffness(pose, DOWN, target, 10.0, 100.0)
+            assert caught.value.low < target < caught.value.high
+            np.testing.assert_allclose(caught.value.nearest, [below, above], rtol=1e-9)
+        for target in (below * (1.0 - 1e-5), below, above, above * (1.0 + 1e-5)):
+            plan = cdsm.plan_stiffness(pose, DOWN, target, 10.0, 100.0)
+            assert plan.achieved == pytest.approx(target, rel=1e-9)
+
+
+def test_every_stiffness_of_a_hinge_beside_its_gaps_is_reached() -> None:
+    pose, places = jump(0.2)
+    for F in (10.0, 20.0, *np.add.outer(places, [-1e-3, 1e-3]).ravel(), 45.0, 80.0):
+        target = along_hinge(pose, float(F))
+        plan = cdsm.plan_stiffness(pose, DOWN, target, 5.0, 100.0)
+        assert plan.tension.values[0] == pytest.approx(F, rel=1e-8)
+
+
+def test_plan_of_a_hinge_has_its_closed_form() -> None:
+    target = soft(33.0) / LENGTH**2
+    plan = cdsm.plan_stiffness(soft_hinge().at([0.0]), DOWN, target, 10.0)
+    np.testing.assert_allclose(plan.tension.values, 33.0, rtol=1e-9)
+
+
+# --- next to the ends, and where there is nothing to choose ---------------------------------
+
+
+def strand_case(seed: int) -> tuple[cdsm.Posture, Array, float, float]:
+    """An arm of strands, any direction, and bounds that let tension nearly buckle it."""
+    rng = np.random.default_rng(seed)
+    kind, joints = ("hinged" if seed % 2 else "universal"), int(rng.integers(2, 5))
+    pose = arms.random_posture(arms.random_arm(seed, joints, kind, STRAND), seed, 0.4)
+    low, high = float(rng.choice([3.0, 10.0, 20.0])), float(rng.choice([60.0, 200.0, np.inf]))
+    return pose, rng.normal(size=3), low, high
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [111, 113, 127])
+def test_ends_of_the_range_and_all_beside_them_are_reached(seed: int) -> None:
+    """Next to buckling all that is left of the stiffness is a difference, and a piece is thin."""
+    pose, u, low, high = strand_case(seed)
+    found = cdsm.stiffness_range(pose, u, low, high)
+    for target in (found.low, 1.0001 * found.low, found.high):
+        plan = cdsm.plan_stiffness(pose, u, target, low, high)
+        assert cdsm.stiffness(pose, plan.tension).along(u) == pytest.approx(target, rel=1e-6)
+        assert (low <= plan.tension.values).all()
+        assert (high >= plan.tension.values).all()
+        # balance to the last bit moves an eigenvalue that is next to nothing
+        assert plan.stiffness.margin >= plan.floor * (1.0 - 1e-6)
+
+
+def test_end_of_the_range_that_a_crossing_meets_by_rounding_is_reached() -> None:
+    pose = arms.random_posture(arms.random_arm(3, 3, "hinged", STRAND), 3, 0.3)
+    u = (0.0, 1.0, 0.3)
+    found = cdsm.stiffness_range(pose, u, 10.0)
+    plan = cdsm.plan_stiffness(pose, u, found.low, 10.0)
+    assert plan.achieved == pytest.approx(found.low, rel=1e-6)
+    path = cdsm.plan_path(pose.arm, u, [3.0 * found.low, found.low], 10.0, angles=[pose.q] * 2)
+    assert path.complete
+
+
+def test_range_and_refusal_name_the_same_numbers() -> None:
+    pose, u, low, high = strand_case(113)
+    found = cdsm.stiffness_range(pose, u, low, high)
+    for target in (0.99 * found.low, 1.01 * found.high):
+        with pytest.raises(cdsm.UnreachableStiffness) as caught:
+            cdsm.plan_stiffness(pose, u, target, low, high)
+        assert (caught.value.low, caught.value.high) == (found.low, found.high)
+
+
+def test_what_a_search_has_met_beyond_the_range_widens_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """As if the range had been found far too narrow."""
+    pose, low, high = posture("hinged-3-strand")
+    found = cdsm.stiffness_range(pose, DOWN, low, high)
+    target = 0.5 * (found.low + found.high)
+    true = attainable
+
+    def narrow(*given: Any) -> Any:
+        ends = true(*given)
+        return ends._replace(high=ends.low)
+
+    monkeypatch.setattr(planner, "attainable", narrow)
+    monkeypatch.setattr(Planner, "least", lambda self: None)
+    plan = cdsm.plan_stiffness(pose, DOWN, target, low, high)
+    assert plan.achieved == pytest.approx(target, rel=1e-9)
+    with pytest.raises(cdsm.UnreachableStiffness) as caught:
+        cdsm.plan_stiffness(pose, DOWN, 1.1 * found.high, low, high)
+    assert found.low < target < caught.value.high <= found.high * (1.0 + 1e-9)
+
+
+def test_one_cable_on_one_hinge_has_one_stiffness() -> None:
+    geometry = cdsm.Geometry(
+        name="one",
+        base_length=0.02,
+        hole_radius=0.02,
+        joints=(cdsm.Joint(axes=((0.0, 1.0, 0.0),), disk_offset=0.01),),
+        links=(cdsm.Link(length=0.05, mass=0.2),),
+        cables=(cdsm.CableRoute(joint=1, angle=math.pi / 2.0),),
+    )
+    arm = cdsm.Manipulator(geometry, cdsm.LinearElasticity(2e5))
+    pose = arm.at([0.0])
+    only = cdsm.stiffness(pose, cdsm.distribute_tension(pose)).along(DOWN)
+    found = cdsm.stiffness_range(pose, DOWN)
+    assert found.low == found.high == pytest.approx(only, rel=1e-12)
+    plan = cdsm.plan_stiffness(pose, DOWN, found.low)
+    assert plan.achieved == pytest.approx(only, rel=1e-12)
+    with pytest.raises(cdsm.UnreachableStiffness) as caught:
+        cdsm.plan_stiffness(pose, DOWN, 1e4)
+    assert (caught.value.low, caught.value.high) == (found.low, found.high)
+    path = cdsm.plan_path(arm, DOWN, [found.low, 1e4, found.low], angles=np.zeros((3, 1)))
+    assert path.planned == (0, 2)
+    assert path.infeasible[0].status == "stiffness"
+
+
+# --- several targets ------------------------------------------------------------------------
+
+
+def test_several_directions_are_hit_at_once_if_they_can_be() -> None:
+    arm = presets.virtual_prototype()
+    pose = arm.at(np.random.default_rng(0).uniform(-0.3, 0.3, arm.nv))
+    least = cdsm.distribute_tension(pose, 60.0)
+    K = cdsm.stiffness(pose, least)
+    for directions in (np.eye(3)[:2], np.eye(3), [[0.0, 2.0, 0.0], [0.0, 1.0, 1.0]]):
+        targets = [K.along(u) for u in directions]
+        plan = cdsm.plan_stiffness(pose, directions, targets, 30.0, 300.0)
+        assert plan.reached
+        np.testing.assert_allclose(plan.achieved, targets, rtol=1e-9)
+        # there may be smaller tensions than those the targets are from
+        assert plan.efforts[0] <= np.linalg.norm(least.values) * (1.0 + 1e-9)
+        assert_admissible(plan, 30.0, 300.0)
+        assert plan.direction is not None
+        np.testing.assert_allclose(np.linalg.norm(plan.direction, axis=1), 1.0, rtol=1e-15)
+
+
+@pytest.mark.parametrize("moment", [False, True])
+def test_cartesian_matrix_is_hit_if_it_can_be(moment: bool) -> None:
+    arm = presets.virtual_prototype()
+    pose = arm.at(np.random.default_rng(0).uniform(-0.3, 0.3, arm.nv))
+    W = arms.random_wrench(1, moment)
+    X = cdsm.stiffness(pose, cdsm.distribute_tension(pose, 60.0, wrench=W)).cartesian
+    target = (X + X.T) / 2.0
+    plan = cdsm.plan_stiffness(pose, None, target, 30.0, 300.0, W)
+    assert plan.reached
+    achieved = np.asarray(plan.achieved)
+    off = (achieved + achieved.T) / 2.0 - target
+    assert np.linalg.norm(off) <= 1e-9 * np.linalg.norm(target)
+    assert_admissible(plan, 30.0, 300.0)
+    # without a moment the skew part is none
+    assert (abs(achieved - achieved.T).max() > 1e-6 * abs(achieved).max()) == moment
+
+
+@pytest.mark.parametrize("what", ["directions", "cartesian"])
+def test_what_cannot_be_hit_is_missed_by_less_than_any_sample(what: str) -> None:
+    pose, low, high = posture("hinged-3-strand")
+    K = cdsm.stiffness(pose, cdsm.distribute_tension(pose, 80.0, 300.0))
+    directions: Any = np.eye(3)
+    if what == "directions":
+        target = np.array([K.along(u) for u in directions]) * [1.0, 1.5, 0.7]
+    else:
+        directions, target = None, np.diag(np.diag(K.cartesian))
+    plan = cdsm.plan_stiffness(pose, directions, target, low, high)
+    assert not plan.reached
+    assert_admissible(plan, low, high)
+
+    def misfit(F: Array) -> float:
+        K = cdsm.stiffness(pose, np.clip(F, low, high))
+        if directions is None:
+            return float(np.linalg.norm(K.cartesian - target) / np.linalg.norm(target))
+        return float(np.linalg.norm([K.along(u) for u in directions] / target - 1.0))
+
+    assert misfit(plan.tension.values) == pytest.approx(plan.misfit, rel=1e-12)
+    ends = corners(pose, low, high, np.zeros(6))
+    rng = np.random.default_rng(0)
+    mixtures = rng.dirichlet(np.full(len(ends), 0.3), 800) @ ends
+    best = min(misfit(F) for F in mixtures)
+    assert plan.misfit <= best <= 1.3 * plan.misfit
+    centre = plan.tension.values
+    for reach in (0.1, 0.01, 1e-3):
+        assert min(misfit(centre + reach * (F - centre)) for F in mixtures[:100]) >= plan.misfit
+    again = cdsm.plan_stiffness(pose, directions, target, low, high, starts=8, seed=5)
+    assert again.misfit == pytest.approx(plan.misfit, rel=1e-6)
+
+
+# --- the border -----------------------------------------------------------------------------
+
+BAD: list[tuple[Any, Any, str]] = [
+    (DOWN, 0.0, "target: 0 N/m given"),
+    (DOWN, -1e4, "target: -10000 N/m given"),
+    (DOWN, math.nan, "target"),
+    (DOWN, math.inf, "target"),
+    (DOWN, [1e4], "target: shape"),
+    (DOWN, "stiff", "target"),
+    (np.eye(3), 1e4, "target: shape"),
+    (np.eye(3), [1e4, 1e4, 0.0], "target: 0 N/m"),
+    (np.eye(3)[:, :2], [1e4] * 3, "direction: shape"),
+    (np.zeros((0, 3)), [], "direction: shape"),
+    ([[0.0, 0.0, 1.0], [0.0, 0.0, 0.0]], [1e4, 1e4], "zero vector"),
+    (None, 1e4, r"\(3, 3\) is needed"),
+    (None, -np.eye(3), "positive definite"),
+    (None, np.triu(np.ones((3, 3))), "symmetric"),
+]
+
+
+@pytest.mark.parametrize(("direction", "target", "message"), BAD)
+def test_targets_that_make_no_sense_are_named(direction: Any, target: Any, message: str) -> None:
+    arm = presets.virtual_prototype()
+    pose = arm.at(np.full(arm.nv, 0.1))
+    with pytest.raises(cdsm.InvalidInput, match=message):
+        cdsm.plan_stiffness(pose, direction, target, 50.0)
+
+
+def test_cartesian_matrix_of_a_flat_posture_does_not_exist() -> None:
+    with pytest.raises(cdsm.SingularStiffness, match="Cartesian stiffness matrix"):
+        cdsm.plan_stiffness(hinge().at([0.0]), None, 1e4 * np.eye(3), 10.0, 50.0)
+
+
+def test_what_is_printed_says_what_was_planned() -> None:
+    pose, low, high = posture("hinged-3-linear")
+    target = 1.05 * cdsm.stiffness_range(pose, DOWN, low, high).low
+    plan = cdsm.plan_stiffness(pose, DOWN, target, low, high)
+    for part in ("tension [N]", "along (0, 0, 1)", "wanted", f"{target / 1000.0:.6g} N/mm"):
+        assert part in str(plan)
+    assert "missed" not in repr(plan)
+    X = plan.stiffness.cartesian
+    off = cdsm.plan_stiffness(pose, None, np.diag(np.diag(X)), low, high)
+    assert "cartesian" in str(off)
+    assert "missed" in repr(off)
+    assert off.spread == 0.0

@@ -1,0 +1,302 @@
+"""Figures draw what they are given; how they look was looked at."""
+
+import numpy as np
+import pytest
+from matplotlib.lines import Line2D
+from mpl_toolkits.mplot3d.art3d import Line3D, Line3DCollection  # type: ignore[import-untyped]
+
+import cdsm
+from cdsm import paper, plots
+from cdsm.support.validation import Array
+from tests.conftest import Results
+from tests.support.arms import mixed_arm, random_posture
+from tests.support.foreign import POSTURE, crab
+
+
+def test_arm_is_drawn_with_disks_cables_and_equal_axes() -> None:
+    pose = random_posture(mixed_arm(), 3)
+    pull = cdsm.distribute_tension(pose, 10.0)
+    axes = plots.plot_arm(pose, pull).axes[0]
+    lines = [line for line in axes.get_lines() if isinstance(line, Line3D)]
+    disks = sum(len(places) for _, places in pose.arm.geometry.disks)
+    before = disks + len(pose.bones)
+    assert len(lines) == before + len(pose.arm.cables)
+    first = np.array(lines[before].get_data_3d())
+    np.testing.assert_allclose(first, 1e3 * pose.cable_paths[0].T)  # in mm
+    colors = {tuple(line.get_color()) for line in lines[before:]}
+    assert len(colors) > 2  # by tension
+    limits = np.ptp([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()], axis=1)  # type: ignore[attr-defined]
+    box = axes._box_aspect  # type: ignore[attr-defined]
+    np.testing.assert_allclose(limits / box, (limits / box)[0])
+
+
+def test_foreign_robot_shows_its_joints_and_what_guides_its_cables() -> None:
+    pose = crab().at(POSTURE)
+    sites = np.concatenate(pose.cable_paths)
+    links = [site.link for cable in pose.arm.cables for site in cable.sites]
+    assert len(pose.brackets) == len(sites)
+    for bracket, site, link in zip(pose.brackets, sites, links, strict=True):
+        np.testing.assert_array_equal(bracket[0], site)
+        # of all points of the bones that move with the link none is nearer than the foot
+        way = float(np.linalg.norm(bracket[1] - bracket[0]))
+        start = pose.link_pose("hand" if link == "tip" else link)[:3, 3]
+        own = [bone for bone in pose.bones if np.allclose(bone[0], start, atol=1e-12)]
+        along = np.linspace(0.0, 1.0, 401)[:, None]
+        points = np.concatenate(
+            [bone[0] + along * (bone[1] - bone[0]) for bone in own] or [[start]]
+        )
+        assert np.linalg.norm(points - site, axis=1).min() == pytest.approx(way, abs=1e-3)
+    axes = plots.plot_arm(pose).axes[0]
+    marked = [line for line in axes.get_lines() if line.get_marker() in ("o", "s")]
+    shown = [np.array(line.get_data_3d()).T for line in marked if line.get_label()[0] == "_"]  # type: ignore[attr-defined,index]
+    turning, sliding = (
+        1e3 * pose.joint_positions[each] for each in (~pose.arm.slides, pose.arm.slides)
+    )
+    np.testing.assert_allclose(shown[0], turning)
+    np.testing.assert_allclose(shown[1], sliding)
+    legend = axes.get_legend()
+    assert legend is not None
+    assert [text.get_text() for text in legend.get_texts()] == ["turns", "slides"]
+
+
+def test_ellipsoid_shows_where_forces_move_the_tip() -> None:
+    pose = random_posture(mixed_arm(), 3)
+    K = cdsm.stiffness(pose, cdsm.distribute_tension(pose, 10.0))
+    axes = plots.plot_arm(pose, stiffness=K).axes[0]
+    (wires,) = [each for each in axes.collections if isinstance(each, Line3DCollection)]
+    points = np.concatenate(wires._segments3d) / 1e3 - pose.tip[:3, 3]
+    C = K.compliance[:3, :3]
+    size = 0.2 * pose.arm.length / np.linalg.norm(C, 2)
+    # all are moved there by forces of one size
+    np.testing.assert_allclose(np.linalg.norm(np.linalg.solve(size * C, points.T), axis=0), 1.0)
+    with pytest.raises(cdsm.InvalidInput, match="another posture"):
+        plots.plot_arm(random_posture(mixed_arm(), 4), stiffness=K)
+    soft = cdsm.serpentine_cables(
+        pose.arm.geometry, cdsm.LinearElasticity(1e9), series_stiffness=10.0
+    )
+    loose = pose.arm.with_cables(soft).at(pose.q)
+    unstable = plots.plot_arm(loose, stiffness=cdsm.stiffness(loose, np.full(9, 300.0)))
+    assert "UNSTABLE" in unstable.get_suptitle()
+    assert not list(unstable.axes[0].collections)
+
+
+def test_paper_figures_show_both_readings_in_newton_per_millimetre(
+    results: Results,
+) -> None:
+    for result in results.values():
+        if not isinstance(result, paper.Figure):
+            continue
+        figure = plots.plot_paper(result)
+        labels = [axes.get_ylabel() for axes in figure.axes]
+        for reading in ("paper's reading", "hung weight"):
+            # of changes in per cent one label serves a row
+            changes = result.name in ("fig4", "fig7")
+            unit, count = ("[%]", 1) if changes else ("[N/mm]", 3)
+            assert sum(reading in label and unit in label for label in labels) == count
+        figure.draw_without_rendering()
+
+
+def test_curves_are_drawn_where_they_are(
+    results: Results,
+) -> None:
+    result = results["fig6"]
+    assert isinstance(result, paper.Figure)
+    axes = plots.plot_paper(result).axes[0]
+    x, y = _shown(axes.get_lines()[0])
+    np.testing.assert_allclose(x, result.curves[0].tension[:, 1])
+    np.testing.assert_allclose(y, result.curves[0].pseudoinverse[:, 0] / 1000.0)
+
+
+def test_experiments_show_the_papers_numbers_beside_the_computed(results: Results) -> None:
+    for name in ("fig10", "fig12", "fig13"):
+        result = results[name]
+        assert isinstance(result, paper.ExperimentFigure)
+        figure = plots.plot_paper(result)
+        figure.draw_without_rendering()
+        assert len(figure.axes) == len(result.traces)
+        unit = 1.0 if result.relative else 1e-3
+        for axes, trace in zip(figure.axes, result.traces, strict=True):
+            computed, printed = axes.get_lines()
+            np.testing.assert_allclose(_shown(computed)[1], unit * trace.computed)
+            np.testing.assert_allclose(_shown(printed)[1], unit * trace.paper)
+            assert "[N" in axes.get_xlabel()
+
+
+def test_prototype_figure_shows_a_dot_for_every_number_that_counted(results: Results) -> None:
+    result = results["prototype"]
+    assert isinstance(result, paper.PrototypeFigure)
+    figure = plots.plot_paper(result)
+    figure.draw_without_rendering()
+    (axes,) = figure.axes
+    *lines, _ = axes.get_lines()
+    for line, fit in zip(lines, result.fits, strict=True):
+        np.testing.assert_allclose(_shown(line)[0], 100.0 * fit.residuals)
+    assert [_shown(line).shape[1] for line in lines] == [20, 20, 20, 15]
+    assert len(axes.get_yticklabels()) == 20
+
+
+def test_changes_are_shown_in_both_readings_beside_the_papers_number(results: Results) -> None:
+    result = results["fig4"]
+    assert isinstance(result, paper.Figure)
+    figure = plots.plot_paper(result)
+    figure.draw_without_rendering()
+    assert len(figure.axes) == 9
+    for i, axes in enumerate(figure.axes[3:6]):
+        strand, original, wire, wire_original, zero, stated = axes.get_lines()
+        strand_claim, wire_claim = result.claims
+        assert _shown(strand)[1, -1] == pytest.approx(strand_claim.computed[i])
+        assert _shown(original)[1, -1] == pytest.approx(strand_claim.original[i])
+        assert _shown(wire)[1, -1] == pytest.approx(wire_claim.computed[i])
+        assert _shown(wire_original)[1, -1] == pytest.approx(wire_claim.original[i])
+        assert strand_claim.paper is not None
+        assert _shown(stated)[1, 0] == strand_claim.paper[i]
+        assert not np.any(_shown(zero)[1])
+
+
+def test_lead_is_shown_for_both_readings_of_k_and_of_the_length(results: Results) -> None:
+    result = results["lead"]
+    assert isinstance(result, paper.LeadFigure)
+    figure = plots.plot_paper(result)
+    figure.draw_without_rendering()
+    left, right = figure.axes
+    np.testing.assert_allclose(
+        _shown(left.get_lines()[0]), (1e3 * result.leads, result.stretched_pseudoinverse[:, 0])
+    )
+    np.testing.assert_allclose(
+        _shown(right.get_lines()[1]), (1e3 * result.leads, result.along[:, 0])
+    )
+    assert "[mm]" in left.get_xlabel()
+
+
+def test_weight_test_shows_its_displacements_in_mm_and_all_tensions() -> None:
+    pose = random_posture(mixed_arm(), 3)
+    test = cdsm.weight_test(pose, cdsm.distribute_tension(pose, 30.0), [0.0, 0.3, -1.0], steps=4)
+    figure = plots.plot_weight_test(test)
+    figure.draw_without_rendering()
+    left, right = figure.axes
+    for axis, (curve, linear) in enumerate(
+        zip(left.get_lines()[::2], left.get_lines()[1::2], strict=True)
+    ):
+        np.testing.assert_allclose(_shown(curve)[0, 1:], 1e3 * test.displacements[:, axis])
+        np.testing.assert_allclose(_shown(curve)[1, 1:], test.loads)
+        np.testing.assert_allclose(_shown(linear)[0, 1], 1e3 * test.linear.displacement[axis])
+    assert len(right.get_lines()) == len(pose.arm.cables)
+
+
+@pytest.mark.parametrize("spring", [2e3, 1e7])
+def test_critical_tension_shows_where_the_arm_is_unstable(spring: float) -> None:
+    geometry = cdsm.presets.experimental_prototype_geometry()
+    cables = cdsm.serpentine_cables(geometry, cdsm.LinearElasticity(1e9), series_stiffness=spring)
+    pose = cdsm.Manipulator(geometry, cables=cables).at(np.zeros(3))
+    critical = cdsm.critical_tension(pose)
+    figure = plots.plot_critical_tension(critical)
+    figure.draw_without_rendering()
+    (axes,) = figure.axes
+    np.testing.assert_allclose(_shown(axes.get_lines()[0]), [critical.bounds, critical.margins])
+    assert axes.get_xlim()[1] == pytest.approx(min(2.0 * critical.minimum, critical.examined[1]))
+    assert any("buckles at" in text.get_text() for text in axes.texts)
+
+
+def test_plan_is_drawn_between_the_softest_and_the_stiffest_tensions() -> None:
+    pose = random_posture(mixed_arm(), 3)
+    found = cdsm.stiffness_range(pose, (0.0, 0.0, 1.0), 10.0, 200.0)
+    plan = cdsm.plan_stiffness(pose, (0.0, 0.0, 1.0), 0.5 * (found.low + found.high), 10.0, 200.0)
+    figure = plots.plot_stiffness_plan(plan, found)
+    figure.draw_without_rendering()
+    (axes,) = figure.axes
+    pulls = (found.low_tension, plan.tension, found.high_tension)
+    for line, pull in zip(axes.get_lines(), pulls, strict=True):
+        np.testing.assert_array_equal(line.get_ydata(), pull.values)
+    legend = axes.get_legend()
+    assert legend is not None
+    assert f"planned: {1e-3 * float(plan.achieved):.4g} N/mm" in legend.get_texts()[1].get_text()
+    other = cdsm.stiffness_range(pose, (0.0, 1.0, 1.0), 10.0, 200.0)
+    with pytest.raises(cdsm.InvalidInput, match="attainable: is not of the posture"):
+        plots.plot_stiffness_plan(plan, other)
+
+
+def test_path_of_which_nothing_is_planned_is_drawn() -> None:
+    arm = cdsm.presets.virtual_prototype()
+    plan = cdsm.plan_path(arm, (0.0, 0.0, 1.0), [1e7, 2e7], 50.0, angles=np.full((2, 10), 0.15))
+    assert plan.planned == ()
+    above, below = plots.plot_path_plan(plan).axes
+    wanted, held = above.get_lines()
+    assert np.nanmax(_shown(wanted)[1]) == 2e4
+    assert np.isnan(_shown(held)[1]).all()
+    assert all(np.isnan(_shown(line)[1]).all() for line in below.get_lines())
+    # the reason is that of the first alone: the ranges and targets of the others differ
+    assert "samples 0 to 1: stiffness, the first of them: no admissible" in str(plan)
+
+
+def test_a_single_bound_of_joints_that_slide_is_a_point_with_both_units() -> None:
+    critical = cdsm.critical_tension(crab(gravity=(0.0, 0.0, 0.0)).at(POSTURE))
+    assert critical.examined == (0.0, 0.0)  # its cables balance it slack, and no other way
+    (axes,) = plots.plot_critical_tension(critical).axes
+    assert axes.get_ylabel() == "smallest joint stiffness [N m/rad or N/m]"
+    assert axes.get_xlim() == (0.0, 1.0)
+    assert axes.get_lines()[0].get_marker() == "o"
+
+
+def test_path_is_drawn_with_gaps_where_nothing_is_planned() -> None:
+    arm = cdsm.presets.virtual_prototype()
+    targets = np.array([80e3, 82e3, 1e7, 86e3, 1e7])
+    q = np.full((5, 10), 0.15)
+    plan = cdsm.plan_path(arm, (0.0, 0.0, 1.0), targets, 50.0, angles=q)
+    assert plan.planned == (0, 1, 3)
+    figure = plots.plot_path_plan(plan)
+    figure.draw_without_rendering()
+    above, below = figure.axes
+    wanted, held = above.get_lines()
+    # upright half-way between samples where it jumps; 80 to 82 may be how it begins to rise
+    steps = [[0, 80.0], [1, 82.0], [1.5, 82.0], [1.5, 1e4], [2, 1e4], [2.5, 1e4], [2.5, 86.0]]
+    steps += [[3, 86.0], [3.5, 86.0], [3.5, 1e4], [4, 1e4]]
+    np.testing.assert_allclose(_shown(wanted).T, steps)
+    np.testing.assert_allclose(_shown(held)[1], [80.0, 82.0, np.nan, 86.0, np.nan])
+    assert len(below.get_lines()) == 15
+    np.testing.assert_array_equal(_shown(below.get_lines()[4])[1, [0, 1, 3]], plan.tensions[:, 4])
+    assert len({line.get_color() for line in below.get_lines()}) == 15
+    legend = below.get_legend()
+    assert legend is not None
+    assert [text.get_text() for text in legend.get_texts()] == [each.name for each in arm.cables]
+    assert [len(axes.patches) for axes in (above, below)] == [2, 2]
+    matrix = cdsm.stiffness(arm.at(q[0]), cdsm.distribute_tension(arm.at(q[0]), 60.0)).cartesian
+    full = cdsm.plan_path(arm, None, (matrix + matrix.T) / 2.0, 50.0, angles=q[:1])
+    with pytest.raises(cdsm.InvalidInput, match="plan: is one of cartesian"):
+        plots.plot_path_plan(full)
+
+
+def test_steps_and_ramps_of_a_path_are_drawn_as_what_they_are() -> None:
+    arm = cdsm.presets.virtual_prototype()
+    targets = 1e3 * np.array([80.0, 80.0, 90.0, 90.0, 91.0, 92.0, 93.0, 80.0])
+    plan = cdsm.plan_path(arm, (0.0, 0.0, 1.0), targets, 50.0, angles=np.full((8, 10), 0.15))
+    line: Line2D = plots.plot_path_plan(plan).axes[0].get_lines()[0]
+    x = [0.0, 1.0, 1.5, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 6.5, 6.5, 7.0]
+    y = [80.0, 80.0, 80.0, 90.0, 90.0, 90.0, 91.0, 92.0, 93.0, 93.0, 80.0, 80.0]
+    np.testing.assert_allclose(_shown(line), [x, y])
+
+
+def test_many_cables_are_not_told_apart_by_colour() -> None:
+    arm = cdsm.Manipulator(
+        cdsm.Geometry.universal(
+            joints=7,
+            cables_per_joint=3,
+            link_length=0.03,
+            base_length=0.02,
+            disk_offset=0.01,
+            hole_radius=0.03,
+            link_mass=0.02,
+        ),
+        cdsm.LinearElasticity(2e5),
+    )
+    q = np.full((1, arm.nv), 0.05)
+    K = cdsm.stiffness(arm.at(q[0]), cdsm.distribute_tension(arm.at(q[0]), 20.0))
+    u = (0.0, 0.0, 1.0)
+    plan = cdsm.plan_path(arm, u, K.along(u), 10.0, angles=q)
+    below = plots.plot_path_plan(plan).axes[1]
+    assert below.get_legend() is None
+    assert len({line.get_color() for line in below.get_lines()}) == 1
+
+
+def _shown(line: Line2D) -> Array:
+    """x and y of a line (2, N)."""
+    return np.asarray(line.get_xydata(), dtype=np.float64).T

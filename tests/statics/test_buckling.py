@@ -1,0 +1,274 @@
+"""Buckling against closed forms of one hinge, and against a scan of the margin on any arm."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import cdsm
+from cdsm.support.validation import Array
+from tests.support.arms import mixed_arm, random_arm, random_posture
+
+SPRING, RADIUS, OFFSET, LENGTH = 1890.0, 0.02, 0.01, 0.1
+
+
+def hinge(
+    spring: float = SPRING, gravity: tuple[float, float, float] = (0.0, 0.0, 0.0), mass: float = 0.0
+) -> cdsm.Manipulator:
+    """One hinge about y with a pair of cables that are springs of one stiffness [N/m]."""
+    geometry = cdsm.Geometry.hinged(
+        joints=1,
+        twist=0.0,
+        link_length=LENGTH,
+        base_length=0.05,
+        disk_offset=OFFSET,
+        hole_radius=RADIUS,
+        link_mass=mass,
+    )
+    cables = cdsm.serpentine_cables(geometry, cdsm.LinearElasticity(1e12), series_stiffness=spring)
+    return cdsm.Manipulator(geometry, cables=cables, gravity=gravity)
+
+
+def margin(pose: cdsm.Posture, minimum: float) -> float:
+    return cdsm.stiffness(pose, cdsm.distribute_tension(pose, minimum)).margin
+
+
+def test_pair_across_a_straight_hinge_buckles_at_its_closed_form() -> None:
+    # K = 2 k R² − F s/4 for either cable of segment s = 2h: DESIGN's active part
+    found = cdsm.critical_tension(hinge().at([0.0]))
+    # the wire of 1e12 N takes 2e-11 of the compliance
+    assert found.minimum == pytest.approx(2.0 * SPRING * RADIUS**2 / OFFSET, rel=1e-9)
+    np.testing.assert_allclose(found.tension, found.minimum, rtol=1e-12)
+    np.testing.assert_allclose(found.mode, [1.0])
+    assert found.stable == ((0.0, found.minimum),)
+
+
+@pytest.mark.parametrize("up", [1.0, -1.0])
+def test_weight_above_the_joint_lowers_it_and_below_raises_it(up: float) -> None:
+    # gravity along ∓x: the link stands on its joint, or hangs from it
+    mass = 2.0
+    arm = hinge(gravity=(-9.81 * up, 0.0, 0.0), mass=mass)
+    expected = (2.0 * SPRING * RADIUS**2 - up * mass * 9.81 * LENGTH / 2.0) / OFFSET
+    assert cdsm.critical_tension(arm.at([0.0])).minimum == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize("minimum", [5.0, 60.0])
+def test_tip_force_along_the_link_buckles_it_at_its_closed_form(minimum: float) -> None:
+    pose = hinge().at([0.0])
+    found = cdsm.critical_load(pose, [-2.0, 0.0, 0.0, 0.0, 0.0, 0.0], minimum)
+    left = 2.0 * SPRING * RADIUS**2 - minimum * OFFSET
+    assert found.limit == "buckling"
+    assert 2.0 * found.factor == pytest.approx(left / LENGTH, rel=1e-9)
+    pulled = cdsm.critical_load(pose, [2.0, 0.0, 0.0, 0.0, 0.0, 0.0], minimum)
+    assert (pulled.factor, pulled.limit) == (math.inf, "none")
+
+
+@pytest.mark.parametrize("push", [3.0, -4.0])
+def test_load_comes_on_top_of_what_is_carried(push: float) -> None:
+    pose = hinge().at([0.0])
+    left = 2.0 * SPRING * RADIUS**2 - 5.0 * OFFSET
+    found = cdsm.critical_load(
+        pose, [-2.0, 0.0, 0.0, 0.0, 0.0, 0.0], 5.0, carried=[-push, 0.0, 0.0, 0.0, 0.0, 0.0]
+    )
+    assert 2.0 * found.factor == pytest.approx(left / LENGTH - push, rel=1e-9)
+    np.testing.assert_array_equal(found.carried, [-push, 0, 0, 0, 0, 0])
+    with pytest.raises(cdsm.InvalidInput, match="carried"):
+        cdsm.critical_load(pose, [1.0] * 6, carried=[1.0])
+
+
+def test_side_load_ends_where_the_cable_can_pull_no_more() -> None:
+    pose = hinge().at([0.0])
+    found = cdsm.critical_load(pose, [0.0, 0.0, -1.0, 0.0, 0.0, 0.0], 1.0, 51.0)
+    # the force −z turns the hinge by the moment P·LENGTH, which one cable more of 50 N holds
+    assert found.limit == "infeasible"
+    assert found.factor == pytest.approx(50.0 * RADIUS / LENGTH, rel=1e-9)
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+@pytest.mark.parametrize("spring", [math.inf, SPRING])
+def test_one_cable_without_a_weight_stands_without_tension_only(side: float, spring: float) -> None:
+    """Any tension bends it, so nothing but zero balances it, and loads only to one side."""
+    geometry = hinge().geometry
+    cables = cdsm.serpentine_cables(
+        replace(geometry, cables=geometry.cables[:1]),
+        cdsm.LinearElasticity(1e4),
+        series_stiffness=spring,
+    )
+    pose = cdsm.Manipulator(geometry, cables=cables, gravity=(0.0, 0.0, 0.0)).at([0.0])
+    found = cdsm.critical_tension(pose)
+    assert found.examined == (0.0, 0.0)
+    assert math.isinf(found.minimum)
+    load = cdsm.critical_load(pose, [0.0, 0.0, -side, 0.0, 0.0, 0.0])
+    # K = k R² − F s/4 over the segment s = 2h, with F = P LENGTH/R
+    if side < 0.0:
+        assert (load.factor, load.limit) == (0.0, "infeasible")
+    elif spring == math.inf:  # R² is more than h²: the wire stiffens by more than F h
+        assert (load.factor, load.limit) == (math.inf, "none")
+    else:
+        # 1/k = (s − F/k_s)/(EA + F) + 1/k_s = (s + EA/k_s)/(EA + F)
+        rate = RADIUS**2 / (2.0 * OFFSET + 1e4 / SPRING)
+        assert load.limit == "buckling"
+        expected = 1e4 * rate / (OFFSET / 2.0 - rate) * RADIUS / LENGTH
+        assert load.factor == pytest.approx(expected, rel=1e-9)
+
+
+def test_law_of_a_cable_whose_motor_holds_the_force_ends_nothing() -> None:
+    arm = hinge()
+    short = cdsm.TabulatedElasticity((0.0, 20.0), (0.0, 1e-3))
+    held = replace(arm.cables[0], elasticity=short, control="force")
+    mixed = cdsm.Manipulator(arm.geometry, cables=[held, arm.cables[1]], gravity=(0.0, 0.0, 0.0))
+    # one spring less, and the force-controlled cable may be pulled beyond its 20 N
+    found = cdsm.critical_tension(mixed.at([0.0]))
+    assert found.minimum == pytest.approx(SPRING * RADIUS**2 / OFFSET, rel=1e-9)
+    assert found.minimum > 20.0
+
+
+def test_wire_at_the_end_of_its_elasticity_says_so() -> None:
+    pose = cdsm.presets.virtual_prototype().at(np.full(10, 0.1))
+    found = cdsm.critical_load(pose, [0.0, 0.0, -1.0, 0.0, 0.0, 0.0], 100.0)
+    assert found.limit == "elasticity"
+    assert found.tension.max() == pytest.approx(810.0, rel=1e-9)
+
+
+def soft_arms() -> list[cdsm.Posture]:
+    geometries = [
+        mixed_arm().geometry,
+        cdsm.presets.virtual_prototype_geometry(),
+        cdsm.presets.experimental_prototype_geometry(),
+    ]
+    poses = []
+    for i, geometry in enumerate(geometries):
+        cables = cdsm.serpentine_cables(geometry, cdsm.LinearElasticity(30e3), series_stiffness=4e3)
+        poses.append(random_posture(cdsm.Manipulator(geometry, cables=cables), 7 + i))
+    return poses
+
+
+@pytest.mark.parametrize("pose", soft_arms(), ids=lambda pose: pose.arm.geometry.name)
+def test_margin_changes_its_sign_there_and_nowhere_below(pose: cdsm.Posture) -> None:
+    found = cdsm.critical_tension(pose)
+    low = found.stable[0][0]
+    assert 0.0 < found.minimum < math.inf
+    # the eigenvalue is zero to rounding of the largest
+    K = cdsm.stiffness(pose, found.tension)
+    assert abs(K.margin) < 1e-9 * np.linalg.norm(K.joint, 2)
+    assert (
+        margin(pose, found.minimum * (1.0 - 1e-6))
+        > 0.0
+        > margin(pose, found.minimum * (1.0 + 1e-6))
+    )
+    for part in np.linspace(0.01, 0.99, 50):
+        assert margin(pose, low + part * (found.minimum - low)) > 0.0
+
+
+def test_mode_is_the_null_vector_of_the_joint_stiffness() -> None:
+    pose = soft_arms()[1]
+    found = cdsm.critical_tension(pose)
+    K = cdsm.stiffness(pose, found.tension).joint
+    symmetric: Array = (K + K.T) / 2.0
+    assert abs(symmetric @ found.mode).max() < 1e-9 * np.linalg.norm(K, 2)
+    assert np.linalg.norm(found.mode) == pytest.approx(1.0, rel=1e-12)
+    assert found.mode[abs(found.mode).argmax()] > 0.0
+
+
+def test_stiff_strand_does_not_buckle_within_its_domain() -> None:
+    found = cdsm.critical_tension(cdsm.presets.virtual_prototype().at(np.full(10, 0.17)))
+    assert math.isinf(found.minimum)
+    assert found.examined[1] < 810.0
+    highest = cdsm.distribute_tension(found.posture, found.examined[1]).values.max()
+    assert highest == pytest.approx(810.0, rel=1e-9)
+    assert "does not buckle" in str(found)
+
+
+def test_strand_arm_stands_between_two_tensions() -> None:
+    """Eq. 19 starts at a hundredth of its rigidity: too slack below, too much tension above."""
+    geometry = cdsm.presets.experimental_prototype_geometry(link_mass=0.6, lead=2.0)
+    arm = cdsm.Manipulator(geometry, cdsm.presets.STRAND_1X19, gravity=(-9.81, 0.0, 0.0))
+    found = cdsm.critical_tension(arm.at(np.zeros(3)))
+    ((low, high),) = found.stable
+    assert found.examined[0] < low < high == found.minimum < found.examined[1]
+    for place, sign in ((low, 1.0), (high, -1.0)):
+        assert sign * margin(found.posture, place * (1.0 + 1e-6)) > 0.0
+        assert sign * margin(found.posture, place * (1.0 - 1e-6)) < 0.0
+
+
+def test_arm_that_never_stands_is_said_to_be_unstable_throughout() -> None:
+    arm = hinge(spring=1.0, gravity=(-9.81, 0.0, 0.0), mass=1.0)
+    found = cdsm.critical_tension(arm.at([0.0]))
+    assert found.stable == ()
+    assert found.minimum == found.examined[0] == 0.0
+    assert "unstable at every lower bound" in str(found)
+    load = cdsm.critical_load(arm.at([0.0]), [-1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    assert (load.factor, load.limit) == (0.0, "buckling")
+    assert "buckles without the load already" in str(load)
+
+
+@pytest.mark.parametrize("degrees", [-40.0, 7.0, 25.0])
+def test_bent_pair_buckles_at_its_closed_form(degrees: float) -> None:
+    """Across one hinge L± = 2 h cos θ/2 ± 2 R sin θ/2, so all of K is known at any angle."""
+    angle = math.radians(degrees)
+    cosine, sine = math.cos(angle / 2.0), math.sin(angle / 2.0)
+    slope = np.array([-OFFSET * sine - RADIUS * cosine, -OFFSET * sine + RADIUS * cosine])
+    curvature = np.array([-OFFSET * cosine + RADIUS * sine, -OFFSET * cosine - RADIUS * sine]) / 2.0
+    # balance: F J = 0 with the smaller tension at the bound
+    ratio = np.array([abs(slope[1]), abs(slope[0])])
+    ratio /= ratio.min()
+    critical = SPRING * float(slope @ slope) / -float(ratio @ curvature)
+    found = cdsm.critical_tension(hinge().at([angle]))
+    assert found.minimum == pytest.approx(critical, rel=1e-9)
+    assert sorted(found.tension) == pytest.approx(sorted(critical * ratio), rel=1e-9)
+
+
+@pytest.mark.parametrize("pose", soft_arms(), ids=lambda pose: pose.arm.geometry.name)
+def test_an_arm_with_locked_motors_leaves_its_posture_just_beyond(pose: cdsm.Posture) -> None:
+    """The equilibrium knows nothing of eigenvalues: below it stays, above it goes far away."""
+    found = cdsm.critical_tension(pose)
+    push = np.zeros(6)
+    push[:3] = 1e-4 * pose.jacobian[:3] @ found.mode
+    moved = []
+    for part in (0.98, 1.05):
+        pull = cdsm.distribute_tension(pose, part * found.minimum)
+        rest = cdsm.equilibrium(pose, pull, push)
+        assert rest.stable
+        moved.append(float(np.linalg.norm(rest.pose.q - pose.q)))
+    assert moved[0] < 1e-2
+    assert moved[1] > 20.0 * moved[0]
+
+
+@pytest.mark.parametrize(
+    ("wrench", "message"),
+    [
+        ([0.0] * 6, "is zero"),
+        ([math.nan] + [0.0] * 5, "wrench"),
+        ([1.0] * 3, "wrench"),
+    ],
+)
+def test_bad_loads_are_refused(wrench: list[float], message: str) -> None:
+    with pytest.raises(cdsm.InvalidInput, match=message):
+        cdsm.critical_load(hinge().at([0.0]), wrench)
+
+
+@pytest.mark.parametrize("up", [1.0, -1.0])
+def test_one_cable_holds_a_weight_on_one_side_only(up: float) -> None:
+    """Where no tension balances the arm there is nothing critical, and the error says why."""
+    geometry = hinge(mass=1.0).geometry
+    single = replace(geometry, cables=geometry.cables[:1])
+    arm = cdsm.Manipulator(single, cdsm.LinearElasticity(1e4), gravity=(0.0, 0.0, 9.81 * up))
+    pose = arm.at([0.0])
+    if pose.length_jacobian[0, 0] * pose.gravity_torque[0] > 0.0:
+        with pytest.raises(cdsm.InfeasibleTension, match="joint1"):
+            cdsm.critical_tension(pose)
+    else:
+        found = cdsm.critical_tension(pose)
+        # its tension is what statics say, so the bound can rise no further than that
+        weight = 9.81 * LENGTH / 2.0 / RADIUS
+        assert found.examined[1] == pytest.approx(weight, rel=1e-6)
+
+
+def test_what_the_cables_may_carry_ends_what_is_examined() -> None:
+    geometry = random_arm(3, 2).geometry
+    cables = cdsm.serpentine_cables(geometry, cdsm.LinearElasticity(1e5))
+    bounded = [replace(cable, maximum=80.0 + c) for c, cable in enumerate(cables)]
+    arm = cdsm.Manipulator(geometry, cables=bounded, gravity=(0.0, 0.0, 0.0))
+    found = cdsm.critical_tension(arm.at(np.zeros(arm.nv)))
+    assert found.examined[1] == pytest.approx(80.0, rel=1e-9)

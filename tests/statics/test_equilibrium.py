@@ -1,0 +1,622 @@
+"""Where a loaded arm comes to rest, against potentials, closed forms and the linear compliance."""
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize_scalar
+
+import cdsm
+from cdsm.statics import trust_region
+from cdsm.statics.loaded_arm import LoadedArm
+from cdsm.support.validation import Array
+from tests.support import arms
+from tests.support.differences import assert_second_order
+from tests.support.locked import (
+    ARMS,
+    EA,
+    MOMENT,
+    SIZES,
+    STRAND,
+    H,
+    R,
+    balanced,
+    compressed,
+    half,
+    hinge,
+    original_lengths,
+    potential,
+    pulls,
+    restoring,
+    soft_hinge,
+    some_arm,
+)
+
+# --- potential, torque, stiffness -----------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_torque_is_the_gradient_of_the_potential_and_stiffness_that_of_the_torque(
+    name: str,
+) -> None:
+    pose, pull = balanced(name, moment=False)
+    arm = pose.arm
+    W = pull.wrench + arms.random_wrench(7, moment=False)
+    loaded = LoadedArm(pose, pull.values, W)
+    q = pose.q + 1e-3 * np.random.default_rng(3).normal(size=arm.nv)
+    here = loaded.at(arm.at(q), pull.values)
+    energy = potential(pose, pull.values, W[:3])
+
+    def at(y: Array) -> cdsm.Posture:
+        return arm.at(y, check_limits=False)
+
+    # steps so small that no tension leaves its law: 30 µm of cable at most
+    step, rounding = 2.0**-10, 100.0
+    assert_second_order(
+        lambda y: np.array(energy(at(y))),
+        here.torque,
+        q,
+        step=step,
+        size=rounding,
+        tolerance=1e-8,
+    )
+    assert_second_order(
+        lambda y: loaded.at(at(y), pull.values).torque,
+        here.stiffness,
+        q,
+        step=step,
+        size=rounding,
+        tolerance=1e-8,
+    )
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_potential_has_its_minimum_at_rest(name: str) -> None:
+    pose, pull = balanced(name, moment=False)
+    W = pull.wrench + arms.random_wrench(8, moment=False)
+    rest = cdsm.equilibrium(pose, pull, W)
+    energy = potential(pose, pull.values, W[:3])
+    least = energy(rest.pose)
+    assert least < energy(pose)
+    rng = np.random.default_rng(1)
+    for _ in range(20):
+        q = rest.pose.q + 3e-4 * rng.normal(size=pose.arm.nv)
+        there = pose.arm.at(q)
+        step = q - rest.pose.q
+        # not merely less, but less by the work of K_θ, and only that: r is zero
+        rise = step @ rest.stiffness.joint @ step / 2.0
+        assert energy(there) - least == pytest.approx(rise, rel=0.05)
+
+
+# --- stiffness ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("moment", [False, True], ids=["force", "wrench"])
+@pytest.mark.parametrize("name", ARMS)
+def test_small_loads_move_the_arm_by_its_compliance(name: str, moment: bool) -> None:
+    pose, pull = balanced(name, moment=moment)
+    K = cdsm.stiffness(pose, pull)
+    R = pose.tip[:3, :3]
+    reach = np.array([pose.arm.geometry.length] * 3 + [1.0] * 3)
+    C = K.compliance / reach[:, None] * reach[::-1]  # rad per newtons at the arm's length
+    scale = 0.1 / abs(C).max()
+
+    def tip(load: Array) -> Array:
+        extra = scale * load * reach[::-1]
+        there = cdsm.equilibrium(pose, pull, pull.wrench + extra).pose.tip
+        turn = there[:3, :3] @ R.T
+        # the axis times the sine of the angle, which starts out as the angle
+        twice = [turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]]
+        motion = np.append(there[:3, 3] - pose.tip[:3, 3], np.array(twice) / 2.0)
+        return np.asarray(motion / reach)
+
+    # 2 mrad at most; the laws are less smooth than the places, so h⁶ leaves more
+    assert_second_order(tip, scale * C, np.zeros(6), step=2.0**-6, size=10.0, tolerance=1e-8)
+
+
+@pytest.mark.parametrize(
+    "name", ["universal-3-8-all", "universal-5-9-strand", "hinged-4-0-all", "mixed-3-0-all"]
+)
+def test_cartesian_stiffness_is_force_by_displacement(name: str) -> None:
+    pose, pull = balanced(name)
+    K = cdsm.stiffness(pose, pull)
+
+    def moved(force: Array) -> Array:
+        return cdsm.equilibrium(
+            pose, pull, pull.wrench + np.append(force, np.zeros(3))
+        ).displacement
+
+    u = np.array([0.6, 0.0, -0.8])
+
+    def measured(size: float) -> tuple[Array, float]:
+        C = np.stack([moved(f) - moved(-f) for f in size * np.eye(3)], axis=1) / (2.0 * size)
+        return C, 2.0 * size / float(u @ (moved(size * u) - moved(-size * u)))
+
+    def errors(C: Array, along: float) -> Array:
+        matrices = abs(C / K.compliance[:3, :3] - 1.0), abs(C @ K.cartesian - np.eye(3))
+        return np.array([*(each.max() for each in matrices), abs(along / K.along(u) - 1.0)])
+
+    coarse, fine = measured(0.1), measured(0.05)
+    np.testing.assert_allclose(errors(*coarse) / errors(*fine), 4.0, rtol=0.01)
+    C = (4.0 * fine[0] - coarse[0]) / 3.0
+    assert errors(C, (4.0 * fine[1] - coarse[1]) / 3.0).max() < 1e-6
+
+
+def test_stiffness_at_rest_keeps_the_original_lengths_of_the_reference() -> None:
+    """And since l_0 is what the motors hold, K of the arm at rest, taken anew, is the same."""
+    pose, pull = balanced("universal-3-8-all")
+    rest = cdsm.equilibrium(pose, pull, pull.wrench + 3.0 * arms.random_wrench(9))
+    locked = original_lengths(pose, pull.values)
+    np.testing.assert_allclose(rest.stiffness.free_lengths, locked, rtol=1e-12)
+    for c, cable in enumerate(pose.arm.cables):
+        k = cable.tangent_stiffness(rest.tension[c], locked[c])
+        expected = k if cable.control == "position" else 0.0
+        assert rest.stiffness.cable_stiffness[c] == pytest.approx(expected, rel=1e-12)
+    assert abs(rest.pose.cable_lengths / pose.cable_lengths - 1.0).max() > 1e-4
+    anew = cdsm.stiffness(rest.pose, rest.tension, rest.wrench)
+    held = [cable.control == "position" for cable in pose.arm.cables]
+    np.testing.assert_allclose(anew.free_lengths[held], locked[held], rtol=1e-11)
+    np.testing.assert_allclose(anew.joint, rest.stiffness.joint, rtol=1e-9, atol=1e-9)
+    np.testing.assert_array_equal(rest.stiffness.wrench, rest.wrench)
+
+
+# --- convergence ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("moment", [False, True], ids=["force", "wrench"])
+@pytest.mark.parametrize("name", ARMS)
+def test_last_steps_converge_quadratically(name: str, moment: bool) -> None:
+    pose, pull = balanced(name, moment=moment)
+    W = pull.wrench + arms.random_wrench(6, moment)
+    rest = cdsm.equilibrium(pose, pull, W)
+    assert rest.converged
+    assert abs(rest.residual).max() == rest.history[-1] < 1e-10
+    assert len(rest.history) == rest.iterations + 1 <= 7
+
+    # one step from three distances: a fourth of the residual leaves a sixteenth
+    loaded = LoadedArm(pose, pull.values, W)
+    way = np.random.default_rng(8).normal(size=pose.arm.nv)
+    first = []
+    for distance in (2.0**-10, 2.0**-12, 2.0**-13):
+        start = loaded.at(pose.arm.at(rest.pose.q + distance * way), rest.tension)
+        settled = trust_region.settle(loaded.moved, start, *loaded.stops())
+        assert settled.steady
+        np.testing.assert_allclose(settled.point.q, rest.pose.q, atol=1e-10)
+        first.append(settled.history[:2])
+    before, after = np.log2(first).T
+    np.testing.assert_allclose(np.diff(after) / np.diff(before), 2.0, atol=0.1)
+
+
+def test_balanced_reference_is_at_rest() -> None:
+    for name in ARMS:
+        pose, pull = balanced(name)
+        rest = cdsm.equilibrium(pose, pull)
+        assert rest.iterations <= 1
+        np.testing.assert_allclose(rest.pose.q, pose.q, atol=1e-11)
+        np.testing.assert_allclose(rest.tension, pull.values, rtol=1e-9)
+        np.testing.assert_allclose(
+            rest.stiffness.joint, cdsm.stiffness(pose, pull).joint, rtol=1e-7, atol=1e-7
+        )
+
+
+def test_tensions_of_ones_own_need_not_balance() -> None:
+    arm = some_arm("universal-3-8-strand")
+    pose = arms.random_posture(arm, 2, reach=0.2)
+    tension = arms.random_tension(arm, 2)
+    rest = cdsm.equilibrium(pose, tension)
+    assert abs(cdsm.stiffness(pose, tension).residual).max() > 0.1
+    assert rest.converged
+    assert rest.stable
+    assert not rest.wrench.any()
+    held = [c for c, cable in enumerate(arm.cables) if cable.control == "force"]
+    np.testing.assert_array_equal(rest.tension[held], tension[held])
+    # what holds at rest holds for anybody: the published residual, and rest from rest
+    K = cdsm.stiffness(rest.pose, rest.tension)
+    assert abs(K.residual).max() < 1e-10
+    np.testing.assert_allclose(
+        cdsm.equilibrium(rest.pose, rest.tension).pose.q, rest.pose.q, atol=1e-11
+    )
+
+
+# --- one hinge, closed form -----------------------------------------------------------------
+
+
+def test_hinge_has_the_lengths_of_the_closed_form() -> None:
+    for angle in (-0.3, 0.0, 0.2):
+        pose = hinge().at([angle])
+        expected = [half(side, angle) for side in (1.0, -1.0)]
+        # the first cable may be the one above or the one below
+        order = slice(None) if pose.length_jacobian[0, 0] > 0.0 else slice(None, None, -1)
+        np.testing.assert_allclose(pose.cable_lengths, [e[0] for e in expected][order], rtol=1e-14)
+        np.testing.assert_allclose(
+            pose.length_jacobian[:, 0], [e[1] for e in expected][order], rtol=1e-13
+        )
+
+
+@pytest.mark.parametrize("angle", [-0.3, 0.005, 0.05, 0.4])
+def test_hinge_rests_where_the_closed_form_says_with_one_cable_slack(angle: float) -> None:
+    pose = hinge(limit=0.5).at([0.0])
+    rest = cdsm.equilibrium(pose, [20.0, 20.0], restoring(angle) * MOMENT)
+    assert rest.pose.q[0] == pytest.approx(angle, rel=1e-12)
+    expected = pulls(angle)
+    np.testing.assert_allclose(sorted(rest.tension), sorted(expected), rtol=1e-11)
+    # 20 N of 2 kN are 1 % strain of 20 mm, which 0.2 mm of cable or 6.7 mrad take away
+    loose = [cable.name for cable, F in zip(pose.arm.cables, rest.tension, strict=True) if F == 0]
+    assert len(loose) == (abs(angle) > 0.01)
+    assert rest.slack == tuple(loose)
+    assert rest.stable
+    assert ("slack" in str(rest)) == (abs(angle) > 0.01)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_stop_takes_what_the_cables_do_not(side: float) -> None:
+    limit, locked = 0.2, 0.05
+    load = 2.0 * restoring(side * limit, locked)
+    rest = cdsm.equilibrium(hinge(limit=limit).at([locked]), [20.0, 20.0], load * MOMENT)
+    assert rest.pose.q[0] == side * limit
+    assert rest.at_limit == ("joint1",)
+    assert math.copysign(1.0, rest.reaction[0]) == -side  # it pushes back
+    assert rest.reaction[0] == pytest.approx(restoring(side * limit, locked) - load, rel=1e-12)
+    np.testing.assert_array_equal(rest.residual, 0.0)
+    assert rest.stable
+    assert "joint1 rests on its stop" in str(rest)
+
+
+def test_joints_leave_the_stop_that_only_holds_them_one_way() -> None:
+    pose = hinge(limit=0.2).at([0.2])
+    rest = cdsm.equilibrium(pose, [20.0, 20.0], -0.5 * MOMENT)
+    assert not rest.at_limit
+    assert rest.pose.q[0] < 0.2
+    assert restoring(rest.pose.q[0], 0.2) == pytest.approx(-0.5, rel=1e-11)
+
+
+def test_stops_hold_some_joints_of_an_arm_and_the_others_find_their_balance() -> None:
+    arm = some_arm("universal-3-8-table")
+    geometry = replace(
+        arm.geometry, joints=tuple(replace(j, limit=0.02) for j in arm.geometry.joints)
+    )
+    narrow = cdsm.Manipulator(geometry, cables=arm.cables, gravity=arm.gravity)
+    pose = narrow.at(np.zeros(narrow.nv))
+    pull = cdsm.distribute_tension(pose, minimum=40.0)
+    W = np.array([0.0, 15.0, -10.0, 0.0, 0.0, 0.3])
+    rest = cdsm.equilibrium(pose, pull, W)
+    assert 0 < len(rest.at_limit) < narrow.nv
+    held = np.array([name in rest.at_limit for name in narrow.joint_names])
+    np.testing.assert_array_equal(abs(rest.pose.q[held]), 0.02)
+    assert (abs(rest.pose.q[~held]) < 0.02).all()
+    # a stop pushes inwards, and only a stop that is touched
+    assert (np.sign(rest.reaction[held]) == -np.sign(rest.pose.q[held])).all()
+    np.testing.assert_array_equal(rest.reaction[~held], 0.0)
+    np.testing.assert_allclose(rest.residual + rest.reaction, rest.stiffness.residual, atol=1e-15)
+    assert abs(rest.residual).max() < 1e-11
+    # without the stops the arm goes further: they do something
+    wide = cdsm.Manipulator(arm.geometry, cables=arm.cables, gravity=arm.gravity)
+    assert abs(cdsm.equilibrium(wide.at(pose.q), pull.values, W).pose.q).max() > 0.021
+
+
+# --- buckling -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("load", "buckles"), [(15.9, False), (16.1, True), (18.0, True)])
+def test_straight_hinge_leaves_the_saddle_beyond_its_buckling_load(
+    load: float, buckles: bool
+) -> None:
+    pose = soft_hinge(limit=1.2).at([0.0])
+    W = np.array([-load, 0.0, 0.0, 0.0, 0.0, 0.0])
+    K = cdsm.stiffness(pose, [20.0, 20.0], W)
+    assert K.joint[0, 0] == pytest.approx(1.6 - load / 10.0, abs=1e-12)
+    assert abs(K.residual[0]) < 1e-14
+    rest = cdsm.equilibrium(pose, [20.0, 20.0], W)
+    lowest = minimize_scalar(
+        lambda q: compressed(q, load), bounds=(0.0, 1.2), method="bounded", options={"xatol": 1e-10}
+    )
+    # the minimum is flat: a bracketing search finds it to the root of the rounding
+    assert rest.pose.q[0] == pytest.approx(lowest.x if buckles else 0.0, abs=1e-6)
+    assert rest.stable
+    assert rest.converged
+    if buckles:
+        assert rest.pose.q[0] > 0.05  # which way is open; the same each time
+        assert compressed(rest.pose.q[0], load) < compressed(0.0, load)
+    again = cdsm.equilibrium(pose, [20.0, 20.0], W)
+    np.testing.assert_array_equal(again.pose.q, rest.pose.q)
+
+
+def test_smallest_imperfection_decides_which_way_the_hinge_buckles() -> None:
+    pose = soft_hinge(limit=1.2).at([0.0])
+    for side in (1.0, -1.0):
+        W = np.array([-18.0, 0.0, 0.0, 0.0, side * 1e-6, 0.0])
+        assert side * cdsm.equilibrium(pose, [20.0, 20.0], W).pose.q[0] > 0.1
+
+
+@pytest.mark.parametrize("push", [1e-12, 1e-10, 1e-8, 6e-8, 1e-6, 1e-5, 1e-3])
+def test_no_push_is_too_small_to_lead_off_a_ridge(push: float) -> None:
+    """Past buckling in all directions at once: the way down turns as the push does."""
+    sizes = {**SIZES, "joints": 1, "cables_per_joint": 3, "link_length": 0.04, "lead": 0.98}
+    sizes.pop("twist")
+    arm = cdsm.Manipulator(
+        cdsm.Geometry.universal(**sizes), cdsm.LinearElasticity(1000.0), gravity=(0.0, 0.0, 0.0)
+    )
+    pose = arm.at([0.0, 0.0])
+    rest = cdsm.equilibrium(pose, np.full(3, 350.0), [0.0, 0.6 * push, 0.8 * push, 0.0, 0.0, 0.0])
+    assert rest.stable
+    assert rest.iterations < 20
+    assert abs(rest.pose.q).max() > 0.1
+
+
+def test_reference_that_is_unstable_by_itself_comes_to_rest_elsewhere() -> None:
+    arm = soft_hinge()
+    pose = arm.at([0.0])
+    tension = np.array([300.0, 300.0])
+    assert not cdsm.stiffness(pose, tension).is_stable
+    rest = cdsm.equilibrium(pose, tension)
+    # the more it bends the less the cables resist, until the disks touch
+    energies = [compressed(q, 0.0, 300.0) for q in np.linspace(0.0, rest.pose.q[0], 200)]
+    assert (np.diff(energies) < 0.0).all()
+    assert rest.at_limit == ("joint1",)
+    assert rest.reaction[0] < 0.0
+    assert rest.stable
+
+
+def test_two_hinges_beyond_buckling_rest_in_a_minimum_that_brute_force_finds() -> None:
+    arm = soft_hinge(limit=0.6, joints=2, twist=0.4)
+    pose = arm.at([0.0, 0.0])
+    tension = np.full(4, 20.0)
+    W = np.array([-10.6, 0.0, 0.0, 0.0, 0.0, 0.0])
+    assert cdsm.stiffness(pose, tension, W).margin < -0.02
+    rest = cdsm.equilibrium(pose, tension, W)
+    assert rest.stable
+    energy = potential(pose, tension, W[:3])
+    axis = np.linspace(-0.6, 0.6, 25)
+    field = np.array([[energy(arm.at([a, b])) for b in axis] for a in axis])
+    a, b = np.unravel_index(field.argmin(), field.shape)
+    least = energy(rest.pose)
+    assert least < energy(pose) - 1e-3
+    # one of the two that mirror each other, and no grid point is lower
+    assert least <= field.min()
+    near = min(abs(rest.pose.q - side * np.array([axis[a], axis[b]])).max() for side in (1, -1))
+    assert near < 0.06
+
+
+def test_the_work_of_steps_is_the_change_of_potential() -> None:
+    pose, pull = balanced("universal-3-8-all", moment=False)
+    loaded = LoadedArm(pose, pull.values, pull.wrench)
+    energy = potential(pose, pull.values, pull.wrench[:3])
+    start = loaded.at(pose, pull.values)
+    errors = []
+    for size in (1e-3, 5e-4, 2.5e-4):
+        q = pose.q + size * np.random.default_rng(2).normal(size=pose.arm.nv)
+        there = loaded.moved(q, start)
+        change = energy(there.K.posture) - energy(pose)
+        errors.append(abs(trust_region.work(start, there) - change))
+    # the fifth power of the step is left
+    assert (np.log2(np.divide(errors[:-1], errors[1:])) > 4.5).all()
+    assert errors[-1] < 1e-5 * abs(change)
+
+
+# --- slack and neutral ----------------------------------------------------------------------
+
+
+def test_hanging_hinge_with_all_cables_slack_is_a_pendulum() -> None:
+    # one cable above the hinge, which the arm slackens as it swings up in gravity along +x +z
+    geometry = cdsm.Geometry.hinged(**{**SIZES, "link_mass": 0.4, "cables_per_joint": 1})
+    arm = cdsm.Manipulator(geometry, cdsm.LinearElasticity(EA), gravity=(9.0, 0.0, 1.8))
+    pose = arm.at([0.0])
+    assert pose.length_jacobian[0, 0] > 0.0  # it slackens with negative angles
+    rest = cdsm.equilibrium(pose, [1.0])
+    # about y, z turns towards x: the link points along gravity at −atan(1.8/9)
+    assert rest.pose.q[0] == pytest.approx(-math.atan(0.2), rel=1e-11)
+    np.testing.assert_array_equal(rest.tension, 0.0)
+    assert rest.slack == ("cable1_1",)
+    assert rest.stable
+    assert not rest.stiffness.passive.any()
+
+
+def test_arm_without_any_tension_or_weight_is_neutral() -> None:
+    arm = hinge()
+    cables = [replace(cable, control="force") for cable in arm.cables]
+    limp = cdsm.Manipulator(arm.geometry, cables=cables, gravity=(0.0, 0.0, 0.0))
+    rest = cdsm.equilibrium(limp.at([0.1]), [0.0, 0.0])
+    assert rest.pose.q[0] == 0.1
+    assert rest.converged
+    assert not rest.stable
+    assert not rest.slack  # force control: it is what was asked for
+    assert "NEUTRAL" in str(rest)
+
+
+def test_limp_arm_falls_as_far_as_its_stops() -> None:
+    arm = hinge(limit=0.3, joints=2, twist=math.pi / 2.0)
+    cables = [replace(cable, control="force") for cable in arm.cables]
+    limp = cdsm.Manipulator(arm.geometry, cables=cables, gravity=(0.0, 0.0, 0.0))
+    # the moment turns the first hinge alone, and nothing holds the second where it is
+    rest = cdsm.equilibrium(limp.at([0.0, 0.1]), np.zeros(4), 0.5 * MOMENT)
+    np.testing.assert_allclose(rest.pose.q, [0.3, 0.1], atol=1e-15)
+    assert rest.reaction[0] == pytest.approx(-0.5, rel=1e-14)
+    assert not rest.stable
+
+
+# --- ends of the laws -----------------------------------------------------------------------
+
+
+def test_answer_below_a_law_names_the_cables_though_iterates_may_pass() -> None:
+    arm = hinge(limit=0.5, law=STRAND)
+    soft = [replace(cable, series_stiffness=2e3) for cable in arm.cables]
+    arm = cdsm.Manipulator(arm.geometry, cables=soft, gravity=(0.0, 0.0, 0.0))
+    pose = arm.at([0.0])
+    with pytest.raises(cdsm.ElasticityRangeError, match=r"\(2\.2 N, 810 N\]") as caught:
+        cdsm.equilibrium(pose, [10.0, 10.0], 1.0 * MOMENT)
+    (name,) = caught.value.cables
+    assert name == arm.cables[caught.value.indices[0]].name
+    assert caught.value.tension[0] < 2.2
+    assert cdsm.equilibrium(pose, [30.0, 30.0], 1.0 * MOMENT).tension.min() > 2.2
+
+
+def test_answer_above_a_law_names_the_cables() -> None:
+    pose = hinge(limit=0.5, law=STRAND).at([0.0])
+    with pytest.raises(cdsm.ElasticityRangeError, match="yields") as caught:
+        cdsm.equilibrium(pose, [700.0, 700.0], 25.0 * MOMENT)
+    assert max(caught.value.tension) > 810.0
+
+
+def test_reference_at_the_very_end_of_a_law_is_inside() -> None:
+    pose = hinge(limit=0.5, law=STRAND).at([0.0])
+    np.testing.assert_allclose(cdsm.equilibrium(pose, [810.0, 810.0]).tension, 810.0, rtol=1e-12)
+
+
+def test_reference_outside_a_law_names_the_cables() -> None:
+    for law in (STRAND, cdsm.StrandElasticity.eq19_as_printed()):
+        pose = hinge(law=law).at([0.0])
+        with pytest.raises(cdsm.ElasticityRangeError) as caught:
+            cdsm.equilibrium(pose, [50.0, 15.0 if law != STRAND else 1.0])
+        assert caught.value.cables
+
+
+def test_law_that_gives_no_strain_names_the_cables() -> None:
+    # at 5 N Eq. 19 as printed still has a rigidity, but none up to the end of its domain
+    pose = hinge(law=cdsm.StrandElasticity.eq19_as_printed()).at([0.0])
+    with pytest.raises(cdsm.ElasticityRangeError, match="eq19_repaired") as caught:
+        cdsm.equilibrium(pose, [5.0, 5.0])
+    assert caught.value.cables == ("cable1_1", "cable1_2")
+
+
+class Odd(cdsm.Elasticity):
+    """A law of the user's own with a strain that is not a number."""
+
+    @property
+    def domain(self) -> cdsm.Domain:
+        return cdsm.Domain(0.0, math.inf)
+
+    def rigidity(self, tension: Any) -> Array:
+        return np.full(np.shape(tension), 1e3)
+
+    def strain(self, tension: Any) -> Array:
+        return np.full(np.shape(tension), math.nan)
+
+    def energy(self, tension: Any) -> Array:
+        return np.zeros(np.shape(tension))
+
+
+def test_law_of_the_users_own_that_is_not_finite_is_refused() -> None:
+    with pytest.raises(cdsm.InvalidInput, match="gives the strain"):
+        cdsm.equilibrium(hinge(law=Odd()).at([0.0]), [5.0, 5.0])
+
+
+# --- load steps and failure -----------------------------------------------------------------
+
+
+def test_load_steps_lead_to_the_same_place(monkeypatch: pytest.MonkeyPatch) -> None:
+    pose, pull = balanced("universal-5-9-strand")
+    W = pull.wrench + arms.random_wrench(6)
+    whole = cdsm.equilibrium(pose, pull, W)
+    monkeypatch.setattr(trust_region, "_ATTEMPTS", whole.iterations)
+    stepped = cdsm.equilibrium(pose, pull, W)
+    assert stepped.iterations > 2 * whole.iterations
+    np.testing.assert_allclose(stepped.pose.q, whole.pose.q, atol=1e-11)
+
+
+def test_no_place_to_rest_is_an_error_with_data(monkeypatch: pytest.MonkeyPatch) -> None:
+    pose, pull = balanced("universal-3-8-all")
+    monkeypatch.setattr(trust_region, "_ATTEMPTS", 2)
+    W = pull.wrench + 2.0 * arms.random_wrench(6)
+    with pytest.raises(cdsm.EquilibriumError, match="no stable place to rest") as caught:
+        cdsm.equilibrium(pose, pull, W)
+    error = caught.value
+    assert error.residual.shape == (pose.arm.nv,)
+    assert error.joint == pose.arm.joint_names[int(abs(error.residual).argmax())]
+    assert 0.0 <= error.load_factor < 1.0
+    assert "raise the tensions" in str(error)
+
+
+# --- the question ---------------------------------------------------------------------------
+
+
+def test_wrench_of_the_tension_is_the_default() -> None:
+    pose, pull = balanced("universal-3-8-all")
+    np.testing.assert_array_equal(cdsm.equilibrium(pose, pull).wrench, pull.wrench)
+    other = cdsm.equilibrium(pose, pull, np.zeros(6))
+    same = cdsm.equilibrium(pose, pull.values, np.zeros(6))
+    np.testing.assert_array_equal(other.pose.q, same.pose.q)
+    assert abs(other.pose.q - pose.q).max() > 1e-4
+    np.testing.assert_array_equal(other.reference_tension, pull.values)
+    assert other.reference is pose
+    tip = other.pose.tip[:3, 3] - pose.tip[:3, 3]
+    np.testing.assert_array_equal(other.displacement, tip)
+
+
+def test_answer_prints_itself() -> None:
+    pose, pull = balanced("universal-3-8-all")
+    rest = cdsm.equilibrium(pose, pull, np.zeros(6))
+    for part in ("tension [N]", "cable3_1", "tip moved by", "mm", "stable", "residual"):
+        assert part in str(rest)
+    assert "tip moved by" in repr(rest)
+
+
+@pytest.mark.parametrize(
+    ("tension", "wrench", "said"),
+    [
+        ([20.0], None, "tension"),
+        ([20.0, -1.0], None, "only pull"),
+        ([20.0, math.nan], None, "tension"),
+        ([20.0, 20.0], [1.0, 2.0, 3.0], "wrench"),
+        ([20.0, 20.0], [math.inf, 0.0, 0.0, 0.0, 0.0, 0.0], "wrench"),
+        ([20.0, 20.0], [math.nan, 0.0, 0.0, 0.0, 0.0, 0.0], "wrench"),
+        ([20.0, 20.0], "up", "wrench"),
+    ],
+)
+def test_bad_input_is_named(tension: Any, wrench: Any, said: str) -> None:
+    with pytest.raises(cdsm.InvalidInput, match=said):
+        cdsm.equilibrium(hinge().at([0.0]), tension, wrench)
+
+
+def test_bad_wrench_beside_a_tension_is_named() -> None:
+    pose, pull = balanced("universal-3-8-all")
+    with pytest.raises(cdsm.InvalidInput, match="wrench"):
+        cdsm.equilibrium(pose, pull, [1.0, 2.0])
+    with pytest.raises(cdsm.InvalidInput, match="another posture"):
+        cdsm.equilibrium(pose.arm.at(pose.q + 0.01), pull)
+    with pytest.raises(cdsm.InvalidInput, match="pose"):
+        cdsm.equilibrium(pull, pull)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_reference_beyond_a_stop_is_refused(side: float) -> None:
+    pose = hinge(limit=0.2).at([side * 0.25], check_limits=False)
+    with pytest.raises(cdsm.InvalidInput, match=f"joint1 = {side * 0.25}.*{side * 0.2}"):
+        cdsm.equilibrium(pose, [20.0, 20.0])
+
+
+def test_disks_that_touch_are_stops_just_before() -> None:
+    # the default limit: there the holes of the cable inside meet, and it has no direction
+    arm = hinge()
+    rest = cdsm.equilibrium(arm.at([0.0]), [20.0, 20.0], 200.0 * MOMENT)
+    assert rest.at_limit == ("joint1",)
+    assert rest.pose.q[0] == pytest.approx(arm.upper[0] - 1e-6, abs=1e-12)
+    assert rest.reaction[0] == pytest.approx(restoring(rest.pose.q[0]) - 200.0, rel=1e-12)
+
+
+def test_sites_that_meet_are_what_the_error_speaks_of() -> None:
+    """A limit beyond where disks touch, and an arm that goes there: the potential has a cusp."""
+    touching = 2.0 * math.atan(H / R)
+    pose = soft_hinge(limit=touching + 0.2).at([0.0])
+    with pytest.raises(cdsm.EquilibriumError, match=r"cable\w+ meet.*joint_limit") as caught:
+        cdsm.equilibrium(pose, [300.0, 300.0])
+    assert caught.value.joint == "joint1"
+    within = soft_hinge().at([0.0])
+    assert cdsm.equilibrium(within, [300.0, 300.0]).at_limit == ("joint1",)
+
+
+def test_compliance_at_a_stop_is_that_of_the_other_joints() -> None:
+    """Of two hinges the second rests on its stop: the tip turns about the first alone."""
+    arm = hinge(joints=2)
+    first, second = arm.geometry.joints
+    geometry = replace(arm.geometry, joints=(first, replace(second, limit=0.02)))
+    stopped = cdsm.Manipulator(geometry, cables=arm.cables, gravity=(0.0, 0.0, 0.0))
+    moment = MOMENT
+    rest = cdsm.equilibrium(stopped.at([0.0, 0.0]), np.full(4, 20.0), moment)
+    assert rest.at_limit == ("joint2",)
+    J = rest.pose.jacobian[:, :1]
+    expected = J @ J.T / rest.stiffness.joint[0, 0]
+    np.testing.assert_allclose(rest.compliance, expected, rtol=1e-12, atol=1e-18)
+    free = cdsm.equilibrium(arm.at([0.0, 0.0]), np.full(4, 20.0), 0.1 * moment)
+    np.testing.assert_array_equal(free.compliance, free.stiffness.compliance)

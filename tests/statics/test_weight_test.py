@@ -1,0 +1,262 @@
+"""The weight test: closed forms of one hinge, the linear prediction, and buckling on the way."""
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import cdsm
+from cdsm import presets
+from tests.support import arms
+from tests.support.locked import (
+    LENGTH,
+    MOMENT,
+    STRAND,
+    balanced,
+    compressed,
+    half,
+    hinge,
+    pulls,
+    restoring,
+    soft_hinge,
+)
+
+
+def prototype() -> tuple[cdsm.Posture, cdsm.Tension]:
+    arm = presets.virtual_prototype()
+    pose = arm.at(np.full(arm.nv, presets.TEN_DEGREES))
+    return pose, cdsm.distribute_tension(pose, 50.0)
+
+
+@pytest.mark.parametrize("angle", [0.004, 0.3, -0.2])
+def test_weight_on_a_hinge_goes_as_far_as_the_closed_form_says(angle: float) -> None:
+    # the tip is at (ℓ cos θ, −ℓ sin θ): a force f along z turns it with −f ℓ cos θ
+    force = -restoring(angle) / (LENGTH * math.cos(angle))
+    test = cdsm.weight_test(hinge(limit=0.5).at([0.0]), [20.0, 20.0], [0.0, 0.0, force], steps=3)
+    expected = [LENGTH * (math.cos(angle) - 1.0), 0.0, -LENGTH * math.sin(angle)]
+    np.testing.assert_allclose(test.displacement, expected, rtol=1e-11, atol=1e-15)
+    np.testing.assert_array_equal(test.displacement, test.displacements[-1])
+    assert test.stiffness == pytest.approx(force / expected[2], rel=1e-11)
+    np.testing.assert_allclose(sorted(test.tensions[-1]), sorted(pulls(angle)), rtol=1e-11)
+    np.testing.assert_allclose(test.loads, abs(force) * np.array([1, 2, 3]) / 3.0, rtol=1e-15)
+    # K_θ = Σ F L'' + k L'² = −2·20 N·h/2 + 2 (EA + F) R²/2h; along z, K_θ/ℓ²
+    stiff = (2.0 * half(1.0, 0.0)[1] ** 2 * 2020.0 / 0.02 - 20.0 * 0.01) / LENGTH**2
+    assert test.linear.stiffness == pytest.approx(stiff, rel=1e-12)
+    np.testing.assert_allclose(test.linear.displacement, [0, 0, force / stiff], atol=1e-15)
+
+
+@pytest.mark.parametrize("name", ["universal-3-8-all", "universal-5-9-strand", "mixed-3-0-all"])
+def test_small_weights_measure_the_stiffness_along(name: str) -> None:
+    pose, pull = balanced(name)
+    u = np.array([0.0, 0.6, -0.8])
+    along = cdsm.stiffness(pose, pull).along(u)
+    errors = np.array(
+        [
+            [test.stiffness / along - 1.0, *(test.displacement / test.linear.displacement - 1.0)]
+            for size in (0.1, 0.05, 0.025)
+            for test in [cdsm.weight_test(pose, pull, size * u)]
+        ]
+    )
+    # the first order is the curvature of the force-displacement curve
+    np.testing.assert_allclose(errors[:-1] / errors[1:], 2.0, rtol=0.05)
+    a, b, c = errors
+    assert abs(a - 6.0 * b + 8.0 * c).max() / 3.0 < 1e-6
+    assert cdsm.weight_test(pose, pull, u).linear.stiffness == pytest.approx(along, rel=1e-12)
+
+
+def test_steps_lead_to_the_same_end_on_a_curve() -> None:
+    pose, pull = prototype()
+    force = np.array([0.0, 0.0, -20.0])
+    once, often = (cdsm.weight_test(pose, pull, force, steps=n) for n in (1, 8))
+    np.testing.assert_allclose(often.displacement, once.displacement, rtol=1e-9)
+    assert often.tips.shape == often.displacements.shape == (8, 3)
+    assert often.tensions.shape == (8, 15)
+    assert len(often.loaded) == often.loads.size == 8
+    # the strand gets stiffer as it is pulled, in other cables softer: no straight line
+    secants = often.loads / -often.displacements[:, 2]
+    assert (np.diff(secants) < 0.0).all()
+    assert secants[0] == pytest.approx(often.linear.stiffness, rel=0.02)
+    assert abs(secants[-1] / often.linear.stiffness - 1.0) > 0.01
+    for rest, load in zip(often.loaded, often.loads, strict=True):
+        np.testing.assert_allclose(rest.wrench, [0, 0, -load, 0, 0, 0], rtol=1e-14)
+        assert rest.reference is pose
+
+
+def test_weight_comes_on_top_of_the_wrench() -> None:
+    pose, pull = balanced("universal-3-8-all")
+    force = np.array([1.0, -2.0, 0.5])
+    test = cdsm.weight_test(pose, pull, force)
+    np.testing.assert_array_equal(test.without.wrench, pull.wrench)
+    np.testing.assert_array_equal(test.loaded[0].wrench[:3], pull.wrench[:3] + force)
+    np.testing.assert_array_equal(test.loaded[0].wrench[3:], pull.wrench[3:])
+    same = cdsm.weight_test(pose, pull.values, force, wrench=pull.wrench)
+    np.testing.assert_array_equal(same.displacement, test.displacement)
+
+
+def test_test_starts_where_unbalanced_tensions_lead() -> None:
+    pose, _ = prototype()
+    tension = arms.random_tension(pose.arm, 3)
+    force = np.array([0.0, -5.0, 0.0])
+    test = cdsm.weight_test(pose, tension, force)
+    before = cdsm.equilibrium(pose, tension)
+    after = cdsm.equilibrium(pose, tension, np.append(force, np.zeros(3)))
+    assert np.linalg.norm(before.displacement) > 1e-4
+    moved = after.pose.tip[:3, 3] - before.pose.tip[:3, 3]
+    np.testing.assert_allclose(test.displacement, moved, atol=1e-13)
+    assert test.linear.stiffness == before.stiffness.along(force)
+
+
+def test_arm_that_cannot_give_way_is_infinitely_stiff() -> None:
+    test = cdsm.weight_test(hinge().at([0.0]), [20.0, 20.0], [30.0, 0.0, 0.0])
+    assert test.stiffness == test.linear.stiffness == math.inf
+    assert "inf" in str(test)
+
+
+# --- buckling -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("steps", [1, 7])
+def test_buckling_under_the_load_says_at_which_part_of_it(steps: int) -> None:
+    # K_θ = 1.6 − P/10 of the soft hinge: it gives way at 16 N
+    pose = soft_hinge(limit=1.2).at([0.0])
+    with pytest.raises(cdsm.EquilibriumError, match=r"buckles at .* joint1 gives way") as caught:
+        cdsm.weight_test(pose, [20.0, 20.0], [-20.0, 0.0, 0.0], steps=steps)
+    assert caught.value.load_factor == pytest.approx(0.8, abs=2.0**-11)
+    assert caught.value.load_factor < 0.8
+    assert caught.value.joint == "joint1"
+    # just below, it stands
+    cdsm.weight_test(pose, [20.0, 20.0], [-15.9, 0.0, 0.0], steps=steps)
+
+
+def test_arm_that_snaps_through_has_buckled() -> None:
+    # where bending softens the hinge, a small moment makes it snap before the straight one buckles
+    moment, pretension = 2e-3, 150.0
+    pose = soft_hinge().at([0.0])
+    with pytest.raises(cdsm.EquilibriumError, match="buckles") as caught:
+        cdsm.weight_test(pose, [pretension] * 2, [-7.0, 0.0, 0.0], wrench=moment * MOMENT)
+    angles = np.linspace(0.0, 0.6, 6001)
+
+    def stands(load: float) -> bool:
+        energy = np.array([compressed(q, load, pretension) - moment * q for q in angles])
+        return bool((np.diff(energy) > 0.0).any())  # there is a dip before it goes down
+
+    low, high = 0.0, 7.0
+    for _ in range(12):
+        middle = (low + high) / 2.0
+        low, high = (middle, high) if stands(middle) else (low, middle)
+    assert caught.value.load_factor * 7.0 == pytest.approx(low, abs=0.01)
+    assert low < 5.3  # the straight one: (2.034 − 1.5)·10 = 5.34 N
+    # equilibrium() goes on to where it comes to rest
+    W = moment * MOMENT - 7.0 * np.eye(6)[0]
+    assert cdsm.equilibrium(pose, [pretension] * 2, W).at_limit == ("joint1",)
+
+
+def test_tension_beyond_the_law_on_the_way_names_the_cable() -> None:
+    pose = hinge(limit=0.5, law=STRAND).at([0.0])
+    with pytest.raises(cdsm.ElasticityRangeError) as caught:
+        cdsm.weight_test(pose, [700.0, 700.0], [0.0, 0.0, 300.0], steps=4)
+    assert caught.value.cables
+
+
+@pytest.mark.parametrize("steps", [1, 2, 3, 7])
+def test_snapping_through_is_seen_however_few_the_steps(steps: int) -> None:
+    """At the full load the arm rests stably beyond: the way there is what tells."""
+    geometry = cdsm.Geometry.hinged(
+        joints=1,
+        twist=0.0,
+        link_length=0.05,
+        base_length=0.02,
+        disk_offset=0.01,
+        hole_radius=0.02,
+        link_mass=0.0,
+    )
+    arm = cdsm.Manipulator(geometry, cdsm.LinearElasticity(100.0), gravity=(0.0, 0.0, 0.0))
+    pose = arm.at([0.0])
+    force = np.array([-40.0, 0.0, 10.0])
+    assert cdsm.equilibrium(pose, [5.0, 5.0], np.append(force, np.zeros(3))).stable
+    with pytest.raises(cdsm.EquilibriumError, match="buckles at") as caught:
+        cdsm.weight_test(pose, [5.0, 5.0], force, steps=steps)
+
+    # the torque that the load must overcome, from the same closed forms as tests/support/locked.py
+    def load(angle: float) -> float:
+        lengths = [
+            2.0 * (0.01 * math.cos(angle / 2) + s * 0.02 * math.sin(angle / 2)) for s in (1, -1)
+        ]
+        slopes = [-0.01 * math.sin(angle / 2) + s * 0.02 * math.cos(angle / 2) for s in (1, -1)]
+        pull = [max(100.0 * (1.05 * L / 0.02 - 1.0), 0.0) for L in lengths]
+        torque = pull[0] * slopes[0] + pull[1] * slopes[1]
+        # the tip is at (ℓ cos θ, −ℓ sin θ)
+        return torque / (0.05 * (40.0 * math.sin(angle) - 10.0 * math.cos(angle)))
+
+    parts = [load(angle) for angle in np.linspace(-0.9, -1e-3, 20001)]
+    assert caught.value.load_factor == pytest.approx(max(parts), rel=1e-3)
+
+
+def test_hardly_any_force_may_buckle_an_arm_that_hardly_stands() -> None:
+    """The part of the load is found to a part of itself, not of the load."""
+    pose = soft_hinge(limit=1.2).at([0.0])
+    with pytest.raises(cdsm.EquilibriumError, match="buckles at") as caught:
+        cdsm.weight_test(pose, [20.0, 20.0], [-1.6e8, 0.0, 0.0])
+    # K_θ = 1.6 − P/10 of the straight hinge
+    assert caught.value.load_factor == pytest.approx(1e-7, rel=2.0**-11)
+
+
+def test_arm_between_disks_that_all_but_touch_is_followed_by_any_steps() -> None:
+    """Buckled, four joints on their stops: segments of micrometres tilt by rounding alone."""
+    arm = arms.random_arm(313526, 4, "universal", cdsm.LinearElasticity(213.5))
+    pose = arms.random_posture(arm, 760486)
+    pull = cdsm.distribute_tension(pose, 18.0)
+    once, twice, often = (
+        cdsm.weight_test(pose, pull, [-0.9, 3.0, 2.4], steps=steps) for steps in (1, 2, 7)
+    )
+    assert len(once.without.at_limit) == 4
+    assert once.settled_first
+    for test in (twice, often):
+        np.testing.assert_allclose(test.tips[-1], once.tips[-1], atol=1e-9)
+
+
+def test_joint_on_a_stop_takes_no_part_in_the_prediction() -> None:
+    arm = hinge(joints=2)
+    first, second = arm.geometry.joints
+    geometry = replace(arm.geometry, joints=(first, replace(second, limit=0.02)))
+    stopped = cdsm.Manipulator(geometry, cables=arm.cables, gravity=(0.0, 0.0, 0.0))
+    pose, moment = stopped.at([0.0, 0.0]), MOMENT
+    test = cdsm.weight_test(pose, np.full(4, 20.0), [0.0, 0.0, 1e-4], wrench=moment)
+    assert test.without.at_limit == ("joint2",)
+    assert test.linear.stiffness == pytest.approx(test.stiffness, rel=1e-4)
+    assert test.without.stiffness.along([0, 0, 1]) < 0.9 * test.stiffness
+    assert "at a stop: joint2" in str(test)
+    assert "did not stay at its reference" in str(test)
+
+
+# --- the question ---------------------------------------------------------------------------
+
+
+def test_answer_prints_itself() -> None:
+    pose, pull = prototype()
+    test = cdsm.weight_test(pose, pull, [0.0, 0.0, -10.0], steps=2)
+    for part in ("load [N]", "z [mm]", "\n         5", "linear", "measured", "N/mm"):
+        assert part in str(test)
+    assert f"{test.stiffness / 1000.0:.4g} N/mm" in str(test)
+    assert "WeightTest" in repr(test)
+
+
+@pytest.mark.parametrize(
+    ("force", "steps", "said"),
+    [
+        ([0.0, 0.0, 0.0], 1, "force"),
+        ([0.0, 0.0, 1e-300], 1, "rounding only"),
+        ([0.0, 0.0, 1e-14], 1, "hang at least"),
+        ([0.0, 1.0], 1, "force"),
+        ([0.0, 1.0, math.nan], 1, "force"),
+        ([0.0, 0.0, 1.0], 0, "steps"),
+        ([0.0, 0.0, 1.0], 1.5, "steps"),
+        ([0.0, 0.0, 1.0], True, "steps"),
+        ([0.0, 0.0, 1.0], "2", "steps"),
+    ],
+)
+def test_bad_input_is_named(force: Any, steps: Any, said: str) -> None:
+    with pytest.raises(cdsm.InvalidInput, match=said):
+        cdsm.weight_test(hinge().at([0.0]), [20.0, 20.0], force, steps=steps)

@@ -1,0 +1,144 @@
+"""Workspace maps show every tip where it is, in mm, under its own colour or status."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+from matplotlib.collections import PathCollection
+from matplotlib.figure import Figure
+
+import cdsm
+from cdsm import plots
+from cdsm.support.validation import Array
+from tests.support.sweeps import short_arm
+
+PLANAR = cdsm.GridPoses(
+    {"joint1_1": np.linspace(-0.4, 0.4, 5), "joint3_1": np.linspace(-0.4, 0.4, 4)}
+)
+
+
+def drawn(figure: Figure, panel: int = 0) -> list[PathCollection]:
+    """The scatters of a panel: each status that is missing, then colours, then the base."""
+    figure.draw_without_rendering()
+    return [each for each in figure.axes[panel].collections if isinstance(each, PathCollection)]
+
+
+def places(scatter: PathCollection) -> Array:
+    return np.asarray(scatter.get_offsets(), dtype=np.float64)
+
+
+@pytest.fixture(scope="module")
+def planar() -> xr.Dataset:
+    """Springs so soft that the upper bounds buckle the arm, in the plane of x and z."""
+    arm = short_arm(spring=1500.0)
+    return cdsm.sweep(arm, PLANAR, minimum=[5.0, 40.0, 100.0])
+
+
+def test_tips_in_a_plane_are_shown_in_it_in_mm_with_equal_axes(planar: xr.Dataset) -> None:
+    figure = plots.plot_map(planar, "softest")
+    colors, _ = drawn(figure)
+    tips = 1e3 * planar.tip_position.values.reshape(-1, 3)
+    assert abs(tips[:, 1]).max() < 1e-9
+    np.testing.assert_allclose(places(colors), tips[:, [0, 2]], rtol=1e-12)
+    shown = np.asarray(colors.get_array())
+    np.testing.assert_allclose(shown, 1e-3 * planar.softest[..., 0].values.ravel(), rtol=1e-12)
+    axes: Any = figure.axes[0]
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("x [mm]", "z [mm]")
+    assert axes.get_aspect() == 1.0
+    assert axes.get_title() == "minimum 5 N"
+    assert figure.axes[-1].get_ylabel() == "stiffness in the softest direction [N/mm]"
+
+
+def test_unstable_entries_are_marked_and_counted(planar: xr.Dataset) -> None:
+    unstable = (planar.status == cdsm.SweepStatus.UNSTABLE).values
+    assert not unstable[..., 0].any()
+    assert unstable[..., 2].all()
+    tips = 1e3 * planar.tip_position.values.reshape(-1, 3)[:, [0, 2]]
+    for quantity in ("softest", "along"):
+        data = planar.isel(direction=[2]) if quantity == "along" else planar
+        figure = plots.plot_map(data, quantity)
+        marked, colors, _ = drawn(figure, 2)
+        np.testing.assert_allclose(places(marked), tips)
+        assert not len(places(colors))
+        told = [text.get_text() for text in figure.legends[0].get_texts()]
+        assert told == ["base", f"unstable: {100 * unstable.mean():.3g} %"]
+
+
+def test_the_margin_is_shown_with_its_sign_also_where_it_is_negative(planar: xr.Dataset) -> None:
+    figure = plots.plot_map(planar, "margin")
+    colors, _ = drawn(figure, 2)
+    np.testing.assert_allclose(
+        np.asarray(colors.get_array()), planar.margin[..., 2].values.ravel(), rtol=1e-12
+    )
+    assert colors.norm.vmin == -colors.norm.vmax  # type: ignore[operator]
+    assert figure.axes[-1].get_ylabel() == "stability margin [N m/rad]; below 0: unstable"
+
+
+def test_infinite_values_are_at_the_end_of_the_bar() -> None:
+    q = np.vstack([np.zeros(6), np.linspace(0.1, 0.4, 20)[:, None] * np.ones(6)])
+    for postures in (q, q[:1]):  # flat, the tip cannot move along the arm
+        found = cdsm.sweep(short_arm(), postures, minimum=20.0)
+        assert (
+            np.isposinf(found.anisotropy).values.tolist()
+            == ([True] + [False] * 20)[: len(postures)]
+        )
+        *_, colors, _ = drawn(plots.plot_map(found, "anisotropy"))
+        values = np.asarray(colors.get_array())
+        assert np.isfinite(values).all()
+        assert values[0] > float(colors.norm.vmax)  # type: ignore[arg-type]
+
+
+def test_three_dimensions_sections_and_statuses() -> None:
+    arm = short_arm(cdsm.presets.STRAND_1X19)
+    found = cdsm.sweep(arm, cdsm.RandomPoses(256), minimum=20.0, maximum=400.0)
+    figure = plots.plot_map(found, "along")
+    figure.draw_without_rendering()
+    axes: Any = figure.axes[0]
+    assert [axes.get_title() for axes in figure.axes[:3]] == [f"direction {u}" for u in "xyz"]
+    limits = np.ptp([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()], axis=1)
+    np.testing.assert_allclose(limits / axes._box_aspect, (limits / axes._box_aspect)[0])
+    infeasible = float((found.status == cdsm.SweepStatus.INFEASIBLE).mean())
+    assert 0.0 < infeasible < 1.0
+    told = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert f"infeasible: {100 * infeasible:.3g} %" in told
+
+    section = plots.plot_map(found, "softest", section=("y", 0.01, 0.02))
+    shown = np.vstack([places(each) for each in drawn(section)[:-1]])
+    tips = 1e3 * found.tip_position.values
+    inside = tips[abs(tips[:, 1] - 10.0) <= 20.0]
+    assert 0 < len(inside) < len(tips)
+    order = [np.lexsort(each.T) for each in (shown, inside[:, [0, 2]])]
+    np.testing.assert_allclose(shown[order[0]], inside[:, [0, 2]][order[1]], rtol=1e-12)
+    assert "y\xa0=\xa010\xa0±\xa020\xa0mm" in section.get_suptitle()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ({"quantity": "softness"}, "no quantity is called 'softness'"),
+        ({"quantity": "tip_position"}, "tip_position has the dimensions"),
+        ({"section": ("w", 0.0, 0.1)}, "no axis is called 'w'"),
+        ({"section": 3.0}, "section: 3.0 given"),
+        ({"section": ("y", 5.0, 0.1)}, "section: has no tip to show"),
+        ({"quantity": "along"}, "makes 9 panels|"),
+    ],
+)
+def test_what_cannot_be_shown_is_named(
+    arguments: dict[str, Any], said: str, planar: xr.Dataset
+) -> None:
+    if said.endswith("|"):
+        planar = cdsm.sweep(short_arm(), PLANAR, minimum=np.arange(10.0, 14.0))
+        said = r"makes 12 panels, of minimum \(4\), direction \(3\); choose up to 9"
+    with pytest.raises(cdsm.CdsmError, match=said):
+        plots.plot_map(planar, **arguments)
+
+
+def test_a_sweep_without_tips_cannot_be_shown() -> None:
+    with pytest.raises(cdsm.UnknownName, match="tip_position"):
+        plots.plot_map(cdsm.sweep(short_arm(), PLANAR, minimum=20.0, outputs="margin"), "margin")
+    with pytest.raises(cdsm.InvalidInput, match="the Dataset of a sweep is needed"):
+        plots.plot_map(3)  # type: ignore[arg-type]
+    beyond = cdsm.sweep(short_arm(), np.full((2, 6), 3.0), minimum=20.0)
+    with pytest.raises(cdsm.InvalidInput, match="has no tip to show"):
+        plots.plot_map(beyond)

@@ -1,0 +1,715 @@
+"""The live view: what it computes, and what a browser shows of it."""
+
+import importlib.util
+import logging
+import math
+import os
+import re
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import cdsm
+from cdsm.plots.arm import ellipsoid, tension_colors
+from cdsm.support.validation import Array
+from cdsm.view import Condition, Setting, View, serve, show
+from cdsm.view.newest import Newest
+from cdsm.view.ranges import joint_sliders, slider
+from cdsm.view.state import GREY
+from cdsm.view.text import _direction, page_text
+from tests.support import foreign
+from tests.support.arms import mixed_arm, random_posture
+from tests.support.patience import HANGS
+
+OUTPUT = Path(__file__).parents[2] / "test-output"
+GEOMETRY: dict[str, Any] = {
+    "joints": 3,
+    "cables_per_joint": 3,
+    "link_length": 0.06,
+    "base_length": 0.03,
+    "disk_offset": 0.012,
+    "hole_radius": 0.02,
+    "link_mass": 0.1,
+    "lead": 0.3,
+}
+DEGREES = [10.0, 5.0, -8.0, 12.0, 6.0, -4.0]
+STABLE, UNSTABLE, INFEASIBLE = 20.0, 60.0, 150.0
+"""Least tensions [N] at which the soft arm is each of them, none above 200 N."""
+
+
+def soft_arm() -> cdsm.Manipulator:
+    """Springs in series: it buckles before the tensions are infeasible."""
+    geometry = cdsm.Geometry.universal(**GEOMETRY)
+    law = cdsm.LinearElasticity(2e5)
+    cables = cdsm.serpentine_cables(geometry, law, series_stiffness=8000.0)
+    return cdsm.Manipulator(geometry, cables=cables)
+
+
+def setting(
+    arm: cdsm.Manipulator,
+    minimum: float = STABLE,
+    force: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    q: Array | None = None,
+) -> Setting:
+    return Setting(
+        q=np.deg2rad(DEGREES[: arm.nv]) if q is None else q,
+        minimum=minimum,
+        maximum=200.0,
+        force=np.array(force),
+    )
+
+
+def numbers(text: str) -> dict[str, str]:
+    """What the page says, by name."""
+    return dict(re.findall(r'data-cdsm="([\w-]+)">([^<]*)<', text))
+
+
+# --- what is computed ---------------------------------------------------------------------------
+
+
+def test_a_stable_arm_is_shown_with_the_numbers_of_the_api() -> None:
+    arm = soft_arm()
+    shown = show(arm, setting(arm, force=(0.5, -1.0, -2.0)))
+    pose = arm.at(np.deg2rad(DEGREES))
+    pull = cdsm.distribute_tension(pose, STABLE, 200.0, (0.5, -1.0, -2.0, 0, 0, 0))
+    K = cdsm.stiffness(pose, pull)
+    assert shown.condition is Condition.STABLE
+    assert shown.along is not None
+    np.testing.assert_array_equal(shown.along, [K.along(u) for u in np.eye(3)])
+    said = numbers(page_text(shown))
+    for axis, u in zip("xyz", np.eye(3), strict=True):
+        assert said[f"along-{axis}"] == f"{K.along(u) / 1000.0:.4g}"
+    assert said["margin"] == f"{K.margin:.4g}"
+    assert said["largest-tension"] == f"{pull.values.max():.4g}"
+    assert said["smallest-tension"] == f"{pull.values.min():.4g}"
+    assert said["tip"] == ", ".join(f"{1000.0 * x:.1f}" for x in pose.tip[:3, 3])
+    assert arm.cables[int(pull.values.argmax())].name in page_text(shown)
+    # the softest direction is one in which K.along is least, of all directions
+    assert shown.principal is not None
+    assert said["softest"] == f"{shown.principal['softest'] / 1000.0:.4g}"
+    # 1e-9: an eigenvalue of C_vv against its inverse along the eigenvector
+    soft = K.along(shown.principal["softest_direction"])
+    np.testing.assert_allclose(shown.principal["softest"], soft, rtol=1e-9)
+    directions = np.random.default_rng(0).normal(size=(200, 3))
+    assert all(K.along(u) >= soft * (1.0 - 1e-9) for u in directions)
+    assert all(K.along(u) <= shown.principal["stiffest"] * (1.0 + 1e-9) for u in directions)
+
+
+def test_colours_are_those_of_the_figure_and_grey_without_tensions() -> None:
+    arm = soft_arm()
+    shown = show(arm, setting(arm))
+    assert shown.tension is not None
+    expected = tension_colors(shown.tension).to_rgba(shown.tension.values)[:, :3]
+    assert shown.cable_colors is not None
+    np.testing.assert_allclose(shown.cable_colors / 255.0, expected, atol=1.0 / 255.0)
+    grey = show(arm, setting(arm, INFEASIBLE)).cable_colors
+    np.testing.assert_array_equal(grey, np.full((9, 3), GREY))
+
+
+def test_the_ellipsoid_is_where_forces_of_one_size_move_the_tip() -> None:
+    arm = soft_arm()
+    shown = show(arm, setting(arm))
+    assert shown.stiffness is not None
+    assert shown.ellipsoid is not None
+    drawn = ellipsoid(shown.stiffness)
+    assert drawn is not None
+    C = shown.stiffness.compliance[:3, :3]
+    moved = shown.ellipsoid.reshape(3, -1) - shown.stiffness.posture.tip[:3, 3:]
+    force = np.linalg.solve(0.2 * arm.length / drawn.longest * C, moved)
+    np.testing.assert_allclose(np.linalg.norm(force, axis=0), 1.0, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("minimum", "force", "condition"),
+    [
+        (UNSTABLE, 0.0, Condition.UNSTABLE),
+        (STABLE, -20.0, Condition.UNSTABLE),
+        (INFEASIBLE, 0.0, Condition.INFEASIBLE),
+        (-1.0, 0.0, Condition.INVALID),
+        (201.0, 0.0, Condition.INVALID),
+    ],
+)
+def test_where_it_does_not_hold_no_stiffness_is_said(
+    minimum: float, force: float, condition: Condition
+) -> None:
+    arm = soft_arm()
+    shown = show(arm, setting(arm, minimum, (0.0, 0.0, force)))
+    said = numbers(page_text(shown))
+    assert shown.condition is condition
+    assert said["condition"] == condition.value
+    assert said["problem"]
+    assert shown.along is None
+    assert shown.principal is None
+    assert shown.ellipsoid is None
+    assert not {"along-x", "softest", "stiffest"} & set(said)
+    assert ("margin" in said) == (condition is Condition.UNSTABLE)
+    assert ("largest-tension" in said) == (condition is Condition.UNSTABLE)
+    if condition is Condition.UNSTABLE:
+        assert float(said["margin"]) < 0.0
+
+
+def test_a_posture_that_is_none_shows_nothing_but_why() -> None:
+    arm = soft_arm()
+    shown = show(arm, setting(arm, q=np.full(6, 3.0)))
+    assert shown.condition is Condition.NO_POSTURE
+    said = numbers(page_text(shown))
+    assert set(said) == {"condition", "problem"}
+    assert "joint1_1" in said["problem"]
+    assert shown.cable_colors is None
+
+
+@pytest.mark.parametrize("number", [1e16, 1e300])
+def test_numbers_that_no_arm_has_are_refused(number: float) -> None:
+    arm = soft_arm()
+    for asked in (
+        setting(arm, q=np.full(6, number)),
+        setting(arm, number),
+        setting(arm, force=(0.0, number, 0.0)),
+    ):
+        assert show(arm, asked).condition is Condition.INVALID
+
+
+def test_cables_outside_their_elasticity_keep_their_tensions() -> None:
+    arm = cdsm.Manipulator(cdsm.Geometry.universal(**GEOMETRY), cdsm.presets.STRAND_1X19)
+    shown = show(arm, setting(arm, 1.0))
+    assert shown.condition is Condition.OUTSIDE_ELASTICITY
+    said = numbers(page_text(shown))
+    assert "largest-tension" in said
+    assert "margin" not in said
+    assert shown.stiffness is None
+
+
+def test_names_and_messages_are_text_and_not_markup() -> None:
+    robot, law = foreign.TREE, cdsm.LinearElasticity(3e4)
+    cables = [cdsm.Cable(f"<b>{cable.name}&", cable.sites, law) for cable in foreign.cables(law)]
+    arm = cdsm.Manipulator.from_urdf(robot, cables, tip="tip", gravity=(0.0, 0.0, 0.0))
+    shown = show(arm, Setting(q=foreign.POSTURE, minimum=-1.0, force=np.zeros(3)))
+    text = page_text(shown)
+    assert "<b>" not in text
+    weightless = show(arm, Setting(q=foreign.POSTURE, minimum=0.0, force=np.zeros(3)))
+    assert weightless.tension is not None
+    assert "&lt;b&gt;c" in page_text(weightless)
+
+
+def test_units_are_those_of_joints_that_slide() -> None:
+    arm = foreign.crab(gravity=(0.0, 0.0, 0.0))
+    shown = show(arm, Setting(q=foreign.POSTURE, minimum=0.0, force=np.zeros(3)))
+    assert shown.stiffness is not None
+    assert "N m/rad or N/m</td>" in page_text(shown)
+    turning = show(soft_arm(), setting(soft_arm()))
+    assert "N m/rad</td>" in page_text(turning)
+
+
+def test_no_direction_has_a_negative_zero() -> None:
+    assert _direction(np.array([-1e-9, 1.0, -0.004])) == "(0.00, 1.00, 0.00)"
+
+
+# --- sliders ------------------------------------------------------------------------------------
+
+
+def test_sliders_end_at_round_numbers_within_the_limits() -> None:
+    arm = soft_arm()
+    for each in joint_sliders(arm, np.zeros(6)):
+        assert (each.low, each.high, each.step) == (-61.9, 61.9, 0.1)
+        arm.at(np.full(6, each.high * each.unit))
+    crab = foreign.crab()
+    ways = joint_sliders(crab, foreign.POSTURE)
+    assert [each.label for each in ways[:2]] == ["a [°]", "b [mm]"]
+    assert (ways[1].low, ways[1].high, ways[1].step) == (-900.0, 1100.0, 1.0)
+    for each, angle in zip(ways, foreign.POSTURE, strict=True):
+        # one rounding by the unit and one back
+        np.testing.assert_allclose(each.initial * each.unit, angle, rtol=1e-15)
+
+
+def test_sliders_of_odd_ranges() -> None:
+    narrow = slider("a", -0.0123, 0.0123, 0.01)
+    assert (narrow.low, narrow.high, narrow.step) == (-0.0123, 0.0123, 1e-5)
+    stuck = slider("b", 0.3, 0.3, 0.3)
+    assert stuck.low == stuck.high == stuck.initial == 0.3
+    assert slider("c", 0.0, 200.0, 12.34567).initial == 12.34567
+    beyond = slider("d", 0.0, 1.0, 1.00001)
+    assert beyond.high == 1.00001
+
+
+# --- one thread for many ------------------------------------------------------------------------
+
+
+def test_what_is_asked_while_it_works_is_done_once_for_the_newest() -> None:
+    started, go_on = threading.Event(), threading.Event()
+    state, seen = [0], []
+
+    def job() -> None:
+        seen.append(state[0])
+        started.set()
+        assert go_on.wait(HANGS)
+
+    newest = Newest(job)
+    newest.ask()
+    assert started.wait(HANGS)
+    threads = [threading.Thread(target=newest.ask) for _ in range(20)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    state[0] = 1
+    go_on.set()
+    newest.settle()
+    assert seen == [0, 1]
+    newest.close()
+    newest.ask()  # after the end: nothing happens
+    newest.settle()
+    assert seen == [0, 1]
+
+
+# --- the server ---------------------------------------------------------------------------------
+
+needs_viser = pytest.mark.skipif(
+    importlib.util.find_spec("viser") is None, reason="the extra [view] is not installed"
+)
+
+
+@pytest.fixture(scope="module")
+def view() -> Iterator[View]:
+    with serve(soft_arm(), port=0, q=np.deg2rad(DEGREES), minimum=STABLE, maximum=200.0) as page:
+        yield page
+
+
+def node(view: View, name: str) -> Any:
+    handle = view._server.scene.get_handle_by_name(name)
+    assert handle is not None
+    return handle
+
+
+@needs_viser
+def test_the_scene_holds_the_arm_where_the_api_has_it(view: View) -> None:
+    pose = view.arm.at(np.deg2rad(DEGREES))
+    for link in ("link1", "link3"):  # shape 0 of a link is its backbone, half a link along x
+        place = pose.link_pose(link)
+        middle = place[:3, 3] + 0.03 * place[:3, 0]
+        shape = node(view, f"/arm/visual/{link}_0")
+        np.testing.assert_allclose(shape.position, middle, atol=1e-12)
+    for i, path in enumerate(pose.cable_paths):
+        # a browser holds float32
+        np.testing.assert_allclose(node(view, f"/cables/{i}").points[:, 0], path[:-1], atol=1e-7)
+        np.testing.assert_allclose(node(view, f"/cables/{i}").points[:, 1], path[1:], atol=1e-7)
+    assert node(view, "/ellipsoid").visible
+    assert not node(view, "/sticks").visible
+
+
+@needs_viser
+def test_the_scene_holds_an_arm_whose_joints_are_told_in_another_order() -> None:
+    plain = soft_arm()
+    arm = cdsm.Manipulator.from_urdf(
+        plain.urdf, plain.cables, tip=plain.tip_link, joint_names=plain.joint_names[::-1]
+    )
+    q = np.deg2rad(DEGREES)
+    with serve(arm, port=0, q=q[::-1]) as view:
+        for link in ("link1", "link3"):
+            place = plain.at(q).link_pose(link)
+            middle = place[:3, 3] + 0.03 * place[:3, 0]
+            shape = node(view, f"/arm/visual/{link}_0")
+            np.testing.assert_allclose(shape.position, middle, atol=1e-12)
+
+
+@needs_viser
+def test_nothing_is_written_into_the_arm() -> None:
+    arm = soft_arm()
+    before = arm._body._model.copy()
+    with serve(arm, port=0, q=np.deg2rad(DEGREES)):
+        pass
+    assert arm._body._model == before
+
+
+@pytest.mark.parametrize("shapes", ["none", "a mesh that is not there"])
+@needs_viser
+def test_robots_without_shapes_are_sticks(shapes: str, caplog: pytest.LogCaptureFixture) -> None:
+    robot = foreign.TREE
+    if shapes != "none":
+        visual = '<visual><geometry><mesh filename="package://lost/x.stl"/></geometry></visual>'
+        robot = robot.replace('<link name="floor">', f'<link name="floor">{visual}')
+    arm = cdsm.Manipulator.from_urdf(
+        robot, foreign.cables(cdsm.LinearElasticity(3e4)), tip="tip", gravity=(0.0, 0.0, 0.0)
+    )
+    with serve(arm, port=0, q=foreign.POSTURE, minimum=0.0) as view:
+        assert view.shown.posture is not None
+        sticks = node(view, "/sticks")
+        assert sticks.visible
+        np.testing.assert_allclose(sticks.points, view.shown.posture.bones, atol=1e-7)
+        assert view._server.scene.get_handle_by_name("/arm/visual/floor_0") is None
+    assert ("lost/x.stl" in caplog.text) == (shapes != "none")
+
+
+@needs_viser
+def test_a_fault_of_our_own_leaves_no_number_behind(
+    view: View, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def broken(*_: object) -> None:
+        raise np.linalg.LinAlgError("did not converge")
+
+    with monkeypatch.context() as patch, caplog.at_level(logging.ERROR):
+        patch.setattr("cdsm.view.server.show", broken)
+        view._worker.ask()
+        shown = view.shown
+    assert shown.condition is Condition.FAILED
+    assert numbers(view._controls._text.content) == {
+        "condition": "FAILED",
+        "problem": "LinAlgError: did not converge",
+    }
+    assert not node(view, "/cables").visible
+    assert not node(view, "/ellipsoid").visible
+    assert "did not converge" in caplog.text
+    view._worker.ask()
+    assert view.shown.condition is Condition.STABLE
+    assert node(view, "/cables").visible
+
+
+@pytest.mark.parametrize("number", [1e16, 1e300])
+@needs_viser
+def test_no_number_that_is_typed_ends_the_view(number: float) -> None:
+    with serve(soft_arm(), port=0, q=np.deg2rad(DEGREES), minimum=STABLE) as view:
+        fields = [view._controls._joints[0].handle, view._controls._force[1].handle]
+        seen = []
+        for field in fields:
+            before = field.value
+            field.value = number  # type: ignore[misc]
+            seen.append(view.shown.condition)
+            assert not node(view, "/force").visible
+            assert not node(view, "/ellipsoid").visible
+            field.value = before  # type: ignore[misc]
+            seen.append(view.shown.condition)
+            assert node(view, "/arm").visible
+        beyond = Condition.NO_POSTURE if number < 1e17 else Condition.INVALID
+        assert seen == [beyond, Condition.STABLE, Condition.INVALID, Condition.STABLE]
+
+
+@needs_viser
+def test_a_port_in_use_is_named_and_nothing_is_left_running() -> None:
+    threads = threading.active_count()
+    with socket.create_server(("127.0.0.1", 0)) as other:
+        port = other.getsockname()[1]
+        with pytest.raises(cdsm.InvalidInput, match=f"port: {port} on 127.0.0.1 cannot be had"):
+            serve(soft_arm(), port=port)
+    with pytest.raises(cdsm.InvalidInput, match="host"):
+        serve(soft_arm(), host="no.such.host.invalid", port=0)
+    assert threading.active_count() == threads
+
+
+@pytest.mark.parametrize(
+    ("options", "match"),
+    [
+        ({"port": 70000}, "port: 70000"),
+        ({"port": "8080"}, "port: '8080'"),
+        ({"host": 7}, "host: 7"),
+        ({"minimum": -1.0}, "minimum: -1 N given"),
+        ({"force": (1.0, 2.0)}, "force: shape"),
+        ({"largest_tension": 0.0}, "largest_tension: 0 N given"),
+        ({"largest_force": math.nan}, "largest_force"),
+        ({"q": np.full(6, 3.0)}, "joint1_1"),
+        ({"q": [0.0]}, "q: shape"),
+        ({"solver": "no such"}, "no installed solver is called 'no such'"),
+    ],
+)
+@needs_viser
+def test_bad_input_is_named(options: dict[str, Any], match: str) -> None:
+    with pytest.raises(cdsm.CdsmError, match=re.escape(match)):
+        serve(soft_arm(), **options)
+
+
+@needs_viser
+def test_without_viser_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "viser", None)
+    with pytest.raises(cdsm.MissingExtra, match=r"cdsm-stiffness\[view\]"):
+        serve(soft_arm(), port=0)
+
+
+@needs_viser
+def test_the_server_prints_nothing_and_closes_twice(capfd: pytest.CaptureFixture[str]) -> None:
+    view = serve(mixed_arm(), port=0, q=random_posture(mixed_arm(), 3).q)
+    assert view.url.startswith("http://127.0.0.1:")
+    view.close()
+    view.close()
+    view.wait()  # which is over
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.slow
+@needs_viser
+def test_the_command_serves_until_ctrl_c(tmp_path: Path) -> None:
+    lines = [f"{name} = {value}" for name, value in GEOMETRY.items()]
+    file = tmp_path / "probe.toml"
+    file.write_text("\n".join(["[universal]", 'name = "probe"', *lines]), encoding="utf-8")
+    command = [sys.executable, "-m", "cdsm", "view", str(file), "--port", "0", "--rigidity", "2e5"]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+    ) as process:
+        assert process.stdout is not None
+        said = ""
+        while "shown at" not in said:
+            line = process.stdout.readline()
+            assert line, "ended before it served"
+            said += line
+        process.send_signal(signal.SIGINT)
+        rest, wrong = process.communicate(timeout=HANGS)
+    assert process.returncode == 0
+    assert re.search(r"shown at http://127\.0\.0\.1:\d+; Ctrl-C ends it", said)
+    assert not rest
+    assert not wrong.strip()
+
+
+# --- in a browser -------------------------------------------------------------------------------
+
+CHROMIUM = next(
+    (
+        path
+        for name in (
+            "chromium",
+            "chromium-browser",
+            "google-chrome",
+            "/Applications/Chromium.app/Contents/MacOS/Chromium",
+            "/Applications/Google Chrome.app/Contents/MacOS/Google Chrome",
+        )
+        if (path := shutil.which(name))
+    ),
+    None,
+)
+PATIENCE = 1e3 * HANGS
+"""Milliseconds that a condition may take to come; a busy machine draws a frame in seconds."""
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    """Chromium without a window, its WebGL in software."""
+    api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    if CHROMIUM is None:
+        pytest.skip("chromium is not installed")
+    options = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+    if os.geteuid() == 0:
+        options.append("--no-sandbox")  # which root has none of
+    with api.sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=options)
+        yield chromium
+        chromium.close()
+
+
+class Page:
+    """A page of the view, as its user sees it."""
+
+    def __init__(self, browser: Any, url: str) -> None:
+        self.requests: list[str] = []
+        self.errors: list[str] = []
+        self.page = browser.new_page(viewport={"width": 1200, "height": 800})
+        self.page.set_default_timeout(PATIENCE)
+        self.page.on("request", lambda request: self.requests.append(request.url))
+        self.page.on("pageerror", lambda error: self.errors.append(str(error)))
+        self.page.goto(url)
+        self.page.wait_for_function(
+            "[...document.querySelectorAll('canvas')].some(one => one.width > 100)"
+        )
+
+    def says(self, name: str, text: str) -> None:
+        """Wait until the number of this name is this, to the digit."""
+        from playwright.sync_api import expect
+
+        expect(self.page.locator(f'[data-cdsm="{name}"]')).to_have_text(text, timeout=PATIENCE)
+
+    def says_no(self, name: str) -> None:
+        from playwright.sync_api import expect
+
+        expect(self.page.locator(f'[data-cdsm="{name}"]')).to_have_count(0, timeout=PATIENCE)
+
+    def slider(self, label: str) -> Any:
+        identity = self.page.locator("label", has_text=label).get_attribute("for")
+        return self.page.locator(f'[id="{identity}"]')
+
+    def type(self, label: str, value: float) -> None:
+        """Type a number into the field beside a slider."""
+        self.field(label).fill(f"{value:g}")
+
+    def field(self, label: str) -> Any:
+        return self.slider(label).locator("xpath=..").locator("input[inputmode=decimal]")
+
+    def press(self, label: str, key: str, times: int) -> None:
+        """Move the knob of a slider with the keyboard."""
+        knob = self.slider(label).get_by_role("slider")
+        for _ in range(times):
+            knob.press(key)
+
+    def picture(self, name: str) -> Array:
+        """A screenshot, kept to be looked at: (rows, columns, 3) from 0 to 1."""
+        from matplotlib.image import imread
+
+        OUTPUT.mkdir(exist_ok=True)
+        self.page.screenshot(path=OUTPUT / name, timeout=PATIENCE)
+        return np.asarray(imread(OUTPUT / name), dtype=np.float64)[..., :3]
+
+
+@pytest.fixture(scope="module")
+def page(browser: Any, view: View) -> Page:
+    return Page(browser, view.url)
+
+
+def answers(
+    arm: cdsm.Manipulator, degrees: list[float], minimum: float, force_z: float = 0.0
+) -> dict[str, str]:
+    """What the API gives, as the page prints it; nothing of the view is used."""
+    pose = arm.at(np.deg2rad(degrees))
+    pull = cdsm.distribute_tension(pose, minimum, 200.0, (0.0, 0.0, force_z, 0.0, 0.0, 0.0))
+    K = cdsm.stiffness(pose, pull)
+    said = {
+        f"along-{axis}": f"{K.along(u) / 1e3:.4g}" for axis, u in zip("xyz", np.eye(3), strict=True)
+    }
+    return said | {"margin": f"{K.margin:.4g}", "largest-tension": f"{pull.values.max():.4g}"}
+
+
+# first of those with a page: the keys that move a slider turn viser's camera, too
+@pytest.mark.slow
+@needs_viser
+def test_the_picture_shows_the_arm_and_the_ellipsoid(page: Page) -> None:
+    page.says("condition", "STABLE")
+    for _ in range(30):  # the first frames may be empty
+        picture = page.picture("view-stable.png")[:, :800]
+        red, green, blue = (picture[..., i] for i in range(3))
+        pink = (red > 0.6) & (abs(green - blue) < 0.12) & (green < 0.75 * red)
+        brown = (red > 0.5) & (blue < 0.4) & (green > 0.4)
+        if pink.mean() > 0.005 and brown.mean() > 0.005:
+            return
+    pytest.fail("no ellipsoid or no disks in view-stable.png")
+
+
+@needs_viser
+def test_a_slider_that_moves_changes_the_numbers_to_those_of_the_api(
+    page: Page, view: View
+) -> None:
+    arm = view.arm
+    first = answers(arm, DEGREES, STABLE)
+    for name, text in first.items():
+        page.says(name, text)
+    page.type("joint2_1 [°]", 14.5)
+    moved = [*DEGREES[:2], 14.5, *DEGREES[3:]]
+    second = answers(arm, moved, STABLE)
+    assert all(first[name] != text for name, text in second.items() if name != "margin")
+    for name, text in second.items():
+        page.says(name, text)
+    # one slider at a time: viser's client holds back what follows within 50 ms, and of that keeps
+    # the last message alone, whichever slider it is of
+    page.press("force z [N]", "ArrowLeft", 3)  # 0.01 N each
+    third = answers(arm, moved, STABLE, -0.03)
+    assert third["along-z"] != second["along-z"]
+    for name, text in third.items():
+        page.says(name, text)
+    page.press("least tension [N]", "ArrowRight", 5)  # 0.1 N each
+    for name, text in answers(arm, moved, STABLE + 0.5, -0.03).items():
+        page.says(name, text)
+    page.page.get_by_role("button", name="Reset").click()
+    for name, text in first.items():
+        page.says(name, text)
+
+
+@needs_viser
+def test_unstable_and_infeasible_are_said_and_drawn(page: Page, view: View) -> None:
+    page.type("least tension [N]", UNSTABLE)
+    page.says("condition", "UNSTABLE")
+    page.says("margin", answers(view.arm, DEGREES, UNSTABLE)["margin"])
+    page.says_no("along-x")
+    page.picture("view-unstable.png")
+    page.type("least tension [N]", INFEASIBLE)
+    page.says("condition", "INFEASIBLE")
+    with pytest.raises(cdsm.InfeasibleTension) as error:
+        answers(view.arm, DEGREES, INFEASIBLE)
+    page.says("problem", str(error.value))
+    for name in ("along-x", "softest", "margin", "largest-tension"):
+        page.says_no(name)
+    page.picture("view-infeasible.png")
+    page.page.get_by_role("button", name="Reset").click()
+    page.says("condition", "STABLE")
+
+
+@needs_viser
+def test_beyond_its_end_a_slider_stands_at_its_end(page: Page, view: View) -> None:
+    from playwright.sync_api import expect
+
+    for _ in range(2):  # the second time it stands there already
+        page.type("joint1_1 [°]", 170.0)
+        for name, text in answers(view.arm, [61.9, *DEGREES[1:]], STABLE).items():
+            page.says(name, text)
+        expect(page.field("joint1_1 [°]")).to_have_value("61.9", timeout=PATIENCE)
+    page.page.get_by_role("button", name="Reset").click()
+    page.says("along-x", answers(view.arm, DEGREES, STABLE)["along-x"])
+
+
+@needs_viser
+def test_a_second_browser_sees_and_moves_the_same(page: Page, browser: Any, view: View) -> None:
+    from playwright.sync_api import expect
+
+    page.type("joint3_2 [°]", 3.5)
+    second = Page(browser, view.url)
+    expected = answers(view.arm, [*DEGREES[:5], 3.5], STABLE)
+    second.says("along-x", expected["along-x"])
+    expect(second.field("joint3_2 [°]")).to_have_value("3.5", timeout=PATIENCE)
+    second.page.get_by_role("button", name="Straight").click()
+    straight = answers(view.arm, [0.0] * 6, STABLE)
+    for each in (page, second):
+        each.says("along-x", "∞")
+        each.says("along-z", straight["along-z"])
+        expect(each.field("joint3_2 [°]")).to_have_value("0", timeout=PATIENCE)
+    second.page.close()
+
+
+@needs_viser
+def test_the_page_asks_nobody_else_for_anything(page: Page, view: View) -> None:
+    own = (view.url, f"blob:{view.url}", "data:")
+    assert [url for url in page.requests if not url.startswith(own)] == []
+    assert page.errors == []
+
+
+@needs_viser
+def test_the_guard_refuses_nothing_that_a_page_does(page: Page, view: View) -> None:
+    box = page.page.locator("canvas").first.bounding_box()
+    page.page.mouse.move(box["x"] + 300.0, box["y"] + 300.0)
+    page.page.mouse.down()
+    page.page.mouse.move(box["x"] + 400.0, box["y"] + 350.0, steps=5)  # turns the camera
+    page.page.mouse.up()
+    page.page.mouse.wheel(0.0, 100.0)
+    page.page.wait_for_timeout(500.0)
+    assert view._guard.refused == 0
+    assert page.errors == []
+
+
+@pytest.mark.parametrize("host", ["::1", "0.0.0.0"])
+@needs_viser
+def test_pages_of_other_addresses_work(browser: Any, host: str) -> None:
+    with serve(soft_arm(), host=host, port=0, q=np.deg2rad(DEGREES), minimum=STABLE) as view:
+        own = Page(browser, view.url.replace("0.0.0.0", "127.0.0.1"))
+        own.type("joint2_1 [°]", 14.5)
+        moved = [*DEGREES[:2], 14.5, *DEGREES[3:]]
+        own.says("along-x", answers(view.arm, moved, STABLE)["along-x"])
+        own.page.reload()
+        own.says("along-x", answers(view.arm, moved, STABLE)["along-x"])
+        assert view._guard.refused == 0
+        own.page.close()
+
+
+@needs_viser
+def test_a_link_does_not_lead_the_page_to_another_server(browser: Any, view: View) -> None:
+    sync = pytest.importorskip("websockets.sync.server")
+    led = threading.Event()
+    with sync.serve(lambda _: led.set(), "127.0.0.1", 0) as other:
+        threading.Thread(target=other.serve_forever, daemon=True).start()
+        address = f"ws://127.0.0.1:{other.socket.getsockname()[1]}"
+        page = browser.new_page()
+        page.set_default_timeout(PATIENCE)
+        with page.expect_console_message(lambda one: f"Connecting to: {address}" in one.text):
+            page.goto(f"{view.url}/?websocket={address}")
+        page.wait_for_timeout(3000.0)  # a page that may connect has done so at once
+        page.close()
+        other.shutdown()
+    assert not led.is_set()
