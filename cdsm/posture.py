@@ -10,6 +10,7 @@ import numpy as np
 
 from cdsm.kernels import segments
 from cdsm.kernels import stiffness as stiffness_kernels
+from cdsm.support.units import coordinates
 from cdsm.support.validation import Array, ReadOnlyState, frozen
 
 if TYPE_CHECKING:
@@ -45,8 +46,7 @@ class Posture(ReadOnlyState):
     _frames: segments.Frames
 
     def __repr__(self) -> str:
-        x, y, z = self.tip[:3, 3]
-        return f"<Posture of {self.arm.name}, tip at ({x:.4g}, {y:.4g}, {z:.4g}) m>"
+        return f"<Posture of {self.arm.name}, tip at {coordinates(self.tip[:3, 3])} m>"
 
     @cached_property
     def length_hessian(self) -> Array:

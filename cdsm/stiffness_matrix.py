@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike
 from cdsm.errors import InvalidInput, SingularStiffness
 from cdsm.posture import Posture
 from cdsm.report import Report, report_on
-from cdsm.support.units import MODEL
+from cdsm.support.units import MODEL, coordinates
 from cdsm.support.validation import (
     Array,
     ReadOnlyState,
@@ -252,7 +252,8 @@ class Stiffness(ReadOnlyState):
         torque = self._torque(u)
         if torque is None:
             raise SingularStiffness(
-                f"the tip cannot move along {_written(u)}: nothing carries an infinite stiffness.",
+                f"the tip cannot move along {coordinates(u)}: nothing carries an infinite "
+                "stiffness.",
                 u,
             )
         motion = self._motion[:, :3] @ u
@@ -346,7 +347,7 @@ class Stiffness(ReadOnlyState):
         if values.size < 3 or values[2] <= FLAT * values[0]:
             u = frozen(np.linalg.svd(self.posture.jacobian[:3])[0][:, 2].astype(np.float64))
             raise SingularStiffness(
-                f"{what} does not exist: the tip cannot move along {_written(u)}, where the "
+                f"{what} does not exist: the tip cannot move along {coordinates(u)}, where the "
                 "stiffness is infinite or nearly so. Use along(direction), or bend the arm.",
                 u,
             )
@@ -424,14 +425,10 @@ def _millimetres(stiffness: float | None) -> str:
     return "-" if stiffness is None else f"{stiffness / 1000.0:.4g}"
 
 
-def _written(direction: Array) -> str:
-    return f"({', '.join(f'{x:.4g}' for x in direction)})"
-
-
 def _singular(why: str, motion: Array) -> SingularStiffness:
     direction = frozen(motion / np.linalg.norm(motion))
     return SingularStiffness(
-        f"K_θ is singular: {why} in the joint motion {_written(direction)}. Change the tensions or "
-        "the posture.",
+        f"K_θ is singular: {why} in the joint motion {coordinates(direction)}. Change the tensions "
+        "or the posture.",
         direction,
     )

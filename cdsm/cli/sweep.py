@@ -23,11 +23,12 @@ from cdsm.cli.options import (
 from cdsm.cli.path_file import read_path
 from cdsm.errors import FileError
 from cdsm.manipulator import Manipulator
+from cdsm.support.datasets import status_names
 from cdsm.support.files import write_file
 from cdsm.support.validation import Array
 from cdsm.sweeps import GridPoses, PathPoses, PoseSet, RandomPoses, read_sweep, write_sweep
 from cdsm.sweeps import sweep as run
-from cdsm.sweeps.export import check_target, status_names
+from cdsm.sweeps.export import check_target
 from cdsm.sweeps.quantities import DEFAULT, QUANTITIES
 
 if TYPE_CHECKING:

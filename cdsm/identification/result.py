@@ -156,38 +156,9 @@ class Identification(ReadOnlyState):
 
     def plot(self) -> Figure:
         """Predicted over measured [N/mm], and every residual in standard deviations."""
-        # an identification without a figure need not load matplotlib
-        from matplotlib.figure import Figure
-        from matplotlib.ticker import MaxNLocator
+        from cdsm.plots.measured import plot_identification  # matplotlib imports slowly
 
-        figure = Figure(figsize=(11.0, 4.5), layout="constrained")
-        grid: Any = figure.subplots(1, 2)
-        left, right = grid
-        measured, predicted = self.measured / 1e3, self.predicted / 1e3
-        sigma = [each.std / 1e3 for each in self.measurements]
-        ends = [min(measured.min(), predicted.min()), max(measured.max(), predicted.max())]
-        left.plot(ends, ends, color="0.6", linewidth=0.9)
-        left.errorbar(
-            measured, predicted, xerr=sigma, fmt="o", color="#3b6fb6", markersize=4, capsize=2
-        )
-        left.set_xlabel("measured [N/mm], ± σ")
-        left.set_ylabel("predicted [N/mm]")
-        place = np.arange(len(sigma))
-        for width, shade in ((2.0, 0.12), (1.0, 0.2)):
-            right.axhspan(-width, width, color="0.5", alpha=shade, linewidth=0.0)
-        right.vlines(place, 0.0, self.residuals, color="#3b6fb6", linewidth=1.2)
-        right.plot(place, self.residuals, "o", color="#3b6fb6", markersize=4)
-        right.axhline(0.0, color="0.2", linewidth=0.8)
-        right.set_ylabel("(predicted − measured)/σ, bands at 1 and 2 σ")
-        if len(sigma) <= 30 and any(each.label for each in self.measurements):
-            right.set_xticks(place, self._labels, rotation=90, fontsize=8)
-        else:
-            right.set_xlabel("measurement")
-            right.xaxis.set_major_locator(MaxNLocator(integer=True))
-        for axes in grid:
-            axes.grid(alpha=0.3)
-        figure.suptitle(self._verdict)
-        return figure
+        return plot_identification(self, self._labels, self._verdict)
 
     def __repr__(self) -> str:
         values = ", ".join(f"{name}={value:.4g}" for name, value in self.parameters.items())

@@ -33,6 +33,7 @@ class StrandFigure:
         low: Least EA of all continuous laws of the printed digits (N,) [N].
         high: Largest EA of them (N,) [N].
         printed: Eq. 19 as printed (N,) [N].
+        join: Tension at which its branches meet [N].
         claims: What the paper says of it.
     """
 
@@ -46,6 +47,7 @@ class StrandFigure:
     low: Array
     high: Array
     printed: Array
+    join: float
     claims: tuple[Claim, ...]
 
 
@@ -72,6 +74,7 @@ def figure_5(gauge_length: float = GAUGE_LENGTH) -> StrandFigure:
         low=low,
         high=high,
         printed=frozen(printed.polynomial(tension)),
+        join=JOIN,
         claims=(
             _claim(
                 "first coefficient for which the branches meet at 31 N, times 1e4",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from matplotlib.cm import ScalarMappable
@@ -10,11 +10,13 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from cdsm.errors import InvalidInput
-from cdsm.plots.style import AXES, COLORS, MM, equal_axes
-from cdsm.posture import Posture
-from cdsm.stiffness_matrix import Stiffness
-from cdsm.support.validation import Array, instance
-from cdsm.tension import Tension
+from cdsm.plots.style import AXES, COLORS, MM, equal_axes, expect
+from cdsm.support.validation import Array
+
+if TYPE_CHECKING:
+    from cdsm.posture import Posture
+    from cdsm.stiffness_matrix import Stiffness
+    from cdsm.tension import Tension
 
 _FLATTEST = 0.35
 """Least range of an axis, as a part of the largest."""
@@ -39,12 +41,15 @@ def plot_arm(
         InvalidInput: The tension or stiffness is of another arm or posture.
         SingularStiffness: K_θ is singular, so there is no ellipsoid.
     """
-    instance("pose", pose, Posture)
-    if tension is not None and instance("tension", tension, Tension).posture.arm != pose.arm:
-        raise InvalidInput("tension", "belongs to another arm than the posture.")
+    expect("pose", pose, "Posture")
+    if tension is not None:
+        expect("tension", tension, "Tension")
+        if tension.posture.arm != pose.arm:
+            raise InvalidInput("tension", "belongs to another arm than the posture.")
     if stiffness is not None:
-        there = instance("stiffness", stiffness, Stiffness).posture
-        if there is not pose and not (there.arm == pose.arm and (there.q == pose.q).all()):
+        expect("stiffness", stiffness, "Stiffness")
+        taken = stiffness.posture
+        if taken is not pose and not (taken.arm == pose.arm and (taken.q == pose.q).all()):
             raise InvalidInput("stiffness", "was taken at another posture; take it at this one.")
     figure = Figure(figsize=(7.0, 5.0), layout="constrained")
     axes: Any = figure.add_subplot(projection="3d")

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from cdsm.plots.style import AXES, COLORS, MM
-from cdsm.statics.buckling import CriticalTension
-from cdsm.statics.weight_test import WeightTest
-from cdsm.support.validation import instance
+from cdsm.plots.style import AXES, COLORS, MM, expect, panels
+
+if TYPE_CHECKING:
+    from cdsm.statics.buckling import CriticalTension
+    from cdsm.statics.weight_test import WeightTest
+
+_ROOM = 0.08
+"""Room above and below all values, as a part of their range."""
 
 
 def plot_weight_test(test: WeightTest) -> Figure:
@@ -24,11 +27,8 @@ def plot_weight_test(test: WeightTest) -> Figure:
     Raises:
         InvalidInput: Not a weight test.
     """
-    instance("test", test, WeightTest)
-    figure = Figure(figsize=(10.0, 4.0), layout="constrained")
-    left: Any
-    right: Any
-    left, right = figure.subplots(1, 2)
+    expect("test", test, "WeightTest")
+    figure, ((left, right),) = panels(10.0, 4.0, 2)
     loads = np.concatenate([[0.0], test.loads])
     moved = np.vstack([np.zeros(3), test.displacements])
     for axis, color, nonlinear, linear in zip(
@@ -42,8 +42,6 @@ def plot_weight_test(test: WeightTest) -> Figure:
     right.plot(loads, tensions, color=COLORS[0], linewidth=0.9, alpha=0.7)
     right.set(xlabel="load [N]", ylabel="tension of each cable [N]")
     right.set_ylim(bottom=0.0)
-    for axes in (left, right):
-        axes.grid(alpha=0.3)
     figure.suptitle(f"{test.without.pose.arm.name}: weight of {np.linalg.norm(test.force):.4g} N")
     return figure
 
@@ -57,19 +55,19 @@ def plot_critical_tension(critical: CriticalTension) -> Figure:
     Raises:
         InvalidInput: Not a critical tension.
     """
-    instance("critical", critical, CriticalTension)
-    figure = Figure(figsize=(7.0, 4.0), layout="constrained")
-    axes: Any = figure.subplots()
+    expect("critical", critical, "CriticalTension")
+    figure, ((axes,),) = panels(7.0, 4.0, 1)
     mark = "o" if critical.bounds.size == 1 else ""
     axes.plot(critical.bounds, critical.margins, color=COLORS[0], marker=mark)
     axes.axhline(0.0, color="0.2", linewidth=0.8)
     low, high = critical.examined
     shown = high if math.isinf(critical.minimum) or not critical.stable else 2.0 * critical.minimum
-    inside = critical.bounds <= shown
     # where no tension can be raised by itself one bound is all there is: a point
     axes.set_xlim(low, min(shown, high) if high > low else low + 1.0)
-    axes.set_ylim(*_with_room([0.0, *critical.margins[inside]]))
-    edges = [critical.examined[0], *np.ravel(critical.stable), critical.examined[1]]
+    margins = np.array([0.0, *critical.margins[critical.bounds <= shown]])
+    room = _ROOM * np.ptp(margins)
+    axes.set_ylim(margins.min() - room, margins.max() + room)
+    edges = [low, *np.ravel(critical.stable), high]
     for start, end in zip(edges[::2], edges[1::2], strict=True):
         axes.axvspan(start, end, color=COLORS[1], alpha=0.15, linewidth=0.0)
     if math.isfinite(critical.minimum) and critical.stable:
@@ -86,12 +84,4 @@ def plot_critical_tension(critical: CriticalTension) -> Figure:
         ylabel=f"smallest joint stiffness [{critical.posture.arm.stiffness_unit()}]",
         title=f"{critical.posture.arm.name}; shaded: unstable",
     )
-    axes.grid(alpha=0.3)
     return figure
-
-
-def _with_room(values: Sequence[float]) -> tuple[float, float]:
-    """Limits of an axis that shows all values."""
-    low, high = min(values), max(values)
-    room = 0.08 * (high - low)
-    return low - room, high + room

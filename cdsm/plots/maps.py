@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 
 from cdsm.errors import InvalidInput
 from cdsm.plots.style import AXES, COLORS, MM, N_PER_MM, TICKS, equal_axes
+from cdsm.support.datasets import check_sweep, status_names
 from cdsm.support.validation import Array, one_of, scalar
-from cdsm.sweeps.export import check_sweep, status_names
-from cdsm.sweeps.quantities import SweepStatus
 
 if TYPE_CHECKING:
     import xarray
@@ -157,7 +156,8 @@ def _panels(dataset: xarray.Dataset, quantity: str, poses: list[str]) -> Iterato
             f"dataset.isel({cases[0]}=[0]).",
         )
     rest = {dim: 0 for dim in status.dims if dim not in dims}
-    means_nothing = [] if quantity == "margin" else [SweepStatus.UNSTABLE]
+    words = {word: value for value, word in status_names(dataset).items()}
+    means_nothing = [] if quantity == "margin" else [words["unstable"]]
     for place in np.ndindex(*sizes):
         at = dict(zip(cases, place, strict=True))
         values = dataset[quantity].isel(at).transpose(*poses).values.ravel()

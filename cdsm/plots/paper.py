@@ -4,15 +4,27 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from cdsm import paper
+from cdsm.errors import InvalidInput
 from cdsm.plots.arm import draw_arm
-from cdsm.plots.style import AXES, COLORS, MM, N_PER_MM, STYLES
+from cdsm.plots.style import (
+    AXES,
+    COLORS,
+    KN,
+    MM,
+    N_PER_MM,
+    STYLES,
+    legend_below,
+    panels,
+)
 from cdsm.support.validation import Array
+
+if TYPE_CHECKING:
+    from cdsm import paper
 
 _LENGTHS = {"stretched": "$l_0 = L$ (paper)", "unstrained": "original $l_0$"}
 
@@ -26,54 +38,47 @@ def plot_paper(result: paper.Result) -> Figure:
 
     Args:
         result: What a function in :data:`cdsm.paper.FIGURES` returns.
+
+    Raises:
+        InvalidInput: Not one of these.
     """
-    if isinstance(result, paper.StrandFigure):
-        return _plot_strand(result)
-    if isinstance(result, paper.LeadFigure):
-        return _plot_lead(result)
-    if isinstance(result, paper.ExperimentFigure):
-        return _plot_experiment(result)
-    if isinstance(result, paper.PrototypeFigure):
-        return _plot_prototype(result)
-    kinds = {"fig4": _plot_changes, "fig7": _plot_changes, "fig8": _plot_postures}
-    return kinds.get(result.name, _plot_directions)(result)
+    draw = _DRAWN.get(getattr(result, "name", ""))
+    if draw is None:
+        raise InvalidInput("result", f"{result!r} given; a figure of cdsm.paper is needed.")
+    return draw(result)
 
 
 def _plot_strand(result: paper.StrandFigure) -> Figure:
     """(a) force over displacement, (b) rigidity over tension."""
-    figure = Figure(figsize=(10.0, 4.0), layout="constrained")
-    left, right = figure.subplots(1, 2)
+    figure, ((left, right),) = panels(10.0, 4.0, 2)
     left.plot(MM * result.displacement, result.tension, color=COLORS[0])
     left.set(
         xlabel=f"stretch of a {MM * result.gauge_length:g} mm wire [mm]",
         ylabel="force [N]",
         title="(a)",
     )
-    kilo = 1e-3
     right.fill_between(
         result.tension,
-        kilo * result.low,
-        kilo * result.high,
+        KN * result.low,
+        KN * result.high,
         color=COLORS[0],
         alpha=0.15,
         linewidth=0.0,
         label="tangent, all laws of the printed digits",
     )
-    right.plot(result.tension, kilo * result.tangent, color=COLORS[0], label="tangent, repaired")
-    right.plot(result.tension, kilo * result.secant, "--", color=COLORS[2], label="secant (Eq. 18)")
-    lower = result.tension <= paper.digits.JOIN  # above, as printed and repaired share their digits
+    right.plot(result.tension, KN * result.tangent, color=COLORS[0], label="tangent, repaired")
+    right.plot(result.tension, KN * result.secant, "--", color=COLORS[2], label="secant (Eq. 18)")
+    lower = result.tension <= result.join  # above, as printed and repaired share their digits
     right.plot(
         result.tension[lower],
-        kilo * result.printed[lower],
+        KN * result.printed[lower],
         ":",
         color=COLORS[1],
         label="as printed, below 31 N",
     )
-    right.set_ylim(-5.0, 1.05 * kilo * result.high.max())  # as printed it falls to -788 kN
+    right.set_ylim(-5.0, 1.05 * KN * result.high.max())  # as printed it falls to -788 kN
     right.set(xlabel="tension [N]", ylabel="rigidity EA [kN]", title="(b)")
     right.legend(fontsize=8, loc="upper left")
-    for axes in (left, right):
-        axes.grid(alpha=0.3)
     figure.suptitle(result.title)
     return figure
 
@@ -87,8 +92,7 @@ def _plot_directions(result: paper.Figure) -> Figure:
     curves = result.curves
     if result.swept == "tension":
         curves += result.original
-    figure = Figure(figsize=(11.0, 2.7 * len(rows) + 0.6), layout="constrained")
-    grid: Any = figure.subplots(len(rows), 3, sharex=True, squeeze=False)
+    figure, grid = panels(11.0, 2.7 * len(rows) + 0.6, 3, len(rows), sharex=True)
     for row, (reading, values) in zip(grid, rows, strict=True):
         for i, axes in enumerate(row):
             for curve, style in zip(curves, STYLES, strict=False):
@@ -100,15 +104,13 @@ def _plot_directions(result: paper.Figure) -> Figure:
                     x = _swept(result, curve)
                     axes.plot(x, N_PER_MM * curve.pseudoinverse_part[:, i], "k.", markersize=3)
             axes.set_ylabel(f"$K_{AXES[i]}$, {reading} [N/mm]")
-            axes.grid(alpha=0.3)
     _finish(figure, grid, result)
     return figure
 
 
 def _plot_changes(result: paper.Figure) -> Figure:
     """A column for each direction: the active part, and the change of the stiffness from start."""
-    figure = Figure(figsize=(11.0, 9.0), layout="constrained")
-    grid: Any = figure.subplots(3, 3, sharex=True, sharey="row")
+    figure, grid = panels(11.0, 9.0, 3, 3, sharex=True, sharey="row")
     for i in range(3):
         active, *others = grid[:, i]
         _draw_curve(
@@ -138,23 +140,19 @@ def _plot_changes(result: paper.Figure) -> Figure:
         assert stated is not None
         others[0].plot([end], [stated[i]], "ko", markersize=5, label="paper, at the end")
         others[1].set_xlabel("cable tension, mean [N]")
-        for axes in grid[:, i]:
-            axes.grid(alpha=0.3)
     grid[0, 0].set_ylabel("active part, EA = 48 kN [N/mm]")
     grid[1, 0].set_ylabel("change, paper's reading of $K_R$ [%]")
     grid[2, 0].set_ylabel("change, hung weight [%]")
-    handles, labels = grid[1, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=9)
+    legend_below(figure, grid[1, 0], 3, fontsize=9)
     figure.suptitle(result.title)
     return figure
 
 
 def _plot_lead(result: paper.LeadFigure) -> Figure:
     """A panel for each reading, a colour for each direction."""
-    figure = Figure(figsize=(10.0, 4.6), layout="constrained")
-    panels: Any = figure.subplots(1, 2, sharey=True)
+    figure, (pair,) = panels(10.0, 4.6, 2, sharey=True)
     readings = {"paper's reading of $K_R$": "pseudoinverse", "hung weight": "along"}
-    for axes, (title, name) in zip(panels, readings.items(), strict=True):
+    for axes, (title, name) in zip(pair, readings.items(), strict=True):
         for i, (axis, color) in enumerate(zip(AXES, COLORS, strict=True)):
             for prefix, length, style in (
                 ("stretched_", "stretched", "-"),
@@ -173,10 +171,8 @@ def _plot_lead(result: paper.LeadFigure) -> Figure:
         axes.set_xticks([0.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 300.0])
         axes.xaxis.set_major_formatter(lambda x, _: f"{x:g}")
         axes.set(title=title, xlabel="lead of all cables [mm]")
-        axes.grid(alpha=0.3)
-    panels[0].set_ylabel("change of stiffness [%]")
-    handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=9)
+    pair[0].set_ylabel("change of stiffness [%]")
+    legend_below(figure, pair[0], 3, fontsize=9)
     figure.suptitle(result.title)
     return figure
 
@@ -201,9 +197,8 @@ def _plot_postures(result: paper.Figure) -> Figure:
             axes.set_ylabel(f"stiffness, {reading} [N/mm]")
             axes.grid(alpha=0.3)
         bottom.append(axes)
-    handles, labels = bottom[0].get_legend_handles_labels()
     title = "direction; solid: l_0 = L (paper), dotted: original length"
-    figure.legend(handles, labels, title=title, ncols=3, loc="outside lower center")
+    legend_below(figure, bottom[0], 3, title=title)
     _finish(figure, [bottom], result, legend=False)
     return figure
 
@@ -214,9 +209,8 @@ def _plot_experiment(result: paper.ExperimentFigure) -> Figure:
     unit = "stiffness in y over the first [-]" if result.relative else "stiffness [N/mm]"
     tension = result.swept == "tension"
     rows, columns = -(-len(result.traces) // 3), min(len(result.traces), 3)
-    size = (3.7 * columns + 1.0, 3.3 * rows + 0.5)
-    figure = Figure(figsize=size, layout="constrained")
-    grid: Any = figure.subplots(rows, columns, squeeze=False, sharex="col", sharey="col")
+    size = 3.7 * columns + 1.0, 3.3 * rows + 0.5
+    figure, grid = panels(*size, columns, rows, sharex="col", sharey="col")
     for axes, trace, color in zip(grid.ravel(), result.traces, COLORS * rows, strict=False):
         across = 1.0 if tension else N_PER_MM
         axes.plot(across * trace.swept, scale * trace.computed, color=color, label="computed")
@@ -227,7 +221,6 @@ def _plot_experiment(result: paper.ExperimentFigure) -> Figure:
         )
         axes.set_title(textwrap.fill(trace.label, 44), fontsize=9)
         axes.set_ylim(bottom=0.0)
-        axes.grid(alpha=0.3)
         axes.legend(fontsize=8)
     figure.suptitle(result.title)
     return figure
@@ -235,9 +228,8 @@ def _plot_experiment(result: paper.ExperimentFigure) -> Figure:
 
 def _plot_prototype(result: paper.PrototypeFigure) -> Figure:
     """Residual number by number, for each way of reading Table II."""
-    names = paper.section_v.NAMES
-    figure = Figure(figsize=(8.5, 7.0), layout="constrained")
-    axes: Any = figure.subplots()
+    names = result.fits[0].step.numbers
+    figure, ((axes,),) = panels(8.5, 7.0, 1)
     places = np.arange(len(names))
     for fit, marker, color in zip(result.fits, "os^D", (*COLORS, "0.3"), strict=True):
         axes.plot(
@@ -253,7 +245,6 @@ def _plot_prototype(result: paper.PrototypeFigure) -> Figure:
     axes.set_yticks(places, names, fontsize=8)
     axes.invert_yaxis()
     axes.set_xlabel("100 ln(model/paper); Figs. 12, 13: (model − paper)/paper [%]")
-    axes.grid(alpha=0.3)
     figure.legend(loc="outside lower center", ncols=1, fontsize=8)
     figure.suptitle(result.title)
     return figure
@@ -300,3 +291,19 @@ def _finish(figure: Figure, grid: Any, result: paper.Figure, *, legend: bool = T
     if legend:
         grid[0][0].legend(fontsize=8, title=note or None, title_fontsize=8)
     figure.suptitle(result.title)
+
+
+_DRAWN: Final[dict[str, Callable[[Any], Figure]]] = {
+    "fig3": _plot_directions,
+    "fig4": _plot_changes,
+    "fig5": _plot_strand,
+    "fig6": _plot_directions,
+    "fig7": _plot_changes,
+    "fig8": _plot_postures,
+    "fig10": _plot_experiment,
+    "fig12": _plot_experiment,
+    "fig13": _plot_experiment,
+    "lead": _plot_lead,
+    "prototype": _plot_prototype,
+}
+"""What draws each figure of :data:`cdsm.paper.FIGURES`, by name."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib import colormaps
@@ -11,9 +11,12 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from cdsm.errors import InvalidInput
-from cdsm.planning import PathPlan, StiffnessPlan, StiffnessRange
-from cdsm.plots.style import COLORS, N_PER_MM
-from cdsm.support.validation import Array, instance
+from cdsm.plots.style import COLORS, N_PER_MM, expect, panels
+from cdsm.support.units import coordinates
+from cdsm.support.validation import Array
+
+if TYPE_CHECKING:
+    from cdsm.planning import PathPlan, StiffnessPlan, StiffnessRange
 
 _SAME = 1e-9
 """Entries of unit directions this near to each other are of one."""
@@ -35,15 +38,14 @@ def plot_stiffness_plan(plan: StiffnessPlan, attainable: StiffnessRange) -> Figu
     Raises:
         InvalidInput: Not a plan and a range, or not of one posture and direction.
     """
-    instance("plan", plan, StiffnessPlan)
-    instance("attainable", attainable, StiffnessRange)
-    one, other = plan.tension.posture, attainable.posture
-    same = one.arm == other.arm and np.array_equal(one.q, other.q)
+    expect("plan", plan, "StiffnessPlan")
+    expect("attainable", attainable, "StiffnessRange")
+    planned, other = plan.tension.posture, attainable.posture
+    same = planned.arm == other.arm and np.array_equal(planned.q, other.q)
     u = np.zeros(3) if plan.direction is None else plan.direction
     if not same or not np.allclose(u, attainable.direction, rtol=0.0, atol=_SAME):
         raise InvalidInput("attainable", "is not of the posture and the direction of the plan.")
-    figure = Figure(figsize=(8.0, 4.0), layout="constrained")
-    axes: Any = figure.subplots()
+    figure, ((axes,),) = panels(8.0, 4.0, 1)
     names = [cable.name for cable in attainable.posture.arm.cables]
     for pull, value, name, color, marker in (
         (attainable.low_tension, attainable.low, "softest", COLORS[2], "v"),
@@ -55,7 +57,6 @@ def plot_stiffness_plan(plan: StiffnessPlan, attainable: StiffnessRange) -> Figu
     axes.set(ylabel="tension [N]", title=f"stiffness along {_named(attainable.direction)}")
     axes.set_ylim(bottom=0.0)
     axes.tick_params(axis="x", rotation=60)
-    axes.grid(alpha=0.3)
     axes.legend(fontsize=8)
     return figure
 
@@ -71,41 +72,38 @@ def plot_path_plan(plan: PathPlan) -> Figure:
     Raises:
         InvalidInput: Not a plan of a path, or one of ``cartesian``.
     """
-    instance("plan", plan, PathPlan)
+    expect("plan", plan, "PathPlan")
     if plan.direction is None:
         raise InvalidInput("plan", "is one of cartesian; only stiffness along directions is drawn.")
-    figure = Figure(figsize=(8.0, 5.5), layout="constrained")
-    above: Any
-    below: Any
-    above, below = figure.subplots(2, 1, sharex=True)
+    figure, ((above,), (below,)) = panels(8.0, 5.5, 1, rows=2, sharex=True)
     size = len(plan.target)
     wanted = N_PER_MM * plan.target.reshape(size, -1)
     # a line over a gap would be a claim about it
-    held, pulls = np.full(wanted.shape, np.nan), np.full((size, plan.tensions.shape[1]), np.nan)
+    achieved, tensions = (
+        np.full(wanted.shape, np.nan),
+        np.full((size, plan.tensions.shape[1]), np.nan),
+    )
     rows = list(plan.planned)
-    held[rows] = N_PER_MM * plan.achieved.reshape(len(rows), wanted.shape[1])
-    pulls[rows] = plan.tensions
+    achieved[rows] = N_PER_MM * plan.achieved.reshape(len(rows), wanted.shape[1])
+    tensions[rows] = plan.tensions
     for k, u in enumerate(plan.direction.reshape(-1, 3)):
         color = COLORS[k % len(COLORS)]
         label = "wanted" if k == 0 else None
         above.plot(*_stepped(wanted[:, k]), color="0.6", linewidth=3.0, label=label)
-        above.plot(held[:, k], ".-", color=color, linewidth=1.0, markersize=3, label=_named(u))
+        above.plot(achieved[:, k], ".-", color=color, linewidth=1.0, markersize=3, label=_named(u))
     names = [cable.name for cable in plan.arm.cables]
-    told = len(names) <= _NAMED
+    named = len(names) <= _NAMED
     for c, name in enumerate(names):
-        color = to_hex(colormaps["tab20"](c)) if told else COLORS[0]
-        below.plot(pulls[:, c], ".-", color=color, linewidth=0.9, markersize=2, label=name)
-    if told:
+        color = to_hex(colormaps["tab20"](c)) if named else COLORS[0]
+        below.plot(tensions[:, c], ".-", color=color, linewidth=0.9, markersize=2, label=name)
+    if named:
         beside = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5), "frameon": False}
         below.legend(fontsize=7, ncols=1 + (len(names) > _NAMED // 2), **beside)
     for axes in (above, below):
-        for each in plan.infeasible:
-            axes.axvspan(
-                each.index - 0.5, each.index + 0.5, color=COLORS[1], alpha=0.15, linewidth=0.0
-            )
+        for index in (sample.index for sample in plan.infeasible):
+            axes.axvspan(index - 0.5, index + 0.5, color=COLORS[1], alpha=0.15, linewidth=0.0)
         axes.margins(y=0.1)
         axes.set_ylim(bottom=0.0)
-        axes.grid(alpha=0.3)
     above.set(ylabel="stiffness [N/mm]", title=f"{plan.arm.name}; shaded: infeasible")
     above.legend(title="along", fontsize=8, title_fontsize=8)
     below.xaxis.set_major_locator(MaxNLocator(integer=True))
@@ -131,4 +129,4 @@ def _stepped(values: Array) -> tuple[Array, Array]:
 
 def _named(u: Array) -> str:
     """A direction in words, what is rounding in it as zero."""
-    return f"({', '.join(f'{x:z.3g}' for x in np.round(u, 9))})"
+    return coordinates(np.round(u, 9), "z.3g")

@@ -1,17 +1,23 @@
-"""What stands beside numbers: units in the keys of JSON, and the model of every stiffness."""
+"""Numbers in print: coordinates, units in the keys of JSON, and the model of every stiffness."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Final
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cdsm.support.validation import Array
+if TYPE_CHECKING:
+    from cdsm.support.validation import Array
 
 MODEL: Final = "frictionless, rigid links, tangent"
 """What every stiffness in print is."""
+
+
+def coordinates(values: Iterable[float], form: str = ".4g") -> str:
+    """A direction or a place: ``(0, 0.5, 1)``."""
+    return f"({', '.join(format(x, form) for x in values)})"
 
 
 def key(name: str, unit: str) -> str:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdsm.errors import FileError, InvalidInput
+from cdsm.support.datasets import check_sweep, status_names
 from cdsm.support.extras import need
 from cdsm.support.files import as_path, write_file
 
@@ -91,38 +92,6 @@ def check_target(path: str | os.PathLike[str]) -> None:
         raise FileError(path, "is a folder; give the path of a file.")
     if not path.parent.is_dir():
         raise FileError(path, f"the folder {path.parent} does not exist; create it.")
-
-
-def check_sweep(dataset: object) -> None:
-    """Raise what is wrong with a sweep.
-
-    Raises:
-        MissingExtra: xarray is not installed.
-        InvalidInput: Not a Dataset with a status.
-    """
-    need("sweep", "xarray")
-    import xarray
-
-    if not isinstance(dataset, xarray.Dataset):
-        raise InvalidInput("dataset", f"{dataset!r} given; the Dataset of a sweep is needed.")
-    if "flag_meanings" not in dataset.get("status", xarray.DataArray()).attrs:
-        raise InvalidInput("dataset", "has no status; the Dataset of a sweep is needed.")
-
-
-def status_names(dataset: xarray.Dataset) -> dict[int, str]:
-    """The words for the numbers of ``status``, as the Dataset itself has them.
-
-    Raises:
-        InvalidInput: They are not one word for each number.
-    """
-    told = dataset["status"].attrs
-    try:
-        values = np.atleast_1d(told["flag_values"]).tolist()
-        return dict(zip(values, told["flag_meanings"].split(), strict=True))
-    except (KeyError, AttributeError, TypeError, ValueError):
-        raise InvalidInput(
-            "dataset", "its status has no word for each number; the Dataset of a sweep is needed."
-        ) from None
 
 
 def _read_netcdf(path: Path) -> xarray.Dataset:

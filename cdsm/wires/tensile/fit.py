@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final, final
+from typing import TYPE_CHECKING, Final, final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -131,37 +131,9 @@ class TensileFit(ReadOnlyState):
 
         Displacement in mm, force in N, rigidity in kN.
         """
-        from matplotlib.figure import Figure  # only where a figure is wanted: it imports slowly
+        from cdsm.plots.measured import plot_tensile_fit  # matplotlib imports slowly
 
-        figure = Figure(figsize=(10.0, 4.2), layout="constrained")
-        axes: Any = figure.subplots(1, 2)
-        force = self.band.tensions
-        stretch = self.elasticity.strain(force) * self.test.gauge_length
-        axes[0].plot(
-            1e3 * self.test.displacement, self.test.force, ".", color="0.6", ms=3, label="test"
-        )
-        axes[0].plot(1e3 * (self.start + stretch), force, color="#c8553d", label=self.method)
-        axes[0].set(xlabel="displacement [mm]", ylabel="force [N]")
-        axes[1].fill_between(
-            force, self.band.low / 1e3, self.band.high / 1e3, color="#3b6fb6", alpha=0.3,
-            label="95 % band", linewidth=0,
-        )  # fmt: skip
-        axes[1].plot(force, self.elasticity.rigidity(force) / 1e3, color="#c8553d", label="EA")
-        for stage, shade in zip(self.stages, ("0.93", "0.98", "0.88"), strict=False):
-            axes[1].axvspan(stage.low, stage.high, color=shade, zorder=0)
-            axes[1].annotate(
-                stage.name,
-                ((stage.low + stage.high) / 2.0, 1.0),
-                xycoords=("data", "axes fraction"),
-                xytext=(0, -4), textcoords="offset points", rotation=90, ha="center", va="top",
-                fontsize=8, color="0.35",
-            )  # fmt: skip
-        axes[1].set(xlabel="tension [N]", ylabel="tangent rigidity EA [kN]")
-        axes[1].set_ylim(bottom=0.0)
-        for each in axes:
-            each.legend(fontsize=8, loc="best")
-            each.grid(alpha=0.3)
-        return figure
+        return plot_tensile_fit(self)
 
 
 def fit_tensile_test(
