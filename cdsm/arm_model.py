@@ -147,7 +147,7 @@ class CableLaws:
         first, second = np.zeros_like(stiffness), np.zeros_like(stiffness)
         for law, held in self.held:
             F, k = tension[held], stiffness[held]
-            last = np.array([*breaks(law), law.domain.high])[np.searchsorted(breaks(law), F)]
+            last = np.array([*kinks(law), law.domain.high])[np.searchsorted(kinks(law), F)]
             step = _STEP * np.maximum(F, 1.0)
             beside = np.where(F + step <= last, F + step, F - step)
             both = np.stack([F, beside])
@@ -181,12 +181,13 @@ class CableLaws:
         return ElasticityRangeError(error.problem, error.tension, outside, names)
 
 
-def breaks(law: Elasticity) -> tuple[float, ...]:
-    """Tensions [N], rising, at which the rigidity of a law jumps or sharply bends.
+def kinks(law: Elasticity) -> tuple[float, ...]:
+    """Tensions [N], rising, at which the slope of a law's rigidity jumps.
 
-    Each belongs to the range below it. The bends at the points of a table are not among them.
+    Slopes at a kink are those of the range below it. The weak kinks at the points of a table are
+    not among them.
     """
-    return law.joins if isinstance(law, StrandElasticity) else law.jumps
+    return law.joins if isinstance(law, StrandElasticity) else ()
 
 
 def _checked_rigidity(law: Elasticity, tension: Array) -> Array:

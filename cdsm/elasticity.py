@@ -89,7 +89,12 @@ class Domain:
 
 
 class Elasticity(ABC):
-    """Axial elasticity of a cable. All methods take any shape and return the same shape."""
+    """Axial elasticity of a cable. All methods take any shape and return the same shape.
+
+    A law of your own defines :attr:`domain`, :meth:`rigidity`, :meth:`strain` and :meth:`energy`.
+    Its rigidity must be positive and continuous; it may bend sharply. :class:`~cdsm.Manipulator`
+    samples it and refuses a jump of more than 0.01 % that it finds.
+    """
 
     @property
     @abstractmethod
@@ -112,8 +117,7 @@ class Elasticity(ABC):
         r"""dEA/dF [-]: how the tangent rigidity grows with tension.
 
         Unless a law knows better, the central difference over F ± 6e-6 max(F, 1 N), good for some
-        ten digits; beside an end of :attr:`domain` or one of :attr:`jumps` it is taken on the side
-        there is, at a jump below it.
+        ten digits. Beside an end of :attr:`domain` it is one-sided.
 
         Args:
             tension: F [N], any shape.
@@ -122,21 +126,10 @@ class Elasticity(ABC):
             ElasticityRangeError: A tension outside :attr:`domain`.
         """
         values = self.domain.check(tension)
-        piece = np.searchsorted(self.jumps, values, side="left")
-        first = np.array([self.domain.first, *np.nextafter(self.jumps, math.inf)])[piece]
-        last = np.array([*self.jumps, self.domain.high])[piece]
         step = _STEP * np.maximum(values, 1.0)
-        before, after = np.maximum(values - step, first), np.minimum(values + step, last)
+        before = np.maximum(values - step, self.domain.first)
+        after = np.minimum(values + step, self.domain.high)
         return np.asarray((self.rigidity(after) - self.rigidity(before)) / (after - before))
-
-    @property
-    def jumps(self) -> tuple[float, ...]:
-        """Tensions [N], rising, beyond which the rigidity starts from another value; mostly none.
-
-        A jump belongs to the range below it. A law of your own has to name its jumps if
-        :func:`~cdsm.plan_stiffness` and its kin are to look on both sides of them.
-        """
-        return ()
 
     @abstractmethod
     def strain(self, tension: ArrayLike) -> Array:

@@ -377,7 +377,8 @@ class UnreachableStiffness(CdsmError):
         target: What was wanted [N/m].
         low: Smallest attainable stiffness along u [N/m].
         high: Largest attainable stiffness along u [N/m]; inf if tension raises it without end.
-        nearest: What is attainable next to it [N/m]: an end of the range, or both sides of a gap.
+        nearest: What is attainable next to it [N/m]: an end of the range, or the nearest found on
+            both sides.
     """
 
     def __init__(
@@ -401,8 +402,8 @@ class UnreachableStiffness(CdsmError):
         if low <= target <= high:
             sides = " and ".join(f"{value:.8g}" for value in self.nearest)
             message += (
-                f", but where a cable's rigidity jumps it has gaps, and {sides} N/m is the nearest "
-                "found. Ask for that, or change the bounds or the posture."
+                f", but the nearest found is {sides} N/m. Raise starts, ask for one of these, or "
+                "change the bounds or the posture."
             )
         else:
             message += (

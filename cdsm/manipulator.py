@@ -40,6 +40,7 @@ from cdsm.support.validation import (
 )
 from cdsm.urdf import TIP, to_urdf
 from cdsm.urdf_reader import read_urdf
+from cdsm.wires.continuity import find_jump
 
 GRAVITY = (0.0, 0.0, -9.81)
 """Default gravity in base axes [m/s²]."""
@@ -74,7 +75,8 @@ class Manipulator(Printed):
             Eq. 19.
 
     Raises:
-        InvalidInput: Both or neither of ``elasticity`` and ``cables``; gravity not three numbers.
+        InvalidInput: Both or neither of ``elasticity`` and ``cables``; gravity not three numbers;
+            the rigidity of an elasticity of your own jumps.
         CableError: Two cables of one name, or one on a link that does not exist.
         UnknownName: No such ``original_length``.
     """
@@ -131,7 +133,8 @@ class Manipulator(Printed):
             FileError: The file cannot be read.
             UrdfError: It is no such robot; every fault is listed.
             UnknownName: There is no link called ``tip``, or no such ``original_length``.
-            InvalidInput: ``joint_names`` does not name each joint that moves once.
+            InvalidInput: ``joint_names`` does not name each joint that moves once; the rigidity of
+                an elasticity of your own jumps.
             CableError: Two cables of one name, or one on a link that does not exist.
         """
         text = read_urdf(urdf, check_inertia=check_inertia)
@@ -167,6 +170,7 @@ class Manipulator(Printed):
         self._highest = self._body.upper + _LIMIT_SLACK
 
         self._laws = CableLaws(self._cables, self._original_length)
+        _require_continuity(self._laws, self._cables)
 
     @property
     def geometry(self) -> Geometry:
@@ -418,3 +422,17 @@ def _checked_cables(cables: Sequence[Cable]) -> tuple[Cable, ...]:
         if count > 1:
             raise CableError(name, "the name is used twice; every cable needs its own.")
     return cables
+
+
+def _require_continuity(laws: CableLaws, cables: tuple[Cable, ...]) -> None:
+    """Refuse a law whose rigidity jumps."""
+    for law, held in laws.held:
+        jump = find_jump(law)
+        if jump is not None:
+            name = np.array(cables, dtype=object)[held][0].name
+            raise InvalidInput(
+                "elasticity",
+                f"the rigidity of {name} jumps at {jump.tension:.6g} N from {jump.below:.6g} to "
+                f"{jump.above:.6g} N, and K_θ with it. Make it continuous, e.g. by a "
+                "TabulatedElasticity through points of its strain.",
+            )

@@ -9,7 +9,7 @@ import numpy as np
 import qpsolvers
 from numpy.typing import ArrayLike
 
-from cdsm.arm_model import breaks
+from cdsm.arm_model import kinks
 from cdsm.errors import ElasticityRangeError
 from cdsm.posture import Posture
 from cdsm.support.validation import Array, frozen
@@ -164,7 +164,7 @@ def admissible(
         rows=right[:rank].copy(),
         null=right[rank:].T.copy(),
         jumps=tuple(
-            tuple(jump for jump in breaks(cable.elasticity) if a <= jump < b) if fixed else ()
+            tuple(jump for jump in kinks(cable.elasticity) if a <= jump < b) if fixed else ()
             for cable, fixed, a, b in zip(cables, held, low, high, strict=True)
         ),
     )

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import minimize_scalar
 
-from cdsm.arm_model import breaks
+from cdsm.arm_model import kinks
 from cdsm.errors import InvalidInput
 from cdsm.planning.gradient import require_finite, stiffness_gradient
 from cdsm.planning.objectives import unstable
@@ -177,8 +177,8 @@ def saturation(
         return _slope(pull(lower), u)
 
     places = sampled(first, last)
-    breaks = _breaks(pull, places[(places >= first) & (places <= last)])
-    beside = np.outer([1.0 - _JUST, 1.0 + _JUST], breaks).ravel()
+    kinks = _breaks(pull, places[(places >= first) & (places <= last)])
+    beside = np.outer([1.0 - _JUST, 1.0 + _JUST], kinks).ravel()
     places = np.unique(np.clip(np.concatenate([places, beside]), first, last))
     curve = np.array([(place, value(place), slope(place)) for place in places.tolist()])
     steepest, largest = _steepest(curve, slope)
@@ -229,7 +229,7 @@ def _breaks(pull: Callable[[float], Tension], places: Array) -> Array:
         one, other = pull(a), pull(b)
         if all(np.array_equal(x, y) for x, y in zip(_active(one), _active(other), strict=True)):
             for cable, F, G in zip(one.posture.arm.cables, one.values, other.values, strict=True):
-                jumps = breaks(cable.elasticity) if cable.control == "position" else ()
+                jumps = kinks(cable.elasticity) if cable.control == "position" else ()
                 passed = (jump for jump in jumps if min(F, G) <= jump < max(F, G))
                 found += [a + (jump - F) / (G - F) * (b - a) for jump in passed]
         elif b - a <= max(_JUST * b, nothing):

@@ -69,7 +69,6 @@ class CableState:
         secant: ΔF/(Δl/l_0) of Eq. 18 [N], or None.
         low: Low end of the law [N].
         high: Its high end [N], or inf.
-        jump: Where it jumps, the place nearest to F [N]; None if nowhere.
     """
 
     name: str
@@ -80,7 +79,6 @@ class CableState:
     secant: float | None
     low: float
     high: float
-    jump: float | None
 
     @property
     def below(self) -> float:
@@ -204,7 +202,6 @@ def _state(cable: Cable, F: float, k: float) -> CableState:
         secant=_number(cable, lambda: law.secant_rigidity(np.array(F))),
         low=float(law.domain.low),
         high=float(law.domain.high),
-        jump=min(law.jumps, key=lambda each: abs(each - F), default=None),
     )
 
 

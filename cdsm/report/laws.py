@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cdsm.arm_model import breaks
+from cdsm.arm_model import kinks
 from cdsm.cable import Cable
 from cdsm.errors import CdsmError, InvalidInput
 from cdsm.support.validation import Array
@@ -17,13 +17,10 @@ if TYPE_CHECKING:
     from cdsm.stiffness_matrix import Stiffness
 
 ONE_SIDED = 1e-4
-"""A tension this part of itself from where its law ends or jumps has a law on one side alone."""
+"""A tension this part of itself from an end or a kink of its law has a law on one side alone."""
 
 _BESIDE = 1e-6
 """A point of a table this part of a tension beside it is at that tension."""
-
-_KINK = 5e-3
-"""Stiffnesses of a cable beside each other that differ by more have a jump between them."""
 
 
 class LockedLaws:
@@ -75,9 +72,9 @@ class LockedLaws:
         return np.asarray(more - F * longer)
 
     def room(self, c: int, cable: Cable) -> float:
-        """How far its tension may go [N] until its law ends, jumps or bends."""
+        """How far its tension may go [N] until its law ends or bends sharply."""
         F, law = float(self._tension[c]), cable.elasticity
-        edges = [law.domain.low, law.domain.high, *breaks(law)]
+        edges = [law.domain.low, law.domain.high, *kinks(law)]
         if isinstance(law, TabulatedElasticity):
             # at its points the rigidity bends; so near to one that no step would be left, the
             # bend stays in the middle, and the differences settle all the same
@@ -86,12 +83,10 @@ class LockedLaws:
 
     def one_sided(self) -> list[str]:
         """Why there is no law on both sides of the tensions, cable by cable; mostly nothing."""
-        reasons = [reason for c, cable in self.held for reason in self._edges(c, cable)]
-        # a law of the user's own need not name its jumps
-        return reasons or [kink for c, cable in self.held if (kink := self._kink(c, cable))]
+        return [reason for c, cable in self.held for reason in self._edges(c, cable)]
 
     def _edges(self, c: int, cable: Cable) -> list[str]:
-        """The ends and jumps of its law that a cable stands at, in words."""
+        """The ends and kinks of its law that a cable stands at, in words."""
         F, law = float(self._tension[c]), cable.elasticity
         if F == 0.0:
             return [f"{cable.name} is slack (0 N), and K_θ counts it as if it were taut"]
@@ -101,45 +96,11 @@ class LockedLaws:
             f"{where} the {end} end of its law {law.domain}" for end in ends if ends[end] <= close
         ]
         said += [
-            f"{where} a jump of its tangent rigidity, {tangents(cable, jump)}"
-            for jump in law.jumps
-            if abs(F - jump) <= close
-        ]
-        said += [
             f"{where} a sharp bend of its tangent rigidity, at {bend:g} N"
-            for bend in breaks(law)
-            if bend not in law.jumps and abs(F - bend) <= close
+            for bend in kinks(law)
+            if abs(F - bend) <= close
         ]
         return said
-
-    def _kink(self, c: int, cable: Cable) -> str:
-        """How the stiffness of a cable jumps at its tension, in words; nothing if it does not."""
-        F, k = float(self._tension[c]), self.stiffness[c]
-        if k == 0.0:
-            return ""
-        step = ONE_SIDED * F / k / 2.0
-        try:
-            below, here, above = self.pulls(c, cable, np.array([-step, 0.0, step])).tolist()
-        except CdsmError:  # the derivatives say so by themselves
-            return ""
-        falls, rises = (here - below) / step, (above - here) / step
-        if abs(rises - falls) <= _KINK * abs(rises + falls):
-            return ""
-        return (
-            f"{cable.name} at {F:.6g} N stands at a kink of its law, which gives {falls:.5g} N/m "
-            f"below and {rises:.5g} N/m above"
-        )
-
-
-def tangents(cable: Cable, jump: float) -> str:
-    """The tangent rigidities on both sides of a jump of a law, in words."""
-    law = cable.elasticity
-    sides = np.array([jump, np.nextafter(jump, np.inf)])
-    try:
-        below, above = asked(cable, lambda: law.rigidity(sides))
-    except CdsmError:  # it ends there, too
-        return f"at {jump:g} N"
-    return f"from {below:.5g} to {above:.5g} N at {jump:g} N"
 
 
 def asked(cable: Cable, answer: Callable[[], Array]) -> Array:

@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cdsm.report.laws import tangents
-
 if TYPE_CHECKING:
     from cdsm.report.report import Report
 
@@ -19,7 +17,7 @@ APART = 0.1
 """Readings that differ by more than this part are worth a word."""
 
 CLOSE = 0.05
-"""So are tensions this part of themselves from an end or a jump of their law."""
+"""So are tensions this part of themselves from an end of their law."""
 
 _SINGULAR = 1e-12
 """A margin at most this part of the largest eigenvalue of K_θ is rounding."""
@@ -114,22 +112,13 @@ def _of_tensions(report: Report) -> list[str]:
                 f"within {100.0 * CLOSE:g} % of the {end} end of their law: {_listed(names)}. "
                 "Beyond it nothing is known."
             )
-    cables = {cable.name: cable for cable in K.posture.arm.cables}
-    lost = [name for name, l0 in zip(cables, K.free_lengths, strict=True) if l0 <= 0.0]
+    pairs = zip(K.posture.arm.cables, K.free_lengths, strict=True)
+    lost = [cable.name for cable, l0 in pairs if l0 <= 0.0]
     if lost:
         said.append(
             f"the series spring stretches by more than the whole cable is long: {_listed(lost)}. "
             "Give a lead that holds the spring; until then K is off by up to F/EA."
         )
-    jumping: dict[str, list[str]] = {}
-    for each in pulled:
-        if each.jump is not None and abs(each.tension - each.jump) <= CLOSE * each.tension:
-            jumping.setdefault(tangents(cables[each.name], each.jump), []).append(each.name)
-    said += [
-        f"within {100.0 * CLOSE:g} % of a jump of their tangent rigidity, {where}: "
-        f"{_listed(names)}. A little more or less tension gives another stiffness."
-        for where, names in jumping.items()
-    ]
     if K.wrench[3:].any():
         said.append(
             "a moment at the tip has no potential: K_θ is not symmetric, stability is judged on "

@@ -199,7 +199,6 @@ def _cable(each: CableState) -> dict[str, object]:
         "tangent_rigidity_N": each.tangent,
         "secant_rigidity_N": each.secant,
         "law_N": (each.low, each.high),
-        "jump_N": each.jump,
         "may_fall_N": each.below,
         "may_rise_N": each.above,
     }

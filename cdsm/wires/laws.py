@@ -20,7 +20,7 @@ EQ19_PRINTED: Final = (
     (-556.89, 377.99, -70.49, 8.74, -0.46, 1.12e-2, -1e-4),
     (-1924.5, 493.35, -2.26, 0.0054, -6.94e-6, 4.58e-9, -1.22e-12),
 )
-"""Coefficients of Eq. 19 in the digits that are printed, but for the first, −1e-3 in the paper."""
+"""Coefficients of Eq. 19 in the printed digits, but for the misprinted −1e-3 (see cdsm.paper)."""
 
 EQ19: Final = (
     (-556.89, 377.99, -70.49, 8.74, -0.46, 1.12e-2, -9.946263022943622e-05),
@@ -28,14 +28,16 @@ EQ19: Final = (
 )
 """Coefficients of the same digits whose branches meet; see StrandElasticity.eq19_repaired."""
 
-_MET = 1e-9
-"""Branches that differ by less than this part of the rigidity meet: it is rounding."""
+_MEET = 1e-9
+"""Largest difference of two ranges at their join, as a part of the rigidity: rounding."""
 
 
 @final
 @dataclass(frozen=True)
 class StrandElasticity(Elasticity):
     """EA(F) as polynomials in the tension, one per range: the form of Eq. 19.
+
+    Neighbouring polynomials meet at their join, within 1e-9 of EA: a rigidity is continuous.
 
     The polynomials are read as the *tangent* rigidity. Read as the secant of Eq. 18 they would need
     the tangent S²/(S − F S'), which is negative wherever S grows faster than F: for Eq. 19 that is
@@ -49,7 +51,8 @@ class StrandElasticity(Elasticity):
         high: High end of the domain [N], included.
 
     Raises:
-        InvalidInput: Numbers or their count do not fit, or the tensions do not rise.
+        InvalidInput: Numbers or their count do not fit, the tensions do not rise, or two ranges do
+            not meet at their join.
     """
 
     coefficients: tuple[tuple[float, ...], ...]
@@ -73,6 +76,16 @@ class StrandElasticity(Elasticity):
             raise InvalidInput("joins", f"0 <= low < joins < high must rise, but are {edges} N.")
         object.__setattr__(self, "coefficients", rows)
         object.__setattr__(self, "joins", joins)
+        for join in joins:
+            below, above = self.polynomial([join, np.nextafter(join, np.inf)]).tolist()
+            if abs(above - below) > _MEET * abs(below):
+                raise InvalidInput(
+                    "coefficients",
+                    f"the ranges do not meet at {join:g} N: {below:.7g} N below, {above:.7g} N "
+                    "above, and a rigidity is continuous. Choose digits with which they meet "
+                    "(StrandElasticity.eq19_repaired() does it for Eq. 19), or use a "
+                    "TabulatedElasticity.",
+                )
 
     @classmethod
     def eq19_repaired(cls) -> StrandElasticity:
@@ -88,15 +101,6 @@ class StrandElasticity(Elasticity):
         polynomial is negative below 2.11 N: the domain is (2.2 N, 810 N].
         """
         return cls(EQ19, joins=(31.0,), low=2.2, high=810.0)
-
-    @classmethod
-    def eq19_as_printed(cls) -> StrandElasticity:
-        """Eq. 19 exactly as printed, for comparison: it has no positive rigidity from 11 to 31 N.
-
-        See :meth:`eq19_repaired`, which is the one to compute with.
-        """
-        lower, upper = EQ19_PRINTED
-        return cls(((*lower[:-1], -1e-3), upper), joins=(31.0,), low=2.2, high=810.0)
 
     @cached_property
     def domain(self) -> Domain:
@@ -123,7 +127,7 @@ class StrandElasticity(Elasticity):
             bad = np.flatnonzero(result <= 0.0)
             raise ElasticityRangeError(
                 f"the polynomial gives {result.ravel()[bad[0]]:.6g} N, and a rigidity must be "
-                "positive. If this is Eq. 19 as printed, use StrandElasticity.eq19_repaired().",
+                "positive. Narrow the domain, or correct the coefficients.",
                 values.ravel()[bad].tolist(),
                 bad.tolist(),
             )
@@ -133,14 +137,6 @@ class StrandElasticity(Elasticity):
         """Derivative of the polynomials [-]; see :meth:`Elasticity.rigidity_slope`."""
         values = self.domain.check(tension)
         return piecewise(self._joins, self._slopes, values)
-
-    @cached_property
-    def jumps(self) -> tuple[float, ...]:
-        """The :attr:`joins` [N] at which the ranges do not meet."""
-        below = self.polynomial(self.joins)
-        above = self.polynomial(np.nextafter(self.joins, np.inf))
-        apart = abs(above - below) > _MET * abs(below)
-        return tuple(np.array(self.joins)[apart].tolist())
 
     def strain(self, tension: ArrayLike) -> Array:
         """∫ dF/EA(F) [-], to rounding; see :meth:`Elasticity.strain`."""
@@ -173,8 +169,8 @@ class StrandElasticity(Elasticity):
         bad = values > self._panels.end
         if np.count_nonzero(bad):
             raise ElasticityRangeError(
-                "the rigidity is not positive everywhere below, so there is no strain. If this is "
-                "Eq. 19 as printed, use StrandElasticity.eq19_repaired().",
+                "the rigidity is not positive everywhere below, so there is no strain. Narrow the "
+                "domain, or correct the coefficients.",
                 np.atleast_1d(values)[np.atleast_1d(bad)].tolist(),
                 np.flatnonzero(bad).tolist(),
             )

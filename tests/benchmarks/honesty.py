@@ -12,13 +12,13 @@ import warnings
 from collections import Counter
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import replace
 from multiprocessing import get_context
 from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
 import qpsolvers
+from numpy.polynomial.polynomial import polyval
 from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
@@ -167,13 +167,13 @@ def eq19_as_printed(group: Group) -> list[Reading]:
     assert group.tension is not None
     strand = cdsm.presets.STRAND_1X19
     lower, upper = strand.coefficients
-    law = replace(strand, coefficients=((*lower[:-1], -1e-3), upper))
     readings = []
     for q, F in zip(group.q, group.tension, strict=True):
         pose = group.arm.at(q)
         active = np.einsum("c,cij->ij", F, pose.length_hessian)
         strain = strand.strain(np.clip(F, strand.domain.first, strand.high))
-        springs = law.polynomial(F) * (1.0 + strain) / pose.cable_lengths
+        EA = np.where(F <= 31.0, polyval(F, (*lower[:-1], -1e-3)), polyval(F, upper))
+        springs = EA * (1.0 + strain) / pose.cable_lengths
         passive = (pose.length_jacobian.T * springs) @ pose.length_jacobian
         joint = active + passive + pose.gravity_stiffness
         least = np.linalg.eigvalsh(joint)[0]

@@ -209,7 +209,7 @@ def edge_of_buckling(rng: Random) -> Group:
 
 
 def ends_of_eq19(rng: Random) -> Group:
-    """Strands of Eq. 19, some of their tensions beside the ends of its domain or its jump."""
+    """Strands of Eq. 19, some of their tensions beside the ends of its domain or its kink."""
     arm, exact = _arm(rng, _geometry(rng), cdsm.presets.STRAND_1X19)
     count = len(arm.cables)
     tension = 10.0 ** rng.uniform(math.log10(2.3), math.log10(800.0), (ROWS, count))

@@ -36,7 +36,7 @@ def with_slsqp(pose: cdsm.Posture, target: float) -> Array:
 
 
 def test_planning_is_three_times_as_fast_as_slsqp_with_differences(clock: Clock | None) -> None:
-    """Both from the least tensions; the plan sees to the jumps of the rigidity, too."""
+    """Both from the least tensions; the plan sees to the kinks of the rigidity, too."""
     one = presets.virtual_prototype()
     pose = one.at(np.full(one.nv, presets.TEN_DEGREES))
     target = 90e3

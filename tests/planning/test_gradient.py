@@ -13,13 +13,13 @@ from cdsm.arm_model import CableLaws
 from cdsm.support.validation import Array
 from tests.support import arms
 from tests.support.differences import assert_second_order, central_difference
-from tests.support.locked import ARMS, JUMPING, STRAND, TABLE, balanced, original_lengths, some_arm
+from tests.support.locked import ARMS, STRAND, TABLE, balanced, original_lengths, some_arm
 
 U = np.array([0.3, -0.5, 0.8])
 
 
 class Plain(cdsm.Elasticity):
-    """A law of one's own that says nothing of its slope: EA of another one, jumps included."""
+    """A law of one's own that says nothing of its slope: EA of another one."""
 
     def __init__(self, law: cdsm.Elasticity) -> None:
         self.law = law
@@ -27,10 +27,6 @@ class Plain(cdsm.Elasticity):
     @property
     def domain(self) -> cdsm.Domain:
         return self.law.domain
-
-    @property
-    def jumps(self) -> tuple[float, ...]:
-        return self.law.jumps
 
     def rigidity(self, tension: ArrayLike) -> Array:
         return self.law.rigidity(tension)
@@ -77,7 +73,7 @@ def test_slope_at_a_join_is_that_of_the_range_below(law: cdsm.Elasticity) -> Non
 def test_law_of_ones_own_has_the_slope_by_differences(law: cdsm.Elasticity) -> None:
     domain = law.domain
     high = min(domain.high, 900.0)
-    ends = [domain.first, high, *law.jumps, *np.nextafter(law.jumps, math.inf)]
+    ends = [domain.first, high]
     inside = np.random.default_rng(1).uniform(domain.low + 1.0, high, 40)
     own = Plain(law)
     np.testing.assert_allclose(
@@ -253,13 +249,12 @@ def test_slope_of_ones_own_that_is_no_number_is_refused() -> None:
         cdsm.stiffness_gradient(cdsm.stiffness(pose, np.full(4, 50.0)))
 
 
-@pytest.mark.parametrize("law", [JUMPING, STRAND], ids=["jump", "bend"])
 @pytest.mark.parametrize("place", [31.0, 810.0], ids=["join", "end"])
 def test_second_slope_is_taken_on_the_side_that_belongs_to_the_place(
-    place: float, law: cdsm.Elasticity
+    place: float,
 ) -> None:
-    """Below a jump, a bend and the end of the domain, where there is no tension beyond."""
-    arm = cdsm.Manipulator(arms.random_arm(1, 2).geometry, law)
+    """Below a kink and the end of the domain, where there is no tension beyond."""
+    arm = cdsm.Manipulator(arms.random_arm(1, 2).geometry, STRAND)
     lengths = arm.at(np.zeros(arm.nv)).cable_lengths
 
     def slopes(F: float) -> tuple[Array, Array]:

@@ -18,8 +18,8 @@ from tests.support import arms
 from tests.support.locked import (
     BUCKLING,
     EA,
-    JUMPING,
     LENGTH,
+    RISING,
     STRAND,
     H,
     R,
@@ -213,7 +213,7 @@ def test_stiffness_that_tension_raises_without_end_asks_for_a_maximum() -> None:
 
 
 def test_end_of_the_elasticity_bounds_the_tensions() -> None:
-    arm = presets.virtual_prototype(JUMPING)
+    arm = presets.virtual_prototype(RISING)
     pose = arm.at(np.full(arm.nv, presets.TEN_DEGREES))
     found = cdsm.stiffness_range(pose, DOWN, 50.0)
     assert found.high_tension.values.max() == pytest.approx(810.0, rel=1e-12)

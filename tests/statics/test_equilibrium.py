@@ -464,18 +464,22 @@ def test_reference_at_the_very_end_of_a_law_is_inside() -> None:
     np.testing.assert_allclose(cdsm.equilibrium(pose, [810.0, 810.0]).tension, 810.0, rtol=1e-12)
 
 
+# the lower branch of Eq. 19 with its misprint: negative from 11 N
+NEGATIVE = cdsm.StrandElasticity(((*STRAND.coefficients[0][:-1], -1e-3),), (), 2.2, 810.0)
+
+
 def test_reference_outside_a_law_names_the_cables() -> None:
-    for law in (STRAND, cdsm.StrandElasticity.eq19_as_printed()):
+    for law, F in ((STRAND, 1.0), (NEGATIVE, 15.0)):
         pose = hinge(law=law).at([0.0])
         with pytest.raises(cdsm.ElasticityRangeError) as caught:
-            cdsm.equilibrium(pose, [50.0, 15.0 if law != STRAND else 1.0])
+            cdsm.equilibrium(pose, [50.0, F])
         assert caught.value.cables
 
 
 def test_law_that_gives_no_strain_names_the_cables() -> None:
-    # at 5 N Eq. 19 as printed still has a rigidity, but none up to the end of its domain
-    pose = hinge(law=cdsm.StrandElasticity.eq19_as_printed()).at([0.0])
-    with pytest.raises(cdsm.ElasticityRangeError, match="eq19_repaired") as caught:
+    # at 5 N it still has a rigidity, but none up to the end of its domain
+    pose = hinge(law=NEGATIVE).at([0.0])
+    with pytest.raises(cdsm.ElasticityRangeError, match="correct the coefficients") as caught:
         cdsm.equilibrium(pose, [5.0, 5.0])
     assert caught.value.cables == ("cable1_1", "cable1_2")
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
@@ -95,19 +94,25 @@ def joins_of(points: Points, join: float) -> tuple[float, ...]:
 
 
 def coefficients(points: Points, joins: tuple[float, ...]) -> list[list[float]]:
-    """Least-squares polynomials of the slopes over the force, lowest power first, one per range."""
+    """Least-squares polynomials of the slopes over the force, lowest power first, one per range.
+
+    Two ranges share their value at the join: with y = F − join the polynomials are
+    v + Σ a_k yᵏ and v + Σ b_k yᵏ, one linear least-squares problem in v, a and b.
+    """
     slopes, forces = _slopes(points)
-    piece = np.searchsorted(joins, forces, side="left")
-    rows = []
-    for k in range(len(joins) + 1):
-        here = piece == k
-        if np.count_nonzero(here) <= _DEGREE:  # noise in a bootstrap sample can thin out a range
-            here = np.argsort(abs(forces - joins[0]))[: 2 * (_DEGREE + 1)]
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", np.exceptions.RankWarning)  # of few or close forces
-            fitted = Polynomial.fit(forces[here], slopes[here], _DEGREE)
-        rows.append(fitted.convert().coef.tolist())
-    return rows
+    if not joins:
+        return [Polynomial.fit(forces, slopes, _DEGREE).convert().coef.tolist()]
+    (join,) = joins
+    below = forces <= join
+    widths = join - float(forces.min()), float(forces.max()) - join
+    y = (forces - join) / np.where(below, *widths)
+    powers = y[:, None] ** np.arange(1, _DEGREE + 1)
+    design = np.hstack([np.ones((len(y), 1)), powers * below[:, None], powers * ~below[:, None]])
+    value, *rest = np.linalg.lstsq(design, slopes, rcond=None)[0].tolist()
+    return [
+        Polynomial([value, *terms], [join, join + width], [0.0, 1.0]).convert().coef.tolist()
+        for terms, width in zip((rest[:_DEGREE], rest[_DEGREE:]), widths, strict=True)
+    ]
 
 
 def miss(

@@ -1,0 +1,70 @@
+"""A search for jumps in the rigidity of a user's own law: K_θ needs EA(F) to be continuous."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from cdsm.elasticity import Elasticity, LinearElasticity
+from cdsm.wires.laws import StrandElasticity, TabulatedElasticity
+
+_SAMPLES = np.linspace(0.0, 1.0, 257) ** 3  # of the domain: most laws change most at low tension
+_LARGEST_TENSION = 1e5  # [N], where the domain has no end: more than any cable here carries
+_JUMP = 1e-4  # smaller steps, as parts of the rigidity, count as rounding of the law
+
+
+class Jump(NamedTuple):
+    """A tension [N], and the rigidities [N] just below and just above it."""
+
+    tension: float
+    below: float
+    above: float
+
+
+def find_jump(law: Elasticity) -> Jump | None:
+    """The largest jump of the rigidity of a law, or None if it is continuous.
+
+    EA is sampled at 257 tensions. Each interval is halved, and its half with the larger change of
+    EA is kept, until the change is below 1e-4 of EA or the interval is as narrow as rounding. A
+    steep law that is continuous passes: its change shrinks with the interval. A jump may be missed
+    if it is much smaller than the change of EA over an interval. Laws of this library are
+    continuous by construction and are not sampled. A law that fails is left to its first use,
+    which reports it.
+    """
+    if isinstance(law, (LinearElasticity, StrandElasticity, TabulatedElasticity)):
+        return None
+    try:
+        with np.errstate(all="ignore"):
+            return _bisect(law)
+    except Exception:  # whatever a user's law raises
+        return None
+
+
+def _bisect(law: Elasticity) -> Jump | None:
+    low, high = law.domain.first, law.domain.high
+    if math.isinf(high):
+        high = max(_LARGEST_TENSION, 2.0 * low)
+    F = low + (high - low) * _SAMPLES
+    F[-1] = high  # which the sum may miss by rounding
+    EA = np.asarray(law.rigidity(F), dtype=np.float64)
+    a, b, below, above = F[:-1], F[1:], EA[:-1], EA[1:]
+    threshold = _JUMP * np.maximum(abs(below), abs(above))
+    jumps: list[Jump] = []
+    while a.size:
+        steep = abs(above - below) > threshold  # false for NaN
+        narrow = b - a <= 4.0 * np.spacing(b)
+        found = np.stack([b, below, above], axis=1)[steep & narrow]
+        jumps += [Jump(*row) for row in found.tolist()]
+        a, b, below, above, threshold = (
+            x[steep & ~narrow] for x in (a, b, below, above, threshold)
+        )
+        if not a.size:
+            break
+        middle = (a + b) / 2.0
+        EA = np.asarray(law.rigidity(middle), dtype=np.float64)
+        lower = abs(EA - below) >= abs(above - EA)
+        a, below = np.where(lower, a, middle), np.where(lower, below, EA)
+        b, above = np.where(lower, middle, b), np.where(lower, EA, above)
+    return max(jumps, key=lambda jump: abs(jump.above - jump.below), default=None)
