@@ -10,7 +10,6 @@ different numbers hide behind "the stiffness in x", and each has its own name he
 
 from __future__ import annotations
 
-import html
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -23,6 +22,7 @@ from numpy.typing import ArrayLike
 from cdsm.errors import InvalidInput, SingularStiffness
 from cdsm.posture import Posture
 from cdsm.report import Report, report_on
+from cdsm.support.markup import element, row
 from cdsm.support.units import MODEL, coordinates
 from cdsm.support.validation import (
     Array,
@@ -285,11 +285,9 @@ class Stiffness(ReadOnlyState):
         return "\n".join([*lines, self._verdict])
 
     def _repr_html_(self) -> str:
-        (_, *axes), *rows = (tuple(map(html.escape, row)) for row in self._rows)
-        head = "".join(f"<th>{axis}</th>" for axis in axes)
-        lines = [f"<tr><th>stiffness [N/mm]</th>{head}</tr>"]
-        lines += [f"<tr>{''.join(f'<td>{cell}</td>' for cell in row)}</tr>" for row in rows]
-        return f"<table>{''.join(lines)}</table><p>{html.escape(self._verdict)}</p>"
+        head, *rows = self._rows
+        table = element("table", row("th", head), *(row("td", cells) for cells in rows))
+        return table + element("p", self._verdict)
 
     @property
     def _rows(self) -> list[tuple[str, ...]]:

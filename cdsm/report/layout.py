@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import html
 import textwrap
 from collections.abc import Sequence
 from typing import NamedTuple
+
+from cdsm.support.markup import Markup, element, row
 
 _WIDTH = 100
 
@@ -72,22 +73,21 @@ def to_text(page: Page) -> str:
     return "\n".join(lines)
 
 
-def to_fragment(page: Page) -> str:
+def to_fragment(page: Page) -> Markup:
     """The page as HTML to be put into another."""
-    shown = "good" if page.good else "bad"
-    parts = [f'<p class="{shown}">{html.escape(page.verdict)}</p>']
-    remarks = [f'<li class="fault">{html.escape(each)}</li>' for each in page.faults]
-    remarks += [f"<li>{html.escape(each)}</li>" for each in page.notes]
+    parts = [element("p", page.verdict, class_="good" if page.good else "bad")]
+    remarks = [element("li", remark, class_="fault") for remark in page.faults]
+    remarks += [element("li", remark) for remark in page.notes]
     if remarks:
-        parts.append(f"<ul>{''.join(remarks)}</ul>")
+        parts.append(element("ul", *remarks))
     for section in page.sections:
-        parts.append(f"<h2>{html.escape(section.title)}</h2>")
+        parts.append(element("h2", section.title))
         if section.rows:
             head, *body = section.rows
-            rows = [_row("th", head), *(_row("td", row) for row in body)]
-            parts.append(f'<div class="wide"><table>{"".join(rows)}</table></div>')
-        parts += [f"<p>{html.escape(line)}</p>" for line in section.lines]
-    return f"<section><h1>{html.escape(page.title)}</h1>{''.join(parts)}</section>"
+            table = element("table", row("th", head), *(row("td", cells) for cells in body))
+            parts.append(element("div", table, class_="wide"))
+        parts += [element("p", line) for line in section.lines]
+    return element("section", element("h1", page.title), *parts)
 
 
 def to_document(page: Page) -> str:
@@ -95,13 +95,9 @@ def to_document(page: Page) -> str:
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"<title>{html.escape(page.title)}</title>\n<style>\n{_STYLE}\n</style>\n</head>\n"
+        f"{element('title', page.title)}\n<style>\n{_STYLE}\n</style>\n</head>\n"
         f"<body>\n{to_fragment(page)}\n</body>\n</html>\n"
     )
-
-
-def _row(tag: str, cells: Sequence[str]) -> str:
-    return f"<tr>{''.join(f'<{tag}>{html.escape(cell)}</{tag}>' for cell in cells)}</tr>"
 
 
 def _wrapped(text: str, first: str, other: str) -> str:

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdsm.elasticity import Elasticity
+from cdsm.kernels.principal import principal_stiffness
 from cdsm.manipulator import Manipulator
 from cdsm.support.validation import Array, ReadOnlyState
-from cdsm.sweeps.principal import principal
 from cdsm.sweeps.quantities import QUANTITIES, SweepStatus
 from cdsm.sweeps.rows import Rows, Statuses, postures, stiffnesses, tensions
 
@@ -110,7 +110,7 @@ def evaluate(problem: Problem, q: Array, threads: int | None = None) -> Answer:
 def _principal(rows: Rows, status: Statuses, names: list[str]) -> Rows:
     """The extreme stiffnesses of the rows that have them: stable ones; NaN in the others."""
     exist = (rows["margin"] > 0.0) & (status != SweepStatus.SINGULAR)  # a margin may be NaN
-    extremes = principal(rows["translational_compliance"][exist])
+    extremes = principal_stiffness(rows["translational_compliance"][exist])
     return {name: _spread(extremes[name], (exist,), exist.shape) for name in names}
 
 

@@ -1,7 +1,7 @@
-"""The live view: an arm in the browser, with sliders. mm, degrees and N/mm live here too.
+"""The live view: an arm in the browser, with sliders. The page shows mm, degrees and N/mm.
 
-:func:`show` computes what there is to see at a :class:`Setting` of the sliders, and knows no
-browser; :func:`serve` puts it on a page and keeps it up to date.
+:func:`show` computes what a page shows at a :class:`Setting` of the sliders, without a browser;
+:func:`serve` puts it on a page and keeps it up to date.
 """
 
 from cdsm.view.server import View, serve

@@ -7,8 +7,7 @@ import logging
 import math
 import socket
 import threading
-from collections.abc import Iterator
-from types import TracebackType
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Self, final
 
 import numpy as np
@@ -19,9 +18,8 @@ from cdsm.manipulator import Manipulator
 from cdsm.support.extras import need
 from cdsm.support.validation import Array, bound, frozen, instance, scalar, vector
 from cdsm.tension import installed_solver
-from cdsm.view.controls import Controls
-from cdsm.view.newest import Newest
 from cdsm.view.scene import Scene
+from cdsm.view.sliders import Controls
 from cdsm.view.state import Condition, Setting, Shown, show
 
 if TYPE_CHECKING:
@@ -76,15 +74,60 @@ def serve(
     need("view", "viser")
     start = Setting(
         q=_first_angles(instance("arm", arm, Manipulator), q),
-        minimum=_positive("minimum", minimum, zero=True),
+        minimum=_newtons("minimum", minimum, zero=True),
         maximum=float(bound("maximum", maximum, 1)[0]),
         force=vector("force", force, 3, "force at the tip [N], base axes"),
         solver=installed_solver(solver),
     )
-    tension = _positive("largest_tension", largest_tension)
-    push = max(_positive("largest_force", largest_force), float(abs(start.force).max()))
+    tension = _newtons("largest_tension", largest_tension)
+    push = max(_newtons("largest_force", largest_force), float(abs(start.force).max()))
     guard, server = _server(host, port)
     return View(arm, start, guard, server, tension, push)
+
+
+class Worker:
+    """One thread that runs a job on request; requests during a run cause one more run, not many.
+
+    Sliders send more values than can be computed, from many threads. The job reads the newest
+    state itself when it starts.
+    """
+
+    def __init__(self, job: Callable[[], None]) -> None:
+        self._job = job
+        self._changed = threading.Condition()
+        self._requested = self._closed = self._busy = False
+        self._thread = threading.Thread(target=self._work, name="cdsm view", daemon=True)
+        self._thread.start()
+
+    def request(self) -> None:
+        """Have the job run, soon; from any thread."""
+        with self._changed:
+            self._requested = True
+            self._changed.notify_all()
+
+    def wait(self) -> None:
+        """Wait until all requests so far are served."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._closed or not (self._requested or self._busy))
+
+    def close(self) -> None:
+        """Let the running job end, and run no other."""
+        with self._changed:
+            self._closed = True
+            self._changed.notify_all()
+        if threading.current_thread() is not self._thread:
+            self._thread.join()
+
+    def _work(self) -> None:
+        while True:
+            with self._changed:
+                self._busy = False
+                self._changed.notify_all()
+                self._changed.wait_for(lambda: self._requested or self._closed)
+                if self._closed:
+                    return
+                self._requested, self._busy = False, True
+            self._job()
 
 
 @final
@@ -107,12 +150,12 @@ class View:
         self.arm = arm
         self._guard, self._server = guard, server
         self._closed = threading.Event()
-        self._worker = Newest(self._refresh)
+        self._worker = Worker(self._refresh)
         try:
             self._scene = Scene(server, arm, largest_force)
-            self._controls = Controls(
-                server, arm, start, largest_tension, largest_force, self._worker.ask, guard.admit
-            )
+            limits = largest_tension, largest_force
+            request = self._worker.request
+            self._controls = Controls(server, arm, start, limits, request, guard.admit)
             self._refresh()
         except BaseException:
             self.close()
@@ -128,7 +171,7 @@ class View:
     @property
     def shown(self) -> Shown:
         """What the page shows, once all that was moved so far is computed."""
-        self._worker.settle()
+        self._worker.wait()
         return self._shown
 
     def wait(self) -> None:
@@ -147,12 +190,7 @@ class View:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def __repr__(self) -> str:
@@ -180,7 +218,7 @@ def _first_angles(arm: Manipulator, q: ArrayLike | None) -> Array:
     return arm._angles(q, check_limits=True)
 
 
-def _positive(name: str, value: object, *, zero: bool = False) -> float:
+def _newtons(name: str, value: object, *, zero: bool = False) -> float:
     number = scalar(name, value)
     if number < 0.0 or (number == 0.0 and not zero):
         allowed = "zero or more" if zero else "more than zero"
@@ -211,11 +249,7 @@ def _server(host: object, port: object) -> tuple[Guard, viser.ViserServer]:
 
 
 def _check_free(host: str, port: int) -> None:
-    """Raise what is wrong with an address: viser takes the next port, or waits for ever.
-
-    Raises:
-        InvalidInput: There is no such address, or the port is taken.
-    """
+    """Refuse an address that cannot be had; viser would take the next port, or wait for ever."""
     remedy = "Give another port, or 0 for any free one."
     try:
         with contextlib.ExitStack() as sockets:
@@ -237,7 +271,7 @@ def _check_free(host: str, port: int) -> None:
 
 @contextlib.contextmanager
 def _quiet() -> Iterator[None]:
-    """Keep viser from printing on the standard output, which it does whatever it is told."""
+    """Keep viser from printing on the standard output; it has no option for that."""
     import rich
 
     console = rich.get_console()

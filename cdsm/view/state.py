@@ -1,4 +1,4 @@
-"""What is to be seen at a setting of the sliders: computed, or why it cannot be."""
+"""What the page shows at a setting of the sliders: results, or why there are none."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from cdsm.errors import (
     JointLimitError,
     SingularStiffness,
 )
+from cdsm.kernels.principal import principal_stiffness
 from cdsm.manipulator import Manipulator
 from cdsm.plots.arm import ellipsoid, tension_colors
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.validation import Array, ReadOnlyState, frozen
-from cdsm.sweeps.principal import principal
 from cdsm.tension import Tension, distribute_tension
 
 GREY: Final = (150, 150, 150)
@@ -33,7 +33,7 @@ GREY: Final = (150, 150, 150)
 
 
 class Condition(Enum):
-    """How the arm fares at a setting; the value is what the page says."""
+    """State of the arm at a setting; the value is what the page says."""
 
     STABLE = "STABLE"
     UNSTABLE = "UNSTABLE"
@@ -75,7 +75,7 @@ class Setting(ReadOnlyState):
     solver: str = "daqp"
 
     def __post_init__(self) -> None:
-        # not checked: what a slider cannot stand at is a condition, and said on the page
+        # not checked here: a wrong value becomes a condition that the page shows
         for name in ("q", "force"):
             object.__setattr__(self, name, frozen(np.array(getattr(self, name))))
 
@@ -83,11 +83,11 @@ class Setting(ReadOnlyState):
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Shown(ReadOnlyState):
-    """What is to be seen at one setting. What does not exist there is None, never an old value.
+    """What the page shows at one setting. What does not exist there is None, never an old value.
 
     Attributes:
         setting: Where the sliders stand.
-        condition: How the arm fares.
+        condition: State of the arm.
         problem: Why something is missing, in the words of the error; empty for a stable arm.
         posture: None where there is none: beyond a limit, or two sites of a cable meet.
         tension: None where nothing balances the arm.
@@ -101,19 +101,21 @@ class Shown(ReadOnlyState):
     tension: Tension | None = None
     stiffness: Stiffness | None = None
 
+    @property
+    def _stable(self) -> Stiffness | None:
+        return self.stiffness if self.condition is Condition.STABLE else None
+
     @cached_property
     def along(self) -> Array | None:
         """Stiffness along x, y and z (3,) [N/m], inf where nothing moves; of a stable arm only."""
-        if self.condition is not Condition.STABLE or self.stiffness is None:
-            return None
-        return frozen(np.array([self.stiffness.along(axis) for axis in np.eye(3)]))
+        K = self._stable
+        return None if K is None else frozen(np.array([K.along(axis) for axis in np.eye(3)]))
 
     @cached_property
     def principal(self) -> dict[str, Array] | None:
         """Softest and stiffest direction and the stiffness [N/m] there; of a stable arm only."""
-        if self.condition is not Condition.STABLE or self.stiffness is None:
-            return None
-        return principal(self.stiffness.compliance[:3, :3])
+        K = self._stable
+        return None if K is None else principal_stiffness(K.compliance[:3, :3])
 
     @cached_property
     def cable_colors(self) -> NDArray[np.uint8] | None:
@@ -131,24 +133,24 @@ class Shown(ReadOnlyState):
 
         The surface that :func:`cdsm.plots.plot_arm` draws.
         """
-        if self.condition is not Condition.STABLE or self.stiffness is None:
-            return None
-        drawn = ellipsoid(self.stiffness)
+        K = self._stable
+        drawn = None if K is None else ellipsoid(K)
         return None if drawn is None else frozen(drawn.surface)
 
 
 def show(arm: Manipulator, setting: Setting) -> Shown:
-    """What is to be seen of an arm at a setting; every error of it becomes a condition."""
-    pose = pull = K = None
+    """Compute what the page shows of an arm at a setting; every error becomes a condition."""
+    pose = tension = K = None
     try:
         pose = arm.at(setting.q)
         wrench = np.concatenate([setting.force, np.zeros(3)])
-        pull = distribute_tension(pose, setting.minimum, setting.maximum, wrench, setting.solver)
-        K = stiffness(pose, pull)
+        tension = distribute_tension(pose, setting.minimum, setting.maximum, wrench, setting.solver)
+        K = stiffness(pose, tension)
         _ = K.compliance  # refuses a singular K_θ, whose margin is rounding
     except CdsmError as error:
         condition = next(
-            (found for kind, found in _CONDITIONS if isinstance(error, kind)), Condition.FAILED
+            (condition for kind, condition in _CONDITIONS if isinstance(error, kind)),
+            Condition.FAILED,
         )
         problem = str(error)
     else:
@@ -161,6 +163,6 @@ def show(arm: Manipulator, setting: Setting) -> Shown:
         condition=condition,
         problem=problem,
         posture=pose,
-        tension=pull,
+        tension=tension,
         stiffness=K,
     )

@@ -11,10 +11,10 @@ import pytest
 import xarray as xr
 
 import cdsm
+from cdsm.kernels.principal import principal_stiffness
 from cdsm.support.validation import Array
 from cdsm.sweeps.blocks import blocks, extents
 from cdsm.sweeps.description import law_text
-from cdsm.sweeps.principal import principal
 from cdsm.sweeps.quantities import LOST, QUANTITIES
 from cdsm.sweeps.rows import _BATCH_NAMES
 from tests.support.sweeps import CASES, EVERYTHING, GRID, LAWS, STEEL, WRENCHES, short_arm
@@ -61,7 +61,7 @@ def single(
     except cdsm.SingularStiffness:
         status = {Status.IMMOBILE} if K.margin > 0.0 else status
     if K.margin > 0.0:
-        found |= principal(K.compliance[:3, :3])
+        found |= principal_stiffness(K.compliance[:3, :3])
     return status, found
 
 
@@ -139,7 +139,7 @@ def test_nothing_is_missing_where_the_status_does_not_say_so(everything: xr.Data
 def test_softest_and_stiffest_are_extremes_of_along_in_their_directions() -> None:
     pose = short_arm().at([0.2, -0.1, 0.3, 0.1, -0.2, 0.15])
     K = cdsm.stiffness(pose, cdsm.distribute_tension(pose, 30.0, wrench=WRENCHES["pulled"]))
-    found = principal(K.compliance[:3, :3])
+    found = principal_stiffness(K.compliance[:3, :3])
     rng = np.random.default_rng(0)
     tried = [K.along(u) for u in rng.normal(size=(2000, 3))]
     assert found["softest"] <= min(tried) <= 1.01 * found["softest"]
@@ -160,7 +160,7 @@ def test_a_flat_arm_is_infinitely_stiff_along_itself() -> None:
 
 
 def test_a_tip_that_cannot_move_is_as_stiff_in_all_directions() -> None:
-    found = principal(np.zeros((3, 3)))
+    found = principal_stiffness(np.zeros((3, 3)))
     assert np.isposinf(found["softest"])
     assert found["anisotropy"] == 1.0
 

@@ -22,10 +22,10 @@ import cdsm
 from cdsm.plots.arm import ellipsoid, tension_colors
 from cdsm.support.validation import Array
 from cdsm.view import Condition, Setting, View, serve, show
-from cdsm.view.newest import Newest
-from cdsm.view.ranges import joint_sliders, slider
+from cdsm.view.panel import page_text
+from cdsm.view.server import Worker
+from cdsm.view.sliders import joint_ranges, slider_range
 from cdsm.view.state import GREY
-from cdsm.view.text import _direction, page_text
 from tests.support import foreign
 from tests.support.arms import mixed_arm, random_posture
 from tests.support.patience import HANGS
@@ -209,20 +209,16 @@ def test_units_are_those_of_joints_that_slide() -> None:
     assert "N m/rad</td>" in page_text(turning)
 
 
-def test_no_direction_has_a_negative_zero() -> None:
-    assert _direction(np.array([-1e-9, 1.0, -0.004])) == "(0.00, 1.00, 0.00)"
-
-
 # --- sliders ------------------------------------------------------------------------------------
 
 
 def test_sliders_end_at_round_numbers_within_the_limits() -> None:
     arm = soft_arm()
-    for each in joint_sliders(arm, np.zeros(6)):
+    for each in joint_ranges(arm, np.zeros(6)):
         assert (each.low, each.high, each.step) == (-61.9, 61.9, 0.1)
         arm.at(np.full(6, each.high * each.unit))
     crab = foreign.crab()
-    ways = joint_sliders(crab, foreign.POSTURE)
+    ways = joint_ranges(crab, foreign.POSTURE)
     assert [each.label for each in ways[:2]] == ["a [°]", "b [mm]"]
     assert (ways[1].low, ways[1].high, ways[1].step) == (-900.0, 1100.0, 1.0)
     for each, angle in zip(ways, foreign.POSTURE, strict=True):
@@ -231,12 +227,12 @@ def test_sliders_end_at_round_numbers_within_the_limits() -> None:
 
 
 def test_sliders_of_odd_ranges() -> None:
-    narrow = slider("a", -0.0123, 0.0123, 0.01)
+    narrow = slider_range("a", -0.0123, 0.0123, 0.01)
     assert (narrow.low, narrow.high, narrow.step) == (-0.0123, 0.0123, 1e-5)
-    stuck = slider("b", 0.3, 0.3, 0.3)
+    stuck = slider_range("b", 0.3, 0.3, 0.3)
     assert stuck.low == stuck.high == stuck.initial == 0.3
-    assert slider("c", 0.0, 200.0, 12.34567).initial == 12.34567
-    beyond = slider("d", 0.0, 1.0, 1.00001)
+    assert slider_range("c", 0.0, 200.0, 12.34567).initial == 12.34567
+    beyond = slider_range("d", 0.0, 1.0, 1.00001)
     assert beyond.high == 1.00001
 
 
@@ -252,21 +248,21 @@ def test_what_is_asked_while_it_works_is_done_once_for_the_newest() -> None:
         started.set()
         assert go_on.wait(HANGS)
 
-    newest = Newest(job)
-    newest.ask()
+    worker = Worker(job)
+    worker.request()
     assert started.wait(HANGS)
-    threads = [threading.Thread(target=newest.ask) for _ in range(20)]
+    threads = [threading.Thread(target=worker.request) for _ in range(20)]
     for thread in threads:
         thread.start()
     for thread in threads:
         thread.join()
     state[0] = 1
     go_on.set()
-    newest.settle()
+    worker.wait()
     assert seen == [0, 1]
-    newest.close()
-    newest.ask()  # after the end: nothing happens
-    newest.settle()
+    worker.close()
+    worker.request()  # after the end: nothing happens
+    worker.wait()
     assert seen == [0, 1]
 
 
@@ -357,7 +353,7 @@ def test_a_fault_of_our_own_leaves_no_number_behind(
 
     with monkeypatch.context() as patch, caplog.at_level(logging.ERROR):
         patch.setattr("cdsm.view.server.show", broken)
-        view._worker.ask()
+        view._worker.request()
         shown = view.shown
     assert shown.condition is Condition.FAILED
     assert numbers(view._controls._text.content) == {
@@ -367,7 +363,7 @@ def test_a_fault_of_our_own_leaves_no_number_behind(
     assert not node(view, "/cables").visible
     assert not node(view, "/ellipsoid").visible
     assert "did not converge" in caplog.text
-    view._worker.ask()
+    view._worker.request()
     assert view.shown.condition is Condition.STABLE
     assert node(view, "/cables").visible
 

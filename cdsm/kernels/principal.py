@@ -1,4 +1,4 @@
-"""The softest and the stiffest direction of the tip, of many stiffnesses at once."""
+"""Principal stiffness: the softest and the stiffest direction of the tip."""
 
 from __future__ import annotations
 
@@ -6,14 +6,12 @@ import numpy as np
 
 from cdsm.support.validation import Array
 
-_FLAT = 1e-12
-"""Ratio of compliances up to which the stiffer direction counts as infinitely stiff.
-
-An eigenvalue is good to 1e-16 of the largest: beyond it, fewer than 4 digits are left.
-"""
+RIGID = 1e-12
+"""Ratio of compliances up to which the stiffer direction counts as infinitely stiff: an eigenvalue
+is good to 1e-16 of the largest, so below it fewer than 4 digits are left."""
 
 
-def principal(compliance: Array) -> dict[str, Array]:
+def principal_stiffness(compliance: Array) -> dict[str, Array]:
     """Extremes of 1/(uᵀ C_vv u) over all unit u: the eigenvalues of the symmetric part of C_vv.
 
     Args:
@@ -23,19 +21,19 @@ def principal(compliance: Array) -> dict[str, Array]:
     most = values[..., 2]
     softest, stiffest = np.full_like(most, np.inf), np.full_like(most, np.inf)
     np.divide(1.0, most, out=softest, where=most > 0.0)
-    np.divide(1.0, values[..., 0], out=stiffest, where=values[..., 0] > _FLAT * most)
+    np.divide(1.0, values[..., 0], out=stiffest, where=values[..., 0] > RIGID * most)
     anisotropy = np.ones_like(most)  # of a tip that cannot move at all
     np.divide(stiffest, softest, out=anisotropy, where=most > 0.0)
     return {
         "softest": softest,
         "stiffest": stiffest,
         "anisotropy": anisotropy,
-        "softest_direction": _upright(vectors[..., 2]),
-        "stiffest_direction": _upright(vectors[..., 0]),
+        "softest_direction": _positive(vectors[..., 2]),
+        "stiffest_direction": _positive(vectors[..., 0]),
     }
 
 
-def _upright(directions: Array) -> Array:
-    """Of u and −u, which are the same, the one whose largest component is positive."""
+def _positive(directions: Array) -> Array:
+    """Of u and −u, which mean the same, the one whose largest component is positive."""
     largest = np.take_along_axis(directions, abs(directions).argmax(-1)[..., None], -1)
     return np.asarray(directions * np.sign(largest))

@@ -1,0 +1,185 @@
+"""The panel of the page: the sliders that set the arm, and the text about it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final, final
+
+import numpy as np
+
+from cdsm.manipulator import Manipulator
+from cdsm.plots.style import AXES
+from cdsm.support.validation import Array
+from cdsm.view.panel import page_text
+from cdsm.view.state import Setting, Shown
+
+if TYPE_CHECKING:
+    import viser
+
+    from cdsm.view.guard import Control
+
+_STEPS = 500
+"""A slider has this many steps at least: a browser shows some hundred pixels of it."""
+
+_TURN: Final = 2.0 * math.pi
+_LENGTHS = 10.0
+"""Range of a joint without limits: a turn each way, or so many lengths of the arm."""
+
+_IN_FOLDER: Final = 10
+"""Joints in one folder; only the first folder is open."""
+
+_ROUND = 1e-9
+"""Part of a step by which an end may miss a round number and still count as one."""
+
+
+@final
+@dataclass(frozen=True, kw_only=True)
+class Range:
+    """Ends, steps and first position of a slider, in the unit that the page shows.
+
+    Attributes:
+        label: Its name and unit.
+        low: Left end.
+        high: Right end.
+        step: Smallest move.
+        initial: Where it stands first.
+        unit: The unit shown, in SI: 1 ° is π/180 rad.
+    """
+
+    label: str
+    low: float
+    high: float
+    step: float
+    initial: float
+    unit: float = 1.0
+
+
+def slider_range(label: str, low: float, high: float, initial: float, unit: float = 1.0) -> Range:
+    """A slider between two values in SI: ends and steps are round numbers within them.
+
+    The value it begins with is kept to the bit, and is within the ends even if they are not.
+    """
+    low, high, initial = (value / unit for value in (low, high, initial))
+    if not high > low:
+        return Range(label=label, low=initial, high=initial, step=1.0, initial=initial, unit=unit)
+    step = 10.0 ** math.floor(math.log10((high - low) / _STEPS))
+    digits = max(0, round(-math.log10(step)))
+    # inwards: a value beyond a limit would be refused
+    low = round(math.ceil(low / step - _ROUND) * step, digits)
+    high = round(math.floor(high / step + _ROUND) * step, digits)
+    step = round(step, digits)
+    low, high = min(low, initial), max(high, initial)
+    return Range(label=label, low=low, high=high, step=step, initial=initial, unit=unit)
+
+
+def joint_ranges(arm: Manipulator, q: Array) -> tuple[Range, ...]:
+    """One slider per joint, within its limits: degrees, or mm where it slides."""
+    most = np.where(arm.slides, _LENGTHS * arm.length, _TURN)
+    low, high = np.maximum(arm.lower, -most), np.minimum(arm.upper, most)
+    units = [("mm", 1e-3) if slides else ("°", math.pi / 180.0) for slides in arm.slides]
+    return tuple(
+        slider_range(f"{name} [{symbol}]", low[i], high[i], float(q[i]), unit)
+        for i, (name, (symbol, unit)) in enumerate(zip(arm.joint_names, units, strict=True))
+    )
+
+
+@final
+@dataclass(frozen=True)
+class Slider:
+    """A slider on the page; its value is in SI."""
+
+    handle: viser.GuiSliderHandle[float]
+    range: Range
+
+    @property
+    def value(self) -> float:
+        """Where it stands, in SI."""
+        return float(self.handle.value) * self.range.unit
+
+    def set(self, value: float) -> None:
+        """Move it to a value in SI, or to the end that is next."""
+        ends = self.range
+        position = min(max(value / ends.unit, ends.low), ends.high)
+        self.handle.value = position  # type: ignore[misc]  # viser's setter hides from mypy
+
+
+class Controls:
+    """The panel of an arm in a viser server.
+
+    Args:
+        server: The server, whose panel is empty.
+        arm: The arm.
+        start: Where the sliders stand first.
+        limits: Right end of the slider of the lower bound, and both ends of those of the force [N].
+        changed: Called, from any thread, when a slider has moved.
+        admit: Called with each control that browsers may use.
+    """
+
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        arm: Manipulator,
+        start: Setting,
+        limits: tuple[float, float],
+        changed: Callable[[], None],
+        admit: Callable[[Control], None],
+    ) -> None:
+        self._gui, self._start, self._changed, self._admit = server.gui, start, changed, admit
+        self._text = server.gui.add_html("")
+        with server.gui.add_folder("Load"):
+            tension, force = limits
+            high = max(tension, start.minimum)
+            self._minimum = self._add(slider_range("least tension [N]", 0.0, high, start.minimum))
+            self._force = [
+                self._add(slider_range(f"force {axis} [N]", -force, force, f))
+                for axis, f in zip(AXES, start.force.tolist(), strict=True)
+            ]
+        self._joints = self._joint_folders(joint_ranges(arm, start.q))
+        straight = server.gui.add_button("Straight", hint="All joints as near zero as they go.")
+        straight.on_click(lambda _: _move(self._joints, np.zeros(arm.nv)))
+        reset = server.gui.add_button("Reset", hint="All sliders as they were at the beginning.")
+        reset.on_click(lambda _: self._reset())
+        for button in (straight, reset):
+            admit(button)
+
+    @property
+    def setting(self) -> Setting:
+        """Where the sliders stand now."""
+        return Setting(
+            q=np.array([joint.value for joint in self._joints]),
+            minimum=self._minimum.value,
+            maximum=self._start.maximum,
+            force=np.array([component.value for component in self._force]),
+            solver=self._start.solver,
+        )
+
+    def update(self, shown: Shown) -> None:
+        """Say what is shown."""
+        self._text.content = page_text(shown)
+
+    def _joint_folders(self, ranges: Sequence[Range]) -> list[Slider]:
+        sliders = []
+        for first in range(0, len(ranges), _IN_FOLDER):
+            group = ranges[first : first + _IN_FOLDER]
+            name = f"Joints {first + 1} to {first + len(group)}" if len(ranges) > 1 else "Joint"
+            with self._gui.add_folder(name, expand_by_default=first == 0):
+                sliders += [self._add(joint) for joint in group]
+        return sliders
+
+    def _add(self, ends: Range) -> Slider:
+        handle = self._gui.add_slider(ends.label, ends.low, ends.high, ends.step, ends.initial)
+        handle.on_update(lambda _: self._changed())
+        self._admit(handle)
+        return Slider(handle, ends)
+
+    def _reset(self) -> None:
+        _move(self._joints, self._start.q)
+        _move(self._force, self._start.force)
+        self._minimum.set(self._start.minimum)
+
+
+def _move(sliders: Sequence[Slider], values: Array) -> None:
+    for slider, value in zip(sliders, values.tolist(), strict=True):
+        slider.set(value)
