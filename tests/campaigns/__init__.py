@@ -1,0 +1,1 @@
+"""Long runs by hand, which pytest does not collect."""
