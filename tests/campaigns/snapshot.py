@@ -231,7 +231,9 @@ def laws() -> dict[str, Any]:
         "linear": cdsm.LinearElasticity(48e3),
         "wire": cdsm.LinearElasticity.of_wire(200e9, 1.2e-3),
         "strand": cdsm.presets.STRAND_1X19,
-        "jump": cdsm.StrandElasticity(((2e4, 30.0), (5e4,)), joins=(70.0,), low=0.0, high=900.0),
+        "kink": cdsm.StrandElasticity(
+            ((2e4, 30.0), (22100.0,)), joins=(70.0,), low=0.0, high=900.0
+        ),
         "table": cdsm.TabulatedElasticity(forces, tuple(F**0.8 / 2e4 for F in forces)),
         "own": Own(),
     }
