@@ -6,7 +6,7 @@ import textwrap
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from cdsm.support.markup import Markup, element, row
+from cdsm.support.markup import element, row
 
 _WIDTH = 100
 
@@ -73,7 +73,7 @@ def to_text(page: Page) -> str:
     return "\n".join(lines)
 
 
-def to_fragment(page: Page) -> Markup:
+def to_fragment(page: Page) -> str:
     """The page as HTML to be put into another."""
     parts = [element("p", page.verdict, class_="good" if page.good else "bad")]
     remarks = [element("li", remark, class_="fault") for remark in page.faults]
@@ -87,7 +87,7 @@ def to_fragment(page: Page) -> Markup:
             table = element("table", row("th", head), *(row("td", cells) for cells in body))
             parts.append(element("div", table, class_="wide"))
         parts += [element("p", line) for line in section.lines]
-    return element("section", element("h1", page.title), *parts)
+    return str(element("section", element("h1", page.title), *parts))
 
 
 def to_document(page: Page) -> str:

@@ -30,7 +30,7 @@ class Printed:
     """For what prints itself as a table: a notebook shows that, in columns that stay in line."""
 
     def _repr_html_(self) -> str:
-        return element("pre", str(self))
+        return str(element("pre", str(self)))
 
 
 class ReadOnlyState(Printed):
