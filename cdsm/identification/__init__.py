@@ -1,7 +1,7 @@
 """Parameters of an arm from stiffnesses measured on it."""
 
+from cdsm.identification.intervals import Profile
 from cdsm.identification.measurement import Measurement
-from cdsm.identification.profile import Profile
 from cdsm.identification.result import Identification
 from cdsm.identification.search import identify
 

@@ -12,8 +12,8 @@ from scipy.linalg import qr
 from scipy.special import ndtri, stdtrit
 
 from cdsm.errors import InvalidInput
+from cdsm.identification.intervals import NEGLIGIBLE, RANK_TOLERANCE, Profile, Side
 from cdsm.identification.measurement import Measurement, label
-from cdsm.identification.profile import LOWER, SAME, Profile, Side
 from cdsm.manipulator import Manipulator
 from cdsm.support.units import MODEL
 from cdsm.support.validation import (
@@ -33,16 +33,16 @@ if TYPE_CHECKING:
 class Identification(ReadOnlyState):
     """Parameters of an arm that explain its measurements best; made by :func:`identify`.
 
-    Of n measurements and P parameters. All arrays are read-only. "Own unit" of a parameter is the
-    one that the user's constructor takes it in: m, kg, N/m, …
+    Of n measurements and P parameters, each in the unit in which ``model_of`` takes it. All arrays
+    are read-only.
 
     Attributes:
-        names: Names of the parameters; their order is that of every (P,) array.
-        values: Their values (P,), in own units (m, kg, N/m, …).
-        bounds: Their bounds (P, 2), low and high, in own units (m, kg, N/m, …).
-        measurements: What was measured.
-        predicted: What the model says instead (n,) [N/m].
-        jacobian: J = ∂r/∂p (n, P), r in standard deviations [-], p in own units (m, kg, N/m, …).
+        names: Names of the parameters, in the order of every (P,) array.
+        values: Their values (P,) [m, kg, N/m, …].
+        bounds: Their bounds (P, 2), low and high [m, kg, N/m, …].
+        measurements: The measurements.
+        predicted: Stiffnesses of the model (n,) [N/m].
+        jacobian: J = ∂r/∂p (n, P) [1/m, m/N, …], r in standard deviations.
         arm: The model with these values.
         warnings: What not to trust, a sentence each, naming the parameters; empty if all is well.
         profiles: How χ² rises as each parameter leaves its value and the others follow, one
@@ -61,7 +61,7 @@ class Identification(ReadOnlyState):
 
     @property
     def parameters(self) -> dict[str, float]:
-        """The values by name, in own units (m, kg, N/m, …), as ``model_of`` takes them."""
+        """The values by name, as ``model_of`` takes them."""
         return dict(zip(self.names, self.values.tolist(), strict=True))
 
     @cached_property
@@ -97,11 +97,10 @@ class Identification(ReadOnlyState):
 
     @cached_property
     def covariance(self) -> Array:
-        """(JᵀJ)⁻¹ (P, P) in own units (m, kg, N/m, …), by the σ given and not scaled by χ².
+        """(JᵀJ)⁻¹ (P, P) [m², m kg, …], by the σ given and not scaled by χ².
 
-        Multiply by :attr:`reduced_chi_square` if only the ratios of the σ are known. It knows
-        nothing of the bounds. What the measurements do not determine has infinite variance: the
-        limit of an ever weaker determination.
+        Multiply by :attr:`reduced_chi_square` if only the ratios of the σ are known. The bounds
+        have no influence. Parameters that the measurements do not determine have infinite variance.
         """
         _, values, right = self._spectrum
         inner = right[self._kept].T / values[self._kept]
@@ -112,7 +111,7 @@ class Identification(ReadOnlyState):
 
     @cached_property
     def std(self) -> Array:
-        """Standard deviations of the parameters (P,) in own units (m, kg, N/m, …)."""
+        """Standard deviations of the parameters (P,) [m, kg, N/m, …]."""
         return frozen(np.sqrt(np.diag(self.covariance)))
 
     @cached_property
@@ -128,22 +127,22 @@ class Identification(ReadOnlyState):
     def confidence(
         self, level: float = 0.95, *, scaled: bool = False
     ) -> dict[str, tuple[float, float]]:
-        """Intervals that hold each true parameter with this probability, in own units (m, kg, …).
+        """Intervals that hold each true parameter with this probability [m, kg, N/m, …].
 
         By profile likelihood: the values p_i where the best fit with p_i held, the other parameters
         within their bounds, has Δχ² ≤ q², with q the quantile of a normal variable. For a linear
         model that is value ± q·std; else it need not be symmetric. An end is -inf or inf where Δχ²
-        stays below q² up to the parameter's own bound, or up to where the model ends: there the
-        measurements set no end, and :attr:`warnings` say so at 95 %.
+        stays below q² up to the bound of the parameter or the end of the model: the measurements
+        set no end there, and :attr:`warnings` say so at 95 %.
 
         Args:
             level: The probability, between 0 and 1.
-            scaled: Take the σ as known up to a common factor, which χ² tells: q is the quantile of
+            scaled: Take the σ as known up to a common factor, estimated by χ²: q is the quantile of
                 Student's t times √(reduced χ²).
 
         Raises:
             InvalidInput: The level is not between 0 and 1, or so near to 1 that the profiles do not
-                reach there, or ``scaled`` no flag.
+                reach there, or ``scaled`` is no flag.
         """
         level = scalar("level", level)
         if not 0.0 < level < 1.0:
@@ -227,14 +226,14 @@ class Identification(ReadOnlyState):
             exact.append(self._rise(0.95, scaled=True))
             far = max(far, self._rise(0.99, scaled=True))
         # of measurements without noise χ² is rounding, and what it scales
-        return sorted(rise for rise in exact if rise > LOWER), far
+        return sorted(rise for rise in exact if rise > NEGLIGIBLE), far
 
     @cached_property
     def _lengths(self) -> Array:
         """Lengths of the columns of J (P,), and 1 for a column of nothing."""
         lengths = np.linalg.norm(self.jacobian, axis=0)
         # over its whole range the parameter moves no residual by a millionth of its σ
-        nothing = lengths * np.ptp(self.bounds, axis=1) < SAME
+        nothing = lengths * np.ptp(self.bounds, axis=1) < RANK_TOLERANCE
         return np.where(nothing, math.inf, lengths)
 
     @cached_property
@@ -246,7 +245,7 @@ class Identification(ReadOnlyState):
     @cached_property
     def _kept(self) -> Any:
         values = self._spectrum[1]
-        return values > SAME * max(values[0], SAME)
+        return values > RANK_TOLERANCE * max(values[0], RANK_TOLERANCE)
 
     @cached_property
     def _loose(self) -> Array:

@@ -1,4 +1,4 @@
-"""Identification: the parameters of an arm from stiffnesses measured on it. scipy does the search.
+"""Identification of the parameters of an arm from stiffnesses measured on it.
 
     min Σ r_i²,   r_i = (K_i(p) − K_i) / σ_i,   low ≤ p ≤ high
 
@@ -6,7 +6,7 @@ with K_i measured, K_i(p) what the model with parameters p predicts by
 :meth:`~cdsm.Stiffness.along` or, for a force that is not small, by
 :func:`~cdsm.weight_test`, and σ_i the standard deviation of the measurement. The
 parameters are whatever a constructor of the user's own takes: dimensions, masses, springs, leads.
-What the measurements cannot tell apart is said by name in :attr:`Identification.warnings`.
+Parameters that the measurements cannot tell apart are named in :attr:`Identification.warnings`.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import least_squares
 
 from cdsm.errors import InvalidInput, UnknownName
-from cdsm.identification.doubts import doubts, unfinished
+from cdsm.identification.diagnosis import unfinished, warnings_of
+from cdsm.identification.intervals import LowerOptimumError, Profile, Profiler
+from cdsm.identification.least_squares import LeastSquares
 from cdsm.identification.measurement import Measurement
-from cdsm.identification.problem import NoStiffnessError, Problem, UserFaultError
-from cdsm.identification.profile import LowerError, Profile, Profiler
+from cdsm.identification.problem import StiffnessModel, UserFaultError
 from cdsm.identification.result import Identification
 from cdsm.manipulator import Manipulator
 from cdsm.support.validation import (
@@ -40,7 +40,13 @@ _ON_BOUND = 1e-9
 """A parameter this near to a bound, as part of their distance, is on it."""
 
 _CANDIDATES, _STARTS = 24, 3
-"""Points looked at over the bounds, and how many of the best of them a search starts from."""
+"""Points evaluated over the bounds, and how many of the best of them a search starts from."""
+
+_COARSE, _FINE = (1e-10,) * 3, (1e-14,) * 3
+"""ftol, xtol and gtol of the searches by one-sided and by central differences."""
+
+_EVALUATIONS = 200
+"""Most evaluations of a search, without those of the differences."""
 
 
 def identify(
@@ -77,7 +83,7 @@ def identify(
         model_of: Makes the arm from the free parameters, given by keyword.
         measurements: As many as there are parameters, or more.
         free: Bounds (low, high) of each parameter, in the unit that ``model_of`` takes it in.
-            Positive ones more than a factor of 100 apart are searched by the logarithm.
+            Positive ones a factor of 100 or more apart are searched by the logarithm.
         start: Where to start, one value for each parameter. If not given, the best of several
             searches spread over the bounds is taken, the same ones every time.
         tension_of: The tensions (C,) [N] or :class:`~cdsm.Tension` of a measurement, as
@@ -91,42 +97,43 @@ def identify(
         UnknownName: A parameter that ``model_of`` or ``tension_of`` does not take.
     """
     measurements = sequence_of("measurements", measurements, Measurement)
-    names, bounds = _checked_bounds(free)
-    if len(measurements) < len(names):
+    bounds = _checked_bounds(free)
+    if len(measurements) < len(bounds):
         raise InvalidInput(
             "measurements",
-            f"{len(measurements)} given for {len(names)} parameters, {', '.join(names)}; give at "
+            f"{len(measurements)} given for {len(bounds)} parameters, {', '.join(bounds)}; give at "
             "least as many, or free fewer parameters.",
         )
-    _check_call("model_of", model_of, 0, names)
+    _check_call("model_of", model_of, 0, tuple(bounds))
     if tension_of is not None:
-        _check_call("tension_of", tension_of, 2, names)
-    problem = Problem(model_of, tension_of, measurements, names, bounds)
+        _check_call("tension_of", tension_of, 2, tuple(bounds))
+    model = StiffnessModel(model_of, tension_of, measurements)
+    problem = LeastSquares(model.residuals, len(measurements), bounds)
     try:
         best = _optimum(problem, _starts(problem, start))
         while True:
             try:
-                return _result(problem, best)
-            except LowerError as lower:  # a profile has led to a deeper valley
+                return _result(model, problem, best)
+            except LowerOptimumError as lower:  # a profile has led to a deeper valley
                 best = min(_optimum(problem, [lower.point]), lower.point, key=problem.cost)
     except UserFaultError as fault:
         raise InvalidInput(
             fault.name,
-            f"fails at {fault.given}: {fault.__cause__!r}. Mend it, narrow the bounds, or let it "
+            f"fails at {fault.at}: {fault.__cause__!r}. Mend it, narrow the bounds, or let it "
             "raise a CdsmError where there is no such arm.",
         ) from fault.__cause__
 
 
-def _checked_bounds(free: Mapping[str, tuple[float, float]]) -> tuple[tuple[str, ...], Array]:
+def _checked_bounds(free: Mapping[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
     if not isinstance(free, Mapping) or not free:
         raise InvalidInput(
             "free", f"{free!r} given; give {{name: (low, high)}} for at least one parameter."
         )
-    rows = []
+    bounds = {}
     for name, limits in free.items():
         if not isinstance(name, str):
             raise InvalidInput("free", f"{name!r} is no name of a parameter.")
-        low, high = vector(f"free[{name!r}]", limits, 2, "the bounds (low, high)")
+        low, high = vector(f"free[{name!r}]", limits, 2, "the bounds (low, high)").tolist()
         # closer together, rounding would drown the differences the search lives on
         if not high - low > 1e-9 * max(abs(low), abs(high)):
             raise InvalidInput(
@@ -134,8 +141,8 @@ def _checked_bounds(free: Mapping[str, tuple[float, float]]) -> tuple[tuple[str,
                 f"low = {low:g}, high = {high:g} given; low must be below high. What is known "
                 "belongs into model_of.",
             )
-        rows.append((low, high))
-    return tuple(free), np.array(rows)
+        bounds[name] = (low, high)
+    return bounds
 
 
 def _check_call(name: str, function: object, positional: int, names: Sequence[str]) -> None:
@@ -165,7 +172,7 @@ def _check_call(name: str, function: object, positional: int, names: Sequence[st
         ) from None
 
 
-def _starts(problem: Problem, start: Mapping[str, float] | None) -> list[Array]:
+def _starts(problem: LeastSquares, start: Mapping[str, float] | None) -> list[Array]:
     """Points of the unit cube to search from, at each of which the model has its stiffnesses."""
     count = len(problem.names)
     if start is None:
@@ -181,19 +188,17 @@ def _starts(problem: Problem, start: Mapping[str, float] | None) -> list[Array]:
     usable = [point for point in points if math.isfinite(problem.cost(point))]
     if usable:
         return sorted(usable, key=problem.cost)[:_STARTS]
-    try:
-        problem.predict(points[0])
-    except NoStiffnessError as error:
-        where = f"none of {len(points)} starts gives" if start is None else "does not give"
-        raise InvalidInput(
-            "free" if start is None else "start",
-            f"{where} every measurement a stable stiffness. At {problem.written(points[0])}, "
-            f"{error} Mend that, narrow the bounds, or give another start.",
-        ) from error.__cause__
-    raise AssertionError("a point without residuals has a reason")  # pragma: no cover
+    failure = problem.failure(points[0])
+    assert failure is not None
+    where = f"none of {len(points)} starts gives" if start is None else "does not give"
+    raise InvalidInput(
+        "free" if start is None else "start",
+        f"{where} every measurement a stable stiffness. At {problem.describe(points[0])}, "
+        f"{failure} Mend that, narrow the bounds, or give another start.",
+    ) from failure.__cause__
 
 
-def _checked_start(problem: Problem, start: Mapping[str, float]) -> Array:
+def _checked_start(problem: LeastSquares, start: Mapping[str, float]) -> Array:
     if not isinstance(start, Mapping) or set(start) != set(problem.names):
         raise InvalidInput(
             "start", f"{start!r} given; one value for each of {', '.join(problem.names)} is needed."
@@ -209,72 +214,49 @@ def _checked_start(problem: Problem, start: Mapping[str, float]) -> Array:
     return values
 
 
-def _optimum(problem: Problem, starts: Sequence[Array]) -> Array:
-    # trf finds its way from afar; dogbox then goes exactly onto a bound, which trf only nears
-    found = [_search(problem, point, "trf", problem.slopes, 1e-10) for point in starts]
+def _optimum(problem: LeastSquares, starts: Sequence[Array]) -> Array:
+    found = [
+        problem.search(point, method="trf", tolerances=_COARSE, most=_EVALUATIONS)
+        for point in starts
+    ]
     best = min(found, key=problem.cost)
-    best = min(
-        _search(problem, best, "dogbox", problem.central_slopes, 1e-14), best, key=problem.cost
-    )
+    finer = problem.search(best, method="dogbox", tolerances=_FINE, most=_EVALUATIONS, central=True)
+    best = min(finer, best, key=problem.cost)
     # rounding may leave it beside the bound it is on
     on_bound = np.where(best < _ON_BOUND, 0.0, np.where(best > 1.0 - _ON_BOUND, 1.0, best))
     return on_bound if math.isfinite(problem.cost(on_bound)) else best
 
 
-def _search(
-    problem: Problem,
-    point: Array,
-    method: str,
-    slopes: Callable[[Array], Array],
-    tolerance: float,
-) -> Array:
-    found = least_squares(
-        problem.residuals,
-        point,
-        slopes,
-        bounds=(0.0, 1.0),
-        method=method,
-        x_scale="jac",
-        ftol=tolerance,
-        xtol=tolerance,
-        gtol=tolerance,
-        max_nfev=200,
-    )
-    return np.asarray(found.x, dtype=np.float64)
-
-
-def _result(problem: Problem, best: Array) -> Identification:
-    arm, predicted = problem.predict(best)
-    slopes = problem.central_slopes(best)
+def _result(model: StiffnessModel, problem: LeastSquares, best: Array) -> Identification:
+    values = problem.parameters(best)
+    arm, predicted = model.predict(values)
+    jacobian = problem.jacobian(best, central=True)
     result = Identification(
         names=problem.names,
-        values=frozen(problem.box.parameters(best)),
+        values=frozen(np.array(list(values.values()))),
         bounds=frozen(problem.box.bounds),
-        measurements=problem.measurements,
+        measurements=model.measurements,
         predicted=frozen(predicted),
-        jacobian=frozen(slopes / problem.box.stretch(best)),
+        jacobian=frozen(jacobian / problem.box.derivative(best)),
         arm=arm,
         warnings=(),
         profiles=(),
     )
-    result = replace(result, profiles=_profiles(problem, best, slopes, result))
-    return replace(result, warnings=(*doubts(result), *unfinished(problem, best, slopes)))
+    result = replace(result, profiles=_profiles(problem, best, jacobian, result))
+    return replace(result, warnings=(*warnings_of(result), *unfinished(problem, best, jacobian)))
 
 
 def _profiles(
-    problem: Problem, best: Array, slopes: Array, result: Identification
+    problem: LeastSquares, best: Array, jacobian: Array, result: Identification
 ) -> tuple[Profile | None, ...]:
-    """The profile of each parameter that is determined.
-
-    Raises:
-        LowerError: One leads below the optimum.
-    """
+    """The profile of each parameter that is determined."""
     follow = [i for i in range(best.size) if i not in result._leading]
     profiles: list[Profile | None] = []
     for i in range(best.size):
+        if not math.isfinite(result.std[i]):
+            profiles.append(None)
+            continue
         others = [j for j in follow if j != i]
-        known = math.isfinite(result.std[i])
-        profiles.append(
-            Profiler(problem, best, slopes, i, others, *result._goals).profile() if known else None
-        )
+        profiler = Profiler(problem, best, jacobian, i, others, *result._goals)
+        profiles.append(profiler.profile())
     return tuple(profiles)

@@ -19,6 +19,7 @@ from scipy.optimize import least_squares
 from cdsm import presets
 from cdsm.elasticity import LinearElasticity
 from cdsm.errors import CdsmError, InvalidInput, SingularStiffness
+from cdsm.identification.least_squares import LeastSquares, NoModelError
 from cdsm.manipulator import Manipulator
 from cdsm.paper.section_v import (
     CHECK,
@@ -415,49 +416,40 @@ def identify_prototype(step: Step) -> PrototypeFit:
         InvalidInput: A start out of bounds, or an arm there that cannot hold itself.
     """
     bounds = {name: BOUNDS[name] for name in step.free}
-    low, high = np.array([_scaled(name, limits) for name, limits in bounds.items()]).T
 
-    def prototype(point: Array) -> Prototype:
-        values = dict(zip(bounds, (low + point * (high - low)).tolist(), strict=True))
-        if _DECADES in values:
-            values[_DECADES] = math.exp(values[_DECADES])
-        return replace(step.start, **values)
-
-    def residuals(point: Array) -> Array:
+    def residuals(values: dict[str, float]) -> Array:
         try:
-            return prototype(point).predict(step.table_alone).residuals(step.table)
-        except CdsmError:  # no such arm: the search steps back from infinite residuals
-            return np.full(len(step.numbers), math.inf)
+            return replace(step.start, **values).predict(step.table_alone).residuals(step.table)
+        except CdsmError as error:
+            raise NoModelError(str(error)) from error
 
-    given = np.array([_scaled(name, getattr(step.start, name)) for name in bounds])
-    point = (given - low) / (high - low)
-    if not ((point > 0.0) & (point < 1.0)).all():
+    problem = LeastSquares(residuals, len(step.numbers), bounds)
+    start = np.array([getattr(step.start, name) for name in bounds])
+    if not ((problem.box.low < start) & (start < problem.box.high)).all():
         raise InvalidInput("start", f"{step.start} is not within {bounds}.")
-    if not np.isfinite(residuals(point)).all():
+    point = problem.box.point(start)
+    if problem.failure(point) is not None:
         raise InvalidInput("start", f"{step.start} cannot hold itself. Start elsewhere.")
-    found = least_squares(
-        residuals, point, bounds=(0.0, 1.0), diff_step=1e-5, ftol=1e-6, xtol=1e-5, max_nfev=60
-    )
-    best = prototype(found.x)
-    predicted = best.predict(step.table_alone)
-    at_bound = (found.x < _NEAR) | (found.x > 1.0 - _NEAR)
+    # with differences this coarse the search passes over the rounding of the weight tests
+    point = least_squares(
+        problem.residuals,
+        point,
+        bounds=(0.0, 1.0),
+        diff_step=1e-5,
+        ftol=1e-6,
+        xtol=1e-5,
+        max_nfev=60,
+    ).x
+    prototype = replace(step.start, **problem.parameters(point))
+    predicted = prototype.predict(step.table_alone)
+    at_bound = (point < _NEAR) | (point > 1.0 - _NEAR)
     return PrototypeFit(
         step=step,
-        prototype=best,
+        prototype=prototype,
         predicted=predicted,
         residuals=frozen(predicted.residuals(step.table)),
         at_bound=tuple(name for name, on in zip(bounds, at_bound, strict=True) if on),
     )
-
-
-_DECADES = "drive_stiffness"
-"""The parameter whose bounds are decades apart: it is searched by its logarithm."""
-
-
-def _scaled(name: str, value: ArrayLike) -> Array:
-    """A parameter, or its bounds, as it is searched."""
-    values = np.asarray(value, dtype=np.float64)
-    return np.asarray(np.log(values)) if name == _DECADES else values
 
 
 _NEAR = 0.02

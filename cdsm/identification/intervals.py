@@ -1,4 +1,6 @@
-"""Profiles: how χ² rises as one parameter leaves its best value and the others follow.
+"""Confidence intervals by profile likelihood.
+
+The profile of a parameter is how χ² rises as it leaves its best value and the others follow:
 
     Δχ²(p_i) = min over the other parameters of χ² − least χ²
 
@@ -16,21 +18,20 @@ from typing import Literal, NamedTuple, final
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import brentq, least_squares
+from scipy.optimize import brentq
 
 from cdsm.errors import InvalidInput
-from cdsm.identification.box import Box
-from cdsm.identification.problem import NoStiffnessError, Problem
+from cdsm.identification.least_squares import Box, LeastSquares
 from cdsm.support.validation import Array, ReadOnlyState, frozen
 
-SAME = 1e-6
+RANK_TOLERANCE = 1e-6
 """Smallest singular value of the Jacobian, columns of unit length, that counts for the rank.
 
 The central differences behind it leave some 1e-10.
 """
 
-LOWER = 1e-3
-"""Fall of χ² that a search may leave to be had; 1 would be one standard deviation."""
+NEGLIGIBLE = 1e-3
+"""Difference of χ² that does not matter; 1 would be one standard deviation."""
 
 Side = Literal[-1, 1]
 
@@ -43,8 +44,11 @@ _HALVINGS = 8
 _NEAR, _REFINEMENTS = 0.25, 4
 """How near to a goal a knot must be, as part of it, and how many more knots to spend on that."""
 
+_TOLERANCES = (1e-4, 1e-6, 1e-8)
+"""ftol, xtol and gtol of the fit at a knot: the cubic between knots is no more exact."""
 
-class LowerError(Exception):
+
+class LowerOptimumError(Exception):
     """χ² is lower at this point than at what was taken for the optimum."""
 
     def __init__(self, point: Array) -> None:
@@ -57,13 +61,13 @@ class Profile(ReadOnlyState):
     """χ² of the best fit with one parameter held, over the value it is held at.
 
     Attributes:
-        values: Values of the parameter (n,), rising, in own units (m, kg, N/m, …).
+        values: Values of the parameter (n,) [m, N/m, …], rising, in the unit of ``model_of``.
         rise: Δχ² (n,) [-]: least χ² with the parameter held there, less the least of all.
-        slope: Derivative of Δχ² by the value (n,), in [-] per own unit.
+        slope: Derivative of Δχ² by the value (n,) [1/m, m/N, …].
         best: Which of the values is the optimum.
         ends: Why it goes no farther down and up: ``""`` as no interval needs more of it,
             ``"bound"``, or what the model says where it ends.
-        bounds: Of the parameter (2,), in own units (m, kg, N/m, …).
+        bounds: Bounds of the parameter (2,) [m, N/m, …].
     """
 
     values: Array
@@ -74,11 +78,11 @@ class Profile(ReadOnlyState):
     bounds: Array
 
     def crossing(self, rise: float, side: Side) -> float | None:
-        """The farthest value to one side, in own units, where Δχ² is no more than this.
+        """The farthest value to one side where Δχ² is no more than ``rise``.
 
-        Between the values that were looked at Δχ² is a cubic in what the search moves: the value,
-        or its logarithm. It is infinite where Δχ² stays below up to the bound or the model's end.
-        It is None where the profile was not followed that far.
+        Between the values Δχ² is a cubic over the parameter as it is searched, by itself or by its
+        logarithm. The crossing is infinite where Δχ² stays below up to the bound or the end of the
+        model, and None where the profile was not followed that far.
         """
         outward = slice(self.best, None, side)
         values, height = self.values[outward], self.rise[outward]
@@ -87,19 +91,19 @@ class Profile(ReadOnlyState):
             return side * math.inf if self.ends[side > 0] else None
         box, pair = Box(self.bounds[None, :]), slice(last, last + 2)
         u = box.point(values[pair])
-        slope = self.slope[outward][pair] * box.stretch(u)
-        return float(box.parameters(np.array([_crossing(u, height[pair], slope, rise)]))[0])
+        slope = self.slope[outward][pair] * box.derivative(u)
+        return float(box.parameters(np.array([_cubic_crossing(u, height[pair], slope, rise)]))[0])
 
 
-def _crossing(u: ArrayLike, height: ArrayLike, slope: ArrayLike, rise: float) -> float:
-    """Where a cubic of two heights and slopes at two places reaches a rise between the two."""
+def _cubic_crossing(u: ArrayLike, height: ArrayLike, slope: ArrayLike, rise: float) -> float:
+    """Where the cubic with these heights and slopes at two places reaches a rise between them."""
     (start, end), (low, high) = np.asarray(u), np.asarray(height)
     first, last = (end - start) * np.asarray(slope)
 
     def above(t: float) -> float:
-        way = t * t * (3.0 - 2.0 * t)
+        chord = t * t * (3.0 - 2.0 * t)
         bend = t * (1.0 - t) * ((1.0 - t) * first - t * last)
-        return float(low - rise + way * (high - low) + bend)
+        return float(low - rise + chord * (high - low) + bend)
 
     return float(start + brentq(above, 0.0, 1.0, xtol=1e-12) * (end - start))
 
@@ -112,7 +116,7 @@ class _Knot(NamedTuple):
         rise: Δχ² there [-].
         slope: Its derivative by the coordinate of the parameter.
         curvature: Its second derivative, by Gauss and Newton.
-        tangent: How the point moves with that coordinate (P,).
+        tangent: Derivative of the point by that coordinate (P,).
     """
 
     point: Array
@@ -123,12 +127,12 @@ class _Knot(NamedTuple):
 
 
 class Profiler:
-    """Follows the profile of one parameter from the optimum.
+    """Follows the profile of parameter ``i`` from the optimum.
 
     Args:
         problem: What was searched.
         best: The optimum (P,), in the unit cube.
-        slopes: ∂r/∂point there (n, P).
+        jacobian: ∂r/∂point there (n, P).
         i: The parameter.
         others: Those that follow it.
         exact: Values of Δχ² that it is exact at, rising.
@@ -137,9 +141,9 @@ class Profiler:
 
     def __init__(
         self,
-        problem: Problem,
+        problem: LeastSquares,
         best: Array,
-        slopes: Array,
+        jacobian: Array,
         i: int,
         others: Sequence[int],
         exact: Sequence[float],
@@ -150,13 +154,13 @@ class Profiler:
         self._i = i
         self._others = list(others)
         self._exact, self._far = exact, far
-        self._start = self._knot(best, slopes[:, i], slopes[:, self._others])
+        self._start = self._knot(best, jacobian[:, i], jacobian[:, self._others])
 
     def profile(self) -> Profile:
         """The profile to both sides.
 
         Raises:
-            LowerError: It leads below the optimum.
+            LowerOptimumError: It leads below the optimum.
         """
         (down, first), (up, last) = self._follow(-1), self._follow(1)
         knots = [*reversed(down), *up[1:]]
@@ -164,7 +168,7 @@ class Profiler:
         return Profile(
             values=frozen(box.parameters(u)),
             rise=frozen(np.array([knot.rise for knot in knots])),
-            slope=frozen(np.array([knot.slope for knot in knots]) / box.stretch(u)),
+            slope=frozen(np.array([knot.slope for knot in knots]) / box.derivative(u)),
             best=len(down) - 1,
             ends=(first, last),
             bounds=frozen(box.bounds[0].copy()),
@@ -175,10 +179,10 @@ class Profiler:
         knots = [self._start]
         for goal in (*self._exact, self._far):
             while knots[-1].rise < goal:
-                there = self._next(knots[-1], side, goal)
-                if isinstance(there, str):
-                    return knots, there
-                knots.append(there)
+                knot = self._next(knots[-1], side, goal)
+                if isinstance(knot, str):
+                    return knots, knot
+                knots.append(knot)
             if goal < self._far:
                 self._refine(knots, goal)
         return knots, ""
@@ -189,15 +193,16 @@ class Profiler:
         room = 1.0 - u if side > 0 else u
         if room == 0.0:
             return "bound"
+        # the root of the parabola through slope and curvature, a little beyond the goal
         need, slope = 1.05 * goal - here.rise, side * here.slope
         rate = slope + math.sqrt(max(slope**2 + 2.0 * here.curvature * need, 0.0))
         step = min(2.0 * need / rate if rate > 0.0 else math.inf, _LONGEST, room)
         for _ in range(_HALVINGS):
-            there = self._moved(here, side * step)
-            if isinstance(there, _Knot):
+            knot = self._moved(here, side * step)
+            if isinstance(knot, _Knot):
                 break
             step /= 2.0
-        return there
+        return knot
 
     def _refine(self, knots: list[_Knot], goal: float) -> None:
         """Add knots until one is so near to a goal that the cubic beside it is exact enough."""
@@ -208,56 +213,38 @@ class Profiler:
             if abs(near.rise - goal) < _NEAR * goal:
                 return
             u = [float(knot.point[self._i]) for knot in pair]
-            place = _crossing(u, [k.rise for k in pair], [k.slope for k in pair], goal)
+            place = _cubic_crossing(u, [k.rise for k in pair], [k.slope for k in pair], goal)
             between = self._moved(near, place - float(near.point[self._i]))
             if isinstance(between, str):  # a hole in the model
                 return
             knots.insert(last + 1, between)
 
     def _moved(self, here: _Knot, step: float) -> _Knot | str:
-        """The knot a step further on, or why the model has none there."""
-        problem, others, i = self._problem, self._others, self._i
+        """The knot a step farther along the tangent, or why the model has none there."""
+        problem, others = self._problem, self._others
         point = np.clip(here.point + step * here.tangent, 0.0, 1.0)
-
-        def at(x: Array) -> Array:
-            moved = point.copy()
-            moved[others] = x
-            return moved
-
-        if not math.isfinite(problem.cost(point)):
-            try:
-                problem.predict(point)
-            except NoStiffnessError as error:
-                return str(error)
+        if (failure := problem.failure(point)) is not None:
+            return str(failure)
         try:
-            beside = np.empty((len(problem.measurements), 0))
+            beside = np.empty((problem.count, 0))
             if others:
-                found = least_squares(
-                    lambda x: problem.residuals(at(x)),
-                    point[others],
-                    lambda x: problem.slopes(at(x), others),
-                    bounds=(0.0, 1.0),
-                    method="dogbox",  # it goes exactly onto a bound
-                    x_scale="jac",
-                    ftol=1e-4,
-                    xtol=1e-6,
-                    gtol=1e-8,
-                    max_nfev=50,
+                point = problem.search(
+                    point, method="dogbox", tolerances=_TOLERANCES, most=50, over=others
                 )
-                point, beside = at(found.x), found.jac
-            along = problem.slopes(point, [i])[:, 0]
+                beside = problem.jacobian(point, others)
+            along = problem.jacobian(point, [self._i])[:, 0]
         except InvalidInput as error:
             return str(error)
         knot = self._knot(point, along, beside)
-        if knot.rise < -LOWER:
-            raise LowerError(point)
+        if knot.rise < -NEGLIGIBLE:
+            raise LowerOptimumError(point)
         return knot
 
     def _knot(self, point: Array, along: Array, beside: Array) -> _Knot:
         r = self._problem.residuals(point)
         x = point[self._others]
         free = (x > 0.0) & (x < 1.0)
-        follow = np.linalg.lstsq(beside[:, free], -along, rcond=SAME)[0]
+        follow = np.linalg.lstsq(beside[:, free], -along, rcond=RANK_TOLERANCE)[0]
         across = along + beside[:, free] @ follow
         tangent = np.zeros_like(point)
         tangent[self._i] = 1.0

@@ -1,4 +1,4 @@
-"""What not to trust in an identification, in sentences."""
+"""Warnings: what not to trust in an identification."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ import math
 import numpy as np
 from scipy.special import chdtrc
 
-from cdsm.identification.problem import NoStiffnessError, Problem
-from cdsm.identification.profile import LOWER, SAME
+from cdsm.identification.intervals import NEGLIGIBLE, RANK_TOLERANCE
+from cdsm.identification.least_squares import LeastSquares
 from cdsm.identification.result import Identification
 from cdsm.support.validation import Array
 
@@ -16,11 +16,11 @@ _CORRELATED = 0.95
 """Correlation of two parameters beyond which a warning names them."""
 
 _UNLIKELY = 1e-3
-"""Probability of the χ² found, below which the model does not explain the measurements."""
+"""Probability of a χ² as large, below which the model does not explain the measurements."""
 
 
-def doubts(result: Identification) -> list[str]:
-    """What not to trust in a result."""
+def warnings_of(result: Identification) -> list[str]:
+    """A sentence for each reason not to trust a result."""
     sentences = [
         f"not identifiable (rank {result.rank} of {len(result.names)}): no prediction changes with "
         f"{combination}, so their values are one choice of many. Fix one, or measure what tells "
@@ -37,7 +37,7 @@ def doubts(result: Identification) -> list[str]:
                     "directions or tensions."
                 )
     for i in range(len(result.names)):
-        sentences += _at_bound(result, i) + _open(result, i)
+        sentences += _at_bound(result, i) + _open_ends(result, i)
     if result.freedom and chdtrc(result.freedom, result.chi_square) < _UNLIKELY:
         worst = int(abs(result.residuals).argmax())
         sentences.append(
@@ -60,7 +60,7 @@ def _at_bound(result: Identification, i: int) -> list[str]:
     ]
 
 
-def _open(result: Identification, i: int) -> list[str]:
+def _open_ends(result: Identification, i: int) -> list[str]:
     """Say so if the measurements set no end to an interval."""
     name, profile, limits = result.names[i], result.profiles[i], result.bounds[i]
     interval = result.confidence()[name]
@@ -86,26 +86,25 @@ def _open(result: Identification, i: int) -> list[str]:
     return sentences
 
 
-def unfinished(problem: Problem, point: Array, slopes: Array) -> list[str]:
+def unfinished(problem: LeastSquares, point: Array, jacobian: Array) -> list[str]:
     """Say so if χ² could fall further, as where the model ends on the way to the optimum."""
     r = problem.residuals(point)
-    gradient = r @ slopes
+    gradient = r @ jacobian
     held = ((point == 0.0) & (gradient >= 0.0)) | ((point == 1.0) & (gradient <= 0.0))
     if held.all():
         return []
     step = np.zeros_like(point)
-    step[~held] = np.linalg.lstsq(slopes[:, ~held], -r, rcond=SAME)[0]
-    fall = float(np.sum((slopes @ step) ** 2))
-    if fall < LOWER:
+    step[~held] = np.linalg.lstsq(jacobian[:, ~held], -r, rcond=RANK_TOLERANCE)[0]
+    fall = float(np.sum((jacobian @ step) ** 2))
+    if fall < NEGLIGIBLE:
         return []
-    reason = "Give another start."
-    # the edge of the model is near if the search stopped for it
-    try:
-        size = 1e-3 / max(1e-3, float(abs(step).max()))
-        problem.predict(np.clip(point + size * step, 0.0, 1.0))
-    except NoStiffnessError as error:
-        reason = f"It lies beyond the edge of the model: {error}"
+    # if the search stopped at the end of the model, that is near
+    size = 1e-3 / max(1e-3, float(abs(step).max()))
+    failure = problem.failure(np.clip(point + size * step, 0.0, 1.0))
+    reason = (
+        f"It lies beyond the edge of the model: {failure}" if failure else "Give another start."
+    )
     return [
         f"no optimum within the bounds: χ² would still fall by about {fall:.3g} on the way from "
-        f"{problem.written(point)}. {reason}"
+        f"{problem.describe(point)}. {reason}"
     ]

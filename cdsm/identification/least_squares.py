@@ -1,0 +1,204 @@
+"""Least squares between bounds, for a model that does not exist everywhere.
+
+    min Σ r_i(p)²   so that   low ≤ p ≤ high
+
+Each parameter is scaled to 0…1 between its bounds, so that the search runs over a unit cube. Where
+the model has no residuals they are infinite, and scipy's search shortens its step.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from functools import lru_cache
+from typing import Literal
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from cdsm.errors import InvalidInput
+from cdsm.support.validation import Array
+
+_DECADES = 100.0
+"""Ratio of positive bounds from which on a parameter is scaled by its logarithm."""
+
+_ONE_SIDED, _CENTRAL = 1e-7, 1e-5
+"""Steps of the differences in the unit cube: each balances rounding and truncation."""
+
+_CACHED = 64
+"""Points whose residuals are kept: a search returns to a point after the differences around it."""
+
+
+class NoModelError(Exception):
+    """The model has no residuals at these parameters. Its text says why."""
+
+
+class Box:
+    """Bounds (P, 2) of the parameters, and the map from the unit cube to them."""
+
+    def __init__(self, bounds: Array) -> None:
+        self.bounds = bounds
+        self.low, self.high = bounds.T
+        self._by_log = (self.low > 0.0) & (self.high >= _DECADES * self.low)
+        self._start = self._scaled(self.low)
+        self._size = self._scaled(self.high) - self._start
+
+    def _scaled(self, values: Array) -> Array:
+        """The parameters, or their logarithms, as they are searched."""
+        return np.where(self._by_log, np.log(np.where(self._by_log, values, 1.0)), values)
+
+    def parameters(self, point: Array) -> Array:
+        """Parameters (P,) at a point of the unit cube."""
+        scaled = self._start + point * self._size
+        values = np.where(self._by_log, np.exp(np.where(self._by_log, scaled, 0.0)), scaled)
+        # exactly the bounds at 0 and 1
+        values = np.where(point == 1.0, self.high, np.where(point == 0.0, self.low, values))
+        return np.asarray(np.clip(values, self.low, self.high), dtype=np.float64)
+
+    def point(self, values: Array) -> Array:
+        """Inverse of :meth:`parameters`."""
+        return np.asarray(np.clip((self._scaled(values) - self._start) / self._size, 0.0, 1.0))
+
+    def derivative(self, point: Array) -> Array:
+        """Derivative of :meth:`parameters` (P,)."""
+        return np.where(self._by_log, self.parameters(point) * self._size, self._size)
+
+    def only(self, i: int) -> Box:
+        """The box of one parameter. Its maps take any number of values."""
+        return Box(self.bounds[i : i + 1])
+
+
+class LeastSquares:
+    """min Σ r² over the unit cube.
+
+    Args:
+        residuals_of: Residuals r (n,) from the parameters by name; raises :class:`NoModelError`.
+        count: n.
+        bounds: (low, high) of each parameter.
+    """
+
+    def __init__(
+        self,
+        residuals_of: Callable[[dict[str, float]], Array],
+        count: int,
+        bounds: Mapping[str, tuple[float, float]],
+    ) -> None:
+        self.names = tuple(bounds)
+        self.box = Box(np.array(list(bounds.values()), dtype=np.float64))
+        self.count = count
+        self._residuals_of = residuals_of
+        self._cached = lru_cache(maxsize=_CACHED)(self._evaluate)
+
+    def parameters(self, point: Array) -> dict[str, float]:
+        """Parameters by name at a point of the unit cube."""
+        return dict(zip(self.names, self.box.parameters(point).tolist(), strict=True))
+
+    def describe(self, point: Array) -> str:
+        """The parameters at a point, for a sentence."""
+        return ", ".join(f"{name} = {x:.6g}" for name, x in self.parameters(point).items())
+
+    def residuals(self, point: Array) -> Array:
+        """Residuals r (n,); inf where the model has none."""
+        return self._cached(point.tobytes()).copy()
+
+    def _evaluate(self, point: bytes) -> Array:
+        try:
+            return self._residuals_of(self.parameters(np.frombuffer(point)))
+        except NoModelError:
+            return np.full(self.count, math.inf)
+
+    def failure(self, point: Array) -> NoModelError | None:
+        """Why the model has no residuals at a point, or None."""
+        if math.isfinite(self.cost(point)):
+            return None
+        try:
+            self._residuals_of(self.parameters(point))
+        except NoModelError as error:
+            return error
+        return None
+
+    def cost(self, point: Array) -> float:
+        """Σ r²."""
+        r = self.residuals(point)
+        return float(r @ r)
+
+    def jacobian(
+        self, point: Array, over: Sequence[int] | None = None, *, central: bool = False
+    ) -> Array:
+        """∂r/∂point (n, P) by one-sided or central differences; of some parameters, if given.
+
+        Beside a bound or an end of the model central differences are one-sided of second order.
+        """
+        chosen = range(len(self.names)) if over is None else over
+        return np.column_stack([self._column(point, i, central) for i in chosen])
+
+    def _column(self, point: Array, i: int, central: bool) -> Array:
+        here, step = self.residuals(point), _CENTRAL if central else _ONE_SIDED
+
+        def at(k: int) -> Array | None:
+            """Residuals k steps away, or None beyond the bounds or the model."""
+            moved = point.copy()
+            moved[i] += k * step
+            if not 0.0 <= moved[i] <= 1.0:
+                return None
+            r = self.residuals(moved)
+            return r if np.isfinite(r).all() else None
+
+        for side in (1, -1):
+            near = at(side)
+            if near is None:
+                continue
+            if not central:
+                return side * (near - here) / step
+            if (far := at(-side)) is not None:
+                return side * (near - far) / (2.0 * step)
+            if (far := at(2 * side)) is not None:
+                return side * (4.0 * near - far - 3.0 * here) / (2.0 * step)
+        raise InvalidInput(
+            "free",
+            f"at {self.describe(point)} the model has a stiffness for all measurements, "
+            f"but beside it, in {self.names[i]}, it has none either way. Change the bounds.",
+        )
+
+    def search(
+        self,
+        start: Array,
+        *,
+        method: Literal["trf", "dogbox"],
+        tolerances: tuple[float, float, float],
+        most: int,
+        over: Sequence[int] | None = None,
+        central: bool = False,
+    ) -> Array:
+        """Point of the unit cube where a search ends.
+
+        Args:
+            start: Where to begin.
+            method: ``trf`` finds its way from far. ``dogbox`` goes exactly onto a bound, which
+                ``trf`` only approaches.
+            tolerances: scipy's ftol, xtol and gtol.
+            most: Most evaluations, without those of the differences.
+            over: Parameters that move.
+            central: Whether the differences are.
+        """
+        ftol, xtol, gtol = tolerances
+        moving = list(range(start.size)) if over is None else list(over)
+
+        def at(x: Array) -> Array:
+            point = start.copy()
+            point[moving] = x
+            return point
+
+        found = least_squares(
+            lambda x: self.residuals(at(x)),
+            start[moving],
+            lambda x: self.jacobian(at(x), moving, central=central),
+            bounds=(0.0, 1.0),
+            method=method,
+            x_scale="jac",
+            ftol=ftol,
+            xtol=xtol,
+            gtol=gtol,
+            max_nfev=most,
+        )
+        return at(found.x)
