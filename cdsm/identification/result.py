@@ -93,7 +93,7 @@ class Identification(ReadOnlyState):
     @property
     def rank(self) -> int:
         """How many combinations of the parameters the measurements determine, at most P."""
-        return int(self._kept.sum())
+        return int(self._determined.sum())
 
     @cached_property
     def covariance(self) -> Array:
@@ -102,11 +102,11 @@ class Identification(ReadOnlyState):
         Multiply by :attr:`reduced_chi_square` if only the ratios of the σ are known. The bounds
         have no influence. Parameters that the measurements do not determine have infinite variance.
         """
-        _, values, right = self._spectrum
-        inner = right[self._kept].T / values[self._kept]
-        covariance = inner @ inner.T / np.outer(self._lengths, self._lengths)
-        loose = self._loose
-        covariance[loose != 0.0] = np.copysign(math.inf, loose[loose != 0.0])
+        _, values, right = self._svd
+        inner = right[self._determined].T / values[self._determined]
+        covariance = inner @ inner.T / np.outer(self._column_norms, self._column_norms)
+        null = self._null_projector
+        covariance[null != 0.0] = np.copysign(math.inf, null[null != 0.0])
         return frozen(covariance)
 
     @cached_property
@@ -117,8 +117,8 @@ class Identification(ReadOnlyState):
     @cached_property
     def correlation(self) -> Array:
         """Correlations of the parameters (P, P) [-]; ±1: only a combination is determined."""
-        free = np.diag(self._loose)
-        matrix = np.where(np.outer(free, free) > 0.0, self._loose, 0.0)
+        free = np.diag(self._null_projector)
+        matrix = np.where(np.outer(free, free) > 0.0, self._null_projector, 0.0)
         firm = np.flatnonzero(free == 0.0)
         matrix[np.ix_(firm, firm)] = self.covariance[np.ix_(firm, firm)]
         root = np.sqrt(np.diag(matrix))
@@ -229,49 +229,48 @@ class Identification(ReadOnlyState):
         return sorted(rise for rise in exact if rise > NEGLIGIBLE), far
 
     @cached_property
-    def _lengths(self) -> Array:
-        """Lengths of the columns of J (P,), and 1 for a column of nothing."""
-        lengths = np.linalg.norm(self.jacobian, axis=0)
-        # over its whole range the parameter moves no residual by a millionth of its σ
-        nothing = lengths * np.ptp(self.bounds, axis=1) < RANK_TOLERANCE
-        return np.where(nothing, math.inf, lengths)
+    def _column_norms(self) -> Array:
+        """Norms of the columns of J (P,); inf for a column that is zero."""
+        norms = np.linalg.norm(self.jacobian, axis=0)
+        # zero: over its whole range the parameter moves no residual by a millionth of its σ
+        zero = norms * np.ptp(self.bounds, axis=1) < RANK_TOLERANCE
+        return np.where(zero, math.inf, norms)
 
     @cached_property
-    def _spectrum(self) -> tuple[Array, Array, Array]:
+    def _svd(self) -> tuple[Array, Array, Array]:
         """Singular values and vectors of J with columns of unit length, or zero."""
-        left, values, right = np.linalg.svd(self.jacobian / self._lengths, full_matrices=False)
+        left, values, right = np.linalg.svd(self.jacobian / self._column_norms, full_matrices=False)
         return left, values, right
 
     @cached_property
-    def _kept(self) -> Any:
-        values = self._spectrum[1]
+    def _determined(self) -> Any:
+        values = self._svd[1]
         return values > RANK_TOLERANCE * max(values[0], RANK_TOLERANCE)
 
     @cached_property
-    def _loose(self) -> Array:
-        """Projector (P, P) on the combinations not determined; exactly 0 where there are none."""
-        loose = self._spectrum[2][~self._kept]
-        projector: Array = loose.T @ loose
+    def _null_projector(self) -> Array:
+        """Projector (P, P) on the undetermined combinations, rounding set to zero."""
+        null = self._svd[2][~self._determined]
+        projector: Array = null.T @ null
         return np.where(abs(projector) > 1e-8, projector, 0.0)
 
     @cached_property
-    def _leading(self) -> Any:
-        """A parameter for each combination not determined: without them the others are."""
-        loose = self._spectrum[2][~self._kept]
-        return qr(loose, mode="r", pivoting=True)[1][: len(loose)]
+    def _dependent(self) -> Any:
+        """One parameter for each undetermined combination; with them held, the others are known."""
+        null = self._svd[2][~self._determined]
+        return qr(null, mode="r", pivoting=True)[1][: len(null)]
 
     @property
-    def _undetermined(self) -> list[str]:
+    def _null_combinations(self) -> list[str]:
         """The combinations that change no prediction, written out: "a by +1 and b by -0.3"."""
-        loose = self._spectrum[2][~self._kept]
-        if not len(loose):
+        null = self._svd[2][~self._determined]
+        if not len(null):
             return []
-        # one leading parameter to each combination, and to no other, reads best
-        leading = self._leading
-        loose = np.linalg.solve(loose[:, leading], loose)
-        scale = np.where(np.isinf(self._lengths), 1.0, self._lengths)
+        # each combination with one dependent parameter of its own reads best
+        null = np.linalg.solve(null[:, self._dependent], null)
+        scale = np.where(np.isinf(self._column_norms), 1.0, self._column_norms)
         written = []
-        for row in loose:
+        for row in null:
             row = np.where(abs(row) > 1e-4, row, 0.0) / scale
             # a step of readable size: 1 % of the range of the one that moves most of its own
             row = 0.01 * row / (abs(row) / np.ptp(self.bounds, axis=1)).max()

@@ -250,7 +250,7 @@ def _profiles(
     problem: LeastSquares, best: Array, jacobian: Array, result: Identification
 ) -> tuple[Profile | None, ...]:
     """The profile of each parameter that is determined."""
-    follow = [i for i in range(best.size) if i not in result._leading]
+    follow = [i for i in range(best.size) if i not in result._dependent]
     profiles: list[Profile | None] = []
     for i in range(best.size):
         if not math.isfinite(result.std[i]):
