@@ -2,9 +2,9 @@
 
 The third, cable lengths from joint angles, is :meth:`~cdsm.Manipulator.cable_lengths`.
 
-Both maps here may have many answers, one or none. Of many, the one nearest a guess is taken; if
-there is none, the nearest that the arm can do is the answer, and its ``reachable`` is false. All
-answers are within the joint limits; where disks touch at a limit and their holes meet, they keep
+Both maps may have many solutions, one or none. Of many, the one nearest a guess is returned. If
+there is none, the nearest that the arm can do is returned, and its ``reachable`` is false. All
+solutions are within the joint limits. Where disks touch at a limit and their holes meet, they keep
 1e-5 of the limit away from it, because a cable has no direction there.
 """
 
@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm.errors import InvalidInput
-from cdsm.kinematics.nearest import Problem, nearest
-from cdsm.kinematics.residuals import HAIR, LengthMisfit, TipMisfit, usable_limits
+from cdsm.kinematics.nearest import InverseProblem, nearest
+from cdsm.kinematics.residuals import LIMIT_MARGIN, LengthResidual, TipResidual, usable_limits
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.rigid_body import rotation_vector
@@ -33,7 +33,7 @@ from cdsm.support.validation import (
     vector,
 )
 
-_REACHED = 1e-9
+_TOLERANCE = 1e-9
 """Default tolerance: lengths and positions over the arm's length, and angles in rad."""
 
 _SMALLEST_TOLERANCE = 1e-12
@@ -98,7 +98,7 @@ class JointSolution(ReadOnlyState):
         return _at_limit(self.arm, self.angles)
 
     def __repr__(self) -> str:
-        return f"<JointSolution of {self.arm.name}, {_reach(self.reachable)}>"
+        return f"<JointSolution of {self.arm.name}, {_verdict(self.reachable)}>"
 
     def __str__(self) -> str:
         rows = [f"{'cable':<12}{'wanted [m]':>14}{'length [m]':>14}{'off [m]':>12}"]
@@ -109,7 +109,7 @@ class JointSolution(ReadOnlyState):
             )
         ]
         worst = int(abs(self.residual).argmax())
-        verdict = f"{_reach(self.reachable)}: {self.arm.cables[worst].name} is off most, "
+        verdict = f"{_verdict(self.reachable)}: {self.arm.cables[worst].name} is off most, "
         verdict += f"by {self.residual[worst]:+.2g} m"
         return "\n".join([*rows, "", *_angle_rows(self.arm, self.angles), "", verdict])
 
@@ -170,10 +170,10 @@ class KinematicSolution(ReadOnlyState):
         return _at_limit(self.arm, self.angles)
 
     def __repr__(self) -> str:
-        return f"<KinematicSolution of {self.arm.name}, {_reach(self.reachable)}>"
+        return f"<KinematicSolution of {self.arm.name}, {_verdict(self.reachable)}>"
 
     def __str__(self) -> str:
-        verdict = f"{_reach(self.reachable)}: the tip is {self.position_error:.2g} m"
+        verdict = f"{_verdict(self.reachable)}: the tip is {self.position_error:.2g} m"
         if self.target.ndim == 2:
             verdict += f" and {self.orientation_error:.2g} rad"
         return "\n".join([*_angle_rows(self.arm, self.angles), "", f"{verdict} from its target"])
@@ -184,7 +184,7 @@ def solve_joint_angles(
     cable_lengths: ArrayLike,
     guess: ArrayLike | None = None,
     *,
-    tolerance: float = _REACHED,
+    tolerance: float = _TOLERANCE,
 ) -> JointSolution:
     """Joint angles from cable lengths: min ‖L(θ) − L‖² within the joint limits (Eq. 5).
 
@@ -217,15 +217,17 @@ def solve_joint_angles(
             "the lead.",
         )
     tolerance = _checked_tolerance(tolerance)
-    answer = nearest(Problem(LengthMisfit(arm, wanted), *usable_limits(arm), guess), tolerance)
+    solution = nearest(
+        InverseProblem(LengthResidual(arm, wanted), *usable_limits(arm), guess), tolerance
+    )
     return JointSolution(
         arm=arm,
         cable_lengths=wanted,
         guess=guess,
-        angles=frozen(answer.angles),
-        lengths=arm.cable_lengths(answer.angles),
+        angles=frozen(solution.angles),
+        lengths=arm.cable_lengths(solution.angles),
         tolerance=tolerance,
-        iterations=answer.iterations,
+        iterations=solution.iterations,
     )
 
 
@@ -234,7 +236,7 @@ def inverse_kinematics(
     target: ArrayLike,
     guess: ArrayLike | None = None,
     *,
-    tolerance: float = _REACHED,
+    tolerance: float = _TOLERANCE,
 ) -> KinematicSolution:
     """Joint angles from the tip: min ½‖θ − guess‖² so that tip(θ) = target, in the limits (Eq. 7).
 
@@ -260,15 +262,17 @@ def inverse_kinematics(
     guess = _checked_guess(instance("arm", arm, Manipulator), guess)
     target = _checked_target(target)
     tolerance = _checked_tolerance(tolerance)
-    answer = nearest(Problem(TipMisfit(arm, target), *usable_limits(arm), guess), tolerance)
+    solution = nearest(
+        InverseProblem(TipResidual(arm, target), *usable_limits(arm), guess), tolerance
+    )
     return KinematicSolution(
         arm=arm,
         target=target,
         guess=guess,
-        angles=frozen(answer.angles),
-        tip=frozen(arm._body.state(answer.angles).tip),
+        angles=frozen(solution.angles),
+        tip=frozen(arm._body.state(solution.angles).tip),
         tolerance=tolerance,
-        iterations=answer.iterations,
+        iterations=solution.iterations,
     )
 
 
@@ -326,19 +330,21 @@ def _checked_target(target: ArrayLike) -> Array:
 
 
 def _at_limit(arm: Manipulator, angles: Array) -> tuple[str, ...]:
-    tight = (angles <= (1.0 - HAIR) * arm.lower) | (angles >= (1.0 - HAIR) * arm.upper)
+    tight = (angles <= (1.0 - LIMIT_MARGIN) * arm.lower) | (
+        angles >= (1.0 - LIMIT_MARGIN) * arm.upper
+    )
     return tuple(arm.joint_names[i] for i in np.flatnonzero(tight))
 
 
-def _reach(reachable: bool) -> str:
+def _verdict(reachable: bool) -> str:
     return "reachable" if reachable else "NOT REACHABLE"
 
 
 def _angle_rows(arm: Manipulator, angles: Array) -> list[str]:
     """A table of the joint angles, with a mark at those that stand at a limit."""
-    stopped = _at_limit(arm, angles)
+    at_limit = _at_limit(arm, angles)
     rows = [
-        f"{joint:<12}{angle:>z14.6f}{'  at limit' if joint in stopped else ''}"
+        f"{joint:<12}{angle:>z14.6f}{'  at limit' if joint in at_limit else ''}"
         for joint, angle in zip(arm.joint_names, angles, strict=True)
     ]
     return [f"{'joint':<12}{'angle [rad]':>14}", *rows]

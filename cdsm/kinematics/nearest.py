@@ -1,20 +1,19 @@
-"""The joint angles nearest a guess among those that answer a question best, within the limits.
+"""Inverse kinematics: the joint angles nearest a guess among those with the least residual.
 
-A question is a misfit r(q) of no dimension. Of the joint angles with r = 0 those are wanted that
-solve
+A residual r(q) is dimensionless. Of the joint angles with r = 0 the solution solves
 
     min ½‖q − guess‖²   so that   r(q) = 0   and   lower ≤ q ≤ upper,
 
-and where there are none, the joint angles of the least ½‖r‖². Both are the limit ε → 0 of
+and where there are none, it has the least ½‖r‖². Both are the limit ε → 0 of
 
     min ½‖r‖² + ½ε‖q − guess‖²   so that   lower ≤ q ≤ upper,
 
 a least-squares problem of full rank, however many joints are redundant and however many equations
-are. scipy solves it for falling ε, each from the last, so that the search goes out from the guess;
-Newton's method, with the limits held that it ends on, then takes the step to ε = 0.
+are. scipy solves it for falling ε, each from the last, so that the search goes out from the guess.
+Newton's method, with the limits held that the search ends on, then takes the step to ε = 0.
 
-Of 108 poses that arms of 3 to 20 joints can reach, this reached all, to rounding, and all answers
-meet the conditions for nearest. SLSQP reached 56, and 103 from a least-squares answer; quadratic
+Of 108 poses that arms of 3 to 20 joints can reach, this reached all, to rounding, and all solutions
+meet the conditions for nearest. SLSQP reached 56, and 103 from a least-squares solution; quadratic
 programs in sequence (DAQP) 83. pink weighs the target against the posture: it came within 1e-6 of
 93, or within 1e-9 of 102 of which 20 were nearest.
 """
@@ -39,10 +38,10 @@ _WEIGHTS = (1e-2, 1e-4, 1e-6, 1e-8)
 """The falling ε."""
 
 _STARTS = 12
-"""Random postures to search from where the guess leads to no answer."""
+"""Random postures to search from where the guess leads to no solution."""
 
 _NEAR = 1e-6
-"""Misfit that may yet turn out to be none."""
+"""A residual this small may turn out to be zero."""
 
 _SINGULAR, _FLAT = 1e-9, 1e-12
 """Singular values, and eigenvalues, this part of the largest are zero."""
@@ -50,15 +49,15 @@ _SINGULAR, _FLAT = 1e-9, 1e-12
 _LONGEST, _ATTEMPTS = 0.2, 60
 """Longest step of Newton's method [rad], as a curvature holds no further, and most steps."""
 
-_SETTLED = 1e-11
-"""Misfit and slope at which Newton's method has settled; it usually gets to 1e-15."""
+_CONVERGED = 1e-11
+"""Residual and gradient at which Newton's method has converged; it usually gets to 1e-15."""
 
 
-class Question(Protocol):
-    """A misfit of no dimension, as a function of joint angles."""
+class Residual(Protocol):
+    """A dimensionless residual r (m,) of joint angles q (nv,)."""
 
-    def misfit(self, q: Array) -> tuple[Array, Array]:
-        """Misfit r (m,) and ∂r/∂q (m, nv)."""
+    def evaluate(self, q: Array) -> tuple[Array, Array]:
+        """Residual r (m,) and ∂r/∂q (m, nv)."""
 
     def curvature(self, q: Array, weight: Array) -> Array:
         """Σ_a weight_a ∂²r_a/∂q² (nv, nv) where r = 0."""
@@ -67,92 +66,78 @@ class Question(Protocol):
         """Second derivative of ½‖r‖² (nv, nv), also where r is not zero."""
 
 
-class Problem(NamedTuple):
-    """What :func:`nearest` solves.
+class InverseProblem(NamedTuple):
+    """A residual, the joint limits (nv,) and the guess (nv,) within them [rad]."""
 
-    Attributes:
-        question: The misfit that is to be least.
-        lower: Lower limits (nv,) [rad].
-        upper: Upper limits (nv,) [rad].
-        guess: The joint angles wanted near (nv,) [rad], within the limits.
-    """
-
-    question: Question
+    residual: Residual
     lower: Array
     upper: Array
     guess: Array
 
+    def size(self, q: Array) -> float:
+        """‖r(q)‖."""
+        return float(np.linalg.norm(self.residual.evaluate(q)[0]))
 
-class Answer(NamedTuple):
-    """Where a search ended.
 
-    Attributes:
-        angles: Joint angles (nv,) [rad], within the limits.
-        misfit: ‖r‖ there [-].
-        iterations: How often r was evaluated.
-    """
+class InverseSolution(NamedTuple):
+    """Joint angles (nv,) [rad] within the limits, ‖r‖ there, and how often r was evaluated."""
 
     angles: Array
-    misfit: float
+    size: float
     iterations: int
 
 
-def nearest(problem: Problem, tolerance: float) -> Answer:
-    """The joint angles nearest a guess among those of a misfit up to a tolerance, or of the least.
+def nearest(problem: InverseProblem, tolerance: float) -> InverseSolution:
+    """The joint angles nearest the guess with ‖r‖ up to a tolerance, or else with the least.
 
-    Nearest in a neighbourhood, as every search that goes downhill: another way to fold the arm
-    may be nearer. Where the guess leads to no answer, random postures, always the same ones, are
-    tried in turn.
+    Nearest in a neighbourhood: another way to fold the arm may be nearer. Where the guess leads to
+    no solution, random postures, always the same ones, are tried in turn.
     """
     q, iterations = problem.guess, 0
     for weight in _WEIGHTS[:-1]:
         q, _, count = _fit(problem, q, weight, 1e-4)
         iterations += count
-    best = _finished(problem, q)
+    best = _solve_from(problem, q)
     iterations += best.iterations
     random = np.random.default_rng(0)
     for _ in range(_STARTS):
-        if best.misfit <= tolerance:
+        if best.size <= tolerance:
             break
-        found = _finished(problem, random.uniform(problem.lower, problem.upper))
-        iterations += found.iterations
+        other = _solve_from(problem, random.uniform(problem.lower, problem.upper))
+        iterations += other.iterations
         # the first is nearest the guess: another that is better by rounding alone is not wanted
-        if found.misfit < (1.0 - 1e-6) * best.misfit:
-            best = found
+        if other.size < (1.0 - 1e-6) * best.size:
+            best = other
     return best._replace(iterations=iterations)
 
 
-def _finished(problem: Problem, start: Array) -> Answer:
-    """The answer that a start leads to, to the last digit where Newton's method gets there."""
+def _solve_from(problem: InverseProblem, start: Array) -> InverseSolution:
+    """The solution that a start leads to, to the last digit where Newton's method gets there."""
     q, held, iterations = _fit(problem, start, _WEIGHTS[-1], 1e-6)
-    best, held, count = _active(_to_fit, problem, q, held)
+    best, held, count = _active_set(_least_residual_step, problem, q, held)
     iterations += count
-    if best is None:  # singular: the search alone must do
+    if best is None:  # singular: least squares alone must do
         best, held, count = _fit(problem, q, 1e-14, 1e-15)
         iterations += count
-    if _size(problem, best) < _NEAR:
-        closer, _, count = _active(_to_guess, problem, best, held)
+    if problem.size(best) < _NEAR:
+        closer, _, count = _active_set(_nearest_step, problem, best, held)
         iterations += count
         if closer is not None:
             best = closer
-    return Answer(best, _size(problem, best), iterations)
-
-
-def _size(problem: Problem, q: Array) -> float:
-    return float(np.linalg.norm(problem.question.misfit(q)[0]))
+    return InverseSolution(best, problem.size(best), iterations)
 
 
 def _fit(
-    problem: Problem, start: Array, weight: float, tolerance: float
+    problem: InverseProblem, start: Array, weight: float, tolerance: float
 ) -> tuple[Array, Limits, int]:
-    """Solve for one ε: joint angles, the limits they rest on, and the effort."""
-    question, lower, upper, guess = problem
+    """Solve for one ε: joint angles, the limits they rest on, and the number of evaluations."""
+    residual, lower, upper, guess = problem
     root = math.sqrt(weight)
-    pull = root * np.eye(guess.size)
+    regularisation = root * np.eye(guess.size)
     found = least_squares(
-        lambda q: np.concatenate([question.misfit(q)[0], root * (q - guess)]),
+        lambda q: np.concatenate([residual.evaluate(q)[0], root * (q - guess)]),
         np.clip(start, lower, upper),
-        lambda q: np.vstack([question.misfit(q)[1], pull]),
+        lambda q: np.vstack([residual.evaluate(q)[1], regularisation]),
         bounds=(lower, upper),
         method="dogbox",  # unlike trf it goes exactly onto a limit, and says which
         ftol=tolerance,
@@ -163,94 +148,94 @@ def _fit(
     return found.x, found.active_mask, int(found.nfev)
 
 
-class _Step(NamedTuple):
+class _NewtonStep(NamedTuple):
     """A step of Newton's method for the free joints.
 
     Attributes:
         move: The step (free,) [rad].
-        slope: Derivative by all joint angles (nv,) of what is to be least, answers kept.
+        gradient: Derivative of the objective by all joint angles (nv,), constraints kept.
         error: How far the joint angles are from optimal.
         convex: Whether they are near a minimum, not a saddle.
     """
 
     move: Array
-    slope: Array
+    gradient: Array
     error: float
     convex: bool
 
 
-_Newton = Callable[[Problem, Array, NDArray[np.bool_]], _Step]
+_Newton = Callable[[InverseProblem, Array, NDArray[np.bool_]], _NewtonStep]
 
 
-def _to_guess(problem: Problem, q: Array, free: NDArray[np.bool_]) -> _Step:
-    """Step to min ½‖q − guess‖² so that r = 0: to r = 0 by the shortest way, then along it."""
-    r, J = problem.question.misfit(q)
+def _nearest_step(problem: InverseProblem, q: Array, free: NDArray[np.bool_]) -> _NewtonStep:
+    """Step to min ½‖q − guess‖² so that r = 0: the shortest to r = 0, then one along r = 0."""
+    r, J = problem.residual.evaluate(q)
     away = q - problem.guess
     left, values, right = np.linalg.svd(J[:, free])
     rank = int(np.count_nonzero(values > _SINGULAR * values.max(initial=0.0)))
     inverse = left[:, :rank] / values[:rank]
     row, null = right[:rank], right[rank:]
-    weight = -inverse @ (row @ away[free])
-    slope = away + weight @ J
-    H = (np.eye(q.size) + problem.question.curvature(q, weight))[np.ix_(free, free)]
+    multipliers = -inverse @ (row @ away[free])
+    gradient = away + multipliers @ J
+    H = (np.eye(q.size) + problem.residual.curvature(q, multipliers))[np.ix_(free, free)]
     move = -(r @ inverse) @ row
-    along, convex = _downhill(null @ H @ null.T, null @ (slope[free] + H @ move))
-    error = max(float(np.linalg.norm(r)), float(abs(null @ slope[free]).max(initial=0.0)))
-    return _Step(move + along @ null, slope, error, convex)
+    along, convex = _downhill(null @ H @ null.T, null @ (gradient[free] + H @ move))
+    error = max(float(np.linalg.norm(r)), float(abs(null @ gradient[free]).max(initial=0.0)))
+    return _NewtonStep(move + along @ null, gradient, error, convex)
 
 
-def _to_fit(problem: Problem, q: Array, free: NDArray[np.bool_]) -> _Step:
+def _least_residual_step(problem: InverseProblem, q: Array, free: NDArray[np.bool_]) -> _NewtonStep:
     """Step to min ½‖r‖²."""
-    r, J = problem.question.misfit(q)
-    slope = r @ J
-    move, convex = _downhill(problem.question.hessian(q)[np.ix_(free, free)], slope[free])
-    error = float(abs(slope[free]).max(initial=0.0)) / max(1.0, float(np.linalg.norm(r)))
-    return _Step(move, slope, error, convex)
+    r, J = problem.residual.evaluate(q)
+    gradient = r @ J
+    move, convex = _downhill(problem.residual.hessian(q)[np.ix_(free, free)], gradient[free])
+    error = float(abs(gradient[free]).max(initial=0.0)) / max(1.0, float(np.linalg.norm(r)))
+    return _NewtonStep(move, gradient, error, convex)
 
 
-def _downhill(H: Array, slope: Array) -> tuple[Array, bool]:
+def _downhill(H: Array, gradient: Array) -> tuple[Array, bool]:
     """Step of Newton's method, turned round where H curves down; none where H is flat."""
     values, vectors = np.linalg.eigh((H + H.T) / 2.0)
     flat = abs(values) <= _FLAT * abs(values).max(initial=0.0)
     rate = np.where(flat, math.inf, abs(values))
-    return -vectors @ ((slope @ vectors) / rate), bool((values[~flat] > 0.0).all())
+    return -vectors @ ((gradient @ vectors) / rate), bool((values[~flat] > 0.0).all())
 
 
-def _active(
-    newton: _Newton, problem: Problem, q: Array, held: Limits
+def _active_set(
+    newton: _Newton, problem: InverseProblem, q: Array, held: Limits
 ) -> tuple[Array | None, Limits, int]:
-    """Newton's method with the right limits held: angles, None if it fails; limits, and effort."""
+    """Newton's method with the right limits held: angles, None if it fails; limits; iterations."""
     _, lower, upper, _ = problem
     held, iterations = held.copy(), 0
     for _ in range(2 * q.size + 5):
         q = np.where(held < 0, lower, np.where(held > 0, upper, q))
-        q, slope, count = _settled(newton, problem, q, held == 0)
+        q, gradient, count = _iterate(newton, problem, q, held == 0)
         iterations += count
-        if slope is None:
+        if gradient is None:
             break
         beyond = (q > upper).astype(np.int_) - (q < lower)
         q = np.clip(q, lower, upper)
-        pull = held * slope  # positive: it would rather leave the limit
+        multiplier = held * gradient  # positive: the objective falls off the limit
         if beyond.any():
             held = np.where(beyond != 0, beyond, held)
-        elif pull.max() > _SETTLED:
-            held[pull.argmax()] = 0
+        elif multiplier.max() > _CONVERGED:
+            held[multiplier.argmax()] = 0
         else:
             return q, held, iterations
     return None, held, iterations
 
 
-def _settled(
-    newton: _Newton, problem: Problem, q: Array, free: NDArray[np.bool_]
+def _iterate(
+    newton: _Newton, problem: InverseProblem, q: Array, free: NDArray[np.bool_]
 ) -> tuple[Array, Array | None, int]:
-    """Newton's method for the free joints: the angles, the slope there unless it fails, effort."""
+    """Newton's method for the free joints: angles, the gradient unless it fails, iterations."""
     least = math.inf
     for count in range(1, _ATTEMPTS + 1):
         step = newton(problem, q, free)
         # below this, and no longer falling fast, only rounding is left
-        done = step.error < _SETTLED and step.error > 0.5 * least
+        done = step.error < _CONVERGED and step.error > 0.5 * least
         if step.convex and (done or step.error == 0.0):
-            return q, step.slope, count
+            return q, step.gradient, count
         least = min(least, step.error)
         q = q.copy()
         q[free] += step.move * min(1.0, _LONGEST / float(abs(step.move).max(initial=_LONGEST)))

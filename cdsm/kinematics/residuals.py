@@ -17,7 +17,7 @@ from cdsm.manipulator import Manipulator
 from cdsm.rigid_body import rotation_vector
 from cdsm.support.validation import Array, frozen
 
-HAIR = 1e-5
+LIMIT_MARGIN = 1e-5
 """Part of a joint's limit within which the joint stands at it."""
 
 _NO_WRENCH = frozen(np.zeros(6))
@@ -25,51 +25,51 @@ _NO_WRENCH = frozen(np.zeros(6))
 
 @final
 @dataclass(frozen=True, eq=False)
-class LengthMisfit:
-    """How far cable lengths are from those wanted, over the arm's length."""
+class LengthResidual:
+    """Cable lengths less those wanted (C,), over the length of the arm."""
 
     arm: Manipulator
     wanted: Array
 
-    def misfit(self, q: Array) -> tuple[Array, Array]:
-        """Residual r(q) and its Jacobian."""
-        pose, size = self.arm.at(q, check_limits=False), self.arm.length
-        return (pose.cable_lengths - self.wanted) / size, pose.length_jacobian / size
+    def evaluate(self, q: Array) -> tuple[Array, Array]:
+        """Residual r (m,) and ∂r/∂q (m, nv)."""
+        pose, length = self.arm.at(q, check_limits=False), self.arm.length
+        return (pose.cable_lengths - self.wanted) / length, pose.length_jacobian / length
 
     def curvature(self, q: Array, weight: Array) -> Array:
-        """Second derivative of weight · r(q)."""
+        """Second derivative of weight · r (nv, nv)."""
         # H_L·F of tensions F = weight
         tension = frozen(weight / self.arm.length)
         pose = self.arm.at(q, check_limits=False)
         return pose._joint_stiffness(tension, frozen(np.zeros(weight.size)), _NO_WRENCH)[0]
 
     def hessian(self, q: Array) -> Array:
-        """Second derivative of ½ |r(q)|²."""
-        r, J = self.misfit(q)
+        """Second derivative of ½‖r‖² (nv, nv)."""
+        r, J = self.evaluate(q)
         return self.curvature(q, r) + J.T @ J
 
 
 @final
 @dataclass(frozen=True, eq=False)
-class TipMisfit:
-    """How far the tip is from its target: position over the arm's length, rotation vector."""
+class TipResidual:
+    """Tip less its target: position over the length of the arm, then rotation vector (3,), (6,)."""
 
     arm: Manipulator
     target: Array
 
-    def misfit(self, q: Array) -> tuple[Array, Array]:
-        """Residual r(q) and its Jacobian."""
-        state, size = self.arm._body.state(q), self.arm.length
-        linear, angular = state.jacobian[:3] / size, state.jacobian[3:]
+    def evaluate(self, q: Array) -> tuple[Array, Array]:
+        """Residual r (m,) and ∂r/∂q (m, nv)."""
+        state, length = self.arm._body.state(q), self.arm.length
+        linear, angular = state.jacobian[:3] / length, state.jacobian[3:]
         if self.target.ndim == 1:
-            return (state.tip[:3, 3] - self.target) / size, linear
-        turn, slope = rotation_vector(state.tip[:3, :3] @ self.target[:3, :3].T)
-        away = (state.tip[:3, 3] - self.target[:3, 3]) / size
-        return np.concatenate([away, turn]), np.vstack([linear, slope @ angular])
+            return (state.tip[:3, 3] - self.target) / length, linear
+        turn, turn_jacobian = rotation_vector(state.tip[:3, :3] @ self.target[:3, :3].T)
+        offset = (state.tip[:3, 3] - self.target[:3, 3]) / length
+        return np.concatenate([offset, turn]), np.vstack([linear, turn_jacobian @ angular])
 
     def curvature(self, q: Array, weight: Array) -> Array:
-        """Second derivative of weight · r(q)."""
-        # ∂(J_Xᵀ W)/∂θ of a dead wrench W = weight: where r = 0, ∂r/∂q is J_X but for the size
+        """Second derivative of weight · r (nv, nv)."""
+        # ∂(J_Xᵀ W)/∂θ of a dead wrench W = weight: where r = 0, ∂r/∂q is J_X but for the length
         wrench = np.zeros(6)
         wrench[: weight.size] = weight
         wrench[:3] /= self.arm.length
@@ -77,18 +77,18 @@ class TipMisfit:
         return -load_stiffness(frozen(jacobian), frozen(wrench), way)
 
     def hessian(self, q: Array) -> Array:
-        """Second derivative of ½ |r(q)|²."""
+        """Second derivative of ½‖r‖² (nv, nv)."""
         # ∂(½φ²) = φ·ω exactly, so its second derivative needs that of φ once, not twice
-        r, J = self.misfit(q)
+        r, J = self.evaluate(q)
         angular = self.arm._body.state(q).jacobian[3 : r.size]
         return self.curvature(q, r) + J[:3].T @ J[:3] + angular.T @ J[3:]
 
 
 def usable_limits(arm: Manipulator) -> tuple[Array, Array]:
-    """The joint limits, drawn in by a hair where the holes of touching disks meet there.
+    """The joint limits, a little narrower where the holes of touching disks meet there.
 
-    The default limit is where disks touch, and a cable that passes there has no direction: such a
-    posture would be an answer that the arm cannot be evaluated at.
+    The default limit is where disks touch. A cable that passes there has no direction, so the arm
+    cannot be evaluated at such a posture.
     """
     limits = arm.lower.copy(), arm.upper.copy()
     for limit in limits:
@@ -96,5 +96,5 @@ def usable_limits(arm: Manipulator) -> tuple[Array, Array]:
             try:
                 arm.cable_lengths(alone)
             except CableError:
-                limit[i] *= 1.0 - HAIR
+                limit[i] *= 1.0 - LIMIT_MARGIN
     return limits

@@ -10,8 +10,8 @@ from scipy.optimize import minimize, minimize_scalar
 from scipy.spatial.transform import Rotation
 
 import cdsm
-from cdsm.kinematics.nearest import Question
-from cdsm.kinematics.residuals import LengthMisfit, TipMisfit
+from cdsm.kinematics.nearest import Residual
+from cdsm.kinematics.residuals import LengthResidual, TipResidual
 from cdsm.support.validation import Array
 from tests.support.arms import STEEL, mixed_arm, random_arm, random_posture
 from tests.support.differences import assert_second_order
@@ -25,7 +25,7 @@ ARMS: dict[str, Callable[[], cdsm.Manipulator]] = {
     "mixed": mixed_arm,
 }
 
-# joints that stand within this part of their limit rest on it, see _misfits.HAIR
+# joints that stand within this part of their limit rest on it, see residuals.LIMIT_MARGIN
 AT_LIMIT = 2e-5
 
 GENTLE = math.radians(25.0)
@@ -431,14 +431,16 @@ def test_nearest_posture_to_a_target_out_of_reach_is_a_minimum(kind: str, joints
     for target in (-0.7 * size * random.uniform(0.8, 1.0, 3), pose):
         found = cdsm.inverse_kinematics(arm, target)
         assert not found.reachable
-        r, J = TipMisfit(arm, found.target).misfit(found.angles)
+        r, J = TipResidual(arm, found.target).evaluate(found.angles)
         assert_least(arm, found.angles, r @ J, float(np.linalg.norm(r)))
         assert np.linalg.norm(r) == pytest.approx(
             math.hypot(found.position_error / size, found.orientation_error), rel=1e-12
         )
         # and no random posture is nearer
         others = [
-            np.linalg.norm(TipMisfit(arm, found.target).misfit(random_posture(arm, s, 0.99).q)[0])
+            np.linalg.norm(
+                TipResidual(arm, found.target).evaluate(random_posture(arm, s, 0.99).q)[0]
+            )
             for s in range(200)
         ]
         assert np.linalg.norm(r) < min(others)
@@ -470,28 +472,28 @@ TURNED[:3, :3] = Rotation.from_rotvec([0.7, -0.4, 1.1]).as_matrix()
 TURNED[:3, 3] = [0.1, -0.05, 0.08]
 
 
-def questions() -> dict[str, tuple[Question, cdsm.Posture]]:
+def questions() -> dict[str, tuple[Residual, cdsm.Posture]]:
     universal, hinged = random_arm(61, 3), random_arm(62, 4, "hinged")
     poses = random_posture(universal, 1), random_posture(hinged, 2)
     return {
-        "lengths": (LengthMisfit(universal, poses[0].cable_lengths + 0.01), poses[0]),
-        "lengths of hinges": (LengthMisfit(hinged, poses[1].cable_lengths - 0.01), poses[1]),
-        "position": (TipMisfit(universal, TURNED[:3, 3]), poses[0]),
-        "pose": (TipMisfit(universal, TURNED), poses[0]),
-        "pose of hinges": (TipMisfit(hinged, TURNED), poses[1]),
+        "lengths": (LengthResidual(universal, poses[0].cable_lengths + 0.01), poses[0]),
+        "lengths of hinges": (LengthResidual(hinged, poses[1].cable_lengths - 0.01), poses[1]),
+        "position": (TipResidual(universal, TURNED[:3, 3]), poses[0]),
+        "pose": (TipResidual(universal, TURNED), poses[0]),
+        "pose of hinges": (TipResidual(hinged, TURNED), poses[1]),
     }
 
 
 @pytest.mark.parametrize("name", questions())
-def test_misfit_and_its_derivatives_agree_with_differences(name: str) -> None:
+def test_residual_and_its_derivatives_agree_with_differences(name: str) -> None:
     question, pose = questions()[name]
 
     def slope(q: Array) -> Array:
-        r, J = question.misfit(q)
+        r, J = question.evaluate(q)
         return r @ J
 
-    r, J = question.misfit(pose.q)
-    assert_second_order(lambda q: question.misfit(q)[0], J, pose.q, tolerance=1e-9)
+    r, J = question.evaluate(pose.q)
+    assert_second_order(lambda q: question.evaluate(q)[0], J, pose.q, tolerance=1e-9)
     hessian = question.hessian(pose.q)
     # the antisymmetric part of the load term is none of the Hessian's
     assert_second_order(slope, (hessian + hessian.T) / 2.0, pose.q, tolerance=1e-9)
@@ -503,16 +505,16 @@ def test_curvature_is_the_second_derivative_where_the_target_is_met() -> None:
     pose = random_posture(arm, 1)
     random = np.random.default_rng(3)
     for question, count in (
-        (LengthMisfit(arm, pose.cable_lengths), len(arm.cables)),
-        (TipMisfit(arm, pose.tip[:3, 3]), 3),
-        (TipMisfit(arm, pose.tip), 6),
+        (LengthResidual(arm, pose.cable_lengths), len(arm.cables)),
+        (TipResidual(arm, pose.tip[:3, 3]), 3),
+        (TipResidual(arm, pose.tip), 6),
     ):
         weight = random.normal(size=count)
         curvature = question.curvature(pose.q, weight)
         symmetric = (curvature + curvature.T) / 2.0
 
-        def slope(q: Array, question: Question = question, weight: Array = weight) -> Array:
-            return weight @ question.misfit(q)[1]
+        def slope(q: Array, question: Residual = question, weight: Array = weight) -> Array:
+            return weight @ question.evaluate(q)[1]
 
         assert_second_order(slope, symmetric, pose.q, tolerance=1e-8)
 
