@@ -9,7 +9,9 @@
 SI units throughout; base frame with x along the straight arm.
 """
 
+from importlib import import_module as _import_module
 from importlib.metadata import version as _version
+from typing import TYPE_CHECKING as _TYPE_CHECKING
 
 from cdsm import presets
 from cdsm.batch import Batch, Status, Tensions, distribute_tensions, evaluate
@@ -36,7 +38,7 @@ from cdsm.errors import (
     UnreachableStiffness,
     UrdfError,
 )
-from cdsm.geometry import Geometry
+from cdsm.geometry import CableRoute, Geometry, Joint, Link
 from cdsm.identification import Identification, Measurement, identify
 from cdsm.interchange.cable_file import read_cables, write_cables
 from cdsm.interchange.caspr import read_caspr
@@ -48,7 +50,6 @@ from cdsm.kinematics.maps import (
     solve_joint_angles,
 )
 from cdsm.manipulator import Manipulator
-from cdsm.parts import CableRoute, Joint, Link
 from cdsm.planning import (
     HalfWay,
     InfeasibleSample,
@@ -64,7 +65,6 @@ from cdsm.planning import (
     stiffness_range,
 )
 from cdsm.posture import Posture
-from cdsm.report import Report, SelfCheck
 from cdsm.statics.buckling import CriticalLoad, CriticalTension, critical_load, critical_tension
 from cdsm.statics.equilibrium import Equilibrium, equilibrium
 from cdsm.statics.natural_modes import Modes, modes
@@ -86,6 +86,9 @@ from cdsm.wires.files import read_elasticity, write_elasticity
 from cdsm.wires.laws import StrandElasticity, TabulatedElasticity
 from cdsm.wires.tensile.fit import TensileFit, fit_tensile_test
 from cdsm.wires.tensile.record import TensileTest, read_tensile_csv
+
+if _TYPE_CHECKING:
+    from cdsm.report import Report, SelfCheck
 
 __version__ = _version("cdsm-stiffness")
 
@@ -189,3 +192,15 @@ __all__ = [
     "write_sweep",
     "write_urdf",
 ]
+
+_LAZY = ("Report", "SelfCheck")
+
+
+def __getattr__(name: str) -> object:
+    if name in _LAZY:
+        return getattr(_import_module("cdsm.report"), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_LAZY})

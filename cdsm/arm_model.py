@@ -1,21 +1,28 @@
-"""The cables of an arm, law by law: how stiff they are, and what they may carry.
+"""What all computations on an arm share: its bodies, tree, cable routing and cable laws.
 
-A locked motor holds the original length l_0 of its wire. Under tension the wire is ℓ = l_0 (1 + ε)
-long, so that its stiffness EA/l_0 is EA (1 + ε)/ℓ.
+A :class:`~cdsm.Manipulator` holds one :class:`ArmModel` in ``_model``; every other module that
+needs more than the public properties of an arm takes it from there.
 """
 
 from __future__ import annotations
 
-from typing import Literal
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal, final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cdsm.cable import Cable
 from cdsm.elasticity import Elasticity, LinearElasticity
-from cdsm.errors import ElasticityRangeError, InvalidInput
+from cdsm.errors import CableError, ElasticityRangeError, InvalidInput, UnknownName
+from cdsm.kernels import segments
+from cdsm.kernels.bodies import Masses
 from cdsm.kernels.stiffness import cable_stiffness
+from cdsm.rigid_body import RigidBody
 from cdsm.support.validation import LARGEST, SMALLEST, Array, frozen
+from cdsm.wires.continuity import find_jump
 from cdsm.wires.laws import StrandElasticity
 
 OriginalLength = Literal["unstrained", "stretched"]
@@ -23,9 +30,111 @@ OriginalLength = Literal["unstrained", "stretched"]
 _STEP = 1e-5
 """Relative step of the difference of the slope of EA (1 + ε)."""
 
+_LIMIT_SLACK = 1e-9
+"""Angles this far [rad] beyond a limit are rounding, as of a conversion from degrees."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class ArmModel:
+    """An arm as arrays and laws; it does not depend on the joint angles.
+
+    Attributes:
+        body: The rigid-body model.
+        tree: The joints.
+        routing: The cable sites and segments.
+        masses: The masses that the joints carry, and the tip.
+        laws: The cables' elasticities.
+        lowest: Lower joint limits (nv,) [rad], less what rounding may take.
+        highest: Upper joint limits (nv,) [rad], likewise.
+    """
+
+    body: RigidBody
+    tree: segments.Tree
+    routing: segments.Routing
+    masses: Masses
+    laws: CableLaws
+    lowest: Array
+    highest: Array
+
+    @classmethod
+    def of(
+        cls, body: RigidBody, cables: tuple[Cable, ...], original_length: OriginalLength
+    ) -> ArmModel:
+        """From the rigid bodies and the cables on them.
+
+        Raises:
+            CableError: A cable on a link that does not exist, or two of its sites coincide.
+            InvalidInput: The rigidity of a law jumps.
+        """
+        tree, laws = body.tree(), CableLaws(cables, original_length)
+        laws.require_continuity()
+        return cls(
+            body=body,
+            tree=tree,
+            routing=route(body, tree, cables),
+            masses=body.masses(),
+            laws=laws,
+            lowest=frozen(body.lower - _LIMIT_SLACK),
+            highest=frozen(body.upper + _LIMIT_SLACK),
+        )
+
+    def beyond_limits(self, q: Array) -> NDArray[np.bool_]:
+        """Which of the joint angles (nv,) [rad] are beyond their limits."""
+        return np.asarray((q < self.lowest) | (q > self.highest))
+
+
+def route(body: RigidBody, tree: segments.Tree, cables: Sequence[Cable]) -> segments.Routing:
+    """Place the sites on the joints, and find for every segment the joints that change it."""
+    row, point, fixed = [], [], np.array([cable.lead for cable in cables])
+    parts: list[tuple[int, int, int, int, int]] = []
+    joints: list[int] = []
+    for c, cable in enumerate(cables):
+        for i, site in enumerate(cable.sites):
+            try:
+                joint, rotation, translation = body.locate(site.link)
+            except UnknownName as error:
+                raise CableError(cable.name, str(error)) from None
+            row.append(joint)
+            point.append(translation + rotation @ np.array(site.position))
+            if i == 0:
+                continue
+            if row[-2] == row[-1]:  # a segment within one link
+                length = math.dist(point[-2], point[-1])
+                if length < segments.SHORTEST_SEGMENT:
+                    raise CableError(cable.name, f"sites {i} and {i + 1} coincide; leave one out.")
+                fixed[c] += length
+                continue
+            to_a, to_b = _joints_to(tree, row[-2]), _joints_to(tree, row[-1])
+            only_a = [j for j in to_a if j not in to_b]
+            only_b = [j for j in to_b if j not in to_a]
+            first = len(joints)
+            parts.append((c, len(row) - 2, len(row) - 1, first, first + len(only_a)))
+            joints += [*only_a, *only_b]
+    parts.append((0, 0, 0, len(joints), len(joints)))
+    return segments.Routing(
+        row=frozen(np.array(row, dtype=np.intp)),
+        point=frozen(np.array(point)),
+        segment=frozen(np.array(parts, dtype=np.intp)),
+        joint=frozen(np.array(joints, dtype=np.intp)),
+        fixed=frozen(fixed),
+    )
+
+
+def _joints_to(tree: segments.Tree, row: int) -> list[int]:
+    """Rows of the joints from the base to a joint, base first, that one included."""
+    rows: list[int] = []
+    while row:
+        rows.insert(0, row)
+        row = int(tree.parent[row])
+    return rows
+
 
 class CableLaws:
-    """What the stiffness of cables needs, gathered once.
+    """The elasticities of an arm's cables: how stiff the cables are, and what they may carry.
+
+    A locked motor holds the original length l_0 of its wire. Under tension the wire is
+    ℓ = l_0 (1 + ε) long, so that its stiffness EA/l_0 is EA (1 + ε)/ℓ.
 
     Args:
         cables: Those of an arm.
@@ -67,6 +176,23 @@ class CableLaws:
             else:
                 self._asked.append((law, of))
         self._constant, self._linear = frozen(constant), frozen(linear)
+
+    def require_continuity(self) -> None:
+        """Refuse a law whose rigidity jumps.
+
+        Raises:
+            InvalidInput: Names a cable and the tension.
+        """
+        for law, held in self.held:
+            jump = find_jump(law)
+            if jump is not None:
+                name = np.array(self._cables, dtype=object)[held][0].name
+                raise InvalidInput(
+                    "elasticity",
+                    f"the rigidity of {name} jumps at {jump.tension:.6g} N from {jump.below:.6g} "
+                    f"to {jump.above:.6g} N, and K_θ with it. Make it continuous, e.g. by a "
+                    "TabulatedElasticity through points of its strain.",
+                )
 
     def narrowed(self, low: Array, high: Array) -> tuple[Array, Array]:
         """Bounds of tension (…, C) [N], and those that the cables have of their own."""

@@ -7,28 +7,110 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Self
 
+import numpy as np
 from pydantic import Field, model_validator
 
 from cdsm.errors import GeometryError
-from cdsm.parts import MAXIMUM_JOINTS, CableRoute, Joint, Link
 from cdsm.support.files import read_text, write_text
 from cdsm.support.records import (
     CrossFaults,
+    Direction,
+    Integer,
     Name,
     NotNegative,
+    Number,
     Positive,
+    checked_keywords,
     parse,
     read_toml,
     record,
     toml_lines,
 )
 from cdsm.support.validation import Printed, instance
-from cdsm.uniform import Hinged, Universal
+
+MAXIMUM_JOINTS = 100
+"""More would overflow the URDF parsers' stack before long; no such arm exists."""
 
 MAXIMUM_DEFAULT_LIMIT = math.radians(80.0)
+
+UNIVERSAL_AXES = ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+JointCount = Annotated[Integer, Field(ge=1, le=MAXIMUM_JOINTS)]
+CablesPerJoint = Annotated[Integer, Field(ge=1, le=64)]
+JointLimit = Annotated[Number, Field(gt=0, le=math.pi)] | None
+
+
+@record
+class Joint:
+    """One joint of the arm and the two disks beside it.
+
+    Attributes:
+        axes: One axis (hinge) or two (universal joint, in this order), in the axes of the link
+            before; any length, none zero, not parallel.
+        disk_offset: h: distance of the disk before and the disk after from the joint centre [m].
+        limit: Largest angle about each axis, both ways [rad]; None: until the disks touch.
+
+    Raises:
+        GeometryError: Lists every fault.
+    """
+
+    axes: Annotated[tuple[Direction, ...], Field(strict=False, min_length=1, max_length=2)]
+    disk_offset: Positive
+    limit: JointLimit = None
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        lengths = [math.hypot(*axis) for axis in self.axes]
+        faults = [
+            f"axes[{i + 1}]: {axis} has no usable length; give a direction"
+            for i, (axis, length) in enumerate(zip(self.axes, lengths, strict=True))
+            if not 1e-6 < length < 1e6
+        ]
+        if not faults and len(self.axes) == 2:
+            sine = math.hypot(*np.cross(*self.axes)) / (lengths[0] * lengths[1])
+            if sine < 1e-6:
+                faults.append(f"axes: the two axes {self.axes} are parallel; one would do")
+        if faults:
+            raise CrossFaults(faults)
+        return self
+
+
+@record
+class Link:
+    """One link: from its joint centre to the next one, or to the tip.
+
+    Attributes:
+        length: Length [m].
+        mass: Mass [kg], spread as a solid cylinder of the hole radius about mid-link.
+
+    Raises:
+        GeometryError: Lists every fault.
+    """
+
+    length: Positive
+    mass: NotNegative
+
+
+@record
+class CableRoute:
+    """The path of one cable: the same hole on every disk until its last one.
+
+    Attributes:
+        joint: Number of the joint it drives, from 1; it ends on the first disk after it.
+        angle: φ: hole angle about x, from y towards z [rad].
+        lead: Straight cable between the actuator and the base disk [m].
+
+    Raises:
+        GeometryError: Lists every fault.
+    """
+
+    joint: Annotated[Integer, Field(ge=1)]
+    angle: Number
+    lead: NotNegative = 0.0
 
 
 @record
@@ -63,20 +145,21 @@ class Geometry(Printed):
     name: Name = "arm"
 
     @classmethod
+    @checked_keywords
     def universal(
         cls,
         *,
-        joints: int,
-        cables_per_joint: int,
-        link_length: float,
-        base_length: float,
-        disk_offset: float,
-        hole_radius: float,
-        link_mass: float,
-        lead: float = 0.0,
-        joint_limit: float | None = None,
-        name: str = "arm",
-    ) -> Geometry:
+        joints: JointCount,
+        cables_per_joint: CablesPerJoint,
+        link_length: Positive,
+        base_length: NotNegative,
+        disk_offset: Positive,
+        hole_radius: Positive,
+        link_mass: NotNegative,
+        lead: NotNegative = 0.0,
+        joint_limit: JointLimit = None,
+        name: Name = "arm",
+    ) -> Self:
         """Uniform arm of n universal joints with m cables each.
 
         Cable j = 0…m−1 of joint k = 1…n has its holes at φ = 2π((k−1) + n j)/(n m), so that all
@@ -98,36 +181,37 @@ class Geometry(Printed):
         Raises:
             GeometryError: Lists every fault.
         """
-        keywords = Universal(
-            joints=joints,
-            cables_per_joint=cables_per_joint,
-            link_length=link_length,
-            base_length=base_length,
-            disk_offset=disk_offset,
-            hole_radius=hole_radius,
-            link_mass=link_mass,
-            lead=lead,
-            joint_limit=joint_limit,
+        n, m = joints, cables_per_joint
+        return cls(
             name=name,
+            base_length=base_length,
+            hole_radius=hole_radius,
+            joints=(Joint(axes=UNIVERSAL_AXES, disk_offset=disk_offset, limit=joint_limit),) * n,
+            links=(Link(length=link_length, mass=link_mass),) * n,
+            cables=tuple(
+                CableRoute(joint=k + 1, angle=2.0 * math.pi * (k + n * j) / (n * m), lead=lead)
+                for k in range(n)
+                for j in range(m)
+            ),
         )
-        return cls(**keywords.fields())
 
     @classmethod
+    @checked_keywords
     def hinged(
         cls,
         *,
-        joints: int,
-        twist: float,
-        cables_per_joint: int = 2,
-        link_length: float,
-        base_length: float,
-        disk_offset: float,
-        hole_radius: float,
-        link_mass: float,
-        lead: float = 0.0,
-        joint_limit: float | None = None,
-        name: str = "arm",
-    ) -> Geometry:
+        joints: JointCount,
+        twist: Number,
+        cables_per_joint: CablesPerJoint = 2,
+        link_length: Positive,
+        base_length: NotNegative,
+        disk_offset: Positive,
+        hole_radius: Positive,
+        link_mass: NotNegative,
+        lead: NotNegative = 0.0,
+        joint_limit: JointLimit = None,
+        name: Name = "arm",
+    ) -> Self:
         """Uniform arm of n hinges, each turned by ``twist`` about x against the one before.
 
         Hinge k has the axis cos ψ_k y + sin ψ_k z with ψ_k = (k−1)·twist; the link frames are not
@@ -149,20 +233,28 @@ class Geometry(Printed):
         Raises:
             GeometryError: Lists every fault.
         """
-        keywords = Hinged(
-            joints=joints,
-            twist=twist,
-            cables_per_joint=cables_per_joint,
-            link_length=link_length,
-            base_length=base_length,
-            disk_offset=disk_offset,
-            hole_radius=hole_radius,
-            link_mass=link_mass,
-            lead=lead,
-            joint_limit=joint_limit,
+        rolls = [k * twist for k in range(joints)]
+        # evenly spread from 90 degrees beside the axis: two give the antagonistic pair
+        turns = [2.0 * math.pi * j / cables_per_joint for j in range(cables_per_joint)]
+        return cls(
             name=name,
+            base_length=base_length,
+            hole_radius=hole_radius,
+            joints=tuple(
+                Joint(
+                    axes=((0.0, math.cos(roll), math.sin(roll)),),
+                    disk_offset=disk_offset,
+                    limit=joint_limit,
+                )
+                for roll in rolls
+            ),
+            links=(Link(length=link_length, mass=link_mass),) * joints,
+            cables=tuple(
+                CableRoute(joint=k + 1, angle=roll + math.pi / 2 + turn, lead=lead)
+                for k, roll in enumerate(rolls)
+                for turn in turns
+            ),
         )
-        return cls(**keywords.fields())
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -262,7 +354,10 @@ class Geometry(Printed):
             GeometryError: Not TOML, or lists every fault found in it.
         """
         instance("text", text, str)
-        short = {"universal": Universal, "hinged": Hinged}
+        short: dict[str, Callable[..., Geometry]] = {
+            "universal": cls.universal,
+            "hinged": cls.hinged,
+        }
         try:
             data = read_toml(text)
             kind = next((key for key in data if key in short), None)
@@ -282,7 +377,9 @@ class Geometry(Printed):
                 raise GeometryError(
                     [f"{others}: stands outside [{kind}], which says it all; move it in, or away"]
                 )
-            return cls(**parse(short[kind], data[kind]).fields())
+            if not isinstance(data[kind], dict):
+                raise GeometryError([f"{kind}: is {data[kind]!r}; give a table [{kind}]"])
+            return short[kind](**data[kind])
         except GeometryError as error:
             raise GeometryError(error.faults, source) from None
 

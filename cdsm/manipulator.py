@@ -15,7 +15,7 @@ from typing import final, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cdsm.arm_model import CableLaws, OriginalLength
+from cdsm.arm_model import ArmModel, OriginalLength
 from cdsm.cable import Cable, serpentine_cables
 from cdsm.elasticity import Elasticity
 from cdsm.errors import (
@@ -27,7 +27,6 @@ from cdsm.geometry import Geometry
 from cdsm.kernels import segments
 from cdsm.posture import Posture
 from cdsm.rigid_body import RigidBody
-from cdsm.routing import route
 from cdsm.support.validation import (
     Array,
     Printed,
@@ -40,7 +39,6 @@ from cdsm.support.validation import (
 )
 from cdsm.urdf import TIP, to_urdf
 from cdsm.urdf_reader import read_urdf
-from cdsm.wires.continuity import find_jump
 
 GRAVITY = (0.0, 0.0, -9.81)
 """Default gravity in base axes [m/s²]."""
@@ -54,9 +52,6 @@ _Value = tuple[
     OriginalLength,
     tuple[str, ...],
 ]
-
-_LIMIT_SLACK = 1e-9
-"""Angles this far [rad] beyond a limit are rounding, as of a conversion from degrees."""
 
 
 @final
@@ -157,20 +152,8 @@ class Manipulator(Printed):
         self._urdf, self._tip_link = urdf, tip
         one_of("original_length", original_length, get_args(OriginalLength))
         self._original_length: OriginalLength = original_length
-        self._body = RigidBody(urdf, tip, self._gravity, joint_names)
-        tree = self._body.tree()
-        routing = route(self._body, tree, self._cables)
-        self._tree, self._routing, self._masses = tree, routing, self._body.masses()
-        self._constants = (*tree, *routing)
-        self._segments = routing.segment, routing.joint
-
-        way = "angle [rad] or way [m]" if self.slides.any() else "angle [rad]"
-        self._meaning_of_q = f"one {way} per joint, {', '.join(self.joint_names)}"
-        self._lowest = self._body.lower - _LIMIT_SLACK
-        self._highest = self._body.upper + _LIMIT_SLACK
-
-        self._laws = CableLaws(self._cables, self._original_length)
-        _require_continuity(self._laws, self._cables)
+        body = RigidBody(urdf, tip, self._gravity, joint_names)
+        self._model = ArmModel.of(body, self._cables, original_length)
 
     @property
     def geometry(self) -> Geometry:
@@ -193,15 +176,7 @@ class Manipulator(Printed):
     @property
     def name(self) -> str:
         """Name of the robot."""
-        return self._body.name
-
-    @cached_property
-    def _touching(self) -> NDArray[np.bool_]:
-        """Which joints (nv,) are stopped by disks that touch."""
-        if self._geometry is None:
-            return np.zeros(self.nv, dtype=np.bool_)
-        joints = self._geometry.joints
-        return np.array([joint.limit is None for joint in joints for _ in joint.axes])
+        return self._model.body.name
 
     @cached_property
     def length(self) -> float:
@@ -212,8 +187,8 @@ class Manipulator(Printed):
         """
         if self._geometry is not None:
             return self._geometry.length
-        reach = float(np.linalg.norm(self._routing.point, axis=1).max())
-        return max(self._body.length, reach)
+        reach = float(np.linalg.norm(self._model.routing.point, axis=1).max())
+        return max(self._model.body.length, reach)
 
     @property
     def tip_link(self) -> str:
@@ -243,17 +218,17 @@ class Manipulator(Printed):
     @property
     def nv(self) -> int:
         """Degrees of freedom."""
-        return self._body.nv
+        return self._model.body.nv
 
     @property
     def joint_names(self) -> tuple[str, ...]:
         """Names of the joints; their order is that of every (nv,) array."""
-        return self._body.joint_names
+        return self._model.body.joint_names
 
     @property
     def slides(self) -> NDArray[np.bool_]:
         """Whether each joint slides (nv,): its coordinate is a way [m], not an angle [rad]."""
-        return self._body.slides
+        return self._model.body.slides
 
     @property
     def joint_units(self) -> tuple[str, ...]:
@@ -276,12 +251,12 @@ class Manipulator(Printed):
     @property
     def lower(self) -> Array:
         """Lower joint limits (nv,) [rad]; [m] where a joint slides."""
-        return self._body.lower
+        return self._model.body.lower
 
     @property
     def upper(self) -> Array:
         """Upper joint limits (nv,) [rad]; [m] where a joint slides."""
-        return self._body.upper
+        return self._model.body.upper
 
     def __repr__(self) -> str:
         return f"<Manipulator {self}>"
@@ -339,7 +314,7 @@ class Manipulator(Printed):
             CableError: Two neighbouring sites of a cable coincide at this posture.
         """
         q = self._angles(q, check_limits)
-        state = self._body.state(q)
+        state = self._model.body.state(q)
         # Pinocchio hands out placements one Python object per joint, 14 µs for ten joints; the
         # kernel places joints and cable sites itself in 2 µs. A test holds the two equal.
         frames, lengths, length_jacobian = self._routed(q)
@@ -373,7 +348,7 @@ class Manipulator(Printed):
         """Joint angles (nv,) [rad], checked and read-only."""
         q = vector("q", q, self.nv, self._meaning_of_q)
         if flag("check_limits", check_limits):
-            beyond = (q < self._lowest) | (q > self._highest)
+            beyond = self._model.beyond_limits(q)
             if np.count_nonzero(beyond):
                 raise JointLimitError(
                     [self.joint_names[i] for i in np.flatnonzero(beyond)],
@@ -383,20 +358,30 @@ class Manipulator(Printed):
                 )
         return q
 
+    @cached_property
+    def _meaning_of_q(self) -> str:
+        coordinate = "angle [rad] or way [m]" if self.slides.any() else "angle [rad]"
+        return f"one {coordinate} per joint, {', '.join(self.joint_names)}"
+
     def _routed(self, q: Array) -> tuple[segments.Frames, Array, Array]:
         """Where joints and cable sites are, L and J_L at checked joint angles.
 
         Raises:
             CableError: Two neighbouring sites of a cable coincide at this posture.
         """
-        *frames, lengths, length_jacobian, coincident = segments.evaluate(*self._constants, q)
+        routing = self._model.routing
+        frames, lengths, length_jacobian, coincident = segments.evaluate(
+            self._model.tree, routing, q
+        )
         if coincident >= 0:
             raise CableError(
-                self._cables[self._segments[0][coincident, 0]].name,
+                self._cables[routing.segment[coincident, 0]].name,
                 f"two neighbouring sites coincide at q = {q.tolist()}, so the cable has no "
                 "direction there. Move a site, or change the posture.",
             )
-        return segments.Frames(*map(frozen, frames)), frozen(lengths), frozen(length_jacobian)
+        for array in frames:
+            frozen(array)
+        return frames, frozen(lengths), frozen(length_jacobian)
 
 
 def _rebuild(
@@ -422,17 +407,3 @@ def _checked_cables(cables: Sequence[Cable]) -> tuple[Cable, ...]:
         if count > 1:
             raise CableError(name, "the name is used twice; every cable needs its own.")
     return cables
-
-
-def _require_continuity(laws: CableLaws, cables: tuple[Cable, ...]) -> None:
-    """Refuse a law whose rigidity jumps."""
-    for law, held in laws.held:
-        jump = find_jump(law)
-        if jump is not None:
-            name = np.array(cables, dtype=object)[held][0].name
-            raise InvalidInput(
-                "elasticity",
-                f"the rigidity of {name} jumps at {jump.tension:.6g} N from {jump.below:.6g} to "
-                f"{jump.above:.6g} N, and K_θ with it. Make it continuous, e.g. by a "
-                "TabulatedElasticity through points of its strain.",
-            )

@@ -54,7 +54,7 @@ class Posture(ReadOnlyState):
         count, nv = self.length_jacobian.shape
         hessian = np.zeros((count, nv, nv))
         segments.add_length_hessian(
-            *self.arm._segments, *self._frames, frozen(np.ones(count)), np.arange(count), hessian
+            self.arm._model.routing, self._frames, frozen(np.ones(count)), np.arange(count), hessian
         )
         return frozen(hessian)
 
@@ -79,7 +79,7 @@ class Posture(ReadOnlyState):
     def brackets(self) -> tuple[Array, ...]:
         """Straight lines from each cable site to the bones of its link, (2, 3) each [m]."""
         lines = []
-        for row, site in zip(self.arm._routing.row, self._frames.site, strict=True):
+        for row, site in zip(self.arm._model.routing.row, self._frames.site, strict=True):
             feet = [_foot(site, bone) for bone in self._bones[row]] or [self._frames.origin[row]]
             nearest = min(feet, key=lambda foot: float(np.linalg.norm(foot - site)))
             lines.append(frozen(np.array([site, nearest])))
@@ -88,9 +88,9 @@ class Posture(ReadOnlyState):
     @cached_property
     def _bones(self) -> tuple[tuple[Array, ...], ...]:
         """The bones that start at each joint, the base first."""
-        origin, parent = self._frames.origin, self.arm._tree.parent
+        origin, parent = self._frames.origin, self.arm._model.tree.parent
         ends = [(parent[i], origin[i]) for i in range(1, len(origin))]
-        ends.append((self.arm._masses.tip, self.tip[:3, 3]))
+        ends.append((self.arm._model.masses.tip, self.tip[:3, 3]))
         return tuple(
             tuple(
                 frozen(np.array([start, end]))
@@ -106,22 +106,22 @@ class Posture(ReadOnlyState):
         Raises:
             UnknownName: There is no such link.
         """
-        return frozen(self.arm._body.placement(self.q, link))
+        return frozen(self.arm._model.body.placement(self.q, link))
 
     def _joint_stiffness(
         self, tension: Array, cable_stiffness: Array, wrench: Array
     ) -> tuple[Array, Array, Array, Array]:
         """Active, passive, load and K_θ (nv, nv); of checked, read-only vectors."""
         active, passive, load, joint = stiffness_kernels.joint_stiffness(
-            *self.arm._segments,
-            *self._frames,
+            self.arm._model.routing,
+            self._frames,
             self.jacobian,
             self.length_jacobian,
             self.gravity_stiffness,
             tension,
             cable_stiffness,
             wrench,
-            self.arm._masses.way,
+            self.arm._model.masses.way,
         )
         return frozen(active), frozen(passive), frozen(load), frozen(joint)
 

@@ -15,9 +15,8 @@ from numpy.typing import ArrayLike
 from cdsm.arm_model import OriginalLength
 from cdsm.cable import serpentine_cables
 from cdsm.elasticity import Elasticity, LinearElasticity
-from cdsm.geometry import Geometry
+from cdsm.geometry import Geometry, Link
 from cdsm.manipulator import Manipulator
-from cdsm.parts import Link
 from cdsm.wires.laws import StrandElasticity
 
 STRAND_1X19: Final = StrandElasticity.eq19_repaired()

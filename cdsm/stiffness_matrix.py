@@ -14,14 +14,13 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import Literal, TypeVar, final, get_args
+from typing import TYPE_CHECKING, Literal, TypeVar, final, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm.errors import InvalidInput, SingularStiffness
 from cdsm.posture import Posture
-from cdsm.report import Report, report_on
 from cdsm.support.markup import element, row
 from cdsm.support.units import MODEL, coordinates
 from cdsm.support.validation import (
@@ -34,6 +33,9 @@ from cdsm.support.validation import (
     vector,
 )
 from cdsm.tension import Tension
+
+if TYPE_CHECKING:
+    from cdsm.report import Report
 
 Term = Literal["active", "passive", "gravity", "load", "joint"]
 
@@ -135,7 +137,7 @@ class Stiffness(ReadOnlyState):
         if self.free_length is not None:
             return self.free_length
         pose = self.posture
-        return pose.arm._laws.original_lengths(pose.cable_lengths, self.tension)
+        return pose.arm._model.laws.original_lengths(pose.cable_lengths, self.tension)
 
     @cached_property
     def residual(self) -> Array:
@@ -274,6 +276,8 @@ class Stiffness(ReadOnlyState):
         posture, which takes some tenths of a second. Nothing that is wrong with the stiffness is
         raised; the report says so.
         """
+        from cdsm.report import report_on  # so that importing cdsm does not import it
+
         return report_on(self)
 
     def __repr__(self) -> str:
@@ -391,7 +395,7 @@ def stiffness(
             raise InvalidInput(
                 "tension", f"{F[c]:g} N given for {arm.cables[c].name}; cables only pull."
             )
-    k = arm._laws.stiffness(pose.cable_lengths, F)
+    k = arm._model.laws.stiffness(pose.cable_lengths, F)
     active, passive, load, joint = pose._joint_stiffness(F, k, W)
     return Stiffness(
         posture=pose,

@@ -192,7 +192,7 @@ def checked_bounds(arm: Manipulator, minimum: ArrayLike, maximum: ArrayLike) -> 
             f"{low[c]:g} N given for {cables[c].name}; cables only pull, so it must be finite "
             "and not negative.",
         )
-    least, most = arm._laws.narrowed(low, high)
+    least, most = arm._model.laws.narrowed(low, high)
     ordered = least <= most
     if np.count_nonzero(ordered) < least.size:
         c = int(ordered.argmin())

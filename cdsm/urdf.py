@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cdsm.errors import UrdfError
-from cdsm.geometry import Geometry
-from cdsm.parts import Link
+from cdsm.geometry import Geometry, Link
 from cdsm.rigid_body import RigidBody
 from cdsm.support.files import write_file
 from cdsm.support.validation import Array, instance

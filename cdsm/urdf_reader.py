@@ -14,7 +14,7 @@ import numpy as np
 from lxml import etree
 
 from cdsm.errors import UrdfError, listed
-from cdsm.parts import MAXIMUM_JOINTS
+from cdsm.geometry import MAXIMUM_JOINTS
 from cdsm.support.files import read_text
 from cdsm.support.validation import flag
 from cdsm.support.xml import XmlFault, numbers, parse_xml

@@ -141,7 +141,7 @@ class Distributor:
         self._arm, self._q, self._wrench = arm, q, wrench
         self._low, self._high = low, high
         self._kernel_arm = kernel_arm(arm, check_limits)
-        self._blocks = blocks(arm._routing, arm.nv)
+        self._blocks = blocks(arm._model.routing, arm.nv)
         self._start = layout.starts(arm.nv, len(arm.cables), 0)
         self._wanted = np.array(
             [layout.JACOBIAN, layout.LENGTH_JACOBIAN, layout.GRAVITY_TORQUE], dtype=np.intp

@@ -17,17 +17,17 @@ def kernel_arm(arm: Manipulator, check_limits: bool) -> Arm:
     Raises:
         InvalidInput: ``check_limits`` is no flag.
     """
-    lowest, highest = arm._lowest, arm._highest
+    lowest, highest = arm._model.lowest, arm._model.highest
     if not flag("check_limits", check_limits):
         lowest, highest = np.full_like(lowest, -np.inf), np.full_like(highest, np.inf)
     return Arm(
-        arm._tree,
-        arm._routing,
-        arm._masses,
+        arm._model.tree,
+        arm._model.routing,
+        arm._model.masses,
         frozen(lowest),
         frozen(highest),
-        arm._laws.series,
-        arm._laws.rest,
+        arm._model.laws.series,
+        arm._model.laws.rest,
     )
 
 
@@ -111,7 +111,7 @@ def bounds(
             "minimum",
             f"{bad[0]:g} N given; cables only pull, so it must be finite and not negative.",
         )
-    low, high = arm._laws.narrowed(low, high)
+    low, high = arm._model.laws.narrowed(low, high)
     if (low > high).any():
         *row, c = np.argwhere(low > high)[0]
         where = f" in row {row[0]}" if row else ""

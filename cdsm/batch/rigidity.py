@@ -29,8 +29,8 @@ def rigidities(arm: Manipulator, tension: Array, usable: Flags) -> Array:
         return frozen(np.zeros_like(tension))
     pulled = tension if usable.all() else tension[usable]
     rigidity = np.zeros_like(pulled)
-    for law, held in arm._laws.held:
-        rigidity[:, held] = _where_defined(arm._laws, law, pulled[:, held])
+    for law, held in arm._model.laws.held:
+        rigidity[:, held] = _where_defined(arm._model.laws, law, pulled[:, held])
     if pulled is tension:
         return frozen(rigidity)
     result = np.zeros_like(tension)

@@ -295,58 +295,36 @@ def measure(
 
 
 @compiled
-def evaluate(
-    parent: Indices,
-    order: Indices,
-    turn: Array,
-    translation: Array,
-    local_axis: Array,
-    local_slide: Array,
-    row: Indices,
-    point: Array,
-    segment: Indices,
-    joint: Indices,
-    fixed: Array,
-    q: Array,
-) -> tuple[Array, Array, Array, Array, Array, Array, int]:
-    """From :class:`Tree`, :class:`Routing` and q (nv,) to everything that depends on q.
-
-    Fields are handed over one by one: unpacking a tuple at the border costs a microsecond.
+def evaluate(tree: Tree, routing: Routing, q: Array) -> tuple[Frames, Array, Array, int]:
+    """Everything about cables that depends on q (nv,) alone.
 
     Returns:
-        The fields of :class:`Frames`, L (C,), J_L (C, nv), and the first segment whose sites
-        coincide, or −1; if there is one, L and J_L are unfinished.
+        The frames, L (C,), J_L (C, nv), and the first segment whose sites coincide, or −1; if there
+        is one, L and J_L are unfinished.
     """
-    count, nv = parent.shape[0], q.shape[0]
-    tree = Tree(parent, order, turn, translation, local_axis, local_slide)
-    origin, axis, slide = np.empty((count, 3)), np.empty((count, 3)), np.empty(local_slide.shape)
-    frames = Frames(origin, axis, slide, np.empty((row.shape[0], 3)))
-    place(tree, row, point, q, np.empty((count, 3, 3)), frames)
+    count, nv = tree.parent.shape[0], q.shape[0]
+    origin, axis, slide = np.empty((count, 3)), np.empty((count, 3)), np.empty(tree.slide.shape)
+    frames = Frames(origin, axis, slide, np.empty((routing.row.shape[0], 3)))
+    place(tree, routing.row, routing.point, q, np.empty((count, 3, 3)), frames)
+    fixed = routing.fixed
     L, J, nothing = fixed.copy(), np.zeros((fixed.shape[0], nv)), np.empty((0, nv, nv))
     page, bent = np.empty(0, dtype=np.intp), np.empty((nv, 3))
-    coincident = measure(segment, joint, frames, fixed, page, bent, L, J, nothing)
-    return origin, axis, slide, frames.site, L, J, coincident
+    coincident = measure(routing.segment, routing.joint, frames, fixed, page, bent, L, J, nothing)
+    return frames, L, J, coincident
 
 
 @compiled
 def add_length_hessian(
-    segment: Indices,
-    joint: Indices,
-    origin: Array,
-    axis: Array,
-    slide: Array,
-    site: Array,
-    weight: Array,
-    page: Indices,
-    hessian: Array,
+    routing: Routing, frames: Frames, weight: Array, page: Indices, hessian: Array
 ) -> None:
     """Add weight[c] ∂²L_c/∂θ_i∂θ_j to hessian[page[c], i, j] for every cable c.
 
     All pages zero and weight = F gives H_L·F; page c for cable c and weight 1 the whole tensor.
     No two neighbouring sites may coincide; :func:`evaluate` has seen to that.
     """
-    frames, nv = Frames(origin, axis, slide, site), hessian.shape[1]
+    nv = hessian.shape[1]
     nothing, L = np.empty((0, nv)), np.zeros(weight.shape[0])
-    measure(segment, joint, frames, weight, page, np.empty((nv, 3)), L, nothing, hessian)
+    bent = np.empty((nv, 3))
+    measure(routing.segment, routing.joint, frames, weight, page, bent, L, nothing, hessian)
     for k in range(hessian.shape[0]):
         mirror(hessian[k])

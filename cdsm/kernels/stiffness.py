@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from cdsm.kernels.compiling import compiled, upwards
-from cdsm.kernels.segments import Indices, add_length_hessian, mirror
+from cdsm.kernels.segments import Frames, Indices, Routing, add_length_hessian, mirror
 from cdsm.support.validation import Array
 
 
@@ -50,12 +50,8 @@ def set_cable_stiffness(
 
 @compiled
 def joint_stiffness(
-    segment: Indices,
-    joint: Indices,
-    origin: Array,
-    axis: Array,
-    slide: Array,
-    site: Array,
+    routing: Routing,
+    frames: Frames,
     jacobian: Array,
     length_jacobian: Array,
     gravity: Array,
@@ -68,7 +64,7 @@ def joint_stiffness(
     nv = jacobian.shape[1]
     active, passive = np.zeros((1, nv, nv)), np.zeros((nv, nv))
     page = np.zeros(tension.shape[0], dtype=np.intp)
-    add_length_hessian(segment, joint, origin, axis, slide, site, tension, page, active)
+    add_length_hessian(routing, frames, tension, page, active)
     add_passive(length_jacobian, cable_stiffness, passive)
     mirror(passive)
     load = load_stiffness(jacobian, wrench, way)

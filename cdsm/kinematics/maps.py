@@ -270,7 +270,7 @@ def inverse_kinematics(
         target=target,
         guess=guess,
         angles=frozen(solution.angles),
-        tip=frozen(arm._body.state(solution.angles).tip),
+        tip=frozen(arm._model.body.state(solution.angles).tip),
         tolerance=tolerance,
         iterations=solution.iterations,
     )
@@ -280,7 +280,7 @@ def _checked_guess(arm: Manipulator, guess: ArrayLike | None) -> Array:
     if guess is None:
         return frozen(np.zeros(arm.nv))
     angles = vector("guess", guess, arm.nv, arm._meaning_of_q)
-    beyond = (angles < arm._lowest) | (angles > arm._highest)
+    beyond = (angles < arm._model.lowest) | (angles > arm._model.highest)
     if beyond.any():
         i = int(beyond.argmax())
         raise InvalidInput(

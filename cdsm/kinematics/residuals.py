@@ -59,7 +59,7 @@ class TipResidual:
 
     def evaluate(self, q: Array) -> tuple[Array, Array]:
         """Residual r (m,) and ∂r/∂q (m, nv)."""
-        state, length = self.arm._body.state(q), self.arm.length
+        state, length = self.arm._model.body.state(q), self.arm.length
         linear, angular = state.jacobian[:3] / length, state.jacobian[3:]
         if self.target.ndim == 1:
             return (state.tip[:3, 3] - self.target) / length, linear
@@ -73,14 +73,14 @@ class TipResidual:
         wrench = np.zeros(6)
         wrench[: weight.size] = weight
         wrench[:3] /= self.arm.length
-        jacobian, way = self.arm._body.state(q).jacobian, self.arm._masses.way
+        jacobian, way = self.arm._model.body.state(q).jacobian, self.arm._model.masses.way
         return -load_stiffness(frozen(jacobian), frozen(wrench), way)
 
     def hessian(self, q: Array) -> Array:
         """Second derivative of ½‖r‖² (nv, nv)."""
         # ∂(½φ²) = φ·ω exactly, so its second derivative needs that of φ once, not twice
         r, J = self.evaluate(q)
-        angular = self.arm._body.state(q).jacobian[3 : r.size]
+        angular = self.arm._model.body.state(q).jacobian[3 : r.size]
         return self.curvature(q, r) + J[:3].T @ J[:3] + angular.T @ J[3:]
 
 

@@ -103,7 +103,7 @@ def stiffness_gradient(stiffness: Stiffness) -> StiffnessGradient:
         ElasticityRangeError: A tension outside the domain of the elasticity of its cable.
     """
     K = instance("stiffness", stiffness, Stiffness)
-    slope, _ = K.posture.arm._laws.slopes(K.tension, K.cable_stiffness)
+    slope, _ = K.posture.arm._model.laws.slopes(K.tension, K.cable_stiffness)
     return StiffnessGradient(stiffness=K, cable_stiffness=slope)
 
 

@@ -36,7 +36,7 @@ class Field:
         self.evaluations = 0
         # products with the tensor, which is cached, beat going through the cables each time
         self.geometry = pose.length_hessian, pose.length_jacobian
-        load = load_stiffness(pose.jacobian, region.least.wrench, pose.arm._masses.way)
+        load = load_stiffness(pose.jacobian, region.least.wrench, pose.arm._model.masses.way)
         self.constant = pose.gravity_stiffness + load
         self._bounds = region.low, region.high
         self.scale = max(float(abs(self.at(region.least.values).values).max()), SMALLEST)
@@ -64,7 +64,7 @@ class Point:
         pose = field.pose
         self.field = field
         self.F = F
-        self._springs = pose.arm._laws.stiffness(pose.cable_lengths, F)
+        self._springs = pose.arm._model.laws.stiffness(pose.cable_lengths, F)
         self.K, self.values, self.vectors = kernels.stiffness_at(
             field.constant, *field.geometry, F, self._springs
         )
@@ -72,7 +72,7 @@ class Point:
     @cached_property
     def slopes(self) -> tuple[Array, Array]:
         """dk/dF (C,) [1/m] and d²k/dF² (C,) [1/(N m)]."""
-        return self.field.pose.arm._laws.slopes(self.F, self._springs)
+        return self.field.pose.arm._model.laws.slopes(self.F, self._springs)
 
     @property
     def reserve(self) -> float:

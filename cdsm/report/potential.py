@@ -79,12 +79,12 @@ class Neighbourhood:
 
     def _sampled(self, places: Array, work: Callable[[Array], float]) -> Array:
         pose, arm = self._pose, self._pose.arm
-        start = arm._body.potential_energy(pose.q)
+        start = arm._model.body.potential_energy(pose.q)
         rows = []
         for q in self._angles(places):
             longer = arm.cable_lengths(q, check_limits=False) - pose.cable_lengths
-            weight = arm._body.potential_energy(q) - start
-            tip = arm._body.placement(q, arm.tip_link)
+            weight = arm._model.body.potential_energy(q) - start
+            tip = arm._model.body.placement(q, arm.tip_link)
             rows.append([self._tension @ longer, weight, -work(tip)])
         return np.array(rows)
 
@@ -157,7 +157,8 @@ class Neighbourhood:
     def _straightness(self) -> float:
         """How far a joint may move, in its unit, until the shortest segment could have vanished."""
         pose = self._pose
-        segment, joint = pose.arm._segments
+        routing = pose.arm._model.routing
+        segment, joint = routing.segment, routing.joint
         site, origin = pose._frames.site, pose._frames.origin
         start, end = segment[:-1, 1:3].T
         apart = np.linalg.norm(site[end] - site[start], axis=1)
@@ -177,7 +178,7 @@ class Neighbourhood:
         """Rounding of the kinematic parts of U (3,) [N m], whatever the step."""
         pose, arm = self._pose, self._pose.arm
         far = arm.length + float(np.linalg.norm(pose.tip[:3, 3]))
-        weight = float(arm._masses.mass.sum() * np.linalg.norm(arm.gravity)) * far
+        weight = float(arm._model.masses.mass.sum() * np.linalg.norm(arm.gravity)) * far
         load = float(abs(self._wrench[:3]).sum()) * far + float(abs(self._wrench[3:]).sum())
         return np.array([self._tension @ self.length_noise, _ULPS * weight, _ULPS * load])
 

@@ -282,10 +282,10 @@ def _settle(loaded: LoadedArm, start: Iterate, held_back: Array | float) -> Sett
 
 def _require_between_stops(pose: Posture) -> None:
     arm, q = pose.arm, pose.q
-    beyond = (q < arm._lowest) | (q > arm._highest)
+    beyond = (q < arm._model.lowest) | (q > arm._model.highest)
     if np.count_nonzero(beyond):
         i = int(beyond.argmax())
-        stop = arm.lower[i] if q[i] < arm._lowest[i] else arm.upper[i]
+        stop = arm.lower[i] if q[i] < arm._model.lowest[i] else arm.upper[i]
         raise InvalidInput(
             "pose",
             f"{arm.joint_names[i]} = {q[i]:.6g} rad is beyond its stop at {stop:.6g} rad, where no "

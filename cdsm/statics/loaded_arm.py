@@ -102,7 +102,11 @@ class LoadedArm:
     def stops(self) -> tuple[Array, Array]:
         """Lowest and highest angles (nv,) [rad], at which the joints rest on their stops."""
         arm, q = self.reference.arm, self.reference.q
-        apart = np.where(arm._touching, _APART, 0.0)
+        touching = np.zeros(arm.nv, dtype=np.bool_)  # joints that are stopped by their disks
+        if arm.is_serpentine:
+            joints = arm.geometry.joints
+            touching[:] = [joint.limit is None for joint in joints for _ in joint.axes]
+        apart = np.where(touching, _APART, 0.0)
         # the reference may stand nearer
         return np.minimum(arm.lower + apart, q), np.maximum(arm.upper - apart, q)
 
@@ -122,7 +126,8 @@ def _tilts(pose: Posture, tension: Array) -> Array:
 
     The shorter a segment the more: between disks that all but touch it is most of the rounding.
     """
-    segment, joint = pose.arm._segments
+    routing = pose.arm._model.routing
+    segment, joint = routing.segment, routing.joint
     site, origin = pose._frames.site, pose._frames.origin
     cable, start, end = segment[:-1, :3].T
     apart = np.linalg.norm(site[end] - site[start], axis=1)

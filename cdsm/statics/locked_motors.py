@@ -91,14 +91,14 @@ class LockedCables:
         self._arm = arm
         self._tension = tension
         self._groups = []
-        self.free_length = arm._laws.original_lengths(lengths, tension)
-        for law, held in arm._laws.held:
-            series = arm._laws.series[held]
+        self.free_length = arm._model.laws.original_lengths(lengths, tension)
+        for law, held in arm._model.laws.held:
+            series = arm._model.laws.series[held]
             springs = _Springs(law, held, self.free_length[held], series, law.domain.low)
             try:
                 ends = _ends(springs, lengths[held], tension[held])
             except ElasticityRangeError as error:
-                raise arm._laws.naming(error, held) from None
+                raise arm._model.laws.naming(error, held) from None
             self._groups.append((springs, ends))
 
     def pull(self, lengths: Array, near: Array) -> tuple[Array, Array]:

@@ -111,7 +111,7 @@ def modes(pose: Posture, stiffness: Stiffness) -> Modes:
     there = instance("stiffness", stiffness, Stiffness).posture
     if there is not pose and not (there.arm == arm and np.array_equal(there.q, pose.q)):
         raise InvalidInput("stiffness", "was taken at another posture; take it at this one.")
-    M = arm._body.mass_matrix(pose.q)
+    M = arm._model.body.mass_matrix(pose.q)
     spectrum, motions = np.linalg.eigh(M)
     if spectrum[0] <= _MASSLESS * spectrum[-1]:
         raise _massless(pose, motions[:, 0])
@@ -206,11 +206,11 @@ def mass_matrix(pose: Posture, carried: Iterable[Carried]) -> Array:
     arm, frames = pose.arm, pose._frames
     M = np.zeros((arm.nv, arm.nv))
     for link, mass, centre, inertia in carried:
-        place, row = pose.link_pose(link), arm._body.locate(link)[0]
+        place, row = pose.link_pose(link), arm._model.body.locate(link)[0]
         moved = []
         while row:
             moved.append(row)
-            row = int(arm._tree.parent[row])
+            row = int(arm._model.tree.parent[row])
         R, joints = place[:3, :3], np.array(moved, dtype=np.intp)
         angular = frames.axis[joints]
         linear = np.cross(angular, R @ centre + place[:3, 3] - frames.origin[joints])

@@ -9,16 +9,26 @@ import tomllib
 from collections.abc import Callable, Iterable
 from dataclasses import fields, is_dataclass
 from functools import wraps
-from typing import Annotated, Any, TypeVar, dataclass_transform, get_args, get_type_hints
+from typing import Annotated, Any, TypeVar, cast, dataclass_transform, get_args, get_type_hints
 
 import numpy as np
-from pydantic import BeforeValidator, ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic import (
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    TypeAdapter,
+    ValidationError,
+    validate_call,
+)
 from pydantic.dataclasses import dataclass
 
 from cdsm.errors import GeometryError
 from cdsm.support.validation import LARGEST
 
 _Record = TypeVar("_Record")
+_Function = TypeVar("_Function", bound=Callable[..., Any])
+
+_STRICT = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
 
 
 def _plain(value: object) -> object:
@@ -55,8 +65,7 @@ class CrossFaults(ValueError):
 @dataclass_transform(frozen_default=True, kw_only_default=True)
 def record(cls: type[_Record]) -> type[_Record]:
     """Make a frozen, strict pydantic dataclass whose faults come as one :class:`GeometryError`."""
-    config = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
-    made: Any = dataclass(frozen=True, kw_only=True, config=config)(cls)
+    made: Any = dataclass(frozen=True, kw_only=True, config=_STRICT)(cls)
     validate: Callable[..., None] = made.__init__
 
     @wraps(validate)
@@ -68,6 +77,20 @@ def record(cls: type[_Record]) -> type[_Record]:
 
     made.__init__ = construct
     return made  # type: ignore[no-any-return]
+
+
+def checked_keywords(function: _Function) -> _Function:
+    """Check the keywords of a function as the fields of a :func:`record` are checked."""
+    validated = validate_call(config=_STRICT)(function)
+
+    @wraps(function)
+    def call(*args: object, **keywords: object) -> object:
+        try:
+            return validated(*args, **keywords)
+        except ValidationError as error:
+            raise GeometryError(_faults(error, function)) from None
+
+    return cast(_Function, call)
 
 
 def read_toml(text: str) -> dict[str, Any]:
@@ -106,9 +129,10 @@ def _toml(value: object) -> str:
     return json.dumps(value) if isinstance(value, str) else repr(value)
 
 
-def _keys(kind: type) -> list[str]:
-    """Names of the fields of a record and of the records in its lists."""
+def _keys(kind: Callable[..., Any]) -> list[str]:
+    """Names of the keywords of a function, or of the fields of a record and those in its lists."""
     hints = get_type_hints(kind)
+    hints.pop("return", None)
     entries = [entry for hint in hints.values() for entry in get_args(hint)]
     return [
         *hints,
@@ -121,7 +145,7 @@ def _keys(kind: type) -> list[str]:
     ]
 
 
-def _faults(error: ValidationError, kind: type) -> list[str]:
+def _faults(error: ValidationError, kind: Callable[..., Any]) -> list[str]:
     known = _keys(kind)
     listed: list[str] = []
     hinted = 0
@@ -139,7 +163,7 @@ def _faults(error: ValidationError, kind: type) -> list[str]:
             for other in faults
         ):
             continue  # the list is only short of the entries that are faulty themselves
-        elif fault["type"] == "missing":
+        elif fault["type"] in ("missing", "missing_keyword_only_argument"):
             listed.append(f"{where}: is missing")
         elif fault["type"] == "unexpected_keyword_argument":
             key = str(fault["loc"][-1])

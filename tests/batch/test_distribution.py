@@ -269,7 +269,7 @@ def test_search_alone_finds_the_optimum_or_a_proof(name: str) -> None:
 
 def test_guess_is_mostly_the_optimum_and_what_it_proves_is_so() -> None:
     arm = shallow_arm(5)
-    parts = serpentine_guess.blocks(arm._routing, arm.nv)
+    parts = serpentine_guess.blocks(arm._model.routing, arm.nv)
     count, nv = len(arm.cables), arm.nv
     assert parts.row_start.tolist() == [0, 2, 4, 6, 8, 10]
     low, high = frozen(np.full(count, 5.0)), frozen(np.full(count, np.inf))
@@ -301,13 +301,13 @@ def test_guess_is_mostly_the_optimum_and_what_it_proves_is_so() -> None:
 
 
 def test_blocks_are_those_of_the_geometry() -> None:
-    parts = serpentine_guess.blocks(mixed_arm()._routing, 5)
+    parts = serpentine_guess.blocks(mixed_arm()._model.routing, 5)
     assert parts.row.tolist() == [0, 1, 2, 3, 4]
     assert parts.row_start.tolist() == [0, 2, 3, 5]
     assert parts.cable_start.tolist() == [0, 3, 5, 9]
     # from anywhere to anywhere there are none
     own = custom_arm()
-    assert not serpentine_guess.blocks(own._routing, own.nv).row.size
+    assert not serpentine_guess.blocks(own._model.routing, own.nv).row.size
 
 
 # --- certificates ---------------------------------------------------------------------------

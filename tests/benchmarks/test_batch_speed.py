@@ -73,7 +73,7 @@ def test_batch_costs_little_more_than_scalar_c(
     subprocess.run([compiler, str(SCALAR), *flags, "-o", str(library)], check=True)
     function = ctypes.CDLL(str(library)).joint_stiffness
     one, q, tension, wrench = problem(joints, rows)
-    tree, routing, masses = one._tree, one._routing, one._masses
+    tree, routing, masses = one._model.tree, one._model.routing, one._model.masses
     nv, cables, sites = one.nv, len(one.cables), len(routing.row)
     scratch, out = np.empty(40 * (nv + sites) * (cables + 9)), np.empty((rows, nv, nv))
     assert masses.tip == nv

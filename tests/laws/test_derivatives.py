@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import cdsm
+from cdsm.arm_model import route
 from cdsm.kernels import segments
 from cdsm.rigid_body import RigidBody
-from cdsm.routing import route
 from cdsm.support.validation import Array
 from tests.support import arms
 from tests.support.differences import assert_second_order, gravity_energy
@@ -173,14 +173,11 @@ class _Fork(NamedTuple):
 
     def evaluate(self, q: Array) -> tuple[Array, Array, Array]:
         """L, J_L and H_L of its one cable."""
-        constants = (*self.tree, *self.routing)
-        *found, lengths, jacobian, coincident = segments.evaluate(*constants, q)
+        frames, lengths, jacobian, coincident = segments.evaluate(self.tree, self.routing, q)
         assert coincident == -1
         hessian = np.zeros((1, q.size, q.size))
         page = np.zeros(1, dtype=np.intp)
-        frames = segments.Frames(*found)
-        of_cables = (self.routing.segment, self.routing.joint)
-        segments.add_length_hessian(*of_cables, *frames, np.ones(1), page, hessian)
+        segments.add_length_hessian(self.routing, frames, np.ones(1), page, hessian)
         return lengths, jacobian, hessian
 
 
