@@ -508,8 +508,7 @@ if cdsm:
 @job
 def elasticities() -> Named:
     forces = np.array([0.0, 0.5, 2.2, 2.3, 11.0, 31.0, 70.0, 71.0, 300.0, 810.0, 900.0, 1e4])
-    printed = cdsm.StrandElasticity.eq19_as_printed()
-    for name, law in {**laws(), "printed": printed}.items():
+    for name, law in laws().items():
         yield name, law
         for method in ("rigidity", "rigidity_slope", "strain", "energy", "secant_rigidity"):
             yield f"{name}.{method}", [attempt(getattr(law, method), F) for F in forces]
@@ -525,8 +524,7 @@ def elasticities() -> Named:
         for method in ("elongation", "tangent_stiffness", "energy"):
             yield f"{name} cable.{method}", attempt(getattr(cable, method), [20.0, 90.0], 0.4)
         yield f"{name} cable.tension", attempt(cable.tension, [1e-4, 3e-3], 0.4)
-    if hasattr(printed, "polynomial"):
-        yield "polynomial", printed.polynomial(forces)
+    yield "polynomial", cdsm.presets.STRAND_1X19.polynomial(forces)
     yield "in_series", [attempt(cdsm.in_series, *k) for k in ((1e3,), (1e3, np.inf), (), (0.0,))]
 
 
