@@ -33,15 +33,15 @@ from cdsm.support.xml import parse_xml
 from cdsm.tension import Tension
 
 _MASS, _INERTIA = 1e-6, 1e-9
-"""What MuJoCo demands of a moving body at least [kg, kg m²]; where the URDF has none it gets that,
-and its weight is taken off again."""
+"""Least mass and moment of inertia of a moving body in MuJoCo [kg, kg m²]. A body without mass in the
+URDF gets these, and its weight is compensated."""
 
 _SMALLEST = 1e-12
 """Mass [kg] below which a body counts as having none; and moment of inertia [kg m²], likewise."""
 
 _ROUNDING = 1e-9
-"""Part of a moment of inertia by which a body keeps away from what MuJoCo refuses, one moment above
-the sum of the others: rounding carries those of a plate there."""
+"""Relative distance from what MuJoCo refuses: a moment of inertia above the sum of the others. The
+moments of a plate get there by rounding."""
 
 _DEFAULT_STEP = 2e-3
 """MuJoCo's own time step [s]."""
@@ -92,9 +92,9 @@ def to_mjcf(
     instance("arm", arm, Manipulator)
     if (pose is None) != (tension is None):
         raise InvalidInput("tension", "give pose and tension, or neither; one says nothing alone.")
-    drag = scalar("damping", damping)
-    if drag < 0.0:
-        raise InvalidInput("damping", f"{drag:g} given; it cannot be negative.")
+    damping = scalar("damping", damping)
+    if damping < 0.0:
+        raise InvalidInput("damping", f"{damping:g} given; it cannot be negative.")
     if pose is not None and instance("pose", pose, Posture).arm != arm:
         raise InvalidInput("pose", "is of another arm; take arm.at(q).")
     K = None if pose is None or tension is None else stiffness(pose, tension)
@@ -105,7 +105,7 @@ def to_mjcf(
     etree.SubElement(root, "compiler", angle="radian", autolimits="true", inertiafromgeom="false")
     # implicit in velocities alone: what is implicit in positions as well takes energy from springs
     option = etree.SubElement(root, "option", gravity=_row(arm.gravity), integrator="implicitfast")
-    order, masses = _bodies(root, arm, drag)
+    order, masses = _bodies(root, arm, damping)
     option.set("timestep", repr(_DEFAULT_STEP if K is None else _time_step(K, masses)))
     if arm.cables:
         _cables(root, arm, K)
@@ -129,21 +129,21 @@ def write_mjcf(
     """Write :func:`to_mjcf` to a file, whole or not at all; return its path.
 
     Args:
-        arm: As there.
+        arm: As for :func:`to_mjcf`.
         path: The file; replaced if it exists.
-        pose: As there.
-        tension: As there [N].
-        damping: As there [N m s/rad].
+        pose: As for :func:`to_mjcf`.
+        tension: As for :func:`to_mjcf` [N].
+        damping: As for :func:`to_mjcf` [N m s/rad].
 
     Raises:
         FileError: The file cannot be written.
-        CdsmError: As there.
+        CdsmError: As for :func:`to_mjcf`.
     """
     return write_text(path, to_mjcf(arm, pose, tension, damping=damping))
 
 
 def instability(K: Stiffness) -> str:
-    """What is to be said of an arm that is not stable."""
+    """The warning for an arm that is not stable."""
     unit = K.posture.arm.stiffness_unit()
     return (
         f"UNSTABLE: the smallest eigenvalue of K_θ is {K.margin:.4g} {unit}; the arm leaves this "
@@ -152,11 +152,7 @@ def instability(K: Stiffness) -> str:
 
 
 def _time_step(K: Stiffness, masses: list[Carried]) -> float:
-    """A step [s] for the fastest motion, rounded down to 1, 2 or 5 times a power of ten.
-
-    Raises:
-        SingularMass: A motion of the arm moves no link of any mass.
-    """
+    """A step [s] for the fastest motion, rounded down to 1, 2 or 5 times a power of ten."""
     omega = fastest(K, mass_matrix(K.posture, masses))
     if omega * _DEFAULT_STEP <= _PHASE:
         return _DEFAULT_STEP
@@ -171,7 +167,7 @@ def _time_step(K: Stiffness, masses: list[Carried]) -> float:
 def _bodies(
     root: etree._Element, arm: Manipulator, damping: float
 ) -> tuple[list[str], list[Carried]]:
-    """Add the tree of links; return the joints in MuJoCo's order, and what the links carry."""
+    """Add the tree of links; return the joints in MuJoCo's order, and the masses of the links."""
     robot = parse_xml(arm.urdf, "robot")
     links = {str(link.get("name")): link for link in robot.findall("link")}
     joints = robot.findall("joint")
@@ -220,14 +216,14 @@ def _joint(joint: etree._Element, kind: str, damping: float) -> etree._Element:
 
 
 def _inertial(body: etree._Element, link: etree._Element, moves: bool) -> list[Carried]:
-    """Give a body the mass of its link, if it needs one; return it as MuJoCo simulates it."""
+    """Give a body the mass of its link, or a stand-in if it moves; return what it has."""
     inertial = link.find("inertial")
     mass = 0.0 if inertial is None else float(inertial.find("mass").get("value"))
     if inertial is not None and mass > _SMALLEST:
         place, turn = _origin(inertial)
         tensor = _inertia(inertial.find("inertia"), turn.as_matrix())
     elif moves:
-        # it must have a mass; what that weighs is taken off
+        # a stand-in mass, without weight
         body.set("gravcomp", "1")
         mass, place, tensor = _MASS, np.zeros(3), _INERTIA * np.eye(3)
     else:
@@ -238,7 +234,7 @@ def _inertial(body: etree._Element, link: etree._Element, moves: bool) -> list[C
 
 
 def _inertia(inertia: etree._Element, R: Array) -> Array:
-    """I (3, 3) in the frame of the link; made one that MuJoCo takes, statics does not know it."""
+    """I (3, 3) in the frame of the link, adjusted to what MuJoCo takes; statics does not use it."""
     xx, yy, zz, xy, xz, yz = (
         float(inertia.get(key)) for key in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
     )
@@ -254,7 +250,7 @@ def _inertia(inertia: etree._Element, R: Array) -> Array:
 
 
 def _shape(body: etree._Element, visual: etree._Element) -> None:
-    """Draw cylinders, boxes and spheres; meshes are files that the model would depend on."""
+    """Draw cylinders, boxes and spheres. Meshes are separate files, and are left out."""
     geometry = visual.find("geometry")
     shape = None if geometry is None or not len(geometry) else geometry[0]
     if shape is None or shape.tag not in ("cylinder", "box", "sphere"):

@@ -1,17 +1,16 @@
-"""The links of a CASPR model, each with the joint that carries it."""
+"""The links of a CASPR model, each with the joint that carries it, and the XML helpers."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from cdsm.errors import FileError
-from cdsm.interchange.caspr.fields import BASE, TEMPLATE, refuse, text_of, whole
+from cdsm.errors import FileError, counted
 from cdsm.support.files import read_text
 from cdsm.support.validation import Array
 from cdsm.support.xml import XmlFault, numbers, parse_xml
@@ -19,6 +18,12 @@ from cdsm.urdf import TIP
 
 if TYPE_CHECKING:
     from lxml import etree
+
+_TEMPLATE: Final = r"(\.\./)*templates/{}\.dtd"
+"""What CASPR's files name as their DTD; it is not read."""
+
+BASE: Final = "base"
+"""Name of link 0."""
 
 _AXES: Final = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
 
@@ -77,16 +82,9 @@ class Body:
 
 
 def read_bodies(path: Path) -> tuple[Body, ...]:
-    """The links, in the order of their numbers from 1.
-
-    Raises:
-        FileError: The file cannot be read, or holds what cannot be mapped; every fault is listed.
-    """
+    """The links, in the order of their numbers from 1."""
     faults: list[str] = []
-    try:
-        root = parse_xml(read_text(path), "bodies_system", TEMPLATE.format("bodies"))
-    except XmlFault as error:
-        raise FileError(path, f"{error}.") from None
+    root = read_root(path, "bodies_system", "bodies")
     holders = root.findall("links")
     elements = [element for holder in holders for element in holder]
     names = [str(element.get("name") or "") for element in elements]
@@ -187,3 +185,33 @@ def _inertia(element: etree._Element, name: str, mass: float, centre: Array) -> 
         shift: Array = mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
         return matrix - shift
     raise XmlFault(f"{name}: <inertia ref={inertia.get('ref')!r}>; com or joint is needed")
+
+
+def text_of(element: etree._Element, name: str, path: str) -> str:
+    """Text of the element at the path below that of the link of this name."""
+    found = element.findtext(path)
+    if found is None:
+        raise XmlFault(f"{name}: has no <{path.replace('/', '> <')}>")
+    return str(found)
+
+
+def whole(where: str, text: str | None) -> int:
+    """A whole number; ``where`` is for the error."""
+    (value,) = numbers(where, text, 1)
+    if value != int(value):
+        raise XmlFault(f"{where}: {value:g} given; a whole number is needed")
+    return int(value)
+
+
+def refuse(path: Path, faults: Sequence[str]) -> None:
+    """Raise a FileError of all faults, if there are any."""
+    if faults:
+        raise FileError(path, f"cannot be read as a CASPR model, {counted(faults, most=20)}")
+
+
+def read_root(path: Path, tag: str, template: str) -> etree._Element:
+    """The root of a file."""
+    try:
+        return parse_xml(read_text(path), tag, _TEMPLATE.format(template))
+    except XmlFault as error:
+        raise FileError(path, f"{error}.") from None
