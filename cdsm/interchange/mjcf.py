@@ -33,15 +33,19 @@ from cdsm.support.xml import parse_xml
 from cdsm.tension import Tension
 
 _MASS, _INERTIA = 1e-6, 1e-9
-"""Least mass and moment of inertia of a moving body in MuJoCo [kg, kg m²]. A body without mass in the
-URDF gets these, and its weight is compensated."""
+"""Least mass and moment of inertia of a moving body in MuJoCo [kg, kg m²].
+
+A body without mass in the URDF gets these, and its weight is compensated.
+"""
 
 _SMALLEST = 1e-12
 """Mass [kg] below which a body counts as having none; and moment of inertia [kg m²], likewise."""
 
 _ROUNDING = 1e-9
-"""Relative distance from what MuJoCo refuses: a moment of inertia above the sum of the others. The
-moments of a plate get there by rounding."""
+"""Relative distance from what MuJoCo refuses: a moment of inertia above the sum of the others.
+
+The moments of a plate get there by rounding.
+"""
 
 _DEFAULT_STEP = 2e-3
 """MuJoCo's own time step [s]."""
