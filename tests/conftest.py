@@ -7,7 +7,7 @@ from hypothesis import HealthCheck, settings
 
 from cdsm import paper
 
-Results = dict[str, paper.Result]
+Results = dict[str, paper.Figure]
 
 # a test is about numbers; how long it takes depends on what else the machine does
 settings.register_profile("cdsm", deadline=None, suppress_health_check=[HealthCheck.too_slow])

@@ -3,6 +3,15 @@
 from collections.abc import Callable
 from typing import Final
 
+from cdsm.paper.claims import (
+    EXPLANATION,
+    HEADER,
+    Claim,
+    Figure,
+    to_dict,
+    to_markdown,
+    to_rows,
+)
 from cdsm.paper.experiments import (
     ExperimentFigure,
     PrototypeFigure,
@@ -12,22 +21,20 @@ from cdsm.paper.experiments import (
     figure_13,
     figure_prototype,
 )
-from cdsm.paper.figures import (
-    Claim,
+from cdsm.paper.lead import LeadFigure, figure_lead
+from cdsm.paper.prototype import BOUNDS, STEPS, Prototype, PrototypeFit, Step, identify_prototype
+from cdsm.paper.simulation import (
     Curve,
-    Figure,
+    StiffnessFigure,
     figure_3,
     figure_4,
     figure_6,
     figure_7,
     figure_8,
 )
-from cdsm.paper.lead import LeadFigure, figure_lead
-from cdsm.paper.prototype import BOUNDS, STEPS, Prototype, PrototypeFit, Step, identify_prototype
-from cdsm.paper.report import EXPLANATION, HEADER, Result, to_dict, to_markdown, to_rows
 from cdsm.paper.strand import StrandFigure, figure_5
 
-FIGURES: Final[dict[str, Callable[[], Result]]] = {
+FIGURES: Final[dict[str, Callable[[], Figure]]] = {
     "fig3": figure_3,
     "fig4": figure_4,
     "lead": figure_lead,
@@ -56,8 +63,8 @@ __all__ = [
     "Prototype",
     "PrototypeFigure",
     "PrototypeFit",
-    "Result",
     "Step",
+    "StiffnessFigure",
     "StrandFigure",
     "Trace",
     "identify_prototype",

@@ -10,8 +10,8 @@ from numpy.polynomial.polynomial import polyval
 from numpy.typing import ArrayLike
 
 from cdsm import presets
+from cdsm.paper.claims import Claim, Figure
 from cdsm.paper.digits import JOIN, LEVEL, band, least_bend
-from cdsm.paper.figures import Claim
 from cdsm.support.validation import Array, frozen
 from cdsm.wires.laws import EQ19_PRINTED
 
@@ -21,12 +21,10 @@ GAUGE_LENGTH: Final = 0.5
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
-class StrandFigure:
+class StrandFigure(Figure):
     """Fig. 5: force over displacement, and rigidity over tension.
 
     Attributes:
-        name: ``"fig5"``.
-        title: What it shows.
         gauge_length: Length of the tested wire [m].
         tension: F (N,) [N].
         displacement: Stretch of the wire from 2.2 N on, ∫ l_0 dF/EA (N,) [m].
@@ -36,11 +34,8 @@ class StrandFigure:
         high: Largest EA of them (N,) [N].
         printed: Eq. 19 as printed (N,) [N].
         join: Tension at which its branches meet [N].
-        claims: What the paper says of it.
     """
 
-    name: str
-    title: str
     gauge_length: float
     tension: Array
     displacement: Array
@@ -50,7 +45,19 @@ class StrandFigure:
     high: Array
     printed: Array
     join: float
-    claims: tuple[Claim, ...]
+
+    def numbers(self) -> dict[str, object]:
+        """Its curves as plain numbers in SI, for JSON."""
+        return {
+            "gauge_length_m": self.gauge_length,
+            "tension_N": self.tension.tolist(),
+            "displacement_m": self.displacement.tolist(),
+            "tangent_rigidity_N": self.tangent.tolist(),
+            "secant_rigidity_N": self.secant.tolist(),
+            "least_rigidity_N": self.low.tolist(),
+            "largest_rigidity_N": self.high.tolist(),
+            "as_printed_N": self.printed.tolist(),
+        }
 
 
 def eq19_as_printed(tension: ArrayLike) -> Array:
@@ -72,9 +79,7 @@ def figure_5(gauge_length: float = GAUGE_LENGTH) -> StrandFigure:
     law = presets.STRAND_1X19
     tension = np.concatenate([np.linspace(2.25, JOIN, 80), np.linspace(31.01, law.high, 120)])
     low, high = band(tension)
-    above = float(law.polynomial(JOIN))
     flat = law.rigidity(np.linspace(*LEVEL, 400))
-    below_31, above_31 = least_bend()
     return StrandFigure(
         name="fig5",
         title="Fig. 5: tensile test of the 1×19 strand, as Eq. 19 implies it",
@@ -88,59 +93,43 @@ def figure_5(gauge_length: float = GAUGE_LENGTH) -> StrandFigure:
         printed=frozen(eq19_as_printed(tension)),
         join=JOIN,
         claims=(
-            _claim(
-                "first coefficient for which the branches meet at 31 N, times 1e4",
-                "N⁻⁵",
-                (-10.0,),
-                (1e4 * law.coefficients[0][-1],),
-                "misprint: −1e-3 for −1e-4; all other digits as printed",
+            Claim(
+                figure="Fig. 5",
+                quantity="first coefficient for which the branches meet at 31 N, times 1e4",
+                unit="N⁻⁵",
+                paper=(-10.0,),
+                computed=(1e4 * law.coefficients[0][-1],),
+                assumption="misprint: −1e-3 for −1e-4; all other digits as printed",
             ),
-            _claim(
-                "EA at 31 N from the lower over that from the upper polynomial, as printed",
-                "-",
-                (1.0,),
-                (float(eq19_as_printed(JOIN)) / above,),
-                "none: a misprint",
+            Claim(
+                figure="Fig. 5",
+                quantity="EA at 31 N from the lower over that from the upper polynomial, "
+                "as printed",
+                unit="-",
+                paper=(1.0,),
+                computed=(float(eq19_as_printed(JOIN)) / float(law.polynomial(JOIN)),),
+                assumption="none: a misprint",
             ),
-            _claim(
-                "slope of EA below and above 31 N, where the least change is sought",
-                "-",
-                None,
-                (below_31, above_31),
-                "any first coefficient, the others within their printed digits",
+            Claim(
+                figure="Fig. 5",
+                quantity="slope of EA below and above 31 N, where the least change is sought",
+                unit="-",
+                computed=least_bend(),
+                assumption="any first coefficient, the others within their printed digits",
             ),
-            _claim(
-                "EA at 810 N, least and largest within the printed digits",
-                "kN",
-                None,
-                (1e-3 * float(low[-1]), 1e-3 * float(high[-1])),
-                "none",
+            Claim(
+                figure="Fig. 5",
+                quantity="EA at 810 N, least and largest within the printed digits",
+                unit="kN",
+                computed=(1e-3 * float(low[-1]), 1e-3 * float(high[-1])),
+                assumption="none",
             ),
-            _claim(
-                "rise of EA from least to largest, 400 to 810 N (paper: near-constant)",
-                "%",
-                None,
-                (100.0 * float(flat.max() / flat.min() - 1.0),),
-                "Eq. 19 most level within its digits",
+            Claim(
+                figure="Fig. 5",
+                quantity="rise of EA from least to largest, 400 to 810 N (paper: near-constant)",
+                unit="%",
+                computed=(100.0 * float(flat.max() / flat.min() - 1.0),),
+                assumption="Eq. 19 most level within its digits",
             ),
         ),
-    )
-
-
-def _claim(
-    quantity: str,
-    unit: str,
-    paper: tuple[float, ...] | None,
-    computed: tuple[float, ...],
-    assumption: str,
-) -> Claim:
-    return Claim(
-        figure="Fig. 5",
-        quantity=quantity,
-        unit=unit,
-        paper=paper,
-        computed=computed,
-        original=(),
-        along=(),
-        assumption=assumption,
     )

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 _LENGTHS = {"stretched": "$l_0 = L$ (paper)", "unstrained": "original $l_0$"}
 
 
-def plot_paper(result: paper.Result) -> Figure:
+def plot_paper(result: paper.Figure) -> Figure:
     """One recomputed figure of the paper.
 
     Of a stiffness its own reading above, that of a hung weight below, each with the stretched
@@ -83,7 +83,7 @@ def _plot_strand(result: paper.StrandFigure) -> Figure:
     return figure
 
 
-def _plot_directions(result: paper.Figure) -> Figure:
+def _plot_directions(result: paper.StiffnessFigure) -> Figure:
     """A column for each direction, a curve for each case."""
     rows: list[tuple[str, Callable[[paper.Curve], Array]]] = [
         ("paper's reading", lambda curve: curve.pseudoinverse),
@@ -108,7 +108,7 @@ def _plot_directions(result: paper.Figure) -> Figure:
     return figure
 
 
-def _plot_changes(result: paper.Figure) -> Figure:
+def _plot_changes(result: paper.StiffnessFigure) -> Figure:
     """A column for each direction: the active part, and the change of the stiffness from start."""
     figure, grid = panels(11.0, 9.0, 3, 3, sharex=True, sharey="row")
     for i in range(3):
@@ -177,7 +177,7 @@ def _plot_lead(result: paper.LeadFigure) -> Figure:
     return figure
 
 
-def _plot_postures(result: paper.Figure) -> Figure:
+def _plot_postures(result: paper.StiffnessFigure) -> Figure:
     """A column for each posture: its picture, and a curve for each direction."""
     figure = Figure(figsize=(11.0, 9.0), layout="constrained")
     grid = figure.add_gridspec(3, 3, height_ratios=(1.15, 1.0, 1.0))
@@ -252,7 +252,7 @@ def _plot_prototype(result: paper.PrototypeFigure) -> Figure:
 
 def _draw_curve(
     axes: Any,
-    result: paper.Figure,
+    result: paper.StiffnessFigure,
     curve: paper.Curve,
     values: Array,
     color: str,
@@ -276,11 +276,13 @@ def _draw_curve(
         )
 
 
-def _swept(result: paper.Figure, curve: paper.Curve) -> Array:
+def _swept(result: paper.StiffnessFigure, curve: paper.Curve) -> Array:
     return curve.swept / 1e9 if result.swept == "young_modulus" else curve.tension[:, 1]
 
 
-def _finish(figure: Figure, grid: Any, result: paper.Figure, *, legend: bool = True) -> None:
+def _finish(
+    figure: Figure, grid: Any, result: paper.StiffnessFigure, *, legend: bool = True
+) -> None:
     label = {
         "young_modulus": "Young's modulus [GPa]",
         "tension": "cable tension, mean and range [N]",

@@ -16,9 +16,9 @@ def claims(results: Results, name: str, quantity: str) -> list[paper.Claim]:
     return found
 
 
-def of_arm(results: Results, name: str) -> paper.Figure:
+def of_arm(results: Results, name: str) -> paper.StiffnessFigure:
     figure = results[name]
-    assert isinstance(figure, paper.Figure)
+    assert isinstance(figure, paper.StiffnessFigure)
     return figure
 
 
@@ -87,7 +87,7 @@ def test_lead_decides_whether_stiffness_falls_with_tension(results: Results) -> 
     assert claim.computed == (0.0, 0.0, 0.0)
     np.testing.assert_allclose(claim.original, (1.88, 6.47, 7.44), atol=0.01)
     np.testing.assert_allclose(claim.along, (277.0, 91.5, 93.2), atol=0.5)
-    for length in (paper.figures.STRETCHED, paper.figures.UNSTRAINED):
+    for length in ("stretched", "unstrained"):
         lead = float(figure.leads[-1])
         arm = presets.virtual_prototype(presets.ELASTIC_STAGE, lead=lead, original_length=length)
         pose = arm.at(np.full(10, presets.TEN_DEGREES))
@@ -116,7 +116,7 @@ def test_fig7_stiffness_falls_in_the_elastic_stage_by_the_stretched_length(
     np.testing.assert_allclose(claim.computed, (-1.21, -1.04, -1.04), atol=0.01)
     np.testing.assert_allclose(claim.original, (0.06, 0.24, 0.24), atol=0.01)
     (curve,) = of_arm(results, "fig7").curves
-    assert curve.tension[-1, 2] == pytest.approx(paper.figures.STRAND_END, abs=0.01)
+    assert curve.tension[-1, 2] == pytest.approx(paper.simulation.STRAND_END, abs=0.01)
 
 
 def test_fig8_rises_and_then_falls_a_little_with_eq19_within_its_digits(results: Results) -> None:

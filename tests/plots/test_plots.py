@@ -84,7 +84,7 @@ def test_paper_figures_show_both_readings_in_newton_per_millimetre(
     results: Results,
 ) -> None:
     for result in results.values():
-        if not isinstance(result, paper.Figure):
+        if not isinstance(result, paper.StiffnessFigure):
             continue
         figure = plots.plot_paper(result)
         labels = [axes.get_ylabel() for axes in figure.axes]
@@ -100,7 +100,7 @@ def test_curves_are_drawn_where_they_are(
     results: Results,
 ) -> None:
     result = results["fig6"]
-    assert isinstance(result, paper.Figure)
+    assert isinstance(result, paper.StiffnessFigure)
     axes = plots.plot_paper(result).axes[0]
     x, y = _shown(axes.get_lines()[0])
     np.testing.assert_allclose(x, result.curves[0].tension[:, 1])
@@ -137,7 +137,7 @@ def test_prototype_figure_shows_a_dot_for_every_number_that_counted(results: Res
 
 def test_changes_are_shown_in_both_readings_beside_the_papers_number(results: Results) -> None:
     result = results["fig4"]
-    assert isinstance(result, paper.Figure)
+    assert isinstance(result, paper.StiffnessFigure)
     figure = plots.plot_paper(result)
     figure.draw_without_rendering()
     assert len(figure.axes) == 9
