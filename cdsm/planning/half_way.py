@@ -8,8 +8,8 @@ from typing import final
 
 from cdsm.errors import CdsmError, EquilibriumError
 from cdsm.planning.objectives import achieved, misfit
-from cdsm.statics.loaded_arm import LoadedArm
-from cdsm.statics.trust_region import settle
+from cdsm.statics.locked_motors import LoadedArm
+from cdsm.statics.trust_region import find_rest
 from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.validation import Array, ReadOnlyState, frozen
 
@@ -105,9 +105,9 @@ def _at_rest(ends: tuple[Stiffness, Stiffness], unstrained: Array) -> Stiffness:
     for c, l_0 in zip(held, unstrained.tolist(), strict=True):
         lengths[c] = l_0 + arm.cables[c].elongation(F[c], l_0)
     loaded = LoadedArm(mean, F, W, lengths)
-    settled = settle(loaded.moved, loaded.at(mean, F), *loaded.stops())
-    K = settled.point.K
-    if not (settled.steady and settled.convex):
+    search = find_rest(loaded.moved, loaded.at(mean, F), *loaded.stops())
+    K = search.state.K
+    if not (search.converged and search.convex):
         worst = int(abs(K.residual).argmax())
         raise EquilibriumError(
             "half-way the arm buckles, or finds no place to rest",

@@ -18,7 +18,15 @@ from cdsm.errors import InvalidInput
 from cdsm.planning.gradient import require_finite, stiffness_gradient
 from cdsm.planning.objectives import unstable
 from cdsm.posture import Posture
-from cdsm.statics.bound_scan import At, crossing, domain, reach, reason, sampled, stable_ranges
+from cdsm.statics.bound_scan import (
+    StiffnessAt,
+    failure_at,
+    log_samples,
+    scan_end,
+    sign_change,
+    stable_ranges,
+    tension_domain,
+)
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.units import MODEL
 from cdsm.support.validation import (
@@ -159,12 +167,12 @@ def saturation(
     def at(lower: float) -> Stiffness:
         return stiffness(pose, pull(lower))
 
-    lowest, highest = domain(arm)
+    lowest, highest = tension_domain(arm)
     low = max(start, lowest)
     pull(start)  # of bounds that contradict each other it says so
     require_finite(math.inf if at(low)._torque(u) is None else 0.0, u)
     top = min(highest, float(ceiling.min()))
-    high = max(reach(at, low, max(top, low)), low)
+    high = max(scan_end(at, low, max(top, low)), low)
     first, last = _stable(at, low, high)
     limit = "buckling" if last < high else _limit(at, pull(high), high)
     if limit in ("maximum", "infeasible"):
@@ -176,7 +184,7 @@ def saturation(
     def slope(lower: float) -> float:
         return _slope(pull(lower), u)
 
-    places = sampled(first, last)
+    places = log_samples(first, last)
     kinks = _breaks(pull, places[(places >= first) & (places <= last)])
     beside = np.outer([1.0 - _JUST, 1.0 + _JUST], kinks).ravel()
     places = np.unique(np.clip(np.concatenate([places, beside]), first, last))
@@ -198,7 +206,7 @@ def saturation(
     )
 
 
-def _stable(at: At, low: float, high: float) -> tuple[float, float]:
+def _stable(at: StiffnessAt, low: float, high: float) -> tuple[float, float]:
     """The first range of lower bounds [N] in which the arm is stable, its edges left out."""
     places, margins, stable = stable_ranges(at, low, high)
     if not stable:
@@ -281,7 +289,7 @@ def _falls(curve: Array, slope: Callable[[float], float], start: float, level: f
     for place, _, there in curve.tolist():
         if place > start:
             if there < level:
-                return crossing(lambda x: slope(x) - level, before, place)
+                return sign_change(lambda x: slope(x) - level, before, place)
             before = place
     return math.inf
 
@@ -293,12 +301,12 @@ def _stiffest(
     best = int(curve[:, 1].argmax())
     place = float(curve[best, 0])
     if 0 < best < len(curve) - 1 and curve[best - 1, 2] > 0.0 > curve[best + 1, 2]:
-        top = crossing(slope, float(curve[best - 1, 0]), float(curve[best + 1, 0]))
+        top = sign_change(slope, float(curve[best - 1, 0]), float(curve[best + 1, 0]))
         if value(top) >= curve[best, 1]:
             place = top
     return place
 
 
-def _limit(at: At, last: Tension, high: float) -> End:
+def _limit(at: StiffnessAt, last: Tension, high: float) -> End:
     """Why the lower bound cannot rise above that of the last tensions."""
-    return "maximum" if last.at_maximum else reason(at, high * (1.0 + _JUST))
+    return "maximum" if last.at_maximum else failure_at(at, high * (1.0 + _JUST))

@@ -1,4 +1,7 @@
-"""What becomes of the least tensions of a held posture as a bound or a load on them rises."""
+"""Scan of a held posture over the lower bound of the tensions, or over a load factor.
+
+A place is a lower bound [N] or a load factor; the stiffness there is that of the least tensions.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +18,7 @@ from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.validation import Array
 
 SAMPLES: Final = 96
-"""Bounds or load factors that are looked at; a stable range narrower than a step is not seen."""
+"""Places that are evaluated; a stable range narrower than a step is not seen."""
 
 PRECISION: Final = 1e-12
 """Relative precision of a place that is found between two others."""
@@ -25,12 +28,12 @@ _ABOVE: Final = 1.0 + 1e-9
 
 Limit = Literal["buckling", "infeasible", "elasticity", "none"]
 
-At = Callable[[float], Stiffness]
-"""The stiffness under the least tensions at a bound [N] or load factor."""
+StiffnessAt = Callable[[float], Stiffness]
+"""The stiffness at a place."""
 
 
-def reason(at: At, place: float) -> Limit:
-    """What keeps the arm from holding at a place; ``"none"`` if it holds."""
+def failure_at(at: StiffnessAt, place: float) -> Limit:
+    """Why the arm does not hold at a place; ``"none"`` if it holds."""
     try:
         return "none" if at(place).is_stable else "buckling"
     except (InfeasibleTension, SolverError):  # on the very edge a solver may find nothing either
@@ -39,15 +42,15 @@ def reason(at: At, place: float) -> Limit:
         return "elasticity"
 
 
-def exists(at: At, place: float) -> bool:
+def _balances(at: StiffnessAt, place: float) -> bool:
     """Whether tensions balance the arm within the domains of the elasticities."""
-    return reason(at, place) in ("none", "buckling")
+    return failure_at(at, place) in ("none", "buckling")
 
 
-def domain(arm: Manipulator) -> tuple[float, float]:
-    """Tensions [N] that all cables may carry and of which their elasticities say something.
+def tension_domain(arm: Manipulator) -> tuple[float, float]:
+    """Tensions [N] that all cables may carry, within the domains of their elasticities.
 
-    That of a cable whose motor holds the force is never asked.
+    Force-controlled cables do not use their elasticity.
     """
     domains = [each.elasticity.domain for each in arm.cables if each.control == "position"]
     low = max((each.low for each in domains), default=0.0) * _ABOVE
@@ -55,7 +58,7 @@ def domain(arm: Manipulator) -> tuple[float, float]:
     return low, min(ends)
 
 
-def edge(true: Callable[[float], bool], a: float, b: float) -> tuple[float, float]:
+def last_true(true: Callable[[float], bool], a: float, b: float) -> tuple[float, float]:
     """The last place from a, where something is true, and the next to b, where it is not."""
     nothing = PRECISION**2 * b  # a may be zero, and true nowhere above
     while b - a > max(PRECISION * b, nothing):
@@ -64,20 +67,20 @@ def edge(true: Callable[[float], bool], a: float, b: float) -> tuple[float, floa
     return a, b
 
 
-def reach(at: At, low: float, highest: float) -> float:
-    """How far a lower bound from ``low`` on is to be looked at [N], at most to ``highest``.
+def scan_end(at: StiffnessAt, low: float, highest: float) -> float:
+    """The end of a scan of the lower bound from ``low`` on [N], at most ``highest``.
 
-    As far as tensions balance the arm within the domains of the elasticities, and if nothing ends
-    them, until the sign of what grows with the tension has decided.
+    It is where no tensions balance the arm within the domains of the elasticities. If they do at
+    every bound, it is where the terms of K_θ that grow with the tension decide its sign.
     """
     if math.isinf(highest):
-        # far out, tensions grow in proportion to the bound, and so do the active part and, as wires
-        # get longer than their original lengths, the passive one: what is least of their sum
+        # at large bounds tensions grow in proportion to the bound, and so do the active part and,
+        # with the strain of the wires, the passive one: the smallest eigenvalue of their sum
         # decides at the latest where it equals the rest
         far = 1e9
         growth = -math.inf
         highest = far
-        if exists(at, far):
+        if _balances(at, far):
             there, K = at(far), at(low)
             growth, active = (
                 float(np.linalg.eigvalsh((part + part.T) / 2.0)[0]) / far
@@ -88,12 +91,16 @@ def reach(at: At, low: float, highest: float) -> float:
             slower = min(abs(growth), abs(active))
             highest = min(2.0 * rest / slower, far) if slower > 0.0 else far
         highest = max(highest, 2.0 * low)
-        while growth < 0.0 and highest < far and exists(at, highest) and at(highest).is_stable:
+        while growth < 0.0 and highest < far and _balances(at, highest) and at(highest).is_stable:
             highest *= 2.0  # an elasticity of the user's own may go on stiffening
-    return highest if exists(at, highest) else edge(lambda b: exists(at, b), low, highest)[0]
+    return (
+        highest
+        if _balances(at, highest)
+        else last_true(lambda b: _balances(at, b), low, highest)[0]
+    )
 
 
-def sampled(low: float, high: float) -> Array:
+def log_samples(low: float, high: float) -> Array:
     """Bounds (N,) [N] from low to high, evenly spread on a logarithmic scale of four decades."""
     if high <= low:
         return np.array([low])
@@ -101,26 +108,26 @@ def sampled(low: float, high: float) -> Array:
 
 
 def stable_ranges(
-    at: At, low: float, high: float
+    at: StiffnessAt, low: float, high: float
 ) -> tuple[Array, Array, tuple[tuple[float, float], ...]]:
     """Bounds looked at (N,) [N], margin at each (N,) [N m/rad], and where the arm is stable."""
 
     def margin(place: float) -> float:
         return at(place).margin
 
-    places = sampled(low, high)
+    places = log_samples(low, high)
     margins = np.array([margin(place) for place in places.tolist()])
     edges, ends = [], []
     for i in range(len(places)):
         if margins[i] > 0.0 and (i == 0 or margins[i - 1] <= 0.0):
-            edges.append(places[i] if i == 0 else crossing(margin, places[i - 1], places[i]))
+            edges.append(places[i] if i == 0 else sign_change(margin, places[i - 1], places[i]))
         if margins[i] > 0.0 and (i + 1 == len(places) or margins[i + 1] <= 0.0):
             last = i + 1 == len(places)
-            ends.append(places[i] if last else crossing(margin, places[i], places[i + 1]))
+            ends.append(places[i] if last else sign_change(margin, places[i], places[i + 1]))
     return places, margins, tuple((float(a), float(b)) for a, b in zip(edges, ends, strict=True))
 
 
-def crossing(f: Callable[[float], float], a: float, b: float) -> float:
-    """Where a function changes its sign between two places, be it by a jump."""
+def sign_change(f: Callable[[float], float], a: float, b: float) -> float:
+    """Where a function changes its sign between two places."""
     root: float = brentq(lambda x: f(float(x)), a, b, xtol=1e-300, rtol=PRECISION)
     return root

@@ -1,10 +1,10 @@
 """Buckling: where tension or load makes the joint stiffness singular at a posture that is held.
 
 Cables stiffen an arm by their elasticity and mostly soften it by their tension (active part of
-Eq. 16). With stiff cables the first always wins; behind soft springs or long leads there is a
-tension from which on K_θ is not positive definite and the arm gives way, whatever its load. Here
-the posture is held and the tensions are those of :func:`~cdsm.distribute_tension`; what an
-arm with locked motors does beyond is :func:`~cdsm.equilibrium`.
+Eq. 16). With stiff cables the first always wins. Behind soft springs or long leads there is a
+tension from which on K_θ is not positive definite and the arm buckles, whatever its load. Here the
+posture is held and the tensions are those of :func:`~cdsm.distribute_tension`.
+:func:`~cdsm.equilibrium` computes where an arm with locked motors goes then.
 """
 
 from __future__ import annotations
@@ -18,7 +18,15 @@ from numpy.typing import ArrayLike
 
 from cdsm.errors import InvalidInput
 from cdsm.posture import Posture
-from cdsm.statics.bound_scan import SAMPLES, Limit, domain, edge, reach, reason, stable_ranges
+from cdsm.statics.bound_scan import (
+    SAMPLES,
+    Limit,
+    failure_at,
+    last_true,
+    scan_end,
+    stable_ranges,
+    tension_domain,
+)
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.validation import Array, ReadOnlyState, bound, frozen, instance, vector
 from cdsm.tension import distribute_tension
@@ -41,10 +49,10 @@ class CriticalTension(ReadOnlyState):
             softest if it does not buckle.
         tension: F there (C,) [N].
         stable: Ranges (low, high) [N] of the lower bound in which the arm is stable.
-        examined: Range [N] of the lower bound that was looked at: as far as tensions balance the
-            arm within the domains of the elasticities, and if these have no end, until the sign of
-            what grows with the tension has decided.
-        bounds: Lower bounds (n,) [N] that were looked at.
+        examined: Range [N] of the lower bound that was scanned: as far as tensions balance the arm
+            within the domains of the elasticities; if they do at every bound, until the terms that
+            grow with the tension decide the sign of K_θ.
+        bounds: Lower bounds (n,) [N] that were evaluated.
         margins: Smallest eigenvalue of K_θ at each (n,) [N m/rad].
     """
 
@@ -71,7 +79,7 @@ class CriticalTension(ReadOnlyState):
             verdict = f"buckles at a lower bound of {self.minimum:.6g} N"
         spans = ", ".join(f"{a:.4g} to {b:.4g} N" for a, b in self.stable if a < b)
         names = self.posture.arm.joint_names
-        lines = [verdict, f"stable from {spans}" if spans else "", _written(names, self.mode)]
+        lines = [verdict, f"stable from {spans}" if spans else "", _describe_mode(names, self.mode)]
         return "\n".join(line for line in lines if line)
 
 
@@ -112,7 +120,7 @@ class CriticalLoad(ReadOnlyState):
             "elasticity": "beyond, a tension leaves the domain of its cable's elasticity",
             "none": "nothing happens that far",
         }[self.limit]
-        mode = _written(self.posture.arm.joint_names, self.mode)
+        mode = _describe_mode(self.posture.arm.joint_names, self.mode)
         if self.factor == 0.0:
             return f"holds no part of the load; {reason}\n{mode}"
         return f"holds the load up to a factor of {self.factor:.6g}; {reason}\n{mode}"
@@ -144,9 +152,9 @@ def critical_tension(
     def at(minimum: float) -> Stiffness:
         return stiffness(pose, distribute_tension(pose, minimum, wrench=W, solver=solver))
 
-    low, highest = domain(arm)
-    at(low)  # if there is nothing to judge, its error says why
-    high = reach(at, low, highest)
+    low, highest = tension_domain(arm)
+    at(low)  # raises the reason if no tensions balance the arm
+    high = scan_end(at, low, highest)
     places, margins, stable = stable_ranges(at, low, high)
     buckles = [b for _, b in stable if b < high]
     if buckles:
@@ -155,13 +163,13 @@ def critical_tension(
         minimum, where = math.inf, float(places[int(np.argmin(margins))])
     else:
         minimum = where = low
-    there = at(where)
+    K = at(where)
     return CriticalTension(
         posture=pose,
         wrench=W,
         minimum=minimum,
-        mode=_mode(there),
-        tension=there.tension,
+        mode=_mode(K),
+        tension=K.tension,
         stable=stable,
         examined=(low, high),
         bounds=frozen(places),
@@ -186,7 +194,7 @@ def critical_load(
         minimum: Lower bound of the tensions [N], for all cables or (C,).
         maximum: Upper bound of the tensions [N], for all cables or (C,).
         solver: As for :func:`~cdsm.distribute_tension`.
-        carried: Another wrench (6,) at ``tool0`` that is always there, as of a tool.
+        carried: Another wrench (6,) at ``tool0`` that always acts, as of a tool.
 
     Raises:
         InvalidInput: The wrench is zero, or it, what is carried or a bound is not what it must be.
@@ -203,41 +211,41 @@ def critical_load(
     def at(factor: float) -> Stiffness:
         return stiffness(pose, distribute_tension(pose, low, high, always + factor * W, solver))
 
-    factor, limit = 0.0, reason(at, 0.0)
-    at(factor)  # if there is nothing to judge, its error says why
+    factor, limit = 0.0, failure_at(at, 0.0)
+    at(factor)  # raises the reason if no tensions balance the arm
     if limit == "none":
         end = 1e-3
-        while end < _NOWHERE and reason(at, end) == "none":
+        while end < _NOWHERE and failure_at(at, end) == "none":
             end *= 2.0
         if end < _NOWHERE:
-            # the first failure: what the doubling has stepped over is sampled again, finer
+            # the doubling may have stepped over the first failure
             places = np.linspace(0.0, end, SAMPLES).tolist()
-            first = next(i for i, place in enumerate(places) if reason(at, place) != "none")
+            first = next(i for i, place in enumerate(places) if failure_at(at, place) != "none")
             holds, fails = places[first - 1], places[first]
-            factor, beyond = edge(lambda x: reason(at, x) == "none", holds, fails)
-            limit = reason(at, beyond)
+            factor, beyond = last_true(lambda x: failure_at(at, x) == "none", holds, fails)
+            limit = failure_at(at, beyond)
         else:
             factor = math.inf
-    there = at(min(factor, _NOWHERE / 2.0))
+    K = at(min(factor, _NOWHERE / 2.0))
     return CriticalLoad(
         posture=pose,
         wrench=W,
         carried=always,
         factor=factor,
         limit=limit,
-        mode=_mode(there),
-        tension=there.tension,
+        mode=_mode(K),
+        tension=K.tension,
     )
 
 
-def _mode(there: Stiffness) -> Array:
+def _mode(K: Stiffness) -> Array:
     """The softest joint motion, its largest entry positive: eigenvectors have no sign."""
-    mode = there.critical_direction
+    mode = K.critical_direction
     return frozen(mode * np.sign(mode[abs(mode).argmax()]))
 
 
-def _written(names: tuple[str, ...], mode: Array) -> str:
-    """The joints that take most part in a mode."""
+def _describe_mode(names: tuple[str, ...], mode: Array) -> str:
+    """The joints with the largest shares in a mode."""
     order = np.argsort(-abs(mode))[:4]
     shares = ", ".join(f"{names[i]} {mode[i]:+.2f}" for i in order)
     return f"softest joint motion: {shares}" + (", …" if len(mode) > len(order) else "")

@@ -19,8 +19,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from cdsm.errors import CableError, EquilibriumError, InvalidInput, SingularStiffness
 from cdsm.posture import Posture
-from cdsm.statics.loaded_arm import Iterate, LoadedArm, rounding
-from cdsm.statics.trust_region import FLAT, Settled, settle
+from cdsm.statics.locked_motors import Iterate, LoadedArm, rounding
+from cdsm.statics.trust_region import FLAT, RestSearch, find_rest
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.validation import Array, ReadOnlyState, frozen, vector
 from cdsm.tension import Tension
@@ -29,19 +29,19 @@ _SMALLEST_STEP = 2.0**-6
 """Steps of the load smaller than this do not help either."""
 
 _CLOSE = 1e-3
-"""Sites this part of their distance apart have met: on the way round each other they would."""
+"""Two sites meet where their distance is this part of that at the reference."""
 
 _FAR = 0.1
-"""An arm is followed in motions of no joint by more than this [rad]."""
+"""Largest motion of a joint in which an arm is followed [rad]."""
 
 _DENSE = 0.02
-"""On its way it is looked at every so far [rad]: a shorter loss of stability is not seen."""
+"""Distance between postures whose stability is checked [rad]: a shorter loss is not seen."""
 
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Equilibrium(ReadOnlyState):
-    """An arm at rest under a load, with the question it answers. All arrays are read-only.
+    """An arm at rest under a load, with the load and the reference. All arrays are read-only.
 
     Attributes:
         reference: The posture at which the motors were locked.
@@ -92,8 +92,8 @@ class Equilibrium(ReadOnlyState):
     def stable(self) -> bool:
         """Whether K_θ, its symmetric part, is positive definite for the joints off the stops.
 
-        False for a neutral state, as of an arm whose cables are all slack, and where the softest
-        way is barred by stops that do not push yet. Else the search goes on down.
+        False for a neutral state, as of an arm whose cables are all slack, and where stops that do
+        not push yet bar the softest motion.
         """
         free = self._off_stops
         K = self.stiffness.joint[np.ix_(free, free)]
@@ -178,11 +178,12 @@ def equilibrium(
 
     r(q) = J_Lᵀ F(q) + g − J_Xᵀ W = 0 (Eq. 13), with F(q) of the elongation that each cable has at
     the reference plus its change of length. For a pure force it is a minimum of the potential of
-    cables, weight and load. The arm goes down from the reference, off saddles too, so that beyond
-    buckling it comes to rest beside the posture that has become unstable. Joint limits are stops.
+    cables, weight and load. The search goes down from the reference and leaves saddles: beyond
+    buckling the arm comes to rest beside the posture that has become unstable. Joint limits are
+    stops.
 
-    The whole load is there from the start, and is divided only if nothing is found: where several
-    places to rest exist, one reached by slow loading (:func:`~cdsm.weight_test`) may differ.
+    The whole load acts from the start, and is divided only if nothing is found. Where several
+    equilibria exist, the one reached by slow loading (:func:`~cdsm.weight_test`) may differ.
 
     Args:
         pose: The reference posture, within the joint limits.
@@ -194,10 +195,10 @@ def equilibrium(
     Raises:
         InvalidInput: As for :func:`~cdsm.stiffness`, or a posture beyond a joint limit.
         ElasticityRangeError: A tension at the reference or at rest is outside the domain of the
-            elasticity of its cable: below where a law begins it does not say how a cable gets
-            slack, above its end not how it yields.
-        EquilibriumError: None was found. Says how much of the load the arm could be followed under,
-            and if two sites of a cable meet on the way, as where disks overlap, which.
+            elasticity of its cable: a law says neither how a cable gets slack below its low end nor
+            how it yields above its high end.
+        EquilibriumError: None was found. Names the part of the load up to which the arm could be
+            followed, and the cable of which two sites meet on the way, as where disks overlap.
     """
     reference = stiffness(pose, tension, None if isinstance(tension, Tension) else wrench)
     W = reference.wrench
@@ -205,20 +206,21 @@ def equilibrium(
         W = vector("wrench", wrench, 6, "force [N], then moment [N m], base axes")
     _require_between_stops(pose)
     loaded = LoadedArm(pose, reference.tension, W)
-    here = loaded.at(pose, reference.tension)
-    imbalance, reached, step, iterations = here.torque, 0.0, 1.0, 0
+    start = loaded.at(pose, reference.tension)
+    # a part of the load is held off the joints; the whole load is tried first
+    imbalance, reached, step, iterations = start.torque, 0.0, 1.0, 0
     while True:
         goal = min(1.0, reached + step)
-        settled = _settle(loaded, here, (1.0 - goal) * imbalance)
-        iterations += settled.iterations
-        if settled.steady and goal == 1.0:
-            return _answer(loaded, settled, iterations)
-        if settled.steady:
-            here, reached, step = settled.point, goal, 2.0 * step
+        search = _find_rest(loaded, start, (1.0 - goal) * imbalance)
+        iterations += search.iterations
+        if search.converged and goal == 1.0:
+            return _equilibrium(loaded, search, iterations)
+        if search.converged:
+            start, reached, step = search.state, goal, 2.0 * step
         elif step > _SMALLEST_STEP:
             step /= 2.0
         else:
-            raise _no_rest(loaded, settled, reached)
+            raise _no_rest(loaded, search, reached)
 
 
 def follow(before: Equilibrium, wrench: Array, start: Array | None = None) -> Equilibrium | None:
@@ -231,39 +233,38 @@ def follow(before: Equilibrium, wrench: Array, start: Array | None = None) -> Eq
             rest under that wrench; if not given, those of the earlier one.
 
     Returns:
-        None if there is none within reach of postures that are all stable: where the arm buckles,
-        or where the step from one wrench to the other is too large to tell.
+        None if no path of stable postures leads to one: where the arm buckles, or where the step
+        from one wrench to the other is too large to tell.
 
     Raises:
         ElasticityRangeError: As for :func:`equilibrium`.
     """
     loaded = LoadedArm(before.reference, before.reference_tension, wrench)
-    here = loaded.at(before.pose, before.tension)
+    iterate = loaded.at(before.pose, before.tension)
     if start is not None:
         try:
-            here = loaded.moved(start, here)
+            iterate = loaded.moved(start, iterate)
         except CableError:
             return None
-    settled = _settle(loaded, here, 0.0)
-    if not (settled.steady and settled.convex and _held(loaded, here, settled)):
+    search = _find_rest(loaded, iterate, 0.0)
+    if not (search.converged and search.convex and _is_stable_between(loaded, iterate, search)):
         return None
-    return _answer(loaded, settled, settled.iterations)
+    return _equilibrium(loaded, search, search.iterations)
 
 
-def _held(loaded: LoadedArm, start: Iterate, settled: Settled[Iterate]) -> bool:
-    """Whether the arm is held, off the stops, all along a short way to where it settled.
+def _is_stable_between(loaded: LoadedArm, start: Iterate, search: RestSearch[Iterate]) -> bool:
+    """Whether K_θ is positive definite all along a short straight path to where the arm rests.
 
-    If it snaps through on the way, there K_θ is not positive definite, though the search may have
-    stepped over that.
+    If the arm snaps through on the path, K_θ is not, though the search may have stepped over that.
     """
-    way = settled.point.q - start.q
-    length = float(abs(way).max())
+    path = search.state.q - start.q
+    length = float(abs(path).max())
     if length > _FAR:
         return False
-    free = np.flatnonzero(~settled.pressed)
+    free = np.flatnonzero(~search.at_stop)
     for part in np.arange(_DENSE, length, _DENSE) / max(length, _DENSE):
         try:
-            K = loaded.moved(start.q + part * way, start).stiffness[np.ix_(free, free)]
+            K = loaded.moved(start.q + part * path, start).stiffness[np.ix_(free, free)]
         except CableError:
             return False
         if np.linalg.eigvalsh((K + K.T) / 2.0)[:1].min(initial=math.inf) <= 0.0:
@@ -271,13 +272,13 @@ def _held(loaded: LoadedArm, start: Iterate, settled: Settled[Iterate]) -> bool:
     return True
 
 
-def _settle(loaded: LoadedArm, start: Iterate, held_back: Array | float) -> Settled[Iterate]:
+def _find_rest(loaded: LoadedArm, start: Iterate, held_back: Array | float) -> RestSearch[Iterate]:
     """Where the arm goes from an iterate while a torque (nv,) keeps part of the load off it."""
 
     def evaluate(q: Array, near: Iterate) -> Iterate:
         return loaded.moved(q, near).holding_back(held_back)
 
-    return settle(evaluate, start.holding_back(held_back), *loaded.stops())
+    return find_rest(evaluate, start.holding_back(held_back), *loaded.stops())
 
 
 def _require_between_stops(pose: Posture) -> None:
@@ -293,10 +294,10 @@ def _require_between_stops(pose: Posture) -> None:
         )
 
 
-def _answer(loaded: LoadedArm, settled: Settled[Iterate], iterations: int) -> Equilibrium:
-    K = settled.point.K
+def _equilibrium(loaded: LoadedArm, search: RestSearch[Iterate], iterations: int) -> Equilibrium:
+    K = search.state.K
     loaded.cables.require_domains(K.tension)
-    reaction = np.where(settled.pressed, K.residual, 0.0)
+    reaction = np.where(search.at_stop, K.residual, 0.0)
     return Equilibrium(
         reference=loaded.reference,
         reference_tension=loaded.tension,
@@ -304,22 +305,22 @@ def _answer(loaded: LoadedArm, settled: Settled[Iterate], iterations: int) -> Eq
         stiffness=K,
         reaction=frozen(reaction),
         residual=frozen(K.residual - reaction),
-        history=settled.history,
+        history=search.history,
         iterations=iterations,
     )
 
 
-def _no_rest(loaded: LoadedArm, settled: Settled[Iterate], reached: float) -> EquilibriumError:
-    here = settled.point
-    residual = np.where(settled.pressed, 0.0, here.torque)
-    arm, worst = here.K.posture.arm, int(abs(residual).argmax())
+def _no_rest(loaded: LoadedArm, search: RestSearch[Iterate], reached: float) -> EquilibriumError:
+    last = search.state
+    residual = np.where(search.at_stop, 0.0, last.torque)
+    arm, worst = last.K.posture.arm, int(abs(residual).argmax())
     joint = arm.joint_names[worst]
     problem = (
         f"the arm finds no stable place to rest beyond {100.0 * reached:.3g} % of the load; at the "
         f"last iterate {abs(residual[worst]):.4g} {arm.torque_unit(worst)} are out of balance at "
         f"{joint}"
     )
-    meeting = _meeting(loaded.reference, here.K.posture)
+    meeting = _meeting_cable(loaded.reference, last.K.posture)
     if meeting is None:
         return EquilibriumError(problem, frozen(residual), reached, joint)
     return EquilibriumError(
@@ -332,8 +333,8 @@ def _no_rest(loaded: LoadedArm, settled: Settled[Iterate], reached: float) -> Eq
     )
 
 
-def _meeting(reference: Posture, pose: Posture) -> str | None:
-    """The cable of which two sites have come far closer than at the reference, if there is one."""
+def _meeting_cable(reference: Posture, pose: Posture) -> str | None:
+    """The cable of which two sites meet, if there is one."""
     for cable, before, after in zip(
         pose.arm.cables, reference.cable_paths, pose.cable_paths, strict=True
     ):

@@ -1,4 +1,4 @@
-"""Cables whose motors are locked: tension over length, and how it goes on where a law ends."""
+"""An arm whose motors are locked, under a load: its cables F(L), and its torque out of balance."""
 
 from __future__ import annotations
 
@@ -11,10 +11,138 @@ from numpy.typing import NDArray
 from cdsm.elasticity import Elasticity, rising_root
 from cdsm.errors import ElasticityRangeError, InvalidInput
 from cdsm.manipulator import Manipulator
+from cdsm.posture import Posture
+from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.validation import Array, frozen
+
+_ROUNDING = 16.0 * float(np.finfo(np.float64).eps)
+"""Relative rounding of a torque: of the angles, lengths and tensions that it is a sum of."""
+
+_APART = 1e-6
+"""Where disks are what stops a joint, it stops this far before they touch [rad]: holes that meet
+leave a cable without a direction."""
 
 _BEYOND = 1e-9
 """Tensions this part beyond the end of a law are rounding: of an arm that started there."""
+
+
+class Iterate(NamedTuple):
+    """The arm at some posture, in balance or not; a state of the search for rest.
+
+    Attributes:
+        K: Tensions and joint stiffness, with the original lengths of the reference.
+        torque: What is out of balance, less what is held back (nv,) [N m].
+        rounding: How much of it is rounding (nv,) [N m].
+    """
+
+    K: Stiffness
+    torque: Array
+    rounding: Array
+
+    @property
+    def q(self) -> Array:
+        """Joint angles (nv,) [rad]."""
+        return self.K.posture.q
+
+    @property
+    def stiffness(self) -> Array:
+        """K_θ (nv, nv) [N m/rad]."""
+        return self.K.joint
+
+    def holding_back(self, torque: Array | float) -> Iterate:
+        """The same posture with a torque (nv,) [N m] on the joints that keeps a load off them."""
+        return self._replace(torque=self.K.residual - torque)
+
+
+class LoadedArm:
+    """The arm under a wrench, its motors locked at a reference.
+
+    Args:
+        reference: The posture at which they were locked.
+        tension: F there (C,) [N].
+        wrench: W (6,) that the arm carries: force [N], then moment [N m].
+        lengths: L (C,) [m] under which the cables have these tensions, if not those at the posture.
+    """
+
+    def __init__(
+        self, reference: Posture, tension: Array, wrench: Array, lengths: Array | None = None
+    ) -> None:
+        self.reference = reference
+        self.tension = tension
+        self.wrench = wrench
+        locked = reference.cable_lengths if lengths is None else lengths
+        self.cables = LockedCables(reference.arm, locked, tension)
+
+    def at(self, pose: Posture, near: Array) -> Iterate:
+        """The arm at a posture where the tensions are near the given ones (C,) [N]."""
+        F, k = self.cables.tension(pose.cable_lengths, near)
+        active, passive, load, joint = pose._joint_stiffness(F, k, self.wrench)
+        K = Stiffness(
+            posture=pose,
+            tension=F,
+            wrench=self.wrench,
+            cable_stiffness=k,
+            active=active,
+            passive=passive,
+            gravity=pose.gravity_stiffness,
+            load=load,
+            joint=joint,
+            free_length=self.cables.free_length,
+        )
+        return Iterate(K, K.residual, rounding(K))
+
+    def moved(self, q: Array, near: Iterate) -> Iterate:
+        """The arm at joint angles (nv,) [rad] near another iterate.
+
+        Raises:
+            CableError: Two neighbouring sites of a cable coincide there.
+        """
+        before = near.K
+        pose = self.reference.arm.at(q, check_limits=False)
+        longer = pose.cable_lengths - before.posture.cable_lengths
+        return self.at(pose, before.tension + before.cable_stiffness * longer)
+
+    def stops(self) -> tuple[Array, Array]:
+        """Lowest and highest angles (nv,) [rad], at which the joints rest on their stops."""
+        arm, q = self.reference.arm, self.reference.q
+        touching = np.zeros(arm.nv, dtype=np.bool_)  # joints that are stopped by their disks
+        if arm.is_serpentine:
+            joints = arm.geometry.joints
+            touching[:] = [joint.limit is None for joint in joints for _ in joint.axes]
+        apart = np.where(touching, _APART, 0.0)
+        # the reference may stand nearer
+        return np.minimum(arm.lower + apart, q), np.maximum(arm.upper - apart, q)
+
+
+def rounding(K: Stiffness) -> Array:
+    """How much of :attr:`~cdsm.Stiffness.residual` is rounding (nv,) [N m]."""
+    pose = K.posture
+    force = K.tension + K.cable_stiffness * pose.cable_lengths
+    terms = force @ abs(pose.length_jacobian) + abs(K.wrench) @ abs(pose.jacobian)
+    turned = abs(K.joint) @ abs(pose.q)
+    terms += abs(pose.gravity_torque) + turned + _tilt_torque(pose, K.tension)
+    return np.asarray(_ROUNDING * terms)
+
+
+def _tilt_torque(pose: Posture, tension: Array) -> Array:
+    """Torque (nv,) [N m] of tensions (C,) [N] by the tilt of segments per tilt of their sites.
+
+    It is larger for shorter segments: between disks that nearly touch it is most of the rounding.
+    """
+    routing = pose.arm._model.routing
+    segment, joint = routing.segment, routing.joint
+    site, origin = pose._frames.site, pose._frames.origin
+    cable, start, end = segment[:-1, :3].T
+    apart = np.linalg.norm(site[end] - site[start], axis=1)
+    far = np.linalg.norm(site[end], axis=1)
+    over = np.repeat(np.arange(cable.size), np.diff(segment[:, 3]))
+    arm = np.linalg.norm(site[end][over] - origin[joint], axis=1)
+    force = (tension[cable] * far / apart)[over] * arm
+    torque = np.bincount(joint, force, minlength=len(origin))[1:]
+    return np.asarray(torque, dtype=np.float64)
+
+
+# --- cables ---------------------------------------------------------------------------------
 
 
 class _Springs(NamedTuple):
@@ -25,22 +153,20 @@ class _Springs(NamedTuple):
         held: Which cables of the arm they are.
         free_length: l_0 [m].
         series: Compliance of spring or drive [m/N].
-        low: Tension where the law begins [N].
     """
 
     law: Elasticity
     held: slice | NDArray[np.intp]
     free_length: Array
     series: Array
-    low: float
 
     def elongation(self, F: Array) -> Array:
-        """Δl [m] from the low end of the law."""
+        """Δl = l_0 ε(F) + ΔF/k_series [m] from the low end of the law."""
         wire = self.free_length * self.law.strain(F)
-        return np.asarray(wire + (F - self.low) * self.series)
+        return np.asarray(wire + (F - self.law.domain.low) * self.series)
 
     def compliance(self, F: Array) -> Array:
-        """dΔl/dF [m/N]."""
+        """dΔl/dF = l_0/EA(F) + 1/k_series [m/N]."""
         return np.asarray(self.free_length / self.law.rigidity(F) + self.series)
 
 
@@ -70,8 +196,8 @@ class LockedCables:
     A position-controlled cable keeps its original length l_0: its elongation is that at the
     reference plus the change of its length. A force-controlled one keeps its tension. Below the
     tension where its law begins a cable goes on with the stiffness it has there, down to zero, from
-    where on it is slack; above the law's end it goes on with the stiffness it has there. Both are
-    for iterates to pass through: :meth:`require_domains` refuses them as answers.
+    where on it is slack; above the end of the law it goes on with the stiffness it has there. Both
+    are for iterates to pass through: :meth:`require_domains` refuses them as solutions.
 
     Args:
         arm: The arm.
@@ -89,24 +215,24 @@ class LockedCables:
 
     def __init__(self, arm: Manipulator, lengths: Array, tension: Array) -> None:
         self._arm = arm
-        self._tension = tension
+        self._reference_tension = tension
         self._groups = []
-        self.free_length = arm._model.laws.original_lengths(lengths, tension)
-        for law, held in arm._model.laws.held:
-            series = arm._model.laws.series[held]
-            springs = _Springs(law, held, self.free_length[held], series, law.domain.low)
+        laws = arm._model.laws
+        self.free_length = laws.original_lengths(lengths, tension)
+        for law, held in laws.held:
+            springs = _Springs(law, held, self.free_length[held], laws.series[held])
             try:
                 ends = _ends(springs, lengths[held], tension[held])
             except ElasticityRangeError as error:
-                raise arm._model.laws.naming(error, held) from None
+                raise laws.naming(error, held) from None
             self._groups.append((springs, ends))
 
-    def pull(self, lengths: Array, near: Array) -> tuple[Array, Array]:
+    def tension(self, lengths: Array, near: Array) -> tuple[Array, Array]:
         """Tension F (C,) [N] and tangent stiffness k (C,) [N/m] at the lengths L (C,) [m].
 
         ``near`` (C,) [N] is F at lengths near these, to start from.
         """
-        tension, stiffness = self._tension.copy(), np.zeros(lengths.size)
+        tension, stiffness = self._reference_tension.copy(), np.zeros(lengths.size)
         for springs, (start, span, low, high, before, after) in self._groups:
             held = springs.held
             elongation = lengths[held] - start
@@ -124,9 +250,9 @@ class LockedCables:
         return frozen(tension), frozen(stiffness)
 
     def require_domains(self, tension: Array) -> None:
-        """Refuse tensions (C,) [N] of which the laws of their cables say nothing.
+        """Refuse tensions (C,) [N] outside the domains of their laws.
 
-        Zero is no such tension where the law begins at zero: the cable is slack.
+        Zero is allowed where the law begins at zero: the cable is slack.
 
         Raises:
             ElasticityRangeError: Names the cables.
@@ -148,7 +274,7 @@ class LockedCables:
 
 
 def _ends(springs: _Springs, lengths: Array, tension: Array) -> _Ends:
-    """From the law, and L and F at the reference."""
+    """The ends of a law, from L and F at the reference."""
     domain, size = springs.law.domain, tension.shape
     first, last = np.full(size, domain.first), np.full(size, domain.high)
     softest = springs.compliance(first)

@@ -32,7 +32,7 @@ _STAND_IN = 0.02
 class Modes(ReadOnlyState):
     """Natural modes of an arm, with the stiffness they follow from; made by :func:`modes`.
 
-    Of the nv modes S vibrate and the others, none if the arm is stable, grow. All arrays are
+    Of the nv modes S vibrate; the others grow, and a stable arm has none of these. All arrays are
     read-only. Shapes are columns of joint angles, mass-normalised and orthogonal in M and K_θ:
     φᵀMφ = 1 and φᵀK_θφ = ω², so their unit is rad/(√kg m); the largest entry is positive.
 
@@ -91,10 +91,9 @@ class Modes(ReadOnlyState):
 def modes(pose: Posture, stiffness: Stiffness) -> Modes:
     """Natural frequencies and mode shapes at a posture: K_θ φ = ω² M φ.
 
-    K_θ is taken by its symmetric part, which it is but under a moment at the tip. The modes are
+    The symmetric part of K_θ is used; only a moment at the tip makes another part. The modes are
     those of a small vibration about the posture if the tensions balance the arm there, see
-    :attr:`Stiffness.residual <cdsm.Stiffness.residual>`; friction and damping are left
-    out.
+    :attr:`Stiffness.residual <cdsm.Stiffness.residual>`, without friction and damping.
 
     Args:
         pose: The posture.
@@ -139,7 +138,7 @@ def modes(pose: Posture, stiffness: Stiffness) -> Modes:
 
 
 def _stand_in_mass(pose: Posture) -> Array:
-    """The part of M (nv, nv) that crosses and massless links have, so that simulators take them."""
+    """The part of M (nv, nv) of the masses that stand in for crosses and massless links."""
     if not pose.arm.is_serpentine:
         return np.zeros((pose.arm.nv, pose.arm.nv))
     inertia, stand_ins = CROSS_INERTIA * np.eye(3), []
@@ -155,16 +154,12 @@ def _stand_in_mass(pose: Posture) -> Array:
 
 
 def fastest(stiffness: Stiffness, M: Array) -> float:
-    """√|ω²| [1/s] of the motion K_θ φ = ω² M φ whose ω² is largest, be it growth or vibration.
-
-    Args:
-        stiffness: K_θ, taken by its symmetric part.
-        M: Mass matrix (nv, nv) [kg m²].
+    """Largest √|ω²| [1/s] of the motions K_θ φ = ω² M φ, whether they vibrate or grow.
 
     Raises:
         SingularMass: A motion of the arm moves no link of any mass.
     """
-    # in units of each joint: beside the mass of the arm that of its last link may be rounding
+    # scaled by joint: beside the mass of the arm that of its last link may be rounding
     unit = 1.0 / np.sqrt(M.diagonal())
     K, M = (matrix * unit * unit[:, None] for matrix in (stiffness.joint, M))
     try:
@@ -183,7 +178,7 @@ def _massless(pose: Posture, motion: Array) -> SingularMass:
 
 
 class Carried(NamedTuple):
-    """What a link carries, in the frame of the link.
+    """A rigid body on a link, in the frame of the link.
 
     Attributes:
         link: Name of the link.
@@ -199,7 +194,7 @@ class Carried(NamedTuple):
 
 
 def mass_matrix(pose: Posture, carried: Iterable[Carried]) -> Array:
-    """Joint-space mass matrix (nv, nv) [kg m²] of what the links carry.
+    """Joint-space mass matrix (nv, nv) [kg m²] of the bodies on the links.
 
     M = Σ m J_vᵀ J_v + J_ωᵀ I J_ω, J_v of the centre of mass and J_ω of the turn of each link.
     """
@@ -207,11 +202,11 @@ def mass_matrix(pose: Posture, carried: Iterable[Carried]) -> Array:
     M = np.zeros((arm.nv, arm.nv))
     for link, mass, centre, inertia in carried:
         place, row = pose.link_pose(link), arm._model.body.locate(link)[0]
-        moved = []
+        chain = []
         while row:
-            moved.append(row)
+            chain.append(row)
             row = int(arm._model.tree.parent[row])
-        R, joints = place[:3, :3], np.array(moved, dtype=np.intp)
+        R, joints = place[:3, :3], np.array(chain, dtype=np.intp)
         angular = frames.axis[joints]
         linear = np.cross(angular, R @ centre + place[:3, 3] - frames.origin[joints])
         if len(frames.slide):

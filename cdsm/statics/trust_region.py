@@ -5,9 +5,12 @@ the work ∫ r·dq along it, with K = ∂r/∂q to the fourth order of its lengt
 
     ½ (r₀ + r₁)·p + (pᵀK₀p − pᵀK₁p)/12,
 
-and to the digit where the difference of two potentials would be rounding. Where r is a gradient
-this is the trust-region method with the exact Hessian, which goes down and leaves saddles; near the
+which stays exact where the difference of two potentials would be rounding. Where r is a gradient
+this is the trust-region method with the exact Hessian, which goes down and leaves saddles. Near the
 end every step is a full one of Newton's method, with K complete and not just its symmetric part.
+
+scipy's trust-exact does not serve: it needs a potential, which a moment at the tip has not, and
+knows no stops.
 """
 
 from __future__ import annotations
@@ -33,16 +36,17 @@ _FIRST, _WIDEST = 0.2, 0.5
 FLAT = 1e-12
 """Eigenvalues of K this part of the largest are rounding: the state is neutral."""
 
-_TINY = 1e-290
-"""Where all of K is smaller than float64 has digits for, a shift to divide by all the same."""
+_POOR, _GOOD, _ACCEPTED = 0.25, 0.75, 0.05
+"""Work over predicted work below which the radius shrinks, above which it grows, and above which a
+step is accepted (Nocedal and Wright, Numerical Optimization, 2006, algorithm 4.1)."""
 
 
-class Point(Protocol):
-    """What is known where the body has been."""
+class State(Protocol):
+    """The body at some place."""
 
     @property
     def q(self) -> Array:
-        """Where (nv,)."""
+        """The place (nv,)."""
 
     @property
     def torque(self) -> Array:
@@ -57,128 +61,136 @@ class Point(Protocol):
         """How much of r is rounding (nv,)."""
 
 
-_Point = TypeVar("_Point", bound=Point)
+_State = TypeVar("_State", bound=State)
 
 
 @final
 @dataclass(frozen=True)
-class Settled(Generic[_Point]):
-    """Where the search ended.
+class RestSearch(Generic[_State]):
+    """Where a search for rest ended.
 
     Attributes:
-        point: The last point.
-        pressed: Which coordinates rest on a stop that pushes (nv,).
-        history: Largest |r| of the others, at every point that was accepted.
+        state: The last state.
+        at_stop: Which coordinates rest on a stop that pushes (nv,).
+        history: Largest |r| of the others, at every accepted state.
         iterations: Number of steps tried.
-        steady: Whether r of the others is rounding and no direction leads further down.
+        converged: Whether r of the others is rounding and no direction leads further down.
         convex: Whether K was positive definite for the others all the way.
     """
 
-    point: _Point
-    pressed: NDArray[np.bool_]
+    state: _State
+    at_stop: NDArray[np.bool_]
     history: tuple[float, ...]
     iterations: int
-    steady: bool
+    converged: bool
     convex: bool
 
 
-class _View(NamedTuple):
-    """What is seen from a point.
+class _Free(NamedTuple):
+    """The coordinates of a state that no stop holds.
 
     Attributes:
-        pressed: Which coordinates a stop holds (nv,).
-        free: The others.
+        at_stop: Which coordinates a stop holds (nv,).
+        indices: The others.
         spectrum: Eigenvalues and eigenvectors of the symmetric part of K for these.
-        still: Whether their r is rounding.
+        imbalance: Their largest |r|.
+        balanced: Whether their r is rounding.
         flat: Eigenvalues up to this size are rounding.
+        lowest: The lowest eigenvalue; inf if no coordinate is free.
     """
 
-    pressed: NDArray[np.bool_]
-    free: NDArray[np.intp]
+    at_stop: NDArray[np.bool_]
+    indices: NDArray[np.intp]
     spectrum: tuple[Array, Array]
-    still: bool
+    imbalance: float
+    balanced: bool
     flat: float
+    lowest: float
 
-    @property
-    def lowest(self) -> float:
-        return float(self.spectrum[0].min(initial=math.inf))
+    @classmethod
+    def of(cls, state: State, lower: Array, upper: Array) -> _Free:
+        q, torque, rounding = state.q, state.torque, state.rounding
+        # a stop can push, but not pull
+        at_stop = ((q <= lower) & (torque > rounding)) | ((q >= upper) & (torque < -rounding))
+        indices = np.flatnonzero(~at_stop)
+        spectrum = _spectrum(state.stiffness, indices)
+        size = abs(torque[indices])
+        return cls(
+            at_stop=at_stop,
+            indices=indices,
+            spectrum=spectrum,
+            imbalance=float(size.max(initial=0.0)),
+            balanced=bool((size <= rounding[indices]).all()),
+            flat=FLAT * abs(spectrum[0]).max(initial=0.0),
+            lowest=float(spectrum[0].min(initial=math.inf)),
+        )
 
 
-def settle(
-    evaluate: Callable[[Array, _Point], _Point], start: _Point, lower: Array, upper: Array
-) -> Settled[_Point]:
-    """Go from a point to where the body comes to rest.
+def find_rest(
+    evaluate: Callable[[Array, _State], _State], start: _State, lower: Array, upper: Array
+) -> RestSearch[_State]:
+    """Go from a state to where the body comes to rest.
 
     Args:
-        evaluate: From a place (nv,) and a point near it to the point there. A CdsmError says that
-            it does not exist.
+        evaluate: From a place (nv,) and a state near it to the state there. It raises a CdsmError
+            where there is none.
         start: Where to begin.
         lower: Lower stops (nv,).
         upper: Upper stops (nv,).
     """
-    here, radius = start, _FIRST
-    view = _seen(here, lower, upper)
-    history, convex = [_largest(here, view)], view.lowest > view.flat
+    state, radius = start, _FIRST
+    free = _Free.of(state, lower, upper)
+    history, convex = [free.imbalance], free.lowest > free.flat
     for iteration in range(_ATTEMPTS):
-        done = view.still and view.lowest >= -view.flat
-        q, expected = (here.q, 0.0) if done else _way_down(here, view, lower, upper, radius)
-        if done or (view.still and expected == 0.0):  # or else only the stops are in the way
-            return Settled(here, view.pressed, tuple(history), iteration, True, convex)
+        done = free.balanced and free.lowest >= -free.flat
+        q, expected = (state.q, 0.0) if done else _trial(state, free, lower, upper, radius)
+        # balanced at a saddle, but only the stops bar the way down
+        if done or (free.balanced and expected == 0.0):
+            return RestSearch(state, free.at_stop, tuple(history), iteration, True, convex)
         if expected == 0.0:
             radius /= 4.0
             continue
         try:
-            there = evaluate(q, here)
-            quality = work(here, there) / expected
+            trial = evaluate(q, state)
+            quality = work(state, trial) / expected
         except CdsmError:  # sites of a cable coincide there, say
             quality = -math.inf
-        length = float(np.linalg.norm(q - here.q))
-        if quality < 0.25:
+        length = float(np.linalg.norm(q - state.q))
+        if quality < _POOR:
             radius = length / 4.0
-        elif quality > 0.75 and length > 0.8 * radius:
+        elif quality > _GOOD and length > 0.8 * radius:
             radius = min(2.0 * radius, _WIDEST)
-        if quality > 0.05:
-            here, view = there, _seen(there, lower, upper)
-            history.append(_largest(here, view))
-            convex = convex and view.lowest > view.flat
-    return Settled(here, view.pressed, tuple(history), _ATTEMPTS, False, convex)
+        if quality > _ACCEPTED:
+            state, free = trial, _Free.of(trial, lower, upper)
+            history.append(free.imbalance)
+            convex = convex and free.lowest > free.flat
+    return RestSearch(state, free.at_stop, tuple(history), _ATTEMPTS, False, convex)
 
 
-def _seen(here: Point, lower: Array, upper: Array) -> _View:
-    pressed = _pressed(here, lower, upper)
-    free = np.flatnonzero(~pressed)
-    spectrum = _spectrum(here.stiffness, free)
-    still = bool((abs(here.torque[free]) <= here.rounding[free]).all())
-    return _View(pressed, free, spectrum, still, FLAT * abs(spectrum[0]).max(initial=0.0))
+def work(before: State, after: State) -> float:
+    """∫ r·dq on the straight line from one state to another."""
+    step = after.q - before.q
+    change = step @ before.stiffness @ step - step @ after.stiffness @ step
+    return float((before.torque + after.torque) @ step / 2.0 + change / 12.0)
 
 
-def _largest(here: Point, view: _View) -> float:
-    return float(abs(here.torque[view.free]).max(initial=0.0))
-
-
-def _way_down(
-    here: Point, view: _View, lower: Array, upper: Array, radius: float
+def _trial(
+    state: State, free: _Free, lower: Array, upper: Array, radius: float
 ) -> tuple[Array, float]:
-    """Where to go next (nv,), and the work that the quadratic model promises for it, negative.
+    """The next place (nv,), and the work that the quadratic model predicts for it.
 
-    Zero if it promises none.
+    The work is negative, or zero if no step goes down.
     """
     # what is left of r at a saddle is rounding, and must not decide which way to leave it
-    torque, signs = (0.0 * here.torque, (1.0, -1.0)) if view.still else (here.torque, (1.0,))
-    q, expected = here.q, 0.0
+    torque, signs = (0.0 * state.torque, (1.0, -1.0)) if free.balanced else (state.torque, (1.0,))
+    q, expected = state.q, 0.0
     for sign in signs:
-        end = _descend(here, torque, view.free, view.spectrum, lower, upper, radius, sign)
-        change = end - here.q
-        promise = float(change @ torque + change @ here.stiffness @ change / 2.0)
-        if promise < expected * (1.0 + 1e-9):  # of two that promise the same the first
-            q, expected = end, promise
+        end = _descend(state, torque, free, lower, upper, radius, sign)
+        change = end - state.q
+        predicted = float(change @ torque + change @ state.stiffness @ change / 2.0)
+        if predicted < expected * (1.0 + 1e-9):  # of two that predict the same the first
+            q, expected = end, predicted
     return q, expected
-
-
-def _pressed(here: Point, lower: Array, upper: Array) -> NDArray[np.bool_]:
-    """Which coordinates are held by a stop (nv,): it can push, but not pull."""
-    q, torque = here.q, here.torque
-    return ((q <= lower) & (torque > here.rounding)) | ((q >= upper) & (torque < -here.rounding))
 
 
 def _spectrum(stiffness: Array, free: NDArray[np.intp]) -> tuple[Array, Array]:
@@ -188,39 +200,31 @@ def _spectrum(stiffness: Array, free: NDArray[np.intp]) -> tuple[Array, Array]:
     return values, vectors
 
 
-def work(here: Point, there: Point) -> float:
-    """∫ r·dq on the straight way from one point to another."""
-    step = there.q - here.q
-    change = step @ here.stiffness @ step - step @ there.stiffness @ step
-    return float((here.torque + there.torque) @ step / 2.0 + change / 12.0)
-
-
 def _descend(
-    here: Point,
+    state: State,
     torque: Array,
-    free: NDArray[np.intp],
-    spectrum: tuple[Array, Array],
+    free: _Free,
     lower: Array,
     upper: Array,
     radius: float,
     sign: float,
 ) -> Array:
-    """Where a way down the quadratic model leads that bends where it meets a stop."""
-    q = here.q.copy()
-    while free.size and radius > 0.0:
-        slope = torque + here.stiffness @ (q - here.q)
-        K = here.stiffness[np.ix_(free, free)]
-        step = _step(slope[free], K, *spectrum, radius, sign)
-        stop = np.where(step > 0.0, upper[free], lower[free])
-        over = abs(step) > abs(stop - q[free])
-        part = np.divide(stop - q[free], step, out=np.ones(step.size), where=over)
+    """Down the quadratic model; where a coordinate meets its stop the path goes on without it."""
+    q, indices, spectrum = state.q.copy(), free.indices, free.spectrum
+    while indices.size and radius > 0.0:
+        r = torque + state.stiffness @ (q - state.q)
+        K = state.stiffness[np.ix_(indices, indices)]
+        step = _step(r[indices], K, *spectrum, radius, sign)
+        stop = np.where(step > 0.0, upper[indices], lower[indices])
+        over = abs(step) > abs(stop - q[indices])
+        part = np.divide(stop - q[indices], step, out=np.ones(step.size), where=over)
         first = over & (part == part.min())
-        q[free] = np.where(first, stop, q[free] + part.min() * step)
+        q[indices] = np.where(first, stop, q[indices] + part.min() * step)
         radius -= float(part.min() * np.linalg.norm(step))
         if not np.count_nonzero(first):
             break
-        free = free[~first]
-        spectrum = _spectrum(here.stiffness, free)
+        indices = indices[~first]
+        spectrum = _spectrum(state.stiffness, indices)
     return q
 
 
@@ -229,7 +233,7 @@ def _step(
 ) -> Array:
     """The step that goes down most within the radius: min r·p + ½ pᵀKp so that |p| <= radius.
 
-    The sign decides where r leaves it open whether to go one way or the other.
+    The sign decides between p and −p where r does not.
     """
     along = vectors.T @ torque
     size, largest = float(np.linalg.norm(along)), float(abs(values).max())
@@ -242,12 +246,13 @@ def _step(
     # p = −(K + σ)⁻¹ r with the σ that makes it as long as the radius, sought from the smallest σ
     # allowed: near a saddle it is larger by a rounding of σ only
     lifted = values + max(0.0, -values[0])
-    least = max(FLAT * max(largest, size / radius), _TINY)
+    least = FLAT * max(largest, size / radius)
 
     def excess(shift: float) -> float:
         return float(1.0 / radius - 1.0 / np.linalg.norm(along / (lifted + shift)))
 
     if size > 0.0 and excess(least) > 0.0:
+        # the relative tolerance alone decides
         shift = brentq(excess, least, 2.0 * size / radius, xtol=1e-300, rtol=1e-6)
         return np.asarray(vectors @ (-along / (lifted + shift)))
     # r has no part along the lowest eigenvector, as on the ridge of a saddle

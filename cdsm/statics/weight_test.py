@@ -1,4 +1,4 @@
-"""The weight test of Section V: hang a weight at the tip, see how far it goes (Eq. 20)."""
+"""The weight test of Section V: stiffness from the displacement under a weight (Eq. 20)."""
 
 from __future__ import annotations
 
@@ -25,19 +25,19 @@ from cdsm.support.validation import (
 from cdsm.tension import Tension
 
 MOST_STEPS = 1000
-"""A curve of more points looks no smoother, and is computed for long."""
+"""Most steps: a curve of more points looks no smoother, and takes long."""
 
 _FINEST = 2.0**-12
-"""Part of itself to which a buckling load is found."""
+"""Relative precision of a buckling load."""
 
 _SLIGHT = 1e-9
-"""Part of the load below which it need not be found so precisely."""
+"""Part of the load below which its precision is absolute."""
 
 _MEASURED = 1e-12
-"""A tip displacement this part of the arm's length is known to some three digits."""
+"""Tip displacement over the length of the arm that is known to some three digits."""
 
-_SETTLED = 1e-9
-"""One by more than this part is no rounding of the balance at the reference."""
+_DISPLACED = 1e-9
+"""Tip displacement over the length of the arm that is no rounding of the balance."""
 
 _IMMOBILE = 1e-14
 """A compliance along the force this part of the largest is rounding."""
@@ -62,7 +62,7 @@ class LinearPrediction(ReadOnlyState):
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class WeightTest(ReadOnlyState):
-    """A weight hung at the tip in equal steps, with every equilibrium on the way.
+    """A weight hung at the tip in equal steps, with the equilibrium at each.
 
     Attributes:
         force: ΔF (3,), the dead force at the full load, base axes [N].
@@ -83,13 +83,15 @@ class WeightTest(ReadOnlyState):
     def stiffness(self) -> float:
         """|ΔF|/(u·ΔX) [N/m] along the force, u = ΔF/|ΔF|: 1/C of Eq. 20, as it is measured.
 
-        inf where the tip does not give way along the force.
+        inf where the tip does not move along the force.
         """
-        return float(np.linalg.norm(self.force)) / self._gives if self._gives else math.inf
+        return (
+            float(np.linalg.norm(self.force)) / self._tip_motion if self._tip_motion else math.inf
+        )
 
     @property
-    def _gives(self) -> float:
-        """How far the tip goes along the force [m]; zero if that is rounding."""
+    def _tip_motion(self) -> float:
+        """Displacement of the tip along the force [m]; zero if it is rounding."""
         moved = float(self.displacement @ unit_direction("force", self.force))
         return moved if abs(moved) > _MEASURED * self.without.pose.arm.length else 0.0
 
@@ -103,8 +105,9 @@ class WeightTest(ReadOnlyState):
         C = self.without.compliance[:3, :3]
         u = unit_direction("force", self.force)
         if self.without.at_limit:
-            gives = float(u @ C @ u)
-            stiff = 1.0 / gives if abs(gives) > _IMMOBILE * np.linalg.norm(C) else math.inf
+            compliance = float(u @ C @ u)
+            mobile = abs(compliance) > _IMMOBILE * np.linalg.norm(C)
+            stiff = 1.0 / compliance if mobile else math.inf
         else:
             stiff = self.without.stiffness.along(u)
         return LinearPrediction(displacement=frozen(C @ self.force), stiffness=stiff)
@@ -113,7 +116,7 @@ class WeightTest(ReadOnlyState):
     def settled_first(self) -> bool:
         """Whether the arm left its reference before the weight: unbalanced there, or unstable."""
         moved = float(np.linalg.norm(self.without.displacement))
-        return moved > _SETTLED * self.without.pose.arm.length
+        return moved > _DISPLACED * self.without.pose.arm.length
 
     @cached_property
     def loads(self) -> Array:
@@ -176,8 +179,8 @@ def weight_test(
 ) -> WeightTest:
     """Hang a weight at the tip of an arm whose motors are locked: C = ΔX/ΔF (Eq. 20).
 
-    Nonlinear: the tensions follow their elongation, and the arm its new posture. What comes out for
-    a small force is 1/:meth:`~cdsm.Stiffness.along`.
+    Nonlinear: the tensions follow the elongations, and the posture changes. For a small force the
+    result is 1/:meth:`~cdsm.Stiffness.along`.
 
     Args:
         pose: The reference posture, at which the motors are locked.
@@ -192,8 +195,8 @@ def weight_test(
         InvalidInput: As for :func:`~cdsm.equilibrium`, or a force of zero or so small
             that what it moves is rounding, or steps that are no whole number from 1 to 1000.
         ElasticityRangeError: As for :func:`~cdsm.equilibrium`, at any step.
-        EquilibriumError: The arm buckles under the load; says at which part of it. Where it comes
-            to rest then, :func:`~cdsm.equilibrium` tells.
+        EquilibriumError: The arm buckles under a part of the load, which it names.
+            :func:`~cdsm.equilibrium` finds where the arm comes to rest then.
     """
     force = vector("force", force, 3, "a force in base axes [N]")
     if not force.any():
@@ -203,10 +206,10 @@ def weight_test(
     added = np.append(force, np.zeros(3))
     loaded, part = [without], 0.0
     for step in range(1, steps + 1):
-        loaded.append(_hang(loaded[-1], without.wrench, added, part, step / steps))
+        loaded.append(_follow_load(loaded[-1], without.wrench, added, part, step / steps))
         part = step / steps
     test = WeightTest(force=force, without=without, loaded=tuple(loaded[1:]))
-    if not test._gives and math.isfinite(test.linear.stiffness):
+    if not test._tip_motion and math.isfinite(test.linear.stiffness):
         raise InvalidInput(
             "force",
             f"{np.abs(force).max():.3g} N moves the tip by rounding only, and measures nothing; "
@@ -215,14 +218,10 @@ def weight_test(
     return test
 
 
-def _hang(
+def _follow_load(
     before: Equilibrium, wrench: Array, added: Array, reached: float, goal: float
 ) -> Equilibrium:
-    """Follow the arm from one part of the load to a larger one.
-
-    Raises:
-        EquilibriumError: It loses its stability on the way.
-    """
+    """Follow the arm from one part of the load to a larger one, in steps of stable equilibria."""
     step = goal - reached
     while reached < goal:
         part = min(goal, reached + step)

@@ -10,7 +10,7 @@ from scipy.optimize import minimize_scalar
 
 import cdsm
 from cdsm.statics import trust_region
-from cdsm.statics.loaded_arm import LoadedArm
+from cdsm.statics.locked_motors import LoadedArm
 from cdsm.support.validation import Array
 from tests.support import arms
 from tests.support.differences import assert_second_order
@@ -181,10 +181,10 @@ def test_last_steps_converge_quadratically(name: str, moment: bool) -> None:
     first = []
     for distance in (2.0**-10, 2.0**-12, 2.0**-13):
         start = loaded.at(pose.arm.at(rest.pose.q + distance * way), rest.tension)
-        settled = trust_region.settle(loaded.moved, start, *loaded.stops())
-        assert settled.steady
-        np.testing.assert_allclose(settled.point.q, rest.pose.q, atol=1e-10)
-        first.append(settled.history[:2])
+        search = trust_region.find_rest(loaded.moved, start, *loaded.stops())
+        assert search.converged
+        np.testing.assert_allclose(search.state.q, rest.pose.q, atol=1e-10)
+        first.append(search.history[:2])
     before, after = np.log2(first).T
     np.testing.assert_allclose(np.diff(after) / np.diff(before), 2.0, atol=0.1)
 
