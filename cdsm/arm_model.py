@@ -20,6 +20,7 @@ from cdsm.errors import CableError, ElasticityRangeError, InvalidInput, UnknownN
 from cdsm.kernels import segments
 from cdsm.kernels.bodies import Masses
 from cdsm.kernels.stiffness import cable_stiffness
+from cdsm.kernels.tree import Routing, Tree
 from cdsm.rigid_body import RigidBody
 from cdsm.support.validation import LARGEST, SMALLEST, Array, frozen
 from cdsm.wires.continuity import find_jump
@@ -50,8 +51,8 @@ class ArmModel:
     """
 
     body: RigidBody
-    tree: segments.Tree
-    routing: segments.Routing
+    tree: Tree
+    routing: Routing
     masses: Masses
     laws: CableLaws
     lowest: Array
@@ -84,7 +85,7 @@ class ArmModel:
         return np.asarray((q < self.lowest) | (q > self.highest))
 
 
-def route(body: RigidBody, tree: segments.Tree, cables: Sequence[Cable]) -> segments.Routing:
+def route(body: RigidBody, tree: Tree, cables: Sequence[Cable]) -> Routing:
     """Place the sites on the joints, and find for every segment the joints that change it."""
     row, point, fixed = [], [], np.array([cable.lead for cable in cables])
     parts: list[tuple[int, int, int, int, int]] = []
@@ -112,7 +113,7 @@ def route(body: RigidBody, tree: segments.Tree, cables: Sequence[Cable]) -> segm
             parts.append((c, len(row) - 2, len(row) - 1, first, first + len(only_a)))
             joints += [*only_a, *only_b]
     parts.append((0, 0, 0, len(joints), len(joints)))
-    return segments.Routing(
+    return Routing(
         row=frozen(np.array(row, dtype=np.intp)),
         point=frozen(np.array(point)),
         segment=frozen(np.array(parts, dtype=np.intp)),
@@ -121,7 +122,7 @@ def route(body: RigidBody, tree: segments.Tree, cables: Sequence[Cable]) -> segm
     )
 
 
-def _joints_to(tree: segments.Tree, row: int) -> list[int]:
+def _joints_to(tree: Tree, row: int) -> list[int]:
     """Rows of the joints from the base to a joint, base first, that one included."""
     rows: list[int] = []
     while row:

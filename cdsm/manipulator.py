@@ -25,6 +25,7 @@ from cdsm.errors import (
 )
 from cdsm.geometry import Geometry
 from cdsm.kernels import segments
+from cdsm.kernels.tree import Frames
 from cdsm.posture import Posture
 from cdsm.rigid_body import RigidBody
 from cdsm.support.validation import (
@@ -363,14 +364,14 @@ class Manipulator(Printed):
         coordinate = "angle [rad] or way [m]" if self.slides.any() else "angle [rad]"
         return f"one {coordinate} per joint, {', '.join(self.joint_names)}"
 
-    def _routed(self, q: Array) -> tuple[segments.Frames, Array, Array]:
+    def _routed(self, q: Array) -> tuple[Frames, Array, Array]:
         """Where joints and cable sites are, L and J_L at checked joint angles.
 
         Raises:
             CableError: Two neighbouring sites of a cable coincide at this posture.
         """
         routing = self._model.routing
-        frames, lengths, length_jacobian, coincident = segments.evaluate(
+        frames, lengths, length_jacobian, coincident = segments.cable_kinematics(
             self._model.tree, routing, q
         )
         if coincident >= 0:

@@ -10,6 +10,7 @@ import numpy as np
 
 from cdsm.kernels import segments
 from cdsm.kernels import stiffness as stiffness_kernels
+from cdsm.kernels.tree import Frames
 from cdsm.support.units import coordinates
 from cdsm.support.validation import Array, ReadOnlyState, frozen
 
@@ -43,7 +44,7 @@ class Posture(ReadOnlyState):
     length_jacobian: Array
     gravity_torque: Array
     gravity_stiffness: Array
-    _frames: segments.Frames
+    _frames: Frames
 
     def __repr__(self) -> str:
         return f"<Posture of {self.arm.name}, tip at {coordinates(self.tip[:3, 3])} m>"
@@ -121,7 +122,7 @@ class Posture(ReadOnlyState):
             tension,
             cable_stiffness,
             wrench,
-            self.arm._model.masses.way,
+            self.arm._model.masses.tip_joints,
         )
         return frozen(active), frozen(passive), frozen(load), frozen(joint)
 

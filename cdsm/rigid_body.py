@@ -16,7 +16,7 @@ import pinocchio as pin
 
 from cdsm.errors import InvalidInput, UrdfError
 from cdsm.kernels.bodies import Masses
-from cdsm.kernels.segments import Indices, Tree
+from cdsm.kernels.tree import Indices, Tree
 from cdsm.support.validation import Array, frozen, one_of, sequence_of
 
 
@@ -140,7 +140,7 @@ class RigidBody:
             centre=np.array([inertia.lever for inertia in inertias]),
             gravity=np.array(model.gravity.linear),
             tip=self._row(tip.parentJoint),
-            way=self._way(tip.parentJoint),
+            tip_joints=self._coordinates_to(tip.parentJoint),
             rotation=tip.placement.rotation.copy(),
             point=tip.placement.translation.copy(),
         )
@@ -220,13 +220,13 @@ class RigidBody:
             ) from None
         return lambda q: drawn.display(q[self._ours])
 
-    def _way(self, joint: int) -> Indices:
-        """Our coordinates of the joints on the way to one of Pinocchio's, base first."""
-        way: list[int] = []
+    def _coordinates_to(self, joint: int) -> Indices:
+        """Our coordinates of the joints from the base to one of Pinocchio's joints."""
+        coordinates: list[int] = []
         while joint:
-            way.insert(0, self._row(joint) - 1)
+            coordinates.insert(0, self._row(joint) - 1)
             joint = self._model.parents[joint]
-        return np.array(way, dtype=np.intp)
+        return np.array(coordinates, dtype=np.intp)
 
     def _row(self, joint: int) -> int:
         """Our row of a joint of Pinocchio's; both call the base 0."""

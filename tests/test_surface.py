@@ -599,7 +599,7 @@ def test_unpickled_posture_needs_no_new_compilation() -> None:
     kernels = [
         stiffness_kernels.joint_stiffness,
         segments.add_length_hessian,
-        segments.evaluate,
+        segments.cable_kinematics,
     ]
     compiled = [len(kernel.signatures) for kernel in kernels]  # type: ignore[attr-defined]
     again = pickle.loads(pickle.dumps(pose))

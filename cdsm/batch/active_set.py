@@ -18,7 +18,7 @@ from typing import NamedTuple
 from cdsm.batch.certificates import torque_of
 from cdsm.batch.linear_algebra import eliminate
 from cdsm.kernels.compiling import compiled
-from cdsm.kernels.segments import Indices
+from cdsm.kernels.tree import Indices
 from cdsm.support.validation import Array
 
 FOUND, IMPOSSIBLE, LOST = range(3)

@@ -37,10 +37,11 @@ from cdsm.batch.layout import (
     Codes,
 )
 from cdsm.batch.readings import Answers, solve_row, workspace
-from cdsm.kernels.bodies import Masses, add_gravity, reach, weigh
+from cdsm.kernels.bodies import Masses, add_gravity_stiffness, gravity_torque, tip_jacobian
 from cdsm.kernels.compiling import compiled, inlined, threaded
-from cdsm.kernels.segments import Frames, Indices, Routing, Tree, measure, mirror, place
-from cdsm.kernels.stiffness import add_load, add_passive, set_cable_stiffness
+from cdsm.kernels.segments import add_segment_derivatives, mirror
+from cdsm.kernels.stiffness import add_load_stiffness, add_passive_stiffness, set_cable_stiffness
+from cdsm.kernels.tree import Frames, Indices, Routing, Tree, forward_kinematics
 from cdsm.support.validation import Array
 
 
@@ -104,13 +105,17 @@ def evaluate_rows(
             UNDECIDED where singular values have to tell whether K_θ is regular.
     """
     tree, routing, masses, lowest, highest, series, rest = arm
-    parent, segment, joint, fixed = tree.parent, routing.segment, routing.joint, routing.fixed
+    parent, fixed = tree.parent, routing.fixed
     nv, count, bodies = q.shape[1], fixed.shape[0], parent.shape[0]
     site = np.empty((routing.row.shape[0], 3))
     slide = np.empty(tree.slide.shape)
     frames = Frames(np.empty((bodies, 3)), np.empty((bodies, 3)), slide, site)
-    rotation, bent, heavy = np.empty((bodies, 3, 3)), np.empty((nv, 3)), np.empty((bodies, 7))
-    page = np.zeros(count, dtype=np.intp)
+    rotation, left_factor, carried = (
+        np.empty((bodies, 3, 3)),
+        np.empty((nv, 3)),
+        np.empty((bodies, 7)),
+    )
+    slot = np.zeros(count, dtype=np.intp)
 
     record = np.zeros(start[start.shape[0] - 1])
     tip = _matrix(record, start, TIP, 4)
@@ -143,7 +148,7 @@ def evaluate_rows(
     for b in range(q.shape[0]):
         beyond, coincident = _is_beyond(q[b], lowest, highest), -1
         if not beyond:
-            place(tree, routing.row, routing.point, q[b], rotation, frames)
+            forward_kinematics(tree, routing, q[b], rotation, frames)
             for c in range(count):
                 L[c] = fixed[c]
             for i in range(start[LENGTH_JACOBIAN], start[LENGTH_JACOBIAN + 1]):
@@ -151,7 +156,9 @@ def evaluate_rows(
             if last >= GRAVITY:
                 for i in range(start[GRAVITY], start[JOINT]):
                     record[i] = 0.0
-            coincident = measure(segment, joint, frames, tension[b], page, bent, L, J, curved)
+            coincident = add_segment_derivatives(
+                routing, frames, tension[b], slot, left_factor, L, J, curved
+            )
         known = 0
         if beyond:
             status[b] = BEYOND_LIMITS
@@ -159,22 +166,22 @@ def evaluate_rows(
             status[b] = COINCIDENT_SITES
         else:
             known = GRAVITY + 1
-            reach(parent, masses, rotation, frames, tip, JX)
-            weigh(tree, masses, rotation, frames, heavy, g)
+            tip_jacobian(parent, masses, rotation, frames, tip, JX)
+            gravity_torque(tree, masses, rotation, frames, carried, g)
             if last >= GRAVITY:
-                add_gravity(parent, heavy, gravity)
+                add_gravity_stiffness(parent, carried, gravity)
                 mirror(gravity)
             if last > GRAVITY and status[b] == OK:
                 known = LOAD + 1
                 _imbalance(tension[b], J, wrench[b], JX, g, residual)
                 mirror(active[0])
-                add_load(JX, wrench[b], masses.way, load)
+                add_load_stiffness(JX, wrench[b], masses.tip_joints, load)
                 if last > LOAD and (rigidity[b] < 0.0).any():
                     status[b] = OUTSIDE_ELASTICITY
                 elif last > LOAD:
                     known = CARTESIAN + 1
                     set_cable_stiffness(L, tension[b], rigidity[b], series, rest, k)
-                    add_passive(J, k, passive)
+                    add_passive_stiffness(J, k, passive)
                     mirror(passive)
                     size = 0.0
                     for i in range(nv):

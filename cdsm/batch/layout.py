@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdsm.batch.status import Status
-from cdsm.kernels.segments import Indices
+from cdsm.kernels.tree import Indices
 
 Codes = NDArray[np.uint8]
 Flags = NDArray[np.bool_]

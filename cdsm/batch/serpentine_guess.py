@@ -19,7 +19,7 @@ import numpy as np
 from cdsm.batch.certificates import is_infeasible
 from cdsm.batch.layout import Flags
 from cdsm.kernels.compiling import compiled
-from cdsm.kernels.segments import Indices, Routing
+from cdsm.kernels.tree import Indices, Routing
 from cdsm.support.validation import Array
 
 _MOST = 2

@@ -1,4 +1,4 @@
-"""Numba kernels of the rigid bodies: the tip, its Jacobian, and what the weight asks of the joints.
+"""Numba kernels of the rigid bodies: pose of the tip, its Jacobian, gravity torque and stiffness.
 
 For one posture Pinocchio answers these; for many at once its calls from Python would cost more than
 all the rest. A test holds both equal to rounding. With M and S = Σ m c of all that joint i moves,
@@ -14,19 +14,19 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from cdsm.kernels.compiling import compiled
-from cdsm.kernels.segments import Frames, Indices, Tree
+from cdsm.kernels.tree import Frames, Indices, Tree
 from cdsm.support.validation import Array
 
 
 class Masses(NamedTuple):
-    """What moves with each joint, and where the tip is; rows as in a tree.
+    """The masses that the joints carry, and where the tip is; rows as in a tree.
 
     Attributes:
         mass: Of the bodies fixed to each joint's frame, (nv+1,) [kg].
         centre: Their centre of mass in that frame, (nv+1, 3) [m].
         gravity: In base axes (3,) [m/s²].
         tip: Row of the joint that moves the tip.
-        way: Coordinates of the joints that move it, base first.
+        tip_joints: Coordinates of the joints that move the tip, base first.
         rotation: Of the tip in that joint's frame, (3, 3).
         point: Its origin there, (3,) [m].
     """
@@ -35,13 +35,13 @@ class Masses(NamedTuple):
     centre: Array
     gravity: Array
     tip: int
-    way: Indices
+    tip_joints: Indices
     rotation: Array
     point: Array
 
 
 @compiled
-def reach(
+def tip_jacobian(
     parent: Indices,
     masses: Masses,
     rotation: Array,
@@ -49,7 +49,7 @@ def reach(
     tip: Array,
     jacobian: Array,
 ) -> None:
-    """Fill the pose of the tip (4, 4), and J_X (6, nv) for the joints on the way to it."""
+    """Fill the pose of the tip (4, 4), and J_X (6, nv) for the joints that move it."""
     origin, axis, slide, _ = frames
     i = masses.tip
     for r in range(3):
@@ -78,51 +78,53 @@ def reach(
 
 
 @compiled
-def weigh(
-    tree: Tree, masses: Masses, rotation: Array, frames: Frames, load: Array, torque: Array
+def gravity_torque(
+    tree: Tree, masses: Masses, rotation: Array, frames: Frames, carried: Array, torque: Array
 ) -> None:
-    """Fill g (nv,), and M, z × r and γ × z of every joint, (nv+1, 7)."""
+    """Fill g (nv,), and M, z × r and γ × z of every joint as the rows of carried (nv+1, 7)."""
     parent, order = tree.parent, tree.order
     origin, axis, slide, _ = frames
     gx, gy, gz = masses.gravity[0], masses.gravity[1], masses.gravity[2]
+    # first M and S of each link alone, in the columns 0 and 1 to 3
     for i in range(parent.shape[0]):
         m = masses.mass[i]
-        load[i, 0] = m
+        carried[i, 0] = m
         for r in range(3):
             centre = origin[i, r]
             for k in range(3):
                 centre += rotation[i, r, k] * masses.centre[i, k]
-            load[i, 1 + r] = m * centre
+            carried[i, 1 + r] = m * centre
+    # then from the ends of the branches inwards: a joint's sums are whole before it hands them on
     for k in range(order.shape[0] - 1, -1, -1):
         i = order[k]
         before = parent[i]
         for r in range(4):
-            load[before, r] += load[i, r]
-        M = load[i, 0]
-        rx = load[i, 1] - M * origin[i, 0]
-        ry = load[i, 2] - M * origin[i, 1]
-        rz = load[i, 3] - M * origin[i, 2]
+            carried[before, r] += carried[i, r]
+        M = carried[i, 0]
+        rx = carried[i, 1] - M * origin[i, 0]
+        ry = carried[i, 2] - M * origin[i, 1]
+        rz = carried[i, 3] - M * origin[i, 2]
         zx, zy, zz = axis[i, 0], axis[i, 1], axis[i, 2]
-        load[i, 1] = zy * rz - zz * ry
-        load[i, 2] = zz * rx - zx * rz
-        load[i, 3] = zx * ry - zy * rx
+        carried[i, 1] = zy * rz - zz * ry
+        carried[i, 2] = zz * rx - zx * rz
+        carried[i, 3] = zx * ry - zy * rx
         if slide.shape[0]:
             for r in range(3):
-                load[i, 1 + r] += M * slide[i, r]
-        load[i, 4] = gy * zz - gz * zy
-        load[i, 5] = gz * zx - gx * zz
-        load[i, 6] = gx * zy - gy * zx
-        torque[i - 1] = -(gx * load[i, 1] + gy * load[i, 2] + gz * load[i, 3])
+                carried[i, 1 + r] += M * slide[i, r]
+        carried[i, 4] = gy * zz - gz * zy
+        carried[i, 5] = gz * zx - gx * zz
+        carried[i, 6] = gx * zy - gy * zx
+        torque[i - 1] = -(gx * carried[i, 1] + gy * carried[i, 2] + gz * carried[i, 3])
 
 
 @compiled
-def add_gravity(parent: Indices, load: Array, gravity: Array) -> None:
-    """Add ∂g/∂θ to a matrix (nv, nv), for i ≤ j only, from what :func:`weigh` left."""
+def add_gravity_stiffness(parent: Indices, carried: Array, gravity: Array) -> None:
+    """Add ∂g/∂θ to a matrix (nv, nv), for i ≤ j only; ``carried`` is of :func:`gravity_torque`."""
     for j in range(parent.shape[0] - 1, 0, -1):
-        x, y, z = load[j, 1], load[j, 2], load[j, 3]
+        x, y, z = carried[j, 1], carried[j, 2], carried[j, 3]
         i = j
         while i > 0:
             # γ·(z_i × w) = (γ × z_i)·w
-            value = load[i, 4] * x + load[i, 5] * y + load[i, 6] * z
+            value = carried[i, 4] * x + carried[i, 5] * y + carried[i, 6] * z
             gravity[min(i, j) - 1, max(i, j) - 1] -= value
             i = parent[i]

@@ -1,4 +1,4 @@
-"""Numba kernels: joint angles and cable routing to L, J_L and H_L. Arrays in, arrays out.
+"""Numba kernels of cable lengths and their derivatives: L, J_L and H_L.
 
 A segment between site a and site b has the length ℓ = |b − a| and, with u = (b − a)/ℓ and
 d_i = ∂(b − a)/∂θ_i,
@@ -9,150 +9,27 @@ Only the joints between the two links enter: those on the way to b with +, those
 with −. For a joint that turns about z through o, d = ±z × (x − o), for one that slides along s,
 d = ±s; and for a joint i not after joint j on the same side the second derivative is z_i × d_j,
 with z = 0 where a joint slides.
+
+So, for i not after j, the second derivative is c_i·d_j with the left factor
+
+    c_i = (d_i − (u·d_i) u)/ℓ + u × z_i,
+
+where the last term counts only if both joints are on the same side: u·(z_i × d_j) = (u × z_i)·d_j.
+A left factor is built once per joint, and each pair of joints costs one dot product.
 """
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cdsm.kernels.compiling import compiled, inlined
-from cdsm.support.validation import Array, frozen
-
-Indices = NDArray[np.intp]
+from cdsm.kernels.tree import Frames, Indices, Routing, Tree, forward_kinematics
+from cdsm.support.validation import Array
 
 SHORTEST_SEGMENT = 1e-9
 """A segment shorter than this [m] has no direction: its two sites coincide."""
-
-
-class Tree(NamedTuple):
-    """The kinematic tree as plain arrays; row 0 is the base, row i joint i.
-
-    Attributes:
-        parent: Row of the joint before, (nv+1,).
-        order: Rows of the joints, each after the joint before it, (nv,); the rows themselves are in
-            the order of q, whatever that is.
-        turn: Three matrices of each joint, (nv+1, 3, 3, 3): by Rodrigues' formula the first, plus
-            the second times cos q, plus the third times sin q, is the rotation of its frame in
-            that of the joint before.
-        translation: Origin in the frame of the joint before, (nv+1, 3) [m].
-        axis: Unit axis of a joint that turns, likewise, (nv+1, 3); zero if it slides.
-        slide: Unit direction of a joint that slides, likewise, (nv+1, 3), zero if it turns; (0, 3)
-            if none slides, which is the usual case and costs nothing.
-    """
-
-    parent: Indices
-    order: Indices
-    turn: Array
-    translation: Array
-    axis: Array
-    slide: Array
-
-    @classmethod
-    def of(
-        cls,
-        parent: Indices,
-        order: Indices,
-        rotation: Array,
-        translation: Array,
-        axis: Array,
-        slide: Array,
-    ) -> Tree:
-        """From joint frames at q = 0 in the frames before; axes and slides in the joints' own."""
-        along = axis[:, :, None] * axis[:, None, :]
-        along[~axis.any(axis=1)] = np.eye(3)  # it does not turn, so all of it stays
-        cross = np.cross(axis[:, None, :], np.eye(3)).transpose(0, 2, 1)
-        parts = np.stack([along, np.eye(3) - along, cross], axis=1)
-        return cls(
-            parent=frozen(parent),
-            order=frozen(order),
-            turn=frozen(rotation[:, None] @ parts),
-            translation=frozen(translation),
-            axis=frozen((rotation @ axis[:, :, None])[:, :, 0].copy()),
-            slide=frozen((rotation @ slide[:, :, None])[: len(slide) * slide.any(), :, 0].copy()),
-        )
-
-
-class Routing(NamedTuple):
-    """All cable sites, and the cable segments that joints can change; rows as in a tree.
-
-    Few arrays on purpose: handing one to a kernel costs as much as computing a segment.
-
-    Attributes:
-        row: Row of the joint that moves each site, (P,).
-        point: The site in the frame of that joint, (P, 3) [m].
-        segment: For each segment its cable, site a, site b, and where in ``joint`` its joints
-            begin and those on the way to b, (S+1, 5); the last row only says where they end.
-        joint: Rows of the joints between a and b: those on the way to a, then those on the way to
-            b, ancestors first.
-        fixed: Length that joints do not change: lead and segments within one link, (C,) [m].
-    """
-
-    row: Indices
-    point: Array
-    segment: Indices
-    joint: Indices
-    fixed: Array
-
-
-class Frames(NamedTuple):
-    """Where the joints and the cable sites are, in base axes.
-
-    Attributes:
-        origin: A point on each joint axis, (nv+1, 3) [m].
-        axis: Its unit direction, (nv+1, 3); zero if the joint slides.
-        slide: Where it slides to, (nv+1, 3), zero if it turns; (0, 3) if none slides.
-        site: The cable sites, (P, 3) [m].
-    """
-
-    origin: Array
-    axis: Array
-    slide: Array
-    site: Array
-
-
-@compiled
-def place(
-    tree: Tree, row: Indices, point: Array, q: Array, rotation: Array, frames: Frames
-) -> None:
-    """Forward kinematics at q (nv,): fill the rotations of the joints (nv+1, 3, 3) and frames."""
-    parent, order, turn, translation, local_axis, local_slide = tree
-    origin, axis, slide, site = frames
-    sliding = slide.shape[0] > 0
-    for r in range(3):
-        origin[0, r] = axis[0, r] = 0.0
-        if sliding:
-            slide[0, r] = 0.0
-        for c in range(3):
-            rotation[0, r, c] = 1.0 if r == c else 0.0
-    for k in range(order.shape[0]):
-        i = np.uint64(order[k])  # see upwards
-        before, angle = np.uint64(parent[i]), q[i - np.uint64(1)]
-        cosine, sine = math.cos(angle), math.sin(angle)
-        for r in range(3):
-            x, y, z = rotation[before, r, 0], rotation[before, r, 1], rotation[before, r, 2]
-            t, a = translation[i], local_axis[i]
-            origin[i, r] = origin[before, r] + (x * t[0] + y * t[1] + z * t[2])
-            if sliding:
-                s = local_slide[i]
-                slide[i, r] = x * s[0] + y * s[1] + z * s[2]
-                origin[i, r] += angle * slide[i, r]
-            axis[i, r] = x * a[0] + y * a[1] + z * a[2]
-            for c in range(3):
-                rotation[i, r, c] = (
-                    x * (turn[i, 0, 0, c] + cosine * turn[i, 1, 0, c] + sine * turn[i, 2, 0, c])
-                    + y * (turn[i, 0, 1, c] + cosine * turn[i, 1, 1, c] + sine * turn[i, 2, 1, c])
-                    + z * (turn[i, 0, 2, c] + cosine * turn[i, 1, 2, c] + sine * turn[i, 2, 2, c])
-                )
-    for p in range(row.shape[0]):
-        i = row[p]
-        x, y, z = point[p, 0], point[p, 1], point[p, 2]
-        for r in range(3):
-            shift = rotation[i, r, 0] * x + rotation[i, r, 1] * y + rotation[i, r, 2] * z
-            site[p, r] = origin[i, r] + shift
 
 
 @inlined
@@ -169,80 +46,82 @@ def _direction(site: Array, a: int, b: int) -> tuple[float, float, float, float]
 
 @inlined
 def _add_side(
-    side: float,
+    sign: float,
     site: int,
-    joints: tuple[int, int, int],
+    part: tuple[int, int, int],
     joint: Indices,
     frames: Frames,
     direction: tuple[float, float, float, float],
     weight: float,
-    bent: Array,
+    left_factor: Array,
     cable: int,
-    slopes: Array,
-    page: int,
-    curvature: Array,
+    jacobian: Array,
+    slot: int,
+    hessian: Array,
 ) -> None:
-    """Add what the joints on the way to one end of a segment do to J_L and H_L, for i ≤ j only.
+    """Add the joints on one side of a segment to J_L and H_L, for i ≤ j only.
 
     Args:
-        side: +1 on the way to b, −1 on the way to a.
+        sign: +1 for the joints on the way to b, −1 for those on the way to a.
         site: The site at that end.
-        joints: Where the joints of the segment begin, where those of this side, and where they end.
+        part: Of ``joint``: where the segment's joints begin, where this side begins, and its end.
         joint: Rows of the joints.
         frames: Where they are.
         direction: u and ℓ.
         weight: Of ∂²ℓ/∂θ_i∂θ_j.
-        bent: For each joint of the segment what stands before d_j in that times the weight,
-            (1 − uuᵀ) d_i/ℓ, and, if on the same side, u × z_i: u·(z_i × d_j) = (u × z_i)·d_j.
-        cable: Row of the slopes.
-        slopes: J_L, or no rows.
-        page: Of the curvature.
-        curvature: H_L, or no pages.
+        left_factor: The weight times c_i of the segment's joints.
+        cable: Row of the Jacobian.
+        jacobian: J_L, or no rows.
+        slot: Of the Hessian.
+        hessian: Sums of H_L, or none.
     """
-    first, begin, end = joints
+    first, begin, end = part
     ux, uy, uz, length = direction
     inverse = 1.0 / length
     for t in range(begin, end):
         j = joint[t]
         zx, zy, zz = frames.axis[j, 0], frames.axis[j, 1], frames.axis[j, 2]
-        rx = side * (frames.site[site, 0] - frames.origin[j, 0])
-        ry = side * (frames.site[site, 1] - frames.origin[j, 1])
-        rz = side * (frames.site[site, 2] - frames.origin[j, 2])
+        # d_j = ±z × (x − o), or ± the slide
+        rx = sign * (frames.site[site, 0] - frames.origin[j, 0])
+        ry = sign * (frames.site[site, 1] - frames.origin[j, 1])
+        rz = sign * (frames.site[site, 2] - frames.origin[j, 2])
         dx, dy, dz = zy * rz - zz * ry, zz * rx - zx * rz, zx * ry - zy * rx
         if frames.slide.shape[0]:
-            dx += side * frames.slide[j, 0]
-            dy += side * frames.slide[j, 1]
-            dz += side * frames.slide[j, 2]
+            dx += sign * frames.slide[j, 0]
+            dy += sign * frames.slide[j, 1]
+            dz += sign * frames.slide[j, 2]
         along = ux * dx + uy * dy + uz * dz
-        if slopes.shape[0]:
-            slopes[cable, j - 1] += along
-        if curvature.shape[0]:
-            bent[t - first, 0] = weight * ((dx - along * ux) * inverse + uy * zz - uz * zy)
-            bent[t - first, 1] = weight * ((dy - along * uy) * inverse + uz * zx - ux * zz)
-            bent[t - first, 2] = weight * ((dz - along * uz) * inverse + ux * zy - uy * zx)
-            for other in range(first, t + 1):
-                i, k = joint[other], other - first
-                value = bent[k, 0] * dx + bent[k, 1] * dy + bent[k, 2] * dz
-                curvature[page, min(i, j) - 1, max(i, j) - 1] += value
+        if jacobian.shape[0]:
+            jacobian[cable, j - 1] += along
+        if hessian.shape[0]:
+            c, k = left_factor, t - first
+            c[k, 0] = weight * ((dx - along * ux) * inverse + uy * zz - uz * zy)
+            c[k, 1] = weight * ((dy - along * uy) * inverse + uz * zx - ux * zz)
+            c[k, 2] = weight * ((dz - along * uz) * inverse + ux * zy - uy * zx)
+            # with every joint before, those of the other side included, and with itself
+            for k in range(t - first + 1):
+                i = joint[first + k]
+                value = c[k, 0] * dx + c[k, 1] * dy + c[k, 2] * dz
+                hessian[slot, min(i, j) - 1, max(i, j) - 1] += value
 
 
 @inlined
-def _unbend(
+def _remove_cross_products(
     joint: Indices,
     first: int,
-    turn: int,
+    end: int,
     axis: Array,
     direction: tuple[float, float, float, float],
     weight: float,
-    bent: Array,
+    left_factor: Array,
 ) -> None:
-    """Take u × z_i away again, before the joints on the other side come."""
+    """Take u × z_i out of the left factors: the joints that follow are on the other side."""
     ux, uy, uz, _ = direction
-    for t in range(first, turn):
+    for t in range(first, end):
         zx, zy, zz = axis[joint[t], 0], axis[joint[t], 1], axis[joint[t], 2]
-        bent[t - first, 0] -= weight * (uy * zz - uz * zy)
-        bent[t - first, 1] -= weight * (uz * zx - ux * zz)
-        bent[t - first, 2] -= weight * (ux * zy - uy * zx)
+        left_factor[t - first, 0] -= weight * (uy * zz - uz * zy)
+        left_factor[t - first, 1] -= weight * (uz * zx - ux * zz)
+        left_factor[t - first, 2] -= weight * (ux * zy - uy * zx)
 
 
 @compiled
@@ -254,49 +133,48 @@ def mirror(matrix: Array) -> None:
 
 
 @compiled
-def measure(
-    segment: Indices,
-    joint: Indices,
+def add_segment_derivatives(
+    routing: Routing,
     frames: Frames,
     weight: Array,
-    page: Indices,
-    bent: Array,
+    slot: Indices,
+    left_factor: Array,
     lengths: Array,
-    slopes: Array,
-    curvature: Array,
+    jacobian: Array,
+    hessian: Array,
 ) -> int:
-    """Add all segments to L (C,), J_L (C, nv) and weight[c] H_L[c] at curvature[page[c]] (nv, nv).
+    """Add all segments to L (C,), J_L (C, nv) and weight[c] H_L[c] at hessian[slot[c]] (nv, nv).
 
-    J_L is left out if it has no rows, H_L if there are no pages for it; of H_L only i ≤ j is
-    filled. ``bent`` (nv, 3) is scratch.
+    J_L is left out if it has no rows, H_L if there are no matrices for it; of H_L only i ≤ j is
+    filled. ``left_factor`` (nv, 3) is scratch.
 
     Returns:
         The first segment whose sites coincide, or −1; if there is one, all are unfinished.
     """
+    segment, joint = routing.segment, routing.joint
     for s in range(segment.shape[0] - 1):
         cable, a, b = segment[s, 0], segment[s, 1], segment[s, 2]
-        first, turn, end = segment[s, 3], segment[s, 4], segment[s + 1, 3]
+        first, split, end = segment[s, 3], segment[s, 4], segment[s + 1, 3]
         direction = _direction(frames.site, a, b)
         if direction[3] == 0.0:
             return s
         lengths[cable] += direction[3]
         w, k = 0.0, 0
-        if curvature.shape[0]:
-            w, k = weight[cable], page[cable]
-        for half in range(0 if turn > first else 1, 2):
-            side, site, begin, stop = (1.0, b, turn, end) if half else (-1.0, a, first, turn)
-            joints = first, begin, stop
-            _add_side(
-                side, site, joints, joint, frames, direction, w, bent, cable, slopes, k, curvature
-            )
-            if not half:
-                _unbend(joint, first, turn, frames.axis, direction, w, bent)
+        if hessian.shape[0]:
+            w, k = weight[cable], slot[cable]
+        # the joints on the way to a, of which a serpentine arm has none, then those on the way to b
+        for towards_b in range(0 if split > first else 1, 2):
+            sign, site, begin, stop = (1.0, b, split, end) if towards_b else (-1.0, a, first, split)
+            part, c = (first, begin, stop), left_factor
+            _add_side(sign, site, part, joint, frames, direction, w, c, cable, jacobian, k, hessian)
+            if not towards_b:
+                _remove_cross_products(joint, first, split, frames.axis, direction, w, c)
     return -1
 
 
 @compiled
-def evaluate(tree: Tree, routing: Routing, q: Array) -> tuple[Frames, Array, Array, int]:
-    """Everything about cables that depends on q (nv,) alone.
+def cable_kinematics(tree: Tree, routing: Routing, q: Array) -> tuple[Frames, Array, Array, int]:
+    """Where joints and cable sites are at q (nv,), and the cable lengths and their Jacobian.
 
     Returns:
         The frames, L (C,), J_L (C, nv), and the first segment whose sites coincide, or −1; if there
@@ -305,26 +183,24 @@ def evaluate(tree: Tree, routing: Routing, q: Array) -> tuple[Frames, Array, Arr
     count, nv = tree.parent.shape[0], q.shape[0]
     origin, axis, slide = np.empty((count, 3)), np.empty((count, 3)), np.empty(tree.slide.shape)
     frames = Frames(origin, axis, slide, np.empty((routing.row.shape[0], 3)))
-    place(tree, routing.row, routing.point, q, np.empty((count, 3, 3)), frames)
-    fixed = routing.fixed
-    L, J, nothing = fixed.copy(), np.zeros((fixed.shape[0], nv)), np.empty((0, nv, nv))
-    page, bent = np.empty(0, dtype=np.intp), np.empty((nv, 3))
-    coincident = measure(routing.segment, routing.joint, frames, fixed, page, bent, L, J, nothing)
+    forward_kinematics(tree, routing, q, np.empty((count, 3, 3)), frames)
+    L, J = routing.fixed.copy(), np.zeros((routing.fixed.shape[0], nv))
+    nothing, slot, scratch = np.empty((0, nv, nv)), np.empty(0, dtype=np.intp), np.empty((nv, 3))
+    coincident = add_segment_derivatives(routing, frames, L, slot, scratch, L, J, nothing)
     return frames, L, J, coincident
 
 
 @compiled
 def add_length_hessian(
-    routing: Routing, frames: Frames, weight: Array, page: Indices, hessian: Array
+    routing: Routing, frames: Frames, weight: Array, slot: Indices, hessian: Array
 ) -> None:
-    """Add weight[c] ∂²L_c/∂θ_i∂θ_j to hessian[page[c], i, j] for every cable c.
+    """Add weight[c] ∂²L_c/∂θ_i∂θ_j to hessian[slot[c], i, j] for every cable c.
 
-    All pages zero and weight = F gives H_L·F; page c for cable c and weight 1 the whole tensor.
-    No two neighbouring sites may coincide; :func:`evaluate` has seen to that.
+    All slots zero and weight = F gives H_L·F; slot c for cable c and weight 1 the whole tensor.
+    No two neighbouring sites may coincide; :func:`cable_kinematics` has seen to that.
     """
     nv = hessian.shape[1]
-    nothing, L = np.empty((0, nv)), np.zeros(weight.shape[0])
-    bent = np.empty((nv, 3))
-    measure(routing.segment, routing.joint, frames, weight, page, bent, L, nothing, hessian)
+    lengths, no_jacobian, scratch = np.zeros(weight.shape[0]), np.empty((0, nv)), np.empty((nv, 3))
+    add_segment_derivatives(routing, frames, weight, slot, scratch, lengths, no_jacobian, hessian)
     for k in range(hessian.shape[0]):
         mirror(hessian[k])

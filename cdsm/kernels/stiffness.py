@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from cdsm.kernels.compiling import compiled, upwards
-from cdsm.kernels.segments import Frames, Indices, Routing, add_length_hessian, mirror
+from cdsm.kernels.segments import add_length_hessian, mirror
+from cdsm.kernels.tree import Frames, Indices, Routing
 from cdsm.support.validation import Array
 
 
@@ -58,21 +59,21 @@ def joint_stiffness(
     tension: Array,
     cable_stiffness: Array,
     wrench: Array,
-    way: Indices,
+    tip_joints: Indices,
 ) -> tuple[Array, Array, Array, Array]:
     """Active, passive and load term of Eq. 16 and the sum of all four, (nv, nv) each."""
     nv = jacobian.shape[1]
     active, passive = np.zeros((1, nv, nv)), np.zeros((nv, nv))
-    page = np.zeros(tension.shape[0], dtype=np.intp)
-    add_length_hessian(routing, frames, tension, page, active)
-    add_passive(length_jacobian, cable_stiffness, passive)
+    slot = np.zeros(tension.shape[0], dtype=np.intp)
+    add_length_hessian(routing, frames, tension, slot, active)
+    add_passive_stiffness(length_jacobian, cable_stiffness, passive)
     mirror(passive)
-    load = load_stiffness(jacobian, wrench, way)
+    load = load_stiffness(jacobian, wrench, tip_joints)
     return active[0], passive, load, active[0] + passive + gravity + load
 
 
 @compiled
-def add_passive(length_jacobian: Array, cable_stiffness: Array, passive: Array) -> None:
+def add_passive_stiffness(length_jacobian: Array, cable_stiffness: Array, passive: Array) -> None:
     """Add J_Lᵀ K_L J_L to a matrix (nv, nv), for i ≤ j only."""
     J, k = length_jacobian, cable_stiffness
     count, nv = J.shape
@@ -91,32 +92,32 @@ def add_passive(length_jacobian: Array, cable_stiffness: Array, passive: Array) 
 
 
 @compiled
-def load_stiffness(jacobian: Array, wrench: Array, way: Indices) -> Array:
+def load_stiffness(jacobian: Array, wrench: Array, tip_joints: Indices) -> Array:
     """−∂(J_Xᵀ W)/∂θ (nv, nv) of a dead wrench W (6,): row torque, column angle."""
     result = np.zeros((jacobian.shape[1], jacobian.shape[1]))
-    add_load(jacobian, wrench, way, result)
+    add_load_stiffness(jacobian, wrench, tip_joints, result)
     return result
 
 
 @compiled
-def add_load(jacobian: Array, wrench: Array, way: Indices, load: Array) -> None:
+def add_load_stiffness(jacobian: Array, wrench: Array, tip_joints: Indices, load: Array) -> None:
     """Add −∂(J_Xᵀ W)/∂θ to a matrix (nv, nv).
 
-    From J_X and the joints on the way to the tip, base first: ∂v_i/∂θ_j = z_a × v_b with a the
+    From J_X and the joints that move the tip, base first: ∂v_i/∂θ_j = z_a × v_b with a the
     earlier and b the later of the two joints, ∂z_i/∂θ_j = z_j × z_i where j comes before i and 0
     otherwise.
     """
     fx, fy, fz = wrench[0], wrench[1], wrench[2]
     mx, my, mz = wrench[3], wrench[4], wrench[5]
-    for s in range(way.shape[0]):
-        a = np.uint64(way[s])
+    for s in range(tip_joints.shape[0]):
+        a = np.uint64(tip_joints[s])
         zx, zy, zz = jacobian[3, a], jacobian[4, a], jacobian[5, a]
         # f·(z × v) = (f × z)·v, m·(z × z_b) = (m × z)·z_b
         gx, gy, gz = fy * zz - fz * zy, fz * zx - fx * zz, fx * zy - fy * zx
         hx, hy, hz = my * zz - mz * zy, mz * zx - mx * zz, mx * zy - my * zx
         load[a, a] -= gx * jacobian[0, a] + gy * jacobian[1, a] + gz * jacobian[2, a]
-        for t in upwards(s + 1, way.shape[0]):
-            b = np.uint64(way[t])
+        for t in upwards(s + 1, tip_joints.shape[0]):
+            b = np.uint64(tip_joints[t])
             force = gx * jacobian[0, b] + gy * jacobian[1, b] + gz * jacobian[2, b]
             moment = hx * jacobian[3, b] + hy * jacobian[4, b] + hz * jacobian[5, b]
             load[a, b] -= force

@@ -73,7 +73,7 @@ class TipResidual:
         wrench = np.zeros(6)
         wrench[: weight.size] = weight
         wrench[:3] /= self.arm.length
-        jacobian, way = self.arm._model.body.state(q).jacobian, self.arm._model.masses.way
+        jacobian, way = self.arm._model.body.state(q).jacobian, self.arm._model.masses.tip_joints
         return -load_stiffness(frozen(jacobian), frozen(wrench), way)
 
     def hessian(self, q: Array) -> Array:

@@ -36,7 +36,7 @@ class Field:
         self.evaluations = 0
         # products with the tensor, which is cached, beat going through the cables each time
         self.geometry = pose.length_hessian, pose.length_jacobian
-        load = load_stiffness(pose.jacobian, region.least.wrench, pose.arm._model.masses.way)
+        load = load_stiffness(pose.jacobian, region.least.wrench, pose.arm._model.masses.tip_joints)
         self.constant = pose.gravity_stiffness + load
         self._bounds = region.low, region.high
         self.scale = max(float(abs(self.at(region.least.values).values).max()), SMALLEST)

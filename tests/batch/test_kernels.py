@@ -11,6 +11,7 @@ from cdsm.kernels import bodies as body_kernels
 from cdsm.kernels import segments
 from cdsm.kernels import stiffness as stiffness_kernels
 from cdsm.kernels import tension as tension_kernels
+from cdsm.kernels.tree import Frames, Routing, forward_kinematics
 from cdsm.rigid_body import RigidBody
 from cdsm.support.validation import Array
 from tests.laws.test_derivatives import BRANCH_JOINT, BRANCHES
@@ -44,18 +45,19 @@ def test_tree_that_branches_weighs_what_pinocchio_says() -> None:
         count = q.size + 1
         rotation = np.full((count, 3, 3), np.nan)  # nothing may stay as it was
         origin, axis = np.full((2, count, 3), np.nan)
-        frames = segments.Frames(origin, axis, np.empty(tree.slide.shape), np.empty((0, 3)))
-        row, point = np.empty(0, dtype=np.intp), np.empty((0, 3))
-        segments.place(tree, row, point, q, rotation, frames)
+        frames = Frames(origin, axis, np.empty(tree.slide.shape), np.empty((0, 3)))
+        none, points = np.empty(0, dtype=np.intp), np.empty((0, 3))
+        routing = Routing(none, points, np.empty((0, 5), dtype=np.intp), none, np.empty(0))
+        forward_kinematics(tree, routing, q, rotation, frames)
         for filled, of_base in ((origin, 0.0), (axis, 0.0), (rotation, np.eye(3))):
             assert np.isfinite(filled).all()
             np.testing.assert_array_equal(filled[0], of_base)
         pose, jacobian = np.full((4, 4), np.nan), np.zeros((6, q.size))
-        body_kernels.reach(tree.parent, masses, rotation, frames, pose, jacobian)
+        body_kernels.tip_jacobian(tree.parent, masses, rotation, frames, pose, jacobian)
         heavy, torque = np.full((count, 7), np.nan), np.full(q.size, np.nan)
         slope = np.zeros((q.size, q.size))
-        body_kernels.weigh(tree, masses, rotation, frames, heavy, torque)
-        body_kernels.add_gravity(tree.parent, heavy, slope)
+        body_kernels.gravity_torque(tree, masses, rotation, frames, heavy, torque)
+        body_kernels.add_gravity_stiffness(tree.parent, heavy, slope)
         segments.mirror(slope)
 
         state = body.state(q)
@@ -74,7 +76,7 @@ def test_passive_term_is_a_sum_over_cables_however_sparse_their_moment_arms() ->
         k = rng.uniform(0.0, 1e-2, len(J))
         before = rng.normal(size=(J.shape[1],) * 2)
         got = before.copy()
-        stiffness_kernels.add_passive(J, k, got)
+        stiffness_kernels.add_passive_stiffness(J, k, got)
         expected = before + np.triu(np.einsum("c,ci,cj->ij", k, J, J))
         np.testing.assert_allclose(got, expected, rtol=1e-13, atol=1e-15)
 

@@ -9,6 +9,7 @@ import pytest
 import cdsm
 from cdsm.arm_model import route
 from cdsm.kernels import segments
+from cdsm.kernels.tree import Routing, Tree
 from cdsm.rigid_body import RigidBody
 from cdsm.support.validation import Array
 from tests.support import arms
@@ -168,12 +169,14 @@ BRANCH_JOINT = """<joint name="{child}" type="revolute">
 
 
 class _Fork(NamedTuple):
-    tree: segments.Tree
-    routing: segments.Routing
+    tree: Tree
+    routing: Routing
 
     def evaluate(self, q: Array) -> tuple[Array, Array, Array]:
         """L, J_L and H_L of its one cable."""
-        frames, lengths, jacobian, coincident = segments.evaluate(self.tree, self.routing, q)
+        frames, lengths, jacobian, coincident = segments.cable_kinematics(
+            self.tree, self.routing, q
+        )
         assert coincident == -1
         hessian = np.zeros((1, q.size, q.size))
         page = np.zeros(1, dtype=np.intp)

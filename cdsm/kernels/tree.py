@@ -1,0 +1,146 @@
+"""The arm as plain arrays, and the numba kernel of its forward kinematics."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cdsm.kernels.compiling import compiled
+from cdsm.support.validation import Array, frozen
+
+Indices = NDArray[np.intp]
+
+
+class Tree(NamedTuple):
+    """The kinematic tree as plain arrays; row 0 is the base, row i joint i.
+
+    Attributes:
+        parent: Row of the joint before, (nv+1,).
+        order: Rows of the joints, each after the joint before it, (nv,); the rows themselves are in
+            the order of q, whatever that is.
+        turn: Three matrices of each joint, (nv+1, 3, 3, 3): by Rodrigues' formula the first, plus
+            the second times cos q, plus the third times sin q, is the rotation of its frame in
+            that of the joint before.
+        translation: Origin in the frame of the joint before, (nv+1, 3) [m].
+        axis: Unit axis of a joint that turns, likewise, (nv+1, 3); zero if it slides.
+        slide: Unit direction of a joint that slides, likewise, (nv+1, 3), zero if it turns; (0, 3)
+            if none slides, which is the usual case and costs nothing.
+    """
+
+    parent: Indices
+    order: Indices
+    turn: Array
+    translation: Array
+    axis: Array
+    slide: Array
+
+    @classmethod
+    def of(
+        cls,
+        parent: Indices,
+        order: Indices,
+        rotation: Array,
+        translation: Array,
+        axis: Array,
+        slide: Array,
+    ) -> Tree:
+        """From joint frames at q = 0 in the frames before; axes and slides in the joints' own."""
+        along = axis[:, :, None] * axis[:, None, :]
+        along[~axis.any(axis=1)] = np.eye(3)  # it does not turn, so all of it stays
+        cross = np.cross(axis[:, None, :], np.eye(3)).transpose(0, 2, 1)
+        parts = np.stack([along, np.eye(3) - along, cross], axis=1)
+        return cls(
+            parent=frozen(parent),
+            order=frozen(order),
+            turn=frozen(rotation[:, None] @ parts),
+            translation=frozen(translation),
+            axis=frozen((rotation @ axis[:, :, None])[:, :, 0].copy()),
+            slide=frozen((rotation @ slide[:, :, None])[: len(slide) * slide.any(), :, 0].copy()),
+        )
+
+
+class Routing(NamedTuple):
+    """All cable sites, and the cable segments that joints can change; rows as in a tree.
+
+    Few arrays on purpose: each that a kernel takes from Python costs as much as a segment.
+
+    Attributes:
+        row: Row of the joint that moves each site, (P,).
+        point: The site in the frame of that joint, (P, 3) [m].
+        segment: For each segment its cable, site a, site b, and where in ``joint`` its joints
+            begin and those on the way to b, (S+1, 5); the last row only says where they end.
+        joint: Rows of the joints between a and b: those on the way to a, then those on the way to
+            b, ancestors first.
+        fixed: Length that joints do not change: lead and segments within one link, (C,) [m].
+    """
+
+    row: Indices
+    point: Array
+    segment: Indices
+    joint: Indices
+    fixed: Array
+
+
+class Frames(NamedTuple):
+    """Where the joints and the cable sites are, in base axes.
+
+    Attributes:
+        origin: A point on each joint axis, (nv+1, 3) [m].
+        axis: Its unit direction, (nv+1, 3); zero if the joint slides.
+        slide: Where it slides to, (nv+1, 3), zero if it turns; (0, 3) if none slides.
+        site: The cable sites, (P, 3) [m].
+    """
+
+    origin: Array
+    axis: Array
+    slide: Array
+    site: Array
+
+
+@compiled
+def forward_kinematics(
+    tree: Tree, routing: Routing, q: Array, rotation: Array, frames: Frames
+) -> None:
+    """Fill the rotations of the joints (nv+1, 3, 3) and the frames at q (nv,).
+
+    A joint that turns has the rotation R_before (A + B cos q + C sin q) with its three matrices of
+    :attr:`Tree.turn`; one that slides moves its origin by q along its slide.
+    """
+    parent, order, turn, translation, local_axis, local_slide = tree
+    origin, axis, slide, site = frames
+    sliding = slide.shape[0] > 0
+    for r in range(3):
+        origin[0, r] = axis[0, r] = 0.0
+        if sliding:
+            slide[0, r] = 0.0
+        for c in range(3):
+            rotation[0, r, c] = 1.0 if r == c else 0.0
+    for k in range(order.shape[0]):
+        i = np.uint64(order[k])  # not negative, so that numba need not look: see upwards
+        before, angle = np.uint64(parent[i]), q[i - np.uint64(1)]
+        cosine, sine = math.cos(angle), math.sin(angle)
+        for r in range(3):
+            x, y, z = rotation[before, r, 0], rotation[before, r, 1], rotation[before, r, 2]
+            t, a = translation[i], local_axis[i]
+            origin[i, r] = origin[before, r] + (x * t[0] + y * t[1] + z * t[2])
+            if sliding:
+                s = local_slide[i]
+                slide[i, r] = x * s[0] + y * s[1] + z * s[2]
+                origin[i, r] += angle * slide[i, r]
+            axis[i, r] = x * a[0] + y * a[1] + z * a[2]
+            for c in range(3):
+                rotation[i, r, c] = (
+                    x * (turn[i, 0, 0, c] + cosine * turn[i, 1, 0, c] + sine * turn[i, 2, 0, c])
+                    + y * (turn[i, 0, 1, c] + cosine * turn[i, 1, 1, c] + sine * turn[i, 2, 1, c])
+                    + z * (turn[i, 0, 2, c] + cosine * turn[i, 1, 2, c] + sine * turn[i, 2, 2, c])
+                )
+    row, point = routing.row, routing.point
+    for p in range(row.shape[0]):
+        i = row[p]
+        x, y, z = point[p, 0], point[p, 1], point[p, 2]
+        for r in range(3):
+            shift = rotation[i, r, 0] * x + rotation[i, r, 1] * y + rotation[i, r, 2] * z
+            site[p, r] = origin[i, r] + shift
