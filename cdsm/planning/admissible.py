@@ -1,9 +1,10 @@
-"""The tensions that balance an arm within bounds and domains. The one that asks for small QPs."""
+"""The tensions that balance an arm within bounds and domains, and the small QPs among them."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import NamedTuple, NoReturn
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 import qpsolvers
@@ -19,20 +20,14 @@ _TOLERANCE = 1e-12
 """Primal tolerance of the solver; all its variables are of the order of one."""
 
 _KEPT = 1e-9
-"""By how much an equation is missed at most; the solver may call found what misses it by far."""
+"""Largest residual of an equation: the solver may call a program solved that it is not."""
 
 _FLAT = 1e-10
-"""Singular values of J_Lᵀ below this part of the largest do not count."""
+"""Singular values of J_Lᵀ below this part of the largest count as zero."""
 
 
 class Optimum(NamedTuple):
-    """The answer of a quadratic program.
-
-    Attributes:
-        x: Its variables.
-        y: Multipliers of the equations.
-        z: Multipliers of the cuts, not negative.
-    """
+    """Variables of a quadratic program, multipliers y of its equations and z >= 0 of its cuts."""
 
     x: Array
     y: Array
@@ -45,42 +40,53 @@ class Admissible:
 
     Attributes:
         least: The least of them (Eq. 17).
-        asked: Bounds (C,) [N] that were asked for.
+        bounds: Bounds (C,) [N] of the caller.
         low: Lower bounds (C,) [N], the domains included.
         high: Upper bounds (C,) [N], the domains included; may hold inf.
         scale: A tension of the size of the least ones [N].
         rows: Orthonormal rows (r, C) that span those of J_Lᵀ.
-        null: Orthonormal basis (C, p) of what changes no torque.
-        jumps: For each cable the tensions [N] at which its rigidity jumps, or its slope does.
+        null: Orthonormal basis (C, p) of the tensions that give no torque.
     """
 
     least: Tension
-    asked: tuple[Array, Array]
+    bounds: tuple[Array, Array]
     low: Array
     high: Array
     scale: float
     rows: Array
     null: Array
-    jumps: tuple[tuple[float, ...], ...]
+
+    @cached_property
+    def kinks(self) -> list[tuple[int, float]]:
+        """Cables and tensions [N] between their bounds at which the slope of EA jumps."""
+        return [
+            (c, kink)
+            for c, cable in enumerate(self.least.posture.arm.cables)
+            if cable.control == "position"
+            for kink in kinks(cable.elasticity)
+            if self.low[c] <= kink < self.high[c]
+        ]
 
     def piece(self, F: Array) -> tuple[Array, Array]:
-        """Bounds (C,) [N] around tensions F (C,) [N] between which no rigidity jumps or bends."""
+        """Bounds (C,) [N] around tensions F (C,) [N] between which no rigidity has a kink.
+
+        A kink belongs to the piece below it, as does the slope there.
+        """
         low, high = self.low.copy(), self.high.copy()
-        for c, jumps in enumerate(self.jumps):
-            for jump in jumps:
-                if F[c] <= jump:
-                    high[c] = min(high[c], jump)
-                else:
-                    low[c] = max(low[c], np.nextafter(jump, np.inf))
+        for c, kink in self.kinks:
+            if F[c] <= kink:
+                high[c] = min(high[c], kink)
+            else:
+                low[c] = max(low[c], np.nextafter(kink, np.inf))
         return low, high
 
     def imbalance(self, F: Array) -> Array:
-        """What rows·F misses (r,) [N]."""
+        """Residual (r,) [N] of the balance of tensions F (C,) [N]."""
         missing: Array = self.rows @ (self.least.values - F)
         return missing
 
     def nearest(self, wanted: Array, low: Array, high: Array) -> Array | None:
-        """The balancing tensions (C,) [N] between bounds nearest to those wanted, if there are."""
+        """The balancing tensions (C,) [N] between bounds nearest to those wanted; None if none."""
         size = max(self.scale, float(abs(wanted).max()))
         found = solve(
             np.eye(wanted.size),
@@ -94,10 +100,10 @@ class Admissible:
         """The same with no tension above a limit [N]."""
         return replace(self, high=np.minimum(self.high, limit))
 
-    def within(self, reach: Array, of: Array) -> Admissible | None:
-        """The same within a reach (C,) [N] of tensions (C,) [N], if any of them balance the arm."""
-        low, high = np.maximum(self.low, of - reach), np.minimum(self.high, of + reach)
-        least = self.nearest(np.zeros_like(of), low, high) if (low <= high).all() else None
+    def within(self, change: Array, F: Array) -> Admissible | None:
+        """The same within a change of tensions F (C,) [N]; None if none balance the arm."""
+        low, high = np.maximum(self.low, F - change), np.minimum(self.high, F + change)
+        least = self.nearest(np.zeros_like(F), low, high) if (low <= high).all() else None
         if least is None:
             return None
         moved = (least - self.least.values) @ self.least.posture.length_jacobian
@@ -107,14 +113,10 @@ class Admissible:
             least=replace(self.least, values=frozen(least), residual=residual),
             low=low,
             high=high,
-            jumps=tuple(
-                tuple(jump for jump in jumps if a <= jump < b)
-                for jumps, a, b in zip(self.jumps, low, high, strict=True)
-            ),
         )
 
     def tension(self, F: Array) -> Tension:
-        """Tensions F (C,) [N], their balance exact again, with the question they answer."""
+        """Tensions F (C,) [N] as a :class:`Tension`, their balance exact again."""
         least = self.least
         exact = self.nearest(F, *self.piece(F))  # steps far shorter than F leave a rounding of F
         F = F if exact is None else exact
@@ -122,8 +124,8 @@ class Admissible:
         return replace(
             least,
             values=frozen(F),
-            minimum=self.asked[0],
-            maximum=self.asked[1],
+            minimum=self.bounds[0],
+            maximum=self.bounds[1],
             residual=frozen(F @ least.posture.length_jacobian - torque),
             least=False,
         )
@@ -139,34 +141,30 @@ def admissible(
         InfeasibleTension: No tension within the bounds and domains balances the arm.
         ElasticityRangeError: The bounds leave nothing of the domain of a cable's elasticity.
     """
-    asked = distribute_tension(pose, minimum, maximum, wrench)
+    least = distribute_tension(pose, minimum, maximum, wrench)
+    bounds = least.minimum, least.maximum
     cables = pose.arm.cables
-    # an elasticity says nothing about a cable whose motor holds the force
+    # under force control the elasticity, and so its domain, does not matter
     held = np.array([cable.control == "position" for cable in cables])
     first = np.array([cable.elasticity.domain.first for cable in cables])
     last = np.array([cable.elasticity.domain.high for cable in cables])
-    low = np.where(held, np.maximum(asked.minimum, first), asked.minimum)
-    high = np.where(held, np.minimum(asked.maximum, last), asked.maximum)
+    low = np.where(held, np.maximum(bounds[0], first), bounds[0])
+    high = np.where(held, np.minimum(bounds[1], last), bounds[1])
     outside = np.flatnonzero(low > high).tolist()
     if outside:
-        _refuse(asked, outside)
-    least = asked
-    if ((asked.values < low) | (asked.values > high)).any():
+        raise _no_domain_left(least, outside)
+    if ((least.values < low) | (least.values > high)).any():
         least = distribute_tension(pose, low, high, wrench)
     _, values, right = np.linalg.svd(pose.length_jacobian.T)
     rank = int((values > _FLAT * values.max(initial=0.0)).sum())
     return Admissible(
         least=least,
-        asked=(asked.minimum, asked.maximum),
+        bounds=bounds,
         low=low,
         high=high,
         scale=float(least.values.max()) or 1.0,
         rows=right[:rank].copy(),
         null=right[rank:].T.copy(),
-        jumps=tuple(
-            tuple(jump for jump in kinks(cable.elasticity) if a <= jump < b) if fixed else ()
-            for cable, fixed, a, b in zip(cables, held, low, high, strict=True)
-        ),
     )
 
 
@@ -179,12 +177,7 @@ def solve(
 ) -> Optimum | None:
     """Min ½xᵀPx + qᵀx so that A x = b, low ≤ x ≤ high and G x ≤ h; None if none is found.
 
-    Args:
-        P: Positive definite (n, n).
-        q: (n,).
-        equations: A and b.
-        bounds: low and high, may be infinite.
-        cuts: G and h.
+    ``P`` is positive definite, ``equations`` are A and b, and ``cuts`` are G and h.
     """
     (A, b), (low, high) = equations, bounds
     G, h = cuts if cuts is not None else (None, None)
@@ -193,19 +186,19 @@ def solve(
     x, y, z = solution.x, solution.y, solution.z
     if not solution.found or x is None or y is None or not np.isfinite(x).all():
         return None
-    if abs(A @ x - b).max(initial=0.0) > _KEPT:  # it is not always told that there is none
+    if abs(A @ x - b).max(initial=0.0) > _KEPT:  # the solver does not always notice
         return None
     return Optimum(x, y, np.zeros(0) if z is None else z)
 
 
-def _refuse(asked: Tension, outside: list[int]) -> NoReturn:
-    cables = [asked.posture.arm.cables[c] for c in outside]
+def _no_domain_left(least: Tension, outside: list[int]) -> ElasticityRangeError:
+    cables = [least.posture.arm.cables[c] for c in outside]
     domains = [cable.elasticity.domain for cable in cables]
-    raise ElasticityRangeError(
+    return ElasticityRangeError(
         f"nothing between minimum and maximum is in the domain {domains[0]} of the elasticity. "
         "Change minimum= or maximum=, or use an elasticity that covers them.",
         [
-            asked.maximum[c] if asked.maximum[c] < domain.first else asked.minimum[c]
+            least.maximum[c] if least.maximum[c] < domain.first else least.minimum[c]
             for c, domain in zip(outside, domains, strict=True)
         ],
         outside,

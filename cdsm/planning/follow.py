@@ -8,11 +8,9 @@ from typing import Final, Literal
 import numpy as np
 
 from cdsm.planning.admissible import Admissible
-from cdsm.planning.objectives import Problem
 from cdsm.planning.planner import Planner
-from cdsm.planning.sqp import EFFORT, Task, search
-from cdsm.planning.starts import settled
-from cdsm.planning.stiffness_model import Reading
+from cdsm.planning.sqp import EFFORT, Program, search
+from cdsm.planning.stiffness_model import Constraints, StiffnessModel
 from cdsm.support.validation import Array
 
 Status = Literal["posture", "balance", "elasticity", "singular", "stiffness", "rate"]
@@ -28,27 +26,27 @@ _BACK = 50
 
 
 @dataclass(frozen=True, eq=False)
-class Aim:
-    """What is wanted at one sample of a path.
+class SampleTarget:
+    """The target of one sample of a path.
 
     Attributes:
         index: Which sample.
-        question: The arm there, and what limits its tensions.
-        reading: What is to be zero.
-        single: u (3,) and the stiffness [N/m] along it, where that is all that is wanted.
+        model: K_θ over the admissible tensions there.
+        constraints: What is to be zero.
+        single: u (3,) and the stiffness [N/m] along it, if there is one direction.
     """
 
     index: int
-    question: Problem
-    reading: Reading
+    model: StiffnessModel
+    constraints: Constraints
     single: tuple[Array, float] | None
 
 
 @dataclass(frozen=True, eq=False)
-class Planned:
+class PlannedSample:
     """A sample and tensions F (C,) [N] for it."""
 
-    aim: Aim
+    target: SampleTarget
     F: Array
 
 
@@ -56,126 +54,125 @@ class Follower:
     """Plans one sample after another, and the record of it.
 
     Args:
-        rate: How much a tension may change per step (C,) [N]; may hold inf.
+        rate: Largest change of a tension per step (C,) [N]; may hold inf.
         starts: From how many tensions to search where there are none to go on from.
         seed: Of the random ones among them.
 
     Attributes:
-        chain: The samples planned so far.
-        iterations: Steps of all searches so far.
+        planned: The samples planned so far.
+        iterations: Iterations of all searches so far.
     """
 
     def __init__(self, rate: Array, starts: int, seed: int) -> None:
         self.rate = rate
         self.starts = starts
         self.seed = seed
-        self.chain: list[Planned] = []
+        self.planned: list[PlannedSample] = []
         self.iterations = 0
 
-    def add(self, aim: Aim) -> tuple[Status, str] | None:
+    def add(self, target: SampleTarget) -> tuple[Status, str] | None:
         """Plan one more sample; return why that is not possible, or None.
 
-        The least tensions within the rate from the last sample. If none of those hit the target,
-        but others do, the samples before are planned again, backwards, until they lead there.
+        The least tensions within the rate from the last sample are taken. If none of those hit the
+        target, but others do, the samples before are planned again until they lead there.
 
         Raises:
             UnreachableStiffness: No tensions hit the one target, whatever the rate.
             SingularStiffness: No admissible tensions hold the arm, whatever the rate.
         """
-        if not self.chain:
-            F = self._anew(aim)
+        if not self.planned:
+            F = self._from_scratch(target)
             if F is None:
                 return _MISSED
-            self.chain.append(Planned(aim, F))
+            self.planned.append(PlannedSample(target, F))
             return None
-        last = self.chain[-1]
-        reach = self._reach(last.aim, aim)
-        region = aim.question.region
-        near = region.within(reach, last.F) if np.isfinite(reach).any() else region
-        F = None if near is None else self._hit(aim, near, last.F)
+
+        last, region = self.planned[-1], target.model.region
+        change = self._allowed_change(last.target, target)
+        near = region.within(change, last.F) if np.isfinite(change).any() else region
+        F = None if near is None else self._search(target, near, last.F)
         if F is None:
-            F = self._anew(aim)
+            F = self._from_scratch(target)
             if F is None:
                 return _MISSED
             if near is not region:
-                nearest = self._hit(aim, region, F, centre=last.F)
-                goal = Planned(aim, F if nearest is None else nearest)
-                F = None if near is None else self._hit(aim, near, goal.F)
+                nearest = self._search(target, region, F, centre=last.F)
+                goal = PlannedSample(target, F if nearest is None else nearest)
+                F = None if near is None else self._search(target, near, goal.F)
                 if F is None:
-                    return None if self._lead_to(goal) else _too_fast(last, goal, reach)
-        self.chain.append(Planned(aim, F))
+                    return None if self._replan_towards(goal) else _too_fast(last, goal, change)
+        self.planned.append(PlannedSample(target, F))
         return None
 
-    def _reach(self, one: Aim, other: Aim) -> Array:
+    def _allowed_change(self, one: SampleTarget, other: SampleTarget) -> Array:
         """How much the tensions may change between two samples (C,) [N]."""
         return self.rate * abs(other.index - one.index)
 
-    def _hit(
-        self, aim: Aim, region: Admissible, start: Array, centre: Array | float = 0.0
+    def _search(
+        self, target: SampleTarget, region: Admissible, start: Array, centre: Array | float = 0.0
     ) -> Array | None:
         """The least tensions, or those nearest a centre, to which one search leads."""
         F = region.nearest(start, region.low, region.high)
-        point = None if F is None else aim.question.field.at(F)
+        point = None if F is None else target.model.at(F)
         if point is None or point.reserve <= 0.0:
             return None
         unit = max(region.scale, float(point.F.max()))
-        task = Task(region, aim.question.field, point, aim.reading, EFFORT, unit, centre)
-        found = settled(task, search(task, point))
+        program = Program(target.model, region, point, target.constraints, EFFORT, unit, centre)
+        found = search(program, point)
         self.iterations += found.iterations
-        return region.tension(found.sight.point.F).values if task.met(found.sight) else None
+        return region.tension(found.end.evaluation.F).values if program.met(found.end) else None
 
-    def _anew(self, aim: Aim) -> Array | None:
-        """The least tensions whatever the rate; none if several targets cannot be hit at once.
+    def _from_scratch(self, target: SampleTarget) -> Array | None:
+        """The least tensions whatever the rate; None if several targets are not hit at once.
 
         Raises:
             UnreachableStiffness: No tensions hit the one target.
             SingularStiffness: No admissible tensions hold the arm.
         """
-        planner = Planner(aim.question, aim.reading, self.starts, self.seed)
+        planner = Planner(target.model, target.constraints, self.starts, self.seed)
         try:
             found = planner.least()
-            if found is None and aim.single is not None:
-                found = planner.within_range(*aim.single)
+            if found is None and target.single is not None:
+                found = planner.within_range(*target.single)
         finally:
             self.iterations += planner.iterations
-        return None if found is None else aim.question.region.tension(found.sight.point.F).values
+        return None if found is None else target.model.region.tension(found.end.evaluation.F).values
 
-    def _lead_to(self, goal: Planned) -> bool:
+    def _replan_towards(self, goal: PlannedSample) -> bool:
         """Plan the last samples again so that they lead to a goal within the rate, if they can.
 
-        Backwards: each is brought as near as possible to the one before it, while it keeps within
-        the rate of the one after it, until both are.
+        From the last sample backwards: each is brought as near as possible to the one before it,
+        within the rate of the one after it, until it is within the rate of both.
         """
-        back = [goal]
-        for k in range(len(self.chain) - 1, max(len(self.chain) - 1 - _BACK, -1), -1):
-            aim, F = self.chain[k].aim, self.chain[k].F
-            region = aim.question.region.within(self._reach(aim, back[-1].aim), back[-1].F)
+        later = [goal]
+        for k in range(len(self.planned) - 1, max(len(self.planned) - 1 - _BACK, -1), -1):
+            target, F = self.planned[k].target, self.planned[k].F
+            change = self._allowed_change(target, later[-1].target)
+            region = target.model.region.within(change, later[-1].F)
             if region is None:
                 return False
-            before = self.chain[k - 1] if k else None
+            before = self.planned[k - 1] if k else None
             joint: Admissible | None = region
             if before is not None:
-                joint = region.within(self._reach(before.aim, aim), before.F)
-            joined = None if joint is None else self._hit(aim, joint, F)
+                joint = region.within(self._allowed_change(before.target, target), before.F)
+            joined = None if joint is None else self._search(target, joint, F)
             if joined is not None:
-                self.chain[k:] = [Planned(aim, joined), *reversed(back)]
+                self.planned[k:] = [PlannedSample(target, joined), *reversed(later)]
                 return True
-            if before is None:
-                return False
-            nearer = self._hit(aim, region, F, centre=before.F)
+            nearer = None if before is None else self._search(target, region, F, centre=before.F)
             if nearer is None:
                 return False
-            back.append(Planned(aim, nearer))
+            later.append(PlannedSample(target, nearer))
         return False
 
 
-def _too_fast(last: Planned, goal: Planned, reach: Array) -> tuple[Status, str]:
+def _too_fast(last: PlannedSample, goal: PlannedSample, allowed: Array) -> tuple[Status, str]:
     change = abs(goal.F - last.F)
-    cable = int((change / reach).argmax())
-    name = goal.aim.question.pose.arm.cables[cable].name
-    steps = goal.aim.index - last.aim.index
+    cable = int((change / allowed).argmax())
+    name = goal.target.model.pose.arm.cables[cable].name
+    before, steps = last.target.index, goal.target.index - last.target.index
     return "rate", (
         f"tensions that hit the target exist, but none were found within the rate: the nearest "
-        f"change {name} by {change[cable]:.4g} N in {steps} step(s) from sample {last.aim.index}, "
-        f"and {reach[cable]:.4g} N are allowed. Raise rate, or change the target more slowly."
+        f"change {name} by {change[cable]:.4g} N in {steps} step(s) from sample {before}, "
+        f"and {allowed[cable]:.4g} N are allowed. Raise rate, or change the target more slowly."
     )

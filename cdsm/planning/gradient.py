@@ -18,7 +18,6 @@ from numpy.typing import ArrayLike
 
 from cdsm.errors import SingularStiffness
 from cdsm.planning.kernels import by_tension
-from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.validation import Array, ReadOnlyState, frozen, instance, unit_direction
 
@@ -28,11 +27,11 @@ from cdsm.support.validation import Array, ReadOnlyState, frozen, instance, unit
 class StiffnessGradient(ReadOnlyState):
     """Derivatives by the cable tensions; each is named as in :class:`~cdsm.Stiffness`.
 
-    The posture and the wrench are held: of balance (Eq. 13) nothing is asked, so that it is for the
-    caller to move within the tensions that balance the arm.
+    The posture and the wrench are held. Single tensions do not keep the arm in balance (Eq. 13):
+    combine the derivatives along changes that do.
 
     Attributes:
-        stiffness: Where.
+        stiffness: K, at whose tensions the derivatives are taken.
         cable_stiffness: dk/dF (C,) of each cable by its own tension [1/m]; 0 under force control.
     """
 
@@ -42,19 +41,18 @@ class StiffnessGradient(ReadOnlyState):
     @cached_property
     def joint(self) -> Array:
         """∂K_θ/∂F (C, nv, nv) [m/rad²]: a symmetric matrix for each cable."""
-        pose = self.stiffness.posture
-        identity = np.eye(pose.arm.nv)
-        return frozen(_by_tension(pose, self.cable_stiffness, identity, identity))
+        identity = np.eye(self.stiffness.posture.arm.nv)
+        return frozen(self._projected(identity, identity))
 
     @cached_property
     def margin(self) -> Array:
         """∂λ_min/∂F = vᵀ ∂K_θ/∂F v (C,) [m/rad²], v the critical direction.
 
-        A multiple eigenvalue has no gradient; this is then that of vᵀ K_θ v for one v of its
-        eigenspace, a bound from above on how the smallest eigenvalue changes.
+        A multiple eigenvalue has no gradient. This is then the gradient of vᵀ K_θ v for one v of
+        its eigenspace, and the smallest eigenvalue changes by no more.
         """
         v = self.stiffness.critical_direction[:, None]
-        return frozen(_by_tension(self.stiffness.posture, self.cable_stiffness, v, v)[:, 0, 0])
+        return frozen(self._projected(v, v)[:, 0, 0])
 
     @cached_property
     def cartesian(self) -> Array:
@@ -82,21 +80,28 @@ class StiffnessGradient(ReadOnlyState):
         return frozen(self._through(rows, np.array([[value]]))[:, 0, 0])
 
     def _through(self, rows: Array, X: Array) -> Array:
-        """∂X/∂F (C, r, r) of the tip stiffness X (r, r) that the rows (r, nv) see."""
+        """∂X/∂F (C, r, r) of the tip stiffness X (r, r) seen through rows (r, nv)."""
         K = self.stiffness.joint
         right = np.linalg.solve(K, rows.T) @ X
-        left = np.linalg.solve(K.T, rows.T) @ X.T  # another only where a moment acts
-        return _by_tension(self.stiffness.posture, self.cable_stiffness, left, right)
+        left = np.linalg.solve(K.T, rows.T) @ X.T  # differs from right only where a moment acts
+        return self._projected(left, right)
+
+    def _projected(self, left: Array, right: Array) -> Array:
+        """leftᵀ (∂K_θ/∂F_c) right for every cable, (C, a, b) of (nv, a) and (nv, b)."""
+        pose = self.stiffness.posture
+        return by_tension(
+            pose.length_hessian, pose.length_jacobian, self.cable_stiffness, left, right
+        )
 
 
 def stiffness_gradient(stiffness: Stiffness) -> StiffnessGradient:
     """Derivatives of a stiffness by the cable tensions, dEA/dF and series springs included.
 
     ∂K_θ/∂F_c = H_c + k′_c J_c J_cᵀ; ``stiffness_gradient(K).along(u)`` is the gradient of
-    ``K.along(u)``, and so on. At a jump of an elasticity they are those of the range below it.
+    ``K.along(u)``, and so on. At a kink of an elasticity the slope below it is taken.
 
     Args:
-        stiffness: K, the answer of :func:`~cdsm.stiffness`.
+        stiffness: K, from :func:`~cdsm.stiffness`.
 
     Raises:
         InvalidInput: No ``Stiffness``, or an elasticity of your own gives no finite slope.
@@ -105,11 +110,6 @@ def stiffness_gradient(stiffness: Stiffness) -> StiffnessGradient:
     K = instance("stiffness", stiffness, Stiffness)
     slope, _ = K.posture.arm._model.laws.slopes(K.tension, K.cable_stiffness)
     return StiffnessGradient(stiffness=K, cable_stiffness=slope)
-
-
-def _by_tension(pose: Posture, slope: Array, left: Array, right: Array) -> Array:
-    """leftᵀ (∂K_θ/∂F_c) right for every cable, (C, a, b) of (nv, a) and (nv, b)."""
-    return by_tension(pose.length_hessian, pose.length_jacobian, slope, left, right)
 
 
 def require_finite(value: float, u: Array) -> None:

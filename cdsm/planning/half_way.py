@@ -1,4 +1,4 @@
-"""How stiff an arm is half-way between two planned samples, its motors half-way, too."""
+"""The stiffness half-way between two planned samples, the motors half-way, too."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ from cdsm.support.validation import Array, ReadOnlyState, frozen
 class HalfWay(ReadOnlyState):
     """An arm half-way between a planned sample and the next.
 
-    Each motor that holds a length has paid out the mean of both ends' unstrained lengths l_0, each
-    that holds a force pulls with the mean of both, and the mean of both wrenches acts. The arm is
-    where it rests under that, r(q) = J_Lᵀ F(q) + g − J_Xᵀ W = 0 (Eq. 13), next to the mean of both
-    ends' joint angles. The misfit falls with the square of the step.
+    A motor that holds a length has the mean of both unstrained lengths l_0, one that holds a force
+    the mean of both tensions, and the mean of both wrenches acts. The arm rests under that,
+    r(q) = J_Lᵀ F(q) + g − J_Xᵀ W = 0 (Eq. 13), next to the mean of both postures. The misfit falls
+    with the square of the step.
 
     Attributes:
         index: The sample before, from 0.
         target: Mean of both targets [N/m]: (), (n,) or (3, 3).
         stiffness: K_θ at rest; None if the arm does not come to rest there.
-        achieved: What ``along`` or ``cartesian`` of that says [N/m], (), (n,) or (3, 3); or None.
+        achieved: ``along`` or ``cartesian`` of it [N/m], (), (n,) or (3, 3); or None.
         misfit: ‖achieved/target − 1‖ [-], or for ``cartesian`` ‖achieved − target‖/‖target‖; inf if
             the arm does not come to rest.
-        reason: Why it does not; else empty.
+        reason: Why it does not; empty if it does.
     """
 
     index: int
@@ -52,14 +52,10 @@ def half_way(
     target: Array,
     directions: Array | None,
 ) -> HalfWay:
-    """The arm half-way between two samples.
+    """The arm half-way between two samples, from K_θ at both.
 
-    Args:
-        index: The first of them.
-        ends: K_θ at both.
-        unstrained: Mean of both ends' l_0 of the H position-controlled cables (H,) [m].
-        target: Mean of both targets [N/m].
-        directions: Unit directions, (3,) or (n, 3); None for a target of ``cartesian``.
+    ``unstrained`` is the mean l_0 of the H position-controlled cables (H,) [m], ``target`` the mean
+    target [N/m].
     """
     try:
         K = _at_rest(ends, unstrained)
@@ -83,12 +79,7 @@ def half_way(
 
 
 def _at_rest(ends: tuple[Stiffness, Stiffness], unstrained: Array) -> Stiffness:
-    """K_θ where the arm rests.
-
-    Raises:
-        EquilibriumError: From the mean posture on, no stable way leads to a place to rest.
-        ElasticityRangeError: A tension there is outside the domain of its cable's elasticity.
-    """
+    """K_θ where the arm rests, next to the mean posture."""
     q, F, W = (
         frozen((a + b) / 2.0)
         for a, b in (
@@ -99,7 +90,7 @@ def _at_rest(ends: tuple[Stiffness, Stiffness], unstrained: Array) -> Stiffness:
     )
     arm = ends[0].posture.arm
     mean = arm.at(q)
-    # locked where every cable has its mean tension: at no posture, but in the domain of every law
+    # cables are locked at their mean tension: the lengths are of no posture, but in every domain
     lengths = mean.cable_lengths.copy()
     held = [c for c, cable in enumerate(arm.cables) if cable.control == "position"]
     for c, l_0 in zip(held, unstrained.tolist(), strict=True):

@@ -1,17 +1,15 @@
-"""What is asked of a planner, checked: an arm at a posture, its bounds, and the stiffness meant."""
+"""Arguments of the planners, checked, and the targets they turn into."""
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm.errors import InvalidInput, SingularStiffness
 from cdsm.manipulator import Manipulator
-from cdsm.planning.admissible import Admissible, admissible
+from cdsm.planning.admissible import admissible
 from cdsm.planning.gradient import require_finite
-from cdsm.planning.stiffness_model import Field, Part, Reading
+from cdsm.planning.stiffness_model import Constraint, Constraints, StiffnessModel
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.validation import (
@@ -26,7 +24,7 @@ from cdsm.support.validation import (
 )
 
 _LEAST_MARGIN = 1e-9
-"""Tensions balanced to rounding tell the smallest eigenvalue to some 1e-11 of the largest."""
+"""Balance to rounding leaves the smallest eigenvalue uncertain by 1e-11 of the largest."""
 
 _MOST_STARTS = 1000
 """A minute of searches, of which the best is seldom one of the last."""
@@ -35,42 +33,17 @@ _SYMMETRIC = 1e-9
 """Largest part of a matrix that may be skew by rounding."""
 
 
-@dataclass(frozen=True, eq=False)
-class Problem:
-    """An arm at a posture, with what limits its tensions.
-
-    Attributes:
-        pose: The posture.
-        region: The admissible tensions.
-        field: K_θ over them.
-    """
-
-    pose: Posture
-    region: Admissible
-    field: Field
-
-
-def problem(
+def stiffness_model(
     pose: Posture, minimum: ArrayLike, maximum: ArrayLike, wrench: ArrayLike, margin: float
-) -> Problem:
-    """Check what all planners share.
-
-    Raises:
-        InvalidInput: A bound, the wrench or the margin is not what it must be.
-        InfeasibleTension: No tension within the bounds and domains balances the arm.
-        ElasticityRangeError: The bounds leave nothing of the domain of a cable's elasticity.
-    """
+) -> StiffnessModel:
+    """K_θ over the admissible tensions, from the arguments that all planners share."""
     instance("pose", pose, Posture)
     region = admissible(pose, minimum, maximum, wrench)
-    return Problem(pose, region, Field(region, checked_margin(margin)))
+    return StiffnessModel(region, checked_margin(margin))
 
 
 def checked_margin(margin: float) -> float:
-    """A part between rounding and 1.
-
-    Raises:
-        InvalidInput: It is not.
-    """
+    """A part between rounding and 1."""
     part = scalar("margin", margin)
     if not _LEAST_MARGIN <= part < 1.0:
         raise InvalidInput(
@@ -82,34 +55,21 @@ def checked_margin(margin: float) -> float:
 
 
 def checked_starts(starts: object, seed: object) -> tuple[int, int]:
-    """From how many tensions to search, and the seed of the random ones among them.
-
-    Raises:
-        InvalidInput: Not whole numbers, too few or too many.
-    """
+    """The number of starts, and the seed of the random ones among them."""
     return whole_number("starts", starts, 1, _MOST_STARTS), whole_number("seed", seed, 0)
 
 
-def checked_direction(question: Problem, direction: ArrayLike) -> Array:
-    """A unit direction (3,) in which the tip can move.
-
-    Raises:
-        InvalidInput: Not a direction.
-        SingularStiffness: The tip cannot move along it.
-    """
+def checked_direction(model: StiffnessModel, direction: ArrayLike) -> Array:
+    """A unit direction (3,) in which the tip can move."""
     u = unit_direction("direction", direction)
-    # whether it moves depends on the posture alone: any tensions will do to ask
-    if stiffness(question.pose, question.region.least)._torque(u) is None:
+    # this depends on the posture alone: any tensions will do
+    if stiffness(model.pose, model.region.least)._torque(u) is None:
         require_finite(np.inf, u)
     return u
 
 
 def unit_directions(direction: ArrayLike) -> Array:
-    """One unit direction (3,), or several (n, 3), in base axes.
-
-    Raises:
-        InvalidInput: None of the two, or one that is zero.
-    """
+    """One unit direction (3,), or several (n, 3), in base axes."""
     given = number_array("direction", direction)
     if given.ndim == 2 and given.shape[1] == 3 and len(given):
         return frozen(np.array([unit_direction("direction", u) for u in given]))
@@ -118,22 +78,54 @@ def unit_directions(direction: ArrayLike) -> Array:
     return unit_direction("direction", given)
 
 
-def wanted(question: Problem, directions: Array | None, target: Array) -> Reading:
-    """What is to be zero for a checked target [N/m] along directions, or of ``cartesian``.
+def target_constraints(
+    model: StiffnessModel, directions: Array | None, target: Array
+) -> Constraints:
+    """Constraints for a checked target [N/m] along directions, or of ``cartesian`` if None.
 
     Raises:
         SingularStiffness: The tip cannot move along a direction; or there is no ``cartesian``.
     """
     if directions is None:
-        _ = stiffness(question.pose, question.region.least).cartesian  # what is missing it says
-        return wanted_cartesian(question, target)
+        _ = stiffness(model.pose, model.region.least).cartesian  # raises, if there is none
+        return cartesian_constraints(model, target)
     for u in directions.reshape(-1, 3):
-        checked_direction(question, u)
-    return wanted_along(question, directions.reshape(-1, 3), target.reshape(-1))
+        checked_direction(model, u)
+    return along_constraints(model, directions.reshape(-1, 3), target.reshape(-1))
+
+
+def along_constraint(model: StiffnessModel, direction: Array, unit: float) -> Constraint:
+    """The stiffness along a unit direction (3,) over a unit [N/m]."""
+    rows = direction[None] @ model.pose.jacobian[:3]
+    return Constraint(rows, np.full((1, 1, 1), 1.0 / unit))
+
+
+def along_constraints(model: StiffnessModel, directions: Array, targets: Array) -> Constraints:
+    """along/target − 1 for directions (m, 3) and targets (m,) [N/m]."""
+    pairs = zip(directions, targets.tolist(), strict=True)
+    return Constraints(
+        tuple(along_constraint(model, u, target) for u, target in pairs), np.ones(targets.size)
+    )
+
+
+def cartesian_constraints(model: StiffnessModel, target: Array) -> Constraints:
+    """The entries of (cartesian − target)/‖target‖, such that their squares sum to its square.
+
+    With a moment in the wrench ``cartesian`` is not symmetric; its symmetric part counts then.
+    """
+    weights = []
+    for i in range(3):
+        for j in range(i, 3):
+            E = np.zeros((3, 3))
+            E[i, j] = E[j, i] = 1.0 if i == j else np.sqrt(0.5)
+            weights.append(E)
+    E = np.array(weights) / np.linalg.norm(target)
+    part = Constraint(model.pose.jacobian[:3].copy(), E)
+    return Constraints((part,), np.tensordot(E, target))
 
 
 def achieved(K: Stiffness, directions: Array | None) -> Array:
-    """What a stiffness says where a target was given: (), (n,) or (3, 3) [N/m]."""
+    """The ``along`` or ``cartesian`` that was planned: (), (n,) or (3, 3) [N/m]."""
     if directions is None:
         return K.cartesian
     along = [K.along(u) for u in directions.reshape(-1, 3)]
@@ -162,40 +154,8 @@ def unstable(arm: Manipulator, problem: str, mode: Array) -> SingularStiffness:
     return SingularStiffness(f"{problem}; it gives way mostly in {joint}. {remedy}", frozen(mode))
 
 
-def along(question: Problem, direction: Array, unit: float) -> Part:
-    """The stiffness along a unit direction (3,) over a unit [N/m]."""
-    rows = direction[None] @ question.pose.jacobian[:3]
-    return Part(rows, np.full((1, 1, 1), 1.0 / unit))
-
-
-def wanted_along(question: Problem, directions: Array, targets: Array) -> Reading:
-    """along/target − 1 for directions (m, 3) and targets (m,) [N/m]."""
-    pairs = zip(directions, targets.tolist(), strict=True)
-    return Reading(tuple(along(question, u, t) for u, t in pairs), np.ones(targets.size))
-
-
-def wanted_cartesian(question: Problem, target: Array) -> Reading:
-    """The entries of (cartesian − target)/‖target‖, such that their squares sum to its square.
-
-    With a moment in the wrench ``cartesian`` is not symmetric; it is its symmetric part then.
-    """
-    weights = []
-    for i in range(3):
-        for j in range(i, 3):
-            E = np.zeros((3, 3))
-            E[i, j] = E[j, i] = 1.0 if i == j else np.sqrt(0.5)
-            weights.append(E)
-    E = np.array(weights) / np.linalg.norm(target)
-    part = Part(question.pose.jacobian[:3].copy(), E)
-    return Reading((part,), np.tensordot(E, target))
-
-
 def checked_targets(directions: Array, target: ArrayLike) -> Array:
-    """One positive target for each direction, () or (m,) [N/m].
-
-    Raises:
-        InvalidInput: Not positive numbers, or not as many as directions.
-    """
+    """One positive target for each direction, () or (m,) [N/m]."""
     targets = number_array("target", target)
     if targets.shape != directions.shape[:-1]:
         raise InvalidInput(
@@ -208,11 +168,7 @@ def checked_targets(directions: Array, target: ArrayLike) -> Array:
 
 
 def checked_positive(targets: Array) -> Array:
-    """The same targets [N/m], all positive and none so small that quotients overflow.
-
-    Raises:
-        InvalidInput: They are not.
-    """
+    """The same targets [N/m], all positive and none so small that quotients overflow."""
     if not (targets >= SMALLEST).all():
         raise InvalidInput(
             "target",
@@ -222,11 +178,7 @@ def checked_positive(targets: Array) -> Array:
 
 
 def checked_matrix(target: ArrayLike) -> Array:
-    """A symmetric, positive definite target (3, 3) [N/m].
-
-    Raises:
-        InvalidInput: It is not.
-    """
+    """A symmetric, positive definite target (3, 3) [N/m]."""
     matrix = number_array("target", target)
     if matrix.shape != (3, 3):
         raise InvalidInput(

@@ -24,16 +24,16 @@ from cdsm.errors import (
 )
 from cdsm.kinematics.maps import KinematicSolution, inverse_kinematics
 from cdsm.manipulator import Manipulator
-from cdsm.planning.follow import Aim, Follower, Status
+from cdsm.planning.follow import Follower, SampleTarget, Status
 from cdsm.planning.objectives import (
     achieved,
     checked_margin,
     checked_matrix,
     checked_positive,
     checked_starts,
-    problem,
+    stiffness_model,
+    target_constraints,
     unit_directions,
-    wanted,
 )
 from cdsm.planning.path_plan import InfeasibleSample, PathPlan
 from cdsm.planning.range import MARGIN
@@ -71,23 +71,20 @@ def plan_path(
 ) -> PathPlan:
     """Tensions for a wanted stiffness along a path: min ‖F_i‖² so that along(u) = target_i.
 
-    Each of S samples is planned as by :func:`~cdsm.planning.plan.plan_stiffness`, but from the
-    tensions of the one before; from scratch where there are none, or where that leads nowhere. The
-    first is the least there is as far as the starts tell, the others the least in reach of a
-    search from their neighbour. The path goes on after a sample that cannot be: it is named, with
-    the reason, in ``infeasible`` of the answer.
+    Each of S samples is planned as by :func:`~cdsm.planning.plan.plan_stiffness`, but starting from
+    the tensions of the one before. If that leads nowhere, or for the first sample, it is planned
+    from scratch. An infeasible sample does not stop the path; ``infeasible`` of the answer lists
+    each with its reason.
 
-    Between sample i and the planned one before it, k samples back, no tension changes by more than
-    k·rate: with k = 1, by what a motor can do in a step; after a gap, by what it can in as many
-    steps. Of the tensions within that the least are taken. If none of them hit the target although
-    others do, up to 50 samples before are planned again, backwards: they still hit their own
-    targets, but with tensions that lead to this one. If that does not join either, the sample is
-    named with the status ``"rate"``, and the ones after it have the more steps: a target that jumps
-    is reached again as many samples later as the motors need. It is not approached in between,
-    since that would miss the targets there; make the target a ramp if the arm is to follow one.
+    Between a planned sample and the one before it, k samples back, no tension changes by more than
+    k·rate. Of the tensions within that the least are taken. If none of them hit the target although
+    others do, up to 50 samples before are planned again, backwards: they still hit their targets,
+    but with tensions that lead to this sample. If that fails, the sample has the status ``"rate"``,
+    and the motors have more steps for the next. So a target that jumps is hit again as many samples
+    later as the motors need; make it a ramp if the arm is to follow it in between.
 
-    The targets are hit at the samples alone. What the stiffness is half-way between two of them
-    says ``between`` of the answer; its miss falls with the square of the step.
+    The targets are hit at the samples. ``between`` of the answer gives the stiffness half-way
+    between two of them; its miss falls with the square of the step.
 
     Args:
         arm: The arm.
@@ -138,45 +135,44 @@ def plan_path(
         try:
             q = path[i]
             if tips is not None:
-                solved = inverse_kinematics(arm, q, near)
+                solved = inverse_kinematics(arm, path[i], near)
                 if not solved.reachable:
                     infeasible.append(InfeasibleSample(i, "posture", _out_of_reach(solved)))
                     continue
                 q = near = solved.angles
-            question = problem(arm.at(q), minimum, maximum, loads[i], margin)
-            reading = wanted(question, directions, targets[i])
+            model = stiffness_model(arm.at(q), minimum, maximum, loads[i], margin)
+            constraints = target_constraints(model, directions, targets[i])
             single = None
             if directions is not None and directions.ndim == 1:
                 single = directions, float(targets[i])
-            reason = follower.add(Aim(i, question, reading, single))
+            reason = follower.add(SampleTarget(i, model, constraints, single))
         except tuple(_STATUS) as error:
-            infeasible.append(InfeasibleSample(i, _status(error), _said(error), error))
+            infeasible.append(InfeasibleSample(i, _status(error), _explained(error), error))
         else:
             if reason is not None:
                 infeasible.append(InfeasibleSample(i, *reason))
 
-    chain = follower.chain
-    found = tuple(
-        stiffness(each.aim.question.pose, each.F, wrench=loads[each.aim.index]) for each in chain
-    )
-    tail = targets.shape[1:]
+    found = [
+        stiffness(each.target.model.pose, each.F, wrench=loads[each.target.index])
+        for each in follower.planned
+    ]
     return PathPlan(
         arm=arm,
         direction=directions,
         target=targets,
         rate=limit,
-        planned=tuple(each.aim.index for each in chain),
+        planned=tuple(each.target.index for each in follower.planned),
         angles=_stacked([K.posture.q for K in found], (arm.nv,)),
         tensions=_stacked([K.tension for K in found], (len(arm.cables),)),
-        achieved=_stacked([achieved(K, directions) for K in found], tail),
-        stiffness=found,
+        achieved=_stacked([achieved(K, directions) for K in found], targets.shape[1:]),
+        stiffness=tuple(found),
         infeasible=tuple(infeasible),
         iterations=follower.iterations,
     )
 
 
 def _checked_path(arm: Manipulator, angles: ArrayLike | None, tips: ArrayLike | None) -> Array:
-    """The path as it was given: (S, nv) [rad] or (S, 3) [m]."""
+    """The path: joint angles (S, nv) [rad] or tip positions (S, 3) [m]."""
     if (angles is None) == (tips is None):
         raise InvalidInput(
             "angles",
@@ -206,7 +202,7 @@ def _checked_targets(directions: Array | None, target: ArrayLike, size: int) -> 
 
 
 def _per_sample(name: str, value: ArrayLike, tail: tuple[int, ...], size: int) -> Array:
-    """The value of each sample (S, …), of one for all or one for each."""
+    """One value for each sample (S, …), from one for all or one for each."""
     given = number_array(name, value)
     if given.shape not in (tail, (size, *tail)):
         raise InvalidInput(
@@ -218,18 +214,18 @@ def _per_sample(name: str, value: ArrayLike, tail: tuple[int, ...], size: int) -
 
 
 def _shown(size: int, progress: bool) -> Iterable[int]:
-    """The samples, with a bar that follows them where somebody sees it."""
+    """The samples, with a progress bar on a terminal."""
     console = Console(stderr=True)
-    wanted = progress and console.is_terminal
-    return track(range(size), "planning the path", console=console, disable=not wanted)
+    disable = not (progress and console.is_terminal)
+    return track(range(size), "planning the path", console=console, disable=disable)
 
 
 def _status(error: CdsmError) -> Status:
     return next(status for kind, status in _STATUS.items() if isinstance(error, kind))
 
 
-def _said(error: CdsmError) -> str:
-    """An error in words, with a remedy that a path has."""
+def _explained(error: CdsmError) -> str:
+    """The message of an error, with a remedy for paths."""
     if isinstance(error, JointLimitError):
         return (
             f"{error.problem}. Keep the path within the limits, or widen joint_limit in the "

@@ -14,9 +14,9 @@ from cdsm.planning.objectives import (
     checked_starts,
     checked_targets,
     misfit,
-    problem,
+    stiffness_model,
+    target_constraints,
     unit_directions,
-    wanted,
 )
 from cdsm.planning.planner import REACHED, Planner
 from cdsm.planning.range import MARGIN
@@ -148,7 +148,7 @@ def plan_stiffness(
         SingularStiffness: The tip cannot move along a direction, or no admissible tension holds the
             arm.
     """
-    question = problem(pose, minimum, maximum, wrench, margin)
+    model = stiffness_model(pose, minimum, maximum, wrench, margin)
     number, seed = checked_starts(starts, seed)
     if direction is None:
         directions, targets = None, checked_matrix(target)
@@ -156,14 +156,14 @@ def plan_stiffness(
         directions = unit_directions(direction)
         targets = checked_targets(directions, target)
 
-    planner = Planner(question, wanted(question, directions, targets), number, seed)
+    planner = Planner(model, target_constraints(model, directions, targets), number, seed)
     found = planner.least()
     if found is None and directions is not None and targets.ndim == 0:
         found = planner.within_range(directions, float(targets))
     elif found is None:
         found = planner.nearest()
 
-    tension = question.region.tension(found.sight.point.F)
+    tension = model.region.tension(found.end.evaluation.F)
     K = stiffness(pose, tension)
     value = achieved(K, directions)
     return StiffnessPlan(
@@ -172,8 +172,8 @@ def plan_stiffness(
         direction=directions,
         target=float(targets) if targets.ndim == 0 else targets,
         achieved=float(value) if value.ndim == 0 else value,
-        floor=question.field.floor,
+        floor=model.floor,
         efforts=frozen(np.array(planner.efforts)),
         iterations=planner.iterations,
-        evaluations=question.field.evaluations,
+        evaluations=model.evaluations,
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple, final
 
 import numpy as np
@@ -11,10 +11,15 @@ from numpy.typing import ArrayLike
 from cdsm.elasticity import Elasticity, LinearElasticity
 from cdsm.errors import ElasticityRangeError, InvalidInput, SingularStiffness
 from cdsm.planning.admissible import Admissible
-from cdsm.planning.objectives import Problem, along, checked_direction, checked_starts, problem
-from cdsm.planning.sqp import HIGHEST, LOWEST, Goal, Task, search
-from cdsm.planning.starts import Ground, settled
-from cdsm.planning.stiffness_model import Point, Reading
+from cdsm.planning.objectives import (
+    along_constraint,
+    checked_direction,
+    checked_starts,
+    stiffness_model,
+)
+from cdsm.planning.sqp import HIGHEST, LOWEST, Objective, Program, search
+from cdsm.planning.starts import StartPoints
+from cdsm.planning.stiffness_model import Constraints, Evaluation, StiffnessModel
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import stiffness
 from cdsm.support.units import MODEL
@@ -26,22 +31,19 @@ MARGIN = 1e-4
 """Default of the smallest eigenvalue of K_θ over its largest: arms of 40 joints reach 3e-4."""
 
 _UPWARD = 4
-"""Starts for the highest where rigidities rise: where they level off, too, there is one alone."""
-
-_SETTLED = 3
-"""How many of the best ends of searches are tried beyond the jumps of rigidities that rise."""
+"""Starts for the highest where rigidities rise: there is mostly one maximum."""
 
 _LAW_SAMPLES = 257
-"""Tensions at which the rigidity of a law is asked for, to see whether it rises."""
+"""Tensions at which a law is sampled, to see whether its rigidity rises."""
 
 _LAW_ROUNDING = 1e-12
-"""A rigidity that falls by no more than this part of it does not fall."""
+"""A fall of the rigidity by this part of it is rounding."""
 
 _LIMITS = (1e2, 1e4, 1e6)
-"""How far unbounded tensions are followed, in least tensions."""
+"""Caps of unbounded tensions, in least tensions."""
 
 _CAPPED = 0.999
-"""From this part of that on they would have gone further."""
+"""Tensions at this part of the cap would have gone further."""
 
 
 @final
@@ -59,7 +61,7 @@ class StiffnessRange(ReadOnlyState):
         low_found: Where each search for ``low`` ended, rising (S,) [N/m]: how often, out of how
             many starts, it was found.
         high_found: Where each search for ``high`` ended, falling (S,) [N/m].
-        iterations: Steps of all searches.
+        iterations: Iterations of all searches.
         evaluations: How often K_θ was evaluated.
     """
 
@@ -148,9 +150,9 @@ def stiffness_range(
         ElasticityRangeError: The bounds leave nothing of the domain of a cable's elasticity.
         SingularStiffness: The tip cannot move along u, or no admissible tension holds the arm.
     """
-    question = problem(pose, minimum, maximum, wrench, margin)
-    u = checked_direction(question, direction)
-    low, high, steps = attainable(question, u, *checked_starts(starts, seed))
+    model = stiffness_model(pose, minimum, maximum, wrench, margin)
+    u = checked_direction(model, direction)
+    low, high, iterations = range_ends(model, u, *checked_starts(starts, seed))
     if low.open or high.open:
         raise InvalidInput(
             "maximum",
@@ -163,91 +165,82 @@ def stiffness_range(
         high=high.value,
         low_tension=low.tension,
         high_tension=high.tension,
-        floor=question.field.floor,
+        floor=model.floor,
         low_found=low.values,
         high_found=high.values,
-        iterations=steps,
-        evaluations=question.field.evaluations,
+        iterations=iterations,
+        evaluations=model.evaluations,
     )
 
 
-class End(NamedTuple):
+class RangeEnd(NamedTuple):
     """One end of the range.
 
     Attributes:
-        point: Where the best search ended.
+        evaluation: Where the best search ended.
         tension: The tensions there, their balance exact.
-        value: The stiffness along the direction under them [N/m], a rounding off that of the
-            search; next to buckling, where all of it is left of a difference, more than that, or
-            that of the search.
-        values: What all searches for it ended with (S,) [N/m], its own first.
-        open: Whether it is only as far as unbounded tensions were followed, and they lead on.
+        value: The stiffness under them [N/m]; beside buckling, where it cannot be read, that of
+            the search.
+        values: Where each search ended (S,) [N/m], the best first.
+        open: Whether the tensions have no bound, and more of them lead further.
     """
 
-    point: Point
+    evaluation: Evaluation
     tension: Tension
     value: float
     values: Array
     open: bool = False
 
 
-class Ends(NamedTuple):
-    """Both ends, and how many steps it took to find them."""
-
-    low: End
-    high: End
-    iterations: int
-
-
-def attainable(question: Problem, u: Array, starts: int, seed: int) -> Ends:
-    """Search both ends of the range along a unit direction (3,)."""
-    region = question.region
+def range_ends(
+    model: StiffnessModel, u: Array, starts: int, seed: int
+) -> tuple[RangeEnd, RangeEnd, int]:
+    """Both ends of the range along a unit direction (3,), and the iterations they took."""
+    region = model.region
     if np.isfinite(region.high).all():
-        return _ends(question, u, starts, seed)
+        return _bounded_ends(model, region, u, starts, seed)
     iterations = 0
     for limit in _LIMITS:
         cap = limit * region.scale
-        *ends, steps = _ends(replace(question, region=region.capped(cap)), u, starts, seed)
-        iterations += steps
+        *ends, more = _bounded_ends(model, region.capped(cap), u, starts, seed)
+        iterations += more
         low, high = (end._replace(open=end.tension.values.max() >= _CAPPED * cap) for end in ends)
         if not (low.open or high.open):
             break
-    return Ends(low, high, iterations)
+    return low, high, iterations
 
 
-def _ends(question: Problem, u: Array, starts: int, seed: int) -> Ends:
-    region, field = question.region, question.field
-    ground = Ground(region, field, starts, seed)
-    plain = Reading((along(question, u, 1.0),), np.zeros(1))
-    unit = float(plain.of(ground.anchor).values[0])
-    reading = Reading((along(question, u, unit),), np.zeros(1))
-    order = sorted(ground.points, key=lambda point: float(reading.of(point).values[0]))
-    rise = _rigidities_rise(region)
-    inside = [] if rise else list(ground.between(starts, seed))
-    most = _SETTLED if rise else len(order) + starts
+def _bounded_ends(
+    model: StiffnessModel, region: Admissible, u: Array, starts: int, seed: int
+) -> tuple[RangeEnd, RangeEnd, int]:
+    begin = StartPoints(model, region, starts, seed)
+    in_newtons = Constraints((along_constraint(model, u, 1.0),), np.zeros(1))
+    unit = float(in_newtons.at(begin.anchor).values[0])
+    constraints = Constraints((along_constraint(model, u, unit),), np.zeros(1))
+    rising = sorted(begin.points, key=lambda point: float(constraints.at(point).values[0]))
     iterations = 0
 
-    def end(goal: Goal, points: list[Point]) -> End:
+    def end(objective: Objective, points: list[Evaluation]) -> RangeEnd:
         nonlocal iterations
-        task = Task(region, field, ground.anchor, reading, goal, region.scale)
-        found = [search(task, point) for point in points]
-        found.sort(key=lambda each: goal.linear * float(each.sight.values[0]))
-        found[:most] = [settled(task, each) for each in found[:most]]
-        found.sort(key=lambda each: goal.linear * float(each.sight.values[0]))
+        program = Program(model, region, begin.anchor, constraints, objective, region.scale)
+        found = [search(program, point) for point in points]
+        found.sort(key=lambda each: objective.linear * float(each.end.values[0]))
         iterations += sum(each.iterations for each in found)
-        values = unit * np.array([each.sight.values[0] for each in found])
-        point = found[0].sight.point
-        tension = region.tension(point.F)
+        values = unit * np.array([each.end.values[0] for each in found])
+        evaluation = found[0].end.evaluation
+        tension = region.tension(evaluation.F)
         try:
-            value = stiffness(question.pose, tension).along(u)
+            value = stiffness(model.pose, tension).along(u)
         except SingularStiffness:  # so near to buckling that an inverse has hardly a digit
             value = float(values[0])
-        return End(point, tension, value, frozen(values))
+        return RangeEnd(evaluation, tension, value, frozen(values))
 
-    low = end(LOWEST, [*order[:starts], *inside, ground.anchor])
-    upward = order[: -(_UPWARD // 2 if rise else starts) - 1 : -1]
-    high = end(HIGHEST, [*upward, order[0], *inside, ground.anchor])
-    return Ends(low, high, iterations)
+    concave = _rigidities_rise(region)  # mostly: then the highest is found from anywhere
+    inside = [] if concave else list(begin.between(starts, seed))
+    falling = rising[: -(_UPWARD // 2 if concave else starts) - 1 : -1]
+    low = end(LOWEST, [*rising[:starts], *inside, begin.anchor])
+    high = end(HIGHEST, [*falling, rising[0], *inside, begin.anchor])
+    return low, high, iterations
 
 
 def _rigidities_rise(region: Admissible) -> bool:
@@ -261,11 +254,10 @@ def _rigidities_rise(region: Admissible) -> bool:
 
 
 def _rises(law: Elasticity, low: float, high: float) -> bool:
-    """Whether a law is known not to fall between two tensions [N]."""
     if isinstance(law, LinearElasticity):
         return True
     if not isinstance(law, (StrandElasticity, TabulatedElasticity)):
-        return False  # between places where it is looked at, a law of one's own may do anything
+        return False  # between samples a law of the user's own may do anything
     try:
         rigidity = law.rigidity(np.linspace(low, high, _LAW_SAMPLES))
     except ElasticityRangeError:

@@ -1,51 +1,80 @@
-"""Sequential quadratic programming among the admissible tensions of a stable arm.
+r"""Sequential quadratic programming among the admissible tensions of a stable arm.
 
-    min f(F) so that c(F) = 0,  J_Lᵀ F = τ,  low ≤ F ≤ high,  λ_min(K_θ) ≥ floor
+    min f(F)   so that   c(F) = 0,  J_Lᵀ F = τ,  low ≤ F ≤ high,  λ_min(K_θ(F)) ≥ floor.
 
-With exact second derivatives, a trust region, and an exact penalty on c. Every iterate is stable.
-With constant rigidities K_θ is affine in F, the stable tensions are a convex set, and the stiffness
-along a direction is a concave function; nothing here relies on it, but it is why so few steps do.
+c is nonlinear, the balance is linear, and the stable tensions are not known in advance. Every
+iterate balances the arm and is stable, so that K_θ can be inverted there.
+
+**The quadratic program of a step.** With d = ΔF/size, g = ∂f/∂d, G = ∂c/∂d and the Lagrangian
+L = f + y·c − z·reserve, y and z being the multipliers of the step before,
+
+    min ½ dᵀ W d + g·d + ρ Σ(s + t) + ½ ρ Σ(s² + t²)
+    so that  J_Lᵀ d = 0,  c + G d = s − t,  s, t ≥ 0,  reserve + ∂reserve·d ≥ 0,
+             bounds,  |d_c| ≤ radius.
+
+s and t are the misses of c above and below: the program has a solution even where the linearized
+c cannot be met ("elastic mode"). The price ρ makes the penalty exact, if it exceeds the largest
+multiplier of c. It is raised tenfold until c is met or until that no longer helps, and it falls to
+three times the multiplier then, since a high price makes for short steps along a curved c.
+
+**The curvature W.** The exact Hessian of L, second derivatives of K_θ⁻¹ and of λ_min included, but
+made positive definite on the steps that keep the balance, c, and (if z > 0) the reserve, as the
+solver needs it: :func:`cdsm.planning.kernels.convex`. Where W was convex on them already, it is
+unchanged there, so that the last steps converge quadratically.
+
+**The trust region.** A step is taken if the merit f + ρ (‖c‖₁ + ½ ‖c‖²) falls by 1e-4 of the
+prediction or more. The radius triples the step after a fall by more than half of the prediction,
+halves it after less than a quarter, and quarters it after a failure. If c bends away from its
+tangent, a second program aims at where c was found (second-order correction). A step that leaves
+the stable tensions is drawn back towards an anchor, a stable place well inside: with constant
+rigidities K_θ is affine in F, the stable tensions are convex, and the way to the anchor is stable.
+
+**Kinks.** At a kink of a rigidity (Eq. 19 has one at 31 N) c is continuous, but its slope is not.
+Kinks divide the tensions into boxes ("pieces") on which c is smooth. A search passes kinks freely
+until a step across one fails; from then on it stays in its piece, whose walls are bounds like
+others. If it ends at a wall, it begins again on the other side, where the other slope holds. A
+place that no piece beside it improves is a local optimum: between walls c is smooth.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from cdsm.planning import kernels
 from cdsm.planning.admissible import Admissible, solve
-from cdsm.planning.stiffness_model import Field, Point, Reading, Sight, drawn_back
+from cdsm.planning.stiffness_model import (
+    Constraints,
+    ConstraintValues,
+    Evaluation,
+    StiffnessModel,
+    backtrack_to_stable,
+)
 from cdsm.support.validation import Array
 
 MET: Final = 1e-9
-"""A number wanted to be zero is so if its magnitude is not above this."""
+"""Largest magnitude of a constraint that counts as met."""
 
 _ITERATIONS = 100
-_FIRST_REGION = 4.0
-_SMALLEST_REGION = 1e-13
-_FLOOR = 1e-6
-"""Curvatures below this part of the largest are raised to it: the solver needs them positive."""
-
-_PENALTIES = (10.0, 1e8)
-"""First and largest price of c in f."""
-
+_CROSSINGS = 60  # how often a search may begin again beyond a kink
+_FIRST_RADIUS = 4.0
+_SMALLEST_RADIUS = 1e-13
+_CURVATURE = 1e-6  # curvatures below this part of the largest are raised to it
+_FIRST_PRICE, _LARGEST_PRICE = 10.0, 1e8
+_PREMIUM = 3.0  # the price over the multiplier: above one the penalty is exact
 _ROUNDING = 1e-15
-_ARRIVED = 1e-10
-"""A step this small, of tensions and of c, ends a search: the next would be its square."""
-
-_DOUBT = 1.02
-"""An effort foreseen, squared, is trusted to this factor."""
-
-_PREMIUM = 3.0
-"""The price of c over its multiplier: above one it is exact, and the lower the longer the steps."""
+_ARRIVED = 1e-10  # a step and a miss this small end a search: the next would be their square
+_AT_KINK = 1e-6  # distance from a kink, as a part of it, that counts as none
 
 
 @dataclass(frozen=True)
-class Goal:
-    """f = effort·½‖(F − centre)/unit‖² + linear·Σc + square·½‖c‖², and whether c = 0 is asked."""
+class Objective:
+    """f = effort·½‖(F − centre)/unit‖² + linear·Σc + square·½‖c‖², and whether c = 0 is needed."""
 
     effort: float = 0.0
     linear: float = 0.0
@@ -53,71 +82,66 @@ class Goal:
     constrained: bool = False
 
 
-EFFORT: Final = Goal(effort=1.0, constrained=True)
-HIGHEST: Final = Goal(linear=-1.0)
-LOWEST: Final = Goal(linear=1.0)
-NEAREST: Final = Goal(square=1.0)
+EFFORT: Final = Objective(effort=1.0, constrained=True)
+HIGHEST: Final = Objective(linear=-1.0)
+LOWEST: Final = Objective(linear=1.0)
+NEAREST: Final = Objective(square=1.0)
 
 
 @dataclass(frozen=True, eq=False)
-class Task:
-    """What is sought, and among what.
+class Program:
+    """A nonlinear program over the tensions.
 
     Attributes:
+        model: K_θ over the tensions.
         region: The admissible tensions.
-        field: K_θ over them.
-        anchor: A stable point well inside, towards which steps are drawn back that leave the
-            stable tensions.
-        reading: c.
-        goal: f.
-        unit: What effort is counted in [N]: of the order of the tensions sought.
-        centre: Tensions (C,) [N] that effort is counted from, or 0.
+        anchor: A stable place well inside, towards which steps are drawn back.
+        constraints: c.
+        objective: f.
+        unit: The unit of effort [N]: of the order of the tensions sought.
+        centre: Tensions (C,) [N] from which effort counts, or 0.
     """
 
+    model: StiffnessModel
     region: Admissible
-    field: Field
-    anchor: Point
-    reading: Reading
-    goal: Goal
+    anchor: Evaluation
+    constraints: Constraints
+    objective: Objective
     unit: float
     centre: Array | float = 0.0
 
-    def look(self, point: Point) -> Sight:
-        """C at a point."""
-        return self.reading.of(point)
-
-    def merit(self, sight: Sight, penalty: float) -> float:
+    def merit(self, at: ConstraintValues, price: float) -> float:
         """f, and the price of c."""
-        goal, c = self.goal, sight.values
-        x = (sight.point.F - self.centre) / self.unit
-        merit = 0.5 * goal.effort * float(x @ x)
-        if goal.constrained:
-            return merit + penalty * _price(c)
-        return merit + goal.linear * float(c.sum()) + 0.5 * goal.square * float(c @ c)
+        objective, c = self.objective, at.values
+        x = (at.evaluation.F - self.centre) / self.unit
+        merit = 0.5 * objective.effort * float(x @ x)
+        if objective.constrained:
+            return merit + price * _miss(c)
+        return merit + objective.linear * float(c.sum()) + 0.5 * objective.square * float(c @ c)
 
-    def met(self, sight: Sight) -> bool:
-        """Whether c = 0, if that is asked for."""
-        return not self.goal.constrained or bool((abs(sight.values) <= MET).all())
+    def met(self, at: ConstraintValues) -> bool:
+        """Whether c = 0, if that is needed."""
+        return not self.objective.constrained or bool((abs(at.values) <= MET).all())
 
-    def better(self, one: Sight, other: Sight) -> bool:
-        """Whether one end of a search beats another by more than rounding."""
+    def better(self, one: ConstraintValues, other: ConstraintValues) -> bool:
+        """Whether one place beats another by more than rounding."""
         if self.met(one) != self.met(other):
             return self.met(one)
-        penalty = 0.0 if self.met(one) else _PENALTIES[1]
-        a, b = self.merit(one, penalty), self.merit(other, penalty)
+        price = 0.0 if self.met(one) else _LARGEST_PRICE
+        a, b = self.merit(one, price), self.merit(other, price)
         return a < b - MET * abs(b)
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
-    """Where a search ended, and after how many steps."""
+class SearchResult:
+    """Where a search ended, and after how many iterations."""
 
-    sight: Sight
+    end: ConstraintValues
     iterations: int
 
 
 class _Model(NamedTuple):
-    """f, c and a convex curvature of the Lagrangian, by d = ΔF/size."""
+    """f, c and the convex curvature of the Lagrangian, as functions of d = ΔF/size."""
 
     size: float
     g: Array
@@ -126,8 +150,8 @@ class _Model(NamedTuple):
     W: Array
 
 
-class _Limits(NamedTuple):
-    """The trust region in sizes, and bounds (C,) [N]."""
+class _Bounds(NamedTuple):
+    """The radius of the trust region in sizes, and bounds (C,) [N]."""
 
     radius: float
     low: Array
@@ -135,7 +159,7 @@ class _Limits(NamedTuple):
 
 
 class _Step(NamedTuple):
-    """A step d, the multipliers of c and of stability, and how far the merit should fall."""
+    """A step d, the multipliers of c and of stability, and the predicted fall of the merit."""
 
     d: Array
     y: Array
@@ -144,164 +168,174 @@ class _Step(NamedTuple):
 
     @property
     def length(self) -> float:
-        """Its largest entry."""
         return float(abs(self.d).max(initial=0.0))
 
 
-def search(task: Task, start: Point, *, confined: bool = False) -> Found:
-    """A local optimum from a stable point.
+def search(program: Program, start: Evaluation) -> SearchResult:
+    """A local optimum from stable tensions, kinks of rigidities crossed where that is better."""
+    best = _search(program, start, in_piece=False)
+    iterations = best.iterations
+    for _ in range(_CROSSINGS):
+        for F in _beyond_kinks(program.region, best.end.evaluation.F):
+            place = backtrack_to_stable(program.model, F, program.anchor)
+            if place is None:
+                continue
+            other = _search(program, place, in_piece=True)
+            iterations += other.iterations
+            if program.better(other.end, best.end):
+                best = other
+                break
+        else:
+            break
+    return SearchResult(best.end, iterations)
 
-    Args:
-        task: What is sought.
-        start: Where to begin.
-        confined: Whether to stay where no rigidity jumps.
-    """
-    region, goal = task.region, task.goal
-    here = task.look(start)
-    y, z = np.zeros(here.values.size if goal.constrained else 0), 0.0
-    penalty, radius, steps = _PENALTIES[0], _FIRST_REGION, 0
-    confined = confined or not any(region.jumps)
-    while steps < _ITERATIONS and radius >= _SMALLEST_REGION:
-        steps += 1
-        piece = region.piece(here.point.F)
-        limits = _Limits(radius, *(piece if confined else (region.low, region.high)))
-        model = _model(task, here, y, z)
-        step, penalty = _step(task, here, model, penalty, limits)
+
+def _beyond_kinks(region: Admissible, F: Array) -> Iterator[Array]:
+    """The same tensions (C,) [N] on the other side of the kinks they are at: of all, then each."""
+    at = [(c, kink) for c, kink in region.kinks if abs(F[c] - kink) <= _AT_KINK * kink]
+    for group in ([at] if len(at) > 1 else []) + [[pair] for pair in at]:
+        beyond = F.copy()
+        for c, kink in group:
+            beyond[c] = np.nextafter(kink, np.inf) if F[c] <= kink else kink
+        yield beyond
+
+
+def _search(program: Program, start: Evaluation, *, in_piece: bool) -> SearchResult:
+    """A local optimum; with ``in_piece`` that of the piece of the start alone."""
+    region, objective = program.region, program.objective
+    here = program.constraints.at(start)
+    y, z = np.zeros(here.values.size if objective.constrained else 0), 0.0
+    price, radius, iterations = _FIRST_PRICE, _FIRST_RADIUS, 0
+    in_piece = in_piece or not region.kinks
+    while iterations < _ITERATIONS and radius >= _SMALLEST_RADIUS:
+        iterations += 1
+        low, high = region.piece(here.evaluation.F)
+        bounds = _Bounds(radius, *((low, high) if in_piece else (region.low, region.high)))
+        model = _model(program, here, y, z)
+        step, price = _step(program, here, model, price, bounds)
         y, z = step.y, step.z
         small = step.length <= _ARRIVED and bool((abs(model.c) <= _ARRIVED).all())
-        if small or step.predicted <= _ROUNDING * max(1.0, abs(task.merit(here, penalty))):
-            if not confined:
-                confined = True  # once more, as if no rigidity jumped beyond the piece
-            elif not task.met(here) and penalty < _PENALTIES[1]:
-                penalty = min(100.0 * penalty, _PENALTIES[1])  # at rest, but for so low a price
+        if small or step.predicted <= _ROUNDING * max(1.0, abs(program.merit(here, price))):
+            if not in_piece:
+                in_piece = True
+            elif not program.met(here) and price < _LARGEST_PRICE:
+                price = min(100.0 * price, _LARGEST_PRICE)  # at rest, but only at so low a price
             else:
                 break
             continue
-        there, gain = _moved(task, here, model, step, penalty, limits)
-        if there is not None and gain >= 1e-4 * step.predicted:
+        there, fall = _take(program, here, model, step, price, bounds)
+        F = here.evaluation.F + model.size * step.d
+        if there is not None and fall >= 1e-4 * step.predicted:
             here = there
-            if gain > 0.5 * step.predicted:
+            if fall > 0.5 * step.predicted:
                 radius = max(radius, 3.0 * step.length)
-            elif gain < 0.25 * step.predicted:
+            elif fall < 0.25 * step.predicted:
                 radius = step.length / 2.0
-        elif not confined and _leaves(piece, here.point.F + model.size * step.d):
-            confined = True  # what looked good on this side of a jump is not on the other
+        elif not in_piece and ((low > F) | (high < F)).any():
+            in_piece = True  # what looked good on this side of a kink is not so on the other
         else:
             radius = step.length / 4.0
-    return Found(here, steps)
+    return SearchResult(here, iterations)
 
 
-def promises(task: Task, start: Point, best: Sight) -> bool:
-    """Whether a search confined to the range of a point may end with less effort than the best.
-
-    Judged by one quadratic program. Where the stiffness is concave it is optimistic about targets
-    that are stiffer; of others, and of other goals, it says yes in doubt.
-    """
-    if not (task.goal.constrained and task.met(best)):
-        return True
-    here = task.look(start)
-    model = _model(task, here, np.zeros(here.values.size), 0.0)
-    limits = _Limits(_FIRST_REGION, *task.region.piece(start.F))
-    d = _step(task, here, model, _PENALTIES[1], limits)[0].d
-    ahead = task.merit(here, 0.0) + float(model.g @ d + 0.5 * d @ model.W @ d)
-    return ahead <= _DOUBT * task.merit(best, 0.0)
-
-
-def _model(task: Task, here: Sight, y: Array, z: float) -> _Model:
-    goal, region, point, c = task.goal, task.region, here.point, here.values
-    size = max(region.scale, float(point.F.max()))
-    relative = size / task.unit
-    G = here.slopes * size
-    weights = y if goal.constrained else goal.linear + goal.square * c
-    g = goal.effort * relative * (point.F - task.centre) / task.unit
-    W = here.curvature(weights) * size**2
-    W[np.diag_indices(len(W))] += goal.effort * relative**2
-    if not goal.constrained:
+def _model(program: Program, here: ConstraintValues, y: Array, z: float) -> _Model:
+    objective, region = program.objective, program.region
+    evaluation, c = here.evaluation, here.values
+    size = max(region.scale, float(evaluation.F.max()))
+    relative = size / program.unit
+    G = here.jacobian * size
+    weights = y if objective.constrained else objective.linear + objective.square * c
+    g = objective.effort * relative * (evaluation.F - program.centre) / program.unit
+    W = here.hessian(weights) * size**2
+    W[np.diag_indices(len(W))] += objective.effort * relative**2
+    if not objective.constrained:
+        # c belongs to f, whose Hessian has Gauss-Newton's term, too; no constraint is left
         g = g + weights @ G
-        W += goal.square * G.T @ G
+        W += objective.square * G.T @ G
         c, G = np.zeros(0), np.zeros((0, g.size))
     held = G
-    if z > 0.0:
-        W -= z * size**2 / task.field.scale * point.reserve_curvature()
-        held = np.vstack([G, point.reserve_slope()])
-    return _Model(size, g, c, G, kernels.convex(W, region.null, held, _FLOOR))
+    if z > 0.0:  # stability was active: its curvature counts, and steps along it do not
+        W -= z * size**2 / program.model.scale * evaluation.reserve_hessian()
+        held = np.vstack([G, evaluation.reserve_gradient()])
+    return _Model(size, g, c, G, kernels.convex(W, region.null, held, _CURVATURE))
 
 
 def _step(
-    task: Task, here: Sight, model: _Model, penalty: float, limits: _Limits
+    program: Program, here: ConstraintValues, model: _Model, price: float, bounds: _Bounds
 ) -> tuple[_Step, float]:
-    """The step that the model recommends, and the price of c that it takes.
-
-    Its variables are d and, for each c, by how much it is missed on either side.
-    """
-    region, point, size = task.region, here.point, model.size
-    count, rank = model.g.size, len(region.rows)
-    P, q, A, b, low, high, cut = kernels.elastic_program(
-        region.rows,
-        region.imbalance(point.F) / size,
-        model.G,
-        model.c,
-        -point.reserve_slope() * size / task.field.scale,
-        model.W,
-        model.g,
-        np.maximum(np.minimum((limits.low - point.F) / size, 0.0), -limits.radius),
-        np.minimum(np.maximum((limits.high - point.F) / size, 0.0), limits.radius),
+    """The step that the quadratic program recommends, and the price of c it needs."""
+    region, evaluation, size = program.region, here.evaluation, model.size
+    count, rank, m = model.g.size, len(region.rows), model.c.size
+    low = np.maximum(np.minimum((bounds.low - evaluation.F) / size, 0.0), -bounds.radius)
+    high = np.minimum(np.maximum((bounds.high - evaluation.F) / size, 0.0), bounds.radius)
+    stability = -evaluation.reserve_gradient() * size / program.model.scale
+    # variables: d, s and t
+    none, one = np.zeros((rank, 2 * m)), np.eye(m)
+    P = block_diag(model.W, np.zeros((2 * m, 2 * m)))
+    q = np.append(model.g, np.zeros(2 * m))
+    equations = (
+        np.block([[region.rows, none], [model.G, -one, one]]),
+        np.append(region.imbalance(evaluation.F) / size, -model.c),
     )
-    cuts = cut, np.array([max(point.reserve, 0.0) / task.field.scale])
-    missed = np.arange(count, len(q))
+    box = np.append(low, np.zeros(2 * m)), np.append(high, np.full(2 * m, np.inf))
+    cuts = (
+        np.append(stability, np.zeros(2 * m))[None],
+        np.array([max(evaluation.reserve, 0.0) / program.model.scale]),
+    )
+    misses = np.arange(count, count + 2 * m)
     best, miss = None, math.inf
     while True:
-        P[missed, missed] = q[missed] = penalty
-        found = solve(P, q, (A, b), (low, high), cuts)
+        P[misses, misses] = q[misses] = price
+        found = solve(P, q, equations, box, cuts)
         if found is None:
             break
-        before, miss = miss, float(found.x[missed].sum())
+        before, miss = miss, float(found.x[misses].sum())
         if best is not None and miss > 0.9 * before:
-            penalty /= 10.0  # the last rise did not help
+            price /= 10.0  # the last rise did not help
             break
         best = found
-        if miss <= MET:  # then no more than the multiplier is needed
+        if miss <= MET:
             needed = _PREMIUM * float(abs(found.y[rank:]).max(initial=0.0))
-            penalty = max(_PENALTIES[0], min(penalty, needed))
+            price = max(_FIRST_PRICE, min(price, needed))
             break
-        if penalty >= _PENALTIES[1]:
+        if price >= _LARGEST_PRICE:
             break
-        penalty *= 10.0
+        price *= 10.0
     if best is None:
-        return _Step(np.zeros(count), np.zeros(model.c.size), 0.0, 0.0), penalty
+        return _Step(np.zeros(count), np.zeros(model.c.size), 0.0, 0.0), price
     d = best.x[:count]
-    cheaper = _price(model.c) - _price(model.c + model.G @ d)
-    predicted = penalty * cheaper - float(model.g @ d + 0.5 * d @ model.W @ d)
-    return _Step(d, best.y[rank:], float(best.z[0]), predicted), penalty
+    cheaper = _miss(model.c) - _miss(model.c + model.G @ d)
+    predicted = price * cheaper - float(model.g @ d + 0.5 * d @ model.W @ d)
+    return _Step(d, best.y[rank:], float(best.z[0]), predicted), price
 
 
-def _moved(
-    task: Task, here: Sight, model: _Model, step: _Step, penalty: float, limits: _Limits
-) -> tuple[Sight | None, float]:
-    """What is seen after a step, if that is stable, and by how much the merit has fallen."""
+def _take(
+    program: Program,
+    here: ConstraintValues,
+    model: _Model,
+    step: _Step,
+    price: float,
+    bounds: _Bounds,
+) -> tuple[ConstraintValues | None, float]:
+    """The place after a step, None if it is not stable, and the fall of the merit."""
 
-    def after(d: Array) -> tuple[Sight | None, float]:
-        F = np.clip(here.point.F + model.size * d, limits.low, limits.high)
-        point = drawn_back(task.field, F, task.anchor)
-        if point is None:
+    def after(d: Array) -> tuple[ConstraintValues | None, float]:
+        F = np.clip(here.evaluation.F + model.size * d, bounds.low, bounds.high)
+        evaluation = backtrack_to_stable(program.model, F, program.anchor)
+        if evaluation is None:
             return None, -math.inf
-        there = task.look(point)
-        return there, task.merit(here, penalty) - task.merit(there, penalty)
+        there = program.constraints.at(evaluation)
+        return there, program.merit(here, price) - program.merit(there, price)
 
-    there, gain = after(step.d)
-    if there is not None and gain < 0.75 * step.predicted and model.c.size:
-        # c bends away from its tangent: aim at where it is met beyond the bend
-        bent = model._replace(c=there.values - model.G @ step.d)
-        other, more = after(_step(task, here, bent, penalty, limits)[0].d)
-        if more > gain:
+    there, fall = after(step.d)
+    if there is not None and fall < 0.75 * step.predicted and model.c.size:
+        # second-order correction: c as it was found after the step, not as its tangent has it
+        corrected = model._replace(c=there.values - model.G @ step.d)
+        other, more = after(_step(program, here, corrected, price, bounds)[0].d)
+        if more > fall:
             return other, more
-    return there, gain
+    return there, fall
 
 
-def _leaves(piece: tuple[Array, Array], F: Array) -> bool:
-    """Whether tensions F (C,) [N] are outside a piece."""
-    return bool(((piece[0] > F) | (piece[1] < F)).any())
-
-
-def _price(c: Array) -> float:
+def _miss(c: Array) -> float:
     return float(abs(c).sum() + 0.5 * (c @ c))

@@ -1,4 +1,4 @@
-"""K_θ of one posture as a function of the tensions, with second derivatives of what it gives."""
+"""K_θ of one posture as a function of the tensions, and the tip stiffness that follows from it."""
 
 from __future__ import annotations
 
@@ -17,15 +17,16 @@ _NEAREST = 1e-9
 """Eigenvalues nearer to each other than this part of the scale are taken to be so far apart."""
 
 
-class Field:
-    """K_θ(F) over the admissible tensions.
+class StiffnessModel:
+    """K_θ(F) over the admissible tensions of a posture.
 
     Args:
         region: The admissible tensions.
-        margin: From which part of :attr:`scale` on the smallest eigenvalue of K_θ counts as stable.
+        margin: Smallest eigenvalue of K_θ that counts as stable, as a part of :attr:`scale`.
 
     Attributes:
         pose: The posture.
+        region: The admissible tensions.
         scale: Largest eigenvalue of K_θ, by magnitude, under the least tensions [N m/rad].
         floor: Smallest eigenvalue of a K_θ that counts as stable [N m/rad].
         evaluations: How often K_θ was evaluated.
@@ -33,101 +34,101 @@ class Field:
 
     def __init__(self, region: Admissible, margin: float) -> None:
         self.pose = pose = region.least.posture
+        self.region = region
         self.evaluations = 0
         # products with the tensor, which is cached, beat going through the cables each time
         self.geometry = pose.length_hessian, pose.length_jacobian
         load = load_stiffness(pose.jacobian, region.least.wrench, pose.arm._model.masses.tip_joints)
         self.constant = pose.gravity_stiffness + load
-        self._bounds = region.low, region.high
-        self.scale = max(float(abs(self.at(region.least.values).values).max()), SMALLEST)
+        self.scale = max(float(abs(self.at(region.least.values).eigenvalues).max()), SMALLEST)
         self.floor = margin * self.scale
 
-    def at(self, F: Array) -> Point:
+    def at(self, F: Array) -> Evaluation:
         """K_θ under admissible tensions F (C,) [N]."""
         self.evaluations += 1
         # between two admissible places rounding can be off their bounds, and off a law's domain
-        return Point(self, np.minimum(np.maximum(F, self._bounds[0]), self._bounds[1]))
+        return Evaluation(self, np.minimum(np.maximum(F, self.region.low), self.region.high))
 
 
-class Point:
+class Evaluation:
     """K_θ under some tensions.
 
     Attributes:
-        field: Of which.
+        model: The model it is evaluated with.
         F: Tensions (C,) [N].
         K: K_θ (nv, nv) [N m/rad].
-        values: Eigenvalues of its symmetric part, rising (nv,) [N m/rad].
-        vectors: Their eigenvectors, the columns of (nv, nv).
+        eigenvalues: Of its symmetric part, rising (nv,) [N m/rad].
+        eigenvectors: The columns of (nv, nv).
     """
 
-    def __init__(self, field: Field, F: Array) -> None:
-        pose = field.pose
-        self.field = field
+    def __init__(self, model: StiffnessModel, F: Array) -> None:
+        self.model = model
         self.F = F
-        self._springs = pose.arm._model.laws.stiffness(pose.cable_lengths, F)
-        self.K, self.values, self.vectors = kernels.stiffness_at(
-            field.constant, *field.geometry, F, self._springs
+        self._springs = model.pose.arm._model.laws.stiffness(model.pose.cable_lengths, F)
+        self.K, self.eigenvalues, self.eigenvectors = kernels.stiffness_at(
+            model.constant, *model.geometry, F, self._springs
         )
 
     @cached_property
-    def slopes(self) -> tuple[Array, Array]:
+    def spring_slopes(self) -> tuple[Array, Array]:
         """dk/dF (C,) [1/m] and d²k/dF² (C,) [1/(N m)]."""
-        return self.field.pose.arm._model.laws.slopes(self.F, self._springs)
+        return self.model.pose.arm._model.laws.slopes(self.F, self._springs)
 
     @property
     def reserve(self) -> float:
-        """By how much λ_min is above the floor [N m/rad]; not negative: it counts as stable."""
-        return float(self.values[0] - self.field.floor)
+        """λ_min less the floor [N m/rad]; stable if not negative."""
+        return float(self.eigenvalues[0] - self.model.floor)
 
-    def reserve_slope(self) -> Array:
+    def reserve_gradient(self) -> Array:
         """Derivative of the reserve by the tensions (C,) [m/rad²]."""
-        return self.along_slope(self.vectors[:, :1])
+        return self.mode_gradient(self.eigenvectors[:, :1])
 
-    def along_slope(self, v: Array) -> Array:
+    def mode_gradient(self, v: Array) -> Array:
         """Derivative of vᵀ K_θ v by the tensions (C,) [m/rad²], v (nv, 1)."""
         v = np.ascontiguousarray(v)
-        rates = kernels.by_tension(*self.field.geometry, self.slopes[0], v, v)
-        return rates[:, 0, 0]
+        return kernels.by_tension(*self.model.geometry, self.spring_slopes[0], v, v)[:, 0, 0]
 
-    def reserve_curvature(self) -> Array:
+    def reserve_hessian(self) -> Array:
         """Second derivative of the reserve by the tensions (C, C) [m/(N rad²)].
 
         2 Σ_j (vᵀ ∂_c K_θ v_j)(v_jᵀ ∂_d K_θ v)/(λ − λ_j) + δ_cd vᵀ J_c k″_c J_cᵀ v, v of λ = λ_min.
         """
-        J, v = self.field.pose.length_jacobian, np.ascontiguousarray(self.vectors[:, :1])
-        first, second = self.slopes
-        mixed = kernels.by_tension(*self.field.geometry, first, self.vectors, v)[:, 1:, 0]
-        gaps = np.maximum(self.values[1:] - self.values[0], _NEAREST * self.field.scale)
-        result: Array = (mixed * (-2.0 / gaps)) @ mixed.T
+        J, v = self.model.pose.length_jacobian, np.ascontiguousarray(self.eigenvectors[:, :1])
+        first, second = self.spring_slopes
+        mixed = kernels.by_tension(*self.model.geometry, first, self.eigenvectors, v)[:, 1:, 0]
+        distances = np.maximum(
+            self.eigenvalues[1:] - self.eigenvalues[0], _NEAREST * self.model.scale
+        )
+        result: Array = (mixed * (-2.0 / distances)) @ mixed.T
         result[np.diag_indices(len(J))] += second * (J @ v)[:, 0] ** 2
         return result
 
 
-def drawn_back(field: Field, F: Array, anchor: Point) -> Point | None:
-    """The first stable point from tensions F (C,) [N] on the way to stable ones, if it is found."""
-    point = field.at(F)
-    if point.reserve >= 0.0:
-        return point
+def backtrack_to_stable(model: StiffnessModel, F: Array, anchor: Evaluation) -> Evaluation | None:
+    """The first stable place from tensions F (C,) [N] on the way to a stable anchor, if found."""
+    start = model.at(F)
+    if start.reserve >= 0.0:
+        return start
 
-    def on_the_way(part: float) -> Point:
-        return field.at(F + part * (anchor.F - F))
+    def on_the_way(part: float) -> Evaluation:
+        return model.at(F + part * (anchor.F - F))
 
     # the reserve, if concave, is above its chord, and zero before that is
-    far = point.reserve / (point.reserve - anchor.reserve) if anchor.reserve > 0.0 else 1.0
+    far = start.reserve / (start.reserve - anchor.reserve) if anchor.reserve > 0.0 else 1.0
     while on_the_way(far).reserve < 0.0:
         if far >= 1.0:
             return None
         far = min(2.0 * far, 1.0)
     part = brentq(lambda part: on_the_way(part).reserve, 0.0, far, xtol=1e-15, rtol=1e-13)
     for back in (0.0, 1e-14, 1e-12, 1e-10):  # the root may lie on the wrong side by its rounding
-        point = on_the_way(min(part + back, 1.0))
-        if point.reserve >= 0.0:
-            return point
+        end = on_the_way(min(part + back, 1.0))
+        if end.reserve >= 0.0:
+            return end
     return None
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class Constraint:
     """Numbers E_j : X [-] of one tip stiffness X = (R K_θ⁻¹ Rᵀ)⁻¹.
 
     Attributes:
@@ -140,85 +141,91 @@ class Part:
 
 
 @dataclass(frozen=True, eq=False)
-class Reading:
-    """What is wanted of the tip stiffness, as numbers that are to be zero.
+class Constraints:
+    """c(F), the numbers of all constraints less their targets: what is to be zero.
 
     Attributes:
-        parts: Where the numbers come from.
-        wanted: What is subtracted from them (n,) [-].
+        parts: The constraints.
+        targets: What is subtracted (n,) [-].
     """
 
-    parts: tuple[Part, ...]
-    wanted: Array
+    parts: tuple[Constraint, ...]
+    targets: Array
 
-    def of(self, point: Point) -> Sight:
-        """The reading at a stable point."""
-        return Sight(self, point)
+    def at(self, evaluation: Evaluation) -> ConstraintValues:
+        """C at stable tensions."""
+        return ConstraintValues(self, evaluation)
 
 
-class Sight:
-    """A reading at a stable point, with its first and second derivative by the tensions.
+class ConstraintValues:
+    """c(F) at stable tensions, with its first and second derivatives.
 
-    With M = K_θ⁻¹ Rᵀ X the joint motion per motion of the tip, and P = K_θ⁻¹ − M R K_θ⁻¹ what moves
-    while the tip is held,
+    With M = K_θ⁻¹ Rᵀ X the joint motion per motion of the tip, and P = K_θ⁻¹ − M R K_θ⁻¹ the
+    joint motion per torque while the tip is held,
 
         ∂X/∂F_c = Mᵀ ∂_c K_θ M,
         ∂²X/∂F_c∂F_d = −Mᵀ (∂_c K_θ P ∂_d K_θ + ∂_d K_θ P ∂_c K_θ) M + δ_cd Mᵀ J_c k″_c J_cᵀ M.
 
     Attributes:
-        point: The point.
-        values: The numbers (n,) [-].
+        evaluation: K_θ there.
+        values: c (n,) [-].
     """
 
-    def __init__(self, reading: Reading, point: Point) -> None:
-        self.point = point
-        self._seen = [_Seen(part, point) for part in reading.parts]
-        self.values: Array = np.concatenate([seen.values for seen in self._seen]) - reading.wanted
+    def __init__(self, constraints: Constraints, evaluation: Evaluation) -> None:
+        self.evaluation = evaluation
+        self._parts = [_TipStiffness(part, evaluation) for part in constraints.parts]
+        self.values: Array = (
+            np.concatenate([part.values for part in self._parts]) - constraints.targets
+        )
 
     @cached_property
-    def slopes(self) -> Array:
-        """Derivative of the values by the tensions (n, C) [1/N]."""
-        return np.concatenate([seen.slopes() for seen in self._seen])
+    def jacobian(self) -> Array:
+        """∂c/∂F (n, C) [1/N]."""
+        return np.concatenate([part.jacobian() for part in self._parts])
 
-    def curvature(self, y: Array) -> Array:
-        """Second derivative of y · values by the tensions (C, C) [1/N²], y (n,)."""
-        total, first = np.zeros((self.point.F.size,) * 2), 0
-        for seen in self._seen:
-            last = first + seen.values.size
-            total += seen.curvature(y[first:last])
+    def hessian(self, y: Array) -> Array:
+        """Second derivative of y · c by the tensions (C, C) [1/N²], y (n,)."""
+        total, first = np.zeros((self.evaluation.F.size,) * 2), 0
+        for part in self._parts:
+            last = first + part.values.size
+            total += part.hessian(y[first:last])
             first = last
         return total
 
 
-class _Seen:
-    """One part at a point."""
+class _TipStiffness:
+    """One constraint at stable tensions."""
 
-    def __init__(self, part: Part, point: Point) -> None:
-        self.part = part
-        self.point = point
-        X, self.right, self.left, self.inverse = kernels.tip_stiffness(point.K, part.rows)
-        self.values: Array = part.weights.reshape(-1, X.size) @ X.ravel()
+    def __init__(self, constraint: Constraint, evaluation: Evaluation) -> None:
+        self.constraint = constraint
+        self.evaluation = evaluation
+        X, self.right, self.left, self.inverse = kernels.tip_stiffness(
+            evaluation.K, constraint.rows
+        )
+        self.values: Array = constraint.weights.reshape(-1, X.size) @ X.ravel()
+
+    def _torques(self, motion: Array) -> Array:
+        """(∂K_θ/∂F_c) m for the columns m of a joint motion (nv, r): (C, nv, r)."""
+        evaluation = self.evaluation
+        return kernels.changed(*evaluation.model.geometry, evaluation.spring_slopes[0], motion)
 
     @cached_property
-    def _pushed(self) -> Array:
-        """∂K_θ M (C, nv, r)."""
-        field = self.point.field
-        return kernels.changed(*field.geometry, self.point.slopes[0], self.right)
+    def _right_torques(self) -> Array:
+        return self._torques(self.right)
 
-    def slopes(self) -> Array:
-        return kernels.readings_by_tension(self.part.weights, self.left, self._pushed)
+    def jacobian(self) -> Array:
+        return kernels.readings_by_tension(self.constraint.weights, self.left, self._right_torques)
 
-    def curvature(self, y: Array) -> Array:
-        point, weights = self.point, self.part.weights
-        first, second = point.slopes
+    def hessian(self, y: Array) -> Array:
+        weights = self.constraint.weights
         return kernels.tip_curvature(
             (y @ weights.reshape(y.size, -1)).reshape(weights.shape[1:]),
             self.inverse,
-            self.part.rows,
+            self.constraint.rows,
             self.left,
             self.right,
-            kernels.changed(*point.field.geometry, first, self.left),
-            self._pushed,
-            point.field.pose.length_jacobian,
-            second,
+            self._torques(self.left),
+            self._right_torques,
+            self.evaluation.model.pose.length_jacobian,
+            self.evaluation.spring_slopes[1],
         )

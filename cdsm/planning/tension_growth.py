@@ -43,10 +43,10 @@ from cdsm.tension import OPTIMALITY, Tension, distribute_tension
 End = Literal["buckling", "maximum", "infeasible", "elasticity", "none"]
 
 _JUST: Final = 1e-9
-"""This part beyond a place is the other side of it."""
+"""Distance to the other side of a place, as a part of it."""
 
 _INSET: Final = 1e-6
-"""This part of its length the curve keeps away from an end without slope: buckling, or balance."""
+"""Distance of the curve from an end at which there is no slope, as a part of its length."""
 
 _ENDS: Final[dict[End, str]] = {
     "buckling": "where the arm buckles",
@@ -65,17 +65,17 @@ class Saturation(ReadOnlyState):
     Attributes:
         direction: u (3,), a unit direction in base axes.
         fraction: Part of the largest slope [-] below which tension does not pay.
-        bound: The lower bound [N] at which the slope has fallen to that part of the largest: inf if
-            it has not up to the end, and the start if the stiffness nowhere rises.
-        tension: The least tensions with that bound, or with that of the end.
+        bound: The lower bound [N] at which the slope has fallen to that part of the largest; inf if
+            it does not fall so far before the end, and the start if the stiffness nowhere rises.
+        tension: The least tensions with that bound, or with the bound of the end.
         stiffness: K_θ under them.
         steepest: The lower bound [N] at which the slope is largest.
         steepest_slope: d along/d bound there [1/m].
-        stiffest: The lower bound [N] at which the stiffness is largest: an end of the curve, or
-            between them a maximum beyond which tension softens the arm.
-        limit: What ends the curve: ``"buckling"``, ``"maximum"`` (the bound ``maximum``),
-            ``"elasticity"`` (a tension leaves its cable's domain), ``"infeasible"`` (statics bind
-            the tensions) or ``"none"`` (nothing; what tension adds far out has shown its sign).
+        stiffest: The lower bound [N] at which the stiffness is largest: an end of the curve, or a
+            maximum between them, beyond which tension softens the arm.
+        limit: The reason of the end of the curve: ``"buckling"``, ``"maximum"`` (the bound
+            ``maximum``), ``"elasticity"`` (a tension leaves its cable's domain), ``"infeasible"``
+            (no tensions balance the arm) or ``"none"`` (more tension goes on in the same way).
         curve: Lower bound [N], stiffness along u [N/m] and its slope [1/m], (n, 3).
     """
 
@@ -129,14 +129,14 @@ def saturation(
     fraction: float = 0.1,
     solver: str = "daqp",
 ) -> Saturation:
-    """The lower bound of tension from which on more of it hardly stiffens an arm.
+    """The lower bound of tension above which more tension hardly stiffens an arm.
 
-    Along F*(b), the least tensions with the lower bound b (Eq. 17), the slope is
-    d along/db = ∂along/∂F · dF*/db, dF*/db following from which cables are at a bound. It is looked
-    for from its largest value on: the first b at which it has fallen to ``fraction`` of that. With
-    a strand that value is large, since strands start soft (Section IV-C); where the rigidity has
-    levelled off, the active part takes over and more tension softens, if springs or leads keep the
-    wires from stiffening as they get longer than their original lengths.
+    F*(b) are the least tensions with the lower bound b (Eq. 17). Their slope is
+    d along/db = ∂along/∂F · dF*/db, where dF*/db follows from the cables at their bounds. The
+    answer is the first b, after the largest slope, at which the slope has fallen to ``fraction`` of
+    it. A strand starts soft, so that its largest slope is large (Section IV-C). Where its rigidity
+    has levelled off, the active part is left, and more tension softens the arm if springs or leads
+    keep the wires from stiffening as they stretch.
 
     Args:
         pose: The posture, held.
@@ -161,20 +161,20 @@ def saturation(
     ceiling = bound("maximum", maximum, len(arm.cables))
 
     @cache
-    def pull(lower: float) -> Tension:
+    def least(lower: float) -> Tension:
         return distribute_tension(pose, lower, ceiling, wrench, solver)
 
     def at(lower: float) -> Stiffness:
-        return stiffness(pose, pull(lower))
+        return stiffness(pose, least(lower))
 
     lowest, highest = tension_domain(arm)
     low = max(start, lowest)
-    pull(start)  # of bounds that contradict each other it says so
+    least(start)  # refuses bounds that contradict each other
     require_finite(math.inf if at(low)._torque(u) is None else 0.0, u)
     top = min(highest, float(ceiling.min()))
     high = max(scan_end(at, low, max(top, low)), low)
     first, last = _stable(at, low, high)
-    limit = "buckling" if last < high else _limit(at, pull(high), high)
+    limit = "buckling" if last < high else _limit(at, least(high), high)
     if limit in ("maximum", "infeasible"):
         last -= _INSET * (last - first)
 
@@ -182,16 +182,16 @@ def saturation(
         return at(lower).along(u)
 
     def slope(lower: float) -> float:
-        return _slope(pull(lower), u)
+        return _slope(least(lower), u)
 
     places = log_samples(first, last)
-    kinks = _breaks(pull, places[(places >= first) & (places <= last)])
-    beside = np.outer([1.0 - _JUST, 1.0 + _JUST], kinks).ravel()
+    bends = _bends(least, places[(places >= first) & (places <= last)])
+    beside = np.outer([1.0 - _JUST, 1.0 + _JUST], bends).ravel()
     places = np.unique(np.clip(np.concatenate([places, beside]), first, last))
     curve = np.array([(place, value(place), slope(place)) for place in places.tolist()])
     steepest, largest = _steepest(curve, slope)
     where = _falls(curve, slope, steepest, part * largest) if largest > 0.0 else first
-    tension = pull(min(where, last))
+    tension = least(min(where, last))
     return Saturation(
         direction=u,
         fraction=part,
@@ -222,50 +222,50 @@ def _stable(at: StiffnessAt, low: float, high: float) -> tuple[float, float]:
     return first + inset * (first > low), last - inset * (last < high)
 
 
-def _breaks(pull: Callable[[float], Tension], places: Array) -> Array:
-    """Lower bounds [N] among others, rising, where the slope jumps.
+def _bends(least: Callable[[float], Tension], places: Array) -> Array:
+    """Lower bounds [N], rising, at which the slope jumps; places are bounds to begin with.
 
-    Where a cable reaches one of its bounds or leaves it, and where one passes a jump or a sharp
-    bend of its rigidity. In between F*(b) is linear: the active bounds of such a program are the
-    same all through, if they are at both ends.
+    A cable reaches or leaves one of its bounds there, or passes a kink of its rigidity. If the same
+    cables are at their bounds at both ends of an interval, they are so all through it, and F*(b) is
+    linear.
     """
     found: list[float] = []
     todo = list(pairwise(places.tolist()))
-    nothing = _JUST**2 * float(places.max(initial=0.0))  # what happens at zero has nothing below it
+    smallest = _JUST**2 * float(places.max(initial=0.0))  # for bends at zero
     while todo:
         a, b = todo.pop()
-        one, other = pull(a), pull(b)
+        one, other = least(a), least(b)
         if all(np.array_equal(x, y) for x, y in zip(_active(one), _active(other), strict=True)):
             for cable, F, G in zip(one.posture.arm.cables, one.values, other.values, strict=True):
-                jumps = kinks(cable.elasticity) if cable.control == "position" else ()
-                passed = (jump for jump in jumps if min(F, G) <= jump < max(F, G))
-                found += [a + (jump - F) / (G - F) * (b - a) for jump in passed]
-        elif b - a <= max(_JUST * b, nothing):
+                if cable.control == "position":
+                    passed = (x for x in kinks(cable.elasticity) if min(F, G) <= x < max(F, G))
+                    found += [a + (kink - F) / (G - F) * (b - a) for kink in passed]
+        elif b - a <= max(_JUST * b, smallest):
             found.append((a + b) / 2.0)
         else:
             todo += [(a, (a + b) / 2.0), ((a + b) / 2.0, b)]
     return np.array(sorted(found))
 
 
-def _active(pull: Tension) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+def _active(tension: Tension) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Which cables (C,) rise with the lower bound, and which stay at their maximum."""
-    tight = OPTIMALITY * float(pull.values.max())
-    stays = pull.maximum - pull.values <= tight
-    return (pull.values - pull.minimum <= tight) & ~stays, stays
+    tight = OPTIMALITY * float(tension.values.max())
+    stays = tension.maximum - tension.values <= tight
+    return (tension.values - tension.minimum <= tight) & ~stays, stays
 
 
-def _slope(pull: Tension, u: Array) -> float:
-    """D along/db [1/m] where the least tensions follow a rising lower bound b.
+def _slope(tension: Tension, u: Array) -> float:
+    """D along/db [1/m] of the least tensions by their lower bound b.
 
-    Cables at it rise with it, those at their maximum stay, and the rest balance them with least
-    norm, as the optimality conditions of Eq. 17 have it.
+    Cables at b rise with it, those at their maximum stay, and the others balance them with least
+    norm: the optimality conditions of Eq. 17.
     """
-    A = pull.posture.length_jacobian.T
-    rises, stays = _active(pull)
+    A = tension.posture.length_jacobian.T
+    rises, stays = _active(tension)
     free = ~(rises | stays)
     rate = rises.astype(np.float64)
     rate[free] = np.linalg.lstsq(A[:, free], -A[:, rises].sum(axis=1), rcond=None)[0]
-    gradient = stiffness_gradient(stiffness(pull.posture, pull)).along(u)
+    gradient = stiffness_gradient(stiffness(tension.posture, tension)).along(u)
     return float(gradient @ rate)
 
 

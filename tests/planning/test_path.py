@@ -220,7 +220,7 @@ def test_ramp_is_anticipated_where_other_tensions_of_the_same_stiffness_lead_the
     plan = cdsm.plan_path(arm, DOWN, **given, rate=rate)
     assert_holds(plan, 50.0, 800.0)
     with monkeypatch.context() as patch:
-        patch.setattr(Follower, "_lead_to", lambda self, goal: False)
+        patch.setattr(Follower, "_replan_towards", lambda self, goal: False)
         greedy = cdsm.plan_path(arm, DOWN, **given, rate=rate)
     with monkeypatch.context() as patch:
         patch.setattr(follow, "_BACK", 3)

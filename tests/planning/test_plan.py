@@ -10,7 +10,7 @@ import cdsm
 from cdsm import presets
 from cdsm.planning import planner
 from cdsm.planning.planner import Planner
-from cdsm.planning.range import attainable
+from cdsm.planning.range import range_ends
 from cdsm.support.validation import Array
 from tests.planning.test_range import DOWN, corners
 from tests.support import arms
@@ -336,13 +336,13 @@ def test_what_a_search_has_met_beyond_the_range_widens_it(
     pose, low, high = posture("hinged-3-strand")
     found = cdsm.stiffness_range(pose, DOWN, low, high)
     target = 0.5 * (found.low + found.high)
-    true = attainable
+    true = range_ends
 
     def narrow(*given: Any) -> Any:
-        ends = true(*given)
-        return ends._replace(high=ends.low)
+        end, _, iterations = true(*given)
+        return end, end, iterations
 
-    monkeypatch.setattr(planner, "attainable", narrow)
+    monkeypatch.setattr(planner, "range_ends", narrow)
     monkeypatch.setattr(Planner, "least", lambda self: None)
     plan = cdsm.plan_stiffness(pose, DOWN, target, low, high)
     assert plan.achieved == pytest.approx(target, rel=1e-9)

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 
 import cdsm
 from cdsm import presets
-from cdsm.planning.objectives import problem
-from cdsm.planning.starts import Ground
+from cdsm.planning.objectives import stiffness_model
+from cdsm.planning.starts import StartPoints
 from cdsm.support.validation import Array
 from tests.support import arms
 from tests.support.locked import (
@@ -424,10 +424,10 @@ def test_more_starts_are_never_worse(seed: int) -> None:
 
 def test_random_starts_go_on_from_fewer() -> None:
     pose = arms.random_posture(arms.random_arm(12, 2, "universal", Bump()), 12, 0.4)
-    question = problem(pose, 10.0, 400.0, np.zeros(6), 1e-4)
-    few, many = (Ground(question.region, question.field, count, 0) for count in (6, 17))
+    model = stiffness_model(pose, 10.0, 400.0, np.zeros(6), 1e-4)
+    few, many = (StartPoints(model, model.region, count, 0) for count in (6, 17))
     np.testing.assert_array_equal(few.anchor.F, many.anchor.F)
     starts = [each.F for each in few.points]
     np.testing.assert_array_equal(starts, [each.F for each in many.points[: len(starts)]])
-    inside = [[each.F for each in ground.between(n, 0)] for ground, n in ((few, 4), (many, 9))]
+    inside = [[each.F for each in begin.between(n, 0)] for begin, n in ((few, 4), (many, 9))]
     np.testing.assert_array_equal(inside[0], inside[1][: len(inside[0])])
