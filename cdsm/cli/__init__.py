@@ -1,4 +1,4 @@
-"""The command line. mm, degrees and N/mm exist here; plotting is imported when it is needed."""
+"""The command line. Options take mm, degrees and N/mm; matplotlib is imported when it is needed."""
 
 from __future__ import annotations
 
@@ -10,9 +10,7 @@ from typing import Annotated
 import typer
 
 import cdsm
-from cdsm.cli.arm import stiffness, urdf
-from cdsm.cli.check import check
-from cdsm.cli.export import export
+from cdsm.cli.arm import check, export, stiffness, urdf
 from cdsm.cli.loads import buckle, weigh
 from cdsm.cli.options import debug_wanted, grouped
 from cdsm.cli.paper import reproduce

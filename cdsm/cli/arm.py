@@ -1,29 +1,19 @@
-"""``cdsm urdf`` and ``cdsm stiffness``: an arm, and how stiff it is."""
+"""``cdsm urdf | stiffness | check | export``: an arm, how stiff it is, and its files."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
 import typer
 
-from cdsm.cli.options import (
-    Angles,
-    ArmOptions,
-    AsJson,
-    TensionOptions,
-    reported,
-    show_json,
-)
-from cdsm.errors import SingularStiffness
+from cdsm.cli.json_answers import of_stiffness
+from cdsm.cli.options import UNMET, Angles, ArmOptions, AsJson, TensionOptions, answer, reported
 from cdsm.geometry import Geometry
-from cdsm.stiffness_matrix import Stiffness
-from cdsm.stiffness_matrix import stiffness as evaluate
-from cdsm.support.units import MODEL, joints_to_dict, key
-from cdsm.support.validation import Array
-from cdsm.tension import Tension
+from cdsm.interchange.cable_file import write_cables
+from cdsm.interchange.mjcf import instability, write_mjcf
+from cdsm.stiffness_matrix import stiffness as stiffness_at
+from cdsm.support.files import write_text
 from cdsm.urdf import write_urdf
 
 
@@ -36,10 +26,8 @@ def urdf(
     with reported():
         arm = Geometry.read(geometry)
         path = write_urdf(arm, output)
-        if as_json:
-            show_json({"name": arm.name, "length_m": arm.length, "written": [str(path)]})
-        else:
-            typer.echo(f"{arm}\nwritten: {path}")
+        numbers = {"name": arm.name, "length_m": arm.length, "written": [str(path)]}
+        answer(as_json, lambda: numbers, f"{arm}\nwritten: {path}")
 
 
 def stiffness(
@@ -51,42 +39,70 @@ def stiffness(
     """Distribute the tensions at a posture, and print them and the stiffness."""
     with reported():
         pose = arm.at(angles)
-        pull = tensions.distribute(pose)
-        K = evaluate(pose, pull)
-        if as_json:
-            show_json(_to_dict(pull, K))
-        else:
-            typer.echo(f"{pose.arm}\n\n{pull}\n\n{K}")
+        tension = tensions.distribute(pose)
+        K = stiffness_at(pose, tension)
+        answer(as_json, lambda: of_stiffness(tension, K), pose.arm, tension, K)
 
 
-def _to_dict(pull: Tension, K: Stiffness) -> dict[str, object]:
-    """Everything the table shows, in SI units; null where a stiffness is infinite."""
+def check(
+    arm: ArmOptions,
+    tensions: TensionOptions,
+    angles: Angles = "0",
+    html: Annotated[
+        Path | None, typer.Option("--html", metavar="FILE.html", help="Write it as a page too.")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Check a stiffness: derive it anew by differences, and report all that speaks against it.
 
-    def matrix(read: Callable[[], Array]) -> list[list[float]] | None:
-        try:
-            values: list[list[float]] = read().tolist()
-        except SingularStiffness:
-            return None
-        return values
+    The options are those of `cdsm stiffness`.
+    Exit code 0: it can be trusted; 3: it cannot, and the report says why.
+    """
+    with reported():
+        pose = arm.at(angles)
+        report = stiffness_at(pose, tensions.distribute(pose)).report()
+        if html is not None:
+            typer.echo(f"written: {write_text(html, report.to_html())}", err=True)
+        answer(as_json, report.to_dict, pose.arm, report)
+    if not report.trustworthy:
+        raise typer.Exit(UNMET)
 
-    pose = pull.posture
-    unit = pose.arm.stiffness_unit()
-    along = [K.along(axis) for axis in np.eye(3)]
-    return {
-        **joints_to_dict(pose.arm.joint_names, pose.arm.slides, pose.q),
-        "tip_position_m": pose.tip[:3, 3].tolist(),
-        "tension_N": {
-            cable.name: value
-            for cable, value in zip(pose.arm.cables, pull.values.tolist(), strict=True)
-        },
-        "cable_length_m": pose.cable_lengths.tolist(),
-        key("static_residual", pose.arm.torque_unit()): K.residual.tolist(),
-        "model": MODEL,
-        "along_N_per_m": [value if np.isfinite(value) else None for value in along],
-        "cartesian_N_per_m": matrix(lambda: K.cartesian),
-        "pseudoinverse_N_per_m": matrix(K.pseudoinverse),
-        "compliance": matrix(lambda: K.compliance),
-        key("joint_stiffness", unit): K.joint.tolist(),
-        key("margin", unit): K.margin,
-        "stable": K.is_stable,
-    }
+
+def export(
+    arm: ArmOptions,
+    tensions: TensionOptions,
+    mjcf: Annotated[
+        Path | None, typer.Option(metavar="FILE.xml", help="MuJoCo model, its cables pulled.")
+    ] = None,
+    cables_out: Annotated[
+        Path | None, typer.Option(metavar="FILE.toml", help="File of its cables to write.")
+    ] = None,
+    angles: Angles = "0",
+    damping: Annotated[
+        float, typer.Option(help="Of every joint in the MuJoCo model, in N m s/rad.")
+    ] = 0.0,
+    as_json: AsJson = False,
+) -> None:
+    """Write an arm for other programs: a MuJoCo model at a posture, or a file of its cables.
+
+    Exit code 0; 3 if the arm of the MuJoCo model is unstable: it is written all the same.
+    """
+    if mjcf is None and cables_out is None:
+        raise typer.BadParameter("give --mjcf, --cables-out or both.", param_hint="--mjcf")
+    with reported():
+        pose = arm.at(angles)
+        numbers: dict[str, object] = {"name": pose.arm.name}
+        lines, written = [str(pose.arm)], []
+        if mjcf is not None:
+            tension = tensions.distribute(pose)
+            K = stiffness_at(pose, tension)
+            numbers["stable"] = K.is_stable
+            if not K.is_stable:
+                lines.insert(0, instability(K))
+            written.append(str(write_mjcf(pose.arm, mjcf, pose, tension, damping=damping)))
+        if cables_out is not None:
+            written.append(str(write_cables(pose.arm.cables, cables_out)))
+        lines += [f"written: {path}" for path in written]
+        answer(as_json, lambda: numbers | {"written": written}, "\n".join(lines))
+    if numbers.get("stable") is False:
+        raise typer.Exit(UNMET)

@@ -1,9 +1,8 @@
-"""What the commands share: options, the arm they describe, and how failure is told."""
+"""What the commands share: options, the arm they describe, answers and failures."""
 
 from __future__ import annotations
 
 import inspect
-import json
 import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -18,6 +17,7 @@ import typer
 from rich.console import Console
 
 from cdsm.cable import serpentine_cables
+from cdsm.cli.json_answers import Json, show_json
 from cdsm.elasticity import Elasticity, LinearElasticity
 from cdsm.errors import CdsmError
 from cdsm.geometry import Geometry
@@ -26,6 +26,7 @@ from cdsm.interchange.caspr import read_caspr
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.presets import STRAND_1X19
+from cdsm.support.files import write_file
 from cdsm.support.validation import Array
 from cdsm.tension import Tension, distribute_tension
 from cdsm.wires.files import read_elasticity
@@ -264,9 +265,21 @@ def numbers(option: str, text: str, count: int | None = None) -> list[float]:
     return values
 
 
-def show_json(values: dict[str, object]) -> None:
-    """Print SI numbers as strict JSON."""
-    typer.echo(json.dumps(values, indent=1, allow_nan=False))
+def answer(as_json: bool, as_dict: Callable[[], Json], *parts: object) -> None:
+    """Print an answer: its parts as text, or its numbers as JSON."""
+    if as_json:
+        show_json(as_dict())
+    else:
+        typer.echo("\n\n".join(map(str, parts)))
+
+
+def write_picture(path: Path | None, draw: str, *results: object, err: bool = True) -> None:
+    """Draw results by a function of :mod:`cdsm.plots`, if a picture is wanted."""
+    if path is not None:
+        from cdsm import plots  # matplotlib, only where it is wanted
+
+        figure = getattr(plots, draw)(*results)
+        typer.echo(f"written: {write_file(path, figure.savefig)}", err=err)
 
 
 UNMET = 3

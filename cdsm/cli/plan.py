@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import Annotated, NamedTuple
 
 import typer
 
+from cdsm.cli.json_answers import Json, of_path, of_plan
 from cdsm.cli.options import (
     ANGLES,
     NO_WRENCH,
@@ -19,28 +21,22 @@ from cdsm.cli.options import (
     MinTension,
     Picture,
     Wrench,
+    answer,
     at_angles,
     console,
     numbers,
     reported,
-    show_json,
+    write_picture,
 )
 from cdsm.cli.path_file import PathFile, read_path
 from cdsm.manipulator import Manipulator
 from cdsm.planning import (
     PathPlan,
-    StiffnessPlan,
-    StiffnessRange,
     plan_path,
     plan_stiffness,
     stiffness_range,
 )
 from cdsm.posture import Posture
-from cdsm.support.files import write_file
-from cdsm.support.units import joints_to_dict, key
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 _Bounds = tuple[float, float, list[float]]
 """Lower and upper bound of the tensions [N], and the wrench."""
@@ -94,34 +90,30 @@ def plan(
                 "is of one posture; --path has its own.", param_hint="--angles"
             )
         if path is not None:
-            answer = _along_path(robot, read_path(path, robot), u, wanted, bounds, rate)
+            found = _along_path(robot, read_path(path, robot), u, wanted, bounds, rate)
         elif wanted is None:
             raise typer.BadParameter("give it, or --path.", param_hint="--target")
         elif math.isfinite(rate):
             raise typer.BadParameter("is of a path; give --path, too.", param_hint="--rate")
         else:
-            answer = _at_posture(
-                at_angles(robot, "0" if angles is None else angles), u, wanted, bounds
-            )
-        if as_json:
-            show_json(answer.numbers)
-        else:
-            typer.echo(f"{robot}\n\n{answer.text}")
+            pose = at_angles(robot, "0" if angles is None else angles)
+            found = _at_posture(pose, u, wanted, bounds)
+        answer(as_json, found.as_dict, robot, *found.parts)
         if out is not None:
-            typer.echo(f"written: {answer.motors().write_csv(out)}", err=as_json)
-        if figure is not None:
-            typer.echo(f"written: {write_file(figure, answer.draw().savefig)}", err=as_json)
-    if not answer.complete:
+            typer.echo(f"written: {found.motors().write_csv(out)}", err=as_json)
+        write_picture(figure, found.draw, *found.drawn, err=as_json)
+    if not found.complete:
         raise typer.Exit(UNMET)
 
 
 class _Answer(NamedTuple):
-    """What is told, and what can be written."""
+    """What is printed, written and drawn."""
 
-    text: str
-    numbers: dict[str, object]
+    parts: tuple[object, ...]
+    as_dict: Callable[[], Json]
     motors: Callable[[], PathPlan]
-    draw: Callable[[], Figure]
+    draw: str
+    drawn: tuple[object, ...]
     complete: bool = True
 
 
@@ -133,12 +125,9 @@ def _at_posture(pose: Posture, u: list[float], target: float, bounds: _Bounds) -
     def motors() -> PathPlan:  # the same search, as a path of one sample
         return plan_path(pose.arm, u, target, *bounds, angles=[pose.q])
 
-    def draw() -> Figure:
-        from cdsm.plots import plot_stiffness_plan  # matplotlib, only where it is wanted
-
-        return plot_stiffness_plan(found, attainable)
-
-    return _Answer(f"{attainable}\n\n{found}", _plan_to_dict(found, attainable), motors, draw)
+    drawn = found, attainable
+    as_dict = partial(of_plan, found, attainable)
+    return _Answer((attainable, found), as_dict, motors, "plot_stiffness_plan", drawn)
 
 
 def _along_path(
@@ -160,57 +149,5 @@ def _along_path(
     path = plan_path(arm, u, wanted, *bounds, angles=file.angles, tips=file.tips, rate=rate)
     with console.status("looking half-way between the samples"):
         _ = path.between
-
-    def draw() -> Figure:
-        from cdsm.plots import plot_path_plan  # matplotlib, only where it is wanted
-
-        return plot_path_plan(path)
-
-    return _Answer(str(path), _path_to_dict(path), lambda: path, draw, not path.infeasible)
-
-
-def _plan_to_dict(plan: StiffnessPlan, attainable: StiffnessRange) -> dict[str, object]:
-    """Range and plan, in SI units."""
-    pose = plan.tension.posture
-    names = [cable.name for cable in pose.arm.cables]
-    return {
-        "direction": attainable.direction.tolist(),
-        "low_N_per_m": attainable.low,
-        "high_N_per_m": attainable.high,
-        "target_N_per_m": plan.target,
-        "achieved_N_per_m": plan.achieved,
-        "tension_N": dict(zip(names, plan.tension.values.tolist(), strict=True)),
-        "cable_length_m": dict(zip(names, pose.cable_lengths.tolist(), strict=True)),
-        **joints_to_dict(pose.arm.joint_names, pose.arm.slides, pose.q),
-        key("margin", pose.arm.stiffness_unit()): plan.stiffness.margin,
-        "efforts_N": plan.efforts.tolist(),
-        "iterations": plan.iterations,
-    }
-
-
-def _path_to_dict(plan: PathPlan) -> dict[str, object]:
-    """Every sample of a path, in SI units."""
-    return {
-        "cables": [cable.name for cable in plan.arm.cables],
-        "target_N_per_m": plan.target.tolist(),
-        "planned": list(plan.planned),
-        "achieved_N_per_m": plan.achieved.tolist(),
-        **joints_to_dict(plan.arm.joint_names, plan.arm.slides, plan.angles),
-        "tensions_N": plan.tensions.tolist(),
-        "cable_lengths_m": plan.cable_lengths.tolist(),
-        "half_way": [
-            {
-                "after": each.index,
-                "target_N_per_m": each.target.tolist(),
-                "achieved_N_per_m": None if each.achieved is None else each.achieved.tolist(),
-                "misfit": each.misfit if math.isfinite(each.misfit) else None,
-                "reason": each.reason,
-            }
-            for each in plan.between
-        ],
-        "infeasible": [
-            {"index": each.index, "status": each.status, "reason": each.reason}
-            for each in plan.infeasible
-        ],
-        "iterations": plan.iterations,
-    }
+    as_dict, complete = partial(of_path, path), not path.infeasible
+    return _Answer((path,), as_dict, lambda: path, "plot_path_plan", (path,), complete)

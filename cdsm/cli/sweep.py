@@ -3,27 +3,28 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 import typer
 
+from cdsm.cli.json_answers import Json, status_counts
 from cdsm.cli.options import (
     NO_WRENCH,
     ArmOptions,
     AsJson,
     MaxTension,
     Wrench,
+    answer,
     joint_scales,
     numbers,
     reported,
-    show_json,
 )
 from cdsm.cli.path_file import read_path
 from cdsm.errors import FileError
 from cdsm.manipulator import Manipulator
-from cdsm.support.datasets import status_names
 from cdsm.support.files import write_file
 from cdsm.support.validation import Array
 from cdsm.sweeps import GridPoses, PathPoses, PoseSet, RandomPoses, read_sweep, write_sweep
@@ -35,11 +36,10 @@ if TYPE_CHECKING:
     import xarray
 
 
-def sweep(
-    arm: ArmOptions,
-    out: Annotated[
-        Path, typer.Option("--out", "-o", help="File to write: .nc (NetCDF) or .csv, SI units.")
-    ],
+@dataclass(frozen=True)
+class PoseOptions:
+    """Which postures a sweep goes over."""
+
     grid: Annotated[
         str | None,
         typer.Option(
@@ -47,7 +47,7 @@ def sweep(
             "where they slide); joints that are not named stay at 0.",
             metavar="JOINT=LOW:HIGH:COUNT,JOINT=ANGLE,...",
         ),
-    ] = None,
+    ] = None
     path: Annotated[
         Path | None,
         typer.Option(
@@ -55,14 +55,43 @@ def sweep(
             "headed by its name and unit, as in joint1_1 [deg].",
             metavar="WAYPOINTS.csv",
         ),
-    ] = None,
+    ] = None
     count: Annotated[int | None, typer.Option(help="Postures along --path; default: its own.")] = (
         None
-    ),
+    )
     random: Annotated[
         int | None, typer.Option(help="So many Sobol points within the joint limits.")
-    ] = None,
-    seed: Annotated[int | None, typer.Option(help="Of --random; 0.")] = None,
+    ] = None
+    seed: Annotated[int | None, typer.Option(help="Of --random; 0.")] = None
+
+    def read(self, arm: Manipulator) -> PoseSet:
+        """The postures.
+
+        Raises:
+            CdsmError: There are none, or the file of the path cannot be read.
+            typer.BadParameter: Not one of the three kinds, or an option of another kind.
+        """
+        if sum(given is not None for given in (self.grid, self.path, self.random)) != 1:
+            raise typer.BadParameter("give one of --grid, --path and --random.", param_hint="poses")
+        for option, value, needed, of in (
+            ("--count", self.count, "--path", self.path),
+            ("--seed", self.seed, "--random", self.random),
+        ):
+            if value is not None and of is None:
+                raise typer.BadParameter(f"goes with {needed} only.", param_hint=option)
+        if self.grid is not None:
+            return _grid(self.grid, arm)
+        if self.path is not None:
+            return PathPoses(_waypoints(self.path, arm), self.count)
+        return RandomPoses(self.random or 0, self.seed or 0)
+
+
+def sweep(
+    arm: ArmOptions,
+    out: Annotated[
+        Path, typer.Option("--out", "-o", help="File to write: .nc (NetCDF) or .csv, SI units.")
+    ],
+    poses: PoseOptions,
     min_tension: Annotated[
         str, typer.Option(help="Lower bound of all tensions [N], or several.", metavar="N,N,...")
     ] = "10",
@@ -81,37 +110,19 @@ def sweep(
     """Stiffness over a grid, a path or random postures, under one or several tension bounds."""
     with reported():
         robot = arm.read()
-        if sum(given is not None for given in (grid, path, random)) != 1:
-            raise typer.BadParameter("give one of --grid, --path and --random.", param_hint="poses")
-        for option, value, needed, is_given in (
-            ("--count", count, "--path", path is not None),
-            ("--seed", seed, "--random", random is not None),
-        ):
-            if value is not None and not is_given:
-                raise typer.BadParameter(f"goes with {needed} only.", param_hint=option)
-        poses: PoseSet
-        if grid is not None:
-            poses = _grid(grid, robot)
-        elif path is not None:
-            poses = PathPoses(_waypoints(path, robot), count)
-        else:
-            poses = RandomPoses(random or 0, seed or 0)
+        wanted = poses.read(robot)
         check_target(out)  # now, rather than when all is computed
         low = numbers("--min-tension", min_tension)
         found = run(
             robot,
-            poses,
+            wanted,
             minimum=low[0] if len(low) == 1 else low,
             maximum=max_tension,
             wrench=numbers("--wrench", wrench, 6),
             outputs=[name.strip() for name in quantities.split(",")],
             store=resume,
         )
-        path = write_sweep(found, out)
-        if as_json:
-            show_json({"entries": _counts(found), "written": [str(path)]})
-        else:
-            typer.echo(f"{_summary(found)}\nwritten: {path}")
+        _answer(as_json, found, write_sweep(found, out), f"{_summary(found)}\n")
 
 
 def map_sweep(
@@ -145,11 +156,7 @@ def map_sweep(
             place, half = numbers("--section", rest.replace(":", " "), 2)
             slab = (axis.strip(), place / 1000.0, half / 1000.0)
         figure = plot_map(found, quantity, section=slab)
-        picture = write_file(out, figure.savefig)
-        if as_json:
-            show_json({"entries": _counts(found), "written": [str(picture)]})
-        else:
-            typer.echo(f"written: {picture}")
+        _answer(as_json, found, write_file(out, figure.savefig))
 
 
 def _grid(text: str, arm: Manipulator) -> GridPoses:
@@ -187,12 +194,11 @@ def _waypoints(path: Path, arm: Manipulator) -> Array:
     return file.angles
 
 
-def _counts(found: xarray.Dataset) -> dict[str, int]:
-    """How many entries came to what."""
-    status = found["status"].values
-    return {word: int((status == value).sum()) for value, word in status_names(found).items()}
+def _answer(as_json: bool, found: xarray.Dataset, written: Path, first: str = "") -> None:
+    counts: Json = {"entries": status_counts(found), "written": [str(written)]}
+    answer(as_json, lambda: counts, f"{first}written: {written}")
 
 
 def _summary(found: xarray.Dataset) -> str:
-    told = ", ".join(f"{count} {word}" for word, count in _counts(found).items() if count)
-    return f"{found.attrs['title']}, {found.attrs['poses']}: {told}"
+    counts = ", ".join(f"{count} {word}" for word, count in status_counts(found).items() if count)
+    return f"{found.attrs['title']}, {found.attrs['poses']}: {counts}"

@@ -16,9 +16,9 @@ from cdsm.cli.options import (
     MaxTension,
     MinTension,
     Solver,
+    answer,
     numbers,
     reported,
-    show_json,
 )
 
 
@@ -68,10 +68,8 @@ def view(
             largest_tension=largest_tension,
             largest_force=largest_force,
         ) as page:
-            if as_json:
-                show_json({"name": pose.arm.name, "url": page.url})
-            else:
-                typer.echo(f"{pose.arm}\n\nshown at {page.url}; Ctrl-C ends it")
+            numbers_shown: dict[str, object] = {"name": pose.arm.name, "url": page.url}
+            answer(as_json, lambda: numbers_shown, pose.arm, f"shown at {page.url}; Ctrl-C ends it")
             if browser:
                 webbrowser.open(page.url)
             page.wait()

@@ -5,13 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
 import typer
 
-from cdsm.cli.options import AsJson, Picture, console, reported, show_json
+from cdsm.cli.json_answers import of_tensile_fit
+from cdsm.cli.options import AsJson, Picture, answer, console, reported
 from cdsm.support.files import write_file
 from cdsm.wires.files import write_elasticity
-from cdsm.wires.tensile.fit import TensileFit, fit_tensile_test
+from cdsm.wires.tensile.fit import fit_tensile_test
 from cdsm.wires.tensile.record import read_tensile_csv
 
 
@@ -40,23 +40,4 @@ def fit(
             typer.echo(f"written: {write_elasticity(found.elasticity, out)}", err=True)
         if figure is not None:
             typer.echo(f"written: {write_file(figure, found.plot().savefig)}", err=True)
-        if as_json:
-            show_json(_to_dict(found))
-        else:
-            typer.echo(str(found))
-
-
-def _to_dict(fit: TensileFit) -> dict[str, object]:
-    """What the report says, in SI units."""
-    return {
-        "method": fit.method,
-        "gauge_length_m": fit.test.gauge_length,
-        "domain_N": [fit.elasticity.domain.low, fit.elasticity.domain.high],
-        "rms_N": fit.rms,
-        "stages_N": {stage.name: [stage.low, stage.high] for stage in fit.stages},
-        "tension_N": fit.band.tensions.tolist(),
-        "rigidity_N": np.asarray(fit.elasticity.rigidity(fit.band.tensions)).tolist(),
-        "rigidity_low_N": fit.band.low.tolist(),
-        "rigidity_high_N": fit.band.high.tolist(),
-        "notes": list(fit.notes),
-    }
+        answer(as_json, lambda: of_tensile_fit(found), found)
