@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm.errors import InvalidInput, SingularStiffness
+from cdsm.kernels import readings
 from cdsm.posture import Posture
 from cdsm.support.markup import element, row
 from cdsm.support.units import MODEL, coordinates
@@ -42,25 +43,7 @@ Term = Literal["active", "passive", "gravity", "load", "joint"]
 _Value = TypeVar("_Value")
 
 _NO_WRENCH = frozen(np.zeros(6))
-
-UNMOVED = 1e-10
-"""Joint torque of a tip force below this part of the largest is rounding: the tip cannot move."""
-
-REGULAR = 1e-8
-"""Smallest singular value of K_θ, over what it is a sum of, that leaves its inverse 6 digits.
-
-Near buckling the parts of K_θ cancel, so that its own entries may be too small to be compared with;
-and each joint is measured in units of its own, a slide beside a hinge.
-"""
-
-SOFTEST = 1e-100
-"""A joint stiffness below this is that of nothing real, and its inverse may overflow."""
-
-FLAT = 1e-6
-"""Smallest ratio of the singular values of J for which a 3×3 stiffness still has 4 digits left.
-
-Its entries differ by the square of the ratio, and float64 holds 16 digits.
-"""
+_NO_DIRECTIONS = frozen(np.zeros((0, 3)))
 
 
 @final
@@ -153,12 +136,13 @@ class Stiffness(ReadOnlyState):
 
         Where some joints slide and some turn, only its sign does not depend on the unit of length.
         """
-        return float(self._spectrum[0][0])
+        return readings.single_margin(self.joint)
 
     @cached_property
     def critical_direction(self) -> Array:
         """Unit joint motion (nv,) of the smallest eigenvalue: how the arm gives way first."""
-        return frozen(self._spectrum[1][:, 0].copy())
+        vectors = np.linalg.eigh((self.joint + self.joint.T) / 2.0)[1]
+        return frozen(vectors[:, 0].copy())
 
     @property
     def is_stable(self) -> bool:
@@ -174,7 +158,9 @@ class Stiffness(ReadOnlyState):
         Raises:
             SingularStiffness: K_θ is singular: the arm is just about to buckle.
         """
-        return frozen(self.posture.jacobian @ self._motion)
+        status, *_, compliance, _ = self._readings(compliance=True)
+        self._refuse(status)
+        return frozen(compliance)
 
     @cached_property
     def cartesian(self) -> Array:
@@ -187,12 +173,9 @@ class Stiffness(ReadOnlyState):
             SingularStiffness: The tip can hardly move in some direction, which the error names; use
                 :meth:`along` for the others. Or K_θ is singular.
         """
-        # through the singular values of J: C_vv itself is too ill-conditioned near a flat posture
-        left, values, right = self._mobility("the Cartesian stiffness matrix")
-        _ = self._motion  # refuses a singular K_θ
-        inner = right @ np.linalg.solve(self.joint, right.T)
-        outer = left / values
-        return frozen(outer @ np.linalg.inv(inner) @ outer.T)
+        status, *_, cartesian = self._readings(cartesian=True)
+        self._refuse(status, "the Cartesian stiffness matrix")
+        return frozen(cartesian)
 
     def along(self, direction: ArrayLike) -> float:
         """1/(uᵀ C_vv u) [N/m]: the tangent of what a weight hung at the tip measures (Eq. 20).
@@ -211,12 +194,7 @@ class Stiffness(ReadOnlyState):
             InvalidInput: Not a direction.
             SingularStiffness: K_θ is singular.
         """
-        u = unit_direction("direction", direction)
-        torque = self._torque(u)
-        if torque is None:
-            return math.inf
-        compliance = float(torque @ self._motion[:, :3] @ u)
-        return 1.0 / compliance if compliance else math.inf
+        return self._along(unit_direction("direction", direction))[0]
 
     def pseudoinverse(self, term: Term = "joint") -> Array:
         """J⁺ᵀ K J⁺ (3, 3) [N/m] with J the linear rows of J_X: the paper's K_R read literally.
@@ -233,9 +211,9 @@ class Stiffness(ReadOnlyState):
             SingularStiffness: The tip can hardly move in some direction, so J⁺ loses it.
         """
         matrix: Array = getattr(self, one_of("stiffness term", term, get_args(Term)))
-        left, values, right = self._mobility("the pseudo-inverse reading")
-        inverse = (left / values @ right).T
-        return frozen(inverse.T @ matrix @ inverse)
+        status, result = readings.single_pseudoinverse(matrix, self.posture.jacobian)
+        self._refuse(status, "the pseudo-inverse reading")
+        return frozen(result)
 
     def shares(self, direction: ArrayLike) -> Shares:
         """How much of :meth:`along` each cable carries, by elasticity and by tension.
@@ -251,15 +229,14 @@ class Stiffness(ReadOnlyState):
             SingularStiffness: The stiffness along u is infinite, or K_θ is singular.
         """
         u = unit_direction("direction", direction)
-        torque = self._torque(u)
-        if torque is None:
+        stiffness, motion = self._along(u)
+        if math.isinf(stiffness):
             raise SingularStiffness(
                 f"the tip cannot move along {coordinates(u)}: nothing carries an infinite "
                 "stiffness.",
                 u,
             )
-        motion = self._motion[:, :3] @ u
-        motion = motion / (torque @ motion)
+        motion = motion * stiffness
         pose = self.posture
         return Shares(
             direction=u,
@@ -319,41 +296,57 @@ class Stiffness(ReadOnlyState):
         unit = self.posture.arm.stiffness_unit()
         return f"{state}, smallest joint stiffness {self.margin:.4g} {unit} ({MODEL})"
 
-    @cached_property
-    def _spectrum(self) -> tuple[Array, Array]:
-        values, vectors = np.linalg.eigh((self.joint + self.joint.T) / 2.0)
-        return values, vectors
+    def _moves(self, u: Array) -> bool:
+        """Whether a force along a unit direction u (3,) moves any joint."""
+        return readings.moves(self.posture.jacobian, u[None])
 
-    def _torque(self, u: Array) -> Array | None:
-        """J_vᵀ u (nv,): joint torque of a unit force along u; None if it moves no joint."""
-        linear = self.posture.jacobian[:3]
-        torque = u @ linear
-        return torque if abs(torque).max() > UNMOVED * abs(linear).max() else None
+    def _along(self, u: Array) -> tuple[float, Array]:
+        """Stiffness along a unit direction [N/m], and the joint motion per unit force (nv,)."""
+        status, along, motion, *_ = self._readings(u[None])
+        if math.isnan(along[0]):
+            self._refuse(status)
+        return float(along[0]), motion[:, 0]
 
-    @cached_property
-    def _motion(self) -> Array:
-        """K_θ⁻¹ J_Xᵀ (nv, 6): joint motion per wrench at the tip; refuses a singular K_θ."""
-        parts = abs(self.active) + abs(self.passive) + abs(self.gravity) + abs(self.load)
-        if not parts.diagonal().min() > SOFTEST:
-            softest = np.eye(len(parts))[parts.diagonal().argmin()]
-            raise _singular("next to nothing holds the arm", softest)
-        unit = np.sqrt(parts.diagonal())
-        _, values, right = np.linalg.svd(self.joint / unit / unit[:, None])
-        if not values[-1] > REGULAR * (parts / unit / unit[:, None]).max():
-            raise _singular("the arm is just about to buckle", right[-1] / unit)
-        return frozen(np.linalg.solve(self.joint, self.posture.jacobian.T).astype(np.float64))
+    def _readings(
+        self, directions: Array = _NO_DIRECTIONS, compliance: bool = False, cartesian: bool = False
+    ) -> tuple[int, Array, Array, Array, Array]:
+        return readings.single_readings(
+            self.joint,
+            self.active,
+            self.passive,
+            self.gravity,
+            self.load,
+            self.posture.jacobian,
+            directions,
+            compliance,
+            cartesian,
+        )
 
-    def _mobility(self, what: str) -> tuple[Array, Array, Array]:
-        """Singular vectors and values of the linear rows of J; refuses a lack of motion."""
-        left, values, right = np.linalg.svd(self.posture.jacobian[:3], full_matrices=False)
-        if values.size < 3 or values[2] <= FLAT * values[0]:
-            u = frozen(np.linalg.svd(self.posture.jacobian[:3])[0][:, 2].astype(np.float64))
+    def _refuse(self, status: int, what: str = "") -> None:
+        """Raise why a reading does not exist, if so; one with a name needs a mobile tip."""
+        if status == readings.READ:
+            return
+        if what and (status == readings.IMMOBILE or not readings.is_mobile(self.posture.jacobian)):
+            u = frozen(np.linalg.svd(self.posture.jacobian[:3])[0][:, 2].copy())
             raise SingularStiffness(
                 f"{what} does not exist: the tip cannot move along {coordinates(u)}, where the "
                 "stiffness is infinite or nearly so. Use along(direction), or bend the arm.",
                 u,
             )
-        return left, values, right
+        parts = abs(self.active) + abs(self.passive) + abs(self.gravity) + abs(self.load)
+        held = parts.diagonal()
+        if not held.min() > 0.0:
+            why, motion = "next to nothing holds the arm", np.eye(len(parts))[held.argmin()]
+        else:
+            unit = np.sqrt(held)
+            why = "the arm is just about to buckle"
+            motion = np.linalg.svd(self.joint / unit / unit[:, None])[2][-1] / unit
+        motion = frozen(motion / np.linalg.norm(motion))
+        raise SingularStiffness(
+            f"K_θ is singular: {why} in the joint motion {coordinates(motion)}. Change the "
+            "tensions or the posture.",
+            motion,
+        )
 
 
 def stiffness(
@@ -425,12 +418,3 @@ def _diagonal(matrix: Array | None) -> list[float | None]:
 
 def _millimetres(stiffness: float | None) -> str:
     return "-" if stiffness is None else f"{stiffness / 1000.0:.4g}"
-
-
-def _singular(why: str, motion: Array) -> SingularStiffness:
-    direction = frozen(motion / np.linalg.norm(motion))
-    return SingularStiffness(
-        f"K_θ is singular: {why} in the joint motion {coordinates(direction)}. Change the tensions "
-        "or the posture.",
-        direction,
-    )

@@ -16,8 +16,8 @@ import math
 from typing import NamedTuple
 
 from cdsm.batch.certificates import torque_of
-from cdsm.batch.linear_algebra import eliminate
 from cdsm.kernels.compiling import compiled
+from cdsm.kernels.linear_algebra import eliminate
 from cdsm.kernels.tree import Indices
 from cdsm.support.validation import Array
 

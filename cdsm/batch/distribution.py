@@ -34,7 +34,7 @@ class Tensions(ReadOnlyState):
     Attributes:
         arm: The arm.
         q: Joint angles (B, nv) [rad].
-        values: F (B, C) [N], in the order of ``arm.cables``; 0 where there are none.
+        values: F (B, C) [N], in the order of ``arm.cables``; NaN where there are none.
         wrench: W (6,) for all, or (B, 6): force [N], then moment [N m].
         minimum: Lower bounds (C,) for all, or (B, C) [N].
         maximum: Upper bounds (C,) for all, or (B, C) [N].

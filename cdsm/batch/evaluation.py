@@ -35,7 +35,7 @@ class Batch(ReadOnlyState):
     """What was asked of many postures, row by row: ``batch["joint"]`` is K_θ (B, nv, nv).
 
     A quantity has the name, shape and unit it has in :class:`~cdsm.Posture` and
-    :class:`~cdsm.Stiffness`, with one more axis in front; what does not exist is 0 there,
+    :class:`~cdsm.Stiffness`, with one more axis in front; what does not exist is NaN,
     and :attr:`status` says why.
 
     Attributes:
@@ -151,7 +151,7 @@ def evaluate(
         low, high = bounds(arm, minimum, math.inf if maximum is None else maximum, rows)
         distributor = Distributor(arm, angles, low, high, loads, check_limits)
     elif maximum is not None:
-        raise InvalidInput("maximum", "belongs to minimum=: give both, or neither.")
+        raise InvalidInput("maximum", "belongs to minimum=: give that too.")
     needy = [name for name in names if name not in QUANTITIES[: layout.RESIDUAL]]
     if needy and given is None and minimum is None:
         raise InvalidInput(

@@ -6,6 +6,7 @@ The physics is that of :mod:`cdsm.kernels.segments`, which the single posture us
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -21,6 +22,7 @@ from cdsm.batch.layout import (
     COMPLIANCE,
     GRAVITY,
     GRAVITY_TORQUE,
+    IMMOBILE,
     JACOBIAN,
     JOINT,
     LENGTH_JACOBIAN,
@@ -33,12 +35,13 @@ from cdsm.batch.layout import (
     RESIDUAL,
     SINGULAR,
     TIP,
-    UNDECIDED,
     Codes,
 )
-from cdsm.batch.readings import Answers, solve_row, workspace
 from cdsm.kernels.bodies import Masses, add_gravity_stiffness, gravity_torque, tip_jacobian
 from cdsm.kernels.compiling import compiled, inlined, threaded
+from cdsm.kernels.readings import IMMOBILE as NOT_MOBILE
+from cdsm.kernels.readings import SINGULAR as NOT_REGULAR
+from cdsm.kernels.readings import Readings, Wanted, read_stiffness, sum_terms, workspace
 from cdsm.kernels.segments import add_segment_derivatives, mirror
 from cdsm.kernels.stiffness import add_load_stiffness, add_passive_stiffness, set_cable_stiffness
 from cdsm.kernels.tree import Frames, Indices, Routing, Tree, forward_kinematics
@@ -100,9 +103,8 @@ def evaluate_rows(
         directions: Unit vectors (D, 3) of ``along``.
         start: Where the quantities begin in a record.
         wanted: Numbers of quantities, rising.
-        out: What is wanted, zeros where it does not exist.
+        out: What is wanted, NaN where it does not exist.
         status: As it is known beforehand: OK, or that there are no tensions; then as it is found.
-            UNDECIDED where singular values have to tell whether K_θ is regular.
     """
     tree, routing, masses, lowest, highest, series, rest = arm
     parent, fixed = tree.parent, routing.fixed
@@ -130,7 +132,7 @@ def evaluate_rows(
     k = _vector(record, start, CABLE_STIFFNESS)
     passive = _matrix(record, start, PASSIVE, nv)
     K = _matrix(record, start, JOINT, nv)
-    answers = Answers(
+    readings = Readings(
         _vector(record, start, MARGIN),
         _matrix(record, start, PSEUDOINVERSE, 3),
         _vector(record, start, ALONG),
@@ -143,7 +145,8 @@ def evaluate_rows(
         last = wanted[w]
         asked[last] = True
     curved = active if last > GRAVITY else np.empty((0, nv, nv))
-    work = workspace(nv, directions.shape[0], asked)
+    read = Wanted(asked[MARGIN], asked[PSEUDOINVERSE], asked[COMPLIANCE], asked[CARTESIAN])
+    work = workspace(nv, directions.shape[0], read)
 
     for b in range(q.shape[0]):
         beyond, coincident = _is_beyond(q[b], lowest, highest), -1
@@ -183,16 +186,14 @@ def evaluate_rows(
                     set_cable_stiffness(L, tension[b], rigidity[b], series, rest, k)
                     add_passive_stiffness(J, k, passive)
                     mirror(passive)
-                    size = 0.0
-                    for i in range(nv):
-                        for j in range(nv):
-                            K[i, j] = active[0, i, j] + passive[i, j] + gravity[i, j] + load[i, j]
-                            parts = abs(active[0, i, j]) + abs(passive[i, j])
-                            size = max(size, parts + abs(gravity[i, j]) + abs(load[i, j]))
+                    sum_terms(active[0], passive, gravity, load, K, work.parts)
                     if last > JOINT:
-                        status[b] = solve_row(K, size, JX, directions, work, asked, answers)
-                        if status[b] == UNDECIDED or status[b] == SINGULAR:
+                        found = read_stiffness(K, JX, directions, read, work, readings)
+                        if found == NOT_REGULAR:
+                            status[b] = SINGULAR
                             known = PSEUDOINVERSE + 1
+                        elif found == NOT_MOBILE:
+                            status[b] = IMMOBILE
         _keep(record, start, known, wanted, b, out)
 
 
@@ -231,5 +232,5 @@ def _keep(record: Array, start: Indices, known: int, wanted: Indices, b: int, ou
         first, end = start[wanted[w]], start[wanted[w] + 1]
         exists = wanted[w] < known
         for i in range(end - first):
-            out[b, at + i] = record[first + i] if exists else 0.0
+            out[b, at + i] = record[first + i] if exists else math.nan
         at += end - first

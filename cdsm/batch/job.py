@@ -10,10 +10,7 @@ from cdsm.batch.fused_kernel import evaluate_rows
 from cdsm.batch.inputs import kernel_arm, of_rows
 from cdsm.batch.layout import QUANTITIES, Codes
 from cdsm.batch.rigidity import rigidities
-from cdsm.batch.status import Status
-from cdsm.errors import SingularStiffness
 from cdsm.manipulator import Manipulator
-from cdsm.stiffness_matrix import stiffness
 from cdsm.support.validation import Array, frozen
 
 
@@ -102,26 +99,3 @@ class Job:
         for name, value in zip(self._names, self.values, strict=True):
             source = tension if name == "tension" else out[:, self._place[name]]
             value[part] = source.reshape(value[part].shape)
-        for r in np.flatnonzero(found == layout.UNDECIDED).tolist():
-            found[r] = self._decide(part.start + r, tension[r], wrench[r])
-
-    def _decide(self, row: int, tension: Array, wrench: Array) -> Status:
-        """Let the single posture tell whether K_θ is singular, and fill what exists if not."""
-        K = stiffness(self._arm.at(self._q[row], check_limits=False), tension, wrench)
-        status = Status.OK
-        try:
-            found = {
-                "compliance": K.compliance,
-                "along": np.array([K.along(u) for u in self._directions]),
-            }
-        except SingularStiffness:
-            return Status.SINGULAR
-        if {"cartesian", "pseudoinverse"}.intersection(self._names):
-            try:
-                found["cartesian"] = K.cartesian
-            except SingularStiffness:
-                status = Status.IMMOBILE
-        for name, value in zip(self._names, self.values, strict=True):
-            if name in found:
-                value[row] = found[name].reshape(value[row].shape)
-        return status

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 @unique
 class Status(IntEnum):
-    """What became of a row, and so which quantities exist; those that do not are 0, never NaN.
+    """What became of a row, and so which quantities exist; those that do not are NaN.
 
     It tells of the first thing that kept something that was asked for from existing, the way
     the single functions would have raised an error. An arm that buckles is no failure: its margin

@@ -5,6 +5,8 @@ min ½‖F‖²   so that   J_Lᵀ F = J_Xᵀ W − g   and   low ≤ F ≤ high
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from cdsm.batch import active_set
@@ -27,7 +29,7 @@ def distribute_rows(
     tension: Array,
     status: Codes,
 ) -> None:
-    """Fill tensions (b, C) [N], zeros where there are none, and the status of every row.
+    """Fill tensions (b, C) [N], NaN where there are none, and the status of every row.
 
     Args:
         blocks: Those of the arm.
@@ -47,7 +49,7 @@ def distribute_rows(
     state = State(np.empty(count), np.empty(nv), side, np.empty(count), system, np.empty(nv))
     for r in range(postures.shape[0]):
         for c in range(count):
-            tension[r, c] = 0.0
+            tension[r, c] = math.nan
         if status[r] != OK:
             continue
         JX = postures[r, : 6 * nv].reshape((6, nv))

@@ -63,7 +63,7 @@ def checked_direction(model: StiffnessModel, direction: ArrayLike) -> Array:
     """A unit direction (3,) in which the tip can move."""
     u = unit_direction("direction", direction)
     # this depends on the posture alone: any tensions will do
-    if stiffness(model.pose, model.region.least)._torque(u) is None:
+    if not stiffness(model.pose, model.region.least)._moves(u):
         require_finite(np.inf, u)
     return u
 

@@ -170,7 +170,7 @@ def saturation(
     lowest, highest = tension_domain(arm)
     low = max(start, lowest)
     least(start)  # refuses bounds that contradict each other
-    require_finite(math.inf if at(low)._torque(u) is None else 0.0, u)
+    require_finite(0.0 if at(low)._moves(u) else math.inf, u)
     top = min(highest, float(ceiling.min()))
     high = max(scan_end(at, low, max(top, low)), low)
     first, last = _stable(at, low, high)

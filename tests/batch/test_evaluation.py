@@ -138,7 +138,7 @@ def test_every_quantity_of_every_row_is_that_of_the_single_posture(name: str) ->
         K = cdsm.stiffness(arm.at(q[r]), tension[r], wrench[r])
         for output in OUTPUTS:
             if expected == cdsm.Status.IMMOBILE and output in ("cartesian", "pseudoinverse"):
-                assert not batch[output].any()
+                assert np.isnan(batch[output]).all()
                 continue
             single = np.asarray(alone(output, K))
             assert batch[output].shape == (7, *single.shape), output
@@ -370,14 +370,11 @@ def test_threads_can_call_it_at_the_same_time() -> None:
 # --- statuses -------------------------------------------------------------------------------
 
 
-def assert_no_nan(batch: cdsm.Batch) -> None:
-    for value in batch.values:
-        assert not np.isnan(value).any()
-
-
 def only(batch: cdsm.Batch, row: int) -> set[str]:
-    """Which quantities of a row are not all zero."""
-    return {name for name in batch.outputs if np.any(batch[name][row])}
+    """Which quantities of a row exist: all of it, or nothing."""
+    exists = {name: ~np.isnan(batch[name][row]) for name in batch.outputs}
+    assert all(there.all() or not there.any() for there in exists.values())
+    return {name for name, there in exists.items() if there.all()}
 
 
 def everything(arm: cdsm.Manipulator, q: Any, tension: Any = None, **more: Any) -> cdsm.Batch:
@@ -426,7 +423,7 @@ def test_row_where_sites_coincide_is_empty() -> None:
         arm.at(q[1])
     pull = cdsm.distribute_tensions(arm, q, 5.0)
     assert pull.status[1] == cdsm.Status.COINCIDENT_SITES
-    assert not pull.values[1].any()
+    assert np.isnan(pull.values[1]).all()
 
 
 def test_row_without_tensions_keeps_what_the_joint_angles_give() -> None:
@@ -438,7 +435,6 @@ def test_row_without_tensions_keeps_what_the_joint_angles_give() -> None:
     batch = everything(arm, q, minimum=low, maximum=high)
     np.testing.assert_array_equal(batch.status, [0, cdsm.Status.INFEASIBLE, 0])
     assert only(batch, 1) == POSED
-    assert_no_nan(batch)
     W = batch.wrench
     with pytest.raises(cdsm.InfeasibleTension):
         cdsm.distribute_tension(arm.at(q[1]), low[1], high[1], W)
@@ -491,14 +487,13 @@ def test_singular_stiffness_is_no_error_but_a_status() -> None:
     np.testing.assert_array_equal(batch.status, [cdsm.Status.SINGULAR, cdsm.Status.IMMOBILE])
     assert not only(batch, 0) & {"along", "compliance", "cartesian"}
     assert {"margin", "joint", "active"} <= only(batch, 1)
-    assert_no_nan(batch)
     with pytest.raises(cdsm.SingularStiffness):
         _ = cdsm.stiffness(arm.at(q[0]), tension[0]).compliance
     assert cdsm.evaluate(arm, q, tension, outputs=("joint", "margin")).ok.all()
 
 
 def test_nearly_singular_stiffness_is_decided_as_for_the_single_posture() -> None:
-    """Not singular by its singular values, but by its pivots the kernel cannot tell."""
+    """Not singular by its singular values, though the probing torque moves it far."""
     arm = slack_arm(1.0)
     q = np.array([[0.1, 0.2]])
     tension = np.array([[0.0, 0.0, 1e-7, 1e-7]])
@@ -509,10 +504,9 @@ def test_nearly_singular_stiffness_is_decided_as_for_the_single_posture() -> Non
     for u in (DIRECTIONS, DIRECTIONS[0]):
         batch = cdsm.evaluate(arm, q, tension, outputs=names, direction=u)
         assert batch.ok.all()
-        np.testing.assert_array_equal(batch["compliance"][0], K.compliance)
-        np.testing.assert_array_equal(
-            batch["along"][0], np.reshape([K.along(d) for d in np.atleast_2d(u)], u.shape[:-1])
-        )
+        np.testing.assert_allclose(batch["compliance"][0], K.compliance, rtol=1e-12)
+        alone = np.reshape([K.along(d) for d in np.atleast_2d(u)], u.shape[:-1])
+        np.testing.assert_allclose(batch["along"][0], alone, rtol=1e-12)
     immobile = cdsm.evaluate(arm, q, tension, outputs=("pseudoinverse", "compliance"))
     assert immobile.status[0] == cdsm.Status.IMMOBILE
     assert only(immobile, 0) == {"compliance"}

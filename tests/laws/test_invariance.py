@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import cdsm
-from cdsm.stiffness_matrix import UNMOVED
+from cdsm.kernels.readings import UNMOVED
 from cdsm.support.validation import Array
 from cdsm.tension import OPTIMALITY
 from tests.support import arms

@@ -1,7 +1,14 @@
 """Numba kernels of dense linear algebra for matrices too small to be worth a call of LAPACK.
 
-A call costs a microsecond or more, and a LAPACK with threads of its own fights over the cores with
-those that run these kernels.
+A LAPACK with threads of its own also fights over the cores with those that run these kernels: the
+inverse of an 80×80 matrix took it 16 ms. Microseconds here, and in LAPACK called from a kernel:
+
+    n                                        2         5        10        20        40        80
+    linear system, ten right sides   0.1 / 0.5 0.3 / 0.9 0.5 / 1.8 2.0 / 4.5  9.0 / 13   55 / 45
+    smallest eigenvalue              0.1 / 0.3 0.4 / 1.4 1.3 / 3.8 4.6 / 13    21 / 51 188 / 370
+    singular values of three rows    0.5 / 1.7 0.4 / 3.1 0.4 / 3.2 0.6 / 3.3 0.8 / 4.2 1.5 / 8.8
+
+Ten columns are a chain of five universal joints, of which a row of a batch takes 5 µs all in all.
 """
 
 from __future__ import annotations
@@ -68,15 +75,6 @@ def smallest_eigenvalue(A: Array, scratch: Array) -> float:
     of its characteristic polynomial from below: all roots are real, so it never passes it.
     """
     n = A.shape[0]
-    size = 0.0
-    for i in range(n):
-        for j in upwards(0, n):
-            size = max(size, abs(A[i, j]))
-    if size == 0.0:
-        return 0.0
-    for i in range(n):
-        for j in upwards(0, n):
-            A[i, j] /= size  # so that no square over- or underflows
     d, e = scratch[0], scratch[1]
     _tridiagonalise(A, d, e, scratch[2], scratch[3])
     scale = x = 0.0
@@ -96,7 +94,7 @@ def smallest_eigenvalue(A: Array, scratch: Array) -> float:
             second = square * inverse * (bend - 2.0 * slope * slope)
             g = d[i] - x - square * inverse
             if g <= 0.0:  # only rounding gets past the root
-                return x * size
+                return x
             inverse = 1.0 / g
             slope, bend = first * inverse, second * inverse
             G -= slope
@@ -105,16 +103,16 @@ def smallest_eigenvalue(A: Array, scratch: Array) -> float:
         x += step
         if step <= _ROUNDING * scale:
             break
-    return x * size
+    return x
 
 
 @compiled
 def _tridiagonalise(A: Array, d: Array, e: Array, v: Array, w: Array) -> None:
-    """Fill the diagonal d (n,) of a similar tridiagonal matrix, and e (n,) beside it; e[0] is 0.
-
-    The largest entry of A is 1.
-    """
-    n = A.shape[0]
+    """Fill the diagonal d (n,) of a similar tridiagonal matrix, and e (n,) beside it; e[0] is 0."""
+    n, size = A.shape[0], 0.0
+    for i in range(n):
+        for j in upwards(0, n):
+            size = max(size, abs(A[i, j]))
     e[0] = 0.0
     for k in range(n - 2):
         d[k] = A[k, k]
@@ -122,7 +120,7 @@ def _tridiagonalise(A: Array, d: Array, e: Array, v: Array, w: Array) -> None:
         for i in range(k + 1, n):
             norm += A[k, i] * A[k, i]
         norm = math.sqrt(norm)
-        if norm < _NOTHING:  # its square may be too small to divide by
+        if norm <= _NOTHING * size:  # its square may be too small to divide by
             e[k + 1] = 0.0
             continue
         alpha = -norm if A[k, k + 1] > 0.0 else norm

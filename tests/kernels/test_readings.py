@@ -1,0 +1,90 @@
+"""Readings of K_θ by themselves: as LAPACK has them, and where they do not exist."""
+
+import math
+
+import numpy as np
+import pytest
+
+from cdsm.kernels import readings
+from cdsm.support.validation import Array, frozen
+
+Matrices = tuple[Array, Array, Array, Array, Array]
+
+
+def terms(seed: int, nv: int) -> Matrices:
+    """K_θ, not symmetric, and its active, passive, gravity and load term."""
+    rng = np.random.default_rng(seed)
+    active, gravity, load = 0.1 * rng.normal(size=(3, nv, nv))
+    half = rng.normal(size=(nv, nv + 2))
+    passive = half @ half.T
+    a, p, g, w = map(frozen, (active + active.T, passive, gravity + gravity.T, load))
+    return frozen(a + p + g + w), a, p, g, w
+
+
+def read(matrices: Matrices, JX: Array, u: Array) -> tuple[int, Array, Array, Array]:
+    status, along, _, compliance, cartesian = readings.single_readings(
+        *matrices, frozen(JX), frozen(u), True, True
+    )
+    return status, along, compliance, cartesian
+
+
+@pytest.mark.parametrize("nv", [3, 4, 10, 25])
+def test_readings_are_their_formulas(nv: int) -> None:
+    matrices = terms(nv, nv)
+    K = matrices[0]
+    rng = np.random.default_rng(nv)
+    JX, u = rng.normal(size=(6, nv)), np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    status, along, compliance, cartesian = read(matrices, JX, u)
+    C = JX @ np.linalg.inv(K) @ JX.T
+    assert status == readings.READ
+    np.testing.assert_allclose(compliance, C, rtol=0.0, atol=1e-11 * abs(C).max())
+    np.testing.assert_allclose(along, [1.0 / (v @ C[:3, :3] @ v) for v in u], rtol=1e-9)
+    expected = np.linalg.inv(C[:3, :3])
+    np.testing.assert_allclose(cartesian, expected, rtol=0.0, atol=1e-9 * abs(expected).max())
+    pinv = np.linalg.pinv(JX[:3])
+    status, pseudoinverse = readings.single_pseudoinverse(K, frozen(JX))
+    np.testing.assert_allclose(pseudoinverse, pinv.T @ K @ pinv, rtol=1e-9)
+    margin = np.linalg.eigvalsh((K + K.T) / 2.0)[0]
+    assert readings.single_margin(K) == pytest.approx(margin, rel=1e-12)
+
+
+def test_a_tip_that_cannot_move_has_no_matrix_and_is_infinitely_stiff_there() -> None:
+    matrices = terms(0, 5)
+    JX = np.random.default_rng(0).normal(size=(6, 5))
+    JX[0] = 0.0
+    status, along, compliance, cartesian = read(matrices, JX, np.eye(3))
+    assert status == readings.IMMOBILE
+    assert not readings.is_mobile(frozen(JX))
+    assert along[0] == math.inf
+    assert np.isfinite(along[1:]).all()
+    assert np.isfinite(compliance).all()
+    assert np.isnan(cartesian).all()
+    status, pseudoinverse = readings.single_pseudoinverse(matrices[0], frozen(JX))
+    assert status == readings.IMMOBILE
+    assert np.isnan(pseudoinverse).all()
+
+
+@pytest.mark.parametrize("units", [1.0, 1e-4, 1e4])
+def test_what_is_singular_does_not_depend_on_the_units_of_a_joint(units: float) -> None:
+    """Just above REGULAR times its parts K_θ has an inverse, just below it has none."""
+    rng = np.random.default_rng(1)
+    D = np.diag([1.0, units, 1.0, 1.0])
+    Q = np.linalg.qr(rng.normal(size=(4, 4)))[0]
+    JX = rng.normal(size=(6, 4))
+    for part, singular in ((0.9, True), (1.1, False)):
+        parts = np.eye(4) + np.diag([0.3] * 3, 1) + np.diag([0.3] * 3, -1)
+        scaled = (Q * [part * readings.REGULAR, 0.5, 0.6, 0.7]) @ Q.T
+        # two terms that sum to K, their magnitudes to parts in the joints' own units
+        plus, minus = (parts + scaled) / 2.0, (scaled - parts) / 2.0
+        K, active, passive = (frozen(D @ each @ D) for each in (scaled, plus, minus))
+        zero = frozen(np.zeros((4, 4)))
+        status, along, *_ = read((K, active, passive, zero, zero), JX, np.eye(3))
+        assert (status == readings.SINGULAR) == singular
+        assert np.isnan(along).all() == singular
+
+
+def test_a_joint_that_nothing_holds_is_singular() -> None:
+    K = frozen(np.diag([1.0, 0.0, 2.0]))
+    zero = frozen(np.zeros((3, 3)))
+    status, *_ = read((K, K, zero, zero, zero), np.ones((6, 3)), np.eye(3))
+    assert status == readings.SINGULAR
