@@ -163,10 +163,10 @@ def of_tensile_fit(fit: TensileFit) -> Json:
         "domain_N": [fit.elasticity.domain.low, fit.elasticity.domain.high],
         "rms_N": fit.rms,
         "stages_N": {stage.name: [stage.low, stage.high] for stage in fit.stages},
-        "tension_N": fit.band.tensions.tolist(),
-        "rigidity_N": np.asarray(fit.elasticity.rigidity(fit.band.tensions)).tolist(),
-        "rigidity_low_N": fit.band.low.tolist(),
-        "rigidity_high_N": fit.band.high.tolist(),
+        "tension_N": fit.tensions.tolist(),
+        "rigidity_N": np.asarray(fit.elasticity.rigidity(fit.tensions)).tolist(),
+        "rigidity_low_N": None if fit.band is None else fit.band.low.tolist(),
+        "rigidity_high_N": None if fit.band is None else fit.band.high.tolist(),
         "notes": list(fit.notes),
     }
 

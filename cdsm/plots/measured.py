@@ -20,22 +20,23 @@ _MOST_LABELS = 30
 
 
 def plot_tensile_fit(fit: TensileFit) -> Figure:
-    """Force over displacement with the fit, and rigidity with its band and stages."""
+    """Force over displacement with the fit, and rigidity with its band, if any, and stages."""
     figure, ((left, right),) = panels(10.0, 4.2, 2)
-    tension, band = fit.band.tensions, fit.band
+    tension, band = fit.tensions, fit.band
     stretch = fit.start + fit.elasticity.strain(tension) * fit.test.gauge_length
     left.plot(MM * fit.test.displacement, fit.test.force, ".", color="0.6", ms=3, label="test")
     left.plot(MM * stretch, tension, color=COLORS[1], label=fit.method)
     left.set(xlabel="displacement [mm]", ylabel="force [N]")
-    right.fill_between(
-        tension,
-        KN * band.low,
-        KN * band.high,
-        color=COLORS[0],
-        alpha=0.3,
-        linewidth=0,
-        label="95 % band",
-    )
+    if band is not None:
+        right.fill_between(
+            tension,
+            KN * band.low,
+            KN * band.high,
+            color=COLORS[0],
+            alpha=0.3,
+            linewidth=0,
+            label="95 % band",
+        )
     right.plot(tension, KN * fit.elasticity.rigidity(tension), color=COLORS[1], label="EA")
     for stage, shade in zip(fit.stages, ("0.93", "0.98", "0.88"), strict=False):
         right.axvspan(stage.low, stage.high, color=shade, zorder=0)

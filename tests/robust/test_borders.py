@@ -167,10 +167,6 @@ COUNTS: dict[str, tuple[Callable[[Any], object], str]] = {
         lambda n: cdsm.plan_path(ARM, UP, K.along(UP), 10.0, 100.0, angles=Q, starts=n),
         "1 to 1000",
     ),
-    "samples": (
-        lambda n: cdsm.fit_tensile_test(DATA, DATA, 1.0, "polynomial", samples=n),
-        "40 to 10000",
-    ),
     "count": (lambda n: cdsm.RandomPoses(n), f"1 to {2**30}"),
     "count of a path": (lambda n: cdsm.PathPoses(np.eye(2), n), f"2 to {2**30}"),
 }

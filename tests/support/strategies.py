@@ -175,9 +175,7 @@ def fitted_elasticities() -> tuple[cdsm.Elasticity, ...]:
     laws: list[cdsm.Elasticity] = []
     for wire in wires:
         force = np.linspace(wire.domain.first + 0.1, 600.0, 80)
-        laws.append(
-            cdsm.fit_tensile_test(0.3 * wire.strain(force), force, 0.3, samples=40).elasticity
-        )
+        laws.append(cdsm.fit_tensile_test(0.3 * wire.strain(force), force, 0.3).elasticity)
     force = np.linspace(0.0, 400.0, 60)
     toe = force / 8e4 + 1e-3 * (1.0 - np.exp(-force / 20.0))
     laws.append(cdsm.TabulatedElasticity(tuple(force.tolist()), tuple(toe.tolist())))

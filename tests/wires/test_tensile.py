@@ -47,8 +47,8 @@ def test_example_data_are_eq_19_integrated() -> None:
 @pytest.mark.parametrize("seed", range(5))
 def test_noisy_strand_is_recovered_within_5_percent(seed: int) -> None:
     displacement, force = strand_test(0.5, seed)
-    monotone = cdsm.fit_tensile_test(displacement, force, GAUGE, samples=40)
-    paper = cdsm.fit_tensile_test(displacement, force, GAUGE, "polynomial", samples=40)
+    monotone = cdsm.fit_tensile_test(displacement, force, GAUGE)
+    paper = cdsm.fit_tensile_test(displacement, force, GAUGE, "polynomial")
     for tensions in (np.linspace(10.0, 800.0, 400), np.geomspace(10.0, 800.0, 400)):
         assert monotone.elasticity.domain.low < 10.0
         assert monotone.elasticity.domain.high > 800.0
@@ -66,7 +66,7 @@ def test_under_more_noise_polynomials_lose_and_the_curve_does_not() -> None:
         errors.append(
             [
                 error(
-                    cdsm.fit_tensile_test(displacement, force, GAUGE, how, samples=40).elasticity,
+                    cdsm.fit_tensile_test(displacement, force, GAUGE, how).elasticity,
                     tensions,
                 )
                 for how in ("monotone", "polynomial")
@@ -81,7 +81,7 @@ def test_under_more_noise_polynomials_lose_and_the_curve_does_not() -> None:
 # a stage ends at one of tensions that are 3 % apart: without noise within two of them
 @pytest.mark.parametrize(("noise", "spread"), [(0.0, 0.06), (0.5, 0.15), (2.0, 0.3)])
 def test_stages_of_eq_19_against_the_paper(noise: float, spread: float, seed: int) -> None:
-    fit = cdsm.fit_tensile_test(*strand_test(noise, seed), GAUGE, samples=40)
+    fit = cdsm.fit_tensile_test(*strand_test(noise, seed), GAUGE)
     first, second = fit.stages
     assert (first.name, second.name) == ("pre-tensioning", "elastic")
     assert first.high == second.low == pytest.approx(120.0, rel=spread)  # the paper's
@@ -103,9 +103,9 @@ def linear_test(points: int, noise: float, slack: float = 0.0) -> tuple[Array, A
 @pytest.mark.parametrize("points", [12, 50, 200, 2000])
 @pytest.mark.parametrize("noise", [0.0, 0.1, 1.0, 4.0])
 def test_linear_wire_is_recovered(points: int, noise: float) -> None:
-    fit = cdsm.fit_tensile_test(*linear_test(points, noise), GAUGE, samples=40)
+    fit = cdsm.fit_tensile_test(*linear_test(points, noise), GAUGE)
     assert [stage.name for stage in fit.stages] == ["elastic"]
-    rigidity = fit.elasticity.rigidity(fit.band.tensions)
+    rigidity = fit.elasticity.rigidity(fit.tensions)
     np.testing.assert_allclose(rigidity, EA, rtol=1e-6 + 0.04 * noise)
 
 
@@ -116,7 +116,7 @@ def test_toe_and_linear_are_recovered_away_from_the_bend(points: int, noise: flo
     strain = np.linspace(0.0, bend + 740.0 / EA, points)
     force = np.where(strain < bend, 8e3 * strain, 60.0 + EA * (strain - bend))
     force += noise * np.random.default_rng(points).normal(size=points)
-    fit = cdsm.fit_tensile_test(GAUGE * strain, force, GAUGE, samples=40)
+    fit = cdsm.fit_tensile_test(GAUGE * strain, force, GAUGE)
     upper = np.linspace(150.0, 750.0, 50)
     lower = np.linspace(20.0, 40.0, 20)
     assert fit.elasticity.rigidity(upper) == pytest.approx(EA, rel=0.1)
@@ -131,7 +131,7 @@ def test_yield_ends_the_domain(points: int, noise: float) -> None:
     strain = np.linspace(0.0, 1.6 * 600.0 / EA, points)
     force = np.where(strain < 600.0 / EA, EA * strain, 600.0 + 0.1 * (EA * strain - 600.0))
     force += noise * np.random.default_rng(points).normal(size=points)
-    fit = cdsm.fit_tensile_test(GAUGE * strain, force, GAUGE, samples=40)
+    fit = cdsm.fit_tensile_test(GAUGE * strain, force, GAUGE)
     high = fit.elasticity.domain.high
     assert high == pytest.approx(600.0, rel=0.08)
     assert fit.stages[-1].name == "plastic"
@@ -143,7 +143,7 @@ def test_yield_ends_the_domain(points: int, noise: float) -> None:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_rigidity_is_positive_and_strain_c1_everywhere(seed: int) -> None:
-    law = cdsm.fit_tensile_test(*strand_test(2.0, seed), GAUGE, samples=40).elasticity
+    law = cdsm.fit_tensile_test(*strand_test(2.0, seed), GAUGE).elasticity
     assert isinstance(law, cdsm.TabulatedElasticity)
     dense = np.linspace(law.domain.low, law.domain.high, 20001)
     assert (law.rigidity(dense) > 0.0).all()
@@ -157,7 +157,7 @@ def test_rigidity_is_positive_and_strain_c1_everywhere(seed: int) -> None:
 
 
 def test_slack_is_dropped() -> None:
-    fit = cdsm.fit_tensile_test(*linear_test(300, 0.5, slack=0.01), GAUGE, samples=40)
+    fit = cdsm.fit_tensile_test(*linear_test(300, 0.5, slack=0.01), GAUGE)
     assert any("before the first load" in note for note in fit.notes)
     assert fit.start == pytest.approx(GAUGE * 0.01, abs=2e-4)
     assert fit.elasticity.rigidity([50.0, 400.0, 750.0]) == pytest.approx(EA, rel=0.03)
@@ -170,7 +170,7 @@ def test_unloading_is_left_out() -> None:
     force = EA * strain
     force[200:] -= np.where(strain[200:] < 0.01, 30.0, 0.0)  # hysteresis
     force += 0.5 * np.random.default_rng(1).normal(size=strain.size)
-    fit = cdsm.fit_tensile_test(GAUGE * strain, force, GAUGE, samples=40)
+    fit = cdsm.fit_tensile_test(GAUGE * strain, force, GAUGE)
     assert any("unloading" in note for note in fit.notes)
     assert fit.elasticity.rigidity(np.linspace(50, 700, 9)) == pytest.approx(EA, rel=0.03)
     assert fit.rms == pytest.approx(0.5, rel=0.2)
@@ -181,14 +181,14 @@ def test_repeated_points_are_averaged() -> None:
     d, f = np.repeat(displacement, 2), np.repeat(force, 2)
     f[::2] += 1.0
     f[1::2] -= 1.0
-    fit = cdsm.fit_tensile_test(d, f, GAUGE, samples=40)
+    fit = cdsm.fit_tensile_test(d, f, GAUGE)
     assert fit.elasticity.rigidity([50.0, 700.0]) == pytest.approx(EA, rel=1e-6)
 
 
 def test_rupture_is_left_out() -> None:
     displacement, force = linear_test(100, 0.0)
     force[90:] = 0.0
-    fit = cdsm.fit_tensile_test(displacement, force, GAUGE, samples=40)
+    fit = cdsm.fit_tensile_test(displacement, force, GAUGE)
     assert fit.elasticity.domain.high == pytest.approx(force[89])
     assert any("largest force" in note for note in fit.notes)
 
@@ -197,9 +197,8 @@ def test_rupture_is_left_out() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("method", ["monotone", "polynomial"])
 @pytest.mark.parametrize("law", ["linear", "strand"])
-def test_band_covers_the_truth_about_as_often_as_it_says(law: str, method: str) -> None:
+def test_band_covers_the_truth_about_as_often_as_it_says(law: str) -> None:
     covered = []
     for seed in range(12):
         if law == "strand":
@@ -207,7 +206,8 @@ def test_band_covers_the_truth_about_as_often_as_it_says(law: str, method: str) 
         else:
             displacement, force = linear_test(150, 0.0)
             force = force + np.random.default_rng(seed).normal(size=force.size)
-        band = cdsm.fit_tensile_test(displacement, force, GAUGE, method, samples=80).band
+        band = cdsm.fit_tensile_test(displacement, force, GAUGE).band
+        assert band is not None
         inner = (band.tensions > 15.0) & (band.tensions < 800.0)
         truth = np.full_like(band.tensions, EA)
         if law == "strand":
@@ -228,6 +228,7 @@ def test_band_misses_a_kink_and_what_lies_next_to_it() -> None:
         strain = np.where(F < 200.0, F / 15e3, 200.0 / 15e3 + (F - 200.0) / 45e3)
         force = F + np.random.default_rng(seed).normal(size=F.size)
         band = cdsm.fit_tensile_test(GAUGE * strain, force, GAUGE).band
+        assert band is not None
         truth = np.where(band.tensions < 200.0, 15e3, 45e3)
         inside = (band.low <= truth) & (truth <= band.high)
         covered.append(inside[(band.tensions > 15.0) & (band.tensions < 800.0)].mean())
@@ -238,8 +239,10 @@ def test_band_misses_a_kink_and_what_lies_next_to_it() -> None:
 
 def test_fit_is_reproducible_and_reports_itself() -> None:
     displacement, force = strand_test(0.5, 0)
-    fit = cdsm.fit_tensile_test(displacement, force, GAUGE, samples=40, seed=3)
-    again = cdsm.fit_tensile_test(displacement, force, GAUGE, samples=40, seed=3)
+    fit = cdsm.fit_tensile_test(displacement, force, GAUGE)
+    again = cdsm.fit_tensile_test(displacement, force, GAUGE)
+    assert fit.band is not None
+    assert again.band is not None
     np.testing.assert_array_equal(fit.band.low, again.band.low)
     assert fit.elasticity == again.elasticity
     for text in ("400 points", "500 mm", "N", "pre-tensioning", "elastic", "rms"):
@@ -251,7 +254,7 @@ def test_fit_is_reproducible_and_reports_itself() -> None:
 
 def test_figure_shows_data_fit_band_and_stages_in_mm_and_kn() -> None:
     displacement, force = strand_test(0.5, 0)
-    fit = cdsm.fit_tensile_test(displacement, force, GAUGE, samples=40)
+    fit = cdsm.fit_tensile_test(displacement, force, GAUGE)
     left, right = fit.plot().axes
     assert (left.get_xlabel(), left.get_ylabel()) == ("displacement [mm]", "force [N]")
     assert (right.get_xlabel(), right.get_ylabel()) == ("tension [N]", "tangent rigidity EA [kN]")
@@ -389,8 +392,6 @@ def test_other_bad_arguments_are_refused() -> None:
         cdsm.fit_tensile_test(RAMP, bad, GAUGE)
     with pytest.raises(cdsm.UnknownName, match="monotone"):
         cdsm.fit_tensile_test(RAMP, PULL, GAUGE, "monoton")
-    with pytest.raises(cdsm.InvalidInput, match="samples"):
-        cdsm.fit_tensile_test(RAMP, PULL, GAUGE, samples=3)
     bent = 500.0 * (RAMP / RAMP[-1]) ** 0.2  # softens from the first point on: never elastic
     with pytest.raises(cdsm.TensileTestError, match="Sample more finely"):
         cdsm.fit_tensile_test(RAMP, bent, GAUGE)

@@ -51,7 +51,7 @@ def test_constant_rigidity(
     law = cdsm.LinearElasticity(10.0**decade)
     displacement, force = made(law, 1.0, points, gauge)
     force = force + noise * np.random.default_rng(seed).normal(size=points)
-    fit = cdsm.fit_tensile_test(displacement, force, gauge, samples=40)
+    fit = cdsm.fit_tensile_test(displacement, force, gauge)
     inner = np.linspace(0.1 * HIGHEST, 0.9 * HIGHEST, 50)
     assert misfit(fit, law, inner) < 1e-6 + 6.0 * of_slope(noise, points, HIGHEST / 2.0)
     assert [stage.name for stage in fit.stages] == ["elastic"]
@@ -64,7 +64,7 @@ def test_eq_19(points: int, noise: float, gauge: float, seed: int) -> None:
     law = cdsm.presets.STRAND_1X19
     displacement, force = made(law, 2.3, points, gauge)
     force = force + noise * np.random.default_rng(seed).normal(size=points)
-    fit = cdsm.fit_tensile_test(displacement, force, gauge, samples=40)
+    fit = cdsm.fit_tensile_test(displacement, force, gauge)
     inner = np.linspace(60.0, 780.0, 100)
     # EA bends over some 100 N; what is left without noise is the smoothed bend
     assert misfit(fit, law, inner) < 0.02 + 4.0 * of_slope(noise, points, 100.0)
@@ -87,7 +87,7 @@ def test_toe_and_constant(
     law = cdsm.TabulatedElasticity(tuple(F.tolist()), tuple(strain.tolist()))
     displacement, force = made(law, 1.0, points, gauge)
     force = force + noise * np.random.default_rng(seed).normal(size=points)
-    fit = cdsm.fit_tensile_test(displacement, force, gauge, samples=40)
+    fit = cdsm.fit_tensile_test(displacement, force, gauge)
     inner = np.linspace(60.0, 780.0, 100)
     assert misfit(fit, law, inner) < 0.02 + 4.0 * of_slope(noise, points, 100.0)
     assert fit.stages[-1].name == "elastic"
@@ -100,8 +100,8 @@ def test_the_law_does_not_depend_on_how_long_the_wire_was(
 ) -> None:
     displacement, force = made(cdsm.presets.STRAND_1X19, 2.3, 150, gauge)
     force = force + 0.5 * np.random.default_rng(seed).normal(size=150)
-    one = cdsm.fit_tensile_test(displacement, force, gauge, samples=40)
-    other = cdsm.fit_tensile_test(times * displacement, force, times * gauge, samples=40)
+    one = cdsm.fit_tensile_test(displacement, force, gauge)
+    other = cdsm.fit_tensile_test(times * displacement, force, times * gauge)
     low = max(one.elasticity.domain.first, other.elasticity.domain.first)
     high = min(one.elasticity.domain.high, other.elasticity.domain.high)
     tensions = np.linspace(low, high, 50)

@@ -1,24 +1,23 @@
-"""From a tensile test to the elasticity of a wire: any wire, not only the paper's."""
+"""From a tensile test to the elasticity of a wire."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, final
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import ndtri, stdtrit
+from scipy.special import stdtrit
 
 from cdsm.elasticity import Elasticity
 from cdsm.errors import TensileTestError
-from cdsm.support.validation import Array, ReadOnlyState, frozen, one_of, scalar, whole_number
+from cdsm.support.validation import Array, ReadOnlyState, frozen, one_of, scalar
 from cdsm.wires.laws import TabulatedElasticity
 from cdsm.wires.tensile.loading import FEWEST, loading
-from cdsm.wires.tensile.polynomials import miss, polynomials
+from cdsm.wires.tensile.polynomials import polynomials
 from cdsm.wires.tensile.record import TensileTest
 from cdsm.wires.tensile.spline import Basis, Curve, Points, fit_curve
-from cdsm.wires.tensile.stages import doubts, refuse_jumps, settled, yield_onset
+from cdsm.wires.tensile.stages import doubts, pretension_end, refuse_jumps, yield_onset
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -26,8 +25,9 @@ if TYPE_CHECKING:
 METHODS: Final = ("monotone", "polynomial")
 CONFIDENCE: Final = 0.95
 UNKNOWN: Final = 1e9
-"""Factor from EA to either end of the band at most: a wider band would say as little."""
+"""Largest factor from EA to an end of the band: a wider band would say as little."""
 _KNOTS: Final = 200
+"""Tensions in the table of a fit: linear interpolation between them is exact enough."""
 
 
 @final
@@ -52,27 +52,23 @@ class Stage:
 @final
 @dataclass(frozen=True, eq=False)
 class Band(ReadOnlyState):
-    """Where EA lies with 95 % confidence: scatter of the points, and bias of the fit.
+    """Where EA lies with 95 % confidence: scatter of the points, and bias of the smoothing.
 
-    ``monotone``: EA·exp(±t s), with s the standard deviation of ln EA, from residuals as large as
-    they are around each tension and from the mean squared bias of the smoothing (Nychka, J. Am.
-    Stat. Assoc. 83, 1988), the smoothing being the least that its likelihood allows.
-    ``polynomial``: EA ± 1.96 r, with r the rms by which polynomials through resampled tests (wild
-    bootstrap) miss the curve that the tests were sampled from; never below 0.
+    EA·exp(±t s), with s the standard deviation of ln EA, from residuals as large as they are around
+    each tension and from the mean squared bias of the smoothing (Nychka, J. Am. Stat. Assoc. 83,
+    1988), the smoothing being the least that its likelihood allows.
 
     It covers 95 % of the tensions, not each, and is calibrated for smooth wires. Counted from 15 N
     to 800 N over 20 tests of each kind, under noise that is the same for all forces or grows with
-    them, ``monotone`` covers 98 % and more of the tensions of a wire without corners. Where EA
-    jumps, as at a kink of force over strain, the curve rounds it off, by 10 % and more: 84 to 95 %
-    are covered, nothing next to the kink, and mostly no note says so. ``polynomial`` covers 83 to
-    100 % of smooth wires on average and 87 to 90 % of kinked ones, but in a single test it may be
-    half and less (44 % of a softening wire).
+    them, it covers 98 % and more of the tensions of a wire without corners. Where EA jumps, as at a
+    kink of force over strain, the curve rounds it off, by 10 % and more: 84 to 95 % are covered,
+    nothing next to the kink, and mostly no note says so.
 
-    Errors that neighbouring points share (drift, ripple, slip) are not in it; ``TensileFit.notes``
-    tells of those it can see, which a drift as slow as the test is not. Nor are errors of
-    calibration or gauge length. Steps of a load cell that are coarser than the noise are shared by
-    neighbours, too: with steps of 0.5 N and no noise 50 to 93 % are covered, with 0.1 N of noise 93
-    to 98 % of smooth wires.
+    Errors that neighbouring points share (drift, ripple, slip) are not included;
+    ``TensileFit.notes`` names those that the residuals show, which a drift as slow as the test is
+    not. Nor are errors of calibration or gauge length. Steps of a load cell that are coarser than
+    the noise are shared by neighbours, too: with steps of 0.5 N and no noise 50 to 93 % are
+    covered, with 0.1 N of noise 93 to 98 % of smooth wires.
 
     Attributes:
         tensions: F, shape (n,) [N].
@@ -95,8 +91,9 @@ class TensileFit(ReadOnlyState):
         stages: What the rigidity curve shows of pre-tensioning, elastic and plastic, in this order.
         rms: Root mean square of measured minus fitted force, over the domain [N]; of averages where
             points were averaged.
-        band: 95 % confidence of EA.
-        test: What was fitted.
+        tensions: F over the domain, rising, shape (n,) [N], some 200.
+        band: 95 % confidence of EA at these; None for ``polynomial``.
+        test: The test.
         method: ``monotone`` or ``polynomial``.
         start: Displacement at the low end of the domain [m].
         notes: What was left out or cut, and what makes the fit doubtful; one sentence each.
@@ -105,7 +102,8 @@ class TensileFit(ReadOnlyState):
     elasticity: Elasticity
     stages: tuple[Stage, ...]
     rms: float
-    band: Band
+    tensions: Array
+    band: Band | None
     test: TensileTest
     method: str
     start: float
@@ -113,7 +111,7 @@ class TensileFit(ReadOnlyState):
 
     def __str__(self) -> str:
         low, high = self.elasticity.domain
-        ends = self.elasticity.rigidity(self.band.tensions[[0, -1]])
+        ends = self.elasticity.rigidity(self.tensions[[0, -1]])
         return "\n".join(
             [
                 f"Tensile test of {self.test.force.size} points, gauge length "
@@ -143,24 +141,22 @@ def fit_tensile_test(
     method: str = "monotone",
     *,
     join: float = 31.0,
-    samples: int = 200,
-    seed: int = 0,
 ) -> TensileFit:
     r"""Fit the tangent rigidity EA(F) = l_0 dF/dΔl [N] of a wire to its tensile test.
 
     ``monotone`` fits the forces themselves by a curve whose log EA is a spline, so that EA > 0 and
     the curve is C1; its smoothness follows from the data (restricted likelihood).
-    ``polynomial`` is the paper's way, for comparison: slopes of the measured curve, fitted
-    by two polynomials of degree 6. Points of equal displacement are averaged. Unloading, what
-    follows the largest force, and single points far from their neighbours are left out, and slack:
-    points before the first load, which is where the force begins to rise beyond three standard
-    deviations of its noise. ``notes`` says so, and names points far from the curve, falls of the
-    force as of a slipping grip, and residuals that go together as under drift.
+    ``polynomial`` is the method of the paper, for comparison: two polynomials of degree 6 through
+    slopes of the measured curve, without a band. Points of equal displacement are averaged. These
+    are left out: unloading, points after the largest force, single points far from their
+    neighbours, and slack, which are points before the force begins to rise beyond three standard
+    deviations of its noise. ``notes`` lists them, and points far from the curve, falls of the force
+    as of a slipping grip, and correlated residuals as under drift.
 
     The domain ends where plasticity begins: where EA falls, for good and beyond its uncertainty,
     below 0.8 of its largest value. Pre-tensioning ends where EA grows slower than √F.
 
-    Wrong units are told only by a strain above 1 or a rigidity outside 1 N to 1e9 N: a force in kN
+    Wrong units are found only by a strain above 1 or a rigidity outside 1 N to 1e9 N: a force in kN
     passes for a thin thread. Read the report.
 
     Args:
@@ -169,11 +165,9 @@ def fit_tensile_test(
         gauge_length: l_0 [m].
         method: ``monotone`` or ``polynomial``.
         join: Tension at which the two polynomials meet [N].
-        samples: Of the bootstrap of ``polynomial``, from 40 to 10 000.
-        seed: Of the same.
 
     Raises:
-        InvalidInput: Not finite numbers, or samples or a seed out of place.
+        InvalidInput: Not finite numbers.
         UnknownName: No such method.
         TensileTestError: Arrays of different length, fewer than 8 points, a gauge length that is
             not positive, compression, a force that does not rise or jumps, units that cannot be
@@ -182,7 +176,6 @@ def fit_tensile_test(
     """
     one_of("method", method, METHODS)
     join = scalar("join", join)
-    samples, seed = whole_number("samples", samples, 40, 10_000), whole_number("seed", seed, 0)
     test = TensileTest(displacement, force, gauge_length)  # type: ignore[arg-type]
     points, noise, notes = loading(test)
     curve = _curve(points, noise)
@@ -200,21 +193,17 @@ def fit_tensile_test(
         spread = curve.spread(points)
         notes += (f"plastic from {onset:.4g} N on: left out",)
     refuse_jumps(curve, points)
-    if method == "monotone":
-        elasticity, start, limits, more = _monotone(curve, points)
-    else:
-        random = np.random.default_rng(seed)
-        elasticity, start, limits, more = _polynomial(curve, points, join, samples, random)
+    fitted_by = _monotone if method == "monotone" else _polynomial
+    elasticity, start, more = fitted_by(curve, points, join)
     low, high = elasticity.domain
     if not elasticity.domain.low_included:
         low = float(np.nextafter(low, high))
-    tensions = frozen(_spread(low, high, curve.basis.tensions))
-    lower, upper = limits(tensions)
+    tensions = frozen(_grid(low, high, curve.basis.tensions))
     strain = points.strain - start
     fitted = np.interp(strain, elasticity.strain(tensions), tensions)
     inside = (strain >= 0.0) & (fitted < tensions[-1])
     deviation = np.interp(tensions, curve.basis.tensions, spread.deviation)
-    settles = settled(tensions, elasticity.rigidity(tensions), deviation)
+    settles = pretension_end(tensions, elasticity.rigidity(tensions), deviation)
     low, high = float(tensions[0]), float(tensions[-1])
     stages: tuple[Stage, ...] = (Stage("elastic", low if settles is None else settles, high),)
     if settles is not None:
@@ -225,15 +214,13 @@ def fit_tensile_test(
         elasticity=elasticity,
         stages=stages,
         rms=float(np.sqrt(np.mean((points.force - fitted)[inside] ** 2))),
-        band=Band(tensions, frozen(lower), frozen(upper)),
+        tensions=tensions,
+        band=_band(elasticity, tensions, curve, points) if method == "monotone" else None,
         test=test,
         method=method,
         start=start * test.gauge_length,
         notes=notes + more + doubts(points, spread, test.gauge_length),
     )
-
-
-_Limits = Callable[[Array], tuple[Array, Array]]
 
 
 def _curve(points: Points, noise: float) -> Curve:
@@ -242,43 +229,40 @@ def _curve(points: Points, noise: float) -> Curve:
     return fit_curve(points, Basis.over(low, high, corner, len(points.force)), noise)
 
 
-def _monotone(curve: Curve, points: Points) -> tuple[Elasticity, float, _Limits, tuple[str, ...]]:
-    """The curve as a table, the strain at its low end, the band of EA(F), and notes."""
+def _monotone(
+    curve: Curve, points: Points, join: float
+) -> tuple[Elasticity, float, tuple[str, ...]]:
+    """The curve as a table, the strain at its low end, and notes."""
     grid = curve.basis.tensions
     # the fit, not the largest noise, says how far the test went
     first, last = curve.force(points.strain[[0, -1]])
-    tensions = _spread(max(grid[0], float(first)), min(grid[-1], float(last)), grid)
+    tensions = _grid(max(grid[0], float(first)), min(grid[-1], float(last)), grid)
     strain = np.interp(tensions, grid, curve.strain)
     law = TabulatedElasticity(tuple(tensions.tolist()), tuple((strain - strain[0]).tolist()))
-    spread = curve.loosest(points).spread(points)
-    reach = float(stdtrit(spread.freedom, (1.0 + CONFIDENCE) / 2.0))
-
-    def limits(at: Array) -> tuple[Array, Array]:
-        deviation = np.minimum(reach * np.interp(at, grid, spread.deviation), np.log(UNKNOWN))
-        factor = np.exp(deviation)
-        return law.rigidity(at) / factor, law.rigidity(at) * factor
-
-    return law, float(strain[0]), limits, ()
+    return law, float(strain[0]), ()
 
 
 def _polynomial(
-    curve: Curve, points: Points, join: float, samples: int, random: np.random.Generator
-) -> tuple[Elasticity, float, _Limits, tuple[str, ...]]:
-    """The same of the paper's two polynomials."""
+    curve: Curve, points: Points, join: float
+) -> tuple[Elasticity, float, tuple[str, ...]]:
+    """The two polynomials of the paper, the strain at their low end, and notes."""
     law, notes = polynomials(points, join)
-    missed = miss(curve, points, join, samples, random)
-    tensions = _spread(float(np.nextafter(law.low, law.high)), law.high, curve.basis.tensions)
+    tensions = _grid(float(np.nextafter(law.low, law.high)), law.high, curve.basis.tensions)
     # where the law begins is not measured: it is put where it fits best
     offsets = np.interp(tensions, curve.basis.tensions, curve.strain) - law.strain(tensions)
-
-    def limits(at: Array) -> tuple[Array, Array]:
-        reach = float(ndtri((1.0 + CONFIDENCE) / 2.0)) * missed(at)
-        return np.maximum(law.rigidity(at) - reach, 0.0), law.rigidity(at) + reach
-
-    return law, float(np.average(offsets, weights=np.gradient(tensions))), limits, notes
+    return law, float(np.average(offsets, weights=np.gradient(tensions))), notes
 
 
-def _spread(low: float, high: float, grid: Array) -> Array:
+def _band(law: Elasticity, tensions: Array, curve: Curve, points: Points) -> Band:
+    spread = curve.loosest(points).spread(points)
+    reach = float(stdtrit(spread.freedom, (1.0 + CONFIDENCE) / 2.0))
+    deviation = reach * np.interp(tensions, curve.basis.tensions, spread.deviation)
+    factor = np.exp(np.minimum(deviation, np.log(UNKNOWN)))
+    rigidity = law.rigidity(tensions)
+    return Band(tensions, frozen(rigidity / factor), frozen(rigidity * factor))
+
+
+def _grid(low: float, high: float, grid: Array) -> Array:
     """Tensions (n,) [N] from low to high, some 200 over the grid."""
     inside = grid[(grid > low) & (grid < high)][5 :: len(grid) // _KNOTS]
     return np.array([low, *inside[:-1], high])

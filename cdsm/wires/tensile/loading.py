@@ -1,4 +1,4 @@
-"""What of a tensile test can be fitted: its loading, from the first load to the largest."""
+"""The part of a tensile test that can be fitted: loading, from the first load to the largest."""
 
 from __future__ import annotations
 
@@ -12,10 +12,15 @@ from cdsm.wires.tensile.record import TensileTest
 from cdsm.wires.tensile.spline import Points
 
 FEWEST = 8
-_MOST = 800  # more are averaged: their mean says as much, and is fitted faster
-_WILD = 5e-3  # share of the range that a single point must stand out by
-_AROUND = 25  # points over which the noise is taken to be the same
-_SURE = 3.0  # standard deviations
+"""Points of a fit: fewer show no bend."""
+_MOST = 800
+"""Points that are fitted; more are averaged, since their mean says as much and fits faster."""
+_WILD = 5e-3
+"""Share of the range by which a single point must stand out."""
+_AROUND = 25
+"""Points over which the noise is taken to be the same."""
+_SURE = 3.0
+"""Standard deviations beyond which a force has risen."""
 _MISTAKEN = (  # what is given in another unit, and what turns force and strain right
     ("the displacement is in mm", 1.0, 1e-3),
     ("the displacement is in µm", 1.0, 1e-6),
@@ -28,15 +33,7 @@ _MAD = 1.4826  # standard deviation of normal noise by its median magnitude
 
 
 def loading(test: TensileTest) -> tuple[Points, float, tuple[str, ...]]:
-    """The points to be fitted, the noise of one of them [N], and what was left out and why.
-
-    Args:
-        test: In the order it was recorded.
-
-    Raises:
-        TensileTestError: Too few points, units that cannot be, compression, or a force that does
-            not rise with the displacement.
-    """
+    """The points to be fitted, the noise of one of them [N], and notes on what was left out."""
     notes: list[str] = []
     _enough(test.force.size, "points are given")
     wild = _wild(test.force)

@@ -1,9 +1,7 @@
-"""The paper's way from a tensile test to EA(F): two polynomials through measured slopes."""
+"""The method of the paper for EA(F): two polynomials through measured slopes."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -12,9 +10,9 @@ from numpy.polynomial import Polynomial
 from cdsm.errors import TensileTestError
 from cdsm.support.validation import Array
 from cdsm.wires.laws import StrandElasticity
-from cdsm.wires.tensile.spline import Curve, Points
+from cdsm.wires.tensile.spline import Points
 
-_DEGREE = 6
+_DEGREE = 6  # as in Eq. 19
 _NARROW = 0.1  # share of its largest tension that a range must span
 _HALF = 3  # neighbours on each side that a slope is taken over
 _FEWEST = 2 * _HALF + 2 * (_DEGREE + 1)  # points: twice as many slopes as coefficients
@@ -26,17 +24,14 @@ def polynomials(points: Points, join: float) -> tuple[StrandElasticity, tuple[st
     Args:
         points: Of loading, strain rising.
         join: Tension [N] at which they meet; one polynomial if either side has too few points.
-
-    Raises:
-        TensileTestError: Too few points, or they are positive on less than half the range.
     """
     if len(points.force) < _FEWEST:
         raise TensileTestError(
             f"only {len(points.force)} points are left, and polynomials of degree {_DEGREE} need "
             f"at least {_FEWEST}. Use method='monotone', or sample more finely."
         )
-    joins = joins_of(points, join)
-    rows = coefficients(points, joins)
+    joins = _joins_of(points, join)
+    rows = _coefficients(points, joins)
     low, high = max(float(points.force[0]), 0.0), float(points.force.max())
     start, end = max(_positive(rows, (low, *joins, high)), key=lambda each: each[1] - each[0])
     if end - start < (high - low) / 2.0:
@@ -65,7 +60,7 @@ def _positive(rows: list[list[float]], edges: tuple[float, ...]) -> list[tuple[f
 
     Each polynomial is positive or not between its roots: a grid would miss a dip between its lines.
     """
-    tops = abs(evaluate(rows, edges[1:-1], np.linspace(edges[0], edges[-1], 400)))
+    tops = abs(_evaluate(rows, edges[1:-1], np.linspace(edges[0], edges[-1], 400)))
     margin = 1e-6 * float(tops.max())  # the strain is the integral of 1/EA
     ranges = [(edges[0], edges[0])]
     for row, low, high in zip(rows, edges[:-1], edges[1:], strict=True):
@@ -83,7 +78,7 @@ def _positive(rows: list[list[float]], edges: tuple[float, ...]) -> list[tuple[f
     return ranges
 
 
-def joins_of(points: Points, join: float) -> tuple[float, ...]:
+def _joins_of(points: Points, join: float) -> tuple[float, ...]:
     """The join, if both sides of it have points and width enough for a polynomial."""
     below = int(np.count_nonzero(points.force <= join))
     enough = 2 * (_DEGREE + 1)
@@ -93,7 +88,7 @@ def joins_of(points: Points, join: float) -> tuple[float, ...]:
     return (join,) if wide and min(below, len(points.force) - below) >= enough else ()
 
 
-def coefficients(points: Points, joins: tuple[float, ...]) -> list[list[float]]:
+def _coefficients(points: Points, joins: tuple[float, ...]) -> list[list[float]]:
     """Least-squares polynomials of the slopes over the force, lowest power first, one per range.
 
     Two ranges share their value at the join: with y = F − join the polynomials are
@@ -115,30 +110,7 @@ def coefficients(points: Points, joins: tuple[float, ...]) -> list[list[float]]:
     ]
 
 
-def miss(
-    curve: Curve, points: Points, join: float, samples: int, random: np.random.Generator
-) -> Callable[[Array], Array]:
-    """The rms (n,) [N] by which such polynomials miss EA at tensions (n,) [N].
-
-    By the wild bootstrap: as if the curve were the truth, tests are sampled that might as well have
-    been measured, with every residual of either sign. Unlike shuffled residuals, these keep noise
-    that grows with the force where it is.
-    """
-    joins = joins_of(points, join)
-    fitted = curve.force(points.strain)
-    errors = curve.spread(points).errors / np.sqrt(points.count)
-    signs = random.choice((-1.0, 1.0), (samples, len(errors)))
-    rows = [coefficients(replace(points, force=fitted + s * errors), joins) for s in signs]
-
-    def rms(tensions: Array) -> Array:
-        truth = np.interp(tensions, curve.basis.tensions, curve.rigidity)
-        missed = np.array([evaluate(each, joins, tensions) - truth for each in rows])
-        return np.asarray(np.sqrt(np.mean(missed**2, axis=0)))
-
-    return rms
-
-
-def evaluate(rows: list[list[float]], joins: tuple[float, ...], tensions: Array) -> Array:
+def _evaluate(rows: list[list[float]], joins: tuple[float, ...], tensions: Array) -> Array:
     """The polynomials at tensions (n,) [N], EA (n,) [N]."""
     piece = np.searchsorted(joins, tensions, side="left")
     values = np.array([np.polyval(row[::-1], tensions) for row in rows])

@@ -1,4 +1,4 @@
-"""Where the rigidity curve settles, where it gives way, and what makes it doubtful."""
+"""Where pre-tensioning ends, where the wire yields, and what makes a fit doubtful."""
 
 from __future__ import annotations
 
@@ -11,13 +11,18 @@ from cdsm.wires.tensile.spline import Curve, Points, Spread
 
 YIELD = 0.8
 """Plasticity begins where EA falls below this share of its largest value, for good."""
-SETTLED = 0.5
+PRETENSIONED = 0.5
 """Pre-tensioning ends where d ln EA/d ln F falls below this: midway from EA ∝ F to EA constant."""
-_CERTAIN = 3.0  # standard deviations
-_FAR = 8.0  # likewise, of a point that does not belong
+_CERTAIN = 3.0
+"""Standard deviations of a fact that noise has not made."""
+_FAR = 8.0
+"""Standard deviations of a point that does not belong to the test."""
 _JUMP = 10.0
-_SEEN = 1e-4  # share of the range: no load cell shows less
-_STEP = 1.25  # ratio of tensions over which the exponent is taken: noise passes for slope below
+"""EA over the steepest measured chord from which on the curve has overshot a jump."""
+_SEEN = 1e-4
+"""Share of the range of force that a load cell shows at least."""
+_STEP = 1.25
+"""Ratio of tensions over which the exponent is taken: over less, noise passes for slope."""
 
 
 def yield_onset(tensions: Array, rigidity: Array, deviation: Array) -> float | None:
@@ -37,7 +42,7 @@ def yield_onset(tensions: Array, rigidity: Array, deviation: Array) -> float | N
     return float(tensions[tail]) if sure[tail:].any() else None
 
 
-def settled(tensions: Array, rigidity: Array, deviation: Array) -> float | None:
+def pretension_end(tensions: Array, rigidity: Array, deviation: Array) -> float | None:
     """Tension [N] from which EA grows slower than √F, or None if it surely never grew faster.
 
     Args:
@@ -51,7 +56,7 @@ def settled(tensions: Array, rigidity: Array, deviation: Array) -> float | None:
         return None
     F = tensions[inner]
     above, under = (np.interp(F * s, tensions, level) for s in (_STEP, 1.0 / _STEP))
-    steep = (above - under) / (2.0 * np.log(_STEP)) >= SETTLED
+    steep = (above - under) / (2.0 * np.log(_STEP)) >= PRETENSIONED
     surely = np.interp(F, tensions, level - _CERTAIN * deviation)
     perhaps = np.interp(F, tensions, level + _CERTAIN * deviation)
     edges = np.flatnonzero(np.diff(np.pad(steep.astype(int), 1)))
@@ -63,11 +68,7 @@ def settled(tensions: Array, rigidity: Array, deviation: Array) -> float | None:
 
 
 def refuse_jumps(curve: Curve, points: Points) -> None:
-    """Refuse a force that jumps: the curve has overshot there.
-
-    Raises:
-        TensileTestError: EA is ten times what it is between any two neighbouring points.
-    """
+    """Refuse a force that jumps: there EA of the curve is ten times that of any measured chord."""
     first, last = curve.force(points.strain[[0, -1]])
     inside = (curve.basis.tensions >= first) & (curve.basis.tensions <= last)
     steepest = int(np.where(inside, curve.rigidity, 0.0).argmax())
@@ -81,7 +82,7 @@ def refuse_jumps(curve: Curve, points: Points) -> None:
 
 
 def doubts(points: Points, spread: Spread, gauge_length: float) -> tuple[str, ...]:
-    """What the residuals say against the fit, one sentence each."""
+    """What in the residuals makes the fit doubtful, one sentence each."""
     errors, reach = spread.errors, float(np.ptp(points.force))
     notes = []
     times = abs(errors) / np.maximum(local_noise(errors), _SEEN * reach)

@@ -38,7 +38,7 @@ def answers() -> dict[str, Any]:
     K, u = cdsm.stiffness(pose, pull), (0.0, 0.3, 1.0)
     pulls = cdsm.distribute_tensions(arm, [pose.q, pose.q / 2.0], 10.0)
     target = K.along(u)
-    fit = cdsm.fit_tensile_test(*tensile(laws()["linear"], 300.0, 40, 0.2), 0.5, samples=40)
+    fit = cdsm.fit_tensile_test(*tensile(laws()["linear"], 300.0, 40, 0.2), 0.5)
     return {
         "arm": arm,
         "geometry": arm.geometry,
