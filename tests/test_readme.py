@@ -8,7 +8,9 @@ from pathlib import Path
 from cdsm import paper
 from tests.conftest import Results
 
-README = Path(__file__).parents[1] / "README.md"
+ROOT = Path(__file__).parents[1]
+README = ROOT / "README.md"
+CONTRIBUTING = ROOT / ".github" / "CONTRIBUTING.md"
 
 
 def test_snippets_print_what_the_readme_shows() -> None:
@@ -42,3 +44,12 @@ def test_table_is_what_reproduce_computes(
     computed = [(row[0], *row[2:7]) for row in rows]
     for row in shown:
         assert row in computed
+
+
+def test_files_and_constants_that_contributing_names_exist() -> None:
+    text = CONTRIBUTING.read_text(encoding="utf-8")
+    named = re.findall(r"`((?:cdsm|tests)/[\w./]+)`", text)
+    assert len(set(named)) > 30
+    assert [path for path in named if not (ROOT / path).exists()] == []
+    for path, name in re.findall(r"`(cdsm/[\w/]+\.py)`: `(\w+)`", text):
+        assert re.search(rf"\b{name}\b", (ROOT / path).read_text(encoding="utf-8")), (path, name)
