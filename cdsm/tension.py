@@ -25,6 +25,7 @@ from scipy.sparse import csc_matrix
 
 from cdsm.errors import InfeasibleTension, InvalidInput, SolverError
 from cdsm.kernels import tension as tension_kernels
+from cdsm.kernels.tension import DISTANCE, OPTIMALITY
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.support.validation import (
@@ -37,12 +38,6 @@ from cdsm.support.validation import (
     scalar,
     vector,
 )
-
-OPTIMALITY = 1e-9
-"""Largest accepted violation of balance, bounds and stationarity, dimensionless."""
-
-DISTANCE = 1e-6
-"""Largest accepted distance from the optimum, as the duality gap bounds it, relative to max F."""
 
 # by default HiGHS calls feasible what misses up to 1e-7, and so would not see less missing torque
 _TIGHT = {"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10}
@@ -266,7 +261,7 @@ def _solve(problem: tension_kernels.Scaled, solver: str) -> Array | str:
             return f"calls a point optimal that is not: {shortfall}"
     # only now: at the edge of the feasible, multipliers are so large that the last bit of x counts
     x, _, z = point
-    return tension_kernels.settled(x, z, low, high, OPTIMALITY * max(1.0, float(abs(x).max())))
+    return tension_kernels.onto_bounds(x, z, low, high, OPTIMALITY * max(1.0, float(abs(x).max())))
 
 
 def _instead(solver: str) -> str:

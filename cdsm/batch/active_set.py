@@ -2,12 +2,15 @@
 
 Goldfarb and Idnani's: from the least tensions that balance the arm, whatever their bounds, it takes
 one violated bound after the other into account, and lets go of those whose multiplier would change
-its sign. It ends at the optimum, or at a proof that there is no point. DAQP does the same, faster
-where the problem is large, but one Python call at a time. Here every step starts afresh from
+its sign. It ends at the optimum, or at a proof that there is no point. DAQP does the same, but one
+Python call at a time, and linear programs have to prove that there is none. Per row, with this
+search and without it: 7 and 75 µs where 18 of 400 rows need it (virtual prototype up to nine tenths
+of its joint limits), 16 and 138 µs, 10 and 518 µs where all do, since the cables run from anywhere
+to anywhere (14 cables, 6 joints). Here every step starts afresh from
 
     S = Σ J_c J_cᵀ  over the free cables,
 
-so that no error builds up; both outcomes are verified by whoever asked.
+so that no error builds up; whoever calls it verifies both outcomes.
 """
 
 from __future__ import annotations
@@ -15,9 +18,9 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from cdsm.batch.certificates import torque_of
 from cdsm.kernels.compiling import compiled
 from cdsm.kernels.linear_algebra import eliminate
+from cdsm.kernels.tension import row_product
 from cdsm.kernels.tree import Indices
 from cdsm.support.validation import Array
 
@@ -74,24 +77,24 @@ def search(J: Array, b: Array, low: Array, high: Array, state: State) -> int:
     F, y, side, multiplier, system, w = state
     for c in range(F.shape[0]):
         side[c], multiplier[c] = 0, 0.0
-    if not _settle(J, b, low, high, state):
+    if not _solve_for_sides(J, b, low, high, state):
         return LOST
     for _ in range(_STEPS * F.shape[0]):
         p, sign = _most_violated(F, low, high, side)
         if p < 0:
-            return FOUND if _settle(J, b, low, high, state) else LOST
+            return FOUND if _solve_for_sides(J, b, low, high, state) else LOST
         bound = low[p] if sign > 0.0 else high[p]
         while side[p] == 0:
             # a force by which p goes for its bound, and the free cables keep the balance
             for i in range(y.shape[0]):
                 w[i] = J[p, i]
-            if not _solve(J, side, w, system):
+            if not _solve_free(J, side, w, system):
                 return LOST
-            way = 1.0 - torque_of(J, p, w)
+            way = 1.0 - row_product(J, p, w)
             whole = sign * (bound - F[p]) / way if way > _DEPENDENT else math.inf
             part, dropped = math.inf, -1
             for c in range(F.shape[0]):
-                slope = side[c] * sign * torque_of(J, c, w)
+                slope = side[c] * sign * row_product(J, c, w)
                 if side[c] != 0 and slope < -_ROUNDING and multiplier[c] < -part * slope:
                     part, dropped = -multiplier[c] / slope, c
             if whole == math.inf and part == math.inf:
@@ -100,7 +103,7 @@ def search(J: Array, b: Array, low: Array, high: Array, state: State) -> int:
                 return IMPOSSIBLE
             step = min(whole, part)
             for c in range(F.shape[0]):
-                change = sign * step * torque_of(J, c, w)
+                change = sign * step * row_product(J, c, w)
                 if side[c] != 0:
                     multiplier[c] += side[c] * change
                 elif c != p:
@@ -129,7 +132,7 @@ def _most_violated(F: Array, low: Array, high: Array, side: Indices) -> tuple[in
 
 
 @compiled
-def _settle(J: Array, b: Array, low: Array, high: Array, state: State) -> bool:
+def _solve_for_sides(J: Array, b: Array, low: Array, high: Array, state: State) -> bool:
     """Fill F and y with the least tensions of the free cables, the others at their bounds."""
     F, y, side, _, system, w = state
     for i in range(b.shape[0]):
@@ -139,18 +142,18 @@ def _settle(J: Array, b: Array, low: Array, high: Array, state: State) -> bool:
             F[c] = low[c] if side[c] > 0 else high[c]
             for i in range(b.shape[0]):
                 w[i] -= J[c, i] * F[c]
-    if not _solve(J, side, w, system):
+    if not _solve_free(J, side, w, system):
         return False
     for i in range(b.shape[0]):
         y[i] = w[i]
     for c in range(F.shape[0]):
         if side[c] == 0:
-            F[c] = torque_of(J, c, y)
+            F[c] = row_product(J, c, y)
     return True
 
 
 @compiled
-def _solve(J: Array, side: Indices, w: Array, system: Array) -> bool:
+def _solve_free(J: Array, side: Indices, w: Array, system: Array) -> bool:
     """Replace w (nv,) by S⁻¹ w, if S is regular."""
     nv = w.shape[0]
     for i in range(nv):

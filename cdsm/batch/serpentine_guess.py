@@ -16,9 +16,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cdsm.batch.certificates import is_infeasible
 from cdsm.batch.layout import Flags
 from cdsm.kernels.compiling import compiled
+from cdsm.kernels.tension import is_infeasible
 from cdsm.kernels.tree import Indices, Routing
 from cdsm.support.validation import Array
 

@@ -11,10 +11,10 @@ import numpy as np
 
 from cdsm.batch import active_set
 from cdsm.batch.active_set import FOUND, IMPOSSIBLE, State
-from cdsm.batch.certificates import is_infeasible, is_optimal
 from cdsm.batch.layout import INFEASIBLE, OK, UNDECIDED, Codes, Flags
 from cdsm.batch.serpentine_guess import Blocks, guess, is_beyond_reach, multipliers
 from cdsm.kernels.compiling import compiled, threaded
+from cdsm.kernels.tension import is_infeasible, is_optimal
 from cdsm.support.validation import Array
 
 
@@ -86,12 +86,12 @@ def _distribute(
         k = guess(blocks, J, b, low, high, F, free, rest)
         if k < 0:
             multipliers(blocks, J, F, free, blocks.row_start[0], y)
-            if is_optimal(J, b, low, high, F, y):
+            if is_optimal(J, b, low, high, F, y, state.w, state.multiplier):
                 return OK
         elif is_beyond_reach(blocks, J, b, low, high, free, rest, k, zero, y):
             return INFEASIBLE
     outcome = active_set.search(J, b, low, high, state)
-    if outcome == FOUND and is_optimal(J, b, low, high, F, y):
+    if outcome == FOUND and is_optimal(J, b, low, high, F, y, state.w, state.multiplier):
         return OK
     if outcome == IMPOSSIBLE and is_infeasible(J, b, low, high, y):
         return INFEASIBLE

@@ -1,4 +1,11 @@
-"""Numba kernels around the tension problem: making it dimensionless, and verifying its answer."""
+"""Numba kernels of the tension problem: it is made dimensionless, and every answer is verified.
+
+    min ½‖F‖²   so that   J_Lᵀ F = τ   and   low ≤ F ≤ high.
+
+Whoever found a point, a solver or a guess, it is the optimum if it meets the conditions of Karush,
+Kuhn and Tucker, since the problem is strictly convex; and a vector of Farkas proves that no point
+meets the constraints. The tolerances below are those of single postures and of batches.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +19,21 @@ from cdsm.support.validation import Array
 
 NO_ARM = 1e-15
 """A moment arm this part of the arm's length is rounding, as of a cable that meets the axis."""
+
+OPTIMALITY = 1e-9
+"""Largest accepted violation of balance, bounds and stationarity, relative to the largest force."""
+
+DISTANCE = 1e-6
+"""Largest accepted distance from the optimum, as the duality gap bounds it, relative to max F."""
+
+_PROOF = 1e-8
+"""What a proof of infeasibility has to leave over, relative to the terms it is the sum of."""
+
+_MISSING = 10.0 * OPTIMALITY
+"""A missing torque this part of the largest arm times the largest force may be accepted."""
+
+_ROUNDING = 1e-11
+"""A torque this part of the largest is none, where a cable may pull as much as it likes."""
 
 
 class Scaled(NamedTuple):
@@ -61,8 +83,8 @@ def scaled_balance(
 
 @compiled
 def _power_of_two(value: float) -> float:
-    """The power of two next above a magnitude, and that can be divided by; 1 for zero."""
-    return 2.0 ** max(math.ceil(math.log2(value)), -1022) if value > 0.0 else 1.0
+    """The power of two next above a magnitude; 1 for zero."""
+    return 2.0 ** math.ceil(math.log2(value)) if value > 0.0 else 1.0
 
 
 @compiled
@@ -81,17 +103,20 @@ def optimality(
         z: Multipliers of the bounds (n,): negative at low, positive at high.
 
     Returns:
-        Largest violation of the constraints, largest entry of x + Aᵀy + z (or of z⁺ where high is
-        infinite), and the duality gap |xᵀx + bᵀy + lowᵀz⁻ + highᵀz⁺|: all zero exactly at the
-        optimum.
+        Largest violation of balance, over the largest moment arm, and of the bounds; largest entry
+        of x + Aᵀy + z (or of z⁺ where high is infinite); and the duality gap
+        |xᵀx + bᵀy + lowᵀz⁻ + highᵀz⁺|, of which twice bounds the squared distance from the
+        optimum. All are zero exactly at the optimum.
     """
-    primal = dual = gap = 0.0
+    primal = dual = gap = arm = 0.0
     for i in range(b.shape[0]):
         residual = -b[i]
         for j in range(x.shape[0]):
             residual += A[i, j] * x[j]
+            arm = max(arm, abs(A[i, j]))
         primal = max(primal, abs(residual))
         gap += b[i] * y[i]
+    primal = primal / arm if arm > 0.0 else primal
     for j in range(x.shape[0]):
         primal = max(primal, low[j] - x[j], x[j] - high[j])
         slope = x[j] + z[j]
@@ -109,11 +134,69 @@ def optimality(
 
 
 @compiled
-def settled(x: Array, z: Array, low: Array, high: Array, rounding: float) -> Array:
-    """The point x (n,) with what is pressed against a bound, or outside of it, exactly on it.
+def is_optimal(
+    J: Array, b: Array, low: Array, high: Array, F: Array, v: Array, y: Array, z: Array
+) -> bool:
+    """Whether F (C,) is the optimum, if J_L v = F for the cables between their bounds, v (nv,).
 
-    What is pressed, the multipliers z (n,) tell: negative at low, positive at high. A solver leaves
-    it there but for ``rounding``, and to a law that begins above zero, almost zero is not zero.
+    Multipliers y (nv,) and z (C,) are filled: a bound takes what the balance leaves over.
+    """
+    force = 0.0
+    for i in range(b.shape[0]):
+        y[i] = -v[i]
+    for c in range(F.shape[0]):
+        force = max(force, abs(F[c]))
+        left = row_product(J, c, v) - F[c]
+        at_bound = F[c] <= low[c] if left < 0.0 else F[c] >= high[c]
+        z[c] = left if at_bound else 0.0
+    primal, dual, gap = optimality(J.T, b, low, high, F, y, z)
+    close = math.sqrt(2.0 * gap) <= DISTANCE * force
+    return max(primal, dual) <= OPTIMALITY * force and close
+
+
+@compiled
+def is_infeasible(J: Array, b: Array, low: Array, high: Array, v: Array) -> bool:
+    """Whether v (nv,) proves that no F balances: vᵀb is above vᵀJ_Lᵀ F for all F within bounds."""
+    largest = left = size = steepest = arm = torques = force = 0.0
+    for c in range(J.shape[0]):
+        largest = max(largest, abs(row_product(J, c, v)))
+        force = max(force, low[c])
+        for i in range(b.shape[0]):
+            arm = max(arm, abs(J[c, i]))
+    for i in range(b.shape[0]):
+        left += v[i] * b[i]
+        size += abs(v[i] * b[i])
+        steepest = max(steepest, abs(v[i]))
+        torques = max(torques, abs(b[i]))
+    for c in range(J.shape[0]):
+        torque = row_product(J, c, v)
+        bound = high[c] if torque > 0.0 else low[c]
+        if bound == math.inf:
+            if torque > _ROUNDING * largest:
+                return False
+            continue
+        left -= torque * bound
+        size += abs(torque * bound)
+    if not arm > 0.0:
+        arm = 1.0  # no cable turns any joint: as in scaled_balance
+    return left > max(_PROOF * size, _MISSING * steepest * max(torques, arm * force))
+
+
+@compiled
+def row_product(J: Array, c: int, v: Array) -> float:
+    """Row c of J_L (C, nv) times v (nv,)."""
+    total = 0.0
+    for i in range(v.shape[0]):
+        total += J[c, i] * v[i]
+    return total
+
+
+@compiled
+def onto_bounds(x: Array, z: Array, low: Array, high: Array, rounding: float) -> Array:
+    """The point x (n,) with its entries at a bound, or outside of it, exactly on it.
+
+    Multipliers z (n,) mark the bounds: negative at low, positive at high. A solver misses them by
+    up to ``rounding``, and a law that begins above zero does not take almost zero for zero.
     """
     point = np.empty_like(x)
     for j in range(x.shape[0]):

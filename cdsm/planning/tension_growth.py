@@ -15,6 +15,7 @@ from scipy.optimize import minimize_scalar
 
 from cdsm.arm_model import kinks
 from cdsm.errors import InvalidInput
+from cdsm.kernels.tension import OPTIMALITY
 from cdsm.planning.gradient import require_finite, stiffness_gradient
 from cdsm.planning.objectives import unstable
 from cdsm.posture import Posture
@@ -38,7 +39,7 @@ from cdsm.support.validation import (
     scalar,
     unit_direction,
 )
-from cdsm.tension import OPTIMALITY, Tension, distribute_tension
+from cdsm.tension import Tension, distribute_tension
 
 End = Literal["buckling", "maximum", "infeasible", "elasticity", "none"]
 

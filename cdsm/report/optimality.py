@@ -11,8 +11,9 @@ from scipy.linalg import null_space
 from scipy.optimize import lsq_linear
 
 from cdsm.kernels import tension as tension_kernels
+from cdsm.kernels.tension import DISTANCE
 from cdsm.support.validation import Array
-from cdsm.tension import DISTANCE, Tension
+from cdsm.tension import Tension
 
 if TYPE_CHECKING:
     from cdsm.stiffness_matrix import Stiffness
@@ -46,7 +47,7 @@ class Optimality:
 
     @property
     def optimal(self) -> bool:
-        """Whether both are within :data:`~cdsm.tension.DISTANCE`."""
+        """Whether both are within :data:`~cdsm.kernels.tension.DISTANCE`."""
         return max(self.feasibility, self.stationarity or 0.0) <= DISTANCE
 
 

@@ -1,7 +1,6 @@
 """Tensions at many postures: each row the optimum of the single posture, or proof of none."""
 
 import itertools
-import math
 from collections.abc import Callable
 from typing import Any
 
@@ -9,7 +8,8 @@ import numpy as np
 import pytest
 
 import cdsm
-from cdsm.batch import active_set, certificates, distribution, serpentine_guess
+from cdsm.batch import active_set, distribution, serpentine_guess
+from cdsm.kernels.tension import is_infeasible, is_optimal
 from cdsm.support.validation import Array, frozen
 from tests.batch.test_evaluation import custom_arm, one_hinge
 from tests.support.arms import STEEL, mixed_arm, random_arm
@@ -259,10 +259,10 @@ def test_search_alone_finds_the_optimum_or_a_proof(name: str) -> None:
             single = cdsm.distribute_tension(arm.at(q), low, high, wrench).values
         except cdsm.InfeasibleTension:
             assert outcome == active_set.IMPOSSIBLE
-            assert certificates.is_infeasible(J, b, low, high, state.y)
+            assert is_infeasible(J, b, low, high, state.y)
             continue
         assert outcome == active_set.FOUND
-        assert certificates.is_optimal(J, b, low, high, state.F, state.y)
+        assert is_optimal(J, b, low, high, state.F, state.y, state.w, state.multiplier)
         np.testing.assert_allclose(state.F, single, rtol=0.0, atol=EXACT * single.max())
     assert active_set.FOUND in outcomes
 
@@ -286,7 +286,7 @@ def test_guess_is_mostly_the_optimum_and_what_it_proves_is_so() -> None:
             serpentine_guess.multipliers(parts, J, F, free, 0, y)
             np.testing.assert_allclose(J.T @ F, b, rtol=0.0, atol=1e-12 * F.max())
             np.testing.assert_allclose((J @ y)[free], F[free], rtol=1e-6)
-            if certificates.is_optimal(J, b, low, high, F, y):
+            if is_optimal(J, b, low, high, F, y, state.w, state.multiplier):
                 assert found
                 np.testing.assert_allclose(F, state.F, rtol=0.0, atol=EXACT * F.max())
                 guessed += 1
@@ -308,48 +308,6 @@ def test_blocks_are_those_of_the_geometry() -> None:
     # from anywhere to anywhere there are none
     own = custom_arm()
     assert not serpentine_guess.blocks(own._model.routing, own.nv).row.size
-
-
-# --- certificates ---------------------------------------------------------------------------
-
-J2 = np.array([[0.03, 0.0], [-0.03, 0.0], [0.0, 0.02], [0.01, -0.02]])
-
-
-def certified(F: Array, y: Array, low: Array, high: Array, b: Array | None = None) -> bool:
-    torque = J2.T @ F if b is None else b
-    return certificates.is_optimal(J2, torque, frozen(low.copy()), frozen(high.copy()), F, y)
-
-
-def test_an_optimum_is_accepted_and_every_fault_refused() -> None:
-    low, high = np.full(4, 5.0), np.array([np.inf, np.inf, 40.0, np.inf])
-    y = np.array([500.0, 2500.0])
-    F = np.clip(J2 @ y, low, high)  # the optimum for the torque it makes
-    assert F[1] == F[3] == 5.0
-    assert F[2] == 40.0
-    assert certified(F, y, low, high)
-    assert not certified(F, y + np.array([1e-3, 0.0]), low, high)  # free cable off J y
-    assert not certified(F, y, low, high, J2.T @ F + np.array([1e-9, 0.0]))  # out of balance
-    assert not certified(F, y, np.array([5.0, 5.1, 5.0, 5.0]), high)  # below a bound
-    assert not certified(F, y, low, np.full(4, 39.0))  # above one
-    # at a bound from which it would rather go
-    assert not certified(F, np.array([500.0, 1500.0]), low, high)
-    assert not certified(
-        F, np.array([500.0, 6e3]), np.array([5.0, 5.0, 40.0, 5.0]), np.full(4, 90.0)
-    )
-
-
-def test_a_proof_of_infeasibility_is_accepted_and_its_opposite_refused() -> None:
-    low, high = frozen(np.zeros(4)), frozen(np.full(4, 10.0))
-    reach = 0.03 * 10 + 0.01 * 10  # the most the cables turn the first joint
-    v = np.array([1.0, 0.0])
-    assert certificates.is_infeasible(J2, np.array([reach + 1e-6, 0.0]), low, high, v)
-    assert not certificates.is_infeasible(J2, np.array([reach - 1e-6, 0.0]), low, high, v)
-    assert not certificates.is_infeasible(J2, np.array([reach + 1e-6, 0.0]), low, high, -v)
-    assert not certificates.is_infeasible(J2, np.array([reach, 0.0]), low, high, v)
-    # a cable without a maximum pulls as much as is wanted
-    high = frozen(np.array([math.inf, 10.0, 10.0, 10.0]))
-    assert not certificates.is_infeasible(J2, np.array([1e6, 0.0]), low, high, v)
-    assert certificates.is_infeasible(J2, np.array([-1e6, 0.0]), low, high, -v)
 
 
 def test_rounding_on_a_joint_that_no_cable_turns_is_no_missing_torque() -> None:

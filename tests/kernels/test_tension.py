@@ -1,10 +1,12 @@
 """The dimensionless balance, and what makes an answer of it the optimum."""
 
 import itertools
+import math
 
 import numpy as np
 
 from cdsm.kernels import tension as tension_kernels
+from cdsm.support.validation import Array, frozen
 
 
 def test_balance_is_scaled_by_powers_of_two_and_so_without_rounding() -> None:
@@ -56,4 +58,48 @@ def test_only_what_is_pressed_against_a_bound_or_outside_is_set_onto_it() -> Non
     )
     x, z, expected = np.array(cases).T
     bounds = np.full(x.size, low), np.full(x.size, high)
-    np.testing.assert_array_equal(tension_kernels.settled(x, z, *bounds, r), expected)
+    np.testing.assert_array_equal(tension_kernels.onto_bounds(x, z, *bounds, r), expected)
+
+
+# --- certificates ---------------------------------------------------------------------------
+
+J2 = np.array([[0.03, 0.0], [-0.03, 0.0], [0.0, 0.02], [0.01, -0.02]])
+
+
+def certified(F: Array, y: Array, low: Array, high: Array, b: Array | None = None) -> bool:
+    torque = J2.T @ F if b is None else b
+    return tension_kernels.is_optimal(
+        J2, torque, frozen(low.copy()), frozen(high.copy()), F, y, np.empty(2), np.empty(4)
+    )
+
+
+def test_an_optimum_is_accepted_and_every_fault_refused() -> None:
+    low, high = np.full(4, 5.0), np.array([np.inf, np.inf, 40.0, np.inf])
+    y = np.array([500.0, 2500.0])
+    F = np.clip(J2 @ y, low, high)  # the optimum for the torque it makes
+    assert F[1] == F[3] == 5.0
+    assert F[2] == 40.0
+    assert certified(F, y, low, high)
+    assert not certified(F, y + np.array([1e-3, 0.0]), low, high)  # free cable off J y
+    assert not certified(F, y, low, high, J2.T @ F + np.array([1e-8, 0.0]))  # out of balance
+    assert not certified(F, y, np.array([5.0, 5.1, 5.0, 5.0]), high)  # below a bound
+    assert not certified(F, y, low, np.full(4, 39.0))  # above one
+    # at a bound from which it would rather go
+    assert not certified(F, np.array([500.0, 1500.0]), low, high)
+    assert not certified(
+        F, np.array([500.0, 6e3]), np.array([5.0, 5.0, 40.0, 5.0]), np.full(4, 90.0)
+    )
+
+
+def test_a_proof_of_infeasibility_is_accepted_and_its_opposite_refused() -> None:
+    low, high = frozen(np.zeros(4)), frozen(np.full(4, 10.0))
+    reach = 0.03 * 10 + 0.01 * 10  # the most the cables turn the first joint
+    v = np.array([1.0, 0.0])
+    assert tension_kernels.is_infeasible(J2, np.array([reach + 1e-6, 0.0]), low, high, v)
+    assert not tension_kernels.is_infeasible(J2, np.array([reach - 1e-6, 0.0]), low, high, v)
+    assert not tension_kernels.is_infeasible(J2, np.array([reach + 1e-6, 0.0]), low, high, -v)
+    assert not tension_kernels.is_infeasible(J2, np.array([reach, 0.0]), low, high, v)
+    # a cable without a maximum pulls as much as is wanted
+    high = frozen(np.array([math.inf, 10.0, 10.0, 10.0]))
+    assert not tension_kernels.is_infeasible(J2, np.array([1e6, 0.0]), low, high, v)
+    assert tension_kernels.is_infeasible(J2, np.array([-1e6, 0.0]), low, high, -v)

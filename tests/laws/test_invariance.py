@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 import cdsm
 from cdsm.kernels.readings import UNMOVED
+from cdsm.kernels.tension import OPTIMALITY
 from cdsm.support.validation import Array
-from cdsm.tension import OPTIMALITY
 from tests.support import arms
 
 # the same examples every time, and no files; numba compiles during the first one

@@ -15,8 +15,9 @@ from scipy.optimize import linprog
 
 import cdsm
 from cdsm.kernels import tension as tension_kernels
+from cdsm.kernels.tension import DISTANCE, OPTIMALITY
 from cdsm.support.validation import Array
-from cdsm.tension import DISTANCE, OPTIMALITY, _polished, _shortfall
+from cdsm.tension import _polished, _shortfall
 from tests.support import foreign
 from tests.support.arms import (
     STEEL,
@@ -947,17 +948,6 @@ def test_a_joint_held_by_nothing_has_no_compliance() -> None:
     np.testing.assert_array_equal(caught.value.direction, [1.0, 0.0])
     batch = cdsm.evaluate(pose.arm, [pose.q], F[None], outputs=("compliance",))
     assert batch.status[0] == cdsm.Status.SINGULAR
-
-
-@pytest.mark.parametrize("force", [1e-310, 1e-300, 1e-160])
-def test_the_least_of_all_loads_is_balanced(force: float) -> None:
-    weightless = cdsm.Manipulator(GEOMETRY, STEEL, gravity=(0.0, 0.0, 0.0))
-    wrench = [0.0, force, 0.0, 0.0, 0.0, 0.0]
-    pull = cdsm.distribute_tension(weightless.at(POSE.q), wrench=wrench)
-    unit = cdsm.distribute_tension(weightless.at(POSE.q), wrench=np.array(wrench) / force)
-    np.testing.assert_allclose(pull.values, force * unit.values, rtol=0.0, atol=1e-9 * force)
-    batch = cdsm.distribute_tensions(weightless, [POSE.q], wrench=wrench)
-    np.testing.assert_allclose(batch.values[0], pull.values, rtol=0.0, atol=1e-9 * force)
 
 
 def test_batch_finds_every_singular_stiffness_that_the_single_posture_does() -> None:
