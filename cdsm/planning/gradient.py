@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 from cdsm.errors import SingularStiffness
 from cdsm.planning.kernels import by_tension
 from cdsm.stiffness_matrix import Stiffness
+from cdsm.support.units import coordinates
 from cdsm.support.validation import Array, ReadOnlyState, frozen, instance, unit_direction
 
 
@@ -116,7 +117,7 @@ def require_finite(value: float, u: Array) -> None:
     """Refuse a direction in which the tip cannot move."""
     if not np.isfinite(value):
         raise SingularStiffness(
-            f"the tip cannot move along ({', '.join(f'{x:.4g}' for x in u)}): the stiffness there "
+            f"the tip cannot move along {coordinates(u)}: the stiffness there "
             "is infinite under any tension. Choose another direction, or bend the arm.",
             u,
         )

@@ -22,7 +22,7 @@ from cdsm.planning.planner import REACHED, Planner
 from cdsm.planning.range import MARGIN
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness, stiffness
-from cdsm.support.units import MODEL
+from cdsm.support.units import MODEL, coordinates
 from cdsm.support.validation import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension
 
@@ -92,7 +92,7 @@ class StiffnessPlan(ReadOnlyState):
                 strict=True,
             )
             rows += [
-                f"along ({', '.join(f'{x:.4g}' for x in u)}): {achieved / 1000.0:.6g} N/mm "
+                f"along {coordinates(u)}: {achieved / 1000.0:.6g} N/mm "
                 f"({target / 1000.0:.6g} N/mm wanted)"
                 for u, target, achieved in triples
             ]

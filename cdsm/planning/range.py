@@ -22,7 +22,7 @@ from cdsm.planning.starts import StartPoints
 from cdsm.planning.stiffness_model import Constraints, Evaluation, StiffnessModel
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import stiffness
-from cdsm.support.units import MODEL
+from cdsm.support.units import MODEL, coordinates
 from cdsm.support.validation import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension
 from cdsm.wires.laws import StrandElasticity, TabulatedElasticity
@@ -89,7 +89,7 @@ class StiffnessRange(ReadOnlyState):
 
     def __str__(self) -> str:
         lines = [
-            f"along ({', '.join(f'{x:.4g}' for x in self.direction)}) the stiffness can be "
+            f"along {coordinates(self.direction)} the stiffness can be "
             f"{self.low / 1000.0:.4g} to {self.high / 1000.0:.4g} N/mm"
         ]
         for name, pull, found in (
@@ -157,7 +157,7 @@ def stiffness_range(
         raise InvalidInput(
             "maximum",
             f"none given, and tensions of {_LIMITS[-1]:g} times the least still change the "
-            f"stiffness along ({', '.join(f'{x:.4g}' for x in u)}), which has no end; give one.",
+            f"stiffness along {coordinates(u)}, which has no end; give one.",
         )
     return StiffnessRange(
         direction=u,

@@ -29,7 +29,7 @@ from cdsm.statics.bound_scan import (
     tension_domain,
 )
 from cdsm.stiffness_matrix import Stiffness, stiffness
-from cdsm.support.units import MODEL
+from cdsm.support.units import MODEL, coordinates
 from cdsm.support.validation import (
     Array,
     ReadOnlyState,
@@ -100,7 +100,7 @@ class Saturation(ReadOnlyState):
         return f"<Saturation at {self.bound:.4g} N>"
 
     def __str__(self) -> str:
-        along = f"({', '.join(f'{x:.4g}' for x in self.direction)})"
+        along = coordinates(self.direction)
         if self.steepest_slope <= 0.0:
             first = f"tension nowhere raises the stiffness along {along}"
         else:

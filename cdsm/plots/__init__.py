@@ -1,4 +1,4 @@
-"""Figures: the arm with its cables, and the paper's figures recomputed. mm and N/mm live here.
+"""Figures: arms, maps, plans, loads, and the paper's figures; axes show mm and N/mm.
 
 Every function returns a :class:`matplotlib.figure.Figure` that belongs to the caller: show it in a
 notebook or save it with ``savefig``. No global plotting state is touched.

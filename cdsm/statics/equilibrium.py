@@ -22,6 +22,7 @@ from cdsm.posture import Posture
 from cdsm.statics.locked_motors import Iterate, LoadedArm, rounding
 from cdsm.statics.trust_region import FLAT, RestSearch, find_rest
 from cdsm.stiffness_matrix import Stiffness, stiffness
+from cdsm.support.units import coordinates
 from cdsm.support.validation import Array, ReadOnlyState, frozen, vector
 from cdsm.tension import Tension
 
@@ -158,8 +159,7 @@ class Equilibrium(ReadOnlyState):
             f"{cable.name:<12}{F:>14.3f}{F0:>12.3f}{'  slack' if cable.name in self.slack else ''}"
             for cable, F, F0 in zip(arm.cables, self.tension, self.reference_tension, strict=True)
         ]
-        x, y, z = self.displacement * 1000.0
-        rows.append(f"tip moved by ({x:.4g}, {y:.4g}, {z:.4g}) mm")
+        rows.append(f"tip moved by {coordinates(1000.0 * self.displacement)} mm")
         rows += [
             f"{name} rests on its stop, which pushes with {self.reaction[i]:.4g} "
             f"{arm.torque_unit(i)}"

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from cdsm.errors import EquilibriumError, InvalidInput
 from cdsm.posture import Posture
 from cdsm.statics.equilibrium import Equilibrium, equilibrium, follow
-from cdsm.support.units import MODEL
+from cdsm.support.units import MODEL, coordinates
 from cdsm.support.validation import (
     Array,
     ReadOnlyState,
@@ -157,10 +157,10 @@ class WeightTest(ReadOnlyState):
             f"(linear is {MODEL}; measured the secant over this weight)",
         ]
         if self.settled_first:
-            x, y, z = 1000.0 * self.without.displacement
+            moved = coordinates(1000.0 * self.without.displacement)
             rows.append(
                 "before the weight the arm did not stay at its reference: the tip moved by "
-                f"({x:.4g}, {y:.4g}, {z:.4g}) mm, from where all this is measured"
+                f"{moved} mm, from where all this is measured"
             )
         if self.without.at_limit:
             rows.append(f"before the weight at a stop: {', '.join(self.without.at_limit)}")
