@@ -74,8 +74,8 @@ def distribute_tensions(
     """Smallest cable tensions in balance at many postures: min ‖F‖² of Eqs. 13 and 17, row by row.
 
     The same as :func:`~cdsm.distribute_tension` at each, and as exact: every row is guessed
-    or searched for, and accepted only if it meets the same optimality conditions; as infeasible only
-    by a proof. That function decides the rows for which both fail.
+    or searched for, and accepted only if it meets the same optimality conditions, or as infeasible
+    only by a proof. That function decides the rows for which both fail.
 
     Args:
         arm: The arm.
