@@ -22,7 +22,7 @@ from cdsm.kernels.bodies import Masses
 from cdsm.kernels.stiffness import cable_stiffness
 from cdsm.kernels.tree import Routing, Tree
 from cdsm.rigid_body import RigidBody
-from cdsm.support.validation import LARGEST, SMALLEST, Array, frozen
+from cdsm.support.validation import LARGEST, RANGES, Array, frozen
 from cdsm.wires.continuity import find_jump
 from cdsm.wires.laws import StrandElasticity
 
@@ -325,7 +325,8 @@ def _checked_rigidity(law: Elasticity, tension: Array) -> Array:
         InvalidInput: The law gives no positive rigidity.
     """
     rigidity = np.asarray(law.rigidity(tension))
-    usable = (rigidity >= SMALLEST) & (rigidity <= LARGEST)  # false for NaN too
+    _, least, most = RANGES["rigidity"]
+    usable = (rigidity >= least) & (rigidity <= most)  # false for NaN too
     if rigidity.shape != tension.shape or np.count_nonzero(usable) < tension.size:
         raise InvalidInput(
             "elasticity",

@@ -14,12 +14,11 @@ from cdsm.elasticity import Elasticity, tension_at
 from cdsm.errors import CableError, CdsmError, InvalidInput
 from cdsm.geometry import Geometry
 from cdsm.support.validation import (
-    SMALLEST,
     Array,
-    bound,
     instance,
     number_array,
     one_of,
+    quantity,
     scalar,
     sequence_of,
     text,
@@ -47,7 +46,7 @@ class Site:
 
     def __post_init__(self) -> None:
         text("link", self.link)
-        position = vector("position", self.position, 3, f"a point on {self.link} [m]")
+        position = vector("position", self.position, 3, f"a point on {self.link} [m]", "length")
         object.__setattr__(self, "position", tuple(position.tolist()))
 
 
@@ -96,29 +95,18 @@ class Cable:
         try:
             sites = sequence_of("sites", self.sites, Site)
             one_of("control", self.control, get_args(Control))
-            lead = scalar("lead", self.lead)
-            series = self.series_stiffness
-            if not (isinstance(series, float) and series == math.inf):
-                series = scalar("series_stiffness", series)
-            least, most = scalar("minimum", self.minimum), self.maximum
-            if not (isinstance(most, float) and most == math.inf):
-                most = scalar("maximum", most)
+            lead = quantity("lead", self.lead, "length", zero=True)
+            series = quantity("series_stiffness", self.series_stiffness, "stiffness", infinite=True)
+            least = quantity("minimum", self.minimum, "tension", zero=True)
+            most = quantity("maximum", self.maximum, "tension", zero=True, infinite=True)
         except CdsmError as error:
             raise CableError(self.name, str(error)) from None
         if len(sites) < 2:
             raise CableError(self.name, f"sites: {len(sites)} given; two or more Site are needed.")
-        if lead < 0.0:
-            raise CableError(self.name, f"lead: {lead:g} m given; it cannot be negative.")
-        if series < SMALLEST:
+        if least > most:
             raise CableError(
                 self.name,
-                f"series_stiffness: {series:g} N/m given; it must be positive (at least "
-                f"{SMALLEST:g}), or inf for none.",
-            )
-        if not 0.0 <= least <= most:
-            raise CableError(
-                self.name,
-                f"tensions from {least:g} to {most:g} N given; 0 <= minimum <= maximum is needed.",
+                f"tensions from {least:g} to {most:g} N given; minimum <= maximum is needed.",
             )
         object.__setattr__(self, "minimum", least)
         object.__setattr__(self, "maximum", most)
@@ -141,7 +129,8 @@ class Cable:
             ElasticityRangeError: A tension outside the domain of the elasticity.
         """
         values = self.elasticity.domain.check(tension)
-        wire = _length(free_length) * self.elasticity.strain(values)
+        length = _length(free_length)
+        wire = length * self.elasticity.strain(values)
         return np.asarray(wire + (values - self.elasticity.domain.low) / self.series_stiffness)
 
     def tangent_stiffness(self, tension: ArrayLike, free_length: float) -> Array:
@@ -211,10 +200,8 @@ def in_series(*stiffness: float) -> float:
     """
     if not stiffness:
         raise InvalidInput("stiffness", "none given; give one or more in N/m.")
-    springs = bound("stiffness", stiffness, len(stiffness))
-    if (springs < SMALLEST).any():
-        raise InvalidInput("stiffness", f"{springs.tolist()} N/m given; each must be positive.")
-    compliance = float((1.0 / springs).sum())
+    springs = [quantity("stiffness", k, "stiffness", infinite=True) for k in stiffness]
+    compliance = float((1.0 / np.array(springs)).sum())
     return 1.0 / compliance if compliance > 0.0 else math.inf
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm.errors import ElasticityRangeError, InvalidInput
-from cdsm.support.validation import LARGEST, SMALLEST, Array, flag, number_array, scalar
+from cdsm.support.validation import RANGES, Array, flag, number_array, quantity, scalar
 
 _STEP = 6e-6
 """Relative step of central differences: the cube root of the rounding of float64."""
@@ -41,11 +41,10 @@ class Domain:
     low_included: bool = True
 
     def __post_init__(self) -> None:
-        high = self.high
-        if not (isinstance(high, float) and high == math.inf):
-            high = scalar("high", high)
+        low = quantity("low", self.low, "tension", zero=True)
+        high = quantity("high", self.high, "tension", infinite=True)
         flag("low_included", self.low_included)
-        if not 0.0 <= scalar("low", self.low) < high:
+        if not low < high:
             raise InvalidInput("low", f"0 <= low < high needed, but are {self.low}, {self.high} N.")
 
     def __iter__(self) -> Iterator[float]:
@@ -200,18 +199,13 @@ class LinearElasticity(Elasticity):
         rigidity: EA [N].
 
     Raises:
-        InvalidInput: EA is not a positive finite number.
+        InvalidInput: EA is not a number, or outside its range in :data:`RANGES`.
     """
 
     _rigidity: float
 
     def __init__(self, rigidity: float) -> None:
-        value = scalar("rigidity", rigidity)
-        if value < SMALLEST:
-            raise InvalidInput(
-                "rigidity", f"{value:g} N given; EA must be positive, at least {SMALLEST:g} N."
-            )
-        object.__setattr__(self, "_rigidity", value)
+        object.__setattr__(self, "_rigidity", quantity("rigidity", rigidity, "rigidity"))
 
     def __repr__(self) -> str:
         return f"LinearElasticity(rigidity={self._rigidity!r})"
@@ -282,11 +276,11 @@ def tension_at(
     Raises:
         ElasticityRangeError: No tension of the domain gives one of the values.
     """
-    low, high = domain
+    low, high, most = *domain, RANGES["tension"].high
     if math.isinf(high):  # as far as is needed: an unbounded law stretches without end
         high = max(1.0, 2.0 * low)
-        while float(stretch(np.array(high))) < wanted.max(initial=0.0) and high < LARGEST:
-            high = min(2.0 * high, LARGEST)
+        while float(stretch(np.array(high))) < wanted.max(initial=0.0) and high < most:
+            high = min(2.0 * high, most)
     grid = np.maximum(low + (high - low) * _GRID, domain.first)
     grid[-1] = high  # which low + (high - low) may miss by rounding
     reached = stretch(grid)

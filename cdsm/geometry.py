@@ -20,10 +20,11 @@ from cdsm.support.records import (
     CrossFaults,
     Direction,
     Integer,
+    Length,
+    LengthOrZero,
+    Mass,
     Name,
-    NotNegative,
     Number,
-    Positive,
     checked_keywords,
     parse,
     read_toml,
@@ -59,7 +60,7 @@ class Joint:
     """
 
     axes: Annotated[tuple[Direction, ...], Field(strict=False, min_length=1, max_length=2)]
-    disk_offset: Positive
+    disk_offset: Length
     limit: JointLimit = None
 
     @model_validator(mode="after")
@@ -91,8 +92,8 @@ class Link:
         GeometryError: Lists every fault.
     """
 
-    length: Positive
-    mass: NotNegative
+    length: Length
+    mass: Mass
 
 
 @record
@@ -110,7 +111,7 @@ class CableRoute:
 
     joint: Annotated[Integer, Field(ge=1)]
     angle: Number
-    lead: NotNegative = 0.0
+    lead: LengthOrZero = 0.0
 
 
 @record
@@ -140,8 +141,8 @@ class Geometry(Printed):
     ]
     links: Annotated[tuple[Link, ...], Field(strict=False)]
     cables: Annotated[tuple[CableRoute, ...], Field(strict=False, min_length=1)]
-    base_length: NotNegative
-    hole_radius: Positive
+    base_length: LengthOrZero
+    hole_radius: Length
     name: Name = "arm"
 
     @classmethod
@@ -151,12 +152,12 @@ class Geometry(Printed):
         *,
         joints: JointCount,
         cables_per_joint: CablesPerJoint,
-        link_length: Positive,
-        base_length: NotNegative,
-        disk_offset: Positive,
-        hole_radius: Positive,
-        link_mass: NotNegative,
-        lead: NotNegative = 0.0,
+        link_length: Length,
+        base_length: LengthOrZero,
+        disk_offset: Length,
+        hole_radius: Length,
+        link_mass: Mass,
+        lead: LengthOrZero = 0.0,
         joint_limit: JointLimit = None,
         name: Name = "arm",
     ) -> Self:
@@ -203,12 +204,12 @@ class Geometry(Printed):
         joints: JointCount,
         twist: Number,
         cables_per_joint: CablesPerJoint = 2,
-        link_length: Positive,
-        base_length: NotNegative,
-        disk_offset: Positive,
-        hole_radius: Positive,
-        link_mass: NotNegative,
-        lead: NotNegative = 0.0,
+        link_length: Length,
+        base_length: LengthOrZero,
+        disk_offset: Length,
+        hole_radius: Length,
+        link_mass: Mass,
+        lead: LengthOrZero = 0.0,
         joint_limit: JointLimit = None,
         name: Name = "arm",
     ) -> Self:

@@ -149,7 +149,7 @@ class Manipulator(Printed):
         """Set everything, once: from checked URDF text, and the geometry behind it if any."""
         self._geometry = geometry
         self._cables = _checked_cables(cables)
-        self._gravity = vector("gravity", gravity, 3, "gravity in base axes [m/s²]")
+        self._gravity = vector("gravity", gravity, 3, "gravity in base axes [m/s²]", "gravity")
         self._urdf, self._tip_link = urdf, tip
         one_of("original_length", original_length, get_args(OriginalLength))
         self._original_length: OriginalLength = original_length

@@ -32,6 +32,7 @@ from cdsm.support.validation import (
     one_of,
     unit_direction,
     vector,
+    wrench_vector,
 )
 from cdsm.tension import Tension
 
@@ -379,10 +380,10 @@ def stiffness(
             raise InvalidInput("wrench", "comes with the Tension; leave it out here.")
         F, W = tension.values, tension.wrench
     else:
-        F = vector("tension", tension, len(arm.cables), "one tension [N] per cable")
+        F = vector("tension", tension, len(arm.cables), "one tension [N] per cable", "tension")
         W = _NO_WRENCH
         if wrench is not None:
-            W = vector("wrench", wrench, 6, "force [N], then moment [N m], base axes")
+            W = wrench_vector("wrench", wrench)
         if np.count_nonzero(F < 0.0):
             c = int(F.argmin())
             raise InvalidInput(

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NoReturn, final
 
@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import linprog
 from scipy.sparse import csc_matrix
 
+from cdsm.cable import Cable
 from cdsm.errors import InfeasibleTension, InvalidInput, SolverError
 from cdsm.kernels import tension as tension_kernels
 from cdsm.kernels.tension import DISTANCE, OPTIMALITY
@@ -35,8 +36,8 @@ from cdsm.support.validation import (
     frozen,
     instance,
     one_of,
-    scalar,
-    vector,
+    quantity,
+    wrench_vector,
 )
 
 # by default HiGHS calls feasible what misses up to 1e-7, and so would not see less missing torque
@@ -148,7 +149,7 @@ def distribute_tension(
     fixed = {} if fixed is None else fixed
     if fixed:
         low, high = _with_fixed(pose, low, high, fixed)
-    wrench = vector("wrench", wrench, 6, "force [N], then moment [N m], base axes")
+    wrench = wrench_vector("wrench", wrench)
     torque = pose.jacobian.T @ wrench - pose.gravity_torque
 
     length = pose.arm.length
@@ -170,34 +171,46 @@ def distribute_tension(
     )
 
 
-def checked_bounds(arm: Manipulator, minimum: ArrayLike, maximum: ArrayLike) -> tuple[Array, Array]:
+def checked_bounds(
+    arm: Manipulator, minimum: ArrayLike, maximum: ArrayLike, rows: int | None = None
+) -> tuple[Array, Array]:
     """Bounds (C,) [N] of the tensions of an arm, those that its cables have of their own included.
 
+    With ``rows`` each may also be (rows, C): other bounds for each row.
+
     Raises:
-        InvalidInput: Not bounds of what can only pull, or the wrong way round.
+        InvalidInput: Not numbers of such a shape, a minimum that is negative or infinite, or a
+            maximum below it.
     """
     cables = arm.cables
-    low = bound("minimum", minimum, len(cables))
-    high = bound("maximum", maximum, len(cables))
+    low = bound("minimum", minimum, len(cables), rows)
+    high = bound("maximum", maximum, len(cables), rows)
     allowed = (low >= 0.0) & (low < math.inf)
     if np.count_nonzero(allowed) < low.size:
-        c = int(allowed.argmin())
+        *row, c = np.argwhere(~allowed)[0].tolist()
         raise InvalidInput(
             "minimum",
-            f"{low[c]:g} N given for {cables[c].name}; cables only pull, so it must be finite "
-            "and not negative.",
+            f"{low[(*row, c)]:g} N given for {_named(cables[c], row)}; cables only pull, so it "
+            "must be finite and not negative.",
         )
     least, most = arm._model.laws.narrowed(low, high)
     ordered = least <= most
-    if np.count_nonzero(ordered) < least.size:
-        c = int(ordered.argmin())
-        given, own = "given" if most[c] == high[c] else "of its own", least[c] > low[c]
+    if np.count_nonzero(ordered) < ordered.size:
+        at = tuple(np.argwhere(~ordered)[0].tolist())
+        l0, l1, h0, h1 = (
+            np.broadcast_to(each, ordered.shape)[at] for each in (low, least, high, most)
+        )
+        given, own = "given" if h1 == h0 else "of its own", l1 > l0
         raise InvalidInput(
             "maximum",
-            f"{most[c]:g} N {given} for {cables[c].name}, below {'its own' if own else 'its'} "
-            f"minimum of {least[c]:g} N; raise maximum or lower minimum.",
+            f"{h1:g} N {given} for {_named(cables[at[-1]], at[:-1])}, below "
+            f"{'its own' if own else 'its'} minimum of {l1:g} N; raise maximum or lower minimum.",
         )
     return least, most
+
+
+def _named(cable: Cable, row: Sequence[int]) -> str:
+    return f"{cable.name} in row {row[0]}" if row else cable.name
 
 
 def _with_fixed(
@@ -210,9 +223,7 @@ def _with_fixed(
     low, high = low.copy(), high.copy()
     for name, value in fixed.items():
         c = names.index(one_of("cable", name, names))
-        low[c] = high[c] = scalar(f"fixed[{name!r}]", value)
-        if low[c] < 0.0:
-            raise InvalidInput(f"fixed[{name!r}]", f"{low[c]:g} N given; cables only pull.")
+        low[c] = high[c] = quantity(f"fixed[{name!r}]", value, "tension", zero=True)
     return frozen(low), frozen(high)
 
 

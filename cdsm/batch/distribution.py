@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from cdsm.batch import layout
 from cdsm.batch.chunks import checked_threads, run
 from cdsm.batch.fused_kernel import evaluate_rows
-from cdsm.batch.inputs import bounds, given_wrench, kernel_arm, of_rows, postures
+from cdsm.batch.inputs import given_wrench, kernel_arm, of_rows, postures
 from cdsm.batch.layout import INFEASIBLE, OK, UNDECIDED, Codes, Flags
 from cdsm.batch.serpentine_guess import blocks
 from cdsm.batch.status import Status, summary
@@ -21,7 +21,7 @@ from cdsm.errors import InfeasibleTension, SolverError
 from cdsm.kernels.tension import NO_ARM
 from cdsm.manipulator import Manipulator
 from cdsm.support.validation import Array, ReadOnlyState, frozen, instance
-from cdsm.tension import distribute_tension
+from cdsm.tension import checked_bounds, distribute_tension
 
 _NO_DIRECTIONS = frozen(np.zeros((0, 3)))
 
@@ -93,7 +93,7 @@ def distribute_tensions(
     """
     instance("arm", arm, Manipulator)
     angles = postures(arm, q)
-    low, high = bounds(arm, minimum, maximum, len(angles))
+    low, high = checked_bounds(arm, minimum, maximum, len(angles))
     loads = given_wrench(wrench, len(angles))
     values = np.empty((len(angles), len(arm.cables)))
     status = np.zeros(len(angles), dtype=np.uint8)

@@ -14,13 +14,21 @@ from numpy.typing import ArrayLike
 from cdsm.batch import layout
 from cdsm.batch.chunks import checked_threads, run
 from cdsm.batch.distribution import Distributor, Tensions
-from cdsm.batch.inputs import bounds, given_tension, given_wrench, postures, unit_directions
+from cdsm.batch.inputs import given_tension, given_wrench, postures
 from cdsm.batch.job import Job
 from cdsm.batch.layout import QUANTITIES, Codes, Flags
 from cdsm.batch.status import summary
 from cdsm.errors import InvalidInput, UnknownName
 from cdsm.manipulator import Manipulator
-from cdsm.support.validation import Array, ReadOnlyState, frozen, instance, one_of
+from cdsm.support.validation import (
+    Array,
+    ReadOnlyState,
+    frozen,
+    instance,
+    one_of,
+    unit_directions,
+)
+from cdsm.tension import checked_bounds
 
 OUTPUTS = (*QUANTITIES, "tension")
 """Names of all that :func:`evaluate` can be asked for."""
@@ -148,7 +156,7 @@ def evaluate(
     if minimum is not None:
         if given is not None:
             raise InvalidInput("minimum", "give tension= or minimum=, not both.")
-        low, high = bounds(arm, minimum, math.inf if maximum is None else maximum, rows)
+        low, high = checked_bounds(arm, minimum, math.inf if maximum is None else maximum, rows)
         distributor = Distributor(arm, angles, low, high, loads, check_limits)
     elif maximum is not None:
         raise InvalidInput("maximum", "belongs to minimum=: give that too.")
@@ -160,7 +168,7 @@ def evaluate(
         )
     if not needy:
         status[:] = layout.OK
-    u = None if direction is None else unit_directions(direction)
+    u = None if direction is None else unit_directions("direction", direction)
     job = Job(arm, angles, given, loads, u, names, distributor if needy else None, check_limits)
     run(lambda part: job.fill(part, status), rows, job.width, checked_threads(threads))
     return Batch(

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from cdsm.batch.fused_kernel import Arm
 from cdsm.errors import InvalidInput
 from cdsm.manipulator import Manipulator
-from cdsm.support.validation import Array, bound, flag, frozen, number_array, unit_direction
+from cdsm.support.validation import WRENCH, Array, flag, frozen, number_array
 
 
 def kernel_arm(arm: Manipulator, check_limits: bool) -> Arm:
@@ -48,13 +48,13 @@ def postures(arm: Manipulator, q: ArrayLike) -> Array:
     return frozen(array)
 
 
-def per_row(name: str, value: ArrayLike, rows: int, width: int, meaning: str) -> Array:
+def per_row(name: str, value: ArrayLike, rows: int, width: int, meaning: str, kind: str) -> Array:
     """Numbers that are the same for all rows (width,), or different (rows, width); read-only.
 
     Raises:
         InvalidInput: Not finite real numbers, or of another shape.
     """
-    array = number_array(name, value)
+    array = number_array(name, value, kind)
     if array.shape not in ((width,), (rows, width)):
         raise InvalidInput(
             name,
@@ -71,7 +71,7 @@ def given_tension(arm: Manipulator, value: ArrayLike, rows: int) -> Array:
         InvalidInput: Not finite real numbers of such a shape, or negative.
     """
     cables = [cable.name for cable in arm.cables]
-    tension = per_row("tension", value, rows, len(cables), "one tension [N] per cable")
+    tension = per_row("tension", value, rows, len(cables), "one tension [N] per cable", "tension")
     if tension.size and tension.min() < 0.0:
         *row, c = np.unravel_index(int(tension.argmin()), tension.shape)
         where = f" in row {row[0]}" if row else ""
@@ -87,55 +87,7 @@ def given_wrench(value: ArrayLike | None, rows: int) -> Array:
     Raises:
         InvalidInput: Not finite real numbers of such a shape.
     """
-    meaning = "force [N], then moment [N m], base axes"
-    return per_row("wrench", np.zeros(6) if value is None else value, rows, 6, meaning)
-
-
-def bounds(
-    arm: Manipulator, minimum: ArrayLike, maximum: ArrayLike, rows: int
-) -> tuple[Array, Array]:
-    """Bounds of tension [N], each (C,) for all rows or (rows, C); read-only.
-
-    Raises:
-        InvalidInput: Not numbers of such a shape, a minimum that is negative or infinite, or a
-            maximum below it.
-    """
-    cables = [cable.name for cable in arm.cables]
-    low, high = (
-        bound(name, value, len(cables), rows)
-        for name, value in (("minimum", minimum), ("maximum", maximum))
-    )
-    if low.size and not (low.min() >= 0.0 and low.max() < np.inf):
-        bad = low[~((low >= 0.0) & (low < np.inf))]
-        raise InvalidInput(
-            "minimum",
-            f"{bad[0]:g} N given; cables only pull, so it must be finite and not negative.",
-        )
-    low, high = arm._model.laws.narrowed(low, high)
-    if (low > high).any():
-        *row, c = np.argwhere(low > high)[0]
-        where = f" in row {row[0]}" if row else ""
-        pair = [np.broadcast_to(each, (low > high).shape)[(*row, c)] for each in (high, low)]
-        raise InvalidInput(
-            "maximum",
-            f"{pair[0]:g} N given for {cables[c]}{where}, below its minimum of {pair[1]:g} N; "
-            "raise maximum or lower minimum.",
-        )
-    return low, high
-
-
-def unit_directions(value: ArrayLike) -> Array:
-    """Unit vectors (3,) or (D, 3), read-only.
-
-    Raises:
-        InvalidInput: Not directions.
-    """
-    given = number_array("direction", value)
-    if given.ndim < 2:
-        return unit_direction("direction", given)
-    if given.ndim > 2 or given.shape[1] != 3 or not len(given):
-        raise InvalidInput("direction", f"shape {given.shape} given, (3,) or (D, 3) needed.")
-    return frozen(np.array([unit_direction(f"direction[{i}]", u) for i, u in enumerate(given)]))
+    return per_row("wrench", np.zeros(6) if value is None else value, rows, 6, WRENCH, "wrench")
 
 
 def of_rows(values: Array, part: slice, rows: int) -> Array:

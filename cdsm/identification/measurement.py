@@ -15,6 +15,7 @@ from cdsm.support.validation import (
     scalar,
     unit_direction,
     vector,
+    wrench_vector,
 )
 
 
@@ -83,7 +84,7 @@ class Measurement:
             raise InvalidInput("label", f"{self.label!r} given; a text is needed.")
         unit_direction("direction", self.direction)
         direction = vector("direction", self.direction, 3, "a direction in base axes")
-        wrench = vector("wrench", self.wrench, 6, "force [N], then moment [N m], base axes")
+        wrench = wrench_vector("wrench", self.wrench)
         checked: dict[str, object] = {
             "value": value,
             "std": std,

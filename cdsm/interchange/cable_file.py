@@ -16,9 +16,10 @@ from cdsm.elasticity import Elasticity
 from cdsm.errors import CableError, FileError, GeometryError, InvalidInput, counted
 from cdsm.support.files import read_text, write_text
 from cdsm.support.records import (
-    Direction,
-    NotNegative,
-    Positive,
+    LengthOrZero,
+    Point,
+    SpringStiffness,
+    Tension,
     parse,
     read_toml,
     record,
@@ -41,18 +42,18 @@ _Label = Annotated[str, Field(min_length=1, max_length=200)]
 @record
 class _Site:
     link: _Label
-    xyz: Direction
+    xyz: Point
 
 
 @record
 class _Entry:
     name: _Label
     elasticity: _Label
-    lead: NotNegative = 0.0
-    series_stiffness: Positive | None = None
+    lead: LengthOrZero = 0.0
+    series_stiffness: SpringStiffness | None = None
     control: Control = "position"
-    minimum: NotNegative = 0.0
-    maximum: Positive | None = None
+    minimum: Tension = 0.0
+    maximum: Tension | None = None
     sites: Annotated[tuple[_Site, ...], Field(strict=False, min_length=2)]
 
 

@@ -68,16 +68,6 @@ def checked_direction(model: StiffnessModel, direction: ArrayLike) -> Array:
     return u
 
 
-def unit_directions(direction: ArrayLike) -> Array:
-    """One unit direction (3,), or several (n, 3), in base axes."""
-    given = number_array("direction", direction)
-    if given.ndim == 2 and given.shape[1] == 3 and len(given):
-        return frozen(np.array([unit_direction("direction", u) for u in given]))
-    if given.ndim == 2:
-        raise InvalidInput("direction", f"shape {given.shape} given; (3,) or (n, 3) is needed.")
-    return unit_direction("direction", given)
-
-
 def target_constraints(
     model: StiffnessModel, directions: Array | None, target: Array
 ) -> Constraints:

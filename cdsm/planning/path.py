@@ -33,12 +33,19 @@ from cdsm.planning.objectives import (
     checked_starts,
     stiffness_model,
     target_constraints,
-    unit_directions,
 )
 from cdsm.planning.path_plan import InfeasibleSample, PathPlan
 from cdsm.planning.range import MARGIN
 from cdsm.stiffness_matrix import stiffness
-from cdsm.support.validation import Array, bound, flag, frozen, instance, number_array
+from cdsm.support.validation import (
+    Array,
+    bound,
+    flag,
+    frozen,
+    instance,
+    number_array,
+    unit_directions,
+)
 from cdsm.tension import checked_bounds
 
 _STATUS: Final[dict[type[CdsmError], Status]] = {
@@ -118,7 +125,7 @@ def plan_path(
     if tips is None and guess is not None:
         raise InvalidInput("guess", "given with angles=, which need none; drop it, or give tips=.")
     size = len(path)
-    directions = None if direction is None else unit_directions(direction)
+    directions = None if direction is None else unit_directions("direction", direction)
     targets = _checked_targets(directions, target, size)
     loads = _per_sample("wrench", wrench, (6,), size)
     limit = bound("rate", rate, len(arm.cables))

@@ -16,14 +16,13 @@ from cdsm.planning.objectives import (
     misfit,
     stiffness_model,
     target_constraints,
-    unit_directions,
 )
 from cdsm.planning.planner import REACHED, Planner
 from cdsm.planning.range import MARGIN
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.units import MODEL, coordinates
-from cdsm.support.validation import Array, ReadOnlyState, frozen
+from cdsm.support.validation import Array, ReadOnlyState, frozen, unit_directions
 from cdsm.tension import Tension
 
 
@@ -153,7 +152,7 @@ def plan_stiffness(
     if direction is None:
         directions, targets = None, checked_matrix(target)
     else:
-        directions = unit_directions(direction)
+        directions = unit_directions("direction", direction)
         targets = checked_targets(directions, target)
 
     planner = Planner(model, target_constraints(model, directions, targets), number, seed)

@@ -15,7 +15,7 @@ from scipy.optimize import brentq
 from cdsm.errors import ElasticityRangeError, InfeasibleTension, SolverError
 from cdsm.manipulator import Manipulator
 from cdsm.stiffness_matrix import Stiffness
-from cdsm.support.validation import Array
+from cdsm.support.validation import RANGES, Array
 
 SAMPLES: Final = 96
 """Places that are evaluated; a stable range narrower than a step is not seen."""
@@ -96,7 +96,7 @@ def scan_end(at: StiffnessAt, low: float, highest: float) -> float:
     return (
         highest
         if _balances(at, highest)
-        else last_true(lambda b: _balances(at, b), low, highest)[0]
+        else last_true(lambda b: b >= RANGES["tension"].low and _balances(at, b), low, highest)[0]
     )
 
 

@@ -28,7 +28,7 @@ from cdsm.statics.bound_scan import (
     tension_domain,
 )
 from cdsm.stiffness_matrix import Stiffness, stiffness
-from cdsm.support.validation import Array, ReadOnlyState, bound, frozen, instance, vector
+from cdsm.support.validation import Array, ReadOnlyState, bound, frozen, instance, wrench_vector
 from cdsm.tension import distribute_tension
 
 _NOWHERE: Final = 1e6
@@ -147,7 +147,7 @@ def critical_tension(
         ElasticityRangeError: Even the least tensions are outside the cables' elasticities.
     """
     arm = instance("pose", pose, Posture).arm
-    W = vector("wrench", wrench, 6, "force [N], then moment [N m], base axes")
+    W = wrench_vector("wrench", wrench)
 
     def at(minimum: float) -> Stiffness:
         return stiffness(pose, distribute_tension(pose, minimum, wrench=W, solver=solver))
@@ -202,8 +202,8 @@ def critical_load(
         ElasticityRangeError: A tension is outside its cable's elasticity even without load.
     """
     count = len(instance("pose", pose, Posture).arm.cables)
-    W = vector("wrench", wrench, 6, "force [N], then moment [N m], base axes")
-    always = vector("carried", carried, 6, "force [N], then moment [N m], base axes")
+    W = wrench_vector("wrench", wrench)
+    always = wrench_vector("carried", carried)
     low, high = bound("minimum", minimum, count), bound("maximum", maximum, count)
     if not W.any():
         raise InvalidInput("wrench", "is zero, and so is any multiple of it; give a load.")

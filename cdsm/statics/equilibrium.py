@@ -23,7 +23,7 @@ from cdsm.statics.locked_motors import Iterate, LoadedArm, rounding
 from cdsm.statics.trust_region import FLAT, RestSearch, find_rest
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.units import coordinates
-from cdsm.support.validation import Array, ReadOnlyState, frozen, vector
+from cdsm.support.validation import Array, ReadOnlyState, frozen, wrench_vector
 from cdsm.tension import Tension
 
 _SMALLEST_STEP = 2.0**-6
@@ -203,7 +203,7 @@ def equilibrium(
     reference = stiffness(pose, tension, None if isinstance(tension, Tension) else wrench)
     W = reference.wrench
     if wrench is not None:
-        W = vector("wrench", wrench, 6, "force [N], then moment [N m], base axes")
+        W = wrench_vector("wrench", wrench)
     _require_between_stops(pose)
     loaded = LoadedArm(pose, reference.tension, W)
     start = loaded.at(pose, reference.tension)

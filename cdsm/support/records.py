@@ -13,6 +13,7 @@ from typing import Annotated, Any, TypeVar, cast, dataclass_transform, get_args,
 
 import numpy as np
 from pydantic import (
+    AfterValidator,
     BeforeValidator,
     ConfigDict,
     Field,
@@ -23,7 +24,7 @@ from pydantic import (
 from pydantic.dataclasses import dataclass
 
 from cdsm.errors import GeometryError
-from cdsm.support.validation import LARGEST
+from cdsm.support.validation import LARGEST, RANGES, within
 
 _Record = TypeVar("_Record")
 _Function = TypeVar("_Function", bound=Callable[..., Any])
@@ -36,11 +37,31 @@ def _plain(value: object) -> object:
     return value.tolist() if isinstance(value, (np.generic, np.ndarray)) else value
 
 
+def _in_range(kind: str, zero: bool = False) -> Callable[[float], float]:
+    """A check of a field against :data:`~cdsm.support.validation.RANGES`."""
+
+    def check(value: float) -> float:
+        problem = within(kind, value, zero=zero)
+        if problem:
+            raise ValueError(problem)
+        return value
+
+    return check
+
+
 Integer = Annotated[int, BeforeValidator(_plain)]
 Number = Annotated[float, BeforeValidator(_plain), Field(ge=-LARGEST, le=LARGEST)]
-Positive = Annotated[Number, Field(gt=0)]
-NotNegative = Annotated[Number, Field(ge=0)]
+Length = Annotated[Number, AfterValidator(_in_range("length"))]
+LengthOrZero = Annotated[Number, AfterValidator(_in_range("length", zero=True))]
+Mass = Annotated[Number, AfterValidator(_in_range("mass", zero=True))]
+Rigidity = Annotated[Number, AfterValidator(_in_range("rigidity"))]
+SpringStiffness = Annotated[Number, AfterValidator(_in_range("stiffness"))]
+Tension = Annotated[Number, AfterValidator(_in_range("tension", zero=True))]
+Coordinate = Annotated[Number, Field(ge=-RANGES["length"].high, le=RANGES["length"].high)]
 Direction = Annotated[tuple[Number, Number, Number], Field(strict=False), BeforeValidator(_plain)]
+Point = Annotated[
+    tuple[Coordinate, Coordinate, Coordinate], Field(strict=False), BeforeValidator(_plain)
+]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$", max_length=64)]
 
 
@@ -158,6 +179,8 @@ def _faults(error: ValidationError, kind: Callable[..., Any]) -> list[str]:
         cause = fault.get("ctx", {}).get("error")
         if isinstance(cause, CrossFaults):
             listed += [f"{where}.{each}".lstrip(".") for each in cause.faults]
+        elif isinstance(cause, ValueError):
+            listed.append(f"{where}: {cause}")
         elif fault["type"] == "too_short" and any(
             other["loc"][: len(fault["loc"])] == fault["loc"] and other is not fault
             for other in faults

@@ -1,77 +1,111 @@
-"""Checks at the border: native float64, right shape, finite, and read-only from there on."""
+"""Checks at the border: native float64, the right shape, finite, of a size a machine could have.
+
+A quantity outside its range in :data:`RANGES` is refused here, by a named error, so that no code
+below has to defend itself against overflow, denormals and the like.
+"""
 
 from __future__ import annotations
 
-from dataclasses import fields
-from typing import TYPE_CHECKING, Any, TypeVar
+import math
+from collections.abc import Iterable
+from typing import Final, NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from cdsm.errors import InvalidInput, UnknownName
-from cdsm.support.markup import element
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-Array = NDArray[np.float64]
+from cdsm.support.values import Array as Array
+from cdsm.support.values import Printed as Printed
+from cdsm.support.values import ReadOnlyState as ReadOnlyState
+from cdsm.support.values import frozen as frozen
 
 _Kind = TypeVar("_Kind")
-_AnyArray = TypeVar("_AnyArray", bound=NDArray[Any])
-
-
-def frozen(array: _AnyArray) -> _AnyArray:
-    """Return the array itself, made read-only."""
-    array.setflags(write=False)
-    return array
-
-
-class Printed:
-    """For what prints itself as a table: a notebook shows that, in columns that stay in line."""
-
-    def _repr_html_(self) -> str:
-        return str(element("pre", str(self)))
-
-
-class ReadOnlyState(Printed):
-    """For frozen dataclasses of read-only arrays: unpickling and copying keep them read-only."""
-
-    def __getstate__(self) -> dict[str, object]:
-        # the fields alone: what is computed from them on first use can be large
-        return {field.name: getattr(self, field.name) for field in fields(self)}  # type: ignore[arg-type]
-
-    def __setstate__(self, state: dict[str, object]) -> None:
-        for value in state.values():
-            for array in value if isinstance(value, tuple) else (value,):
-                if isinstance(array, np.ndarray):
-                    frozen(array)
-        self.__dict__.update(state)
-
 
 LARGEST = 1e15
-"""No force, length or rigidity of a real arm comes near this; beyond, products overflow."""
-
+"""Largest magnitude of a number that has no range of its own."""
 
 SMALLEST = 1e-12
-"""No stiffness or rigidity of a real cable is this small; below, quotients overflow."""
+"""Smallest positive number of the same."""
 
 
-_LEAST = 1e-100
-"""No bound of a tension is this small, unless it is zero; below, products vanish."""
+class Range(NamedTuple):
+    """The magnitudes a machine could have of a quantity, zero apart, in an SI unit."""
+
+    unit: str
+    low: float
+    high: float
 
 
-def number_array(name: str, value: ArrayLike) -> Array:
-    """Return a fresh native float64 array of finite numbers, or raise :class:`InvalidInput`."""
+RANGES: Final = {
+    "force": Range("N", 1e-9, 1e9),
+    "gravity": Range("m/s²", 1e-6, 1e4),
+    "length": Range("m", 1e-6, 1e4),
+    "mass": Range("kg", 1e-9, 1e6),
+    "moment": Range("N m", 1e-9, 1e9),
+    "rigidity": Range("N", 1e-6, 1e12),
+    "speed": Range("m/s", 1e-9, 1e4),
+    "stiffness": Range("N/m", 1e-6, 1e12),
+    "tension": Range("N", 1e-9, 1e9),
+    "wrench": Range("N, N m", 1e-9, 1e9),
+}
+"""Generous: a hair of rubber to the cables of a bridge."""
+
+WRENCH: Final = "force [N], then moment [N m], base axes"
+
+
+def within(quantity: str, value: float, *, zero: bool = False, infinite: bool = False) -> str:
+    """What is wrong with the size of a positive quantity, with its range; empty if nothing is."""
+    unit, low, high = RANGES[quantity]
+    if low <= value <= high or (zero and value == 0.0) or (infinite and value == math.inf):
+        return ""
+    if quantity == "tension" and value < 0.0:
+        return f"{value:g} N given; cables only pull"
+    words = [*(["0"] if zero else []), f"{low:g} to {high:g} {unit}"]
+    words += ["inf"] if infinite else []
+    return f"{value:g} {unit} given; {', or '.join(words)} is needed"
+
+
+def quantity(
+    name: str, value: object, kind: str, *, zero: bool = False, infinite: bool = False
+) -> float:
+    """Return a positive float within the range of its kind.
+
+    Args:
+        name: The argument's name, for the error.
+        value: What the user gave.
+        kind: A key of :data:`RANGES`.
+        zero: Whether zero is allowed.
+        infinite: Whether inf is allowed.
+
+    Raises:
+        InvalidInput: Not a number, or outside the range.
+    """
+    if infinite and isinstance(value, float) and value == math.inf:
+        return value
+    number = scalar(name, value)
+    problem = within(kind, number, zero=zero, infinite=infinite)
+    if problem:
+        raise InvalidInput(name, f"{problem}.")
+    return number
+
+
+def number_array(name: str, value: ArrayLike, kind: str | None = None) -> Array:
+    """Return a fresh native float64 array of finite numbers, or raise :class:`InvalidInput`.
+
+    With a kind no magnitude is above that of its range; small ones may be rounding and pass.
+    """
     array = _native(name, value)
+    unit, _, largest = ("", 0.0, LARGEST) if kind is None else RANGES[kind]
     # where the sum of squares is small enough, so is each; four times as fast as to look at each
-    if np.vdot(array, array) <= LARGEST:  # false for NaN too
+    if np.vdot(array, array) <= largest:  # false for NaN too
         return array
-    usable = abs(array) <= LARGEST
+    usable = abs(array) <= largest
     if np.count_nonzero(usable) < array.size:
         bad = np.argwhere(~usable)[0]
         where = f"entry [{', '.join(map(str, bad))}] is " if array.ndim else ""
+        allowed = f"{largest:g} {unit}".rstrip()
         raise InvalidInput(
-            name, f"{where}{array[tuple(bad)]:g}; finite numbers up to {LARGEST:g} are allowed."
+            name, f"{where}{array[tuple(bad)]:g}; finite numbers up to {allowed} are allowed."
         )
     return array
 
@@ -91,7 +125,7 @@ def sequence_of(name: str, value: Iterable[_Kind], kind: type[_Kind]) -> tuple[_
     return entries
 
 
-def vector(name: str, value: ArrayLike, size: int, meaning: str) -> Array:
+def vector(name: str, value: ArrayLike, size: int, meaning: str, kind: str | None = None) -> Array:
     """Return a fresh, read-only, finite vector of the given size.
 
     Args:
@@ -99,11 +133,12 @@ def vector(name: str, value: ArrayLike, size: int, meaning: str) -> Array:
         value: What the user gave.
         size: Required number of entries.
         meaning: What the entries are ("one angle [rad] per joint"), for the error.
+        kind: Their key in :data:`RANGES`, if they have one.
 
     Raises:
-        InvalidInput: Not numbers, masked, not finite, or not of shape (size,).
+        InvalidInput: Not numbers, masked, not finite, too large, or not of shape (size,).
     """
-    array = number_array(name, value)
+    array = number_array(name, value, kind)
     if array.shape != (size,):
         raise InvalidInput(name, f"shape {array.shape} given, ({size},) needed: {meaning}.")
     array.setflags(write=False)
@@ -124,16 +159,22 @@ def bound(name: str, value: ArrayLike, size: int, rows: int | None = None) -> Ar
         raise InvalidInput(
             name, f"shape {array.shape} given; give one number, or {wanted}: one per cable [N]."
         )
-    force = abs(array)
-    usable = ((force <= LARGEST) & (force >= _LEAST)) | (force == 0.0) | np.isinf(force)
+    _, least, most = RANGES["tension"]
+    size_of = abs(array)
+    usable = ((size_of <= most) & (size_of >= least)) | (size_of == 0.0) | np.isinf(size_of)
     if np.count_nonzero(usable) < array.size:
         bad = np.argwhere(~usable)[0]
         raise InvalidInput(
             name,
             f"entry [{', '.join(map(str, bad))}] is {array[tuple(bad)]:g}; give newtons from "
-            f"{_LEAST:g} to {LARGEST:g}, 0 or inf.",
+            f"{least:g} to {most:g}, 0 or inf.",
         )
     return frozen(array)
+
+
+def wrench_vector(name: str, value: ArrayLike) -> Array:
+    """Return a read-only wrench (6,)."""
+    return vector(name, value, 6, WRENCH, "wrench")
 
 
 def scalar(name: str, value: object) -> float:
@@ -152,6 +193,16 @@ def unit_direction(name: str, value: ArrayLike) -> Array:
         raise InvalidInput(name, "is the zero vector; give a direction, such as (0, 0, 1).")
     scaled = array / largest  # so that no length over- or underflows
     return frozen(scaled / np.linalg.norm(scaled))
+
+
+def unit_directions(name: str, value: ArrayLike) -> Array:
+    """Return read-only unit vectors (3,), or (n, 3) along n given directions."""
+    given = number_array(name, value)
+    if given.ndim < 2:
+        return unit_direction(name, given)
+    if given.ndim > 2 or given.shape[1] != 3 or not len(given):
+        raise InvalidInput(name, f"shape {given.shape} given, (3,) or (n, 3) needed.")
+    return frozen(np.array([unit_direction(f"{name}[{i}]", u) for i, u in enumerate(given)]))
 
 
 def flag(name: str, value: object) -> bool:

@@ -20,6 +20,7 @@ from cdsm.support.validation import (
     text,
     unit_direction,
     vector,
+    wrench_vector,
 )
 from cdsm.sweeps.labels import Label
 
@@ -85,7 +86,7 @@ def wrenches_of(wrench: ArrayLike | Mapping[str, ArrayLike]) -> Choice[Array]:
     """
 
     def checked(name: str, value: ArrayLike) -> Array:
-        return vector(name, value, 6, "force [N], then moment [N m], base axes")
+        return wrench_vector(name, value)
 
     return _vectors("wrench", wrench, checked)
 

@@ -11,7 +11,7 @@ from pydantic import Field
 from cdsm.elasticity import Elasticity, LinearElasticity
 from cdsm.errors import FileError, GeometryError, InvalidInput, listed
 from cdsm.support.files import read_text, write_text
-from cdsm.support.records import Number, Positive, parse, read_toml, record, toml_lines
+from cdsm.support.records import Number, Rigidity, parse, read_toml, record, toml_lines
 from cdsm.wires.laws import StrandElasticity, TabulatedElasticity
 
 _Row = Annotated[tuple[Number, ...], Field(strict=False)]
@@ -20,7 +20,7 @@ _Row = Annotated[tuple[Number, ...], Field(strict=False)]
 @record
 class _Linear:
     kind: Literal["linear"] = "linear"
-    rigidity: Positive
+    rigidity: Rigidity
 
     def build(self) -> Elasticity:
         return LinearElasticity(self.rigidity)

@@ -172,7 +172,7 @@ def test_tiny_and_huge_forces() -> None:
     q, wrench = postures(arm, 6, 0.4), loads(6)
     reference = cdsm.distribute_tensions(arm, q, 1.0, wrench=wrench)
     assert reference.ok.all()
-    for size in (1e-9, 1e9):  # the problem is homogeneous
+    for size in (1e-6, 1e6):  # the problem is homogeneous
         pull = cdsm.distribute_tensions(arm, q, size, wrench=size * wrench)
         np.testing.assert_allclose(pull.values, size * reference.values, rtol=1e-10)
 

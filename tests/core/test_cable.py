@@ -10,7 +10,7 @@ import pytest
 import cdsm
 from cdsm import presets
 from cdsm.arm_model import _checked_rigidity
-from cdsm.support.validation import LARGEST, SMALLEST
+from cdsm.support.validation import RANGES
 from tests.support.arms import random_arm, random_posture, random_wrench
 from tests.support.locked import original_length
 
@@ -70,22 +70,28 @@ def test_elongation_and_energy_begin_at_the_low_end(name: str, spring: float) ->
     assert float(cable.energy(first, LENGTH)) == pytest.approx(0.0, abs=1e-15)
 
 
-def test_limits_are_allowed_and_what_is_beyond_them_is_named() -> None:
-    assert hybrid(SMALLEST).series_stiffness == SMALLEST
-    assert cdsm.in_series(SMALLEST, math.inf) == SMALLEST
-    assert cdsm.Cable("a", SITES, STRAND, maximum=LARGEST).maximum == LARGEST
+def test_ends_of_ranges_are_allowed_and_what_is_beyond_them_is_named() -> None:
+    low, high = RANGES["stiffness"].low, RANGES["tension"].high
+    assert hybrid(low).series_stiffness == low
+    assert cdsm.in_series(low, math.inf) == low
+    assert cdsm.Cable("a", SITES, STRAND, maximum=high).maximum == high
     assert cdsm.Cable("a", SITES, STRAND, minimum=7.0, maximum=7.0).maximum == 7.0
-    too_much: dict[str, Any] = dict.fromkeys(
-        ("series_stiffness", "minimum", "maximum"), 2.0 * LARGEST
-    )
-    for option, value in too_much.items():
-        with pytest.raises(cdsm.CableError, match=rf"{option}.*up to 1e\+15"):
-            cdsm.Cable("a", SITES, STRAND, **{option: value})
-    with pytest.raises(cdsm.CableError, match="0 <= minimum"):
+    beyond: dict[str, tuple[float, str]] = {
+        "series_stiffness": (1e13, r"to 1e\+12 N/m, or inf"),
+        "minimum": (2e9, r"0, or 1e-09 to 1e\+09 N"),
+        "maximum": (1e-10, "or inf"),
+        "lead": (1e5, "to 10000 m"),
+    }
+    for option, (value, allowed) in beyond.items():
+        with pytest.raises(cdsm.CableError, match=f"{option}.*{allowed}"):
+            cdsm.Cable("a", SITES, STRAND, **{option: value})  # type: ignore[arg-type]
+    with pytest.raises(cdsm.CableError, match="minimum: -1 N given; cables only pull"):
         cdsm.Cable("a", SITES, STRAND, minimum=-1.0)
+    with pytest.raises(cdsm.CableError, match="minimum <= maximum"):
+        cdsm.Cable("a", SITES, STRAND, minimum=2.0, maximum=1.0)
 
 
-@pytest.mark.parametrize("rigidity", [SMALLEST, LARGEST])
+@pytest.mark.parametrize("rigidity", RANGES["rigidity"][1:])
 def test_smallest_and_largest_rigidity_of_ones_own_are_usable(rigidity: float) -> None:
     law, tension = cdsm.LinearElasticity(rigidity), np.array([1.0, 2.0])
     np.testing.assert_array_equal(_checked_rigidity(law, tension), rigidity)

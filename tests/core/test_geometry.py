@@ -184,13 +184,16 @@ def test_integers_stand_for_lengths_in_toml() -> None:
 
 # what is replaced in a universal arm, and what the message must say: key, value, what is allowed
 FAULTS: dict[str, tuple[dict[str, Any], list[str]]] = {
-    "hole radius zero": ({"hole_radius": 0.0}, ["hole_radius", "greater than 0", "0.0"]),
-    "hole radius negative": ({"hole_radius": -0.03}, ["hole_radius", "greater than 0", "-0.03"]),
-    "zero-length link": ({"link_length": 0.0}, ["link_length", "greater than 0", "0.0"]),
-    "negative mass": ({"link_mass": -0.5}, ["link_mass", "greater than or equal to 0", "-0.5"]),
-    "negative lead": ({"lead": -1.0}, ["lead", "greater than or equal to 0", "-1.0"]),
-    "negative base": ({"base_length": -1.0}, ["base_length", "greater than or equal", "-1.0"]),
-    "no disk offset": ({"disk_offset": 0.0}, ["disk_offset", "greater than 0", "0.0"]),
+    "hole radius zero": ({"hole_radius": 0.0}, ["hole_radius", "0 m given", "1e-06 to 10000 m"]),
+    "hole radius negative": (
+        {"hole_radius": -0.03},
+        ["hole_radius", "-0.03 m given", "1e-06 to"],
+    ),
+    "zero-length link": ({"link_length": 0.0}, ["link_length", "0 m given", "1e-06 to 10000 m"]),
+    "negative mass": ({"link_mass": -0.5}, ["link_mass", "-0.5 kg given", "0, or 1e-09 to"]),
+    "negative lead": ({"lead": -1.0}, ["lead", "-1 m given", "0, or 1e-06 to 10000 m"]),
+    "negative base": ({"base_length": -1.0}, ["base_length", "-1 m given", "0, or 1e-06 to"]),
+    "no disk offset": ({"disk_offset": 0.0}, ["disk_offset", "0 m given", "1e-06 to 10000 m"]),
     "101 joints": ({"joints": 101}, ["joints", "less than or equal to 100", "101"]),
     "no joints": ({"joints": 0}, ["joints", "greater than or equal to 1", "0"]),
     "no cables": ({"cables_per_joint": 0}, ["cables_per_joint", "greater than or equal to 1"]),

@@ -52,7 +52,7 @@ PLAUSIBLE = Sizes(
     disk_offset=st.floats(0.003, 0.02),
     hole_radius=st.floats(0.005, 0.06),
     mass=st.just(0.0) | decades(1e-3, 1.0),
-    lead=st.just(0.0) | st.floats(0.0, 2.0),
+    lead=st.just(0.0) | st.floats(1e-6, 2.0),
 )
 EXTREME = Sizes(*[decades(1e-4, 10.0)] * 3, *[st.just(0.0) | decades(1e-6, 100.0)] * 2)
 """From a tenth of a millimetre to ten metres, and in any proportion."""
@@ -225,7 +225,7 @@ def cables(
             name=f"c{i}",
             sites=tuple(draw(sites)),
             elasticity=few[i % len(few)],
-            lead=draw(st.just(0.0) | st.floats(0.0, 2.0)),
+            lead=draw(st.just(0.0) | st.floats(1e-6, 2.0)),
             **draw(pulled()),
         )
         for i in range(draw(st.integers(1, most)))
