@@ -61,7 +61,7 @@ def read_path(path: Path, arm: Manipulator) -> PathFile:
         """The columns of these names, each in one of its units; None if there is none of them."""
         if not wanted.keys() & units.keys():
             return None
-        found = []
+        values = []
         for name, known in wanted.items():
             at, unit = units.get(name, (-1, ""))
             if unit not in known:
@@ -69,10 +69,10 @@ def read_path(path: Path, arm: Manipulator) -> PathFile:
                 raise FileError(
                     path,
                     f"{what or f'has no column {name}'}; call it "
-                    f"{' or '.join(f'{name} [{each}]' for each in known)}.",
+                    f"{' or '.join(f'{name} [{unit}]' for unit in known)}.",
                 )
-            found.append([known[unit] * _number(path, k, row, at) for k, row in rows[1:]])
-        return np.array(found).T
+            values.append([known[unit] * _number(path, k, row, at) for k, row in rows[1:]])
+        return np.array(values).T
 
     joints = {
         name: _LENGTH if slides else _ANGLE

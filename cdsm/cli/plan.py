@@ -90,19 +90,19 @@ def plan(
                 "is of one posture; --path has its own.", param_hint="--angles"
             )
         if path is not None:
-            found = _along_path(robot, read_path(path, robot), u, wanted, bounds, rate)
+            result = _along_path(robot, read_path(path, robot), u, wanted, bounds, rate)
         elif wanted is None:
             raise typer.BadParameter("give it, or --path.", param_hint="--target")
         elif math.isfinite(rate):
             raise typer.BadParameter("is of a path; give --path, too.", param_hint="--rate")
         else:
             pose = at_angles(robot, "0" if angles is None else angles)
-            found = _at_posture(pose, u, wanted, bounds)
-        answer(as_json, found.as_dict, robot, *found.parts)
+            result = _at_posture(pose, u, wanted, bounds)
+        answer(as_json, result.as_dict, robot, *result.parts)
         if out is not None:
-            typer.echo(f"written: {found.motors().write_csv(out)}", err=as_json)
-        write_picture(figure, found.draw, *found.drawn, err=as_json)
-    if not found.complete:
+            typer.echo(f"written: {result.motors().write_csv(out)}", err=as_json)
+        write_picture(figure, result.draw, *result.drawn, err=as_json)
+    if not result.complete:
         raise typer.Exit(UNMET)
 
 
@@ -120,14 +120,14 @@ class _Answer(NamedTuple):
 def _at_posture(pose: Posture, u: list[float], target: float, bounds: _Bounds) -> _Answer:
     """The plan at one posture, and the range."""
     attainable = stiffness_range(pose, u, *bounds)
-    found = plan_stiffness(pose, u, target, *bounds)
+    best = plan_stiffness(pose, u, target, *bounds)
 
     def motors() -> PathPlan:  # the same search, as a path of one sample
         return plan_path(pose.arm, u, target, *bounds, angles=[pose.q])
 
-    drawn = found, attainable
-    as_dict = partial(of_plan, found, attainable)
-    return _Answer((attainable, found), as_dict, motors, "plot_stiffness_plan", drawn)
+    drawn = best, attainable
+    as_dict = partial(of_plan, best, attainable)
+    return _Answer((attainable, best), as_dict, motors, "plot_stiffness_plan", drawn)
 
 
 def _along_path(

@@ -113,7 +113,7 @@ def sweep(
         wanted = poses.read(robot)
         check_target(out)  # now, rather than when all is computed
         low = numbers("--min-tension", min_tension)
-        found = run(
+        dataset = run(
             robot,
             wanted,
             minimum=low[0] if len(low) == 1 else low,
@@ -122,7 +122,7 @@ def sweep(
             outputs=[name.strip() for name in quantities.split(",")],
             store=resume,
         )
-        _answer(as_json, found, write_sweep(found, out), f"{_summary(found)}\n")
+        _answer(as_json, dataset, write_sweep(dataset, out), f"{_summary(dataset)}\n")
 
 
 def map_sweep(
@@ -147,7 +147,7 @@ def map_sweep(
 ) -> None:
     """Colour the reachable workspace by a quantity of a sweep."""
     with reported():
-        found = read_sweep(sweep)
+        dataset = read_sweep(sweep)
         from cdsm.plots import plot_map  # matplotlib, only where it is wanted
 
         slab = None
@@ -155,8 +155,8 @@ def map_sweep(
             axis, _, rest = section.partition("=")
             place, half = numbers("--section", rest.replace(":", " "), 2)
             slab = (axis.strip(), place / 1000.0, half / 1000.0)
-        figure = plot_map(found, quantity, section=slab)
-        _answer(as_json, found, write_file(out, figure.savefig))
+        figure = plot_map(dataset, quantity, section=slab)
+        _answer(as_json, dataset, write_file(out, figure.savefig))
 
 
 def _grid(text: str, arm: Manipulator) -> GridPoses:
@@ -194,11 +194,11 @@ def _waypoints(path: Path, arm: Manipulator) -> Array:
     return file.angles
 
 
-def _answer(as_json: bool, found: xarray.Dataset, written: Path, first: str = "") -> None:
-    counts: Json = {"entries": status_counts(found), "written": [str(written)]}
+def _answer(as_json: bool, dataset: xarray.Dataset, written: Path, first: str = "") -> None:
+    counts: Json = {"entries": status_counts(dataset), "written": [str(written)]}
     answer(as_json, lambda: counts, f"{first}written: {written}")
 
 
-def _summary(found: xarray.Dataset) -> str:
-    counts = ", ".join(f"{count} {word}" for word, count in status_counts(found).items() if count)
-    return f"{found.attrs['title']}, {found.attrs['poses']}: {counts}"
+def _summary(dataset: xarray.Dataset) -> str:
+    counts = ", ".join(f"{count} {word}" for word, count in status_counts(dataset).items() if count)
+    return f"{dataset.attrs['title']}, {dataset.attrs['poses']}: {counts}"

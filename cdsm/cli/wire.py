@@ -35,9 +35,9 @@ def fit(
         length = None if gauge_length is None else gauge_length / 1000.0
         data = read_tensile_csv(test, gauge_length=length)
         with console.status("fitting"):
-            found = fit_tensile_test(data.displacement, data.force, data.gauge_length, method)
+            fitted = fit_tensile_test(data.displacement, data.force, data.gauge_length, method)
         if out is not None:
-            typer.echo(f"written: {write_elasticity(found.elasticity, out)}", err=True)
+            typer.echo(f"written: {write_elasticity(fitted.elasticity, out)}", err=True)
         if figure is not None:
-            typer.echo(f"written: {write_file(figure, found.plot().savefig)}", err=True)
-        answer(as_json, lambda: of_tensile_fit(found), found)
+            typer.echo(f"written: {write_file(figure, fitted.plot().savefig)}", err=True)
+        answer(as_json, lambda: of_tensile_fit(fitted), fitted)

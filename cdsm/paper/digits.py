@@ -1,8 +1,8 @@
 """Eq. 19 within its printed digits: what they leave open, and the most level law among them.
 
 A printed coefficient stands for all numbers that round to it. With c = c_printed + h ∘ d, half a
-unit of the last digit h and |d| ≤ 1, the rigidity EA(F) = Σ c_i Fⁱ is linear in d, and so is all
-that is asked of it here: linear programs answer.
+unit of the last digit h and |d| ≤ 1, the rigidity EA(F) = Σ c_i Fⁱ is linear in d, so its
+bounds and its most level member are solutions of linear programs.
 """
 
 from __future__ import annotations
@@ -104,8 +104,8 @@ def least_bend() -> tuple[float, float]:
         equation=(join * half / _FORCE, -join @ printed / _FORCE),
         bounds=free,
     )
-    found = printed + half * d
-    return float(below @ found), float(above @ found)
+    law = printed + half * d
+    return float(below @ law), float(above @ law)
 
 
 def band(tension: ArrayLike) -> tuple[Array, Array]:
@@ -158,7 +158,7 @@ def _solve(
 ) -> Array:
     """Min cost·x so that A x ≤ b, one equation and bounds; these programs have a solution."""
     row, value = equation if equation is not None else (None, None)
-    found = linprog(
+    solution = linprog(
         cost,
         A_ub=A,
         b_ub=b,
@@ -166,4 +166,4 @@ def _solve(
         b_eq=None if value is None else [value],
         bounds=bounds,
     )
-    return np.asarray(found.x)
+    return np.asarray(solution.x)

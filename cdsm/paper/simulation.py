@@ -349,14 +349,14 @@ def _highest_minimum(pose: Posture) -> float:
     return bound - 1e-3  # safely inside the elasticity's domain
 
 
-def _claim(pair: _Pair, measure: Callable[[Array, Array], Array], **said: Any) -> Claim:
+def _claim(pair: _Pair, measure: Callable[[Array, Array], Array], **texts: Any) -> Claim:
     """A claim about one curve, measured alike in all readings."""
     stretched, unstrained = pair
     return Claim(
         computed=floats(measure(stretched.pseudoinverse, stretched.pseudoinverse_part)),
         original=floats(measure(unstrained.pseudoinverse, unstrained.pseudoinverse_part)),
         along=floats(measure(unstrained.along, unstrained.along_part)),
-        **said,
+        **texts,
     )
 
 

@@ -12,10 +12,11 @@ import numpy as np
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from cdsm.errors import InvalidInput
-from cdsm.plots.style import AXES, COLORS, MM, N_PER_MM, TICKS, equal_axes
+from cdsm.plots.style import AXES, COLORS, MM, N_PER_MM, TICKS, equal_axes, panels
 from cdsm.support.datasets import check_sweep, status_names
 from cdsm.support.validation import Array, one_of, scalar
 
@@ -76,13 +77,15 @@ def plot_map(
     one_of("quantity", "tip_position", [str(name) for name in dataset.data_vars])
     tips = MM * dataset["tip_position"].transpose(..., "axis")
     poses = [str(dim) for dim in tips.dims[:-1]]
-    panels = list(_panels(dataset, quantity, poses))
+    words = status_names(dataset)
+    maps = list(_panels(dataset, quantity, poses, words))
     points = np.asarray(tips.values, dtype=np.float64).reshape(-1, 3)
     shown = np.asarray(np.isfinite(points).all(axis=1))
-    where = ""
+    title = [dataset.attrs["title"], dataset.attrs["poses"]]
     if section is not None:
-        inside, where = _slab(points, section)
+        inside, slab = _slab(points, section)
         shown &= inside
+        title.append(slab)
     if not shown.any():
         raise InvalidInput(
             "section" if section is not None else "dataset",
@@ -91,16 +94,15 @@ def plot_map(
     points = points[shown]
     plane = _plane(points, section)
     factor, unit = _UNITS.get(dataset[quantity].units, (1.0, dataset[quantity].units))
-    panels = [panel.part(shown, factor) for panel in panels]
-    colors = _colors(np.concatenate([panel.values for panel in panels]))
+    maps = [panel.part(shown, factor) for panel in maps]
+    colors = _colors(np.concatenate([panel.values for panel in maps]))
 
-    columns = 2 if len(panels) == 4 else min(len(panels), 3)
-    rows = -(-len(panels) // columns)
-    figure = Figure(figsize=(1.5 + 3.6 * columns, 0.9 + 3.2 * rows), layout="constrained")
-    options: dict[str, Any] = {} if plane else {"subplot_kw": {"projection": "3d"}}
-    grid = figure.subplots(rows, columns, squeeze=False, **options)
-    words = status_names(dataset)
-    for axes, panel in itertools.zip_longest(grid.ravel(), panels):
+    columns = 2 if len(maps) == 4 else min(len(maps), 3)
+    rows = -(-len(maps) // columns)
+    size = 1.5 + 3.6 * columns, 0.9 + 3.2 * rows
+    projection: dict[str, Any] = {} if plane else {"subplot_kw": {"projection": "3d"}}
+    figure, grid = panels(*size, columns, rows, **projection)
+    for axes, panel in itertools.zip_longest(grid.flat, maps):
         if panel is None:
             axes.set_axis_off()
             continue
@@ -111,14 +113,15 @@ def plot_map(
     sign = "; below 0: unstable" if quantity == "margin" else ""
     bar.set_label(f"{name} [{unit}]{sign}", fontsize=9)
     bar.ax.tick_params(labelsize=8)
-    _legend(figure, panels, words)
-    told = ", ".join([dataset.attrs["title"], dataset.attrs["poses"], *([where] if where else [])])
-    figure.suptitle(textwrap.fill(told, 30 + 45 * columns), fontsize=9)
+    _legend(figure, maps, words)
+    figure.suptitle(textwrap.fill(", ".join(title), 30 + 45 * columns), fontsize=9)
     return figure
 
 
 @dataclass(frozen=True)
 class _Panel:
+    """One map: values of all tips, NaN where there are none, and their status."""
+
     title: str
     values: Array
     status: NDArray[np.int8]
@@ -129,12 +132,16 @@ class _Panel:
 
 @dataclass(frozen=True)
 class _Colors:
+    """The scale; infinite values are drawn at ``beyond``."""
+
     mappable: ScalarMappable
     beyond: float
     extend: str
 
 
-def _panels(dataset: xarray.Dataset, quantity: str, poses: list[str]) -> Iterator[_Panel]:
+def _panels(
+    dataset: xarray.Dataset, quantity: str, poses: list[str], words: Mapping[int, str]
+) -> Iterator[_Panel]:
     """One for each combination of the dimensions that are not of the poses."""
     status = dataset["status"]
     allowed = {*map(str, status.dims), "direction"}
@@ -145,7 +152,6 @@ def _panels(dataset: xarray.Dataset, quantity: str, poses: list[str]) -> Iterato
             f"{quantity} has the dimensions {', '.join(dims)}; a map shows one number per entry, "
             "such as softest, stiffest, anisotropy, margin or along.",
         )
-    # status has every case the quantity has, and may have more: those that do not matter to it
     cases = [dim for dim in dims if dim not in poses]
     sizes = [dataset.sizes[dim] for dim in cases]
     if (count := int(np.prod(sizes))) > _MOST_PANELS:
@@ -155,16 +161,16 @@ def _panels(dataset: xarray.Dataset, quantity: str, poses: list[str]) -> Iterato
             f"makes {count} panels, of {listed}; choose up to {_MOST_PANELS}, as in "
             f"dataset.isel({cases[0]}=[0]).",
         )
-    rest = {dim: 0 for dim in status.dims if dim not in dims}
-    words = {word: value for value, word in status_names(dataset).items()}
-    means_nothing = [] if quantity == "margin" else [words["unstable"]]
+    # a case that the quantity does not depend on does not matter to its status either
+    irrelevant = {dim: 0 for dim in status.dims if dim not in dims}
+    hidden = [] if quantity == "margin" else [v for v, word in words.items() if word == "unstable"]
     for place in np.ndindex(*sizes):
         at = dict(zip(cases, place, strict=True))
         values = dataset[quantity].isel(at).transpose(*poses).values.ravel()
-        own = {dim: i for dim, i in at.items() if dim in status.dims}
-        told = status.isel({**own, **rest}).transpose(*poses).values.ravel()
-        values = np.where(np.isin(told, means_nothing), np.nan, values)
-        yield _Panel(", ".join(_title(dataset, dim, i) for dim, i in at.items()), values, told)
+        relevant = {dim: i for dim, i in at.items() if dim in status.dims}
+        codes = status.isel({**relevant, **irrelevant}).transpose(*poses).values.ravel()
+        values = np.where(np.isin(codes, hidden), np.nan, values)
+        yield _Panel(", ".join(_title(dataset, dim, i) for dim, i in at.items()), values, codes)
 
 
 def _title(dataset: xarray.Dataset, dim: str, place: int) -> str:
@@ -176,6 +182,7 @@ def _title(dataset: xarray.Dataset, dim: str, place: int) -> str:
 
 
 def _slab(points: Array, section: tuple[str, float, float]) -> tuple[NDArray[np.bool_], str]:
+    """Which tips are inside a section, and the section in words."""
     if not isinstance(section, (tuple, list)) or len(section) != 3:
         raise InvalidInput(
             "section", f"{section!r} given; an axis, its place and the half thickness [m] needed."
@@ -183,8 +190,8 @@ def _slab(points: Array, section: tuple[str, float, float]) -> tuple[NDArray[np.
     axis = AXES.index(one_of("axis", section[0], AXES))
     place, half = scalar("section", section[1]), scalar("section", section[2])
     inside = abs(points[:, axis] - MM * place) <= MM * half
-    told = f"{section[0]} = {MM * place:g} ± {MM * half:g} mm"
-    return inside, told.replace(" ", "\xa0")  # not to be broken across lines
+    words = f"{section[0]} = {MM * place:g} ± {MM * half:g} mm"
+    return inside, words.replace(" ", "\xa0")  # not to be broken across lines
 
 
 def _plane(points: Array, section: tuple[str, float, float] | None) -> tuple[int, int] | None:
@@ -203,11 +210,11 @@ def _plane(points: Array, section: tuple[str, float, float] | None) -> tuple[int
 def _colors(values: Array) -> _Colors:
     """Colours of finite values; up to the 99th percentile of them where some are infinite."""
     finite = values[np.isfinite(values)]
-    endless = bool(np.isposinf(values).any())
+    infinite = bool(np.isposinf(values).any())
     if not finite.size:
         finite = np.array([0.0, 1.0])
     low = float(finite.min())
-    high = float(np.quantile(finite, 0.99) if endless else finite.max())
+    high = float(np.quantile(finite, 0.99) if infinite else finite.max())
     scale = Normalize
     if low > 0.0 and high > _WIDE * low:
         scale = LogNorm
@@ -217,8 +224,8 @@ def _colors(values: Array) -> _Colors:
     high = max(high, low + 1e-12 * abs(low))
     return _Colors(
         ScalarMappable(scale(low, high), name),
-        high + abs(high),  # what is infinite is drawn as this
-        "max" if endless else "neither",
+        high + abs(high),
+        "max" if infinite else "neither",
     )
 
 
@@ -231,15 +238,14 @@ def _draw(
     words: Mapping[int, str],
 ) -> None:
     shown = plane or (0, 1, 2)
-    there = ~np.isnan(panel.values)
-    for value in np.unique(panel.status[~there]).tolist():
-        mark, color, size = _MARKS.get(words[value], _MARKS["outside_elasticity"])
-        some = points[~there & (panel.status == value)][:, shown]
-        axes.scatter(*some.T, marker=mark, c=color, s=size, linewidths=0.7)
-    order = np.flatnonzero(there)
+    known = ~np.isnan(panel.values)
+    for code in np.unique(panel.status[~known]).tolist():
+        mark, color, size = _MARKS.get(words[code], _MARKS["outside_elasticity"])
+        marked = points[~known & (panel.status == code)][:, shown]
+        axes.scatter(*marked.T, marker=mark, c=color, s=size, linewidths=0.7)
     axes.scatter(
-        *points[order][:, shown].T,
-        c=np.minimum(panel.values[order], colors.beyond),
+        *points[known][:, shown].T,
+        c=np.minimum(panel.values[known], colors.beyond),
         norm=colors.mappable.norm,
         cmap=colors.mappable.cmap,
         s=14.0,
@@ -252,15 +258,12 @@ def _draw(
     if plane:
         axes.locator_params(nbins=TICKS)
         axes.set_aspect("equal", adjustable="datalim")
-        axes.grid(alpha=0.3)
     else:
         equal_axes(axes)
 
 
 def _legend(figure: Figure, panels: list[_Panel], words: Mapping[int, str]) -> None:
     """The markers, and how many entries of all they stand for."""
-    from matplotlib.lines import Line2D
-
     status = np.concatenate([panel.status[np.isnan(panel.values)] for panel in panels])
     total = sum(panel.status.size for panel in panels)
     handles = [Line2D([], [], marker="s", color="0.1", linestyle="", label="base")]

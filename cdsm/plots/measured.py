@@ -59,11 +59,11 @@ def plot_tensile_fit(fit: TensileFit) -> Figure:
     return figure
 
 
-def plot_identification(found: Identification, labels: Sequence[str], title: str) -> Figure:
+def plot_identification(fit: Identification, labels: Sequence[str], title: str) -> Figure:
     """Predicted over measured stiffness, and every residual in standard deviations."""
     figure, ((left, right),) = panels(11.0, 4.5, 2)
-    measured, predicted = N_PER_MM * found.measured, N_PER_MM * found.predicted
-    sigma = [N_PER_MM * measurement.std for measurement in found.measurements]
+    measured, predicted = N_PER_MM * fit.measured, N_PER_MM * fit.predicted
+    sigma = [N_PER_MM * measurement.std for measurement in fit.measurements]
     ends = [min(measured.min(), predicted.min()), max(measured.max(), predicted.max())]
     left.plot(ends, ends, color="0.6", linewidth=0.9)
     left.errorbar(
@@ -73,11 +73,11 @@ def plot_identification(found: Identification, labels: Sequence[str], title: str
     place = np.arange(len(sigma))
     for width, shade in ((2.0, 0.12), (1.0, 0.2)):
         right.axhspan(-width, width, color="0.5", alpha=shade, linewidth=0.0)
-    right.vlines(place, 0.0, found.residuals, color=COLORS[0], linewidth=1.2)
-    right.plot(place, found.residuals, "o", color=COLORS[0], markersize=4)
+    right.vlines(place, 0.0, fit.residuals, color=COLORS[0], linewidth=1.2)
+    right.plot(place, fit.residuals, "o", color=COLORS[0], markersize=4)
     right.axhline(0.0, color="0.2", linewidth=0.8)
     right.set_ylabel("(predicted − measured)/σ, bands at 1 and 2 σ")
-    if len(sigma) <= _MOST_LABELS and any(each.label for each in found.measurements):
+    if len(sigma) <= _MOST_LABELS and any(measurement.label for measurement in fit.measurements):
         right.set_xticks(place, labels, rotation=90, fontsize=8)
     else:
         right.set_xlabel("measurement")

@@ -264,11 +264,11 @@ def _draw_curve(
     if result.swept == "tension":
         low, mean, high = curve.tension.T
         spread = np.array([mean - low, high - mean])
-        some = slice(None, None, max(1, len(x) // 8))
+        every = slice(None, None, max(1, len(x) // 8))
         axes.errorbar(
-            x[some],
-            N_PER_MM * values[some],
-            xerr=spread[:, some],
+            x[every],
+            N_PER_MM * values[every],
+            xerr=spread[:, every],
             fmt="none",
             ecolor=color,
             elinewidth=0.7,

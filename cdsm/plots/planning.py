@@ -47,13 +47,13 @@ def plot_stiffness_plan(plan: StiffnessPlan, attainable: StiffnessRange) -> Figu
         raise InvalidInput("attainable", "is not of the posture and the direction of the plan.")
     figure, ((axes,),) = panels(8.0, 4.0, 1)
     names = [cable.name for cable in attainable.posture.arm.cables]
-    for pull, value, name, color, marker in (
+    for tension, value, name, color, marker in (
         (attainable.low_tension, attainable.low, "softest", COLORS[2], "v"),
         (plan.tension, float(plan.achieved), "planned", COLORS[0], "o"),
         (attainable.high_tension, attainable.high, "stiffest", COLORS[1], "^"),
     ):
         label = f"{name}: {N_PER_MM * value:.4g} N/mm"
-        axes.plot(names, pull.values, marker, color=color, label=label, linestyle=":")
+        axes.plot(names, tension.values, marker, color=color, label=label, linestyle=":")
     axes.set(ylabel="tension [N]", title=f"stiffness along {_named(attainable.direction)}")
     axes.set_ylim(bottom=0.0)
     axes.tick_params(axis="x", rotation=60)

@@ -25,7 +25,7 @@ def expect(name: str, value: object, kind: str) -> None:
 
     The class is named, not imported: results import this package for their ``plot`` methods.
     """
-    if kind not in (each.__name__ for each in type(value).__mro__):
+    if kind not in (base.__name__ for base in type(value).__mro__):
         raise InvalidInput(name, f"{value!r} given; a {kind} is needed.")
 
 
@@ -35,8 +35,8 @@ def panels(
     """A figure and its panels (rows, columns), each with a grid; sizes in inches."""
     figure = Figure(figsize=(width, height), layout="constrained")
     axes = figure.subplots(rows, columns, squeeze=False, **options)
-    for each in axes.flat:
-        each.grid(alpha=0.3)
+    for panel in axes.flat:
+        panel.grid(alpha=0.3)
     return figure, axes
 
 
