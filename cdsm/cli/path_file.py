@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-import re
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, NoReturn
 
 import numpy as np
 
 from cdsm.errors import FileError
 from cdsm.manipulator import Manipulator
-from cdsm.support.files import csv_cells, read_text
+from cdsm.support.tables import name_and_unit, read_table
 from cdsm.support.validation import Array
 
 _ANGLE: Final = {"deg": math.pi / 180.0, "°": math.pi / 180.0, "rad": 1.0}
@@ -45,17 +44,18 @@ def read_path(path: Path, arm: Manipulator) -> PathFile:
         FileError: It cannot be read, columns or units are missing, or an entry is not a number; the
             line is named.
     """
-    lines = [(k, line) for k, line in enumerate(read_text(path).splitlines(), 1) if line.strip()]
-    lines = [(k, line) for k, line in lines if not line.lstrip().startswith("#")]
-    rows = [(k, csv_cells(path, k, line)) for k, line in lines]
-    if len(rows) < 2:
+    table = read_table(path)
+    if len(table.rows) < 2:
         raise FileError(path, "holds no path; a header and one line per sample are needed.")
     units: dict[str, tuple[int, str]] = {}
-    for at, cell in enumerate(rows[0][1]):
-        name, unit = re.fullmatch(r"(.*?)\s*(?:\[(.*)\])?", cell).groups()  # type: ignore[union-attr]
+    for at, cell in enumerate(table.header):
+        name, unit = name_and_unit(cell)
         if name in units:
             raise FileError(path, f"has two columns called {name}; give each once.")
-        units[name] = at, unit or ""
+        units[name] = at, unit
+
+    def refuse(problem: str) -> NoReturn:
+        raise FileError(path, f"{problem}.")
 
     def columns(wanted: dict[str, dict[str, float]]) -> Array | None:
         """The columns of these names, each in one of its units; None if there is none of them."""
@@ -71,7 +71,7 @@ def read_path(path: Path, arm: Manipulator) -> PathFile:
                     f"{what or f'has no column {name}'}; call it "
                     f"{' or '.join(f'{name} [{unit}]' for unit in known)}.",
                 )
-            values.append([known[unit] * _number(path, k, row, at) for k, row in rows[1:]])
+            values.append(known[unit] * table.column(at, refuse))
         return np.array(values).T
 
     joints = {
@@ -88,14 +88,3 @@ def read_path(path: Path, arm: Manipulator) -> PathFile:
         )
     target = columns({"target": _STIFFNESS})
     return PathFile(angles, tips, None if target is None else target[:, 0])
-
-
-def _number(path: Path, line: int, row: list[str], at: int) -> float:
-    cell = row[at] if at < len(row) else ""
-    try:
-        value = float(cell)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise FileError(path, f"line {line}: {cell!r} is not a finite number.")
-    return value

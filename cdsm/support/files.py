@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import csv
 import os
 import secrets
 import stat
@@ -14,9 +13,6 @@ from cdsm.errors import CdsmError, FileError, InvalidInput
 
 MAXIMUM_BYTES = 10_000_000
 """No description of an arm comes near this; a larger file is a mistake or an attack."""
-
-_LONGEST_CELL = 1000
-"""Characters of a cell of a table; no number, name or remark is longer."""
 
 
 def read_text(path: str | os.PathLike[str]) -> str:
@@ -46,27 +42,6 @@ def read_text(path: str | os.PathLike[str]) -> str:
         ) from None
     except (OSError, ValueError) as error:
         raise FileError(path, f"cannot be read: {_reason(error)}.") from None
-
-
-def csv_cells(
-    path: str | os.PathLike[str], number: int, line: str, delimiter: str = ","
-) -> list[str]:
-    """The cells of a line of a table, white space around them taken off.
-
-    Raises:
-        FileError: Names the line in which a cell is longer than any number or name.
-    """
-    try:
-        cells = [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter))]
-    except csv.Error as error:
-        raise FileError(path, f"line {number} is no line of a table: {error}.") from None
-    longest = max(map(len, cells), default=0)
-    if longest > _LONGEST_CELL:
-        raise FileError(
-            path,
-            f"line {number} has a cell of {longest} characters; {_LONGEST_CELL} are read at most.",
-        )
-    return cells
 
 
 def write_text(path: str | os.PathLike[str], text: str) -> Path:

@@ -1,22 +1,22 @@
-"""The force-displacement record of a tensile test: read from CSV, units named, checked."""
+"""The force-displacement record of a tensile test, read from CSV with its units."""
 
 from __future__ import annotations
 
+import math
 import os
 import re
 from dataclasses import dataclass
 from typing import Final, NoReturn, final
 
-import numpy as np
-
 from cdsm.errors import TensileTestError
-from cdsm.support.files import csv_cells, read_text
+from cdsm.support.tables import Table, read_table
 from cdsm.support.validation import Array, ReadOnlyState, frozen, number_array, scalar
 
 _UNITS: Final = {
     "displacement": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "μm": 1e-6},
     "force": {"mN": 1e-3, "N": 1.0, "kN": 1e3, "MN": 1e6},
 }
+_USUAL: Final = {"displacement": "mm", "force": "N"}
 _WORDS: Final = {
     "displacement": ("displacement", "extension", "elongation", "stroke"),
     "force": ("force", "load", "tension"),
@@ -72,7 +72,7 @@ def read_tensile_csv(
     force_unit: str | None = None,
     gauge_length: float | None = None,
 ) -> TensileTest:
-    """Read a tensile test; what the header leaves open is asked for by name, never guessed.
+    """Read a tensile test. Units that the header does not give are required as arguments.
 
     The first line that is no comment names the columns: one of displacement, extension, elongation
     or stroke, and one of force, load or tension, each with its unit: ``displacement [mm]``,
@@ -91,26 +91,18 @@ def read_tensile_csv(
         TensileTestError: No header, a column or unit or the gauge length missing, given twice or
             not understood, or entries that are not finite numbers; the line is named.
     """
-    text = read_text(path)
-    lines = [(k, line) for k, line in enumerate(text.splitlines(), 1) if line.strip()]
-    comments = [line for _, line in lines if line.lstrip().startswith("#")]
-    lines = [(k, line) for k, line in lines if not line.lstrip().startswith("#")]
-    if not lines:
+    table = read_table(path, "\t;,")
+    if not table.rows:
         _refuse(path, "holds no data; a header and one line per point are needed.")
-    first = lines[0][1]
-    delimiter = next((each for each in "\t;" if each in first), ",")
-    rows = [(k, csv_cells(path, k, line, delimiter)) for k, line in lines]
-    header, body = rows[0][1], rows[1:]
-    if all(_number(cell, delimiter) is not None for cell in header):
+    header, first = _header(path, table)
+
+    def refuse(problem: str) -> NoReturn:
         _refuse(
             path,
-            f"line {rows[0][0]}: there is no header. Begin with a line that names the columns and "
-            "their units, such as: displacement [mm], force [N]",
+            f"{problem}; write one point per line, with a decimal point (a comma only where "
+            "semicolons or tabs separate).",
         )
-    if body and all(re.fullmatch(r"[\[(]?\s*[^\W\d]*\s*[\])]?", cell) for cell in body[0][1]):
-        cells = (*body[0][1], *[""] * len(header))
-        header = [f"{a} [{b.strip('[]() ')}]" if b else a for a, b in zip(header, cells)]  # noqa: B905
-        body = body[1:]
+
     columns = []
     for kind, given in (("displacement", displacement_unit), ("force", force_unit)):
         at = [k for k, cell in enumerate(header) if _name(cell) in _WORDS[kind]]
@@ -119,22 +111,31 @@ def read_tensile_csv(
                 path,
                 f"{len(at) or 'no'} columns of {kind} in the header {header}; exactly one must be "
                 f"called {' or '.join(_WORDS[kind])}, with its unit, such as: {kind} "
-                f"[{'mm' if kind == 'displacement' else 'N'}]",
+                f"[{_USUAL[kind]}]",
             )
-        unit = _factor(path, kind, _unit(header[at[0]]), given)
-        columns.append(unit * _column(path, body, at[0], delimiter))
-    return TensileTest(columns[0], columns[1], _gauge_length(path, comments, gauge_length))
+        factor = _factor(path, kind, _unit(header[at[0]]), given)
+        columns.append(factor * table.column(at[0], refuse, first))
+    return TensileTest(columns[0], columns[1], _gauge_length(path, table.comments, gauge_length))
+
+
+def _header(path: object, table: Table) -> tuple[list[str], int]:
+    """Names with units, and the first row of numbers: a second row may hold the units."""
+    header = table.header
+    if not any(math.isnan(table.number(cell)) for cell in header):
+        _refuse(
+            path,
+            f"line {table.rows[0][0]}: there is no header. Begin with a line that names the "
+            "columns and their units, such as: displacement [mm], force [N]",
+        )
+    units = table.rows[1][1] if len(table.rows) > 1 else ["1"]
+    if not all(re.fullmatch(r"[\[(]?\s*[^\W\d]*\s*[\])]?", cell) for cell in units):
+        return header, 1
+    units = [unit.strip("[]() ") for unit in (*units, *[""] * len(header))]
+    return [f"{a} [{b}]" if b else a for a, b in zip(header, units, strict=False)], 2
 
 
 def _refuse(path: object, problem: str) -> NoReturn:
     raise TensileTestError(f"{path}: {problem}")
-
-
-def _number(cell: str, delimiter: str) -> float | None:
-    try:
-        return float(cell if delimiter == "," else cell.replace(",", "."))
-    except ValueError:
-        return None
 
 
 def _name(cell: str) -> str:
@@ -166,31 +167,16 @@ def _factor(path: object, kind: str, found: str | None, given: str | None) -> fl
         _refuse(
             path,
             f"the {kind} has no unit. Put it into the header, such as {kind} "
-            f"[{'mm' if kind == 'displacement' else 'N'}], or pass {keyword}=.",
+            f"[{_USUAL[kind]}], or pass {keyword}=.",
         )
     return known[unit]
-
-
-def _column(path: object, body: list[tuple[int, list[str]]], at: int, delimiter: str) -> Array:
-    numbers = []
-    for k, row in body:
-        cell = row[at] if at < len(row) else ""
-        number = _number(cell, delimiter)
-        if number is None or not np.isfinite(number):
-            _refuse(
-                path,
-                f"line {k}: {cell!r} is not a finite number; write one point per line, with a "
-                "decimal point (a comma only where semicolons or tabs separate).",
-            )
-        numbers.append(number)
-    return np.array(numbers)
 
 
 def _gauge_length(path: object, comments: list[str], given: float | None) -> float:
     lengths = [] if given is None else [scalar("gauge_length", given)]
     for number, unit in (found.groups() for line in comments for found in _GAUGE.finditer(line)):
-        value = _number(number, ";")
-        if value is None or unit not in _UNITS["displacement"]:
+        value = Table([], [], ";").number(number)
+        if math.isnan(value) or unit not in _UNITS["displacement"]:
             _refuse(
                 path,
                 f"the gauge length {number!r} {unit!r} is not understood; write it with its unit: "
