@@ -13,13 +13,13 @@ from cdsm.batch import layout
 from cdsm.batch.chunks import checked_threads, run
 from cdsm.batch.fused_kernel import evaluate_rows
 from cdsm.batch.inputs import given_wrench, kernel_arm, of_rows, postures
-from cdsm.batch.layout import INFEASIBLE, OK, UNDECIDED, Codes, Flags
+from cdsm.batch.layout import OK, UNDECIDED, Codes, Flags
 from cdsm.batch.serpentine_guess import blocks
-from cdsm.batch.status import Status, summary
 from cdsm.batch.tension_kernel import distribute_rows
 from cdsm.errors import InfeasibleTension, SolverError
 from cdsm.kernels.tension import NO_ARM
 from cdsm.manipulator import Manipulator
+from cdsm.status import Status, summary
 from cdsm.support.validation import Array, ReadOnlyState, frozen, instance
 from cdsm.tension import checked_bounds, distribute_tension
 
@@ -176,8 +176,6 @@ class Distributor:
             try:
                 values[r] = distribute_tension(pose, low[r], high[r], wrench[r]).values
                 status[r] = OK
-            except InfeasibleTension:
-                status[r] = INFEASIBLE
-            except SolverError:
-                status[r] = Status.SOLVER_FAILED
+            except (InfeasibleTension, SolverError) as error:
+                status[r] = Status.of(error) or Status.SOLVER_FAILED
         return values, status

@@ -17,9 +17,9 @@ from cdsm.batch.distribution import Distributor, Tensions
 from cdsm.batch.inputs import given_tension, given_wrench, postures
 from cdsm.batch.job import Job
 from cdsm.batch.layout import QUANTITIES, Codes, Flags
-from cdsm.batch.status import summary
 from cdsm.errors import InvalidInput, UnknownName
 from cdsm.manipulator import Manipulator
+from cdsm.status import summary
 from cdsm.support.validation import (
     Array,
     ReadOnlyState,

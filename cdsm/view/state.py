@@ -11,19 +11,12 @@ from typing import Final, final
 import numpy as np
 from numpy.typing import NDArray
 
-from cdsm.errors import (
-    CableError,
-    CdsmError,
-    ElasticityRangeError,
-    InfeasibleTension,
-    InvalidInput,
-    JointLimitError,
-    SingularStiffness,
-)
+from cdsm.errors import CdsmError, InvalidInput
 from cdsm.kernels.principal import principal_stiffness
 from cdsm.manipulator import Manipulator
 from cdsm.plots.arm import ellipsoid, tension_colors
 from cdsm.posture import Posture
+from cdsm.status import Status
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.validation import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension, distribute_tension
@@ -45,14 +38,13 @@ class Condition(Enum):
     FAILED = "FAILED"
 
 
-_CONDITIONS: Final[tuple[tuple[type[CdsmError], Condition], ...]] = (
-    (InfeasibleTension, Condition.INFEASIBLE),
-    (ElasticityRangeError, Condition.OUTSIDE_ELASTICITY),
-    (SingularStiffness, Condition.SINGULAR),
-    (JointLimitError, Condition.NO_POSTURE),
-    (CableError, Condition.NO_POSTURE),
-    (InvalidInput, Condition.INVALID),
-)
+_CONDITIONS: Final[dict[Status | None, Condition]] = {
+    Status.INFEASIBLE: Condition.INFEASIBLE,
+    Status.OUTSIDE_ELASTICITY: Condition.OUTSIDE_ELASTICITY,
+    Status.SINGULAR: Condition.SINGULAR,
+    Status.BEYOND_LIMITS: Condition.NO_POSTURE,
+    Status.COINCIDENT_SITES: Condition.NO_POSTURE,
+}
 
 
 @final
@@ -148,10 +140,9 @@ def show(arm: Manipulator, setting: Setting) -> Shown:
         K = stiffness(pose, tension)
         _ = K.compliance  # refuses a singular K_θ, whose margin is rounding
     except CdsmError as error:
-        condition = next(
-            (condition for kind, condition in _CONDITIONS if isinstance(error, kind)),
-            Condition.FAILED,
-        )
+        condition = _CONDITIONS.get(Status.of(error), Condition.FAILED)
+        if isinstance(error, InvalidInput):
+            condition = Condition.INVALID
         problem = str(error)
     else:
         condition, problem = Condition.STABLE, ""

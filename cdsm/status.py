@@ -1,4 +1,4 @@
-"""What became of a row of a batch."""
+"""What became of a posture among many, instead of the error that a single one raises."""
 
 from __future__ import annotations
 
@@ -7,14 +7,24 @@ from enum import IntEnum, unique
 import numpy as np
 from numpy.typing import NDArray
 
+from cdsm.errors import (
+    CableError,
+    CdsmError,
+    ElasticityRangeError,
+    InfeasibleTension,
+    JointLimitError,
+    SingularStiffness,
+    SolverError,
+)
+
 
 @unique
 class Status(IntEnum):
     """What became of a row, and so which quantities exist; those that do not are NaN.
 
-    It tells of the first thing that kept something that was asked for from existing, the way
-    the single functions would have raised an error. An arm that buckles is no failure: its margin
-    is negative. Nor is an infinite stiffness ``along`` a direction in which the tip cannot move.
+    It names the first failure, for which the functions of a single posture raise an error. An arm
+    that buckles is no failure: its margin is negative. Nor is an infinite stiffness ``along`` a
+    direction in which the tip cannot move.
     """
 
     OK = 0
@@ -38,9 +48,24 @@ class Status(IntEnum):
     """The tip can hardly move in some direction (SingularStiffness): all but cartesian and
     pseudoinverse exists."""
 
+    @classmethod
+    def of(cls, error: CdsmError) -> Status | None:
+        """The status that stands for an error; None where no posture raises such an error."""
+        return next((status for kind, status in _ERRORS.items() if isinstance(error, kind)), None)
+
+
+_ERRORS: dict[type[CdsmError], Status] = {
+    JointLimitError: Status.BEYOND_LIMITS,
+    CableError: Status.COINCIDENT_SITES,
+    InfeasibleTension: Status.INFEASIBLE,
+    SolverError: Status.SOLVER_FAILED,
+    ElasticityRangeError: Status.OUTSIDE_ELASTICITY,
+    SingularStiffness: Status.SINGULAR,
+}
+
 
 def summary(status: NDArray[np.uint8]) -> str:
-    """How many rows came to what."""
+    """How many rows have which status."""
     counts = np.bincount(status, minlength=len(Status))
-    told = [f"{counts[each]} {each.name}" for each in Status if counts[each] or each == Status.OK]
-    return f"{len(status)} postures: {', '.join(told)}"
+    listed = [f"{counts[each]} {each.name}" for each in Status if counts[each] or each == Status.OK]
+    return f"{len(status)} postures: {', '.join(listed)}"
