@@ -1,7 +1,6 @@
 """The truth report: whether a stiffness can be trusted, with what a user can check it by."""
 
-from cdsm.report.facts import CableState, Rank, Readings
-from cdsm.report.optimality import Optimality
+from cdsm.report.facts import CableState, Optimality, Rank, Readings
 from cdsm.report.report import Report, report_on
 from cdsm.report.self_check import Agreement, Difference, SelfCheck, self_check
 

@@ -33,21 +33,21 @@ _NAMED = 4
 
 def faults(report: Report) -> tuple[str, ...]:
     """Why the stiffness is not to be trusted; nothing if it is."""
-    K, said = report.stiffness, []
+    K, texts = report.stiffness, []
     unchecked: dict[str, list[str]] = {}
     for each in report.self_check.compared:
         if each.verdict == "DIFFERS":
-            said.append(
-                f"self-check: {_words(each.name)} {each.reason}. Do not use this stiffness."
+            texts.append(
+                f"self-check: {_label(each.name)} {each.reason}. Do not use this stiffness."
             )
         elif each.verdict == "not possible":
-            unchecked.setdefault(each.reason, []).append(_words(each.name))
-    said += [
+            unchecked.setdefault(each.reason, []).append(_label(each.name))
+    texts += [
         f"self-check not possible of the {' and '.join(names)}: {reason}"
         for reason, names in unchecked.items()
     ]
     if report.imbalance > BALANCED:
-        said.append(
+        texts.append(
             f"the tensions do not balance the arm: {report.residual:.3g} N m are left, most at "
             f"{report.residual_joint}, {report.imbalance:.1e} of the torques ({BALANCED:g} is "
             "allowed). K_θ is that of an arm held here by something else; distribute_tension "
@@ -55,24 +55,24 @@ def faults(report: Report) -> tuple[str, ...]:
         )
     spectrum, unit = np.linalg.norm(K.joint, 2), K.posture.arm.stiffness_unit()
     if not K.is_stable:
-        said.append(
+        texts.append(
             f"the arm is UNSTABLE: the smallest eigenvalue of K_θ is {K.margin:.4g} {unit}, "
             f"moving {_motion(report)}. It buckles; change tensions, posture or load."
         )
     elif K.margin <= _SINGULAR * spectrum:
-        said.append(
+        texts.append(
             f"the arm is about to buckle: the smallest eigenvalue of K_θ, {K.margin:.2g} {unit}, "
             "is rounding."
         )
     found = report.optimality
     if found is not None and not found.optimal:
         least = found.stationarity
-        said.append(
+        texts.append(
             f"the tensions are not what {found.solver} was asked for: bounds and balance are "
             f"missed by {found.feasibility:.1e}"
             + ("." if least is None else f", stationarity by {least:.1e}.")
         )
-    return tuple(said)
+    return tuple(texts)
 
 
 def notes(report: Report) -> tuple[str, ...]:
@@ -88,63 +88,63 @@ def _of_size(report: Report) -> list[str]:
 
 
 def _of_tensions(report: Report) -> list[str]:
-    K, said = report.stiffness, []
+    K, texts = report.stiffness, []
     if report.optimality is None:
         came = "were given" if K.free_length is None else "follow from an equilibrium"
-        said.append(f"the tensions {came}, not distributed: nothing says they are the least.")
+        texts.append(f"the tensions {came}, not distributed: nothing says they are the least.")
     elif report.optimality.stationarity is None:
-        said.append("the tensions were chosen for a stiffness: they are not the least.")
+        texts.append("the tensions were chosen for a stiffness: they are not the least.")
     held = [each for each in report.cables if each.control == "position"]
     slack = [each.name for each in held if each.is_slack]
     if slack:
-        said.append(
+        texts.append(
             f"slack cables, 0 N: {_listed(slack)}. They stiffen one way only; raise minimum=."
         )
     forced = [each.name for each in report.cables if each.control == "force"]
     if forced:
-        said.append(f"force-controlled, no passive stiffness: {_listed(forced)}.")
+        texts.append(f"force-controlled, no passive stiffness: {_listed(forced)}.")
     pulled = [each for each in held if not each.is_slack]
     low = [each.name for each in pulled if each.below <= CLOSE * each.tension]
     high = [each.name for each in pulled if each.above <= CLOSE * each.tension]
     for names, end in ((low, "low"), (high, "high")):
         if names:
-            said.append(
+            texts.append(
                 f"within {100.0 * CLOSE:g} % of the {end} end of their law: {_listed(names)}. "
                 "Beyond it nothing is known."
             )
     pairs = zip(K.posture.arm.cables, K.free_lengths, strict=True)
     lost = [cable.name for cable, l0 in pairs if l0 <= 0.0]
     if lost:
-        said.append(
+        texts.append(
             f"the series spring stretches by more than the whole cable is long: {_listed(lost)}. "
             "Give a lead that holds the spring; until then K is off by up to F/EA."
         )
     if K.wrench[3:].any():
-        said.append(
+        texts.append(
             "a moment at the tip has no potential: K_θ is not symmetric, stability is judged on "
             "its symmetric part, and the load term is checked by the torque alone."
         )
-    return said
+    return texts
 
 
 def _of_ranks(report: Report) -> list[str]:
-    said = []
+    texts = []
     cables, tip, jacobian = report.cable_rank, report.translation_rank, report.jacobian_rank
     nv = report.stiffness.posture.arm.nv
     if cables.rank < nv:
-        said.append(f"the cables give {cables.rank} of {nv} joint torques: they do not hold all.")
+        texts.append(f"the cables give {cables.rank} of {nv} joint torques: they do not hold all.")
     elif report.closure == 0.0:
-        said.append("not all tensions can grow together without a torque: no pretension at will.")
+        texts.append("not all tensions can grow together without a torque: no pretension at will.")
     if tip.rank < 3:
-        said.append(
+        texts.append(
             f"the joints move the tip in {tip.rank} of 3 directions here: in the others it is "
             "rigid, and neither cartesian nor pseudoinverse exists."
         )
     if jacobian.rank < min(6, nv):
-        said.append(f"J_X has rank {jacobian.rank} here, not {min(6, nv)}.")
+        texts.append(f"J_X has rank {jacobian.rank} here, not {min(6, nv)}.")
     if report.condition > _DIGITS:
-        said.append(f"K_θ has the condition {report.condition:.1g}: the compliance loses digits.")
-    return said
+        texts.append(f"K_θ has the condition {report.condition:.1g}: the compliance loses digits.")
+    return texts
 
 
 def _of_readings(report: Report) -> list[str]:
@@ -167,7 +167,7 @@ def _motion(report: Report) -> str:
     return f"{report.stiffness.posture.arm.joint_names[i]} most ({abs(way[i]):.2f} of 1)"
 
 
-def _words(name: str) -> str:
+def _label(name: str) -> str:
     return {
         "joint": "sum K_θ",
         "torque": "torque out of balance",

@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING, final
 import numpy as np
 
 from cdsm.errors import SingularStiffness
-from cdsm.report import facts, layout, remarks
-from cdsm.report.facts import CableState, Rank, Readings
-from cdsm.report.optimality import Optimality, optimality
-from cdsm.report.page import page
+from cdsm.report import facts, remarks
+from cdsm.report.facts import CableState, Optimality, Rank, Readings
+from cdsm.report.page import page, to_document, to_fragment, to_text
 from cdsm.report.potential import joint_unit
 from cdsm.report.self_check import SelfCheck, self_check
 from cdsm.support.units import joints_to_dict, key
@@ -107,7 +106,7 @@ class Report(ReadOnlyState):
         """
         K = self.stiffness
         arm = K.posture.arm
-        told: dict[str, object] = {
+        values: dict[str, object] = {
             "arm": arm.name,
             "trustworthy": self.trustworthy,
             "faults": self.faults,
@@ -125,14 +124,14 @@ class Report(ReadOnlyState):
                 "terms": [asdict(each) for each in self.self_check.compared],
             },
             "statics": {"residual_Nm": self.residual, "relative": self.imbalance},
-            "optimality": None if self.optimality is None else _told(self.optimality),
+            "optimality": None if self.optimality is None else _optimality_to_json(self.optimality),
             "stability": {
                 "stable": K.is_stable,
                 key("margin", arm.stiffness_unit()): self.margin,
                 "critical_direction": self.critical_direction,
                 "condition": self.condition,
             },
-            "cables": [_cable(each) for each in self.cables],
+            "cables": [_cable_to_json(each) for each in self.cables],
             "rank": {
                 name: {**asdict(rank), "condition": rank.condition}
                 for name, rank in (
@@ -144,21 +143,21 @@ class Report(ReadOnlyState):
             "closure": self.closure,
             "readings_N_per_m": None if self.readings is None else asdict(self.readings),
         }
-        return {name: _plain(value) for name, value in told.items()}
+        return {name: _plain(value) for name, value in values.items()}
 
     def to_html(self) -> str:
         """The report as an HTML file that needs no other."""
-        return layout.to_document(page(self))
+        return to_document(page(self))
 
     def __repr__(self) -> str:
         state = "trustworthy" if self.trustworthy else "NOT TO BE TRUSTED"
         return f"<Report on the stiffness of {self.stiffness.posture.arm.name}, {state}>"
 
     def __str__(self) -> str:
-        return layout.to_text(page(self))
+        return to_text(page(self))
 
     def _repr_html_(self) -> str:
-        return layout.to_fragment(page(self))
+        return to_fragment(page(self))
 
 
 def report_on(K: Stiffness) -> Report:
@@ -179,7 +178,7 @@ def report_on(K: Stiffness) -> Report:
         residual=residual,
         residual_joint=joint,
         imbalance=imbalance,
-        optimality=None if pull is None else optimality(K, pull),
+        optimality=None if pull is None else facts.optimality(K, pull),
         cables=facts.cable_states(K),
         jacobian_rank=facts.jacobian_rank(K),
         translation_rank=facts.translation_rank(K),
@@ -189,7 +188,7 @@ def report_on(K: Stiffness) -> Report:
     )
 
 
-def _cable(each: CableState) -> dict[str, object]:
+def _cable_to_json(each: CableState) -> dict[str, object]:
     return {
         "name": each.name,
         "control": each.control,
@@ -204,8 +203,8 @@ def _cable(each: CableState) -> dict[str, object]:
     }
 
 
-def _told(found: Optimality) -> dict[str, object]:
-    return {**asdict(found), "optimal": found.optimal}
+def _optimality_to_json(optimality: Optimality) -> dict[str, object]:
+    return {**asdict(optimality), "optimal": optimality.optimal}
 
 
 def _plain(value: object) -> object:
