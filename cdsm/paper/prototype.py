@@ -88,13 +88,13 @@ class Prototype:
     spring_ratio: float
     hybrid_tension: float
     highest_hybrid_tension: float
-    disk_ratio: float = math.tan(_LIMIT / 2.0)
-    level_2: float = float(TENSIONS[1])
-    level_3: float = float(TENSIONS[2])
-    level_4: float = float(TENSIONS[3])
-    weight_x: float = 0.0
-    weight_y: float = 0.0
-    weight_z: float = 0.0
+    disk_ratio: float
+    level_2: float
+    level_3: float
+    level_4: float
+    weight_x: float
+    weight_y: float
+    weight_z: float
 
     @property
     def levels(self) -> Array:
@@ -135,12 +135,7 @@ class Prototype:
             CdsmError: No tension of the position-controlled cables balances the arm, or it leaves
                 the domain of their elasticity, or the arm is unstable.
         """
-        return np.array(
-            [
-                [K.along(axis) for axis in np.eye(3)]
-                for K in self._held(pose, np.atleast_1d(np.asarray(tensions, dtype=np.float64)))
-            ]
-        )
+        return self._measured(pose, tensions, np.zeros((3, 3)))
 
     def weigh(self, pose: Posture, tensions: ArrayLike) -> Array:
         """As :meth:`measure`, with the weights of Table II: force over displacement (N, 3) [N/m].
@@ -148,13 +143,18 @@ class Prototype:
         Raises:
             CdsmError: As for :meth:`measure`, with the weights on it.
         """
+        return self._measured(pose, tensions, self.weights)
+
+    def _measured(self, pose: Posture, tensions: ArrayLike, weights: Array) -> Array:
+        """Tangent stiffness along x, y and z; the secant where a weight is given."""
+        levels = np.atleast_1d(np.asarray(tensions, dtype=np.float64))
         return np.array(
             [
                 [
                     weight_test(pose, K.tension, force).stiffness if force.any() else K.along(axis)
-                    for axis, force in zip(np.eye(3), self.weights, strict=True)
+                    for axis, force in zip(np.eye(3), weights, strict=True)
                 ]
-                for K in self._held(pose, np.atleast_1d(np.asarray(tensions, dtype=np.float64)))
+                for K in self._held(pose, levels)
             ]
         )
 
@@ -238,82 +238,40 @@ class Predicted:
         )
 
 
-BOUNDS: Final[dict[str, tuple[float, float]]] = {
-    "link_length": (0.03, 0.15),
-    "tool_length": (0.03, 0.3),
-    "hole_radius": (0.015, 0.05),
-    "lead": (0.0, 0.5),
-    "link_mass": (0.05, 1.0),
-    "drive_stiffness": (1e5, 1e7),
-    "tension_offset": (0.0, 20.0),
-    "angle_1": (-_LIMIT, _LIMIT),
-    "angle_2": (-_LIMIT, _LIMIT),
-    "angle_3": (-_LIMIT, _LIMIT),
-    "spring_ratio": (5.0, 15.0),
-    "hybrid_tension": (3.0, 86.0),
-    "highest_hybrid_tension": (10.0, 86.0),
-    "disk_ratio": (math.tan(_LIMIT / 2.0), 1.0),  # less, and disks touch before ±30°
-    "level_2": (3.0, 40.0),
-    "level_3": (3.0, 60.0),
-    "level_4": (3.0, 86.0),
-    "weight_x": (0.0, 20.0),
-    "weight_y": (0.0, 20.0),
-    "weight_z": (0.0, 20.0),
+_EVEN = TENSIONS.tolist()
+_TOUCH = math.tan(_LIMIT / 2.0)  # a smaller disk ratio, and disks touch before ±30°
+
+_PARAMETERS: Final[dict[str, tuple[float, ...]]] = {
+    # bounds, then starts: even tensions, uneven tensions, Table II alone
+    "link_length": (0.03, 0.15, 0.031, 0.0305, 0.0305),
+    "tool_length": (0.03, 0.3, 0.295, 0.295, 0.266),
+    "hole_radius": (0.015, 0.05, 0.0495, 0.0495, 0.0268),
+    "lead": (0.0, 0.5, 0.085, 0.062, 0.002),
+    "link_mass": (0.05, 1.0, 0.98, 0.947, 0.41),
+    "drive_stiffness": (1e5, 1e7, 9.5e6, 9.5e6, 9.5e6),
+    "tension_offset": (0.0, 20.0, 17.5, 15.0, 6.45),
+    "angle_1": (-_LIMIT, _LIMIT, -0.51, -0.505, -0.505),
+    "angle_2": (-_LIMIT, _LIMIT, -0.51, 0.084, 0.084),
+    "angle_3": (-_LIMIT, _LIMIT, 0.12, -0.1155, -0.1155),
+    "spring_ratio": (5.0, 15.0, 8.0, 8.54, 8.54),
+    "hybrid_tension": (3.0, 86.0, 3.5, 3.5, 3.5),
+    "highest_hybrid_tension": (10.0, 86.0, 34.0, 34.0, 34.0),
+    "disk_ratio": (_TOUCH, 1.0, _TOUCH, 0.275, 0.275),
+    "level_2": (3.0, 40.0, _EVEN[1], 12.3, 11.6),
+    "level_3": (3.0, 60.0, _EVEN[2], 18.4, 17.7),
+    "level_4": (3.0, 86.0, _EVEN[3], 43.8, 47.9),
+    "weight_x": (0.0, 20.0, 0.0, 0.0, 8.0),
+    "weight_y": (0.0, 20.0, 0.0, 0.0, 8.0),
+    "weight_z": (0.0, 20.0, 0.0, 0.0, 7.0),
 }
+
+BOUNDS: Final = {name: (low, high) for name, (low, high, *_) in _PARAMETERS.items()}
 """What a prototype of that kind can be, in SI units; the tensions as far as Table II goes."""
 
-START: Final = Prototype(
-    link_length=0.031,
-    tool_length=0.295,
-    hole_radius=0.0495,
-    lead=0.085,
-    link_mass=0.98,
-    drive_stiffness=9.5e6,
-    tension_offset=17.5,
-    angle_1=-0.51,
-    angle_2=-0.51,
-    angle_3=0.12,
-    spring_ratio=8.0,
-    hybrid_tension=3.5,
-    highest_hybrid_tension=34.0,
+START, UNEVEN_START, TABLE_START = (
+    Prototype(**{name: row[column] for name, row in _PARAMETERS.items()}) for column in (2, 3, 4)
 )
 """Near where searches over the whole of :data:`BOUNDS` end; a search from here is short."""
-
-UNEVEN_START: Final = replace(
-    START,
-    link_length=0.0305,
-    lead=0.062,
-    link_mass=0.947,
-    tension_offset=15.0,
-    angle_1=-0.505,
-    angle_2=0.084,
-    angle_3=-0.1155,
-    spring_ratio=8.54,
-    highest_hybrid_tension=34.0,
-    disk_ratio=0.275,
-    level_2=12.3,
-    level_3=18.4,
-    level_4=43.8,
-)
-"""The same where the tensions of Table II and the disk offset are free."""
-
-TABLE_START: Final = replace(
-    UNEVEN_START,
-    link_length=0.0305,
-    tool_length=0.266,
-    hole_radius=0.0268,
-    lead=0.002,
-    link_mass=0.41,
-    tension_offset=6.45,
-    disk_ratio=0.275,
-    level_2=11.6,
-    level_3=17.7,
-    level_4=47.9,
-    weight_x=8.0,
-    weight_y=8.0,
-    weight_z=7.0,
-)
-"""The same where Table II alone counts and its weights are free, too."""
 
 
 @final
