@@ -123,12 +123,7 @@ class ArmOptions:
     ] = "0,0,-9.81"
 
     def read(self) -> Manipulator:
-        """The arm.
-
-        Raises:
-            CdsmError: There is no such file or arm.
-            typer.BadParameter: An option that this kind of arm needs is missing, or has no effect.
-        """
+        """The arm."""
         gravity = numbers("--gravity", self.gravity, 3)
         if self.arm.suffix.lower() == ".urdf":
             cables = read_cables(_needed("--cables", self.cables))
@@ -149,12 +144,7 @@ class ArmOptions:
         return Manipulator(geometry, cables=routed, gravity=gravity)
 
     def at(self, angles: str) -> Posture:
-        """The arm at joint angles [degrees] and ways [mm].
-
-        Raises:
-            CdsmError: There is no such file, arm or posture.
-            typer.BadParameter: As :meth:`read`, or another number of angles than joints.
-        """
+        """The arm at joint angles [degrees] and ways [mm]."""
         return at_angles(self.read(), angles)
 
     def _refuse(self, why: str, *names: str) -> None:
@@ -181,11 +171,7 @@ class TensionOptions:
     solver: Solver = "daqp"
 
     def distribute(self, pose: Posture) -> Tension:
-        """The tensions at a posture.
-
-        Raises:
-            CdsmError: There are none.
-        """
+        """The tensions at a posture."""
         load = numbers("--wrench", self.wrench, 6)
         return distribute_tension(pose, self.min_tension, self.max_tension, load, self.solver)
 
@@ -197,10 +183,10 @@ def _needed(option: str, value: _Value | None) -> _Value:
 
 
 def grouped(command: Callable[..., None]) -> Callable[..., None]:
-    """A command for typer, with an option for each field of its parameters that are dataclasses.
+    """A command for typer, with an option for each field of its dataclass parameters.
 
-    typer reads options from the signature alone; so groups of them that many commands share are
-    declared once, as a dataclass, and put in here.
+    typer reads options from the signature alone. Options that many commands share are declared
+    once, as the fields of a dataclass, and this puts them into the signature.
     """
     hints = get_type_hints(command, include_extras=True)
     own = inspect.signature(command).parameters
@@ -230,12 +216,7 @@ def grouped(command: Callable[..., None]) -> Callable[..., None]:
 
 
 def at_angles(arm: Manipulator, angles: str) -> Posture:
-    """An arm at joint angles [degrees] and ways [mm].
-
-    Raises:
-        JointLimitError: An angle is beyond its limit.
-        typer.BadParameter: Another number of angles than joints.
-    """
+    """An arm at joint angles [degrees] and ways [mm]."""
     given = numbers("--angles", angles)
     given = given * arm.nv if len(given) == 1 else given
     if len(given) != arm.nv:

@@ -39,10 +39,6 @@ def read_path(path: Path, arm: Manipulator) -> PathFile:
         path: The file: a header and a line for each sample, separated by commas; lines that begin
             with # are comments.
         arm: Whose joints the columns may be named for.
-
-    Raises:
-        FileError: It cannot be read, columns or units are missing, or an entry is not a number; the
-            line is named.
     """
     table = read_table(path)
     if len(table.rows) < 2:

@@ -65,12 +65,7 @@ class PoseOptions:
     seed: Annotated[int | None, typer.Option(help="Of --random; 0.")] = None
 
     def read(self, arm: Manipulator) -> PoseSet:
-        """The postures.
-
-        Raises:
-            CdsmError: There are none, or the file of the path cannot be read.
-            typer.BadParameter: Not one of the three kinds, or an option of another kind.
-        """
+        """The postures."""
         if sum(given is not None for given in (self.grid, self.path, self.random)) != 1:
             raise typer.BadParameter("give one of --grid, --path and --random.", param_hint="poses")
         for option, value, needed, of in (
@@ -183,11 +178,7 @@ def _grid(text: str, arm: Manipulator) -> GridPoses:
 
 
 def _waypoints(path: Path, arm: Manipulator) -> Array:
-    """Waypoints (n, nv) in SI of a file as ``cdsm plan --path`` reads it.
-
-    Raises:
-        FileError: It cannot be read, or holds tips or targets.
-    """
+    """Waypoints (n, nv) in SI of a file as ``cdsm plan --path`` reads it."""
     file = read_path(path, arm)
     if file.angles is None or file.target is not None:
         raise FileError(path, "holds tips or targets; a sweep goes along joint angles.")

@@ -49,8 +49,8 @@ _LONGEST = 2**16
 """Bytes in a message; those of the page have some hundred."""
 
 _PAUSE = 1.0
-"""Seconds until a page is told that its value was beyond the range: at once would be while somebody
-types, and the first digits of a number may be below the range."""
+"""Seconds until a page is told that its value is out of range. Somebody may still be typing: the
+first digits of a number can be below the range."""
 
 _STARTING: Final = threading.Lock()
 

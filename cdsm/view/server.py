@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from cdsm.errors import InvalidInput
 from cdsm.manipulator import Manipulator
 from cdsm.support.extras import need
-from cdsm.support.validation import Array, bound, frozen, instance, scalar, vector
+from cdsm.support.validation import Array, bound, frozen, instance, scalar, vector, whole_number
 from cdsm.tension import installed_solver
 from cdsm.view.scene import Scene
 from cdsm.view.sliders import Controls
@@ -232,8 +232,7 @@ def _server(host: object, port: object) -> tuple[Guard, viser.ViserServer]:
 
     if not isinstance(host, str):
         raise InvalidInput("host", f"{host!r} given; an address is needed, such as '127.0.0.1'.")
-    if isinstance(port, bool) or not isinstance(port, int) or not 0 <= port <= 65535:
-        raise InvalidInput("port", f"{port!r} given; a whole number from 0 to 65535 is needed.")
+    port = whole_number("port", port, 0, 65535)
     _check_free(host, port)
     guard = Guard(host)
     with _quiet():

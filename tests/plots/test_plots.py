@@ -1,5 +1,7 @@
 """Figures draw what they are given; how they look was looked at."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from matplotlib.lines import Line2D
@@ -28,6 +30,21 @@ def test_arm_is_drawn_with_disks_cables_and_equal_axes() -> None:
     limits = np.ptp([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()], axis=1)  # type: ignore[attr-defined]
     box = axes._box_aspect  # type: ignore[attr-defined]
     np.testing.assert_allclose(limits / box, (limits / box)[0])
+
+
+@pytest.mark.parametrize(
+    ("draw", "kind"),
+    [
+        (plots.plot_arm, "Posture"),
+        (plots.plot_weight_test, "WeightTest"),
+        (plots.plot_critical_tension, "CriticalTension"),
+        (plots.plot_path_plan, "PathPlan"),
+        (plots.plot_paper, "figure of cdsm.paper"),
+    ],
+)
+def test_another_kind_of_result_is_refused(draw: Callable[[object], object], kind: str) -> None:
+    with pytest.raises(cdsm.InvalidInput, match=f"given; a {kind} is needed"):
+        draw(mixed_arm())
 
 
 def test_foreign_robot_shows_its_joints_and_what_guides_its_cables() -> None:
