@@ -1,0 +1,82 @@
+"""Elasticities of a user's own in an arm."""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import cdsm
+from cdsm.support.validation import Array
+from tests.support.arms import (
+    random_arm,
+)
+
+ARM = random_arm(1, 3)
+GEOMETRY = ARM.geometry
+NAN, INF = math.nan, math.inf
+
+
+class Own(cdsm.Elasticity):
+    """An elasticity that answers with whatever it is told to."""
+
+    def __init__(self, answer: Callable[[Array], Any]) -> None:
+        self.answer = answer
+
+    def __eq__(self, other: object) -> bool:  # so it cannot be hashed
+        return self is other
+
+    @property
+    def domain(self) -> cdsm.Domain:
+        return cdsm.Domain(0.0, INF)
+
+    def rigidity(self, tension: Any) -> Array:
+        return self.answer(tension)  # type: ignore[no-any-return]
+
+    def strain(self, tension: Any) -> Array:
+        return np.log1p(np.asarray(tension) / 1e3)
+
+    def energy(self, tension: Any) -> Array:
+        raise AssertionError("not needed for stiffness")
+
+
+def test_own_elasticity_need_not_be_hashable() -> None:
+    arm = cdsm.Manipulator(GEOMETRY, Own(lambda tension: 1e3 + tension))
+    stiff = cdsm.stiffness(arm.at(np.zeros(arm.nv)), np.full(len(arm.cables), 50.0))
+    l0 = stiff.posture.cable_lengths / (1.0 + np.log(1.05))  # ε = ∫ dF/(1 kN + F)
+    np.testing.assert_allclose(stiff.cable_stiffness, 1050.0 / l0)
+
+
+@pytest.mark.parametrize(
+    "answer",
+    [
+        lambda tension: tension * NAN,
+        lambda tension: -tension,
+        lambda tension: 0.0 * tension,
+        lambda tension: tension + INF,
+        lambda tension: np.array([1e3]),
+        lambda tension: 1e3,
+    ],
+    ids=["NaN", "negative", "zero", "infinite", "one for all", "a scalar"],
+)
+def test_own_elasticity_without_a_positive_rigidity_is_refused(
+    answer: Callable[[Array], Any],
+) -> None:
+    arm = cdsm.Manipulator(GEOMETRY, Own(answer))
+    with pytest.raises(cdsm.InvalidInput, match=r"elasticity.*rigidity.*positive"):
+        cdsm.stiffness(arm.at(np.zeros(arm.nv)), np.full(len(arm.cables), 50.0))
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: cdsm.Domain(5.0, 1.0),
+        lambda: cdsm.Domain(NAN, 1.0),
+        lambda: cdsm.Domain(-1.0, 1.0),
+        lambda: cdsm.LinearElasticity(5e-324),
+    ],
+)
+def test_domain_and_rigidity_must_be_usable(make: Callable[[], object]) -> None:
+    with pytest.raises(cdsm.InvalidInput):
+        make()

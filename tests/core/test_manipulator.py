@@ -1,0 +1,77 @@
+"""Manipulator: joint limits, and sites that meet."""
+
+import math
+
+import numpy as np
+import pytest
+
+import cdsm
+from tests.support import foreign
+from tests.support.arms import (
+    STEEL,
+    mixed_arm,
+    random_arm,
+)
+
+ARM = random_arm(1, 3)
+
+
+def test_angles_beyond_their_limits_are_an_error_with_data() -> None:
+    arm = mixed_arm()
+    q = np.array([0.0, 2.0, 0.0, -0.41, 0.0])
+    with pytest.raises(cdsm.JointLimitError) as caught:
+        arm.at(q)
+    assert caught.value.joints == ("joint1_2", "joint3_1")
+    assert caught.value.angles == (2.0, -0.41)
+    assert caught.value.limits == ((arm.lower[1], arm.upper[1]), (-0.4, 0.4))
+    for part in ("joint1_2 = 2 rad", "joint3_1 = -0.41 rad", "[-0.4, 0.4]", "check_limits=False"):
+        assert part in str(caught.value)
+    assert np.isfinite(arm.at(q, check_limits=False).tip).all()
+
+
+def test_only_the_first_joints_beyond_their_limits_are_named() -> None:
+    q = np.full(ARM.nv, 3.0)
+    with pytest.raises(cdsm.JointLimitError) as caught:
+        ARM.at(q)
+    assert len(caught.value.joints) == ARM.nv
+    assert str(caught.value).count("is outside") == 4
+    assert f"; and {ARM.nv - 4} joints more." in str(caught.value)
+
+
+def test_ways_beyond_their_limits_are_in_metres() -> None:
+    q = foreign.POSTURE.copy()
+    q[[0, 1]] = 2.0
+    with pytest.raises(cdsm.JointLimitError) as caught:
+        foreign.crab().at(q)
+    for part in (
+        "a = 2 rad is outside [-0.9, 1.1] rad (114.6° of -51.57° to 63.03°)",
+        "b = 2 m is outside [-0.9, 1.1] m",
+    ):
+        assert part in str(caught.value)
+
+
+def test_angles_at_their_limits_are_inside_even_through_degrees() -> None:
+    for sign in (-1.0, 1.0):
+        ARM.at(sign * ARM.upper)
+        ARM.at(np.deg2rad(np.rad2deg(sign * ARM.upper)))
+    with pytest.raises(cdsm.JointLimitError):
+        ARM.at(ARM.upper + 1e-6)
+
+
+def test_sites_that_meet_at_a_posture_are_named_there() -> None:
+    geometry = cdsm.Geometry(
+        base_length=0.02,
+        hole_radius=0.03,
+        joints=(cdsm.Joint(axes=((0.0, 0.0, 1.0),), disk_offset=0.01, limit=3.0),) * 2,
+        links=(cdsm.Link(length=0.05, mass=0.1),) * 2,
+        cables=(cdsm.CableRoute(joint=1, angle=0.0),),
+    )
+    sites = (
+        cdsm.Site("base_disk", (0.02, 0.02, 0.0)),  # 20 mm beside the joint, reached at 90 degrees
+        cdsm.Site("link1", (0.02, 0.0, 0.0)),
+    )
+    arm = cdsm.Manipulator(geometry, cables=[cdsm.Cable("loop", sites, STEEL)])
+    assert np.isfinite(arm.at([1.5, 0.0]).length_jacobian).all()
+    with pytest.raises(cdsm.CableError, match=r"coincide at q = \[1\.57.*Move a site") as caught:
+        arm.at([math.pi / 2.0, 0.0])
+    assert caught.value.cable == "loop"

@@ -1,0 +1,191 @@
+"""Stiffness: singular, unstable, and infinite in some direction."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import scipy.linalg
+
+import cdsm
+from tests.support.arms import (
+    STEEL,
+    random_arm,
+    random_posture,
+    random_tension,
+)
+
+ARM = random_arm(1, 3)
+POSE = random_posture(ARM, 1)
+PULL = cdsm.distribute_tension(POSE, minimum=10.0)
+K = cdsm.stiffness(POSE, PULL)
+GEOMETRY = ARM.geometry
+NAN, INF = math.nan, math.inf
+
+
+def soft_posture() -> cdsm.Posture:
+    """Without gravity an arm on soft cables is stable when slack and buckles under tension."""
+    arm = random_arm(3, 3, elasticity=cdsm.LinearElasticity(2000.0))
+    free = cdsm.Manipulator(arm.geometry, cdsm.LinearElasticity(50.0), gravity=(0.0, 0.0, 0.0))
+    return random_posture(free, 1)
+
+
+def brink() -> cdsm.Stiffness:
+    """The stiffness at the very tension at which the arm buckles, by bisection."""
+    pose = soft_posture()
+    unit = random_tension(pose.arm, 1)
+
+    def at(scale: float) -> cdsm.Stiffness:
+        return cdsm.stiffness(pose, scale * unit)
+
+    low, high = 0.0, 1.0
+    while at(high).margin > 0.0:
+        high *= 2.0
+    for _ in range(200):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if at(middle).margin > 0.0 else (low, middle)
+    return min((at(low), at(high)), key=lambda K: abs(K.margin))
+
+
+def test_stiffness_on_the_brink_of_buckling_is_singular_and_still_prints() -> None:
+    brittle = brink()
+    assert abs(brittle.margin) < 1e-13 * abs(brittle.joint).max()
+    for call in (
+        lambda: brittle.compliance,
+        lambda: brittle.cartesian,
+        lambda: brittle.along((0.0, 0.0, 1.0)),
+        lambda: brittle.shares((0.0, 0.0, 1.0)),
+    ):
+        with pytest.raises(cdsm.SingularStiffness, match=r"singular.*buckle.*Change") as caught:
+            call()
+        # the same motion, up to its sign
+        assert abs(caught.value.direction @ brittle.critical_direction) == pytest.approx(1.0)
+        assert np.linalg.norm(caught.value.direction) == pytest.approx(1.0)
+    assert "smallest joint stiffness" in str(brittle)
+    assert "nan" not in str(brittle)
+    assert "nan" not in brittle._repr_html_()
+    assert np.isfinite(brittle.pseudoinverse()).all()
+
+
+def led(arm: cdsm.Manipulator) -> cdsm.Manipulator:
+    """The arm with leads of 5 m, which let tension buckle it."""
+    assert arm.geometry is not None
+    cables = [replace(cable, lead=5.0) for cable in arm.geometry.cables]
+    geometry = replace(arm.geometry, cables=tuple(cables))
+    return cdsm.Manipulator(geometry, arm.cables[0].elasticity, gravity=arm.gravity)
+
+
+def test_one_joint_on_the_brink_is_singular_though_its_stiffness_is_the_largest_there_is() -> None:
+    """The parts of its K_θ cancel to some digits, and no more of its inverse is known."""
+    arm = led(random_arm(3, 1, "hinged", cdsm.LinearElasticity(50.0)))
+    pose = cdsm.Manipulator(arm.geometry, arm.cables[0].elasticity, gravity=np.zeros(3)).at([0.1])
+    # k = (EA + F)/L, so that K_θ is affine in F
+    slack, unit = (float(cdsm.stiffness(pose, np.full(2, F)).joint[0, 0]) for F in (0.0, 1.0))
+    critical = slack / (slack - unit)
+    for off, digits in ((1e-10, 6), (1e-5, 11)):
+        F = np.full((1, 2), critical * (1.0 - off))
+        K = cdsm.stiffness(pose, F[0])
+        assert K.margin == pytest.approx(off * slack, rel=1e-4)
+        batch = cdsm.evaluate(pose.arm, [pose.q], F, outputs=("compliance",))
+        if digits > 6:
+            assert batch.ok.all()
+            np.testing.assert_array_equal(batch["compliance"][0], K.compliance)
+            continue
+        assert batch.status[0] == cdsm.Status.SINGULAR
+        with pytest.raises(cdsm.SingularStiffness, match="just about to buckle"):
+            _ = K.compliance
+
+
+def test_a_joint_held_by_nothing_has_no_compliance() -> None:
+    geometry = cdsm.Geometry(
+        name="flat",
+        base_length=0.02,
+        hole_radius=0.03,
+        joints=(cdsm.Joint(axes=((0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), disk_offset=0.01),),
+        links=(cdsm.Link(length=0.04, mass=0.0),),
+        cables=(cdsm.CableRoute(joint=1, angle=0.0),),
+    )
+    pose = cdsm.Manipulator(geometry, STEEL).at([0.0, 0.0])
+    F = np.zeros(1)
+    stiff = cdsm.stiffness(pose, F)
+    with pytest.raises(cdsm.SingularStiffness, match="next to nothing holds the arm") as caught:
+        _ = stiff.compliance
+    np.testing.assert_array_equal(caught.value.direction, [1.0, 0.0])
+    batch = cdsm.evaluate(pose.arm, [pose.q], F[None], outputs=("compliance",))
+    assert batch.status[0] == cdsm.Status.SINGULAR
+
+
+def test_batch_finds_every_singular_stiffness_that_the_single_posture_does() -> None:
+    """Though pivots need not be small where K_θ is singular."""
+    for seed in range(12):
+        arm = led(random_arm(seed, 5, "hinged", cdsm.LinearElasticity(2e3)))
+        pose = random_posture(arm, seed)
+        unit = random_tension(arm, seed)
+        rest = cdsm.stiffness(pose, 0.0 * unit).joint
+        change = cdsm.stiffness(pose, unit).joint - rest  # k = (EA + F)/L: affine in F
+        factors = scipy.linalg.eigvals(rest, -change)
+        scale = float(factors.real[abs(factors.imag) < 1e-9 * abs(factors)].max())
+        F = scale * (1.0 + 1e-10) * unit
+        with pytest.raises(cdsm.SingularStiffness):
+            _ = cdsm.stiffness(pose, F).compliance
+        batch = cdsm.evaluate(arm, [pose.q], F, outputs=("compliance",))
+        assert batch.status[0] == cdsm.Status.SINGULAR
+
+
+def test_unstable_stiffness_says_so() -> None:
+    pose = soft_posture()
+    tension = random_tension(pose.arm, 1)
+    slack, tight = (cdsm.stiffness(pose, scale * tension) for scale in (1e-6, 100.0))
+    assert slack.is_stable
+    assert slack.margin > 0.0
+    assert "UNSTABLE" not in str(slack) + repr(slack) + slack._repr_html_()
+    assert not tight.is_stable
+    assert tight.margin < 0.0
+    for text in (str(tight), repr(tight), tight._repr_html_()):
+        assert "UNSTABLE" in text
+    assert np.isfinite(tight.compliance).all()
+
+
+def test_direction_the_tip_cannot_move_in_is_infinitely_stiff() -> None:
+    straight = ARM.at(np.zeros(6))
+    stiff = cdsm.stiffness(straight, cdsm.distribute_tension(straight, minimum=10.0))
+    assert stiff.along((1.0, 0.0, 0.0)) == INF
+    for call, remedy in (
+        (lambda: stiff.cartesian, "Use along"),
+        (lambda: stiff.pseudoinverse(), "Use along"),
+        (lambda: stiff.shares((1.0, 0.0, 0.0)), "infinite"),
+    ):
+        with pytest.raises(cdsm.SingularStiffness, match=remedy) as caught:
+            call()
+        assert abs(caught.value.direction) == pytest.approx([1.0, 0.0, 0.0])
+    assert "inf" in str(stiff)
+    assert "nan" not in str(stiff)
+
+
+def test_however_little_negative_a_stiffness_is_the_arm_is_unstable() -> None:
+    for margin, stable in ((-1e-9, False), (0.0, False), (1e-9, True)):
+        stiff = replace(K, joint=margin * np.eye(ARM.nv))
+        assert (stiff.margin, stiff.is_stable) == (margin, stable)
+
+
+def nearly_flat(size: float) -> cdsm.Stiffness:
+    """All but straight beyond a bent first joint: the tip moves along the arm ever less."""
+    arm = cdsm.Manipulator(GEOMETRY, cdsm.LinearElasticity(48e3))
+    q = size * np.array([0.0, 0.0, 1.0, -0.7, 0.3, 0.5])
+    q[:2] = 0.3, 0.25
+    return cdsm.stiffness(arm.at(q), np.full(len(arm.cables), 50.0))
+
+
+def test_cartesian_stiffness_is_accurate_up_to_where_it_is_refused() -> None:
+    for size in (1e-2, 1e-4, 2e-5):
+        stiff = nearly_flat(size)
+        # softest first; the two soft ones must not drown beside the stiff one
+        ours = np.sort(np.linalg.eigvalsh(stiff.cartesian))
+        soft = 1.0 / np.sort(np.linalg.eigvalsh(stiff.compliance[:3, :3]))[::-1]
+        np.testing.assert_allclose(ours[:2], soft[:2], rtol=1e-3)
+    for size in (1e-6, 1e-8, 1e-10):
+        stiff = nearly_flat(size)
+        for read in (lambda s=stiff: s.cartesian, stiff.pseudoinverse):
+            with pytest.raises(cdsm.SingularStiffness, match="cannot move along"):
+                read()
+        assert np.isfinite(stiff.along((0.0, 1.0, 0.0)))
