@@ -7,6 +7,7 @@ For a change that must not change any answer::
     python -m tests.campaigns.snapshot write FOLDER --only plans cli
     python -m tests.campaigns.snapshot write FOLDER --tree TREE   # of a checkout elsewhere
     python -m tests.campaigns.snapshot compare FOLDER_A FOLDER_B  # exit code 1 if they differ
+    python -m tests.campaigns.snapshot compare FOLDER_A FOLDER_B --tolerance 1e-10
 
 Every job writes JOB.npz, its arrays, and JOB.json, all else as text. A name tells how a value was
 reached, such as ``pose1/least/K.joint``. Only public names are used, so that it runs on trees whose

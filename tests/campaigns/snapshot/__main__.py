@@ -71,9 +71,10 @@ def main() -> None:
     comparing = actions.add_parser("compare", help="compare what two trees have answered")
     comparing.add_argument("first", type=Path)
     comparing.add_argument("second", type=Path)
+    comparing.add_argument("--tolerance", type=float, default=0.0, metavar="RELATIVE")
     given = parser.parse_args()
     if given.action == "compare":
-        raise SystemExit(compare(given.first, given.second) > 0)
+        raise SystemExit(compare(given.first, given.second, given.tolerance) > 0)
     wanted = {**os.environ, **FIXED, "CDSM_TREE": str(Path(given.tree).resolve())}
     if wanted != os.environ:
         os.execve(sys.executable, [sys.executable, *sys.orig_argv[1:]], wanted)

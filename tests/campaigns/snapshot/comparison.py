@@ -22,17 +22,37 @@ def read(folder: Path, name: str) -> Entries:
     return found
 
 
-def differences(first: Entries, second: Entries) -> Iterator[str]:
-    """A line or more for each entry that differs."""
+_NUMBER = re.compile(r"[-+]?\d+\.?\d*(?:e[-+]?\d+)?")
+
+
+def differences(first: Entries, second: Entries, tolerance: float = 0.0) -> Iterator[str]:
+    """A line or more for each entry that differs.
+
+    Numbers, of texts as well, may differ by ``tolerance`` times the largest beside them.
+    """
     one, other = ({**each.texts, **each.arrays} for each in (first, second))
     for name in [*one, *(name for name in other if name not in one)]:
         if name not in other or name not in one:
             yield f"{name}: only in the {'first' if name in one else 'second'}"
+        elif tolerance and _close(one[name], other[name], tolerance):
+            continue
         elif isinstance(one[name], str) and isinstance(other[name], str):
             if one[name] != other[name]:
                 yield f"{name}: {_texts(one[name], other[name])}"
         elif said := _arrays(np.asarray(one[name]), np.asarray(other[name])):
             yield f"{name}: {said}"
+
+
+def _close(one: Any, other: Any, tolerance: float) -> bool:
+    if isinstance(one, str) and isinstance(other, str):
+        if _NUMBER.sub("#", one) != _NUMBER.sub("#", other):
+            return False
+        one, other = (np.array(_NUMBER.findall(each), dtype=float) for each in (one, other))
+    if np.shape(one) != np.shape(other) or np.asarray(one).dtype != np.float64:
+        return False
+    one, other = np.ravel(one), np.ravel(other)
+    size = np.max(abs(one[np.isfinite(one)]), initial=0.0)
+    return np.allclose(one, other, rtol=0.0, atol=tolerance * size, equal_nan=True)
 
 
 def _texts(one: str, other: str) -> str:
@@ -69,7 +89,7 @@ def _arrays(one: Any, other: Any) -> str:
     )
 
 
-def compare(first: Path, second: Path) -> int:
+def compare(first: Path, second: Path, tolerance: float) -> int:
     """Print what differs, and return how many entries do."""
     jobs = [{path.stem for path in folder.glob("*.json")} for folder in (first, second)]
     count = total = 0
@@ -79,7 +99,7 @@ def compare(first: Path, second: Path) -> int:
     for name in sorted(jobs[0] & jobs[1]):
         one, other = read(first, name), read(second, name)
         total += len(one.texts) + len(one.arrays)
-        for said in differences(one, other):
+        for said in differences(one, other, tolerance):
             print(f"{name}: {said}")
             count += 1
     print(f"{total} entries compared, {count} differ")
