@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -26,7 +26,8 @@ from cdsm.support.validation import Array
 if TYPE_CHECKING:
     from cdsm import paper
 
-_LENGTHS = {"stretched": "$l_0 = L$ (paper)", "unstrained": "original $l_0$"}
+_LENGTHS: Final = {"stretched": "$l_0 = L$ (paper)", "unstrained": "original $l_0$"}
+_READINGS: Final = {"pseudoinverse": "paper's reading", "along": "hung weight"}
 
 
 def plot_paper(result: paper.Figure) -> Figure:
@@ -84,62 +85,54 @@ def _plot_strand(result: paper.StrandFigure) -> Figure:
 
 
 def _plot_directions(result: paper.StiffnessFigure) -> Figure:
-    """A column for each direction, a curve for each case."""
-    rows: list[tuple[str, Callable[[paper.Curve], Array]]] = [
-        ("paper's reading", lambda curve: curve.pseudoinverse),
-        ("hung weight", lambda curve: curve.along),
-    ]
-    curves = result.curves
-    if result.swept == "tension":
-        curves += result.original
-    figure, grid = panels(11.0, 2.7 * len(rows) + 0.6, 3, len(rows), sharex=True)
-    for row, (reading, values) in zip(grid, rows, strict=True):
+    """A row for each reading, a column for each direction, a curve for each case."""
+    over_tension = result.swept == "tension"
+    curves = result.curves + (result.original if over_tension else ())
+    figure, grid = panels(11.0, 6.0, 3, 2, sharex=True)
+    for row, (name, reading) in zip(grid, _READINGS.items(), strict=True):
         for i, axes in enumerate(row):
             for curve, style in zip(curves, STYLES, strict=False):
-                label = (
-                    curve.label if result.swept != "tension" else _LENGTHS[curve.original_length]
+                label = _LENGTHS[curve.original_length] if over_tension else curve.label
+                _draw_curve(
+                    axes, result, curve, getattr(curve, name)[:, i], COLORS[i], style, label
                 )
-                _draw_curve(axes, result, curve, values(curve)[:, i], COLORS[i], style, label=label)
-                if result.part == "passive" and reading == "paper's reading":
-                    x = _swept(result, curve)
-                    axes.plot(x, N_PER_MM * curve.pseudoinverse_part[:, i], "k.", markersize=3)
+                if result.part == "passive" and name == "pseudoinverse":
+                    passive = N_PER_MM * curve.pseudoinverse_part[:, i]
+                    axes.plot(_swept(result, curve), passive, "k.", markersize=3)
             axes.set_ylabel(f"$K_{AXES[i]}$, {reading} [N/mm]")
-    _finish(figure, grid, result)
+    note = "dots: passive part alone" if result.part == "passive" else None
+    grid[0, 0].legend(fontsize=8, title=note, title_fontsize=8)
+    _label_swept(grid[-1], result)
+    figure.suptitle(result.title)
     return figure
 
 
 def _plot_changes(result: paper.StiffnessFigure) -> Figure:
     """A column for each direction: the active part, and the change of the stiffness from start."""
     figure, grid = panels(11.0, 9.0, 3, 3, sharex=True, sharey="row")
-    for i in range(3):
-        active, *others = grid[:, i]
-        _draw_curve(
-            active,
-            result,
-            result.curves[0],
-            result.curves[0].pseudoinverse_part[:, i],
-            COLORS[i],
-            "-",
-        )
+    first, stated = result.curves[0], result.claims[0].paper or ()
+    for i, color in enumerate(COLORS):
+        active, *changes = grid[:, i]
+        _draw_curve(active, result, first, first.pseudoinverse_part[:, i], color, "-")
         active.set(title=AXES[i])
-        for axes, name in zip(others, ("pseudoinverse", "along"), strict=True):
-            for n, color in zip(range(len(result.curves)), (COLORS[i], "0.45"), strict=False):
-                for curve, style in ((result.curves[n], "-"), (result.original[n], "--")):
+        for axes, name in zip(changes, _READINGS, strict=True):
+            for pair, shade in zip(
+                zip(result.curves, result.original, strict=True), (color, "0.45"), strict=False
+            ):
+                for curve, style in zip(pair, ("-", "--"), strict=True):
                     values = getattr(curve, name)[:, i]
-                    rigidity = curve.label.split(" (")[0]
+                    rigidity, length = curve.label.split(" (")[0], _LENGTHS[curve.original_length]
                     axes.plot(
                         curve.tension[:, 1],
                         100.0 * (values / values[0] - 1.0),
                         style,
-                        color=color,
-                        label=f"{rigidity}, {_LENGTHS[curve.original_length]}",
+                        color=shade,
+                        label=f"{rigidity}, {length}",
                     )
             axes.axhline(0.0, color="0.2", linewidth=0.6)
-        end = result.curves[0].tension[-1, 1]
-        stated = result.claims[0].paper
-        assert stated is not None
-        others[0].plot([end], [stated[i]], "ko", markersize=5, label="paper, at the end")
-        others[1].set_xlabel("cable tension, mean [N]")
+        end = first.tension[-1, 1]
+        changes[0].plot([end], [stated[i]], "ko", markersize=5, label="paper, at the end")
+        changes[1].set_xlabel("cable tension, mean [N]")
     grid[0, 0].set_ylabel("active part, EA = 48 kN [N/mm]")
     grid[1, 0].set_ylabel("change, paper's reading of $K_R$ [%]")
     grid[2, 0].set_ylabel("change, hung weight [%]")
@@ -151,27 +144,22 @@ def _plot_changes(result: paper.StiffnessFigure) -> Figure:
 def _plot_lead(result: paper.LeadFigure) -> Figure:
     """A panel for each reading, a colour for each direction."""
     figure, (pair,) = panels(10.0, 4.6, 2, sharey=True)
-    readings = {"paper's reading of $K_R$": "pseudoinverse", "hung weight": "along"}
-    for axes, (title, name) in zip(pair, readings.items(), strict=True):
+    for axes, name in zip(pair, _READINGS, strict=True):
         for i, (axis, color) in enumerate(zip(AXES, COLORS, strict=True)):
-            for prefix, length, style in (
-                ("stretched_", "stretched", "-"),
-                ("", "unstrained", "--"),
+            for changes, length, style in (
+                (getattr(result, f"stretched_{name}"), "stretched", "-"),
+                (getattr(result, name), "unstrained", "--"),
             ):
-                axes.plot(
-                    MM * result.leads,
-                    getattr(result, prefix + name)[:, i],
-                    style,
-                    color=color,
-                    label=f"{axis}, {_LENGTHS[length]}",
-                )
+                label = f"{axis}, {_LENGTHS[length]}"
+                axes.plot(MM * result.leads, changes[:, i], style, color=color, label=label)
         axes.axhline(0.0, color="0.2", linewidth=0.8)
         axes.set_xscale("symlog", linthresh=10.0, linscale=0.6)
         axes.set_xlim(0.0, MM * result.leads[-1])
         axes.set_xticks([0.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 300.0])
         axes.xaxis.set_major_formatter(lambda x, _: f"{x:g}")
-        axes.set(title=title, xlabel="lead of all cables [mm]")
-    pair[0].set_ylabel("change of stiffness [%]")
+        axes.set_xlabel("lead of all cables [mm]")
+    pair[0].set(title="paper's reading of $K_R$", ylabel="change of stiffness [%]")
+    pair[1].set(title="hung weight")
     legend_below(figure, pair[0], 3, fontsize=9)
     figure.suptitle(result.title)
     return figure
@@ -182,24 +170,25 @@ def _plot_postures(result: paper.StiffnessFigure) -> Figure:
     figure = Figure(figsize=(11.0, 9.0), layout="constrained")
     grid = figure.add_gridspec(3, 3, height_ratios=(1.15, 1.0, 1.0))
     bottom = []
-    for i, (curve, pose) in enumerate(zip(result.curves, result.postures, strict=True)):
-        picture: Any = figure.add_subplot(grid[0, i], projection="3d")
+    for column, (curve, original, pose) in enumerate(
+        zip(result.curves, result.original, result.postures, strict=True)
+    ):
+        picture: Any = figure.add_subplot(grid[0, column], projection="3d")
         draw_arm(picture, pose, None)
         picture.set_title(curve.label, fontsize=10)
-        for row, (reading, values) in enumerate(
-            (("paper's reading", curve.pseudoinverse), ("hung weight", curve.along)), start=1
-        ):
-            axes: Any = figure.add_subplot(grid[row, i])
-            true = getattr(result.original[i], ("pseudoinverse", "along")[row - 1])
-            for j, (name, color) in enumerate(zip(AXES, COLORS, strict=True)):
-                _draw_curve(axes, result, curve, values[:, j], color, "-", label=name)
-                axes.plot(_swept(result, curve), N_PER_MM * true[:, j], "k:", linewidth=0.8)
+        for row, (name, reading) in enumerate(_READINGS.items(), start=1):
+            axes: Any = figure.add_subplot(grid[row, column])
+            for i, (axis, color) in enumerate(zip(AXES, COLORS, strict=True)):
+                _draw_curve(axes, result, curve, getattr(curve, name)[:, i], color, "-", axis)
+                unstrained = N_PER_MM * getattr(original, name)[:, i]
+                axes.plot(_swept(result, curve), unstrained, "k:", linewidth=0.8)
             axes.set_ylabel(f"stiffness, {reading} [N/mm]")
             axes.grid(alpha=0.3)
         bottom.append(axes)
     title = "direction; solid: l_0 = L (paper), dotted: original length"
     legend_below(figure, bottom[0], 3, title=title)
-    _finish(figure, [bottom], result, legend=False)
+    _label_swept(bottom, result)
+    figure.suptitle(result.title)
     return figure
 
 
@@ -259,16 +248,16 @@ def _draw_curve(
     style: str,
     label: str | None = None,
 ) -> None:
-    x = _swept(result, curve)
-    axes.plot(x, N_PER_MM * values, style, color=color, label=label or curve.label)
+    """A stiffness [N/m] over what is swept; over tension with bars, the range over all cables."""
+    x, y = _swept(result, curve), N_PER_MM * values
+    axes.plot(x, y, style, color=color, label=label or curve.label)
     if result.swept == "tension":
         low, mean, high = curve.tension.T
-        spread = np.array([mean - low, high - mean])
         every = slice(None, None, max(1, len(x) // 8))
         axes.errorbar(
             x[every],
-            N_PER_MM * values[every],
-            xerr=spread[:, every],
+            y[every],
+            xerr=np.array([mean - low, high - mean])[:, every],
             fmt="none",
             ecolor=color,
             elinewidth=0.7,
@@ -280,19 +269,13 @@ def _swept(result: paper.StiffnessFigure, curve: paper.Curve) -> Array:
     return curve.swept / 1e9 if result.swept == "young_modulus" else curve.tension[:, 1]
 
 
-def _finish(
-    figure: Figure, grid: Any, result: paper.StiffnessFigure, *, legend: bool = True
-) -> None:
+def _label_swept(row: Iterable[Any], result: paper.StiffnessFigure) -> None:
     label = {
         "young_modulus": "Young's modulus [GPa]",
         "tension": "cable tension, mean and range [N]",
     }[result.swept]
-    for axes in grid[-1]:
+    for axes in row:
         axes.set_xlabel(label)
-    note = "dots: passive part alone" if result.part == "passive" else ""
-    if legend:
-        grid[0][0].legend(fontsize=8, title=note or None, title_fontsize=8)
-    figure.suptitle(result.title)
 
 
 _DRAWN: Final[dict[str, Callable[[Any], Figure]]] = {

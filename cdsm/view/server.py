@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from cdsm.errors import InvalidInput
 from cdsm.manipulator import Manipulator
 from cdsm.support.extras import need
-from cdsm.support.validation import Array, bound, frozen, instance, scalar, vector, whole_number
+from cdsm.support.validation import Array, bound, frozen, instance, quantity, vector, whole_number
 from cdsm.tension import installed_solver
 from cdsm.view.scene import Scene
 from cdsm.view.sliders import Controls
@@ -74,13 +74,13 @@ def serve(
     need("view", "viser")
     start = Setting(
         q=_first_angles(instance("arm", arm, Manipulator), q),
-        minimum=_newtons("minimum", minimum, zero=True),
+        minimum=quantity("minimum", minimum, "tension", zero=True),
         maximum=float(bound("maximum", maximum, 1)[0]),
         force=vector("force", force, 3, "force at the tip [N], base axes"),
         solver=installed_solver(solver),
     )
-    tension = _newtons("largest_tension", largest_tension)
-    push = max(_newtons("largest_force", largest_force), float(abs(start.force).max()))
+    tension = quantity("largest_tension", largest_tension, "tension")
+    push = max(quantity("largest_force", largest_force, "force"), float(abs(start.force).max()))
     guard, server = _server(host, port)
     return View(arm, start, guard, server, tension, push)
 
@@ -216,14 +216,6 @@ def _first_angles(arm: Manipulator, q: ArrayLike | None) -> Array:
     if q is None:
         return frozen(np.clip(np.zeros(arm.nv), arm.lower, arm.upper))
     return arm._angles(q, check_limits=True)
-
-
-def _newtons(name: str, value: object, *, zero: bool = False) -> float:
-    number = scalar(name, value)
-    if number < 0.0 or (number == 0.0 and not zero):
-        allowed = "zero or more" if zero else "more than zero"
-        raise InvalidInput(name, f"{number:g} N given; {allowed} is needed.")
-    return number
 
 
 def _server(host: object, port: object) -> tuple[Guard, viser.ViserServer]:
