@@ -38,7 +38,7 @@ class Tensions(ReadOnlyState):
         wrench: W (6,) for all, or (B, 6): force [N], then moment [N m].
         minimum: Lower bounds (C,) for all, or (B, C) [N].
         maximum: Upper bounds (C,) for all, or (B, C) [N].
-        status: A :class:`Status` for each row, (B,) [-].
+        status: A :class:`Status` for each row, (B,).
     """
 
     arm: Manipulator
@@ -51,7 +51,7 @@ class Tensions(ReadOnlyState):
 
     @property
     def ok(self) -> Flags:
-        """Where there are tensions, (B,) [-]."""
+        """Where there are tensions, (B,)."""
         return frozen(self.status == OK)
 
     def __len__(self) -> int:

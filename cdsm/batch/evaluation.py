@@ -55,7 +55,7 @@ class Batch(ReadOnlyState):
             None.
         maximum: Upper bounds, likewise (C,) or (B, C) [N].
         direction: Unit direction (3,) of ``along``, or several (D, 3); or None.
-        status: A :class:`Status` for each row, (B,) [-].
+        status: A :class:`Status` for each row, (B,).
         outputs: Names of the quantities, as asked for.
         values: The quantities themselves, (B, …) each, in SI units: [m], [N], [rad].
     """
@@ -72,7 +72,7 @@ class Batch(ReadOnlyState):
     values: tuple[Array, ...]
 
     def __getitem__(self, name: str) -> Array:
-        """A quantity by name, (B, …), any shape, in the unit [-] it has for one posture.
+        """A quantity by name, (B, …), any shape, in the unit it has for one posture.
 
         Raises:
             UnknownName: It was not asked for.
@@ -83,7 +83,7 @@ class Batch(ReadOnlyState):
 
     @cached_property
     def ok(self) -> Flags:
-        """Where everything asked for exists, (B,) [-]."""
+        """Where everything asked for exists, (B,)."""
         return frozen(self.status == layout.OK)
 
     def __len__(self) -> int:
