@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm.errors import SingularStiffness
-from cdsm.planning.kernels import by_tension
+from cdsm.planning.kernels import form_by_tension
 from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.units import coordinates
 from cdsm.support.validation import Array, ReadOnlyState, frozen, instance, unit_direction
@@ -90,7 +90,7 @@ class StiffnessGradient(ReadOnlyState):
     def _projected(self, left: Array, right: Array) -> Array:
         """leftᵀ (∂K_θ/∂F_c) right for every cable, (C, a, b) of (nv, a) and (nv, b)."""
         pose = self.stiffness.posture
-        return by_tension(
+        return form_by_tension(
             pose.length_hessian, pose.length_jacobian, self.cable_stiffness, left, right
         )
 

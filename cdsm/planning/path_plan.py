@@ -1,4 +1,4 @@
-"""What is planned along a path: tensions, stiffness, what the motors do, and what cannot be."""
+"""The plan of a path: tensions, stiffness, cable lengths for the motors, infeasible samples."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ class InfeasibleSample:
     """A sample of a path that cannot be planned.
 
     Attributes:
-        index: Which one, from 0.
-        status: What stands against it: ``"posture"`` (a joint limit, a cable without direction, or
-            the tip does not reach), ``"balance"`` (no tensions within the bounds), ``"elasticity"``
-            (none within its domain), ``"singular"`` (none hold the arm, or the tip cannot move
-            along u), ``"stiffness"`` (none hit the target) or ``"rate"`` (some do, but too far from
-            those of the samples before).
-        reason: The same in words, with the remedy.
-        error: What a planner of this sample alone raises, with its data; None if it would not.
+        index: Its number, from 0.
+        status: ``"posture"`` (a joint limit, a cable without direction, or the tip does not reach),
+            ``"balance"`` (no tensions within the bounds), ``"elasticity"`` (none within its
+            domain), ``"singular"`` (none hold the arm, or the tip cannot move along u),
+            ``"stiffness"`` (none hit the target) or ``"rate"`` (some do, but too far from those of
+            the samples before).
+        reason: The reason in words, with the remedy.
+        error: The error of a plan of this sample alone, with its data; None if there is none.
     """
 
     index: int
@@ -58,17 +58,15 @@ class PathPlan(ReadOnlyState):
         arm: The arm.
         direction: Unit directions u in base axes, (3,) or (n, 3); None for a target of
             ``cartesian``.
-        target: What was asked for at every sample [N/m]: (S,), one per direction (S, n), or
-            (S, 3, 3).
-        rate: By how much a tension may change per step (C,) [N]; may hold inf.
-        planned: Which samples are planned, from 0.
+        target: The target at every sample [N/m]: (S,), one per direction (S, n), or (S, 3, 3).
+        rate: Largest change of a tension per step (C,) [N]; may hold inf.
+        planned: Numbers of the planned samples, from 0.
         angles: Joint angles (P, nv) [rad]; [m] where a joint slides.
         tensions: F (P, C) [N].
-        achieved: What ``stiffness.along`` or ``stiffness.cartesian`` says, (P,), (P, n) or
-            (P, 3, 3) [N/m].
+        achieved: ``stiffness.along`` or ``stiffness.cartesian``, (P,), (P, n) or (P, 3, 3) [N/m].
         stiffness: K_θ at each planned sample, with its posture and wrench.
         infeasible: The other samples, each with its reason.
-        iterations: Steps of all searches.
+        iterations: Iterations of all searches.
     """
 
     arm: Manipulator
@@ -107,12 +105,11 @@ class PathPlan(ReadOnlyState):
 
     @cached_property
     def unstrained_lengths(self) -> Array:
-        """What the motors of the H position-controlled cables have paid out (P, H) [m].
+        """Lengths that the motors of the H position-controlled cables have paid out (P, H) [m].
 
-        The l_0 with l_0 + Δl(F, l_0) = L, Δl being :meth:`~cdsm.Cable.elongation`: it counts
-        from the low end of the elasticity's domain, so that l_0 is the length at that tension, with
-        the series spring at rest. So it is for every ``original_length`` of the arm: what K_θ takes
-        for l_0 does not change what motors do.
+        l_0 + Δl(F, l_0) = L, with Δl of :meth:`~cdsm.Cable.elongation`: l_0 is the length at the
+        low end of the elasticity's domain, the series spring at rest. It does not depend on
+        ``original_length`` of the arm, which concerns K_θ alone.
         """
         motors = CableLaws(self.arm.cables, "unstrained")
         pairs = zip(self.cable_lengths, self.tensions, strict=True)
@@ -124,9 +121,8 @@ class PathPlan(ReadOnlyState):
     def between(self) -> tuple[HalfWay, ...]:
         """The arm half-way between each two planned samples that follow each other.
 
-        The targets are hit at the samples. In between the motors go on evenly, and this is how far
-        the stiffness is off there; half the step leaves a quarter of it. It takes some
-        milliseconds for each pair, when first asked for.
+        The targets are hit at the samples. In between the motors move evenly, and the stiffness is
+        off; half the step leaves a quarter of that. On first use a pair takes some milliseconds.
         """
         pairs = zip(self.planned, self.planned[1:], strict=False)
         l_0, targets = self.unstrained_lengths, self.target
@@ -148,12 +144,11 @@ class PathPlan(ReadOnlyState):
         return [(c, each) for c, each in enumerate(self.arm.cables) if each.control == "position"]
 
     def write_csv(self, path: str | os.PathLike[str]) -> Path:
-        """Write what the motors have to do, a line for each sample, SI units; return the path.
+        """Write a line for each sample, SI units; return the path.
 
-        The columns are ``sample``, ``status``, joint angles [rad] ([m] where a joint slides), and
-        for each cable its tension [N], its length [m] and, if the motor holds that, the unstrained
-        length [m]. Of an infeasible sample there is only the status, and the reason in the last
-        column.
+        The columns are ``sample``, ``status``, joint angles [rad] ([m] where a joint slides), for
+        each cable its tension [N], its length [m] and, if the motor holds it, its unstrained length
+        [m], and ``reason``. An infeasible sample has only the status and the reason.
 
         Args:
             path: The file; it is written whole or not at all.

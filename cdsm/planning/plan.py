@@ -32,17 +32,16 @@ class StiffnessPlan(ReadOnlyState):
     """Tensions for a wanted stiffness, with the question they answer.
 
     Attributes:
-        tension: The tensions; of those that come as near the target the least, by ‖F‖.
-        stiffness: K_θ under them, and all that follows from it.
+        tension: The tensions; of those equally near the target the least, by ‖F‖.
+        stiffness: K_θ under them.
         direction: Unit directions u in base axes, (3,) or (n, 3); None for a target of
             ``cartesian``.
-        target: What was asked for [N/m]: a number, one per direction (n,), or (3, 3).
-        achieved: What ``stiffness.along`` or ``stiffness.cartesian`` says [N/m]: a number, (n,) or
-            (3, 3) as the target.
+        target: The target [N/m]: a number, one per direction (n,), or (3, 3).
+        achieved: ``stiffness.along`` or ``stiffness.cartesian`` [N/m], of the target's shape.
         floor: Smallest eigenvalue of K_θ that counted as stable [N m/rad].
         efforts: ‖F‖ (S,) [N] where each search ended that hit the target, rising; the first is that
             of ``tension``.
-        iterations: Steps of all searches.
+        iterations: Iterations of all searches.
         evaluations: How often K_θ was evaluated.
     """
 
@@ -75,9 +74,9 @@ class StiffnessPlan(ReadOnlyState):
         return float(self.efforts[-1] / self.efforts[0] - 1.0) if self.efforts.size else 0.0
 
     def __repr__(self) -> str:
-        pull = self.tension.values
+        F = self.tension.values
         state = "" if self.reached else f", missed by {self.misfit:.2g}"
-        return f"<StiffnessPlan {pull.min():.4g} to {pull.max():.4g} N{state}>"
+        return f"<StiffnessPlan {F.min():.4g} to {F.max():.4g} N{state}>"
 
     def __str__(self) -> str:
         rows = [str(self.tension)]
@@ -115,14 +114,11 @@ def plan_stiffness(
     Over F with J_Lᵀ F = J_Xᵀ W − g, the bounds, the domains of the elasticities of position-
     controlled cables, and λ_min(K_θ), symmetric part, not below ``margin``. One direction is hit
     within 1e-6, or it is an error. Several directions, or ``cartesian``, are hit too if that is
-    possible; if not, their relative misses are least in the sum of squares, and ``reached`` of the
-    answer is false.
+    possible. If not, the sum of their squared relative misses is least, and ``reached`` is false.
 
-    The tensions are the least there are as far as the searches tell. With the laws of this library
-    all searches mostly end at one effort. With a law of one's own, above all one whose rigidity
-    jumps, they need not: with one such law the effort found was 3.6 % above the least, and where
-    the rigidity jumps it may be a third and more. A ``spread`` above zero warns of it, one of zero
-    does not rule it out, and more ``starts`` find more.
+    The searches are local. With the laws of this library they mostly end at one effort. With a
+    user's own law they need not: with one of them the effort found was 3.6 % above the least. A
+    ``spread`` above zero warns of it, one of zero does not rule it out, and more ``starts`` help.
 
     Args:
         pose: The posture.

@@ -49,7 +49,7 @@ _CAPPED = 0.999
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class StiffnessRange(ReadOnlyState):
-    """What stiffness along a direction an arm can have; made by :func:`stiffness_range`.
+    """The stiffness along a direction that an arm can have; made by :func:`stiffness_range`.
 
     Attributes:
         direction: u (3,), a unit direction in base axes.
@@ -78,7 +78,7 @@ class StiffnessRange(ReadOnlyState):
 
     @property
     def posture(self) -> Posture:
-        """Where."""
+        """The posture."""
         return self.low_tension.posture
 
     def __contains__(self, target: float) -> bool:
@@ -92,13 +92,13 @@ class StiffnessRange(ReadOnlyState):
             f"along {coordinates(self.direction)} the stiffness can be "
             f"{self.low / 1000.0:.4g} to {self.high / 1000.0:.4g} N/mm"
         ]
-        for name, pull, found in (
+        for name, F, found in (
             ("softest", self.low_tension.values, self.low_found),
             ("stiffest", self.high_tension.values, self.high_found),
         ):
             same = int((abs(found - found[0]) <= 1e-6 * found[0]).sum())
             lines.append(
-                f"{name} with {pull.min():.4g} to {pull.max():.4g} N, "
+                f"{name} with {F.min():.4g} to {F.max():.4g} N, "
                 f"found from {same} of {found.size} starts"
             )
         return "\n".join([*lines, f"({MODEL})"])
@@ -119,15 +119,14 @@ def stiffness_range(
 
     Over F with J_Lᵀ F = J_Xᵀ W − g, the bounds, the domains of the elasticities of position-
     controlled cables, and λ_min(K_θ), symmetric part, not below ``margin``. With constant rigidity,
-    or one that levels off, ``along`` is a concave function of F: the largest is the only one there
-    is, the smallest one of many in the corners, so that it is sought from many starts. Of a law of
-    one's own, or one whose rigidity falls somewhere, nothing like that is known: both ends are
-    sought from many starts then, in the corners and between, and ``high_found`` tells how often
-    ``high`` was found. More starts go on from fewer. An arm that tension can buckle is softest just
-    before: then ``low`` depends on ``margin``.
+    or one that levels off, ``along`` is a concave function of F: it has one maximum, and many
+    minima in the corners, so that ``low`` is sought from many starts. With other laws it may have
+    many of both, and both are sought from many starts, in the corners and between; ``high_found``
+    tells how often ``high`` was found. More starts add to fewer. If tension can buckle the arm, it
+    is softest just before, and ``low`` depends on ``margin``.
 
     No number of starts proves that ``low`` is the smallest. With the default it was found too high
-    by up to 0.16 % with constant rigidity (15 cables), and by up to 5.5 % with a law of one's own
+    by up to 0.16 % with constant rigidity (15 cables), and by up to 5.5 % with a user's own law
     whose rigidity has a hump.
 
     Args:

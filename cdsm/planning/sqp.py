@@ -18,9 +18,9 @@ multiplier of c. It is raised tenfold until c is met or until that no longer hel
 three times the multiplier then, since a high price makes for short steps along a curved c.
 
 **The curvature W.** The exact Hessian of L, second derivatives of K_θ⁻¹ and of λ_min included, but
-made positive definite on the steps that keep the balance, c, and (if z > 0) the reserve, as the
-solver needs it: :func:`cdsm.planning.kernels.convex`. Where W was convex on them already, it is
-unchanged there, so that the last steps converge quadratically.
+made positive definite, as the solver needs it, on the steps that keep the balance, c, and (if
+z > 0) the reserve: :func:`cdsm.planning.kernels.convex`. Where it is so already it stays as it is,
+and the last steps converge quadratically.
 
 **The trust region.** A step is taken if the merit f + ρ (‖c‖₁ + ½ ‖c‖²) falls by 1e-4 of the
 prediction or more. The radius triples the step after a fall by more than half of the prediction,
@@ -32,8 +32,8 @@ rigidities K_θ is affine in F, the stable tensions are convex, and the way to t
 **Kinks.** At a kink of a rigidity (Eq. 19 has one at 31 N) c is continuous, but its slope is not.
 Kinks divide the tensions into boxes ("pieces") on which c is smooth. A search passes kinks freely
 until a step across one fails; from then on it stays in its piece, whose walls are bounds like
-others. If it ends at a wall, it begins again on the other side, where the other slope holds. A
-place that no piece beside it improves is a local optimum: between walls c is smooth.
+others. If it ends at a wall, it begins again on the other side, where the other slope holds, until
+that is no better. An end away from all walls is a local optimum, since c is smooth around it.
 """
 
 from __future__ import annotations
@@ -44,7 +44,6 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 import numpy as np
-from scipy.linalg import block_diag
 
 from cdsm.planning import kernels
 from cdsm.planning.admissible import Admissible, solve
@@ -256,7 +255,7 @@ def _model(program: Program, here: ConstraintValues, y: Array, z: float) -> _Mod
     held = G
     if z > 0.0:  # stability was active: its curvature counts, and steps along it do not
         W -= z * size**2 / program.model.scale * evaluation.reserve_hessian()
-        held = np.vstack([G, evaluation.reserve_gradient()])
+        held = np.vstack([G, evaluation.reserve_gradient])
     return _Model(size, g, c, G, kernels.convex(W, region.null, held, _CURVATURE))
 
 
@@ -268,25 +267,24 @@ def _step(
     count, rank, m = model.g.size, len(region.rows), model.c.size
     low = np.maximum(np.minimum((bounds.low - evaluation.F) / size, 0.0), -bounds.radius)
     high = np.minimum(np.maximum((bounds.high - evaluation.F) / size, 0.0), bounds.radius)
-    stability = -evaluation.reserve_gradient() * size / program.model.scale
+    stability = -evaluation.reserve_gradient * size / program.model.scale
     # variables: d, s and t
-    none, one = np.zeros((rank, 2 * m)), np.eye(m)
-    P = block_diag(model.W, np.zeros((2 * m, 2 * m)))
-    q = np.append(model.g, np.zeros(2 * m))
-    equations = (
-        np.block([[region.rows, none], [model.G, -one, one]]),
-        np.append(region.imbalance(evaluation.F) / size, -model.c),
-    )
+    size_of_x, misses = count + 2 * m, np.arange(count, count + 2 * m)
+    P, q = np.zeros((size_of_x, size_of_x)), np.append(model.g, np.zeros(2 * m))
+    A = np.zeros((rank + m, size_of_x))
+    P[:count, :count] = model.W
+    A[:rank, :count], A[rank:, :count] = region.rows, model.G
+    A[rank:, misses[:m]], A[rank:, misses[m:]] = -np.eye(m), np.eye(m)
+    b = np.append(region.imbalance(evaluation.F) / size, -model.c)
     box = np.append(low, np.zeros(2 * m)), np.append(high, np.full(2 * m, np.inf))
     cuts = (
         np.append(stability, np.zeros(2 * m))[None],
         np.array([max(evaluation.reserve, 0.0) / program.model.scale]),
     )
-    misses = np.arange(count, count + 2 * m)
     best, miss = None, math.inf
     while True:
         P[misses, misses] = q[misses] = price
-        found = solve(P, q, equations, box, cuts)
+        found = solve(P, q, (A, b), box, cuts)
         if found is None:
             break
         before, miss = miss, float(found.x[misses].sum())

@@ -79,6 +79,7 @@ class Evaluation:
         """λ_min less the floor [N m/rad]; stable if not negative."""
         return float(self.eigenvalues[0] - self.model.floor)
 
+    @cached_property
     def reserve_gradient(self) -> Array:
         """Derivative of the reserve by the tensions (C,) [m/rad²]."""
         return self.mode_gradient(self.eigenvectors[:, :1])
@@ -86,7 +87,7 @@ class Evaluation:
     def mode_gradient(self, v: Array) -> Array:
         """Derivative of vᵀ K_θ v by the tensions (C,) [m/rad²], v (nv, 1)."""
         v = np.ascontiguousarray(v)
-        return kernels.by_tension(*self.model.geometry, self.spring_slopes[0], v, v)[:, 0, 0]
+        return kernels.form_by_tension(*self.model.geometry, self.spring_slopes[0], v, v)[:, 0, 0]
 
     def reserve_hessian(self) -> Array:
         """Second derivative of the reserve by the tensions (C, C) [m/(N rad²)].
@@ -95,7 +96,7 @@ class Evaluation:
         """
         J, v = self.model.pose.length_jacobian, np.ascontiguousarray(self.eigenvectors[:, :1])
         first, second = self.spring_slopes
-        mixed = kernels.by_tension(*self.model.geometry, first, self.eigenvectors, v)[:, 1:, 0]
+        mixed = kernels.form_by_tension(*self.model.geometry, first, self.eigenvectors, v)[:, 1:, 0]
         distances = np.maximum(
             self.eigenvalues[1:] - self.eigenvalues[0], _NEAREST * self.model.scale
         )
@@ -207,18 +208,20 @@ class _TipStiffness:
     def _torques(self, motion: Array) -> Array:
         """(∂K_θ/∂F_c) m for the columns m of a joint motion (nv, r): (C, nv, r)."""
         evaluation = self.evaluation
-        return kernels.changed(*evaluation.model.geometry, evaluation.spring_slopes[0], motion)
+        return kernels.torques_by_tension(
+            *evaluation.model.geometry, evaluation.spring_slopes[0], motion
+        )
 
     @cached_property
     def _right_torques(self) -> Array:
         return self._torques(self.right)
 
     def jacobian(self) -> Array:
-        return kernels.readings_by_tension(self.constraint.weights, self.left, self._right_torques)
+        return kernels.constraint_jacobian(self.constraint.weights, self.left, self._right_torques)
 
     def hessian(self, y: Array) -> Array:
         weights = self.constraint.weights
-        return kernels.tip_curvature(
+        return kernels.constraint_hessian(
             (y @ weights.reshape(y.size, -1)).reshape(weights.shape[1:]),
             self.inverse,
             self.constraint.rows,
