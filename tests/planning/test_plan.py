@@ -8,14 +8,12 @@ import pytest
 
 import cdsm
 from cdsm import presets
-from cdsm.planning import planner
-from cdsm.planning.planner import Planner
-from cdsm.planning.range import range_ends
 from cdsm.support.validation import Array
-from tests.planning.test_range import DOWN, corners
+from tests.planning.test_range import corners
 from tests.support import arms
 from tests.support.differences import central_difference
 from tests.support.locked import LENGTH, STRAND, hinge, soft, soft_hinge, some_arm
+from tests.support.paths import DOWN
 
 ARMS: dict[str, tuple[str, int, int, cdsm.Elasticity, float, float]] = {
     "hinged-3-strand": ("hinged", 3, 0, STRAND, 40.0, 300.0),
@@ -217,25 +215,6 @@ def test_answer_does_not_depend_on_the_starts(
         np.testing.assert_allclose(efforts, efforts[0], rtol=1e-6)
 
 
-def test_efforts_of_all_starts_are_told() -> None:
-    pose, low, high = posture("universal-5-strand")
-    found = cdsm.stiffness_range(pose, DOWN, low, high, starts=6)
-    plan = cdsm.plan_stiffness(pose, DOWN, 0.5 * (found.low + found.high), low, high, starts=5)
-    assert plan.efforts.size == 5
-    assert plan.efforts[0] == pytest.approx(np.linalg.norm(plan.tension.values), rel=1e-12)
-    assert plan.spread == pytest.approx(0.0, abs=1e-9)
-
-
-def test_few_evaluations_are_enough_at_five_joints() -> None:
-    arm = presets.virtual_prototype()
-    pose = arm.at(np.full(arm.nv, presets.TEN_DEGREES))
-    for target in (60e3, 80e3, 100e3, 120e3):
-        plan = cdsm.plan_stiffness(pose, DOWN, target, 50.0)
-        # 24 of them find out where to begin
-        assert plan.evaluations < 120
-        assert plan.iterations < 60
-
-
 # --- out of reach ---------------------------------------------------------------------------
 
 
@@ -310,16 +289,6 @@ def test_ends_of_the_range_and_all_beside_them_are_reached(seed: int) -> None:
         assert plan.stiffness.margin >= plan.floor * (1.0 - 1e-6)
 
 
-def test_end_of_the_range_that_a_crossing_meets_by_rounding_is_reached() -> None:
-    pose = arms.random_posture(arms.random_arm(3, 3, "hinged", STRAND), 3, 0.3)
-    u = (0.0, 1.0, 0.3)
-    found = cdsm.stiffness_range(pose, u, 10.0)
-    plan = cdsm.plan_stiffness(pose, u, found.low, 10.0)
-    assert plan.achieved == pytest.approx(found.low, rel=1e-6)
-    path = cdsm.plan_path(pose.arm, u, [3.0 * found.low, found.low], 10.0, angles=[pose.q] * 2)
-    assert path.complete
-
-
 def test_range_and_refusal_name_the_same_numbers() -> None:
     pose, u, low, high = strand_case(113)
     found = cdsm.stiffness_range(pose, u, low, high)
@@ -327,28 +296,6 @@ def test_range_and_refusal_name_the_same_numbers() -> None:
         with pytest.raises(cdsm.UnreachableStiffness) as caught:
             cdsm.plan_stiffness(pose, u, target, low, high)
         assert (caught.value.low, caught.value.high) == (found.low, found.high)
-
-
-def test_what_a_search_has_met_beyond_the_range_widens_it(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """As if the range had been found far too narrow."""
-    pose, low, high = posture("hinged-3-strand")
-    found = cdsm.stiffness_range(pose, DOWN, low, high)
-    target = 0.5 * (found.low + found.high)
-    true = range_ends
-
-    def narrow(*given: Any) -> Any:
-        end, _, iterations = true(*given)
-        return end, end, iterations
-
-    monkeypatch.setattr(planner, "range_ends", narrow)
-    monkeypatch.setattr(Planner, "least", lambda self: None)
-    plan = cdsm.plan_stiffness(pose, DOWN, target, low, high)
-    assert plan.achieved == pytest.approx(target, rel=1e-9)
-    with pytest.raises(cdsm.UnreachableStiffness) as caught:
-        cdsm.plan_stiffness(pose, DOWN, 1.1 * found.high, low, high)
-    assert found.low < target < caught.value.high <= found.high * (1.0 + 1e-9)
 
 
 def test_one_cable_on_one_hinge_has_one_stiffness() -> None:
@@ -442,39 +389,6 @@ def test_what_cannot_be_hit_is_missed_by_less_than_any_sample(what: str) -> None
         assert min(misfit(centre + reach * (F - centre)) for F in mixtures[:100]) >= plan.misfit
     again = cdsm.plan_stiffness(pose, directions, target, low, high, starts=8, seed=5)
     assert again.misfit == pytest.approx(plan.misfit, rel=1e-6)
-
-
-# --- the border -----------------------------------------------------------------------------
-
-BAD: list[tuple[Any, Any, str]] = [
-    (DOWN, 0.0, "target: 0 N/m given"),
-    (DOWN, -1e4, "target: -10000 N/m given"),
-    (DOWN, math.nan, "target"),
-    (DOWN, math.inf, "target"),
-    (DOWN, [1e4], "target: shape"),
-    (DOWN, "stiff", "target"),
-    (np.eye(3), 1e4, "target: shape"),
-    (np.eye(3), [1e4, 1e4, 0.0], "target: 0 N/m"),
-    (np.eye(3)[:, :2], [1e4] * 3, "direction: shape"),
-    (np.zeros((0, 3)), [], "direction: shape"),
-    ([[0.0, 0.0, 1.0], [0.0, 0.0, 0.0]], [1e4, 1e4], "zero vector"),
-    (None, 1e4, r"\(3, 3\) is needed"),
-    (None, -np.eye(3), "positive definite"),
-    (None, np.triu(np.ones((3, 3))), "symmetric"),
-]
-
-
-@pytest.mark.parametrize(("direction", "target", "message"), BAD)
-def test_targets_that_make_no_sense_are_named(direction: Any, target: Any, message: str) -> None:
-    arm = presets.virtual_prototype()
-    pose = arm.at(np.full(arm.nv, 0.1))
-    with pytest.raises(cdsm.InvalidInput, match=message):
-        cdsm.plan_stiffness(pose, direction, target, 50.0)
-
-
-def test_cartesian_matrix_of_a_flat_posture_does_not_exist() -> None:
-    with pytest.raises(cdsm.SingularStiffness, match="Cartesian stiffness matrix"):
-        cdsm.plan_stiffness(hinge().at([0.0]), None, 1e4 * np.eye(3), 10.0, 50.0)
 
 
 def test_what_is_printed_says_what_was_planned() -> None:

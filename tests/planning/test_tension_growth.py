@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 import cdsm
 from cdsm import presets
 from cdsm.support.validation import Array
-from tests.planning.test_range import DOWN, stayed
+from tests.planning.test_range import stayed
 from tests.support import arms
 from tests.support.differences import assert_second_order
 from tests.support.locked import (
@@ -27,6 +27,7 @@ from tests.support.locked import (
     soft_hinge,
     some_arm,
 )
+from tests.support.paths import DOWN
 
 SPRING = 2e3
 

@@ -1,0 +1,68 @@
+"""Searches end where the conditions of first order hold, on either side of kinks and at them."""
+
+import numpy as np
+import pytest
+
+import cdsm
+from cdsm.planning.objectives import along_constraints, stiffness_model
+from cdsm.planning.sqp import EFFORT, HIGHEST, MET, NEAREST, Program, search
+from cdsm.planning.stiffness_model import StiffnessModel
+from tests.support import arms
+from tests.support.locked import STRAND
+
+UP = np.array([[0.0, 0.0, 1.0]])
+KINK = 31.0
+
+
+def at_kinks(seed: int) -> tuple[StiffnessModel, Program]:
+    """Strands of which some end at 31 N, where more tension pays much less than below."""
+    pose = arms.random_posture(arms.random_arm(seed, 2, "universal", STRAND), seed, 0.3)
+    model = stiffness_model(pose, 10.0, 200.0, np.zeros(6), 1e-4)
+    anchor = model.at(cdsm.distribute_tension(pose, 30.0).values)
+    target = cdsm.stiffness(pose, anchor.F).along(UP[0])
+    constraints = along_constraints(model, UP, np.array([target]))
+    return model, Program(model, model.region, anchor, constraints, EFFORT, 30.0)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_no_feasible_step_has_less_effort_not_even_across_a_kink(seed: int) -> None:
+    model, program = at_kinks(seed)
+    found = search(program, program.anchor)
+    F = found.end.evaluation.F
+    assert abs(found.end.values).max() <= MET
+    assert abs(model.region.imbalance(F)).max() < 1e-9 * F.max()
+    rng, tried = np.random.default_rng(seed), 0
+    for size in (0.3, 1e-2, 1e-3):
+        for _ in range(60):
+            start = F + size * model.region.null @ rng.normal(size=model.region.null.shape[1])
+            start = np.clip(start, model.region.low, model.region.high)
+            nearby = model.region.nearest(start, model.region.low, model.region.high)
+            assert nearby is not None
+            c = float(program.constraints.at(model.at(nearby)).values[0])
+            if c >= 0.0:  # stiff enough: then it takes more effort
+                assert np.linalg.norm(nearby) > np.linalg.norm(F) * (1.0 - 1e-9)
+                tried += 1
+    assert tried > 20
+
+
+def test_some_optima_are_at_kinks_and_found_from_either_side() -> None:
+    met = 0
+    for seed in range(4):
+        model, program = at_kinks(seed)
+        ends = []
+        for minimum in (15.0, 30.0, 40.0):
+            F = cdsm.distribute_tension(model.pose, minimum).values
+            ends.append(search(program, model.at(F)).end.evaluation.F)
+        np.testing.assert_allclose(ends[1:], [ends[0]] * 2, rtol=1e-6)
+        met += int((abs(ends[0] - KINK) < 1e-9 * KINK).sum())
+    assert met > 0
+
+
+def test_other_objectives() -> None:
+    model, program = at_kinks(1)
+    start = program.anchor
+    for objective, better in ((HIGHEST, -1.0), (NEAREST, 0.0)):
+        other = Program(model, model.region, start, program.constraints, objective, 30.0)
+        end = search(other, model.at(cdsm.distribute_tension(model.pose, 15.0).values)).end
+        value = float(end.values[0])
+        assert value > 0.0 if better else abs(value) < 1e-6
