@@ -187,10 +187,10 @@ class TabulatedElasticity(Elasticity):
     (Gregory and Delbourgo, IMA J. Numer. Anal. 2, 1982). Strain is C1, and so is its inverse, the
     force-displacement curve; EA = 1/(dε/dF) is continuous and positive.
 
-    The slopes at the points follow from ln EA of the chords, each taken as known in the middle of
-    its strain and interpolated over the strain. At an end it goes on as far as a straight line, or,
-    where it levels off, at least half as far. A slope is at most 3 times that of either chord
-    beside the point, and at least the smaller of them; at an end half of its chord's.
+    The slopes at the points follow from ln EA of the chords, each assigned to the middle of its
+    strain and interpolated over the strain. At an end it changes as a straight line does, or at
+    least half as much where it levels off. A slope is at most 3 times that of either chord beside
+    the point, and at least the smaller of them; at an end at least half of its chord's.
 
     So EA is at most 2.1 times the largest rigidity of its own chord and the two beside it: let that
     be M times its own, M at least 2 in the first and last interval; then 1/M <= a, b <= 3. EA over
@@ -199,9 +199,9 @@ class TabulatedElasticity(Elasticity):
 
     How well five or more exact points give EA in the last interval, if the wire stiffens (Eq. 19,
     power laws, exponential toes): within 2 % for even steps, 8 % for steps that grow up to twofold,
-    9 % for steps of 1, 2, 5, 10, … N, but 25 % and more for steps that grow faster. Whether a wire
-    levels off between the last two points, the points do not tell: up to 31 %. Nor do they tell how
-    EA rises in the first interval of a wire without stiffness at 0 N.
+    9 % for steps of 1, 2, 5, 10, … N, but 25 % and more for steps that grow faster. If the wire
+    levels off between the last two points, which the points cannot show, up to 31 %. Nor do they
+    show how EA rises in the first interval of a wire without stiffness at 0 N.
 
     Attributes:
         tensions: F of the points [N], rising from 0 or more.
@@ -254,7 +254,7 @@ class TabulatedElasticity(Elasticity):
         See :meth:`Elasticity.rigidity_slope`.
         """
         values = self.domain.check(tension)
-        return np.asarray(-self._curve.bend(values) / self._curve.slope(values) ** 2)
+        return np.asarray(-self._curve.second_derivative(values) / self._curve.slope(values) ** 2)
 
     def strain(self, tension: ArrayLike) -> Array:
         """ε [-] of the curve; see :meth:`Elasticity.strain`."""

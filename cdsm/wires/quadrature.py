@@ -1,9 +1,13 @@
-"""∫ Fⁿ dF/p(F) over piecewise polynomials p, to rounding and fast: panels, each with a Gauss rule.
+"""∫ Fⁿ dF/p(F) over piecewise polynomials p, to rounding, by a Gauss rule on each of some panels.
 
-1/p is analytic but at the roots of p, and the error of a Gauss rule on an interval is set by how
-near they are: it falls by ρ² per node, where ρ is the sum of the half-axes (over the half-width) of
-the ellipse through the nearest root that has the ends of the interval for its foci. So the panels
-follow from the roots, and on a part of a panel the rule is better still.
+1/p is analytic except at the roots of p. The error of a Gauss rule on an interval falls by ρ² per
+node, where ρ is the sum of the half-axes (over the half-width) of the ellipse through the nearest
+root whose foci are the ends of the interval. So the panels follow from the roots, and on a part of
+a panel the rule is better still.
+
+scipy's quad takes some 300 times as long (tests/benchmarks/test_equilibrium_speed.py). Bisection
+until rules of 12 and 24 nodes agree needs no roots, but near them the rounding of p keeps the rules
+apart: with roots at 50 ± 1e-4 i N it makes more than 1e5 panels, where the roots make 76.
 """
 
 from __future__ import annotations
@@ -24,16 +28,16 @@ _NODES, _WEIGHTS = (leggauss(12)[0] + 1.0) / 2.0, leggauss(12)[1] / 2.0
 _POWERS = (0, 1)
 
 _NEAREST = 6.0
-"""ρ of the nearest root: ρ^-24 = 2e-19, which leaves a factor of 1000 to the growth of 1/p."""
+"""ρ of the nearest root: ρ^-24 = 2e-19 leaves a factor of 1000 for the growth of 1/p."""
 
 _ROUNDING = 1e-14
-"""A polynomial this small beside the sum of its terms' magnitudes is zero."""
+"""A polynomial this part of the sum of the magnitudes of its terms is zero."""
 
 _NEGLIGIBLE = 1e-30
-"""A term of a polynomial this part of its largest one leaves no trace."""
+"""A term of a polynomial this part of its largest one is nothing."""
 
 _NARROWEST = 4
-"""Panels shrink towards a root at their end; this many units in the last place are none."""
+"""Narrowest panel in units in the last place: panels shrink towards a root at their end."""
 
 
 def coefficient_table(rows: Sequence[Sequence[float]]) -> Array:
@@ -86,7 +90,7 @@ class Panels(NamedTuple):
         edges: Where they begin and end, (P+1,).
         coefficients: Of the polynomial on each, lowest power first, (powers, P).
         before: ∫ Fⁿ dF/p from the low end to the beginning of each, n = 0 and 1, (2, P).
-        end: Up to where p is positive; inf if it is all the way.
+        end: Where p ceases to be positive; inf if nowhere.
     """
 
     edges: Array
@@ -112,8 +116,8 @@ def panels(rows: Sequence[Sequence[float]], edges: Sequence[float]) -> Panels:
     end = np.inf
     for index, (row, (low, high)) in enumerate(zip(rows, pairwise(edges), strict=True)):
         p = Polynomial(_significant(row, high))
-        stop = _positive_until(p, low, high)
-        inner = _divided(np.asarray(p.roots(), dtype=np.complex128), low, min(stop, high))
+        stop = _end_of_positive(p, low, high)
+        inner = _panel_ends(np.asarray(p.roots(), dtype=np.complex128), low, min(stop, high))
         ends += inner
         piece += [index] * len(inner)
         if stop < np.inf:
@@ -130,33 +134,30 @@ def panels(rows: Sequence[Sequence[float]], edges: Sequence[float]) -> Panels:
 
 
 def _significant(row: Sequence[float], high: float) -> list[float]:
-    """The coefficients without highest ones that add nothing up to ``high``.
-
-    Those have roots too, so far away that they are not even numbers.
-    """
+    """The coefficients without negligible highest ones, whose roots overflow."""
     sizes = abs(np.array(row)) * high ** np.arange(len(row))
     last = np.flatnonzero(sizes > _NEGLIGIBLE * sizes.max()).max(initial=0)
     return list(row[: last + 1])
 
 
-def _divided(roots: NDArray[np.complex128], low: float, high: float) -> list[float]:
-    """Ends of panels from low to high on which a Gauss rule is exact to rounding."""
+def _panel_ends(roots: NDArray[np.complex128], low: float, high: float) -> list[float]:
+    """Ends of panels from low to high on which the Gauss rule is exact to rounding."""
     narrowest = _NARROWEST * np.spacing(high)
     ends: list[float] = []
-    todo = [(low, high)] if low < high else []
-    while todo:
-        a, b = todo.pop()
+    intervals = [(low, high)] if low < high else []
+    while intervals:
+        a, b = intervals.pop()
         # |z − a| + |z − b| is ρ + 1/ρ half-widths, by the ellipse's definition
         reach = (abs(roots - a) + abs(roots - b)).min(initial=np.inf) / (b - a)
         if reach >= (_NEAREST + 1.0 / _NEAREST) / 2.0 or b - a <= narrowest:
             ends.append(b)
         else:
-            todo += [((a + b) / 2.0, b), (a, (a + b) / 2.0)]
+            intervals += [((a + b) / 2.0, b), (a, (a + b) / 2.0)]
     return ends
 
 
-def _positive_until(p: Polynomial, low: float, high: float) -> float:
-    """Up to where p is larger than the rounding of its terms; inf if all the way to high."""
+def _end_of_positive(p: Polynomial, low: float, high: float) -> float:
+    """Where p falls to the rounding of its terms; inf if nowhere up to high."""
     from scipy.optimize import brentq  # only where it is wanted: it imports slowly
 
     rounding = Polynomial(_ROUNDING * abs(p.coef))  # high and low are not negative
@@ -166,7 +167,7 @@ def _positive_until(p: Polynomial, low: float, high: float) -> float:
         if p(point) <= rounding(point):
             if point == low:
                 return low
-            # what is found may lie beyond by xtol and rtol together, where p can be nothing
+            # the root may be too high by xtol and rtol together
             found = brentq(p - rounding, before, point, xtol=1e-15 * point, rtol=1e-15)
             return max(low, float(found - 2e-15 * point))
         before = point

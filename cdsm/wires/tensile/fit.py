@@ -11,7 +11,7 @@ from scipy.special import stdtrit
 
 from cdsm.elasticity import Elasticity
 from cdsm.errors import TensileTestError
-from cdsm.support.validation import Array, ReadOnlyState, frozen, one_of, scalar
+from cdsm.support.validation import RANGES, Array, ReadOnlyState, frozen, one_of, scalar
 from cdsm.wires.laws import TabulatedElasticity
 from cdsm.wires.tensile.loading import FEWEST, loading
 from cdsm.wires.tensile.polynomials import polynomials
@@ -236,7 +236,9 @@ def _monotone(
     grid = curve.basis.tensions
     # the fit, not the largest noise, says how far the test went
     first, last = curve.force(points.strain[[0, -1]])
-    tensions = _grid(max(grid[0], float(first)), min(grid[-1], float(last)), grid)
+    low = max(grid[0], float(first))
+    low = low if low >= RANGES["tension"].low else 0.0  # rounding of a test that begins at zero
+    tensions = _grid(low, min(grid[-1], float(last)), grid)
     strain = np.interp(tensions, grid, curve.strain)
     law = TabulatedElasticity(tuple(tensions.tolist()), tuple((strain - strain[0]).tolist()))
     return law, float(strain[0]), ()

@@ -15,7 +15,7 @@ FEWEST = 8
 """Points of a fit: fewer show no bend."""
 _MOST = 800
 """Points that are fitted; more are averaged, since their mean says as much and fits faster."""
-_WILD = 5e-3
+_OUTLYING = 5e-3
 """Share of the range by which a single point must stand out."""
 _AROUND = 25
 """Points over which the noise is taken to be the same."""
@@ -35,15 +35,15 @@ _MAD = 1.4826  # standard deviation of normal noise by its median magnitude
 def loading(test: TensileTest) -> tuple[Points, float, tuple[str, ...]]:
     """The points to be fitted, the noise of one of them [N], and notes on what was left out."""
     notes: list[str] = []
-    _enough(test.force.size, "points are given")
-    wild = _wild(test.force)
-    wild[1:-1] |= _wild(test.displacement)[1:-1]  # a soft wire moves far at its first load
-    if wild.any():
-        listed = [f"{f:.4g} N at {d:.4g} m" for d, f in zip(*_of(test, wild), strict=True)]
+    _require(test.force.size, "points are given")
+    outlier = _outliers(test.force)
+    outlier[1:-1] |= _outliers(test.displacement)[1:-1]  # a soft wire moves far at its first load
+    if outlier.any():
+        listed = [f"{f:.4g} N at {d:.4g} m" for d, f in zip(*_selected(test, outlier), strict=True)]
         more = f" and {len(listed) - 3} more" if len(listed) > 3 else ""
         notes.append(f"far from their neighbours and left out: {', '.join(listed[:3])}{more}")
-    _enough(int(np.count_nonzero(~wild)), "points are left that lie near their neighbours")
-    displacement, force = _of(test, ~wild)
+    _require(int(np.count_nonzero(~outlier)), "points are left that lie near their neighbours")
+    displacement, force = _selected(test, ~outlier)
     strain = displacement / test.gauge_length
     _check_span(strain, force)
     kept = _is_loading(strain)
@@ -51,7 +51,7 @@ def loading(test: TensileTest) -> tuple[Points, float, tuple[str, ...]]:
         notes.append(f"points of unloading and reloading left out: {np.count_nonzero(~kept)}")
     order = np.argsort(strain[kept], kind="stable")
     points = _merged(strain[kept][order], force[kept][order], np.ones(len(order)))
-    _enough(
+    _require(
         len(points.force),
         "points of loading are left, each farther than all before it; give the points in the order "
         "they were recorded, with the displacement growing under load",
@@ -77,7 +77,7 @@ def loading(test: TensileTest) -> tuple[Points, float, tuple[str, ...]]:
             f"largest force, which scatter {scatter:.3g} N about a rise of {np.ptp(rising):.3g} N. "
             "Check that the columns are not swapped and belong together."
         )
-    notes += _slips(points, test.gauge_length, max(8.0 * noise, _WILD * span))
+    notes += _slips(points, test.gauge_length, max(8.0 * noise, _OUTLYING * span))
     if count := _slack(points, noise, 1e-6 * span):
         until = points.strain[count] * test.gauge_length
         notes.append(
@@ -85,38 +85,35 @@ def loading(test: TensileTest) -> tuple[Points, float, tuple[str, ...]]:
             "does not rise beyond its noise"
         )
         points = points.part(slice(count, None))
-    _enough(len(points.force), "points are left after the slack")
+    _require(len(points.force), "points are left after the slack")
     _check_rigidity(points)
     return _averaged(points), noise, tuple(notes)
 
 
-def _of(test: TensileTest, kept: NDArray[np.bool_]) -> tuple[Array, Array]:
+def _selected(test: TensileTest, kept: NDArray[np.bool_]) -> tuple[Array, Array]:
     return test.displacement[kept], test.force[kept]
 
 
-def _wild(values: Array) -> NDArray[np.bool_]:
+def _outliers(values: Array) -> NDArray[np.bool_]:
     """Single values far from those around them, in the order recorded.
 
-    What rises or falls lies between its neighbours, and a peak or the last value before a rupture
+    A rising or falling value lies between its neighbours. A peak or the last value before a rupture
     stands out by no more than a step.
     """
-    # an end is judged by how the values next to it go on
+    # the neighbour beyond an end is extrapolated
     first, last = 2.0 * values[1] - values[2], 2.0 * values[-2] - values[-3]
     before, after = np.append(first, values[:-1]), np.append(values[1:], last)
     size = abs(np.diff(values))
     step = np.maximum(np.pad(size, (2, 0))[:-1], np.pad(size, (0, 2))[1:])  # not its own
     noise = local_noise((values - (before + after) / 2.0) / np.sqrt(1.5))
-    reach = float(np.ptp(np.quantile(values, (0.1, 0.9))))  # not of the wild ones
+    reach = float(np.ptp(np.quantile(values, (0.1, 0.9))))  # without outliers
     beyond = np.maximum(values - np.maximum(before, after), np.minimum(before, after) - values)
-    limit = np.maximum(np.maximum(8.0 * noise, 2.0 * step), _WILD * reach)
+    limit = np.maximum(np.maximum(8.0 * noise, 2.0 * step), _OUTLYING * reach)
     return np.asarray(beyond > limit)
 
 
 def local_noise(errors: Array) -> Array:
-    """Standard deviation (n,) of errors (n,) around each, or of all if that is larger.
-
-    Wild ones do not count, and it may grow with the force.
-    """
+    """Standard deviation (n,) of errors (n,) around each, or of all if that is larger."""
     width = min(_AROUND, len(errors))
     near = np.pad(abs(errors), (width // 2, width - 1 - width // 2), mode="reflect")
     local = np.median(np.lib.stride_tricks.sliding_window_view(near, width), axis=1)
@@ -174,7 +171,7 @@ def _trends(points: Points, noise: float, least: float) -> tuple[Array, Array]:
     return xy / xx, np.maximum(np.minimum(noise, scatter), least) / np.sqrt(xx)
 
 
-def _enough(count: int, what: str) -> None:
+def _require(count: int, what: str) -> None:
     if count < FEWEST:
         raise TensileTestError(f"only {count} {what}; a fit needs at least {FEWEST}.")
 
@@ -191,7 +188,7 @@ def _check_span(strain: Array, force: Array) -> None:
 
 
 def _check_rigidity(points: Points) -> None:
-    """Units that cannot be: EA over the upper half of the rise."""
+    """Refuse a rigidity over the upper half of the rise that no wire has."""
     upper = points.force >= (points.force[0] + points.force[-1]) / 2.0
     rise, reach = np.ptp(points.force[upper]), np.ptp(points.strain[upper])
     rigidity = float(rise / max(reach, 1e-30))
@@ -203,7 +200,7 @@ def _check_rigidity(points: Points) -> None:
 
 
 def _likely(rigidity: float, reach: float) -> str:
-    """Which unit, taken for another, would explain a rigidity [N] and a largest strain."""
+    """A hint which unit, mistaken for another, explains a rigidity [N] and a largest strain."""
     found = [
         unit
         for unit, by_force, by_strain in _MISTAKEN

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.polynomial import Polynomial
 
 from cdsm.errors import TensileTestError
-from cdsm.support.validation import Array
+from cdsm.support.validation import RANGES, Array
 from cdsm.wires.laws import StrandElasticity
 from cdsm.wires.tensile.spline import Points
 
@@ -32,7 +32,8 @@ def polynomials(points: Points, join: float) -> tuple[StrandElasticity, tuple[st
         )
     joins = _joins_of(points, join)
     rows = _coefficients(points, joins)
-    low, high = max(float(points.force[0]), 0.0), float(points.force.max())
+    low, high = float(points.force[0]), float(points.force.max())
+    low = low if low >= RANGES["tension"].low else 0.0
     start, end = max(_positive(rows, (low, *joins, high)), key=lambda each: each[1] - each[0])
     if end - start < (high - low) / 2.0:
         raise TensileTestError(
