@@ -28,6 +28,7 @@ from cdsm.kernels import segments
 from cdsm.kernels.tree import Frames
 from cdsm.posture import Posture
 from cdsm.rigid_body import RigidBody
+from cdsm.support.format import JointUnits
 from cdsm.support.validation import (
     Array,
     Printed,
@@ -234,20 +235,15 @@ class Manipulator(Printed):
     @property
     def joint_units(self) -> tuple[str, ...]:
         """Unit of each joint's coordinate (nv,): rad, or m where it slides."""
-        return tuple("m" if slides else "rad" for slides in self.slides)
+        return JointUnits(self.slides).coordinates
 
     def torque_unit(self, joint: int | None = None) -> str:
         """Unit of the torque of a joint: N where it slides; or that of all of them together."""
-        slides = self.slides if joint is None else self.slides[joint : joint + 1]
-        if slides.all():
-            return "N"
-        return "N m or N" if slides.any() else "N m"
+        return JointUnits(self.slides).torque(joint)
 
     def stiffness_unit(self) -> str:
         """Unit of the diagonal of K_θ and of its eigenvalues: N/m where joints slide."""
-        if self.slides.all():
-            return "N/m"
-        return "N m/rad or N/m" if self.slides.any() else "N m/rad"
+        return JointUnits(self.slides).stiffness()
 
     @property
     def lower(self) -> Array:

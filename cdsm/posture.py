@@ -11,7 +11,7 @@ import numpy as np
 from cdsm.kernels import segments
 from cdsm.kernels import stiffness as stiffness_kernels
 from cdsm.kernels.tree import Frames
-from cdsm.support.units import coordinates
+from cdsm.support.format import coordinates
 from cdsm.support.validation import Array, ReadOnlyState, frozen
 
 if TYPE_CHECKING:

@@ -22,8 +22,8 @@ from numpy.typing import ArrayLike
 from cdsm.errors import InvalidInput, SingularStiffness
 from cdsm.kernels import readings
 from cdsm.posture import Posture
+from cdsm.support.format import MODEL, coordinates
 from cdsm.support.markup import element, row
-from cdsm.support.units import MODEL, coordinates
 from cdsm.support.validation import (
     Array,
     ReadOnlyState,
@@ -390,18 +390,32 @@ def stiffness(
                 "tension", f"{F[c]:g} N given for {arm.cables[c].name}; cables only pull."
             )
     k = arm._model.laws.stiffness(pose.cable_lengths, F)
-    active, passive, load, joint = pose._joint_stiffness(F, k, W)
+    return assemble(pose, F, W, k, distribution=tension if isinstance(tension, Tension) else None)
+
+
+def assemble(
+    pose: Posture,
+    tension: Array,
+    wrench: Array,
+    cable_stiffness: Array,
+    *,
+    free_length: Array | None = None,
+    distribution: Tension | None = None,
+) -> Stiffness:
+    """The stiffness of checked, read-only tensions, wrench and cable stiffnesses (Eq. 16)."""
+    active, passive, load, joint = pose._joint_stiffness(tension, cable_stiffness, wrench)
     return Stiffness(
         posture=pose,
-        tension=F,
-        wrench=W,
-        cable_stiffness=k,
+        tension=tension,
+        wrench=wrench,
+        cable_stiffness=cable_stiffness,
         active=active,
         passive=passive,
         gravity=pose.gravity_stiffness,
         load=load,
         joint=joint,
-        distribution=tension if isinstance(tension, Tension) else None,
+        free_length=free_length,
+        distribution=distribution,
     )
 
 

@@ -17,7 +17,7 @@ from cdsm.statics.buckling import CriticalLoad, CriticalTension
 from cdsm.statics.weight_test import WeightTest
 from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.datasets import status_names
-from cdsm.support.units import MODEL, joints_to_dict, key
+from cdsm.support.format import MODEL, JointUnits, key
 from cdsm.support.validation import Array
 from cdsm.tension import Tension
 from cdsm.wires.tensile.fit import TensileFit
@@ -132,7 +132,7 @@ def of_path(plan: PathPlan) -> Json:
         "target_N_per_m": plan.target.tolist(),
         "planned": list(plan.planned),
         "achieved_N_per_m": plan.achieved.tolist(),
-        **joints_to_dict(plan.arm.joint_names, plan.arm.slides, plan.angles),
+        **JointUnits(plan.arm.slides).to_dict(plan.arm.joint_names, plan.angles),
         "tensions_N": plan.tensions.tolist(),
         "cable_lengths_m": plan.cable_lengths.tolist(),
         "half_way": [
@@ -178,7 +178,7 @@ def status_counts(dataset: xarray.Dataset) -> dict[str, int]:
 
 
 def _joints(pose: Posture) -> Json:
-    return joints_to_dict(pose.arm.joint_names, pose.arm.slides, pose.q)
+    return JointUnits(pose.arm.slides).to_dict(pose.arm.joint_names, pose.q)
 
 
 def _by_cable(pose: Posture, values: Array) -> dict[str, float]:

@@ -27,6 +27,7 @@ from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.presets import STRAND_1X19
 from cdsm.support.files import write_file
+from cdsm.support.format import JointUnits
 from cdsm.support.validation import Array
 from cdsm.tension import Tension, distribute_tension
 from cdsm.wires.files import read_elasticity
@@ -230,7 +231,7 @@ def at_angles(arm: Manipulator, angles: str) -> Posture:
 
 def joint_scales(arm: Manipulator) -> Array:
     """The unit in which the command line takes each joint (nv,): degree or mm, in SI."""
-    return np.where(arm.slides, 1e-3, np.deg2rad(1.0))
+    return np.array([scale for _, scale in JointUnits(arm.slides).shown])
 
 
 def numbers(option: str, text: str, count: int | None = None) -> list[float]:

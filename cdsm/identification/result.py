@@ -15,7 +15,7 @@ from cdsm.errors import InvalidInput
 from cdsm.identification.intervals import NEGLIGIBLE, RANK_TOLERANCE, Profile, Side
 from cdsm.identification.measurement import Measurement, label
 from cdsm.manipulator import Manipulator
-from cdsm.support.units import MODEL
+from cdsm.support.format import MODEL
 from cdsm.support.validation import (
     Array,
     ReadOnlyState,

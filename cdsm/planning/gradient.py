@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from cdsm.errors import SingularStiffness
 from cdsm.planning.kernels import form_by_tension
 from cdsm.stiffness_matrix import Stiffness
-from cdsm.support.units import coordinates
+from cdsm.support.format import coordinates
 from cdsm.support.validation import Array, ReadOnlyState, frozen, instance, unit_direction
 
 

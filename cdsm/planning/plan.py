@@ -21,7 +21,7 @@ from cdsm.planning.planner import REACHED, Planner
 from cdsm.planning.range import MARGIN
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness, stiffness
-from cdsm.support.units import MODEL, coordinates
+from cdsm.support.format import MODEL, coordinates
 from cdsm.support.validation import Array, ReadOnlyState, frozen, unit_directions
 from cdsm.tension import Tension
 

@@ -22,7 +22,7 @@ from cdsm.planning.starts import StartPoints
 from cdsm.planning.stiffness_model import Constraints, Evaluation, StiffnessModel
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import stiffness
-from cdsm.support.units import MODEL, coordinates
+from cdsm.support.format import MODEL, coordinates
 from cdsm.support.validation import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension
 from cdsm.wires.laws import StrandElasticity, TabulatedElasticity

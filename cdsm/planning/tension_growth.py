@@ -29,7 +29,7 @@ from cdsm.statics.bound_scan import (
     tension_domain,
 )
 from cdsm.stiffness_matrix import Stiffness, stiffness
-from cdsm.support.units import MODEL, coordinates
+from cdsm.support.format import MODEL, coordinates
 from cdsm.support.validation import (
     Array,
     ReadOnlyState,

@@ -12,7 +12,7 @@ from matplotlib.ticker import MaxNLocator
 
 from cdsm.errors import InvalidInput
 from cdsm.plots.style import COLORS, N_PER_MM, expect, panels
-from cdsm.support.units import coordinates
+from cdsm.support.format import coordinates
 from cdsm.support.validation import Array
 
 if TYPE_CHECKING:

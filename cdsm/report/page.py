@@ -11,8 +11,8 @@ import numpy as np
 
 from cdsm.report.facts import RANK, Rank
 from cdsm.report.self_check import Agreement, Difference
+from cdsm.support.format import MODEL
 from cdsm.support.markup import element, row
-from cdsm.support.units import MODEL
 
 if TYPE_CHECKING:
     from cdsm.report.report import Report

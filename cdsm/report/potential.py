@@ -19,6 +19,7 @@ from cdsm.arm_model import kinks
 from cdsm.cable import Cable
 from cdsm.errors import CdsmError, InvalidInput
 from cdsm.manipulator import Manipulator
+from cdsm.support.format import JointUnits
 from cdsm.support.validation import Array
 from cdsm.wires.laws import TabulatedElasticity
 
@@ -292,4 +293,4 @@ class Neighbourhood:
 
 def joint_unit(arm: Manipulator) -> Array:
     """1 rad for a joint that turns, the arm's length [m] for one that slides (nv,)."""
-    return np.where(arm.slides, arm.length, 1.0)
+    return JointUnits(arm.slides).levers(arm.length)

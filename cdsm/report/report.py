@@ -15,7 +15,7 @@ from cdsm.report.facts import CableState, Optimality, Rank, Readings
 from cdsm.report.page import page, to_document, to_fragment, to_text
 from cdsm.report.potential import joint_unit
 from cdsm.report.self_check import SelfCheck, self_check
-from cdsm.support.units import joints_to_dict, key
+from cdsm.support.format import JointUnits, key
 from cdsm.support.validation import Array, ReadOnlyState
 
 if TYPE_CHECKING:
@@ -117,7 +117,7 @@ class Report(ReadOnlyState):
                 "tip": arm.tip_link,
                 "gravity_m_per_s2": arm.gravity,
                 "wrench_N_Nm": K.wrench,
-                **joints_to_dict(arm.joint_names, arm.slides, K.posture.q),
+                **JointUnits(arm.slides).to_dict(arm.joint_names, K.posture.q),
             },
             "self_check": {
                 "passed": self.self_check.passed,

@@ -22,7 +22,7 @@ from cdsm.posture import Posture
 from cdsm.statics.locked_motors import Iterate, LoadedArm, rounding
 from cdsm.statics.trust_region import FLAT, RestSearch, find_rest
 from cdsm.stiffness_matrix import Stiffness, stiffness
-from cdsm.support.units import coordinates
+from cdsm.support.format import coordinates
 from cdsm.support.validation import Array, ReadOnlyState, frozen, wrench_vector
 from cdsm.tension import Tension
 

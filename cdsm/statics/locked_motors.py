@@ -12,7 +12,7 @@ from cdsm.elasticity import Elasticity, rising_root
 from cdsm.errors import ElasticityRangeError, InvalidInput
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
-from cdsm.stiffness_matrix import Stiffness
+from cdsm.stiffness_matrix import Stiffness, assemble
 from cdsm.support.validation import Array, frozen
 
 _ROUNDING = 16.0 * float(np.finfo(np.float64).eps)
@@ -76,19 +76,7 @@ class LoadedArm:
     def at(self, pose: Posture, near: Array) -> Iterate:
         """The arm at a posture where the tensions are near the given ones (C,) [N]."""
         F, k = self.cables.tension(pose.cable_lengths, near)
-        active, passive, load, joint = pose._joint_stiffness(F, k, self.wrench)
-        K = Stiffness(
-            posture=pose,
-            tension=F,
-            wrench=self.wrench,
-            cable_stiffness=k,
-            active=active,
-            passive=passive,
-            gravity=pose.gravity_stiffness,
-            load=load,
-            joint=joint,
-            free_length=self.cables.free_length,
-        )
+        K = assemble(pose, F, self.wrench, k, free_length=self.cables.free_length)
         return Iterate(K, K.residual, rounding(K))
 
     def moved(self, q: Array, near: Iterate) -> Iterate:

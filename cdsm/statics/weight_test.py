@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from cdsm.errors import EquilibriumError, InvalidInput
 from cdsm.posture import Posture
 from cdsm.statics.equilibrium import Equilibrium, equilibrium, follow
-from cdsm.support.units import MODEL, coordinates
+from cdsm.support.format import MODEL, coordinates
 from cdsm.support.validation import (
     Array,
     ReadOnlyState,

@@ -14,7 +14,7 @@ import numpy as np
 from cdsm.cable import Cable
 from cdsm.elasticity import Elasticity
 from cdsm.manipulator import Manipulator
-from cdsm.support.units import MODEL
+from cdsm.support.format import MODEL
 from cdsm.support.validation import Array
 
 _SAMPLES = np.ldexp(np.arange(4.0, 8.0), np.arange(-12, 18)[:, None]).ravel()

@@ -9,8 +9,8 @@ from typing import Final
 import matplotlib
 
 from cdsm.plots.style import AXES, MM, N_PER_MM
+from cdsm.support.format import MODEL, coordinates
 from cdsm.support.markup import Markup, element
-from cdsm.support.units import MODEL, coordinates
 from cdsm.tension import Tension
 from cdsm.view.state import Condition, Shown
 

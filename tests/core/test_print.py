@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from cdsm.support.format import coordinates, key
 from cdsm.support.markup import element, row
-from cdsm.support.units import coordinates, key
 
 
 def test_text_is_escaped_and_elements_are_not_escaped_again() -> None:
