@@ -53,3 +53,15 @@ def test_files_and_constants_that_contributing_names_exist() -> None:
     assert [path for path in named if not (ROOT / path).exists()] == []
     for path, name in re.findall(r"`(cdsm/[\w/]+\.py)`: `(\w+)`", text):
         assert re.search(rf"\b{name}\b", (ROOT / path).read_text(encoding="utf-8")), (path, name)
+
+
+def test_tolerances_that_contributing_lists_are_those_of_the_code() -> None:
+    rows = re.findall(
+        r"^\| `([\w/]+)` \| `([\w, ]+)` \| (.*?) \|", CONTRIBUTING.read_text("utf-8"), re.M
+    )
+    assert len(rows) > 50
+    for module, name, value in rows:
+        source = (ROOT / "cdsm" / f"{module}.py").read_text(encoding="utf-8")
+        line = re.search(rf"^{name}(?:: \w+)? = (.*)", source, re.M)
+        assert line is not None, (module, name)
+        assert value in line[1], (module, name, line[1])
