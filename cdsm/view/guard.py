@@ -103,14 +103,8 @@ class Guard:
         """Start a viser server with this guard before it.
 
         viser leaves no way to say how its websocket server checks requests and receives messages.
-        While it starts, that server is therefore made here.
-
-        Args:
-            port: Port to listen at; viser takes the next one that is free.
-            label: Title of the panel.
-
-        Raises:
-            CdsmError: viser has not asked for a websocket server in the way that is known.
+        While it starts, that server is therefore made here. If the port is taken, viser takes the
+        next one that is free.
         """
         original, made = websocket_server.serve, threading.Event()
 

@@ -33,12 +33,8 @@ class Scene:
     """An arm in a viser server.
 
     Links are drawn by Pinocchio's visualiser from the shapes in the URDF; where it has none, or
-    one of its meshes cannot be read, straight sticks join the joints instead.
-
-    Args:
-        server: The server, whose scene is empty.
-        arm: The arm.
-        largest_force: Force [N] whose arrow is half as long as the arm.
+    one of its meshes cannot be read, straight sticks join the joints instead. The arrow of
+    ``largest_force`` [N] is half as long as the arm.
     """
 
     def __init__(self, server: viser.ViserServer, arm: Manipulator, largest_force: float) -> None:

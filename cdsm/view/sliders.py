@@ -37,15 +37,9 @@ _ROUND = 1e-9
 @final
 @dataclass(frozen=True, kw_only=True)
 class Range:
-    """Ends, steps and first position of a slider, in the unit that the page shows.
+    """Ends, step and first position of a slider in the unit that the page shows.
 
-    Attributes:
-        label: Its name and unit.
-        low: Left end.
-        high: Right end.
-        step: Smallest move.
-        initial: Where it stands first.
-        unit: The unit shown, in SI: 1 ° is π/180 rad.
+    ``unit`` is that unit in SI: 1 ° is π/180 rad.
     """
 
     label: str
@@ -106,15 +100,11 @@ class Slider:
 
 
 class Controls:
-    """The panel of an arm in a viser server.
+    """The panel of an arm in a viser server, whose panel is empty.
 
-    Args:
-        server: The server, whose panel is empty.
-        arm: The arm.
-        start: Where the sliders stand first.
-        limits: Right end of the slider of the lower bound, and both ends of those of the force [N].
-        changed: Called, from any thread, when a slider has moved.
-        admit: Called with each control that browsers may use.
+    ``limits`` are the right end of the slider of the lower bound and both ends of those of the
+    force [N]. A slider that moves calls ``changed``, from any thread; ``admit`` is called with each
+    control that browsers may use.
     """
 
     def __init__(
