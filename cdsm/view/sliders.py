@@ -11,7 +11,8 @@ import numpy as np
 
 from cdsm.manipulator import Manipulator
 from cdsm.plots.style import AXES
-from cdsm.support.validation import Array
+from cdsm.support.format import JointUnits
+from cdsm.support.values import Array
 from cdsm.view.panel import page_text
 from cdsm.view.state import Setting, Shown
 
@@ -72,9 +73,9 @@ def joint_ranges(arm: Manipulator, q: Array) -> tuple[Range, ...]:
     """One slider per joint, within its limits: degrees, or mm where it slides."""
     most = np.where(arm.slides, _LENGTHS * arm.length, _TURN)
     low, high = np.maximum(arm.lower, -most), np.minimum(arm.upper, most)
-    units = [("mm", 1e-3) if slides else ("°", math.pi / 180.0) for slides in arm.slides]
+    units = JointUnits(arm.slides).shown
     return tuple(
-        slider_range(f"{name} [{symbol}]", low[i], high[i], float(q[i]), unit)
+        slider_range(f"{name} [{symbol.replace('deg', '°')}]", low[i], high[i], float(q[i]), unit)
         for i, (name, (symbol, unit)) in enumerate(zip(arm.joint_names, units, strict=True))
     )
 
