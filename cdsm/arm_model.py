@@ -22,7 +22,8 @@ from cdsm.kernels.bodies import Masses
 from cdsm.kernels.stiffness import cable_stiffness
 from cdsm.kernels.tree import Routing, Tree
 from cdsm.rigid_body import RigidBody
-from cdsm.support.validation import LARGEST, RANGES, Array, frozen
+from cdsm.support.validation import LARGEST, RANGES
+from cdsm.support.values import Array, frozen
 from cdsm.wires.continuity import find_jump
 from cdsm.wires.laws import StrandElasticity
 

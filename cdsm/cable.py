@@ -14,7 +14,6 @@ from cdsm.elasticity import Elasticity, tension_at
 from cdsm.errors import CableError, CdsmError, InvalidInput
 from cdsm.geometry import Geometry
 from cdsm.support.validation import (
-    Array,
     instance,
     number_array,
     one_of,
@@ -24,6 +23,7 @@ from cdsm.support.validation import (
     text,
     vector,
 )
+from cdsm.support.values import Array
 
 Control = Literal["position", "force"]
 

@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm.errors import ElasticityRangeError, InvalidInput
-from cdsm.support.validation import RANGES, Array, flag, number_array, quantity, scalar
+from cdsm.support.validation import RANGES, flag, number_array, quantity, scalar
+from cdsm.support.values import Array
 
 _STEP = 6e-6
 """Relative step of central differences: the cube root of the rounding of float64."""

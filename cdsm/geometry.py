@@ -31,7 +31,8 @@ from cdsm.support.records import (
     record,
     toml_lines,
 )
-from cdsm.support.validation import Printed, instance
+from cdsm.support.validation import instance
+from cdsm.support.values import Printed
 
 MAXIMUM_JOINTS = 100
 """More would overflow the URDF parsers' stack before long; no such arm exists."""

@@ -29,16 +29,8 @@ from cdsm.kernels.tree import Frames
 from cdsm.posture import Posture
 from cdsm.rigid_body import RigidBody
 from cdsm.support.format import JointUnits
-from cdsm.support.validation import (
-    Array,
-    Printed,
-    flag,
-    frozen,
-    instance,
-    one_of,
-    sequence_of,
-    vector,
-)
+from cdsm.support.validation import flag, instance, one_of, sequence_of, vector
+from cdsm.support.values import Array, Printed, frozen
 from cdsm.urdf import TIP, to_urdf
 from cdsm.urdf_reader import read_urdf
 

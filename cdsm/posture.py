@@ -12,7 +12,7 @@ from cdsm.kernels import segments
 from cdsm.kernels import stiffness as stiffness_kernels
 from cdsm.kernels.tree import Frames
 from cdsm.support.format import coordinates
-from cdsm.support.validation import Array, ReadOnlyState, frozen
+from cdsm.support.values import Array, ReadOnlyState, frozen
 
 if TYPE_CHECKING:
     from cdsm.manipulator import Manipulator

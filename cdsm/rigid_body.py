@@ -17,7 +17,8 @@ import pinocchio as pin
 from cdsm.errors import InvalidInput, UrdfError
 from cdsm.kernels.bodies import Masses
 from cdsm.kernels.tree import Indices, Tree
-from cdsm.support.validation import Array, frozen, one_of, sequence_of
+from cdsm.support.validation import one_of, sequence_of
+from cdsm.support.values import Array, frozen
 
 
 class BodyState(NamedTuple):

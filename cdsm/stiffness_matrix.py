@@ -24,16 +24,8 @@ from cdsm.kernels import readings
 from cdsm.posture import Posture
 from cdsm.support.format import MODEL, coordinates
 from cdsm.support.markup import element, row
-from cdsm.support.validation import (
-    Array,
-    ReadOnlyState,
-    frozen,
-    instance,
-    one_of,
-    unit_direction,
-    vector,
-    wrench_vector,
-)
+from cdsm.support.validation import instance, one_of, unit_direction, vector, wrench_vector
+from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension
 
 if TYPE_CHECKING:

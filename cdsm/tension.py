@@ -29,16 +29,8 @@ from cdsm.kernels import tension as tension_kernels
 from cdsm.kernels.tension import DISTANCE, OPTIMALITY
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
-from cdsm.support.validation import (
-    Array,
-    ReadOnlyState,
-    bound,
-    frozen,
-    instance,
-    one_of,
-    quantity,
-    wrench_vector,
-)
+from cdsm.support.validation import bound, instance, one_of, quantity, wrench_vector
+from cdsm.support.values import Array, ReadOnlyState, frozen
 
 # by default HiGHS calls feasible what misses up to 1e-7, and so would not see less missing torque
 _TIGHT = {"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10}

@@ -18,7 +18,8 @@ from cdsm.errors import UrdfError
 from cdsm.geometry import Geometry, Link
 from cdsm.rigid_body import RigidBody
 from cdsm.support.files import write_file
-from cdsm.support.validation import Array, instance
+from cdsm.support.validation import instance
+from cdsm.support.values import Array
 
 if TYPE_CHECKING:
     import yourdfpy

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 from cdsm.kernels.compiling import compiled
 from cdsm.kernels.tree import Frames, Indices, Tree
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 
 
 class Masses(NamedTuple):

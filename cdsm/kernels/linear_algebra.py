@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 
 from cdsm.kernels.compiling import compiled, upwards
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 
 _SWEEPS = 30
 """Of Jacobi rotations, at most; they converge in five or six."""

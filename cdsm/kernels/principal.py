@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 
 RIGID = 1e-12
 """Ratio of compliances up to which the stiffer direction counts as infinitely stiff: an eigenvalue

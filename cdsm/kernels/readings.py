@@ -24,7 +24,7 @@ import numpy as np
 
 from cdsm.kernels.compiling import compiled, inlined
 from cdsm.kernels.linear_algebra import eliminate, singular_values, smallest_eigenvalue
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 
 REGULAR = 1e-8
 """Smallest singular value of K_θ, over what it is a sum of, that leaves its inverse 6 digits."""

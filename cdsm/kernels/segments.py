@@ -26,7 +26,7 @@ import numpy as np
 
 from cdsm.kernels.compiling import compiled, inlined
 from cdsm.kernels.tree import Frames, Indices, Routing, Tree, forward_kinematics
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 
 SHORTEST_SEGMENT = 1e-9
 """A segment shorter than this [m] has no direction: its two sites coincide."""

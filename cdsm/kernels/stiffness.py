@@ -7,7 +7,7 @@ import numpy as np
 from cdsm.kernels.compiling import compiled, upwards
 from cdsm.kernels.segments import add_length_hessian, mirror
 from cdsm.kernels.tree import Frames, Indices, Routing
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 
 
 @compiled

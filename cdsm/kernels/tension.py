@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cdsm.kernels.compiling import compiled
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 
 NO_ARM = 1e-15
 """A moment arm this part of the arm's length is rounding, as of a cable that meets the axis."""

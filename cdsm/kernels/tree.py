@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdsm.kernels.compiling import compiled
-from cdsm.support.validation import Array, frozen
+from cdsm.support.values import Array, frozen
 
 Indices = NDArray[np.intp]
 

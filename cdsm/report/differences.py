@@ -13,7 +13,7 @@ from collections.abc import Callable
 import numpy as np
 
 from cdsm.errors import CdsmError
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 
 Estimates = tuple[Array, Array]
 """Derivatives of T functions, and by how much their entries may be off (T,)."""

@@ -17,7 +17,7 @@ from cdsm.errors import CdsmError, SingularStiffness
 from cdsm.kernels import tension as tension_kernels
 from cdsm.kernels.tension import DISTANCE
 from cdsm.report.potential import evaluate_law, joint_unit
-from cdsm.support.validation import Array, ReadOnlyState, frozen
+from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension
 
 if TYPE_CHECKING:

@@ -20,7 +20,7 @@ from cdsm.cable import Cable
 from cdsm.errors import CdsmError, InvalidInput
 from cdsm.manipulator import Manipulator
 from cdsm.support.format import JointUnits
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 from cdsm.wires.laws import TabulatedElasticity
 
 if TYPE_CHECKING:

@@ -16,7 +16,7 @@ from cdsm.report.page import page, to_document, to_fragment, to_text
 from cdsm.report.potential import joint_unit
 from cdsm.report.self_check import SelfCheck, self_check
 from cdsm.support.format import JointUnits, key
-from cdsm.support.validation import Array, ReadOnlyState
+from cdsm.support.values import Array, ReadOnlyState
 
 if TYPE_CHECKING:
     from cdsm.stiffness_matrix import Stiffness

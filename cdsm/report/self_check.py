@@ -18,7 +18,7 @@ from cdsm.errors import CdsmError, first_of
 from cdsm.report.differences import Estimates, gradients, hessians
 from cdsm.report.facts import torque_size
 from cdsm.report.potential import Neighbourhood
-from cdsm.support.validation import Array, ReadOnlyState
+from cdsm.support.values import Array, ReadOnlyState
 
 if TYPE_CHECKING:
     from cdsm.stiffness_matrix import Stiffness

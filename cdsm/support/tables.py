@@ -13,7 +13,7 @@ import numpy as np
 
 from cdsm.errors import FileError
 from cdsm.support.files import read_text
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 
 _LONGEST_CELL = 1000
 """Characters of a cell: longer than any number or name."""

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import cdsm
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 from tests.support.arms import (
     random_arm,
 )

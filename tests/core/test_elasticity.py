@@ -12,7 +12,8 @@ from scipy.integrate import quad
 
 import cdsm
 from cdsm.elasticity import Domain, rising_root, tension_at
-from cdsm.support.validation import RANGES, Array
+from cdsm.support.validation import RANGES
+from cdsm.support.values import Array
 
 STEEL = cdsm.LinearElasticity(226_195.0)
 STRAND = cdsm.StrandElasticity.eq19_repaired()

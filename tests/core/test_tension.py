@@ -13,7 +13,7 @@ from scipy.optimize import linprog
 import cdsm
 from cdsm.kernels import tension as tension_kernels
 from cdsm.kernels.tension import DISTANCE, OPTIMALITY
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 from cdsm.tension import _polished, _shortfall
 from tests.support.arms import (
     STEEL,

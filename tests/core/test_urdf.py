@@ -15,7 +15,7 @@ import pytest
 import yourdfpy
 
 import cdsm
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 from cdsm.urdf import CROSS_INERTIA, CROSS_MASS
 from tests.support.arms import mixed_arm, random_arm
 from tests.support.patience import HANGS

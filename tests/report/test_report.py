@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 import cdsm
 from cdsm.report import Agreement, Report
 from cdsm.report.differences import gradients, hessians
-from cdsm.support.validation import Array, frozen
+from cdsm.support.values import Array, frozen
 from tests.interchange.test_caspr import toy
 from tests.support import arms, foreign, locked
 

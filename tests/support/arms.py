@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 import cdsm
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 
 STEEL = cdsm.LinearElasticity.of_wire(200e9, 1.2e-3)
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 
 
 def coordinates(kind: str) -> int:

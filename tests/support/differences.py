@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 import cdsm
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 from cdsm.urdf import CROSS_MASS
 
 EPSILON = float(np.finfo(np.float64).eps)

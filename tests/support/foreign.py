@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 import cdsm
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 
 _INERTIAL = (
     '<inertial><origin xyz="{1} 0.01 -0.02" rpy="0.3 0.2 0.1"/><mass value="{0}"/>'

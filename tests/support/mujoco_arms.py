@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 
 import cdsm
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 from cdsm.urdf import CROSS_INERTIA, CROSS_MASS
 
 

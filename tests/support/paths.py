@@ -5,7 +5,7 @@ import pytest
 
 import cdsm
 from cdsm import presets
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 
 DOWN = (0.0, 0.0, 1.0)
 

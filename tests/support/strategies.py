@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 import cdsm
 from cdsm.cable import Control
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 from tests.support.foreign import joint_element, link_element
 
 Strategy = st.SearchStrategy

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 import cdsm
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 from cdsm.sweeps.quantities import QUANTITIES
 
 EVERYTHING = tuple(QUANTITIES)
