@@ -167,15 +167,14 @@ def test_a_posture_that_is_none_shows_nothing_but_why() -> None:
     assert shown.cable_colors is None
 
 
-@pytest.mark.parametrize("number", [1e16, 1e300])
-def test_numbers_that_no_arm_has_are_refused(number: float) -> None:
+def test_numbers_that_no_arm_has_are_refused() -> None:
     arm = soft_arm()
-    for asked in (
-        setting(arm, q=np.full(6, number)),
-        setting(arm, number),
-        setting(arm, force=(0.0, number, 0.0)),
+    for refused in (
+        setting(arm, q=np.full(6, 1e16)),
+        setting(arm, 1e16),
+        setting(arm, force=(0.0, 1e16, 0.0)),
     ):
-        assert show(arm, asked).condition is Condition.INVALID
+        assert show(arm, refused).condition is Condition.INVALID
 
 
 def test_cables_outside_their_elasticity_keep_their_tensions() -> None:
@@ -368,23 +367,22 @@ def test_a_fault_of_our_own_leaves_no_number_behind(
     assert node(view, "/cables").visible
 
 
-@pytest.mark.parametrize("number", [1e16, 1e300])
 @needs_viser
-def test_no_number_that_is_typed_ends_the_view(number: float) -> None:
+def test_no_number_that_is_typed_ends_the_view() -> None:
     with serve(soft_arm(), port=0, q=np.deg2rad(DEGREES), minimum=STABLE) as view:
         fields = [view._controls._joints[0].handle, view._controls._force[1].handle]
         seen = []
         for field in fields:
             before = field.value
-            field.value = number  # type: ignore[misc]
+            field.value = 1e16  # type: ignore[misc]
             seen.append(view.shown.condition)
             assert not node(view, "/force").visible
             assert not node(view, "/ellipsoid").visible
             field.value = before  # type: ignore[misc]
             seen.append(view.shown.condition)
             assert node(view, "/arm").visible
-        beyond = Condition.NO_POSTURE if number < 1e17 else Condition.INVALID
-        assert seen == [beyond, Condition.STABLE, Condition.INVALID, Condition.STABLE]
+        stable = Condition.STABLE
+        assert seen == [Condition.NO_POSTURE, stable, Condition.INVALID, stable]
 
 
 @needs_viser
