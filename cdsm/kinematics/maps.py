@@ -280,7 +280,7 @@ def _checked_guess(arm: Manipulator, guess: ArrayLike | None) -> Array:
     if guess is None:
         return frozen(np.zeros(arm.nv))
     angles = vector("guess", guess, arm.nv, arm._meaning_of_q)
-    beyond = (angles < arm._model.lowest) | (angles > arm._model.highest)
+    beyond = arm._model.beyond_limits(angles)
     if beyond.any():
         i = int(beyond.argmax())
         raise InvalidInput(

@@ -81,10 +81,10 @@ def scan_end(at: StiffnessAt, low: float, highest: float) -> float:
         growth = -math.inf
         highest = far
         if _balances(at, far):
-            there, K = at(far), at(low)
+            outer, K = at(far), at(low)
             growth, active = (
                 float(np.linalg.eigvalsh((part + part.T) / 2.0)[0]) / far
-                for part in (there.joint, there.active)
+                for part in (outer.joint, outer.active)
             )
             rest = float(np.linalg.norm(K.joint, 2) + np.linalg.norm(K.active, 2))
             # a passive part that grows faster may be small before: then the active one decides

@@ -283,7 +283,7 @@ def _find_rest(loaded: LoadedArm, start: Iterate, held_back: Array | float) -> R
 
 def _require_between_stops(pose: Posture) -> None:
     arm, q = pose.arm, pose.q
-    beyond = (q < arm._model.lowest) | (q > arm._model.highest)
+    beyond = arm._model.beyond_limits(q)
     if np.count_nonzero(beyond):
         i = int(beyond.argmax())
         stop = arm.lower[i] if q[i] < arm._model.lowest[i] else arm.upper[i]

@@ -107,8 +107,8 @@ def modes(pose: Posture, stiffness: Stiffness) -> Modes:
         SingularMass: A motion of the arm moves no link of any mass, so it has no frequency.
     """
     arm = instance("pose", pose, Posture).arm
-    there = instance("stiffness", stiffness, Stiffness).posture
-    if there is not pose and not (there.arm == arm and np.array_equal(there.q, pose.q)):
+    other = instance("stiffness", stiffness, Stiffness).posture
+    if other is not pose and not (other.arm == arm and np.array_equal(other.q, pose.q)):
         raise InvalidInput("stiffness", "was taken at another posture; take it at this one.")
     M = arm._model.body.mass_matrix(pose.q)
     spectrum, motions = np.linalg.eigh(M)

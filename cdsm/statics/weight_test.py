@@ -231,8 +231,8 @@ def _follow_load(
         elif step > _FINEST * max(reached, _SLIGHT):
             step /= 2.0
         else:
-            way = before.stiffness.critical_direction
-            joint = before.pose.arm.joint_names[int(abs(way).argmax())]
+            mode = before.stiffness.critical_direction
+            joint = before.pose.arm.joint_names[int(abs(mode).argmax())]
             raise EquilibriumError(
                 f"the arm buckles at {100.0 * reached:.4g} % of the load, under "
                 f"{reached * float(np.linalg.norm(added)):.4g} N: {joint} gives way",

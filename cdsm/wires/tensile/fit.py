@@ -195,24 +195,16 @@ def fit_tensile_test(
     refuse_jumps(curve, points)
     fitted_by = _monotone if method == "monotone" else _polynomial
     elasticity, start, more = fitted_by(curve, points, join)
-    low, high = elasticity.domain
-    if not elasticity.domain.low_included:
-        low = float(np.nextafter(low, high))
-    tensions = frozen(_grid(low, high, curve.basis.tensions))
+    domain = elasticity.domain
+    tensions = frozen(_grid(domain.first, domain.high, curve.basis.tensions))
     strain = points.strain - start
     fitted = np.interp(strain, elasticity.strain(tensions), tensions)
     inside = (strain >= 0.0) & (fitted < tensions[-1])
     deviation = np.interp(tensions, curve.basis.tensions, spread.deviation)
-    settles = pretension_end(tensions, elasticity.rigidity(tensions), deviation)
-    low, high = float(tensions[0]), float(tensions[-1])
-    stages: tuple[Stage, ...] = (Stage("elastic", low if settles is None else settles, high),)
-    if settles is not None:
-        stages = (Stage("pre-tensioning", low, settles), *stages)
-    if onset is not None:
-        stages += (Stage("plastic", high, max(most, high)),)
+    elastic_from = pretension_end(tensions, elasticity.rigidity(tensions), deviation)
     return TensileFit(
         elasticity=elasticity,
-        stages=stages,
+        stages=_stages(tensions, elastic_from, onset, most),
         rms=float(np.sqrt(np.mean((points.force - fitted)[inside] ** 2))),
         tensions=tensions,
         band=_band(elasticity, tensions, curve, points) if method == "monotone" else None,
@@ -221,6 +213,19 @@ def fit_tensile_test(
         start=start * test.gauge_length,
         notes=notes + more + doubts(points, spread, test.gauge_length),
     )
+
+
+def _stages(
+    tensions: Array, elastic_from: float | None, onset: float | None, most: float
+) -> tuple[Stage, ...]:
+    low, high = float(tensions[0]), float(tensions[-1])
+    if elastic_from is None:
+        stages = [Stage("elastic", low, high)]
+    else:
+        stages = [Stage("pre-tensioning", low, elastic_from), Stage("elastic", elastic_from, high)]
+    if onset is not None:
+        stages.append(Stage("plastic", high, max(most, high)))
+    return tuple(stages)
 
 
 def _curve(points: Points, noise: float) -> Curve:

@@ -1,8 +1,9 @@
 """A smooth, positive rigidity curve through noisy points of force over strain.
 
 log EA is a cubic B-spline in a coordinate that spreads both small and large tensions, so EA > 0 and
-F(ε) is C1 whatever the data. What is fitted is the force at each strain, never a quotient of
-differences, which noise would swamp. How smooth: restricted likelihood, from the data themselves.
+F(ε) is C1 whatever the data. The forces at the strains are fitted, not quotients of differences,
+which would be mostly noise. The smoothing follows from the data by restricted likelihood. scipy's
+smoothing splines fit values, and cannot fit a function through its integral.
 """
 
 from __future__ import annotations
@@ -19,8 +20,11 @@ from scipy.optimize import least_squares
 from cdsm.support.validation import Array
 
 _INTERVALS = 48
-_NEAR = 41  # points over which the noise is taken to be the same
-_GRID = 1200  # quadrature error below 1e-4 of the strain where EA varies thousandfold
+"""Most intervals of the splines: more change no curve of a wire."""
+_NEAR = 41
+"""Points over which the noise is taken to be the same."""
+_GRID = 1200
+"""Tensions of the grid: error of the strain below 1e-4 where EA varies thousandfold."""
 
 
 def _running_integral(values: Array, tensions: Array, axis: int = -1) -> Array:
@@ -87,21 +91,21 @@ class Basis:
 
 @dataclass(frozen=True)
 class Curve:
-    """A fitted curve: log EA, and the strain at one tension, on which the rest hangs.
+    """A fitted curve: log EA, and the strain at one tension.
 
     Attributes:
         basis: Of log EA.
         coefficients: Of the splines (k,).
-        anchor: Where on the grid. Best where the wire is stiff: in a soft end, any change of EA
-            would shift all the rest, and the fit would creep.
-        strain_there: ε at the anchor [-].
+        anchor: Index of that tension on the grid. It is where the wire is stiff: at a soft end any
+            change of EA would shift the rest of the curve, and the fit would converge slowly.
+        anchor_strain: ε at the anchor [-].
         smoothing: Weight of the roughness [N²].
     """
 
     basis: Basis
     coefficients: Array
     anchor: int
-    strain_there: float
+    anchor_strain: float
     smoothing: float
 
     @cached_property
@@ -113,7 +117,7 @@ class Curve:
     def strain(self) -> Array:
         """ε (g,) [-] on the grid, of the same origin as the points."""
         stretch = _running_integral(1.0 / self.rigidity, self.basis.tensions)
-        return np.asarray(self.strain_there + stretch - stretch[self.anchor])
+        return np.asarray(self.anchor_strain + stretch - stretch[self.anchor])
 
     def force(self, strain: Array) -> Array:
         """Tension (n,) [N] at strains (n,); straight beyond the ends."""
@@ -150,7 +154,7 @@ class Curve:
 
         def of(x: Array) -> Curve:
             return replace(
-                self, coefficients=np.clip(x[:-1], -30.0, 40.0), strain_there=x[-1] * unit
+                self, coefficients=np.clip(x[:-1], -30.0, 40.0), anchor_strain=x[-1] * unit
             )
 
         def residual(x: Array) -> Array:
@@ -162,24 +166,24 @@ class Curve:
             rows[:, -1] *= unit
             return np.vstack((rows, rough))
 
-        x = np.append(self.coefficients, self.strain_there / unit)
+        x = np.append(self.coefficients, self.anchor_strain / unit)
         found = least_squares(residual, x, slope, method="lm", max_nfev=60, xtol=1e-6, ftol=1e-6)
         return of(found.x)
 
     def spread(self, points: Points) -> Spread:
-        """How far the noise of the points may have moved the curve."""
+        """Uncertainty of the curve due to the noise of the points."""
         rows, error = self._linearised(points)
         factor, scale = self._factored(rows)
         inverse = cho_solve(factor, np.eye(len(scale))) / np.outer(scale, scale)
         leverage = np.clip(((rows @ inverse) * rows).sum(axis=1), 0.0, 1.0)
         freedom = float(max(len(error) - leverage.sum(), 1.0))
         variance = float((error**2).sum() / freedom)
-        # what a flexible curve takes up of the noise is missing from the residuals
+        # residuals lack the part of the noise that the curve follows
         error = error / np.sqrt(np.maximum(1.0 - leverage, 0.1))
         near = min(_NEAR, len(error))
         padded = np.pad(error**2, (near // 2, near - 1 - near // 2), mode="reflect")
         local = np.convolve(padded, np.full(near, 1.0 / near), mode="valid")
-        # scatter, each point's own, and the prior of the smoothing seen from the fitted curve
+        # scatter by the local noise, and bias by the prior of the smoothing
         moved = (inverse @ rows.T) * np.sqrt(local)
         covariance = moved @ moved.T + variance * inverse @ self._penalty @ inverse
         splines = self.basis.splines
@@ -189,8 +193,8 @@ class Curve:
     def loosest(self, points: Points) -> Curve:
         """The curve with the least smoothing that its restricted likelihood allows.
 
-        That is one standard deviation below the most likely: −2 log likelihood is larger by 1.
-        Points that show no bend leave a curve no freedom to err; this gives back what they allow.
+        That is one standard deviation below the most likely: −2 log likelihood is larger by 1. Of
+        points without a bend the most likely curve is straight, and its band would be too narrow.
         """
         least, chosen = np.inf, self
         for smoothing in self.smoothing * 10.0 ** np.arange(0.0, -6.0, -0.25):
@@ -203,14 +207,14 @@ class Curve:
         return chosen
 
     def _likelihood(self, points: Points) -> float:
-        """−2 log of the restricted likelihood of the smoothing, the curve linearised as it is."""
+        """−2 log of the restricted likelihood of the smoothing, for the linearised curve."""
         rows, error = self._linearised(points)
-        unknowns = np.append(self.coefficients, self.strain_there)
+        unknowns = np.append(self.coefficients, self.anchor_strain)
         factor, scale = self._factored(rows)
         bent = self._penalty @ unknowns
         gradient = (rows.T @ error - bent) / scale
         deviance = error @ error + unknowns @ bent - gradient @ cho_solve(factor, gradient)
-        # of the unknowns, the strain and the two of a straight log EA are free of the penalty
+        # three unknowns have no penalty: the strain, and the two of a straight log EA
         return float(
             (len(error) - 3) * np.log(deviance + len(error) * _least_variance(points))
             + 2.0 * np.log(np.diag(factor[0]) * scale).sum()
@@ -219,7 +223,7 @@ class Curve:
 
     @property
     def _penalty(self) -> Array:
-        """Of the unknowns (k + 1, k + 1)."""
+        """Penalty of the unknowns (k + 1, k + 1)."""
         return np.pad(self.smoothing * self.basis.roughness, (0, 1))
 
     def _linearised(self, points: Points) -> tuple[Array, Array]:
@@ -231,7 +235,7 @@ class Curve:
     def _factored(self, rows: Array) -> tuple[tuple[Array, bool], Array]:
         """Cholesky factor of the normal matrix, scaled to a unit diagonal, and the scale."""
         normal = rows.T @ rows + self._penalty
-        # the strain counts in other units
+        # strain and log EA are orders apart
         scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
         regular = normal / np.outer(scale, scale) + 1e-10 * np.eye(len(scale))
         return cho_factor(regular), scale
@@ -244,9 +248,9 @@ class Spread:
     Attributes:
         inverse: Of the normal matrix, penalty included, by the unknowns (k + 1, k + 1).
         noise: Standard deviation of one point [N].
-        freedom: Points less what the curve takes up of them.
-        errors: Of the points, each as one not averaged (n,) [N]: the residuals, enlarged by what
-            the curve takes up.
+        freedom: Degrees of freedom: points less those that the curve follows.
+        errors: Errors of the points, each as one not averaged (n,) [N]: the residuals, enlarged by
+            the part that the curve follows.
         deviation: Standard deviation of log EA on the grid (g,): of the scatter, as large as it is
             around each point, so that it may grow with the force; and of the smoothing, whose
             squared bias is taken as that of a curve as rough as this one is on average (Nychka,
@@ -264,8 +268,8 @@ def fit_curve(points: Points, basis: Basis, noise: float) -> Curve:
     """Fit the curve, its smoothing by restricted likelihood (Fellner and Schall's iteration).
 
     Args:
-        points: What to fit.
-        basis: Where log EA may bend.
+        points: The points.
+        basis: The splines of log EA.
         noise: First estimate of the noise of one point [N], and a floor for it.
     """
     tensions = basis.tensions
@@ -280,7 +284,7 @@ def fit_curve(points: Points, basis: Basis, noise: float) -> Curve:
     ridge = basis.splines.T @ basis.splines + 1e-3 * basis.roughness + 1e-9 * np.eye(size)
     coefficients: Array = np.linalg.solve(ridge, basis.splines.T @ guess).astype(np.float64)
     floor = _least_variance(points)
-    # stiff at first, and looser step by step: a flexible curve can lose its way from a rough start
+    # from smooth to flexible: a flexible curve may not converge from a rough start
     smoothing = 10.0 * max(noise**2, 1e8 * floor)
     anchor = int((basis.splines @ coefficients).argmax())
     strain = float(np.interp(tensions[anchor], force, points.strain))

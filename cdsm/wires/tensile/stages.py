@@ -92,12 +92,13 @@ def doubts(points: Points, spread: Spread, gauge_length: float) -> tuple[str, ..
             f"{points.force[worst]:.4g} N at {points.strain[worst] * gauge_length:.4g} m lies "
             f"{times[worst]:.0f} times the scatter around it off the curve: check this point"
         )
-    follow = float(errors[1:] @ errors[:-1]) / max(float(errors @ errors), 1e-300)
-    if follow > 4.0 / np.sqrt(len(errors)) and spread.noise > _SEEN * reach:
-        widen = float(np.sqrt((1.0 + follow) / (1.0 - follow)))
+    # errors of a test without noise may all be zero
+    correlation = float(errors[1:] @ errors[:-1]) / (float(errors @ errors) or 1.0)
+    if correlation > 4.0 / np.sqrt(len(errors)) and spread.noise > _SEEN * reach:
+        widen = float(np.sqrt((1.0 + correlation) / (1.0 - correlation)))
         notes.append(
-            f"neighbouring residuals go together (correlation {follow:.2f}): the force drifts or "
-            f"ripples, or EA bends too sharply for the curve. The band is at least {widen:.1f} "
+            f"neighbouring residuals go together (correlation {correlation:.2f}): the force drifts "
+            f"or ripples, or EA bends too sharply for the curve. The band is at least {widen:.1f} "
             "times too narrow"
         )
     return tuple(notes)
