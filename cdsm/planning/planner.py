@@ -88,11 +88,11 @@ class Planner:
         Raises:
             UnreachableStiffness: The target is out of the range, or was not hit.
         """
-        one, other, iterations = range_ends(self.model, u, _RANGE_STARTS, self.seed)
+        softest, stiffest, iterations = range_ends(self.model, u, _RANGE_STARTS, self.seed)
         self.iterations += iterations
-        low = 0.0 if one.open else one.value
-        high = math.inf if other.open else other.value
-        balanced = [self.model.at(end.tension.values) for end in (one, other)]
+        low = 0.0 if softest.open else softest.value
+        high = math.inf if stiffest.open else stiffest.value
+        balanced = [self.model.at(end.tension.values) for end in (softest, stiffest)]
         seen = [
             *map(self.constraints.at, balanced),
             *self._ends,
@@ -104,7 +104,7 @@ class Planner:
         high = max([high, *(value for value in met if value > high * (1.0 + REACHED))])
         if not low * (1.0 - _EDGE) <= target <= high * (1.0 + _EDGE):
             raise UnreachableStiffness(u, target, low, high, [low if target < low else high])
-        ends = [one.evaluation, other.evaluation]
+        ends = [softest.evaluation, stiffest.evaluation]
         found = self._best(
             [*self._crossings(ends[0], ends), *self._crossings(ends[1], ends)] or ends
         )
@@ -172,16 +172,16 @@ class Planner:
 
     def _crossings(self, hub: Evaluation, others: list[Evaluation]) -> list[Evaluation]:
         """Stable places on the way from one to others where the one target is hit, least first."""
-        here, guesses = self._miss(hub), []
+        at_hub, guesses = self._miss(hub), []
         for other in others:
-            there = self._miss(other)
-            if here * there < 0.0:
-                guess = hub.F + here / (here - there) * (other.F - hub.F)
-                guesses.append((float(guess @ guess), there, other.F - hub.F))
+            at_other, way = self._miss(other), other.F - hub.F
+            if at_hub * at_other < 0.0:
+                guess = hub.F + at_hub / (at_hub - at_other) * way
+                guesses.append((float(guess @ guess), at_other, way))
         found = []
-        for _, there, way in sorted(guesses, key=lambda guess: guess[0])[: self.starts]:
+        for _, at_other, way in sorted(guesses, key=lambda guess: guess[0])[: self.starts]:
             # known at both ends: the rounding of F at an end may be enough to change the sign
-            known = {0.0: here, 1.0: there}
+            known = {0.0: at_hub, 1.0: at_other}
 
             def miss(part: float, way: Array = way, known: dict[float, float] = known) -> float:
                 if part in known:

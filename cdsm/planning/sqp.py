@@ -202,30 +202,30 @@ def _beyond_kinks(region: Admissible, F: Array) -> Iterator[Array]:
 def _search(program: Program, start: Evaluation, *, in_piece: bool) -> SearchResult:
     """A local optimum; with ``in_piece`` that of the piece of the start alone."""
     region, objective = program.region, program.objective
-    here = program.constraints.at(start)
-    y, z = np.zeros(here.values.size if objective.constrained else 0), 0.0
+    iterate = program.constraints.at(start)
+    y, z = np.zeros(iterate.values.size if objective.constrained else 0), 0.0
     price, radius, iterations = _FIRST_PRICE, _FIRST_RADIUS, 0
     in_piece = in_piece or not region.kinks
     while iterations < _ITERATIONS and radius >= _SMALLEST_RADIUS:
         iterations += 1
-        low, high = region.piece(here.evaluation.F)
+        low, high = region.piece(iterate.evaluation.F)
         bounds = _Bounds(radius, *((low, high) if in_piece else (region.low, region.high)))
-        model = _model(program, here, y, z)
-        step, price = _step(program, here, model, price, bounds)
+        model = _model(program, iterate, y, z)
+        step, price = _step(program, iterate, model, price, bounds)
         y, z = step.y, step.z
         small = step.length <= _ARRIVED and bool((abs(model.c) <= _ARRIVED).all())
-        if small or step.predicted <= _ROUNDING * max(1.0, abs(program.merit(here, price))):
+        if small or step.predicted <= _ROUNDING * max(1.0, abs(program.merit(iterate, price))):
             if not in_piece:
                 in_piece = True
-            elif not program.met(here) and price < _LARGEST_PRICE:
+            elif not program.met(iterate) and price < _LARGEST_PRICE:
                 price = min(100.0 * price, _LARGEST_PRICE)  # at rest, but only at so low a price
             else:
                 break
             continue
-        there, fall = _take(program, here, model, step, price, bounds)
-        F = here.evaluation.F + model.size * step.d
-        if there is not None and fall >= 1e-4 * step.predicted:
-            here = there
+        candidate, fall = _take(program, iterate, model, step, price, bounds)
+        F = iterate.evaluation.F + model.size * step.d
+        if candidate is not None and fall >= 1e-4 * step.predicted:
+            iterate = candidate
             if fall > 0.5 * step.predicted:
                 radius = max(radius, 3.0 * step.length)
             elif fall < 0.25 * step.predicted:
@@ -234,18 +234,18 @@ def _search(program: Program, start: Evaluation, *, in_piece: bool) -> SearchRes
             in_piece = True  # what looked good on this side of a kink is not so on the other
         else:
             radius = step.length / 4.0
-    return SearchResult(here, iterations)
+    return SearchResult(iterate, iterations)
 
 
-def _model(program: Program, here: ConstraintValues, y: Array, z: float) -> _Model:
+def _model(program: Program, iterate: ConstraintValues, y: Array, z: float) -> _Model:
     objective, region = program.objective, program.region
-    evaluation, c = here.evaluation, here.values
+    evaluation, c = iterate.evaluation, iterate.values
     size = max(region.scale, float(evaluation.F.max()))
     relative = size / program.unit
-    G = here.jacobian * size
+    G = iterate.jacobian * size
     weights = y if objective.constrained else objective.linear + objective.square * c
     g = objective.effort * relative * (evaluation.F - program.centre) / program.unit
-    W = here.hessian(weights) * size**2
+    W = iterate.hessian(weights) * size**2
     W[np.diag_indices(len(W))] += objective.effort * relative**2
     if not objective.constrained:
         # c belongs to f, whose Hessian has Gauss-Newton's term, too; no constraint is left
@@ -260,10 +260,10 @@ def _model(program: Program, here: ConstraintValues, y: Array, z: float) -> _Mod
 
 
 def _step(
-    program: Program, here: ConstraintValues, model: _Model, price: float, bounds: _Bounds
+    program: Program, iterate: ConstraintValues, model: _Model, price: float, bounds: _Bounds
 ) -> tuple[_Step, float]:
     """The step that the quadratic program recommends, and the price of c it needs."""
-    region, evaluation, size = program.region, here.evaluation, model.size
+    region, evaluation, size = program.region, iterate.evaluation, model.size
     count, rank, m = model.g.size, len(region.rows), model.c.size
     low = np.maximum(np.minimum((bounds.low - evaluation.F) / size, 0.0), -bounds.radius)
     high = np.minimum(np.maximum((bounds.high - evaluation.F) / size, 0.0), bounds.radius)
@@ -309,7 +309,7 @@ def _step(
 
 def _take(
     program: Program,
-    here: ConstraintValues,
+    iterate: ConstraintValues,
     model: _Model,
     step: _Step,
     price: float,
@@ -318,21 +318,21 @@ def _take(
     """The place after a step, None if it is not stable, and the fall of the merit."""
 
     def after(d: Array) -> tuple[ConstraintValues | None, float]:
-        F = np.clip(here.evaluation.F + model.size * d, bounds.low, bounds.high)
+        F = np.clip(iterate.evaluation.F + model.size * d, bounds.low, bounds.high)
         evaluation = backtrack_to_stable(program.model, F, program.anchor)
         if evaluation is None:
             return None, -math.inf
-        there = program.constraints.at(evaluation)
-        return there, program.merit(here, price) - program.merit(there, price)
+        candidate = program.constraints.at(evaluation)
+        return candidate, program.merit(iterate, price) - program.merit(candidate, price)
 
-    there, fall = after(step.d)
-    if there is not None and fall < 0.75 * step.predicted and model.c.size:
+    candidate, fall = after(step.d)
+    if candidate is not None and fall < 0.75 * step.predicted and model.c.size:
         # second-order correction: c as it was found after the step, not as its tangent has it
-        corrected = model._replace(c=there.values - model.G @ step.d)
-        other, more = after(_step(program, here, corrected, price, bounds)[0].d)
+        corrected = model._replace(c=candidate.values - model.G @ step.d)
+        other, more = after(_step(program, iterate, corrected, price, bounds)[0].d)
         if more > fall:
             return other, more
-    return there, fall
+    return candidate, fall
 
 
 def _miss(c: Array) -> float:

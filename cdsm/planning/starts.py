@@ -87,41 +87,41 @@ def _stabilize(model: StiffnessModel, region: Admissible, start: Evaluation) -> 
     vᵀ K_θ(F) v bounds the smallest eigenvalue from above for every unit v. The two softest modes of
     each iterate are kept, and linear in F they bound the reserve of the next.
     """
-    here, radius, unit = start, 1.0, model.scale
+    iterate, radius, unit = start, 1.0, model.scale
     modes: list[Array] = []
     count = start.F.size
     A = np.hstack([region.rows, np.zeros((len(region.rows), 1))])
     # variables: the step, and the reserve after it as far as the modes bound it
     P, q = 1e-4 * np.eye(count + 1), np.append(np.zeros(count), -1.0)
     for _ in range(_ITERATIONS):
-        softest = (here.eigenvectors[:, [i]] for i in range(min(2, len(here.eigenvectors))))
+        softest = (iterate.eigenvectors[:, [i]] for i in range(min(2, len(iterate.eigenvectors))))
         modes = [*modes, *softest][-_MODES:]
-        size = max(region.scale, float(here.F.max()))
-        rates = np.array([here.mode_gradient(v) for v in modes]) * size / unit
-        values = np.array([(v.T @ here.K @ v).item() - model.floor for v in modes]) / unit
-        low = np.append(np.maximum((region.low - here.F) / size, -radius), -np.inf)
-        high = np.append(np.minimum((region.high - here.F) / size, radius), np.inf)
+        size = max(region.scale, float(iterate.F.max()))
+        rates = np.array([iterate.mode_gradient(v) for v in modes]) * size / unit
+        values = np.array([(v.T @ iterate.K @ v).item() - model.floor for v in modes]) / unit
+        low = np.append(np.maximum((region.low - iterate.F) / size, -radius), -np.inf)
+        high = np.append(np.minimum((region.high - iterate.F) / size, radius), np.inf)
         cuts = np.hstack([-rates, np.ones((len(modes), 1))]), values
-        found = solve(P, q, (A, region.imbalance(here.F) / size), (low, high), cuts)
+        found = solve(P, q, (A, region.imbalance(iterate.F) / size), (low, high), cuts)
         if found is None:
             break
-        there = model.at(here.F + size * found.x[:count])
-        expected = float(found.x[count]) - here.reserve / unit
-        gain = (there.reserve - here.reserve) / unit
+        candidate = model.at(iterate.F + size * found.x[:count])
+        expected = float(found.x[count]) - iterate.reserve / unit
+        gain = (candidate.reserve - iterate.reserve) / unit
         if expected <= _NO_GAIN or radius <= _NO_GAIN:
             break
         if gain > 0.0:
-            here = there
+            iterate = candidate
         if gain > 0.5 * expected:
             radius *= 2.0
         elif gain < 0.1 * expected:
             radius = float(abs(found.x[:count]).max()) / 2.0
-    if here.reserve > 0.0:
-        return here
-    of = model.pose.arm.stiffness_unit()
+    if iterate.reserve > 0.0:
+        return iterate
+    unit_name = model.pose.arm.stiffness_unit()
     raise unstable(
         model.pose.arm,
         "no admissible tensions hold the arm stable: at best the smallest eigenvalue of K_θ is "
-        f"{here.eigenvalues[0]:.4g} {of}, and {model.floor:.4g} {of} is asked for",
-        here.eigenvectors[:, 0],
+        f"{iterate.eigenvalues[0]:.4g} {unit_name}, and {model.floor:.4g} {unit_name} is asked for",
+        iterate.eigenvectors[:, 0],
     )

@@ -287,9 +287,9 @@ def _steepest(curve: Array, slope: Callable[[float], float]) -> tuple[float, flo
 def _falls(curve: Array, slope: Callable[[float], float], start: float, level: float) -> float:
     """The first lower bound [N] after a start at which the slope [1/m] is below a level, or inf."""
     before = start
-    for place, _, there in curve.tolist():
+    for place, _, value in curve.tolist():
         if place > start:
-            if there < level:
+            if value < level:
                 return sign_change(lambda x: slope(x) - level, before, place)
             before = place
     return math.inf
