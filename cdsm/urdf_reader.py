@@ -16,7 +16,7 @@ from lxml import etree
 from cdsm.errors import UrdfError, listed
 from cdsm.geometry import MAXIMUM_JOINTS
 from cdsm.support.files import read_text
-from cdsm.support.validation import flag
+from cdsm.support.validation import RANGES, flag
 from cdsm.support.xml import XmlFault, numbers, parse_xml
 
 TAKEN = ("revolute", "prismatic", "fixed")
@@ -106,8 +106,9 @@ def _of_link(link: etree._Element, check_inertia: bool) -> list[str]:
     mass = inertial.find("mass")
     inertia = inertial.find("inertia")
     value = _read(faults, f"{where}: mass", None if mass is None else mass.get("value"), 1)
-    if value is not None and value[0] < 0.0:
-        faults.append(f"{where}: mass {value[0]:g} kg; it cannot be negative")
+    most = RANGES["mass"].high
+    if value is not None and not 0.0 <= value[0] <= most:
+        faults.append(f"{where}: mass {value[0]:g} kg; 0 to {most:g} kg is needed")
     faults += _of_origin(where, inertial)
     if inertia is None:
         return [*faults, f"{where}: <inertial> has no <inertia>"]
@@ -163,8 +164,11 @@ def _of_origin(where: str, element: etree._Element) -> list[str]:
     origin = element.find("origin")
     faults: list[str] = []
     if origin is not None:
-        for key in ("xyz", "rpy"):
-            _read(faults, f"{where}: origin {key}", origin.get(key, "0 0 0"), 3)
+        _read(faults, f"{where}: origin rpy", origin.get("rpy", "0 0 0"), 3)
+        xyz, most = origin.get("xyz", "0 0 0"), RANGES["length"].high
+        position = _read(faults, f"{where}: origin xyz", xyz, 3)
+        if position is not None and max(map(abs, position)) > most:
+            faults.append(f"{where}: origin xyz {xyz!r} is further than {most:g} m away")
     return faults
 
 

@@ -6,7 +6,7 @@ from cdsm.kernels import bodies as body_kernels
 from cdsm.kernels.segments import mirror
 from cdsm.kernels.tree import Frames, Routing, forward_kinematics
 from cdsm.rigid_body import RigidBody
-from tests.laws.test_derivatives import BRANCH_JOINT, BRANCHES
+from tests.kernels.test_segments import BRANCH_JOINT, BRANCHES
 
 
 def test_tree_that_branches_weighs_what_pinocchio_says() -> None:
