@@ -8,6 +8,7 @@ import math
 import socket
 import threading
 from collections.abc import Callable, Iterator
+from concurrent import futures
 from typing import TYPE_CHECKING, Self, final
 
 import numpy as np
@@ -94,40 +95,32 @@ class Worker:
 
     def __init__(self, job: Callable[[], None]) -> None:
         self._job = job
-        self._changed = threading.Condition()
-        self._requested = self._closed = self._busy = False
-        self._thread = threading.Thread(target=self._work, name="cdsm view", daemon=True)
-        self._thread.start()
+        self._thread = futures.ThreadPoolExecutor(1, "cdsm view")
+        self._lock = threading.Lock()
+        self._queued = self._closed = False
+        self._last: list[futures.Future[None]] = []
 
     def request(self) -> None:
         """Have the job run, soon; from any thread."""
-        with self._changed:
-            self._requested = True
-            self._changed.notify_all()
+        with self._lock:
+            if not self._queued and not self._closed:
+                self._queued = True
+                self._last = [self._thread.submit(self._run)]
 
     def wait(self) -> None:
         """Wait until all requests so far are served."""
-        with self._changed:
-            self._changed.wait_for(lambda: self._closed or not (self._requested or self._busy))
+        futures.wait(self._last)
 
     def close(self) -> None:
         """Let the running job end, and run no other."""
-        with self._changed:
+        with self._lock:
             self._closed = True
-            self._changed.notify_all()
-        if threading.current_thread() is not self._thread:
-            self._thread.join()
+        self._thread.shutdown(cancel_futures=True)
 
-    def _work(self) -> None:
-        while True:
-            with self._changed:
-                self._busy = False
-                self._changed.notify_all()
-                self._changed.wait_for(lambda: self._requested or self._closed)
-                if self._closed:
-                    return
-                self._requested, self._busy = False, True
-            self._job()
+    def _run(self) -> None:
+        with self._lock:
+            self._queued = False  # what changes from here on needs another run
+        self._job()
 
 
 @final
