@@ -10,9 +10,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm.batch import layout
-from cdsm.batch.chunks import checked_threads, run
 from cdsm.batch.fused_kernel import evaluate_rows
-from cdsm.batch.inputs import given_wrench, kernel_arm, of_rows, postures
+from cdsm.batch.inputs import (
+    checked_threads,
+    given_wrench,
+    kernel_arm,
+    of_rows,
+    postures,
+    run_slices,
+)
 from cdsm.batch.layout import OK, UNDECIDED, Codes, Flags
 from cdsm.batch.serpentine_guess import blocks
 from cdsm.batch.tension_kernel import distribute_rows
@@ -89,7 +95,7 @@ def distribute_tensions(
 
     Raises:
         InvalidInput: Something has the wrong shape or is not a number, or bounds contradict each
-            other. Whatever is wrong with single postures is said by :attr:`Tensions.status`.
+            other. :attr:`Tensions.status` says what is wrong with single postures.
     """
     instance("arm", arm, Manipulator)
     angles = postures(arm, q)
@@ -102,7 +108,7 @@ def distribute_tensions(
     def work(part: slice) -> None:
         values[part], status[part] = distributor.at(part)
 
-    run(work, len(angles), distributor.width, checked_threads(threads))
+    run_slices(work, len(angles), distributor.width, checked_threads(threads))
     return Tensions(
         arm=arm,
         q=angles,
@@ -126,7 +132,7 @@ class Distributor:
         check_limits: Pass over angles beyond the joint limits.
 
     Attributes:
-        width: Floats that come and go per row.
+        width: Floats of temporary memory per row.
     """
 
     def __init__(
@@ -140,7 +146,7 @@ class Distributor:
     ) -> None:
         self._arm, self._q, self._wrench = arm, q, wrench
         self._low, self._high = low, high
-        self._kernel_arm = kernel_arm(arm, check_limits)
+        self._arrays = kernel_arm(arm, check_limits)
         self._blocks = blocks(arm._model.routing, arm.nv)
         self._start = layout.starts(arm.nv, len(arm.cables), 0)
         self._wanted = np.array(
@@ -158,7 +164,7 @@ class Distributor:
         values, status = np.empty((len(q), low.shape[1])), np.zeros(len(q), dtype=np.uint8)
         known = np.empty((len(q), (7 + low.shape[1]) * q.shape[1]))
         evaluate_rows(
-            self._kernel_arm,
+            self._arrays,
             q,
             low,
             low,
@@ -169,8 +175,8 @@ class Distributor:
             known,
             status,
         )
-        nothing = NO_ARM * self._arm.length
-        distribute_rows(self._blocks, known, low, high, wrench, nothing, values, status)
+        smallest_arm = NO_ARM * self._arm.length
+        distribute_rows(self._blocks, known, low, high, wrench, smallest_arm, values, status)
         for r in np.flatnonzero(status == UNDECIDED).tolist():
             pose = self._arm.at(q[r], check_limits=False)
             try:

@@ -12,10 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm.batch import layout
-from cdsm.batch.chunks import checked_threads, run
 from cdsm.batch.distribution import Distributor, Tensions
-from cdsm.batch.inputs import given_tension, given_wrench, postures
-from cdsm.batch.job import Job
+from cdsm.batch.evaluator import Evaluator
+from cdsm.batch.inputs import checked_threads, given_tension, given_wrench, postures, run_slices
 from cdsm.batch.layout import QUANTITIES, Codes, Flags
 from cdsm.errors import InvalidInput, UnknownName
 from cdsm.manipulator import Manipulator
@@ -31,7 +30,7 @@ from cdsm.support.validation import (
 from cdsm.tension import checked_bounds
 
 OUTPUTS = (*QUANTITIES, "tension")
-"""Names of all that :func:`evaluate` can be asked for."""
+"""Names of the quantities that :func:`evaluate` computes."""
 
 DEFAULT_OUTPUTS = ("tip", "compliance", "margin")
 """Where the tip is, what it does under load, and whether the arm is stable."""
@@ -40,7 +39,7 @@ DEFAULT_OUTPUTS = ("tip", "compliance", "margin")
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Batch(ReadOnlyState):
-    """What was asked of many postures, row by row: ``batch["joint"]`` is K_θ (B, nv, nv).
+    """Quantities at many postures, row by row: ``batch["joint"]`` is K_θ (B, nv, nv).
 
     A quantity has the name, shape and unit it has in :class:`~cdsm.Posture` and
     :class:`~cdsm.Stiffness`, with one more axis in front; what does not exist is NaN,
@@ -114,7 +113,7 @@ def evaluate(
     check_limits: bool = True,
     threads: int | None = None,
 ) -> Batch:
-    """Evaluate an arm at many postures: what Posture and Stiffness say of one, microseconds each.
+    """Evaluate Posture and Stiffness of an arm at many postures, in microseconds each.
 
     Rows that cannot be evaluated raise no error; their :attr:`Batch.status` says why.
 
@@ -123,10 +122,10 @@ def evaluate(
         q: Joint angles (B, nv) [rad], a row for each posture.
         tension: F (C,) for all rows or (B, C) [N], not negative, or the answer of
             :func:`distribute_tensions` at these postures. Only left out if ``minimum`` is given, or
-            if nothing asked for depends on it.
+            if no output depends on it.
         wrench: W (6,) for all rows or (B, 6) at ``tool0`` in base axes: force [N], then moment
             [N m]; zero if not given. Belongs to tensions of your own, and to ``minimum``.
-        outputs: Names of what is wanted; nothing else is stored. Of a posture ``"tip"``,
+        outputs: Names of the wanted quantities; no others are stored. Of a posture ``"tip"``,
             ``"jacobian"``, ``"cable_lengths"``, ``"length_jacobian"``, ``"gravity_torque"``; of a
             stiffness ``"active"``, ``"passive"``, ``"gravity"``, ``"load"``, ``"joint"``,
             ``"cable_stiffness"``, ``"residual"``, ``"margin"``, ``"compliance"``, ``"cartesian"``,
@@ -169,8 +168,12 @@ def evaluate(
     if not needy:
         status[:] = layout.OK
     u = None if direction is None else unit_directions("direction", direction)
-    job = Job(arm, angles, given, loads, u, names, distributor if needy else None, check_limits)
-    run(lambda part: job.fill(part, status), rows, job.width, checked_threads(threads))
+    evaluator = Evaluator(
+        arm, angles, given, loads, u, names, distributor if needy else None, check_limits
+    )
+    run_slices(
+        lambda part: evaluator.fill(part, status), rows, evaluator.width, checked_threads(threads)
+    )
     return Batch(
         arm=arm,
         q=angles,
@@ -181,7 +184,7 @@ def evaluate(
         direction=u,
         status=frozen(status),
         outputs=names,
-        values=tuple(frozen(value) for value in job.values),
+        values=tuple(frozen(value) for value in evaluator.values),
     )
 
 

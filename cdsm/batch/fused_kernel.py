@@ -1,7 +1,6 @@
-"""The fused kernel: from joint angles, tensions and wrenches to all that is asked for, row by row.
+"""The fused kernel: from joint angles, tensions and wrenches to the wanted quantities, row by row.
 
-The physics is that of :mod:`cdsm.kernels.segments`, which the single posture uses too, and of
-:mod:`cdsm.kernels.bodies`; here it is only strung together, without allocating anything per row.
+The physics is in :mod:`cdsm.kernels`; here it is only called in turn, without allocating per row.
 """
 
 from __future__ import annotations
@@ -39,9 +38,15 @@ from cdsm.batch.layout import (
 )
 from cdsm.kernels.bodies import Masses, add_gravity_stiffness, gravity_torque, tip_jacobian
 from cdsm.kernels.compiling import compiled, inlined, threaded
-from cdsm.kernels.readings import IMMOBILE as NOT_MOBILE
+from cdsm.kernels.readings import (
+    READ,
+    Readings,
+    Wanted,
+    read_stiffness,
+    sum_terms,
+    workspace,
+)
 from cdsm.kernels.readings import SINGULAR as NOT_REGULAR
-from cdsm.kernels.readings import Readings, Wanted, read_stiffness, sum_terms, workspace
 from cdsm.kernels.segments import add_segment_derivatives, mirror
 from cdsm.kernels.stiffness import add_load_stiffness, add_passive_stiffness, set_cable_stiffness
 from cdsm.kernels.tree import Frames, Indices, Routing, Tree, forward_kinematics
@@ -49,7 +54,7 @@ from cdsm.support.validation import Array
 
 
 class Arm(NamedTuple):
-    """What does not change from row to row.
+    """The arm as arrays; the same for all rows.
 
     Attributes:
         tree: The joints.
@@ -70,13 +75,48 @@ class Arm(NamedTuple):
     rest: Array
 
 
-@compiled
-def _is_beyond(q: Array, lowest: Array, highest: Array) -> bool:
-    """Whether an angle is beyond its limits."""
-    beyond = False
-    for i in range(q.shape[0]):
-        beyond = beyond or q[i] < lowest[i] or q[i] > highest[i]
-    return beyond
+class Row(NamedTuple):
+    """The quantities of one row: views of its record, which lists them one after the other.
+
+    Attributes:
+        tip: (4, 4).
+        JX: J_X (6, nv).
+        L: Cable lengths (C,).
+        J: J_L (C, nv).
+        g: Gravity torque (nv,).
+        gravity: (nv, nv).
+        residual: (nv,).
+        active: (1, nv, nv).
+        load: (nv, nv).
+        k: Cable stiffness (C,).
+        passive: (nv, nv).
+        K: K_θ (nv, nv).
+        readings: What is read from K_θ.
+    """
+
+    tip: Array
+    JX: Array
+    L: Array
+    J: Array
+    g: Array
+    gravity: Array
+    residual: Array
+    active: Array
+    load: Array
+    k: Array
+    passive: Array
+    K: Array
+    readings: Readings
+
+
+class Scratch(NamedTuple):
+    """What a row needs on the way: frames, rotations, and scratch of the kernels it calls."""
+
+    frames: Frames
+    rotation: Array
+    left_factor: Array
+    carried: Array
+    slot: Indices
 
 
 @threaded
@@ -103,118 +143,158 @@ def evaluate_rows(
         directions: Unit vectors (D, 3) of ``along``.
         start: Where the quantities begin in a record.
         wanted: Numbers of quantities, rising.
-        out: What is wanted, NaN where it does not exist.
-        status: As it is known beforehand: OK, or that there are no tensions; then as it is found.
+        out: The wanted quantities, NaN where they do not exist.
+        status: As known beforehand, OK or that there are no tensions; replaced by what is found.
     """
+    # numba counts references at every access to a field, half a microsecond a row: so all fields
+    # are unpacked here, and the stages below are one function
     tree, routing, masses, lowest, highest, series, rest = arm
     parent, fixed = tree.parent, routing.fixed
-    nv, count, bodies = q.shape[1], fixed.shape[0], parent.shape[0]
-    site = np.empty((routing.row.shape[0], 3))
-    slide = np.empty(tree.slide.shape)
-    frames = Frames(np.empty((bodies, 3)), np.empty((bodies, 3)), slide, site)
-    rotation, left_factor, carried = (
+    nv, count = q.shape[1], fixed.shape[0]
+    frames, rotation, left_factor, carried, slot = _scratch(arm, nv)
+    record = np.zeros(start[start.shape[0] - 1])
+    row = _views(record, start, nv, count)
+    tip, JX, L, J, g, gravity, residual, active, load, k, passive, K, readings = row
+    last, is_wanted = 0, np.zeros(start.shape[0] - 1, dtype=np.bool_)
+    for w in range(wanted.shape[0]):
+        last = wanted[w]
+        is_wanted[last] = True
+    read = Wanted(
+        is_wanted[MARGIN], is_wanted[PSEUDOINVERSE], is_wanted[COMPLIANCE], is_wanted[CARTESIAN]
+    )
+    work = workspace(nv, directions.shape[0], read)
+    # the active term costs as much as lengths and moment arms: it is left out if there is no room
+    active_slots = active if last > GRAVITY else np.empty((0, nv, nv))
+
+    for b in range(q.shape[0]):
+        # the joint angles alone
+        if _is_beyond(q[b], lowest, highest):
+            status[b] = BEYOND_LIMITS
+            _copy(record, start, 0, wanted, b, out)
+            continue
+        forward_kinematics(tree, routing, q[b], rotation, frames)
+        for c in range(count):
+            L[c] = fixed[c]
+        _clear(record, start[LENGTH_JACOBIAN], start[LENGTH_JACOBIAN + 1])
+        if last >= GRAVITY:
+            _clear(record, start[GRAVITY], start[JOINT])
+        coincident = add_segment_derivatives(
+            routing, frames, tension[b], slot, left_factor, L, J, active_slots
+        )
+        if coincident >= 0:
+            status[b] = COINCIDENT_SITES
+            _copy(record, start, 0, wanted, b, out)
+            continue
+        tip_jacobian(parent, masses, rotation, frames, tip, JX)
+        gravity_torque(tree, masses, rotation, frames, carried, g)
+        if last >= GRAVITY:
+            add_gravity_stiffness(parent, carried, gravity)
+            mirror(gravity)
+        known = GRAVITY + 1
+
+        # tensions, if there are any
+        if last > GRAVITY and status[b] == OK:
+            _set_residual(tension[b], J, wrench[b], JX, g, residual)
+            mirror(active[0])
+            add_load_stiffness(JX, wrench[b], masses.tip_joints, load)
+            known = LOAD + 1
+
+        # the stiffness of the cables
+        if last > LOAD and known > LOAD:
+            if (rigidity[b] < 0.0).any():
+                status[b] = OUTSIDE_ELASTICITY
+            else:
+                set_cable_stiffness(L, tension[b], rigidity[b], series, rest, k)
+                add_passive_stiffness(J, k, passive)
+                mirror(passive)
+                sum_terms(active[0], passive, gravity, load, K, work.parts)
+                known = JOINT + 1
+
+        # readings of K_θ
+        if last > JOINT and known > JOINT:
+            found = read_stiffness(K, JX, directions, read, work, readings)
+            known = PSEUDOINVERSE + 1 if found == NOT_REGULAR else CARTESIAN + 1
+            if found != READ:
+                status[b] = SINGULAR if found == NOT_REGULAR else IMMOBILE
+        _copy(record, start, known, wanted, b, out)
+
+
+@compiled
+def _views(record: Array, start: Indices, nv: int, cables: int) -> Row:
+    """Views of the quantities in a record."""
+    return Row(
+        _matrix(record, start, TIP, 4),
+        _matrix(record, start, JACOBIAN, 6),
+        _vector(record, start, CABLE_LENGTHS),
+        _matrix(record, start, LENGTH_JACOBIAN, cables),
+        _vector(record, start, GRAVITY_TORQUE),
+        _matrix(record, start, GRAVITY, nv),
+        _vector(record, start, RESIDUAL),
+        _vector(record, start, ACTIVE).reshape((1, nv, nv)),
+        _matrix(record, start, LOAD, nv),
+        _vector(record, start, CABLE_STIFFNESS),
+        _matrix(record, start, PASSIVE, nv),
+        _matrix(record, start, JOINT, nv),
+        Readings(
+            _vector(record, start, MARGIN),
+            _matrix(record, start, PSEUDOINVERSE, 3),
+            _vector(record, start, ALONG),
+            _matrix(record, start, COMPLIANCE, 6),
+            _matrix(record, start, CARTESIAN, 3),
+        ),
+    )
+
+
+@compiled
+def _scratch(arm: Arm, nv: int) -> Scratch:
+    bodies = arm.tree.parent.shape[0]
+    return Scratch(
+        Frames(
+            np.empty((bodies, 3)),
+            np.empty((bodies, 3)),
+            np.empty(arm.tree.slide.shape),
+            np.empty((arm.routing.row.shape[0], 3)),
+        ),
         np.empty((bodies, 3, 3)),
         np.empty((nv, 3)),
         np.empty((bodies, 7)),
+        np.zeros(arm.routing.fixed.shape[0], dtype=np.intp),  # all cables add to one matrix
     )
-    slot = np.zeros(count, dtype=np.intp)
-
-    record = np.zeros(start[start.shape[0] - 1])
-    tip = _matrix(record, start, TIP, 4)
-    JX = _matrix(record, start, JACOBIAN, 6)
-    L = _vector(record, start, CABLE_LENGTHS)
-    J = _matrix(record, start, LENGTH_JACOBIAN, count)
-    g = _vector(record, start, GRAVITY_TORQUE)
-    gravity = _matrix(record, start, GRAVITY, nv)
-    residual = _vector(record, start, RESIDUAL)
-    active = _vector(record, start, ACTIVE).reshape((1, nv, nv))
-    load = _matrix(record, start, LOAD, nv)
-    k = _vector(record, start, CABLE_STIFFNESS)
-    passive = _matrix(record, start, PASSIVE, nv)
-    K = _matrix(record, start, JOINT, nv)
-    readings = Readings(
-        _vector(record, start, MARGIN),
-        _matrix(record, start, PSEUDOINVERSE, 3),
-        _vector(record, start, ALONG),
-        _matrix(record, start, COMPLIANCE, 6),
-        _matrix(record, start, CARTESIAN, 3),
-    )
-
-    asked, last = np.zeros(start.shape[0] - 1, dtype=np.bool_), 0
-    for w in range(wanted.shape[0]):
-        last = wanted[w]
-        asked[last] = True
-    curved = active if last > GRAVITY else np.empty((0, nv, nv))
-    read = Wanted(asked[MARGIN], asked[PSEUDOINVERSE], asked[COMPLIANCE], asked[CARTESIAN])
-    work = workspace(nv, directions.shape[0], read)
-
-    for b in range(q.shape[0]):
-        beyond, coincident = _is_beyond(q[b], lowest, highest), -1
-        if not beyond:
-            forward_kinematics(tree, routing, q[b], rotation, frames)
-            for c in range(count):
-                L[c] = fixed[c]
-            for i in range(start[LENGTH_JACOBIAN], start[LENGTH_JACOBIAN + 1]):
-                record[i] = 0.0
-            if last >= GRAVITY:
-                for i in range(start[GRAVITY], start[JOINT]):
-                    record[i] = 0.0
-            coincident = add_segment_derivatives(
-                routing, frames, tension[b], slot, left_factor, L, J, curved
-            )
-        known = 0
-        if beyond:
-            status[b] = BEYOND_LIMITS
-        elif coincident >= 0:
-            status[b] = COINCIDENT_SITES
-        else:
-            known = GRAVITY + 1
-            tip_jacobian(parent, masses, rotation, frames, tip, JX)
-            gravity_torque(tree, masses, rotation, frames, carried, g)
-            if last >= GRAVITY:
-                add_gravity_stiffness(parent, carried, gravity)
-                mirror(gravity)
-            if last > GRAVITY and status[b] == OK:
-                known = LOAD + 1
-                _imbalance(tension[b], J, wrench[b], JX, g, residual)
-                mirror(active[0])
-                add_load_stiffness(JX, wrench[b], masses.tip_joints, load)
-                if last > LOAD and (rigidity[b] < 0.0).any():
-                    status[b] = OUTSIDE_ELASTICITY
-                elif last > LOAD:
-                    known = CARTESIAN + 1
-                    set_cable_stiffness(L, tension[b], rigidity[b], series, rest, k)
-                    add_passive_stiffness(J, k, passive)
-                    mirror(passive)
-                    sum_terms(active[0], passive, gravity, load, K, work.parts)
-                    if last > JOINT:
-                        found = read_stiffness(K, JX, directions, read, work, readings)
-                        if found == NOT_REGULAR:
-                            status[b] = SINGULAR
-                            known = PSEUDOINVERSE + 1
-                        elif found == NOT_MOBILE:
-                            status[b] = IMMOBILE
-        _keep(record, start, known, wanted, b, out)
 
 
 @inlined
 def _vector(record: Array, start: Indices, quantity: int) -> Array:
-    """The place of a quantity in the record."""
+    """The part of the record with a quantity."""
     return record[start[quantity] : start[quantity + 1]]
 
 
 @inlined
 def _matrix(record: Array, start: Indices, quantity: int, rows: int) -> Array:
-    """The place of a matrix in the record."""
+    """The part of the record with a matrix of so many rows."""
     part = record[start[quantity] : start[quantity + 1]]
     return part.reshape((rows, part.shape[0] // rows))
 
 
 @compiled
-def _imbalance(
+def _is_beyond(q: Array, lowest: Array, highest: Array) -> bool:
+    """Whether an angle is beyond its limits."""
+    beyond = False
+    for i in range(q.shape[0]):
+        beyond = beyond or q[i] < lowest[i] or q[i] > highest[i]
+    return beyond
+
+
+@compiled
+def _clear(record: Array, first: int, end: int) -> None:
+    for i in range(first, end):
+        record[i] = 0.0
+
+
+@compiled
+def _set_residual(
     tension: Array, J: Array, wrench: Array, JX: Array, g: Array, residual: Array
 ) -> None:
-    """Fill what is left of Eq. 13, J_Lᵀ F − J_Xᵀ W + g (nv,)."""
+    """Fill the residual of Eq. 13, J_Lᵀ F − J_Xᵀ W + g (nv,)."""
     for i in range(g.shape[0]):
         residual[i] = g[i]
         for a in range(6):
@@ -225,8 +305,8 @@ def _imbalance(
 
 
 @compiled
-def _keep(record: Array, start: Indices, known: int, wanted: Indices, b: int, out: Array) -> None:
-    """Copy the wanted ones of the quantities known, which are the first so many, to out[b]."""
+def _copy(record: Array, start: Indices, known: int, wanted: Indices, b: int, out: Array) -> None:
+    """Copy the wanted quantities to out[b]; NaN for all but the first ``known`` of the record."""
     at = 0
     for w in range(wanted.shape[0]):
         first, end = start[wanted[w]], start[wanted[w] + 1]

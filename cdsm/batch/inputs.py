@@ -1,6 +1,10 @@
-"""Checks of what is given row by row."""
+"""Arguments given row by row, and rows in slices that fit a processor's cache."""
 
 from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -8,15 +12,17 @@ from numpy.typing import ArrayLike
 from cdsm.batch.fused_kernel import Arm
 from cdsm.errors import InvalidInput
 from cdsm.manipulator import Manipulator
-from cdsm.support.validation import WRENCH, Array, flag, frozen, number_array
+from cdsm.support.validation import WRENCH, Array, flag, frozen, number_array, whole_number
+
+_NUMBERS = 2**17
+"""Floats per chunk: one megabyte."""
+
+_FEWEST, _MOST = 4, 4096
+"""Rows per chunk."""
 
 
 def kernel_arm(arm: Manipulator, check_limits: bool) -> Arm:
-    """The arm as plain arrays.
-
-    Raises:
-        InvalidInput: ``check_limits`` is no flag.
-    """
+    """The arm as plain arrays."""
     lowest, highest = arm._model.lowest, arm._model.highest
     if not flag("check_limits", check_limits):
         lowest, highest = np.full_like(lowest, -np.inf), np.full_like(highest, np.inf)
@@ -32,11 +38,7 @@ def kernel_arm(arm: Manipulator, check_limits: bool) -> Arm:
 
 
 def postures(arm: Manipulator, q: ArrayLike) -> Array:
-    """Joint angles (B, nv) [rad], read-only.
-
-    Raises:
-        InvalidInput: Not (B, nv) finite real numbers.
-    """
+    """Joint angles (B, nv) [rad], read-only."""
     array = number_array("q", q)
     if array.ndim != 2 or array.shape[1] != arm.nv:
         raise InvalidInput(
@@ -49,11 +51,7 @@ def postures(arm: Manipulator, q: ArrayLike) -> Array:
 
 
 def per_row(name: str, value: ArrayLike, rows: int, width: int, meaning: str, kind: str) -> Array:
-    """Numbers that are the same for all rows (width,), or different (rows, width); read-only.
-
-    Raises:
-        InvalidInput: Not finite real numbers, or of another shape.
-    """
+    """Numbers that are the same for all rows (width,), or different (rows, width); read-only."""
     array = number_array(name, value, kind)
     if array.shape not in ((width,), (rows, width)):
         raise InvalidInput(
@@ -65,11 +63,7 @@ def per_row(name: str, value: ArrayLike, rows: int, width: int, meaning: str, ki
 
 
 def given_tension(arm: Manipulator, value: ArrayLike, rows: int) -> Array:
-    """Tensions (C,) or (rows, C) [N], read-only.
-
-    Raises:
-        InvalidInput: Not finite real numbers of such a shape, or negative.
-    """
+    """Tensions (C,) or (rows, C) [N], read-only."""
     cables = [cable.name for cable in arm.cables]
     tension = per_row("tension", value, rows, len(cables), "one tension [N] per cable", "tension")
     if tension.size and tension.min() < 0.0:
@@ -82,15 +76,45 @@ def given_tension(arm: Manipulator, value: ArrayLike, rows: int) -> Array:
 
 
 def given_wrench(value: ArrayLike | None, rows: int) -> Array:
-    """Wrench (6,) or (rows, 6), zero if there is none; read-only.
-
-    Raises:
-        InvalidInput: Not finite real numbers of such a shape.
-    """
+    """Wrench (6,) or (rows, 6), zero if there is none; read-only."""
     return per_row("wrench", np.zeros(6) if value is None else value, rows, 6, WRENCH, "wrench")
 
 
 def of_rows(values: Array, part: slice, rows: int) -> Array:
-    """What belongs to a slice of the rows, with a row for each; read-only."""
+    """The rows of a slice of values that are the same for all rows or not; read-only."""
     whole = np.broadcast_to(values, (rows, *values.shape[-1:]))
     return frozen(np.ascontiguousarray(whole[part]))
+
+
+def run_slices(work: Callable[[slice], None], rows: int, width: int, threads: int) -> None:
+    """Call ``work`` for slices that cover all rows, in several threads.
+
+    Threads of Python, whose kernels release the interpreter, in place of numba's parallel loops:
+    those cannot be entered from two threads at once on some machines, nor in a process that forks
+    later on others, and take seconds longer to compile.
+
+    Args:
+        work: Computes the rows of its slice, and touches no others.
+        rows: Number of rows.
+        width: Floats of temporary memory per row.
+        threads: How many at most.
+    """
+    share = max(_FEWEST, -(-rows // threads))
+    size = min(share, max(_FEWEST, min(_MOST, _NUMBERS // max(width, 1))))
+    slices = [slice(first, min(first + size, rows)) for first in range(0, rows, size)]
+    if threads == 1 or len(slices) < 2:
+        for part in slices:
+            work(part)
+        return
+    with ThreadPoolExecutor(min(threads, len(slices))) as pool:
+        for _ in pool.map(work, slices):  # an error in one cancels those that have not begun
+            pass
+
+
+def checked_threads(threads: int | None) -> int:
+    """The number of threads given, or one for each core this process may use."""
+    if threads is None:
+        if hasattr(os, "sched_getaffinity"):
+            return len(os.sched_getaffinity(0))
+        return os.cpu_count() or 1
+    return whole_number("threads", threads, 1)

@@ -1,4 +1,4 @@
-"""The record of a row: all that can be known of a posture under tension, one after the other."""
+"""The record of a row: the quantities of a posture under tension, one after the other."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ OUTSIDE_ELASTICITY = int(Status.OUTSIDE_ELASTICITY)
 SINGULAR = int(Status.SINGULAR)
 IMMOBILE = int(Status.IMMOBILE)
 UNDECIDED = 255
-"""The kernel cannot tell; the functions of the single posture have to."""
+"""The kernel certifies nothing; ``distribute_tension`` decides the row."""
 
 QUANTITIES = (
     "tip",
@@ -43,8 +43,8 @@ QUANTITIES = (
     "compliance",
     "cartesian",
 )
-"""In the order of the record: first what needs the joint angles alone, then what needs tensions,
-then what needs the rigidity of the cables too, and last what needs a regular K_θ."""
+"""In the order of the record: first those of the joint angles alone, then those that need tensions,
+then those that need the rigidity of the cables too, and last those that need a regular K_θ."""
 
 (
     TIP,

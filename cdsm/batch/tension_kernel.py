@@ -1,4 +1,4 @@
-"""The kernel of tension distribution: guessed and certified, or searched and certified, row by row.
+"""The kernel of tension distribution: tensions are guessed or searched, then verified, row by row.
 
 min ½‖F‖²   so that   J_Lᵀ F = J_Xᵀ W − g   and   low ≤ F ≤ high.
 """
@@ -12,7 +12,7 @@ import numpy as np
 from cdsm.batch import active_set
 from cdsm.batch.active_set import FOUND, IMPOSSIBLE, State
 from cdsm.batch.layout import INFEASIBLE, OK, UNDECIDED, Codes, Flags
-from cdsm.batch.serpentine_guess import Blocks, guess, is_beyond_reach, multipliers
+from cdsm.batch.serpentine_guess import Blocks, guess, is_provably_infeasible, multipliers
 from cdsm.kernels.compiling import compiled, threaded
 from cdsm.kernels.tension import is_infeasible, is_optimal
 from cdsm.support.validation import Array
@@ -25,25 +25,25 @@ def distribute_rows(
     low: Array,
     high: Array,
     wrench: Array,
-    nothing: float,
+    smallest_arm: float,
     tension: Array,
     status: Codes,
 ) -> None:
     """Fill tensions (b, C) [N], NaN where there are none, and the status of every row.
 
     Args:
-        blocks: Those of the arm.
+        blocks: The blocks of the arm.
         postures: J_X, J_L and g of each row, one after the other, (b, 6 nv + C nv + nv).
         low: Lower bounds (b, C) [N].
         high: Upper bounds (b, C) [N].
         wrench: W (b, 6).
-        nothing: Moment arms below this are rounding [m], and are made zero.
-        tension: What is wanted.
+        smallest_arm: Moment arms below this are rounding [m], and are made zero.
+        tension: To be filled.
         status: Rows that are not OK are passed over; UNDECIDED where nothing could be certified.
     """
     count = low.shape[1]
     nv = postures.shape[1] // (count + 7)
-    b, rest, zero = np.empty(nv), np.empty(2), np.zeros(count)
+    b, lacking, zero = np.empty(nv), np.empty(2), np.zeros(count)
     free, side = np.empty(count, dtype=np.bool_), np.empty(count, dtype=np.intp)
     system = np.empty((nv, nv + 1))
     state = State(np.empty(count), np.empty(nv), side, np.empty(count), system, np.empty(nv))
@@ -56,13 +56,13 @@ def distribute_rows(
         J = postures[r, 6 * nv : (6 + count) * nv].reshape((count, nv))
         for c in range(count):
             for i in range(nv):
-                if abs(J[c, i]) < nothing:
+                if abs(J[c, i]) < smallest_arm:
                     J[c, i] = 0.0
         for i in range(nv):
             b[i] = -postures[r, (6 + count) * nv + i]
             for a in range(6):
                 b[i] += wrench[r, a] * JX[a, i]
-        status[r] = _distribute(blocks, J, b, low[r], high[r], free, rest, zero, state)
+        status[r] = _distribute(blocks, J, b, low[r], high[r], free, lacking, zero, state)
         if status[r] == OK:
             for c in range(count):  # a bound that is active is not crossed by rounding
                 tension[r, c] = min(max(state.F[c], low[r, c]), high[r, c])
@@ -76,19 +76,19 @@ def _distribute(
     low: Array,
     high: Array,
     free: Flags,
-    rest: Array,
+    lacking: Array,
     zero: Array,
     state: State,
 ) -> int:
     """Fill the tensions of the state; OK, INFEASIBLE or UNDECIDED."""
     F, y = state.F, state.y
     if blocks.row.shape[0]:
-        k = guess(blocks, J, b, low, high, F, free, rest)
+        k = guess(blocks, J, b, low, high, F, free, lacking)
         if k < 0:
             multipliers(blocks, J, F, free, blocks.row_start[0], y)
             if is_optimal(J, b, low, high, F, y, state.w, state.multiplier):
                 return OK
-        elif is_beyond_reach(blocks, J, b, low, high, free, rest, k, zero, y):
+        elif is_provably_infeasible(blocks, J, b, low, high, free, lacking, k, zero, y):
             return INFEASIBLE
     outcome = active_set.search(J, b, low, high, state)
     if outcome == FOUND and is_optimal(J, b, low, high, F, y, state.w, state.multiplier):

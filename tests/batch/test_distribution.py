@@ -290,7 +290,7 @@ def test_guess_is_mostly_the_optimum_and_what_it_proves_is_so() -> None:
                 assert found
                 np.testing.assert_allclose(F, state.F, rtol=0.0, atol=EXACT * F.max())
                 guessed += 1
-        elif serpentine_guess.is_beyond_reach(
+        elif serpentine_guess.is_provably_infeasible(
             parts, J, b, low, high, free, rest, k, np.zeros(count), y
         ):
             assert not found

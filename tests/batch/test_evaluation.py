@@ -17,8 +17,9 @@ import pytest
 from numpy.typing import ArrayLike
 
 import cdsm
-from cdsm.batch import chunks, evaluation, fused_kernel
+from cdsm.batch import evaluation, fused_kernel
 from cdsm.batch.evaluation import OUTPUTS
+from cdsm.batch.inputs import run_slices
 from cdsm.batch.layout import QUANTITIES
 from cdsm.support.validation import Array
 from tests.support.arms import STEEL, mixed_arm, random_arm, random_posture
@@ -262,7 +263,7 @@ def test_slices_cover_all_rows_once_and_stay_small() -> None:
         (50, 10**6, 1),
     ):
         seen: list[slice] = []
-        chunks.run(seen.append, count, width, threads)
+        run_slices(seen.append, count, width, threads)
         covered = sorted(r for part in seen for r in range(part.start, part.stop))
         assert covered == list(range(count))
         assert all(part.stop - part.start <= 4096 for part in seen)
@@ -683,7 +684,7 @@ BAD: dict[str, tuple[Callable[[], object], tuple[str, ...]]] = {
     ),
     "directions too wide": (
         lambda: cdsm.evaluate(ARM, Q, F, outputs=("along",), direction=np.eye(4)),
-        ("direction: shape (4, 4)", "(D, 3)"),
+        ("direction: shape (4, 4)", "(n, 3)"),
     ),
     "directions ragged": (
         lambda: cdsm.evaluate(ARM, Q, F, outputs=("along",), direction=[[1.0], []]),

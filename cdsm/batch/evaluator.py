@@ -1,20 +1,22 @@
-"""Fills the answers to a batch slice by slice; of checked arguments."""
+"""Evaluates rows slice by slice; the arguments are checked."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from cdsm.arm_model import CableLaws
 from cdsm.batch import layout
 from cdsm.batch.distribution import Distributor
 from cdsm.batch.fused_kernel import evaluate_rows
 from cdsm.batch.inputs import kernel_arm, of_rows
-from cdsm.batch.layout import QUANTITIES, Codes
-from cdsm.batch.rigidity import rigidities
+from cdsm.batch.layout import QUANTITIES, Codes, Flags
+from cdsm.elasticity import Elasticity
+from cdsm.errors import ElasticityRangeError
 from cdsm.manipulator import Manipulator
 from cdsm.support.validation import Array, frozen
 
 
-class Job:
+class Evaluator:
     """Evaluates slices of the rows.
 
     Args:
@@ -23,13 +25,13 @@ class Job:
         tension: F (C,) or (B, C) [N]; None if they are distributed, or not needed.
         wrench: W (6,) or (B, 6).
         direction: Unit directions (3,) or (D, 3) of ``along``; or None.
-        names: What is wanted.
+        names: Names of the outputs.
         distributor: Of tensions, if they are not given.
         check_limits: Pass over angles beyond the joint limits.
 
     Attributes:
-        values: What is wanted, in its order; filled slice by slice.
-        width: Floats that come and go per row.
+        values: The outputs, in their order; filled slice by slice.
+        width: Floats of temporary memory per row.
     """
 
     def __init__(
@@ -49,7 +51,7 @@ class Job:
         self._directions = frozen(
             np.zeros((0, 3)) if direction is None else direction.reshape(-1, 3)
         )
-        self._kernel_arm = kernel_arm(arm, check_limits)
+        self._arrays = kernel_arm(arm, check_limits)
         count = len(self._directions)
         self._start = layout.starts(nv, cables, count)
         wanted = sorted(QUANTITIES.index(name) for name in names if name != "tension")
@@ -82,10 +84,10 @@ class Job:
         else:
             tension = frozen(np.zeros((len(q), len(self._arm.cables))))
         springs = self._wanted.size and self._wanted[-1] > layout.LOAD
-        rigidity = rigidities(self._arm, tension, found == layout.OK) if springs else tension
+        rigidity = _rigidities(self._arm, tension, found == layout.OK) if springs else tension
         out = np.empty((len(q), self._size))
         evaluate_rows(
-            self._kernel_arm,
+            self._arrays,
             q,
             tension,
             rigidity,
@@ -99,3 +101,48 @@ class Job:
         for name, value in zip(self._names, self.values, strict=True):
             source = tension if name == "tension" else out[:, self._place[name]]
             value[part] = source.reshape(value[part].shape)
+
+
+def _rigidities(arm: Manipulator, tension: Array, usable: Flags) -> Array:
+    """EA (1 + ε) (b, C) [N] at tensions F (b, C) [N]; 0 under force control, −1 where undefined.
+
+    Rows that are not usable (b,) are left out.
+    """
+    if not usable.any():  # a law of the user's own need not take empty arrays
+        return frozen(np.zeros_like(tension))
+    given = tension if usable.all() else tension[usable]
+    rigidity = np.zeros_like(given)
+    for law, held in arm._model.laws.held:
+        rigidity[:, held] = _where_defined(arm._model.laws, law, given[:, held])
+    if given is tension:
+        return frozen(rigidity)
+    result = np.zeros_like(tension)
+    result[usable] = rigidity
+    return frozen(result)
+
+
+def _where_defined(laws: CableLaws, law: Elasticity, tension: Array) -> Array:
+    """EA (1 + ε) [N] at tensions of any shape, −1 outside the domain."""
+    try:
+        return laws.stretched_rigidity(law, tension)
+    except ElasticityRangeError:
+        pass
+    result, values = np.full(tension.size, -1.0), tension.ravel()
+    left = np.arange(tension.size)
+    while left.size:
+        try:
+            result[left] = laws.stretched_rigidity(law, values[left])
+            break
+        except ElasticityRangeError as error:
+            if not error.indices:  # an elasticity of the user's own that does not say where
+                result[left] = [_one(laws, law, value) for value in values[left]]
+                break
+            left = np.delete(left, error.indices)
+    return result.reshape(tension.shape)
+
+
+def _one(laws: CableLaws, law: Elasticity, tension: float) -> float:
+    try:
+        return float(laws.stretched_rigidity(law, np.array([tension]))[0])
+    except ElasticityRangeError:
+        return -1.0
