@@ -319,12 +319,7 @@ def kinks(law: Elasticity) -> tuple[float, ...]:
 
 
 def _checked_rigidity(law: Elasticity, tension: Array) -> Array:
-    """EA(F) [N] of a law, same shape as F [N], which need not be the library's own.
-
-    Raises:
-        ElasticityRangeError: A tension outside the domain of the law.
-        InvalidInput: The law gives no positive rigidity.
-    """
+    """EA(F) [N] of a law, same shape as F [N], which need not be the library's own."""
     rigidity = np.asarray(law.rigidity(tension))
     _, least, most = RANGES["rigidity"]
     usable = (rigidity >= least) & (rigidity <= most)  # false for NaN too
@@ -338,12 +333,7 @@ def _checked_rigidity(law: Elasticity, tension: Array) -> Array:
 
 
 def _checked_strain(law: Elasticity, tension: Array) -> Array:
-    """ε(F) [-] of a law, same shape as F [N], which need not be the library's own.
-
-    Raises:
-        ElasticityRangeError: A tension outside the domain of the law.
-        InvalidInput: The law gives no strain.
-    """
+    """ε(F) [-] of a law, same shape as F [N], which need not be the library's own."""
     strain = np.asarray(law.strain(tension))
     usable = (strain > -1.0) & (strain <= LARGEST)  # false for NaN too
     if strain.shape != tension.shape or np.count_nonzero(usable) < tension.size:

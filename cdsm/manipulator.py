@@ -353,11 +353,7 @@ class Manipulator(Printed):
         return f"one {coordinate} per joint, {', '.join(self.joint_names)}"
 
     def _routed(self, q: Array) -> tuple[Frames, Array, Array]:
-        """Where joints and cable sites are, L and J_L at checked joint angles.
-
-        Raises:
-            CableError: Two neighbouring sites of a cable coincide at this posture.
-        """
+        """Where joints and cable sites are, L and J_L at checked joint angles."""
         routing = self._model.routing
         frames, lengths, length_jacobian, coincident = segments.cable_kinematics(
             self._model.tree, routing, q

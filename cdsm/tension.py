@@ -229,11 +229,7 @@ def installed_solver(solver: str) -> str:
 
 
 def _solve(problem: tension_kernels.Scaled, solver: str) -> Array | str:
-    """Return the verified optimum, or what is wrong with the solver's answer: there may be none.
-
-    Raises:
-        SolverError: It fails, or says too little to be verified.
-    """
+    """Return the verified optimum, or what is wrong with the solver's answer: there may be none."""
     installed_solver(solver)
     A, b, low, high, *_ = problem
     sparse = csc_matrix if solver in qpsolvers.sparse_solvers else np.asarray
@@ -313,11 +309,6 @@ def _explain(
         solver: What found none.
         fault: What it did instead.
         free: The cables (C,) whose bounds may widen: all but those of fixed tension.
-
-    Raises:
-        InfeasibleTension: There are none. Carries the least missing torque Σ|τ − J_Lᵀ F| within
-            the bounds, and the least widening of all free bounds that leaves none missing.
-        SolverError: There are some, so it is the solver that failed; or the linear program did.
     """
     A, b, lower, upper, arm_scale, force_scale = problem
     nv, count = A.shape

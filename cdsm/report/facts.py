@@ -219,11 +219,7 @@ def _number(cable: Cable, answer: Callable[[], Array]) -> float | None:
 
 
 def readings(K: Stiffness) -> Readings:
-    """The three stiffnesses along the base axes.
-
-    Raises:
-        SingularStiffness: K_θ is singular, so that there are none.
-    """
+    """The three stiffnesses along the base axes."""
     along = np.array([K.along(axis) for axis in np.eye(3)])
 
     def diagonal(read: Callable[[], Array]) -> Array:
