@@ -198,7 +198,7 @@ def weight_test(
         EquilibriumError: The arm buckles under a part of the load, which it names.
             :func:`~cdsm.equilibrium` finds where the arm comes to rest then.
     """
-    force = vector("force", force, 3, "a force in base axes [N]")
+    force = vector("force", force, 3, "a force in base axes [N]", "force")
     if not force.any():
         raise InvalidInput("force", "is zero; nothing moves, and there is nothing to measure.")
     steps = whole_number("steps", steps, 1, MOST_STEPS)

@@ -247,8 +247,7 @@ def test_answer_prints_itself() -> None:
     ("force", "steps", "said"),
     [
         ([0.0, 0.0, 0.0], 1, "force"),
-        ([0.0, 0.0, 1e-300], 1, "rounding only"),
-        ([0.0, 0.0, 1e-14], 1, "hang at least"),
+        ([0.0, 0.0, 1e-9], 1, "rounding only.* hang at least"),
         ([0.0, 1.0], 1, "force"),
         ([0.0, 1.0, math.nan], 1, "force"),
         ([0.0, 0.0, 1.0], 0, "steps"),
