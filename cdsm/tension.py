@@ -15,7 +15,7 @@ import math
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NoReturn, final
+from typing import Any, Final, NoReturn, final
 
 import numpy as np
 import qpsolvers
@@ -31,6 +31,9 @@ from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.support.validation import bound, instance, one_of, quantity, wrench_vector
 from cdsm.support.values import Array, ReadOnlyState, frozen
+
+DEFAULT_SOLVER: Final = "daqp"
+"""The solver of every tension distribution that names none: exact, and the fastest measured."""
 
 # by default HiGHS calls feasible what misses up to 1e-7, and so would not see less missing torque
 _TIGHT = {"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10}
@@ -112,7 +115,7 @@ def distribute_tension(
     minimum: ArrayLike = 0.0,
     maximum: ArrayLike = math.inf,
     wrench: ArrayLike = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
-    solver: str = "daqp",
+    solver: str = DEFAULT_SOLVER,
     *,
     fixed: Mapping[str, float] | None = None,
 ) -> Tension:

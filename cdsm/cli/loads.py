@@ -24,6 +24,7 @@ from cdsm.cli.options import (
 )
 from cdsm.statics.buckling import critical_load, critical_tension
 from cdsm.statics.weight_test import weight_test
+from cdsm.tension import DEFAULT_SOLVER
 
 
 def weigh(
@@ -64,7 +65,7 @@ def buckle(
         float | None, typer.Option(help="Upper bound of all tensions under the load [N].")
     ] = None,
     wrench: Wrench = NO_WRENCH,
-    solver: Solver = "daqp",
+    solver: Solver = DEFAULT_SOLVER,
     figure: Picture = None,
     as_json: AsJson = False,
 ) -> None:

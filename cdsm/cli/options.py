@@ -29,7 +29,7 @@ from cdsm.presets import STRAND_1X19
 from cdsm.support.files import write_file
 from cdsm.support.format import JointUnits
 from cdsm.support.validation import Array
-from cdsm.tension import Tension, distribute_tension
+from cdsm.tension import DEFAULT_SOLVER, Tension, distribute_tension
 from cdsm.wires.files import read_elasticity
 
 _Value = TypeVar("_Value")
@@ -169,7 +169,7 @@ class TensionOptions:
     min_tension: MinTension = 10.0
     max_tension: MaxTension = math.inf
     wrench: Wrench = NO_WRENCH
-    solver: Solver = "daqp"
+    solver: Solver = DEFAULT_SOLVER
 
     def distribute(self, pose: Posture) -> Tension:
         """The tensions at a posture."""

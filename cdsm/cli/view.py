@@ -20,6 +20,7 @@ from cdsm.cli.options import (
     numbers,
     reported,
 )
+from cdsm.tension import DEFAULT_SOLVER
 
 
 def view(
@@ -30,7 +31,7 @@ def view(
     force: Annotated[
         str, typer.Option(help="At the tip, to begin with: FX,FY,FZ [N].", metavar="FX,FY,FZ")
     ] = "0,0,0",
-    solver: Solver = "daqp",
+    solver: Solver = DEFAULT_SOLVER,
     largest_tension: Annotated[
         float, typer.Option(help="Right end of the slider of the least tension [N].")
     ] = 200.0,

@@ -39,7 +39,7 @@ from cdsm.support.validation import (
     scalar,
     unit_direction,
 )
-from cdsm.tension import Tension, distribute_tension
+from cdsm.tension import DEFAULT_SOLVER, Tension, distribute_tension
 
 End = Literal["buckling", "maximum", "infeasible", "elasticity", "none"]
 
@@ -128,7 +128,7 @@ def saturation(
     wrench: ArrayLike = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
     *,
     fraction: float = 0.1,
-    solver: str = "daqp",
+    solver: str = DEFAULT_SOLVER,
 ) -> Saturation:
     """The lower bound of tension above which more tension hardly stiffens an arm.
 

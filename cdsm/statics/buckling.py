@@ -29,7 +29,7 @@ from cdsm.statics.bound_scan import (
 )
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.validation import Array, ReadOnlyState, bound, frozen, instance, wrench_vector
-from cdsm.tension import distribute_tension
+from cdsm.tension import DEFAULT_SOLVER, distribute_tension
 
 _NOWHERE: Final = 1e6
 """A load factor up to which nothing happens counts as infinite."""
@@ -129,7 +129,7 @@ class CriticalLoad(ReadOnlyState):
 def critical_tension(
     pose: Posture,
     wrench: ArrayLike = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
-    solver: str = "daqp",
+    solver: str = DEFAULT_SOLVER,
 ) -> CriticalTension:
     """The lower bound of tension at which least tensions make K_θ singular: det K_θ(F_min) = 0.
 
@@ -182,7 +182,7 @@ def critical_load(
     wrench: ArrayLike,
     minimum: ArrayLike = 0.0,
     maximum: ArrayLike = math.inf,
-    solver: str = "daqp",
+    solver: str = DEFAULT_SOLVER,
     *,
     carried: ArrayLike = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
 ) -> CriticalLoad:

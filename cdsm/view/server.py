@@ -18,7 +18,7 @@ from cdsm.errors import InvalidInput
 from cdsm.manipulator import Manipulator
 from cdsm.support.extras import need
 from cdsm.support.validation import Array, bound, frozen, instance, quantity, vector, whole_number
-from cdsm.tension import installed_solver
+from cdsm.tension import DEFAULT_SOLVER, installed_solver
 from cdsm.view.scene import Scene
 from cdsm.view.sliders import Controls
 from cdsm.view.state import Condition, Setting, Shown, show
@@ -43,7 +43,7 @@ def serve(
     minimum: float = 10.0,
     maximum: float = math.inf,
     force: ArrayLike = (0.0, 0.0, 0.0),
-    solver: str = "daqp",
+    solver: str = DEFAULT_SOLVER,
     largest_tension: float = 200.0,
     largest_force: float = 20.0,
 ) -> View:

@@ -19,7 +19,7 @@ from cdsm.posture import Posture
 from cdsm.status import Status
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.validation import Array, ReadOnlyState, frozen
-from cdsm.tension import Tension, distribute_tension
+from cdsm.tension import DEFAULT_SOLVER, Tension, distribute_tension
 
 GREY: Final = (150, 150, 150)
 """Colour of cables whose tension is not known."""
@@ -64,7 +64,7 @@ class Setting(ReadOnlyState):
     minimum: float
     maximum: float = math.inf
     force: Array
-    solver: str = "daqp"
+    solver: str = DEFAULT_SOLVER
 
     def __post_init__(self) -> None:
         # not checked here: a wrong value becomes a condition that the page shows
