@@ -37,7 +37,7 @@ class StiffnessPlan(ReadOnlyState):
         direction: Unit directions u in base axes, (3,) or (n, 3); None for a target of
             ``cartesian``.
         target: The target [N/m]: a number, one per direction (n,), or (3, 3).
-        achieved: ``stiffness.along`` or ``stiffness.cartesian`` [N/m], of the target's shape.
+        achieved: ``stiffness.along`` () or (n,), or ``stiffness.cartesian`` (3, 3) [N/m].
         floor: Smallest eigenvalue of K_θ that counted as stable [N m/rad].
         efforts: ‖F‖ (S,) [N] where each search ended that hit the target, rising; the first is that
             of ``tension``.
