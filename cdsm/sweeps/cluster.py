@@ -13,8 +13,8 @@ from cdsm.errors import CdsmError, ClusterError, InvalidInput
 from cdsm.support.extras import need
 from cdsm.support.validation import Array
 from cdsm.sweeps.blocks import Block
-from cdsm.sweeps.evaluation import Answer, Problem, evaluate
-from cdsm.sweeps.specification import Question
+from cdsm.sweeps.evaluation import BlockResult, SweepTask, evaluate
+from cdsm.sweeps.specification import Specification
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -40,8 +40,8 @@ def checked_client(client: object) -> None:
 
 
 def on_cluster(
-    client: Client, question: Question, blocks: Iterable[Block]
-) -> Iterator[tuple[Block, Answer | None]]:
+    client: Client, specification: Specification, blocks: Iterable[Block]
+) -> Iterator[tuple[Block, BlockResult | None]]:
     """Each block with its answer, in the order in which they finish; None: its workers died.
 
     Dask hands a block whose worker died to another, ``allowed-failures`` times, and then gives it
@@ -53,15 +53,15 @@ def on_cluster(
     from distributed import as_completed
     from distributed.protocol.pickle import dumps  # by value what a notebook defines
 
-    payload, ours = dumps(question.problem), version("cdsm-stiffness")
+    payload, ours = dumps(specification.task), version("cdsm-stiffness")
 
-    def submitted(block: Block) -> Future[Answer]:
-        q = question.poses.angles(block.start, block.stop)
+    def submitted(block: Block) -> Future[BlockResult]:
+        q = specification.poses.angles(block.start, block.stop)
         key = f"cdsm-sweep-{secrets.token_hex(8)}"
         return client.submit(_on_worker, payload, ours, q, key=key)
 
     waiting, given_up = iter(blocks), []
-    running: dict[object, tuple[Future[Answer], Block]] = {}
+    running: dict[object, tuple[Future[BlockResult], Block]] = {}
     finished = as_completed()
     try:
         while True:
@@ -91,11 +91,11 @@ def on_cluster(
             client.cancel([future for future, _ in running.values()])
 
 
-def _answer(future: Future[Answer]) -> Answer | None:
+def _answer(future: Future[BlockResult]) -> BlockResult | None:
     from distributed import CancelledError, KilledWorker
 
     try:
-        answer: Answer = future.result()
+        answer: BlockResult = future.result()
     except KilledWorker:
         return None
     except CdsmError:
@@ -110,20 +110,20 @@ def _answer(future: Future[Answer]) -> Answer | None:
     return answer
 
 
-def _on_worker(payload: bytes, client_version: str, q: Array) -> Answer:
+def _on_worker(payload: bytes, client_version: str, q: Array) -> BlockResult:
     ours = version("cdsm-stiffness")
     if ours != client_version:
         raise ClusterError(
             f"a worker has cdsm {ours}, the client {client_version}; install the same."
         )
     # one thread: dask runs a task in each of its own
-    return evaluate(_problem(payload), q, threads=1)
+    return evaluate(_task(payload), q, threads=1)
 
 
 @lru_cache(maxsize=4)
-def _problem(payload: bytes) -> Problem:
-    """The problem as shipped, made once in each worker: an arm takes milliseconds to build."""
+def _task(payload: bytes) -> SweepTask:
+    """The task as shipped, made once in each worker: an arm takes milliseconds to build."""
     from distributed.protocol.pickle import loads
 
-    problem: Problem = loads(payload)
-    return problem
+    task: SweepTask = loads(payload)
+    return task

@@ -1,4 +1,4 @@
-"""A question and its answer as a labelled Dataset."""
+"""A specification and its answer as a labelled Dataset."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from cdsm.errors import InvalidInput
 from cdsm.sweeps.quantities import LOST, QUANTITIES, SweepStatus
-from cdsm.sweeps.specification import Question
+from cdsm.sweeps.specification import Specification
 
 if TYPE_CHECKING:
     from typing import Any
@@ -24,16 +24,16 @@ EMPTY = {"status": np.int8(SweepStatus.PENDING)}
 """What stands where nothing is computed yet; NaN in all outputs."""
 
 
-def empty(question: Question, name: str) -> NDArray[Any]:
+def empty(specification: Specification, name: str) -> NDArray[Any]:
     """An array for an output or ``status``, with nothing in it yet.
 
     Raises:
         InvalidInput: It does not fit into memory.
     """
     try:
-        return np.full(question.shape(name), EMPTY.get(name, np.float64(np.nan)))
+        return np.full(specification.shape(name), EMPTY.get(name, np.float64(np.nan)))
     except (MemoryError, ValueError):  # numpy's word for sizes beyond all memory
-        entries = " x ".join(map(str, question.shape(name)))
+        entries = " x ".join(map(str, specification.shape(name)))
         raise InvalidInput(
             "outputs",
             f"{name} has {entries} entries, more than fits into memory; ask for less, or give "
@@ -41,30 +41,30 @@ def empty(question: Question, name: str) -> NDArray[Any]:
         ) from None
 
 
-def to_dataset(question: Question, values: Mapping[str, NDArray[Any]]) -> xarray.Dataset:
-    """The coordinates of a question, and as many of its outputs as are given."""
+def to_dataset(specification: Specification, values: Mapping[str, NDArray[Any]]) -> xarray.Dataset:
+    """The coordinates of a specification, and as many of its outputs as are given."""
     import xarray
 
-    labels = question.labels.items()
+    labels = specification.labels.items()
     found = xarray.Dataset(
         coords={name: (label.dims, label.values, label.attributes) for name, label in labels},
-        attrs=dict(question.attributes),
+        attrs=dict(specification.attributes),
     )
     return found.assign(
         {
-            name: (question.dims(name), array, variable_attributes(question, name))
+            name: (specification.dims(name), array, variable_attributes(specification, name))
             for name, array in values.items()
         }
     )
 
 
-def variable_attributes(question: Question, name: str) -> dict[str, Any]:
+def variable_attributes(specification: Specification, name: str) -> dict[str, Any]:
     """What an output or ``status`` says of itself."""
     if name != "status":
         quantity = QUANTITIES[name]
-        units = _units(quantity.units, question.problem.arm.slides)
+        units = _units(quantity.units, specification.task.arm.slides)
         return {"long_name": quantity.long_name, "units": units}
-    outputs = question.problem.outputs
+    outputs = specification.task.outputs
     lost = {
         kind: [name for name in outputs if QUANTITIES[name].stage in LOST[kind]]
         for kind in SweepStatus

@@ -1,7 +1,8 @@
-"""Some postures of a sweep, computed: all their cases, each with its status."""
+"""All cases at some postures of a sweep, each with its status."""
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, final
@@ -9,22 +10,36 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
+from cdsm import batch
 from cdsm.elasticity import Elasticity
 from cdsm.kernels.principal import principal_stiffness
 from cdsm.manipulator import Manipulator
 from cdsm.support.validation import Array, ReadOnlyState
-from cdsm.sweeps.quantities import QUANTITIES, SweepStatus
-from cdsm.sweeps.rows import Rows, Statuses, postures, stiffnesses, tensions
+from cdsm.sweeps.quantities import LOST, QUANTITIES, SweepStatus
 
-Answer = dict[str, NDArray[Any]]
+BlockResult = dict[str, NDArray[Any]]
 """Outputs by name, and their ``status``: postures first, then the cases."""
+
+Rows = dict[str, Array]
+Statuses = NDArray[np.int8]
+
+_BATCH_NAMES = {
+    "tip_position": "tip",
+    "gravity_stiffness": "gravity",
+    "active_stiffness": "active",
+    "passive_stiffness": "passive",
+    "load_stiffness": "load",
+    "joint_stiffness": "joint",
+    "translational_compliance": "compliance",
+}
+"""Quantities whose name in a batch would be a dimension here, or means more."""
 
 _Place = tuple[NDArray[np.intp], ...] | tuple[NDArray[np.bool_]]
 
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Problem(ReadOnlyState):
+class SweepTask(ReadOnlyState):
     """What to compute at each posture: all that a worker needs beside the postures.
 
     Attributes:
@@ -56,53 +71,55 @@ class Problem(ReadOnlyState):
         return tuple(self.arm if law is None else _with(self.arm, law) for law in self.laws)
 
 
-def evaluate(problem: Problem, q: Array, threads: int | None = None) -> Answer:
+def evaluate(task: SweepTask, q: Array, threads: int | None = None) -> BlockResult:
     """All cases at joint angles q (P, nv) [rad]; none fails, each has its status instead.
 
     Returns:
         ``status`` (P, E, W, M), and every output with those of the four axes it depends on: E
         elasticities, W wrenches, M minima.
     """
-    shape = len(q), len(problem.wrenches), len(problem.minima)
-    stages = {name: QUANTITIES[name].stage for name in problem.outputs}
+    shape = len(q), len(task.wrenches), len(task.minima)
+    stages = {name: QUANTITIES[name].stage for name in task.outputs}
     of_pose = [name for name, stage in stages.items() if stage == "pose"]
     of_law = [name for name, stage in stages.items() if stage not in ("pose", "tension")]
     extreme = [name for name, stage in stages.items() if stage == "principal"]
 
-    found, posed = postures(problem.arm, q, of_pose, threads)
-    answer: Answer = {**found}
+    found, posed = _postures(task.arm, q, of_pose, threads)
+    answer: BlockResult = {**found}
     status = np.tile(posed[:, None, None], (1, *shape[1:]))
     if len(stages) > len(of_pose):
         place = p, w, m = np.nonzero(status == SweepStatus.OK)
-        pull, status[place] = tensions(
-            problem.arm, q[p], problem.minima[m], problem.maximum, problem.wrenches[w], threads
+        tension, status[place] = _tensions(
+            task.arm, q[p], task.minima[m], task.maximum, task.wrenches[w], threads
         )
-        pull = _spread(pull, place, shape)
+        tension = _spread(tension, place, shape)
         if "tension" in stages:
-            answer["tension"] = pull
+            answer["tension"] = tension
     if not of_law:
-        return answer | {"status": np.stack([status] * len(problem.laws), axis=1)}
+        return answer | {"status": np.stack([status] * len(task.laws), axis=1)}
 
     needed = [name for name in of_law if name not in extreme]
     needed += ["margin", "translational_compliance"] if extreme else ["margin"]
     place = p, w, m = np.nonzero(status == SweepStatus.OK)
     statuses, by_law = [], []
-    for arm in problem.arms:
-        rows, told = stiffnesses(
+    for arm in task.arms:
+        rows, found_status = _stiffnesses(
             arm,
             q[p],
-            pull[place],
-            problem.wrenches[w],
-            problem.directions,
+            tension[place],
+            task.wrenches[w],
+            task.directions,
             list(dict.fromkeys(needed)),
             threads,
         )
         if extreme:
-            rows |= _principal(rows, told, extreme)
+            rows |= _principal(rows, found_status, extreme)
         by_law.append({name: _spread(rows[name], place, shape) for name in of_law})
         statuses.append(status.copy())
-        buckles = (rows["margin"] <= 0.0) & np.isin(told, (SweepStatus.OK, SweepStatus.IMMOBILE))
-        statuses[-1][place] = np.where(buckles, SweepStatus.UNSTABLE, told)
+        buckles = (rows["margin"] <= 0.0) & np.isin(
+            found_status, (SweepStatus.OK, SweepStatus.IMMOBILE)
+        )
+        statuses[-1][place] = np.where(buckles, SweepStatus.UNSTABLE, found_status)
     answer |= {name: np.stack([rows[name] for rows in by_law], axis=1) for name in of_law}
     return answer | {"status": np.stack(statuses, axis=1)}
 
@@ -124,3 +141,70 @@ def _spread(rows: Array, place: _Place, shape: tuple[int, ...]) -> Array:
 def _with(arm: Manipulator, law: Elasticity) -> Manipulator:
     cables = [replace(cable, elasticity=law) for cable in arm.cables]
     return arm.with_cables(cables)
+
+
+# --- rows: the only place where a sweep meets the physics -------------------------------------
+
+
+def _postures(
+    arm: Manipulator, q: Array, names: Collection[str], threads: int | None
+) -> tuple[Rows, Statuses]:
+    """What depends on the joint angles q (R, nv) [rad] alone."""
+    return _read(batch.evaluate(arm, q, outputs=_batch_names(names), threads=threads), names)
+
+
+def _tensions(
+    arm: Manipulator,
+    q: Array,
+    minimum: Array,
+    maximum: float,
+    wrench: Array,
+    threads: int | None,
+) -> tuple[Array, Statuses]:
+    """Least tensions in balance (R, C) [N], under a lower bound (R,) [N] and wrench (R, 6) each."""
+    low = np.repeat(minimum[:, None], len(arm.cables), axis=1)
+    pull = batch.distribute_tensions(arm, q, low, maximum, wrench, threads=threads)
+    return pull.values, pull.status.astype(np.int8)
+
+
+def _stiffnesses(
+    arm: Manipulator,
+    q: Array,
+    tension: Array,
+    wrench: Array,
+    directions: Array,
+    names: Collection[str],
+    threads: int | None,
+) -> tuple[Rows, Statuses]:
+    """What depends on tensions (R, C) [N] and elasticity too."""
+    found = batch.evaluate(
+        arm,
+        q,
+        tension,
+        wrench,
+        _batch_names(names),
+        direction=directions if "along" in names else None,
+        threads=threads,
+    )
+    return _read(found, names)
+
+
+def _batch_names(names: Collection[str]) -> list[str]:
+    return [_BATCH_NAMES.get(name, name) for name in names]
+
+
+def _read(found: batch.Batch, names: Collection[str]) -> tuple[Rows, Statuses]:
+    """The quantities of a batch under the names of a sweep, NaN where the status says so."""
+    status = found.status.astype(np.int8)
+    rows = {}
+    for name in names:
+        values = found[_BATCH_NAMES.get(name, name)]
+        if name == "tip_position":
+            values = values[:, :3, 3]
+        elif name == "translational_compliance":
+            values = values[:, :3, :3]
+        # where K_θ is singular a batch has the pseudoinverse still
+        lost = [kind for kind in SweepStatus if QUANTITIES[name].stage in LOST[kind]]
+        rows[name] = values.copy()
+        rows[name][np.isin(status, lost)] = np.nan
+    return rows, status

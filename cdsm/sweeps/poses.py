@@ -26,8 +26,7 @@ from cdsm.support.validation import (
     scalar,
     whole_number,
 )
-from cdsm.sweeps.arguments import distinct
-from cdsm.sweeps.labels import Label
+from cdsm.sweeps.arguments import Label, distinct
 
 MAXIMUM_POSES = 2**30
 """Of a path or drawn; the Sobol sequence of scipy has 30 bits."""
@@ -44,12 +43,12 @@ class Listed:
     Attributes:
         q: Joint angles (N, nv) [rad].
         labels: Its coordinates, by name.
-        told: What it is, in words.
+        description: What it is, in words.
     """
 
     q: Array
     labels: Mapping[str, Label]
-    told: str
+    description: str
 
     @property
     def sizes(self) -> dict[str, int]:
@@ -71,14 +70,14 @@ class Product:
         joints: Which joints these are.
         rest: Joint angles (nv,) [rad] of those that stand still.
         labels: Its coordinates, by name: those of the grid first.
-        told: What it is, in words.
+        description: What it is, in words.
     """
 
     values: tuple[Array, ...]
     joints: tuple[int, ...]
     rest: Array
     labels: Mapping[str, Label]
-    told: str
+    description: str
 
     @property
     def sizes(self) -> dict[str, int]:
@@ -161,7 +160,7 @@ class GridPoses(PoseSet):
             joints=joints,
             rest=frozen(rest),
             labels=labels,
-            told=f"grid over {', '.join(names[joint] for joint in joints)}",
+            description=f"grid over {', '.join(names[joint] for joint in joints)}",
         )
 
 
@@ -243,8 +242,8 @@ class RandomPoses(PoseSet):
             q[start:stop] = sequence.random(stop - start)
         q *= arm.upper - arm.lower
         q += arm.lower
-        told = f"{self.count} Sobol points within the joint limits, seed {self.seed}"
-        return _listed(q, arm, told, {})
+        description = f"{self.count} Sobol points within the joint limits, seed {self.seed}"
+        return _listed(q, arm, description, {})
 
 
 def poses_of(arm: Manipulator, q: PoseSet | ArrayLike) -> Listed | Product:
@@ -282,7 +281,7 @@ def _meaning(arm: Manipulator, joint: int) -> tuple[str, str]:
     return f"{what} of {arm.joint_names[joint]}", arm.joint_units[joint]
 
 
-def _listed(q: Array, arm: Manipulator, told: str, labels: dict[str, Label]) -> Listed:
+def _listed(q: Array, arm: Manipulator, description: str, labels: dict[str, Label]) -> Listed:
     labels["pose"] = Label(("pose",), np.arange(len(q)), "number of the posture", "1")
     labels["q"] = Label(("pose", "joint"), q, "joint angles", _unit(arm))
-    return Listed(q=frozen(q), labels=labels, told=told)
+    return Listed(q=frozen(q), labels=labels, description=description)

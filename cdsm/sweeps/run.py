@@ -20,10 +20,10 @@ from cdsm.support.validation import flag, whole_number
 from cdsm.sweeps.blocks import Block, blocks, extents
 from cdsm.sweeps.cluster import checked_client, on_cluster
 from cdsm.sweeps.dataset import empty, to_dataset
-from cdsm.sweeps.evaluation import Answer, evaluate
+from cdsm.sweeps.evaluation import BlockResult, evaluate
 from cdsm.sweeps.poses import PoseSet
 from cdsm.sweeps.quantities import DEFAULT, SweepStatus
-from cdsm.sweeps.specification import Question, ask
+from cdsm.sweeps.specification import Specification, specify
 
 if TYPE_CHECKING:
     import xarray
@@ -99,7 +99,7 @@ def sweep(
     flag("progress", progress)
     if client is not None:
         checked_client(client)
-    question = ask(
+    specification = specify(
         arm,
         q,
         minimum=minimum,
@@ -109,30 +109,32 @@ def sweep(
         direction=direction,
         outputs=outputs,
     )
-    extent = extents(question.poses.sizes, _postures(question, chunk))
+    extent = extents(specification.poses.sizes, _postures(specification, chunk))
     if store is None:
-        values = {name: empty(question, name) for name in (*question.problem.outputs, "status")}
-        _run(question, values, extent, client, progress)
-        return to_dataset(question, values)
+        values = {
+            name: empty(specification, name) for name in (*specification.task.outputs, "status")
+        }
+        _run(specification, values, extent, client, progress)
+        return to_dataset(specification, values)
 
     from cdsm.sweeps import store as stores  # needs zarr
 
     path = as_path(store)
-    with stores.opened(path, question, extent) as arrays:
-        kept = dict(zip(question.poses.sizes, arrays["status"].chunks, strict=False))
-        _run(question, arrays, kept, client, progress, path)
+    with stores.opened(path, specification, extent) as arrays:
+        kept = dict(zip(specification.poses.sizes, arrays["status"].chunks, strict=False))
+        _run(specification, arrays, kept, client, progress, path)
     return stores.read(path)
 
 
-def _postures(question: Question, chunk: int | None) -> int:
+def _postures(specification: Specification, chunk: int | None) -> int:
     """How many postures make a block."""
     if chunk is None:
-        return _NUMBERS // (question.problem.arm.nv * question.problem.cases)
-    return whole_number("chunk", chunk, 1) // question.problem.cases
+        return _NUMBERS // (specification.task.arm.nv * specification.task.cases)
+    return whole_number("chunk", chunk, 1) // specification.task.cases
 
 
 def _run(
-    question: Question,
+    specification: Specification,
     arrays: Mapping[str, Any],
     extent: Mapping[str, int],
     client: Client | None,
@@ -142,48 +144,54 @@ def _run(
     """Compute what is pending, and write it into arrays of numpy, or of zarr at that path."""
     from cdsm.sweeps.progress import progress_bar  # rich takes a while to import
 
-    every = list(blocks(question.poses.sizes, extent))
-    todo = [block for block in every if _is_pending(question, arrays["status"], block)]
-    cases = question.problem.cases
+    every = list(blocks(specification.poses.sizes, extent))
+    todo = [block for block in every if _is_pending(specification, arrays["status"], block)]
+    cases = specification.task.cases
     total, left = (sum(b.stop - b.start for b in some) * cases for some in (every, todo))
-    answers: Iterator[tuple[Block, Answer | None]]
+    answers: Iterator[tuple[Block, BlockResult | None]]
     if client is None:
         answers = (
-            (block, evaluate(question.problem, question.poses.angles(block.start, block.stop)))
+            (
+                block,
+                evaluate(specification.task, specification.poses.angles(block.start, block.stop)),
+            )
             for block in todo
         )
     else:
-        answers = on_cluster(client, question, todo)
+        answers = on_cluster(client, specification, todo)
     with ExitStack() as stack:
         advance = stack.enter_context(progress_bar(total, total - left, wanted=progress))
         for block, answer in answers:
             try:
-                _write(question, arrays, block, answer)
+                _write(specification, arrays, block, answer)
             except OSError as error:
                 raise FileError(path, f"cannot be written: {error}.") from error
             advance((block.stop - block.start) * cases)
 
 
-def _is_pending(question: Question, status: Any, block: Block) -> bool:
-    found = status[_region(question, "status", block)]
+def _is_pending(specification: Specification, status: Any, block: Block) -> bool:
+    found = status[_region(specification, "status", block)]
     return bool(np.isin(found, (SweepStatus.PENDING, SweepStatus.WORKER_LOST)).any())
 
 
 def _write(
-    question: Question, arrays: Mapping[str, Any], block: Block, answer: Answer | None
+    specification: Specification,
+    arrays: Mapping[str, Any],
+    block: Block,
+    answer: BlockResult | None,
 ) -> None:
     if answer is not None:
-        for name in question.problem.outputs:
-            shape = question.shape(name, block.slices)
-            arrays[name][_region(question, name, block)] = answer[name].reshape(shape)
+        for name in specification.task.outputs:
+            shape = specification.shape(name, block.slices)
+            arrays[name][_region(specification, name, block)] = answer[name].reshape(shape)
     # last: it says that the rest is there
-    region = _region(question, "status", block)
+    region = _region(specification, "status", block)
     if answer is None:
         arrays["status"][region] = np.int8(SweepStatus.WORKER_LOST)
     else:
-        shape = question.shape("status", block.slices)
+        shape = specification.shape("status", block.slices)
         arrays["status"][region] = answer["status"].reshape(shape)
 
 
-def _region(question: Question, name: str, block: Block) -> tuple[slice, ...]:
-    return tuple(block.slices.get(dim, slice(None)) for dim in question.dims(name))
+def _region(specification: Specification, name: str, block: Block) -> tuple[slice, ...]:
+    return tuple(block.slices.get(dim, slice(None)) for dim in specification.dims(name))

@@ -1,43 +1,57 @@
-"""The question a sweep answers: an arm, its poses and what is varied; checked, then frozen."""
+"""The specification a sweep answers: an arm, its poses and what is varied; checked, then frozen."""
 
 from __future__ import annotations
 
+import hashlib
 import json
+import math
+import pickle
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from importlib.metadata import version
 from typing import final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cdsm.cable import Cable
 from cdsm.elasticity import Elasticity
 from cdsm.errors import InvalidInput
 from cdsm.manipulator import Manipulator
-from cdsm.support.validation import instance, one_of
-from cdsm.sweeps.arguments import bounds_of, directions_of, laws_of, wrenches_of
-from cdsm.sweeps.description import attributes_of, law_text
-from cdsm.sweeps.evaluation import Problem
-from cdsm.sweeps.labels import Label
+from cdsm.support.format import MODEL
+from cdsm.support.validation import Array, instance, one_of
+from cdsm.sweeps.arguments import Label, bounds_of, directions_of, laws_of, wrenches_of
+from cdsm.sweeps.evaluation import SweepTask
 from cdsm.sweeps.poses import Listed, PoseSet, Product, poses_of
 from cdsm.sweeps.quantities import CASES, QUANTITIES
 
 AXES = ("x", "y", "z")
 
+_SAMPLES = np.ldexp(np.arange(4.0, 8.0), np.arange(-12, 18)[:, None]).ravel()
+"""Tensions [N] from 1e-3 to 1e6, four an octave, the same to the last bit on every machine."""
+
+_WITHIN = 65
+"""Tensions evenly over the domain, of which a narrow one has few of the others."""
+
+_SAMPLED = re.compile(r"\b([\w.<>]+) (\w+), samples ([0-9a-f]{16})")
+"""A law of the user's own in words: its class, its state, and a digest of its answers."""
+
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Question:
+class Specification:
     """What is to be computed, and what it is called.
 
     Attributes:
-        problem: What to compute at each posture.
+        task: What to compute at each posture.
         poses: The postures.
         labels: Every coordinate, by name.
         attributes: What the Dataset says of the whole.
     """
 
-    problem: Problem
+    task: SweepTask
     poses: Listed | Product
     labels: Mapping[str, Label]
     attributes: Mapping[str, str]
@@ -73,7 +87,7 @@ class Question:
         )
 
 
-def ask(
+def specify(
     arm: Manipulator,
     q: PoseSet | ArrayLike,
     *,
@@ -83,7 +97,7 @@ def ask(
     wrench: ArrayLike | Mapping[str, ArrayLike],
     direction: ArrayLike | Mapping[str, ArrayLike],
     outputs: Iterable[str],
-) -> Question:
+) -> Specification:
     """Check what was given, and give every dimension and coordinate its name.
 
     Raises:
@@ -113,12 +127,12 @@ def ask(
         "joint": _names("joint", arm.joint_names, "name of the joint"),
         "joint_column": _names("joint_column", arm.joint_names, "joint that turns, of the columns"),
     }
-    attributes = attributes_of(arm) | {"poses": poses.told}
+    attributes = attributes_of(arm) | {"poses": poses.description}
     if laws.values != (None,):
         names = ["all cables"] if laws.names is None else laws.names.tolist()
         texts = [law_text(law) for law in laws.values if law is not None]
         attributes["elasticity"] = json.dumps(dict(zip(names, texts, strict=True)), indent=1)
-    problem = Problem(
+    task = SweepTask(
         arm=arm,
         laws=laws.values,
         wrenches=wrenches.values,
@@ -127,19 +141,19 @@ def ask(
         directions=directions.values,
         outputs=_outputs(outputs),
     )
-    everything = Question(problem=problem, poses=poses, labels=labels, attributes=attributes)
+    everything = Specification(task=task, poses=poses, labels=labels, attributes=attributes)
     return replace(everything, labels=_needed(everything))
 
 
-def _needed(question: Question) -> dict[str, Label]:
+def _needed(specification: Specification) -> dict[str, Label]:
     """The coordinates that some output, or another coordinate, has use for."""
-    outputs = question.problem.outputs
+    outputs = specification.task.outputs
     labels = {
         name: label
-        for name, label in question.labels.items()
+        for name, label in specification.labels.items()
         if "along" in outputs or not name.startswith("direction")
     }
-    used = {dim for name in (*outputs, "status") for dim in question.dims(name)}
+    used = {dim for name in (*outputs, "status") for dim in specification.dims(name)}
     used |= {dim for name, label in labels.items() for dim in label.dims if label.dims != (name,)}
     return {name: label for name, label in labels.items() if label.dims != (name,) or name in used}
 
@@ -159,3 +173,90 @@ def _outputs(outputs: Iterable[str]) -> tuple[str, ...]:
 
 def _names(dim: str, names: Iterable[str], long_name: str) -> Label:
     return Label((dim,), np.array(list(names)), long_name, "")
+
+
+# --- an arm in words, so that a Dataset can be traced back to it ------------------------------
+
+
+def attributes_of(arm: Manipulator) -> dict[str, str]:
+    """The attributes of a Dataset that say which arm, computed by what."""
+    laws = list(dict.fromkeys(law_text(cable.elasticity) for cable in arm.cables))
+    return {
+        "Conventions": "CF-1.11",
+        "title": f"stiffness sweep of {arm.name}",
+        "source": f"cdsm {version('cdsm-stiffness')}",
+        **({"geometry": arm.geometry.to_toml()} if arm.is_serpentine else {"urdf": arm.urdf}),
+        "model": MODEL,
+        "original_length": arm.original_length,
+        "cables": _json([_cable(cable, laws) for cable in arm.cables]),
+        "cable_elasticities": _json(laws),
+    }
+
+
+def law_text(law: Elasticity) -> str:
+    """An elasticity in one line: equal for equal ones, also in another process.
+
+    What a law of the user's own depends on is its state and its code. The code shows in what it
+    answers: domain, EA and strain, at up to 185 tensions.
+    """
+    text = repr(law)
+    if type(law).__module__.startswith("cdsm.") and "..." not in text:  # numpy shortens arrays
+        return text
+    # what a class of the user's own prints need not be all that it depends on
+    kind = f"{type(law).__module__}.{type(law).__qualname__}"
+    try:
+        state = _digest(pickle.dumps(law))
+    except Exception:  # whatever a foreign class raises; its address is at least never wrong
+        return f"{kind} at {id(law):#x}"
+    return f"{kind} {state}, samples {_digest(_answers(law).encode())}"
+
+
+def changed_laws(one: str, other: str) -> tuple[str, ...]:
+    """Classes of the laws that answer otherwise, where two texts differ in nothing else."""
+    if _SAMPLED.sub(r"\1 \2", one) != _SAMPLED.sub(r"\1 \2", other):
+        return ()
+    pairs = zip(_SAMPLED.findall(one), _SAMPLED.findall(other), strict=True)
+    return tuple(dict.fromkeys(mine[0] for mine, theirs in pairs if mine != theirs))
+
+
+def _answers(law: Elasticity) -> str:
+    """The answers of a law at the sampled tensions, to the last bit."""
+    domain = law.domain
+    first, high = domain.first, domain.high
+    tensions = _SAMPLES[(first <= _SAMPLES) & (high >= _SAMPLES)]
+    if math.isfinite(high):
+        tensions = np.concatenate([tensions, np.linspace(first, high, _WITHIN)])
+    answers = [_answer(law, name, F) for name in ("rigidity", "strain") for F in tensions]
+    return f"{domain!r} {' '.join(answers)}"
+
+
+def _answer(law: Elasticity, name: str, tension: float) -> str:
+    """One number in full, or why there is none: a law need not have an answer everywhere."""
+    try:
+        value: Array = np.asarray(getattr(law, name)(np.array([tension])), dtype=np.float64)
+        return float(value.reshape(())).hex()
+    except Exception as error:  # whatever a foreign class raises
+        return type(error).__name__
+
+
+def _digest(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()[:16]
+
+
+def _cable(cable: Cable, laws: list[str]) -> dict[str, object]:
+    """A cable as JSON, in SI units; its elasticity by the place in the list of them."""
+    series = cable.series_stiffness
+    return {
+        "name": cable.name,
+        "sites": [[site.link, *site.position] for site in cable.sites],
+        "lead": cable.lead,
+        "elasticity": laws.index(law_text(cable.elasticity)),
+        "series_stiffness": None if math.isinf(series) else series,
+        "control": cable.control,
+        "minimum": cable.minimum,
+        "maximum": None if math.isinf(cable.maximum) else cable.maximum,
+    }
+
+
+def _json(value: object) -> str:
+    return json.dumps(value, allow_nan=False)

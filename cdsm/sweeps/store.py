@@ -21,8 +21,7 @@ from numpy.typing import NDArray
 
 from cdsm.errors import FileError, StoreError
 from cdsm.sweeps.dataset import EMPTY, to_dataset, variable_attributes
-from cdsm.sweeps.description import changed_laws
-from cdsm.sweeps.specification import Question
+from cdsm.sweeps.specification import Specification, changed_laws
 
 if TYPE_CHECKING:
     import xarray
@@ -37,7 +36,7 @@ _TOLD = 8
 
 @contextmanager
 def opened(
-    path: Path, question: Question, extent: Mapping[str, int]
+    path: Path, specification: Specification, extent: Mapping[str, int]
 ) -> Iterator[Mapping[str, zarr.Array[Any]]]:
     """The arrays of a store, one per output and ``status``; made if there is none.
 
@@ -51,7 +50,7 @@ def opened(
     import zarr
 
     if not path.exists():
-        _make(path, question, extent)
+        _make(path, specification, extent)
     try:
         folder = os.open(path, os.O_RDONLY | os.O_DIRECTORY)
     except OSError as error:
@@ -63,9 +62,9 @@ def opened(
             raise StoreError(path, "another run is writing to it; wait for it to end.") from None
         except OSError as error:
             raise FileError(path, f"cannot be locked: {error.strerror}.") from None
-        _check(path, question)
+        _check(path, specification)
         group = zarr.open_group(path, mode="r+", use_consolidated=False)
-        yield {name: _array(group, name) for name in (*question.problem.outputs, "status")}
+        yield {name: _array(group, name) for name in (*specification.task.outputs, "status")}
     finally:
         os.close(folder)
 
@@ -99,7 +98,7 @@ def _array(group: zarr.Group, name: str) -> zarr.Array[Any]:
     return array
 
 
-def _make(path: Path, question: Question, extent: Mapping[str, int]) -> None:
+def _make(path: Path, specification: Specification, extent: Mapping[str, int]) -> None:
     """Write a store with nothing in it aside, then rename it into place."""
     import zarr
 
@@ -107,16 +106,16 @@ def _make(path: Path, question: Question, extent: Mapping[str, int]) -> None:
         raise FileError(path, f"the folder {path.parent} does not exist; create it.")
     aside = path.with_name(f".{path.name}-{secrets.token_hex(4)}")
     try:
-        names = (*question.problem.outputs, "status")
-        labels = to_dataset(question, {})
-        labels.attrs[_ORDER] = [*question.labels, *names]
+        names = (*specification.task.outputs, "status")
+        labels = to_dataset(specification, {})
+        labels.attrs[_ORDER] = [*specification.labels, *names]
         for name, label in labels.coords.items():
             if label.dtype.kind == "U":  # texts of one width have no place in the format
                 labels[name] = label.astype(object)
         labels.to_zarr(aside, mode="w-", zarr_format=3, consolidated=False)
         group = zarr.open_group(aside, mode="r+", use_consolidated=False)
         for name in names:
-            dims, shape = question.dims(name), question.shape(name)
+            dims, shape = specification.dims(name), specification.shape(name)
             fill = EMPTY.get(name, np.float64(np.nan))
             group.create_array(
                 name,
@@ -125,7 +124,7 @@ def _make(path: Path, question: Question, extent: Mapping[str, int]) -> None:
                 dtype=fill.dtype,
                 fill_value=fill,
                 dimension_names=dims,
-                attributes=variable_attributes(question, name),
+                attributes=variable_attributes(specification, name),
             )
         with suppress(FileExistsError):  # another run was faster; its store will be looked at
             _rename(aside, path)
@@ -144,10 +143,10 @@ def _rename(aside: Path, path: Path) -> None:
         raise
 
 
-def _check(path: Path, question: Question) -> None:
-    """Raise what tells a store from one for this question."""
-    stored, wanted = read(path), to_dataset(question, {})
-    held, asked = {str(name) for name in stored.data_vars}, {*question.problem.outputs, "status"}
+def _check(path: Path, specification: Specification) -> None:
+    """Raise what tells a store from one for this specification."""
+    stored, wanted = read(path), to_dataset(specification, {})
+    held, asked = {str(name) for name in stored.data_vars}, {*specification.task.outputs, "status"}
     different = [f"outputs: {each} in the store alone" for each in sorted(held - asked)]
     different += [f"outputs: {each} not in the store" for each in sorted(asked - held)]
     for name in {**stored.coords, **wanted.coords}:
@@ -170,7 +169,7 @@ def _check(path: Path, question: Question) -> None:
                 lambda pair: pair[0] == pair[1], zip(theirs, ours, strict=False)
             )
             start = max(0, len(list(same)) - 30)
-            different.append(_told(str(name), theirs[start:], ours[start:]))
+            different.append(_mismatch(str(name), theirs[start:], ours[start:]))
     if different:
         more = f"\n  - and {len(different) - _TOLD} more" if len(different) > _TOLD else ""
         listed = "".join(f"\n  - {each}" for each in different[:_TOLD]) + more
@@ -184,16 +183,16 @@ def _check(path: Path, question: Question) -> None:
 def _difference(name: str, stored: NDArray[Any], wanted: NDArray[Any]) -> list[str]:
     """The first difference of two arrays, in words, if there is one."""
     if stored.shape != wanted.shape:
-        return [_told(name, stored, wanted)]
+        return [_mismatch(name, stored, wanted)]
     places = np.argwhere(stored != wanted)
     if not len(places):
         return []
     place = tuple(places[0].tolist())
     where = f"{name}{list(place)}" if place else name
-    return [_told(where, stored[place], wanted[place])]
+    return [_mismatch(where, stored[place], wanted[place])]
 
 
-def _told(what: str, stored: object, wanted: object) -> str:
+def _mismatch(what: str, stored: object, wanted: object) -> str:
     return f"{what}: {_short(stored)} in the store, {_short(wanted)} wanted"
 
 

@@ -14,9 +14,9 @@ import cdsm
 from cdsm.kernels.principal import principal_stiffness
 from cdsm.support.validation import Array
 from cdsm.sweeps.blocks import blocks, extents
-from cdsm.sweeps.description import law_text
+from cdsm.sweeps.evaluation import _BATCH_NAMES
 from cdsm.sweeps.quantities import LOST, QUANTITIES
-from cdsm.sweeps.rows import _BATCH_NAMES
+from cdsm.sweeps.specification import law_text
 from tests.support.sweeps import CASES, EVERYTHING, GRID, LAWS, STEEL, WRENCHES, short_arm
 
 Status = cdsm.SweepStatus

@@ -15,10 +15,10 @@ import xarray as xr
 import zarr
 
 import cdsm
-from cdsm.sweeps import description, run, store
+from cdsm.sweeps import run, specification, store
 from cdsm.sweeps.blocks import extents
-from cdsm.sweeps.evaluation import Answer, Problem, evaluate
-from cdsm.sweeps.specification import Question, ask
+from cdsm.sweeps.evaluation import BlockResult, SweepTask, evaluate
+from cdsm.sweeps.specification import Specification, specify
 from tests.support.patience import HANGS
 from tests.support.sweeps import CASES, GRID, STEEL, Deadly, short_arm
 
@@ -33,7 +33,7 @@ def whole() -> xr.Dataset:
     return cdsm.sweep(short_arm(), GRID, outputs=OUTPUTS, **CASES)
 
 
-def question(**changes: Any) -> Question:
+def specified(**changes: Any) -> Specification:
     given: dict[str, Any] = {
         "minimum": 9.0,
         "maximum": np.inf,
@@ -42,7 +42,7 @@ def question(**changes: Any) -> Question:
         "direction": {"x": (1, 0, 0), "y": (0, 1, 0), "z": (0, 0, 1)},
         "outputs": ["margin"],
     }
-    return ask(short_arm(), GRID, **{**given, **changes})
+    return specify(short_arm(), GRID, **{**given, **changes})
 
 
 def kept(path: Path, **changes: Any) -> xr.Dataset:
@@ -55,9 +55,9 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """How many postures each call of the evaluation was for."""
     calls: list[int] = []
 
-    def counting(problem: Problem, q: Any, threads: int | None = None) -> Answer:
+    def counting(task: SweepTask, q: Any, threads: int | None = None) -> BlockResult:
         calls.append(len(q))
-        return evaluate(problem, q, threads)
+        return evaluate(task, q, threads)
 
     monkeypatch.setattr(run, "evaluate", counting)
     return calls
@@ -77,11 +77,11 @@ def test_an_interrupted_run_goes_on_where_it_stopped(
 ) -> None:
     path = tmp_path / "s.zarr"
 
-    def interrupted(problem: Problem, q: Any, threads: int | None = None) -> Answer:
+    def interrupted(task: SweepTask, q: Any, threads: int | None = None) -> BlockResult:
         if len(counted) == 4:
             raise KeyboardInterrupt
         counted.append(len(q))
-        return evaluate(problem, q, threads)
+        return evaluate(task, q, threads)
 
     with monkeypatch.context() as patch:
         patch.setattr(run, "evaluate", interrupted)
@@ -140,7 +140,7 @@ def test_a_run_may_stop_between_any_two_writes(
         done[0] += 1
         write(*arguments)
 
-    with store.opened(path, question(**CASES, outputs=OUTPUTS), {"joint1_1": 1, "joint3_2": 2}):
+    with store.opened(path, specified(**CASES, outputs=OUTPUTS), {"joint1_1": 1, "joint3_2": 2}):
         pass
     with monkeypatch.context() as patch:
         patch.setattr(zarr.Array, "__setitem__", interrupted)
@@ -208,13 +208,13 @@ def test_a_store_of_another_version_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     kept(tmp_path / "s.zarr")
-    monkeypatch.setattr(description, "version", lambda _: "9.9")
+    monkeypatch.setattr(specification, "version", lambda _: "9.9")
     with pytest.raises(cdsm.StoreError, match=r"source: cdsm .* in the store, cdsm 9.9"):
         kept(tmp_path / "s.zarr")
 
 
 def test_two_runs_cannot_write_to_one_store(tmp_path: Path) -> None:
-    asked = question()
+    asked = specified()
     extent = extents(asked.poses.sizes, 4)
     again: dict[str, Any] = {"minimum": 9.0, "outputs": "margin"}
     with store.opened(tmp_path / "s.zarr", asked, extent):
@@ -227,7 +227,7 @@ def test_two_runs_cannot_write_to_one_store(tmp_path: Path) -> None:
 def test_of_two_runs_that_make_a_store_at_once_the_first_one_counts(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    path, asked = tmp_path / "s.zarr", question()
+    path, asked = tmp_path / "s.zarr", specified()
     make, extent = store._make, extents(asked.poses.sizes, 4)
     first: list[int] = []
 
@@ -389,10 +389,10 @@ def test_a_law_whose_code_has_changed_is_noticed(
 def test_a_law_of_ones_own_is_described_alike_in_every_process(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    here = description.law_text(own_law(tmp_path, monkeypatch))
+    here = specification.law_text(own_law(tmp_path, monkeypatch))
     script = (
         f"import sys; sys.path.insert(0, {str(tmp_path)!r})\n"
-        "from own_law import Own; from cdsm.sweeps.description import law_text\n"
+        "from own_law import Own; from cdsm.sweeps.specification import law_text\n"
         "print(law_text(Own()))"
     )
     for seed in ("1", "2"):
@@ -423,16 +423,16 @@ class Partial(Reticent):
 
 
 def test_a_law_need_not_answer_everywhere_to_be_described() -> None:
-    text = description.law_text(Partial(1e5))
-    assert text == description.law_text(Partial(1e5))
-    assert text != description.law_text(Partial(1e4))
+    text = specification.law_text(Partial(1e5))
+    assert text == specification.law_text(Partial(1e5))
+    assert text != specification.law_text(Partial(1e4))
 
 
 def test_what_differs_otherwise_is_no_change_of_code() -> None:
-    one, other = (description.law_text(Reticent(value)) for value in (1e5, 1e4))
-    assert description.changed_laws(one, other) == ()
-    assert description.changed_laws(one, one) == ()
-    assert description.changed_laws(repr(STEEL), repr(STEEL)) == ()
+    one, other = (specification.law_text(Reticent(value)) for value in (1e5, 1e4))
+    assert specification.changed_laws(one, other) == ()
+    assert specification.changed_laws(one, one) == ()
+    assert specification.changed_laws(repr(STEEL), repr(STEEL)) == ()
 
 
 def test_bounds_of_a_cable_are_part_of_the_question(tmp_path: Path) -> None:
