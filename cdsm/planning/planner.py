@@ -41,6 +41,9 @@ _NEAREST_STARTS = 8
 _NEARLY = 0.1
 """Relative miss with which a place tells how large the tensions will be."""
 
+_SIDES = 6
+"""How many of the places nearest to a target on either side are joined."""
+
 _EDGE = 1e-9
 """A target this part beyond an end of the range is at the end."""
 
@@ -108,7 +111,11 @@ class Planner:
         found = self._best(
             [*self._crossings(ends[0], ends), *self._crossings(ends[1], ends)] or ends
         )
-        found = found or self._nearly_hit([*map(self.constraints.at, ends), *seen, *self._ends])
+        if found is None:  # next to buckling the straight way between both ends may leave the range
+            seen += [*map(self.constraints.at, ends), *self._ends]
+            bridges = self._bridges(seen)
+            found = self._best(bridges)
+            found = found or self._nearly_hit([*map(self.constraints.at, bridges), *seen])
         if found is None:
             below = max((value for value in met if value < target), default=low)
             above = min((value for value in met if value > target), default=high)
@@ -170,7 +177,9 @@ class Planner:
         yield from points
         yield from self.begin.between(self.starts - len(points), self.seed)
 
-    def _crossings(self, hub: Evaluation, others: list[Evaluation]) -> list[Evaluation]:
+    def _crossings(
+        self, hub: Evaluation, others: list[Evaluation], precision: float = 1e-2
+    ) -> list[Evaluation]:
         """Stable places on the way from one to others where the one target is hit, least first."""
         at_hub, guesses = self._miss(hub), []
         for other in others:
@@ -188,11 +197,18 @@ class Planner:
                     return known[part]
                 return self._miss(self.model.at(hub.F + part * way))
 
-            part = float(brentq(miss, 0.0, 1.0, xtol=1e-15, rtol=1e-2))
+            part = float(brentq(miss, 0.0, 1.0, xtol=1e-15, rtol=precision))
             point = self.model.at(hub.F + part * way)
             if point.reserve >= 0.0:
                 found.append(point)
         return sorted(found, key=lambda point: float(point.F @ point.F))
+
+    def _bridges(self, seen: list[ConstraintValues]) -> list[Evaluation]:
+        """Places that hit the one target between the nearest that were seen on either side."""
+        order = sorted(seen, key=lambda place: float(abs(place.values[0])))
+        below = [place.evaluation for place in order if place.values[0] < 0.0][:_SIDES]
+        above = [place.evaluation for place in order if place.values[0] > 0.0][:_SIDES]
+        return [place for one in below for place in self._crossings(one, above, 1e-15)]
 
     def _miss(self, point: Evaluation) -> float:
         """By how much a point is off the one target; -1 where it has buckled, for no stiffness."""
