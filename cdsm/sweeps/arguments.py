@@ -83,11 +83,7 @@ class Choice(Generic[_Values]):
 def laws_of(
     elasticity: Elasticity | Mapping[str, Elasticity] | None,
 ) -> Choice[tuple[Elasticity | None, ...]]:
-    """The elasticities of all cables in turn; None stands for the arm's own.
-
-    Raises:
-        InvalidInput: Neither an elasticity nor a mapping of names to elasticities.
-    """
+    """The elasticities of all cables in turn; None stands for the arm's own."""
     if elasticity is None or isinstance(elasticity, Elasticity):
         return Choice("elasticity", (elasticity,), None)
     if not isinstance(elasticity, Mapping) or not all(
@@ -101,11 +97,7 @@ def laws_of(
 
 
 def wrenches_of(wrench: ArrayLike | Mapping[str, ArrayLike]) -> Choice[Array]:
-    """Wrenches (W, 6) at ``tool0`` in base axes: force [N], then moment [N m].
-
-    Raises:
-        InvalidInput: Not (6,), (W, 6) or a mapping of names to (6,).
-    """
+    """Wrenches (W, 6) at ``tool0`` in base axes: force [N], then moment [N m]."""
 
     def checked(name: str, value: ArrayLike) -> Array:
         return wrench_vector(name, value)
@@ -114,20 +106,12 @@ def wrenches_of(wrench: ArrayLike | Mapping[str, ArrayLike]) -> Choice[Array]:
 
 
 def directions_of(direction: ArrayLike | Mapping[str, ArrayLike]) -> Choice[Array]:
-    """Unit directions (D, 3) in base axes.
-
-    Raises:
-        InvalidInput: Not (3,), (D, 3) or a mapping of names to (3,), or one of them is zero.
-    """
+    """Unit directions (D, 3) in base axes."""
     return _vectors("direction", direction, unit_direction)
 
 
 def bounds_of(minimum: ArrayLike, maximum: float) -> tuple[Choice[Array], float]:
-    """Lower bounds of tension (M,) [N] and the upper one.
-
-    Raises:
-        InvalidInput: Not numbers, negative, one given twice, or above the maximum.
-    """
+    """Lower bounds of tension (M,) [N] and the upper one."""
     several = np.ndim(number_array("minimum", minimum)) > 0
     lows = distinct("minimum", minimum)
     if lows.min() < 0.0:
@@ -146,11 +130,7 @@ def bounds_of(minimum: ArrayLike, maximum: float) -> tuple[Choice[Array], float]
 
 
 def distinct(name: str, values: ArrayLike) -> Array:
-    """Numbers (n,), one or more, none twice: the labels of a dimension.
-
-    Raises:
-        InvalidInput: They are not.
-    """
+    """Numbers (n,), one or more, none twice: the labels of a dimension."""
     array = np.atleast_1d(number_array(name, values))
     array = vector(name, array, array.size, "the values of a dimension")
     if not array.size:

@@ -26,12 +26,7 @@ _GO_ON = "What a store holds is kept: run the same again with store= to go on fr
 
 
 def checked_client(client: object) -> None:
-    """Raise what is wrong with a client.
-
-    Raises:
-        MissingExtra: dask.distributed is not installed.
-        InvalidInput: Not a client, or one for asynchronous use.
-    """
+    """Raise what is wrong with a client."""
     need("dask", "distributed")
     from distributed import Client
 
@@ -46,9 +41,6 @@ def on_cluster(
 
     Dask hands a block whose worker died to another, ``allowed-failures`` times, and then gives it
     up. As it also gives up blocks that only waited there, all of them are tried once more, alone.
-
-    Raises:
-        ClusterError: The scheduler is gone, or a worker cannot compute.
     """
     from distributed import as_completed
     from distributed.protocol.pickle import dumps  # by value what a notebook defines

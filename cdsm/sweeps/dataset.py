@@ -25,11 +25,7 @@ EMPTY = {"status": np.int8(SweepStatus.PENDING)}
 
 
 def empty(specification: Specification, name: str) -> NDArray[Any]:
-    """An array for an output or ``status``, with nothing in it yet.
-
-    Raises:
-        InvalidInput: It does not fit into memory.
-    """
+    """An array for an output or ``status``, with nothing in it yet."""
     try:
         return np.full(specification.shape(name), EMPTY.get(name, np.float64(np.nan)))
     except (MemoryError, ValueError):  # numpy's word for sizes beyond all memory

@@ -247,12 +247,7 @@ class RandomPoses(PoseSet):
 
 
 def poses_of(arm: Manipulator, q: PoseSet | ArrayLike) -> Listed | Product:
-    """A pose set, or postures (N, nv) [rad] given as an array, put to an arm.
-
-    Raises:
-        InvalidInput: Neither, or not the joint angles of this arm.
-        UnknownName: A grid over a joint the arm does not have.
-    """
+    """A pose set, or postures (N, nv) [rad] given as an array, put to an arm."""
     if isinstance(q, PoseSet):
         return q._of(arm)
     return _listed(checked_angles("q", q, arm), arm, "postures as given", {})

@@ -98,12 +98,7 @@ def specify(
     direction: ArrayLike | Mapping[str, ArrayLike],
     outputs: Iterable[str],
 ) -> Specification:
-    """Check what was given, and give every dimension and coordinate its name.
-
-    Raises:
-        InvalidInput: Names the argument, and says what is wrong with it.
-        UnknownName: No such joint or output.
-    """
+    """Check what was given, and give every dimension and coordinate its name."""
     poses = poses_of(instance("arm", arm, Manipulator), q)
     lows, maximum = bounds_of(minimum, maximum)
     laws, wrenches, directions = laws_of(elasticity), wrenches_of(wrench), directions_of(direction)

@@ -42,10 +42,6 @@ def opened(
 
     Nobody else can have it open for writing meanwhile, and the system lets go of it when the
     process ends, however it ends.
-
-    Raises:
-        FileError: It cannot be made or read, or something else stands there.
-        StoreError: It holds another sweep, or another run has it open.
     """
     import zarr
 
@@ -70,11 +66,7 @@ def opened(
 
 
 def read(path: Path) -> xarray.Dataset:
-    """What a store holds; numbers are read when they are looked at.
-
-    Raises:
-        FileError: It is no store that can be read.
-    """
+    """What a store holds; numbers are read when they are looked at."""
     import xarray
 
     for described in (path / "zarr.json", *path.glob("*/zarr.json")):
