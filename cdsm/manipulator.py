@@ -355,7 +355,7 @@ class Manipulator(Printed):
     def _routed(self, q: Array) -> tuple[Frames, Array, Array]:
         """Where joints and cable sites are, L and J_L at checked joint angles."""
         routing = self._model.routing
-        frames, lengths, length_jacobian, coincident = segments.cable_kinematics(
+        *arrays, lengths, length_jacobian, coincident = segments.cable_kinematics(
             self._model.tree, routing, q
         )
         if coincident >= 0:
@@ -364,9 +364,7 @@ class Manipulator(Printed):
                 f"two neighbouring sites coincide at q = {q.tolist()}, so the cable has no "
                 "direction there. Move a site, or change the posture.",
             )
-        for array in frames:
-            frozen(array)
-        return frames, frozen(lengths), frozen(length_jacobian)
+        return Frames(*map(frozen, arrays)), frozen(lengths), frozen(length_jacobian)
 
 
 def _rebuild(

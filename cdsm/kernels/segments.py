@@ -173,12 +173,15 @@ def add_segment_derivatives(
 
 
 @compiled
-def cable_kinematics(tree: Tree, routing: Routing, q: Array) -> tuple[Frames, Array, Array, int]:
+def cable_kinematics(
+    tree: Tree, routing: Routing, q: Array
+) -> tuple[Array, Array, Array, Array, Array, Array, int]:
     """Where joints and cable sites are at q (nv,), and the cable lengths and their Jacobian.
 
     Returns:
-        The frames, L (C,), J_L (C, nv), and the first segment whose sites coincide, or −1; if there
-        is one, L and J_L are unfinished.
+        The fields of :class:`Frames`, L (C,), J_L (C, nv), and the first segment whose sites
+        coincide, or −1; if there is one, L and J_L are unfinished. (To hand a named tuple back to
+        Python would take a quarter of the whole call.)
     """
     count, nv = tree.parent.shape[0], q.shape[0]
     origin, axis, slide = np.empty((count, 3)), np.empty((count, 3)), np.empty(tree.slide.shape)
@@ -187,7 +190,7 @@ def cable_kinematics(tree: Tree, routing: Routing, q: Array) -> tuple[Frames, Ar
     L, J = routing.fixed.copy(), np.zeros((routing.fixed.shape[0], nv))
     nothing, slot, scratch = np.empty((0, nv, nv)), np.empty(0, dtype=np.intp), np.empty((nv, 3))
     coincident = add_segment_derivatives(routing, frames, L, slot, scratch, L, J, nothing)
-    return frames, L, J, coincident
+    return origin, axis, slide, frames.site, L, J, coincident
 
 
 @compiled

@@ -33,9 +33,10 @@ class _Fork(NamedTuple):
 
     def evaluate(self, q: Array) -> tuple[Array, Array, Array]:
         """L, J_L and H_L of its one cable."""
-        frames, lengths, jacobian, coincident = segments.cable_kinematics(
+        *arrays, lengths, jacobian, coincident = segments.cable_kinematics(
             self.tree, self.routing, q
         )
+        frames = Frames(*arrays)
         assert coincident == -1
         hessian = np.zeros((1, q.size, q.size))
         page = np.zeros(1, dtype=np.intp)
