@@ -8,7 +8,7 @@ import pytest
 import cdsm
 from cdsm.arm_model import route
 from cdsm.kernels import segments
-from cdsm.kernels.tree import Routing, Tree
+from cdsm.kernels.tree import Frames, Routing, Tree
 from cdsm.rigid_body import RigidBody
 from cdsm.support.values import Array
 from tests.support import arms
