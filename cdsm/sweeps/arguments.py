@@ -29,7 +29,7 @@ _Values = TypeVar("_Values")
 @final
 @dataclass(frozen=True, eq=False)
 class Label:
-    """A coordinate: what stands along a dimension, or the one value there is.
+    """A coordinate: values along a dimension, or a single value.
 
     Attributes:
         dims: Its dimensions; none for a single value.

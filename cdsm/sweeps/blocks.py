@@ -28,16 +28,16 @@ class Block:
 
 
 def extents(poses: Mapping[str, int], most: int) -> dict[str, int]:
-    """How far a block of at most so many postures (but at least one) reaches each way.
+    """Size along each dimension of a block of at most so many postures, but at least one.
 
     The last dimensions whole, as many as fit; part of one; and one entry of each before: such
     blocks cover the postures in order without gaps.
     """
-    room, found = most, {}
+    room, extent = most, {}
     for dim, size in reversed(list(poses.items())):
-        found[dim] = min(size, max(1, room))
+        extent[dim] = min(size, max(1, room))
         room //= size
-    return dict(reversed(found.items()))
+    return dict(reversed(extent.items()))
 
 
 def blocks(poses: Mapping[str, int], extent: Mapping[str, int]) -> Iterator[Block]:

@@ -1,4 +1,4 @@
-"""A specification and its answer as a labelled Dataset."""
+"""The results of a sweep as a labelled Dataset."""
 
 from __future__ import annotations
 
@@ -42,11 +42,11 @@ def to_dataset(specification: Specification, values: Mapping[str, NDArray[Any]])
     import xarray
 
     labels = specification.labels.items()
-    found = xarray.Dataset(
+    dataset = xarray.Dataset(
         coords={name: (label.dims, label.values, label.attributes) for name, label in labels},
         attrs=dict(specification.attributes),
     )
-    return found.assign(
+    return dataset.assign(
         {
             name: (specification.dims(name), array, variable_attributes(specification, name))
             for name, array in values.items()
@@ -65,13 +65,15 @@ def variable_attributes(specification: Specification, name: str) -> dict[str, An
         kind: [name for name in outputs if QUANTITIES[name].stage in LOST[kind]]
         for kind in SweepStatus
     }
-    told = "; ".join(f"{kind.name.lower()}: {', '.join(lost[kind])}" for kind in lost if lost[kind])
+    missing = "; ".join(
+        f"{kind.name.lower()}: {', '.join(lost[kind])}" for kind in lost if lost[kind]
+    )
     return {
         "long_name": "what became of the entry",
         "units": "1",
         "flag_values": [int(kind) for kind in SweepStatus],
         "flag_meanings": " ".join(kind.name.lower() for kind in SweepStatus),
-        "comment": f"NaN stands only where the status says so, in: {told or 'nothing'}",
+        "comment": f"NaN stands only where the status says so, in: {missing or 'nothing'}",
     }
 
 

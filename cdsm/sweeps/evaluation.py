@@ -84,9 +84,9 @@ def evaluate(task: SweepTask, q: Array, threads: int | None = None) -> BlockResu
     of_law = [name for name, stage in stages.items() if stage not in ("pose", "tension")]
     extreme = [name for name, stage in stages.items() if stage == "principal"]
 
-    found, posed = _postures(task.arm, q, of_pose, threads)
-    answer: BlockResult = {**found}
-    status = np.tile(posed[:, None, None], (1, *shape[1:]))
+    result, status_of_pose = _postures(task.arm, q, of_pose, threads)
+    answer: BlockResult = {**result}
+    status = np.tile(status_of_pose[:, None, None], (1, *shape[1:]))
     if len(stages) > len(of_pose):
         place = p, w, m = np.nonzero(status == SweepStatus.OK)
         tension, status[place] = _tensions(

@@ -64,18 +64,18 @@ def read_sweep(path: str | os.PathLike[str]) -> xarray.Dataset:
         need("sweep", "zarr")
         from cdsm.sweeps import store  # needs zarr
 
-        found = store.read(path)
+        dataset = store.read(path)
     else:
-        found = _read_netcdf(path)
+        dataset = _read_netcdf(path)
     try:
-        check_sweep(found)
+        check_sweep(dataset)
     except InvalidInput:
         raise FileError(path, "is not a sweep of cdsm: it has no status.") from None
-    return found
+    return dataset
 
 
 def check_target(path: str | os.PathLike[str]) -> None:
-    """Raise what :func:`write_sweep` would, as far as that can be told before the sweep is there.
+    """Raise what :func:`write_sweep` would, as far as that is known before the sweep runs.
 
     Raises:
         InvalidInput: A path of neither kind.
@@ -103,8 +103,8 @@ def _read_netcdf(path: Path) -> xarray.Dataset:
     if not path.is_file():  # a pipe that nobody writes to would be waited for
         raise FileError(path, "is not a regular file; give the path of a file.")
     try:
-        with xarray.open_dataset(path, engine="netcdf4") as found:
-            return found.load()
+        with xarray.open_dataset(path, engine="netcdf4") as dataset:
+            return dataset.load()
     except Exception as error:  # whatever netCDF4 and xarray raise
         raise FileError(path, f"cannot be read as NetCDF: {error}.") from None
 

@@ -203,11 +203,11 @@ class PathPoses(ReadOnlyState, PoseSet):
 
     def _of(self, arm: Manipulator) -> Listed:
         known = self._distances
-        q, way = checked_angles("waypoints", self.waypoints, arm), known
+        q, distances = checked_angles("waypoints", self.waypoints, arm), known
         if self.count is not None:
-            way = np.linspace(0.0, known[-1], self.count)
-            q = np.column_stack([np.interp(way, known, column) for column in q.T])
-        distance = Label(("pose",), way, "way along the path in joint space", _unit(arm))
+            distances = np.linspace(0.0, known[-1], self.count)
+            q = np.column_stack([np.interp(distances, known, column) for column in q.T])
+        distance = Label(("pose",), distances, "way along the path in joint space", _unit(arm))
         return _listed(q, arm, f"path of {len(known)} waypoints", {"distance": distance})
 
 

@@ -1,4 +1,4 @@
-"""What a sweep can compute, and the status that says of each entry what there is.
+"""The quantities of a sweep, and the status of its entries.
 
 The one table of names, units and dimensions: the Dataset, the store, the CSV and the maps read it.
 """
@@ -39,7 +39,7 @@ class SweepStatus(IntEnum):
     SINGULAR = Status.SINGULAR
     """K_θ is singular, just about to buckle: no Cartesian quantity."""
     IMMOBILE = Status.IMMOBILE
-    """The tip cannot move in some direction: no cartesian, no pseudoinverse. Only told where one of
+    """The tip cannot move in some direction: no cartesian, no pseudoinverse. Only where one of
     them was asked for."""
     UNSTABLE = 8
     """The arm buckles, its margin is not positive: no softest, stiffest or anisotropy; and as
@@ -129,4 +129,4 @@ QUANTITIES: Final[dict[str, Quantity]] = {
 }
 
 DEFAULT: Final = ("tip_position", "along", "margin", "softest", "stiffest", "anisotropy")
-"""What is computed unless told otherwise: what a map is drawn from."""
+"""The default outputs, from which a map is drawn."""

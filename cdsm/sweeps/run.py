@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from distributed import Client
 
 _NUMBERS = 2**18
-"""Joint angles in a block unless told otherwise: some tenths of a second of work."""
+"""Joint angles in a block by default: some tenths of a second of work."""
 
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 _NO_WRENCH = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -184,7 +184,7 @@ def _write(
         for name in specification.task.outputs:
             shape = specification.shape(name, block.slices)
             arrays[name][_region(specification, name, block)] = answer[name].reshape(shape)
-    # last: it says that the rest is there
+    # last: any other status than pending promises that the outputs are written
     region = _region(specification, "status", block)
     if answer is None:
         arrays["status"][region] = np.int8(SweepStatus.WORKER_LOST)

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 _ORDER = "order"
 """Attribute with the names of all variables, which a folder does not keep in order."""
 
-_TOLD = 8
+_LISTED = 8
 """Differences an error lists."""
 
 
@@ -156,15 +156,15 @@ def _check(path: Path, specification: Specification) -> None:
                 "changed, and what the store holds is not what it gives now"
                 for law in changed
             ]
-        elif theirs != ours:  # told from a little before they part
+        elif theirs != ours:  # shown from a little before they part
             same = itertools.takewhile(
                 lambda pair: pair[0] == pair[1], zip(theirs, ours, strict=False)
             )
             start = max(0, len(list(same)) - 30)
             different.append(_mismatch(str(name), theirs[start:], ours[start:]))
     if different:
-        more = f"\n  - and {len(different) - _TOLD} more" if len(different) > _TOLD else ""
-        listed = "".join(f"\n  - {each}" for each in different[:_TOLD]) + more
+        more = f"\n  - and {len(different) - _LISTED} more" if len(different) > _LISTED else ""
+        listed = "".join(f"\n  - {each}" for each in different[:_LISTED]) + more
         raise StoreError(
             path,
             f"holds another sweep; ask the same again, or give another path to store=:{listed}",
