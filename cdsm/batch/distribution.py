@@ -25,7 +25,7 @@ from cdsm.batch.tension_kernel import distribute_rows
 from cdsm.errors import InfeasibleTension, SolverError
 from cdsm.kernels.tension import NO_ARM
 from cdsm.manipulator import Manipulator
-from cdsm.status import Status, summary
+from cdsm.support.status import Status, summary
 from cdsm.support.validation import Array, ReadOnlyState, frozen, instance
 from cdsm.tension import checked_bounds, distribute_tension
 

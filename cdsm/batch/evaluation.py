@@ -18,7 +18,7 @@ from cdsm.batch.inputs import checked_threads, given_tension, given_wrench, post
 from cdsm.batch.layout import QUANTITIES, Codes, Flags
 from cdsm.errors import InvalidInput, UnknownName
 from cdsm.manipulator import Manipulator
-from cdsm.status import summary
+from cdsm.support.status import summary
 from cdsm.support.validation import (
     Array,
     ReadOnlyState,

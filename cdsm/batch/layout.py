@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdsm.kernels.tree import Indices
-from cdsm.status import Status
+from cdsm.support.status import Status
 
 Codes = NDArray[np.uint8]
 Flags = NDArray[np.bool_]

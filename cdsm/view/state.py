@@ -16,8 +16,8 @@ from cdsm.kernels.principal import principal_stiffness
 from cdsm.manipulator import Manipulator
 from cdsm.plots.arm import ellipsoid, tension_colors
 from cdsm.posture import Posture
-from cdsm.status import Status
 from cdsm.stiffness_matrix import Stiffness, stiffness
+from cdsm.support.status import Status
 from cdsm.support.validation import Array, ReadOnlyState, frozen
 from cdsm.tension import DEFAULT_SOLVER, Tension, distribute_tension
 

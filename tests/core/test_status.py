@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import cdsm
-from cdsm.status import Status, summary
+from cdsm.support.status import Status, summary
 
 ERRORS: dict[Status, cdsm.CdsmError] = {
     Status.BEYOND_LIMITS: cdsm.JointLimitError(["joint1"], [2.0], [(-1.0, 1.0)]),
