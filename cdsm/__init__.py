@@ -2,11 +2,11 @@
 
     geometry = cdsm.Geometry.universal(...)            # or read from TOML
     arm = cdsm.Manipulator(geometry, elasticity=...)   # URDF, rigid-body model, cables
-    pose = arm.at(q)                                   # all that depends on the joint angles
-    pull = cdsm.distribute_tension(pose, minimum=50.0) # all that depends on the load
+    pose = arm.at(q)                                   # kinematics, cable lengths, gravity torque
+    pull = cdsm.distribute_tension(pose, minimum=50.0) # tensions that balance the load
     K = cdsm.stiffness(pose, pull)                     # joint and Cartesian stiffness
 
-SI units throughout; base frame with x along the straight arm.
+All units are SI. The x-axis of the base frame lies along the straight arm.
 """
 
 from importlib import import_module as _import_module

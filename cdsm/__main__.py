@@ -1,4 +1,4 @@
-"""``python -m cdsm`` is ``cdsm``."""
+"""Run the command line: ``python -m cdsm`` does the same as ``cdsm``."""
 
 from cdsm.cli import app
 

@@ -1,7 +1,7 @@
-"""What all computations on an arm share: its bodies, tree, cable routing and cable laws.
+"""Parts of an arm that all computations share: bodies, tree, cable routing and cable laws.
 
-A :class:`~cdsm.Manipulator` holds one :class:`ArmModel` in ``_model``; every other module that
-needs more than the public properties of an arm takes it from there.
+A :class:`~cdsm.Manipulator` holds one :class:`ArmModel` in ``_model``. Modules that need more than
+the public properties of an arm read this model.
 """
 
 from __future__ import annotations
@@ -30,25 +30,25 @@ from cdsm.wires.laws import StrandElasticity
 OriginalLength = Literal["unstrained", "stretched"]
 
 _STEP = 1e-5
-"""Relative step of the difference of the slope of EA (1 + ε)."""
+"""Relative step of the finite difference of the slope of EA (1 + ε)."""
 
 _LIMIT_SLACK = 1e-9
-"""Angles this far [rad] beyond a limit are rounding, as of a conversion from degrees."""
+"""Angle [rad] beyond a limit that is accepted as rounding, e.g. of a conversion from degrees."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class ArmModel:
-    """An arm as arrays and laws; it does not depend on the joint angles.
+    """Arrays and cable laws of an arm that do not depend on the joint angles.
 
     Attributes:
-        body: The rigid-body model.
-        tree: The joints.
-        routing: The cable sites and segments.
-        masses: The masses that the joints carry, and the tip.
-        laws: The cables' elasticities.
-        lowest: Lower joint limits (nv,) [rad], less what rounding may take.
-        highest: Upper joint limits (nv,) [rad], likewise.
+        body: Rigid-body model.
+        tree: Kinematic tree of the joints.
+        routing: Cable sites and segments.
+        masses: Masses that the joints carry, and the position of the tip.
+        laws: Elasticities of the cables.
+        lowest: Lower joint limits (nv,) [rad], minus the rounding tolerance.
+        highest: Upper joint limits (nv,) [rad], plus the rounding tolerance.
     """
 
     body: RigidBody
@@ -63,12 +63,7 @@ class ArmModel:
     def of(
         cls, body: RigidBody, cables: tuple[Cable, ...], original_length: OriginalLength
     ) -> ArmModel:
-        """From the rigid bodies and the cables on them.
-
-        Raises:
-            CableError: A cable on a link that does not exist, or two of its sites coincide.
-            InvalidInput: The rigidity of a law jumps.
-        """
+        """Build the model from the rigid bodies and their cables; check sites, links and laws."""
         tree, laws = body.tree(), CableLaws(cables, original_length)
         laws.require_continuity()
         return cls(
@@ -82,12 +77,12 @@ class ArmModel:
         )
 
     def beyond_limits(self, q: Array) -> NDArray[np.bool_]:
-        """Which of the joint angles (nv,) [rad] are beyond their limits."""
+        """Check which joint angles (nv,) [rad] are beyond their limits."""
         return np.asarray((q < self.lowest) | (q > self.highest))
 
 
 def route(body: RigidBody, tree: Tree, cables: Sequence[Cable]) -> Routing:
-    """Place the sites on the joints, and find for every segment the joints that change it."""
+    """Compute each site in the frame of its joint, and find the joints that change each segment."""
     row, point, fixed = [], [], np.array([cable.lead for cable in cables])
     parts: list[tuple[int, int, int, int, int]] = []
     joints: list[int] = []
@@ -124,7 +119,7 @@ def route(body: RigidBody, tree: Tree, cables: Sequence[Cable]) -> Routing:
 
 
 def _joints_to(tree: Tree, row: int) -> list[int]:
-    """Rows of the joints from the base to a joint, base first, that one included."""
+    """Return the rows of the joints from the base to joint ``row``, base first, ``row`` last."""
     rows: list[int] = []
     while row:
         rows.insert(0, row)
@@ -133,20 +128,21 @@ def _joints_to(tree: Tree, row: int) -> list[int]:
 
 
 class CableLaws:
-    """The elasticities of an arm's cables: how stiff the cables are, and what they may carry.
+    """Elasticities of the cables of an arm: stiffness, tension bounds and original lengths.
 
-    A locked motor holds the original length l_0 of its wire. Under tension the wire is
-    ℓ = l_0 (1 + ε) long, so that its stiffness EA/l_0 is EA (1 + ε)/ℓ.
+    A locked motor holds the original length l_0 of its wire. Under tension the length of the wire
+    is ℓ = l_0 (1 + ε). The stiffness EA/l_0 is therefore EA (1 + ε)/ℓ.
 
     Args:
-        cables: Those of an arm.
-        original_length: ``"unstrained"``: a wire's original length is ℓ/(1 + ε); ``"stretched"``:
-            it is ℓ itself, as in the paper.
+        cables: Cables of the arm.
+        original_length: ``"unstrained"``: the original length of a wire is ℓ/(1 + ε).
+            ``"stretched"``: it is ℓ, as in the paper.
 
     Attributes:
-        held: Each law of the position-controlled cables, and which cables have it.
+        held: Each different law of the position-controlled cables, with the indices of its cables.
         series: 1/k_series of all cables (C,) [m/N].
-        rest: Tension at which their springs are at rest (C,) [N]: the low end of each law.
+        rest: Tension at which each series spring is at rest (C,) [N]: the low end of the law's
+            domain.
     """
 
     def __init__(self, cables: tuple[Cable, ...], original_length: OriginalLength) -> None:
@@ -156,7 +152,7 @@ class CableLaws:
         by_law: dict[object, list[int]] = {}
         for c in held:
             by_law.setdefault(_key(self._cables[c].elasticity), []).append(c)
-        # one law for all is the usual case, and a slice costs less than indices
+        # usually all cables have one law, and a slice is faster than indices
         self.held = [
             (
                 self._cables[cables[0]].elasticity,
@@ -170,7 +166,7 @@ class CableLaws:
         series = np.array([cable.series_stiffness for cable in self._cables])
         self.series = frozen(1.0 / series)
         self.rest = frozen(np.array([cable.elasticity.domain.low for cable in self._cables]))
-        # EA of the cables where it is always the same; laws that have to be asked
+        # constant EA of linear laws; all other laws are evaluated at each tension
         constant, linear, self._asked = np.zeros(len(self._cables)), np.zeros(len(self._cables)), []
         for law, of in self.held:
             if isinstance(law, LinearElasticity):
@@ -180,11 +176,7 @@ class CableLaws:
         self._constant, self._linear = frozen(constant), frozen(linear)
 
     def require_continuity(self) -> None:
-        """Refuse a law whose rigidity jumps.
-
-        Raises:
-            InvalidInput: Names a cable and the tension.
-        """
+        """Raise InvalidInput if the rigidity of a law jumps."""
         for law, held in self.held:
             jump = find_jump(law)
             if jump is not None:
@@ -197,20 +189,16 @@ class CableLaws:
                 )
 
     def narrowed(self, low: Array, high: Array) -> tuple[Array, Array]:
-        """Bounds of tension (…, C) [N], and those that the cables have of their own."""
+        """Return bounds of tension (…, C) [N], narrowed by the bounds that each cable defines."""
         if not self._bounded:
             return low, high
         return frozen(np.maximum(low, self._least)), frozen(np.minimum(high, self._most))
 
     def stiffness(self, lengths: Array, tension: Array) -> Array:
-        """Diagonal of K_L (C,) [N/m]: 1/(l_0/EA(F) + 1/k_series), 0 for force-controlled cables.
+        """Compute the diagonal of K_L (C,) [N/m]: 1/(l_0/EA(F) + 1/k_series).
 
-        Of checked lengths L (C,) [m] and tensions (C,) [N], which are not negative.
-
-        Raises:
-            ElasticityRangeError: Names the cables whose tension is outside their elasticity's
-                domain.
-            InvalidInput: An elasticity of the user's own gives no positive rigidity, or no strain.
+        Force-controlled cables have the stiffness 0. The lengths L (C,) [m] and the tensions (C,)
+        [N] must be checked before, and no tension may be negative.
         """
         rigidity = self._constant
         if self._asked:
@@ -224,12 +212,7 @@ class CableLaws:
         return frozen(k)
 
     def stretched_rigidity(self, law: Elasticity, tension: Array) -> Array:
-        """EA (1 + ε) [N] of a law, or EA where the stretched length counts; same shape as F [N].
-
-        Raises:
-            ElasticityRangeError: A tension outside the domain of the law.
-            InvalidInput: The law gives no positive rigidity, or no strain.
-        """
+        """Compute EA (1 + ε) [N] of a law, or EA if l_0 is the stretched length."""
         if isinstance(law, LinearElasticity):
             rigidity = law.rigidity(tension)
             return rigidity + tension if self._unstrained else rigidity
@@ -237,14 +220,11 @@ class CableLaws:
         return rigidity * (1.0 + _checked_strain(law, tension)) if self._unstrained else rigidity
 
     def original_lengths(self, lengths: Array, tension: Array) -> Array:
-        """l_0 (C,) [m] of cables that are L (C,) [m] long under F (C,) [N].
+        """Compute l_0 (C,) [m] of cables of length L (C,) [m] under tension F (C,) [N].
 
-        The series spring counts into the cable: l_0 is negative where it stretches by more than the
-        whole cable is long. Of a force-controlled cable, whose motor holds no length, L itself.
-
-        Raises:
-            ElasticityRangeError: As for :meth:`stiffness`.
-            InvalidInput: As for :meth:`stiffness`.
+        The cable length includes the series spring. l_0 is therefore negative if the spring
+        stretches by more than the length of the cable. The motor of a force-controlled cable holds
+        no length: the result is L.
         """
         wire = np.array(lengths)
         for law, held in self.held:
@@ -258,19 +238,15 @@ class CableLaws:
         return frozen(wire)
 
     def slopes(self, tension: Array, stiffness: Array) -> tuple[Array, Array]:
-        """dk/dF (C,) [1/m] and d²k/dF² (C,) [1/(N m)] of cables of stiffness k under F (C,) [N].
+        """Compute dk/dF (C,) [1/m] and d²k/dF² (C,) [1/(N m)] of the cable stiffness k at F (C,).
 
-        Both at a posture, where l_0 changes with F. With R = EA (1 + ε), G = R′/R and w = 1 −
-        k/k_series, the part of the wire in the cable's compliance,
+        The posture is constant, so l_0 changes with F. With R = EA (1 + ε), G = R′/R and the wire's
+        part of the cable compliance, w = 1 − k/k_series,
 
             k′ = k A,  k″ = k (A² + A′),  A = (1 − w)/R + w G,
             A′ = (1 − w) (A/R − G/R − A G) + w G′.
 
-        G′ is a difference, good for some five digits.
-
-        Raises:
-            ElasticityRangeError: As for :meth:`stiffness`.
-            InvalidInput: An elasticity of the user's own gives no finite slope.
+        G′ is computed by finite differences and has about five correct digits.
         """
         first, second = np.zeros_like(stiffness), np.zeros_like(stiffness)
         for law, held in self.held:
@@ -303,26 +279,26 @@ class CableLaws:
     def naming(
         self, error: ElasticityRangeError, held: slice | NDArray[np.intp]
     ) -> ElasticityRangeError:
-        """The error of a law at the tensions of some cables, with their names and numbers."""
+        """Return the error of a law with the names and the indices of its cables added."""
         outside = np.arange(len(self._cables))[held][list(error.indices)].tolist()
         names = [self._cables[c].name for c in outside]
         return ElasticityRangeError(error.problem, error.tension, outside, names)
 
 
 def kinks(law: Elasticity) -> tuple[float, ...]:
-    """Tensions [N], rising, at which the slope of a law's rigidity jumps.
+    """Return the tensions [N], in rising order, at which the slope of a law's rigidity jumps.
 
-    Slopes at a kink are those of the range below it. The weak kinks at the points of a table are
-    not among them.
+    The slope at a kink is the slope of the range below it. A table has weak kinks at its points;
+    they are not returned.
     """
     return law.joins if isinstance(law, StrandElasticity) else ()
 
 
 def _checked_rigidity(law: Elasticity, tension: Array) -> Array:
-    """EA(F) [N] of a law, same shape as F [N], which need not be the library's own."""
+    """Return EA(F) [N] of a law, same shape as F [N]; check it, since users define laws."""
     rigidity = np.asarray(law.rigidity(tension))
     _, least, most = RANGES["rigidity"]
-    usable = (rigidity >= least) & (rigidity <= most)  # false for NaN too
+    usable = (rigidity >= least) & (rigidity <= most)  # False for NaN
     if rigidity.shape != tension.shape or np.count_nonzero(usable) < tension.size:
         raise InvalidInput(
             "elasticity",
@@ -333,9 +309,9 @@ def _checked_rigidity(law: Elasticity, tension: Array) -> Array:
 
 
 def _checked_strain(law: Elasticity, tension: Array) -> Array:
-    """ε(F) [-] of a law, same shape as F [N], which need not be the library's own."""
+    """Return ε(F) [-] of a law, same shape as F [N]; check it, since users define laws."""
     strain = np.asarray(law.strain(tension))
-    usable = (strain > -1.0) & (strain <= LARGEST)  # false for NaN too
+    usable = (strain > -1.0) & (strain <= LARGEST)  # False for NaN
     if strain.shape != tension.shape or np.count_nonzero(usable) < tension.size:
         raise InvalidInput(
             "elasticity",
@@ -346,7 +322,7 @@ def _checked_strain(law: Elasticity, tension: Array) -> Array:
 
 
 def _key(law: Elasticity) -> object:
-    """What equal laws share; an elasticity of the user's own need not be hashable."""
+    """Return a key that is equal for equal laws; a user-defined law may not be hashable."""
     try:
         hash(law)
     except TypeError:

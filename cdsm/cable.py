@@ -1,4 +1,4 @@
-"""Cables: straight runs between sites on links, and the cables of a serpentine geometry."""
+"""Cables as straight segments between sites on links, and the cables of a serpentine geometry."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ Control = Literal["position", "force"]
 @final
 @dataclass(frozen=True)
 class Site:
-    """A point fixed to a link that a cable passes or ends at.
+    """A point fixed to a link. A cable passes through it or ends at it.
 
     Attributes:
-        link: Name of the link, as in the URDF.
-        position: The point in the link's frame [m].
+        link: Name of the link in the URDF.
+        position: Position in the link's frame [m].
 
     Raises:
-        InvalidInput: The position is not three finite numbers, or the link not a name.
+        InvalidInput: ``position`` is not three finite numbers, or ``link`` is not a name.
     """
 
     link: str
@@ -55,23 +55,24 @@ class Site:
 class Cable:
     """A frictionless cable through an ordered list of sites, actuator side first.
 
-    Its length L is ``lead`` plus the straight segments between neighbouring sites. Its stiffness is
-    k = 1/(l_0/EA(F) + 1/k_series), or 0 where the motor controls force. The original length of the
-    wire is l_0 = (L − ΔF/k_series)/(1 + ε(F)), strain and ΔF counted from the low end of the
-    elasticity's domain: a series spring is part of the cable, so give it a lead that holds it.
+    The cable length L is ``lead`` plus the straight segments between neighbouring sites. The cable
+    stiffness is k = 1/(l_0/EA(F) + 1/k_series); it is 0 if the motor controls force. The original
+    length of the wire is l_0 = (L − ΔF/k_series)/(1 + ε(F)). Strain ε and ΔF start at the low end
+    of the elasticity's domain. L includes the series spring, so the lead must be long enough to
+    contain it.
 
     Attributes:
         name: Unique name within an arm.
-        sites: Two or more, from the actuator's side to the end.
-        elasticity: EA(F).
+        sites: Two or more sites, from the actuator to the end of the cable.
+        elasticity: Law EA(F).
         lead: Straight cable between the actuator and the first site [m].
-        series_stiffness: k_series of a spring or drive in series [N/m]; inf: none.
+        series_stiffness: k_series of a spring or drive in series [N/m]; inf: no spring.
         control: ``"position"``: the motor holds the length; ``"force"``: it holds the tension.
-        minimum: Least tension the cable is to carry [N]; every distribution of tensions keeps it.
-        maximum: Largest tension it may carry [N], likewise; inf: any.
+        minimum: Smallest allowed tension [N]; every tension distribution respects it.
+        maximum: Largest allowed tension [N]; every tension distribution respects it; inf: no limit.
 
     Raises:
-        CableError: Names the cable and what is wrong with it.
+        CableError: An attribute is invalid; the error names the cable and the fault.
     """
 
     name: str
@@ -115,18 +116,18 @@ class Cable:
         object.__setattr__(self, "series_stiffness", series)
 
     def elongation(self, tension: ArrayLike, free_length: float) -> Array:
-        """Δl = l_0 ε(F) + ΔF/k_series [m], from the low end of the elasticity's domain.
+        """Compute Δl = l_0 ε(F) + ΔF/k_series [m], from the low end of the elasticity's domain.
 
-        Wire and series spring carry the same tension and stretch each on its own: a hybrid cable
-        (Fig. 11), or a wire on a compliant drive.
+        Wire and series spring carry the same tension, and their elongations add up. Examples are a
+        hybrid cable (Fig. 11) and a wire on a compliant drive.
 
         Args:
             tension: F [N], any shape.
             free_length: l_0 of the wire [m].
 
         Raises:
-            InvalidInput: The length is not a positive number.
-            ElasticityRangeError: A tension outside the domain of the elasticity.
+            InvalidInput: ``free_length`` is not a positive number.
+            ElasticityRangeError: A tension is outside the domain of the elasticity.
         """
         values = self.elasticity.domain.check(tension)
         length = _length(free_length)
@@ -134,44 +135,32 @@ class Cable:
         return np.asarray(wire + (values - self.elasticity.domain.low) / self.series_stiffness)
 
     def tangent_stiffness(self, tension: ArrayLike, free_length: float) -> Array:
-        """dF/dΔl = 1/(l_0/EA(F) + 1/k_series) [N/m], whatever the motor controls.
+        """Compute dF/dΔl = 1/(l_0/EA(F) + 1/k_series) [N/m] for any type of motor control.
 
-        Args:
-            tension: F [N], any shape.
-            free_length: l_0 of the wire [m].
-
-        Raises:
-            InvalidInput: The length is not a positive number.
-            ElasticityRangeError: A tension outside the domain of the elasticity.
+        Arguments, shapes and errors are those of :meth:`elongation`.
         """
         rigidity = self.elasticity.rigidity(tension)
         return np.asarray(1.0 / (_length(free_length) / rigidity + 1.0 / self.series_stiffness))
 
     def energy(self, tension: ArrayLike, free_length: float) -> Array:
-        """∫ F dΔl = l_0 ∫ F dε + Δ(F²)/(2 k_series) [J], from the low end of the domain.
+        """Compute ∫ F dΔl = l_0 ∫ F dε + Δ(F²)/(2 k_series) [J], from the low end of the domain.
 
-        Args:
-            tension: F [N], any shape.
-            free_length: l_0 of the wire [m].
-
-        Raises:
-            InvalidInput: The length is not a positive number.
-            ElasticityRangeError: A tension outside the domain of the elasticity.
+        Arguments, shapes and errors are those of :meth:`elongation`.
         """
         values = self.elasticity.domain.check(tension)
         spring = (values**2 - self.elasticity.domain.low**2) / (2.0 * self.series_stiffness)
         return np.asarray(_length(free_length) * self.elasticity.energy(values) + spring)
 
     def tension(self, elongation: ArrayLike, free_length: float) -> Array:
-        """F [N] at an elongation: the inverse of :meth:`elongation`.
+        """Compute F [N] at an elongation: the inverse of :meth:`elongation`.
 
         Args:
             elongation: Δl [m] from the low end of the elasticity's domain, any shape.
             free_length: l_0 of the wire [m].
 
         Raises:
-            InvalidInput: Not numbers, or the length is not positive.
-            ElasticityRangeError: An elongation that no tension of the domain gives.
+            InvalidInput: ``elongation`` is not numbers, or ``free_length`` is not positive.
+            ElasticityRangeError: No tension of the domain gives one of the elongations.
         """
         return tension_at(
             number_array("elongation", elongation),
@@ -190,13 +179,13 @@ def _length(value: float) -> float:
 
 
 def in_series(*stiffness: float) -> float:
-    """Stiffness of springs in series, 1/Σ(1/k) [N/m]: of a spring behind a compliant drive, say.
+    """Compute the stiffness of springs in series, 1/Σ(1/k) [N/m], e.g. a spring and its drive.
 
     Args:
-        stiffness: One or more k [N/m], each positive; inf for a rigid one.
+        stiffness: One or more positive k [N/m]; inf for a rigid spring.
 
     Raises:
-        InvalidInput: One of them is not positive, or none is given.
+        InvalidInput: A stiffness is not positive, or no stiffness is given.
     """
     if not stiffness:
         raise InvalidInput("stiffness", "none given; give one or more in N/m.")
@@ -214,19 +203,19 @@ def serpentine_cables(
 ) -> tuple[Cable, ...]:
     """Route the cables of a serpentine arm through the holes of its disks.
 
-    A cable of joint k passes the base disk and every disk of links 1…k−1 and ends on the first disk
-    of link k, always through the hole (x, R cos φ, R sin φ). It is called ``cable{k}_{i}``, the
-    i-th of its joint.
+    A cable of joint k passes the base disk and every disk of links 1…k−1. It ends on the first disk
+    of link k. Its hole is always (x, R cos φ, R sin φ). The i-th cable of joint k has the name
+    ``cable{k}_{i}``.
 
     Args:
         geometry: The arm.
-        elasticity: One for all cables, or one per cable in the geometry's order.
-        series_stiffness: As in :class:`Cable`, for all cables [N/m].
-        control: As in :class:`Cable`, for all cables.
+        elasticity: One law for all cables, or one law per cable in the geometry's order.
+        series_stiffness: k_series of all cables [N/m], as in :class:`Cable`.
+        control: Motor control of all cables, as in :class:`Cable`.
 
     Raises:
-        InvalidInput: The number of elasticities is not one, nor that of the cables.
-        CableError: A cable that cannot be.
+        InvalidInput: The number of elasticities is neither one nor the number of cables.
+        CableError: A cable is invalid.
     """
     count = len(instance("geometry", geometry, Geometry).cables)
     elasticities = (elasticity,) * count if isinstance(elasticity, Elasticity) else elasticity

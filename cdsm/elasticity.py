@@ -1,7 +1,7 @@
-"""How stiff the cable material is: axial rigidity EA [N] as a function of tension [N].
+"""Elasticity of the cable material: axial rigidity EA [N] as a function of tension [N].
 
-A cable of free length l_0 under tension F has the stiffness dF/dL = EA(F)/l_0, where EA is the
-*tangent* rigidity. Nothing here knows of a robot.
+A cable of unstretched length l_0 under tension F has the stiffness dF/dL = EA(F)/l_0. EA is the
+*tangent* rigidity. This module is independent of the robot.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ _STEP = 6e-6
 @final
 @dataclass(frozen=True)
 class Domain:
-    """The tensions [N] an elasticity is defined on; iterates as (low, high).
+    """Range of tensions [N] on which an elasticity is defined; iterates as (low, high).
 
     Attributes:
         low: Smallest tension [N].
         high: Largest tension [N], included unless infinite.
-        low_included: Whether ``low`` itself belongs to the domain.
+        low_included: Whether ``low`` belongs to the domain.
 
     Raises:
-        InvalidInput: Not two numbers with 0 <= low < high, or ``low_included`` no flag.
+        InvalidInput: Not two numbers with 0 <= low < high, or ``low_included`` is not a bool.
     """
 
     low: float
@@ -62,18 +62,18 @@ class Domain:
 
     @property
     def first(self) -> float:
-        """Smallest tension that belongs to it [N]: ``low``, or the next number above."""
+        """Smallest tension in the domain [N]: ``low``, or the next float64 above ``low``."""
         return self.low if self.low_included else math.nextafter(self.low, math.inf)
 
     def check(self, tension: ArrayLike) -> Array:
-        """Return the tensions as a float array of the same shape if all lie in the domain.
+        """Return the tensions as a float array of the same shape; check that all are in the domain.
 
         Args:
             tension: F [N], any shape.
 
         Raises:
-            InvalidInput: Not finite numbers.
-            ElasticityRangeError: Some lie outside; the error says which.
+            InvalidInput: ``tension`` is not finite numbers.
+            ElasticityRangeError: Some tensions are outside the domain; the error lists them.
         """
         values = number_array("tension", tension)
         outside = values <= self.low if not self.low_included else values < self.low
@@ -91,39 +91,40 @@ class Domain:
 class Elasticity(ABC):
     """Axial elasticity of a cable. All methods take any shape and return the same shape.
 
-    A law of your own defines :attr:`domain`, :meth:`rigidity`, :meth:`strain` and :meth:`energy`.
-    Its rigidity must be positive and continuous; it may bend sharply. :class:`~cdsm.Manipulator`
-    samples it and refuses a jump of more than 0.01 % that it finds.
+    A user-defined law must define :attr:`domain`, :meth:`rigidity`, :meth:`strain` and
+    :meth:`energy`. The rigidity must be positive and continuous; its slope may jump.
+    :class:`~cdsm.Manipulator` samples the rigidity and refuses a law if it finds a jump of more
+    than 0.01 %.
     """
 
     @property
     @abstractmethod
     def domain(self) -> Domain:
-        """The tensions [N] for which the elasticity is defined."""
+        """Tensions [N] for which the elasticity is defined."""
 
     @abstractmethod
     def rigidity(self, tension: ArrayLike) -> Array:
-        r"""Tangent rigidity EA(F) = l_0 dF/dΔl [N]: what K_L is made of (caption of Fig. 5).
+        """Compute the tangent rigidity EA(F) = l_0 dF/dΔl [N]; K_L uses it (caption of Fig. 5).
 
         Args:
             tension: F [N], any shape.
 
         Raises:
-            ElasticityRangeError: A tension outside :attr:`domain`, or one at which the law gives no
-                positive rigidity.
+            ElasticityRangeError: A tension is outside :attr:`domain`, or the law has no positive
+                rigidity there.
         """
 
     def rigidity_slope(self, tension: ArrayLike) -> Array:
-        r"""dEA/dF [-]: how the tangent rigidity grows with tension.
+        """Compute dEA/dF [-], the slope of the tangent rigidity.
 
-        Unless a law knows better, the central difference over F ± 6e-6 max(F, 1 N), good for some
-        ten digits. Beside an end of :attr:`domain` it is one-sided.
+        By default it is the central difference over F ± 6e-6 max(F, 1 N), with about ten correct
+        digits. Near an end of :attr:`domain` the difference is one-sided. A law may override it.
 
         Args:
             tension: F [N], any shape.
 
         Raises:
-            ElasticityRangeError: A tension outside :attr:`domain`.
+            ElasticityRangeError: A tension is outside :attr:`domain`.
         """
         values = self.domain.check(tension)
         step = _STEP * np.maximum(values, 1.0)
@@ -133,37 +134,27 @@ class Elasticity(ABC):
 
     @abstractmethod
     def strain(self, tension: ArrayLike) -> Array:
-        r"""Strain Δl/l_0 = ∫ dF/EA(F) [-] since the low end of the domain.
+        """Compute the strain Δl/l_0 = ∫ dF/EA(F) [-] from the low end of the domain.
 
-        Args:
-            tension: F [N], any shape.
-
-        Raises:
-            ElasticityRangeError: As for :meth:`rigidity`.
+        Argument and errors are those of :meth:`rigidity`.
         """
 
     @abstractmethod
     def energy(self, tension: ArrayLike) -> Array:
-        r"""Elastic energy ∫ F dε = ∫ F dF/EA(F) [N] = [J/m] per metre of free length.
+        """Compute the elastic energy ∫ F dε = ∫ F dF/EA(F) [N] = [J/m] per unstretched metre.
 
-        Counted, like :meth:`strain`, from the low end of the domain.
-
-        Args:
-            tension: F [N], any shape.
-
-        Raises:
-            ElasticityRangeError: As for :meth:`rigidity`.
+        It starts at the low end of the domain. Argument and errors are those of :meth:`rigidity`.
         """
 
     def tension(self, strain: ArrayLike) -> Array:
-        r"""Tension F [N] at a strain: the inverse of :meth:`strain`.
+        """Compute the tension F [N] at a strain: the inverse of :meth:`strain`.
 
         Args:
-            strain: Δl/l_0 [-] since the low end of the domain, any shape.
+            strain: Δl/l_0 [-] from the low end of the domain, any shape.
 
         Raises:
-            InvalidInput: Not numbers.
-            ElasticityRangeError: A strain that no tension of the domain gives.
+            InvalidInput: ``strain`` is not numbers.
+            ElasticityRangeError: No tension of the domain gives one of the strains.
         """
         wanted = number_array("strain", strain)
         return tension_at(
@@ -171,15 +162,10 @@ class Elasticity(ABC):
         )
 
     def secant_rigidity(self, tension: ArrayLike) -> Array:
-        r"""Secant rigidity ΔF/(Δl/l_0) [N] of Eq. 18, both Δ taken from the low end of the domain.
+        """Compute the secant rigidity ΔF/(Δl/l_0) [N] of Eq. 18 from the low end of the domain.
 
-        Equal to :meth:`rigidity` at the low end, and everywhere if EA is constant.
-
-        Args:
-            tension: F [N], any shape.
-
-        Raises:
-            ElasticityRangeError: As for :meth:`rigidity`.
+        It equals :meth:`rigidity` at the low end, and everywhere if EA is constant. Argument and
+        errors are those of :meth:`rigidity`.
         """
         values = self.domain.check(tension)
         strain = self.strain(values)
@@ -194,13 +180,13 @@ _ALL_TENSIONS = Domain(0.0, math.inf)
 @final
 @dataclass(frozen=True, init=False, repr=False)
 class LinearElasticity(Elasticity):
-    """EA constant: a solid wire, or a strand in its elastic stage.
+    """Elasticity with constant EA: a solid wire, or a strand in its elastic stage.
 
     Args:
         rigidity: EA [N].
 
     Raises:
-        InvalidInput: EA is not a number, or outside its range in :data:`RANGES`.
+        InvalidInput: EA is not a number, or is outside its range in :data:`RANGES`.
     """
 
     _rigidity: float
@@ -213,14 +199,14 @@ class LinearElasticity(Elasticity):
 
     @classmethod
     def of_wire(cls, young_modulus: float, diameter: float) -> LinearElasticity:
-        """EA = E π d²/4 of a solid round wire.
+        """Compute EA = E π d²/4 of a solid round wire.
 
         Args:
             young_modulus: E [Pa].
             diameter: d [m].
 
         Raises:
-            InvalidInput: Either is not a positive finite number.
+            InvalidInput: E or d is not a positive finite number.
         """
         for name, value in (("young_modulus", young_modulus), ("diameter", diameter)):
             if scalar(name, value) <= 0.0:
@@ -229,32 +215,32 @@ class LinearElasticity(Elasticity):
 
     @property
     def domain(self) -> Domain:
-        """[0 N, inf N)."""
+        """All tensions: [0 N, inf N)."""
         return _ALL_TENSIONS
 
     def rigidity(self, tension: ArrayLike) -> Array:
-        """EA [N], whatever the tension; see :meth:`Elasticity.rigidity`."""
+        """Return EA [N] for every tension; see :meth:`Elasticity.rigidity`."""
         rigidity = self.domain.check(tension)
         rigidity.fill(self._rigidity)
         return rigidity
 
     def rigidity_slope(self, tension: ArrayLike) -> Array:
-        """Zero [-]; see :meth:`Elasticity.rigidity_slope`."""
+        """Return zero [-]; see :meth:`Elasticity.rigidity_slope`."""
         return np.zeros_like(self.domain.check(tension))
 
     def strain(self, tension: ArrayLike) -> Array:
-        """F/EA [-]; see :meth:`Elasticity.strain`."""
+        """Compute F/EA [-]; see :meth:`Elasticity.strain`."""
         return self.domain.check(tension) / self._rigidity
 
     def energy(self, tension: ArrayLike) -> Array:
-        """F²/(2 EA) [N]; see :meth:`Elasticity.energy`."""
+        """Compute F²/(2 EA) [N]; see :meth:`Elasticity.energy`."""
         return np.asarray(self.domain.check(tension) ** 2 / (2.0 * self._rigidity))
 
 
 _ROUNDING = 1e-15
 """Relative rounding of a strain: a few units in the last place."""
 
-# denser at the low end, where most laws are soft; ends exactly at 0 and 1
+# denser at the low end, where most laws are soft; the first and last points are exactly 0 and 1
 _GRID = np.linspace(0.0, 1.0, 25) ** 3
 
 
@@ -265,27 +251,26 @@ def tension_at(
     slope: Callable[[Array], Array],
     name: str,
 ) -> Array:
-    """Tensions F [N] at which a rising stretch(F), zero at the low end, has the wanted values.
+    """Find the tensions F [N] at which a rising function stretch(F) has the wanted values.
+
+    If no tension of the domain gives one of the values, ElasticityRangeError is raised.
 
     Args:
         wanted: Strain [-] or elongation [m], any shape.
-        domain: Tensions to look in.
-        stretch: The rising law.
-        slope: Its derivative by F.
-        name: What is wanted, for the error.
-
-    Raises:
-        ElasticityRangeError: No tension of the domain gives one of the values.
+        domain: Allowed tensions.
+        stretch: Rising function of F; it is zero at the low end of the domain.
+        slope: Derivative of ``stretch`` with respect to F.
+        name: Name of the wanted quantity, for the error.
     """
     low, high, most = *domain, RANGES["tension"].high
-    if math.isinf(high):  # as far as is needed: an unbounded law stretches without end
+    if math.isinf(high):  # an unbounded law: search only as far as needed
         high = max(1.0, 2.0 * low)
         while float(stretch(np.array(high))) < wanted.max(initial=0.0) and high < most:
             high = min(2.0 * high, most)
     grid = np.maximum(low + (high - low) * _GRID, domain.first)
-    grid[-1] = high  # which low + (high - low) may miss by rounding
+    grid[-1] = high  # low + (high - low) may differ from high by rounding
     reached = stretch(grid)
-    # one tension alone may give another last digit than among many, and the end belongs to it
+    # a law's last digit may depend on the array size, and ``high`` belongs to the domain
     outside = (wanted < 0.0) | (wanted > reached[-1] * (1.0 + _ROUNDING))
     if outside.any():
         first = np.atleast_1d(wanted)[np.atleast_1d(outside)][0]
@@ -308,27 +293,28 @@ def rising_root(
     stretch: Callable[[Array], Array],
     slope: Callable[[Array], Array],
 ) -> tuple[Array, Array]:
-    """Tensions F [N] between bounds at which a rising stretch(F) has the wanted values, and slope.
+    """Find tensions F [N] between bounds at which a rising stretch(F) has the wanted values.
 
-    Newton's method inside a shrinking bracket, so that it converges for every rising law. All
-    arrays have one shape; an upper bound may be infinite.
+    Returns the tensions and the slopes of stretch(F) there. All arrays have the same shape; an
+    upper bound may be infinite. Newton's method runs inside a shrinking bracket, so it converges
+    for every rising law.
 
-    scipy has nothing as fast: of 15 cables of the 1×19 strand, from 2 % beside the root, this takes
-    a thirteenth of the time of ``scipy.optimize.elementwise.find_root`` (scipy 1.17), which has no
-    derivative to use, and an eleventh of that of ``brentq``, cable by cable.
+    scipy 1.17 is slower: the test was 15 cables of the 1×19 strand, started 2 % from the root.
+    ``scipy.optimize.elementwise.find_root`` uses no derivative and takes 13 times as long.
+    ``brentq``, cable by cable, takes 11 times as long.
     """
     first, last, previous = lower, upper, np.full(np.shape(wanted), math.inf)
     guess = np.minimum(np.maximum(guess, first), last)
-    for _ in range(200):  # bisection alone would take 60
+    for _ in range(200):  # bisection alone needs 60
         error, rise = np.asarray(stretch(guess)) - wanted, slope(guess)
         step = error / rise
-        converged = abs(step) <= 1e-13 * np.maximum(guess, 1.0)  # rounding is near
+        converged = abs(step) <= 1e-13 * np.maximum(guess, 1.0)  # close to rounding
         if converged.all():
             break
         lower = np.where(error <= 0.0, guess, lower)
         upper = np.where(error >= 0.0, guess, upper)
         newton = guess - step
-        # where the law is nearly upright, Newton's method may cycle inside the bracket
+        # where the law is very steep, Newton's method may cycle inside the bracket
         cycling = ~converged & (abs(step) > previous / 2.0) & np.isfinite(upper)
         halve = cycling | (newton < lower) | (newton > upper)
         following = np.where(halve, (lower + upper) / 2.0, newton)

@@ -1,7 +1,7 @@
-"""What can go wrong, by name: every failure of the library is a :class:`CdsmError`.
+"""All errors of the library; each one is a subclass of :class:`CdsmError`.
 
-Each error carries the data it speaks of as attributes, and its message says what was found, what is
-allowed and what to do about it.
+An error stores its data as attributes. Its message names the fault, the allowed values and the
+remedy.
 """
 
 from __future__ import annotations
@@ -17,39 +17,39 @@ if TYPE_CHECKING:
 
 
 def listed(faults: Sequence[str], most: int | None = None) -> str:
-    """Faults on lines of their own, at most so many of them."""
+    """Return the faults as one line each; ``most`` limits their number."""
     more = "" if most is None or len(faults) <= most else f"\n  and {len(faults) - most} more"
     return "".join(f"\n  - {fault}" for fault in faults[:most]) + more
 
 
 def counted(faults: Sequence[str], most: int | None = None) -> str:
-    """How many faults there are, and :func:`listed` below it."""
+    """Return the number of faults, with :func:`listed` below it."""
     count = "1 fault" if len(faults) == 1 else f"{len(faults)} faults"
     return f"{count}:{listed(faults, most)}"
 
 
 def first_of(said: Sequence[str], most: int, what: str) -> str:
-    """The first of some sentences, and how many there are beyond: ``…; and 3 joints more``."""
+    """Return the first ``most`` sentences and the number of others: ``…; and 3 joints more``."""
     more = len(said) - most
     return "; ".join(said[:most]) + (f"; and {more} {what} more" if more > 0 else "")
 
 
 _NAMED = 4
-"""Joints or cables that a message names; all are in the data of its error."""
+"""Number of joints or cables that a message names; the attributes of the error hold all of them."""
 
 LONGEST = 8000
-"""Characters of a message; a file can hold a name of megabytes, and the rest helps nobody."""
+"""Largest number of characters of a message, since a name in a file can be very long."""
 
 
 class CdsmError(Exception):
-    """Root of all errors raised by cdsm."""
+    """Base class of all errors raised by cdsm."""
 
     def __init__(self, message: str = "") -> None:
         more = len(message) - LONGEST
         super().__init__(message if more <= 0 else f"{message[:LONGEST]}… ({more} characters more)")
 
     def __reduce__(self) -> tuple[object, ...]:
-        # the children take keyword data, which Exception's own pickling would lose
+        # subclasses have attributes, which Exception's own pickling would lose
         return (_restore, (type(self), self.args, self.__dict__))
 
 
@@ -64,10 +64,10 @@ def _restore(kind: type[CdsmError], args: tuple[object, ...], data: dict[str, ob
 
 
 class InvalidInput(CdsmError, ValueError):
-    """An argument has the wrong type, shape or value.
+    """An argument with a wrong type, shape or value.
 
     Attributes:
-        name: The offending argument.
+        name: Name of the argument.
     """
 
     def __init__(self, name: str, problem: str) -> None:
@@ -76,11 +76,11 @@ class InvalidInput(CdsmError, ValueError):
 
 
 class UnknownName(CdsmError, LookupError):
-    """A name (of a link, solver, stiffness term, …) that does not exist here.
+    """An unknown name, e.g. of a link, a solver or a stiffness term.
 
     Attributes:
-        name: The name asked for.
-        known: The names that exist.
+        name: The unknown name.
+        known: The known names.
     """
 
     def __init__(self, kind: str, name: object, known: Iterable[str], remedy: str = "") -> None:
@@ -95,14 +95,14 @@ class UnknownName(CdsmError, LookupError):
 
 
 _PATH = 1000
-"""Characters of a path that a message shows."""
+"""Number of characters of a path that a message shows."""
 
 
 class FileError(CdsmError, OSError):
-    """A file cannot be read or written.
+    """A file that cannot be read or written.
 
     Attributes:
-        path: The file.
+        path: Path of the file.
     """
 
     def __init__(self, path: object, problem: str) -> None:
@@ -112,10 +112,10 @@ class FileError(CdsmError, OSError):
 
 
 class StoreError(FileError):
-    """A store of a sweep that holds another one, or that another run is writing to.
+    """A sweep store that holds another sweep, or that another run is writing to.
 
     Attributes:
-        differences: What the store holds and what was asked for, one difference each.
+        differences: Differences between the stored sweep and the requested sweep, one each.
     """
 
     def __init__(self, path: object, problem: str, differences: Sequence[str] = ()) -> None:
@@ -127,8 +127,8 @@ class MissingExtra(CdsmError, ImportError):
     """An optional package that is not installed.
 
     Attributes:
-        package: Its name.
-        extra: The extra of ``cdsm-stiffness`` that brings it.
+        package: Name of the package.
+        extra: The extra of ``cdsm-stiffness`` that installs it.
     """
 
     def __init__(self, package: str, extra: str) -> None:
@@ -141,15 +141,15 @@ class MissingExtra(CdsmError, ImportError):
 
 
 class ClusterError(CdsmError):
-    """A dask cluster that does not do its work."""
+    """A dask cluster that does not work."""
 
 
 class GeometryError(CdsmError, ValueError):
     """A geometry that cannot be built.
 
     Attributes:
-        faults: Every fault found, one sentence each.
-        source: The file it came from, or None.
+        faults: All faults, one sentence each.
+        source: The file of the geometry, or None.
     """
 
     def __init__(self, faults: Sequence[str], source: str | None = None) -> None:
@@ -160,7 +160,7 @@ class GeometryError(CdsmError, ValueError):
 
 
 class UrdfError(CdsmError, ValueError):
-    """A URDF that is not a robot cdsm can work with, or that does not survive being read back."""
+    """A URDF that cdsm cannot use, or that two parsers read differently."""
 
 
 class CableError(CdsmError, ValueError):
@@ -176,17 +176,17 @@ class CableError(CdsmError, ValueError):
 
 
 class TensileTestError(CdsmError, ValueError):
-    """A tensile test that no elasticity can be read from."""
+    """A tensile test from which no elasticity can be computed."""
 
 
 class JointLimitError(CdsmError, ValueError):
     """A joint angle beyond its limit.
 
     Attributes:
-        problem: Which angles are beyond which limits, the first few of them.
-        joints: Names of the offending joints.
-        angles: Their angles [rad]; [m] where a joint slides.
-        limits: Their (lower, upper) limits [rad]; [m] where a joint slides.
+        problem: The first few angles that are beyond their limits, as text.
+        joints: Names of the joints beyond their limits.
+        angles: Angles of these joints [rad]; [m] where a joint slides.
+        limits: Limits (lower, upper) of these joints [rad]; [m] where a joint slides.
     """
 
     def __init__(
@@ -213,7 +213,7 @@ class JointLimitError(CdsmError, ValueError):
 
 
 def _beyond(joint: str, angle: float, limits: tuple[float, float], unit: str) -> str:
-    """Where a joint is and may be; in degrees too, if it turns."""
+    """Return a joint's position and limits as text; if the joint turns, add degrees."""
     low, high = limits
     said = f"{joint} = {angle:.6g} {unit} is outside [{low:.6g}, {high:.6g}] {unit}"
     if unit != "rad":
@@ -226,10 +226,10 @@ class ElasticityRangeError(CdsmError, ValueError):
     """A tension at which the elasticity is not defined.
 
     Attributes:
-        problem: What is wrong with it.
-        tension: The offending tensions [N].
-        indices: Where they stand in what was given.
-        cables: Names of the cables that carry them; empty where no cable is known.
+        problem: The fault, as text.
+        tension: The invalid tensions [N].
+        indices: Indices of these tensions in the input array.
+        cables: Names of the cables with these tensions; empty if no cable is known.
     """
 
     def __init__(
@@ -249,15 +249,16 @@ class ElasticityRangeError(CdsmError, ValueError):
 
 
 class InfeasibleTension(CdsmError):
-    """No admissible cable tension balances the arm at this posture.
+    """No cable tension within the bounds balances the arm at this posture.
 
     Attributes:
-        missing: Torque that no admissible tension supplies, per joint, shape (nv,) [N m] ([N] where
-            it slides); the smallest in the sum of magnitudes.
-        joint: Name of the joint that lacks most.
-        relaxation: By how much all bounds would have to widen [N]; inf if no bounds would do.
-        binding: Names of the cables that stand at a bound in the closest attempt.
-        fixed: Names of the cables whose fixed tensions are in the way; empty if they are not.
+        missing: Missing torque per joint, shape (nv,) [N m] ([N] where it slides). It has the
+            smallest possible sum of magnitudes.
+        joint: Name of the joint with the largest missing torque.
+        relaxation: Widening of all bounds that makes the problem feasible [N]; inf if none does.
+        binding: Names of the cables at a bound in the closest attempt.
+        fixed: Names of the cables with fixed tensions, if these make the problem infeasible; else
+            empty.
     """
 
     def __init__(
@@ -304,16 +305,16 @@ def _first(words: Sequence[str]) -> str:
 
 
 def _rounded_up(value: float) -> str:
-    """Four digits, so that what is said to be enough is."""
+    """Round up to four digits, so that the printed widening is sufficient."""
     step = 10.0 ** (math.floor(math.log10(value)) - 3) if value > 0.0 else 1.0
     return f"{math.ceil(value / step) * step:.4g}"
 
 
 class SolverError(CdsmError):
-    """A quadratic-programming solver returned something that is not the optimum.
+    """A quadratic-programming solver returned a result that is not the optimum.
 
     Attributes:
-        solver: Its name.
+        solver: Name of the solver.
     """
 
     def __init__(self, solver: str, problem: str) -> None:
@@ -334,10 +335,10 @@ class SingularStiffness(CdsmError, ArithmeticError):
 
 
 class SingularMass(CdsmError, ArithmeticError):
-    """A joint motion that moves no mass, and so has no natural frequency.
+    """A joint motion that moves no mass and therefore has no natural frequency.
 
     Attributes:
-        direction: The motion (nv,), unit length.
+        direction: The joint motion (nv,), unit length.
     """
 
     def __init__(self, problem: str, direction: NDArray[np.float64]) -> None:
@@ -346,12 +347,12 @@ class SingularMass(CdsmError, ArithmeticError):
 
 
 class EquilibriumError(CdsmError, ArithmeticError):
-    """A loaded arm that finds no place to rest, or buckles on the way.
+    """A loaded arm that has no equilibrium, or that buckles before the full load.
 
     Attributes:
-        residual: Torque out of balance at the last iterate (nv,) [N m].
-        load_factor: Part of the load [-] under which the arm still stood.
-        joint: Name of the joint furthest from balance, or that gives way first.
+        residual: Torque residual at the last iterate (nv,) [N m].
+        load_factor: Largest fraction of the load [-] at which the arm was in equilibrium.
+        joint: Name of the joint with the largest residual, or of the joint that buckles first.
     """
 
     def __init__(
@@ -374,11 +375,11 @@ class UnreachableStiffness(CdsmError):
 
     Attributes:
         direction: u (3,), unit length, base axes.
-        target: What was wanted [N/m].
+        target: Wanted stiffness [N/m].
         low: Smallest attainable stiffness along u [N/m].
-        high: Largest attainable stiffness along u [N/m]; inf if tension raises it without end.
-        nearest: What is attainable next to it [N/m]: an end of the range, or the nearest found on
-            both sides.
+        high: Largest attainable stiffness along u [N/m]; inf if it has no upper bound.
+        nearest: Attainable stiffness nearest to the target [N/m]: an end of the range, or the
+            nearest values found on both sides.
     """
 
     def __init__(

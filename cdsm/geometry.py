@@ -1,6 +1,6 @@
-"""The description of an arm: joints, links, holes and cable routes, and its TOML form.
+"""Description of an arm: joints, links, holes and cable routes, and its TOML form.
 
-SI units throughout (m, rad, kg). The straight arm lies along x; all lengths are measured along it.
+All units are SI (m, rad, kg). The straight arm lies along x, and all lengths are measured along x.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from cdsm.support.validation import instance
 from cdsm.support.values import Printed
 
 MAXIMUM_JOINTS = 100
-"""More would overflow the URDF parsers' stack before long; no such arm exists."""
+"""Largest number of joints, since many more would overflow the stack of the URDF parsers."""
 
 MAXIMUM_DEFAULT_LIMIT = math.radians(80.0)
 
@@ -48,16 +48,16 @@ JointLimit = Annotated[Number, Field(gt=0, le=math.pi)] | None
 
 @record
 class Joint:
-    """One joint of the arm and the two disks beside it.
+    """One joint of the arm and the two disks next to it.
 
     Attributes:
-        axes: One axis (hinge) or two (universal joint, in this order), in the axes of the link
-            before; any length, none zero, not parallel.
-        disk_offset: h: distance of the disk before and the disk after from the joint centre [m].
-        limit: Largest angle about each axis, both ways [rad]; None: until the disks touch.
+        axes: One axis (hinge) or two (universal joint, in this order), in the axes of the previous
+            link. Any length; no axis is zero, and two axes are not parallel.
+        disk_offset: h: distance from the joint centre to the disk on each side [m].
+        limit: Largest angle about each axis in both directions [rad]; None: until the disks touch.
 
     Raises:
-        GeometryError: Lists every fault.
+        GeometryError: Some attributes are invalid; lists every fault.
     """
 
     axes: Annotated[tuple[Direction, ...], Field(strict=False, min_length=1, max_length=2)]
@@ -83,14 +83,14 @@ class Joint:
 
 @record
 class Link:
-    """One link: from its joint centre to the next one, or to the tip.
+    """One link: from its joint centre to the next joint centre, or to the tip.
 
     Attributes:
         length: Length [m].
-        mass: Mass [kg], spread as a solid cylinder of the hole radius about mid-link.
+        mass: Mass [kg] of a solid cylinder with the hole radius, centred at mid-link.
 
     Raises:
-        GeometryError: Lists every fault.
+        GeometryError: Some attributes are invalid; lists every fault.
     """
 
     length: Length
@@ -99,15 +99,15 @@ class Link:
 
 @record
 class CableRoute:
-    """The path of one cable: the same hole on every disk until its last one.
+    """Path of one cable: the same hole on every disk until its last disk.
 
     Attributes:
-        joint: Number of the joint it drives, from 1; it ends on the first disk after it.
-        angle: φ: hole angle about x, from y towards z [rad].
+        joint: Number of the joint it drives, from 1; it ends on the first disk after the joint.
+        angle: φ: angle of the hole about x, from y towards z [rad].
         lead: Straight cable between the actuator and the base disk [m].
 
     Raises:
-        GeometryError: Lists every fault.
+        GeometryError: Some attributes are invalid; lists every fault.
     """
 
     joint: Annotated[Integer, Field(ge=1)]
@@ -119,22 +119,23 @@ class CableRoute:
 class Geometry(Printed):
     """A serpentine arm, joint by joint; frozen, checked, all in SI units.
 
-    The general constructor: joints, links and cables may all differ. :meth:`universal` and
-    :meth:`hinged` fill it for uniform arms. Joint 1 sits at x = ``base_length``, joint k+1 at the
-    end of link k, the tip at the end of the last link. Every joint has one disk ``disk_offset``
-    before and one after it, with holes at ``hole_radius``.
+    This general constructor allows different joints, links and cables. :meth:`universal` and
+    :meth:`hinged` build uniform arms. Joint 1 is at x = ``base_length``, joint k+1 at the end of
+    link k, and the tip at the end of the last link. Every joint has one disk ``disk_offset`` before
+    it and one after it. The holes of the disks are at ``hole_radius``.
 
     Attributes:
         name: Name of the robot: letters, digits and underscores.
-        base_length: L_0: from the base frame to joint 1 [m].
+        base_length: L_0: distance from the base frame to joint 1 [m].
         hole_radius: R: distance of all holes from the arm's axis [m].
-        joints: One :class:`Joint` each, base to tip.
+        joints: All joints, base to tip.
         links: One :class:`Link` per joint.
-        cables: One :class:`CableRoute` each.
+        cables: One :class:`CableRoute` per cable.
 
     Raises:
-        GeometryError: Lists every fault: unknown or missing keys, wrong types, lengths that are
-            not positive, overlapping disks, cables that end past the last joint, > 100 joints.
+        GeometryError: The geometry is invalid; lists every fault: unknown or missing keys, wrong
+            types, lengths that are not positive, overlapping disks, cables that end past the last
+            joint, > 100 joints.
     """
 
     joints: Annotated[
@@ -162,26 +163,26 @@ class Geometry(Printed):
         joint_limit: JointLimit = None,
         name: Name = "arm",
     ) -> Self:
-        """Uniform arm of n universal joints with m cables each.
+        """Build a uniform arm of n universal joints with m cables each.
 
-        Cable j = 0…m−1 of joint k = 1…n has its holes at φ = 2π((k−1) + n j)/(n m), so that all
-        holes of the base disk are evenly spread.
+        Cable j = 0…m−1 of joint k = 1…n has its holes at φ = 2π((k−1) + n j)/(n m). All holes of
+        the base disk are therefore evenly spaced.
 
         Args:
             joints: n, 1 to 100.
             cables_per_joint: m.
             link_length: Length of every link [m], more than two ``disk_offset``.
-            base_length: L_0: from the base frame to joint 1 [m].
-            disk_offset: h: from each joint centre to the disk before and the disk after it [m].
+            base_length: L_0: distance from the base frame to joint 1 [m].
+            disk_offset: h: distance from each joint centre to the disk on each side [m].
             hole_radius: R [m].
             link_mass: Mass of every link [kg].
             lead: Straight cable between each actuator and the base disk [m].
-            joint_limit: Largest angle about each axis, both ways [rad]; None: until the disks
-                touch, 2 atan(h/R), at most 80°.
+            joint_limit: Largest angle about each axis in both directions [rad]. None: until the
+                disks touch, 2 atan(h/R), at most 80°.
             name: Name of the robot.
 
         Raises:
-            GeometryError: Lists every fault.
+            GeometryError: Some arguments are invalid; lists every fault.
         """
         n, m = joints, cables_per_joint
         return cls(
@@ -214,29 +215,30 @@ class Geometry(Printed):
         joint_limit: JointLimit = None,
         name: Name = "arm",
     ) -> Self:
-        """Uniform arm of n hinges, each turned by ``twist`` about x against the one before.
+        """Build a uniform arm of n hinges; ``twist`` turns each axis about x from the previous one.
 
-        Hinge k has the axis cos ψ_k y + sin ψ_k z with ψ_k = (k−1)·twist; the link frames are not
-        twisted. Its cables are evenly spread from φ = ψ_k + 90° on: a pair sits at ψ_k ± 90°.
+        Hinge k has the axis cos ψ_k y + sin ψ_k z with ψ_k = (k−1)·twist. The link frames are not
+        twisted. The cables of a hinge are evenly spaced and start at φ = ψ_k + 90°. A pair is at
+        ψ_k ± 90°.
 
         Args:
             joints: n, 1 to 100.
             twist: Angle between neighbouring hinge axes about x [rad].
             cables_per_joint: m; 2 is the antagonistic pair.
-            link_length: As for :meth:`universal`, like all that follow.
+            link_length: As for :meth:`universal`, like all following arguments [m].
             base_length: L_0 [m].
             disk_offset: h [m].
             hole_radius: R [m].
             link_mass: Mass of every link [kg].
-            lead: Straight cable before the base disk [m].
-            joint_limit: Largest angle, both ways [rad].
+            lead: Straight cable between each actuator and the base disk [m].
+            joint_limit: Largest angle in both directions [rad].
             name: Name of the robot.
 
         Raises:
-            GeometryError: Lists every fault.
+            GeometryError: Some arguments are invalid; lists every fault.
         """
         rolls = [k * twist for k in range(joints)]
-        # evenly spread from 90 degrees beside the axis: two give the antagonistic pair
+        # evenly spaced, starting 90 degrees from the axis: two cables form the antagonistic pair
         turns = [2.0 * math.pi * j / cables_per_joint for j in range(cables_per_joint)]
         return cls(
             name=name,
@@ -296,12 +298,12 @@ class Geometry(Printed):
 
     @property
     def length(self) -> float:
-        """Length of the straight arm, base frame to tip [m]."""
+        """Length of the straight arm from the base frame to the tip [m]."""
         return self.base_length + sum(link.length for link in self.links)
 
     @property
     def joint_limits(self) -> tuple[float, ...]:
-        """The limit of each joint [rad]: as given, or 2 atan(h/R), at most 80°."""
+        """Limit of each joint [rad]: the given limit, or 2 atan(h/R), at most 80°."""
         return tuple(
             min(2.0 * math.atan(joint.disk_offset / self.hole_radius), MAXIMUM_DEFAULT_LIMIT)
             if joint.limit is None
@@ -311,7 +313,7 @@ class Geometry(Printed):
 
     @property
     def disks(self) -> tuple[tuple[str, tuple[float, ...]], ...]:
-        """For each link from the base: its name and where its disks sit on it, along x [m]."""
+        """Name and disk positions along x [m] of each link, starting with the base."""
         offsets = [joint.disk_offset for joint in self.joints]
         rows: list[tuple[str, tuple[float, ...]]] = [
             ("base_disk", (self.base_length - offsets[0],))
@@ -324,7 +326,7 @@ class Geometry(Printed):
         return tuple(rows)
 
     def to_toml(self) -> str:
-        """The TOML text that :meth:`read` turns back into an equal geometry."""
+        """Return the TOML text from which :meth:`read` builds an equal geometry."""
         lines = [
             "# cdsm geometry. Units: m, rad, kg.",
             "# axes: in the axes of the link before; angle: of the hole about x, from y towards z;",
@@ -337,7 +339,7 @@ class Geometry(Printed):
         return "\n".join(lines) + "\n"
 
     def write(self, path: str | os.PathLike[str]) -> Path:
-        """Write :meth:`to_toml` to a file, whole or not at all; return its path.
+        """Write :meth:`to_toml` to a file and return its path; a failure leaves no partial file.
 
         Raises:
             FileError: The file cannot be written.
@@ -346,14 +348,14 @@ class Geometry(Printed):
 
     @classmethod
     def from_toml(cls, text: str, source: str | None = None) -> Geometry:
-        """Parse a geometry from TOML: see :meth:`read`.
+        """Build a geometry from TOML text: see :meth:`read`.
 
         Args:
             text: The TOML text.
-            source: Where it came from, for the error.
+            source: Name of its file, for the error.
 
         Raises:
-            GeometryError: Not TOML, or lists every fault found in it.
+            GeometryError: ``text`` is not TOML or not a geometry; lists every fault.
         """
         instance("text", text, str)
         short: dict[str, Callable[..., Geometry]] = {
@@ -389,11 +391,12 @@ class Geometry(Printed):
     def read(cls, path: str | os.PathLike[str]) -> Geometry:
         """Read a geometry from a TOML file.
 
-        Either the full form that :meth:`write` makes, or one table ``[universal]`` or ``[hinged]``
-        with the keywords of the constructor of that name.
+        The file has the full form that :meth:`write` writes, or one table ``[universal]`` or
+        ``[hinged]``. The keys of the table are the keywords of the constructor with this name.
 
         Raises:
             FileError: The file cannot be read.
-            GeometryError: Not TOML, or lists every fault found in it; unknown keys are faults.
+            GeometryError: The file is not TOML or not a geometry; lists every fault, also unknown
+                keys.
         """
         return cls.from_toml(read_text(path), source=os.fspath(path))

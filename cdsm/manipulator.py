@@ -1,7 +1,7 @@
-"""An arm with its cables, and the postures it takes.
+"""An arm with its cables.
 
-:class:`Manipulator` is what does not change, :class:`Posture` everything that depends on the joint
-angles alone. A posture is frozen, and exists only once all of it is computed.
+:class:`Manipulator` holds everything that does not change. :class:`Posture` holds everything that
+depends only on the joint angles. A posture is frozen and always complete.
 """
 
 from __future__ import annotations
@@ -54,20 +54,20 @@ class Manipulator(Printed):
 
     Args:
         geometry: The arm.
-        elasticity: Of all cables, or one per cable; the cables are then those of
+        elasticity: One law for all cables, or one law per cable. The cables are then those of
             :func:`~cdsm.serpentine_cables`.
-        cables: The cables, instead of ``elasticity``: any sites on any links of :attr:`urdf`.
-        gravity: In base axes (3,) [m/s²]; (0, 0, 0) for none.
-        original_length: Of which length of a locked wire EA/l_0 is taken: ``"unstrained"``, what
-            the motor holds, ℓ/(1 + ε(F)) of a wire that is ℓ long under F; or ``"stretched"``, ℓ
-            itself, as in the paper's figures, which makes K too low by the strain, 3–5 % for
-            Eq. 19.
+        cables: The cables, if ``elasticity`` is not given: any sites on any links of :attr:`urdf`.
+        gravity: Gravity in base axes (3,) [m/s²]; (0, 0, 0) for none.
+        original_length: Length l_0 of a locked wire that its stiffness EA/l_0 uses.
+            ``"unstrained"``: the length that the motor holds, ℓ/(1 + ε(F)) for a wire of length ℓ
+            under F. ``"stretched"``: ℓ, as in the paper's figures; K is then too low by the strain,
+            3–5 % for Eq. 19.
 
     Raises:
-        InvalidInput: Both or neither of ``elasticity`` and ``cables``; gravity not three numbers;
-            the rigidity of an elasticity of your own jumps.
-        CableError: Two cables of one name, or one on a link that does not exist.
-        UnknownName: No such ``original_length``.
+        InvalidInput: ``elasticity`` and ``cables`` are both given or both missing, gravity is not
+            three numbers, or the rigidity of a user-defined law jumps.
+        CableError: Two cables have the same name, or a cable is on an unknown link.
+        UnknownName: ``original_length`` is unknown.
     """
 
     def __init__(
@@ -102,29 +102,29 @@ class Manipulator(Printed):
         check_inertia: bool = True,
         original_length: OriginalLength = "unstrained",
     ) -> Manipulator:
-        """A robot of somebody else's: a tree of revolute, prismatic and fixed joints, and cables.
+        """Build an arm from a URDF and cables: a tree of revolute, prismatic and fixed joints.
 
-        Where a joint slides, its coordinate is in m, its torque a force [N], and so on.
+        Where a joint slides, the unit of its coordinate is m and the unit of its torque is N. Other
+        units change in the same way.
 
         Args:
-            urdf: Path of the file, or the text itself.
-            cables: Its cables, as :func:`~cdsm.read_cables` reads them.
-            tip: The link whose frame is the tip, ``tool0`` of other docstrings.
-            joint_names: The joints that move, in the order that q is to have. None: from the base
-                on, each branch to its end, branches in the order of their joints' names
-                (Pinocchio's order).
-            gravity: In base axes (3,) [m/s²]; (0, 0, 0) for none.
-            check_inertia: Refuse moments of inertia that no body has. Stiffness does not depend on
-                them, :func:`~cdsm.modes` do.
+            urdf: Path of the URDF file, or its text.
+            cables: Cables of the arm; :func:`~cdsm.read_cables` reads them from a file.
+            tip: Link whose frame is the tip; other docstrings call it ``tool0``.
+            joint_names: The moving joints in the order of q. None: Pinocchio's order, from the base
+                along each branch to its end, branches in the order of their joints' names.
+            gravity: Gravity in base axes (3,) [m/s²]; (0, 0, 0) for none.
+            check_inertia: Refuse moments of inertia that no rigid body can have. Stiffness does not
+                depend on them, but :func:`~cdsm.modes` do.
             original_length: As for :class:`Manipulator`.
 
         Raises:
             FileError: The file cannot be read.
-            UrdfError: It is no such robot; every fault is listed.
-            UnknownName: There is no link called ``tip``, or no such ``original_length``.
-            InvalidInput: ``joint_names`` does not name each joint that moves once; the rigidity of
-                an elasticity of your own jumps.
-            CableError: Two cables of one name, or one on a link that does not exist.
+            UrdfError: The URDF is not a supported robot; lists every fault.
+            UnknownName: No link is called ``tip``, or ``original_length`` is unknown.
+            InvalidInput: ``joint_names`` does not name each moving joint once, or the rigidity of a
+                user-defined law jumps.
+            CableError: Two cables have the same name, or a cable is on an unknown link.
         """
         text = read_urdf(urdf, check_inertia=check_inertia)
         return _rebuild(None, text, cables, tip, gravity, original_length, joint_names)
@@ -139,7 +139,7 @@ class Manipulator(Printed):
         original_length: OriginalLength,
         joint_names: Sequence[str] | None = None,
     ) -> None:
-        """Set everything, once: from checked URDF text, and the geometry behind it if any."""
+        """Set all attributes from checked URDF text and, if given, its geometry."""
         self._geometry = geometry
         self._cables = _checked_cables(cables)
         self._gravity = vector("gravity", gravity, 3, "gravity in base axes [m/s²]", "gravity")
@@ -151,10 +151,10 @@ class Manipulator(Printed):
 
     @property
     def geometry(self) -> Geometry:
-        """The geometry it was made from.
+        """Geometry of an arm that was made from a geometry.
 
         Raises:
-            InvalidInput: It was made from a URDF.
+            InvalidInput: The arm was made from a URDF.
         """
         if self._geometry is None:
             raise InvalidInput(
@@ -164,7 +164,7 @@ class Manipulator(Printed):
 
     @property
     def is_serpentine(self) -> bool:
-        """Whether it was made from a :class:`~cdsm.Geometry`."""
+        """Whether the arm was made from a :class:`~cdsm.Geometry`."""
         return self._geometry is not None
 
     @property
@@ -174,10 +174,11 @@ class Manipulator(Printed):
 
     @cached_property
     def length(self) -> float:
-        """Way from the base over the joints to the tip, all joints at zero [m].
+        """Length of the path from the base through the joints to the tip, all joints at zero [m].
 
-        Of a robot from a URDF at least the largest distance of a cable's site from its joint: the
-        tip may sit on a joint, and a length that errors are compared with is not zero.
+        For a robot from a URDF, it is at least the largest distance of a cable site from its joint.
+        The length is therefore never zero, even if the tip is on a joint. Errors are compared with
+        it.
         """
         if self._geometry is not None:
             return self._geometry.length
@@ -191,12 +192,12 @@ class Manipulator(Printed):
 
     @property
     def urdf(self) -> str:
-        """Its URDF text."""
+        """URDF text of the arm."""
         return self._urdf
 
     @property
     def cables(self) -> tuple[Cable, ...]:
-        """Its cables; their order is that of every (C,) array."""
+        """Cables of the arm, in the order of every (C,) array."""
         return self._cables
 
     @property
@@ -206,35 +207,35 @@ class Manipulator(Printed):
 
     @property
     def original_length(self) -> OriginalLength:
-        """Of which length of a locked wire EA/l_0 is taken; see :class:`Manipulator`."""
+        """Definition of the length l_0 of a wire in EA/l_0; see :class:`Manipulator`."""
         return self._original_length
 
     @property
     def nv(self) -> int:
-        """Degrees of freedom."""
+        """Number of degrees of freedom."""
         return self._model.body.nv
 
     @property
     def joint_names(self) -> tuple[str, ...]:
-        """Names of the joints; their order is that of every (nv,) array."""
+        """Names of the joints, in the order of every (nv,) array."""
         return self._model.body.joint_names
 
     @property
     def slides(self) -> NDArray[np.bool_]:
-        """Whether each joint slides (nv,): its coordinate is a way [m], not an angle [rad]."""
+        """Whether each joint slides (nv,); its coordinate is then a length [m], not an angle."""
         return self._model.body.slides
 
     @property
     def joint_units(self) -> tuple[str, ...]:
-        """Unit of each joint's coordinate (nv,): rad, or m where it slides."""
+        """Unit of each joint's coordinate (nv,): rad, or m where the joint slides."""
         return JointUnits(self.slides).coordinates
 
     def torque_unit(self, joint: int | None = None) -> str:
-        """Unit of the torque of a joint: N where it slides; or that of all of them together."""
+        """Return the torque unit of one joint (N where it slides), or of all joints together."""
         return JointUnits(self.slides).torque(joint)
 
     def stiffness_unit(self) -> str:
-        """Unit of the diagonal of K_θ and of its eigenvalues: N/m where joints slide."""
+        """Return the unit of the diagonal of K_θ and its eigenvalues; N/m where joints slide."""
         return JointUnits(self.slides).stiffness()
 
     @property
@@ -260,7 +261,7 @@ class Manipulator(Printed):
         return isinstance(other, Manipulator) and self._value == other._value
 
     def __hash__(self) -> int:
-        return hash(self._urdf)  # an elasticity of the user's own need not be hashable
+        return hash(self._urdf)  # a user-defined elasticity may not be hashable
 
     @property
     def _value(self) -> _Value:
@@ -278,14 +279,15 @@ class Manipulator(Printed):
         return (_rebuild, self._value)
 
     def with_cables(self, cables: Sequence[Cable]) -> Manipulator:
-        """The same robot with other cables.
+        """Return an arm with the same robot and other cables.
 
         Args:
-            cables: One or more.
+            cables: One or more cables.
 
         Raises:
-            InvalidInput: Not a list or tuple of cables.
-            CableError: Two cables of one name, or one on a link that does not exist.
+            InvalidInput: ``cables`` is not a list or tuple of cables, or the rigidity of a law
+                jumps.
+            CableError: Two cables have the same name, or a cable is on an unknown link.
         """
         geometry, urdf, _, tip, gravity, original_length, names = self._value
         return _rebuild(geometry, urdf, cables, tip, gravity, original_length, names)
@@ -298,14 +300,14 @@ class Manipulator(Printed):
             check_limits: Refuse angles beyond the joint limits.
 
         Raises:
-            InvalidInput: q is not (nv,) finite real numbers, or ``check_limits`` no flag.
-            JointLimitError: An angle is beyond its limit, and ``check_limits`` is set.
+            InvalidInput: q is not (nv,) finite real numbers, or ``check_limits`` is not a bool.
+            JointLimitError: An angle is beyond its limit, and ``check_limits`` is True.
             CableError: Two neighbouring sites of a cable coincide at this posture.
         """
         q = self._angles(q, check_limits)
         state = self._model.body.state(q)
-        # Pinocchio hands out placements one Python object per joint, 14 µs for ten joints; the
-        # kernel places joints and cable sites itself in 2 µs. A test holds the two equal.
+        # Pinocchio returns one Python object per joint frame: 14 µs for ten joints. The kernel
+        # computes all joint frames and cable sites in 2 µs. A test compares the two.
         frames, lengths, length_jacobian = self._routed(q)
         return Posture(
             arm=self,
@@ -320,21 +322,15 @@ class Manipulator(Printed):
         )
 
     def cable_lengths(self, q: ArrayLike, *, check_limits: bool = True) -> Array:
-        """L(q) (C,) [m], lead included (Eq. 8): ``at(q).cable_lengths`` and nothing else.
+        """Compute only L(q) (C,) [m], lead included (Eq. 8); equal to ``at(q).cable_lengths``.
 
-        Args:
-            q: Joint angles (nv,) [rad], in the order of :attr:`joint_names`.
-            check_limits: Refuse angles beyond the joint limits.
-
-        Raises:
-            InvalidInput: q is not (nv,) finite real numbers, or ``check_limits`` no flag.
-            JointLimitError: An angle is beyond its limit, and ``check_limits`` is set.
-            CableError: Two neighbouring sites of a cable coincide at this posture.
+        The lead is the straight cable between its actuator and the base disk. Arguments and errors
+        are those of :meth:`at`.
         """
         return self._routed(self._angles(q, check_limits))[1]
 
     def _angles(self, q: ArrayLike, check_limits: bool) -> Array:
-        """Joint angles (nv,) [rad], checked and read-only."""
+        """Check joint angles (nv,) [rad] and return them read-only."""
         q = vector("q", q, self.nv, self._meaning_of_q)
         if flag("check_limits", check_limits):
             beyond = self._model.beyond_limits(q)
@@ -353,7 +349,7 @@ class Manipulator(Printed):
         return f"one {coordinate} per joint, {', '.join(self.joint_names)}"
 
     def _routed(self, q: Array) -> tuple[Frames, Array, Array]:
-        """Where joints and cable sites are, L and J_L at checked joint angles."""
+        """Compute the joint frames, the cable sites, L and J_L at checked joint angles."""
         routing = self._model.routing
         *arrays, lengths, length_jacobian, coincident = segments.cable_kinematics(
             self._model.tree, routing, q

@@ -1,4 +1,4 @@
-"""The arm at some joint angles: frozen, and only there once all of it is computed."""
+"""Posture of an arm: everything that depends only on the joint angles."""
 
 from __future__ import annotations
 
@@ -21,18 +21,19 @@ if TYPE_CHECKING:
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Posture(ReadOnlyState):
-    """Everything that depends on the joint angles alone; made by :meth:`Manipulator.at`.
+    """Kinematics, cable lengths and gravity of an arm at q; made by :meth:`Manipulator.at`.
 
-    All arrays are read-only and in base axes.
+    All arrays are read-only and in base axes. Cable lengths include the lead (the straight cable
+    between its actuator and the base disk).
 
     Attributes:
         arm: The arm.
         q: Joint angles (nv,) [rad].
         tip: Pose of ``tool0`` (4, 4), translation in m (Eqs. 3–4).
-        jacobian: J_X (6, nv): linear rows [m/rad] first, then angular, at ``tool0``.
+        jacobian: J_X (6, nv) at ``tool0``: linear rows [m/rad] first, then angular rows.
         cable_lengths: L (C,) [m], lead included (Eq. 8).
         length_jacobian: J_L = ∂L/∂θ (C, nv) [m/rad].
-        gravity_torque: g = ∂V/∂θ (nv,) [N m], V the potential energy: J_Hᵀ G_g of Eq. 13.
+        gravity_torque: g = ∂V/∂θ (nv,) [N m] with the potential energy V: J_Hᵀ G_g of Eq. 13.
         gravity_stiffness: ∂g/∂θ (nv, nv) [N m/rad]: H_H G_g of Eq. 16.
     """
 
@@ -51,7 +52,7 @@ class Posture(ReadOnlyState):
 
     @cached_property
     def length_hessian(self) -> Array:
-        """H_L[c, i, j] = ∂²L_c/∂θ_i∂θ_j, (C, nv, nv) [m/rad²], built on first use."""
+        """H_L[c, i, j] = ∂²L_c/∂θ_i∂θ_j, (C, nv, nv) [m/rad²], computed on first use."""
         count, nv = self.length_jacobian.shape
         hessian = np.zeros((count, nv, nv))
         segments.add_length_hessian(
@@ -61,19 +62,19 @@ class Posture(ReadOnlyState):
 
     @cached_property
     def cable_paths(self) -> tuple[Array, ...]:
-        """The sites of each cable in base axes, one array (sites, 3) per cable [m]."""
+        """Sites of each cable in base axes, one array (sites, 3) per cable [m]."""
         counts = [len(cable.sites) for cable in self.arm.cables]
         paths = np.split(self._frames.site, np.cumsum(counts)[:-1])
         return tuple(frozen(path.copy()) for path in paths)
 
     @property
     def joint_positions(self) -> Array:
-        """Where the joints are, (nv, 3) [m]: a point of each axis."""
+        """Positions of the joints (nv, 3) [m]: one point on each joint axis."""
         return self._frames.origin[1:]
 
     @property
     def bones(self) -> tuple[Array, ...]:
-        """Straight lines from joint to joint, and to the tip, (2, 3) each [m]: a stick figure."""
+        """Straight lines from joint to joint and to the tip, (2, 3) each [m]: a stick figure."""
         return tuple(bone for bones in self._bones for bone in bones)
 
     @property
@@ -88,7 +89,7 @@ class Posture(ReadOnlyState):
 
     @cached_property
     def _bones(self) -> tuple[tuple[Array, ...], ...]:
-        """The bones that start at each joint, the base first."""
+        """Bones that start at each joint, base first."""
         origin, parent = self._frames.origin, self.arm._model.tree.parent
         ends = [(parent[i], origin[i]) for i in range(1, len(origin))]
         ends.append((self.arm._model.masses.tip, self.tip[:3, 3]))
@@ -102,17 +103,17 @@ class Posture(ReadOnlyState):
         )
 
     def link_pose(self, link: str) -> Array:
-        """Pose of a link's frame in the base, (4, 4) [m].
+        """Compute the pose of a link's frame in the base frame, (4, 4) [m].
 
         Raises:
-            UnknownName: There is no such link.
+            UnknownName: No link has this name.
         """
         return frozen(self.arm._model.body.placement(self.q, link))
 
     def _joint_stiffness(
         self, tension: Array, cable_stiffness: Array, wrench: Array
     ) -> tuple[Array, Array, Array, Array]:
-        """Active, passive, load and K_θ (nv, nv); of checked, read-only vectors."""
+        """Compute the active, passive and load terms and K_θ (nv, nv) from checked vectors."""
         active, passive, load, joint = stiffness_kernels.joint_stiffness(
             self.arm._model.routing,
             self._frames,
@@ -128,6 +129,6 @@ class Posture(ReadOnlyState):
 
 
 def _foot(point: Array, line: Array) -> Array:
-    """The point of a straight line (2, 3) that is nearest to a point (3,)."""
+    """Return the point of a line segment (2, 3) that is nearest to a point (3,)."""
     way = line[1] - line[0]
     return np.asarray(line[0] + np.clip((point - line[0]) @ way / (way @ way), 0.0, 1.0) * way)

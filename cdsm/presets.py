@@ -1,6 +1,7 @@
-"""The arms and the strand of the paper, with what it leaves open filled in by name.
+"""Arms and strand of the paper; values that the paper does not give are named assumptions.
 
-Assumptions are parameters: change them and see what follows.
+Assumptions are parameters: change them to see their effect. The lead is the straight cable between
+its actuator and the base disk.
 """
 
 from __future__ import annotations
@@ -23,10 +24,10 @@ STRAND_1X19: Final = StrandElasticity.eq19_repaired()
 """The 1×19 steel strand of 1.2 mm of Section IV-C: Eq. 19, repaired and continuous."""
 
 STRAND_DIAMETER: Final = 1.2e-3
-"""Its diameter [m]."""
+"""Diameter of the 1×19 strand [m]."""
 
 STEEL_WIRE_200GPA: Final = LinearElasticity.of_wire(200e9, STRAND_DIAMETER)
-"""A solid wire of its diameter with the 200 GPa of Section IV-B: EA = 226 kN."""
+"""Solid wire with the strand's diameter and the 200 GPa of Section IV-B: EA = 226 kN."""
 
 ELASTIC_STAGE: Final = LinearElasticity(48e3)
 """Constant EA [N] of the strand in its elastic stage; assumed, from Eq. 19 at 600 N."""
@@ -36,14 +37,14 @@ TEN_DEGREES: Final = np.deg2rad(10.0)
 
 
 def virtual_prototype_geometry(link_mass: float = 0.5, lead: float = 0.0) -> Geometry:
-    """Geometry of Section IV: five universal joints, R = 30 mm, disks every 20 mm.
+    """Build the geometry of Section IV: five universal joints, R = 30 mm, disks every 20 mm.
 
-    The paper gives the joints, the hole radius and the disk spacing. Assumed: three cables per
-    joint, ending as in :class:`~cdsm.CableRoute`; no lead; 0.5 kg per link.
+    The paper gives the joints, the hole radius and the disk spacing. Assumptions: three cables per
+    joint that end as in :class:`~cdsm.CableRoute`, no lead, 0.5 kg per link.
 
     Args:
         link_mass: Mass of every link [kg].
-        lead: Of every cable, before the base disk [m].
+        lead: Lead of every cable [m].
     """
     return Geometry.universal(
         name="virtual_prototype",
@@ -66,15 +67,14 @@ def virtual_prototype(
     gravity: ArrayLike = (0.0, -9.81, 0.0),
     original_length: OriginalLength = "unstrained",
 ) -> Manipulator:
-    """The virtual prototype of Section IV.
+    """Build the virtual prototype of Section IV.
 
     Args:
-        elasticity: Of all cables; the repaired Eq. 19 by default.
+        elasticity: Elasticity of all cables; the repaired Eq. 19 by default.
         link_mass: Mass of every link [kg]; assumed.
-        lead: Of every cable, before the base disk [m]; assumed.
-        gravity: In base axes (3,) [m/s²]; along −y by assumption.
-        original_length: As for :class:`~cdsm.Manipulator`; ``"stretched"`` is what the
-            paper computes with.
+        lead: Lead of every cable [m]; assumed.
+        gravity: Gravity in base axes (3,) [m/s²]; the direction −y is assumed.
+        original_length: As for :class:`~cdsm.Manipulator`; the paper uses ``"stretched"``.
     """
     geometry = virtual_prototype_geometry(link_mass, lead)
     return Manipulator(geometry, elasticity, gravity=gravity, original_length=original_length)
@@ -90,22 +90,22 @@ def experimental_prototype_geometry(
     link_mass: float = 0.3,
     lead: float = 0.3,
 ) -> Geometry:
-    """Geometry of Section V: three hinges of ±30°, turned 30° each, one antagonistic pair each.
+    """Build the geometry of Section V: three hinges of ±30°, turned by 30°, with one pair each.
 
-    The paper gives the joints, their limits, the twist and the pairs. All dimensions are assumed:
-    it prints none.
+    The paper gives the joints, their limits, the twist and the antagonistic pairs of cables. It
+    gives no dimensions: all are assumed.
 
     Args:
-        link_length: [m]; assumed.
-        tool_length: From the last joint to where the weights hang [m]; None: ``link_length``.
-        base_length: [m]; assumed.
-        disk_offset: [m]; assumed.
-        hole_radius: [m]; assumed.
-        link_mass: [kg]; assumed.
-        lead: [m]; assumed.
+        link_length: Length of every link [m]; assumed.
+        tool_length: Distance from the last joint to the weights [m]; None: ``link_length``.
+        base_length: Distance from the base frame to joint 1 [m]; assumed.
+        disk_offset: Distance from each joint centre to its disks [m]; assumed.
+        hole_radius: Distance of all holes from the arm's axis [m]; assumed.
+        link_mass: Mass of every link [kg]; assumed.
+        lead: Lead of every cable [m]; assumed.
 
     Raises:
-        GeometryError: Lists every fault.
+        GeometryError: Some dimensions are invalid; lists every fault.
     """
     geometry = Geometry.hinged(
         name="experimental_prototype",
@@ -133,20 +133,21 @@ def experimental_prototype(
     gravity: ArrayLike = (0.0, 0.0, -9.81),
     **dimensions: float,
 ) -> Manipulator:
-    """The prototype of Section V-A: of each pair one cable is position-controlled, one force-.
+    """Build the prototype of Section V-A; each pair has a position- and a force-controlled cable.
 
-    The first of each pair (``cable1_1`` …) holds its length, the second (``cable1_2`` …) its
-    tension, so that the second contributes no passive stiffness; give its tension to
+    The first cable of each pair (``cable1_1`` …) holds its length. The second (``cable1_2`` …)
+    holds its tension and adds no passive stiffness. Give its tension to
     :func:`~cdsm.distribute_tension` as ``fixed``.
 
     Args:
-        elasticity: Of all cables; the repaired Eq. 19 by default.
-        series_stiffness: Of the springs of the hybrid cables (Fig. 11), or of the drives [N/m].
-        gravity: In base axes (3,) [m/s²]; along −z by assumption.
-        dimensions: Keywords of :func:`experimental_prototype_geometry`; all assumed there.
+        elasticity: Elasticity of all cables; the repaired Eq. 19 by default.
+        series_stiffness: Stiffness of the springs of hybrid cables (Fig. 11), or of the drives
+            [N/m].
+        gravity: Gravity in base axes (3,) [m/s²]; the direction −z is assumed.
+        dimensions: Keywords of :func:`experimental_prototype_geometry`; all have assumed defaults.
 
     Raises:
-        GeometryError: Lists every fault of the dimensions.
+        GeometryError: Some dimensions are invalid; lists every fault.
     """
     geometry = experimental_prototype_geometry(**dimensions)
     cables = serpentine_cables(geometry, elasticity, series_stiffness=series_stiffness)

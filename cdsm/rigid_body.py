@@ -1,8 +1,8 @@
-"""The rigid-body model behind an arm. The only module that speaks Pinocchio.
+"""Rigid-body model of an arm. Only this module imports Pinocchio.
 
-Pinocchio crashes on wrong ids, reads foreign memory layouts silently and keeps scratch data that
-two threads must not share; everything that could trip it is settled here, once, when a model is
-built, so that callers hand over checked arrays and receive their own copies.
+Pinocchio crashes on wrong ids, misreads unusual memory layouts, and its scratch data are not
+thread-safe. This module handles these cases when it builds a model. Callers pass checked arrays and
+receive copies.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from cdsm.support.values import Array, frozen
 
 
 class BodyState(NamedTuple):
-    """What depends on q alone: tip pose, its Jacobian, gravity torque and its derivative."""
+    """Tip pose, tip Jacobian, gravity torque and its derivative at one posture."""
 
     tip: Array
     jacobian: Array
@@ -33,17 +33,13 @@ class BodyState(NamedTuple):
 class RigidBody:
     """A Pinocchio model of a tree of revolute and prismatic joints, with one tip frame.
 
+    Other joints raise UrdfError, an unknown tip UnknownName, wrong joint names InvalidInput.
+
     Args:
         urdf: Text of a URDF that has passed the checks of :mod:`cdsm.urdf`.
         tip: Name of the link whose frame is the tip.
         gravity: Gravity in base axes, (3,) [m/s²].
-        joint_names: The joints that move, in the order of their coordinates. None: Pinocchio's
-            order, in which parents come first.
-
-    Raises:
-        UrdfError: Pinocchio does not accept it, or a joint is neither revolute nor prismatic.
-        UnknownName: There is no link called ``tip``.
-        InvalidInput: The names are not those of the joints that move.
+        joint_names: The moving joints in the order of q. None: Pinocchio's order, parents first.
     """
 
     def __init__(
@@ -61,7 +57,7 @@ class RigidBody:
                 "prismatic ones."
             )
         self.joint_names = names if joint_names is None else _reordered(names, joint_names)
-        # where Pinocchio has each of our coordinates, and where we have each of its
+        # index in Pinocchio's order of each of our coordinates, and the inverse permutation
         self._theirs = frozen(np.array([names.index(name) for name in self.joint_names]))
         self._ours = frozen(np.argsort(self._theirs))
         self._reordered = self.joint_names != names
@@ -86,10 +82,10 @@ class RigidBody:
         return tuple(self._frames)
 
     def locate(self, link: str) -> tuple[int, Array, Array]:
-        """Row of the joint that moves a link, and the link's frame in it as (3,3) and (3,).
+        """Return the row of a link's joint, and the link's frame in the frame of that joint.
 
-        Raises:
-            UnknownName: There is no such link.
+        The frame is a rotation (3, 3) and a translation (3,) [m]. An unknown link raises
+        UnknownName.
         """
         frame = self._model.frames[self._frame(link)]
         return (
@@ -99,7 +95,7 @@ class RigidBody:
         )
 
     def tree(self) -> Tree:
-        """The tree as plain arrays."""
+        """Build the kinematic tree as plain arrays."""
         model = self._model
         rows = (0, *self._ids)
         return Tree.of(
@@ -113,7 +109,7 @@ class RigidBody:
 
     @property
     def length(self) -> float:
-        """Way from the base over the joints to the tip, all joints at zero [m]."""
+        """Length of the path from the base through the joints to the tip at q = 0 [m]."""
         frame = self._model.frames[self._tip]
         way, joint = float(np.linalg.norm(frame.placement.translation)), frame.parentJoint
         while joint:
@@ -122,7 +118,7 @@ class RigidBody:
         return way
 
     def _local_twists(self) -> Array:
-        """Motion of each joint in its own frame (nv, 6): linear [-], then angular [rad]."""
+        """Compute each joint's motion in its own frame (nv, 6): linear [-], then angular [rad]."""
         model, data = self._model, self._data()
         pin.computeJointJacobians(model, data, pin.neutral(model))
         return np.array(
@@ -133,7 +129,7 @@ class RigidBody:
         )
 
     def masses(self) -> Masses:
-        """What the tree carries and where its tip is, as plain arrays."""
+        """Build the arrays of the masses on the tree and the position of the tip."""
         model, tip = self._model, self._model.frames[self._tip]
         inertias = [model.inertias[i] for i in (0, *self._ids)]
         return Masses(
@@ -147,9 +143,9 @@ class RigidBody:
         )
 
     def state(self, q: Array) -> BodyState:
-        """Evaluate everything that depends on the joint angles (nv,) [rad] alone.
+        """Compute everything that depends only on the joint angles (nv,) [rad].
 
-        The Jacobian (6, nv) has linear rows first, in base axes, at the tip.
+        The Jacobian (6, nv) is at the tip in base axes, linear rows first.
         """
         model, data = self._model, self._data()
         if self._reordered:
@@ -158,7 +154,7 @@ class RigidBody:
         jacobian = pin.getFrameJacobian(model, data, self._tip, pin.LOCAL_WORLD_ALIGNED)
         tip = pin.updateFramePlacement(model, data, self._tip).homogeneous
         stiffness = pin.computeGeneralizedGravityDerivatives(model, data, q)
-        # a model with one joint yields vectors for its matrices
+        # for a model with one joint, Pinocchio returns vectors instead of matrices
         state = BodyState(
             tip,
             np.ascontiguousarray(jacobian).reshape(6, self.nv),
@@ -173,39 +169,32 @@ class RigidBody:
         return BodyState(tip, jacobian.take(i, axis=1), torque[i], stiffness[np.ix_(i, i)])
 
     def placement(self, q: Array, link: str) -> Array:
-        """Pose of a link's frame in the base, (4, 4).
-
-        Raises:
-            UnknownName: There is no such link.
-        """
+        """Compute the pose of a link's frame in the base frame (4, 4), or raise UnknownName."""
         model, data, frame = self._model, self._data(), self._frame(link)
         pin.forwardKinematics(model, data, q[self._ours])
         placement: Array = pin.updateFramePlacement(model, data, frame).homogeneous
         return placement
 
     def potential_energy(self, q: Array) -> float:
-        """V of the weight of all links [J] at the joint angles (nv,) [rad], from their places."""
+        """Compute the gravitational energy V of all links [J] at joint angles (nv,) [rad]."""
         return float(pin.computePotentialEnergy(self._model, self._data(), q[self._ours]))
 
     def mass_matrix(self, q: Array) -> Array:
-        """Joint-space mass matrix M (nv, nv) [kg m²] at the joint angles (nv,) [rad]."""
+        """Compute the joint-space mass matrix M (nv, nv) [kg m²] at joint angles (nv,) [rad]."""
         M = np.array(pin.crba(self._model, self._data(), q[self._ours])).reshape(self.nv, self.nv)
-        upper = np.triu(M)  # some versions of Pinocchio fill that alone
+        upper = np.triu(M)  # some versions of Pinocchio fill only this part
         whole: Array = (upper + np.triu(upper, 1).T)[np.ix_(self._theirs, self._theirs)]
         return whole
 
     def visualizer(self, urdf: str, server: object, node: str) -> Callable[[Array], None] | None:
         """Draw the shapes of the URDF below a node of a viser server.
 
-        Returns:
-            What moves them to joint angles (nv,) [rad]; None if the URDF has no shapes.
-
-        Raises:
-            UrdfError: A shape, a mesh perhaps, cannot be read; nothing is drawn.
+        Return a function that moves the shapes to joint angles (nv,) [rad], or None without shapes.
+        If a shape, e.g. a mesh, cannot be read, nothing is drawn and UrdfError is raised.
         """
         from pinocchio.visualize import ViserVisualizer
 
-        model = self._model.copy()  # a visualiser may write into what it is given
+        model = self._model.copy()  # a visualiser may change the model
         try:
             shapes = pin.buildGeomFromUrdfString(model, urdf, pin.GeometryType.VISUAL)
             if not shapes.ngeoms:
@@ -213,7 +202,7 @@ class RigidBody:
             drawn = ViserVisualizer(model, pin.GeometryModel(), shapes)
             drawn.initViewer(viewer=server)
             drawn.loadViewerModel(node)
-        except Exception as error:  # whatever the loader of some mesh format raises
+        except Exception as error:  # mesh loaders raise many types of errors
             server.scene.remove_by_name(node)  # type: ignore[attr-defined]
             raise UrdfError(
                 f"the shapes of the URDF cannot be drawn: {str(error).strip().rstrip('.')}. Meshes "
@@ -222,7 +211,7 @@ class RigidBody:
         return lambda q: drawn.display(q[self._ours])
 
     def _coordinates_to(self, joint: int) -> Indices:
-        """Our coordinates of the joints from the base to one of Pinocchio's joints."""
+        """Return our coordinates of the joints from the base to a Pinocchio joint."""
         coordinates: list[int] = []
         while joint:
             coordinates.insert(0, self._row(joint) - 1)
@@ -230,22 +219,22 @@ class RigidBody:
         return np.array(coordinates, dtype=np.intp)
 
     def _row(self, joint: int) -> int:
-        """Our row of a joint of Pinocchio's; both call the base 0."""
+        """Return our row of a Pinocchio joint; the base is 0 in both numberings."""
         return 1 + int(self._ours[joint - 1]) if joint else 0
 
     def _frame(self, link: str) -> int:
-        # Pinocchio cannot even be asked for a name that is no UTF-8
+        # Pinocchio fails if it searches a name that is not UTF-8
         return self._frames[one_of("link", link, self._frames)]
 
     def _data(self) -> pin.Data:
-        # one per thread, made once: it is scratch memory, and costs milliseconds for long arms
+        # scratch memory: one per thread, made once, since it takes milliseconds for long arms
         if not hasattr(self._scratch, "data"):
             self._scratch.data = self._model.createData()
         return self._scratch.data
 
 
 def _reordered(names: tuple[str, ...], wanted: Sequence[str]) -> tuple[str, ...]:
-    """The wanted order, if it names every joint that moves once."""
+    """Return the wanted order; check that it names each moving joint once."""
     wanted = sequence_of("joint_names", wanted, str)
     if sorted(wanted) != sorted(names):
         missing = [name for name in names if name not in wanted]
@@ -260,8 +249,8 @@ def _reordered(names: tuple[str, ...], wanted: Sequence[str]) -> tuple[str, ...]
 
 
 def rotation_vector(rotation: Array) -> tuple[Array, Array]:
-    """Rotation vector φ (3,) [rad] of a rotation (3, 3), and its derivative (3, 3).
+    """Compute the rotation vector φ (3,) [rad] of a rotation (3, 3), and its derivative (3, 3).
 
-    The derivative is that by a further turn in base axes: φ changes by it times ω.
+    The derivative maps an angular velocity ω in base axes to the rate of change of φ.
     """
     return pin.log3(rotation), pin.Jlog3(rotation).T

@@ -3,8 +3,8 @@
     K_θ = H_L·F + J_Lᵀ K_L J_L + ∂g/∂θ − ∂(J_Xᵀ W)/∂θ                          (Eq. 16)
           active   passive       gravity   load
 
-The paper goes on to Cartesian space with J_X⁻¹, which does not exist for a redundant arm. Three
-different numbers hide behind "the stiffness in x", and each has its own name here:
+The paper maps K_θ to Cartesian space with J_X⁻¹, which does not exist for a redundant arm. "The
+stiffness in x" then has three different meanings. Each meaning has a name here:
 :meth:`Stiffness.along`, :attr:`Stiffness.cartesian` and :meth:`Stiffness.pseudoinverse`.
 """
 
@@ -42,14 +42,14 @@ _NO_DIRECTIONS = frozen(np.zeros((0, 3)))
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Shares(ReadOnlyState):
-    """What carries the stiffness in one direction; the parts sum to :attr:`total`.
+    """Contributions to the stiffness in one direction; their sum is :attr:`total`.
 
     Attributes:
         direction: The unit direction (3,), base axes.
-        passive: Elasticity of each cable, (C,) [N/m].
-        active: Tension of each cable, (C,) [N/m]; mostly negative.
-        gravity: Weight of the links [N/m].
-        load: The wrench at the tip [N/m].
+        passive: Contribution of each cable's elasticity, (C,) [N/m].
+        active: Contribution of each cable's tension, (C,) [N/m]; mostly negative.
+        gravity: Contribution of the weight of the links [N/m].
+        load: Contribution of the wrench at the tip [N/m].
     """
 
     direction: Array
@@ -60,24 +60,24 @@ class Shares(ReadOnlyState):
 
     @property
     def cables(self) -> Array:
-        """Passive plus active of each cable, (C,) [N/m]."""
+        """Sum of the passive and active contributions of each cable, (C,) [N/m]."""
         return frozen(self.passive + self.active)
 
     @property
     def total(self) -> float:
-        """Sum of all parts [N/m]: the stiffness along the direction."""
+        """Sum of all contributions [N/m]: the stiffness along the direction."""
         return float(self.passive.sum() + self.active.sum() + self.gravity + self.load)
 
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Stiffness(ReadOnlyState):
-    """Joint and Cartesian stiffness, with the posture, tensions and wrench they belong to.
+    """Joint and Cartesian stiffness with their posture, tensions and wrench.
 
     Cartesian quantities are at ``tool0`` in base axes. All arrays are read-only.
 
     Attributes:
-        posture: Where.
+        posture: The posture.
         tension: F (C,) [N].
         wrench: W (6,): force [N], then moment [N m].
         cable_stiffness: Diagonal of K_L (C,) [N/m]; 0 for force-controlled cables.
@@ -85,10 +85,11 @@ class Stiffness(ReadOnlyState):
         passive: J_Lᵀ K_L J_L (nv, nv) [N m/rad]; also called material or elastic.
         gravity: ∂g/∂θ (nv, nv) [N m/rad].
         load: −∂(J_Xᵀ W)/∂θ (nv, nv) [N m/rad]; not symmetric if W has a moment.
-        joint: K_θ, their sum (nv, nv) [N m/rad]: rows torque, columns angle.
-        free_length: l_0 (C,) [m] of an :class:`~cdsm.Equilibrium`, whose motors were
-            locked at its reference; None where they are locked here.
-        distribution: The :class:`~cdsm.Tension` it is of; None for bare tensions.
+        joint: K_θ, sum of the four terms (nv, nv) [N m/rad]: row torque, column angle.
+        free_length: l_0 (C,) [m] of an :class:`~cdsm.Equilibrium`, with motors locked at its
+            reference posture; None if the motors are locked at this posture.
+        distribution: The :class:`~cdsm.Tension` that gave the tensions; None for tensions as an
+            array.
     """
 
     posture: Posture
@@ -105,10 +106,10 @@ class Stiffness(ReadOnlyState):
 
     @property
     def free_lengths(self) -> Array:
-        """Original lengths l_0 (C,) [m] of the wires, which :attr:`cable_stiffness` is of.
+        """Original lengths l_0 (C,) [m] of the wires, as used in :attr:`cable_stiffness`.
 
-        What the locked motors hold: (L − ΔF/k_series)/(1 + ε(F)). Negative where the series spring
-        stretches by more than the whole cable is long. Of a force-controlled cable L.
+        The locked motors hold l_0 = (L − ΔF/k_series)/(1 + ε(F)). It is negative if the series
+        spring stretches by more than the length of the cable. For a force-controlled cable it is L.
         """
         if self.free_length is not None:
             return self.free_length
@@ -117,7 +118,7 @@ class Stiffness(ReadOnlyState):
 
     @cached_property
     def residual(self) -> Array:
-        """J_Lᵀ F − (J_Xᵀ W − g) (nv,) [N m]: zero where the tensions balance the arm (Eq. 13)."""
+        """J_Lᵀ F − (J_Xᵀ W − g) (nv,) [N m]; zero if the tensions balance the arm (Eq. 13)."""
         pose = self.posture
         return frozen(
             self.tension @ pose.length_jacobian - self.wrench @ pose.jacobian + pose.gravity_torque
@@ -125,15 +126,16 @@ class Stiffness(ReadOnlyState):
 
     @cached_property
     def margin(self) -> float:
-        """Smallest eigenvalue of the symmetric part of K_θ [N m/rad]; negative: it buckles.
+        """Smallest eigenvalue of the symmetric part of K_θ [N m/rad]; if negative, the arm buckles.
 
-        Where some joints slide and some turn, only its sign does not depend on the unit of length.
+        If an arm has sliding and turning joints, only its sign is independent of the unit of
+        length.
         """
         return readings.single_margin(self.joint)
 
     @cached_property
     def critical_direction(self) -> Array:
-        """Unit joint motion (nv,) of the smallest eigenvalue: how the arm gives way first."""
+        """Unit joint motion (nv,) of the smallest eigenvalue: the arm buckles along it first."""
         vectors = np.linalg.eigh((self.joint + self.joint.T) / 2.0)[1]
         return frozen(vectors[:, 0].copy())
 
@@ -144,12 +146,12 @@ class Stiffness(ReadOnlyState):
 
     @cached_property
     def compliance(self) -> Array:
-        """C = J_X K_θ⁻¹ J_Xᵀ (6, 6): tip motion per wrench, what the arm really does.
+        """Compliance C = J_X K_θ⁻¹ J_Xᵀ (6, 6): tip motion per wrench, as the real arm moves.
 
         Linear rows first: C_vv [m/N], C_vω [m/(N m)] = [rad/N], C_ωω [rad/(N m)].
 
         Raises:
-            SingularStiffness: K_θ is singular: the arm is just about to buckle.
+            SingularStiffness: K_θ is singular: the arm is about to buckle.
         """
         status, *_, compliance, _ = self._readings(compliance=True)
         self._refuse(status)
@@ -157,51 +159,51 @@ class Stiffness(ReadOnlyState):
 
     @cached_property
     def cartesian(self) -> Array:
-        """(C_vv)⁻¹ (3, 3) [N/m]: force per tip displacement, the tip free to rotate.
+        """Matrix (C_vv)⁻¹ (3, 3) [N/m]: force per tip displacement, while the tip may rotate.
 
-        Its diagonal is the stiffness while the other two translations are *held*, so it is never
-        below :meth:`along`, and often several times above.
+        A diagonal entry is the stiffness while the other two translations are *held*. It is never
+        less than :meth:`along`, and often several times larger.
 
         Raises:
-            SingularStiffness: The tip can hardly move in some direction, which the error names; use
-                :meth:`along` for the others. Or K_θ is singular.
+            SingularStiffness: K_θ is singular, or the tip hardly moves in one direction. The error
+                then names this direction; use :meth:`along` for other directions.
         """
         status, *_, cartesian = self._readings(cartesian=True)
         self._refuse(status, "the Cartesian stiffness matrix")
         return frozen(cartesian)
 
     def along(self, direction: ArrayLike) -> float:
-        """1/(uᵀ C_vv u) [N/m]: the tangent of what a weight hung at the tip measures (Eq. 20).
+        """Compute 1/(uᵀ C_vv u) [N/m], the tangent stiffness that a tip weight measures (Eq. 20).
 
-        A weight that is not small beside the tensions measures a secant, which with a stiffening
-        wire can be a multiple: see :func:`~cdsm.weight_test`.
+        A weight that is not small compared with the tensions measures a secant stiffness. With a
+        stiffening wire, the secant can be several times larger: see :func:`~cdsm.weight_test`.
 
         Args:
             direction: u (3,) in base axes, any length.
 
         Returns:
-            The stiffness; inf where the tip does not give way in this direction. Where the arm is
-            unstable it may be negative: see :attr:`is_stable`.
+            The stiffness; inf if the tip cannot move in this direction. It may be negative if the
+            arm is unstable: see :attr:`is_stable`.
 
         Raises:
-            InvalidInput: Not a direction.
+            InvalidInput: ``direction`` is not three finite numbers, or is zero.
             SingularStiffness: K_θ is singular.
         """
         return self._along(unit_direction("direction", direction))[0]
 
     def pseudoinverse(self, term: Term = "joint") -> Array:
-        """J⁺ᵀ K J⁺ (3, 3) [N/m] with J the linear rows of J_X: the paper's K_R read literally.
+        """Compute J⁺ᵀ K J⁺ (3, 3) [N/m], J the linear rows of J_X: the paper's K_R, read literally.
 
-        The paper's figures are read with it, and it overestimates: the arm is stiffer than in
-        :attr:`cartesian`, by 4 % to over 100 %, since only the joint motion of least norm happens.
+        The paper's figures use this formula, but it overestimates stiffness. It is larger than
+        :attr:`cartesian` by 4 % to over 100 %, since it allows only the joint motion of least norm.
 
         Args:
-            term: Which part of K_θ: ``"active"``, ``"passive"``, ``"gravity"``, ``"load"`` or the
-                sum, ``"joint"``.
+            term: Part of K_θ: ``"active"``, ``"passive"``, ``"gravity"``, ``"load"``, or the sum
+                ``"joint"``.
 
         Raises:
-            UnknownName: No such term.
-            SingularStiffness: The tip can hardly move in some direction, so J⁺ loses it.
+            UnknownName: ``term`` is unknown.
+            SingularStiffness: The tip hardly moves in one direction, so J⁺ omits this direction.
         """
         matrix: Array = getattr(self, one_of("stiffness term", term, get_args(Term)))
         status, result = readings.single_pseudoinverse(matrix, self.posture.jacobian)
@@ -209,16 +211,16 @@ class Stiffness(ReadOnlyState):
         return frozen(result)
 
     def shares(self, direction: ArrayLike) -> Shares:
-        """How much of :meth:`along` each cable carries, by elasticity and by tension.
+        """Compute the contribution of each cable's elasticity and tension to :meth:`along`.
 
-        With δθ the joint motion per unit tip displacement along u, along(u) = δθᵀ K_θ δθ, and K_θ
-        is a sum over cables, gravity and load.
+        With the joint motion δθ per unit tip displacement along u, along(u) = δθᵀ K_θ δθ. K_θ is a
+        sum over cables, gravity and load.
 
         Args:
             direction: u (3,) in base axes, any length.
 
         Raises:
-            InvalidInput: Not a direction.
+            InvalidInput: ``direction`` is not three finite numbers, or is zero.
             SingularStiffness: The stiffness along u is infinite, or K_θ is singular.
         """
         u = unit_direction("direction", direction)
@@ -240,13 +242,13 @@ class Stiffness(ReadOnlyState):
         )
 
     def report(self) -> Report:
-        """Whether this stiffness can be trusted: facts, warnings, and a second derivation of it.
+        """Check this stiffness; return facts, warnings and a second derivation of K_θ.
 
-        K_θ is derived anew, by central differences of the potential and of the torque at this very
-        posture, which takes some tenths of a second. Nothing that is wrong with the stiffness is
-        raised; the report says so.
+        The second derivation uses central differences of the potential and the torque at this
+        posture. It takes some tenths of a second. Problems are not raised as errors; the report
+        lists them.
         """
-        from cdsm.report import report_on  # so that importing cdsm does not import it
+        from cdsm.report import report_on  # here, so that "import cdsm" does not import it
 
         return report_on(self)
 
@@ -265,7 +267,7 @@ class Stiffness(ReadOnlyState):
 
     @property
     def _rows(self) -> list[tuple[str, ...]]:
-        """The summary as a table: a header, then a name and three numbers a row."""
+        """Rows of the printed table: a header, then a name and three numbers per row."""
         axes = np.eye(3)
         shares = [_or_none(partial(self.shares, u)) for u in axes]
         diagonals = [_or_none(lambda: self.cartesian), _or_none(self.pseudoinverse)]
@@ -290,11 +292,11 @@ class Stiffness(ReadOnlyState):
         return f"{state}, smallest joint stiffness {self.margin:.4g} {unit} ({MODEL})"
 
     def _moves(self, u: Array) -> bool:
-        """Whether a force along a unit direction u (3,) moves any joint."""
+        """Check whether a force along a unit direction u (3,) moves any joint."""
         return readings.moves(self.posture.jacobian, u[None])
 
     def _along(self, u: Array) -> tuple[float, Array]:
-        """Stiffness along a unit direction [N/m], and the joint motion per unit force (nv,)."""
+        """Return stiffness along a unit direction [N/m] and joint motion per unit force (nv,)."""
         status, along, motion, *_ = self._readings(u[None])
         if math.isnan(along[0]):
             self._refuse(status)
@@ -316,7 +318,8 @@ class Stiffness(ReadOnlyState):
         )
 
     def _refuse(self, status: int, what: str = "") -> None:
-        """Raise why a reading does not exist, if so; one with a name needs a mobile tip."""
+        """Raise an error if a reading does not exist; one with a name ``what`` needs a mobile tip.
+        """
         if status == readings.READ:
             return
         if what and (status == readings.IMMOBILE or not readings.is_mobile(self.posture.jacobian)):
@@ -345,20 +348,20 @@ class Stiffness(ReadOnlyState):
 def stiffness(
     pose: Posture, tension: Tension | ArrayLike, wrench: ArrayLike | None = None
 ) -> Stiffness:
-    """Joint stiffness of an arm and its four parts (Eq. 16), and through it the Cartesian one.
+    """Compute the joint stiffness with its four terms (Eq. 16), and the Cartesian stiffness.
 
     Args:
         pose: The posture.
-        tension: The answer of :func:`~cdsm.distribute_tension` at this posture, or tensions
-            of your own (C,) [N], not negative. These need not balance the arm; see
+        tension: The result of :func:`~cdsm.distribute_tension` at this posture, or your own
+            tensions (C,) [N], not negative. These may be out of balance; see
             :attr:`Stiffness.residual`.
-        wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m]; zero if not given.
-            Belongs to tensions of your own: a :class:`~cdsm.Tension` carries its wrench.
+        wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m]; default zero. Only
+            for your own tensions, since a :class:`~cdsm.Tension` has its own wrench.
 
     Raises:
-        InvalidInput: Wrong shape, not numbers, a negative tension, tensions of another posture, or
-            a wrench beside a ``Tension``.
-        ElasticityRangeError: A tension outside the domain of the elasticity of its cable.
+        InvalidInput: An argument has the wrong shape or is not numbers, a tension is negative, the
+            tensions are of another posture, or a wrench is given with a ``Tension``.
+        ElasticityRangeError: A tension is outside the domain of its cable's elasticity.
     """
     arm = instance("pose", pose, Posture).arm
     if isinstance(tension, Tension):
@@ -394,7 +397,7 @@ def assemble(
     free_length: Array | None = None,
     distribution: Tension | None = None,
 ) -> Stiffness:
-    """The stiffness of checked, read-only tensions, wrench and cable stiffnesses (Eq. 16)."""
+    """Compute K_θ from checked, read-only tensions, wrench and cable stiffnesses (Eq. 16)."""
     active, passive, load, joint = pose._joint_stiffness(tension, cable_stiffness, wrench)
     return Stiffness(
         posture=pose,
@@ -412,7 +415,7 @@ def assemble(
 
 
 def _or_none(read: Callable[[], _Value]) -> _Value | None:
-    """What is read, or None where it does not exist."""
+    """Return the result of ``read``, or None if it does not exist."""
     try:
         return read()
     except SingularStiffness:

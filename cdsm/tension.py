@@ -1,12 +1,13 @@
-"""Tension distribution: the least cable tensions that balance the arm.
+"""Tension distribution: the smallest cable tensions that balance the arm.
 
-A redundant arm leaves the tensions of Eq. 17 undetermined; as is usual, the smallest are taken:
+The balance (Eq. 17) does not determine the tensions of a redundant arm. As usual, the smallest are
+chosen:
 
     min ½‖F‖²   so that   J_Lᵀ F = J_Xᵀ W − g   and   minimum ≤ F ≤ maximum.
 
-The problem is made dimensionless before a solver sees it, the answer is accepted only if it meets
-the optimality conditions, and infeasibility is decided by linear programs, which also say how far
-off the bounds are.
+The problem is made dimensionless before a solver gets it. A solution is accepted only if it meets
+the optimality conditions. Linear programs decide whether the problem is infeasible; they also give
+the missing torque and the necessary widening of the bounds.
 """
 
 from __future__ import annotations
@@ -33,13 +34,13 @@ from cdsm.support.validation import bound, instance, one_of, quantity, wrench_ve
 from cdsm.support.values import Array, ReadOnlyState, frozen
 
 DEFAULT_SOLVER: Final = "daqp"
-"""The solver of every tension distribution that names none: exact, and the fastest measured."""
+"""Default solver of all tension distributions: exact, and the fastest in measurements."""
 
-# by default HiGHS calls feasible what misses up to 1e-7, and so would not see less missing torque
+# HiGHS accepts violations of 1e-7 by default, and would not see a smaller missing torque
 _TIGHT = {"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10}
 
-# qpsolvers' defaults miss OPTIMALITY by orders of magnitude for these, and OSQP's polishing step
-# can spoil a solution while it reports success
+# with qpsolvers' defaults, these solvers miss OPTIMALITY by orders of magnitude; OSQP's polishing
+# step can spoil a solution and still report success
 _SETTINGS: dict[str, dict[str, Any]] = {
     "clarabel": {"tol_gap_abs": 1e-11, "tol_gap_rel": 1e-11, "tol_feas": 1e-11},
     "daqp": {"primal_tol": 1e-10},
@@ -58,17 +59,17 @@ _SETTINGS: dict[str, dict[str, Any]] = {
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Tension(ReadOnlyState):
-    """Cable tensions that balance an arm, with the question they answer.
+    """Cable tensions that balance an arm, with the data of their problem.
 
     Attributes:
-        posture: Where.
+        posture: The posture.
         values: F (C,) [N], in the order of ``posture.arm.cables``.
         wrench: W (6,) at ``tool0``, base axes: force [N], then moment [N m].
         minimum: Lower bounds (C,) [N].
         maximum: Upper bounds (C,) [N].
-        solver: Name of the solver that found them.
-        residual: J_Lᵀ F − (J_Xᵀ W − g), what is left of Eq. 13, (nv,) [N m].
-        least: Whether they are the smallest; False of those chosen for a stiffness.
+        solver: Name of the solver that found the tensions.
+        residual: Residual J_Lᵀ F − (J_Xᵀ W − g) of Eq. 13, (nv,) [N m].
+        least: Whether the tensions are the smallest; False if they were chosen for a stiffness.
     """
 
     posture: Posture
@@ -82,12 +83,12 @@ class Tension(ReadOnlyState):
 
     @property
     def at_minimum(self) -> tuple[str, ...]:
-        """Names of the cables that stand at their lower bound."""
+        """Names of the cables at their lower bound."""
         return self._names(self.values - self.minimum)
 
     @property
     def at_maximum(self) -> tuple[str, ...]:
-        """Names of the cables that stand at their upper bound."""
+        """Names of the cables at their upper bound."""
         return self._names(self.maximum - self.values)
 
     def _names(self, distance: Array) -> tuple[str, ...]:
@@ -119,25 +120,26 @@ def distribute_tension(
     *,
     fixed: Mapping[str, float] | None = None,
 ) -> Tension:
-    """Smallest cable tensions in balance: min ‖F‖² with J_Lᵀ F = J_Xᵀ W − g (Eqs. 13, 17).
+    """Compute the smallest tensions in balance: min ‖F‖² with J_Lᵀ F = J_Xᵀ W − g (Eqs. 13, 17).
 
     Args:
         pose: The posture.
         minimum: Lower bound [N], for all cables or (C,); not negative, since cables only pull.
-        maximum: Upper bound [N], for all cables or (C,); inf for none. Bounds that a cable has of
-            its own hold as well.
+        maximum: Upper bound [N], for all cables or (C,); inf for none. Bounds that a cable defines
+            also apply.
         wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m].
-        solver: ``"daqp"`` (exact), ``"osqp"``, or any other that qpsolvers finds installed.
-        fixed: Tensions [N] given by name of the cable, as of motors that control force; the rest
-            is solved for. They stand in place of that cable's bounds, and no advice widens them.
+        solver: ``"daqp"`` (exact), ``"osqp"``, or another solver that qpsolvers finds installed.
+        fixed: Tensions [N] by cable name, e.g. of motors that control force. The other tensions are
+            computed. A fixed tension replaces the bounds of its cable; these are never widened.
 
     Raises:
-        InvalidInput: A bound, a fixed tension or the wrench has the wrong shape or is not a
-            number, or the bounds contradict each other.
-        InfeasibleTension: No tension within the bounds balances the arm; says what is missing, and
-            how far the bounds of the cables that are not fixed would have to widen, if that helps.
-        UnknownName: No such solver is installed, or no such cable.
-        SolverError: The solver's answer does not satisfy the optimality conditions.
+        InvalidInput: A bound, a fixed tension or the wrench has the wrong shape or is not a number,
+            or the bounds contradict each other.
+        InfeasibleTension: No tension within the bounds balances the arm. The error gives the
+            missing torque and, if it helps, how far the bounds of the cables that are not fixed
+            must widen.
+        UnknownName: The solver is not installed, or a fixed cable does not exist.
+        SolverError: The solver's solution does not meet the optimality conditions.
     """
     instance("pose", pose, Posture)
     low, high = checked_bounds(pose.arm, minimum, maximum)
@@ -169,13 +171,10 @@ def distribute_tension(
 def checked_bounds(
     arm: Manipulator, minimum: ArrayLike, maximum: ArrayLike, rows: int | None = None
 ) -> tuple[Array, Array]:
-    """Bounds (C,) [N] of the tensions of an arm, those that its cables have of their own included.
+    """Return valid bounds (C,) [N] of the tensions, including those that the cables define.
 
-    With ``rows`` each may also be (rows, C): other bounds for each row.
-
-    Raises:
-        InvalidInput: Not numbers of such a shape, a minimum that is negative or infinite, or a
-            maximum below it.
+    With ``rows`` a bound may also have the shape (rows, C): one row per posture. Invalid bounds
+    raise InvalidInput.
     """
     cables = arm.cables
     low = bound("minimum", minimum, len(cables), rows)
@@ -211,7 +210,7 @@ def _named(cable: Cable, row: Sequence[int]) -> str:
 def _with_fixed(
     pose: Posture, low: Array, high: Array, fixed: Mapping[str, float]
 ) -> tuple[Array, Array]:
-    """The bounds with those of named cables replaced by one value."""
+    """Return bounds in which both bounds of each fixed cable equal its fixed tension."""
     if not isinstance(fixed, Mapping):
         raise InvalidInput("fixed", f"{fixed!r} given; give a dict of tensions [N] by cable.")
     names = [cable.name for cable in pose.arm.cables]
@@ -223,16 +222,12 @@ def _with_fixed(
 
 
 def installed_solver(solver: str) -> str:
-    """The name of a solver, checked.
-
-    Raises:
-        UnknownName: No such solver is installed.
-    """
+    """Return the name of a solver; UnknownName if it is not installed."""
     return one_of("installed solver", solver, qpsolvers.available_solvers)
 
 
 def _solve(problem: tension_kernels.Scaled, solver: str) -> Array | str:
-    """Return the verified optimum, or what is wrong with the solver's answer: there may be none."""
+    """Return the verified optimum, or the fault as text: no solution, or not the optimum."""
     installed_solver(solver)
     A, b, low, high, *_ = problem
     sparse = csc_matrix if solver in qpsolvers.sparse_solvers else np.asarray
@@ -242,10 +237,10 @@ def _solve(problem: tension_kernels.Scaled, solver: str) -> Array | str:
     try:
         if solver == "daqp":
             solution = qpsolvers.solve_problem(qp, solver, **settings)
-        else:  # the others also report failure as warnings
+        else:  # other solvers also report failure as warnings
             with warnings.catch_warnings(action="ignore"):
                 solution = qpsolvers.solve_problem(qp, solver, **settings)
-    except Exception as error:  # each backend has its own kinds
+    except Exception as error:  # each solver has its own error types
         raise SolverError(solver, f"failed: {error}. {_instead(solver)}") from error
     x = solution.x
     if not solution.found or x is None:
@@ -256,12 +251,12 @@ def _solve(problem: tension_kernels.Scaled, solver: str) -> Array | str:
     if not np.isfinite(point[0]).all():
         raise SolverError(solver, f"calls {x.tolist()} optimal. {_instead(solver)}")
     if _shortfall(problem, point):
-        # a first-order or interior-point answer: near the optimum, with its active bounds known
+        # first-order and interior-point solvers end near the optimum; the active bounds are then known
         point = _polished(problem, point)
         shortfall = _shortfall(problem, point)
         if shortfall:
             return f"calls a point optimal that is not: {shortfall}"
-    # only now: at the edge of the feasible, multipliers are so large that the last bit of x counts
+    # after the check: near infeasibility, large multipliers make the last bit of x matter
     x, _, z = point
     return tension_kernels.onto_bounds(x, z, low, high, OPTIMALITY * max(1.0, float(abs(x).max())))
 
@@ -273,8 +268,8 @@ def _instead(solver: str) -> str:
 
 
 def _shortfall(problem: tension_kernels.Scaled, point: tuple[Array, ...]) -> str:
-    """What keeps a point and its multipliers from being the optimum; nothing if they are."""
-    # the same as the solution's primal_residual, dual_residual and duality_gap, ten times faster
+    """Return as text why a point and its multipliers are not the optimum; empty if they are."""
+    # equal to qpsolvers' primal_residual, dual_residual and duality_gap, ten times faster
     primal, dual, gap = tension_kernels.optimality(*problem[:4], *point)
     size = max(1.0, float(abs(point[0]).max()))
     distance = math.sqrt(2.0 * gap)  # ½‖x − x*‖² is at most the gap
@@ -304,20 +299,16 @@ def _polished(problem: tension_kernels.Scaled, point: tuple[Array, ...]) -> tupl
 def _explain(
     pose: Posture, problem: tension_kernels.Scaled, solver: str, fault: str, free: NDArray[np.bool_]
 ) -> NoReturn:
-    """Settle by linear programs why a solver found no tensions, and raise it.
+    """Find by linear programs why a solver found no tensions, and raise the error.
 
-    Args:
-        pose: The posture.
-        problem: What was asked.
-        solver: What found none.
-        fault: What it did instead.
-        free: The cables (C,) whose bounds may widen: all but those of fixed tension.
+    Only bounds of ``free`` cables (C,) may widen: those without a fixed tension. ``fault`` is the
+    solver's result, as text.
     """
     A, b, lower, upper, arm_scale, force_scale = problem
     nv, count = A.shape
-    # variables: F, then missing torque as its positive and negative part
+    # variables: F, then the positive and the negative part of the missing torque
     identity = np.eye(nv)
-    # HiGHS drops entries below 1e-9, so each cable is measured by its own largest moment arm
+    # HiGHS drops entries below 1e-9, so each cable is scaled by its own largest moment arm
     lever = abs(A).max(axis=0)
     lever = np.where(lever > 0.0, lever, 1.0)
     nearest = linprog(
@@ -339,7 +330,7 @@ def _explain(
         )
 
     widening = _widening(problem, free)
-    blocking = False  # whether it is the fixed tensions that are in the way
+    blocking = False  # whether the fixed tensions make the problem infeasible
     if math.isinf(widening) and not free.all():
         blocking = math.isfinite(_widening(problem, np.ones_like(free)))
     missing = (b - A @ values) * arm_scale * force_scale
@@ -356,10 +347,10 @@ def _explain(
 
 
 def _widening(problem: tension_kernels.Scaled, free: NDArray[np.bool_]) -> float:
-    """By how much the bounds of free cables (C,) must widen [N]; inf if that does not help."""
+    """Compute how far the bounds of free cables (C,) must widen [N]; inf if this does not help."""
     A, b, lower, upper, _, force_scale = problem
     nv, count = A.shape
-    # variables: F, then the widening t: low − t <= F <= high + t, and F >= 0 all the same; a fixed
+    # variables: F, then the widening t: low − t <= F <= high + t, and F >= 0; a fixed
     # tension does not widen
     rows = np.vstack([-np.eye(count), np.eye(count)])
     sides = np.concatenate([-lower, upper])

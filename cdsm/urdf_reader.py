@@ -1,8 +1,8 @@
-"""Reading URDFs of strangers: what other parsers let through is refused here, by name.
+"""Read URDFs from other sources, and refuse faults that other parsers accept.
 
-Pinocchio accepts a link with two parents, negative and impossible masses, axes of zero and limits
-the wrong way round; what it refuses it explains on the standard error only. So the text is checked
-first: the XML, the tree, the joints and what they carry.
+Pinocchio accepts links with two parents, impossible masses, zero axes and inverted limits. It
+prints the reason of a refusal only to standard error. This module therefore checks the text first:
+the XML, the tree, the joints, the masses and inertias.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from cdsm.support.validation import RANGES, flag
 from cdsm.support.xml import XmlFault, numbers, parse_xml
 
 TAKEN = ("revolute", "prismatic", "fixed")
-"""Joint types that cdsm takes."""
+"""Joint types that cdsm accepts."""
 
 _INSTEAD = {
     "continuous": "write it as revolute with a <limit>; one angle per joint is needed",
@@ -32,27 +32,27 @@ _INSTEAD = {
 _MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 _MOST_LINKS = 2000
-"""Pinocchio compares the name of each link with all others."""
+"""Largest number of links, since Pinocchio compares the name of each link with all others."""
 
 _LONGEST_CHAIN = 400
-"""Joints one behind the other, moving or not; ten times as many overflow Pinocchio's stack."""
+"""Largest number of joints in series, moving or not; ten times as many crash Pinocchio."""
 
 _LOOSE = 1e-2
-"""Part of the largest moment of inertia by which rounded or estimated ones may miss each other."""
+"""Tolerance of the inertia check for rounded values, relative to the largest principal moment."""
 
 
 def read_urdf(source: str | os.PathLike[str], *, check_inertia: bool = True) -> str:
-    """The text of a URDF, from a file or as it is, checked.
+    """Read the text of a URDF and check it.
 
     Args:
         source: Path of the file, or the text itself, which begins with ``<``.
-        check_inertia: Refuse moments of inertia that no body has.
+        check_inertia: Refuse moments of inertia that no rigid body can have.
 
     Raises:
-        InvalidInput: ``check_inertia`` is no flag.
+        InvalidInput: ``check_inertia`` is not a bool.
         FileError: The file cannot be read.
-        UrdfError: It is no URDF of a tree of revolute, prismatic and fixed joints; every fault is
-            listed.
+        UrdfError: The text is not a URDF of a tree of revolute, prismatic and fixed joints; lists
+            every fault.
     """
     flag("check_inertia", check_inertia)
     inline = isinstance(source, str) and source.lstrip("\ufeff \t\r\n").startswith("<")
@@ -173,7 +173,7 @@ def _of_origin(where: str, element: etree._Element) -> list[str]:
 
 
 def _read(faults: list[str], where: str, text: str | None, count: int) -> tuple[float, ...] | None:
-    """The numbers, or None and one fault more."""
+    """Read the numbers of an attribute; if they are invalid, add a fault and return None."""
     try:
         return numbers(where, text, count)
     except XmlFault as error:
@@ -182,7 +182,7 @@ def _read(faults: list[str], where: str, text: str | None, count: int) -> tuple[
 
 
 def _of_tree(links: list[str], joints: list[etree._Element]) -> list[str]:
-    """Of links (n,) with one parent each but for the root, and no way round."""
+    """Check that the links form a tree: one root, one parent for every other link, no cycle."""
     faults: list[str] = []
     known = set(links)
     parents: dict[str, tuple[str, str]] = {}

@@ -1,1 +1,1 @@
-"""Compiled kernels of the single path: forward kinematics, gravity, stiffness, tensions."""
+"""Compiled kernels of forward kinematics, gravity, cable lengths, stiffness and tensions."""

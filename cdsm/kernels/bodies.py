@@ -1,12 +1,12 @@
-"""Numba kernels of the rigid bodies: pose of the tip, its Jacobian, gravity torque and stiffness.
+"""Numba kernels of the rigid bodies: tip pose, tip Jacobian, gravity torque and stiffness.
 
-For one posture Pinocchio answers these; for many at once its calls from Python would cost more than
-all the rest. A test holds both equal to rounding. With M and S = Σ m c of all that joint i moves,
-r_i = S − M o_i and gravity γ,
+Single postures use Pinocchio. For many postures, its calls from Python would take longer than all
+other computations. A test compares the two to rounding. Joint i moves bodies of total mass M and S
+= Σ m c. With r_i = S − M o_i and gravity γ,
 
     g_i = −γ·(z_i × r_i),    ∂g_i/∂θ_j = −γ·(z_i × (z_j × r_j)) for i before or equal to j.
 
-Where joint j slides along s, M s stands for z_j × r_j.
+If joint j slides along s, M s replaces z_j × r_j.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ from cdsm.support.values import Array
 
 
 class Masses(NamedTuple):
-    """The masses that the joints carry, and where the tip is; rows as in a tree.
+    """Masses that the joints carry, and the position of the tip; rows as in :class:`Tree`.
 
     Attributes:
-        mass: Of the bodies fixed to each joint's frame, (nv+1,) [kg].
-        centre: Their centre of mass in that frame, (nv+1, 3) [m].
-        gravity: In base axes (3,) [m/s²].
+        mass: Mass of the bodies fixed to each joint's frame, (nv+1,) [kg].
+        centre: Centre of mass of these bodies in the joint's frame, (nv+1, 3) [m].
+        gravity: Gravity in base axes (3,) [m/s²].
         tip: Row of the joint that moves the tip.
         tip_joints: Coordinates of the joints that move the tip, base first.
-        rotation: Of the tip in that joint's frame, (3, 3).
-        point: Its origin there, (3,) [m].
+        rotation: Rotation of the tip in the frame of joint ``tip``, (3, 3).
+        point: Origin of the tip in the frame of joint ``tip``, (3,) [m].
     """
 
     mass: Array
@@ -49,7 +49,7 @@ def tip_jacobian(
     tip: Array,
     jacobian: Array,
 ) -> None:
-    """Fill the pose of the tip (4, 4), and J_X (6, nv) for the joints that move it."""
+    """Fill the tip pose (4, 4), and the columns of J_X (6, nv) of the joints that move the tip."""
     origin, axis, slide, _ = frames
     i = masses.tip
     for r in range(3):
@@ -81,11 +81,11 @@ def tip_jacobian(
 def gravity_torque(
     tree: Tree, masses: Masses, rotation: Array, frames: Frames, carried: Array, torque: Array
 ) -> None:
-    """Fill g (nv,), and M, z × r and γ × z of every joint as the rows of carried (nv+1, 7)."""
+    """Fill g (nv,), and the rows of carried (nv+1, 7) with M, z × r and γ × z of each joint."""
     parent, order = tree.parent, tree.order
     origin, axis, slide, _ = frames
     gx, gy, gz = masses.gravity[0], masses.gravity[1], masses.gravity[2]
-    # first M and S of each link alone, in the columns 0 and 1 to 3
+    # first M and S of each link alone: column 0, and columns 1 to 3
     for i in range(parent.shape[0]):
         m = masses.mass[i]
         carried[i, 0] = m
@@ -94,7 +94,7 @@ def gravity_torque(
             for k in range(3):
                 centre += rotation[i, r, k] * masses.centre[i, k]
             carried[i, 1 + r] = m * centre
-    # then from the ends of the branches inwards: a joint's sums are whole before it hands them on
+    # then from the ends of the branches to the base: add each joint's complete sums to its parent
     for k in range(order.shape[0] - 1, -1, -1):
         i = order[k]
         before = parent[i]
@@ -119,7 +119,7 @@ def gravity_torque(
 
 @compiled
 def add_gravity_stiffness(parent: Indices, carried: Array, gravity: Array) -> None:
-    """Add ∂g/∂θ to a matrix (nv, nv), for i ≤ j only; ``carried`` is of :func:`gravity_torque`."""
+    """Add ∂g/∂θ to a matrix (nv, nv) for i ≤ j only; :func:`gravity_torque` fills ``carried``."""
     for j in range(parent.shape[0] - 1, 0, -1):
         x, y, z = carried[j, 1], carried[j, 2], carried[j, 3]
         i = j

@@ -1,4 +1,4 @@
-"""How kernels are compiled: three decorators over numba's, and a loop it can vectorise."""
+"""Compilation of kernels: three decorators based on numba's njit, and a loop that vectorises."""
 
 from __future__ import annotations
 
@@ -13,20 +13,21 @@ _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 
 def compiled(function: _Function) -> _Function:
-    """Compile for speed, once for all runs if there is a place to keep the result.
+    """Compile a kernel; numba caches the result on disk if a folder is writable.
 
-    No fastmath: it may drop NaN. Divisions are not guarded: none here is by zero.
+    fastmath is off, since it may remove NaN. Division by zero is not checked: no kernel divides by
+    zero.
     """
     return _compile(function)
 
 
 def threaded(function: _Function) -> _Function:
-    """Compile, and let Python's other threads run on meanwhile: for what takes milliseconds."""
+    """Compile a kernel that releases the GIL, for kernels that take milliseconds."""
     return _compile(function, nogil=True)
 
 
 def inlined(function: _Function) -> _Function:
-    """Compile as part of every kernel that calls it: for what is over in nanoseconds."""
+    """Compile a kernel inline in every kernel that calls it, for kernels that take nanoseconds."""
     return _compile(function, inline="always")
 
 
@@ -36,14 +37,15 @@ def _compile(
     compiler = partial(njit, error_model="numpy", inline=inline, nogil=nogil)
     try:
         return cast(_Function, compiler(cache=True)(function))
-    except RuntimeError:  # neither the package's folder nor the user's cache can be written
+    except RuntimeError:  # neither the package's folder nor the user's cache is writable
         return cast(_Function, compiler()(function))
 
 
 @inlined
 def upwards(first: int, end: int) -> range:
-    """``range(first, end)`` of indices that are known not to be negative.
+    """Return ``range(first, end)`` for indices that are never negative.
 
-    A negative index counts from the end, and a loop that has to look is not vectorised.
+    A negative index counts from the end, and numba does not vectorise a loop that must check for
+    it.
     """
     return range(np.uint64(first), np.uint64(end))

@@ -1,14 +1,14 @@
-"""Numba kernels of dense linear algebra for matrices too small to be worth a call of LAPACK.
+"""Numba kernels of dense linear algebra for matrices too small for LAPACK.
 
-A LAPACK with threads of its own also fights over the cores with those that run these kernels: the
-inverse of an 80×80 matrix took it 16 ms. Microseconds here, and in LAPACK called from a kernel:
+A LAPACK with its own threads also competes for cores with the threads that run these kernels: the
+inverse of an 80×80 matrix then took 16 ms. Microseconds here / in LAPACK called from a kernel:
 
     n                                        2         5        10        20        40        80
     linear system, ten right sides   0.1 / 0.5 0.3 / 0.9 0.5 / 1.8 2.0 / 4.5  9.0 / 13   55 / 45
     smallest eigenvalue              0.1 / 0.3 0.4 / 1.4 1.3 / 3.8 4.6 / 13    21 / 51 188 / 370
     singular values of three rows    0.5 / 1.7 0.4 / 3.1 0.4 / 3.2 0.6 / 3.3 0.8 / 4.2 1.5 / 8.8
 
-Ten columns are a chain of five universal joints, of which a row of a batch takes 5 µs all in all.
+An arm of five universal joints has ten columns; one posture of a batch then takes 5 µs in total.
 """
 
 from __future__ import annotations
@@ -19,23 +19,24 @@ from cdsm.kernels.compiling import compiled, upwards
 from cdsm.support.values import Array
 
 _SWEEPS = 30
-"""Of Jacobi rotations, at most; they converge in five or six."""
+"""Largest number of sweeps of Jacobi rotations; five or six are enough to converge."""
 
 _STEPS = 200
-"""Of Laguerre's method, at most; simple eigenvalues take five, n-fold ones some twenty."""
+"""Largest number of Laguerre steps; simple eigenvalues take five, n-fold ones about twenty."""
 
 _ROUNDING = 2.0**-52
 
 _NOTHING = 1e-30
-"""Entries beside the diagonal that are this part of the largest move no eigenvalue."""
+"""Off-diagonal entries below this part of the largest entry do not change any eigenvalue."""
 
 
 @compiled
 def eliminate(M: Array) -> float:
-    """Replace the columns B that stand right of A (n, n) in M (n, n + …) by A⁻¹ B.
+    """Solve A X = B: replace the columns B, right of A (n, n) in M (n, n + …), by A⁻¹ B.
 
     Returns:
-        Smallest over largest pivot, of rows exchanged; 0 if one is zero, and then B is unfinished.
+        Smallest over largest pivot, with row exchanges; 0 if a pivot is zero, and B is then
+        unfinished.
     """
     n, width = M.shape
     smallest, largest = math.inf, 0.0
@@ -69,10 +70,11 @@ def eliminate(M: Array) -> float:
 
 @compiled
 def smallest_eigenvalue(A: Array, scratch: Array) -> float:
-    """Smallest eigenvalue of a symmetric matrix A (n, n), which is lost; scratch is (4, n).
+    """Compute the smallest eigenvalue of a symmetric A (n, n); overwrite A; scratch is (4, n).
 
-    Householder's reflections make it tridiagonal, and Laguerre's method climbs to the smallest root
-    of its characteristic polynomial from below: all roots are real, so it never passes it.
+    Householder reflections make A tridiagonal. Laguerre's method then converges from below to the
+    smallest root of the characteristic polynomial. It never passes the root, since all roots are
+    real.
     """
     n = A.shape[0]
     d, e = scratch[0], scratch[1]
@@ -84,7 +86,7 @@ def smallest_eigenvalue(A: Array, scratch: Array) -> float:
         x = min(x, d[i] - radius) if i else d[i] - radius  # Gershgorin
     x -= _ROUNDING * scale
     for _ in range(_STEPS):
-        # the leading minors' ratios g, and the logarithmic derivatives of the last minor:
+        # ratios g of the leading minors, and logarithmic derivatives of the last minor:
         # G = Σ 1/(λ − x), H = Σ 1/(λ − x)²
         inverse = slope = bend = G = H = 0.0
         for i in range(n):
@@ -93,7 +95,7 @@ def smallest_eigenvalue(A: Array, scratch: Array) -> float:
             first = -1.0 + square * inverse * slope
             second = square * inverse * (bend - 2.0 * slope * slope)
             g = d[i] - x - square * inverse
-            if g <= 0.0:  # only rounding gets past the root
+            if g <= 0.0:  # only rounding passes the root
                 return x
             inverse = 1.0 / g
             slope, bend = first * inverse, second * inverse
@@ -108,7 +110,7 @@ def smallest_eigenvalue(A: Array, scratch: Array) -> float:
 
 @compiled
 def _tridiagonalise(A: Array, d: Array, e: Array, v: Array, w: Array) -> None:
-    """Fill the diagonal d (n,) of a similar tridiagonal matrix, and e (n,) beside it; e[0] is 0."""
+    """Fill diagonal d (n,) and off-diagonal e (n,) of a similar tridiagonal matrix; e[0] is 0."""
     n, size = A.shape[0], 0.0
     for i in range(n):
         for j in upwards(0, n):
@@ -120,7 +122,7 @@ def _tridiagonalise(A: Array, d: Array, e: Array, v: Array, w: Array) -> None:
         for i in range(k + 1, n):
             norm += A[k, i] * A[k, i]
         norm = math.sqrt(norm)
-        if norm <= _NOTHING * size:  # its square may be too small to divide by
+        if norm <= _NOTHING * size:  # its square may be too small for a division
             e[k + 1] = 0.0
             continue
         alpha = -norm if A[k, k + 1] > 0.0 else norm
@@ -153,7 +155,8 @@ def _tridiagonalise(A: Array, d: Array, e: Array, v: Array, w: Array) -> None:
 def singular_values(rows: Array, left: Array, values: Array) -> None:
     """Replace three rows (3, n) by left (3, 3) and values (3,) times orthonormal rows.
 
-    Jacobi rotations make them orthogonal, in no order; those of length zero stay zero.
+    Jacobi rotations make the rows orthogonal. They are not sorted, and rows of length zero stay
+    zero.
     """
     n = rows.shape[1]
     for i in range(3):
@@ -168,7 +171,7 @@ def singular_values(rows: Array, left: Array, values: Array) -> None:
                     aa += rows[a, j] * rows[a, j]
                     bb += rows[b, j] * rows[b, j]
                     ab += rows[a, j] * rows[b, j]
-                # as good as orthogonal, or one of them as good as zero
+                # orthogonal to rounding, or one row is zero to rounding
                 negligible = max(math.sqrt(aa * bb), _ROUNDING * max(aa, bb))
                 if abs(ab) <= _ROUNDING * negligible:
                     continue

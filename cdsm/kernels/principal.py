@@ -1,4 +1,4 @@
-"""Principal stiffness: the softest and the stiffest direction of the tip."""
+"""Principal stiffness: the smallest and the largest stiffness of the tip, with directions."""
 
 from __future__ import annotations
 
@@ -7,22 +7,25 @@ import numpy as np
 from cdsm.support.values import Array
 
 RIGID = 1e-12
-"""Ratio of compliances up to which the stiffer direction counts as infinitely stiff: an eigenvalue
-is good to 1e-16 of the largest, so below it fewer than 4 digits are left."""
+"""Ratio of compliances below which the larger stiffness counts as infinite.
+
+An eigenvalue is accurate to 1e-16 of the largest one; below the ratio, fewer than 4 digits are
+left.
+"""
 
 
 def principal_stiffness(compliance: Array) -> dict[str, Array]:
-    """Extremes of 1/(uᵀ C_vv u) over all unit u: the eigenvalues of the symmetric part of C_vv.
+    """Compute the extremes of 1/(uᵀ C_vv u) over unit u: eigenvalues of the symmetric part of C_vv.
 
     Args:
-        compliance: C_vv (..., 3, 3) [m/N], positive semidefinite: of stable arms.
+        compliance: C_vv (..., 3, 3) [m/N], positive semidefinite, as for stable arms.
     """
     values, vectors = np.linalg.eigh((compliance + compliance.swapaxes(-1, -2)) / 2.0)
     most = values[..., 2]
     softest, stiffest = np.full_like(most, np.inf), np.full_like(most, np.inf)
     np.divide(1.0, most, out=softest, where=most > 0.0)
     np.divide(1.0, values[..., 0], out=stiffest, where=values[..., 0] > RIGID * most)
-    anisotropy = np.ones_like(most)  # of a tip that cannot move at all
+    anisotropy = np.ones_like(most)  # value for a tip that cannot move at all
     np.divide(stiffest, softest, out=anisotropy, where=most > 0.0)
     return {
         "softest": softest,
@@ -34,6 +37,6 @@ def principal_stiffness(compliance: Array) -> dict[str, Array]:
 
 
 def _positive(directions: Array) -> Array:
-    """Of u and −u, which mean the same, the one whose largest component is positive."""
+    """Return u or −u, which mean the same direction, with the largest component positive."""
     largest = np.take_along_axis(directions, abs(directions).argmax(-1)[..., None], -1)
     return np.asarray(directions * np.sign(largest))

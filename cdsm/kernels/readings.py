@@ -1,18 +1,18 @@
-"""Readings of K_θ: stability margin, compliance and Cartesian stiffness, of one posture or many.
+"""Kernels that compute readings of K_θ: stability margin, compliance and Cartesian stiffness.
 
-With J_v the linear rows of J_X, and C = J_X K_θ⁻¹ J_Xᵀ with its linear part C_vv,
+With the linear rows J_v of J_X, and C = J_X K_θ⁻¹ J_Xᵀ with its linear part C_vv,
 
     margin = λ_min((K_θ + K_θᵀ)/2),    compliance = C,    along(u) = 1/(uᵀ C_vv u),
     cartesian = (C_vv)⁻¹,              pseudoinverse = J_v⁺ᵀ K_θ J_v⁺.
 
-Near a flat posture C_vv is too ill-conditioned to be inverted. With the singular values J_v = U S V
-and O = U S⁻¹,
+Near a flat posture C_vv is too ill-conditioned for inversion. With the singular value decomposition
+J_v = U S V and O = U S⁻¹,
 
     cartesian = O (V K_θ⁻¹ Vᵀ)⁻¹ Oᵀ,    pseudoinverse = O (V K_θ Vᵀ) Oᵀ.
 
-K_θ is a sum of four terms that may cancel, so it is compared with P, the sum of their magnitudes,
-and each joint is measured in units of its own. With D the diagonal of P, K_θ is singular if the
-smallest singular value of D^-½ K_θ D^-½ is below REGULAR times the largest entry of D^-½ P D^-½.
+The four terms of K_θ may cancel. K_θ is therefore compared with P, the sum of their magnitudes, and
+scaled by the diagonal D of P. K_θ is singular if the smallest singular value of D^-½ K_θ D^-½ is
+below REGULAR times the largest entry of D^-½ P D^-½.
 """
 
 from __future__ import annotations
@@ -27,30 +27,30 @@ from cdsm.kernels.linear_algebra import eliminate, singular_values, smallest_eig
 from cdsm.support.values import Array
 
 REGULAR = 1e-8
-"""Smallest singular value of K_θ, over what it is a sum of, that leaves its inverse 6 digits."""
+"""Smallest relative singular value of K_θ at which its inverse still has 6 correct digits."""
 
 FLAT = 1e-6
-"""Smallest ratio of the singular values of J_v for which a 3×3 stiffness still has 4 digits.
+"""Smallest ratio of the singular values of J_v at which a 3×3 stiffness still has 4 correct digits.
 
-Its entries differ by the square of the ratio, and float64 holds 16 digits.
+Its entries differ by the square of the ratio, and float64 has 16 digits.
 """
 
 UNMOVED = 1e-10
-"""Joint torque of a tip force below this part of the largest is rounding: the tip cannot move."""
+"""Relative joint torque of a tip force that counts as rounding: the tip cannot move."""
 
 _DOUBT = 1e5
-"""Scaled motion under a probing torque from which on the singular values have to be computed.
+"""Scaled motion under a probing torque above which the singular values are computed.
 
-The motion is at most the torque over the smallest singular value, mostly a part of some tenths of
-that: 1e5 is decades off the inverse of :data:`REGULAR`.
+The motion is at most the torque over the smallest singular value, and usually some tenths of that.
+1e5 is orders of magnitude below the inverse of :data:`REGULAR`.
 """
 
 READ, SINGULAR, IMMOBILE = range(3)
-"""What can be read: everything; nothing that needs K_θ⁻¹; nothing that needs J_v⁺."""
+"""Status: all readings exist; those with K_θ⁻¹ do not; those with J_v⁺ do not."""
 
 
 class Wanted(NamedTuple):
-    """Which readings are wanted; ``along`` is, if there are directions."""
+    """Flags of the wanted readings; ``along`` is computed for every given direction."""
 
     margin: bool
     pseudoinverse: bool
@@ -59,12 +59,12 @@ class Wanted(NamedTuple):
 
 
 class Readings(NamedTuple):
-    """The readings, to be filled.
+    """Arrays for the readings, filled by :func:`read_stiffness`.
 
     Attributes:
         margin: (1,).
         pseudoinverse: (3, 3).
-        along: One for each direction (D,).
+        along: One stiffness per direction (D,).
         compliance: (6, 6).
         cartesian: (3, 3).
     """
@@ -77,14 +77,14 @@ class Readings(NamedTuple):
 
 
 class Workspace(NamedTuple):
-    """Scratch for one row.
+    """Scratch arrays for one posture.
 
     Attributes:
         parts: P, the sum of the magnitudes of the four terms of K_θ (nv, nv).
         symmetric: The symmetric part of K_θ (nv, nv).
-        vectors: For its smallest eigenvalue (4, nv).
+        vectors: Scratch of the smallest eigenvalue (4, nv).
         scale: D^-½ (nv,).
-        system: K_θ, a probing torque, and as far as wanted J_vᵀu of each direction, J_Xᵀ and Vᵀ.
+        system: K_θ, a probing torque, and, if wanted, J_vᵀu of each direction, J_Xᵀ and Vᵀ.
         left: U, then O (3, 3).
         values: The singular values S (3,).
         right: V (3, nv).
@@ -137,7 +137,7 @@ def single_readings(
     compliance: bool,
     cartesian: bool,
 ) -> tuple[int, Array, Array, Array, Array]:
-    """Status, along (D,), joint motions K_θ⁻¹ J_vᵀu (nv, D), compliance and cartesian if wanted."""
+    """Return status, along (D,), joint motions K_θ⁻¹ J_vᵀu (nv, D), compliance and cartesian."""
     nv, count = K.shape[0], directions.shape[0]
     wanted = Wanted(False, False, compliance, cartesian)
     work = workspace(nv, count, wanted)
@@ -146,7 +146,7 @@ def single_readings(
     readings = Readings(
         np.empty(1), np.empty((3, 3)), np.empty(count), np.empty((6, 6)), np.empty((3, 3))
     )
-    # copies are writable, as a batch's rows are: the same compiled kernels serve both
+    # copies are writable like the rows of a batch, so one compilation serves both
     status = read_stiffness(K.copy(), JX.copy(), directions, wanted, work, readings)
     motion = work.system[:, nv + 1 : nv + 1 + count].copy()
     return status, readings.along, motion, readings.compliance, readings.cartesian
@@ -154,14 +154,14 @@ def single_readings(
 
 @compiled
 def single_margin(K: Array) -> float:
-    """Smallest eigenvalue of the symmetric part of K (nv, nv)."""
+    """Compute the smallest eigenvalue of the symmetric part of K (nv, nv)."""
     nv = K.shape[0]
     return _margin(K.copy(), np.empty((nv, nv)), np.empty((4, nv)))
 
 
 @compiled
 def single_pseudoinverse(K: Array, JX: Array) -> tuple[int, Array]:
-    """Status and J_v⁺ᵀ K J_v⁺ (3, 3) of any term K (nv, nv)."""
+    """Return the status and J_v⁺ᵀ K J_v⁺ (3, 3) of any term K (nv, nv)."""
     wanted = Wanted(False, True, False, False)
     readings = Readings(
         np.empty(1), np.empty((3, 3)), np.empty(0), np.empty((6, 6)), np.empty((3, 3))
@@ -173,14 +173,14 @@ def single_pseudoinverse(K: Array, JX: Array) -> tuple[int, Array]:
 
 @compiled
 def is_mobile(JX: Array) -> bool:
-    """Whether the tip can move in all directions."""
+    """Check whether the tip can move in all directions."""
     wanted = Wanted(False, False, False, False)
     return _decompose(JX.copy(), workspace(JX.shape[1], 0, wanted))
 
 
 @compiled
 def moves(JX: Array, direction: Array) -> bool:
-    """Whether a force along u, given as (1, 3), moves any joint."""
+    """Check whether a force along u (1, 3) moves any joint."""
     return _is_moved(JX, direction, 0)
 
 
@@ -191,7 +191,7 @@ def moves(JX: Array, direction: Array) -> bool:
 def sum_terms(
     active: Array, passive: Array, gravity: Array, load: Array, K: Array, parts: Array
 ) -> None:
-    """Fill K_θ and the sum of its terms' magnitudes P, (nv, nv) each."""
+    """Fill K_θ and P, the sum of the magnitudes of its terms, (nv, nv) each."""
     for i in range(K.shape[0]):
         for j in range(K.shape[0]):
             K[i, j] = active[i, j] + passive[i, j] + gravity[i, j] + load[i, j]
@@ -203,18 +203,18 @@ def sum_terms(
 def read_stiffness(
     K: Array, JX: Array, directions: Array, wanted: Wanted, work: Workspace, readings: Readings
 ) -> int:
-    """Fill the wanted readings, as far as the status says that they exist.
+    """Fill the wanted readings that exist.
 
-    Where the tip is immobile, pseudoinverse and cartesian are NaN; where K_θ is singular, ``along``
-    is NaN, but infinite in directions in which the tip does not move.
+    If the tip is immobile, pseudoinverse and cartesian are NaN. If K_θ is singular, ``along`` is
+    NaN, or infinite in directions in which the tip cannot move.
 
     Args:
         K: K_θ (nv, nv).
         JX: J_X (6, nv).
         directions: Unit vectors u (D, 3).
-        wanted: What to fill.
-        work: Scratch, of which ``parts`` is filled.
-        readings: To be filled.
+        wanted: Wanted readings.
+        work: Scratch; ``parts`` must be filled before.
+        readings: Arrays to fill.
 
     Returns:
         READ, SINGULAR or IMMOBILE.
@@ -298,7 +298,7 @@ def _solve(K: Array, parts: Array, scale: Array, system: Array) -> bool:
     """Replace the right sides B of a system by K_θ⁻¹ B; return whether K_θ is regular."""
     nv = K.shape[0]
     largest = _equilibrate(K, parts, scale, system)
-    if largest == math.inf:  # nothing holds some joint
+    if largest == math.inf:  # a joint has zero stiffness in all terms
         return False
     for i in range(nv):
         system[i, nv] = _probe_torque(i)
@@ -309,7 +309,7 @@ def _solve(K: Array, parts: Array, scale: Array, system: Array) -> bool:
     moved = 0.0
     for i in range(nv):
         moved = max(moved, abs(system[i, nv]))
-    # LAPACK takes ten times as long as all the rest, and is hardly ever asked
+    # LAPACK's singular values take ten times as long as all the rest, and are rarely needed
     if not moved * largest < _DOUBT and not _is_regular(K, parts):
         return False
     for i in range(nv):
@@ -335,7 +335,7 @@ def _equilibrate(K: Array, parts: Array, scale: Array, scaled: Array) -> float:
 
 @compiled
 def _is_regular(K: Array, parts: Array) -> bool:
-    """Whether the smallest singular value of the scaled K_θ is large enough."""
+    """Check whether the smallest singular value of the scaled K_θ is large enough."""
     scaled = np.empty(K.shape)
     largest = _equilibrate(K, parts, np.empty(K.shape[0]), scaled)
     regular: bool = np.linalg.svd(scaled)[1][-1] > REGULAR * largest
@@ -344,7 +344,7 @@ def _is_regular(K: Array, parts: Array) -> bool:
 
 @inlined
 def _probe_torque(i: int) -> float:
-    """Torque on joint i, from 1 to 2 and so irregular that hardly a motion is free of it."""
+    """Return an irregular torque on joint i, from 1 to 2, that excites almost every motion."""
     return 1.0 + (0.6180339887498949 * i) % 1.0
 
 
@@ -352,7 +352,7 @@ def _probe_torque(i: int) -> float:
 def _set_right_sides(
     JX: Array, directions: Array, right: Array, wanted: Wanted, system: Array
 ) -> None:
-    """Fill the wanted ones of J_vᵀu, J_Xᵀ and Vᵀ, right of the probing torque."""
+    """Fill those of J_vᵀu, J_Xᵀ and Vᵀ that are wanted, right of the probing torque."""
     nv, count = JX.shape[1], directions.shape[0]
     width = system.shape[1]
     for i in range(nv):
@@ -368,7 +368,7 @@ def _set_right_sides(
 
 @inlined
 def _tip_torque(JX: Array, directions: Array, u: int, i: int) -> float:
-    """Entry i of J_vᵀu: the torque of a unit force along u."""
+    """Compute entry i of J_vᵀu: the joint torque of a unit force along u."""
     x, y, z = directions[u, 0], directions[u, 1], directions[u, 2]
     torque: float = x * JX[0, i] + y * JX[1, i] + z * JX[2, i]
     return torque
@@ -376,7 +376,7 @@ def _tip_torque(JX: Array, directions: Array, u: int, i: int) -> float:
 
 @compiled
 def _is_moved(JX: Array, directions: Array, u: int) -> bool:
-    """Whether a force along u moves any joint."""
+    """Check whether a force along u moves any joint."""
     torque = linear = 0.0
     for i in range(JX.shape[1]):
         torque = max(torque, abs(_tip_torque(JX, directions, u, i)))
@@ -387,7 +387,7 @@ def _is_moved(JX: Array, directions: Array, u: int) -> bool:
 
 @compiled
 def _project(A: Array, B: Array, first: int, out: Array) -> None:
-    """Fill the first columns of out with A (m, nv) times m columns of B (nv, …)."""
+    """Fill the first m columns of out with A (m, nv) times m columns of B (nv, …)."""
     m = A.shape[0]
     for a in range(m):
         for c in range(m):
@@ -399,7 +399,7 @@ def _project(A: Array, B: Array, first: int, out: Array) -> None:
 
 @compiled
 def _congruence(factor: Array, inner: Array, first: int, out: Array) -> None:
-    """Fill out (3, 3) with O X Oᵀ, X three columns of inner and O the factor."""
+    """Fill out (3, 3) with O X Oᵀ; X is three columns of inner, and O is the factor."""
     for i in range(3):
         for j in range(3):
             out[i, j] = 0.0

@@ -1,21 +1,21 @@
 """Numba kernels of cable lengths and their derivatives: L, J_L and H_L.
 
-A segment between site a and site b has the length ℓ = |b − a| and, with u = (b − a)/ℓ and
-d_i = ∂(b − a)/∂θ_i,
+A segment between site a and site b has the length ℓ = |b − a|. With u = (b − a)/ℓ and d_i = ∂(b −
+a)/∂θ_i,
 
     ∂ℓ/∂θ_i = u·d_i,    ∂²ℓ/∂θ_i∂θ_j = (d_i·d_j − (u·d_i)(u·d_j))/ℓ + u·∂²(b − a)/∂θ_i∂θ_j.
 
-Only the joints between the two links enter: those on the way to b with +, those on the way to a
-with −. For a joint that turns about z through o, d = ±z × (x − o), for one that slides along s,
-d = ±s; and for a joint i not after joint j on the same side the second derivative is z_i × d_j,
-with z = 0 where a joint slides.
+Only the joints between the two links matter. Joints on the path to b have the sign +, joints on the
+path to a have the sign −. A joint that turns about z through o has d = ±z × (x − o); a joint that
+slides along s has d = ±s. If joint i is not after joint j and both are on the same side, the second
+derivative of b − a is z_i × d_j, with z = 0 where a joint slides.
 
-So, for i not after j, the second derivative is c_i·d_j with the left factor
+For i not after j, the second derivative of ℓ is therefore c_i·d_j with the left factor
 
-    c_i = (d_i − (u·d_i) u)/ℓ + u × z_i,
+    c_i = (d_i − (u·d_i) u)/ℓ + u × z_i.
 
-where the last term counts only if both joints are on the same side: u·(z_i × d_j) = (u × z_i)·d_j.
-A left factor is built once per joint, and each pair of joints costs one dot product.
+The last term counts only if both joints are on the same side: u·(z_i × d_j) = (u × z_i)·d_j. A left
+factor is computed once per joint, and each pair of joints needs one dot product.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ from cdsm.kernels.tree import Frames, Indices, Routing, Tree, forward_kinematics
 from cdsm.support.values import Array
 
 SHORTEST_SEGMENT = 1e-9
-"""A segment shorter than this [m] has no direction: its two sites coincide."""
+"""Length [m] below which a segment has no direction: its two sites coincide."""
 
 
 @inlined
 def _direction(site: Array, a: int, b: int) -> tuple[float, float, float, float]:
-    """Unit vector from site a to site b, and their distance; zeros if they coincide."""
+    """Return the unit vector from site a to site b and their distance; zeros if they coincide."""
     x = site[b, 0] - site[a, 0]
     y = site[b, 1] - site[a, 1]
     z = site[b, 2] - site[a, 2]
@@ -62,18 +62,18 @@ def _add_side(
     """Add the joints on one side of a segment to J_L and H_L, for i ≤ j only.
 
     Args:
-        sign: +1 for the joints on the way to b, −1 for those on the way to a.
-        site: The site at that end.
-        part: Of ``joint``: where the segment's joints begin, where this side begins, and its end.
+        sign: +1 for the joints on the path to b, −1 for the joints on the path to a.
+        site: The site at this end of the segment.
+        part: Indices into ``joint``: start of the segment's joints, start and end of this side.
         joint: Rows of the joints.
-        frames: Where they are.
+        frames: Frames of the joints and positions of the sites.
         direction: u and ℓ.
-        weight: Of ∂²ℓ/∂θ_i∂θ_j.
+        weight: Factor of ∂²ℓ/∂θ_i∂θ_j.
         left_factor: The weight times c_i of the segment's joints.
         cable: Row of the Jacobian.
-        jacobian: J_L, or no rows.
-        slot: Of the Hessian.
-        hessian: Sums of H_L, or none.
+        jacobian: J_L, or an array without rows.
+        slot: Index of the Hessian in ``hessian``.
+        hessian: Weighted sums of H_L, or an empty array.
     """
     first, begin, end = part
     ux, uy, uz, length = direction
@@ -98,7 +98,7 @@ def _add_side(
             c[k, 0] = weight * ((dx - along * ux) * inverse + uy * zz - uz * zy)
             c[k, 1] = weight * ((dy - along * uy) * inverse + uz * zx - ux * zz)
             c[k, 2] = weight * ((dz - along * uz) * inverse + ux * zy - uy * zx)
-            # with every joint before, those of the other side included, and with itself
+            # pair joint j with itself and all joints before it, also those of the other side
             for k in range(t - first + 1):
                 i = joint[first + k]
                 value = c[k, 0] * dx + c[k, 1] * dy + c[k, 2] * dz
@@ -115,7 +115,7 @@ def _remove_cross_products(
     weight: float,
     left_factor: Array,
 ) -> None:
-    """Take u × z_i out of the left factors: the joints that follow are on the other side."""
+    """Subtract u × z_i from the left factors: the joints that follow are on the other side."""
     ux, uy, uz, _ = direction
     for t in range(first, end):
         zx, zy, zz = axis[joint[t], 0], axis[joint[t], 1], axis[joint[t], 2]
@@ -126,7 +126,7 @@ def _remove_cross_products(
 
 @compiled
 def mirror(matrix: Array) -> None:
-    """Copy the upper triangle of a matrix onto the lower one."""
+    """Copy the upper triangle of a matrix to the lower triangle."""
     for i in range(matrix.shape[0]):
         for j in range(i):
             matrix[i, j] = matrix[j, i]
@@ -145,11 +145,11 @@ def add_segment_derivatives(
 ) -> int:
     """Add all segments to L (C,), J_L (C, nv) and weight[c] H_L[c] at hessian[slot[c]] (nv, nv).
 
-    J_L is left out if it has no rows, H_L if there are no matrices for it; of H_L only i ≤ j is
+    An array without rows skips J_L, and an array without matrices skips H_L. Only i ≤ j of H_L is
     filled. ``left_factor`` (nv, 3) is scratch.
 
     Returns:
-        The first segment whose sites coincide, or −1; if there is one, all are unfinished.
+        The first segment with coinciding sites, or −1. If there is one, all arrays are unfinished.
     """
     segment, joint = routing.segment, routing.joint
     for s in range(segment.shape[0] - 1):
@@ -162,7 +162,7 @@ def add_segment_derivatives(
         w, k = 0.0, 0
         if hessian.shape[0]:
             w, k = weight[cable], slot[cable]
-        # the joints on the way to a, of which a serpentine arm has none, then those on the way to b
+        # first the joints on the path to a (none in a serpentine arm), then those on the path to b
         for towards_b in range(0 if split > first else 1, 2):
             sign, site, begin, stop = (1.0, b, split, end) if towards_b else (-1.0, a, first, split)
             part, c = (first, begin, stop), left_factor
@@ -176,12 +176,12 @@ def add_segment_derivatives(
 def cable_kinematics(
     tree: Tree, routing: Routing, q: Array
 ) -> tuple[Array, Array, Array, Array, Array, Array, int]:
-    """Where joints and cable sites are at q (nv,), and the cable lengths and their Jacobian.
+    """Compute the joint and site frames at q (nv,), the cable lengths and their Jacobian.
 
     Returns:
-        The fields of :class:`Frames`, L (C,), J_L (C, nv), and the first segment whose sites
-        coincide, or −1; if there is one, L and J_L are unfinished. (To hand a named tuple back to
-        Python would take a quarter of the whole call.)
+        The fields of :class:`Frames`, L (C,), J_L (C, nv), and the first segment with coinciding
+        sites, or −1. If there is one, L and J_L are unfinished. (A named tuple would take a quarter
+        of the total time to return to Python.)
     """
     count, nv = tree.parent.shape[0], q.shape[0]
     origin, axis, slide = np.empty((count, 3)), np.empty((count, 3)), np.empty(tree.slide.shape)
@@ -199,8 +199,8 @@ def add_length_hessian(
 ) -> None:
     """Add weight[c] ∂²L_c/∂θ_i∂θ_j to hessian[slot[c], i, j] for every cable c.
 
-    All slots zero and weight = F gives H_L·F; slot c for cable c and weight 1 the whole tensor.
-    No two neighbouring sites may coincide; :func:`cable_kinematics` has seen to that.
+    H_L·F needs weight = F and all slots 0. The whole tensor needs weight 1 and slot c for cable c.
+    Neighbouring sites must not coincide; :func:`cable_kinematics` checks this.
     """
     nv = hessian.shape[1]
     lengths, no_jacobian, scratch = np.zeros(weight.shape[0]), np.empty((0, nv)), np.empty((nv, 3))

@@ -1,4 +1,4 @@
-"""Numba kernels of the terms of Eq. 16, for one posture or for many."""
+"""Numba kernels of the terms of Eq. 16, for single postures and for batches."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from cdsm.support.values import Array
 def cable_stiffness(
     length: Array, tension: Array, rigidity: Array, linear: Array, series: Array, rest: Array
 ) -> Array:
-    """Stiffness k of each cable (C,) [N/m], as a new array; see :func:`set_cable_stiffness`.
+    """Compute the stiffness k of each cable (C,) [N/m]; see :func:`set_cable_stiffness`.
 
-    EA (1 + ε) is the rigidity, and where ``linear`` (C,) is one that and the tension: EA + F.
+    EA (1 + ε) is ``rigidity``, or rigidity + tension (EA + F) where ``linear`` (C,) is one.
     """
     stretched, stiffness = np.empty(length.shape[0]), np.empty(length.shape[0])
     for c in range(length.shape[0]):
@@ -29,18 +29,18 @@ def cable_stiffness(
 def set_cable_stiffness(
     length: Array, tension: Array, rigidity: Array, series: Array, rest: Array, stiffness: Array
 ) -> None:
-    """Fill k = 1/(l_0/EA + 1/k_series) (C,) [N/m]; 0 where EA is 0: there the motor holds force.
+    """Fill k = 1/(l_0/EA + 1/k_series) (C,) [N/m]; 0 where EA is 0, for motors that hold force.
 
-    The wire is as long as what the series spring leaves of the cable, ℓ = L − (F − F_0)/k_series,
-    so that l_0/EA = ℓ/(EA (1 + ε)).
+    The length of the wire is the cable length without the series spring, ℓ = L − (F −
+    F_0)/k_series. Therefore l_0/EA = ℓ/(EA (1 + ε)).
 
     Args:
         length: L (C,) [m].
         tension: F (C,) [N].
         rigidity: EA (1 + ε) (C,) [N].
         series: 1/k_series (C,) [m/N].
-        rest: F_0 (C,) [N], at which the springs are at rest.
-        stiffness: To be filled.
+        rest: F_0 (C,) [N], tension at which the springs are at rest.
+        stiffness: Array to fill.
     """
     for c in range(length.shape[0]):
         stiffness[c] = 0.0
@@ -61,7 +61,7 @@ def joint_stiffness(
     wrench: Array,
     tip_joints: Indices,
 ) -> tuple[Array, Array, Array, Array]:
-    """Active, passive and load term of Eq. 16 and the sum of all four, (nv, nv) each."""
+    """Compute the active, passive and load terms of Eq. 16 and the sum of all four, (nv, nv)."""
     nv = jacobian.shape[1]
     active, passive = np.zeros((1, nv, nv)), np.zeros((nv, nv))
     slot = np.zeros(tension.shape[0], dtype=np.intp)
@@ -77,10 +77,10 @@ def add_passive_stiffness(length_jacobian: Array, cable_stiffness: Array, passiv
     """Add J_Lᵀ K_L J_L to a matrix (nv, nv), for i ≤ j only."""
     J, k = length_jacobian, cable_stiffness
     count, nv = J.shape
-    for c in range(0, count, 3):  # three cables at a time, for a third of the loads and stores
+    for c in range(0, count, 3):  # three cables at a time: a third of the memory accesses
         d, e = min(c + 1, count - 1), min(c + 2, count - 1)
         kd, ke = k[d] if d > c else 0.0, k[e] if e > d else 0.0
-        last = nv  # a cable moves only with the joints before its end
+        last = nv  # only the joints before its end change a cable's length
         while (
             last > 0 and J[c, last - 1] == 0.0 and J[d, last - 1] == 0.0 and J[e, last - 1] == 0.0
         ):
@@ -93,7 +93,7 @@ def add_passive_stiffness(length_jacobian: Array, cable_stiffness: Array, passiv
 
 @compiled
 def load_stiffness(jacobian: Array, wrench: Array, tip_joints: Indices) -> Array:
-    """−∂(J_Xᵀ W)/∂θ (nv, nv) of a dead wrench W (6,): row torque, column angle."""
+    """Compute −∂(J_Xᵀ W)/∂θ (nv, nv) of a constant wrench W (6,): row torque, column angle."""
     result = np.zeros((jacobian.shape[1], jacobian.shape[1]))
     add_load_stiffness(jacobian, wrench, tip_joints, result)
     return result
@@ -103,9 +103,8 @@ def load_stiffness(jacobian: Array, wrench: Array, tip_joints: Indices) -> Array
 def add_load_stiffness(jacobian: Array, wrench: Array, tip_joints: Indices, load: Array) -> None:
     """Add −∂(J_Xᵀ W)/∂θ to a matrix (nv, nv).
 
-    From J_X and the joints that move the tip, base first: ∂v_i/∂θ_j = z_a × v_b with a the
-    earlier and b the later of the two joints, ∂z_i/∂θ_j = z_j × z_i where j comes before i and 0
-    otherwise.
+    ``tip_joints`` are the joints that move the tip, base first. Of two joints, a is the earlier and
+    b the later: ∂v_i/∂θ_j = z_a × v_b. ∂z_i/∂θ_j = z_j × z_i if joint j is before joint i, else 0.
     """
     fx, fy, fz = wrench[0], wrench[1], wrench[2]
     mx, my, mz = wrench[3], wrench[4], wrench[5]

@@ -1,10 +1,10 @@
-"""Numba kernels of the tension problem: it is made dimensionless, and every answer is verified.
+"""Numba kernels of the tension problem: make it dimensionless, and verify every solution.
 
     min ½‖F‖²   so that   J_Lᵀ F = τ   and   low ≤ F ≤ high.
 
-Whoever found a point, a solver or a guess, it is the optimum if it meets the conditions of Karush,
-Kuhn and Tucker, since the problem is strictly convex; and a vector of Farkas proves that no point
-meets the constraints. The tolerances below are those of single postures and of batches.
+The problem is strictly convex. A point from any solver or guess is the optimum if it meets the
+Karush-Kuhn-Tucker conditions. A Farkas vector proves that the constraints are infeasible. The
+tolerances below hold for single postures and batches.
 """
 
 from __future__ import annotations
@@ -18,34 +18,34 @@ from cdsm.kernels.compiling import compiled
 from cdsm.support.values import Array
 
 NO_ARM = 1e-15
-"""A moment arm this part of the arm's length is rounding, as of a cable that meets the axis."""
+"""Moment arm, relative to the arm's length, that counts as rounding (cable through the axis)."""
 
 OPTIMALITY = 1e-9
 """Largest accepted violation of balance, bounds and stationarity, relative to the largest force."""
 
 DISTANCE = 1e-6
-"""Largest accepted distance from the optimum, as the duality gap bounds it, relative to max F."""
+"""Largest accepted distance from the optimum, bounded by the duality gap, relative to max F."""
 
 _PROOF = 1e-8
-"""What a proof of infeasibility has to leave over, relative to the terms it is the sum of."""
+"""Smallest margin of a proof of infeasibility, relative to the terms of its sum."""
 
 _MISSING = 10.0 * OPTIMALITY
-"""A missing torque this part of the largest arm times the largest force may be accepted."""
+"""Missing torque, relative to the largest arm times the largest force, that may be accepted."""
 
 _ROUNDING = 1e-11
-"""A torque this part of the largest is none, where a cable may pull as much as it likes."""
+"""Torque, relative to the largest, that counts as zero for a cable without upper bound."""
 
 
 class Scaled(NamedTuple):
-    """The balance of an arm, J_Lᵀ F = J_Xᵀ W − g with low ≤ F ≤ high, made dimensionless.
+    """Balance of an arm, J_Lᵀ F = J_Xᵀ W − g with low ≤ F ≤ high, in dimensionless form.
 
     Attributes:
-        A: J_Lᵀ over the largest moment arm (nv, C).
-        b: Torque over moment arm and force (nv,).
-        low: Lower bounds over force (C,).
-        high: Upper bounds over force (C,).
-        arm: Largest moment arm [m], up to the next power of two, so that scaling rounds nothing.
-        force: Largest of the lower bounds and of torque over moment arm [N], likewise.
+        A: J_Lᵀ divided by ``arm`` (nv, C).
+        b: Torque divided by ``arm`` and ``force`` (nv,).
+        low: Lower bounds divided by ``force`` (C,).
+        high: Upper bounds divided by ``force`` (C,).
+        arm: Largest moment arm [m], rounded up to a power of two, so that scaling is exact.
+        force: Largest of the lower bounds and of torque over moment arm [N], rounded up likewise.
     """
 
     A: Array
@@ -60,7 +60,7 @@ class Scaled(NamedTuple):
 def scaled_balance(
     length_jacobian: Array, torque: Array, low: Array, high: Array, reach: float
 ) -> tuple[Array, Array, Array, Array, float, float]:
-    """Return the fields of :class:`Scaled`; moment arms that are rounding of ``reach`` are none."""
+    """Compute the fields of :class:`Scaled`; moment arms below NO_ARM times ``reach`` are zero."""
     count, nv = length_jacobian.shape
     largest = 0.0
     A = np.empty((nv, count))
@@ -77,13 +77,13 @@ def scaled_balance(
     for c in range(count):
         largest = max(largest, low[c])
     force = _power_of_two(largest)
-    # one after the other: their product may be less than any number
+    # divide twice: the product of the two may underflow
     return A / arm, torque / arm / force, low / force, high / force, arm, force
 
 
 @compiled
 def _power_of_two(value: float) -> float:
-    """The power of two next above a magnitude; 1 for zero."""
+    """Return the next power of two at or above a magnitude; 1 for zero."""
     return 2.0 ** math.ceil(math.log2(value)) if value > 0.0 else 1.0
 
 
@@ -91,7 +91,7 @@ def _power_of_two(value: float) -> float:
 def optimality(
     A: Array, b: Array, low: Array, high: Array, x: Array, y: Array, z: Array
 ) -> tuple[float, float, float]:
-    """How far x is from solving min ½‖x‖² so that A x = b, low ≤ x ≤ high.
+    """Measure the violation of optimality of x for min ½‖x‖² so that A x = b, low ≤ x ≤ high.
 
     Args:
         A: (m, n).
@@ -103,10 +103,10 @@ def optimality(
         z: Multipliers of the bounds (n,): negative at low, positive at high.
 
     Returns:
-        Largest violation of balance, over the largest moment arm, and of the bounds; largest entry
-        of x + Aᵀy + z (or of z⁺ where high is infinite); and the duality gap
-        |xᵀx + bᵀy + lowᵀz⁻ + highᵀz⁺|, of which twice bounds the squared distance from the
-        optimum. All are zero exactly at the optimum.
+        Three numbers that are all zero exactly at the optimum. First, the largest violation of
+        balance (divided by the largest moment arm) and of the bounds. Second, the largest entry of
+        x + Aᵀy + z, or of z⁺ where high is infinite. Third, the duality gap |xᵀx + bᵀy + lowᵀz⁻ +
+        highᵀz⁺|; twice the gap bounds the squared distance from the optimum.
     """
     primal = dual = gap = arm = 0.0
     for i in range(b.shape[0]):
@@ -129,7 +129,7 @@ def optimality(
         elif high[j] < np.inf:
             gap += high[j] * z[j]
         else:
-            dual = max(dual, z[j])  # a bound that is not there has no multiplier
+            dual = max(dual, z[j])  # an infinite bound has no multiplier
     return primal, dual, abs(gap)
 
 
@@ -137,9 +137,9 @@ def optimality(
 def is_optimal(
     J: Array, b: Array, low: Array, high: Array, F: Array, v: Array, y: Array, z: Array
 ) -> bool:
-    """Whether F (C,) is the optimum, if J_L v = F for the cables between their bounds, v (nv,).
+    """Check whether F (C,) is the optimum; v (nv,) gives J_L v = F for cables between their bounds.
 
-    Multipliers y (nv,) and z (C,) are filled: a bound takes what the balance leaves over.
+    Fill the multipliers y = −v (nv,) and z (C,); at a bound z = J_L v − F, elsewhere 0.
     """
     force = 0.0
     for i in range(b.shape[0]):
@@ -156,7 +156,7 @@ def is_optimal(
 
 @compiled
 def is_infeasible(J: Array, b: Array, low: Array, high: Array, v: Array) -> bool:
-    """Whether v (nv,) proves that no F balances: vᵀb is above vᵀJ_Lᵀ F for all F within bounds."""
+    """Check whether v (nv,) proves infeasibility: vᵀb > vᵀJ_Lᵀ F for all F within the bounds."""
     largest = left = size = steepest = arm = torques = force = 0.0
     for c in range(J.shape[0]):
         largest = max(largest, abs(row_product(J, c, v)))
@@ -184,7 +184,7 @@ def is_infeasible(J: Array, b: Array, low: Array, high: Array, v: Array) -> bool
 
 @compiled
 def row_product(J: Array, c: int, v: Array) -> float:
-    """Row c of J_L (C, nv) times v (nv,)."""
+    """Compute row c of J_L (C, nv) times v (nv,)."""
     total = 0.0
     for i in range(v.shape[0]):
         total += J[c, i] * v[i]
@@ -193,10 +193,10 @@ def row_product(J: Array, c: int, v: Array) -> float:
 
 @compiled
 def onto_bounds(x: Array, z: Array, low: Array, high: Array, rounding: float) -> Array:
-    """The point x (n,) with its entries at a bound, or outside of it, exactly on it.
+    """Return the point x (n,) with the entries at or outside a bound set exactly to the bound.
 
-    Multipliers z (n,) mark the bounds: negative at low, positive at high. A solver misses them by
-    up to ``rounding``, and a law that begins above zero does not take almost zero for zero.
+    Multipliers z (n,) mark the bounds: negative at low, positive at high. A solver misses bounds by
+    up to ``rounding``. A law whose domain starts above zero needs an exact zero.
     """
     point = np.empty_like(x)
     for j in range(x.shape[0]):

@@ -1,4 +1,4 @@
-"""The arm as plain arrays, and the numba kernel of its forward kinematics."""
+"""Kinematic tree of an arm as plain arrays, and the numba kernel of its forward kinematics."""
 
 from __future__ import annotations
 
@@ -15,19 +15,18 @@ Indices = NDArray[np.intp]
 
 
 class Tree(NamedTuple):
-    """The kinematic tree as plain arrays; row 0 is the base, row i joint i.
+    """The kinematic tree as plain arrays; row 0 is the base, row i is joint i in the order of q.
 
     Attributes:
-        parent: Row of the joint before, (nv+1,).
-        order: Rows of the joints, each after the joint before it, (nv,); the rows themselves are in
-            the order of q, whatever that is.
-        turn: Three matrices of each joint, (nv+1, 3, 3, 3): by Rodrigues' formula the first, plus
-            the second times cos q, plus the third times sin q, is the rotation of its frame in
-            that of the joint before.
-        translation: Origin in the frame of the joint before, (nv+1, 3) [m].
-        axis: Unit axis of a joint that turns, likewise, (nv+1, 3); zero if it slides.
-        slide: Unit direction of a joint that slides, likewise, (nv+1, 3), zero if it turns; (0, 3)
-            if none slides, which is the usual case and costs nothing.
+        parent: Row of the previous joint, (nv+1,).
+        order: Rows of the joints, each one after its parent, (nv,).
+        turn: Three matrices of each joint, (nv+1, 3, 3, 3), from Rodrigues' formula. The first,
+            plus the second times cos q, plus the third times sin q, is the rotation of the joint's
+            frame in its parent's frame.
+        translation: Origin in the parent's frame, (nv+1, 3) [m].
+        axis: Unit axis of a turning joint in the parent's frame, (nv+1, 3); zero if it slides.
+        slide: Unit direction of a sliding joint in the parent's frame, (nv+1, 3), zero if it turns.
+            (0, 3) if no joint slides: this usual case then takes no time.
     """
 
     parent: Indices
@@ -47,9 +46,9 @@ class Tree(NamedTuple):
         axis: Array,
         slide: Array,
     ) -> Tree:
-        """From joint frames at q = 0 in the frames before; axes and slides in the joints' own."""
+        """Build a tree from joint frames at q = 0 in their parents; axes in the joint frames."""
         along = axis[:, :, None] * axis[:, None, :]
-        along[~axis.any(axis=1)] = np.eye(3)  # it does not turn, so all of it stays
+        along[~axis.any(axis=1)] = np.eye(3)  # a sliding joint: the rotation is constant
         cross = np.cross(axis[:, None, :], np.eye(3)).transpose(0, 2, 1)
         parts = np.stack([along, np.eye(3) - along, cross], axis=1)
         return cls(
@@ -63,18 +62,20 @@ class Tree(NamedTuple):
 
 
 class Routing(NamedTuple):
-    """All cable sites, and the cable segments that joints can change; rows as in a tree.
+    """All cable sites, and the cable segments that joints can change; rows as in :class:`Tree`.
 
-    Few arrays on purpose: each that a kernel takes from Python costs as much as a segment.
+    The number of arrays is small, since each array passed from Python takes as long as a segment.
 
     Attributes:
         row: Row of the joint that moves each site, (P,).
-        point: The site in the frame of that joint, (P, 3) [m].
-        segment: For each segment its cable, site a, site b, and where in ``joint`` its joints
-            begin and those on the way to b, (S+1, 5); the last row only says where they end.
-        joint: Rows of the joints between a and b: those on the way to a, then those on the way to
-            b, ancestors first.
-        fixed: Length that joints do not change: lead and segments within one link, (C,) [m].
+        point: Position of each site in the frame of this joint, (P, 3) [m].
+        segment: Five numbers per segment (S+1, 5): cable, site a, site b, and two indices into
+            ``joint``, for the first of its joints and for the first on the path to b. The last row
+            only marks the end.
+        joint: Rows of the joints between a and b: first those on the path to a, then those on the
+            path to b, ancestors first.
+        fixed: Length that joints do not change, (C,) [m]: segments within one link and the lead
+            (the straight cable between its actuator and the base disk).
     """
 
     row: Indices
@@ -85,13 +86,14 @@ class Routing(NamedTuple):
 
 
 class Frames(NamedTuple):
-    """Where the joints and the cable sites are, in base axes.
+    """Joint axes and cable sites at one posture, in base axes.
 
     Attributes:
         origin: A point on each joint axis, (nv+1, 3) [m].
-        axis: Its unit direction, (nv+1, 3); zero if the joint slides.
-        slide: Where it slides to, (nv+1, 3), zero if it turns; (0, 3) if none slides.
-        site: The cable sites, (P, 3) [m].
+        axis: Unit direction of each joint axis, (nv+1, 3); zero if the joint slides.
+        slide: Unit direction of each sliding joint, (nv+1, 3), zero if it turns; (0, 3) if none
+            slides.
+        site: Positions of the cable sites, (P, 3) [m].
     """
 
     origin: Array
@@ -106,8 +108,8 @@ def forward_kinematics(
 ) -> None:
     """Fill the rotations of the joints (nv+1, 3, 3) and the frames at q (nv,).
 
-    A joint that turns has the rotation R_before (A + B cos q + C sin q) with its three matrices of
-    :attr:`Tree.turn`; one that slides moves its origin by q along its slide.
+    A turning joint has the rotation R_parent (A + B cos q + C sin q) with its three matrices of
+    :attr:`Tree.turn`. A sliding joint moves its origin by q along its slide.
     """
     parent, order, turn, translation, local_axis, local_slide = tree
     origin, axis, slide, site = frames
@@ -119,7 +121,7 @@ def forward_kinematics(
         for c in range(3):
             rotation[0, r, c] = 1.0 if r == c else 0.0
     for k in range(order.shape[0]):
-        i = np.uint64(order[k])  # not negative, so that numba need not look: see upwards
+        i = np.uint64(order[k])  # not negative: see upwards
         before, angle = np.uint64(parent[i]), q[i - np.uint64(1)]
         cosine, sine = math.cos(angle), math.sin(angle)
         for r in range(3):
