@@ -253,14 +253,9 @@ def tension_at(
 ) -> Array:
     """Find the tensions F [N] at which a rising function stretch(F) has the wanted values.
 
-    If no tension of the domain gives one of the values, ElasticityRangeError is raised.
-
-    Args:
-        wanted: Strain [-] or elongation [m], any shape.
-        domain: Allowed tensions.
-        stretch: Rising function of F; it is zero at the low end of the domain.
-        slope: Derivative of ``stretch`` with respect to F.
-        name: Name of the wanted quantity, for the error.
+    ``wanted`` is a strain [-] or an elongation [m] of any shape; the error calls it ``name``.
+    ``stretch`` is zero at the low end of ``domain``, and ``slope`` is its derivative. If no tension
+    of the domain gives one of the values, ElasticityRangeError is raised.
     """
     low, high, most = *domain, RANGES["tension"].high
     if math.isinf(high):  # an unbounded law: search only as far as needed
@@ -295,12 +290,12 @@ def rising_root(
 ) -> tuple[Array, Array]:
     """Find tensions F [N] between bounds at which a rising stretch(F) has the wanted values.
 
-    Returns the tensions and the slopes of stretch(F) there. All arrays have the same shape; an
+    It returns the tensions and the slopes of stretch(F) there. All arrays have the same shape; an
     upper bound may be infinite. Newton's method runs inside a shrinking bracket, so it converges
     for every rising law.
 
-    scipy 1.17 is slower: the test was 15 cables of the 1×19 strand, started 2 % from the root.
-    ``scipy.optimize.elementwise.find_root`` uses no derivative and takes 13 times as long.
+    scipy 1.17 is slower. For 15 cables of the 1×19 strand, started 2 % from the root,
+    ``scipy.optimize.elementwise.find_root`` takes 13 times as long, since it uses no derivative.
     ``brentq``, cable by cable, takes 11 times as long.
     """
     first, last, previous = lower, upper, np.full(np.shape(wanted), math.inf)

@@ -165,8 +165,8 @@ class Stiffness(ReadOnlyState):
         less than :meth:`along`, and often several times larger.
 
         Raises:
-            SingularStiffness: K_θ is singular, or the tip hardly moves in one direction. The error
-                then names this direction; use :meth:`along` for other directions.
+            SingularStiffness: K_θ is singular, or the tip hardly moves in one direction. In the
+                second case the error names the direction; use :meth:`along` for other directions.
         """
         status, *_, cartesian = self._readings(cartesian=True)
         self._refuse(status, "the Cartesian stiffness matrix")
@@ -318,8 +318,7 @@ class Stiffness(ReadOnlyState):
         )
 
     def _refuse(self, status: int, what: str = "") -> None:
-        """Raise an error if a reading does not exist; one with a name ``what`` needs a mobile tip.
-        """
+        """Raise an error if a reading does not exist; a named reading also needs a mobile tip."""
         if status == readings.READ:
             return
         if what and (status == readings.IMMOBILE or not readings.is_mobile(self.posture.jacobian)):

@@ -125,19 +125,19 @@ def distribute_tension(
     Args:
         pose: The posture.
         minimum: Lower bound [N], for all cables or (C,); not negative, since cables only pull.
-        maximum: Upper bound [N], for all cables or (C,); inf for none. Bounds that a cable defines
+        maximum: Upper bound [N], for all cables or (C,); inf: no bound. Bounds that a cable defines
             also apply.
         wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m].
         solver: ``"daqp"`` (exact), ``"osqp"``, or another solver that qpsolvers finds installed.
         fixed: Tensions [N] by cable name, e.g. of motors that control force. The other tensions are
-            computed. A fixed tension replaces the bounds of its cable; these are never widened.
+            computed. A fixed tension replaces the bounds of its cable and is never widened.
 
     Raises:
         InvalidInput: A bound, a fixed tension or the wrench has the wrong shape or is not a number,
             or the bounds contradict each other.
         InfeasibleTension: No tension within the bounds balances the arm. The error gives the
-            missing torque and, if it helps, how far the bounds of the cables that are not fixed
-            must widen.
+            missing torque. If wider bounds help, it says how far the bounds of cables without a
+            fixed tension must widen.
         UnknownName: The solver is not installed, or a fixed cable does not exist.
         SolverError: The solver's solution does not meet the optimality conditions.
     """
@@ -210,7 +210,7 @@ def _named(cable: Cable, row: Sequence[int]) -> str:
 def _with_fixed(
     pose: Posture, low: Array, high: Array, fixed: Mapping[str, float]
 ) -> tuple[Array, Array]:
-    """Return bounds in which both bounds of each fixed cable equal its fixed tension."""
+    """Return the bounds; for each fixed cable, minimum and maximum equal its fixed tension."""
     if not isinstance(fixed, Mapping):
         raise InvalidInput("fixed", f"{fixed!r} given; give a dict of tensions [N] by cable.")
     names = [cable.name for cable in pose.arm.cables]
@@ -251,7 +251,7 @@ def _solve(problem: tension_kernels.Scaled, solver: str) -> Array | str:
     if not np.isfinite(point[0]).all():
         raise SolverError(solver, f"calls {x.tolist()} optimal. {_instead(solver)}")
     if _shortfall(problem, point):
-        # first-order and interior-point solvers end near the optimum; the active bounds are then known
+        # first-order and interior-point solvers end near the optimum, with known active bounds
         point = _polished(problem, point)
         shortfall = _shortfall(problem, point)
         if shortfall:

@@ -1,8 +1,9 @@
 """Build the URDF of a :class:`Geometry`, and check it by reading it back.
 
-The links are ``base_link`` (empty, no inertia), ``base_disk`` fixed to it, ``cross{k}`` (universal
-joints only), ``link{k}``, and ``tool0`` at the end of the last link. The joints are ``joint{k}_1``
-and ``joint{k}_2``, or ``joint{k}`` for a hinge (Table I with T(R_0→R_g) of Eq. 2).
+The links are ``base_link`` (empty, no inertia), ``base_disk``, ``cross{k}`` (universal joints
+only), ``link{k}`` and ``tool0``. ``base_disk`` is fixed to ``base_link``, and ``tool0`` is at the
+end of the last link. The joints are ``joint{k}_1`` and ``joint{k}_2``, or ``joint{k}`` for a hinge
+(Table I with T(R_0→R_g) of Eq. 2).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Compilation of kernels: three decorators based on numba's njit, and a loop that vectorises."""
+"""Compilation of kernels: three decorators based on numba's njit, and a range for fast loops."""
 
 from __future__ import annotations
 

@@ -46,7 +46,7 @@ The motion is at most the torque over the smallest singular value, and usually s
 """
 
 READ, SINGULAR, IMMOBILE = range(3)
-"""Status: all readings exist; those with K_θ⁻¹ do not; those with J_v⁺ do not."""
+"""Status of the readings: all exist; K_θ⁻¹ does not exist; J_v⁺ does not exist."""
 
 
 class Wanted(NamedTuple):
@@ -61,12 +61,7 @@ class Wanted(NamedTuple):
 class Readings(NamedTuple):
     """Arrays for the readings, filled by :func:`read_stiffness`.
 
-    Attributes:
-        margin: (1,).
-        pseudoinverse: (3, 3).
-        along: One stiffness per direction (D,).
-        compliance: (6, 6).
-        cartesian: (3, 3).
+    Shapes: margin (1,), pseudoinverse (3, 3), along (D,), compliance (6, 6), cartesian (3, 3).
     """
 
     margin: Array
@@ -191,7 +186,7 @@ def moves(JX: Array, direction: Array) -> bool:
 def sum_terms(
     active: Array, passive: Array, gravity: Array, load: Array, K: Array, parts: Array
 ) -> None:
-    """Fill K_θ and P, the sum of the magnitudes of its terms, (nv, nv) each."""
+    """Fill K_θ, and P, the sum of the magnitudes of its four terms, (nv, nv) each."""
     for i in range(K.shape[0]):
         for j in range(K.shape[0]):
             K[i, j] = active[i, j] + passive[i, j] + gravity[i, j] + load[i, j]
@@ -203,21 +198,11 @@ def sum_terms(
 def read_stiffness(
     K: Array, JX: Array, directions: Array, wanted: Wanted, work: Workspace, readings: Readings
 ) -> int:
-    """Fill the wanted readings that exist.
+    """Fill the readings that are wanted and exist; return READ, SINGULAR or IMMOBILE.
 
     If the tip is immobile, pseudoinverse and cartesian are NaN. If K_θ is singular, ``along`` is
-    NaN, or infinite in directions in which the tip cannot move.
-
-    Args:
-        K: K_θ (nv, nv).
-        JX: J_X (6, nv).
-        directions: Unit vectors u (D, 3).
-        wanted: Wanted readings.
-        work: Scratch; ``parts`` must be filled before.
-        readings: Arrays to fill.
-
-    Returns:
-        READ, SINGULAR or IMMOBILE.
+    NaN, or infinite in directions in which the tip cannot move. K is K_θ (nv, nv), JX is J_X (6,
+    nv), and directions are unit vectors u (D, 3). ``work.parts`` must be filled before.
     """
     nv, count, system = K.shape[0], directions.shape[0], work.system
     if wanted.margin:
@@ -352,7 +337,7 @@ def _probe_torque(i: int) -> float:
 def _set_right_sides(
     JX: Array, directions: Array, right: Array, wanted: Wanted, system: Array
 ) -> None:
-    """Fill those of J_vᵀu, J_Xᵀ and Vᵀ that are wanted, right of the probing torque."""
+    """Fill the wanted columns of J_vᵀu, J_Xᵀ and Vᵀ, right of the probing torque."""
     nv, count = JX.shape[1], directions.shape[0]
     width = system.shape[1]
     for i in range(nv):

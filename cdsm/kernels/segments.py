@@ -61,19 +61,10 @@ def _add_side(
 ) -> None:
     """Add the joints on one side of a segment to J_L and H_L, for i ≤ j only.
 
-    Args:
-        sign: +1 for the joints on the path to b, −1 for the joints on the path to a.
-        site: The site at this end of the segment.
-        part: Indices into ``joint``: start of the segment's joints, start and end of this side.
-        joint: Rows of the joints.
-        frames: Frames of the joints and positions of the sites.
-        direction: u and ℓ.
-        weight: Factor of ∂²ℓ/∂θ_i∂θ_j.
-        left_factor: The weight times c_i of the segment's joints.
-        cable: Row of the Jacobian.
-        jacobian: J_L, or an array without rows.
-        slot: Index of the Hessian in ``hessian``.
-        hessian: Weighted sums of H_L, or an empty array.
+    ``sign`` is +1 for joints on the path to b and −1 for joints on the path to a; ``site`` is the
+    site at this end. ``part`` holds indices into ``joint``: start of the segment's joints, start
+    and end of this side. ``direction`` is u and ℓ. ``left_factor`` receives the weight times c_i.
+    Row ``cable`` of J_L and matrix ``slot`` of the Hessians are changed; empty arrays are skipped.
     """
     first, begin, end = part
     ux, uy, uz, length = direction

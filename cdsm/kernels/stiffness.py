@@ -31,16 +31,10 @@ def set_cable_stiffness(
 ) -> None:
     """Fill k = 1/(l_0/EA + 1/k_series) (C,) [N/m]; 0 where EA is 0, for motors that hold force.
 
-    The length of the wire is the cable length without the series spring, ℓ = L − (F −
-    F_0)/k_series. Therefore l_0/EA = ℓ/(EA (1 + ε)).
-
-    Args:
-        length: L (C,) [m].
-        tension: F (C,) [N].
-        rigidity: EA (1 + ε) (C,) [N].
-        series: 1/k_series (C,) [m/N].
-        rest: F_0 (C,) [N], tension at which the springs are at rest.
-        stiffness: Array to fill.
+    The length of the wire is the cable length L without the series spring, ℓ = L − (F −
+    F_0)/k_series. Therefore l_0/EA = ℓ/(EA (1 + ε)). ``rigidity`` is EA (1 + ε) [N], ``series`` is
+    1/k_series [m/N], and ``rest`` is F_0 [N], the tension at which the springs are at rest. All
+    arrays are (C,).
     """
     for c in range(length.shape[0]):
         stiffness[c] = 0.0

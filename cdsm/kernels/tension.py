@@ -45,7 +45,7 @@ class Scaled(NamedTuple):
         low: Lower bounds divided by ``force`` (C,).
         high: Upper bounds divided by ``force`` (C,).
         arm: Largest moment arm [m], rounded up to a power of two, so that scaling is exact.
-        force: Largest of the lower bounds and of torque over moment arm [N], rounded up likewise.
+        force: Largest of the lower bounds and of torque over moment arm [N], also rounded up.
     """
 
     A: Array
@@ -93,14 +93,9 @@ def optimality(
 ) -> tuple[float, float, float]:
     """Measure the violation of optimality of x for min ½‖x‖² so that A x = b, low ≤ x ≤ high.
 
-    Args:
-        A: (m, n).
-        b: (m,).
-        low: (n,).
-        high: (n,), may hold inf.
-        x: The point (n,).
-        y: Multipliers of the equations (m,).
-        z: Multipliers of the bounds (n,): negative at low, positive at high.
+    A is (m, n), b is (m,), and low, high and x are (n,); high may hold inf. y (m,) are the
+    multipliers of the equations. z (n,) are the multipliers of the bounds: negative at low,
+    positive at high.
 
     Returns:
         Three numbers that are all zero exactly at the optimum. First, the largest violation of

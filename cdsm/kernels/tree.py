@@ -19,10 +19,9 @@ class Tree(NamedTuple):
 
     Attributes:
         parent: Row of the previous joint, (nv+1,).
-        order: Rows of the joints, each one after its parent, (nv,).
-        turn: Three matrices of each joint, (nv+1, 3, 3, 3), from Rodrigues' formula. The first,
-            plus the second times cos q, plus the third times sin q, is the rotation of the joint's
-            frame in its parent's frame.
+        order: Rows of the joints, sorted so that each joint comes after its parent, (nv,).
+        turn: Matrices A, B and C of each joint, (nv+1, 3, 3, 3). The rotation of the joint's frame
+            in its parent's frame is A + B cos q + C sin q (Rodrigues' formula).
         translation: Origin in the parent's frame, (nv+1, 3) [m].
         axis: Unit axis of a turning joint in the parent's frame, (nv+1, 3); zero if it slides.
         slide: Unit direction of a sliding joint in the parent's frame, (nv+1, 3), zero if it turns.
@@ -64,16 +63,15 @@ class Tree(NamedTuple):
 class Routing(NamedTuple):
     """All cable sites, and the cable segments that joints can change; rows as in :class:`Tree`.
 
-    The number of arrays is small, since each array passed from Python takes as long as a segment.
+    The number of arrays is small: each array passed from Python takes as much time as a segment.
 
     Attributes:
         row: Row of the joint that moves each site, (P,).
         point: Position of each site in the frame of this joint, (P, 3) [m].
-        segment: Five numbers per segment (S+1, 5): cable, site a, site b, and two indices into
-            ``joint``, for the first of its joints and for the first on the path to b. The last row
-            only marks the end.
-        joint: Rows of the joints between a and b: first those on the path to a, then those on the
-            path to b, ancestors first.
+        segment: Five integers per segment (S+1, 5): cable, site a, site b, start of its joints in
+            ``joint``, start of its joints on the path to b. The last row only marks the end.
+        joint: Rows of the joints between a and b: first the joints on the path to a, then the
+            joints on the path to b, ancestors first.
         fixed: Length that joints do not change, (C,) [m]: segments within one link and the lead
             (the straight cable between its actuator and the base disk).
     """
@@ -108,8 +106,8 @@ def forward_kinematics(
 ) -> None:
     """Fill the rotations of the joints (nv+1, 3, 3) and the frames at q (nv,).
 
-    A turning joint has the rotation R_parent (A + B cos q + C sin q) with its three matrices of
-    :attr:`Tree.turn`. A sliding joint moves its origin by q along its slide.
+    A turning joint has the rotation R_parent (A + B cos q + C sin q); see :attr:`Tree.turn`. A
+    sliding joint moves its origin by q along its slide.
     """
     parent, order, turn, translation, local_axis, local_slide = tree
     origin, axis, slide, site = frames
