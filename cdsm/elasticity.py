@@ -136,14 +136,24 @@ class Elasticity(ABC):
     def strain(self, tension: ArrayLike) -> Array:
         """Compute the strain Δl/l_0 = ∫ dF/EA(F) [-] from the low end of the domain.
 
-        Argument and errors are those of :meth:`rigidity`.
+        Args:
+            tension: F [N], any shape.
+
+        Raises:
+            ElasticityRangeError: As for :meth:`rigidity`.
         """
 
     @abstractmethod
     def energy(self, tension: ArrayLike) -> Array:
         """Compute the elastic energy ∫ F dε = ∫ F dF/EA(F) [N] = [J/m] per unstretched metre.
 
-        It starts at the low end of the domain. Argument and errors are those of :meth:`rigidity`.
+        It starts at the low end of the domain, like :meth:`strain`.
+
+        Args:
+            tension: F [N], any shape.
+
+        Raises:
+            ElasticityRangeError: As for :meth:`rigidity`.
         """
 
     def tension(self, strain: ArrayLike) -> Array:

@@ -151,10 +151,10 @@ class Manipulator(Printed):
 
     @property
     def geometry(self) -> Geometry:
-        """Geometry of an arm that was made from a geometry.
+        """Geometry from which the arm was built.
 
         Raises:
-            InvalidInput: The arm was made from a URDF.
+            InvalidInput: The arm was built from a URDF.
         """
         if self._geometry is None:
             raise InvalidInput(
@@ -164,7 +164,7 @@ class Manipulator(Printed):
 
     @property
     def is_serpentine(self) -> bool:
-        """Whether the arm was made from a :class:`~cdsm.Geometry`."""
+        """Whether the arm was built from a :class:`~cdsm.Geometry`."""
         return self._geometry is not None
 
     @property
@@ -177,8 +177,7 @@ class Manipulator(Printed):
         """Length of the path from the base through the joints to the tip, all joints at zero [m].
 
         For a robot from a URDF, it is at least the largest distance of a cable site from its joint.
-        The length is therefore never zero, even if the tip is on a joint. Errors are compared with
-        it.
+        The length is a scale for errors, so it must not be zero if the tip is on a joint.
         """
         if self._geometry is not None:
             return self._geometry.length
