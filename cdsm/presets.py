@@ -1,7 +1,6 @@
 """Arms and strand of the paper; values that the paper does not give are named assumptions.
 
-Assumptions are parameters: change them to see their effect. The lead is the straight cable between
-its actuator and the base disk.
+Assumptions are parameters: change them to see their effect.
 """
 
 from __future__ import annotations
@@ -44,7 +43,7 @@ def virtual_prototype_geometry(link_mass: float = 0.5, lead: float = 0.0) -> Geo
 
     Args:
         link_mass: Mass of every link [kg].
-        lead: Lead of every cable [m].
+        lead: Straight cable between each actuator and the base disk [m].
     """
     return Geometry.universal(
         name="virtual_prototype",
@@ -72,7 +71,7 @@ def virtual_prototype(
     Args:
         elasticity: Elasticity of all cables; the repaired Eq. 19 by default.
         link_mass: Mass of every link [kg]; assumed.
-        lead: Lead of every cable [m]; assumed.
+        lead: Straight cable between each actuator and the base disk [m]; assumed.
         gravity: Gravity in base axes (3,) [m/s²]; the direction −y is assumed.
         original_length: As for :class:`~cdsm.Manipulator`; the paper uses ``"stretched"``.
     """
@@ -102,7 +101,7 @@ def experimental_prototype_geometry(
         disk_offset: Distance from each joint centre to its disks [m]; assumed.
         hole_radius: Distance of all holes from the arm's axis [m]; assumed.
         link_mass: Mass of every link [kg]; assumed.
-        lead: Lead of every cable [m]; assumed.
+        lead: Straight cable between each actuator and the base disk [m]; assumed.
 
     Raises:
         GeometryError: Some dimensions are invalid; lists every fault.

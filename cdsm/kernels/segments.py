@@ -1,14 +1,14 @@
 """Numba kernels of cable lengths and their derivatives: L, J_L and H_L.
 
-A segment between site a and site b has the length ℓ = |b − a|. With u = (b − a)/ℓ and d_i = ∂(b −
-a)/∂θ_i,
+A segment between site a and site b has the length ℓ = |b − a|. With u = (b − a)/ℓ and the
+derivative d_i = ∂(b − a)/∂θ_i,
 
     ∂ℓ/∂θ_i = u·d_i,    ∂²ℓ/∂θ_i∂θ_j = (d_i·d_j − (u·d_i)(u·d_j))/ℓ + u·∂²(b − a)/∂θ_i∂θ_j.
 
-Only the joints between the two links matter. Joints on the path to b have the sign +, joints on the
-path to a have the sign −. A joint that turns about z through o has d = ±z × (x − o); a joint that
-slides along s has d = ±s. If joint i is not after joint j and both are on the same side, the second
-derivative of b − a is z_i × d_j, with z = 0 where a joint slides.
+Only the joints between the two links matter. They have two sides: joints on the path to b have the
+sign +, joints on the path to a have the sign −. A joint that turns about z through o has d = ±z ×
+(x − o); a joint that slides along s has d = ±s. If joint i is not after joint j and both are on the
+same side, the second derivative of b − a is z_i × d_j, with z = 0 where a joint slides.
 
 For i not after j, the second derivative of ℓ is therefore c_i·d_j with the left factor
 
