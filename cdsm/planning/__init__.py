@@ -1,7 +1,4 @@
-"""Stiffness control: gradients, attainable range, saturation, and tensions for a wanted stiffness.
-
-At one posture, or along a path.
-"""
+"""Stiffness control at one posture or along a path: gradients, range, saturation and plans."""
 
 from cdsm.planning.gradient import StiffnessGradient, stiffness_gradient
 from cdsm.planning.half_way import HalfWay

@@ -1,4 +1,4 @@
-"""The tensions that balance an arm within bounds and domains, and the small QPs among them."""
+"""Tensions that balance an arm within bounds and domains, and small QPs over them."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from cdsm.support.validation import Array, frozen
 from cdsm.tension import Tension, distribute_tension
 
 _TOLERANCE = 1e-12
-"""Primal tolerance of the solver; all its variables are of the order of one."""
+"""Primal tolerance of the solver; all its variables are of order one."""
 
-_INFINITE, _EQUATION = 1e30, 5  # DAQP's infinity, and its mark of equations
+_INFINITE, _EQUATION = 1e30, 5  # DAQP's infinity, and its flag for equations
 
 _KEPT = 1e-9
-"""Largest residual of an equation: the solver may call a program solved that it is not."""
+"""Largest accepted residual of an equation: the solver may report success with a larger one."""
 
 _FLAT = 1e-10
 """Singular values of J_Lᵀ below this part of the largest count as zero."""
@@ -41,13 +41,13 @@ class Admissible:
     """Tensions F with J_Lᵀ F = τ and low ≤ F ≤ high, in the domains of their elasticities.
 
     Attributes:
-        least: The least of them (Eq. 17).
-        bounds: Bounds (C,) [N] of the caller.
-        low: Lower bounds (C,) [N], the domains included.
-        high: Upper bounds (C,) [N], the domains included; may hold inf.
-        scale: A tension of the size of the least ones [N].
-        rows: Orthonormal rows (r, C) that span those of J_Lᵀ.
-        null: Orthonormal basis (C, p) of the tensions that give no torque.
+        least: The least admissible tensions (Eq. 17).
+        bounds: Bounds (C,) [N] that the caller gave.
+        low: Lower bounds (C,) [N], including the domains.
+        high: Upper bounds (C,) [N], including the domains; may hold inf.
+        scale: Size of the least tensions [N].
+        rows: Orthonormal basis (r, C) of the row space of J_Lᵀ.
+        null: Orthonormal basis (C, p) of the null space of J_Lᵀ.
     """
 
     least: Tension
@@ -60,7 +60,7 @@ class Admissible:
 
     @cached_property
     def kinks(self) -> list[tuple[int, float]]:
-        """Cables and tensions [N] between their bounds at which the slope of EA jumps."""
+        """Kinks (jumps of the slope of EA) within bounds: pairs of cable index and tension [N]."""
         return [
             (c, kink)
             for c, cable in enumerate(self.least.posture.arm.cables)
@@ -70,9 +70,9 @@ class Admissible:
         ]
 
     def piece(self, F: Array) -> tuple[Array, Array]:
-        """Bounds (C,) [N] around tensions F (C,) [N] between which no rigidity has a kink.
+        """Return bounds (C,) [N] of the piece around F (C,) [N] in which no rigidity has a kink.
 
-        A kink belongs to the piece below it, as does the slope there.
+        A kink and its slope belong to the piece below.
         """
         low, high = self.low.copy(), self.high.copy()
         for c, kink in self.kinks:
@@ -83,12 +83,12 @@ class Admissible:
         return low, high
 
     def imbalance(self, F: Array) -> Array:
-        """Residual (r,) [N] of the balance of tensions F (C,) [N]."""
+        """Return the residual (r,) [N] of the balance for tensions F (C,) [N]."""
         missing: Array = self.rows @ (self.least.values - F)
         return missing
 
     def nearest(self, wanted: Array, low: Array, high: Array) -> Array | None:
-        """The balancing tensions (C,) [N] between bounds nearest to those wanted; None if none."""
+        """Return the balancing tensions (C,) [N] within bounds nearest to ``wanted``, or None."""
         size = max(self.scale, float(abs(wanted).max()))
         found = solve(
             np.eye(wanted.size),
@@ -99,11 +99,11 @@ class Admissible:
         return None if found is None else np.minimum(np.maximum(found.x * size, low), high)
 
     def capped(self, limit: float) -> Admissible:
-        """The same with no tension above a limit [N]."""
+        """Return a copy with an upper limit [N] on all tensions."""
         return replace(self, high=np.minimum(self.high, limit))
 
     def within(self, change: Array, F: Array) -> Admissible | None:
-        """The same within a change of tensions F (C,) [N]; None if none balance the arm."""
+        """Return a copy limited to a change of F (C,) [N]; None if no tensions balance the arm."""
         low, high = np.maximum(self.low, F - change), np.minimum(self.high, F + change)
         least = self.nearest(np.zeros_like(F), low, high) if (low <= high).all() else None
         if least is None:
@@ -118,9 +118,9 @@ class Admissible:
         )
 
     def tension(self, F: Array) -> Tension:
-        """Tensions F (C,) [N] as a :class:`Tension`, their balance exact again."""
+        """Convert tensions F (C,) [N] to a :class:`Tension` whose balance is exact again."""
         least = self.least
-        exact = self.nearest(F, *self.piece(F))  # steps far shorter than F leave a rounding of F
+        exact = self.nearest(F, *self.piece(F))  # removes the rounding of short steps
         F = F if exact is None else exact
         torque = least.values @ least.posture.length_jacobian - least.residual
         return replace(
@@ -136,17 +136,17 @@ class Admissible:
 def admissible(
     pose: Posture, minimum: ArrayLike, maximum: ArrayLike, wrench: ArrayLike
 ) -> Admissible:
-    """The admissible tensions of an arm at a posture.
+    """Find the admissible tensions of an arm at a posture.
 
     Raises:
         InvalidInput: As for :func:`~cdsm.distribute_tension`.
-        InfeasibleTension: No tension within the bounds and domains balances the arm.
-        ElasticityRangeError: The bounds leave nothing of the domain of a cable's elasticity.
+        InfeasibleTension: No tensions within the bounds and domains balance the arm.
+        ElasticityRangeError: The bounds and the domain of an elasticity do not overlap.
     """
     least = distribute_tension(pose, minimum, maximum, wrench)
     bounds = least.minimum, least.maximum
     cables = pose.arm.cables
-    # under force control the elasticity, and so its domain, does not matter
+    # a force-controlled cable does not use its elasticity, so its domain does not matter
     held = np.array([cable.control == "position" for cable in cables])
     first = np.array([cable.elasticity.domain.first for cable in cables])
     last = np.array([cable.elasticity.domain.high for cable in cables])
@@ -177,14 +177,14 @@ def solve(
     bounds: tuple[Array, Array],
     cuts: tuple[Array, Array] | None = None,
 ) -> Optimum | None:
-    """Min ½xᵀPx + qᵀx so that A x = b, low ≤ x ≤ high and G x ≤ h; None if none is found.
+    """Solve min ½xᵀPx + qᵀx with A x = b, low ≤ x ≤ high and G x ≤ h; return None on failure.
 
-    ``P`` is positive definite, ``equations`` are A and b, and ``cuts`` are G and h. DAQP is called
+    ``P`` is positive definite, ``equations`` are A and b, ``cuts`` are G and h. DAQP is called
     directly: through qpsolvers a plan takes a quarter longer.
     """
     (A, b), (low, high) = equations, bounds
     G, h = cuts if cuts is not None else (A[:0], b[:0])
-    first, last = len(q), len(q) + len(h)  # the multipliers are those of bounds, cuts, equations
+    first, last = len(q), len(q) + len(h)  # multipliers: bounds, cuts, equations
     kind = np.zeros(last + len(b), dtype=np.int32)
     kind[last:] = _EQUATION
     x, _, flag, info = daqp.solve(

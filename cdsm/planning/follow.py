@@ -1,4 +1,4 @@
-"""Tensions along a path: each sample searched from those before, within what a motor can change."""
+"""Tensions along a path: each search starts from the samples before, within the rate."""
 
 from __future__ import annotations
 
@@ -22,41 +22,34 @@ _MISSED: Final[tuple[Status, str]] = (
 )
 
 _BACK = 50
-"""How many samples are planned again at most, so that a later one is within the rate."""
+"""Largest number of earlier samples that are planned again for a later sample."""
 
 
 @dataclass(frozen=True, eq=False)
 class SampleTarget:
-    """The target of one sample of a path.
-
-    Attributes:
-        index: Which sample.
-        model: K_θ over the admissible tensions there.
-        constraints: What is to be zero.
-        single: u (3,) and the stiffness [N/m] along it, if there is one direction.
-    """
+    """Target of one sample of a path."""
 
     index: int
-    model: StiffnessModel
+    model: StiffnessModel  # K_θ over the admissible tensions at the sample
     constraints: Constraints
-    single: tuple[Array, float] | None
+    single: tuple[Array, float] | None  # u (3,) and stiffness [N/m], for a single direction
 
 
 @dataclass(frozen=True, eq=False)
 class PlannedSample:
-    """A sample and tensions F (C,) [N] for it."""
+    """Sample with its planned tensions F (C,) [N]."""
 
     target: SampleTarget
     F: Array
 
 
 class Follower:
-    """Plans one sample after another, and the record of it.
+    """Planner of a path, sample by sample, with a record of the planned samples.
 
     Args:
         rate: Largest change of a tension per step (C,) [N]; may hold inf.
-        starts: From how many tensions to search where there are none to go on from.
-        seed: Of the random ones among them.
+        starts: Number of starting tensions of a search from scratch.
+        seed: Seed of the random starting tensions.
 
     Attributes:
         planned: The samples planned so far.
@@ -71,14 +64,14 @@ class Follower:
         self.iterations = 0
 
     def add(self, target: SampleTarget) -> tuple[Status, str] | None:
-        """Plan one more sample; return why that is not possible, or None.
+        """Plan one more sample. Return None, or the reason of a failure.
 
-        The least tensions within the rate from the last sample are taken. If none of those hit the
-        target, but others do, the samples before are planned again until they lead there.
+        It takes the least tensions within the rate from the last sample. If these miss the target
+        but others hit it, the samples before are planned again until they lead to the others.
 
         Raises:
-            UnreachableStiffness: No tensions hit the one target, whatever the rate.
-            SingularStiffness: No admissible tensions hold the arm, whatever the rate.
+            UnreachableStiffness: No tensions hit the single target at any rate.
+            SingularStiffness: No admissible tensions hold the arm at any rate.
         """
         if not self.planned:
             F = self._from_scratch(target)
@@ -105,13 +98,13 @@ class Follower:
         return None
 
     def _allowed_change(self, one: SampleTarget, other: SampleTarget) -> Array:
-        """How much the tensions may change between two samples (C,) [N]."""
+        """Return the allowed change of tensions (C,) [N] between two samples."""
         return self.rate * abs(other.index - one.index)
 
     def _search(
         self, target: SampleTarget, region: Admissible, start: Array, centre: Array | float = 0.0
     ) -> Array | None:
-        """The least tensions, or those nearest a centre, to which one search leads."""
+        """Search once for the least tensions, or for the nearest to a centre."""
         F = region.nearest(start, region.low, region.high)
         point = None if F is None else target.model.at(F)
         if point is None or point.reserve <= 0.0:
@@ -123,12 +116,7 @@ class Follower:
         return region.tension(found.end.evaluation.F).values if program.met(found.end) else None
 
     def _from_scratch(self, target: SampleTarget) -> Array | None:
-        """The least tensions whatever the rate; None if several targets are not hit at once.
-
-        Raises:
-            UnreachableStiffness: No tensions hit the one target.
-            SingularStiffness: No admissible tensions hold the arm.
-        """
+        """Return the least tensions at any rate, or None if several targets are not hit at once."""
         planner = Planner(target.model, target.constraints, self.starts, self.seed)
         try:
             found = planner.least()
@@ -139,10 +127,11 @@ class Follower:
         return None if found is None else target.model.region.tension(found.end.evaluation.F).values
 
     def _replan_towards(self, goal: PlannedSample) -> bool:
-        """Plan the last samples again so that they lead to a goal within the rate, if they can.
+        """Plan the last samples again so that they lead to a goal within the rate; return success.
 
-        From the last sample backwards: each is brought as near as possible to the one before it,
-        within the rate of the one after it, until it is within the rate of both.
+        The loop goes backwards from the last sample. Each sample stays within the rate of the next
+        one and comes as near as possible to the one before. It ends when a sample is within the
+        rate of both.
         """
         later = [goal]
         for k in range(len(self.planned) - 1, max(len(self.planned) - 1 - _BACK, -1), -1):

@@ -1,10 +1,10 @@
-"""How stiffness changes with tension: exact derivatives of what a :class:`Stiffness` says.
+"""Exact derivatives of a :class:`Stiffness` by the cable tensions.
 
     ∂K_θ/∂F_c = H_c + k′_c J_c J_cᵀ,    k = 1/(l_0/EA(F) + 1/k_series)
 
-with H_c the Hessian of the length of cable c and J_c its gradient (Eq. 16). The tip stiffness
-X = (R K_θ⁻¹ Rᵀ)⁻¹ seen through the rows R of the Jacobian changes by Mᵀ ∂K_θ M, M = K_θ⁻¹ Rᵀ X
-being the joint motion per unit motion of the tip.
+H_c is the Hessian of the length of cable c, and J_c its gradient (Eq. 16). Let R be rows of the tip
+Jacobian. The tip stiffness X = (R K_θ⁻¹ Rᵀ)⁻¹ changes by Mᵀ ∂K_θ M. M = K_θ⁻¹ Rᵀ X is the joint
+motion per unit motion of the tip.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ from cdsm.support.validation import Array, ReadOnlyState, frozen, instance, unit
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class StiffnessGradient(ReadOnlyState):
-    """Derivatives by the cable tensions; each is named as in :class:`~cdsm.Stiffness`.
+    """Derivatives of a stiffness by the cable tensions, named as in :class:`~cdsm.Stiffness`.
 
-    The posture and the wrench are held. Single tensions do not keep the arm in balance (Eq. 13):
-    combine the derivatives along changes that do.
+    Posture and wrench are fixed. A change of one tension alone breaks the balance (Eq. 13), so
+    combine the derivatives along changes that keep it.
 
     Attributes:
-        stiffness: K, at whose tensions the derivatives are taken.
+        stiffness: K, whose tensions are the point of differentiation.
         cable_stiffness: dk/dF (C,) of each cable by its own tension [1/m]; 0 under force control.
     """
 
@@ -41,16 +41,16 @@ class StiffnessGradient(ReadOnlyState):
 
     @cached_property
     def joint(self) -> Array:
-        """∂K_θ/∂F (C, nv, nv) [m/rad²]: a symmetric matrix for each cable."""
+        """∂K_θ/∂F (C, nv, nv) [m/rad²]: one symmetric matrix per cable."""
         identity = np.eye(self.stiffness.posture.arm.nv)
         return frozen(self._projected(identity, identity))
 
     @cached_property
     def margin(self) -> Array:
-        """∂λ_min/∂F = vᵀ ∂K_θ/∂F v (C,) [m/rad²], v the critical direction.
+        """∂λ_min/∂F = vᵀ ∂K_θ/∂F v (C,) [m/rad²], where v is the critical direction.
 
-        A multiple eigenvalue has no gradient. This is then the gradient of vᵀ K_θ v for one v of
-        its eigenspace, and the smallest eigenvalue changes by no more.
+        A multiple eigenvalue has no gradient. Then this is the gradient of vᵀ K_θ v for one v of
+        its eigenspace. It is an upper bound for the change of the smallest eigenvalue.
         """
         v = self.stiffness.critical_direction[:, None]
         return frozen(self._projected(v, v)[:, 0, 0])
@@ -65,13 +65,13 @@ class StiffnessGradient(ReadOnlyState):
         return frozen(self._through(self.stiffness.posture.jacobian[:3], self.stiffness.cartesian))
 
     def along(self, direction: ArrayLike) -> Array:
-        """∂(1/(uᵀ C_vv u))/∂F = along² wᵀ ∂K_θ/∂F w with w = K_θ⁻¹ J_vᵀ u, (C,) [1/m].
+        """Return ∂(1/(uᵀ C_vv u))/∂F = along² wᵀ ∂K_θ/∂F w with w = K_θ⁻¹ J_vᵀ u, (C,) [1/m].
 
         Args:
             direction: u (3,) in base axes, any length.
 
         Raises:
-            InvalidInput: Not a direction.
+            InvalidInput: ``direction`` is not three finite numbers, or is zero.
             SingularStiffness: The stiffness along u is infinite, or K_θ is singular.
         """
         u = unit_direction("direction", direction)
@@ -81,14 +81,14 @@ class StiffnessGradient(ReadOnlyState):
         return frozen(self._through(rows, np.array([[value]]))[:, 0, 0])
 
     def _through(self, rows: Array, X: Array) -> Array:
-        """∂X/∂F (C, r, r) of the tip stiffness X (r, r) seen through rows (r, nv)."""
+        """Return ∂X/∂F (C, r, r) of tip stiffness X (r, r) for rows (r, nv) of the tip Jacobian."""
         K = self.stiffness.joint
         right = np.linalg.solve(K, rows.T) @ X
-        left = np.linalg.solve(K.T, rows.T) @ X.T  # differs from right only where a moment acts
+        left = np.linalg.solve(K.T, rows.T) @ X.T  # differs from right only if a moment acts
         return self._projected(left, right)
 
     def _projected(self, left: Array, right: Array) -> Array:
-        """leftᵀ (∂K_θ/∂F_c) right for every cable, (C, a, b) of (nv, a) and (nv, b)."""
+        """Return leftᵀ (∂K_θ/∂F_c) right (C, a, b) for left (nv, a) and right (nv, b)."""
         pose = self.stiffness.posture
         return form_by_tension(
             pose.length_hessian, pose.length_jacobian, self.cable_stiffness, left, right
@@ -96,17 +96,18 @@ class StiffnessGradient(ReadOnlyState):
 
 
 def stiffness_gradient(stiffness: Stiffness) -> StiffnessGradient:
-    """Derivatives of a stiffness by the cable tensions, dEA/dF and series springs included.
+    """Compute the derivatives of a stiffness by the cable tensions, with dEA/dF and series springs.
 
-    ∂K_θ/∂F_c = H_c + k′_c J_c J_cᵀ; ``stiffness_gradient(K).along(u)`` is the gradient of
-    ``K.along(u)``, and so on. At a kink of an elasticity the slope below it is taken.
+    ∂K_θ/∂F_c = H_c + k′_c J_c J_cᵀ. For example, ``stiffness_gradient(K).along(u)`` is the gradient
+    of ``K.along(u)``. At a kink of an elasticity, the slope is that below the kink.
 
     Args:
-        stiffness: K, from :func:`~cdsm.stiffness`.
+        stiffness: K, the result of :func:`~cdsm.stiffness`.
 
     Raises:
-        InvalidInput: No ``Stiffness``, or an elasticity of your own gives no finite slope.
-        ElasticityRangeError: A tension outside the domain of the elasticity of its cable.
+        InvalidInput: ``stiffness`` is not a ``Stiffness``, or the slope of a user-defined law is
+            not finite.
+        ElasticityRangeError: A tension is outside the domain of its elasticity.
     """
     K = instance("stiffness", stiffness, Stiffness)
     slope, _ = K.posture.arm._model.laws.slopes(K.tension, K.cable_stiffness)
@@ -114,7 +115,7 @@ def stiffness_gradient(stiffness: Stiffness) -> StiffnessGradient:
 
 
 def require_finite(value: float, u: Array) -> None:
-    """Refuse a direction in which the tip cannot move."""
+    """Raise SingularStiffness if the stiffness along u is infinite: the tip cannot move along u."""
     if not np.isfinite(value):
         raise SingularStiffness(
             f"the tip cannot move along {coordinates(u)}: the stiffness there "

@@ -1,4 +1,4 @@
-"""The stiffness half-way between two planned samples, the motors half-way, too."""
+"""Stiffness of an arm half-way between two planned samples."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ from cdsm.support.validation import Array, ReadOnlyState, frozen
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class HalfWay(ReadOnlyState):
-    """An arm half-way between a planned sample and the next.
+    """Arm half-way between a planned sample and the next sample.
 
-    A motor that holds a length has the mean of both unstrained lengths l_0, one that holds a force
-    the mean of both tensions, and the mean of both wrenches acts. The arm rests under that,
-    r(q) = J_Lᵀ F(q) + g − J_Xᵀ W = 0 (Eq. 13), next to the mean of both postures. The misfit falls
-    with the square of the step.
+    A position-controlled cable has the mean of its two unstretched lengths l_0. A force-controlled
+    cable has the mean of its two tensions. The mean of the two wrenches acts. The arm is in
+    equilibrium, r(q) = J_Lᵀ F(q) + g − J_Xᵀ W = 0 (Eq. 13), near the mean of the two postures. The
+    misfit falls with the square of the step.
 
     Attributes:
-        index: The sample before, from 0.
-        target: Mean of both targets [N/m]: (), (n,) or (3, 3).
-        stiffness: K_θ at rest; None if the arm does not come to rest there.
-        achieved: ``along`` or ``cartesian`` of it [N/m], (), (n,) or (3, 3); or None.
-        misfit: ‖achieved/target − 1‖ [-], or for ``cartesian`` ‖achieved − target‖/‖target‖; inf if
-            the arm does not come to rest.
-        reason: Why it does not; empty if it does.
+        index: Number of the first sample, from 0.
+        target: Mean of the two targets [N/m]: (), (n,) or (3, 3).
+        stiffness: K_θ at the equilibrium; None without equilibrium.
+        achieved: ``along`` or ``cartesian`` [N/m], (), (n,) or (3, 3); or None.
+        misfit: ‖achieved/target − 1‖ [-], or ‖achieved − target‖/‖target‖ for ``cartesian``; inf
+            without equilibrium.
+        reason: Why the arm does not come to rest; otherwise empty.
     """
 
     index: int
@@ -52,10 +52,9 @@ def half_way(
     target: Array,
     directions: Array | None,
 ) -> HalfWay:
-    """The arm half-way between two samples, from K_θ at both.
+    """Compute the arm half-way between two samples from K_θ at these samples.
 
-    ``unstrained`` is the mean l_0 of the H position-controlled cables (H,) [m], ``target`` the mean
-    target [N/m].
+    ``unstrained``: mean l_0 (H,) [m] of position-controlled cables; ``target``: mean target [N/m].
     """
     try:
         K = _at_rest(ends, unstrained)
@@ -79,7 +78,7 @@ def half_way(
 
 
 def _at_rest(ends: tuple[Stiffness, Stiffness], unstrained: Array) -> Stiffness:
-    """K_θ where the arm rests, next to the mean posture."""
+    """Compute K_θ at the equilibrium near the mean posture."""
     q, F, W = (
         frozen((a + b) / 2.0)
         for a, b in (
@@ -90,7 +89,7 @@ def _at_rest(ends: tuple[Stiffness, Stiffness], unstrained: Array) -> Stiffness:
     )
     arm = ends[0].posture.arm
     mean = arm.at(q)
-    # cables are locked at their mean tension: the lengths are of no posture, but in every domain
+    # lock the cables at their mean tension, inside every domain; no posture has these lengths
     lengths = mean.cable_lengths.copy()
     held = [c for c, cable in enumerate(arm.cables) if cable.control == "position"]
     for c, l_0 in zip(held, unstrained.tolist(), strict=True):

@@ -1,6 +1,6 @@
-"""Numba kernels of the searches. With numpy in their place plans take 1.4 times as long (n = 5).
+"""Numba kernels of the searches. In numpy a plan would take 1.4 times as long (n = 5).
 
-Shapes: C cables, nv joint angles, r rows through which the tip is seen, n constraints.
+Shapes: C cables, nv joint angles, r rows of the tip Jacobian, n constraints.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from cdsm.support.validation import Array
 def stiffness_at(
     constant: Array, hessian: Array, length_jacobian: Array, tension: Array, springs: Array
 ) -> tuple[Array, Array, Array]:
-    """K_θ = constant + Σ F_c H_c + k_c J_c J_cᵀ, eigenvalues and vectors of its symmetric part."""
+    """Return K_θ = constant + Σ F_c H_c + k_c J_c J_cᵀ, and eigen-pairs of its symmetric part."""
     K = constant.copy()
     count, nv = length_jacobian.shape
     for c in range(count):
@@ -29,7 +29,7 @@ def stiffness_at(
 
 @compiled
 def tip_stiffness(K: Array, rows: Array) -> tuple[Array, Array, Array, Array]:
-    """X = (R K_θ⁻¹ Rᵀ)⁻¹, K_θ⁻¹ Rᵀ X, K_θ⁻ᵀ Rᵀ Xᵀ and K_θ⁻¹ of a K_θ that is not singular."""
+    """Return X = (R K_θ⁻¹ Rᵀ)⁻¹, K_θ⁻¹ Rᵀ X, K_θ⁻ᵀ Rᵀ Xᵀ and K_θ⁻¹ of a regular K_θ."""
     inverse = np.empty_like(K)
     inverse[:, :] = np.linalg.inv(K)
     soft = np.dot(inverse, rows.T)
@@ -43,7 +43,7 @@ def tip_stiffness(K: Array, rows: Array) -> tuple[Array, Array, Array, Array]:
 def torques_by_tension(
     hessian: Array, length_jacobian: Array, slope: Array, motion: Array
 ) -> Array:
-    """(∂K_θ/∂F_c) m = (H_c + k′_c J_c J_cᵀ) m for the columns m of motion (nv, b): (C, nv, b)."""
+    """Return (∂K_θ/∂F_c) m = (H_c + k′_c J_c J_cᵀ) m (C, nv, b) for columns m of motion (nv, b)."""
     count, nv = length_jacobian.shape
     columns = motion.shape[1]
     result = np.zeros((count, nv, columns))
@@ -65,13 +65,13 @@ def torques_by_tension(
 def form_by_tension(
     hessian: Array, length_jacobian: Array, slope: Array, left: Array, right: Array
 ) -> Array:
-    """leftᵀ (∂K_θ/∂F_c) right, (C, a, b) of (nv, a) and (nv, b)."""
+    """Return leftᵀ (∂K_θ/∂F_c) right (C, a, b) for left (nv, a) and right (nv, b)."""
     return _through(left, torques_by_tension(hessian, length_jacobian, slope, right))
 
 
 @compiled
 def _through(left: Array, torques: Array) -> Array:
-    """leftᵀ torques_c (C, a, b) of (nv, a) and (C, nv, b)."""
+    """Return leftᵀ torques_c (C, a, b) for left (nv, a) and torques (C, nv, b)."""
     count, nv, columns = torques.shape
     result = np.zeros((count, left.shape[1], columns))
     for c in range(count):
@@ -84,7 +84,7 @@ def _through(left: Array, torques: Array) -> Array:
 
 @compiled
 def constraint_jacobian(weights: Array, left: Array, torques: Array) -> Array:
-    """E_j : leftᵀ torques_c (n, C) of weights E (n, r, r)."""
+    """Return E_j : leftᵀ torques_c (n, C) for weights E (n, r, r)."""
     rates = _through(left, torques)
     result = np.zeros((weights.shape[0], rates.shape[0]))
     for n in range(weights.shape[0]):
@@ -107,7 +107,7 @@ def constraint_hessian(
     length_jacobian: Array,
     bend: Array,
 ) -> Array:
-    """Second derivative of Y : X by the tensions (C, C)."""
+    """Return the second derivative of Y : X by the tensions (C, C)."""
     count, nv, r = right_torques.shape
     held = inverse - np.dot(right, np.dot(rows, inverse))
     one = np.zeros((count, nv, r))
@@ -134,12 +134,12 @@ def constraint_hessian(
 
 @compiled
 def convex(W: Array, null: Array, held: Array, floor: float) -> Array:
-    """A positive definite matrix that equals W on the steps that matter, where W is convex there.
+    """Return a positive definite matrix that equals W, where W is convex, on the steps that matter.
 
     Args:
         W: Symmetric (C, C).
         null: Orthonormal basis (C, p) of the steps that keep the balance.
-        held: Gradients (n, C) of the constraints that the steps keep, too.
+        held: Gradients (n, C) of constraints that the steps also keep.
         floor: Curvatures below this part of the largest are raised to it.
     """
     count, p = null.shape
@@ -159,7 +159,7 @@ def convex(W: Array, null: Array, held: Array, floor: float) -> Array:
         vectors = np.ascontiguousarray(vectors)
         raised = vectors * np.maximum(values, floor * largest)
         inner = np.dot(raised, np.ascontiguousarray(vectors.T)) + largest * fixed
-    # steps that the balance forbids only need some positive curvature
+    # steps that break the balance only need some positive curvature
     for i in range(p):
         inner[i, i] -= largest
     result: Array = np.dot(null, np.dot(inner, np.ascontiguousarray(null.T)))

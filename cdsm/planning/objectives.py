@@ -1,4 +1,4 @@
-"""Arguments of the planners, checked, and the targets they turn into."""
+"""Checks of the arguments of the planners, and the constraints that follow from the targets."""
 
 from __future__ import annotations
 
@@ -24,26 +24,26 @@ from cdsm.support.validation import (
 )
 
 _LEAST_MARGIN = 1e-9
-"""Balance to rounding leaves the smallest eigenvalue uncertain by 1e-11 of the largest."""
+"""Smallest margin: rounding changes the smallest eigenvalue by 1e-11 of the largest."""
 
 _MOST_STARTS = 1000
-"""A minute of searches, of which the best is seldom one of the last."""
+"""Largest number of starts. It takes about a minute, and a late start is seldom the best."""
 
 _SYMMETRIC = 1e-9
-"""Largest part of a matrix that may be skew by rounding."""
+"""A skew part of a matrix below this part of its largest entry is rounding."""
 
 
 def stiffness_model(
     pose: Posture, minimum: ArrayLike, maximum: ArrayLike, wrench: ArrayLike, margin: float
 ) -> StiffnessModel:
-    """K_θ over the admissible tensions, from the arguments that all planners share."""
+    """Build K_θ as a function of the admissible tensions from the common arguments."""
     instance("pose", pose, Posture)
     region = admissible(pose, minimum, maximum, wrench)
     return StiffnessModel(region, checked_margin(margin))
 
 
 def checked_margin(margin: float) -> float:
-    """A part between rounding and 1."""
+    """Check that ``margin`` is above rounding and below 1."""
     part = scalar("margin", margin)
     if not _LEAST_MARGIN <= part < 1.0:
         raise InvalidInput(
@@ -55,14 +55,14 @@ def checked_margin(margin: float) -> float:
 
 
 def checked_starts(starts: object, seed: object) -> tuple[int, int]:
-    """The number of starts, and the seed of the random ones among them."""
+    """Check the number of starting tensions and the seed of the random ones."""
     return whole_number("starts", starts, 1, _MOST_STARTS), whole_number("seed", seed, 0)
 
 
 def checked_direction(model: StiffnessModel, direction: ArrayLike) -> Array:
-    """A unit direction (3,) in which the tip can move."""
+    """Check that the tip can move along a direction; return it as a unit vector (3,)."""
     u = unit_direction("direction", direction)
-    # this depends on the posture alone: any tensions will do
+    # this depends on the posture only, so any tensions serve
     if not stiffness(model.pose, model.region.least)._moves(u):
         require_finite(np.inf, u)
     return u
@@ -71,13 +71,9 @@ def checked_direction(model: StiffnessModel, direction: ArrayLike) -> Array:
 def target_constraints(
     model: StiffnessModel, directions: Array | None, target: Array
 ) -> Constraints:
-    """Constraints for a checked target [N/m] along directions, or of ``cartesian`` if None.
-
-    Raises:
-        SingularStiffness: The tip cannot move along a direction; or there is no ``cartesian``.
-    """
+    """Build constraints for a target [N/m] along directions, or of ``cartesian`` if None."""
     if directions is None:
-        _ = stiffness(model.pose, model.region.least).cartesian  # raises, if there is none
+        _ = stiffness(model.pose, model.region.least).cartesian  # raises if it does not exist
         return cartesian_constraints(model, target)
     for u in directions.reshape(-1, 3):
         checked_direction(model, u)
@@ -85,13 +81,13 @@ def target_constraints(
 
 
 def along_constraint(model: StiffnessModel, direction: Array, unit: float) -> Constraint:
-    """The stiffness along a unit direction (3,) over a unit [N/m]."""
+    """Build the constraint of the stiffness along a direction (3,), divided by a unit [N/m]."""
     rows = direction[None] @ model.pose.jacobian[:3]
     return Constraint(rows, np.full((1, 1, 1), 1.0 / unit))
 
 
 def along_constraints(model: StiffnessModel, directions: Array, targets: Array) -> Constraints:
-    """along/target − 1 for directions (m, 3) and targets (m,) [N/m]."""
+    """Build the constraints along/target − 1 for directions (m, 3) and targets (m,) [N/m]."""
     pairs = zip(directions, targets.tolist(), strict=True)
     return Constraints(
         tuple(along_constraint(model, u, target) for u, target in pairs), np.ones(targets.size)
@@ -99,10 +95,7 @@ def along_constraints(model: StiffnessModel, directions: Array, targets: Array) 
 
 
 def cartesian_constraints(model: StiffnessModel, target: Array) -> Constraints:
-    """The entries of (cartesian − target)/‖target‖, such that their squares sum to its square.
-
-    With a moment in the wrench ``cartesian`` is not symmetric; its symmetric part counts then.
-    """
+    """Build (cartesian − target)/‖target‖ (symmetric part), weighted to keep the sum of squares."""
     weights = []
     for i in range(3):
         for j in range(i, 3):
@@ -115,7 +108,7 @@ def cartesian_constraints(model: StiffnessModel, target: Array) -> Constraints:
 
 
 def achieved(K: Stiffness, directions: Array | None) -> Array:
-    """The ``along`` or ``cartesian`` that was planned: (), (n,) or (3, 3) [N/m]."""
+    """Return ``along`` or ``cartesian``, as planned: (), (n,) or (3, 3) [N/m]."""
     if directions is None:
         return K.cartesian
     along = [K.along(u) for u in directions.reshape(-1, 3)]
@@ -123,9 +116,9 @@ def achieved(K: Stiffness, directions: Array | None) -> Array:
 
 
 def misfit(achieved: Array, target: Array, directions: Array | None) -> float:
-    """‖achieved/target − 1‖ [-], or for ``cartesian`` ‖achieved − target‖/‖target‖.
+    """Return ‖achieved/target − 1‖ [-], or ‖achieved − target‖/‖target‖ for ``cartesian``.
 
-    With a moment in the wrench ``cartesian`` is not symmetric: its symmetric part counts.
+    The symmetric part of ``cartesian`` counts.
     """
     if directions is None:
         off = (achieved + achieved.T) / 2.0 - target
@@ -134,7 +127,7 @@ def misfit(achieved: Array, target: Array, directions: Array | None) -> float:
 
 
 def unstable(arm: Manipulator, problem: str, mode: Array) -> SingularStiffness:
-    """The error of an arm that no tensions hold, with the joint motion (nv,) that is softest."""
+    """Build the error of an arm that no tensions hold, with its softest joint motion (nv,)."""
     mode = mode * np.sign(mode[abs(mode).argmax()])
     remedy = "Change the bounds, the posture or the load, take stiffer cables, or lower margin."
     if all(cable.control == "force" for cable in arm.cables):
@@ -145,7 +138,7 @@ def unstable(arm: Manipulator, problem: str, mode: Array) -> SingularStiffness:
 
 
 def checked_targets(directions: Array, target: ArrayLike) -> Array:
-    """One positive target for each direction, () or (m,) [N/m]."""
+    """Check that there is one positive target for each direction, () or (m,) [N/m]."""
     targets = number_array("target", target)
     if targets.shape != directions.shape[:-1]:
         raise InvalidInput(
@@ -158,7 +151,7 @@ def checked_targets(directions: Array, target: ArrayLike) -> Array:
 
 
 def checked_positive(targets: Array) -> Array:
-    """The same targets [N/m], all positive and none so small that quotients overflow."""
+    """Check that all targets [N/m] are positive and large enough to divide by."""
     if not (targets >= SMALLEST).all():
         raise InvalidInput(
             "target",
@@ -168,7 +161,7 @@ def checked_positive(targets: Array) -> Array:
 
 
 def checked_matrix(target: ArrayLike) -> Array:
-    """A symmetric, positive definite target (3, 3) [N/m]."""
+    """Check that a target (3, 3) [N/m] is symmetric and positive definite."""
     matrix = number_array("target", target)
     if matrix.shape != (3, 3):
         raise InvalidInput(

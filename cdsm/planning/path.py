@@ -1,4 +1,4 @@
-"""Tensions for a wanted stiffness along a path, and what the motors have to do for it."""
+"""Plan tensions for a wanted stiffness along a path, within the rate of the motors."""
 
 from __future__ import annotations
 
@@ -76,49 +76,51 @@ def plan_path(
     seed: int = 0,
     progress: bool = True,
 ) -> PathPlan:
-    """Tensions for a wanted stiffness along a path: min ‖F_i‖² so that along(u) = target_i.
+    """Plan tensions for a wanted stiffness along a path: min ‖F_i‖² with along(u) = target_i.
 
-    Each of S samples is planned as by :func:`~cdsm.planning.plan.plan_stiffness`, but starting from
-    the tensions of the one before. If that leads nowhere, or for the first sample, it is planned
-    from scratch. An infeasible sample does not stop the path; ``infeasible`` of the answer lists
-    each with its reason.
+    Each of S samples is planned as by :func:`~cdsm.planning.plan.plan_stiffness`. The search starts
+    from the tensions of the sample before. If it fails, or for the first sample, it starts from
+    scratch. An infeasible sample does not stop the path: ``infeasible`` of the result lists it with
+    its reason.
 
-    Between a planned sample and the one before it, k samples back, no tension changes by more than
-    k·rate. Of the tensions within that the least are taken. If none of them hit the target although
-    others do, up to 50 samples before are planned again, backwards: they still hit their targets,
-    but with tensions that lead to this sample. If that fails, the sample has the status ``"rate"``,
-    and the motors have more steps for the next. So a target that jumps is hit again as many samples
-    later as the motors need; make it a ramp if the arm is to follow it in between.
+    The rate limits the change of every tension between a planned sample and the planned sample
+    before it: k·rate if they are k samples apart. The plan takes the least tensions within this
+    limit. If these miss the target although others hit it, up to 50 earlier samples are planned
+    again, backwards. They still hit their targets, with tensions that lead to this sample. If this
+    fails, the sample has the status ``"rate"``, and the next sample has more steps. So after a jump
+    of the target the plan misses as many samples as the motors need. Give a ramp if the arm must
+    follow in between.
 
-    The targets are hit at the samples. ``between`` of the answer gives the stiffness half-way
-    between two of them; its miss falls with the square of the step.
+    The plan hits the targets at the samples. ``between`` of the result gives the stiffness half-way
+    between two samples. Its misfit falls with the square of the step.
 
     Args:
         arm: The arm.
-        direction: u (3,) in base axes, any length; several (n, 3), all of which are to be hit; or
-            None for ``cartesian``.
+        direction: u (3,) in base axes, any length; several directions (n, 3), which are hit
+            together; or None for ``cartesian``.
         target: The stiffness [N/m], one for all samples or one per sample: () or (S,) along u, (n,)
-            or (S, n) along several, (3, 3) or (S, 3, 3) of ``cartesian``.
+            or (S, n) along several directions, (3, 3) or (S, 3, 3) for ``cartesian``.
         minimum: Lower bound of the tensions [N], for all cables or (C,).
-        maximum: Upper bound of the tensions [N], for all cables or (C,); inf for none but the end
-            of the elasticity's domain, and buckling.
+        maximum: Upper bound of the tensions [N], for all cables or (C,). With inf, only the domain
+            of the elasticity and buckling limit the tensions.
         wrench: W at ``tool0`` in base axes, (6,) or one per sample (S, 6): force [N], then moment
             [N m].
-        angles: The path as joint angles (S, nv) [rad]; or else
-        tips: the path as tip positions (S, 3) [m], solved for the angles nearest to those before by
-            :func:`~cdsm.inverse_kinematics`.
-        guess: Angles (nv,) [rad] near which the first of ``tips`` is solved for; the straight arm
-            if not given.
-        rate: By how much a tension may change per step [N], for all cables or (C,); inf for any.
-        margin: From which part of the largest eigenvalue of K_θ under the least tensions on the
-            smallest one counts as stable [-], 1e-9 or more.
-        starts: From how many tensions to search where there are none to go on from, at most 1000.
-        seed: Of the random ones among them.
+        angles: The path as joint angles (S, nv) [rad]. Give either ``angles`` or ``tips``.
+        tips: The path as tip positions (S, 3) [m]. :func:`~cdsm.inverse_kinematics` finds the joint
+            angles nearest to those of the sample before.
+        guess: Joint angles (nv,) [rad] from which the first of ``tips`` is solved. Default: the
+            straight arm.
+        rate: Largest change of a tension per step [N], for all cables or (C,); inf for no limit.
+        margin: Smallest eigenvalue of K_θ that counts as stable, as a part of the largest
+            eigenvalue under the least tensions [-], 1e-9 or more.
+        starts: Number of starting tensions of a search from scratch, at most 1000.
+        seed: Seed of the random starting tensions.
         progress: Show a bar on the standard error, if that is a terminal.
 
     Raises:
-        InvalidInput: None or both of ``angles`` and ``tips``, no direction, a target or a rate that
-            is not positive, bounds the wrong way, or another argument out of place.
+        InvalidInput: Neither or both of ``angles`` and ``tips`` are given; ``direction`` is not
+            finite or is zero; a target or a rate is not positive; ``minimum`` exceeds ``maximum``;
+            or another argument is invalid.
     """
     instance("arm", arm, Manipulator)
     path = _checked_path(arm, angles, tips)
@@ -131,7 +133,7 @@ def plan_path(
     limit = bound("rate", rate, len(arm.cables))
     if not (limit > 0.0).all():
         raise InvalidInput("rate", f"{limit.min():g} N given; it must be positive, or inf for any.")
-    checked_bounds(arm, minimum, maximum)  # at once, not at the first posture that is possible
+    checked_bounds(arm, minimum, maximum)  # check now, not at the first feasible posture
     checked_margin(margin)
     follower = Follower(limit, *checked_starts(starts, seed))
     flag("progress", progress)
@@ -179,7 +181,7 @@ def plan_path(
 
 
 def _checked_path(arm: Manipulator, angles: ArrayLike | None, tips: ArrayLike | None) -> Array:
-    """The path: joint angles (S, nv) [rad] or tip positions (S, 3) [m]."""
+    """Check the path: joint angles (S, nv) [rad] or tip positions (S, 3) [m]."""
     if (angles is None) == (tips is None):
         raise InvalidInput(
             "angles",
@@ -197,7 +199,7 @@ def _checked_path(arm: Manipulator, angles: ArrayLike | None, tips: ArrayLike | 
 
 
 def _checked_targets(directions: Array | None, target: ArrayLike, size: int) -> Array:
-    """Positive targets [N/m], one for each sample: (S,), (S, n) or (S, 3, 3)."""
+    """Check the targets [N/m] and return one per sample: (S,), (S, n) or (S, 3, 3)."""
     tail = (3, 3) if directions is None else directions.shape[:-1]
     targets = _per_sample("target", target, tail, size)
     if directions is None:
@@ -209,7 +211,7 @@ def _checked_targets(directions: Array | None, target: ArrayLike, size: int) -> 
 
 
 def _per_sample(name: str, value: ArrayLike, tail: tuple[int, ...], size: int) -> Array:
-    """One value for each sample (S, …), from one for all or one for each."""
+    """Return one value per sample (S, …) from one value for all samples or one for each."""
     given = number_array(name, value)
     if given.shape not in (tail, (size, *tail)):
         raise InvalidInput(
@@ -221,7 +223,7 @@ def _per_sample(name: str, value: ArrayLike, tail: tuple[int, ...], size: int) -
 
 
 def _shown(size: int, progress: bool) -> Iterable[int]:
-    """The samples, with a progress bar on a terminal."""
+    """Return the sample numbers, with a progress bar on a terminal."""
     console = Console(stderr=True)
     disable = not (progress and console.is_terminal)
     return track(range(size), "planning the path", console=console, disable=disable)
@@ -232,7 +234,7 @@ def _status(error: CdsmError) -> Status:
 
 
 def _explained(error: CdsmError) -> str:
-    """The message of an error, with a remedy for paths."""
+    """Return the message of an error, with a remedy for paths."""
     if isinstance(error, JointLimitError):
         return (
             f"{error.problem}. Keep the path within the limits, or widen joint_limit in the "

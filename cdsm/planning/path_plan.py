@@ -1,4 +1,4 @@
-"""The plan of a path: tensions, stiffness, cable lengths for the motors, infeasible samples."""
+"""Plan of a path: tensions, stiffness, cable lengths for the motors, infeasible samples."""
 
 from __future__ import annotations
 
@@ -28,17 +28,17 @@ from cdsm.support.validation import Array, ReadOnlyState, frozen
 @final
 @dataclass(frozen=True)
 class InfeasibleSample:
-    """A sample of a path that cannot be planned.
+    """Sample of a path that cannot be planned.
 
     Attributes:
-        index: Its number, from 0.
-        status: ``"posture"`` (a joint limit, a cable without direction, or the tip does not reach),
-            ``"balance"`` (no tensions within the bounds), ``"elasticity"`` (none within its
-            domain), ``"singular"`` (none hold the arm, or the tip cannot move along u),
-            ``"stiffness"`` (none hit the target) or ``"rate"`` (some do, but too far from those of
-            the samples before).
+        index: Number of the sample, from 0.
+        status: ``"posture"`` (a joint limit, a cable without direction, or a tip out of reach),
+            ``"balance"`` (no tensions within the bounds), ``"elasticity"`` (no tensions within the
+            domains), ``"singular"`` (no tensions hold the arm, or the tip cannot move along u),
+            ``"stiffness"`` (no tensions hit the target) or ``"rate"`` (tensions hit the target, but
+            differ too much from those of the samples before).
         reason: The reason in words, with the remedy.
-        error: The error of a plan of this sample alone, with its data; None if there is none.
+        error: The error of a plan of this sample alone, with its data; or None.
     """
 
     index: int
@@ -50,14 +50,13 @@ class InfeasibleSample:
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class PathPlan(ReadOnlyState):
-    """Tensions along a path, with the question they answer; made by :func:`plan_path`.
+    """Tensions along a path, with the arguments of the plan; made by :func:`plan_path`.
 
-    Of S samples P are planned: arrays of the answer have a row for each of those.
+    P of the S samples are planned. Arrays of results have one row per planned sample.
 
     Attributes:
         arm: The arm.
-        direction: Unit directions u in base axes, (3,) or (n, 3); None for a target of
-            ``cartesian``.
+        direction: Unit directions u in base axes, (3,) or (n, 3); None for ``cartesian``.
         target: The target at every sample [N/m]: (S,), one per direction (S, n), or (S, 3, 3).
         rate: Largest change of a tension per step (C,) [N]; may hold inf.
         planned: Numbers of the planned samples, from 0.
@@ -88,10 +87,7 @@ class PathPlan(ReadOnlyState):
 
     @cached_property
     def steps(self) -> Array:
-        """Largest change of a tension per step since the planned sample before (P,) [N].
-
-        Zero for the first.
-        """
+        """Largest tension change per step since the last planned sample (P,) [N]; first 0."""
         changes = np.zeros(len(self.planned))
         moved = abs(np.diff(self.tensions, axis=0)).max(axis=1, initial=0.0)
         changes[1:] = moved / np.diff(self.planned)
@@ -99,17 +95,17 @@ class PathPlan(ReadOnlyState):
 
     @cached_property
     def cable_lengths(self) -> Array:
-        """L (P, C) [m], lead included."""
+        """Cable lengths L (P, C) [m] with lead (straight cable between actuator and base disk)."""
         lengths = [K.posture.cable_lengths for K in self.stiffness]
         return frozen(np.array(lengths).reshape(self.tensions.shape))
 
     @cached_property
     def unstrained_lengths(self) -> Array:
-        """Lengths that the motors of the H position-controlled cables have paid out (P, H) [m].
+        """Unstretched lengths l_0 (P, H) [m] paid out by motors of H position-controlled cables.
 
         l_0 + Δl(F, l_0) = L, with Δl of :meth:`~cdsm.Cable.elongation`: l_0 is the length at the
-        low end of the elasticity's domain, the series spring at rest. It does not depend on
-        ``original_length`` of the arm, which concerns K_θ alone.
+        low end of the domain of the elasticity, with the series spring at rest. It does not depend
+        on ``original_length`` of the arm, which only affects K_θ.
         """
         motors = CableLaws(self.arm.cables, "unstrained")
         pairs = zip(self.cable_lengths, self.tensions, strict=True)
@@ -119,10 +115,10 @@ class PathPlan(ReadOnlyState):
 
     @cached_property
     def between(self) -> tuple[HalfWay, ...]:
-        """The arm half-way between each two planned samples that follow each other.
+        """Arm half-way between each two consecutive planned samples.
 
-        The targets are hit at the samples. In between the motors move evenly, and the stiffness is
-        off; half the step leaves a quarter of that. On first use a pair takes some milliseconds.
+        The motors move evenly between the samples. Half the step leaves a quarter of the misfit.
+        The first use takes some milliseconds per pair.
         """
         pairs = zip(self.planned, self.planned[1:], strict=False)
         l_0, targets = self.unstrained_lengths, self.target
@@ -140,21 +136,21 @@ class PathPlan(ReadOnlyState):
 
     @property
     def _held(self) -> list[tuple[int, Cable]]:
-        """The cables whose motors hold a length, with their numbers."""
+        """Position-controlled cables with their indices."""
         return [(c, each) for c, each in enumerate(self.arm.cables) if each.control == "position"]
 
     def write_csv(self, path: str | os.PathLike[str]) -> Path:
-        """Write a line for each sample, SI units; return the path.
+        """Write one line per sample in SI units; return the path.
 
-        The columns are ``sample``, ``status``, joint angles [rad] ([m] where a joint slides), for
-        each cable its tension [N], its length [m] and, if the motor holds it, its unstrained length
-        [m], and ``reason``. An infeasible sample has only the status and the reason.
+        The columns are ``sample``, ``status``, joint angles [rad] ([m] where a joint slides),
+        tensions [N], cable lengths [m], unstrained lengths [m] of position-controlled cables, and
+        ``reason``. An infeasible sample has only its number, status and reason.
 
         Args:
-            path: The file; it is written whole or not at all.
+            path: The file. It is written completely or not at all.
 
         Raises:
-            FileError: It cannot be written.
+            FileError: The file cannot be written.
         """
         names = [cable.name for cable in self.arm.cables]
         header = [
@@ -219,7 +215,7 @@ class PathPlan(ReadOnlyState):
 
 
 def _runs(samples: tuple[InfeasibleSample, ...]) -> Iterator[list[InfeasibleSample]]:
-    """Infeasible samples that follow each other and have one status."""
+    """Group consecutive infeasible samples with one status."""
     numbered = enumerate(samples)
     for _, run in groupby(numbered, key=lambda pair: (pair[1].index - pair[0], pair[1].status)):
         yield [each for _, each in run]

@@ -1,4 +1,4 @@
-"""Tensions that give an arm the stiffness that is wanted, with the least effort."""
+"""Plan the least tensions that give an arm a wanted stiffness."""
 
 from __future__ import annotations
 
@@ -29,20 +29,19 @@ from cdsm.tension import Tension
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class StiffnessPlan(ReadOnlyState):
-    """Tensions for a wanted stiffness, with the question they answer.
+    """Tensions for a wanted stiffness, with the arguments of the plan.
 
     Attributes:
-        tension: The tensions; of those equally near the target the least, by ‖F‖.
-        stiffness: K_θ under them.
-        direction: Unit directions u in base axes, (3,) or (n, 3); None for a target of
-            ``cartesian``.
+        tension: The tensions; if several are equally near to the target, those with the least ‖F‖.
+        stiffness: K_θ under these tensions.
+        direction: Unit directions u in base axes, (3,) or (n, 3); None for ``cartesian``.
         target: The target [N/m]: a number, one per direction (n,), or (3, 3).
         achieved: ``stiffness.along`` () or (n,), or ``stiffness.cartesian`` (3, 3) [N/m].
         floor: Smallest eigenvalue of K_θ that counted as stable [N m/rad].
-        efforts: ‖F‖ (S,) [N] where each search ended that hit the target, rising; the first is that
-            of ``tension``.
+        efforts: ‖F‖ (S,) [N] at the end of each search that hit the target, rising. The first
+            belongs to ``tension``.
         iterations: Iterations of all searches.
-        evaluations: How often K_θ was evaluated.
+        evaluations: Number of evaluations of K_θ.
     """
 
     tension: Tension
@@ -57,20 +56,20 @@ class StiffnessPlan(ReadOnlyState):
 
     @property
     def misfit(self) -> float:
-        """‖achieved/target − 1‖ [-], or for ``cartesian`` ‖achieved − target‖/‖target‖.
+        """‖achieved/target − 1‖ [-], or ‖achieved − target‖/‖target‖ for ``cartesian``.
 
-        With a moment in the wrench ``cartesian`` is not symmetric: its symmetric part counts.
+        With a moment in the wrench ``cartesian`` is not symmetric. Then its symmetric part counts.
         """
         return misfit(np.asarray(self.achieved), np.asarray(self.target), self.direction)
 
     @property
     def reached(self) -> bool:
-        """Whether the target is hit within 1e-6; with one direction all else is an error."""
+        """Whether the target is hit within 1e-6. With one direction, a miss raises an error."""
         return self.misfit <= REACHED
 
     @property
     def spread(self) -> float:
-        """By how much the largest effort found exceeds the least [-]."""
+        """Relative excess of the largest effort found over the least [-]."""
         return float(self.efforts[-1] / self.efforts[0] - 1.0) if self.efforts.size else 0.0
 
     def __repr__(self) -> str:
@@ -109,38 +108,39 @@ def plan_stiffness(
     starts: int = 3,
     seed: int = 0,
 ) -> StiffnessPlan:
-    """Least tensions with a wanted stiffness: min ‖F‖² so that along(u) = target (Eqs. 13, 17, 20).
+    """Plan least tensions for a wanted stiffness: min ‖F‖², along(u) = target (Eqs. 13, 17, 20).
 
-    Over F with J_Lᵀ F = J_Xᵀ W − g, the bounds, the domains of the elasticities of position-
-    controlled cables, and λ_min(K_θ), symmetric part, not below ``margin``. One direction is hit
-    within 1e-6, or it is an error. Several directions, or ``cartesian``, are hit too if that is
+    The constraints on F are J_Lᵀ F = J_Xᵀ W − g, the bounds, the domains of the elasticities of
+    position-controlled cables, and λ_min(K_θ), symmetric part, not below ``margin``. One direction
+    is hit within 1e-6; otherwise an error is raised. Several directions or ``cartesian`` are hit if
     possible. If not, the sum of their squared relative misses is least, and ``reached`` is false.
 
-    The searches are local. With the laws of this library they mostly end at one effort. With a
-    user's own law they need not: with one of them the effort found was 3.6 % above the least. A
-    ``spread`` above zero warns of it, one of zero does not rule it out, and more ``starts`` help.
+    The searches are local. With the laws of this library they mostly end at one effort. With one
+    user-defined law, the effort found was 3.6 % above the least. A ``spread`` above zero warns of
+    this. A ``spread`` of zero does not exclude it. More ``starts`` help.
 
     Args:
         pose: The posture.
-        direction: u (3,) in base axes, any length; several (n, 3); or None for ``cartesian``.
+        direction: u (3,) in base axes, any length; several directions (n, 3); or None for
+            ``cartesian``.
         target: The stiffness [N/m] along u; one per direction (n,); or (3, 3).
         minimum: Lower bound of the tensions [N], for all cables or (C,).
-        maximum: Upper bound of the tensions [N], for all cables or (C,); inf for none but the end
-            of the elasticity's domain, and buckling.
+        maximum: Upper bound of the tensions [N], for all cables or (C,). With inf, only the domain
+            of the elasticity and buckling limit the tensions.
         wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m].
-        margin: From which part of the largest eigenvalue of K_θ under the least tensions on the
-            smallest one counts as stable [-], 1e-9 or more.
-        starts: From how many tensions to search, at most 1000.
-        seed: Of the random ones among them.
+        margin: Smallest eigenvalue of K_θ that counts as stable, as a part of the largest
+            eigenvalue under the least tensions [-], 1e-9 or more.
+        starts: Number of starting tensions, at most 1000.
+        seed: Seed of the random starting tensions.
 
     Raises:
-        InvalidInput: No direction, a target that is not positive, bounds the wrong way, or another
-            argument out of place.
-        UnreachableStiffness: No admissible tensions give this stiffness along the one direction;
-            carries what they do give.
-        InfeasibleTension: No tension within the bounds and domains balances the arm.
-        ElasticityRangeError: The bounds leave nothing of the domain of a cable's elasticity.
-        SingularStiffness: The tip cannot move along a direction, or no admissible tension holds the
+        InvalidInput: ``direction`` is not finite or is zero; a target is not positive; ``minimum``
+            exceeds ``maximum``; or another argument is invalid.
+        UnreachableStiffness: No admissible tensions give this stiffness along the single direction.
+            The error holds the stiffness that they give.
+        InfeasibleTension: No tensions within the bounds and domains balance the arm.
+        ElasticityRangeError: The bounds and the domain of an elasticity do not overlap.
+        SingularStiffness: The tip cannot move along a direction, or no admissible tensions hold the
             arm.
     """
     model = stiffness_model(pose, minimum, maximum, wrench, margin)

@@ -1,6 +1,6 @@
-"""The search for the least tensions that hit a target, from several starts.
+"""Search from several starts for the least tensions that hit a target.
 
-It is local: :func:`~cdsm.planning.plan.plan_stiffness` says how far above the least it has ended.
+The search is local: :func:`~cdsm.planning.plan.plan_stiffness` gives its measured error.
 """
 
 from __future__ import annotations
@@ -27,41 +27,41 @@ from cdsm.planning.stiffness_model import (
 from cdsm.support.validation import Array
 
 REACHED: Final = 1e-6
-"""Largest relative miss with which a target counts as hit; what is found is mostly at rounding."""
+"""Largest relative miss of a target that counts as hit. Searches mostly end at rounding."""
 
 _CORNERS = 1e3
-"""Cap of unbounded tensions for the starts, in least tensions."""
+"""Upper bound of unbounded tensions for the starts, as a multiple of the least tensions."""
 
 _RANGE_STARTS = 24
-"""Starts of the search for the range, before a target is refused."""
+"""Number of starts of the range search before a target is rejected."""
 
 _NEAREST_STARTS = 8
-"""Corners from which targets that cannot all be hit are approached, too."""
+"""Number of additional corner starts for targets that cannot all be hit."""
 
 _NEARLY = 0.1
-"""Relative miss with which a place tells how large the tensions will be."""
+"""Tensions within this relative miss show how large the solution will be."""
 
 _SIDES = 6
-"""How many of the places nearest to a target on either side are joined."""
+"""Number of nearest points on either side of a target that are connected."""
 
 _EDGE = 1e-9
-"""A target this part beyond an end of the range is at the end."""
+"""A target beyond an end of the range by this part is at the end."""
 
 _AS_NEAR = 1e-8
-"""Misses up to this are as good as none: next to buckling a search may come no nearer."""
+"""Misses up to this count as zero: next to buckling a search may come no nearer."""
 
 
 class Planner:
-    """Searches for one set of constraints, and the record of them.
+    """Searches for one set of constraints, with a record of the searches.
 
     Args:
-        model: K_θ over the admissible tensions.
-        constraints: What is to be zero.
-        starts: From how many tensions to search.
-        seed: Of the random ones.
+        model: K_θ as a function of the admissible tensions.
+        constraints: Constraints that must be zero.
+        starts: Number of starting tensions.
+        seed: Seed of the random starting tensions.
 
     Attributes:
-        efforts: ‖F‖ [N] where each search ended that hit the target, rising.
+        efforts: ‖F‖ [N] at the end of each search that hit the target, rising.
         iterations: Iterations of all searches so far.
     """
 
@@ -82,15 +82,11 @@ class Planner:
         self._ends: list[ConstraintValues] = []
 
     def least(self) -> SearchResult | None:
-        """The least tensions that hit the target, if any start leads to some."""
+        """Return the least tensions that hit the target, or None."""
         return self._best(self._starts())
 
     def within_range(self, u: Array, target: float) -> SearchResult:
-        """The least tensions for one target [N/m] along u (3,), from the ends of the range.
-
-        Raises:
-            UnreachableStiffness: The target is out of the range, or was not hit.
-        """
+        """Return least tensions for a target [N/m] along u (3,), or raise UnreachableStiffness."""
         softest, stiffest, iterations = range_ends(self.model, u, _RANGE_STARTS, self.seed)
         self.iterations += iterations
         low = 0.0 if softest.open else softest.value
@@ -101,7 +97,7 @@ class Planner:
             *self._ends,
             *map(self.constraints.at, self.begin.points),
         ]
-        # what a search has met beyond the range, by more than rounding, is attainable, too
+        # a stiffness that a search met beyond the range, by more than rounding, is attainable too
         met = [target * (1.0 + float(place.values[0])) for place in seen]
         low = min([low, *(value for value in met if value < low * (1.0 - REACHED))])
         high = max([high, *(value for value in met if value > high * (1.0 + REACHED))])
@@ -111,7 +107,7 @@ class Planner:
         found = self._best(
             [*self._crossings(ends[0], ends), *self._crossings(ends[1], ends)] or ends
         )
-        if found is None:  # next to buckling the straight way between both ends may leave the range
+        if found is None:  # near buckling the straight line may leave the range
             seen += [*map(self.constraints.at, ends), *self._ends]
             bridges = self._bridges(seen)
             found = self._best(bridges)
@@ -123,7 +119,7 @@ class Planner:
         return found
 
     def nearest(self) -> SearchResult:
-        """The tensions with the least sum of squared misses, and of these the least."""
+        """Return the least tensions among those with the least sum of squared misses."""
         program = replace(self.program, objective=NEAREST)
 
         def misses(place: ConstraintValues) -> float:
@@ -140,7 +136,7 @@ class Planner:
         return least if kept else best
 
     def _best(self, points: Iterable[Evaluation]) -> SearchResult | None:
-        """The least tensions that hit the target, if any of some points leads to them."""
+        """Return the least tensions that hit the target from some starts, or None."""
         begin = list(points)
         near = [point.F.max() for point in begin if self._is_near(point)]
         program = replace(self.program, unit=float(min(near, default=self.program.unit)))
@@ -156,7 +152,7 @@ class Planner:
         return bool((abs(self.constraints.at(point).values) <= _NEARLY).all())
 
     def _nearly_hit(self, seen: list[ConstraintValues]) -> SearchResult | None:
-        """The least tensions among those that hit the one target within 1e-6."""
+        """Return the least tensions seen that hit the single target within 1e-6, or None."""
         misses = [float(abs(place.values[0])) for place in seen]
         if min(misses) > REACHED:
             return None
@@ -167,7 +163,7 @@ class Planner:
         return SearchResult(best, 0)
 
     def _starts(self) -> Iterator[Evaluation]:
-        """The least tensions, places where one target is hit between corners, and random ones."""
+        """Return the starts: least tensions, points that hit one target, and random points."""
         anchor = self.begin.anchor
         least = backtrack_to_stable(self.model, self.model.region.least.values, anchor)
         points = [] if least is None else [least]
@@ -180,7 +176,7 @@ class Planner:
     def _crossings(
         self, hub: Evaluation, others: list[Evaluation], precision: float = 1e-2
     ) -> list[Evaluation]:
-        """Stable places on the way from one to others where the one target is hit, least first."""
+        """Find stable points that hit the single target between a hub and others; least first."""
         at_hub, guesses = self._miss(hub), []
         for other in others:
             at_other, way = self._miss(other), other.F - hub.F
@@ -189,7 +185,7 @@ class Planner:
                 guesses.append((float(guess @ guess), at_other, way))
         found = []
         for _, at_other, way in sorted(guesses, key=lambda guess: guess[0])[: self.starts]:
-            # known at both ends: the rounding of F at an end may be enough to change the sign
+            # reuse the values at the ends: rounding of F there could change the sign
             known = {0.0: at_hub, 1.0: at_other}
 
             def miss(part: float, way: Array = way, known: dict[float, float] = known) -> float:
@@ -204,14 +200,14 @@ class Planner:
         return sorted(found, key=lambda point: float(point.F @ point.F))
 
     def _bridges(self, seen: list[ConstraintValues]) -> list[Evaluation]:
-        """Places that hit the one target between the nearest that were seen on either side."""
+        """Find points that hit the single target between the nearest points on either side."""
         order = sorted(seen, key=lambda place: float(abs(place.values[0])))
         below = [place.evaluation for place in order if place.values[0] < 0.0][:_SIDES]
         above = [place.evaluation for place in order if place.values[0] > 0.0][:_SIDES]
         return [place for one in below for place in self._crossings(one, above, 1e-15)]
 
     def _miss(self, point: Evaluation) -> float:
-        """By how much a point is off the one target; -1 where it has buckled, for no stiffness."""
+        """Return the miss of the single target; -1 (zero stiffness) if the arm buckles."""
         return float(self.constraints.at(point).values[0]) if point.reserve >= 0.0 else -1.0
 
     def _search(self, program: Program, point: Evaluation) -> SearchResult:

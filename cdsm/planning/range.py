@@ -1,4 +1,4 @@
-"""The smallest and the largest stiffness that the redundant cables can give an arm."""
+"""Smallest and largest stiffness that redundant cables can give an arm."""
 
 from __future__ import annotations
 
@@ -28,41 +28,41 @@ from cdsm.tension import Tension
 from cdsm.wires.laws import StrandElasticity, TabulatedElasticity
 
 MARGIN = 1e-4
-"""Default of the smallest eigenvalue of K_θ over its largest: arms of 40 joints reach 3e-4."""
+"""Default ratio of the smallest to the largest eigenvalue of K_θ: arms of 40 joints reach 3e-4."""
 
 _UPWARD = 4
-"""Starts for the highest where rigidities rise: there is mostly one maximum."""
+"""Starts for the upper end if rigidities rise: there is mostly one maximum."""
 
 _LAW_SAMPLES = 257
-"""Tensions at which a law is sampled, to see whether its rigidity rises."""
+"""Number of tensions at which a law is sampled to check that its rigidity rises."""
 
 _LAW_ROUNDING = 1e-12
-"""A fall of the rigidity by this part of it is rounding."""
+"""A relative fall of the rigidity below this is rounding."""
 
 _LIMITS = (1e2, 1e4, 1e6)
-"""Caps of unbounded tensions, in least tensions."""
+"""Upper bounds of unbounded tensions, as multiples of the least tensions."""
 
 _CAPPED = 0.999
-"""Tensions at this part of the cap would have gone further."""
+"""A tension above this part of the upper bound would rise further."""
 
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class StiffnessRange(ReadOnlyState):
-    """The stiffness along a direction that an arm can have; made by :func:`stiffness_range`.
+    """Range of the stiffness of an arm along a direction; made by :func:`stiffness_range`.
 
     Attributes:
         direction: u (3,), a unit direction in base axes.
-        low: Smallest attainable ``along(u)`` [N/m], as far as the searches found it.
+        low: Smallest attainable ``along(u)`` [N/m] that the searches found.
         high: Largest attainable ``along(u)`` [N/m].
         low_tension: Tensions that give ``low``.
         high_tension: Tensions that give ``high``.
         floor: Smallest eigenvalue of K_θ that counted as stable [N m/rad].
-        low_found: Where each search for ``low`` ended, rising (S,) [N/m]: how often, out of how
-            many starts, it was found.
-        high_found: Where each search for ``high`` ended, falling (S,) [N/m].
+        low_found: Stiffness at the end of each search for ``low``, rising (S,) [N/m]. It shows how
+            many of the starts found ``low``.
+        high_found: Stiffness at the end of each search for ``high``, falling (S,) [N/m].
         iterations: Iterations of all searches.
-        evaluations: How often K_θ was evaluated.
+        evaluations: Number of evaluations of K_θ.
     """
 
     direction: Array
@@ -115,39 +115,41 @@ def stiffness_range(
     starts: int = 24,
     seed: int = 0,
 ) -> StiffnessRange:
-    """Smallest and largest ``along(u)`` over all tensions that hold the arm (Eqs. 13 and 20).
+    """Compute smallest and largest ``along(u)`` of all tensions that hold the arm (Eqs. 13, 20).
 
-    Over F with J_Lᵀ F = J_Xᵀ W − g, the bounds, the domains of the elasticities of position-
-    controlled cables, and λ_min(K_θ), symmetric part, not below ``margin``. With constant rigidity,
-    or one that levels off, ``along`` is a concave function of F: it has one maximum, and many
-    minima in the corners, so that ``low`` is sought from many starts. With other laws it may have
-    many of both, and both are sought from many starts, in the corners and between; ``high_found``
-    tells how often ``high`` was found. More starts add to fewer. If tension can buckle the arm, it
-    is softest just before, and ``low`` depends on ``margin``.
+    The constraints on F are J_Lᵀ F = J_Xᵀ W − g, the bounds, the domains of the elasticities of
+    position-controlled cables, and λ_min(K_θ), symmetric part, not below ``margin``. With a
+    rigidity that is constant or levels off, ``along`` is a concave function of F. It has one
+    maximum and many minima in the corners, so ``low`` is searched from many starts. With other laws
+    it may have many maxima too. Then ``low`` and ``high`` are searched from many starts, in the
+    corners and between. ``high_found`` shows how often ``high`` was found. More starts include the
+    starts of a smaller number. If tension can buckle the arm, it is softest just before, and
+    ``low`` depends on ``margin``.
 
-    No number of starts proves that ``low`` is the smallest. With the default it was found too high
-    by up to 0.16 % with constant rigidity (15 cables), and by up to 5.5 % with a user's own law
+    No number of starts proves that ``low`` is the smallest. With the default, ``low`` was too high
+    by up to 0.16 % with constant rigidity (15 cables), and by up to 5.5 % with a user-defined law
     whose rigidity has a hump.
 
     Args:
         pose: The posture.
         direction: u (3,) in base axes, any length.
         minimum: Lower bound of the tensions [N], for all cables or (C,).
-        maximum: Upper bound of the tensions [N], for all cables or (C,); inf for none but the end
-            of the elasticity's domain, and buckling.
+        maximum: Upper bound of the tensions [N], for all cables or (C,). With inf, only the domain
+            of the elasticity and buckling limit the tensions.
         wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m].
-        margin: From which part of the largest eigenvalue of K_θ under the least tensions on the
-            smallest one counts as stable [-], 1e-9 or more.
-        starts: From how many tensions to search for ``low``, and for ``high`` unless the rigidity
-            of all cables is known to rise with the tension, where a few are enough; at most 1000.
-        seed: Of the random ones among them.
+        margin: Smallest eigenvalue of K_θ that counts as stable, as a part of the largest
+            eigenvalue under the least tensions [-], 1e-9 or more.
+        starts: Number of starting tensions for ``low``, at most 1000. ``high`` has the same number,
+            or a few if the rigidity of all cables is known to rise with the tension.
+        seed: Seed of the random starting tensions.
 
     Raises:
-        InvalidInput: Not a direction, bounds the wrong way or another argument out of place; or no
-            maximum, and the stiffness does not stop changing with the tension.
-        InfeasibleTension: No tension within the bounds and domains balances the arm.
-        ElasticityRangeError: The bounds leave nothing of the domain of a cable's elasticity.
-        SingularStiffness: The tip cannot move along u, or no admissible tension holds the arm.
+        InvalidInput: ``direction`` is not three finite numbers, or is zero; ``minimum`` exceeds
+            ``maximum``; another argument is invalid; or ``maximum`` is inf and the stiffness does
+            not stop changing with the tension.
+        InfeasibleTension: No tensions within the bounds and domains balance the arm.
+        ElasticityRangeError: The bounds and the domain of an elasticity do not overlap.
+        SingularStiffness: The tip cannot move along u, or no admissible tensions hold the arm.
     """
     model = stiffness_model(pose, minimum, maximum, wrench, margin)
     u = checked_direction(model, direction)
@@ -173,28 +175,19 @@ def stiffness_range(
 
 
 class RangeEnd(NamedTuple):
-    """One end of the range.
+    """One end of the range."""
 
-    Attributes:
-        evaluation: Where the best search ended.
-        tension: The tensions there, their balance exact.
-        value: The stiffness under them [N/m]; beside buckling, where it cannot be read, that of
-            the search.
-        values: Where each search ended (S,) [N/m], the best first.
-        open: Whether the tensions have no bound, and more of them lead further.
-    """
-
-    evaluation: Evaluation
-    tension: Tension
-    value: float
-    values: Array
-    open: bool = False
+    evaluation: Evaluation  # at the end of the best search
+    tension: Tension  # there, with exact balance
+    value: float  # stiffness [N/m]; near buckling, if it cannot be computed, that of the search
+    values: Array  # stiffness at the end of each search (S,) [N/m], the best first
+    open: bool = False  # whether tensions are unbounded and larger ones lead further
 
 
 def range_ends(
     model: StiffnessModel, u: Array, starts: int, seed: int
 ) -> tuple[RangeEnd, RangeEnd, int]:
-    """Both ends of the range along a unit direction (3,), and the iterations they took."""
+    """Find both ends of the range along a unit direction (3,), and count the iterations."""
     region = model.region
     if np.isfinite(region.high).all():
         return _bounded_ends(model, region, u, starts, seed)
@@ -230,11 +223,11 @@ def _bounded_ends(
         tension = region.tension(evaluation.F)
         try:
             value = stiffness(model.pose, tension).along(u)
-        except SingularStiffness:  # so near to buckling that an inverse has hardly a digit
+        except SingularStiffness:  # next to buckling K_θ has no accurate inverse
             value = float(values[0])
         return RangeEnd(evaluation, tension, value, frozen(values))
 
-    concave = _rigidities_rise(region)  # mostly: then the highest is found from anywhere
+    concave = _rigidities_rise(region)  # mostly: then any start leads to the maximum
     inside = [] if concave else list(begin.between(starts, seed))
     falling = rising[: -(_UPWARD // 2 if concave else starts) - 1 : -1]
     low = end(LOWEST, [*rising[:starts], *inside, begin.anchor])
@@ -243,7 +236,7 @@ def _bounded_ends(
 
 
 def _rigidities_rise(region: Admissible) -> bool:
-    """Whether the rigidity of every cable is known not to fall where the tension rises."""
+    """Check that the rigidity of every cable is known not to fall as the tension rises."""
     cables = region.least.posture.arm.cables
     return all(
         _rises(cable.elasticity, low, high)
@@ -256,7 +249,7 @@ def _rises(law: Elasticity, low: float, high: float) -> bool:
     if isinstance(law, LinearElasticity):
         return True
     if not isinstance(law, (StrandElasticity, TabulatedElasticity)):
-        return False  # between samples a law of the user's own may do anything
+        return False  # a user-defined law may do anything between samples
     try:
         rigidity = law.rigidity(np.linspace(low, high, _LAW_SAMPLES))
     except ElasticityRangeError:

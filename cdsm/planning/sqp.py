@@ -1,39 +1,41 @@
-r"""Sequential quadratic programming among the admissible tensions of a stable arm.
+r"""Sequential quadratic programming over the admissible tensions of a stable arm.
 
     min f(F)   so that   c(F) = 0,  J_Lᵀ F = τ,  low ≤ F ≤ high,  λ_min(K_θ(F)) ≥ floor.
 
 c is nonlinear, the balance is linear, and the stable tensions are not known in advance. Every
-iterate balances the arm and is stable, so that K_θ can be inverted there.
+iterate balances the arm and is stable, so K_θ can be inverted there.
 
-**The quadratic program of a step.** With d = ΔF/size, g = ∂f/∂d, G = ∂c/∂d and the Lagrangian
-L = f + y·c − z·reserve, y and z being the multipliers of the step before,
+**The quadratic program of a step.** Let d = ΔF/size, g = ∂f/∂d and G = ∂c/∂d. The Lagrangian is
+L = f + y·c − z·reserve, with the multipliers y and z of the step before. Solve
 
     min ½ dᵀ W d + g·d + ρ Σ(s + t) + ½ ρ Σ(s² + t²)
     so that  J_Lᵀ d = 0,  c + G d = s − t,  s, t ≥ 0,  reserve + ∂reserve·d ≥ 0,
              bounds,  |d_c| ≤ radius.
 
-s and t are the misses of c above and below: the program has a solution even where the linearized
-c cannot be met ("elastic mode"). The price ρ makes the penalty exact, if it exceeds the largest
-multiplier of c. It is raised tenfold until c is met or until that no longer helps, and it falls to
-three times the multiplier then, since a high price makes for short steps along a curved c.
+s and t are the violations of c above and below. With them the program has a solution even if the
+linearized c cannot be met ("elastic mode"). The penalty weight ρ (``price``) makes the penalty
+exact if it exceeds the largest multiplier of c. It rises tenfold until c is met, or until a rise
+does not help. Once c is met, it falls to three times the multiplier: a large ρ shortens the steps
+along a curved c.
 
-**The curvature W.** The exact Hessian of L, second derivatives of K_θ⁻¹ and of λ_min included, but
-made positive definite, as the solver needs it, on the steps that keep the balance, c, and (if
-z > 0) the reserve: :func:`cdsm.planning.kernels.convex`. Where it is so already it stays as it is,
-and the last steps converge quadratically.
+**The curvature W.** W is the exact Hessian of L, with the second derivatives of K_θ⁻¹ and λ_min.
+The solver needs a positive definite W. So :func:`cdsm.planning.kernels.convex` raises its curvature
+on the steps that keep the balance, c and, if z > 0, the reserve. If W is already positive definite
+there, it stays unchanged, and the last steps converge quadratically.
 
-**The trust region.** A step is taken if the merit f + ρ (‖c‖₁ + ½ ‖c‖²) falls by 1e-4 of the
-prediction or more. The radius triples the step after a fall by more than half of the prediction,
-halves it after less than a quarter, and quarters it after a failure. If c bends away from its
-tangent, a second program aims at where c was found (second-order correction). A step that leaves
-the stable tensions is drawn back towards an anchor, a stable place well inside: with constant
-rigidities K_θ is affine in F, the stable tensions are convex, and the way to the anchor is stable.
+**The trust region.** A step is accepted if the merit f + ρ (‖c‖₁ + ½ ‖c‖²) falls by at least 1e-4
+of the prediction. After a fall of more than half of the prediction, the radius is at least three
+steps. After less than a quarter it is half a step, and after a failure a quarter. If c bends away
+from its tangent, a second program uses the value of c after the step (second-order correction). A
+step that leaves the stable tensions is moved back towards an anchor, a stable point well inside.
+With constant rigidities K_θ is affine in F. Then the stable tensions are convex, and all points on
+the way to the anchor are stable.
 
 **Kinks.** At a kink of a rigidity (Eq. 19 has one at 31 N) c is continuous, but its slope is not.
-Kinks divide the tensions into boxes ("pieces") on which c is smooth. A search passes kinks freely
-until a step across one fails; from then on it stays in its piece, whose walls are bounds like
-others. If it ends at a wall, it begins again on the other side, where the other slope holds, until
-that is no better. An end away from all walls is a local optimum, since c is smooth around it.
+Kinks divide the tensions into boxes ("pieces") on which c is smooth. A search crosses kinks freely
+until a step across a kink fails. Then it stays in its piece, whose walls act as bounds. If it ends
+at a wall, it starts again on the other side with the other slope, until that is not better. An end
+away from all walls is a local optimum, because c is smooth around it.
 """
 
 from __future__ import annotations
@@ -60,15 +62,15 @@ MET: Final = 1e-9
 """Largest magnitude of a constraint that counts as met."""
 
 _ITERATIONS = 100
-_CROSSINGS = 60  # how often a search may begin again beyond a kink
+_CROSSINGS = 60  # largest number of restarts beyond a kink
 _FIRST_RADIUS = 4.0
 _SMALLEST_RADIUS = 1e-13
 _CURVATURE = 1e-6  # curvatures below this part of the largest are raised to it
 _FIRST_PRICE, _LARGEST_PRICE = 10.0, 1e8
-_PREMIUM = 3.0  # the price over the multiplier: above one the penalty is exact
+_PREMIUM = 3.0  # price over multiplier: above one the penalty is exact
 _ROUNDING = 1e-15
-_ARRIVED = 1e-10  # a step and a miss this small end a search: the next would be their square
-_AT_KINK = 1e-6  # distance from a kink, as a part of it, that counts as none
+_ARRIVED = 1e-10  # smaller steps and misses end a search: the next would be their square
+_AT_KINK = 1e-6  # relative distance from a kink that counts as zero
 
 
 @dataclass(frozen=True)
@@ -89,16 +91,16 @@ NEAREST: Final = Objective(square=1.0)
 
 @dataclass(frozen=True, eq=False)
 class Program:
-    """A nonlinear program over the tensions.
+    """Nonlinear program over the tensions.
 
     Attributes:
-        model: K_θ over the tensions.
+        model: K_θ as a function of the tensions.
         region: The admissible tensions.
-        anchor: A stable place well inside, towards which steps are drawn back.
+        anchor: Stable point well inside, towards which steps are moved back.
         constraints: c.
         objective: f.
-        unit: The unit of effort [N]: of the order of the tensions sought.
-        centre: Tensions (C,) [N] from which effort counts, or 0.
+        unit: Unit of the effort [N], of the order of the tensions in the solution.
+        centre: Tensions (C,) [N] at which the effort is zero, or 0.
     """
 
     model: StiffnessModel
@@ -110,7 +112,7 @@ class Program:
     centre: Array | float = 0.0
 
     def merit(self, at: ConstraintValues, price: float) -> float:
-        """f, and the price of c."""
+        """Return f plus the penalty of c."""
         objective, c = self.objective, at.values
         x = (at.evaluation.F - self.centre) / self.unit
         merit = 0.5 * objective.effort * float(x @ x)
@@ -119,11 +121,11 @@ class Program:
         return merit + objective.linear * float(c.sum()) + 0.5 * objective.square * float(c @ c)
 
     def met(self, at: ConstraintValues) -> bool:
-        """Whether c = 0, if that is needed."""
+        """Check that c = 0, if this is required."""
         return not self.objective.constrained or bool((abs(at.values) <= MET).all())
 
     def better(self, one: ConstraintValues, other: ConstraintValues) -> bool:
-        """Whether one place beats another by more than rounding."""
+        """Check that one point is better than another by more than rounding."""
         if self.met(one) != self.met(other):
             return self.met(one)
         price = 0.0 if self.met(one) else _LARGEST_PRICE
@@ -133,7 +135,7 @@ class Program:
 
 @dataclass(frozen=True, eq=False)
 class SearchResult:
-    """Where a search ended, and after how many iterations."""
+    """Last point of a search, and the number of iterations."""
 
     end: ConstraintValues
     iterations: int
@@ -150,7 +152,7 @@ class _Model(NamedTuple):
 
 
 class _Bounds(NamedTuple):
-    """The radius of the trust region in sizes, and bounds (C,) [N]."""
+    """Trust-region radius in units of ``size``, and bounds (C,) [N]."""
 
     radius: float
     low: Array
@@ -158,7 +160,7 @@ class _Bounds(NamedTuple):
 
 
 class _Step(NamedTuple):
-    """A step d, the multipliers of c and of stability, and the predicted fall of the merit."""
+    """Step d, multipliers of c and of the reserve, and predicted fall of the merit."""
 
     d: Array
     y: Array
@@ -171,7 +173,7 @@ class _Step(NamedTuple):
 
 
 def search(program: Program, start: Evaluation) -> SearchResult:
-    """A local optimum from stable tensions, kinks of rigidities crossed where that is better."""
+    """Find a local optimum from stable tensions; cross kinks of rigidities if better."""
     best = _search(program, start, in_piece=False)
     iterations = best.iterations
     for _ in range(_CROSSINGS):
@@ -190,7 +192,7 @@ def search(program: Program, start: Evaluation) -> SearchResult:
 
 
 def _beyond_kinks(region: Admissible, F: Array) -> Iterator[Array]:
-    """The same tensions (C,) [N] on the other side of the kinks they are at: of all, then each."""
+    """Move tensions (C,) [N] across the kinks they are at: first all of them, then one each."""
     at = [(c, kink) for c, kink in region.kinks if abs(F[c] - kink) <= _AT_KINK * kink]
     for group in ([at] if len(at) > 1 else []) + [[pair] for pair in at]:
         beyond = F.copy()
@@ -200,7 +202,7 @@ def _beyond_kinks(region: Admissible, F: Array) -> Iterator[Array]:
 
 
 def _search(program: Program, start: Evaluation, *, in_piece: bool) -> SearchResult:
-    """A local optimum; with ``in_piece`` that of the piece of the start alone."""
+    """Find a local optimum; with ``in_piece`` only in the piece of the start."""
     region, objective = program.region, program.objective
     iterate = program.constraints.at(start)
     y, z = np.zeros(iterate.values.size if objective.constrained else 0), 0.0
@@ -218,7 +220,7 @@ def _search(program: Program, start: Evaluation, *, in_piece: bool) -> SearchRes
             if not in_piece:
                 in_piece = True
             elif not program.met(iterate) and price < _LARGEST_PRICE:
-                price = min(100.0 * price, _LARGEST_PRICE)  # at rest, but only at so low a price
+                price = min(100.0 * price, _LARGEST_PRICE)  # converged, but only at this low price
             else:
                 break
             continue
@@ -231,7 +233,7 @@ def _search(program: Program, start: Evaluation, *, in_piece: bool) -> SearchRes
             elif fall < 0.25 * step.predicted:
                 radius = step.length / 2.0
         elif not in_piece and ((low > F) | (high < F)).any():
-            in_piece = True  # what looked good on this side of a kink is not so on the other
+            in_piece = True  # the model of this side of the kink fails on the other side
         else:
             radius = step.length / 4.0
     return SearchResult(iterate, iterations)
@@ -248,12 +250,12 @@ def _model(program: Program, iterate: ConstraintValues, y: Array, z: float) -> _
     W = iterate.hessian(weights) * size**2
     W[np.diag_indices(len(W))] += objective.effort * relative**2
     if not objective.constrained:
-        # c belongs to f, whose Hessian has Gauss-Newton's term, too; no constraint is left
+        # c is part of f, whose Hessian gets a Gauss-Newton term; no constraint is left
         g = g + weights @ G
         W += objective.square * G.T @ G
         c, G = np.zeros(0), np.zeros((0, g.size))
     held = G
-    if z > 0.0:  # stability was active: its curvature counts, and steps along it do not
+    if z > 0.0:  # stability was active: its curvature counts; steps that change the reserve do not
         W -= z * size**2 / program.model.scale * evaluation.reserve_hessian()
         held = np.vstack([G, evaluation.reserve_gradient])
     return _Model(size, g, c, G, kernels.convex(W, region.null, held, _CURVATURE))
@@ -262,7 +264,7 @@ def _model(program: Program, iterate: ConstraintValues, y: Array, z: float) -> _
 def _step(
     program: Program, iterate: ConstraintValues, model: _Model, price: float, bounds: _Bounds
 ) -> tuple[_Step, float]:
-    """The step that the quadratic program recommends, and the price of c it needs."""
+    """Solve the quadratic program; return the step and the price of c that it needs."""
     region, evaluation, size = program.region, iterate.evaluation, model.size
     count, rank, m = model.g.size, len(region.rows), model.c.size
     low = np.maximum(np.minimum((bounds.low - evaluation.F) / size, 0.0), -bounds.radius)
@@ -315,7 +317,7 @@ def _take(
     price: float,
     bounds: _Bounds,
 ) -> tuple[ConstraintValues | None, float]:
-    """The place after a step, None if it is not stable, and the fall of the merit."""
+    """Evaluate a step; return the new point (None if unstable) and the fall of the merit."""
 
     def after(d: Array) -> tuple[ConstraintValues | None, float]:
         F = np.clip(iterate.evaluation.F + model.size * d, bounds.low, bounds.high)
@@ -327,7 +329,7 @@ def _take(
 
     candidate, fall = after(step.d)
     if candidate is not None and fall < 0.75 * step.predicted and model.c.size:
-        # second-order correction: c as it was found after the step, not as its tangent has it
+        # second-order correction: the value of c after the step, not that of its tangent
         corrected = model._replace(c=candidate.values - model.G @ step.d)
         other, more = after(_step(program, iterate, corrected, price, bounds)[0].d)
         if more > fall:

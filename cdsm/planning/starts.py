@@ -1,4 +1,4 @@
-"""Where searches begin: stable tensions far apart."""
+"""Starting points of searches: stable tensions far apart."""
 
 from __future__ import annotations
 
@@ -12,29 +12,29 @@ from cdsm.planning.stiffness_model import Evaluation, StiffnessModel, backtrack_
 from cdsm.support.validation import Array
 
 _FAR = 1e4
-"""A corner is looked for this many times the largest tension away."""
+"""Corners are searched in a direction at this multiple of the largest tension."""
 
 _SAME = 1e-6
-"""Corners nearer to each other than this part of their size are one."""
+"""Corners closer to each other than this part of their size are one."""
 
 _ITERATIONS = 60
-_MODES = 24  # how many cutting planes are kept
+_MODES = 24  # number of cutting planes that are kept
 _NO_GAIN = 1e-9
-"""A reserve, over the scale of K_θ, that is not worth a step."""
+"""A gain of reserve below this part of the scale of K_θ is not worth a step."""
 
 
 class StartPoints:
-    """Stable tensions to begin from.
+    """Stable tensions from which searches start.
 
     Args:
-        model: K_θ over the tensions.
+        model: K_θ as a function of the tensions.
         region: The admissible tensions, bounded.
-        directions: How many random directions to look for corners in, beside those of the cables.
-        seed: Of these directions.
+        directions: Number of random directions for corners, in addition to those of the cables.
+        seed: Seed of the random directions.
 
     Attributes:
-        anchor: A stable place well inside.
-        points: It, and stable places towards the corners. More directions add to those of fewer.
+        anchor: A stable point well inside.
+        points: The anchor, and stable points towards the corners. More directions only add points.
 
     Raises:
         SingularStiffness: No admissible tensions were found that hold the arm stable.
@@ -57,7 +57,7 @@ class StartPoints:
             if corner is not None and (abs(corners - corner).max(axis=1) > _SAME * size).all():
                 corners = np.vstack([corners, corner])
                 known += k < 2 * least.size
-        # random corners do not move the anchor, so that more of them leave the others as they are
+        # random corners do not move the anchor, so more of them do not change the others
         points = [model.at(F) for F in (corners[:known].mean(axis=0), *corners)]
         self.anchor = points[0]
         if self.anchor.reserve <= 0.0:
@@ -73,7 +73,7 @@ class StartPoints:
         self.points = [*self._known, *(point for point in drawn[known:] if point is not None)]
 
     def between(self, count: int, seed: int) -> Iterator[Evaluation]:
-        """Random stable places among the corners of the cables, ``count`` of them if found."""
+        """Return up to ``count`` random stable points between the corners of the cables."""
         shares = np.random.default_rng(seed).dirichlet(np.ones(len(self._known)), count)
         for F in shares @ np.array([point.F for point in self._known]):
             point = backtrack_to_stable(self.anchor.model, F, self.anchor)
@@ -82,16 +82,16 @@ class StartPoints:
 
 
 def _stabilize(model: StiffnessModel, region: Admissible, start: Evaluation) -> Evaluation:
-    """The stable tensions with about the largest reserve, by cutting planes in a trust region.
+    """Find the tensions with about the largest reserve, by cutting planes in a trust region.
 
-    vᵀ K_θ(F) v bounds the smallest eigenvalue from above for every unit v. The two softest modes of
-    each iterate are kept, and linear in F they bound the reserve of the next.
+    vᵀ K_θ(F) v is an upper bound of the smallest eigenvalue for every unit v. The two softest modes
+    of each iterate are kept. Linear in F, they bound the reserve of the next iterate.
     """
     iterate, radius, unit = start, 1.0, model.scale
     modes: list[Array] = []
     count = start.F.size
     A = np.hstack([region.rows, np.zeros((len(region.rows), 1))])
-    # variables: the step, and the reserve after it as far as the modes bound it
+    # variables: the step, and the bound of the reserve after it
     P, q = 1e-4 * np.eye(count + 1), np.append(np.zeros(count), -1.0)
     for _ in range(_ITERATIONS):
         softest = (iterate.eigenvectors[:, [i]] for i in range(min(2, len(iterate.eigenvectors))))

@@ -1,4 +1,4 @@
-"""K_θ of one posture as a function of the tensions, and the tip stiffness that follows from it."""
+"""K_θ at one posture as a function of the tensions, and the tip stiffness that follows."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from cdsm.planning.admissible import Admissible
 from cdsm.support.validation import SMALLEST, Array
 
 _NEAREST = 1e-9
-"""Eigenvalues nearer to each other than this part of the scale are taken to be so far apart."""
+"""Smallest distance of two eigenvalues in a derivative, as a part of the scale."""
 
 
 class StiffnessModel:
-    """K_θ(F) over the admissible tensions of a posture.
+    """K_θ(F) over the admissible tensions at a posture.
 
     Args:
         region: The admissible tensions.
@@ -27,16 +27,16 @@ class StiffnessModel:
     Attributes:
         pose: The posture.
         region: The admissible tensions.
-        scale: Largest eigenvalue of K_θ, by magnitude, under the least tensions [N m/rad].
-        floor: Smallest eigenvalue of a K_θ that counts as stable [N m/rad].
-        evaluations: How often K_θ was evaluated.
+        scale: Largest magnitude of an eigenvalue of K_θ under the least tensions [N m/rad].
+        floor: Smallest eigenvalue of K_θ that counts as stable [N m/rad].
+        evaluations: Number of evaluations of K_θ.
     """
 
     def __init__(self, region: Admissible, margin: float) -> None:
         self.pose = pose = region.least.posture
         self.region = region
         self.evaluations = 0
-        # products with the tensor, which is cached, beat going through the cables each time
+        # products with the cached tensor are faster than a loop over the cables
         self.geometry = pose.length_hessian, pose.length_jacobian
         load = load_stiffness(pose.jacobian, region.least.wrench, pose.arm._model.masses.tip_joints)
         self.constant = pose.gravity_stiffness + load
@@ -44,21 +44,21 @@ class StiffnessModel:
         self.floor = margin * self.scale
 
     def at(self, F: Array) -> Evaluation:
-        """K_θ under admissible tensions F (C,) [N]."""
+        """Evaluate K_θ under admissible tensions F (C,) [N]."""
         self.evaluations += 1
-        # between two admissible places rounding can be off their bounds, and off a law's domain
+        # rounding between two admissible points can leave the bounds and the domain of a law
         return Evaluation(self, np.minimum(np.maximum(F, self.region.low), self.region.high))
 
 
 class Evaluation:
-    """K_θ under some tensions.
+    """K_θ under given tensions.
 
     Attributes:
-        model: The model it is evaluated with.
+        model: The model that evaluates K_θ.
         F: Tensions (C,) [N].
         K: K_θ (nv, nv) [N m/rad].
-        eigenvalues: Of its symmetric part, rising (nv,) [N m/rad].
-        eigenvectors: The columns of (nv, nv).
+        eigenvalues: Eigenvalues of its symmetric part, rising (nv,) [N m/rad].
+        eigenvectors: Eigenvectors, the columns of (nv, nv).
     """
 
     def __init__(self, model: StiffnessModel, F: Array) -> None:
@@ -76,7 +76,7 @@ class Evaluation:
 
     @property
     def reserve(self) -> float:
-        """λ_min less the floor [N m/rad]; stable if not negative."""
+        """λ_min minus the floor [N m/rad]. The arm is stable if it is not negative."""
         return float(self.eigenvalues[0] - self.model.floor)
 
     @cached_property
@@ -85,12 +85,12 @@ class Evaluation:
         return self.mode_gradient(self.eigenvectors[:, :1])
 
     def mode_gradient(self, v: Array) -> Array:
-        """Derivative of vᵀ K_θ v by the tensions (C,) [m/rad²], v (nv, 1)."""
+        """Return the derivative of vᵀ K_θ v by the tensions (C,) [m/rad²] for v (nv, 1)."""
         v = np.ascontiguousarray(v)
         return kernels.form_by_tension(*self.model.geometry, self.spring_slopes[0], v, v)[:, 0, 0]
 
     def reserve_hessian(self) -> Array:
-        """Second derivative of the reserve by the tensions (C, C) [m/(N rad²)].
+        """Return the second derivative of the reserve by the tensions (C, C) [m/(N rad²)].
 
         2 Σ_j (vᵀ ∂_c K_θ v_j)(v_jᵀ ∂_d K_θ v)/(λ − λ_j) + δ_cd vᵀ J_c k″_c J_cᵀ v, v of λ = λ_min.
         """
@@ -106,7 +106,7 @@ class Evaluation:
 
 
 def backtrack_to_stable(model: StiffnessModel, F: Array, anchor: Evaluation) -> Evaluation | None:
-    """The first stable place from tensions F (C,) [N] on the way to a stable anchor, if found."""
+    """Find the first stable point on the line from tensions F (C,) [N] to an anchor, or None."""
     start = model.at(F)
     if start.reserve >= 0.0:
         return start
@@ -114,14 +114,14 @@ def backtrack_to_stable(model: StiffnessModel, F: Array, anchor: Evaluation) -> 
     def on_the_way(part: float) -> Evaluation:
         return model.at(F + part * (anchor.F - F))
 
-    # the reserve, if concave, is above its chord, and zero before that is
+    # a concave reserve is above its chord, so it is zero before its chord
     far = start.reserve / (start.reserve - anchor.reserve) if anchor.reserve > 0.0 else 1.0
     while on_the_way(far).reserve < 0.0:
         if far >= 1.0:
             return None
         far = min(2.0 * far, 1.0)
     part = brentq(lambda part: on_the_way(part).reserve, 0.0, far, xtol=1e-15, rtol=1e-13)
-    for back in (0.0, 1e-14, 1e-12, 1e-10):  # the root may lie on the wrong side by its rounding
+    for back in (0.0, 1e-14, 1e-12, 1e-10):  # rounding may put the root on the unstable side
         end = on_the_way(min(part + back, 1.0))
         if end.reserve >= 0.0:
             return end
@@ -130,45 +130,35 @@ def backtrack_to_stable(model: StiffnessModel, F: Array, anchor: Evaluation) -> 
 
 @dataclass(frozen=True, eq=False)
 class Constraint:
-    """Numbers E_j : X [-] of one tip stiffness X = (R K_θ⁻¹ Rᵀ)⁻¹.
+    """Constraint values E_j : X [-] of one tip stiffness X = (R K_θ⁻¹ Rᵀ)⁻¹."""
 
-    Attributes:
-        rows: R (r, nv) [m/rad].
-        weights: E (n, r, r) [m/N].
-    """
-
-    rows: Array
-    weights: Array
+    rows: Array  # R (r, nv) [m/rad]
+    weights: Array  # E (n, r, r) [m/N]
 
 
 @dataclass(frozen=True, eq=False)
 class Constraints:
-    """c(F), the numbers of all constraints less their targets: what is to be zero.
-
-    Attributes:
-        parts: The constraints.
-        targets: What is subtracted (n,) [-].
-    """
+    """c(F): values of all constraints minus their targets, to be zero."""
 
     parts: tuple[Constraint, ...]
-    targets: Array
+    targets: Array  # (n,) [-]
 
     def at(self, evaluation: Evaluation) -> ConstraintValues:
-        """C at stable tensions."""
+        """Return the constraint values c at stable tensions."""
         return ConstraintValues(self, evaluation)
 
 
 class ConstraintValues:
     """c(F) at stable tensions, with its first and second derivatives.
 
-    With M = K_θ⁻¹ Rᵀ X the joint motion per motion of the tip, and P = K_θ⁻¹ − M R K_θ⁻¹ the
-    joint motion per torque while the tip is held,
+    M = K_θ⁻¹ Rᵀ X is the joint motion per motion of the tip. P = K_θ⁻¹ − M R K_θ⁻¹ is the joint
+    motion per torque while the tip is held.
 
         ∂X/∂F_c = Mᵀ ∂_c K_θ M,
         ∂²X/∂F_c∂F_d = −Mᵀ (∂_c K_θ P ∂_d K_θ + ∂_d K_θ P ∂_c K_θ) M + δ_cd Mᵀ J_c k″_c J_cᵀ M.
 
     Attributes:
-        evaluation: K_θ there.
+        evaluation: K_θ at these tensions.
         values: c (n,) [-].
     """
 
@@ -185,7 +175,7 @@ class ConstraintValues:
         return np.concatenate([part.jacobian() for part in self._parts])
 
     def hessian(self, y: Array) -> Array:
-        """Second derivative of y · c by the tensions (C, C) [1/N²], y (n,)."""
+        """Return the second derivative of y · c by the tensions (C, C) [1/N²] for y (n,)."""
         total, first = np.zeros((self.evaluation.F.size,) * 2), 0
         for part in self._parts:
             last = first + part.values.size
@@ -206,7 +196,7 @@ class _TipStiffness:
         self.values: Array = constraint.weights.reshape(-1, X.size) @ X.ravel()
 
     def _torques(self, motion: Array) -> Array:
-        """(∂K_θ/∂F_c) m for the columns m of a joint motion (nv, r): (C, nv, r)."""
+        """Return (∂K_θ/∂F_c) m (C, nv, r) for the columns m of a joint motion (nv, r)."""
         evaluation = self.evaluation
         return kernels.torques_by_tension(
             *evaluation.model.geometry, evaluation.spring_slopes[0], motion

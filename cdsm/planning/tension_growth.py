@@ -1,4 +1,4 @@
-"""Where more tension stops paying: the least tensions as their lower bound rises."""
+"""Saturation of the stiffness as the lower bound of the least tensions rises."""
 
 from __future__ import annotations
 
@@ -44,10 +44,10 @@ from cdsm.tension import DEFAULT_SOLVER, Tension, distribute_tension
 End = Literal["buckling", "maximum", "infeasible", "elasticity", "none"]
 
 _JUST: Final = 1e-9
-"""Distance to the other side of a place, as a part of it."""
+"""Relative distance from a bound to a point just beside it."""
 
 _INSET: Final = 1e-6
-"""Distance of the curve from an end at which there is no slope, as a part of its length."""
+"""Distance of the curve from an end without a slope, as a part of the length of the curve."""
 
 _ENDS: Final[dict[End, str]] = {
     "buckling": "where the arm buckles",
@@ -66,17 +66,17 @@ class Saturation(ReadOnlyState):
     Attributes:
         direction: u (3,), a unit direction in base axes.
         fraction: Part of the largest slope [-] below which tension does not pay.
-        bound: The lower bound [N] at which the slope has fallen to that part of the largest; inf if
-            it does not fall so far before the end, and the start if the stiffness nowhere rises.
-        tension: The least tensions with that bound, or with the bound of the end.
-        stiffness: K_θ under them.
-        steepest: The lower bound [N] at which the slope is largest.
+        bound: The lower bound [N] at which the slope has fallen to this part of the largest slope.
+            It is inf if the slope stays above it, and the start if the stiffness never rises.
+        tension: The least tensions with this bound, or with the bound of the end.
+        stiffness: K_θ under these tensions.
+        steepest: The lower bound [N] with the largest slope.
         steepest_slope: d along/d bound there [1/m].
-        stiffest: The lower bound [N] at which the stiffness is largest: an end of the curve, or a
-            maximum between them, beyond which tension softens the arm.
-        limit: The reason of the end of the curve: ``"buckling"``, ``"maximum"`` (the bound
-            ``maximum``), ``"elasticity"`` (a tension leaves its cable's domain), ``"infeasible"``
-            (no tensions balance the arm) or ``"none"`` (more tension goes on in the same way).
+        stiffest: The lower bound [N] with the largest stiffness: an end of the curve, or a maximum
+            between, above which tension softens the arm.
+        limit: Why the curve ends: ``"buckling"``, ``"maximum"`` (the bound ``maximum``),
+            ``"elasticity"`` (a tension leaves the domain of its cable), ``"infeasible"`` (no
+            tensions balance the arm) or ``"none"`` (the curve goes on).
         curve: Lower bound [N], stiffness along u [N/m] and its slope [1/m], (n, 3).
     """
 
@@ -93,7 +93,7 @@ class Saturation(ReadOnlyState):
 
     @property
     def end(self) -> float:
-        """The lower bound [N] at which the curve ends; for the reason see ``limit``."""
+        """Lower bound [N] at which the curve ends; ``limit`` is the reason."""
         return float(self.curve[-1, 0])
 
     def __repr__(self) -> str:
@@ -130,28 +130,30 @@ def saturation(
     fraction: float = 0.1,
     solver: str = DEFAULT_SOLVER,
 ) -> Saturation:
-    """The lower bound of tension above which more tension hardly stiffens an arm.
+    """Find the lower bound of tension above which more tension hardly stiffens an arm.
 
-    F*(b) are the least tensions with the lower bound b (Eq. 17). Their slope is
+    F*(b) are the least tensions with the lower bound b (Eq. 17). The slope of the stiffness is
     d along/db = ∂along/∂F · dF*/db, where dF*/db follows from the cables at their bounds. The
-    answer is the first b, after the largest slope, at which the slope has fallen to ``fraction`` of
-    it. A strand starts soft, so that its largest slope is large (Section IV-C). Where its rigidity
-    has levelled off, the active part is left, and more tension softens the arm if springs or leads
-    keep the wires from stiffening as they stretch.
+    result is the first b above the largest slope at which the slope has fallen to ``fraction`` of
+    the largest. A strand starts soft, so its largest slope is large (Section IV-C). Where its
+    rigidity has levelled off, the active part remains. Then more tension softens the arm if springs
+    or leads (straight cables between actuators and base disk) keep the wires from stiffening as
+    they stretch.
 
     Args:
-        pose: The posture, held.
+        pose: The posture, which stays fixed.
         direction: u (3,) in base axes, any length.
-        minimum: Lower bound to begin with [N]; the low end of the elasticities if that is higher.
-        maximum: Upper bound of the tensions [N], for all cables or (C,); inf for none.
+        minimum: First lower bound [N]; the low end of the elasticities if that is higher.
+        maximum: Upper bound of the tensions [N], for all cables or (C,); inf for no bound.
         wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m].
         fraction: Part of the largest slope, from 0 to below 1 [-].
         solver: As for :func:`~cdsm.distribute_tension`.
 
     Raises:
-        InvalidInput: Not a direction, bounds the wrong way, or another argument out of place.
+        InvalidInput: ``direction`` is not three finite numbers, or is zero; ``minimum`` exceeds
+            ``maximum``; or another argument is invalid.
         InfeasibleTension: No tensions balance the arm even at the smallest lower bound.
-        ElasticityRangeError: There they are outside the elasticities of the cables.
+        ElasticityRangeError: The tensions at the smallest lower bound are outside the elasticities.
         SingularStiffness: The tip cannot move along u, or the arm is stable at no lower bound.
     """
     arm = instance("pose", pose, Posture).arm
@@ -170,7 +172,7 @@ def saturation(
 
     lowest, highest = tension_domain(arm)
     low = max(start, lowest)
-    least(start)  # refuses bounds that contradict each other
+    least(start)  # raises if minimum exceeds maximum
     require_finite(0.0 if at(low)._moves(u) else math.inf, u)
     top = min(highest, float(ceiling.min()))
     high = max(scan_end(at, low, max(top, low)), low)
@@ -208,7 +210,7 @@ def saturation(
 
 
 def _stable(at: StiffnessAt, low: float, high: float) -> tuple[float, float]:
-    """The first range of lower bounds [N] in which the arm is stable, its edges left out."""
+    """Return the first stable range of lower bounds [N], without its edges."""
     places, margins, stable = stable_ranges(at, low, high)
     if not stable:
         best = at(float(places[int(margins.argmax())]))
@@ -219,16 +221,15 @@ def _stable(at: StiffnessAt, low: float, high: float) -> tuple[float, float]:
             best.critical_direction,
         )
     first, last = stable[0]
-    inset = _INSET * (last - first)  # on the edge K_θ is singular
+    inset = _INSET * (last - first)  # K_θ is singular on the edge
     return first + inset * (first > low), last - inset * (last < high)
 
 
 def _bends(least: Callable[[float], Tension], places: Array) -> Array:
-    """Lower bounds [N], rising, at which the slope jumps; places are bounds to begin with.
+    """Find the lower bounds [N], rising, at which the slope jumps; start from ``places``.
 
-    A cable reaches or leaves one of its bounds there, or passes a kink of its rigidity. If the same
-    cables are at their bounds at both ends of an interval, they are so all through it, and F*(b) is
-    linear.
+    There a cable reaches or leaves a bound, or passes a kink of its rigidity. If the same cables
+    are at their bounds at both ends of an interval, F*(b) is linear in the interval.
     """
     found: list[float] = []
     todo = list(pairwise(places.tolist()))
@@ -249,17 +250,17 @@ def _bends(least: Callable[[float], Tension], places: Array) -> Array:
 
 
 def _active(tension: Tension) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Which cables (C,) rise with the lower bound, and which stay at their maximum."""
+    """Find which cables (C,) rise with the lower bound, and which stay at their maximum."""
     tight = OPTIMALITY * float(tension.values.max())
     stays = tension.maximum - tension.values <= tight
     return (tension.values - tension.minimum <= tight) & ~stays, stays
 
 
 def _slope(tension: Tension, u: Array) -> float:
-    """D along/db [1/m] of the least tensions by their lower bound b.
+    """Compute the slope d along/db [1/m] of the least tensions over their lower bound b.
 
-    Cables at b rise with it, those at their maximum stay, and the others balance them with least
-    norm: the optimality conditions of Eq. 17.
+    Cables at b rise; the free cables balance them with least norm (optimality conditions of
+    Eq. 17).
     """
     A = tension.posture.length_jacobian.T
     rises, stays = _active(tension)
@@ -271,7 +272,7 @@ def _slope(tension: Tension, u: Array) -> float:
 
 
 def _steepest(curve: Array, slope: Callable[[float], float]) -> tuple[float, float]:
-    """The lower bound [N] with the largest slope, and the slope [1/m]."""
+    """Return the lower bound [N] with the largest slope, and this slope [1/m]."""
     best = int(curve[:, 2].argmax())
     a, b = curve[max(best - 1, 0), 0], curve[min(best + 1, len(curve) - 1), 0]
     place, value = float(curve[best, 0]), float(curve[best, 2])
@@ -285,7 +286,7 @@ def _steepest(curve: Array, slope: Callable[[float], float]) -> tuple[float, flo
 
 
 def _falls(curve: Array, slope: Callable[[float], float], start: float, level: float) -> float:
-    """The first lower bound [N] after a start at which the slope [1/m] is below a level, or inf."""
+    """Return the first lower bound [N] after a start with a slope [1/m] below a level, or inf."""
     before = start
     for place, _, value in curve.tolist():
         if place > start:
@@ -298,7 +299,7 @@ def _falls(curve: Array, slope: Callable[[float], float], start: float, level: f
 def _stiffest(
     curve: Array, value: Callable[[float], float], slope: Callable[[float], float]
 ) -> float:
-    """The lower bound [N] with the largest stiffness."""
+    """Return the lower bound [N] with the largest stiffness."""
     best = int(curve[:, 1].argmax())
     place = float(curve[best, 0])
     if 0 < best < len(curve) - 1 and curve[best - 1, 2] > 0.0 > curve[best + 1, 2]:
@@ -309,5 +310,5 @@ def _stiffest(
 
 
 def _limit(at: StiffnessAt, last: Tension, high: float) -> End:
-    """Why the lower bound cannot rise above that of the last tensions."""
+    """Return why the lower bound cannot rise above that of the last tensions."""
     return "maximum" if last.at_maximum else failure_at(at, high * (1.0 + _JUST))

@@ -1,1 +1,1 @@
-"""The loaded arm: equilibrium, hung weights, buckling, modes."""
+"""Statics of the loaded arm: equilibrium, hung weights, buckling and natural modes."""

@@ -1,6 +1,7 @@
-"""Scan of a held posture over the lower bound of the tensions, or over a load factor.
+"""Scan a fixed posture over the lower bound of the tensions, or over a load factor.
 
-A place is a lower bound [N] or a load factor; the stiffness there is that of the least tensions.
+A ``place`` is one lower bound [N] or one load factor [-]. The stiffness at a place is that of the
+least tensions there.
 """
 
 from __future__ import annotations
@@ -18,40 +19,37 @@ from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.validation import RANGES, Array
 
 SAMPLES: Final = 96
-"""Places that are evaluated; a stable range narrower than a step is not seen."""
+"""Number of places that a scan evaluates. A stable range narrower than one step is not seen."""
 
 PRECISION: Final = 1e-12
-"""Relative precision of a place that is found between two others."""
+"""Relative precision of a place found by bisection or root finding."""
 
 _ABOVE: Final = 1.0 + 1e-9
-"""The low end of a domain may be excluded; this far above it everything is defined."""
+"""Factor just above the low end of a domain, because a domain may exclude its low end."""
 
 Limit = Literal["buckling", "infeasible", "elasticity", "none"]
 
 StiffnessAt = Callable[[float], Stiffness]
-"""The stiffness at a place."""
+"""Function that returns the stiffness at a place."""
 
 
 def failure_at(at: StiffnessAt, place: float) -> Limit:
-    """Why the arm does not hold at a place; ``"none"`` if it holds."""
+    """Return why the arm fails at a place, or ``"none"`` if the arm holds."""
     try:
         return "none" if at(place).is_stable else "buckling"
-    except (InfeasibleTension, SolverError):  # on the very edge a solver may find nothing either
+    except (InfeasibleTension, SolverError):  # a solver may fail on the very edge
         return "infeasible"
     except ElasticityRangeError:
         return "elasticity"
 
 
 def _balances(at: StiffnessAt, place: float) -> bool:
-    """Whether tensions balance the arm within the domains of the elasticities."""
+    """Check that some tensions balance the arm within the domains of the elasticities."""
     return failure_at(at, place) in ("none", "buckling")
 
 
 def tension_domain(arm: Manipulator) -> tuple[float, float]:
-    """Tensions [N] that all cables may carry, within the domains of their elasticities.
-
-    Force-controlled cables do not use their elasticity.
-    """
+    """Return the tensions [N] within all maxima and the domains of position-controlled cables."""
     domains = [each.elasticity.domain for each in arm.cables if each.control == "position"]
     low = max((each.low for each in domains), default=0.0) * _ABOVE
     ends = [*(each.high for each in domains), *(each.maximum for each in arm.cables)]
@@ -59,8 +57,8 @@ def tension_domain(arm: Manipulator) -> tuple[float, float]:
 
 
 def last_true(true: Callable[[float], bool], a: float, b: float) -> tuple[float, float]:
-    """The last place from a, where something is true, and the next to b, where it is not."""
-    nothing = PRECISION**2 * b  # a may be zero, and true nowhere above
+    """Return the last place from a to b where a condition holds, and the next, where it fails."""
+    nothing = PRECISION**2 * b  # a may be zero, and the condition false right above it
     while b - a > max(PRECISION * b, nothing):
         middle = (a + b) / 2.0
         a, b = (middle, b) if true(middle) else (a, middle)
@@ -68,15 +66,16 @@ def last_true(true: Callable[[float], bool], a: float, b: float) -> tuple[float,
 
 
 def scan_end(at: StiffnessAt, low: float, highest: float) -> float:
-    """The end of a scan of the lower bound from ``low`` on [N], at most ``highest``.
+    """Return the end [N] of a scan of the lower bound that begins at ``low``; at most ``highest``.
 
-    It is where no tensions balance the arm within the domains of the elasticities. If they do at
-    every bound, it is where the terms of K_θ that grow with the tension decide its sign.
+    The scan ends where no tensions balance the arm within the domains of the elasticities. If
+    tensions balance the arm at every bound, the scan ends where the terms of K_θ that grow with the
+    tension decide its sign.
     """
     if math.isinf(highest):
-        # at large bounds tensions grow in proportion to the bound, and so do the active part and,
-        # with the strain of the wires, the passive one: the smallest eigenvalue of their sum
-        # decides at the latest where it equals the rest
+        # At large bounds the tensions grow in proportion to the bound. The active part of K_θ
+        # grows with them, and so does the passive part, by the strain of the wires. The smallest
+        # eigenvalue of their sum decides the sign, at the latest where it equals the rest.
         far = 1e9
         growth = -math.inf
         highest = far
@@ -87,12 +86,12 @@ def scan_end(at: StiffnessAt, low: float, highest: float) -> float:
                 for part in (outer.joint, outer.active)
             )
             rest = float(np.linalg.norm(K.joint, 2) + np.linalg.norm(K.active, 2))
-            # a passive part that grows faster may be small before: then the active one decides
+            # a passive part that grows faster may be small at first: then the active part decides
             slower = min(abs(growth), abs(active))
             highest = min(2.0 * rest / slower, far) if slower > 0.0 else far
         highest = max(highest, 2.0 * low)
         while growth < 0.0 and highest < far and _balances(at, highest) and at(highest).is_stable:
-            highest *= 2.0  # an elasticity of the user's own may go on stiffening
+            highest *= 2.0  # a user-defined law may stiffen further
     return (
         highest
         if _balances(at, highest)
@@ -101,7 +100,7 @@ def scan_end(at: StiffnessAt, low: float, highest: float) -> float:
 
 
 def log_samples(low: float, high: float) -> Array:
-    """Bounds (N,) [N] from low to high, evenly spread on a logarithmic scale of four decades."""
+    """Return bounds (N,) [N] from low to high, evenly spaced on a log scale of four decades."""
     if high <= low:
         return np.array([low])
     return np.unique([low, *np.geomspace(max(low, 1e-4 * high), high, SAMPLES)])
@@ -110,7 +109,7 @@ def log_samples(low: float, high: float) -> Array:
 def stable_ranges(
     at: StiffnessAt, low: float, high: float
 ) -> tuple[Array, Array, tuple[tuple[float, float], ...]]:
-    """Bounds looked at (N,) [N], margin at each (N,) [N m/rad], and where the arm is stable."""
+    """Return the bounds (N,) [N] of a scan, their margins (N,) [N m/rad], and the stable ranges."""
 
     def margin(place: float) -> float:
         return at(place).margin
@@ -128,6 +127,6 @@ def stable_ranges(
 
 
 def sign_change(f: Callable[[float], float], a: float, b: float) -> float:
-    """Where a function changes its sign between two places."""
+    """Find the place between a and b where a function changes its sign."""
     root: float = brentq(lambda x: f(float(x)), a, b, xtol=1e-300, rtol=PRECISION)
     return root

@@ -1,10 +1,11 @@
-"""Buckling: where tension or load makes the joint stiffness singular at a posture that is held.
+"""Buckling: tension or load makes the joint stiffness of a fixed posture singular.
 
-Cables stiffen an arm by their elasticity and mostly soften it by their tension (active part of
-Eq. 16). With stiff cables the first always wins. Behind soft springs or long leads there is a
-tension from which on K_θ is not positive definite and the arm buckles, whatever its load. Here the
-posture is held and the tensions are those of :func:`~cdsm.distribute_tension`.
-:func:`~cdsm.equilibrium` computes where an arm with locked motors goes then.
+Cables stiffen an arm by their elasticity. Their tension mostly softens it (active part of Eq. 16).
+With stiff cables the elasticity always wins. With soft springs or long leads (lead: the straight
+cable between its actuator and the base disk) there is a critical tension. Above it K_θ is not
+positive definite and the arm buckles under any load. This module keeps the posture fixed and takes
+the tensions of :func:`~cdsm.distribute_tension`. :func:`~cdsm.equilibrium` computes where an arm
+with locked motors moves when it buckles.
 """
 
 from __future__ import annotations
@@ -32,28 +33,29 @@ from cdsm.support.validation import Array, ReadOnlyState, bound, frozen, instanc
 from cdsm.tension import DEFAULT_SOLVER, distribute_tension
 
 _NOWHERE: Final = 1e6
-"""A load factor up to which nothing happens counts as infinite."""
+"""Largest load factor that is tried. If the arm holds it, the critical factor is infinite."""
 
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class CriticalTension(ReadOnlyState):
-    """The tension at which an arm buckles at a posture; made by :func:`critical_tension`.
+    """Tension at which an arm buckles at one posture; made by :func:`critical_tension`.
 
     Attributes:
-        posture: Where.
+        posture: The fixed posture.
         wrench: W (6,) at ``tool0``, base axes: force [N], then moment [N m].
-        minimum: The lower bound of tension [N] at which the arm, stable below, buckles: inf if it
-            is stable up to the end of :attr:`examined`, and its low end if it is stable nowhere.
-        mode: Unit joint motion (nv,) of the smallest eigenvalue of K_θ there, or where the arm is
-            softest if it does not buckle.
-        tension: F there (C,) [N].
+        minimum: Lower bound of tension [N] at which the arm, stable below, buckles. It is inf if
+            the arm is stable up to the end of :attr:`examined`. It is the low end of
+            :attr:`examined` if the arm is stable at no bound.
+        mode: Unit joint motion (nv,) of the smallest eigenvalue of K_θ at that bound. If the arm
+            does not buckle: at the bound where the arm is softest.
+        tension: F (C,) [N] at the bound of ``mode``.
         stable: Ranges (low, high) [N] of the lower bound in which the arm is stable.
-        examined: Range [N] of the lower bound that was scanned: as far as tensions balance the arm
-            within the domains of the elasticities; if they do at every bound, until the terms that
-            grow with the tension decide the sign of K_θ.
+        examined: Range [N] of the lower bound that was scanned. It ends where no tensions balance
+            the arm within the domains of the elasticities. If tensions balance the arm at every
+            bound, it ends where the terms that grow with the tension decide the sign of K_θ.
         bounds: Lower bounds (n,) [N] that were evaluated.
-        margins: Smallest eigenvalue of K_θ at each (n,) [N m/rad].
+        margins: Smallest eigenvalue of K_θ at each of these bounds (n,) [N m/rad].
     """
 
     posture: Posture
@@ -86,18 +88,17 @@ class CriticalTension(ReadOnlyState):
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class CriticalLoad(ReadOnlyState):
-    """The multiple of a load at which an arm fails at a posture; made by :func:`critical_load`.
+    """Multiple of a load at which an arm fails at one posture; made by :func:`critical_load`.
 
     Attributes:
-        posture: Where.
-        wrench: W (6,), of which the factor is the multiple: force [N], then moment [N m].
-        carried: Wrench (6,) that is there besides, whatever the factor: force [N], then moment
-            [N m].
-        factor: The largest factor [-] up to which the arm holds; inf if it holds a million times W.
-        limit: Why no further: ``"buckling"``, ``"infeasible"`` (no tensions balance the load),
-            ``"elasticity"`` (a tension leaves its cable's domain) or ``"none"``.
-        mode: Unit joint motion (nv,) of the smallest eigenvalue of K_θ there.
-        tension: F (C,) [N] there.
+        posture: The fixed posture.
+        wrench: W (6,) that is multiplied by the factor: force [N], then moment [N m].
+        carried: Constant wrench (6,) that acts in addition: force [N], then moment [N m].
+        factor: Largest factor [-] up to which the arm holds; inf if it holds a million times W.
+        limit: Reason of the failure: ``"buckling"``, ``"infeasible"`` (no tensions balance the
+            load), ``"elasticity"`` (a tension leaves the domain of its cable) or ``"none"``.
+        mode: Unit joint motion (nv,) of the smallest eigenvalue of K_θ at this factor.
+        tension: F (C,) [N] at this factor.
     """
 
     posture: Posture
@@ -131,20 +132,20 @@ def critical_tension(
     wrench: ArrayLike = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
     solver: str = DEFAULT_SOLVER,
 ) -> CriticalTension:
-    """The lower bound of tension at which least tensions make K_θ singular: det K_θ(F_min) = 0.
+    """Compute the lower bound of tension at which K_θ becomes singular: det K_θ(F_min) = 0.
 
-    K_θ as in :func:`~cdsm.stiffness`, its symmetric part judged, F by
-    :func:`~cdsm.distribute_tension` with that bound on all cables.
+    K_θ is that of :func:`~cdsm.stiffness`; its symmetric part decides. F is the result of
+    :func:`~cdsm.distribute_tension` with this lower bound on all cables.
 
     Args:
-        pose: The posture, held.
+        pose: The posture, which stays fixed.
         wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m].
         solver: As for :func:`~cdsm.distribute_tension`.
 
     Raises:
-        InvalidInput: The wrench has the wrong shape or is not finite.
-        InfeasibleTension: No tensions at all balance the arm.
-        ElasticityRangeError: Even the least tensions are outside the cables' elasticities.
+        InvalidInput: ``wrench`` has the wrong shape or is not finite.
+        InfeasibleTension: No tensions balance the arm.
+        ElasticityRangeError: Even the least tensions are outside the domains of the elasticities.
     """
     arm = instance("pose", pose, Posture).arm
     W = wrench_vector("wrench", wrench)
@@ -186,20 +187,20 @@ def critical_load(
     *,
     carried: ArrayLike = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
 ) -> CriticalLoad:
-    """The factor λ up to which the arm, holding this posture, stands λ W on top of what it carries.
+    """Compute the factor λ up to which an arm at a fixed posture holds λ W and the carried wrench.
 
     Args:
-        pose: The posture, held: the tensions are distributed anew for every load.
+        pose: The posture, which stays fixed. Tensions are distributed again for every load.
         wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m]; not zero.
         minimum: Lower bound of the tensions [N], for all cables or (C,).
         maximum: Upper bound of the tensions [N], for all cables or (C,).
         solver: As for :func:`~cdsm.distribute_tension`.
-        carried: Another wrench (6,) at ``tool0`` that always acts, as of a tool.
+        carried: Constant wrench (6,) at ``tool0`` that always acts, such as the weight of a tool.
 
     Raises:
-        InvalidInput: The wrench is zero, or it, what is carried or a bound is not what it must be.
-        InfeasibleTension: The arm does not even hold itself and what it carries.
-        ElasticityRangeError: A tension is outside its cable's elasticity even without load.
+        InvalidInput: ``wrench`` is zero; or ``wrench``, ``carried`` or a bound is invalid.
+        InfeasibleTension: The arm does not hold its own weight and ``carried``.
+        ElasticityRangeError: A tension without the load is outside the domain of its elasticity.
     """
     count = len(instance("pose", pose, Posture).arm.cables)
     W = wrench_vector("wrench", wrench)
@@ -239,13 +240,13 @@ def critical_load(
 
 
 def _mode(K: Stiffness) -> Array:
-    """The softest joint motion, its largest entry positive: eigenvectors have no sign."""
+    """Return the softest joint motion, its largest entry positive (eigenvectors have no sign)."""
     mode = K.critical_direction
     return frozen(mode * np.sign(mode[abs(mode).argmax()]))
 
 
 def _describe_mode(names: tuple[str, ...], mode: Array) -> str:
-    """The joints with the largest shares in a mode."""
+    """Name the joints with the largest shares in a mode."""
     order = np.argsort(-abs(mode))[:4]
     shares = ", ".join(f"{names[i]} {mode[i]:+.2f}" for i in order)
     return f"softest joint motion: {shares}" + (", …" if len(mode) > len(order) else "")

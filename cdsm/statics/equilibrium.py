@@ -1,10 +1,10 @@
-"""Where a loaded arm comes to rest once its motors are locked.
+"""Equilibrium of a loaded arm whose motors are locked.
 
     r(q) = J_Lᵀ F(q) + g − J_Xᵀ W = 0,    ∂r/∂q = K_θ                       (Eqs. 13 and 16)
 
-At a reference the cables are pulled and their motors locked. Under another load the arm moves, and
-every position-controlled cable pulls with what its elongation gives, F(q), nonlinear elasticity and
-series springs included.
+The cables are pulled at a reference posture, and their motors are locked there. Under another load
+the arm moves. The tension F(q) of every position-controlled cable follows from its elongation,
+nonlinear elasticity and series springs included.
 """
 
 from __future__ import annotations
@@ -27,36 +27,36 @@ from cdsm.support.validation import Array, ReadOnlyState, frozen, wrench_vector
 from cdsm.tension import Tension
 
 _SMALLEST_STEP = 2.0**-6
-"""Steps of the load smaller than this do not help either."""
+"""Smallest load step that is tried."""
 
 _CLOSE = 1e-3
-"""Two sites meet where their distance is this part of that at the reference."""
+"""Two sites meet if their distance falls below this part of their distance at the reference."""
 
 _FAR = 0.1
-"""Largest motion of a joint in which an arm is followed [rad]."""
+"""Largest joint motion [rad] between two equilibria that :func:`follow` connects."""
 
 _DENSE = 0.02
-"""Distance between postures whose stability is checked [rad]: a shorter loss is not seen."""
+"""Distance [rad] between postures whose stability is checked. A shorter loss is not seen."""
 
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Equilibrium(ReadOnlyState):
-    """An arm at rest under a load, with the load and the reference. All arrays are read-only.
+    """Equilibrium of an arm under a load, with load and reference. All arrays are read-only.
 
     Attributes:
         reference: The posture at which the motors were locked.
-        reference_tension: F (C,) there [N].
+        reference_tension: F (C,) [N] at the reference.
         wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m].
-        stiffness: K_θ at rest with the original lengths of the *reference*: ∂r/∂q, and for a pure
-            force the exact Hessian of the potential. Where no cable is slack it equals
-            :func:`~cdsm.stiffness` of this posture and tension. The stops are no part of
-            it.
+        stiffness: K_θ = ∂r/∂q at the equilibrium, with the original lengths of the *reference*. For
+            a pure force it is the exact Hessian of the potential. If no cable is slack and
+            ``original_length`` of the arm is "unstrained", it equals :func:`~cdsm.stiffness` of
+            this posture and tension. It does not include the stops.
         reaction: Torque of the stops on the joints (nv,) [N m]: positive at a lower limit, negative
-            at an upper one, zero elsewhere.
-        residual: J_Lᵀ F + g − J_Xᵀ W − reaction (nv,) [N m]: what is left of the balance.
+            at an upper limit, zero elsewhere.
+        residual: J_Lᵀ F + g − J_Xᵀ W − reaction (nv,) [N m], the remaining imbalance.
         history: Largest residual [N m] at every accepted iterate of the last load step.
-        iterations: Number of steps taken, over all load steps.
+        iterations: Number of iterations over all load steps.
     """
 
     reference: Posture
@@ -70,31 +70,31 @@ class Equilibrium(ReadOnlyState):
 
     @property
     def pose(self) -> Posture:
-        """The posture at rest."""
+        """Posture at the equilibrium."""
         return self.stiffness.posture
 
     @property
     def tension(self) -> Array:
-        """F (C,) at rest [N]."""
+        """Tensions F (C,) [N] at the equilibrium."""
         return self.stiffness.tension
 
     @property
     def displacement(self) -> Array:
-        """Motion of the tip from the reference (3,) [m]."""
+        """Displacement of the tip from the reference (3,) [m]."""
         return frozen(self.pose.tip[:3, 3] - self.reference.tip[:3, 3])
 
     @property
     def converged(self) -> bool:
-        """Whether the residual is mere rounding, computed anew; anything else is an error."""
+        """Whether the residual is only rounding; :func:`equilibrium` raises an error if not."""
         K = self.stiffness
         return bool((abs(self.residual) <= rounding(K)).all())
 
     @property
     def stable(self) -> bool:
-        """Whether K_θ, its symmetric part, is positive definite for the joints off the stops.
+        """Whether K_θ (symmetric part) is positive definite for the joints that no stop pushes.
 
-        False for a neutral state, as of an arm whose cables are all slack, and where stops that do
-        not push yet bar the softest motion.
+        It is False for a neutral state, for example if all cables are slack. It is also False if
+        only stops that do not push yet bar the softest motion.
         """
         free = self._off_stops
         K = self.stiffness.joint[np.ix_(free, free)]
@@ -103,9 +103,9 @@ class Equilibrium(ReadOnlyState):
 
     @cached_property
     def compliance(self) -> Array:
-        """Tip motion per wrench (6, 6), its blocks [m/N] to [rad/(N m)], joints at stops held.
+        """Tip motion per wrench (6, 6), blocks [m/N] to [rad/(N m)], with joints at stops fixed.
 
-        C = J_X K_θ⁻¹ J_Xᵀ of the joints that no stop pushes.
+        C = J_X K_θ⁻¹ J_Xᵀ over the joints that no stop pushes.
 
         Raises:
             SingularStiffness: K_θ of these joints is singular.
@@ -130,12 +130,12 @@ class Equilibrium(ReadOnlyState):
 
     @property
     def _off_stops(self) -> NDArray[np.intp]:
-        """The joints that no stop pushes."""
+        """Indices of the joints that no stop pushes."""
         return np.flatnonzero(self.reaction == 0.0)
 
     @property
     def slack(self) -> tuple[str, ...]:
-        """Names of the position-controlled cables that hang slack."""
+        """Names of the position-controlled cables that are slack."""
         pulled = zip(
             self.pose.arm.cables, self.tension, self.stiffness.cable_stiffness, strict=True
         )
@@ -174,31 +174,30 @@ class Equilibrium(ReadOnlyState):
 def equilibrium(
     pose: Posture, tension: Tension | ArrayLike, wrench: ArrayLike | None = None
 ) -> Equilibrium:
-    """Where the arm comes to rest under a dead wrench, its motors locked at a reference.
+    """Compute the equilibrium of an arm under a dead wrench, its motors locked at a reference.
 
-    r(q) = J_Lᵀ F(q) + g − J_Xᵀ W = 0 (Eq. 13), with F(q) of the elongation that each cable has at
-    the reference plus its change of length. For a pure force it is a minimum of the potential of
-    cables, weight and load. The search goes down from the reference and leaves saddles: beyond
-    buckling the arm comes to rest beside the posture that has become unstable. Joint limits are
-    stops.
+    Solve r(q) = J_Lᵀ F(q) + g − J_Xᵀ W = 0 (Eq. 13). The elongation of a cable is its elongation at
+    the reference plus its change of length. For a pure force the solution is a minimum of the
+    potential of cables, weight and load. The search goes down from the reference and leaves
+    saddles. So an arm that buckles comes to rest beside the posture that became unstable. Joint
+    limits act as stops.
 
-    The whole load acts from the start, and is divided only if nothing is found. Where several
-    equilibria exist, the one reached by slow loading (:func:`~cdsm.weight_test`) may differ.
+    The whole load acts from the start. It is divided into steps only if the search fails. If
+    several equilibria exist, slow loading (:func:`~cdsm.weight_test`) may reach another one.
 
     Args:
         pose: The reference posture, within the joint limits.
-        tension: F there: the answer of :func:`~cdsm.distribute_tension`, or tensions of
-            your own (C,) [N], which need not balance the arm.
-        wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m]. If not given, that
+        tension: F at the reference: the result of :func:`~cdsm.distribute_tension`, or other
+            tensions (C,) [N], which need not balance the arm.
+        wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m]. Default: the wrench
             of the ``Tension``, or zero.
 
     Raises:
-        InvalidInput: As for :func:`~cdsm.stiffness`, or a posture beyond a joint limit.
-        ElasticityRangeError: A tension at the reference or at rest is outside the domain of the
-            elasticity of its cable: a law says neither how a cable gets slack below its low end nor
-            how it yields above its high end.
-        EquilibriumError: None was found. Names the part of the load up to which the arm could be
-            followed, and the cable of which two sites meet on the way, as where disks overlap.
+        InvalidInput: As for :func:`~cdsm.stiffness`, or the posture is beyond a joint limit.
+        ElasticityRangeError: A tension at the reference or at the equilibrium is outside the domain
+            of its law. A law does not say how a cable becomes slack or yields.
+        EquilibriumError: No equilibrium was found. The error names the part of the load that was
+            reached. If two sites of a cable meet (disks overlap), it also names this cable.
     """
     reference = stiffness(pose, tension, None if isinstance(tension, Tension) else wrench)
     W = reference.wrench
@@ -207,7 +206,7 @@ def equilibrium(
     _require_between_stops(pose)
     loaded = LoadedArm(pose, reference.tension, W)
     start = loaded.at(pose, reference.tension)
-    # a part of the load is held off the joints; the whole load is tried first
+    # try the whole load first; in a smaller step a torque holds part of the load back
     imbalance, reached, step, iterations = start.torque, 0.0, 1.0, 0
     while True:
         goal = min(1.0, reached + step)
@@ -224,17 +223,17 @@ def equilibrium(
 
 
 def follow(before: Equilibrium, wrench: Array, start: Array | None = None) -> Equilibrium | None:
-    """The equilibrium that an earlier one turns into under another wrench (6,).
+    """Find the equilibrium that continues an earlier equilibrium under another wrench (6,).
 
     Args:
-        before: The earlier one.
+        before: The earlier equilibrium.
         wrench: The other wrench.
-        start: Joint angles (nv,) [rad] to search from, where an arm that differs little came to
-            rest under that wrench; if not given, those of the earlier one.
+        start: Joint angles (nv,) [rad] to start from, such as the equilibrium of a similar arm
+            under this wrench. Default: the joint angles of ``before``.
 
     Returns:
-        None if no path of stable postures leads to one: where the arm buckles, or where the step
-        from one wrench to the other is too large to tell.
+        The equilibrium, or None if no path of stable postures leads to it: the arm buckles, or the
+        step between the wrenches is too large to decide.
 
     Raises:
         ElasticityRangeError: As for :func:`equilibrium`.
@@ -253,9 +252,9 @@ def follow(before: Equilibrium, wrench: Array, start: Array | None = None) -> Eq
 
 
 def _is_stable_between(loaded: LoadedArm, start: Iterate, search: RestSearch[Iterate]) -> bool:
-    """Whether K_θ is positive definite all along a short straight path to where the arm rests.
+    """Check that the straight path to the equilibrium is short, and K_θ positive definite on it.
 
-    If the arm snaps through on the path, K_θ is not, though the search may have stepped over that.
+    An arm that snaps through has an unstable posture on this path. The search may have jumped it.
     """
     path = search.state.q - start.q
     length = float(abs(path).max())
@@ -273,7 +272,7 @@ def _is_stable_between(loaded: LoadedArm, start: Iterate, search: RestSearch[Ite
 
 
 def _find_rest(loaded: LoadedArm, start: Iterate, held_back: Array | float) -> RestSearch[Iterate]:
-    """Where the arm goes from an iterate while a torque (nv,) keeps part of the load off it."""
+    """Find the equilibrium from an iterate while a torque (nv,) holds part of the load back."""
 
     def evaluate(q: Array, near: Iterate) -> Iterate:
         return loaded.moved(q, near).holding_back(held_back)
@@ -334,7 +333,7 @@ def _no_rest(loaded: LoadedArm, search: RestSearch[Iterate], reached: float) -> 
 
 
 def _meeting_cable(reference: Posture, pose: Posture) -> str | None:
-    """The cable of which two sites meet, if there is one."""
+    """Return the name of a cable with two sites that meet, or None."""
     for cable, before, after in zip(
         pose.arm.cables, reference.cable_paths, pose.cable_paths, strict=True
     ):

@@ -1,4 +1,4 @@
-"""An arm whose motors are locked, under a load: its cables F(L), and its torque out of balance."""
+"""Loaded arm with locked motors: cable tensions F(L) and torque imbalance."""
 
 from __future__ import annotations
 
@@ -16,28 +16,21 @@ from cdsm.stiffness_matrix import Stiffness, assemble
 from cdsm.support.validation import Array, frozen
 
 _ROUNDING = 16.0 * float(np.finfo(np.float64).eps)
-"""Relative rounding of a torque: of the angles, lengths and tensions that it is a sum of."""
+"""Relative rounding of a torque, from the angles, lengths and tensions in its sum."""
 
 _APART = 1e-6
-"""Where disks are what stops a joint, it stops this far before they touch [rad]: holes that meet
-leave a cable without a direction."""
+"""A joint stops this far [rad] before its disks touch, where a cable would have no direction."""
 
 _BEYOND = 1e-9
-"""Tensions this part beyond the end of a law are rounding: of an arm that started there."""
+"""A tension beyond the end of a law by this part is rounding: the arm may start at the end."""
 
 
 class Iterate(NamedTuple):
-    """The arm at some posture, in balance or not; a state of the search for rest.
+    """Arm at one posture, balanced or not: a state of the equilibrium search."""
 
-    Attributes:
-        K: Tensions and joint stiffness, with the original lengths of the reference.
-        torque: What is out of balance, less what is held back (nv,) [N m].
-        rounding: How much of it is rounding (nv,) [N m].
-    """
-
-    K: Stiffness
-    torque: Array
-    rounding: Array
+    K: Stiffness  # with the original lengths of the reference
+    torque: Array  # imbalance minus the torque held back (nv,) [N m]
+    rounding: Array  # rounding of the imbalance (nv,) [N m]
 
     @property
     def q(self) -> Array:
@@ -50,18 +43,18 @@ class Iterate(NamedTuple):
         return self.K.joint
 
     def holding_back(self, torque: Array | float) -> Iterate:
-        """The same posture with a torque (nv,) [N m] on the joints that keeps a load off them."""
+        """Return this posture with a torque (nv,) [N m] that holds part of the load back."""
         return self._replace(torque=self.K.residual - torque)
 
 
 class LoadedArm:
-    """The arm under a wrench, its motors locked at a reference.
+    """Arm under a wrench, its motors locked at a reference.
 
     Args:
-        reference: The posture at which they were locked.
-        tension: F there (C,) [N].
-        wrench: W (6,) that the arm carries: force [N], then moment [N m].
-        lengths: L (C,) [m] under which the cables have these tensions, if not those at the posture.
+        reference: The posture at which the motors were locked.
+        tension: F (C,) [N] at the reference.
+        wrench: W (6,) on the arm: force [N], then moment [N m].
+        lengths: L (C,) [m] at which the cables have these tensions. Default: L at the reference.
     """
 
     def __init__(
@@ -74,36 +67,32 @@ class LoadedArm:
         self.cables = LockedCables(reference.arm, locked, tension)
 
     def at(self, pose: Posture, near: Array) -> Iterate:
-        """The arm at a posture where the tensions are near the given ones (C,) [N]."""
+        """Compute the arm at a posture. The search for its tensions starts at ``near`` (C,) [N]."""
         F, k = self.cables.tension(pose.cable_lengths, near)
         K = assemble(pose, F, self.wrench, k, free_length=self.cables.free_length)
         return Iterate(K, K.residual, rounding(K))
 
     def moved(self, q: Array, near: Iterate) -> Iterate:
-        """The arm at joint angles (nv,) [rad] near another iterate.
-
-        Raises:
-            CableError: Two neighbouring sites of a cable coincide there.
-        """
+        """Compute the arm at joint angles (nv,) [rad]; raise CableError if two sites coincide."""
         before = near.K
         pose = self.reference.arm.at(q, check_limits=False)
         longer = pose.cable_lengths - before.posture.cable_lengths
         return self.at(pose, before.tension + before.cable_stiffness * longer)
 
     def stops(self) -> tuple[Array, Array]:
-        """Lowest and highest angles (nv,) [rad], at which the joints rest on their stops."""
+        """Return the lowest and highest angles (nv,) [rad], at which joints rest on stops."""
         arm, q = self.reference.arm, self.reference.q
-        touching = np.zeros(arm.nv, dtype=np.bool_)  # joints that are stopped by their disks
+        touching = np.zeros(arm.nv, dtype=np.bool_)  # joints that their disks stop
         if arm.is_serpentine:
             joints = arm.geometry.joints
             touching[:] = [joint.limit is None for joint in joints for _ in joint.axes]
         apart = np.where(touching, _APART, 0.0)
-        # the reference may stand nearer
+        # the reference may be nearer to the stop
         return np.minimum(arm.lower + apart, q), np.maximum(arm.upper - apart, q)
 
 
 def rounding(K: Stiffness) -> Array:
-    """How much of :attr:`~cdsm.Stiffness.residual` is rounding (nv,) [N m]."""
+    """Estimate the rounding (nv,) [N m] of :attr:`~cdsm.Stiffness.residual`."""
     pose = K.posture
     force = K.tension + K.cable_stiffness * pose.cable_lengths
     terms = force @ abs(pose.length_jacobian) + abs(K.wrench) @ abs(pose.jacobian)
@@ -113,9 +102,9 @@ def rounding(K: Stiffness) -> Array:
 
 
 def _tilt_torque(pose: Posture, tension: Array) -> Array:
-    """Torque (nv,) [N m] of tensions (C,) [N] by the tilt of segments per tilt of their sites.
+    """Compute the torque (nv,) [N m] per relative rounding of the sites, which tilts the segments.
 
-    It is larger for shorter segments: between disks that nearly touch it is most of the rounding.
+    Short segments tilt most. Between disks that nearly touch this is most of the rounding.
     """
     routing = pose.arm._model.routing
     segment, joint = routing.segment, routing.joint
@@ -134,71 +123,55 @@ def _tilt_torque(pose: Posture, tension: Array) -> Array:
 
 
 class _Springs(NamedTuple):
-    """The position-controlled cables of one law; arrays over them.
-
-    Attributes:
-        law: Their elasticity.
-        held: Which cables of the arm they are.
-        free_length: l_0 [m].
-        series: Compliance of spring or drive [m/N].
-    """
+    """Position-controlled cables with one law; the arrays are over these cables."""
 
     law: Elasticity
-    held: slice | NDArray[np.intp]
-    free_length: Array
-    series: Array
+    held: slice | NDArray[np.intp]  # indices of the cables in the arm
+    free_length: Array  # l_0 [m]
+    series: Array  # compliance of spring or drive [m/N]
 
     def elongation(self, F: Array) -> Array:
-        """Δl = l_0 ε(F) + ΔF/k_series [m] from the low end of the law."""
+        """Return Δl = l_0 ε(F) + ΔF/k_series [m] from the low end of the law."""
         wire = self.free_length * self.law.strain(F)
         return np.asarray(wire + (F - self.law.domain.low) * self.series)
 
     def compliance(self, F: Array) -> Array:
-        """dΔl/dF = l_0/EA(F) + 1/k_series [m/N]."""
+        """Return dΔl/dF = l_0/EA(F) + 1/k_series [m/N]."""
         return np.asarray(self.free_length / self.law.rigidity(F) + self.series)
 
 
 class _Ends(NamedTuple):
-    """How such cables go on before and after their law; arrays over them.
+    """Linear continuation of F(L) below and above a law; the arrays are over its cables."""
 
-    Attributes:
-        start: L where the law begins [m].
-        span: Elongation from there to its end [m].
-        low: Tension where it begins [N].
-        high: Tension where it ends [N].
-        before: Stiffness below [N/m].
-        after: Stiffness above [N/m].
-    """
-
-    start: Array
-    span: Array
-    low: Array
-    high: Array
-    before: Array
-    after: Array
+    start: Array  # L where the law begins [m]
+    span: Array  # elongation from there to the end of the law [m]
+    low: Array  # tension where the law begins [N]
+    high: Array  # tension where the law ends [N]
+    before: Array  # stiffness below the law [N/m]
+    after: Array  # stiffness above the law [N/m]
 
 
 class LockedCables:
-    """Tension F(L) of the cables of an arm, each motor left as it is at a reference.
+    """Tension F(L) of the cables of an arm, the motors locked at a reference.
 
-    A position-controlled cable keeps its original length l_0: its elongation is that at the
-    reference plus the change of its length. A force-controlled one keeps its tension. Below the
-    tension where its law begins a cable goes on with the stiffness it has there, down to zero, from
-    where on it is slack; above the end of the law it goes on with the stiffness it has there. Both
-    are for iterates to pass through: :meth:`require_domains` refuses them as solutions.
+    A position-controlled cable keeps its original length l_0. Its elongation is that at the
+    reference plus the change of its length. A force-controlled cable keeps its tension. Below the
+    domain of its law a cable keeps the stiffness of the low end until its tension is zero; then it
+    is slack. Above the domain it keeps the stiffness of the high end. Only iterates may leave the
+    domain: :meth:`require_domains` rejects such tensions in a solution.
 
     Args:
         arm: The arm.
         lengths: L at the reference (C,) [m].
-        tension: F at the reference (C,) [N]; of position-controlled cables inside their laws.
+        tension: F at the reference (C,) [N], within the domains of position-controlled cables.
 
     Attributes:
         free_length: l_0 (C,) [m].
 
     Raises:
-        ElasticityRangeError: A law gives no strain, or a series spring stretches by so much more
-            than the cable is long that no wire explains its tension; names the cables.
-        InvalidInput: An elasticity of the user's own gives no finite strain.
+        ElasticityRangeError: A law gives no strain; or a series spring stretches by more than the
+            whole cable, so that no wire is left. The error names the cables.
+        InvalidInput: A user-defined law gives a strain that is not finite.
     """
 
     def __init__(self, arm: Manipulator, lengths: Array, tension: Array) -> None:
@@ -216,10 +189,7 @@ class LockedCables:
             self._groups.append((springs, ends))
 
     def tension(self, lengths: Array, near: Array) -> tuple[Array, Array]:
-        """Tension F (C,) [N] and tangent stiffness k (C,) [N/m] at the lengths L (C,) [m].
-
-        ``near`` (C,) [N] is F at lengths near these, to start from.
-        """
+        """Return F (C,) [N] and dF/dL (C,) [N/m] at L (C,) [m], searched from F = ``near``."""
         tension, stiffness = self._reference_tension.copy(), np.zeros(lengths.size)
         for springs, (start, span, low, high, before, after) in self._groups:
             held = springs.held
@@ -238,12 +208,9 @@ class LockedCables:
         return frozen(tension), frozen(stiffness)
 
     def require_domains(self, tension: Array) -> None:
-        """Refuse tensions (C,) [N] outside the domains of their laws.
+        """Raise ElasticityRangeError if tensions (C,) [N] are outside the domains of their laws.
 
-        Zero is allowed where the law begins at zero: the cable is slack.
-
-        Raises:
-            ElasticityRangeError: Names the cables.
+        Zero is allowed if the law begins at zero: the cable is slack.
         """
         names = [cable.name for cable in self._arm.cables]
         for springs, _ in self._groups:
@@ -262,7 +229,7 @@ class LockedCables:
 
 
 def _ends(springs: _Springs, lengths: Array, tension: Array) -> _Ends:
-    """The ends of a law, from L and F at the reference."""
+    """Compute the ends of a law from L and F at the reference."""
     domain, size = springs.law.domain, tension.shape
     first, last = np.full(size, domain.first), np.full(size, domain.high)
     softest = springs.compliance(first)

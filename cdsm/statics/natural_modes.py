@@ -1,7 +1,7 @@
 """Small vibrations of an arm about a posture: K_θ φ = ω² M φ.
 
-M is the joint-space mass matrix of the links; cables have no mass here. Where K_θ is not positive
-definite a motion does not vibrate but grows, and has a rate instead of a frequency.
+M is the joint-space mass matrix of the links. Cables have no mass here. If K_θ is not positive
+definite, some motions grow. Such a motion has a growth rate, not a frequency.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from cdsm.support.validation import Array, ReadOnlyState, frozen, instance
 from cdsm.urdf import CROSS_INERTIA, CROSS_MASS
 
 _MASSLESS = 1e-12
-"""An eigenvalue of M this part of the largest is that of a motion without mass."""
+"""A motion has no mass if its eigenvalue of M is below this part of the largest."""
 
 _STAND_IN = 0.02
-"""Part of a motion's kinetic energy that may be in stand-in masses: 1 % of its frequency."""
+"""Largest part of the kinetic energy that stand-in masses may have: 1 % of the frequency."""
 
 
 @final
@@ -32,18 +32,18 @@ _STAND_IN = 0.02
 class Modes(ReadOnlyState):
     """Natural modes of an arm, with the stiffness they follow from; made by :func:`modes`.
 
-    Of the nv modes S vibrate; the others grow, and a stable arm has none of these. All arrays are
+    S of the nv modes vibrate. The other modes grow; a stable arm has none of them. All arrays are
     read-only. Shapes are columns of joint angles, mass-normalised and orthogonal in M and K_θ:
-    φᵀMφ = 1 and φᵀK_θφ = ω², so their unit is rad/(√kg m); the largest entry is positive.
+    φᵀMφ = 1 and φᵀK_θφ = ω². Their unit is rad/(√kg m). The largest entry is positive.
 
     Attributes:
-        stiffness: K_θ with the posture, tensions and wrench it belongs to.
+        stiffness: K_θ with its posture, tensions and wrench.
         mass: M (nv, nv) [kg m²].
-        frequencies: ω/2π (S,) [Hz], the lowest first.
+        frequencies: ω/2π (S,) [Hz], rising.
         shapes: φ of the modes that vibrate (nv, S) [rad/(√kg m)].
-        growth_rates: √(−ω²) of the modes that do not (n,) [1/s], the fastest first: a deflection
-            grows by e in the inverse of it.
-        growth_shapes: φ of these (nv, n) [rad/(√kg m)].
+        growth_rates: √(−ω²) of the modes that grow (n,) [1/s], the fastest first. A deflection
+            grows by a factor e in the time 1/rate.
+        growth_shapes: φ of the modes that grow (nv, n) [rad/(√kg m)].
     """
 
     stiffness: Stiffness
@@ -83,28 +83,28 @@ class Modes(ReadOnlyState):
         return "\n".join(rows)
 
     def _leading(self, shapes: Array) -> list[str]:
-        """Name of the joint that moves most in each shape."""
+        """Name the joint that moves most in each shape."""
         names = self.stiffness.posture.arm.joint_names
         return [names[i] for i in abs(shapes).argmax(axis=0)]
 
 
 def modes(pose: Posture, stiffness: Stiffness) -> Modes:
-    """Natural frequencies and mode shapes at a posture: K_θ φ = ω² M φ.
+    """Compute natural frequencies and mode shapes at a posture: K_θ φ = ω² M φ.
 
-    The symmetric part of K_θ is used; only a moment at the tip makes another part. The modes are
-    those of a small vibration about the posture if the tensions balance the arm there, see
-    :attr:`Stiffness.residual <cdsm.Stiffness.residual>`, without friction and damping.
+    The symmetric part of K_θ is used; only a moment at the tip adds a skew part. The modes describe
+    a small vibration about the posture, without friction and damping. They require that the
+    tensions balance the arm there, see :attr:`Stiffness.residual <cdsm.Stiffness.residual>`.
 
     Args:
         pose: The posture.
-        stiffness: K_θ there, the answer of :func:`~cdsm.stiffness` at this posture.
+        stiffness: K_θ, the result of :func:`~cdsm.stiffness` at this posture.
 
     Returns:
-        The modes. An arm that buckles is an answer: its ``is_stable`` is false.
+        The modes. If the arm buckles, ``is_stable`` is false; this is not an error.
 
     Raises:
-        InvalidInput: The stiffness is that of another posture.
-        SingularMass: A motion of the arm moves no link of any mass, so it has no frequency.
+        InvalidInput: ``stiffness`` belongs to another posture.
+        SingularMass: A motion of the arm moves only massless links, so it has no frequency.
     """
     arm = instance("pose", pose, Posture).arm
     other = instance("stiffness", stiffness, Stiffness).posture
@@ -138,7 +138,7 @@ def modes(pose: Posture, stiffness: Stiffness) -> Modes:
 
 
 def _stand_in_mass(pose: Posture) -> Array:
-    """The part of M (nv, nv) of the masses that stand in for crosses and massless links."""
+    """Compute the part of M (nv, nv) that comes from the stand-in masses of crosses and links."""
     if not pose.arm.is_serpentine:
         return np.zeros((pose.arm.nv, pose.arm.nv))
     inertia, stand_ins = CROSS_INERTIA * np.eye(3), []
@@ -154,12 +154,8 @@ def _stand_in_mass(pose: Posture) -> Array:
 
 
 def fastest(stiffness: Stiffness, M: Array) -> float:
-    """Largest √|ω²| [1/s] of the motions K_θ φ = ω² M φ, whether they vibrate or grow.
-
-    Raises:
-        SingularMass: A motion of the arm moves no link of any mass.
-    """
-    # scaled by joint: beside the mass of the arm that of its last link may be rounding
+    """Return the largest √|ω²| [1/s] of K_θ φ = ω² M φ; raise SingularMass if M is singular."""
+    # scaled by joint: the mass of the last link may be rounding beside that of the arm
     unit = 1.0 / np.sqrt(M.diagonal())
     K, M = (matrix * unit * unit[:, None] for matrix in (stiffness.joint, M))
     try:
@@ -178,25 +174,18 @@ def _massless(pose: Posture, motion: Array) -> SingularMass:
 
 
 class Carried(NamedTuple):
-    """A rigid body on a link, in the frame of the link.
-
-    Attributes:
-        link: Name of the link.
-        mass: m [kg].
-        centre: Centre of mass (3,) [m].
-        inertia: I about the centre of mass (3, 3) [kg m²].
-    """
+    """Rigid body on a link, in the frame of the link."""
 
     link: str
-    mass: float
-    centre: Array
-    inertia: Array
+    mass: float  # m [kg]
+    centre: Array  # centre of mass (3,) [m]
+    inertia: Array  # I about the centre of mass (3, 3) [kg m²]
 
 
 def mass_matrix(pose: Posture, carried: Iterable[Carried]) -> Array:
-    """Joint-space mass matrix (nv, nv) [kg m²] of the bodies on the links.
+    """Compute the joint-space mass matrix (nv, nv) [kg m²] of the bodies on the links.
 
-    M = Σ m J_vᵀ J_v + J_ωᵀ I J_ω, J_v of the centre of mass and J_ω of the turn of each link.
+    M = Σ m J_vᵀ J_v + J_ωᵀ I J_ω, with J_v of the centre of mass, J_ω of the rotation.
     """
     arm, frames = pose.arm, pose._frames
     M = np.zeros((arm.nv, arm.nv))

@@ -1,16 +1,16 @@
-"""Where a body comes to rest: r(q) = 0 between stops, found downhill and finished by Newton.
+"""Find the equilibrium r(q) = 0 between stops: a trust-region search that ends with Newton steps.
 
-The torque r that is out of balance need not be the gradient of a potential. A step p is judged by
-the work ∫ r·dq along it, with K = ∂r/∂q to the fourth order of its length
+The torque imbalance r need not be the gradient of a potential. So a step p is judged by the work
+∫ r·dq along it. With K = ∂r/∂q, to the fourth order of its length, the work is
 
-    ½ (r₀ + r₁)·p + (pᵀK₀p − pᵀK₁p)/12,
+    ½ (r₀ + r₁)·p + (pᵀK₀p − pᵀK₁p)/12.
 
-which stays exact where the difference of two potentials would be rounding. Where r is a gradient
-this is the trust-region method with the exact Hessian, which goes down and leaves saddles. Near the
-end every step is a full one of Newton's method, with K complete and not just its symmetric part.
+It stays exact where the difference of two potentials would be rounding. If r is a gradient, this is
+the trust-region method with the exact Hessian, which goes down and leaves saddles. Near the end
+every step is a full Newton step with the complete K, not only its symmetric part.
 
-scipy's trust-exact does not serve: it needs a potential, which a moment at the tip has not, and
-knows no stops.
+scipy's trust-exact does not fit: it has no stops, and it needs a potential. A moment at the tip has
+no potential.
 """
 
 from __future__ import annotations
@@ -28,37 +28,37 @@ from cdsm.errors import CdsmError
 from cdsm.support.validation import Array
 
 _ATTEMPTS = 200
-"""Steps before giving up; arms that come to rest at all need up to 130, and mostly below 10."""
+"""Largest number of iterations. Arms with an equilibrium need up to 130, mostly below 10."""
 
 _FIRST, _WIDEST = 0.2, 0.5
-"""Radius of the trust region [rad] to begin with, and at most, so as not to skip a valley."""
+"""Initial and largest trust-region radius [rad]. The limit keeps a step within its valley."""
 
 FLAT = 1e-12
-"""Eigenvalues of K this part of the largest are rounding: the state is neutral."""
+"""Eigenvalues of K below this part of the largest are rounding: the state is neutral."""
 
 _POOR, _GOOD, _ACCEPTED = 0.25, 0.75, 0.05
-"""Work over predicted work below which the radius shrinks, above which it grows, and above which a
-step is accepted (Nocedal and Wright, Numerical Optimization, 2006, algorithm 4.1)."""
+"""Ratios of work to predicted work: the radius shrinks below the first, grows above the second, and
+a step is accepted above the third (Nocedal and Wright, Numerical Optimization, 2006, alg. 4.1)."""
 
 
 class State(Protocol):
-    """The body at some place."""
+    """State of a body at coordinates q."""
 
     @property
     def q(self) -> Array:
-        """The place (nv,)."""
+        """Coordinates q (nv,)."""
 
     @property
     def torque(self) -> Array:
-        """Torque r that is out of balance (nv,)."""
+        """Torque imbalance r (nv,)."""
 
     @property
     def stiffness(self) -> Array:
-        """Its derivative K (nv, nv)."""
+        """Derivative K = ∂r/∂q (nv, nv)."""
 
     @property
     def rounding(self) -> Array:
-        """How much of r is rounding (nv,)."""
+        """Rounding of r (nv,)."""
 
 
 _State = TypeVar("_State", bound=State)
@@ -67,45 +67,26 @@ _State = TypeVar("_State", bound=State)
 @final
 @dataclass(frozen=True)
 class RestSearch(Generic[_State]):
-    """Where a search for rest ended.
+    """Result of an equilibrium search."""
 
-    Attributes:
-        state: The last state.
-        at_stop: Which coordinates rest on a stop that pushes (nv,).
-        history: Largest |r| of the others, at every accepted state.
-        iterations: Number of steps tried.
-        converged: Whether r of the others is rounding and no direction leads further down.
-        convex: Whether K was positive definite for the others all the way.
-    """
-
-    state: _State
-    at_stop: NDArray[np.bool_]
-    history: tuple[float, ...]
-    iterations: int
-    converged: bool
-    convex: bool
+    state: _State  # the last state
+    at_stop: NDArray[np.bool_]  # which coordinates rest on a stop that pushes (nv,)
+    history: tuple[float, ...]  # largest |r| of the free coordinates at every accepted state
+    iterations: int  # number of steps tried
+    converged: bool  # whether r of the free coordinates is rounding and no direction leads down
+    convex: bool  # whether K of the free coordinates was positive definite at every state
 
 
 class _Free(NamedTuple):
-    """The coordinates of a state that no stop holds.
+    """Coordinates of a state that no stop holds."""
 
-    Attributes:
-        at_stop: Which coordinates a stop holds (nv,).
-        indices: The others.
-        spectrum: Eigenvalues and eigenvectors of the symmetric part of K for these.
-        imbalance: Their largest |r|.
-        balanced: Whether their r is rounding.
-        flat: Eigenvalues up to this size are rounding.
-        lowest: The lowest eigenvalue; inf if no coordinate is free.
-    """
-
-    at_stop: NDArray[np.bool_]
-    indices: NDArray[np.intp]
-    spectrum: tuple[Array, Array]
-    imbalance: float
-    balanced: bool
-    flat: float
-    lowest: float
+    at_stop: NDArray[np.bool_]  # which coordinates a stop holds (nv,)
+    indices: NDArray[np.intp]  # indices of the free coordinates
+    spectrum: tuple[Array, Array]  # eigenvalues and eigenvectors of their K (symmetric part)
+    imbalance: float  # their largest |r|
+    balanced: bool  # whether their r is rounding
+    flat: float  # eigenvalues up to this size are rounding
+    lowest: float  # lowest eigenvalue; inf if no coordinate is free
 
     @classmethod
     def of(cls, state: State, lower: Array, upper: Array) -> _Free:
@@ -129,12 +110,12 @@ class _Free(NamedTuple):
 def find_rest(
     evaluate: Callable[[Array, _State], _State], start: _State, lower: Array, upper: Array
 ) -> RestSearch[_State]:
-    """Go from a state to where the body comes to rest.
+    """Find the equilibrium of a body from a start state.
 
     Args:
-        evaluate: From a place (nv,) and a state near it to the state there. It raises a CdsmError
-            where there is none.
-        start: Where to begin.
+        evaluate: Function of coordinates (nv,) and a nearby state that returns the state at these
+            coordinates. It raises a CdsmError if there is no state.
+        start: The first state.
         lower: Lower stops (nv,).
         upper: Upper stops (nv,).
     """
@@ -144,7 +125,7 @@ def find_rest(
     for iteration in range(_ATTEMPTS):
         done = free.balanced and free.lowest >= -free.flat
         q, expected = (state.q, 0.0) if done else _trial(state, free, lower, upper, radius)
-        # balanced at a saddle, but only the stops bar the way down
+        # balanced at a saddle, and the stops bar every way down
         if done or (free.balanced and expected == 0.0):
             return RestSearch(state, free.at_stop, tuple(history), iteration, True, convex)
         if expected == 0.0:
@@ -153,7 +134,7 @@ def find_rest(
         try:
             trial = evaluate(q, state)
             quality = work(state, trial) / expected
-        except CdsmError:  # sites of a cable coincide there, say
+        except CdsmError:  # for example, two sites of a cable coincide
             quality = -math.inf
         length = float(np.linalg.norm(q - state.q))
         if quality < _POOR:
@@ -168,7 +149,7 @@ def find_rest(
 
 
 def work(before: State, after: State) -> float:
-    """∫ r·dq on the straight line from one state to another."""
+    """Compute ∫ r·dq on the straight line between two states."""
     step = after.q - before.q
     change = step @ before.stiffness @ step - step @ after.stiffness @ step
     return float((before.torque + after.torque) @ step / 2.0 + change / 12.0)
@@ -177,24 +158,21 @@ def work(before: State, after: State) -> float:
 def _trial(
     state: State, free: _Free, lower: Array, upper: Array, radius: float
 ) -> tuple[Array, float]:
-    """The next place (nv,), and the work that the quadratic model predicts for it.
-
-    The work is negative, or zero if no step goes down.
-    """
-    # what is left of r at a saddle is rounding, and must not decide which way to leave it
+    """Return the next coordinates (nv,) and the predicted work: 0 if no step goes down."""
+    # at a saddle r is rounding and must not decide the way to leave it
     torque, signs = (0.0 * state.torque, (1.0, -1.0)) if free.balanced else (state.torque, (1.0,))
     q, expected = state.q, 0.0
     for sign in signs:
         end = _descend(state, torque, free, lower, upper, radius, sign)
         change = end - state.q
         predicted = float(change @ torque + change @ state.stiffness @ change / 2.0)
-        if predicted < expected * (1.0 + 1e-9):  # of two that predict the same the first
+        if predicted < expected * (1.0 + 1e-9):  # if equal, keep the first
             q, expected = end, predicted
     return q, expected
 
 
 def _spectrum(stiffness: Array, free: NDArray[np.intp]) -> tuple[Array, Array]:
-    """Eigenvalues, rising, and eigenvectors of the symmetric part of K for some coordinates."""
+    """Return eigenvalues (rising) and eigenvectors of K (symmetric part) for some coordinates."""
     K = stiffness[np.ix_(free, free)]
     values, vectors = np.linalg.eigh((K + K.T) / 2.0)
     return values, vectors
@@ -209,7 +187,7 @@ def _descend(
     radius: float,
     sign: float,
 ) -> Array:
-    """Down the quadratic model; where a coordinate meets its stop the path goes on without it."""
+    """Go down the quadratic model. A coordinate that meets its stop stays there."""
     q, indices, spectrum = state.q.copy(), free.indices, free.spectrum
     while indices.size and radius > 0.0:
         r = torque + state.stiffness @ (q - state.q)
@@ -231,10 +209,7 @@ def _descend(
 def _step(
     torque: Array, stiffness: Array, values: Array, vectors: Array, radius: float, sign: float
 ) -> Array:
-    """The step that goes down most within the radius: min r·p + ½ pᵀKp so that |p| <= radius.
-
-    The sign decides between p and −p where r does not.
-    """
+    """Minimize r·p + ½ pᵀKp with |p| <= radius; the sign chooses between p and −p if r does not."""
     along = vectors.T @ torque
     size, largest = float(np.linalg.norm(along)), float(abs(values).max())
     if size == 0.0 and values[0] >= 0.0:
@@ -243,8 +218,8 @@ def _step(
         newton = -np.linalg.solve(stiffness, torque)
         if np.linalg.norm(newton) <= radius:
             return np.asarray(newton)
-    # p = −(K + σ)⁻¹ r with the σ that makes it as long as the radius, sought from the smallest σ
-    # allowed: near a saddle it is larger by a rounding of σ only
+    # p = −(K + σ)⁻¹ r, with σ such that |p| is the radius. The search starts at the smallest σ
+    # allowed: near a saddle the root is larger by rounding only.
     lifted = values + max(0.0, -values[0])
     least = FLAT * max(largest, size / radius)
 
@@ -255,7 +230,7 @@ def _step(
         # the relative tolerance alone decides
         shift = brentq(excess, least, 2.0 * size / radius, xtol=1e-300, rtol=1e-6)
         return np.asarray(vectors @ (-along / (lifted + shift)))
-    # r has no part along the lowest eigenvector, as on the ridge of a saddle
+    # r has no component along the lowest eigenvector, as on the ridge of a saddle
     inner = vectors @ (-along / (lifted + least))
     down = vectors[:, 0] * np.sign(vectors[abs(vectors[:, 0]).argmax(), 0])
     return np.asarray(inner + sign * math.sqrt(max(radius**2 - inner @ inner, 0.0)) * down)

@@ -1,4 +1,4 @@
-"""The weight test of Section V: stiffness from the displacement under a weight (Eq. 20)."""
+"""Weight test of Section V: stiffness from the displacement under a weight (Eq. 20)."""
 
 from __future__ import annotations
 
@@ -25,33 +25,31 @@ from cdsm.support.validation import (
 from cdsm.tension import Tension
 
 MOST_STEPS = 1000
-"""Most steps: a curve of more points looks no smoother, and takes long."""
+"""Largest number of steps. A curve with more points is not smoother, but takes long."""
 
 _FINEST = 2.0**-12
 """Relative precision of a buckling load."""
 
 _SLIGHT = 1e-9
-"""Part of the load below which its precision is absolute."""
+"""Part of the load below which the precision of a buckling load is absolute."""
 
 _MEASURED = 1e-12
-"""Tip displacement over the length of the arm that is known to some three digits."""
+"""Smallest tip displacement, over the length of the arm, that has about three correct digits."""
 
 _DISPLACED = 1e-9
-"""Tip displacement over the length of the arm that is no rounding of the balance."""
+"""Tip displacement, over the length of the arm, that is more than rounding of the balance."""
 
 _IMMOBILE = 1e-14
-"""A compliance along the force this part of the largest is rounding."""
+"""A compliance along the force below this part of the largest is rounding."""
 
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class LinearPrediction(ReadOnlyState):
-    """What the stiffness at the unloaded arm predicts of a weight test.
-
-    Joints that rest on a stop stay there in it.
+    """Prediction of a weight test by the stiffness of the unloaded arm; joints at stops stay there.
 
     Attributes:
-        displacement: C_vv ΔF (3,) [m], C of :attr:`~cdsm.Equilibrium.compliance`.
+        displacement: C_vv ΔF (3,) [m], with C of :attr:`~cdsm.Equilibrium.compliance`.
         stiffness: 1/(uᵀ C_vv u) along the force [N/m].
     """
 
@@ -62,12 +60,12 @@ class LinearPrediction(ReadOnlyState):
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class WeightTest(ReadOnlyState):
-    """A weight hung at the tip in equal steps, with the equilibrium at each.
+    """Equilibria of an arm while a weight at its tip grows in equal steps.
 
     Attributes:
-        force: ΔF (3,), the dead force at the full load, base axes [N].
-        without: The arm before: at rest under the reference's wrench alone.
-        loaded: The arm at rest under each load, the last under the full one.
+        force: ΔF (3,) [N], the dead force at the full load, base axes.
+        without: Equilibrium without the weight, under ``wrench`` alone.
+        loaded: Equilibrium at each step; the last one is under the full load.
     """
 
     force: Array
@@ -76,15 +74,12 @@ class WeightTest(ReadOnlyState):
 
     @cached_property
     def displacement(self) -> Array:
-        """ΔX (3,) [m]: the tip with the full weight minus the tip without."""
+        """ΔX (3,) [m]: tip position with the full weight minus tip position without the weight."""
         return frozen(self.displacements[-1].copy())
 
     @cached_property
     def stiffness(self) -> float:
-        """|ΔF|/(u·ΔX) [N/m] along the force, u = ΔF/|ΔF|: 1/C of Eq. 20, as it is measured.
-
-        inf where the tip does not move along the force.
-        """
+        """Measured |ΔF|/(u·ΔX) [N/m], u = ΔF/|ΔF| (1/C of Eq. 20); inf without motion along u."""
         return (
             float(np.linalg.norm(self.force)) / self._tip_motion if self._tip_motion else math.inf
         )
@@ -97,10 +92,10 @@ class WeightTest(ReadOnlyState):
 
     @cached_property
     def linear(self) -> LinearPrediction:
-        """What the stiffness without the weight predicts.
+        """Linear prediction by the stiffness without the weight.
 
         Raises:
-            SingularStiffness: The arm without the weight is just about to buckle.
+            SingularStiffness: The arm without the weight is about to buckle.
         """
         C = self.without.compliance[:3, :3]
         u = unit_direction("force", self.force)
@@ -114,7 +109,7 @@ class WeightTest(ReadOnlyState):
 
     @property
     def settled_first(self) -> bool:
-        """Whether the arm left its reference before the weight: unbalanced there, or unstable."""
+        """Whether the arm, unbalanced or unstable, left its reference before the weight."""
         moved = float(np.linalg.norm(self.without.displacement))
         return moved > _DISPLACED * self.without.pose.arm.length
 
@@ -131,7 +126,7 @@ class WeightTest(ReadOnlyState):
 
     @cached_property
     def displacements(self) -> Array:
-        """Tip at each step minus the tip without weight (n, 3) [m]."""
+        """Tip position at each step minus tip position without the weight (n, 3) [m]."""
         return frozen(self.tips - self.without.pose.tip[:3, 3])
 
     @cached_property
@@ -177,26 +172,26 @@ def weight_test(
     steps: int = 1,
     wrench: ArrayLike | None = None,
 ) -> WeightTest:
-    """Hang a weight at the tip of an arm whose motors are locked: C = ΔX/ΔF (Eq. 20).
+    """Hang a weight at the tip of an arm with locked motors: C = ΔX/ΔF (Eq. 20).
 
-    Nonlinear: the tensions follow the elongations, and the posture changes. For a small force the
-    result is 1/:meth:`~cdsm.Stiffness.along`.
+    The test is nonlinear: the tensions follow the elongations, and the posture changes. For a small
+    force the result is 1/:meth:`~cdsm.Stiffness.along`.
 
     Args:
         pose: The reference posture, at which the motors are locked.
-        tension: F there, as for :func:`~cdsm.equilibrium`. Tensions of your own need
-            not balance the arm: the test starts from the equilibrium that they lead to.
-        force: ΔF (3,) at ``tool0`` in base axes [N], on top of ``wrench``.
-        steps: Into how many equal steps to divide it, at most 1000.
-        wrench: What the arm carries without the weight (6,): force [N], then moment [N m]. If not
-            given, that of the ``Tension``, or zero.
+        tension: F at the reference, as for :func:`~cdsm.equilibrium`. If these tensions do not
+            balance the arm, the test starts from the equilibrium they lead to.
+        force: ΔF (3,) [N] at ``tool0`` in base axes, added to ``wrench``.
+        steps: Number of equal load steps, at most 1000.
+        wrench: Wrench (6,) without the weight: force [N], then moment [N m]. Default: the wrench of
+            the ``Tension``, or zero.
 
     Raises:
-        InvalidInput: As for :func:`~cdsm.equilibrium`, or a force of zero or so small
-            that what it moves is rounding, or steps that are no whole number from 1 to 1000.
+        InvalidInput: As for :func:`~cdsm.equilibrium`; or the force is zero or moves the tip by
+            rounding only; or ``steps`` is not a whole number from 1 to 1000.
         ElasticityRangeError: As for :func:`~cdsm.equilibrium`, at any step.
-        EquilibriumError: The arm buckles under a part of the load, which it names.
-            :func:`~cdsm.equilibrium` finds where the arm comes to rest then.
+        EquilibriumError: The arm buckles under a part of the load. The error names this part.
+            :func:`~cdsm.equilibrium` finds the posture after buckling.
     """
     force = vector("force", force, 3, "a force in base axes [N]", "force")
     if not force.any():
@@ -221,7 +216,7 @@ def weight_test(
 def _follow_load(
     before: Equilibrium, wrench: Array, added: Array, reached: float, goal: float
 ) -> Equilibrium:
-    """Follow the arm from one part of the load to a larger one, in steps of stable equilibria."""
+    """Follow the stable equilibria from one part of the load to a larger part."""
     step = goal - reached
     while reached < goal:
         part = min(goal, reached + step)
