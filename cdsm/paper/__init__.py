@@ -1,4 +1,4 @@
-"""The paper recomputed: simulation study (Section IV, Figs. 3 to 8) and experiments (Section V)."""
+"""Recompute the paper: simulations (Section IV, Figs. 3 to 8) and experiments (Section V)."""
 
 from collections.abc import Callable
 from typing import Final
@@ -47,7 +47,7 @@ FIGURES: Final[dict[str, Callable[[], Figure]]] = {
     "fig13": figure_13,
     "prototype": figure_prototype,
 }
-"""What computes each figure, by name."""
+"""Function that computes each figure, by the name of the figure."""
 
 __all__ = [
     "BOUNDS",

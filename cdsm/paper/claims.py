@@ -1,4 +1,4 @@
-"""What a recomputed figure is: what the paper claims, what comes out, and both as text or JSON."""
+"""Recomputed figures: claims of the paper, computed numbers, and their output as text or JSON."""
 
 from __future__ import annotations
 
@@ -25,19 +25,19 @@ EXPLANATION = (
 @final
 @dataclass(frozen=True, kw_only=True)
 class Claim:
-    """One number or triple of the paper, and what comes out.
+    """One number, or one for each of x, y and z, of the paper, and the computed numbers.
 
     Attributes:
         figure: Name of the figure.
-        quantity: What is compared.
+        quantity: Name of the compared quantity.
         unit: Unit of all numbers.
-        paper: The paper's numbers, x, y, z or one; None where it gives words only.
-        computed: Ours, in the paper's reading: pseudo-inverse, and l_0 = L.
-        original: Ours, the pseudo-inverse with the original length; empty where no cable strains.
-        along: Ours, for a small weight hung at the tip, with the original length; empty where no
-            arm is involved.
-        assumption: What the paper leaves open and we chose.
-        searched: Which of these assumptions were searched for the paper's number; empty: none.
+        paper: Numbers of the paper; None if the paper gives words only.
+        computed: K_R with the pseudo-inverse and l_0 = L, as in the paper; for Section V the
+            stiffness measured by weights; for Fig. 5 numbers of the strand.
+        original: K_R with the pseudo-inverse and the original length. Empty for Fig. 5, Section V.
+        along: Stiffness for a small weight at the tip, with the original length. Empty likewise.
+        assumption: Assumptions where the paper is silent.
+        searched: Assumptions that were searched to meet the paper's number; empty if none.
         at_most: Whether the paper's number is an upper bound.
     """
 
@@ -54,7 +54,7 @@ class Claim:
 
     @property
     def difference(self) -> tuple[float, ...] | None:
-        """Computed minus the paper's, in :attr:`unit`; None where that means nothing."""
+        """Computed minus paper, in :attr:`unit`; None without a number or for an upper bound."""
         if self.paper is None or self.at_most:
             return None
         return tuple(ours - theirs for ours, theirs in zip(self.computed, self.paper, strict=True))
@@ -62,12 +62,12 @@ class Claim:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Figure(ABC):
-    """One recomputed figure of the paper; its subclasses hold what is drawn.
+    """One recomputed figure of the paper. Subclasses hold the curves.
 
     Attributes:
         name: ``"fig3"``, ``"lead"`` and so on.
-        title: What it shows.
-        claims: What the paper says of it.
+        title: Title above the figure.
+        claims: Numbers of the paper and computed numbers.
     """
 
     name: str
@@ -76,20 +76,20 @@ class Figure(ABC):
 
     @abstractmethod
     def numbers(self) -> dict[str, object]:
-        """Its curves as plain numbers in SI, for JSON."""
+        """Return the curves as plain SI numbers, for JSON."""
 
     def tables(self) -> tuple[str, ...]:
-        """Further tables of the report, in Markdown."""
+        """Return further tables of the report, in Markdown."""
         return ()
 
 
 def floats(values: Iterable[float]) -> tuple[float, ...]:
-    """The numbers of a claim."""
+    """Convert values to the tuple of floats that a claim holds."""
     return tuple(float(value) for value in values)
 
 
 def to_rows(figures: Sequence[Figure]) -> list[tuple[str, ...]]:
-    """The claims, one row of text each under :data:`HEADER`."""
+    """Return one row of text per claim; :data:`HEADER` names the columns."""
     return [
         (
             claim.figure,
@@ -108,19 +108,19 @@ def to_rows(figures: Sequence[Figure]) -> list[tuple[str, ...]]:
 
 
 def to_markdown(figures: Sequence[Figure]) -> str:
-    """The claims as a Markdown table: what the paper says, what comes out, and what was assumed."""
+    """Return a Markdown table of the claims with their assumptions, and further tables."""
     further = [table for figure in figures for table in figure.tables()]
     return "\n\n".join([markdown_table(HEADER, to_rows(figures)), EXPLANATION, *further]) + "\n"
 
 
 def markdown_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A table in Markdown."""
+    """Return a table in Markdown."""
     lines = [header, ("---",) * len(header), *rows]
     return "\n".join(f"| {' | '.join(cells)} |" for cells in lines)
 
 
 def to_dict(figures: Sequence[Figure]) -> dict[str, object]:
-    """All curves and claims as plain SI numbers, ready for JSON."""
+    """Return all curves (plain SI numbers) and claims, ready for JSON."""
     return {
         figure.name: {
             "title": figure.title,

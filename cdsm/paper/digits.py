@@ -1,8 +1,8 @@
-"""Eq. 19 within its printed digits: what they leave open, and the most level law among them.
+"""Laws that round to the printed digits of Eq. 19: their bounds and the most level law.
 
-A printed coefficient stands for all numbers that round to it. With c = c_printed + h ∘ d, half a
-unit of the last digit h and |d| ≤ 1, the rigidity EA(F) = Σ c_i Fⁱ is linear in d, so its
-bounds and its most level member are solutions of linear programs.
+A printed coefficient stands for all numbers that round to it: c = c_printed + h ∘ d with |d| ≤ 1,
+where h is half a unit of the last digit. The rigidity EA(F) = Σ c_i Fⁱ is linear in d. Therefore
+linear programs find the bounds of EA and the most level law.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from cdsm.support.validation import Array, frozen, number_array
 from cdsm.wires.laws import EQ19_PRINTED
 
 JOIN: Final = 31.0
-"""Where the two branches meet [N]."""
+"""Tension at which the two branches of Eq. 19 meet [N]."""
 
 LEVEL: Final = (400.0, 810.0)
-"""Range of tension [N] over which the text calls the rigidity near-constant (Section IV-C)."""
+"""Range of tension [N] over which the paper calls the rigidity near-constant (Section IV-C)."""
 
 HALF_UNITS: Final = (
     frozen(np.array([5e-3, 5e-3, 5e-3, 5e-3, 5e-3, 5e-5, 5e-5])),
@@ -31,30 +31,30 @@ HALF_UNITS: Final = (
 """Half a unit of the last printed digit of each coefficient, lowest power first."""
 
 _INSIDE = 0.99
-"""The most level law stays this far within the half units, so that its coefficients round back."""
+"""Largest |d| of the most level law. Below 1, its coefficients round to the printed ones."""
 
 _SAMPLES = 200
-"""Tensions at which a range is looked at."""
+"""Number of tensions at which a range is sampled."""
 
 _FORCE = 1e4
-"""Rigidities are counted in this many newtons, for the solver's tolerances."""
+"""Unit of rigidity [N] inside the linear programs; it scales them for the solver's tolerances."""
 
 Coefficients = tuple[tuple[float, ...], tuple[float, ...]]
 
 
 def most_level() -> Coefficients:
-    """Coefficients of the printed digits whose law is continuous and most level.
+    """Find the coefficients of the printed digits whose law is continuous and most level.
 
-    First the upper branch: min over d and a level c of max |EA(F) − c| on :data:`LEVEL`, EA rising
-    up to there. Then the lower one: min Σ|d| so that EA is continuous at :data:`JOIN` and rises
-    from the low end of the domain on. Only the first coefficient moves, which the paper misprints.
+    Upper branch: minimise max |EA(F) − c| on :data:`LEVEL` over d and a level c. EA rises up to
+    this range. Lower branch: minimise Σ|d| so that EA is continuous at :data:`JOIN` and rises from
+    the low end of the domain. Only the coefficient of F⁶ moves there, which the paper misprints.
     """
     level = np.linspace(*LEVEL, 2 * _SAMPLES)
     values, ones = _powers(level), np.ones((level.size, 1))
     printed, half = np.array(EQ19_PRINTED[1]), HALF_UNITS[1]
     climb = _powers(np.linspace(JOIN, LEVEL[0], _SAMPLES), slope=True)
     none = np.zeros((_SAMPLES, 2))
-    # variables d (7,), the level c and the largest distance from it
+    # variables: d (7,), the level c, and the largest distance of EA from c
     d = _solve(
         np.eye(9)[8],
         np.vstack(
@@ -65,7 +65,7 @@ def most_level() -> Coefficients:
             ]
         ),
         np.concatenate([-values @ printed / _FORCE, values @ printed / _FORCE, climb @ printed]),
-        # the constant only shifts the level: it stays as printed
+        # the constant term only shifts the level, so it stays as printed
         bounds=[(0.0, 0.0)] + [(-_INSIDE, _INSIDE)] * 6 + [(None, None), (0.0, None)],
     )[:7]
     upper = printed + half * d
@@ -74,7 +74,7 @@ def most_level() -> Coefficients:
     meet = _powers(JOIN)[0]
     climb = _powers(np.linspace(presets.STRAND_1X19.low, JOIN, _SAMPLES), slope=True) * half
     both = np.concatenate([half, -half])
-    # variables: by how much each coefficient is raised, and lowered (14,)
+    # variables (14,): increase and decrease of each coefficient
     d = _solve(
         np.ones(14),
         np.hstack([-climb, climb]),
@@ -87,9 +87,10 @@ def most_level() -> Coefficients:
 
 
 def least_bend() -> tuple[float, float]:
-    """dEA/dF [-] below and above 31 N of the continuous law of these digits that bends least there.
+    """Find the smallest change of slope at 31 N of a continuous law of the printed digits.
 
-    They differ: no law of the printed digits, whatever its first coefficient, has one slope there.
+    Return dEA/dF [-] of this law below and above 31 N. The two slopes differ even with a free
+    coefficient of F⁶ (misprinted), so no law of these digits is smooth at 31 N.
     """
     printed, half = np.concatenate(EQ19_PRINTED), np.concatenate(HALF_UNITS)
     meet, bend = _powers(JOIN)[0], _powers(JOIN, slope=True)[0]
@@ -109,15 +110,15 @@ def least_bend() -> tuple[float, float]:
 
 
 def band(tension: ArrayLike) -> tuple[Array, Array]:
-    """Least and largest EA(F) [N] of all laws of the printed digits, same shape as F.
+    """Find the least and largest EA(F) [N] of all laws of the printed digits, same shape as F.
 
-    Of those that are positive over the domain and continuous at 31 N.
+    The laws are continuous at 31 N and positive over the domain.
 
     Args:
         tension: F [N], any shape.
 
     Raises:
-        InvalidInput: Not finite numbers.
+        InvalidInput: ``tension`` is not finite numbers.
     """
     values = number_array("tension", tension)
     printed, half = np.concatenate(EQ19_PRINTED), np.concatenate(HALF_UNITS)
@@ -144,7 +145,7 @@ def band(tension: ArrayLike) -> tuple[Array, Array]:
 
 
 def _powers(tension: ArrayLike, slope: bool = False) -> Array:
-    """Rows Fⁱ (N, 7), or their derivatives i Fⁱ⁻¹."""
+    """Return a row of powers Fⁱ, i = 0 to 6, for each tension, or of derivatives i Fⁱ⁻¹."""
     F, i = np.atleast_1d(np.asarray(tension, dtype=np.float64))[:, None], np.arange(7)
     return np.asarray(i * F ** np.maximum(i - 1, 0) if slope else F**i)
 
@@ -156,7 +157,7 @@ def _solve(
     bounds: Sequence[tuple[float | None, float | None]],
     equation: tuple[Array, ArrayLike] | None = None,
 ) -> Array:
-    """Min cost·x so that A x ≤ b, one equation and bounds; these programs have a solution."""
+    """Minimise cost·x so that A x ≤ b, within bounds and one equation. A solution exists here."""
     row, value = equation if equation is not None else (None, None)
     solution = linprog(
         cost,

@@ -1,8 +1,8 @@
 """Figs. 10, 12 and 13, Table II and the accuracy check of Section V, as virtual experiments.
 
-They are made on the one prototype that :mod:`cdsm.paper.prototype` identifies from their own
-numbers. Agreement shows no more than that such a prototype could be; what does not agree
-contradicts the model, an assumption, or the rest of the data.
+:mod:`cdsm.paper.prototype` identifies a prototype from the numbers of these experiments.
+Agreement only shows that such a prototype is possible. Disagreement contradicts the model, an
+assumption or the other data.
 """
 
 from __future__ import annotations
@@ -21,20 +21,20 @@ from cdsm.support.validation import Array, frozen
 
 _POINTS: Final = 40
 _ALL: Final = "all parameters of the prototype"
-"""What was searched for these numbers. Measured with weights, they have one reading only."""
+"""``searched`` of all claims of Section V. Measured with weights, they have one reading only."""
 
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Trace:
-    """One curve of a virtual experiment, and what the paper prints of it.
+    """One curve of a virtual experiment, with the values that the paper prints.
 
     Attributes:
-        label: What it is of.
-        swept: The swept quantity (N,) [N] or [N/m].
-        computed: Stiffness (N,) [N/m], or over the first one [-].
-        paper_at: Where the paper prints a value (M,).
-        paper: Those values (M,), in the unit of ``computed``.
+        label: Name of the curve.
+        swept: Swept quantity (N,), a tension [N] or a stiffness [N/m].
+        computed: Stiffness (N,) [N/m], or its ratio to the first value [-].
+        paper_at: Values of ``swept`` at which the paper prints the stiffness (M,).
+        paper: Stiffness in the paper (M,), in the unit of ``computed``.
     """
 
     label: str
@@ -50,11 +50,11 @@ class ExperimentFigure(Figure):
     """A virtual experiment on the identified prototype.
 
     Attributes:
-        swept: ``"tension"``, of the force-controlled cables as reported [N], or
+        swept: ``"tension"``, the reported tension of the force-controlled cables [N], or
             ``"cable_stiffness"`` [N/m].
-        relative: Whether the stiffness is given over its first value.
-        traces: Its curves.
-        fit: The prototype it was made on.
+        relative: Whether the stiffness is divided by its first value.
+        traces: Curves of the figure.
+        fit: Identified prototype; in Fig. 10 the one with x and y exchanged in Table II.
     """
 
     swept: Literal["tension", "cable_stiffness"]
@@ -63,7 +63,7 @@ class ExperimentFigure(Figure):
     fit: PrototypeFit
 
     def numbers(self) -> dict[str, object]:
-        """Its curves as plain numbers in SI, for JSON."""
+        """Return the curves as plain SI numbers, for JSON."""
         swept = {"tension": "tension_N", "cable_stiffness": "cable_stiffness_N_per_m"}[self.swept]
         computed = "stiffness_over_first" if self.relative else "stiffness_N_per_m"
         return {
@@ -83,16 +83,16 @@ class ExperimentFigure(Figure):
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PrototypeFigure(Figure):
-    """Every number of Section V over what the identified prototype gives.
+    """Residuals of all numbers of Section V for the identified prototypes.
 
     Attributes:
-        fits: The prototype identified at each step.
+        fits: Prototype identified at each step.
     """
 
     fits: tuple[PrototypeFit, ...]
 
     def numbers(self) -> dict[str, object]:
-        """Parameters and residuals of all steps, for JSON."""
+        """Return parameters and residuals of all steps, for JSON."""
         return {
             "bounds_SI": BOUNDS,
             "fits": [
@@ -111,7 +111,7 @@ class PrototypeFigure(Figure):
         }
 
     def tables(self) -> tuple[str, ...]:
-        """Parameters of the identified prototypes; * where one is at a bound."""
+        """Return the table of identified parameters; * marks a parameter at a bound."""
         rows = []
         for name, (low, high) in BOUNDS.items():
             cells = [
@@ -126,12 +126,12 @@ class PrototypeFigure(Figure):
 
 
 def figure_10() -> ExperimentFigure:
-    """Stiffness in x, y and z over tension with the 1×19 strand, beside Table II.
+    """Compute stiffness in x, y and z over tension with the 1×19 strand, beside Table II.
 
-    Once as printed, once with x and y exchanged in rows 2 to 4, for which there is evidence in the
-    paper (see :data:`~cdsm.paper.section_v.TABLE_II_SWAPPED`), and that once more with uneven
-    tensions and weights of finite size, for Table II alone. No step is a proof: the last frees 14
-    parameters for 15 numbers.
+    Three prototypes are shown. The first is fitted to Section V as printed. The second takes Table
+    II with x and y exchanged in rows 2 to 4 (evidence:
+    :data:`~cdsm.paper.section_v.TABLE_II_SWAPPED`). The third is fitted to the exchanged Table II
+    alone, with uneven tensions and finite weights: 14 parameters for 15 numbers. No fit is a proof.
     """
     fits = [_identified(step.label) for step in (STEPS[0], STEPS[1], STEPS[-1])]
     return ExperimentFigure(
@@ -146,7 +146,7 @@ def figure_10() -> ExperimentFigure:
 
 
 def figure_12() -> ExperimentFigure:
-    """Stiffness in y over tension with hybrid cables of constant stiffness, two configurations."""
+    """Compute stiffness in y over tension with cables of constant stiffness, 2 configurations."""
     fit = _identified()
     prototype = fit.prototype
     tensions = np.linspace(TENSIONS[0], prototype.highest_hybrid_tension, _POINTS)
@@ -178,7 +178,7 @@ def figure_12() -> ExperimentFigure:
 
 
 def figure_13() -> ExperimentFigure:
-    """Stiffness in y over that of the cables, tension constant, two configurations."""
+    """Compute stiffness in y over cable stiffness at constant tension, for 2 configurations."""
     fit = _identified()
     prototype = fit.prototype
     springs = np.linspace(HYBRID, HYBRID * prototype.spring_ratio, _POINTS)
@@ -212,7 +212,7 @@ def figure_13() -> ExperimentFigure:
 
 
 def figure_prototype() -> PrototypeFigure:
-    """All numbers of Section V against one prototype, for each step of reading Table II."""
+    """Compare all numbers of Section V with the prototype identified at each step."""
     fits = tuple(_identified(step.label) for step in STEPS)
     checks = [
         Claim(
@@ -254,7 +254,7 @@ def _identified(label: str = STEPS[1].label) -> PrototypeFit:
 
 
 def _over_tension(fit: PrototypeFit) -> tuple[Trace, ...]:
-    """Stiffness in x, y and z over tension, beside the columns of the table it was fitted to."""
+    """Compute stiffness in x, y and z over tension, beside the table of the fit."""
     prototype = fit.prototype
     tensions = np.linspace(TENSIONS[0], TENSIONS[-1], _POINTS)
     curves = prototype.weigh(prototype.arm().at(prototype.configurations[0]), tensions)
@@ -271,7 +271,7 @@ def _over_tension(fit: PrototypeFit) -> tuple[Trace, ...]:
 
 
 def _table_claims(fit: PrototypeFit) -> list[Claim]:
-    """What a step makes of Table II: its columns, and how much they rise."""
+    """Compare the columns of Table II, and their increments, with the fitted prototype."""
     table, computed = fit.step.table, fit.predicted.table
     assumption = f"{fit.step.label}; {fit.step.count}"
     claims = [
@@ -301,7 +301,7 @@ def _table_claims(fit: PrototypeFit) -> list[Claim]:
 def _configurations(
     fit: PrototypeFit, swept: Array, stiffness_of: Callable[[Array], Array], paper: Array
 ) -> tuple[Trace, ...]:
-    """A trace for each configuration, over its first value; the paper's is at the end."""
+    """Build a trace per configuration, relative to its first value; the paper gives the last."""
     traces = []
     for i, q in enumerate(fit.prototype.configurations):
         computed = stiffness_of(q)

@@ -1,8 +1,9 @@
-"""For which leads the paper's third finding holds: that stiffness falls a little with tension.
+"""Leads for which stiffness falls a little with tension, the paper's third finding.
 
-With EA constant, tension softens an arm by the active stiffness and stiffens it since the locked
-wire is shorter than the cable: EA/l_0 = (EA + F)/L. Only the second depends on the length of the
-cables, so the lead decides. The paper takes l_0 = L and has the first alone.
+The lead is the straight cable between its actuator and the base disk. With EA constant, tension
+has two effects. The active stiffness softens the arm. The original length l_0 of a locked wire is
+shorter than the cable, which stiffens the arm: EA/l_0 = (EA + F)/L. Only this effect depends on
+the cable length, hence on the lead. The paper takes l_0 = L and has the first effect only.
 """
 
 from __future__ import annotations
@@ -22,23 +23,23 @@ from cdsm.support.validation import Array, frozen
 from cdsm.tension import distribute_tension
 
 LEADS: Final = frozen(np.concatenate([[0.0], np.geomspace(0.003, 0.3, 30)]))
-"""Leads looked at [m]; from 0.33 m on the arm buckles below 800 N."""
+"""Examined leads [m]. With a lead of 0.33 m or more the arm buckles below 800 N."""
 
 MINIMA: Final = (100.0, 800.0)
-"""Lower bounds of tension [N] between which the stiffness changes, as for Fig. 4."""
+"""Lower bounds of tension [N] at the start and the end of the change, as in Fig. 4."""
 
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class LeadFigure(Figure):
-    """Change of stiffness with tension over the lead of the cables.
+    """Change of stiffness with tension, over the lead of the cables.
 
     Attributes:
-        leads: (N,) [m].
+        leads: Leads of all cables (N,) [m].
         pseudoinverse: Change of K_R with the original length (N, 3) [%].
-        along: Change of what a small weight measures, with the original length (N, 3) [%].
-        stretched_pseudoinverse: As ``pseudoinverse``, with the paper's l_0 = L.
-        stretched_along: As ``along``, with the paper's l_0 = L.
+        along: Change of the stiffness for a small weight, with the original length (N, 3) [%].
+        stretched_pseudoinverse: ``pseudoinverse`` with the paper's l_0 = L (N, 3) [%].
+        stretched_along: ``along`` with the paper's l_0 = L (N, 3) [%].
     """
 
     leads: Array
@@ -48,14 +49,14 @@ class LeadFigure(Figure):
     stretched_along: Array
 
     def numbers(self) -> dict[str, object]:
-        """Its curves as plain numbers in SI, for JSON."""
+        """Return the leads [m] and the curves [%] as plain numbers, for JSON."""
         names = ("pseudoinverse", "along", "stretched_pseudoinverse", "stretched_along")
         changes = {f"{name}_change_xyz_percent": getattr(self, name).tolist() for name in names}
         return {"lead_m": self.leads.tolist(), **changes}
 
 
 def figure_lead() -> LeadFigure:
-    """Change of stiffness from a lower bound of 100 N to one of 800 N over the lead, EA = 48 kN."""
+    """Compute the stiffness change from 100 N to 800 N minimum tension over lead; EA = 48 kN."""
     unstrained, stretched = (
         frozen(np.array([_changes(lead, length) for lead in LEADS.tolist()]))
         for length in ("unstrained", "stretched")
@@ -84,7 +85,7 @@ def figure_lead() -> LeadFigure:
 
 
 def _changes(lead: float, length: OriginalLength) -> Array:
-    """Change of K_R and of what a weight measures, in x, y and z (2, 3) [%]."""
+    """Compute the change of K_R and of the stiffness for a weight, in x, y and z (2, 3) [%]."""
     arm = presets.virtual_prototype(presets.ELASTIC_STAGE, lead=lead, original_length=length)
     pose = arm.at(np.full(arm.nv, presets.TEN_DEGREES))
     first, last = (readings(stiffness(pose, distribute_tension(pose, F))) for F in MINIMA)
@@ -92,7 +93,7 @@ def _changes(lead: float, length: OriginalLength) -> Array:
 
 
 def _first_fall(changes: Array, length: OriginalLength, reading: int) -> tuple[float, ...]:
-    """Lead [mm] from which on stiffness falls, for x, y and z; 0 where it always does."""
+    """Find the lead [mm] above which stiffness falls, for x, y and z; 0 if it always falls."""
 
     def crossing(axis: int) -> float:
         if changes[0, axis] < 0.0:

@@ -1,9 +1,10 @@
-"""One prototype for all that Section V measured: what it must have been like, if the model holds.
+"""One prototype that explains all measurements of Section V, if the model holds.
 
-The paper prints 20 numbers of its prototype and not one dimension of it. Everything it leaves open
-is a parameter here, within the bounds of :data:`BOUNDS`, and the parameters that explain the
-numbers best are searched for, in steps that free more of them. A stiffness misfits by factors, so
-its residual is the logarithm ln(model/paper); that of a drop or rise is (model − paper)/paper.
+The paper prints 20 numbers of its prototype and none of its dimensions. Every unknown is a
+parameter within :data:`BOUNDS`. A search finds the parameters that explain the numbers best, in
+steps that free more and more parameters. The residual of a stiffness is ln(model/paper), because
+its errors are factors. The residual of a drop or a rise is (model − paper)/paper.
+The lead is the straight cable between its actuator and the base disk.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.validation import Array, frozen
 from cdsm.tension import distribute_tension
 
-_RIGID = LinearElasticity(1e12)  # a hybrid cable's stiffness is given as a whole
+_RIGID = LinearElasticity(1e12)  # the series stiffness is the whole stiffness of a hybrid cable
 
 _LIMIT = math.radians(30.0)
 
@@ -46,33 +47,33 @@ _LIMIT = math.radians(30.0)
 @final
 @dataclass(frozen=True, kw_only=True)
 class Prototype:
-    """What Section V leaves open. Of each pair the first cable is position-controlled.
+    """Unknown parameters of Section V. The first cable of each pair is position-controlled.
 
     Attributes:
-        link_length: Of the links between the joints [m].
-        tool_length: From the last joint to where the weights hang [m].
+        link_length: Length of the links between the joints [m].
+        tool_length: Distance from the last joint to the weights [m].
         hole_radius: R [m].
-        lead: Of all cables, before the base disk [m].
-        link_mass: Of every link [kg].
-        drive_stiffness: In series with every strand [N/m].
-        tension_offset: Tension of the force-controlled cables beyond the value reported [N].
-        angle_1: Joint angles of the second configuration of Figs. 12 and 13 [rad]; the first is
-            assumed to be that of Table II.
-        angle_2: [rad].
-        angle_3: [rad].
-        spring_ratio: Stiffness of the stiffest over that of the softest hybrid cable (Fig. 11
-            shows it as a picture only) [-].
-        hybrid_tension: At which Fig. 13 and the accuracy check were made [N]. The check's cables
-            are not named either; they are assumed to be the hybrid ones of 1.89 N/mm.
-        highest_hybrid_tension: Up to which Fig. 12 goes [N]; from 3 N, as Table II.
-        disk_ratio: Disk offset over hole radius [-]; at tan 15° disks touch at ±30°, the stated
-            limit.
-        level_2: Tension of the second row of Table II [N]; the first is at 3 N, the last at 86 N.
-        level_3: Of the third row [N].
-        level_4: Of the fourth row [N].
-        weight_x: Weight that Table II was measured with along x [N]; 0: next to none.
-        weight_y: Along y [N].
-        weight_z: Along −z, as it hangs [N].
+        lead: Lead of all cables [m].
+        link_mass: Mass of every link [kg].
+        drive_stiffness: Stiffness of the drive in series with every strand [N/m].
+        tension_offset: Actual minus reported tension of the force-controlled cables [N].
+        angle_1: Joint angle 1 of the second configuration of Figs. 12 and 13 [rad]. The first
+            configuration is assumed to be that of Table II.
+        angle_2: Joint angle 2 of the second configuration [rad].
+        angle_3: Joint angle 3 of the second configuration [rad].
+        spring_ratio: Stiffness of the stiffest over that of the softest hybrid cable [-]. Fig. 11
+            shows only a picture.
+        hybrid_tension: Tension in Fig. 13 and in the accuracy check [N]. The cables of the check
+            are assumed to be the hybrid ones of 1.89 N/mm.
+        highest_hybrid_tension: Highest tension in Fig. 12 [N]; the lowest is 3 N, as in Table II.
+        disk_ratio: Disk offset over hole radius [-]. At tan 15° disks touch at ±30°, the stated
+            joint limit.
+        level_2: Tension of row 2 of Table II [N]. Row 1 is at 3 N, row 5 at 86 N.
+        level_3: Tension of row 3 of Table II [N].
+        level_4: Tension of row 4 of Table II [N].
+        weight_x: Weight along x that measured Table II [N]; 0 means an infinitesimal weight.
+        weight_y: Weight along y [N].
+        weight_z: Weight along −z, as it hangs [N].
     """
 
     link_length: float
@@ -103,7 +104,7 @@ class Prototype:
 
     @property
     def weights(self) -> Array:
-        """Forces that Table II was measured with (3, 3) [N], one a row."""
+        """Forces that measured Table II (3, 3) [N], one per row."""
         return np.diag([self.weight_x, self.weight_y, -self.weight_z])
 
     @property
@@ -112,10 +113,10 @@ class Prototype:
         return POSTURE, np.array([self.angle_1, self.angle_2, self.angle_3])
 
     def arm(self, cable_stiffness: float | None = None) -> Manipulator:
-        """The arm with the 1×19 strand, or with hybrid cables of one stiffness [N/m].
+        """Build the arm with the 1×19 strand, or with hybrid cables of one stiffness [N/m].
 
         Raises:
-            GeometryError: No such arm can be.
+            GeometryError: The dimensions do not make a valid arm.
         """
         return presets.experimental_prototype(
             presets.STRAND_1X19 if cable_stiffness is None else _RIGID,
@@ -129,24 +130,26 @@ class Prototype:
         )
 
     def measure(self, pose: Posture, tensions: ArrayLike) -> Array:
-        """Stiffness (N, 3) [N/m] along x, y, z with the force-controlled cables at N tensions [N].
+        """Compute stiffness (N, 3) [N/m] along x, y, z at N tensions [N].
+
+        The tensions are the reported ones of the force-controlled cables.
 
         Raises:
             CdsmError: No tension of the position-controlled cables balances the arm, or it leaves
-                the domain of their elasticity, or the arm is unstable.
+                the domain of their law, or the arm is unstable.
         """
         return self._measured(pose, tensions, np.zeros((3, 3)))
 
     def weigh(self, pose: Posture, tensions: ArrayLike) -> Array:
-        """As :meth:`measure`, with the weights of Table II: force over displacement (N, 3) [N/m].
+        """Compute force over displacement (N, 3) [N/m] with the weights of Table II.
 
         Raises:
-            CdsmError: As for :meth:`measure`, with the weights on it.
+            CdsmError: As for :meth:`measure`, also with the weights hung.
         """
         return self._measured(pose, tensions, self.weights)
 
     def _measured(self, pose: Posture, tensions: ArrayLike, weights: Array) -> Array:
-        """Tangent stiffness along x, y and z; the secant where a weight is given."""
+        """Compute the stiffness along x, y and z: secant with a weight, tangent without."""
         levels = np.atleast_1d(np.asarray(tensions, dtype=np.float64))
         return np.array(
             [
@@ -159,7 +162,7 @@ class Prototype:
         )
 
     def _held(self, pose: Posture, tensions: Array) -> list[Stiffness]:
-        """K_θ with the force-controlled cables at each tension as reported [N]."""
+        """Compute K_θ for each reported tension [N] of the force-controlled cables."""
         results = []
         for tension in tensions.tolist():
             actual = tension + self.tension_offset
@@ -175,13 +178,13 @@ class Prototype:
         return results
 
     def predict(self, table_alone: bool = False) -> Predicted:
-        """What this prototype would have shown.
+        """Predict the numbers of Section V for this prototype.
 
         Args:
-            table_alone: Only in Table II, not in the other experiments.
+            table_alone: Whether to predict Table II only.
 
         Raises:
-            CdsmError: It cannot hold itself in one of the experiments; see :meth:`measure`.
+            CdsmError: An experiment has no stable equilibrium; see :meth:`measure`.
         """
         table = self.weigh(self.arm().at(POSTURE), self.levels)
         if table_alone:
@@ -209,9 +212,9 @@ class Predicted:
 
     Attributes:
         table: Table II (5, 3) [N/m].
-        drops: Of Fig. 12 (2,) [-], or empty.
-        rises: Of Fig. 13 (2,) [-], or empty.
-        check: Of Section V-B [N/m], or None.
+        drops: Reductions of Fig. 12 (2,) [-], or empty.
+        rises: Increments of Fig. 13 (2,) [-], or empty.
+        check: Stiffness in z of Section V-B [N/m], or None.
     """
 
     table: Array
@@ -220,10 +223,12 @@ class Predicted:
     check: float | None = None
 
     def residuals(self, table: Array) -> Array:
-        """ln(model/paper) of each stiffness, (model − paper)/paper of drops and rises (20,), (15,).
+        """Compute the residuals of the numbers [-], (20,), or (15,) for Table II alone.
+
+        They are ln(model/paper) for a stiffness, (model − paper)/paper for a drop or a rise.
 
         Args:
-            table: Table II (5, 3) [N/m], as printed or not.
+            table: Table II (5, 3) [N/m], as printed or with exchanged entries.
         """
         of_table = np.log(self.table / table).ravel()
         if self.check is None:
@@ -239,7 +244,7 @@ class Predicted:
 
 
 _EVEN = TENSIONS.tolist()
-_TOUCH = math.tan(_LIMIT / 2.0)  # a smaller disk ratio, and disks touch before ±30°
+_TOUCH = math.tan(_LIMIT / 2.0)  # with a smaller disk ratio, disks touch before ±30°
 
 _PARAMETERS: Final[dict[str, tuple[float, ...]]] = {
     # bounds, then starts: even tensions, uneven tensions, Table II alone
@@ -266,25 +271,25 @@ _PARAMETERS: Final[dict[str, tuple[float, ...]]] = {
 }
 
 BOUNDS: Final = {name: (low, high) for name, (low, high, *_) in _PARAMETERS.items()}
-"""What a prototype of that kind can be, in SI units; the tensions as far as Table II goes."""
+"""Plausible range of each parameter, in SI units. Tensions end at 86 N, as in Table II."""
 
 START, UNEVEN_START, TABLE_START = (
     Prototype(**{name: row[column] for name, row in _PARAMETERS.items()}) for column in (2, 3, 4)
 )
-"""Near where searches over the whole of :data:`BOUNDS` end; a search from here is short."""
+"""Starts near the results of searches over all of :data:`BOUNDS`. They keep the search short."""
 
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Step:
-    """One way of reading Section V.
+    """One reading of Section V.
 
     Attributes:
-        label: What it is called in tables and figures.
-        table: Table II (5, 3) [N/m], as printed or not.
-        free: Names of the parameters that are searched.
-        start: Where the search starts; the other parameters stay as they are here.
-        table_alone: Whether Figs. 12, 13 and Section V-B do not count.
+        label: Name in tables and figures.
+        table: Table II (5, 3) [N/m], as printed or with exchanged entries.
+        free: Names of the searched parameters.
+        start: Start of the search. Parameters that are not free keep these values.
+        table_alone: Whether only Table II counts, without Figs. 12, 13 and Section V-B.
     """
 
     label: str
@@ -300,7 +305,7 @@ class Step:
 
     @property
     def count(self) -> str:
-        """How many parameters are free for how many numbers."""
+        """Count of free parameters and of numbers, as text."""
         return f"{len(self.free)} free parameters for {len(self.numbers)} numbers"
 
 
@@ -330,20 +335,20 @@ STEPS: Final = (
         table_alone=True,
     ),
 )
-"""Readings of Section V, each with more freedom than the one before; none is proven by its fit."""
+"""Readings of Section V. Each has more freedom than the one before. A good fit proves none."""
 
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PrototypeFit:
-    """The prototype that explains the numbers best, and how well.
+    """The prototype that explains the numbers best, with its residuals.
 
     Attributes:
-        step: What was searched, and against which table.
-        prototype: The parameters found.
-        predicted: Its numbers.
-        residuals: As :meth:`Predicted.residuals`, in the order of the step's numbers.
-        at_bound: Names of searched parameters on a bound: the numbers want them there or beyond.
+        step: Reading of Section V.
+        prototype: Identified parameters.
+        predicted: Numbers of Section V for the identified prototype.
+        residuals: Residuals of :meth:`Predicted.residuals`, in the order of ``step.numbers``.
+        at_bound: Names of searched parameters at a bound; the best value may lie beyond it.
     """
 
     step: Step
@@ -365,13 +370,13 @@ class PrototypeFit:
 
 
 def identify_prototype(step: Step) -> PrototypeFit:
-    """Search the free parameters within :data:`BOUNDS` that explain Section V best: min Σ r².
+    """Find the free parameters within :data:`BOUNDS` that explain Section V best: min Σ r².
 
     Args:
-        step: What is free, where to start, and against which table.
+        step: Free parameters, start of the search, and table.
 
     Raises:
-        InvalidInput: A start out of bounds, or an arm there that cannot hold itself.
+        InvalidInput: The start is out of bounds, or its arm has no stable equilibrium.
     """
     bounds = {name: BOUNDS[name] for name in step.free}
 
@@ -388,7 +393,7 @@ def identify_prototype(step: Step) -> PrototypeFit:
     point = problem.box.point(start)
     if problem.failure(point) is not None:
         raise InvalidInput("start", f"{step.start} cannot hold itself. Start elsewhere.")
-    # with differences this coarse the search passes over the rounding of the weight tests
+    # finite differences are coarse: the rounding errors of the weight tests must not matter
     point = least_squares(
         problem.residuals,
         point,
@@ -411,4 +416,4 @@ def identify_prototype(step: Step) -> PrototypeFit:
 
 
 _NEAR = 0.02
-"""Part of its range within which a parameter counts as on its bound."""
+"""A parameter is at a bound if it is this near, as a fraction of its range."""

@@ -1,4 +1,4 @@
-"""What Section V of the paper prints of its experiments, in SI units."""
+"""Numbers that Section V of the paper prints of its experiments, in SI units."""
 
 from __future__ import annotations
 
@@ -22,29 +22,29 @@ TABLE_II: Final = frozen(
         ]
     )
 )
-"""Stiffness in x, y, z (5, 3) [N/m], measured at tensions rising from 3 to 86 N (Table II)."""
+"""Measured stiffness in x, y, z (5, 3) [N/m], at tensions rising from 3 to 86 N (Table II)."""
 
 TABLE_II_SWAPPED: Final = frozen(
     np.where(np.isin(np.arange(5), (1, 2, 3))[:, None], TABLE_II[:, [1, 0, 2]], TABLE_II)
 )
 """Table II with x and y exchanged in rows 2 to 4 (5, 3) [N/m].
 
-As printed it contradicts the caption of Fig. 10 and Section V-C, by which y is the least of the
-three, in just these rows (7.45 > 4.86, 7.24 > 5.76, 9.94 > 8.21), and y falls from 7.45 to 7.24.
-Exchanged, y is the least in every row and rises all the way; the increments stay.
+By the caption of Fig. 10 and Section V-C, y is the least of the three. The printed table
+contradicts this in exactly these rows: 7.45 > 4.86, 7.24 > 5.76, 9.94 > 8.21. Also y falls there
+from 7.45 to 7.24. Exchanged, y is the least in every row and always rises. The increments stay.
 """
 
 TENSIONS: Final = frozen(np.linspace(3.0, 86.0, 5))
-"""Those tensions [N]: the paper gives the first and the last, evenly spaced ones are assumed."""
+"""Tensions of the rows of Table II (5,) [N]: first and last are given, even spacing is assumed."""
 
 POSTURE: Final = frozen(np.deg2rad([-12.0, -18.0, -20.0]))
-"""Joint angles of Table II [rad] (Section V-C)."""
+"""Joint angles of Table II (3,) [rad] (Section V-C)."""
 
 DROPS: Final = (0.17, 0.40)
-"""Largest reductions in y with tension, of two configurations (Fig. 12)."""
+"""Largest reductions of stiffness in y with tension [-], of two configurations (Fig. 12)."""
 
 RISES: Final = (7.93, 12.25)
-"""Increments in y, (last − first)/first, from the softest to the stiffest spring (Fig. 13)."""
+"""Increments of stiffness in y, (last − first)/first, from softest to stiffest spring (Fig. 13)."""
 
 CHECK: Final = 139.0
 """Calculated stiffness in z [N/m] of the accuracy check (Section V-B)."""
@@ -53,11 +53,11 @@ MEASURED: Final = 131.0
 """Measured stiffness in z [N/m] of the accuracy check."""
 
 HYBRID: Final = 1890.0
-"""Stiffness of the hybrid cables of Fig. 12 [N/m]: strand and spring together."""
+"""Stiffness of the hybrid cables (strand and spring together) of Fig. 12 [N/m]."""
 
 NAMES: Final = (
     *(f"Table II, {axis}, row {row}" for row in range(1, 6) for axis in AXES),
     *("Fig. 12, first", "Fig. 12, second", "Fig. 13, first", "Fig. 13, second"),
     "V-B, z",
 )
-"""What each of the 20 numbers is."""
+"""Names of the 20 numbers of Section V."""

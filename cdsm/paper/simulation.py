@@ -1,10 +1,10 @@
 """Figs. 3, 4, 6, 7 and 8 of the paper, recomputed.
 
-What the paper leaves open is filled in by :mod:`cdsm.presets` and by the assumptions that each
-claim carries, which also says which of them were searched to meet the paper's number. Every number
-is given thrice: as the paper computes it, K_R read as ``pseudoinverse`` and a cable's original
-length as its stretched one; the same with the original length; and as the stiffness that a small
-weight hung at the tip would measure, ``along``, with the original length.
+:mod:`cdsm.presets` and the assumptions of each claim fill in what the paper leaves open. A claim
+also says which assumptions were searched to meet the paper's number. Every number is computed in
+three readings: ``pseudoinverse`` with the stretched length as original length, as in the paper;
+``pseudoinverse`` with the original length; and ``along`` with the original length, the stiffness
+that a small weight at the tip measures.
 """
 
 from __future__ import annotations
@@ -32,18 +32,18 @@ Part = Literal["active", "passive"]
 Swept = Literal["young_modulus", "tension"]
 
 STRAND_END: Final = presets.STRAND_1X19.high
-"""Tension [N] at which the strand's elastic stage ends, by the text of Section IV-C."""
+"""Tension [N] at which the elastic stage of the strand ends (text of Section IV-C)."""
 
 PROTOTYPE: Final = "three cables a joint, 0.5 kg a link, gravity along −y, no lead"
-"""What the virtual prototype of all these figures assumes besides the stated dimensions."""
+"""Assumptions of the virtual prototype in all figures, besides the stated dimensions."""
 
 SEARCHED: Final = (
     "cables, link, mass, gravity, hole phase, lower bound and reading of K_R, for this row"
 )
-"""What was searched for Fig. 6."""
+"""``searched`` of the claim of Fig. 6."""
 
 KEPT: Final = "prototype searched for Fig. 6"
-"""What the other figures take over from it."""
+"""``searched`` of the other figures: they keep the prototype of Fig. 6."""
 
 _TEN = np.full(10, presets.TEN_DEGREES)
 FIGURE_8_POSTURES: Final = {
@@ -51,7 +51,7 @@ FIGURE_8_POSTURES: Final = {
     "arc: 15° about y": np.deg2rad([15.0, 0.0] * 5),
     "S: 12° up, then 12° down": np.deg2rad([12.0, 6.0] * 2 + [0.0, 0.0] + [-12.0, -6.0] * 2),
 }
-"""Postures of Fig. 8 [rad]: assumed, since the paper shows them as pictures only."""
+"""Postures of Fig. 8 [rad]. They are assumed: the paper shows only pictures."""
 
 _POINTS = 25
 
@@ -62,14 +62,14 @@ class Curve:
     """Stiffness in x, y and z over a swept quantity.
 
     Attributes:
-        label: What distinguishes this curve in its figure.
-        original_length: As of its :class:`~cdsm.Manipulator`.
-        swept: The swept quantity (N,): Young's modulus [Pa] or lower bound of tension [N].
+        label: Name of the curve in its figure.
+        original_length: ``original_length`` of the :class:`~cdsm.Manipulator`.
+        swept: Swept quantity (N,): Young's modulus [Pa] or lower bound of tension [N].
         tension: Smallest, mean and largest cable tension (N, 3) [N].
         pseudoinverse: Diagonal of the paper's K_R (N, 3) [N/m].
-        pseudoinverse_part: The same of one term of K_θ alone, the figure's ``part``.
+        pseudoinverse_part: Diagonal of K_R of the figure's ``part`` of K_θ alone (N, 3) [N/m].
         along: Stiffness that a small weight measures along x, y, z (N, 3) [N/m].
-        along_part: What that term carries of it.
+        along_part: Share of ``part`` in ``along`` (N, 3) [N/m].
     """
 
     label: str
@@ -90,9 +90,9 @@ class StiffnessFigure(Figure):
     Attributes:
         swept: Name of the swept quantity.
         part: Name of the term of K_θ shown beside the total.
-        curves: Its curves, original lengths taken as the stretched ones, as in the paper.
-        original: The same curves with the original lengths.
-        postures: Where each curve was computed.
+        curves: Curves with the stretched length as original length, as in the paper.
+        original: Curves of the same cases with the original length.
+        postures: Posture of each curve.
     """
 
     swept: Swept
@@ -102,7 +102,7 @@ class StiffnessFigure(Figure):
     postures: tuple[Posture, ...]
 
     def numbers(self) -> dict[str, object]:
-        """Its curves as plain numbers in SI, for JSON."""
+        """Return the curves as plain SI numbers, for JSON."""
         swept = {"young_modulus": "young_modulus_Pa", "tension": "minimum_tension_N"}[self.swept]
         return {
             "postures_rad": [pose.q.tolist() for pose in self.postures],
@@ -125,11 +125,11 @@ class StiffnessFigure(Figure):
 
 
 _Pair = tuple[Curve, Curve]
-"""A curve with the stretched length, as in the paper, and with the original one."""
+"""Two curves of one case: with the stretched length (as in the paper), with the original one."""
 
 
 def figure_3() -> StiffnessFigure:
-    """Passive and total stiffness over Young's modulus, 160 to 320 GPa, at equal tensions."""
+    """Compute passive and total stiffness over Young's modulus, 160 to 320 GPa, at fixed tension."""
     moduli = np.linspace(160e9, 320e9, _POINTS)
     laws = [LinearElasticity.of_wire(modulus, presets.STRAND_DIAMETER) for modulus in moduli]
     pairs = [
@@ -167,7 +167,7 @@ def figure_3() -> StiffnessFigure:
 
 
 def figure_4() -> StiffnessFigure:
-    """Active and total stiffness over tension, with constant cable elasticity."""
+    """Compute active and total stiffness over tension, with constant EA."""
     minima = np.linspace(100.0, 800.0, _POINTS)
     strand, wire = (
         _over_minimum(label, law, _TEN, minima)
@@ -197,7 +197,7 @@ def figure_4() -> StiffnessFigure:
 
 
 def figure_6() -> StiffnessFigure:
-    """Stiffness over tension in the pre-tensioning stage, with Eq. 19."""
+    """Compute stiffness over tension in the pre-tensioning stage, with Eq. 19."""
     pair = _over_minimum("Eq. 19", presets.STRAND_1X19, _TEN, np.linspace(15.0, 120.0, _POINTS))
     claim = _claim(
         pair,
@@ -214,7 +214,7 @@ def figure_6() -> StiffnessFigure:
 
 
 def figure_7() -> StiffnessFigure:
-    """Stiffness over tension in the elastic stage, EA constant."""
+    """Compute stiffness over tension in the elastic stage, with constant EA."""
     highest = _highest_minimum(presets.virtual_prototype().at(_TEN))
     minima = np.linspace(120.0, highest, _POINTS)
     pair = _over_minimum("EA = 48 kN", presets.ELASTIC_STAGE, _TEN, minima)
@@ -234,12 +234,12 @@ def figure_7() -> StiffnessFigure:
 
 
 def figure_8() -> StiffnessFigure:
-    """Stiffness over the whole range of tension, at three postures."""
+    """Compute stiffness over the whole range of tension, at three postures."""
     arm = presets.virtual_prototype()
     pairs, claims = [], []
     for label, q in FIGURE_8_POSTURES.items():
         highest = _highest_minimum(arm.at(q))
-        # dense where the pre-tensioning stage is steep
+        # more points at low tension, where the curve is steep
         minima = np.geomspace(5.0, highest, 2 * _POINTS)
         whole = _over_minimum(label, presets.STRAND_1X19, q, minima)
         end = _over_minimum(label, presets.STRAND_1X19, q, np.array([LEVEL[0], highest]))
@@ -270,7 +270,7 @@ def figure_8() -> StiffnessFigure:
 
 
 def readings(K: Stiffness) -> Array:
-    """Diagonal of the paper's K_R, and what a small weight measures in x, y and z (2, 3) [N/m]."""
+    """Compute the diagonal of K_R and the stiffness for a small weight in x, y, z (2, 3) [N/m]."""
     return np.array([np.diag(K.pseudoinverse()), [K.along(axis) for axis in np.eye(3)]])
 
 
@@ -304,7 +304,7 @@ def _over_minimum(label: str, law: Elasticity, q: Array, minima: Array) -> _Pair
 def _pair(
     label: str, q: Array, cases: Sequence[tuple[Elasticity, float]], swept: Array, part: Part
 ) -> _Pair:
-    """A curve over cases of law and lower bound of tension, in both readings of the length."""
+    """Compute a curve over cases (law, lower bound of tension) for both original lengths."""
 
     def curve(length: OriginalLength) -> Curve:
         results = [_at_minimum(_prototype(law, length), q, minimum) for law, minimum in cases]
@@ -325,7 +325,7 @@ def _pair(
     return curve("stretched"), curve("unstrained")
 
 
-@lru_cache(maxsize=1)  # a curve over tension has one arm
+@lru_cache(maxsize=1)  # all points of a curve over tension use one arm
 def _prototype(law: Elasticity, length: OriginalLength) -> Manipulator:
     return presets.virtual_prototype(law, original_length=length)
 
@@ -340,17 +340,17 @@ def _table(rows: Iterable[Sequence[float] | Array]) -> Array:
 
 
 def _highest_minimum(pose: Posture) -> float:
-    """The lower bound [N] at which the largest tension reaches the end of the elastic stage."""
+    """Find the lower bound [N] at which the largest tension reaches :data:`STRAND_END`."""
 
     def excess(minimum: float) -> float:
         return float(distribute_tension(pose, minimum).values.max()) - STRAND_END
 
     bound: float = brentq(excess, 5.0, STRAND_END, xtol=1e-6)
-    return bound - 1e-3  # safely inside the elasticity's domain
+    return bound - 1e-3  # safely inside the domain of the law
 
 
 def _claim(pair: _Pair, measure: Callable[[Array, Array], Array], **texts: Any) -> Claim:
-    """A claim about one curve, measured alike in all readings."""
+    """Build a claim from one measure of a curve, evaluated in all three readings."""
     stretched, unstrained = pair
     return Claim(
         computed=floats(measure(stretched.pseudoinverse, stretched.pseudoinverse_part)),

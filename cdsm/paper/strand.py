@@ -1,4 +1,4 @@
-"""Fig. 5 of the paper: the strand's tensile test, as its Eq. 19 implies it."""
+"""Fig. 5 of the paper: the tensile test of the strand, computed from Eq. 19."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from cdsm.support.validation import Array, frozen
 from cdsm.wires.laws import EQ19_PRINTED
 
 GAUGE_LENGTH: Final = 0.5
-"""Length of the tested wire [m]: assumed, since the paper does not give it."""
+"""Length of the tested wire [m]. It is assumed: the paper does not give it."""
 
 
 @final
@@ -27,13 +27,13 @@ class StrandFigure(Figure):
     Attributes:
         gauge_length: Length of the tested wire [m].
         tension: F (N,) [N].
-        displacement: Stretch of the wire from 2.2 N on, ∫ l_0 dF/EA (N,) [m].
-        tangent: EA of the repaired Eq. 19 (N,) [N].
-        secant: Its secant, Eq. 18 (N,) [N].
+        displacement: Stretch of the wire above 2.2 N, ∫ l_0 dF/EA (N,) [m].
+        tangent: Tangent rigidity EA of the repaired Eq. 19 (N,) [N].
+        secant: Secant rigidity of the repaired Eq. 19, Eq. 18 (N,) [N].
         low: Least EA of all continuous laws of the printed digits (N,) [N].
-        high: Largest EA of them (N,) [N].
+        high: Largest EA of all continuous laws of the printed digits (N,) [N].
         printed: Eq. 19 as printed (N,) [N].
-        join: Tension at which its branches meet [N].
+        join: Tension at which the branches of Eq. 19 meet [N].
     """
 
     gauge_length: float
@@ -47,7 +47,7 @@ class StrandFigure(Figure):
     join: float
 
     def numbers(self) -> dict[str, object]:
-        """Its curves as plain numbers in SI, for JSON."""
+        """Return the curves as plain SI numbers, for JSON."""
         return {
             "gauge_length_m": self.gauge_length,
             "tension_N": self.tension.tolist(),
@@ -61,9 +61,9 @@ class StrandFigure(Figure):
 
 
 def eq19_as_printed(tension: ArrayLike) -> Array:
-    """Eq. 19 [N] in the digits of the paper, its misprint included; same shape as ``tension`` [N].
+    """Compute Eq. 19 [N] as printed, with its misprint; same shape as ``tension`` [N].
 
-    It is negative from 11 to 31 N, and no elasticity.
+    The result is negative from 11 to 31 N, so it is not a valid law.
     """
     F = np.asarray(tension, dtype=np.float64)
     lower, upper = EQ19_PRINTED
@@ -71,7 +71,7 @@ def eq19_as_printed(tension: ArrayLike) -> Array:
 
 
 def figure_5(gauge_length: float = GAUGE_LENGTH) -> StrandFigure:
-    """Force over displacement and rigidity over tension of the 1×19 strand.
+    """Compute force over displacement and rigidity over tension of the 1×19 strand.
 
     Args:
         gauge_length: Length of the tested wire [m].
