@@ -1,4 +1,4 @@
-"""The command line. Options take mm, degrees and N/mm; matplotlib is imported when it is needed."""
+"""Command line of cdsm. Options take mm, degrees and N/mm. matplotlib is imported on demand."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def main(
     """Stiffness of cable-driven serpentine manipulators."""
     debug_wanted.set(debug)
     for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):  # a terminal without Greek shows "?" for it
+        if isinstance(stream, io.TextIOWrapper):  # a terminal without Greek letters shows "?"
             stream.reconfigure(errors="replace")
 
 

@@ -1,4 +1,4 @@
-"""``cdsm urdf | stiffness | check | export``: an arm, how stiff it is, and its files."""
+"""``cdsm urdf | stiffness | check | export``: stiffness of an arm, and files of an arm."""
 
 from __future__ import annotations
 

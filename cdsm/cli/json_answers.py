@@ -1,4 +1,4 @@
-"""What ``--json`` prints: SI numbers, keys that name their unit, null where one is infinite."""
+"""Build the output of ``--json``: SI numbers, units in the keys, null for infinite values."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def show_json(values: Json) -> None:
 
 
 def of_stiffness(tension: Tension, K: Stiffness) -> Json:
-    """Posture, tensions and stiffness."""
+    """Return posture, tensions and stiffness."""
 
     def matrix(read: Callable[[], Array]) -> list[list[float]] | None:
         try:
@@ -63,7 +63,7 @@ def of_stiffness(tension: Tension, K: Stiffness) -> Json:
 
 
 def of_weight_test(test: WeightTest) -> Json:
-    """Every step of a weight test."""
+    """Return all steps of a weight test."""
     last, before = test.loaded[-1], test.without
     return {
         "before": {
@@ -88,7 +88,7 @@ def of_weight_test(test: WeightTest) -> Json:
 
 
 def of_buckling(tension: CriticalTension, load: CriticalLoad | None) -> Json:
-    """The critical tension, and the critical load if one was looked for."""
+    """Return the critical tension, and the critical load if it was computed."""
     names = tension.posture.arm.joint_names
     answer: Json = {
         "critical_minimum_tension_N": _finite(tension.minimum),
@@ -108,7 +108,7 @@ def of_buckling(tension: CriticalTension, load: CriticalLoad | None) -> Json:
 
 
 def of_plan(plan: StiffnessPlan, attainable: StiffnessRange) -> Json:
-    """A plan at one posture, and the range."""
+    """Return a plan at one posture, and the attainable range of stiffness."""
     pose = plan.tension.posture
     return {
         "direction": attainable.direction.tolist(),
@@ -126,7 +126,7 @@ def of_plan(plan: StiffnessPlan, attainable: StiffnessRange) -> Json:
 
 
 def of_path(plan: PathPlan) -> Json:
-    """Every sample of a planned path."""
+    """Return all samples of a planned path."""
     return {
         "cables": [cable.name for cable in plan.arm.cables],
         "target_N_per_m": plan.target.tolist(),
@@ -156,7 +156,7 @@ def of_path(plan: PathPlan) -> Json:
 
 
 def of_tensile_fit(fit: TensileFit) -> Json:
-    """What the report of a tensile test says."""
+    """Return the numbers of a fit to a tensile test."""
     return {
         "method": fit.method,
         "gauge_length_m": fit.test.gauge_length,
@@ -172,7 +172,7 @@ def of_tensile_fit(fit: TensileFit) -> Json:
 
 
 def status_counts(dataset: xarray.Dataset) -> dict[str, int]:
-    """How many entries of a sweep have each status."""
+    """Count the entries of a sweep by status."""
     status = dataset["status"].values
     return {word: int((status == value).sum()) for value, word in status_names(dataset).items()}
 

@@ -1,4 +1,4 @@
-"""``cdsm weigh`` and ``cdsm buckle``: what a load does, and when the arm gives way."""
+"""``cdsm weigh`` and ``cdsm buckle``: displacement under a weight, and buckling."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the commands share: options, the arm they describe, answers and failures."""
+"""Shared by all commands: options, the arm that they describe, output and errors."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ from cdsm.wires.files import read_elasticity
 _Value = TypeVar("_Value")
 
 console = Console(stderr=True)
-"""For progress and errors; answers go to the standard output."""
+"""Console for progress and errors. Answers go to standard output."""
 
 _ARM = "The arm"
 _TENSIONS = "Tensions and load"
@@ -68,14 +68,14 @@ Picture = Annotated[Path | None, typer.Option(metavar="FILE.png", help="Picture 
 AsJson = Annotated[bool, typer.Option("--json", help="Print SI numbers as JSON.")]
 
 debug_wanted: ContextVar[bool] = ContextVar("debug_wanted", default=False)
-"""Whether this call of the command line is to show tracebacks."""
+"""Whether the running command shows tracebacks."""
 
 NO_WRENCH = "0,0,0,0,0,0"
 
 
 @dataclass(frozen=True)
 class ArmOptions:
-    """Which arm a command is about."""
+    """Options that describe the arm of a command."""
 
     arm: Annotated[
         Path,
@@ -124,7 +124,7 @@ class ArmOptions:
     ] = "0,0,-9.81"
 
     def read(self) -> Manipulator:
-        """The arm."""
+        """Build the arm from its files and options."""
         gravity = numbers("--gravity", self.gravity, 3)
         if self.arm.suffix.lower() == ".urdf":
             cables = read_cables(_needed("--cables", self.cables))
@@ -145,11 +145,11 @@ class ArmOptions:
         return Manipulator(geometry, cables=routed, gravity=gravity)
 
     def at(self, angles: str) -> Posture:
-        """The arm at joint angles [degrees] and ways [mm]."""
+        """Return the posture at joint coordinates [degrees, or mm if a joint slides]."""
         return at_angles(self.read(), angles)
 
     def _refuse(self, why: str, *names: str) -> None:
-        """Refuse options that this kind of arm would not heed."""
+        """Raise BadParameter for options that this kind of arm would ignore."""
         for field in fields(self):
             if field.name in names and getattr(self, field.name) != field.default:
                 raise typer.BadParameter(f"{why}; leave it out.", param_hint=f"--{field.name}")
@@ -164,7 +164,7 @@ class ArmOptions:
 
 @dataclass(frozen=True)
 class TensionOptions:
-    """How the cables of an arm are pulled."""
+    """Options of the tension distribution."""
 
     min_tension: MinTension = 10.0
     max_tension: MaxTension = math.inf
@@ -172,7 +172,7 @@ class TensionOptions:
     solver: Solver = DEFAULT_SOLVER
 
     def distribute(self, pose: Posture) -> Tension:
-        """The tensions at a posture."""
+        """Compute the tensions at a posture."""
         load = numbers("--wrench", self.wrench, 6)
         return distribute_tension(pose, self.min_tension, self.max_tension, load, self.solver)
 
@@ -184,10 +184,10 @@ def _needed(option: str, value: _Value | None) -> _Value:
 
 
 def grouped(command: Callable[..., None]) -> Callable[..., None]:
-    """A command for typer, with an option for each field of its dataclass parameters.
+    """Replace each dataclass parameter of a command by one option per field, for typer.
 
-    typer reads options from the signature alone. Options that many commands share are declared
-    once, as the fields of a dataclass, and this puts them into the signature.
+    typer reads options only from the signature. Shared options are declared once, as fields of a
+    dataclass, and this function puts them into the signature.
     """
     hints = get_type_hints(command, include_extras=True)
     own = inspect.signature(command).parameters
@@ -217,7 +217,7 @@ def grouped(command: Callable[..., None]) -> Callable[..., None]:
 
 
 def at_angles(arm: Manipulator, angles: str) -> Posture:
-    """An arm at joint angles [degrees] and ways [mm]."""
+    """Return the posture of an arm at joint coordinates [degrees, or mm if a joint slides]."""
     given = numbers("--angles", angles)
     given = given * arm.nv if len(given) == 1 else given
     if len(given) != arm.nv:
@@ -230,12 +230,12 @@ def at_angles(arm: Manipulator, angles: str) -> Posture:
 
 
 def joint_scales(arm: Manipulator) -> Array:
-    """The unit in which the command line takes each joint (nv,): degree or mm, in SI."""
+    """Return the command-line unit of each joint (nv,) in SI: one degree [rad] or one mm [m]."""
     return np.array([scale for _, scale in JointUnits(arm.slides).shown])
 
 
 def numbers(option: str, text: str, count: int | None = None) -> list[float]:
-    """Numbers separated by commas or spaces, as many as are wanted."""
+    """Read numbers separated by commas or spaces, and check their count."""
     try:
         values = [float(word) for word in text.replace(",", " ").split()]
     except ValueError as error:
@@ -256,23 +256,23 @@ def answer(as_json: bool, as_dict: Callable[[], Json], *parts: object) -> None:
 
 
 def write_picture(path: Path | None, draw: str, *results: object, err: bool = True) -> None:
-    """Draw results by a function of :mod:`cdsm.plots`, if a picture is wanted."""
+    """Draw results with the function ``draw`` of :mod:`cdsm.plots`, if a path is given."""
     if path is not None:
-        from cdsm import plots  # matplotlib, only where it is wanted
+        from cdsm import plots  # imports matplotlib, so on demand
 
         figure = getattr(plots, draw)(*results)
         typer.echo(f"written: {write_file(path, figure.savefig)}", err=err)
 
 
 UNMET = 3
-"""Exit code where the answer is not what one wants; 1 is an error, 2 a wrong option."""
+"""Exit code of a negative answer (unstable, untrusted, infeasible); 1: error, 2: wrong option."""
 
 
 @contextmanager
 def reported() -> Iterator[None]:
-    """Turn a CdsmError into one message and exit code 1; with --debug leave it as it is.
+    """Turn an error into one message and exit code 1, and Ctrl-C into exit code 130.
 
-    Ctrl-C likewise, with the exit code that shells give it.
+    With --debug the exception passes unchanged.
     """
     try:
         yield
@@ -281,7 +281,7 @@ def reported() -> Iterator[None]:
             raise
         console.print("interrupted: no file is half-written, and what --resume keeps stays")
         raise typer.Exit(130) from None
-    except (CdsmError, OSError) as error:  # OSError: the terminal or pipe itself
+    except (CdsmError, OSError) as error:  # OSError: of the terminal or pipe
         if debug_wanted.get():
             raise
         console.print(f"error: {error}", style="red", markup=False, highlight=False, soft_wrap=True)

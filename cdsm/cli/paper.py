@@ -1,4 +1,4 @@
-"""``cdsm reproduce``: the paper, recomputed."""
+"""``cdsm reproduce``: recompute the paper."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from cdsm.cli.options import AsJson, console, reported
 from cdsm.support.files import make_folder, write_file, write_text
 
 _WIDE = 110
-"""Columns from which the table of claims is legible; below, each claim is a few lines."""
+"""Smallest width of the terminal for the table of claims; below it, a claim is a few lines."""
 
 
 def reproduce(
@@ -28,7 +28,7 @@ def reproduce(
 ) -> None:
     """Recompute Figs. 3 to 13 of the paper: pictures, table and numbers."""
     with reported():
-        from cdsm.plots import plot_paper  # matplotlib, only where it is wanted
+        from cdsm.plots import plot_paper  # imports matplotlib, so on demand
 
         make_folder(out)
         results, written = [], []
@@ -48,7 +48,7 @@ def reproduce(
 
 
 def _show(header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """A table where there is room for one, else a few lines for each row."""
+    """Print a table on a wide terminal, else a few lines for each row."""
     screen = Console()
     if screen.width >= _WIDE:
         table = Table(*header)

@@ -1,4 +1,4 @@
-"""Paths from CSV files: joint angles or tip positions, and stiffness, with their units."""
+"""Read paths from CSV files: joint angles or tip positions, and stiffness, with units."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ class PathFile(NamedTuple):
     """A path of S samples, in SI.
 
     Attributes:
-        angles: Joint angles (S, nv) [rad] ([m] where a joint slides), or None where there are tips.
-        tips: Tip positions (S, 3) [m], or None where there are angles.
-        target: Stiffness (S,) [N/m], or None if the file has none.
+        angles: Joint angles (S, nv) [rad] ([m] where a joint slides); None if tips are given.
+        tips: Tip positions (S, 3) [m]; None if angles are given.
+        target: Wanted stiffness (S,) [N/m]; None if the file has no such column.
     """
 
     angles: Array | None
@@ -33,12 +33,10 @@ class PathFile(NamedTuple):
 
 
 def read_path(path: Path, arm: Manipulator) -> PathFile:
-    """Read a path; the header names the columns and their units, and further ones are ignored.
+    """Read a path from a CSV file: a header, then one line per sample.
 
-    Args:
-        path: The file: a header and a line for each sample, separated by commas; lines that begin
-            with # are comments.
-        arm: Whose joints the columns may be named for.
+    The header names the columns and their units. Joint columns have the names of the joints of
+    the arm. Other columns are ignored. Lines that begin with # are comments.
     """
     table = read_table(path)
     if len(table.rows) < 2:
@@ -54,7 +52,7 @@ def read_path(path: Path, arm: Manipulator) -> PathFile:
         raise FileError(path, f"{problem}.")
 
     def columns(wanted: dict[str, dict[str, float]]) -> Array | None:
-        """The columns of these names, each in one of its units; None if there is none of them."""
+        """Read the columns of these names in SI; None if the file has none of them."""
         if not wanted.keys() & units.keys():
             return None
         values = []

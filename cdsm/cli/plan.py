@@ -1,4 +1,4 @@
-"""``cdsm plan``: tensions for a wanted stiffness, at one posture or along a path."""
+"""``cdsm plan``: plan tensions for a wanted stiffness, at one posture or along a path."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ def plan(
 
 
 class _Answer(NamedTuple):
-    """What is printed, written and drawn."""
+    """Results to print, write and draw."""
 
     parts: tuple[object, ...]
     as_dict: Callable[[], Json]
@@ -118,11 +118,11 @@ class _Answer(NamedTuple):
 
 
 def _at_posture(pose: Posture, u: list[float], target: float, bounds: _Bounds) -> _Answer:
-    """The plan at one posture, and the range."""
+    """Plan the stiffness at one posture, and compute its attainable range."""
     attainable = stiffness_range(pose, u, *bounds)
     best = plan_stiffness(pose, u, target, *bounds)
 
-    def motors() -> PathPlan:  # the same search, as a path of one sample
+    def motors() -> PathPlan:  # the plan repeated as a path of one sample
         return plan_path(pose.arm, u, target, *bounds, angles=[pose.q])
 
     drawn = best, attainable
@@ -138,7 +138,7 @@ def _along_path(
     bounds: _Bounds,
     rate: float,
 ) -> _Answer:
-    """The plan of a path whose targets [N/m] are in its file, or all the same."""
+    """Plan a path with one target [N/m] for all samples, or with the targets of its file."""
     wanted = file.target if target is None else target
     if wanted is None or (target is not None and file.target is not None):
         raise typer.BadParameter(

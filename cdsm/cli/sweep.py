@@ -1,4 +1,4 @@
-"""``cdsm sweep`` and ``cdsm map``: stiffness over many postures, as a file and as a picture."""
+"""``cdsm sweep`` and ``cdsm map``: write and plot the stiffness over many postures."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class PoseOptions:
-    """Which postures a sweep goes over."""
+    """Options that describe the postures of a sweep."""
 
     grid: Annotated[
         str | None,
@@ -65,7 +65,7 @@ class PoseOptions:
     seed: Annotated[int | None, typer.Option(help="Of --random; 0.")] = None
 
     def read(self, arm: Manipulator) -> PoseSet:
-        """The postures."""
+        """Build the set of postures from its options."""
         if sum(given is not None for given in (self.grid, self.path, self.random)) != 1:
             raise typer.BadParameter("give one of --grid, --path and --random.", param_hint="poses")
         for option, value, needed, of in (
@@ -106,7 +106,7 @@ def sweep(
     with reported():
         robot = arm.read()
         wanted = poses.read(robot)
-        check_target(out)  # now, rather than when all is computed
+        check_target(out)  # before the long computation
         low = numbers("--min-tension", min_tension)
         dataset = run(
             robot,
@@ -143,7 +143,7 @@ def map_sweep(
     """Colour the reachable workspace by a quantity of a sweep."""
     with reported():
         dataset = read_sweep(sweep)
-        from cdsm.plots import plot_map  # matplotlib, only where it is wanted
+        from cdsm.plots import plot_map  # imports matplotlib, so on demand
 
         slab = None
         if section is not None:
@@ -155,14 +155,14 @@ def map_sweep(
 
 
 def _grid(text: str, arm: Manipulator) -> GridPoses:
-    """The joints of ``joint1=-20:20:9,joint2=5``, in degrees, or mm where they slide."""
+    """Read a grid such as ``joint1=-20:20:9,joint2=5``, in degrees, or mm if a joint slides."""
     units = dict(zip(arm.joint_names, joint_scales(arm), strict=True))
     angles: dict[str, Array] = {}
     rest: dict[str, float] = {}
     for part in text.split(","):
         name, _, value = part.partition("=")
         given = numbers("--grid", value.replace(":", " "))
-        unit = units.get(name.strip(), 1.0)  # a name that is none is refused with the grid
+        unit = units.get(name.strip(), 1.0)  # the sweep refuses unknown names
         if name.strip() in (*angles, *rest):
             raise typer.BadParameter(f"{name.strip()} is given twice.", param_hint="--grid")
         if len(given) == 1:
@@ -178,7 +178,7 @@ def _grid(text: str, arm: Manipulator) -> GridPoses:
 
 
 def _waypoints(path: Path, arm: Manipulator) -> Array:
-    """Waypoints (n, nv) in SI of a file as ``cdsm plan --path`` reads it."""
+    """Read waypoints (n, nv) in SI from a file with the format of ``cdsm plan --path``."""
     file = read_path(path, arm)
     if file.angles is None or file.target is not None:
         raise FileError(path, "holds tips or targets; a sweep goes along joint angles.")

@@ -52,9 +52,9 @@ def view(
     as_json: AsJson = False,
 ) -> None:
     """Show an arm in the browser, live: move joints, tension and load; see how stiff it is."""
-    # Ctrl-C is how it ends, and may come while it is still beginning
+    # Ctrl-C ends the view; it can also arrive while the view starts
     with reported(), contextlib.suppress(KeyboardInterrupt):
-        from cdsm.view import serve  # matplotlib and, if it is installed, viser
+        from cdsm.view import serve  # imports matplotlib and viser (if installed), so on demand
 
         pose = arm.at(angles)
         with serve(

@@ -1,4 +1,4 @@
-"""``cdsm fit``: from a tensile test to an elasticity."""
+"""``cdsm fit``: fit an elasticity to a tensile test."""
 
 from __future__ import annotations
 

@@ -87,10 +87,9 @@ def most_level() -> Coefficients:
 
 
 def least_bend() -> tuple[float, float]:
-    """Find the smallest change of slope at 31 N of a continuous law of the printed digits.
+    """Return dEA/dF [-] below and above 31 N of the continuous law whose slope changes least there.
 
-    Return dEA/dF [-] of this law below and above 31 N. The two slopes differ even with a free
-    coefficient of F⁶ (misprinted), so no law of these digits is smooth at 31 N.
+    The slopes differ even with a free coefficient of F⁶: no law of these digits is smooth at 31 N.
     """
     printed, half = np.concatenate(EQ19_PRINTED), np.concatenate(HALF_UNITS)
     meet, bend = _powers(JOIN)[0], _powers(JOIN, slope=True)[0]

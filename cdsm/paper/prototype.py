@@ -4,7 +4,6 @@ The paper prints 20 numbers of its prototype and none of its dimensions. Every u
 parameter within :data:`BOUNDS`. A search finds the parameters that explain the numbers best, in
 steps that free more and more parameters. The residual of a stiffness is ln(model/paper), because
 its errors are factors. The residual of a drop or a rise is (model − paper)/paper.
-The lead is the straight cable between its actuator and the base disk.
 """
 
 from __future__ import annotations
@@ -53,7 +52,7 @@ class Prototype:
         link_length: Length of the links between the joints [m].
         tool_length: Distance from the last joint to the weights [m].
         hole_radius: R [m].
-        lead: Lead of all cables [m].
+        lead: Lead (the straight cable between its actuator and the base disk) of all cables [m].
         link_mass: Mass of every link [kg].
         drive_stiffness: Stiffness of the drive in series with every strand [N/m].
         tension_offset: Actual minus reported tension of the force-controlled cables [N].
@@ -130,9 +129,7 @@ class Prototype:
         )
 
     def measure(self, pose: Posture, tensions: ArrayLike) -> Array:
-        """Compute stiffness (N, 3) [N/m] along x, y, z at N tensions [N].
-
-        The tensions are the reported ones of the force-controlled cables.
+        """Compute stiffness (N, 3) [N/m] along x, y, z at N reported tensions [N].
 
         Raises:
             CdsmError: No tension of the position-controlled cables balances the arm, or it leaves
@@ -144,7 +141,7 @@ class Prototype:
         """Compute force over displacement (N, 3) [N/m] with the weights of Table II.
 
         Raises:
-            CdsmError: As for :meth:`measure`, also with the weights hung.
+            CdsmError: The reasons of :meth:`measure`, also with the weights hung.
         """
         return self._measured(pose, tensions, self.weights)
 
@@ -178,10 +175,7 @@ class Prototype:
         return results
 
     def predict(self, table_alone: bool = False) -> Predicted:
-        """Predict the numbers of Section V for this prototype.
-
-        Args:
-            table_alone: Whether to predict Table II only.
+        """Predict the numbers of Section V, or those of Table II alone.
 
         Raises:
             CdsmError: An experiment has no stable equilibrium; see :meth:`measure`.
@@ -223,12 +217,9 @@ class Predicted:
     check: float | None = None
 
     def residuals(self, table: Array) -> Array:
-        """Compute the residuals of the numbers [-], (20,), or (15,) for Table II alone.
+        """Compute residuals (20,) [-], or (15,) for Table II alone; ``table`` is (5, 3) [N/m].
 
         They are ln(model/paper) for a stiffness, (model − paper)/paper for a drop or a rise.
-
-        Args:
-            table: Table II (5, 3) [N/m], as printed or with exchanged entries.
         """
         of_table = np.log(self.table / table).ravel()
         if self.check is None:
@@ -370,10 +361,7 @@ class PrototypeFit:
 
 
 def identify_prototype(step: Step) -> PrototypeFit:
-    """Find the free parameters within :data:`BOUNDS` that explain Section V best: min Σ r².
-
-    Args:
-        step: Free parameters, start of the search, and table.
+    """Find the free parameters of a step within :data:`BOUNDS` that minimise Σ r².
 
     Raises:
         InvalidInput: The start is out of bounds, or its arm has no stable equilibrium.

@@ -129,7 +129,7 @@ _Pair = tuple[Curve, Curve]
 
 
 def figure_3() -> StiffnessFigure:
-    """Compute passive and total stiffness over Young's modulus, 160 to 320 GPa, at fixed tension."""
+    """Compute passive and total stiffness over Young's modulus, 160 to 320 GPa, fixed tension."""
     moduli = np.linspace(160e9, 320e9, _POINTS)
     laws = [LinearElasticity.of_wire(modulus, presets.STRAND_DIAMETER) for modulus in moduli]
     pairs = [

@@ -61,21 +61,14 @@ class StrandFigure(Figure):
 
 
 def eq19_as_printed(tension: ArrayLike) -> Array:
-    """Compute Eq. 19 [N] as printed, with its misprint; same shape as ``tension`` [N].
-
-    The result is negative from 11 to 31 N, so it is not a valid law.
-    """
+    """Compute Eq. 19 [N] as misprinted, same shape as ``tension`` [N]: negative from 11 to 31 N."""
     F = np.asarray(tension, dtype=np.float64)
     lower, upper = EQ19_PRINTED
     return np.where(F <= JOIN, polyval(F, (*lower[:-1], -1e-3)), polyval(F, upper))
 
 
 def figure_5(gauge_length: float = GAUGE_LENGTH) -> StrandFigure:
-    """Compute force over displacement and rigidity over tension of the 1×19 strand.
-
-    Args:
-        gauge_length: Length of the tested wire [m].
-    """
+    """Compute Fig. 5 for a 1×19 strand whose tested length is ``gauge_length`` [m]."""
     law = presets.STRAND_1X19
     tension = np.concatenate([np.linspace(2.25, JOIN, 80), np.linspace(31.01, law.high, 120)])
     low, high = band(tension)

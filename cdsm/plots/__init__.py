@@ -1,7 +1,7 @@
-"""Figures: arms, maps, plans, loads, and the paper's figures; axes show mm and N/mm.
+"""Figures of arms, maps, plans, loads, and of the paper. Axes show mm and N/mm.
 
-Every function returns a :class:`matplotlib.figure.Figure` that belongs to the caller: show it in a
-notebook or save it with ``savefig``. No global plotting state is touched.
+Every function returns a new :class:`matplotlib.figure.Figure`. Show it in a notebook, or save it
+with ``savefig``. No function changes the global state of matplotlib.
 """
 
 from cdsm.plots.arm import plot_arm

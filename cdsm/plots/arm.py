@@ -1,4 +1,4 @@
-"""The arm in three dimensions."""
+"""Plot an arm in three dimensions."""
 
 from __future__ import annotations
 
@@ -19,27 +19,28 @@ if TYPE_CHECKING:
     from cdsm.tension import Tension
 
 _FLATTEST = 0.35
-"""Least range of an axis, as a part of the largest."""
+"""Smallest range of an axis, as a fraction of the largest."""
 
 
 def plot_arm(
     pose: Posture, tension: Tension | None = None, stiffness: Stiffness | None = None
 ) -> Figure:
-    """The arm in 3D: backbone, disks and cables, with equal axes in mm.
+    """Plot an arm in 3D: backbone, disks and cables, with equal axes in mm.
 
-    Of a robot from a URDF the joints are drawn, those that slide as squares, and thin lines from
-    where a cable passes to the link that guides it there.
+    For a robot from a URDF the joints are drawn: circles turn, squares slide. A thin line joins
+    each cable site to its link.
 
     Args:
-        pose: The posture to draw.
-        tension: Colours the cables, if given.
-        stiffness: Draws at the tip how far it goes under a force of any direction, if given: the
-            ellipsoid C_vv f, |f| = 1, its longest half axis a fifth of the arm's length. Not drawn
-            where the arm is unstable, which the title says.
+        pose: Posture to draw.
+        tension: Tensions that colour the cables, if given.
+        stiffness: If given and stable, the ellipsoid C_vv f, |f| = 1, is drawn at the tip. It
+            shows the displacement under a force of any direction. Its longest half axis is a
+            fifth of the arm's length. If the arm is unstable, the title says so.
 
     Raises:
-        InvalidInput: The tension or stiffness is of another arm or posture.
-        SingularStiffness: K_θ is singular, so there is no ellipsoid.
+        InvalidInput: The tension or stiffness belongs to another arm or posture, or an argument
+            has the wrong type.
+        SingularStiffness: K_θ is singular, so the ellipsoid does not exist.
     """
     expect("pose", pose, "Posture")
     if tension is not None:
@@ -66,13 +67,13 @@ def plot_arm(
 
 
 ELLIPSOID_GRID = 13, 25
-"""Points down and around an ellipsoid."""
+"""Number of points of an ellipsoid from pole to pole, and around."""
 
 
 class Ellipsoid(NamedTuple):
-    """Where forces of one size move the tip: the surface (3, 13, 25) [m], and its scale [m/N].
+    """Displacement ellipsoid of the tip: surface (3, 13, 25) [m] and ``longest`` [m/N].
 
-    The scale is the longest half axis of C_vv f, |f| = 1; it is drawn a fifth of the arm long.
+    ``longest`` is the longest half axis of C_vv f, |f| = 1. It is drawn a fifth of the arm long.
     """
 
     surface: Array
@@ -80,10 +81,10 @@ class Ellipsoid(NamedTuple):
 
 
 def ellipsoid(stiffness: Stiffness) -> Ellipsoid | None:
-    """The ellipsoid C_vv f, |f| = 1, at the tip; None where no force moves it.
+    """Compute the ellipsoid C_vv f, |f| = 1, at the tip; None if no force moves the tip.
 
     Raises:
-        SingularStiffness: K_θ is singular, so there is none.
+        SingularStiffness: K_θ is singular, so the ellipsoid does not exist.
     """
     C = stiffness.compliance[:3, :3]
     longest = float(np.linalg.norm(C, 2))
@@ -113,7 +114,7 @@ def _draw_ellipsoid(axes: Any, stiffness: Stiffness) -> None:
 
 
 def draw_arm(axes: Any, pose: Posture, tension: Tension | None) -> None:
-    """Draw it on axes of three dimensions, for a figure of its own or part of another."""
+    """Draw an arm on existing 3D axes."""
     if pose.arm.is_serpentine:
         _draw_disks(axes, pose)
     else:
@@ -130,14 +131,14 @@ def draw_arm(axes: Any, pose: Posture, tension: Tension | None) -> None:
     axes.tick_params(labelsize=7, pad=-1)
     limits = np.array([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()])
     ranges = np.ptp(limits, axis=1)
-    ranges = np.maximum(ranges, _FLATTEST * ranges.max())  # a flat arm is no sheet of paper
+    ranges = np.maximum(ranges, _FLATTEST * ranges.max())  # keep space around a flat arm
     for name, middle, size in zip(AXES, limits.mean(axis=1), ranges, strict=True):
         getattr(axes, f"set_{name}lim")(middle - size / 2.0, middle + size / 2.0)
     equal_axes(axes)
 
 
 def _draw_joints(axes: Any, pose: Posture) -> None:
-    """What turns, what slides, and which link each cable site belongs to."""
+    """Draw revolute and prismatic joints, and lines from cable sites to their links."""
     for bracket in pose.brackets:
         axes.plot(*(MM * bracket.T), color="0.5", linewidth=0.8)
     for chosen, marker in ((~pose.arm.slides, "o"), (pose.arm.slides, "s")):
@@ -162,6 +163,6 @@ def _draw_disks(axes: Any, pose: Posture) -> None:
 
 
 def tension_colors(tension: Tension) -> ScalarMappable:
-    """Colours from the smallest to the largest tension."""
+    """Build the colour scale from the smallest to the largest tension."""
     low, high = tension.values.min(), tension.values.max()
     return ScalarMappable(Normalize(low, max(high, low + 1e-9)), "viridis")

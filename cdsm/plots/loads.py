@@ -1,4 +1,4 @@
-"""What loads and tensions do to an arm: weight tests and buckling."""
+"""Plot weight tests and buckling."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ if TYPE_CHECKING:
     from cdsm.statics.weight_test import WeightTest
 
 _ROOM = 0.08
-"""Room above and below all values, as a part of their range."""
+"""Margin above and below all values, as a fraction of their range."""
 
 
 def plot_weight_test(test: WeightTest) -> Figure:
-    """Load over the displacement of the tip, measured and linear, and tensions over the load.
+    """Plot load over tip displacement, nonlinear and linear, and tensions over load.
 
     Args:
-        test: What :func:`~cdsm.weight_test` returns; of several steps, to see a curve.
+        test: Result of :func:`~cdsm.weight_test`. Several steps show a curve.
 
     Raises:
-        InvalidInput: Not a weight test.
+        InvalidInput: ``test`` is not a weight test.
     """
     expect("test", test, "WeightTest")
     figure, ((left, right),) = panels(10.0, 4.0, 2)
@@ -47,13 +47,13 @@ def plot_weight_test(test: WeightTest) -> Figure:
 
 
 def plot_critical_tension(critical: CriticalTension) -> Figure:
-    """Stability margin over the lower bound of tension, unstable ranges shaded.
+    """Plot the stability margin over the lower bound of tension; unstable ranges are shaded.
 
     Args:
-        critical: What :func:`~cdsm.critical_tension` returns.
+        critical: Result of :func:`~cdsm.critical_tension`.
 
     Raises:
-        InvalidInput: Not a critical tension.
+        InvalidInput: ``critical`` is not a critical tension.
     """
     expect("critical", critical, "CriticalTension")
     figure, ((axes,),) = panels(7.0, 4.0, 1)
@@ -62,7 +62,7 @@ def plot_critical_tension(critical: CriticalTension) -> Figure:
     axes.axhline(0.0, color="0.2", linewidth=0.8)
     low, high = critical.examined
     shown = high if math.isinf(critical.minimum) or not critical.stable else 2.0 * critical.minimum
-    # where no tension can be raised by itself one bound is all there is: a point
+    # if no tension can be raised by itself, only one bound is examined: a point
     axes.set_xlim(low, min(shown, high) if high > low else low + 1.0)
     margins = np.array([0.0, *critical.margins[critical.bounds <= shown]])
     room = _ROOM * np.ptp(margins)

@@ -1,4 +1,4 @@
-"""Workspace maps: where the tip can be, coloured by how stiff the arm is there."""
+"""Plot workspace maps: reachable tip positions, coloured by stiffness."""
 
 from __future__ import annotations
 
@@ -29,21 +29,21 @@ _UNITS: Final = {
     "N m rad-1 or N m-1": (1.0, "N m/rad or N/m"),
     "1": (1.0, "-"),
 }
-"""What the colour bar shows for the units of a Dataset."""
+"""Factor and label of the colour bar for each unit of a Dataset."""
 
 _MOST_PANELS = 9
 _WIDE = 30.0
-"""Ratio of largest to smallest value from which the colours are logarithmic."""
+"""The colours are logarithmic if the ratio of largest to smallest value exceeds this."""
 
 _FLAT = 1e-9
-"""Extent along an axis, over the whole, up to which the tips count as in one plane."""
+"""The tips are in a plane if their extent along an axis is below this fraction of the largest."""
 
 _MARKS: Final[dict[str, tuple[str, str, float]]] = {
     "unstable": ("x", COLORS[1], 18.0),
     "infeasible": (".", "0.75", 8.0),
     "outside_elasticity": ("+", "0.55", 18.0),
 }
-"""Marker, colour and size of entries without the quantity; all others are as the last."""
+"""Marker, colour and size of entries without the quantity; any other status uses the last one."""
 
 
 def plot_map(
@@ -52,24 +52,24 @@ def plot_map(
     *,
     section: tuple[str, float, float] | None = None,
 ) -> Figure:
-    """The tips of a sweep in mm, equal axes, coloured by a quantity; a panel for each case.
+    """Plot the tips of a sweep in mm, coloured by a quantity, with a panel for each case.
 
-    Tips in a plane, and sections, are shown in two dimensions, others in three. Entries without the
-    quantity are marked with their status: infeasible, …; so are unstable ones, whose stiffness
-    means nothing, unless it is the margin that is shown. Where values are infinite, the colours end
-    at the 99th percentile of the others, and the bar in an arrow.
+    Axes are equal. Tips in a plane and sections are shown in 2D, other tips in 3D. Entries without
+    the quantity are marked by their status. Unstable entries are marked too, because their
+    stiffness has no meaning, except in a map of the margin. If some values are infinite, the
+    colours end at the 99th percentile of the finite ones, and the colour bar ends in an arrow.
 
     Args:
-        dataset: What :func:`~cdsm.sweeps.run.sweep` returns, with ``tip_position`` among its
-            outputs; use ``sel`` on one with more than 9 panels.
-        quantity: One number per entry: ``"softest"``, ``"stiffest"``, ``"anisotropy"``,
-            ``"margin"``, ``"along"`` (a panel for each direction).
-        section: Axis, place and half thickness [m] of a slab: tips outside it are left out.
+        dataset: Result of :func:`~cdsm.sweeps.run.sweep` with the output ``tip_position``. Use
+            ``sel`` if it has more than 9 panels.
+        quantity: Quantity with one number per entry: ``"softest"``, ``"stiffest"``,
+            ``"anisotropy"``, ``"margin"``, ``"along"`` (a panel for each direction).
+        section: Axis, position and half thickness [m] of a slab. Only tips inside it are shown.
 
     Raises:
-        InvalidInput: Not a sweep, one without tip positions or with too many panels, a quantity
-            with more than one number per entry, or a section without any tip.
-        UnknownName: The sweep has no such quantity, or there is no such axis.
+        InvalidInput: ``dataset`` is not a sweep or makes too many panels, ``quantity`` has more
+            than one number per entry, or ``section`` is invalid or holds no tip.
+        UnknownName: The sweep has no such quantity or no tip positions, or the axis is unknown.
         MissingExtra: xarray is not installed.
     """
     check_sweep(dataset)
@@ -120,7 +120,7 @@ def plot_map(
 
 @dataclass(frozen=True)
 class _Panel:
-    """One map: values of all tips, NaN where there are none, and their status."""
+    """One map: values of all tips (NaN if missing) and their status."""
 
     title: str
     values: Array
@@ -132,7 +132,7 @@ class _Panel:
 
 @dataclass(frozen=True)
 class _Colors:
-    """The scale; infinite values are drawn at ``beyond``."""
+    """Colour scale. Infinite values are drawn with the value ``beyond``."""
 
     mappable: ScalarMappable
     beyond: float
@@ -142,7 +142,7 @@ class _Colors:
 def _panels(
     dataset: xarray.Dataset, quantity: str, poses: list[str], words: Mapping[int, str]
 ) -> Iterator[_Panel]:
-    """One for each combination of the dimensions that are not of the poses."""
+    """Build a panel for each combination of the dimensions that do not belong to the postures."""
     status = dataset["status"]
     allowed = {*map(str, status.dims), "direction"}
     dims = [str(dim) for dim in dataset[quantity].dims]
@@ -161,7 +161,7 @@ def _panels(
             f"makes {count} panels, of {listed}; choose up to {_MOST_PANELS}, as in "
             f"dataset.isel({cases[0]}=[0]).",
         )
-    # a case that the quantity does not depend on does not matter to its status either
+    # a dimension that the quantity does not have cannot change its status: take index 0
     irrelevant = {dim: 0 for dim in status.dims if dim not in dims}
     hidden = [] if quantity == "margin" else [v for v, word in words.items() if word == "unstable"]
     for place in np.ndindex(*sizes):
@@ -182,7 +182,7 @@ def _title(dataset: xarray.Dataset, dim: str, place: int) -> str:
 
 
 def _slab(points: Array, section: tuple[str, float, float]) -> tuple[NDArray[np.bool_], str]:
-    """Which tips are inside a section, and the section in words."""
+    """Find the tips inside a section; return their mask and a text about the section."""
     if not isinstance(section, (tuple, list)) or len(section) != 3:
         raise InvalidInput(
             "section", f"{section!r} given; an axis, its place and the half thickness [m] needed."
@@ -191,11 +191,11 @@ def _slab(points: Array, section: tuple[str, float, float]) -> tuple[NDArray[np.
     place, half = scalar("section", section[1]), scalar("section", section[2])
     inside = abs(points[:, axis] - MM * place) <= MM * half
     words = f"{section[0]} = {MM * place:g} ± {MM * half:g} mm"
-    return inside, words.replace(" ", "\xa0")  # not to be broken across lines
+    return inside, words.replace(" ", "\xa0")  # no line break inside
 
 
 def _plane(points: Array, section: tuple[str, float, float] | None) -> tuple[int, int] | None:
-    """The two axes to show: of the section, or of the plane in which all tips are."""
+    """Find the two axes of the section, or of the plane of all tips; None if there is no plane."""
     if section is not None:
         normal = AXES.index(section[0])
     else:
@@ -208,7 +208,7 @@ def _plane(points: Array, section: tuple[str, float, float] | None) -> tuple[int
 
 
 def _colors(values: Array) -> _Colors:
-    """Colours of finite values; up to the 99th percentile of them where some are infinite."""
+    """Build the scale of the finite values, up to their 99th percentile if some are infinite."""
     finite = values[np.isfinite(values)]
     infinite = bool(np.isposinf(values).any())
     if not finite.size:
@@ -218,7 +218,7 @@ def _colors(values: Array) -> _Colors:
     scale = Normalize
     if low > 0.0 and high > _WIDE * low:
         scale = LogNorm
-    elif low < 0.0 < high:  # a margin: its sign matters most
+    elif low < 0.0 < high:  # a margin: the colour shows its sign first
         low, high = -max(-low, high), max(-low, high)
     name = "coolwarm_r" if low < 0.0 < high else "viridis"
     high = max(high, low + 1e-12 * abs(low))
@@ -263,7 +263,7 @@ def _draw(
 
 
 def _legend(figure: Figure, panels: list[_Panel], words: Mapping[int, str]) -> None:
-    """The markers, and how many entries of all they stand for."""
+    """Draw the legend: each marker and its percentage of all entries."""
     status = np.concatenate([panel.status[np.isnan(panel.values)] for panel in panels])
     total = sum(panel.status.size for panel in panels)
     handles = [Line2D([], [], marker="s", color="0.1", linestyle="", label="base")]

@@ -1,4 +1,4 @@
-"""Fits beside what was measured: a tensile test, and an identification."""
+"""Plot fits beside their measurements: tensile tests and identifications."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ if TYPE_CHECKING:
     from cdsm.wires.tensile.fit import TensileFit
 
 _MOST_LABELS = 30
-"""More measurements than these are numbered, not named."""
+"""Above this number of measurements the axis shows numbers, not names."""
 
 
 def plot_tensile_fit(fit: TensileFit) -> Figure:
-    """Force over displacement with the fit, and rigidity with its band, if any, and stages."""
+    """Plot force over displacement with the fit, and rigidity with its stages and any band."""
     figure, ((left, right),) = panels(10.0, 4.2, 2)
     tension, band = fit.tensions, fit.band
     stretch = fit.start + fit.elasticity.strain(tension) * fit.test.gauge_length
@@ -60,7 +60,7 @@ def plot_tensile_fit(fit: TensileFit) -> Figure:
 
 
 def plot_identification(fit: Identification, labels: Sequence[str], title: str) -> Figure:
-    """Predicted over measured stiffness, and every residual in standard deviations."""
+    """Plot predicted over measured stiffness, and each residual in standard deviations."""
     figure, ((left, right),) = panels(11.0, 4.5, 2)
     measured, predicted = N_PER_MM * fit.measured, N_PER_MM * fit.predicted
     sigma = [N_PER_MM * measurement.std for measurement in fit.measurements]

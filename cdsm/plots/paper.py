@@ -1,4 +1,4 @@
-"""The paper's figures, recomputed."""
+"""Plot the recomputed figures of the paper."""
 
 from __future__ import annotations
 
@@ -31,17 +31,17 @@ _READINGS: Final = {"pseudoinverse": "paper's reading", "along": "hung weight"}
 
 
 def plot_paper(result: paper.Figure) -> Figure:
-    """One recomputed figure of the paper.
+    """Plot one recomputed figure of the paper.
 
-    Of a stiffness its own reading above, that of a hung weight below, each with the stretched
-    length in EA/l_0, as the paper has it, and with the original one; the cable tension is the mean,
-    and the bars are the range over all cables, as in the paper.
+    A stiffness has two readings: the paper's K_R above, a hung weight below. Each is shown with
+    the stretched length in EA/l_0, as in the paper, and with the original length. The cable
+    tension is the mean, and bars show the range over all cables, as in the paper.
 
     Args:
-        result: What a function in :data:`cdsm.paper.FIGURES` returns.
+        result: Result of a function in :data:`cdsm.paper.FIGURES`.
 
     Raises:
-        InvalidInput: Not one of these.
+        InvalidInput: ``result`` is not a figure of :mod:`cdsm.paper`.
     """
     draw = _DRAWN.get(getattr(result, "name", ""))
     if draw is None:
@@ -50,7 +50,7 @@ def plot_paper(result: paper.Figure) -> Figure:
 
 
 def _plot_strand(result: paper.StrandFigure) -> Figure:
-    """(a) force over displacement, (b) rigidity over tension."""
+    """Plot (a) force over displacement, (b) rigidity over tension."""
     figure, ((left, right),) = panels(10.0, 4.0, 2)
     left.plot(MM * result.displacement, result.tension, color=COLORS[0])
     left.set(
@@ -69,7 +69,7 @@ def _plot_strand(result: paper.StrandFigure) -> Figure:
     )
     right.plot(result.tension, KN * result.tangent, color=COLORS[0], label="tangent, repaired")
     right.plot(result.tension, KN * result.secant, "--", color=COLORS[2], label="secant (Eq. 18)")
-    lower = result.tension <= result.join  # above, as printed and repaired share their digits
+    lower = result.tension <= result.join  # above, the printed and the repaired law share digits
     right.plot(
         result.tension[lower],
         KN * result.printed[lower],
@@ -85,7 +85,7 @@ def _plot_strand(result: paper.StrandFigure) -> Figure:
 
 
 def _plot_directions(result: paper.StiffnessFigure) -> Figure:
-    """A row for each reading, a column for each direction, a curve for each case."""
+    """Plot a row for each reading, a column for each direction, a curve for each case."""
     over_tension = result.swept == "tension"
     curves = result.curves + (result.original if over_tension else ())
     figure, grid = panels(11.0, 6.0, 3, 2, sharex=True)
@@ -108,7 +108,7 @@ def _plot_directions(result: paper.StiffnessFigure) -> Figure:
 
 
 def _plot_changes(result: paper.StiffnessFigure) -> Figure:
-    """A column for each direction: the active part, and the change of the stiffness from start."""
+    """Plot a column for each direction: active part, and change of stiffness from its start."""
     figure, grid = panels(11.0, 9.0, 3, 3, sharex=True, sharey="row")
     first, stated = result.curves[0], result.claims[0].paper or ()
     for i, color in enumerate(COLORS):
@@ -142,7 +142,7 @@ def _plot_changes(result: paper.StiffnessFigure) -> Figure:
 
 
 def _plot_lead(result: paper.LeadFigure) -> Figure:
-    """A panel for each reading, a colour for each direction."""
+    """Plot a panel for each reading, a colour for each direction."""
     figure, (pair,) = panels(10.0, 4.6, 2, sharey=True)
     for axes, name in zip(pair, _READINGS, strict=True):
         for i, (axis, color) in enumerate(zip(AXES, COLORS, strict=True)):
@@ -166,7 +166,7 @@ def _plot_lead(result: paper.LeadFigure) -> Figure:
 
 
 def _plot_postures(result: paper.StiffnessFigure) -> Figure:
-    """A column for each posture: its picture, and a curve for each direction."""
+    """Plot a column for each posture: a picture of the arm, and a curve for each direction."""
     figure = Figure(figsize=(11.0, 9.0), layout="constrained")
     grid = figure.add_gridspec(3, 3, height_ratios=(1.15, 1.0, 1.0))
     bottom = []
@@ -193,7 +193,7 @@ def _plot_postures(result: paper.StiffnessFigure) -> Figure:
 
 
 def _plot_experiment(result: paper.ExperimentFigure) -> Figure:
-    """A panel for each trace: computed as a line, the paper's values as dots."""
+    """Plot a panel for each trace: a line of computed values, dots for the paper's values."""
     scale = 1.0 if result.relative else N_PER_MM
     unit = "stiffness in y over the first [-]" if result.relative else "stiffness [N/mm]"
     tension = result.swept == "tension"
@@ -216,7 +216,7 @@ def _plot_experiment(result: paper.ExperimentFigure) -> Figure:
 
 
 def _plot_prototype(result: paper.PrototypeFigure) -> Figure:
-    """Residual number by number, for each way of reading Table II."""
+    """Plot the residual of each number of Section V, for each reading of Table II."""
     names = result.fits[0].step.numbers
     figure, ((axes,),) = panels(8.5, 7.0, 1)
     places = np.arange(len(names))
@@ -248,7 +248,7 @@ def _draw_curve(
     style: str,
     label: str | None = None,
 ) -> None:
-    """A stiffness [N/m] over what is swept; over tension with bars, the range over all cables."""
+    """Draw a stiffness [N/m] over the swept quantity; bars show the range of tension."""
     x, y = _swept(result, curve), N_PER_MM * values
     axes.plot(x, y, style, color=color, label=label or curve.label)
     if result.swept == "tension":
@@ -291,4 +291,4 @@ _DRAWN: Final[dict[str, Callable[[Any], Figure]]] = {
     "lead": _plot_lead,
     "prototype": _plot_prototype,
 }
-"""What draws each figure of :data:`cdsm.paper.FIGURES`, by name."""
+"""Function that draws each figure of :data:`cdsm.paper.FIGURES`, by name."""

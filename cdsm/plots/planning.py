@@ -1,4 +1,4 @@
-"""What the cables can make of an arm's stiffness, and what is planned with them."""
+"""Plot the attainable stiffness of an arm, and plans of stiffness."""
 
 from __future__ import annotations
 
@@ -19,24 +19,24 @@ if TYPE_CHECKING:
     from cdsm.planning import PathPlan, StiffnessPlan, StiffnessRange
 
 _SAME = 1e-9
-"""Entries of unit directions this near to each other are of one."""
+"""Largest difference between the entries of two equal unit directions."""
 
 _JUMP = 3.0
-"""A target jumps where it changes by more than this many times what it goes on before and after."""
+"""A change of the target is a jump if it exceeds its neighbours of equal sign by this factor."""
 
 _NAMED = 20
-"""More cables than these cannot be told apart by their colours, and are not named."""
+"""Above this number of cables the colours are not distinct, so cables are not named."""
 
 
 def plot_stiffness_plan(plan: StiffnessPlan, attainable: StiffnessRange) -> Figure:
-    """Tensions of every cable where the arm is softest, as planned, and where it is stiffest.
+    """Plot the tensions of all cables: for the softest, the planned and the stiffest arm.
 
     Args:
-        plan: What :func:`~cdsm.planning.plan.plan_stiffness` returns for one direction.
-        attainable: The range along that direction at that posture.
+        plan: Result of :func:`~cdsm.planning.plan.plan_stiffness` for one direction.
+        attainable: Range of stiffness along the direction of the plan, at its posture.
 
     Raises:
-        InvalidInput: Not a plan and a range, or not of one posture and direction.
+        InvalidInput: The arguments are not a plan and a range, or differ in posture or direction.
     """
     expect("plan", plan, "StiffnessPlan")
     expect("attainable", attainable, "StiffnessRange")
@@ -62,15 +62,16 @@ def plot_stiffness_plan(plan: StiffnessPlan, attainable: StiffnessRange) -> Figu
 
 
 def plot_path_plan(plan: PathPlan) -> Figure:
-    """Stiffness wanted and planned, and the tensions, over the samples; infeasible ones shaded.
+    """Plot wanted and planned stiffness, and tensions, over the samples of a path.
 
-    Where the target jumps it is drawn as a step. Up to 20 cables have a colour each, and a legend.
+    Infeasible samples are shaded. A jump of the target is drawn as a step. Up to 20 cables have
+    their own colours and a legend.
 
     Args:
-        plan: What :func:`~cdsm.planning.path.plan_path` returns for one direction or several.
+        plan: Result of :func:`~cdsm.planning.path.plan_path` for one direction or several.
 
     Raises:
-        InvalidInput: Not a plan of a path, or one of ``cartesian``.
+        InvalidInput: ``plan`` is not a plan of a path, or is a plan of ``cartesian``.
     """
     expect("plan", plan, "PathPlan")
     if plan.direction is None:
@@ -78,7 +79,7 @@ def plot_path_plan(plan: PathPlan) -> Figure:
     figure, ((above,), (below,)) = panels(8.0, 5.5, 1, rows=2, sharex=True)
     size = len(plan.target)
     wanted = N_PER_MM * plan.target.reshape(size, -1)
-    # a line over a gap would be a claim about it
+    # NaN leaves a gap in the line at samples that are not planned
     achieved, tensions = (
         np.full(wanted.shape, np.nan),
         np.full((size, plan.tensions.shape[1]), np.nan),
@@ -112,10 +113,10 @@ def plot_path_plan(plan: PathPlan) -> Figure:
 
 
 def _stepped(values: Array) -> tuple[Array, Array]:
-    """Numbers (S,) of samples as a line, which is upright half-way between two where they jump."""
+    """Build a line through the samples (S,); a jump becomes a step half-way between two samples."""
     changes = np.diff(values)
     around = np.pad(changes, 1)
-    # there and back is two jumps: only what goes the same way makes a ramp
+    # only neighbouring changes of equal sign make a ramp; up and back down is two jumps
     ramp = np.maximum(around[:-2] * np.sign(changes), around[2:] * np.sign(changes))
     last = np.flatnonzero(abs(changes) > _JUMP * np.maximum(ramp, 0.0))
     places = np.insert(np.arange(values.size, dtype=float), np.repeat(last + 1, 2), 0.0)
@@ -128,5 +129,5 @@ def _stepped(values: Array) -> tuple[Array, Array]:
 
 
 def _named(u: Array) -> str:
-    """A direction in words, what is rounding in it as zero."""
+    """Format a direction; rounding errors become zero."""
     return coordinates(np.round(u, 9), "z.3g")

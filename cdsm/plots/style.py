@@ -1,4 +1,4 @@
-"""What all figures share: colours, units, scales of axes, and the check of what is drawn."""
+"""Shared by all figures: colours, units, scales of axes, and a check of the input type."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ MM: Final = 1e3
 KN: Final = 1e-3
 N_PER_MM: Final = 1e-3
 TICKS: Final = 5
-"""Most intervals between the ticks of an axis of a map or of a picture in space."""
+"""Largest number of tick intervals on an axis of a map or a 3D picture."""
 
 
 def expect(name: str, value: object, kind: str) -> None:
-    """Raise :class:`InvalidInput` unless the value is a result of the class of this name.
+    """Raise :class:`InvalidInput` unless the value is an instance of the class named ``kind``.
 
-    The class is named, not imported: results import this package for their ``plot`` methods.
+    The class is not imported, because results import this package for their ``plot`` methods.
     """
     if kind not in (base.__name__ for base in type(value).__mro__):
         raise InvalidInput(name, f"{value!r} given; a {kind} is needed.")
@@ -32,7 +32,7 @@ def expect(name: str, value: object, kind: str) -> None:
 def panels(
     width: float, height: float, columns: int, rows: int = 1, **options: Any
 ) -> tuple[Figure, Any]:
-    """A figure and its panels (rows, columns), each with a grid; sizes in inches."""
+    """Build a figure and its panels (rows, columns), each with grid lines; sizes in inches."""
     figure = Figure(figsize=(width, height), layout="constrained")
     axes = figure.subplots(rows, columns, squeeze=False, **options)
     for panel in axes.flat:
@@ -41,15 +41,15 @@ def panels(
 
 
 def legend_below(figure: Figure, axes: Any, columns: int, **options: Any) -> None:
-    """One legend under all panels, of the lines of one of them."""
+    """Draw one legend below all panels, from the lines of one panel."""
     handles, labels = axes.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=columns, **options)
 
 
 def equal_axes(axes: Any) -> None:
-    """Give axes of three dimensions one scale, with room for their labels."""
+    """Give 3D axes equal scales, with space for their labels."""
     ranges = np.ptp([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()], axis=1)
     axes.set_box_aspect(ranges, zoom=0.75)
     for letter, part in zip(AXES, ranges / ranges.max(), strict=True):
-        ticks = MaxNLocator(max(1, round(TICKS * part)))  # a short axis has room for few
+        ticks = MaxNLocator(max(1, round(TICKS * part)))  # fewer ticks on a short axis
         getattr(axes, f"{letter}axis").set_major_locator(ticks)

@@ -1,7 +1,7 @@
-"""The live view: an arm in the browser, with sliders. The page shows mm, degrees and N/mm.
+"""Live view of an arm in the browser, with sliders. The page shows mm, degrees and N/mm.
 
-:func:`show` computes what a page shows at a :class:`Setting` of the sliders, without a browser;
-:func:`serve` puts it on a page and keeps it up to date.
+:func:`show` computes the results for a :class:`Setting` of the sliders, without a browser.
+:func:`serve` serves a page with these results and updates it.
 """
 
 from cdsm.view.server import View, serve

@@ -1,22 +1,22 @@
-"""Who may connect to the live view, and what they may send: checked before viser sees it.
+"""Check every client and message of the live view before viser receives it.
 
 viser serves every client that connects, and lets it change any property of any control. The guard
-keeps out:
+refuses:
 
 - **A web page of another site**, open in a browser on this machine. It can reach every port of
-  this machine, and would read the scene over a websocket. Its ``Origin`` gives it away.
-- **The same page under a name of its own** that it points at this machine (DNS rebinding). Its
-  ``Host`` gives it away.
-- **Our own page led to another server**, by ``?websocket=`` in a link. That server could run its
-  scripts in our page. The page is served with the instruction to connect to its own server only.
-- **Other messages than the page sends.** A client may tell where its camera is, move a slider
-  within its range and press a button. All else is dropped: requests to share the view on a public
-  server, and changes of any property that is not a value.
-- **Other machines**, where the address is not one of this machine alone, unless they know a token
-  that is part of the URL.
+  this machine and could read the scene over a websocket. Its ``Origin`` header shows the site.
+- **DNS rebinding**: such a page uses a host name that it directs to this machine. The ``Host``
+  header shows that name.
+- **A connection of our page to another server**, by ``?websocket=`` in a link. That server could
+  run scripts in our page. A header of the page allows connections to its own server only.
+- **Messages that the page does not send.** A client may report its camera, move a slider within
+  its range, and press a button. Requests to share the view on a public server are dropped, and
+  so are changes of any property that is not a value.
+- **Other machines**, unless they know the token in the URL. With a loopback address they cannot
+  connect at all.
 
-Not kept out: any program that runs on this machine, of any user, while only this machine can
-connect; and whoever can read the network traffic, which is not encrypted and shows the token.
+The guard does not stop programs on this machine (of any user) while only this machine can connect.
+Nor does it stop readers of the network traffic, which is not encrypted and shows the token.
 """
 
 from __future__ import annotations
@@ -46,22 +46,21 @@ from cdsm.errors import CdsmError
 _LOG = logging.getLogger(__name__)
 
 _LONGEST = 2**16
-"""Bytes in a message; those of the page have some hundred."""
+"""Largest size of a message in bytes. Messages of the page have a few hundred."""
 
 _PAUSE = 1.0
-"""Seconds until a page is told that its value is out of range. Somebody may still be typing: the
-first digits of a number can be below the range."""
+"""Seconds before an out-of-range value is corrected; the user may still be typing digits."""
 
 _STARTING: Final = threading.Lock()
 
 _Reply = Callable[[ServerConnection, Request], Response | None]
 
 Control = viser.GuiSliderHandle[float] | viser.GuiButtonHandle
-"""What a client may use."""
+"""Controls that a client may use."""
 
 
 class _Camera(msgspec.Struct, tag_field="type", tag="ViewerCameraMessage"):
-    """Where a client looks from; viser keeps it for each client alone."""
+    """Camera of a client; viser keeps it separately for each client."""
 
 
 class _Value(msgspec.Struct, forbid_unknown_fields=True):
@@ -69,28 +68,28 @@ class _Value(msgspec.Struct, forbid_unknown_fields=True):
 
 
 class _Change(msgspec.Struct, tag_field="type", tag="GuiUpdateMessage", forbid_unknown_fields=True):
-    """The new value of a control; of a button, that it is pressed."""
+    """New value of a control; for a button True, if it is pressed."""
 
     uuid: str
     updates: _Value
 
 
 class _Address(str):
-    """An address that is told from an equal one: the server of this very guard listens at it."""
+    """Listening address of one guard, told by identity from equal strings of other servers."""
 
     __slots__ = ()
 
 
 @final
 class Guard:
-    """Stands between the clients of one live view and viser.
+    """Filter between viser and the clients of one live view.
 
     Args:
         host: Address to listen at.
 
     Attributes:
-        token: First part of every path, where other machines can connect; otherwise empty.
-        refused: Requests and messages refused so far.
+        token: First part of every path if other machines can connect, else empty.
+        refused: Number of refused requests and messages.
     """
 
     def __init__(self, host: str) -> None:
@@ -100,16 +99,16 @@ class Guard:
         self._controls: dict[str, Control] = {}
 
     def start(self, port: int, label: str) -> viser.ViserServer:
-        """Start a viser server with this guard before it.
+        """Start a viser server that is filtered by this guard.
 
-        viser leaves no way to say how its websocket server checks requests and receives messages.
-        While it starts, that server is therefore made here. If the port is taken, viser takes the
-        next one that is free.
+        viser has no option to filter requests and messages of its websocket server. Therefore this
+        function replaces the constructor of that server while viser starts. If the port is taken,
+        viser uses the next free port.
         """
         original, made = websocket_server.serve, threading.Event()
 
         def serve(*args: Any, **options: Any) -> Any:
-            if len(args) < 2 or args[1] is not self._address:  # of somebody else in this process
+            if len(args) < 2 or args[1] is not self._address:  # another server in this process
                 return original(*args, **options)
             made.set()
             options |= {
@@ -141,13 +140,13 @@ class Guard:
         return server
 
     def admit(self, control: Control) -> None:
-        """Let clients move this slider, or press this button."""
+        """Allow clients to move this slider or press this button."""
         self._controls[control._impl.uuid] = control
 
     def _answer(
         self, reply: _Reply, connection: ServerConnection, request: Request
     ) -> Response | None:
-        """Refuse a request for a page or a websocket, or let viser reply to it."""
+        """Refuse a request for a page or a websocket, or let viser answer it."""
         hosts = request.headers.get_all("Host")
         _, first, rest = [*request.path.partition("?")[0].split("/", 2), "", ""][:3]
         fault = self._fault(hosts, request.headers.get_all("Origin"), first)
@@ -164,11 +163,11 @@ class Guard:
         return response
 
     def _fault(self, hosts: list[str], origins: list[str], first: str) -> str:
-        """What is wrong with a request: its hosts and origins, and the first part of its path."""
+        """Return the fault of a request (hosts, origins, first part of its path), empty if none."""
         if len(hosts) != 1:
             return f"a request for {len(hosts)} hosts"
         host = hosts[0]
-        # with a token no name can be wrong: another page that has a name for us has no token
+        # with a token any host name is allowed: a page that rebinds DNS does not know the token
         if not self.token and not _is_loopback(re.sub(r":\d+$", "", host).strip("[]")):
             return f"a request for another host, {host[:80]!a}"
         if any(origin not in (f"http://{host}", f"https://{host}") for origin in origins):
@@ -179,14 +178,11 @@ class Guard:
         return ""
 
     def _kept(self, raw: bytes) -> bytes | None:
-        """A message of a client as viser may have it, None if it may not.
-
-        It is packed anew: of two fields of one name, viser may read another than is read here.
-        """
+        """Return a message of a client, packed again for viser, or None if it is refused."""
         try:
             message = msgspec.msgpack.decode(raw)
             known = msgspec.convert(message, _Camera | _Change)
-        except Exception as error:  # whatever the bytes of a stranger bring about
+        except Exception as error:  # unknown bytes can cause any error
             self._refuse(f"a message, {str(error)[:80]!a}")
             return None
         if isinstance(known, _Change):
@@ -195,31 +191,32 @@ class Guard:
                 self._refuse(f"a change, {known!a:.80}")
                 return None
             message["updates"]["value"] = value
+        # packed again: of two fields with one name, viser may read the one not checked here
         return msgspec.msgpack.encode(message)
 
     def _value(self, change: _Change) -> bool | float | None:
-        """The value that a control may take, None if it may take none of the kind."""
+        """Return the value that a control may take, or None if control or value is not allowed."""
         control, value = self._controls.get(change.uuid), change.updates.value
         if isinstance(control, viser.GuiButtonHandle):
             return value if value is True else None
         if control is None or isinstance(value, bool) or not math.isfinite(value):
             return None
         within = min(max(value, control.min), control.max)
-        if within != value:  # viser tells the other clients, but not the one that has sent it
+        if within != value:  # viser updates the other clients, but not the sender
             asyncio.get_running_loop().call_later(
                 _PAUSE, lambda: control._queue_update("value", control.value)
             )
         return within
 
     def _refuse(self, what: str) -> None:
-        """Count it, and log the count each time that it has doubled."""
+        """Count the refusals, and log the count each time it has doubled."""
         self.refused += 1
         if self.refused & (self.refused - 1) == 0:
             _LOG.warning("Refused from clients so far: %d; the last: %s.", self.refused, what)
 
 
 class _Connection(ServerConnection):
-    """A connection that receives what its guard keeps."""
+    """A connection that receives only messages that its guard allows."""
 
     def __init__(self, guard: Guard, *parts: Any, **limits: Any) -> None:
         super().__init__(*parts, **limits)
@@ -232,7 +229,7 @@ class _Connection(ServerConnection):
 
 
 def _is_loopback(name: str) -> bool:
-    """Whether only this machine is reached under a name, whoever resolves it."""
+    """Return whether a name always means this machine only, whoever resolves the name."""
     try:
         return ipaddress.ip_address(name).is_loopback
     except ValueError:

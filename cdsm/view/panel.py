@@ -1,4 +1,4 @@
-"""What the panel of the page says, as HTML: units that people use, a name on every number."""
+"""Write the panel of the page as HTML, in mm and N/mm, with a name on every number."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ _BADGES: Final = {
     Condition.SINGULAR: _RED,
 }
 _BOX: Final = "padding:0 0.8em;margin-bottom:0.6em;font-size:0.85em;height:23em;overflow-y:auto"
-"""The height is fixed: no slider may move away under the mouse that drags it."""
+"""Style of the panel. Its height is fixed, so that sliders do not move while they are dragged."""
 
 _NUMBER: Final = "text-align:right;white-space:nowrap;font-variant-numeric:tabular-nums"
 
 _STOPS = 9
-"""Colours in the bar of tensions."""
+"""Number of colours in the bar of tensions."""
 
 
 def page_text(shown: Shown) -> str:
-    """The panel of one setting. Every number is in an element with ``data-cdsm="its name"``."""
+    """Write the panel of one setting. Each number is in an element with ``data-cdsm="name"``."""
     parts = [_badge(shown.condition)]
     if shown.problem:
         parts.append(element("p", _named("problem", shown.problem)))

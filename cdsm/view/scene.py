@@ -1,4 +1,4 @@
-"""The arm in three dimensions: nodes made once in a viser server, then moved and recoloured."""
+"""Draw the arm in 3D: scene nodes are made once in viser, then moved and recoloured."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ _ELLIPSOID: Final = (200, 85, 61)
 _FORCE: Final = (59, 111, 182)
 _NOTHING: Final = np.zeros((1, 2, 3))
 _ABOVE = 0.1
-"""Height of the label over the tip, as a part of the arm's length."""
+"""Height of the label above the tip, as a fraction of the arm's length."""
 
 
 class Scene:
     """An arm in a viser server.
 
-    Links are drawn by Pinocchio's visualiser from the shapes in the URDF; where it has none, or
-    one of its meshes cannot be read, straight sticks join the joints instead. The arrow of
-    ``largest_force`` [N] is half as long as the arm.
+    Pinocchio's visualiser draws the links from the shapes in the URDF. If the URDF has no shapes,
+    or a mesh cannot be read, straight sticks join the joints. The arrow of ``largest_force`` [N]
+    is half as long as the arm.
     """
 
     def __init__(self, server: viser.ViserServer, arm: Manipulator, largest_force: float) -> None:
@@ -48,7 +48,7 @@ class Scene:
         except UrdfError as error:
             _LOG.warning("%s Sticks are drawn instead.", error)
             self._place = None
-        # light of a picture and shadows take seconds where no GPU helps
+        # an environment map and shadows take seconds without a GPU
         scene.configure_environment_map(hdri=None)
         scene.configure_default_lights(cast_shadow=False)
         scene.add_light_ambient("/light", intensity=2.0)
@@ -58,15 +58,15 @@ class Scene:
         self._sticks = scene.add_line_segments(
             "/sticks", _NOTHING, _STICK, thickness=0.012 * length, visible=False
         )
-        # a node for each: where the points of one have their own colours, viser takes those for
-        # linear light, and they would not be the colours of the bar
+        # one node per cable: viser treats colours of single points as linear light, so they
+        # would differ from the colours of the bar
         self._cables = [
             scene.add_line_segments(
                 f"/cables/{i}", _NOTHING, GREY, thickness=2.5, thickness_units="screen"
             )
             for i in range(len(arm.cables))
         ]
-        # what is hidden where there is no posture
+        # hidden if there is no posture
         self._parts = (body if self._place is not None else self._sticks, cables)
         self._ellipsoid = scene.add_mesh_simple(
             "/ellipsoid",
@@ -74,7 +74,7 @@ class Scene:
             _faces(*ELLIPSOID_GRID),
             color=_ELLIPSOID,
             opacity=0.65,
-            side="front",  # both sides of one that is flat would flicker through each other
+            side="front",  # the two sides of a flat ellipsoid would flicker
             cast_shadow=False,
             receive_shadow=False,
             visible=False,
@@ -92,12 +92,12 @@ class Scene:
         self._look(arm)
 
     def update(self, shown: Shown) -> None:
-        """Show this, and nothing of what was shown before."""
+        """Show these results, and hide everything that they do not have."""
         pose = shown.posture
         for part in self._parts:
             part.visible = pose is not None
         self._ellipsoid.visible = shown.ellipsoid is not None
-        # a force that no force can be has no arrow
+        # an invalid force has no arrow
         force = shown.setting.force
         pushed = pose is not None and shown.condition is not Condition.INVALID
         self._force.visible = pushed and bool(force.any())
@@ -123,11 +123,11 @@ class Scene:
         self._label.position = tip + self._up
 
     def _look(self, arm: Manipulator) -> None:
-        """Where a browser looks from first: at the side of the arm, a little from above."""
+        """Set the first camera: at the side of the arm, a little above it."""
         try:
             straight = arm.at(np.clip(np.zeros(arm.nv), arm.lower, arm.upper))
             points = np.concatenate([*straight.bones, *straight.cable_paths])
-        except CableError:  # a cable whose sites meet just there
+        except CableError:  # two sites of a cable coincide at this posture
             points = np.array([[0.0, 0.0, 0.0], [arm.length, 0.0, 0.0]])
         middle = (points.min(axis=0) + points.max(axis=0)) / 2.0
         size = max(float(np.ptp(points, axis=0).max()), arm.length)
@@ -139,7 +139,7 @@ class Scene:
 
 
 def _faces(rows: int, columns: int) -> NDArray[np.uint32]:
-    """Two triangles for each cell of a grid of points, whose numbers run along its rows."""
+    """Build two triangles for each cell of a grid of points, numbered row by row."""
     faces = []
     for i, j in product(range(rows - 1), range(columns - 1)):
         a, b = columns * i + j, columns * (i + 1) + j

@@ -1,4 +1,4 @@
-"""The server of the live view: one page for as many browsers as come."""
+"""Serve the live view: one page for any number of browsers."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 _LOG = logging.getLogger(__name__)
 
 _PANEL = 390
-"""Width of the panel in pixels: its longest row takes one line."""
+"""Width of the panel in pixels, so that its longest row fits on one line."""
 
 
 def serve(
@@ -47,30 +47,30 @@ def serve(
     largest_tension: float = 200.0,
     largest_force: float = 20.0,
 ) -> View:
-    """Serve a live view of an arm: sliders, the arm in three dimensions, its stiffness.
+    """Serve a live view of an arm: sliders, a 3D picture, and the stiffness.
 
-    It runs in threads of its own until it is closed. All browsers see and move the same sliders.
-    Pages of other sites cannot connect. Other machines can only where ``host`` lets them, and only
-    with the token in the URL; a warning is logged then.
+    The view runs in background threads until it is closed. All browsers share one set of sliders.
+    Pages of other sites cannot connect. Other machines can connect only if ``host`` allows it, and
+    only with the token in the URL. In this case a warning is logged.
 
     Args:
-        arm: The arm; nothing is written into it.
-        host: Address to listen at; the default is this machine alone.
-        port: Port to listen at; 0 for any free one.
-        q: Joint angles (nv,) [rad] to begin with; zero, or the limit next to it, if not given.
-        minimum: Lower bound of all tensions [N] to begin with.
+        arm: The arm; it is not changed.
+        host: Address to listen at; the default allows this machine only.
+        port: Port to listen at; 0 for any free port.
+        q: First joint angles (nv,) [rad]; by default zero, or the nearest joint limit.
+        minimum: First lower bound of all tensions [N].
         maximum: Upper bound of all tensions [N].
-        force: At the tip, in base axes (3,) [N], to begin with.
-        solver: Of :func:`~cdsm.distribute_tension`.
+        force: First force at the tip, in base axes (3,) [N].
+        solver: Solver of :func:`~cdsm.distribute_tension`.
         largest_tension: Right end of the slider of the lower bound [N].
-        largest_force: Ends of the sliders of the force [N]; more if ``force`` is.
+        largest_force: Ends of the sliders of the force [N]; larger if ``force`` is larger.
 
     Raises:
-        MissingExtra: viser is not installed: the extra ``[view]``.
-        InvalidInput: A value of the wrong type or shape, or the port cannot be had.
+        MissingExtra: viser is not installed (extra ``[view]``).
+        InvalidInput: A value has the wrong type or shape, or the port is not available.
         CdsmError: The installed viser cannot be guarded.
         JointLimitError: An angle is beyond its limit.
-        UnknownName: No such solver is installed.
+        UnknownName: The solver is not installed.
     """
     need("view", "viser")
     start = Setting(
@@ -87,10 +87,10 @@ def serve(
 
 
 class Worker:
-    """One thread that runs a job on request; requests during a run cause one more run, not many.
+    """A thread that runs a job on request. All requests during a run cause one further run.
 
-    Sliders send more values than can be computed, from many threads. The job reads the newest
-    state itself when it starts.
+    Sliders send values from many threads, faster than results can be computed. The job itself
+    reads the newest state when it starts.
     """
 
     def __init__(self, job: Callable[[], None]) -> None:
@@ -101,35 +101,31 @@ class Worker:
         self._last: list[futures.Future[None]] = []
 
     def request(self) -> None:
-        """Have the job run, soon; from any thread."""
+        """Request a run of the job. Any thread may call this."""
         with self._lock:
             if not self._queued and not self._closed:
                 self._queued = True
                 self._last = [self._thread.submit(self._run)]
 
     def wait(self) -> None:
-        """Wait until all requests so far are served."""
+        """Wait until all requests made before are done."""
         futures.wait(self._last)
 
     def close(self) -> None:
-        """Let the running job end, and run no other."""
+        """Wait for the running job, and refuse further ones."""
         with self._lock:
             self._closed = True
         self._thread.shutdown(cancel_futures=True)
 
     def _run(self) -> None:
         with self._lock:
-            self._queued = False  # what changes from here on needs another run
+            self._queued = False  # a change after this line needs another run
         self._job()
 
 
 @final
 class View:
-    """A live view that is being served, by :func:`serve`; close it, or use it in ``with``.
-
-    Attributes:
-        arm: The arm.
-    """
+    """Running live view of ``arm``, made by :func:`serve`. Close it, or use it in ``with``."""
 
     def __init__(
         self,
@@ -156,23 +152,23 @@ class View:
 
     @property
     def url(self) -> str:
-        """Address of the page; with a token, where other machines can connect."""
+        """Address of the page; it contains a token if other machines can connect."""
         host, token = self._server.get_host(), self._guard.token
         place = f"{f'[{host}]' if ':' in host else host}:{self._server.get_port()}"
         return f"http://{place}/{token}/" if token else f"http://{place}"
 
     @property
     def shown(self) -> Shown:
-        """What the page shows, once all that was moved so far is computed."""
+        """Content of the page, after all slider moves so far are computed."""
         self._worker.wait()
         return self._shown
 
     def wait(self) -> None:
-        """Wait until somebody closes it, or for Ctrl-C."""
+        """Wait until the view is closed, or for Ctrl-C."""
         self._closed.wait()
 
     def close(self) -> None:
-        """Stop serving; a second call does nothing."""
+        """Stop the server. A second call does nothing."""
         if self._closed.is_set():
             return
         self._worker.close()
@@ -193,7 +189,7 @@ class View:
         setting = self._controls.setting
         try:
             self._put(show(self.arm, setting))
-        except Exception as error:  # a fault of ours may not leave numbers that are not true
+        except Exception as error:  # a bug must not leave outdated numbers on the page
             _LOG.exception("the view cannot show %s", setting)
             problem = f"{type(error).__name__}: {error}"
             self._put(Shown(setting=setting, condition=Condition.FAILED, problem=problem))
@@ -212,7 +208,7 @@ def _first_angles(arm: Manipulator, q: ArrayLike | None) -> Array:
 
 
 def _server(host: object, port: object) -> tuple[Guard, viser.ViserServer]:
-    """A viser server at this address and no other, guarded, with a page of its own design."""
+    """Start a guarded viser server at exactly this address, and set up its page."""
     from cdsm.view.guard import Guard
 
     if not isinstance(host, str):
@@ -225,15 +221,15 @@ def _server(host: object, port: object) -> tuple[Guard, viser.ViserServer]:
         if port not in (0, taken := server.get_port()):
             server.stop()
             raise InvalidInput("port", f"{port} was taken meanwhile ({taken} is free); try again.")
-    # viser's share button opens a tunnel to a server of others, which the guard refuses
+    # viser's share button opens a tunnel to a public server; the guard refuses it
     server.gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
     server.gui.main_panel.dock_right()
-    server.gui.main_panel.set_width(_PANEL)  # or browsers differ in what "large" is when docked
+    server.gui.main_panel.set_width(_PANEL)  # the width of "large" depends on the browser
     return guard, server
 
 
 def _check_free(host: str, port: int) -> None:
-    """Refuse an address that cannot be had; viser would take the next port, or wait for ever."""
+    """Check that the address is free; viser would use the next port, or wait for ever."""
     remedy = "Give another port, or 0 for any free one."
     try:
         with contextlib.ExitStack() as sockets:
@@ -241,7 +237,7 @@ def _check_free(host: str, port: int) -> None:
                 host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
             ):
                 probe = sockets.enter_context(socket.socket(family, kind, protocol))
-                probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # as viser will
+                probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # viser sets it too
                 if family == socket.AF_INET6:
                     probe.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_V6ONLY, 1)
                 probe.bind(address)
@@ -255,7 +251,7 @@ def _check_free(host: str, port: int) -> None:
 
 @contextlib.contextmanager
 def _quiet() -> Iterator[None]:
-    """Keep viser from printing on the standard output; it has no option for that."""
+    """Keep viser from printing to standard output; viser has no option for this."""
     import rich
 
     console = rich.get_console()

@@ -1,4 +1,4 @@
-"""The panel of the page: the sliders that set the arm, and the text about it."""
+"""Build the panel of the page: sliders that set the arm, and text about the arm."""
 
 from __future__ import annotations
 
@@ -22,25 +22,25 @@ if TYPE_CHECKING:
     from cdsm.view.guard import Control
 
 _STEPS = 500
-"""A slider has this many steps at least: a browser shows some hundred pixels of it."""
+"""Smallest number of steps of a slider. A slider is some hundred pixels long."""
 
 _TURN: Final = 2.0 * math.pi
 _LENGTHS = 10.0
-"""Range of a joint without limits: a turn each way, or so many lengths of the arm."""
+"""Range of a sliding joint without limits, in lengths of the arm; others turn once each way."""
 
 _IN_FOLDER: Final = 10
-"""Joints in one folder; only the first folder is open."""
+"""Number of joints in one folder. Only the first folder is open."""
 
 _ROUND = 1e-9
-"""Part of a step by which an end may miss a round number and still count as one."""
+"""Largest difference of an end from a round number, as a fraction of a step."""
 
 
 @final
 @dataclass(frozen=True, kw_only=True)
 class Range:
-    """Ends, step and first position of a slider in the unit that the page shows.
+    """Ends, step and first position of a slider in the unit of the page.
 
-    ``unit`` is that unit in SI: 1 ° is π/180 rad.
+    ``unit`` is this unit in SI: π/180 for degrees.
     """
 
     label: str
@@ -52,16 +52,16 @@ class Range:
 
 
 def slider_range(label: str, low: float, high: float, initial: float, unit: float = 1.0) -> Range:
-    """A slider between two values in SI: ends and steps are round numbers within them.
+    """Compute a slider between two SI values; its ends and its step are round numbers.
 
-    The value it begins with is kept to the bit, and is within the ends even if they are not.
+    The ends lie within the two values, but they always include the unrounded ``initial``.
     """
     low, high, initial = (value / unit for value in (low, high, initial))
     if not high > low:
         return Range(label=label, low=initial, high=initial, step=1.0, initial=initial, unit=unit)
     step = 10.0 ** math.floor(math.log10((high - low) / _STEPS))
     digits = max(0, round(-math.log10(step)))
-    # inwards: a value beyond a limit would be refused
+    # round inwards: a value beyond a limit would be refused
     low = round(math.ceil(low / step - _ROUND) * step, digits)
     high = round(math.floor(high / step + _ROUND) * step, digits)
     step = round(step, digits)
@@ -70,7 +70,7 @@ def slider_range(label: str, low: float, high: float, initial: float, unit: floa
 
 
 def joint_ranges(arm: Manipulator, q: Array) -> tuple[Range, ...]:
-    """One slider per joint, within its limits: degrees, or mm where it slides."""
+    """Compute one slider per joint within the joint limits, in degrees, or mm if it slides."""
     most = np.where(arm.slides, _LENGTHS * arm.length, _TURN)
     low, high = np.maximum(arm.lower, -most), np.minimum(arm.upper, most)
     units = JointUnits(arm.slides).shown
@@ -83,29 +83,29 @@ def joint_ranges(arm: Manipulator, q: Array) -> tuple[Range, ...]:
 @final
 @dataclass(frozen=True)
 class Slider:
-    """A slider on the page; its value is in SI."""
+    """A slider on the page, with its value in SI."""
 
     handle: viser.GuiSliderHandle[float]
     range: Range
 
     @property
     def value(self) -> float:
-        """Where it stands, in SI."""
+        """Current value in SI."""
         return float(self.handle.value) * self.range.unit
 
     def set(self, value: float) -> None:
-        """Move it to a value in SI, or to the end that is next."""
+        """Move the slider to a value in SI, or to the nearest end."""
         ends = self.range
         position = min(max(value / ends.unit, ends.low), ends.high)
         self.handle.value = position  # type: ignore[misc]  # viser's setter hides from mypy
 
 
 class Controls:
-    """The panel of an arm in a viser server, whose panel is empty.
+    """Controls and text of an arm in the empty panel of a viser server.
 
-    ``limits`` are the right end of the slider of the lower bound and both ends of those of the
-    force [N]. A slider that moves calls ``changed``, from any thread; ``admit`` is called with each
-    control that browsers may use.
+    ``limits`` [N] are the largest lower bound of tension and the largest force of the sliders.
+    A moved slider calls ``changed`` from any thread. ``admit`` receives every control that
+    browsers may use.
     """
 
     def __init__(
@@ -137,7 +137,7 @@ class Controls:
 
     @property
     def setting(self) -> Setting:
-        """Where the sliders stand now."""
+        """Current values of all sliders."""
         return Setting(
             q=np.array([joint.value for joint in self._joints]),
             minimum=self._minimum.value,
@@ -147,7 +147,7 @@ class Controls:
         )
 
     def update(self, shown: Shown) -> None:
-        """Say what is shown."""
+        """Write the text about these results."""
         self._text.content = page_text(shown)
 
     def _joint_folders(self, ranges: Sequence[Range]) -> list[Slider]:

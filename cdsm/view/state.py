@@ -1,4 +1,4 @@
-"""What the page shows at a setting of the sliders: results, or why there are none."""
+"""Compute the results for a setting of the sliders, or the reason why they do not exist."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from cdsm.support.validation import Array, ReadOnlyState, frozen
 from cdsm.tension import DEFAULT_SOLVER, Tension, distribute_tension
 
 GREY: Final = (150, 150, 150)
-"""Colour of cables whose tension is not known."""
+"""Colour of cables with unknown tension."""
 
 
 class Condition(Enum):
-    """State of the arm at a setting; the value is what the page says."""
+    """State of the arm at a setting; the value is the text on the page."""
 
     STABLE = "STABLE"
     UNSTABLE = "UNSTABLE"
@@ -50,14 +50,14 @@ _CONDITIONS: Final[dict[Status | None, Condition]] = {
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Setting(ReadOnlyState):
-    """Where the sliders stand, in SI units.
+    """Values of the sliders in SI units.
 
     Attributes:
         q: Joint angles (nv,) [rad]; [m] where a joint slides.
         minimum: Lower bound of all tensions [N].
         maximum: Upper bound of all tensions [N].
-        force: At the tip, in base axes (3,) [N].
-        solver: Of the tension distribution.
+        force: Force at the tip, in base axes (3,) [N].
+        solver: Solver of the tension distribution.
     """
 
     q: Array
@@ -67,7 +67,7 @@ class Setting(ReadOnlyState):
     solver: str = DEFAULT_SOLVER
 
     def __post_init__(self) -> None:
-        # not checked here: a wrong value becomes a condition that the page shows
+        # not checked here: the page shows an invalid value as a condition
         for name in ("q", "force"):
             object.__setattr__(self, name, frozen(np.array(getattr(self, name))))
 
@@ -75,15 +75,15 @@ class Setting(ReadOnlyState):
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Shown(ReadOnlyState):
-    """What the page shows at one setting. What does not exist there is None, never an old value.
+    """Results on the page at one setting. A result that does not exist is None, never outdated.
 
     Attributes:
-        setting: Where the sliders stand.
+        setting: Values of the sliders.
         condition: State of the arm.
-        problem: Why something is missing, in the words of the error; empty for a stable arm.
-        posture: None where there is none: beyond a limit, or two sites of a cable meet.
-        tension: None where nothing balances the arm.
-        stiffness: None where the tensions are missing or outside the elasticity.
+        problem: Error message, or why the arm is unstable; empty for a stable arm.
+        posture: None if the angles are invalid or beyond a limit, or sites of a cable coincide.
+        tension: None if no tensions balance the arm.
+        stiffness: None if the tensions are missing or outside the domain of the law.
     """
 
     setting: Setting
@@ -99,19 +99,19 @@ class Shown(ReadOnlyState):
 
     @cached_property
     def along(self) -> Array | None:
-        """Stiffness along x, y and z (3,) [N/m], inf where nothing moves; of a stable arm only."""
+        """Stiffness along x, y, z (3,) [N/m], inf if the tip cannot move; None if not stable."""
         K = self._stable
         return None if K is None else frozen(np.array([K.along(axis) for axis in np.eye(3)]))
 
     @cached_property
     def principal(self) -> dict[str, Array] | None:
-        """Softest and stiffest direction and the stiffness [N/m] there; of a stable arm only."""
+        """Softest and stiffest direction and their stiffness [N/m]; None if not stable."""
         K = self._stable
         return None if K is None else principal_stiffness(K.compliance[:3, :3])
 
     @cached_property
     def cable_colors(self) -> NDArray[np.uint8] | None:
-        """Red, green and blue of each cable (C, 3): by tension, grey where it is not known."""
+        """Red, green and blue of each cable (C, 3), by tension; grey if it is unknown."""
         if self.posture is None:
             return None
         if self.tension is None:
@@ -121,24 +121,21 @@ class Shown(ReadOnlyState):
 
     @cached_property
     def ellipsoid(self) -> Array | None:
-        """Where forces of one size move the tip, (3, rows, columns) [m]; of a stable arm only.
-
-        The surface that :func:`cdsm.plots.plot_arm` draws.
-        """
+        """Ellipsoid of :func:`cdsm.plots.plot_arm` (3, rows, columns) [m]; None if not stable."""
         K = self._stable
         drawn = None if K is None else ellipsoid(K)
         return None if drawn is None else frozen(drawn.surface)
 
 
 def show(arm: Manipulator, setting: Setting) -> Shown:
-    """Compute what the page shows of an arm at a setting; every error becomes a condition."""
+    """Compute the results for an arm at a setting; every error becomes a condition."""
     pose = tension = K = None
     try:
         pose = arm.at(setting.q)
         wrench = np.concatenate([setting.force, np.zeros(3)])
         tension = distribute_tension(pose, setting.minimum, setting.maximum, wrench, setting.solver)
         K = stiffness(pose, tension)
-        _ = K.compliance  # refuses a singular K_θ, whose margin is rounding
+        _ = K.compliance  # raises if K_θ is singular: its margin is only rounding error
     except CdsmError as error:
         condition = _CONDITIONS.get(Status.of(error), Condition.FAILED)
         if isinstance(error, InvalidInput):
