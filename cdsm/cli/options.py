@@ -270,10 +270,7 @@ UNMET = 3
 
 @contextmanager
 def reported() -> Iterator[None]:
-    """Turn an error into one message and exit code 1, and Ctrl-C into exit code 130.
-
-    With --debug the exception passes unchanged.
-    """
+    """Turn an error into a message and exit code 1, Ctrl-C into 130; --debug changes nothing."""
     try:
         yield
     except KeyboardInterrupt:

@@ -122,7 +122,7 @@ def _at_posture(pose: Posture, u: list[float], target: float, bounds: _Bounds) -
     attainable = stiffness_range(pose, u, *bounds)
     best = plan_stiffness(pose, u, target, *bounds)
 
-    def motors() -> PathPlan:  # the plan repeated as a path of one sample
+    def motors() -> PathPlan:  # repeats the search of plan_stiffness as a path of one sample
         return plan_path(pose.arm, u, target, *bounds, angles=[pose.q])
 
     drawn = best, attainable

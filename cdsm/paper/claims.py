@@ -35,7 +35,7 @@ class Claim:
         computed: K_R with the pseudo-inverse and l_0 = L, as in the paper; for Section V the
             stiffness measured by weights; for Fig. 5 numbers of the strand.
         original: K_R with the pseudo-inverse and the original length. Empty for Fig. 5, Section V.
-        along: Stiffness for a small weight at the tip, with the original length. Empty likewise.
+        along: Stiffness for a small weight, with the original length. Empty for Fig. 5, Section V.
         assumption: Assumptions where the paper is silent.
         searched: Assumptions that were searched to meet the paper's number; empty if none.
         at_most: Whether the paper's number is an upper bound.

@@ -109,12 +109,9 @@ def least_bend() -> tuple[float, float]:
 
 
 def band(tension: ArrayLike) -> tuple[Array, Array]:
-    """Find the least and largest EA(F) [N] of all laws of the printed digits, same shape as F.
+    """Find least and largest EA [N] of all laws of the printed digits, shape of ``tension`` [N].
 
     The laws are continuous at 31 N and positive over the domain.
-
-    Args:
-        tension: F [N], any shape.
 
     Raises:
         InvalidInput: ``tension`` is not finite numbers.

@@ -21,7 +21,7 @@ from cdsm.support.validation import Array, frozen
 
 _POINTS: Final = 40
 _ALL: Final = "all parameters of the prototype"
-"""``searched`` of all claims of Section V. Measured with weights, they have one reading only."""
+"""Text of ``Claim.searched`` for Section V. Measured with weights, it has one reading only."""
 
 
 @final

@@ -60,8 +60,7 @@ class Prototype:
             configuration is assumed to be that of Table II.
         angle_2: Joint angle 2 of the second configuration [rad].
         angle_3: Joint angle 3 of the second configuration [rad].
-        spring_ratio: Stiffness of the stiffest over that of the softest hybrid cable [-]. Fig. 11
-            shows only a picture.
+        spring_ratio: Stiffest over softest hybrid cable stiffness [-]; Fig. 11 is only a picture.
         hybrid_tension: Tension in Fig. 13 and in the accuracy check [N]. The cables of the check
             are assumed to be the hybrid ones of 1.89 N/mm.
         highest_hybrid_tension: Highest tension in Fig. 12 [N]; the lowest is 3 N, as in Table II.
@@ -381,7 +380,7 @@ def identify_prototype(step: Step) -> PrototypeFit:
     point = problem.box.point(start)
     if problem.failure(point) is not None:
         raise InvalidInput("start", f"{step.start} cannot hold itself. Start elsewhere.")
-    # finite differences are coarse: the rounding errors of the weight tests must not matter
+    # the step of the finite differences is large against rounding errors of the weight tests
     point = least_squares(
         problem.residuals,
         point,

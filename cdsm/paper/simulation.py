@@ -40,10 +40,10 @@ PROTOTYPE: Final = "three cables a joint, 0.5 kg a link, gravity along −y, no 
 SEARCHED: Final = (
     "cables, link, mass, gravity, hole phase, lower bound and reading of K_R, for this row"
 )
-"""``searched`` of the claim of Fig. 6."""
+"""Text of ``Claim.searched`` for Fig. 6."""
 
 KEPT: Final = "prototype searched for Fig. 6"
-"""``searched`` of the other figures: they keep the prototype of Fig. 6."""
+"""Text of ``Claim.searched`` for the other figures, which keep the prototype of Fig. 6."""
 
 _TEN = np.full(10, presets.TEN_DEGREES)
 FIGURE_8_POSTURES: Final = {

@@ -35,11 +35,10 @@ def plot_arm(
         tension: Tensions that colour the cables, if given.
         stiffness: If given and stable, the ellipsoid C_vv f, |f| = 1, is drawn at the tip. It
             shows the displacement under a force of any direction. Its longest half axis is a
-            fifth of the arm's length. If the arm is unstable, the title says so.
+            fifth of the arm's length. The title says if the arm is unstable.
 
     Raises:
-        InvalidInput: The tension or stiffness belongs to another arm or posture, or an argument
-            has the wrong type.
+        InvalidInput: An argument has the wrong type, or belongs to another arm or posture.
         SingularStiffness: K_θ is singular, so the ellipsoid does not exist.
     """
     expect("pose", pose, "Posture")

@@ -22,7 +22,7 @@ _SAME = 1e-9
 """Largest difference between the entries of two equal unit directions."""
 
 _JUMP = 3.0
-"""A change of the target is a jump if it exceeds its neighbours of equal sign by this factor."""
+"""The target jumps where a change exceeds the neighbouring changes of equal sign by this factor."""
 
 _NAMED = 20
 """Above this number of cables the colours are not distinct, so cables are not named."""

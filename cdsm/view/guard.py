@@ -10,13 +10,12 @@ refuses:
 - **A connection of our page to another server**, by ``?websocket=`` in a link. That server could
   run scripts in our page. A header of the page allows connections to its own server only.
 - **Messages that the page does not send.** A client may report its camera, move a slider within
-  its range, and press a button. Requests to share the view on a public server are dropped, and
-  so are changes of any property that is not a value.
-- **Other machines**, unless they know the token in the URL. With a loopback address they cannot
-  connect at all.
+  its range, and press a button. The guard drops all other messages: requests to share the view on
+  a public server, and changes of any property that is not a value.
+- **Other machines** that do not know the token in the URL, if the address is not loopback.
 
-The guard does not stop programs on this machine (of any user) while only this machine can connect.
-Nor does it stop readers of the network traffic, which is not encrypted and shows the token.
+At a loopback address any program on this machine, of any user, can connect. The network traffic
+is not encrypted: whoever can read it has the token.
 """
 
 from __future__ import annotations
@@ -82,10 +81,7 @@ class _Address(str):
 
 @final
 class Guard:
-    """Filter between viser and the clients of one live view.
-
-    Args:
-        host: Address to listen at.
+    """Filter between viser and the clients of one live view at the address ``host``.
 
     Attributes:
         token: First part of every path if other machines can connect, else empty.
@@ -101,9 +97,9 @@ class Guard:
     def start(self, port: int, label: str) -> viser.ViserServer:
         """Start a viser server that is filtered by this guard.
 
-        viser has no option to filter requests and messages of its websocket server. Therefore this
-        function replaces the constructor of that server while viser starts. If the port is taken,
-        viser uses the next free port.
+        viser has no option to filter its websocket server. This method therefore replaces the
+        function that starts this server while viser starts. If the port is taken, viser uses the
+        next free port.
         """
         original, made = websocket_server.serve, threading.Event()
 

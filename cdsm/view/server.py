@@ -89,8 +89,7 @@ def serve(
 class Worker:
     """A thread that runs a job on request. All requests during a run cause one further run.
 
-    Sliders send values from many threads, faster than results can be computed. The job itself
-    reads the newest state when it starts.
+    Many threads request runs, faster than the job ends. It reads the newest state when it starts.
     """
 
     def __init__(self, job: Callable[[], None]) -> None:

@@ -38,10 +38,7 @@ _ROUND = 1e-9
 @final
 @dataclass(frozen=True, kw_only=True)
 class Range:
-    """Ends, step and first position of a slider in the unit of the page.
-
-    ``unit`` is this unit in SI: π/180 for degrees.
-    """
+    """Ends, step and first position of a slider, in a unit of the SI value ``unit`` (° = π/180)."""
 
     label: str
     low: float
