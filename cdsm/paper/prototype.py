@@ -290,7 +290,7 @@ class Step:
 
     @property
     def numbers(self) -> tuple[str, ...]:
-        """Names of the numbers that count."""
+        """Names of the numbers to explain."""
         return NAMES[: TABLE_II.size] if self.table_alone else NAMES
 
     @property

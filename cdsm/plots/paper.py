@@ -77,7 +77,7 @@ def _plot_strand(result: paper.StrandFigure) -> Figure:
         color=COLORS[1],
         label="as printed, below 31 N",
     )
-    right.set_ylim(-5.0, 1.05 * KN * result.high.max())  # as printed it falls to -788 kN
+    right.set_ylim(-5.0, 1.05 * KN * result.high.max())  # the printed law falls to -788 kN
     right.set(xlabel="tension [N]", ylabel="rigidity EA [kN]", title="(b)")
     right.legend(fontsize=8, loc="upper left")
     figure.suptitle(result.title)

@@ -41,7 +41,7 @@ def page_text(shown: Shown) -> str:
         parts.append(element("div", MODEL, style="color:gray"))
     if shown.tension is not None:
         parts += _color_bar(shown.tension)
-    return str(element("div", *parts, style=_BOX))  # msgspec knows no subclass of str
+    return str(element("div", *parts, style=_BOX))  # msgspec accepts no subclass of str
 
 
 def _badge(condition: Condition) -> Markup:

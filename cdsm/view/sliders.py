@@ -94,7 +94,7 @@ class Slider:
         """Move the slider to a value in SI, or to the nearest end."""
         ends = self.range
         position = min(max(value / ends.unit, ends.low), ends.high)
-        self.handle.value = position  # type: ignore[misc]  # viser's setter hides from mypy
+        self.handle.value = position  # type: ignore[misc]  # mypy does not see viser's setter
 
 
 class Controls:
