@@ -1,4 +1,4 @@
-"""Many postures at once: stiffness and tension distribution, row by row in compiled kernels."""
+"""Stiffness and tension distribution at many postures at once, in compiled kernels."""
 
 from cdsm.batch.distribution import Tensions, distribute_tensions
 from cdsm.batch.evaluation import Batch, evaluate

@@ -1,16 +1,18 @@
-"""A dual active-set method for the tensions that no guess has found, as a numba kernel.
+"""Dual active-set method for tension distribution (Goldfarb and Idnani), as a numba kernel.
 
-Goldfarb and Idnani's: from the least tensions that balance the arm, whatever their bounds, it takes
-one violated bound after the other into account, and lets go of those whose multiplier would change
-its sign. It ends at the optimum, or at a proof that there is no point. DAQP does the same, but one
-Python call at a time, and linear programs have to prove that there is none. Per row, with this
-search and without it: 7 and 75 µs where 18 of 400 rows need it (virtual prototype up to nine tenths
-of its joint limits), 16 and 138 µs, 10 and 518 µs where all do, since the cables run from anywhere
-to anywhere (14 cables, 6 joints). Here every step starts afresh from
+It is used where the guess of :mod:`cdsm.batch.serpentine_guess` fails. It starts at the least
+tensions that balance the arm without bounds. It adds one violated bound after the other, and drops
+a bound whose multiplier would change its sign. It ends at the optimum, or at a proof of
+infeasibility. Every step solves anew with
 
     S = Σ J_c J_cᵀ  over the free cables,
 
-so that no error builds up; whoever calls it verifies both outcomes.
+so that no error builds up. The caller verifies the optimum or the proof.
+
+DAQP does the same, but one Python call per posture, and needs linear programs to prove
+infeasibility. Time per posture with this search and without it: 7 and 75 µs where 18 of 400
+postures need the search (virtual prototype up to nine tenths of its joint limits); 16 and 138 µs,
+10 and 518 µs where all postures need it (cables from any link to any link, 14 cables, 6 joints).
 """
 
 from __future__ import annotations
@@ -25,31 +27,31 @@ from cdsm.kernels.tree import Indices
 from cdsm.support.validation import Array
 
 FOUND, IMPOSSIBLE, LOST = range(3)
-"""F and y are the optimum; y proves there is none; neither."""
+"""Outcome: F and y are the optimum; y proves infeasibility; the search failed."""
 
 _REGULAR = 1e-13
-"""Smallest over largest pivot of S with which it can be solved."""
+"""Smallest accepted ratio of smallest to largest pivot of S."""
 
 _DEPENDENT = 1e-10
-"""A cable of which the others leave this part free, squared, balances nothing that they do not."""
+"""If 1 − J_p S⁻¹ J_pᵀ is at most this, F_p cannot move while the free cables keep the balance."""
 
 _ROUNDING = 1e-13
-"""Violation of a bound, relative to the forces, that is none; and slopes that are zero."""
+"""Smaller violations of a bound, relative to the largest tension, and slopes are rounding."""
 
 _STEPS = 20
-"""For each cable, at most; one or two are usual."""
+"""Maximum number of steps per cable; one or two are usual."""
 
 
 class State(NamedTuple):
-    """What is known on the way.
+    """Iterate and working memory of the search.
 
     Attributes:
         F: Tensions (C,).
         y: Multipliers of balance (nv,).
-        side: For each cable 1 at its lower, −1 at its upper bound, 0 free (C,).
-        multiplier: Of the bounds (C,).
+        side: Of each cable: 1 at its lower bound, −1 at its upper bound, 0 free (C,).
+        multiplier: Multipliers of the bounds (C,).
         system: S and a right-hand side (nv, nv + 1).
-        w: A vector (nv,).
+        w: Right-hand side, then solution, of a system with S (nv,).
     """
 
     F: Array
@@ -62,14 +64,14 @@ class State(NamedTuple):
 
 @compiled
 def search(J: Array, b: Array, low: Array, high: Array, state: State) -> int:
-    """Go from the least tensions that balance the arm to those within bounds.
+    """Find the least tensions within bounds that balance the arm.
 
     Args:
         J: J_L (C, nv).
         b: Torque to balance (nv,).
         low: Lower bounds (C,).
         high: Upper bounds (C,).
-        state: Filled.
+        state: Iterate and working memory, filled here.
 
     Returns:
         FOUND, IMPOSSIBLE or LOST.
@@ -85,7 +87,7 @@ def search(J: Array, b: Array, low: Array, high: Array, state: State) -> int:
             return FOUND if _solve_for_sides(J, b, low, high, state) else LOST
         bound = low[p] if sign > 0.0 else high[p]
         while side[p] == 0:
-            # a force by which p goes for its bound, and the free cables keep the balance
+            # cable p moves towards its bound, and the free cables keep the balance
             for i in range(y.shape[0]):
                 w[i] = J[p, i]
             if not _solve_free(J, side, w, system):
@@ -119,7 +121,7 @@ def search(J: Array, b: Array, low: Array, high: Array, state: State) -> int:
 
 @compiled
 def _most_violated(F: Array, low: Array, high: Array, side: Indices) -> tuple[int, float]:
-    """The free cable farthest out of its bounds, and 1 if below or −1 if above; or −1."""
+    """Find the free cable farthest outside its bounds (or −1), and 1 if below, −1 if above."""
     p, sign, worst = -1, 0.0, 0.0
     for c in range(F.shape[0]):
         worst = max(worst, _ROUNDING * abs(F[c]))
@@ -133,7 +135,7 @@ def _most_violated(F: Array, low: Array, high: Array, side: Indices) -> tuple[in
 
 @compiled
 def _solve_for_sides(J: Array, b: Array, low: Array, high: Array, state: State) -> bool:
-    """Fill F and y with the least tensions of the free cables, the others at their bounds."""
+    """Fill F and y: fixed cables at their bounds, least balancing tensions of the free cables."""
     F, y, side, _, system, w = state
     for i in range(b.shape[0]):
         w[i] = b[i]
@@ -154,7 +156,7 @@ def _solve_for_sides(J: Array, b: Array, low: Array, high: Array, state: State) 
 
 @compiled
 def _solve_free(J: Array, side: Indices, w: Array, system: Array) -> bool:
-    """Replace w (nv,) by S⁻¹ w, if S is regular."""
+    """Replace w (nv,) by S⁻¹ w; return False if S is singular."""
     nv = w.shape[0]
     for i in range(nv):
         for j in range(nv):

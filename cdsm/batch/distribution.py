@@ -35,16 +35,16 @@ _NO_DIRECTIONS = frozen(np.zeros((0, 3)))
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Tensions(ReadOnlyState):
-    """Cable tensions that balance an arm, posture by posture, with the question they answer.
+    """Cable tensions that balance an arm at many postures, with loads, bounds and status.
 
     Attributes:
         arm: The arm.
         q: Joint angles (B, nv) [rad].
-        values: F (B, C) [N], in the order of ``arm.cables``; NaN where there are none.
-        wrench: W (6,) for all, or (B, 6): force [N], then moment [N m].
-        minimum: Lower bounds (C,) for all, or (B, C) [N].
-        maximum: Upper bounds (C,) for all, or (B, C) [N].
-        status: A :class:`Status` for each row, (B,).
+        values: F (B, C) [N], in the order of ``arm.cables``; NaN where no tensions were found.
+        wrench: W (6,) for all postures, or (B, 6): force [N], then moment [N m].
+        minimum: Lower bounds (C,) for all postures, or (B, C) [N].
+        maximum: Upper bounds (C,) for all postures, or (B, C) [N].
+        status: :class:`Status` of each posture (B,).
     """
 
     arm: Manipulator
@@ -57,7 +57,7 @@ class Tensions(ReadOnlyState):
 
     @property
     def ok(self) -> Flags:
-        """Where there are tensions, (B,)."""
+        """Return for each posture whether tensions were found, (B,)."""
         return frozen(self.status == OK)
 
     def __len__(self) -> int:
@@ -77,25 +77,25 @@ def distribute_tensions(
     check_limits: bool = True,
     threads: int | None = None,
 ) -> Tensions:
-    """Smallest cable tensions in balance at many postures: min ‖F‖² of Eqs. 13 and 17, row by row.
+    """Compute the least tensions that balance an arm at many postures: min ‖F‖² (Eqs. 13, 17).
 
-    The same as :func:`~cdsm.distribute_tension` at each, and as exact: every row is guessed
-    or searched for, and accepted only if it meets the same optimality conditions, or as infeasible
-    only by a proof. That function decides the rows for which both fail.
+    Tensions are accepted only if they meet the optimality conditions of
+    :func:`~cdsm.distribute_tension`. A posture is called infeasible only with a proof. If neither
+    succeeds, :func:`~cdsm.distribute_tension` solves the posture.
 
     Args:
         arm: The arm.
         q: Joint angles (B, nv) [rad], a row for each posture.
-        minimum: Lower bound [N], for all cables, (C,), or (B, C); not negative.
-        maximum: Upper bound [N], likewise; inf for none.
-        wrench: W (6,) for all rows or (B, 6) at ``tool0`` in base axes: force [N], then moment
+        minimum: Lower bound [N]: one number for all cables, (C,) or (B, C); not negative.
+        maximum: Upper bound [N] in the same forms; inf for no bound.
+        wrench: W (6,) for all postures or (B, 6) at ``tool0`` in base axes: force [N], then moment
             [N m]; zero if not given.
-        check_limits: Pass over angles beyond the joint limits.
-        threads: How many at most; by default as many as there are cores.
+        check_limits: Pass over postures beyond the joint limits.
+        threads: Maximum number of threads; by default one for each core.
 
     Raises:
-        InvalidInput: Something has the wrong shape or is not a number, or bounds contradict each
-            other. :attr:`Tensions.status` says what is wrong with single postures.
+        InvalidInput: An argument has the wrong shape or is not a number, or bounds contradict each
+            other. A failure at a single posture sets :attr:`Tensions.status` instead.
     """
     instance("arm", arm, Manipulator)
     angles = postures(arm, q)
@@ -121,18 +121,18 @@ def distribute_tensions(
 
 
 class Distributor:
-    """Distributes tension in slices of the rows; of checked arguments.
+    """Tension distribution for slices of the postures; its arguments are already checked.
 
     Args:
         arm: The arm.
         q: Joint angles (B, nv) [rad].
         low: Lower bounds (C,) or (B, C) [N].
-        high: Upper bounds, likewise [N].
-        wrench: (6,) or (B, 6).
-        check_limits: Pass over angles beyond the joint limits.
+        high: Upper bounds (C,) or (B, C) [N].
+        wrench: W (6,) or (B, 6).
+        check_limits: Pass over postures beyond the joint limits.
 
     Attributes:
-        width: Floats of temporary memory per row.
+        width: Floats of temporary memory per posture.
     """
 
     def __init__(
@@ -155,7 +155,7 @@ class Distributor:
         self.width = (7 + len(arm.cables)) * arm.nv + 3 * len(arm.cables)
 
     def at(self, part: slice) -> tuple[Array, Codes]:
-        """Tensions (b, C) [N] and status (b,) of a slice of the rows."""
+        """Return tensions (b, C) [N] and status (b,) of a slice of the postures."""
         rows = len(self._q)
         q = self._q[part]
         low, high, wrench = (

@@ -1,4 +1,4 @@
-"""Posture and stiffness at many joint angles."""
+"""Evaluation of posture and stiffness at many joint angles."""
 
 from __future__ import annotations
 
@@ -33,30 +33,28 @@ OUTPUTS = (*QUANTITIES, "tension")
 """Names of the quantities that :func:`evaluate` computes."""
 
 DEFAULT_OUTPUTS = ("tip", "compliance", "margin")
-"""Where the tip is, what it does under load, and whether the arm is stable."""
+"""Default outputs: place of the tip, its compliance, and the stability margin."""
 
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Batch(ReadOnlyState):
-    """Quantities at many postures, row by row: ``batch["joint"]`` is K_θ (B, nv, nv).
+    """Quantities at many postures: ``batch["joint"]`` is K_θ (B, nv, nv).
 
-    A quantity has the name, shape and unit it has in :class:`~cdsm.Posture` and
-    :class:`~cdsm.Stiffness`, with one more axis in front; what does not exist is NaN,
-    and :attr:`status` says why.
+    Names, shapes and units are those of :class:`~cdsm.Posture` and :class:`~cdsm.Stiffness`, with
+    the posture as first axis. A quantity that does not exist is NaN; :attr:`status` says why.
 
     Attributes:
         arm: The arm.
         q: Joint angles (B, nv) [rad].
-        tension: Tensions given, (C,) for all or (B, C) [N]; None if none were.
-        wrench: W (6,) for all, or (B, 6): force [N], then moment [N m].
-        minimum: Lower bounds for which tensions were distributed, (C,) for all or (B, C) [N]; or
-            None.
-        maximum: Upper bounds, likewise (C,) or (B, C) [N].
+        tension: Given tensions, (C,) for all postures or (B, C) [N]; None if not given.
+        wrench: W (6,) for all postures, or (B, 6): force [N], then moment [N m].
+        minimum: Lower bounds (C,) for all postures or (B, C) [N]; None if nothing was distributed.
+        maximum: Upper bounds (C,) for all postures or (B, C) [N], or None.
         direction: Unit direction (3,) of ``along``, or several (D, 3); or None.
-        status: A :class:`Status` for each row, (B,).
-        outputs: Names of the quantities, as asked for.
-        values: The quantities themselves, (B, …) each, in SI units: [m], [N], [rad].
+        status: :class:`Status` of each posture (B,).
+        outputs: Names of the requested quantities.
+        values: The requested quantities, (B, …) each, in SI units: [m], [N], [rad].
     """
 
     arm: Manipulator
@@ -71,10 +69,10 @@ class Batch(ReadOnlyState):
     values: tuple[Array, ...]
 
     def __getitem__(self, name: str) -> Array:
-        """A quantity by name, (B, …), any shape, in the unit it has for one posture.
+        """Return a quantity by name, (B, …), in the unit that it has for one posture.
 
         Raises:
-            UnknownName: It was not asked for.
+            UnknownName: The quantity was not requested in ``outputs``.
         """
         if name not in self.outputs:
             raise UnknownName("output", name, self.outputs, "Name it in outputs=.")
@@ -82,7 +80,7 @@ class Batch(ReadOnlyState):
 
     @cached_property
     def ok(self) -> Flags:
-        """Where everything asked for exists, (B,)."""
+        """Return for each posture whether all requested quantities exist, (B,)."""
         return frozen(self.status == layout.OK)
 
     def __len__(self) -> int:
@@ -113,36 +111,36 @@ def evaluate(
     check_limits: bool = True,
     threads: int | None = None,
 ) -> Batch:
-    """Evaluate Posture and Stiffness of an arm at many postures, in microseconds each.
+    """Compute posture and stiffness of an arm at many postures, in microseconds each.
 
-    Rows that cannot be evaluated raise no error; their :attr:`Batch.status` says why.
+    A posture that cannot be evaluated raises no error; its :attr:`Batch.status` says why.
 
     Args:
         arm: The arm.
         q: Joint angles (B, nv) [rad], a row for each posture.
-        tension: F (C,) for all rows or (B, C) [N], not negative, or the answer of
-            :func:`distribute_tensions` at these postures. Only left out if ``minimum`` is given, or
-            if no output depends on it.
-        wrench: W (6,) for all rows or (B, 6) at ``tool0`` in base axes: force [N], then moment
-            [N m]; zero if not given. Belongs to tensions of your own, and to ``minimum``.
-        outputs: Names of the wanted quantities; no others are stored. Of a posture ``"tip"``,
-            ``"jacobian"``, ``"cable_lengths"``, ``"length_jacobian"``, ``"gravity_torque"``; of a
-            stiffness ``"active"``, ``"passive"``, ``"gravity"``, ``"load"``, ``"joint"``,
-            ``"cable_stiffness"``, ``"residual"``, ``"margin"``, ``"compliance"``, ``"cartesian"``,
-            ``"along"``, ``"pseudoinverse"``; and ``"tension"``.
-        direction: u (3,) of ``"along"``, any length, or several (D, 3) for an answer (B, D).
-        minimum: Distribute the tensions: their lower bounds [N], as in
+        tension: F (C,) for all postures or (B, C) [N], not negative, or the result of
+            :func:`distribute_tensions` at these postures. Leave it out if ``minimum`` is given or
+            no output depends on tensions.
+        wrench: W (6,) for all postures or (B, 6) at ``tool0`` in base axes: force [N], then moment
+            [N m]; zero if not given. Leave it out if ``tension`` comes from
             :func:`distribute_tensions`.
-        maximum: Their upper bounds [N]; none if not given.
-        check_limits: Pass over angles beyond the joint limits.
-        threads: How many at most; by default as many as there are cores. An elasticity of your own
-            is called from all of them.
+        outputs: Names of the quantities to store. Of a posture: ``"tip"``, ``"jacobian"``,
+            ``"cable_lengths"``, ``"length_jacobian"``, ``"gravity_torque"``. Of a stiffness:
+            ``"active"``, ``"passive"``, ``"gravity"``, ``"load"``, ``"joint"``,
+            ``"cable_stiffness"``, ``"residual"``, ``"margin"``, ``"compliance"``, ``"cartesian"``,
+            ``"along"``, ``"pseudoinverse"``. And ``"tension"``.
+        direction: u (3,) of ``"along"``, any length; or several (D, 3), then ``along`` is (B, D).
+        minimum: Lower bounds [N] for :func:`distribute_tensions`, which then finds the tensions.
+        maximum: Upper bounds [N] of distributed tensions; no bounds if not given.
+        check_limits: Pass over postures beyond the joint limits.
+        threads: Maximum number of threads; by default one for each core. All threads call a
+            user-defined elasticity.
 
     Raises:
-        InvalidInput: Something has the wrong shape or is not a number, a tension is negative, two
-            arguments contradict each other or one is missing; or an elasticity of the user's own
-            gives no positive rigidity.
-        UnknownName: An output of no such name.
+        InvalidInput: An argument has the wrong shape or is not a number; a tension is negative; two
+            arguments contradict each other or one is missing; or a user-defined elasticity gives no
+            positive rigidity.
+        UnknownName: An output does not exist.
     """
     instance("arm", arm, Manipulator)
     names = _checked_outputs(outputs)
@@ -201,7 +199,7 @@ def _checked_outputs(outputs: Sequence[str]) -> tuple[str, ...]:
 def _checked_load(
     arm: Manipulator, q: Array, tension: Tensions | ArrayLike | None, wrench: ArrayLike | None
 ) -> tuple[Array | None, Array, Codes]:
-    """Tensions, wrench and what is known of the rows before they are evaluated."""
+    """Return the given tensions (or None), the wrench, and the status before evaluation."""
     if not isinstance(tension, Tensions):
         given = None if tension is None else given_tension(arm, tension, len(q))
         return given, given_wrench(wrench, len(q)), np.zeros(len(q), dtype=np.uint8)

@@ -1,4 +1,4 @@
-"""Evaluates rows slice by slice; the arguments are checked."""
+"""Evaluation of the postures of a batch, slice by slice, with checked arguments."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ from cdsm.support.validation import Array, frozen
 
 
 class Evaluator:
-    """Evaluates slices of the rows.
+    """Evaluation of slices of the postures.
 
     Args:
         arm: The arm.
         q: Joint angles (B, nv) [rad].
-        tension: F (C,) or (B, C) [N]; None if they are distributed, or not needed.
+        tension: F (C,) or (B, C) [N]; None if tensions are distributed or not needed.
         wrench: W (6,) or (B, 6).
         direction: Unit directions (3,) or (D, 3) of ``along``; or None.
         names: Names of the outputs.
-        distributor: Of tensions, if they are not given.
-        check_limits: Pass over angles beyond the joint limits.
+        distributor: Distributes the tensions if they are not given.
+        check_limits: Pass over postures beyond the joint limits.
 
     Attributes:
-        values: The outputs, in their order; filled slice by slice.
-        width: Floats of temporary memory per row.
+        values: The outputs in the order of ``names``, filled slice by slice.
+        width: Floats of temporary memory per posture.
     """
 
     def __init__(
@@ -73,7 +73,7 @@ class Evaluator:
         self.values = [np.empty((len(q), *shapes[name])) for name in names]
 
     def fill(self, part: slice, status: Codes) -> None:
-        """Fill the values and the status (B,) of a slice of the rows."""
+        """Fill the values and the status (B,) of a slice of the postures."""
         rows, q, found = len(self._q), self._q[part], status[part]
         wrench = of_rows(self._wrench, part, rows)
         if self._distributor is not None:
@@ -104,11 +104,11 @@ class Evaluator:
 
 
 def _rigidities(arm: Manipulator, tension: Array, usable: Flags) -> Array:
-    """EA (1 + ε) (b, C) [N] at tensions F (b, C) [N]; 0 under force control, −1 where undefined.
+    """Return EA (1 + ε) (b, C) [N] at tensions F (b, C) [N] of usable postures (b,).
 
-    Rows that are not usable (b,) are left out.
+    It is 0 under force control and in postures that are not usable, and −1 outside the domain.
     """
-    if not usable.any():  # a law of the user's own need not take empty arrays
+    if not usable.any():  # a user-defined law may fail on empty arrays
         return frozen(np.zeros_like(tension))
     given = tension if usable.all() else tension[usable]
     rigidity = np.zeros_like(given)
@@ -122,7 +122,7 @@ def _rigidities(arm: Manipulator, tension: Array, usable: Flags) -> Array:
 
 
 def _where_defined(laws: CableLaws, law: Elasticity, tension: Array) -> Array:
-    """EA (1 + ε) [N] at tensions of any shape, −1 outside the domain."""
+    """Return EA (1 + ε) [N] at tensions of any shape; −1 outside the domain of the law."""
     try:
         return laws.stretched_rigidity(law, tension)
     except ElasticityRangeError:
@@ -134,7 +134,7 @@ def _where_defined(laws: CableLaws, law: Elasticity, tension: Array) -> Array:
             result[left] = laws.stretched_rigidity(law, values[left])
             break
         except ElasticityRangeError as error:
-            if not error.indices:  # an elasticity of the user's own that does not say where
+            if not error.indices:  # a user-defined law may not say which tensions are outside
                 result[left] = [_one(laws, law, value) for value in values[left]]
                 break
             left = np.delete(left, error.indices)

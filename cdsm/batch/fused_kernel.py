@@ -1,6 +1,6 @@
-"""The fused kernel: from joint angles, tensions and wrenches to the wanted quantities, row by row.
+"""Fused kernel that computes all requested quantities of many postures, one after the other.
 
-The physics is in :mod:`cdsm.kernels`; here it is only called in turn, without allocating per row.
+The physics is in :mod:`cdsm.kernels`. This kernel calls it without allocating memory per posture.
 """
 
 from __future__ import annotations
@@ -54,16 +54,16 @@ from cdsm.support.validation import Array
 
 
 class Arm(NamedTuple):
-    """The arm as arrays; the same for all rows.
+    """Arrays of the arm, equal for all postures.
 
     Attributes:
         tree: The joints.
         routing: The cables.
-        masses: What the joints carry, and the tip.
+        masses: Masses on the joints, and place of the tip.
         lowest: Lower joint limits (nv,) [rad].
         highest: Upper joint limits (nv,) [rad].
         series: 1/k_series of the cables (C,) [m/N].
-        rest: Tension at which these springs are at rest (C,) [N].
+        rest: Tension at which the series springs are at rest (C,) [N].
     """
 
     tree: Tree
@@ -76,7 +76,7 @@ class Arm(NamedTuple):
 
 
 class Row(NamedTuple):
-    """The quantities of one row: views of its record, which lists them one after the other.
+    """Quantities of one posture: views of its record, which stores them one after the other.
 
     Attributes:
         tip: (4, 4).
@@ -91,7 +91,7 @@ class Row(NamedTuple):
         k: Cable stiffness (C,).
         passive: (nv, nv).
         K: K_θ (nv, nv).
-        readings: What is read from K_θ.
+        readings: Margin, pseudoinverse, along, compliance and cartesian, read from K_θ.
     """
 
     tip: Array
@@ -110,7 +110,7 @@ class Row(NamedTuple):
 
 
 class Scratch(NamedTuple):
-    """What a row needs on the way: frames, rotations, and scratch of the kernels it calls."""
+    """Temporary arrays of the kernels, used again at every posture."""
 
     frames: Frames
     rotation: Array
@@ -132,22 +132,22 @@ def evaluate_rows(
     out: Array,
     status: Codes,
 ) -> None:
-    """Fill the status (b,) and, one after the other, the wanted quantities of every row, (b, …).
+    """Fill the status (b,) and the requested quantities (b, …) of every posture.
 
     Args:
         arm: The arm.
         q: Joint angles (b, nv) [rad].
         tension: F (b, C) [N].
-        rigidity: EA (1 + ε) (b, C) [N]; 0 under force control, negative where there is none.
+        rigidity: EA (1 + ε) (b, C) [N]; 0 under force control, negative outside the domain.
         wrench: W (b, 6).
         directions: Unit vectors (D, 3) of ``along``.
-        start: Where the quantities begin in a record.
-        wanted: Numbers of quantities, rising.
-        out: The wanted quantities, NaN where they do not exist.
-        status: As known beforehand, OK or that there are no tensions; replaced by what is found.
+        start: Index in the record at which each quantity begins.
+        wanted: Numbers of the requested quantities, rising.
+        out: The requested quantities in one row per posture; NaN where they do not exist.
+        status: On entry OK, or why no tensions were found; on return the status of the posture.
     """
-    # numba counts references at every access to a field, half a microsecond a row: so all fields
-    # are unpacked here, and the stages below are one function
+    # numba counts references at every access to a field, which costs 0.5 µs per posture. So all
+    # fields are unpacked here, and the stages below are one function.
     tree, routing, masses, lowest, highest, series, rest = arm
     parent, fixed = tree.parent, routing.fixed
     nv, count = q.shape[1], fixed.shape[0]
@@ -163,11 +163,11 @@ def evaluate_rows(
         is_wanted[MARGIN], is_wanted[PSEUDOINVERSE], is_wanted[COMPLIANCE], is_wanted[CARTESIAN]
     )
     work = workspace(nv, directions.shape[0], read)
-    # the active term costs as much as lengths and moment arms: it is left out if there is no room
+    # the active term costs as much as lengths and moment arms; without slots it is not computed
     active_slots = active if last > GRAVITY else np.empty((0, nv, nv))
 
     for b in range(q.shape[0]):
-        # the joint angles alone
+        # quantities of the joint angles alone
         if _is_beyond(q[b], lowest, highest):
             status[b] = BEYOND_LIMITS
             _copy(record, start, 0, wanted, b, out)
@@ -192,14 +192,14 @@ def evaluate_rows(
             mirror(gravity)
         known = GRAVITY + 1
 
-        # tensions, if there are any
+        # quantities that need tensions
         if last > GRAVITY and status[b] == OK:
             _set_residual(tension[b], J, wrench[b], JX, g, residual)
             mirror(active[0])
             add_load_stiffness(JX, wrench[b], masses.tip_joints, load)
             known = LOAD + 1
 
-        # the stiffness of the cables
+        # quantities that need the rigidity of the cables
         if last > LOAD and known > LOAD:
             if (rigidity[b] < 0.0).any():
                 status[b] = OUTSIDE_ELASTICITY
@@ -221,7 +221,7 @@ def evaluate_rows(
 
 @compiled
 def _views(record: Array, start: Indices, nv: int, cables: int) -> Row:
-    """Views of the quantities in a record."""
+    """Return views of the quantities in a record."""
     return Row(
         _matrix(record, start, TIP, 4),
         _matrix(record, start, JACOBIAN, 6),
@@ -264,20 +264,20 @@ def _scratch(arm: Arm, nv: int) -> Scratch:
 
 @inlined
 def _vector(record: Array, start: Indices, quantity: int) -> Array:
-    """The part of the record with a quantity."""
+    """Return a quantity of the record as a vector."""
     return record[start[quantity] : start[quantity + 1]]
 
 
 @inlined
 def _matrix(record: Array, start: Indices, quantity: int, rows: int) -> Array:
-    """The part of the record with a matrix of so many rows."""
+    """Return a quantity of the record as a matrix with the given number of rows."""
     part = record[start[quantity] : start[quantity + 1]]
     return part.reshape((rows, part.shape[0] // rows))
 
 
 @compiled
 def _is_beyond(q: Array, lowest: Array, highest: Array) -> bool:
-    """Whether an angle is beyond its limits."""
+    """Check whether an angle is beyond its limits."""
     beyond = False
     for i in range(q.shape[0]):
         beyond = beyond or q[i] < lowest[i] or q[i] > highest[i]
@@ -294,7 +294,7 @@ def _clear(record: Array, first: int, end: int) -> None:
 def _set_residual(
     tension: Array, J: Array, wrench: Array, JX: Array, g: Array, residual: Array
 ) -> None:
-    """Fill the residual of Eq. 13, J_Lᵀ F − J_Xᵀ W + g (nv,)."""
+    """Compute the residual of Eq. 13, J_Lᵀ F − J_Xᵀ W + g (nv,)."""
     for i in range(g.shape[0]):
         residual[i] = g[i]
         for a in range(6):
@@ -306,7 +306,7 @@ def _set_residual(
 
 @compiled
 def _copy(record: Array, start: Indices, known: int, wanted: Indices, b: int, out: Array) -> None:
-    """Copy the wanted quantities to out[b]; NaN for all but the first ``known`` of the record."""
+    """Copy the requested quantities to out[b]; NaN if their number is ``known`` or higher."""
     at = 0
     for w in range(wanted.shape[0]):
         first, end = start[wanted[w]], start[wanted[w] + 1]

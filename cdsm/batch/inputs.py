@@ -1,4 +1,4 @@
-"""Arguments given row by row, and rows in slices that fit a processor's cache."""
+"""Checks of the arguments of a batch, and its division into slices that fit the cache."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from cdsm.manipulator import Manipulator
 from cdsm.support.validation import WRENCH, Array, flag, frozen, number_array, whole_number
 
 _NUMBERS = 2**17
-"""Floats per chunk: one megabyte."""
+"""Maximum number of floats in a slice: one megabyte."""
 
 _FEWEST, _MOST = 4, 4096
-"""Rows per chunk."""
+"""Fewest and most postures in a slice."""
 
 
 def kernel_arm(arm: Manipulator, check_limits: bool) -> Arm:
-    """The arm as plain arrays."""
+    """Return the arrays of an arm for the kernels; without limits if they are not checked."""
     lowest, highest = arm._model.lowest, arm._model.highest
     if not flag("check_limits", check_limits):
         lowest, highest = np.full_like(lowest, -np.inf), np.full_like(highest, np.inf)
@@ -38,7 +38,7 @@ def kernel_arm(arm: Manipulator, check_limits: bool) -> Arm:
 
 
 def postures(arm: Manipulator, q: ArrayLike) -> Array:
-    """Joint angles (B, nv) [rad], read-only."""
+    """Check joint angles (B, nv) [rad]; return them as a read-only array."""
     array = number_array("q", q)
     if array.ndim != 2 or array.shape[1] != arm.nv:
         raise InvalidInput(
@@ -51,7 +51,7 @@ def postures(arm: Manipulator, q: ArrayLike) -> Array:
 
 
 def per_row(name: str, value: ArrayLike, rows: int, width: int, meaning: str, kind: str) -> Array:
-    """Numbers that are the same for all rows (width,), or different (rows, width); read-only."""
+    """Check an array (width,) for all postures or (rows, width); return it read-only."""
     array = number_array(name, value, kind)
     if array.shape not in ((width,), (rows, width)):
         raise InvalidInput(
@@ -63,7 +63,7 @@ def per_row(name: str, value: ArrayLike, rows: int, width: int, meaning: str, ki
 
 
 def given_tension(arm: Manipulator, value: ArrayLike, rows: int) -> Array:
-    """Tensions (C,) or (rows, C) [N], read-only."""
+    """Check tensions (C,) or (rows, C) [N]; return them as a read-only array."""
     cables = [cable.name for cable in arm.cables]
     tension = per_row("tension", value, rows, len(cables), "one tension [N] per cable", "tension")
     if tension.size and tension.min() < 0.0:
@@ -76,28 +76,28 @@ def given_tension(arm: Manipulator, value: ArrayLike, rows: int) -> Array:
 
 
 def given_wrench(value: ArrayLike | None, rows: int) -> Array:
-    """Wrench (6,) or (rows, 6), zero if there is none; read-only."""
+    """Check a wrench (6,) or (rows, 6), zero if None; return it as a read-only array."""
     return per_row("wrench", np.zeros(6) if value is None else value, rows, 6, WRENCH, "wrench")
 
 
 def of_rows(values: Array, part: slice, rows: int) -> Array:
-    """The rows of a slice of values that are the same for all rows or not; read-only."""
+    """Return the values (b, n) of a slice of the postures; one row (n,) for all is repeated."""
     whole = np.broadcast_to(values, (rows, *values.shape[-1:]))
     return frozen(np.ascontiguousarray(whole[part]))
 
 
 def run_slices(work: Callable[[slice], None], rows: int, width: int, threads: int) -> None:
-    """Call ``work`` for slices that cover all rows, in several threads.
+    """Call ``work`` for slices that cover all postures, in several threads.
 
-    Threads of Python, whose kernels release the interpreter, in place of numba's parallel loops:
-    those cannot be entered from two threads at once on some machines, nor in a process that forks
-    later on others, and take seconds longer to compile.
+    These are Python threads; the kernels release the interpreter lock. Parallel loops of numba
+    take seconds longer to compile. On some machines two threads cannot enter such a loop at once;
+    on others a process that forks later cannot use one.
 
     Args:
-        work: Computes the rows of its slice, and touches no others.
-        rows: Number of rows.
-        width: Floats of temporary memory per row.
-        threads: How many at most.
+        work: Computes the postures of its slice, and changes no others.
+        rows: Number of postures.
+        width: Floats of temporary memory per posture.
+        threads: Maximum number of threads.
     """
     share = max(_FEWEST, -(-rows // threads))
     size = min(share, max(_FEWEST, min(_MOST, _NUMBERS // max(width, 1))))
@@ -107,12 +107,12 @@ def run_slices(work: Callable[[slice], None], rows: int, width: int, threads: in
             work(part)
         return
     with ThreadPoolExecutor(min(threads, len(slices))) as pool:
-        for _ in pool.map(work, slices):  # an error in one cancels those that have not begun
+        for _ in pool.map(work, slices):  # an error cancels the slices that have not begun
             pass
 
 
 def checked_threads(threads: int | None) -> int:
-    """The number of threads given, or one for each core this process may use."""
+    """Check the number of threads; None gives one for each core that this process may use."""
     if threads is None:
         if hasattr(os, "sched_getaffinity"):
             return len(os.sched_getaffinity(0))

@@ -1,4 +1,4 @@
-"""The record of a row: the quantities of a posture under tension, one after the other."""
+"""Layout of a record: the quantities of one posture, one after the other."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ OUTSIDE_ELASTICITY = int(Status.OUTSIDE_ELASTICITY)
 SINGULAR = int(Status.SINGULAR)
 IMMOBILE = int(Status.IMMOBILE)
 UNDECIDED = 255
-"""The kernel certifies nothing; ``distribute_tension`` decides the row."""
+"""The kernel certified neither tensions nor infeasibility; ``distribute_tension`` decides."""
 
 QUANTITIES = (
     "tip",
@@ -43,8 +43,8 @@ QUANTITIES = (
     "compliance",
     "cartesian",
 )
-"""In the order of the record: first those of the joint angles alone, then those that need tensions,
-then those that need the rigidity of the cables too, and last those that need a regular K_θ."""
+"""Quantities in the order of the record: of the joint angles alone; with tensions; with the
+rigidity of the cables; with a regular K_θ."""
 
 (
     TIP,
@@ -68,7 +68,7 @@ then those that need the rigidity of the cables too, and last those that need a 
 
 
 def shapes(nv: int, cables: int, directions: int) -> tuple[tuple[int, ...], ...]:
-    """Shape of each quantity, for one row."""
+    """Return the shape of each quantity at one posture."""
     matrix = (nv, nv)
     return (
         (4, 4),
@@ -92,6 +92,6 @@ def shapes(nv: int, cables: int, directions: int) -> tuple[tuple[int, ...], ...]
 
 
 def starts(nv: int, cables: int, directions: int) -> Indices:
-    """Where each quantity begins in the record, and where the last one ends."""
+    """Return the index at which each quantity begins in the record, and the record's length."""
     sizes = [math.prod(shape) for shape in shapes(nv, cables, directions)]
     return np.array([0, *np.cumsum(sizes)], dtype=np.intp)

@@ -1,11 +1,11 @@
-"""A guess of the tensions of a serpentine arm, block by block, or a proof that there are none.
+"""Guess of the tensions of a serpentine arm, or a proof that no tensions balance it.
 
-The cables that end at a joint turn it and the joints before it, but none behind it: J_Lᵀ is block
-triangular. From the last joint inwards, as many cables per joint are taken off their lower bounds
-as it has axes, two at most, so that they balance it. From the first joint outwards, the multipliers
-follow from these cables. Mostly this is the optimum: with three cables for each universal joint it
-was in all of 9000 random postures up to half the joint limits, and in three of four up to nine
-tenths. A row takes 0.3 to 1.5 µs, and the search of :mod:`cdsm.batch.active_set` 9 to 16 µs.
+The cables that end at a joint turn this joint and the joints before it, but no joint behind it. So
+J_Lᵀ is block triangular. From the last joint to the first, one cable per axis (at most two) is
+raised above its lower bound to balance the joint. From the first joint to the last, the multipliers
+follow from these cables. With three cables for each universal joint, the guess was the optimum in
+all of 9000 random postures up to half the joint limits, and in three of four up to nine tenths. A
+guess takes 0.3 to 1.5 µs, and the search of :mod:`cdsm.batch.active_set` 9 to 16 µs.
 """
 
 from __future__ import annotations
@@ -23,17 +23,17 @@ from cdsm.kernels.tree import Indices, Routing
 from cdsm.support.validation import Array
 
 _MOST = 2
-"""Axes of one joint."""
+"""Maximum number of axes of one joint."""
 
 
 class Blocks(NamedTuple):
-    """Joint rows and cables, block by block from base to tip; none if the arm has no such order.
+    """Joint axes and cables of all blocks from base to tip; empty if the guess cannot be used.
 
     Attributes:
         row: Columns of J_L, block by block (nv,).
-        row_start: Where each block begins in them, and where the last ends.
+        row_start: Index in ``row`` at which each block begins, and where the last ends.
         cable: Rows of J_L, block by block (C,).
-        cable_start: Likewise.
+        cable_start: Index in ``cable`` at which each block begins, and where the last ends.
     """
 
     row: Indices
@@ -43,7 +43,7 @@ class Blocks(NamedTuple):
 
 
 def blocks(routing: Routing, nv: int) -> Blocks:
-    """Find the blocks of an arm of nv joints."""
+    """Find the blocks of an arm with nv joint coordinates."""
     turned: list[set[int]] = [set() for _ in routing.fixed]
     ends = routing.segment[1:, 3]
     for (cable, _, _, first, _), end in zip(routing.segment[:-1], ends, strict=True):
@@ -87,10 +87,10 @@ def guess(
     free: Flags,
     lacking: Array,
 ) -> int:
-    """Fill tensions F (C,) that balance the arm with as few cables above their bounds as can be.
+    """Fill tensions F (C,) that balance the arm with the fewest cables above their lower bounds.
 
     Returns:
-        The block that no two cables balance, or −1; ``lacking`` (2,) is then its missing torque.
+        −1, or the block that its cables cannot balance; ``lacking`` (2,) is then its missing torque.
     """
     row, row_start, cable, cable_start = blocks
     for c in range(F.shape[0]):
@@ -118,7 +118,7 @@ def guess(
 def _cheapest(
     J: Array, lacking: Array, low: Array, high: Array, own: Indices, i: int, j: int
 ) -> tuple[int, int, float, float]:
-    """The cables that supply the lacking torque at the least ‖F‖², and what they add; or −1."""
+    """Find the one or two cables (or −1) that supply the torque at least ‖F‖², and their rise."""
     best, p, q, x, y = math.inf, -1, -1, 0.0, 0.0
     for s in range(own.shape[0]):
         c = own[s]
@@ -144,7 +144,7 @@ def _cheapest(
 
 @compiled
 def multipliers(blocks: Blocks, J: Array, F: Array, free: Flags, first: int, y: Array) -> None:
-    """Fill y (nv,) from block ``first`` on so that J_L y = F for the cables that are free there."""
+    """Fill y (nv,) from block ``first`` on so that J_L y = F for the free cables there."""
     row, row_start, cable, cable_start = blocks
     for k in range(first, row_start.shape[0] - 1):
         i, j = row[row_start[k]], row[row_start[k + 1] - 1]
@@ -180,11 +180,11 @@ def is_provably_infeasible(
     zero: Array,
     v: Array,
 ) -> bool:
-    """Whether it can be proved that block k, which lacks torque, cannot be balanced.
+    """Check whether a proof shows that no tensions balance block k, which lacks torque.
 
-    The vector of the proof is normal to a line that separates the lacking torque from those that
-    the block's cables can add, mostly along one of them. Its entries for the joints behind are such
-    that the free cables there do no work.
+    The proof is a vector v. In block k, v is normal to a line that separates the lacking torque
+    from the torques of the block's cables; mostly the line is along one of these torques. For the
+    joints behind block k, v is such that their free cables do no work.
 
     Args:
         blocks: The blocks.
@@ -192,11 +192,11 @@ def is_provably_infeasible(
         b: Torque to balance (nv,).
         low: Lower bounds (C,).
         high: Upper bounds (C,).
-        free: Which cables are free in the blocks behind (C,).
+        free: Whether each cable is free in the blocks behind block k (C,).
         lacking: Torque that block k lacks (2,).
-        k: The block.
+        k: Number of the block.
         zero: Zeros (C,).
-        v: Scratch (nv,).
+        v: Working memory for the vector of the proof (nv,).
     """
     row, row_start, cable, cable_start = blocks
     i, j = row[row_start[k]], row[row_start[k + 1] - 1]

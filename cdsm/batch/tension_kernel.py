@@ -1,4 +1,4 @@
-"""The kernel of tension distribution: tensions are guessed or searched, then verified, row by row.
+"""Kernel of tension distribution: it guesses or searches tensions at every posture, then verifies.
 
 min ½‖F‖²   so that   J_Lᵀ F = J_Xᵀ W − g   and   low ≤ F ≤ high.
 """
@@ -29,17 +29,18 @@ def distribute_rows(
     tension: Array,
     status: Codes,
 ) -> None:
-    """Fill tensions (b, C) [N], NaN where there are none, and the status of every row.
+    """Fill tensions (b, C) [N], NaN where none were found, and the status of every posture.
 
     Args:
         blocks: The blocks of the arm.
-        postures: J_X, J_L and g of each row, one after the other, (b, 6 nv + C nv + nv).
+        postures: J_X, J_L and g of each posture, one after the other, (b, 6 nv + C nv + nv).
         low: Lower bounds (b, C) [N].
         high: Upper bounds (b, C) [N].
         wrench: W (b, 6).
-        smallest_arm: Moment arms below this are rounding [m], and are made zero.
-        tension: To be filled.
-        status: Rows that are not OK are passed over; UNDECIDED where nothing could be certified.
+        smallest_arm: Moment arms below this are rounding [m]; they are set to zero.
+        tension: Tensions, filled here.
+        status: Status, filled here; postures not OK on entry are passed over. UNDECIDED means that
+            neither an optimum nor a proof was found.
     """
     count = low.shape[1]
     nv = postures.shape[1] // (count + 7)
@@ -64,7 +65,7 @@ def distribute_rows(
                 b[i] += wrench[r, a] * JX[a, i]
         status[r] = _distribute(blocks, J, b, low[r], high[r], free, lacking, zero, state)
         if status[r] == OK:
-            for c in range(count):  # a bound that is active is not crossed by rounding
+            for c in range(count):  # rounding may not cross an active bound
                 tension[r, c] = min(max(state.F[c], low[r, c]), high[r, c])
 
 
@@ -80,7 +81,7 @@ def _distribute(
     zero: Array,
     state: State,
 ) -> int:
-    """Fill the tensions of the state; OK, INFEASIBLE or UNDECIDED."""
+    """Fill the tensions of the state; return OK, INFEASIBLE or UNDECIDED."""
     F, y = state.F, state.y
     if blocks.row.shape[0]:
         k = guess(blocks, J, b, low, high, F, free, lacking)
