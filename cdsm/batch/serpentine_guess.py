@@ -90,7 +90,7 @@ def guess(
     """Fill tensions F (C,) that balance the arm with the fewest cables above their lower bounds.
 
     Returns:
-        −1, or the block that its cables cannot balance; ``lacking`` (2,) is then its missing torque.
+        −1, or the block that no two cables balance; ``lacking`` (2,) is then its missing torque.
     """
     row, row_start, cable, cable_start = blocks
     for c in range(F.shape[0]):

@@ -1,1 +1,1 @@
-"""What every chapter uses: validation, frozen values, files, XML, units."""
+"""Tools that every chapter uses: validation, frozen values, files, XML, units."""

@@ -1,4 +1,4 @@
-"""What the Dataset of a sweep must hold: a status, with a word for each of its numbers."""
+"""Checks of the Dataset of a sweep: it needs a status with a word for each number."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ if TYPE_CHECKING:
 
 
 def check_sweep(dataset: object) -> None:
-    """Raise what is wrong with a sweep.
+    """Check that an object is the Dataset of a sweep.
 
     Raises:
         MissingExtra: xarray is not installed.
-        InvalidInput: Not a Dataset with a status.
+        InvalidInput: The object is not a Dataset, or has no status.
     """
     need("sweep", "xarray")
     import xarray
@@ -30,10 +30,10 @@ def check_sweep(dataset: object) -> None:
 
 
 def status_names(dataset: xarray.Dataset) -> dict[int, str]:
-    """The words for the numbers of ``status``, as the Dataset itself has them.
+    """Return the word for each number of ``status``, read from the Dataset.
 
     Raises:
-        InvalidInput: They are not one word for each number.
+        InvalidInput: The Dataset does not have one word for each number.
     """
     flags = dataset["status"].attrs
     try:

@@ -1,4 +1,4 @@
-"""Packages that only some need: asked for by the name of the extra that brings them."""
+"""Checks that optional packages are installed."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from cdsm.errors import MissingExtra
 
 
 def need(extra: str, *packages: str) -> None:
-    """Raise :class:`~cdsm.MissingExtra` if one of the packages is not installed."""
+    """Raise :class:`~cdsm.MissingExtra` if a package of the extra is not installed."""
     for package in packages:
         try:
             importlib.import_module(package)

@@ -1,4 +1,4 @@
-"""Reading and writing whole files: named errors, size caps, never a half-written file."""
+"""Reading and writing of whole files: named errors, size limits, no half-written files."""
 
 from __future__ import annotations
 
@@ -12,26 +12,26 @@ from pathlib import Path
 from cdsm.errors import CdsmError, FileError, InvalidInput
 
 MAXIMUM_BYTES = 10_000_000
-"""No description of an arm comes near this; a larger file is a mistake or an attack."""
+"""Largest size of a file that is read; a larger file is a mistake or an attack."""
 
 
 def read_text(path: str | os.PathLike[str]) -> str:
     """Return the UTF-8 text of a file.
 
     Raises:
-        FileError: Missing, not readable, no regular file, larger than :data:`MAXIMUM_BYTES`, or not
-            UTF-8.
+        FileError: The file is missing, not readable, not a regular file, larger than
+            :data:`MAXIMUM_BYTES`, or not UTF-8.
     """
     path = as_path(path)
     try:
-        # a pipe that nobody writes to would be waited for
+        # O_NONBLOCK: opening a pipe without a writer would wait forever
         with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), "rb") as file:
             if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
                 raise FileError(path, "is not a regular file; give the path of a file.")
             data = file.read(MAXIMUM_BYTES + 1)
         if len(data) > MAXIMUM_BYTES:
             raise FileError(path, f"is larger than the {MAXIMUM_BYTES} bytes that are read.")
-        return data.decode("utf-8-sig")  # some editors begin a file with a mark
+        return data.decode("utf-8-sig")  # some editors write a byte order mark
     except CdsmError:
         raise
     except FileNotFoundError:
@@ -45,19 +45,17 @@ def read_text(path: str | os.PathLike[str]) -> str:
 
 
 def write_text(path: str | os.PathLike[str], text: str) -> Path:
-    """Write UTF-8 text with newline endings, whole or not at all; return the path."""
+    """Write UTF-8 text with newline endings, completely or not at all; return the path."""
     return write_file(path, lambda aside: aside.write_bytes(text.encode()))
 
 
 def write_file(path: str | os.PathLike[str], fill: Callable[[Path], object]) -> Path:
-    """Let ``fill`` write a file beside the wanted one, then rename it into place.
+    """Call ``fill`` with a temporary file, then rename this file to the wanted path.
 
-    A failure, of ``fill`` or of the disk, leaves the wanted path as it was. A link is followed, and
-    an existing file keeps its mode.
+    On failure the wanted path stays unchanged. A link is followed; an existing file keeps its mode.
 
     Raises:
-        FileError: The folder is missing or not writable, the disk refuses, or something that is not
-            a file stands there.
+        FileError: The folder is missing or not writable, the disk fails, or the path is not a file.
     """
     path = as_path(path)
     aside: Path | None = None
@@ -84,10 +82,10 @@ def write_file(path: str | os.PathLike[str], fill: Callable[[Path], object]) -> 
 
 
 def make_folder(path: str | os.PathLike[str]) -> Path:
-    """Create a folder and its parents if missing; return it.
+    """Create a folder and its parents if missing; return its path.
 
     Raises:
-        FileError: It cannot be created, or a file stands in its place.
+        FileError: The folder cannot be created, or the path is a file.
     """
     path = as_path(path)
     try:
@@ -98,11 +96,11 @@ def make_folder(path: str | os.PathLike[str]) -> Path:
 
 
 def as_path(path: str | os.PathLike[str]) -> Path:
-    """Return the path, of something that exists or could be made.
+    """Check that the system can use a path; the file may or may not exist.
 
     Raises:
-        InvalidInput: It is no path.
-        FileError: The system cannot look there: too long, no text, forbidden.
+        InvalidInput: ``path`` is not a path.
+        FileError: The path is too long, is not text, or access is forbidden.
     """
     try:
         found = Path(path)

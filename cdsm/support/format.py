@@ -1,4 +1,4 @@
-"""Numbers in print: coordinates, units in the keys of JSON, and the model of every stiffness."""
+"""Formats for printed output: coordinates, units, keys of JSON."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ from numpy.typing import NDArray
 from cdsm.support.values import Array
 
 MODEL: Final = "frictionless, rigid links, tangent"
-"""What every stiffness in print is."""
+"""Assumptions of every printed stiffness."""
 
 
 def coordinates(values: Iterable[float], form: str = ".4g") -> str:
-    """A direction or a place: ``(0, 0.5, 1)``."""
+    """Return a vector as text: ``(0, 0.5, 1)``."""
     return f"({', '.join(format(x, form) for x in values)})"
 
 
 def key(name: str, unit: str) -> str:
-    """A key that names its unit: ``margin`` in ``N m/rad`` is ``margin_Nm_per_rad``."""
+    """Return a JSON key with unit: ``margin`` in ``N m/rad`` becomes ``margin_Nm_per_rad``."""
     words = unit.replace("N m", "Nm").replace("/", " per ").split()
     return "_".join([name, *words])
 
 
 class JointUnits(NamedTuple):
-    """Units of joints of which some turn and some may slide.
+    """Units of the joints of an arm; joints turn or slide.
 
     Attributes:
         slides: Whether each joint slides (nv,).
@@ -37,28 +37,28 @@ class JointUnits(NamedTuple):
 
     @property
     def coordinates(self) -> tuple[str, ...]:
-        """SI unit of each coordinate."""
+        """Return the SI unit of each joint coordinate: rad, or m where the joint slides."""
         return tuple("m" if slides else "rad" for slides in self.slides)
 
     @property
     def shown(self) -> tuple[tuple[str, float], ...]:
-        """The unit in which people are shown each coordinate, and what it is in SI."""
+        """Return the printed unit of each joint coordinate, deg or mm, and its size in SI."""
         return tuple(("mm", 1e-3) if slides else ("deg", math.pi / 180.0) for slides in self.slides)
 
     def torque(self, joint: int | None = None) -> str:
-        """Unit of the torque of a joint, or of all of them together."""
+        """Return the unit of the torque of one joint, or of all joints together."""
         return self._joined("N m", "N", joint)
 
     def stiffness(self) -> str:
-        """Unit of the diagonal of K_θ and of its eigenvalues."""
+        """Return the unit of the diagonal of K_θ and of the eigenvalues of K_θ."""
         return self._joined("N m/rad", "N/m")
 
     def levers(self, length: float) -> Array:
-        """1 rad for a joint that turns, the arm's length [m] for one that slides (nv,)."""
+        """Return 1 rad for joints that turn, the arm's length [m] for joints that slide (nv,)."""
         return np.where(self.slides, length, 1.0)
 
     def to_dict(self, names: Sequence[str], q: Array) -> dict[str, object]:
-        """Coordinates q (..., nv) by joint, angles and ways apart since their units differ."""
+        """Return joint coordinates q (..., nv) by joint name; angles [rad] and ways [m] apart."""
         found: dict[str, object] = {}
         for key_of, chosen in (("angles_rad", ~self.slides), ("ways_m", self.slides)):
             if chosen.any() or key_of == "angles_rad":

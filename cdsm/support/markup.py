@@ -7,15 +7,15 @@ from collections.abc import Iterable
 
 
 class Markup(str):
-    """HTML that :func:`element` made: it is not escaped again."""
+    """HTML text made by :func:`element`; it is not escaped again."""
 
     __slots__ = ()
 
 
 def element(name: str, *contents: str, **attributes: str) -> Markup:
-    """An HTML element; contents are escaped unless they are elements themselves.
+    """Build an HTML element; contents are escaped unless they are :class:`Markup`.
 
-    An underscore in the name of an attribute stands for a hyphen, one at its end for nothing.
+    In attribute names, underscores become hyphens; underscores at the end are removed.
     """
     given = "".join(
         f' {key.rstrip("_").replace("_", "-")}="{html.escape(value)}"'
@@ -26,5 +26,5 @@ def element(name: str, *contents: str, **attributes: str) -> Markup:
 
 
 def row(tag: str, cells: Iterable[str]) -> Markup:
-    """A row of a table, its cells ``th`` or ``td``."""
+    """Build a row of a table; ``tag`` of the cells is ``th`` or ``td``."""
     return element("tr", *(element(tag, cell) for cell in cells))

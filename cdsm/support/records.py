@@ -1,4 +1,4 @@
-"""Strict frozen records: all faults of a description at once, and its TOML form."""
+"""Strict frozen records that report all faults of a description at once, and their TOML form."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ _STRICT = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
 
 
 def _plain(value: object) -> object:
-    """Turn numpy numbers and arrays into Python's own, which strict validation asks for."""
+    """Convert numpy numbers and arrays to Python numbers and lists for strict validation."""
     return value.tolist() if isinstance(value, (np.generic, np.ndarray)) else value
 
 
 def _in_range(kind: str, zero: bool = False) -> Callable[[float], float]:
-    """A check of a field against :data:`~cdsm.support.validation.RANGES`."""
+    """Return a check of a field against :data:`~cdsm.support.validation.RANGES`."""
 
     def check(value: float) -> float:
         problem = within(kind, value, zero=zero)
@@ -66,17 +66,17 @@ Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$", max_length=64)]
 
 
 _DEEPEST = 64
-"""Parts of a dotted key; no description of an arm has more than two."""
+"""Maximum number of parts of a dotted key; a description of an arm needs two."""
 
 _PART = r"""[ \t]*+(?:"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+'|[^\s.=\[\]{},#"']++)[ \t]*+"""
 _DEEP_KEY = re.compile(rf"(?:\.{_PART}){{{_DEEPEST}}}")
 
 _HINTED = 20
-"""Unknown keys for which a known one is looked for."""
+"""Maximum number of unknown keys for which a similar known key is suggested."""
 
 
 class CrossFaults(ValueError):
-    """Faults between the fields of a record, on their way through pydantic."""
+    """Faults that concern several fields of a record, raised during pydantic's validation."""
 
     def __init__(self, faults: Iterable[str]) -> None:
         self.faults = tuple(faults)
@@ -85,7 +85,7 @@ class CrossFaults(ValueError):
 
 @dataclass_transform(frozen_default=True, kw_only_default=True)
 def record(cls: type[_Record]) -> type[_Record]:
-    """Make a frozen, strict pydantic dataclass whose faults come as one :class:`GeometryError`."""
+    """Build a frozen, strict pydantic dataclass; all faults raise one :class:`GeometryError`."""
     made: Any = dataclass(frozen=True, kw_only=True, config=_STRICT)(cls)
     validate: Callable[..., None] = made.__init__
 
@@ -101,7 +101,7 @@ def record(cls: type[_Record]) -> type[_Record]:
 
 
 def checked_keywords(function: _Function) -> _Function:
-    """Check the keywords of a function as the fields of a :func:`record` are checked."""
+    """Decorate a function to check its keywords like the fields of a :func:`record`."""
     validated = validate_call(config=_STRICT)(function)
 
     @wraps(function)
@@ -115,21 +115,21 @@ def checked_keywords(function: _Function) -> _Function:
 
 
 def read_toml(text: str) -> dict[str, Any]:
-    """Parse TOML, or raise a :class:`GeometryError` that says where it breaks off."""
-    if _DEEP_KEY.search(text) is not None:  # for which the parser would need gigabytes
+    """Parse TOML; raise a :class:`GeometryError` that names the place of an error."""
+    if _DEEP_KEY.search(text) is not None:  # the parser would need gigabytes for such a key
         raise GeometryError([f"is not TOML that is read here: a key has over {_DEEPEST} parts"])
     try:
         data = tomllib.loads(text)
         json.dumps(data, default=str)
-    except (ValueError, RecursionError) as error:  # also integers of too many digits
+    except (ValueError, RecursionError) as error:  # integers of too many digits raise too
         raise GeometryError([f"is not TOML: {error}"]) from None
     return data
 
 
 def parse(kind: type[_Record], data: object) -> _Record:
-    """Build a record from parsed TOML, or raise a :class:`GeometryError` with every fault."""
-    # JSON is where pydantic's strict mode takes a table for a record and an array for a tuple;
-    # dates, which JSON lacks, become strings, which no field but the name is
+    """Build a record from parsed TOML; raise one :class:`GeometryError` with all faults."""
+    # only from JSON does pydantic's strict mode accept a table as a record and an array as a tuple;
+    # JSON has no dates, so they become strings, which only names accept
     try:
         return TypeAdapter(kind).validate_json(json.dumps(data, default=str))
     except ValidationError as error:
@@ -137,7 +137,7 @@ def parse(kind: type[_Record], data: object) -> _Record:
 
 
 def toml_lines(record: object, keys: Iterable[str] | None = None) -> list[str]:
-    """One TOML line per field that is set."""
+    """Return one TOML line for each field that is not None."""
     names = keys or [field.name for field in fields(record)]  # type: ignore[arg-type]
     values = ((name, getattr(record, name)) for name in names)
     return [f"{name} = {_toml(value)}" for name, value in values if value is not None]
@@ -146,12 +146,12 @@ def toml_lines(record: object, keys: Iterable[str] | None = None) -> list[str]:
 def _toml(value: object) -> str:
     if isinstance(value, tuple):
         return f"[{', '.join(map(_toml, value))}]"
-    # a name has no character that JSON and TOML would escape differently
+    # JSON and TOML escape all characters of a name in the same manner
     return json.dumps(value) if isinstance(value, str) else repr(value)
 
 
 def _keys(kind: Callable[..., Any]) -> list[str]:
-    """Names of the keywords of a function, or of the fields of a record and those in its lists."""
+    """Return the keyword names of a function, or field names of a record and of nested records."""
     hints = get_type_hints(kind)
     hints.pop("return", None)
     entries = [entry for hint in hints.values() for entry in get_args(hint)]
@@ -172,7 +172,7 @@ def _faults(error: ValidationError, kind: Callable[..., Any]) -> list[str]:
     hinted = 0
     faults = error.errors()
     for fault in faults:
-        # joints[2].limit counts from 1, as the joints' and cables' names do
+        # joints[2].limit counts from 1 like the names of joints and cables
         where = "".join(
             f"[{part + 1}]" if isinstance(part, int) else f".{part}" for part in fault["loc"]
         ).lstrip(".")
@@ -185,7 +185,7 @@ def _faults(error: ValidationError, kind: Callable[..., Any]) -> list[str]:
             other["loc"][: len(fault["loc"])] == fault["loc"] and other is not fault
             for other in faults
         ):
-            continue  # the list is only short of the entries that are faulty themselves
+            continue  # the list is only too short because its faulty entries do not count
         elif fault["type"] in ("missing", "missing_keyword_only_argument"):
             listed.append(f"{where}: is missing")
         elif fault["type"] == "unexpected_keyword_argument":

@@ -1,4 +1,4 @@
-"""What became of a posture among many, instead of the error that a single one raises."""
+"""Status of each posture of a batch; a single posture would raise an error."""
 
 from __future__ import annotations
 
@@ -20,37 +20,36 @@ from cdsm.errors import (
 
 @unique
 class Status(IntEnum):
-    """What became of a row, and so which quantities exist; those that do not are NaN.
+    """Status of one posture of a batch; it tells which quantities exist. All others are NaN.
 
-    It names the first failure, for which the functions of a single posture raise an error. An arm
-    that buckles is no failure: its margin is negative. Nor is an infinite stiffness ``along`` a
-    direction in which the tip cannot move.
+    It names the first failure, and the error that a single posture would raise. An arm that buckles
+    (negative margin) and an infinite stiffness ``along`` (immobile direction) are not failures.
     """
 
     OK = 0
-    """Everything asked for exists."""
+    """All requested quantities exist."""
     BEYOND_LIMITS = 1
     """A joint angle is beyond its limit (JointLimitError): nothing exists."""
     COINCIDENT_SITES = 2
     """Two neighbouring sites of a cable coincide (CableError): nothing exists."""
     INFEASIBLE = 3
-    """No tension within the bounds balances the arm (InfeasibleTension): what depends on the joint
-    angles alone exists, nothing that needs tensions."""
+    """No tensions within the bounds balance the arm (InfeasibleTension): only quantities of the
+    joint angles alone exist."""
     SOLVER_FAILED = 4
-    """The solver finds no tensions, though there are some (SolverError): as INFEASIBLE."""
+    """The solver finds no tensions, though tensions exist (SolverError): as INFEASIBLE."""
     OUTSIDE_ELASTICITY = 5
-    """A tension is outside the domain of the cable's elasticity (ElasticityRangeError): tensions,
-    residual, active and load part exist, nothing that needs the stiffness of the cables."""
+    """A tension is outside the domain of the cable's law (ElasticityRangeError): tensions, residual,
+    active and load part exist, quantities that need the stiffness of the cables do not."""
     SINGULAR = 6
-    """K_θ is singular (SingularStiffness): along, compliance and cartesian do not exist, nor does
-    pseudoinverse if the tip is IMMOBILE too."""
+    """K_θ is singular (SingularStiffness): along, compliance and cartesian do not exist. If the tip
+    is also IMMOBILE, pseudoinverse does not exist."""
     IMMOBILE = 7
-    """The tip can hardly move in some direction (SingularStiffness): all but cartesian and
-    pseudoinverse exists."""
+    """The tip can hardly move in some direction (SingularStiffness): cartesian and pseudoinverse do
+    not exist, all other quantities exist."""
 
     @classmethod
     def of(cls, error: CdsmError) -> Status | None:
-        """The status that stands for an error; None where no posture raises such an error."""
+        """Return the status for an error; None if a posture cannot raise this error."""
         return next((status for kind, status in _ERRORS.items() if isinstance(error, kind)), None)
 
 
@@ -65,7 +64,7 @@ _ERRORS: dict[type[CdsmError], Status] = {
 
 
 def summary(status: NDArray[np.uint8]) -> str:
-    """How many rows have which status."""
+    """Return a text that counts the postures with each status."""
     counts = np.bincount(status, minlength=len(Status))
     listed = [f"{counts[each]} {each.name}" for each in Status if counts[each] or each == Status.OK]
     return f"{len(status)} postures: {', '.join(listed)}"

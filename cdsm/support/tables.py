@@ -1,4 +1,4 @@
-"""Tables of numbers in text files: comments behind #, a header, and a line per row."""
+"""Tables of numbers in text files: comment lines that begin with #, a header, and rows."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from cdsm.support.files import read_text
 from cdsm.support.values import Array
 
 _LONGEST_CELL = 1000
-"""Characters of a cell: longer than any number or name."""
+"""Maximum number of characters of a cell; numbers and names are shorter."""
 
 
 class Table(NamedTuple):
-    """The cells of a table, white space around them removed.
+    """Cells of a table, without white space around them.
 
     Attributes:
-        rows: Line number and cells of every line that is no comment; the first is the header.
-        comments: The lines that begin with #.
-        delimiter: What separates the cells; with another than a comma, decimal commas are read.
+        rows: Line number and cells of every line that is not a comment; the first is the header.
+        comments: Lines that begin with #.
+        delimiter: Character between cells; if it is not a comma, decimal commas are read.
     """
 
     rows: list[tuple[int, list[str]]]
@@ -34,11 +34,11 @@ class Table(NamedTuple):
 
     @property
     def header(self) -> list[str]:
-        """The cells of the first row."""
+        """Return the cells of the first row."""
         return self.rows[0][1]
 
     def column(self, at: int, refuse: Callable[[str], NoReturn], first: int = 1) -> Array:
-        """The numbers of a column from a row on; ``refuse`` is called for what is none."""
+        """Return the numbers of a column from row ``first`` on; ``refuse`` raises for bad cells."""
         numbers = []
         for line, cells in self.rows[first:]:
             cell = cells[at] if at < len(cells) else ""
@@ -49,7 +49,7 @@ class Table(NamedTuple):
         return np.array(numbers)
 
     def number(self, cell: str) -> float:
-        """The number in a cell; NaN if there is none."""
+        """Return the number in a cell; NaN if the cell holds no number."""
         try:
             return float(cell if self.delimiter == "," else cell.replace(",", "."))
         except ValueError:
@@ -61,11 +61,10 @@ def read_table(path: str | os.PathLike[str], delimiters: str = ",") -> Table:
 
     Args:
         path: The file.
-        delimiters: What may separate the cells; the first of these that is in the header does, or
-            else the last.
+        delimiters: Allowed delimiters. The first one found in the header is used, else the last.
 
     Raises:
-        FileError: The file cannot be read, or a line is no line of a table; the line is named.
+        FileError: The file cannot be read, or a line cannot be split into cells; the line is named.
     """
     lines = [(k, line) for k, line in enumerate(read_text(path).splitlines(), 1) if line.strip()]
     comments = [line for _, line in lines if line.lstrip().startswith("#")]
@@ -77,7 +76,7 @@ def read_table(path: str | os.PathLike[str], delimiters: str = ",") -> Table:
 
 
 def name_and_unit(cell: str) -> tuple[str, str]:
-    """The parts of a header such as ``joint1 [deg]``; without brackets the unit is empty."""
+    """Split a header such as ``joint1 [deg]``; without brackets the unit is empty."""
     found = re.fullmatch(r"(.*?)\s*(?:\[(.*)\])?", cell, re.DOTALL)
     assert found is not None
     return found[1], found[2] or ""

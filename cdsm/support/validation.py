@@ -1,7 +1,7 @@
-"""Checks at the border: native float64, the right shape, finite, of a size a machine could have.
+"""Checks of all inputs: native float64, right shape, finite, of a size that machines have.
 
-A quantity outside its range in :data:`RANGES` is refused here, by a named error, so that no code
-below has to defend itself against overflow, denormals and the like.
+A quantity outside its range in :data:`RANGES` raises a named error here. So all other code needs
+no defence against overflow or denormal numbers.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ from cdsm.support.values import frozen as frozen
 _Kind = TypeVar("_Kind")
 
 LARGEST = 1e15
-"""Largest magnitude of a number that has no range of its own."""
+"""Largest magnitude of a number whose quantity is not in :data:`RANGES`."""
 
 SMALLEST = 1e-12
-"""Smallest positive number of the same."""
+"""Smallest positive number whose quantity is not in :data:`RANGES`."""
 
 
 class Range(NamedTuple):
-    """The magnitudes a machine could have of a quantity, zero apart, in an SI unit."""
+    """Range of the nonzero magnitudes of a quantity in real machines, in an SI unit."""
 
     unit: str
     low: float
@@ -48,13 +48,13 @@ RANGES: Final = {
     "tension": Range("N", 1e-9, 1e9),
     "wrench": Range("N, N m", 1e-9, 1e9),
 }
-"""Generous: a hair of rubber to the cables of a bridge."""
+"""Range of each quantity; generous, from a hair of rubber to the cables of a bridge."""
 
 WRENCH: Final = "force [N], then moment [N m], base axes"
 
 
 def within(quantity: str, value: float, *, zero: bool = False, infinite: bool = False) -> str:
-    """What is wrong with the size of a positive quantity, with its range; empty if nothing is."""
+    """Return why a positive quantity is outside its range; an empty text if it is inside."""
     unit, low, high = RANGES[quantity]
     if low <= value <= high or (zero and value == 0.0) or (infinite and value == math.inf):
         return ""
@@ -68,17 +68,17 @@ def within(quantity: str, value: float, *, zero: bool = False, infinite: bool = 
 def quantity(
     name: str, value: object, kind: str, *, zero: bool = False, infinite: bool = False
 ) -> float:
-    """Return a positive float within the range of its kind.
+    """Check a positive number against the range of its quantity; return it as a float.
 
     Args:
-        name: The argument's name, for the error.
-        value: What the user gave.
+        name: Name of the argument, for the error.
+        value: Value from the user.
         kind: A key of :data:`RANGES`.
         zero: Whether zero is allowed.
         infinite: Whether inf is allowed.
 
     Raises:
-        InvalidInput: Not a number, or outside the range.
+        InvalidInput: The value is not a number, or is outside the range.
     """
     if infinite and isinstance(value, float) and value == math.inf:
         return value
@@ -90,14 +90,14 @@ def quantity(
 
 
 def number_array(name: str, value: ArrayLike, kind: str | None = None) -> Array:
-    """Return a fresh native float64 array of finite numbers, or raise :class:`InvalidInput`.
+    """Return a new native float64 array of finite numbers, or raise :class:`InvalidInput`.
 
-    With a kind no magnitude is above that of its range; small ones may be rounding and pass.
+    ``kind`` limits the magnitudes from above; small magnitudes pass, as they may be rounding.
     """
     array = _native(name, value)
     unit, _, largest = ("", 0.0, LARGEST) if kind is None else RANGES[kind]
-    # where the sum of squares is small enough, so is each; four times as fast as to look at each
-    if np.vdot(array, array) <= largest:  # false for NaN too
+    # if the sum of squares is small enough, all entries are; four times as fast as comparing each
+    if np.vdot(array, array) <= largest:  # false also for NaN
         return array
     usable = abs(array) <= largest
     if np.count_nonzero(usable) < array.size:
@@ -111,14 +111,14 @@ def number_array(name: str, value: ArrayLike, kind: str | None = None) -> Array:
 
 
 def instance(name: str, value: _Kind, kind: type[_Kind]) -> _Kind:
-    """Return the value if it is of the kind, else raise :class:`InvalidInput`."""
+    """Return the value if it is an instance of ``kind``, else raise :class:`InvalidInput`."""
     if not isinstance(value, kind):
         raise InvalidInput(name, f"{value!r} given; a {kind.__name__} is needed.")
     return value
 
 
 def sequence_of(name: str, value: Iterable[_Kind], kind: type[_Kind]) -> tuple[_Kind, ...]:
-    """Return the values as a tuple if all are of the kind, else raise :class:`InvalidInput`."""
+    """Return a list or tuple of ``kind`` as a tuple; else raise :class:`InvalidInput`."""
     entries = tuple(value) if isinstance(value, (list, tuple)) else None
     if entries is None or not all(isinstance(entry, kind) for entry in entries):
         raise InvalidInput(name, f"{value!r} given; a list or tuple of {kind.__name__} is needed.")
@@ -126,17 +126,17 @@ def sequence_of(name: str, value: Iterable[_Kind], kind: type[_Kind]) -> tuple[_
 
 
 def vector(name: str, value: ArrayLike, size: int, meaning: str, kind: str | None = None) -> Array:
-    """Return a fresh, read-only, finite vector of the given size.
+    """Return a new, read-only, finite vector of the given size.
 
     Args:
-        name: The argument's name, for the error.
-        value: What the user gave.
+        name: Name of the argument, for the error.
+        value: Value from the user.
         size: Required number of entries.
-        meaning: What the entries are ("one angle [rad] per joint"), for the error.
-        kind: Their key in :data:`RANGES`, if they have one.
+        meaning: Meaning of the entries ("one angle [rad] per joint"), for the error.
+        kind: Key of the entries in :data:`RANGES`, or None.
 
     Raises:
-        InvalidInput: Not numbers, masked, not finite, too large, or not of shape (size,).
+        InvalidInput: The shape is not (size,), or an entry is masked, too large or not finite.
     """
     array = number_array(name, value, kind)
     if array.shape != (size,):
@@ -146,11 +146,11 @@ def vector(name: str, value: ArrayLike, size: int, meaning: str, kind: str | Non
 
 
 def bound(name: str, value: ArrayLike, size: int, rows: int | None = None) -> Array:
-    """Return a read-only vector (size,) from a scalar or a vector that may hold ±inf.
+    """Check bounds of tension: a number or (size,), with ±inf allowed; return (size,), read-only.
 
-    With ``rows`` it may be an array (rows, size) too, and is returned as such.
+    If ``rows`` is given, an array (rows, size) is also allowed and keeps its shape.
     """
-    # a float for all is the usual case, and a hot one
+    # one float for all cables is the usual case and must be fast
     array: Array = np.full(size, value) if isinstance(value, float) else _native(name, value)
     if array.ndim == 0:
         array = array.repeat(size)
@@ -173,12 +173,12 @@ def bound(name: str, value: ArrayLike, size: int, rows: int | None = None) -> Ar
 
 
 def wrench_vector(name: str, value: ArrayLike) -> Array:
-    """Return a read-only wrench (6,)."""
+    """Check a wrench; return it as a read-only vector (6,)."""
     return vector(name, value, 6, WRENCH, "wrench")
 
 
 def scalar(name: str, value: object) -> float:
-    """Return one finite float."""
+    """Check one finite number; return it as a float."""
     array = number_array(name, value)  # type: ignore[arg-type]
     if array.ndim != 0:
         raise InvalidInput(name, f"shape {array.shape} given; one number is needed.")
@@ -186,17 +186,17 @@ def scalar(name: str, value: object) -> float:
 
 
 def unit_direction(name: str, value: ArrayLike) -> Array:
-    """Return a read-only unit vector (3,) along the one given."""
+    """Return the read-only unit vector (3,) along a given vector that is not zero."""
     array = vector(name, value, 3, "a direction in base axes")
     largest = float(abs(array).max())
     if largest == 0.0:
         raise InvalidInput(name, "is the zero vector; give a direction, such as (0, 0, 1).")
-    scaled = array / largest  # so that no length over- or underflows
+    scaled = array / largest  # so that the norm neither overflows nor underflows
     return frozen(scaled / np.linalg.norm(scaled))
 
 
 def unit_directions(name: str, value: ArrayLike) -> Array:
-    """Return read-only unit vectors (3,), or (n, 3) along n given directions."""
+    """Return the read-only unit vector (3,) of one direction, or (n, 3) of n directions."""
     given = number_array(name, value)
     if given.ndim < 2:
         return unit_direction(name, given)
@@ -206,14 +206,14 @@ def unit_directions(name: str, value: ArrayLike) -> Array:
 
 
 def flag(name: str, value: object) -> bool:
-    """Return True or False, or raise :class:`InvalidInput`: many an object is neither."""
+    """Return the value if it is True or False, else raise :class:`InvalidInput`."""
     if not isinstance(value, (bool, np.bool_)):
         raise InvalidInput(name, f"{value!r} given; True or False is needed.")
     return bool(value)
 
 
 def whole_number(name: str, value: object, least: int, most: int | None = None) -> int:
-    """Return a whole number within its bounds, or raise :class:`InvalidInput`."""
+    """Return a whole number from ``least`` to ``most``, or raise :class:`InvalidInput`."""
     if (
         isinstance(value, bool)
         or not isinstance(value, (int, np.integer))
@@ -226,7 +226,7 @@ def whole_number(name: str, value: object, least: int, most: int | None = None) 
 
 
 def text(name: str, value: object) -> str:
-    """Return a name that every file can hold, or raise :class:`InvalidInput`."""
+    """Return a nonempty text that can be encoded in files, or raise :class:`InvalidInput`."""
     if not isinstance(value, str) or not value:
         raise InvalidInput(name, f"{value!r} given; a name is needed, a text that is not empty.")
     try:
@@ -239,7 +239,7 @@ def text(name: str, value: object) -> str:
 
 
 def one_of(kind: str, name: object, known: Iterable[str]) -> str:
-    """Return the name if it is known, else raise :class:`UnknownName` with near matches."""
+    """Return the name if it is known, else raise :class:`UnknownName` with similar names."""
     known = tuple(known)
     if not isinstance(name, str) or name not in known:
         raise UnknownName(kind, name, known)
@@ -247,8 +247,8 @@ def one_of(kind: str, name: object, known: Iterable[str]) -> str:
 
 
 def _native(name: str, value: ArrayLike) -> Array:
-    """A copy in the machine's own byte order: the caller's array may change later."""
-    if type(value) is np.ndarray and value.dtype == np.float64:  # the usual case, and a hot one
+    """Return a copy as native float64; the caller may change the original array later."""
+    if type(value) is np.ndarray and value.dtype == np.float64:  # usual case, must be fast
         copy: Array = value.copy()
         return copy
     if isinstance(value, np.ma.MaskedArray) or (
@@ -257,11 +257,11 @@ def _native(name: str, value: ArrayLike) -> Array:
         raise InvalidInput(name, "is a masked array; fill or drop the masked entries first.")
     try:
         array = np.asarray(value)
-    except Exception as error:  # whatever a foreign __array__ raises
+    except Exception as error:  # a user-defined __array__ may raise anything
         raise InvalidInput(name, f"is not an array of numbers ({error}).") from None
     if array.dtype.kind not in "iuf":
         raise InvalidInput(name, f"holds {array.dtype} entries; real numbers are needed.")
     if array.dtype == np.float64:
         return np.array(array, order="C")
-    with np.errstate(over="ignore"):  # what exceeds float64 becomes inf, which is refused later
+    with np.errstate(over="ignore"):  # numbers beyond float64 become inf, which is refused later
         return array.astype(np.float64, order="C")

@@ -1,4 +1,4 @@
-"""Values that do not change: read-only arrays, and frozen dataclasses that hold and print them."""
+"""Immutable values: read-only arrays, and base classes of frozen dataclasses of arrays."""
 
 from __future__ import annotations
 
@@ -16,23 +16,23 @@ _AnyArray = TypeVar("_AnyArray", bound=NDArray[Any])
 
 
 def frozen(array: _AnyArray) -> _AnyArray:
-    """Return the array itself, made read-only."""
+    """Make an array read-only, and return the same array."""
     array.setflags(write=False)
     return array
 
 
 class Printed:
-    """A base of classes that print themselves as a table: a notebook shows the same text."""
+    """Base class for values that print as a table; a notebook shows the printed text."""
 
     def _repr_html_(self) -> str:
         return str(element("pre", str(self)))
 
 
 class ReadOnlyState(Printed):
-    """A base of frozen dataclasses of arrays: unpickling and copying keep the arrays read-only."""
+    """Base class of frozen dataclasses; their arrays stay read-only after copying and pickling."""
 
     def __getstate__(self) -> dict[str, object]:
-        # the fields alone: what is computed from them on first use can be large
+        # only fields: cached properties can be large
         return {field.name: getattr(self, field.name) for field in fields(self)}  # type: ignore[arg-type]
 
     def __setstate__(self, state: dict[str, object]) -> None:

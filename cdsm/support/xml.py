@@ -1,4 +1,4 @@
-"""XML of strangers, read strictly: nothing recovered, nothing expanded, nothing fetched."""
+"""Strict reading of untrusted XML: no recovery, no expansion of entities, no network access."""
 
 from __future__ import annotations
 
@@ -11,34 +11,34 @@ from cdsm.support.files import MAXIMUM_BYTES
 from cdsm.support.validation import LARGEST
 
 DEEPEST = 100
-"""No description of a robot nests its elements deeper."""
+"""Maximum depth of nested elements; descriptions of robots are less deep."""
 
 _LONGEST = 10_000
-"""Characters of a name or number; none is longer."""
+"""Maximum number of characters of an attribute or of the text of an element."""
 
 _WIDEST = 100_000
-"""Characters of a tag with what follows it, or of a comment; libxml2 compares all attributes of an
-element with each other."""
+"""Maximum number of characters of a tag with the text behind it, or of a comment; libxml2 compares
+the attributes of an element in pairs."""
 
 _SHOWN = 40
 
 
 class XmlFault(ValueError):
-    """What is wrong with a document; turned into an error of the format it should have had."""
+    """Fault of an XML document; the caller turns it into an error of its file format."""
 
 
 def parse_xml(text: str, root: str, doctype: str | None = None) -> etree._Element:
-    """The root element of an XML text.
+    """Parse an XML text and return its root element.
 
     Args:
         text: The document.
-        root: What its root element must be called.
-        doctype: A DOCTYPE whose system identifier matches this pattern as a whole, with an empty
-            public identifier or none, and with nothing inside, is let pass, unread; any other is
-            refused, since it can define entities or name files to read.
+        root: Required name of the root element.
+        doctype: Pattern of the whole system identifier of an allowed DOCTYPE, which must have no
+            public identifier (or an empty one) and no other content. The DTD is not read. Any other
+            DOCTYPE is refused, since it can define entities or name files to read.
 
     Raises:
-        XmlFault: Not well-formed, too large or too deep, a DOCTYPE, or another root.
+        XmlFault: The text is not well-formed, too large or too deep; its DOCTYPE or root is wrong.
     """
     if len(text) > MAXIMUM_BYTES:
         raise XmlFault(f"is larger than the {MAXIMUM_BYTES} characters that are read")
@@ -58,7 +58,7 @@ def parse_xml(text: str, root: str, doctype: str | None = None) -> etree._Elemen
         remove_pis=True,
     )
     try:
-        # a declaration speaks of bytes, and these are UTF-8 whatever it says
+        # these bytes are UTF-8, even if the XML declaration names another encoding
         document = etree.fromstring(text.encode(), parser).getroottree()
     except (etree.XMLSyntaxError, ValueError) as error:
         raise XmlFault(f"is not well-formed XML: {_short(str(error))}") from None
@@ -84,17 +84,17 @@ def parse_xml(text: str, root: str, doctype: str | None = None) -> etree._Elemen
 
 
 def _names_dtd(text: str, system: str) -> bool:
-    """Whether the one DOCTYPE of a text names such a DTD, and does nothing else."""
+    """Check that the text has one DOCTYPE, that it names an allowed DTD, and nothing else."""
     literal = rf"""(?:"{system}"|'{system}')"""
     alone = rf"""<!DOCTYPE\s+[^\s"'<>\[]+\s+(?:SYSTEM|PUBLIC\s+(?:""|''))\s+{literal}\s*>"""
     return text.count("<!DOCTYPE") == 1 and re.search(alone, text) is not None
 
 
 def numbers(where: str, text: str | None, count: int) -> tuple[float, ...]:
-    """Finite numbers separated by white space.
+    """Read ``count`` finite numbers separated by white space.
 
     Raises:
-        XmlFault: Says where, what is there and what is needed.
+        XmlFault: The text is not ``count`` finite numbers; ``where`` names the place.
     """
     words = (text or "").split()
     try:
