@@ -1,4 +1,4 @@
-"""The truth report: whether a stiffness can be trusted, with what a user can check it by."""
+"""Truth report: checks of a stiffness matrix that tell whether it can be trusted."""
 
 from cdsm.report.facts import CableState, Optimality, Rank, Readings
 from cdsm.report.report import Report, report_on

@@ -1,4 +1,4 @@
-"""Facts about a stiffness: ranks, balance, optimality, where cables stand, the three readings."""
+"""Numbers that the report shows: ranks, residual, optimality, cable states, tip stiffnesses."""
 
 from __future__ import annotations
 
@@ -25,19 +25,17 @@ if TYPE_CHECKING:
 
 
 RANK = 1e-9
-"""A singular value below this part of the largest counts as zero."""
+"""Singular values below this part of the largest one count as zero."""
 
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Rank(ReadOnlyState):
-    """Rank and condition of a matrix.
-
-    Lengths are taken in arm lengths, so that rows and columns compare.
+    """Rank and condition number of a matrix whose lengths are divided by the arm's length.
 
     Attributes:
-        rank: Singular values above :data:`RANK` of the largest.
-        full: The smaller of its numbers of rows and columns.
+        rank: Number of singular values above :data:`RANK` times the largest.
+        full: Largest possible rank: the smaller of the numbers of rows and columns.
         values: Singular values (n,) [-], the largest first.
     """
 
@@ -47,14 +45,14 @@ class Rank(ReadOnlyState):
 
     @classmethod
     def of(cls, matrix: Array) -> Rank:
-        """That of a matrix whose entries are comparable."""
+        """Compute the rank of a matrix whose entries have one unit."""
         values = np.linalg.svd(matrix, compute_uv=False)
         rank = int(np.count_nonzero(values > RANK * values[0]))
         return cls(rank=rank, full=values.size, values=frozen(values.astype(np.float64)))
 
     @property
     def condition(self) -> float:
-        """Largest over smallest singular value [-]; inf where the rank is not full."""
+        """Return the condition number [-]; inf if the rank is not full."""
         if self.rank < self.full:
             return math.inf
         return float(self.values[0] / self.values[-1])
@@ -63,17 +61,17 @@ class Rank(ReadOnlyState):
 @final
 @dataclass(frozen=True, kw_only=True)
 class CableState:
-    """One cable: where it stands in its law.
+    """Tension and stiffness of one cable, and the domain of its law.
 
     Attributes:
-        name: Its name.
+        name: Name of the cable.
         control: ``"position"`` or ``"force"``.
         tension: F [N].
-        stiffness: k as K_θ counts it [N/m].
-        tangent: EA(F) [N]; None where the law has none, as for a motor that holds a force outside.
+        stiffness: k as used in K_θ [N/m].
+        tangent: EA(F) [N]; None if F is outside the domain (possible under force control).
         secant: ΔF/(Δl/l_0) of Eq. 18 [N], or None.
-        low: Low end of the law [N].
-        high: Its high end [N], or inf.
+        low: Lowest tension in the domain of the law [N].
+        high: Highest tension in the domain of the law [N], or inf.
     """
 
     name: str
@@ -87,27 +85,27 @@ class CableState:
 
     @property
     def below(self) -> float:
-        """How far F may fall before the law ends [N]; negative outside."""
+        """Return F minus the low end of the domain [N]; negative outside the domain."""
         return self.tension - self.low
 
     @property
     def above(self) -> float:
-        """How far F may rise before the law ends [N]; negative outside."""
+        """Return the high end of the domain minus F [N]; negative outside the domain."""
         return self.high - self.tension
 
     @property
     def is_slack(self) -> bool:
-        """Whether it pulls with nothing at all."""
+        """Return whether the tension is zero."""
         return self.tension == 0.0
 
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Readings(ReadOnlyState):
-    """The three numbers behind "the stiffness in x", side by side.
+    """Three definitions of the tip stiffness along each base axis.
 
     Attributes:
-        along: 1/(uᵀ C_vv u) along x, y, z (3,) [N/m]: what a small hung weight measures.
+        along: 1/(uᵀ C_vv u) along x, y, z (3,) [N/m]: the stiffness that a small weight measures.
         cartesian: Diagonal of (C_vv)⁻¹ (3,) [N/m]; NaN if it does not exist.
         pseudoinverse: Diagonal of J⁺ᵀ K J⁺ (3,) [N/m]; NaN if it does not exist.
     """
@@ -118,7 +116,7 @@ class Readings(ReadOnlyState):
 
     @property
     def spread(self) -> Array:
-        """The largest of those that exist over the smallest (3,) [-], inf if the signs differ."""
+        """Return the largest over the smallest finite stiffness (3,) [-]; inf if signs differ."""
         spread = np.ones(3)
         rows = np.array([self.along, self.cartesian, self.pseudoinverse])
         for i, column in enumerate(rows.T):
@@ -130,12 +128,12 @@ class Readings(ReadOnlyState):
 
 
 def jacobian_rank(K: Stiffness) -> Rank:
-    """Rank of J_X (6, nv): how many of the six motions of the tip the joints make."""
+    """Compute the rank of J_X (6, nv): the number of independent tip motions."""
     return Rank.of(_scaled_jacobian(K))
 
 
 def translation_rank(K: Stiffness) -> Rank:
-    """Rank of the linear rows of J_X (3, nv)."""
+    """Compute the rank of the linear rows of J_X (3, nv)."""
     return Rank.of(_scaled_jacobian(K)[:3])
 
 
@@ -147,19 +145,19 @@ def _scaled_jacobian(K: Stiffness) -> Array:
 
 
 def cable_rank(K: Stiffness) -> Rank:
-    """Rank of J_Lᵀ (nv, C): how many of the joint torques the cables give."""
+    """Compute the rank of J_Lᵀ (nv, C): the number of independent joint torques of the cables."""
     return Rank.of(K.posture.length_jacobian.T * joint_unit(K.posture.arm)[:, None])
 
 
 def closure(K: Stiffness) -> float:
-    """How evenly tensions can grow without a torque: max min n/max n with J_Lᵀ n = 0, n ≥ 0 [-].
+    """Compute how evenly tensions n can cause no torque: max min n/max n, J_Lᵀ n = 0, n ≥ 0 [-].
 
-    Zero: they cannot, and there is no pretension in all cables.
+    Zero means that the arm cannot be pretensioned by all cables.
     """
     A = (K.posture.length_jacobian * joint_unit(K.posture.arm)).T
     A = A / (abs(A).max() or 1.0)
     count = A.shape[1]
-    found = linprog(  # variables n, then the smallest of them
+    found = linprog(  # variables: n, then the smallest entry of n
         np.append(np.zeros(count), -1.0),
         A_ub=np.hstack([-np.eye(count), np.ones((count, 1))]),
         b_ub=np.zeros(count),
@@ -173,9 +171,9 @@ def closure(K: Stiffness) -> float:
 
 
 def imbalance(K: Stiffness) -> tuple[float, str, float]:
-    """Largest residual of the statics [N m], its joint, and that over the torques it is a sum of.
+    """Return the largest residual of Eq. 13 [N m], its joint, and residual over torque size.
 
-    A joint that slides counts with the arm's length as lever.
+    The force at a joint that slides is multiplied by the arm's length.
     """
     arm, whole = K.posture.arm, torque_size(K)
     left = abs(K.residual * joint_unit(arm))
@@ -184,14 +182,14 @@ def imbalance(K: Stiffness) -> tuple[float, str, float]:
 
 
 def torque_size(K: Stiffness) -> float:
-    """Largest of the sums of magnitudes that the statics cancel [N m]."""
+    """Return the largest entry of |J_L|ᵀ F + |J_X|ᵀ |W| + |g| [N m], the size of the torques."""
     pose = K.posture
     parts = K.tension @ abs(pose.length_jacobian) + abs(K.wrench) @ abs(pose.jacobian)
     return float(((parts + abs(pose.gravity_torque)) * joint_unit(pose.arm)).max())
 
 
 def cable_states(K: Stiffness) -> tuple[CableState, ...]:
-    """Every cable, in the order of the arm."""
+    """Return the state of each cable, in the order of the arm."""
     pulled = zip(K.posture.arm.cables, K.tension.tolist(), K.cable_stiffness.tolist(), strict=True)
     return tuple(_state(cable, F, k) for cable, F, k in pulled)
 
@@ -211,7 +209,7 @@ def _state(cable: Cable, F: float, k: float) -> CableState:
 
 
 def _number(cable: Cable, answer: Callable[[], Array]) -> float | None:
-    """What a law answers; None where it has no answer."""
+    """Evaluate a law; return None if it raises an error of this library."""
     try:
         return float(evaluate_law(cable, answer))
     except CdsmError:
@@ -219,7 +217,7 @@ def _number(cable: Cable, answer: Callable[[], Array]) -> float | None:
 
 
 def readings(K: Stiffness) -> Readings:
-    """The three stiffnesses along the base axes."""
+    """Compute the three tip stiffnesses along each base axis."""
     along = np.array([K.along(axis) for axis in np.eye(3)])
 
     def diagonal(read: Callable[[], Array]) -> Array:
@@ -238,21 +236,18 @@ def readings(K: Stiffness) -> Readings:
 @final
 @dataclass(frozen=True, kw_only=True)
 class Optimality:
-    """How well distributed tensions meet what they were distributed for.
+    """Optimality conditions of distributed tensions: balance, bounds and stationarity (Eq. 17).
 
-    They balance the arm within their bounds, and are the least that do (Eq. 17) unless chosen for a
-    stiffness.
-
-    All dimensionless, relative to the largest tension and moment arm. The multipliers are found
-    anew, whatever the solver said: by least squares, those of the bounds with the sign they need.
+    Violations are relative to the largest tension and moment arm. The multipliers do not come from
+    the solver: least squares finds them anew, with the required sign at the bounds.
 
     Attributes:
         solver: Name of the solver.
         at_minimum: Names of the cables at their lower bound.
         at_maximum: Names of the cables at their upper bound.
         feasibility: Largest violation of balance and bounds [-].
-        stationarity: Largest entry of F + J_L λ + μ, the KKT residual [-]; None if they are not
-            meant to be the least.
+        stationarity: Largest entry of the KKT residual F + J_L λ + μ [-]; None if the tensions were
+            chosen for a stiffness and so need not be the least.
     """
 
     solver: str
@@ -263,12 +258,12 @@ class Optimality:
 
     @property
     def optimal(self) -> bool:
-        """Whether both are within :data:`~cdsm.kernels.tension.DISTANCE`."""
+        """Return whether no violation exceeds :data:`~cdsm.kernels.tension.DISTANCE`."""
         return max(self.feasibility, self.stationarity or 0.0) <= DISTANCE
 
 
 def optimality(K: Stiffness, pull: Tension) -> Optimality:
-    """The optimality conditions of tensions, evaluated anew."""
+    """Evaluate the optimality conditions of distributed tensions."""
     pose = K.posture
     torque = pose.jacobian.T @ K.wrench - pose.gravity_torque
     problem = tension_kernels.Scaled(
@@ -295,11 +290,9 @@ def optimality(K: Stiffness, pull: Tension) -> Optimality:
 def _bound_multipliers(
     A: Array, x: Array, at_low: NDArray[np.bool_], at_high: NDArray[np.bool_]
 ) -> Array:
-    """Bound multipliers z (C,) that come nearest to x + z = −Aᵀ y, of the sign they need.
+    """Find bound multipliers z (C,), ≤ 0 at lower and ≥ 0 at upper bounds, with x + z ≈ −Aᵀ y.
 
-    Negative or zero at a lower bound, positive or zero at an upper one.
-
-    Whatever y is, it has no part in the null space of A.
+    y is eliminated: least squares in the null space of A, where Aᵀ y has no part.
     """
     null = null_space(A).T
     lows, highs = np.flatnonzero(at_low), np.flatnonzero(at_high)

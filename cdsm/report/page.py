@@ -1,4 +1,4 @@
-"""What a report shows, section by section, and how: as text and as HTML."""
+"""Contents of a report, section by section, as text and as HTML."""
 
 from __future__ import annotations
 
@@ -35,12 +35,12 @@ li.fault{color:#b3261e}
 
 
 class Section(NamedTuple):
-    """A heading, a table, and lines below it.
+    """Section of a report: a heading, a table, and lines below it.
 
     Attributes:
         title: The heading.
-        rows: Of equally many cells; the first row is the head, the first column the names.
-        lines: Sentences.
+        rows: Rows of equal length; the first row is the head, the first column holds the names.
+        lines: Sentences below the table.
     """
 
     title: str
@@ -49,14 +49,14 @@ class Section(NamedTuple):
 
 
 class Page(NamedTuple):
-    """What a report shows.
+    """Contents of a report.
 
     Attributes:
         title: The heading.
-        verdict: In one sentence.
-        good: Whether it is a good one.
-        faults: Why not.
-        notes: What else is to be known.
+        verdict: The verdict in one sentence.
+        good: Whether the stiffness can be trusted.
+        faults: Reasons why it cannot be trusted.
+        notes: Other remarks.
         sections: The details.
     """
 
@@ -69,7 +69,7 @@ class Page(NamedTuple):
 
 
 def to_text(page: Page) -> str:
-    """The page in columns, wrapped."""
+    """Return the page as wrapped text with aligned columns."""
     lines = [page.title, page.verdict]
     for mark, remarks in (("!", page.faults), ("-", page.notes)):
         lines += [_wrapped(remark, f"{mark} ", "  ") for remark in remarks]
@@ -84,7 +84,7 @@ def to_text(page: Page) -> str:
 
 
 def to_fragment(page: Page) -> str:
-    """The page as HTML to be put into another."""
+    """Return the page as an HTML element, for another page."""
     parts = [element("p", page.verdict, class_="good" if page.good else "bad")]
     remarks = [element("li", remark, class_="fault") for remark in page.faults]
     remarks += [element("li", remark) for remark in page.notes]
@@ -101,7 +101,7 @@ def to_fragment(page: Page) -> str:
 
 
 def to_document(page: Page) -> str:
-    """The page as an HTML file that needs no other."""
+    """Return the page as a self-contained HTML file."""
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
@@ -115,7 +115,7 @@ def _wrapped(text: str, first: str, other: str) -> str:
 
 
 def page(report: Report) -> Page:
-    """The whole report."""
+    """Build all contents of a report."""
     name = report.stiffness.posture.arm.name
     good = report.trustworthy
     verdict = (

@@ -1,10 +1,10 @@
-"""The potential of an arm near a posture, term by term, and the torque out of balance there.
+"""Potential U of an arm near a posture, term by term, and the torque residual there.
 
     U(q) = Σ F_c (L_c − L_c0) + Σ [E_c(F_c(L_c)) − E_c(F_c) − F_c (L_c − L_c0)] + V(q) − f·x(q)
            active               passive                                           gravity  load
 
-Nothing but lengths, places and the energies of the cables enters: no moment arm, no Hessian, no
-rigidity. A moment has no potential; it does the work m·ω.
+U uses only cable lengths, places of links and energies of cables. It uses no moment arms, no
+Hessian and no rigidity. A moment has no potential; it does the work m·ω.
 """
 
 from __future__ import annotations
@@ -28,23 +28,23 @@ if TYPE_CHECKING:
 
 
 ONE_SIDED = 1e-4
-"""A tension this part of itself from an end or a kink of its law has a law on one side alone."""
+"""A tension counts as at an end or a kink of its law if their relative distance is at most this."""
 
 _BESIDE = 1e-6
-"""A point of a table this part of a tension beside it is at that tension."""
+"""A tension counts as at a point of a tabulated law if their relative distance is at most this."""
 
 
 class LockedLaws:
-    """The position-controlled cables of a stiffness, from strain and energy of their laws alone.
+    """Position-controlled cables with locked motors, computed from strain and energy of their laws.
 
     Args:
-        K: The stiffness. Its posture, tensions and free lengths are taken from it, and of its
-            ``cable_stiffness`` no more than steps.
+        K: The stiffness. Its posture, tensions and original lengths are used; its cable stiffness
+            is used only to choose steps.
 
     Attributes:
-        held: Number and cable. One that hangs slack beside its law, as at some equilibria, gives
-            nothing when moved and is left out.
-        stiffness: K_L (C,) [N/m] as the stiffness has it, to choose steps by; zero for the others.
+        held: Number and cable of each position-controlled cable. Slack cables without stiffness, as
+            at some equilibria, are left out: moving the arm does not tension them.
+        stiffness: K_L (C,) [N/m] of the held cables, to choose steps; zero for all other cables.
     """
 
     def __init__(self, K: Stiffness) -> None:
@@ -59,35 +59,35 @@ class LockedLaws:
         self.stiffness[which] = abs(K.cable_stiffness[which])
 
     def pulls(self, c: int, cable: Cable, longer: Array) -> Array:
-        """Tensions of a cable (P,) [N] that is longer by so much (P,) [m]."""
+        """Compute the tensions (P,) [N] of a cable that becomes longer by ``longer`` (P,) [m]."""
         start, F = self._free_length[c], self._tension[c]
         return evaluate_law(
             cable, lambda: cable.tension(float(cable.elongation(F, start)) + longer, start)
         )
 
     def stored(self, c: int, cable: Cable, longer: Array) -> Array:
-        """Energy of such a cable (P,) [J] beyond that of a constant tension."""
+        """Compute the energy (P,) [J] that a longer cable stores beyond F times its elongation."""
         start, F = self._free_length[c], self._tension[c]
         pulls = self.pulls(c, cable, longer)
         more = evaluate_law(cable, lambda: cable.energy(pulls, start) - cable.energy(F, start))
         return np.asarray(more - F * longer)
 
     def room(self, c: int, cable: Cable) -> float:
-        """How far its tension may go [N] until its law ends or bends sharply."""
+        """Return the distance [N] from the tension to the nearest end or kink of its law."""
         F, law = float(self._tension[c]), cable.elasticity
         edges = [law.domain.low, law.domain.high, *kinks(law)]
         if isinstance(law, TabulatedElasticity):
-            # at its points the rigidity bends; so near to one that no step would be left, the
-            # bend stays in the middle, and the differences settle all the same
+            # the rigidity has kinks at the points of a table. A point too near leaves no room for
+            # a step and is ignored: the kink is then in the middle, and differences still converge
             edges += [point for point in law.tensions if abs(F - point) > _BESIDE * F]
         return min(abs(F - edge) for edge in edges)
 
     def one_sided(self) -> list[str]:
-        """Why there is no law on both sides of the tensions, cable by cable; mostly nothing."""
+        """Return for each cable at an end or kink of its law a message; mostly an empty list."""
         return [reason for c, cable in self.held for reason in self._edges(c, cable)]
 
     def _edges(self, c: int, cable: Cable) -> list[str]:
-        """The ends and kinks of its law that a cable stands at, in words."""
+        """Return a message for each end or kink of the law at the cable's tension."""
         F, law = float(self._tension[c]), cable.elasticity
         if F == 0.0:
             return [f"{cable.name} is slack (0 N), and K_θ counts it as if it were taut"]
@@ -105,12 +105,12 @@ class LockedLaws:
 
 
 def evaluate_law(cable: Cable, answer: Callable[[], Array]) -> Array:
-    """What an elasticity answers, which need not be the library's own."""
+    """Evaluate an elasticity; raise InvalidInput if a user-defined law fails or is not finite."""
     try:
         values = np.asarray(answer(), dtype=np.float64)
     except CdsmError:
         raise
-    except Exception as error:  # whatever a law of the user's own raises
+    except Exception as error:  # a user-defined law may raise anything
         raise InvalidInput(
             "elasticity", f"{cable.elasticity!r} of {cable.name} fails: {error!r}."
         ) from error
@@ -122,49 +122,49 @@ def evaluate_law(cable: Cable, answer: Callable[[], Array]) -> Array:
 
 
 _FIRST = 2.0**-4
-"""Largest step, in rad or lengths of the arm."""
+"""Largest step [rad], or in arm lengths for joints that slide."""
 
 _ULPS = 2.0 * float(np.finfo(np.float64).eps)
-"""Relative rounding of a place or a length, a sum over the links."""
+"""Relative rounding error of a place or a length, which is a sum over the links."""
 
 _ROOT = 2e-13
-"""Relative error of a tension that is found by its elongation."""
+"""Relative error of a tension that is computed from the elongation."""
 
 
 class Neighbourhood:
-    """The arm around a posture, its motors locked there.
+    """The arm near a posture, with motors locked at this posture.
 
-    Places are given as (P, nv): displacements of the joints from the posture in units of
-    :attr:`unit`, so that everything that is differenced by them is in N m.
+    ``places`` (P, nv) are joint displacements from the posture in units of :attr:`unit`. So all
+    derivatives with respect to them are in N m.
 
     Args:
-        K: The stiffness that is questioned. Posture, tensions, wrench and free lengths are taken
-            from it, its cable stiffnesses only to choose steps.
+        K: The stiffness to check. Its posture, tensions, wrench and original lengths are used; its
+            cable stiffness is used only to choose steps.
 
     Attributes:
-        laws: Its position-controlled cables.
-        unit: 1 rad for a joint that turns, the length of the arm for one that slides (nv,).
+        laws: The position-controlled cables.
+        unit: 1 rad for each joint that turns, the arm's length for each joint that slides (nv,).
     """
 
     def __init__(self, K: Stiffness) -> None:
         self._pose, self._tension, self._wrench = K.posture, K.tension, K.wrench
         self.laws = LockedLaws(K)
         self.unit = joint_unit(K.posture.arm)
-        # chooses steps and tells rounding, no more
+        # moment arms are used only to choose steps and to estimate rounding errors
         self._arms = abs(K.posture.length_jacobian * self.unit).max(axis=1)
 
     # --- potentials ---------------------------------------------------------------------------
 
     def kinematic(self, places: Array) -> Array:
-        """Active, gravity and load part of U (P, 3) [N m], of a force alone."""
+        """Compute active, gravity and load part of U (P, 3) [N m]; the load is the force alone."""
         return self._sampled(places, self._work_of_force)
 
     def work(self, places: Array) -> Array:
-        """The same with the work of the moment, which is right to first order only."""
+        """Compute active, gravity and load part (P, 3) [N m]; moments are exact to first order."""
         return self._sampled(places, self._work_of_wrench)
 
     def elastic(self, places: Array) -> Array:
-        """Passive part of U (P, 1) [N m]."""
+        """Compute the passive part of U (P, 1) [N m]."""
         arm = self._pose.arm
         lengths = [arm.cable_lengths(q, check_limits=False) for q in self._angles(places)]
         longer = np.array(lengths) - self._pose.cable_lengths
@@ -187,14 +187,14 @@ class Neighbourhood:
 
     def _work_of_wrench(self, tip: Array) -> float:
         turn = tip[:3, :3] @ self._pose.tip[:3, :3].T
-        # the axis times the sine of the angle
+        # twice the rotation axis times the sine of the angle
         twice = (turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1])
         return self._work_of_force(tip) + float(self._wrench[3:] @ np.array(twice)) / 2.0
 
     # --- torques and lengths ------------------------------------------------------------------
 
     def kinematic_torques(self, places: Array) -> Array:
-        """J_Lᵀ F, g and −J_Xᵀ W (P, 3, nv) [N m] with the tensions of the posture."""
+        """Compute J_Lᵀ F, g and −J_Xᵀ W (P, 3, nv) [N m] with the tensions of the posture."""
         torques = []
         for q in self._angles(places):
             pose = self._pose.arm.at(q, check_limits=False)
@@ -203,7 +203,7 @@ class Neighbourhood:
         return np.array(torques) * self.unit
 
     def elastic_torques(self, places: Array) -> Array:
-        """J_Lᵀ (F(L) − F) (P, 1, nv) [N m]."""
+        """Compute J_Lᵀ (F(L) − F) (P, 1, nv) [N m]."""
         poses = [self._pose.arm.at(q, check_limits=False) for q in self._angles(places)]
         longer = np.array([pose.cable_lengths for pose in poses]) - self._pose.cable_lengths
         more = np.zeros_like(longer)
@@ -213,7 +213,10 @@ class Neighbourhood:
         return np.array(torques)[:, None] * self.unit
 
     def measured_lengths(self) -> Array:
-        """L (C,) [m] once more: lead, and the ways between the sites where Pinocchio has them."""
+        """Compute L (C,) [m] a second time, from the places of all sites found by Pinocchio.
+
+        L includes the lead (the straight cable between its actuator and the base disk).
+        """
         pose = self._pose
         links = {site.link for cable in pose.arm.cables for site in cable.sites}
         frames = {link: pose.link_pose(link) for link in links}
@@ -230,12 +233,12 @@ class Neighbourhood:
 
     @property
     def first_step(self) -> float:
-        """A step on which no segment of cable loses more than half its length."""
+        """Return a first step so small that no cable segment loses more than half its length."""
         return min(_FIRST, self._straightness / 4.0)
 
     @property
     def first_elastic_step(self) -> float:
-        """Such a one on which no tension goes more than half way to where its law ends."""
+        """Return a first step so small that also no tension goes half way to an end of its law."""
         step = self.first_step
         for c, cable in self.laws.held:
             rise = self.laws.stiffness[c] * self._arms[c]
@@ -244,7 +247,7 @@ class Neighbourhood:
 
     @cached_property
     def _straightness(self) -> float:
-        """How far a joint may move, in its unit, until the shortest segment could have vanished."""
+        """Return the joint displacement, in :attr:`unit`, that could shorten a segment to zero."""
         pose = self._pose
         routing = pose.arm._model.routing
         segment, joint = routing.segment, routing.joint
@@ -260,11 +263,11 @@ class Neighbourhood:
 
     @property
     def length_noise(self) -> Array:
-        """Rounding of the lengths of the cables (C,) [m]: of what is summed, and of the places."""
+        """Return the rounding error of the cable lengths (C,) [m], from sums and from places."""
         return np.asarray(_ULPS * (self._pose.cable_lengths + self._pose.arm.length))
 
     def kinematic_noise(self, step: float) -> Array:
-        """Rounding of the kinematic parts of U (3,) [N m], whatever the step."""
+        """Return the rounding error of the kinematic parts of U (3,) [N m], equal for all steps."""
         pose, arm = self._pose, self._pose.arm
         far = arm.length + float(np.linalg.norm(pose.tip[:3, 3]))
         weight = float(arm._model.masses.mass.sum() * np.linalg.norm(arm.gravity)) * far
@@ -272,19 +275,19 @@ class Neighbourhood:
         return np.array([self._tension @ self.length_noise, _ULPS * weight, _ULPS * load])
 
     def elastic_noise(self, step: float) -> Array:
-        """Rounding of the elastic part of U (1,) [N m]."""
+        """Return the rounding error of the elastic part of U (1,) [N m]."""
         k, F = self.laws.stiffness, self._tension
         stored = np.divide(F * F, k, out=np.zeros_like(k), where=k > 0.0).sum()
         return np.array([_ROOT * stored + 2.0 * step * (k * self._arms) @ self.length_noise])
 
     def kinematic_torque_noise(self, step: float) -> Array:
-        """Rounding of the kinematic torques (3,) [N m]; the most where a segment is short."""
+        """Return the rounding error of the kinematic torques (3,) [N m]; large at short segments."""
         noise = self.kinematic_noise(step)
         noise[0] *= 1.0 + 1.0 / self._straightness
         return noise
 
     def elastic_torque_noise(self, step: float) -> Array:
-        """Rounding of the elastic torques (1,) [N m]."""
+        """Return the rounding error of the elastic torques (1,) [N m]."""
         k = self.laws.stiffness
         errors = k * self.length_noise + _ROOT * self._tension * (k > 0.0)
         tilted = 2.0 * step * (k * self._arms) @ self.length_noise
@@ -292,5 +295,5 @@ class Neighbourhood:
 
 
 def joint_unit(arm: Manipulator) -> Array:
-    """1 rad for a joint that turns, the arm's length [m] for one that slides (nv,)."""
+    """Return 1 rad for joints that turn, the arm's length [m] for joints that slide (nv,)."""
     return JointUnits(arm.slides).levers(arm.length)

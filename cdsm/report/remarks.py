@@ -1,4 +1,4 @@
-"""What there is to say about a stiffness: why it cannot be trusted, and what to know beside it."""
+"""Remarks on a stiffness: faults, which forbid to trust it, and notes."""
 
 from __future__ import annotations
 
@@ -11,28 +11,28 @@ if TYPE_CHECKING:
     from cdsm.report.report import Report
 
 BALANCED = 1e-6
-"""Tensions balance an arm if the residual is at most this part of the torques it is a sum of."""
+"""Tensions balance an arm if the residual is at most this part of the torque size."""
 
 APART = 0.1
-"""Readings that differ by more than this part are worth a word."""
+"""A note is given if the three tip stiffnesses differ by more than this part."""
 
 CLOSE = 0.05
-"""So are tensions this part of themselves from an end of their law."""
+"""A note is given if a tension is nearer than this part of itself to an end of its law."""
 
 _SINGULAR = 1e-12
-"""A margin at most this part of the largest eigenvalue of K_θ is rounding."""
+"""A margin of at most this part of the norm of K_θ is rounding."""
 
 _DIGITS = 1e10
-"""Condition of K_θ from which on its inverse has less than six digits."""
+"""Condition number of K_θ above which K_θ⁻¹ has less than six digits."""
 
 _LONGEST = 30.0
-"""An arm longer than this [m] was most likely written in millimetres."""
+"""The lengths of an arm longer than this [m] are probably in millimetres."""
 
 _NAMED = 4
 
 
 def faults(report: Report) -> tuple[str, ...]:
-    """Why the stiffness is not to be trusted; nothing if it is."""
+    """Return the reasons not to trust the stiffness; empty if it can be trusted."""
     K, texts = report.stiffness, []
     unchecked: dict[str, list[str]] = {}
     for each in report.self_check.compared:
@@ -76,7 +76,7 @@ def faults(report: Report) -> tuple[str, ...]:
 
 
 def notes(report: Report) -> tuple[str, ...]:
-    """What to know beside a stiffness that may be right."""
+    """Return notes for a user of the stiffness; they do not mean that it is wrong."""
     return (*_of_size(report), *_of_tensions(report), *_of_ranks(report), *_of_readings(report))
 
 

@@ -1,4 +1,4 @@
-"""Everything that says whether a stiffness can be trusted, in one value."""
+"""Report that tells whether a stiffness can be trusted."""
 
 from __future__ import annotations
 
@@ -25,22 +25,23 @@ if TYPE_CHECKING:
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Report(ReadOnlyState):
-    """Whether a stiffness can be trusted, and why; made by :meth:`Stiffness.report`.
+    """Report that tells whether a stiffness can be trusted; made by :meth:`Stiffness.report`.
 
     Attributes:
-        stiffness: The one in question.
-        self_check: It and its terms against central differences at this very posture.
-        residual: Largest |J_Lᵀ F + g − J_Xᵀ W| [N m], what is left of Eq. 13; a joint that slides
-            counts with the arm's length as lever.
-        residual_joint: Name of the joint where it is.
-        imbalance: That over the torques it is a sum of [-].
-        optimality: How well the tensions meet Eq. 17; None if they were given, not distributed.
-        cables: Where each cable stands in its law.
-        jacobian_rank: Rank and condition of J_X.
-        translation_rank: Those of its linear rows.
-        cable_rank: Those of J_Lᵀ: whether the cables give every joint torque.
-        closure: Least over largest of tensions without a torque [-]: zero if none pulls all cables.
-        readings: The three stiffnesses at the tip side by side; None if K_θ is singular.
+        stiffness: The stiffness to check.
+        self_check: Comparison of K_θ and its terms with central differences at this posture.
+        residual: Largest residual |J_Lᵀ F + g − J_Xᵀ W| of Eq. 13 [N m]; the force at a joint that
+            slides is multiplied by the arm's length.
+        residual_joint: Name of the joint with the largest residual.
+        imbalance: The residual over the size of the torques that it sums [-].
+        optimality: Optimality conditions of Eq. 17; None if the tensions were not distributed.
+        cables: Tension, stiffness and domain of each cable.
+        jacobian_rank: Rank and condition number of J_X.
+        translation_rank: Rank and condition number of the linear rows of J_X.
+        cable_rank: Rank and condition number of J_Lᵀ; full if cables can give every joint torque.
+        closure: Best ratio of least to largest tension among tensions without torque [-]; zero if
+            the arm cannot be pretensioned by all cables.
+        readings: The three tip stiffnesses along the base axes; None if K_θ is singular.
     """
 
     stiffness: Stiffness
@@ -58,52 +59,48 @@ class Report(ReadOnlyState):
 
     @cached_property
     def faults(self) -> tuple[str, ...]:
-        """Why the stiffness is not to be trusted, a sentence each; empty if it is."""
+        """Return the reasons not to trust the stiffness, one text each; empty if trustworthy."""
         return remarks.faults(self)
 
     @cached_property
     def notes(self) -> tuple[str, ...]:
-        """What to know beside it, a sentence each: slack cables, laws that end, readings apart."""
+        """Return notes, one text each: slack cables, ends of laws, different tip stiffnesses."""
         return remarks.notes(self)
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """All there is to say: :attr:`faults`, then :attr:`notes`."""
+        """Return :attr:`faults`, then :attr:`notes`."""
         return (*self.faults, *self.notes)
 
     @property
     def trustworthy(self) -> bool:
-        """Whether nothing failed.
+        """Return whether there are no faults.
 
-        That is: the self-check could be made of every term, their sum and the torque, and agreed;
-        the tensions balance the arm to 1e-6 of its torques; K_θ is positive definite by more than
-        rounding; and tensions that were distributed are the least within their bounds. Notes do not
-        count: a stiffness beside them is right, if it is read as they say.
+        The self-check agrees for every term, their sum and the torque. The tensions balance the arm
+        to 1e-6 of the torques. K_θ is positive definite by more than rounding. Distributed tensions
+        are the least within their bounds. Notes do not count: they say how to read the stiffness.
         """
         return not self.faults
 
     @property
     def margin(self) -> float:
-        """Smallest eigenvalue of the symmetric part of K_θ [N m/rad]; [N/m] where joints slide."""
+        """Smallest eigenvalue of the symmetric part of K_θ [N m/rad]; [N/m] if joints slide."""
         return self.stiffness.margin
 
     @property
     def critical_direction(self) -> Array:
-        """Unit joint motion (nv,) of it: how the arm gives way first."""
+        """Return the unit eigenvector (nv,) of the margin: the softest joint motion."""
         return self.stiffness.critical_direction
 
     @cached_property
     def condition(self) -> float:
-        """Largest over smallest singular value of K_θ [-], joints that slide in arm lengths."""
+        """Return the condition number of K_θ [-]; ways of joints that slide are in arm lengths."""
         unit = joint_unit(self.stiffness.posture.arm)
         values = np.linalg.svd(self.stiffness.joint * unit[:, None] * unit, compute_uv=False)
         return float(values[0] / values[-1]) if values[-1] > 0.0 else math.inf
 
     def to_dict(self) -> dict[str, object]:
-        """Everything it says as plain SI numbers, ready for strict JSON.
-
-        Null where a number is infinite or does not exist.
-        """
+        """Return the report as plain SI numbers for strict JSON; None for infinity and NaN."""
         K = self.stiffness
         arm = K.posture.arm
         values: dict[str, object] = {
@@ -146,7 +143,7 @@ class Report(ReadOnlyState):
         return {name: _plain(value) for name, value in values.items()}
 
     def to_html(self) -> str:
-        """The report as an HTML file that needs no other."""
+        """Return the report as a self-contained HTML file."""
         return to_document(page(self))
 
     def __repr__(self) -> str:
@@ -161,10 +158,10 @@ class Report(ReadOnlyState):
 
 
 def report_on(K: Stiffness) -> Report:
-    """Measure and derive everything a report holds.
+    """Compute the report on a stiffness.
 
     Args:
-        K: The stiffness in question.
+        K: The stiffness to check.
     """
     residual, joint, imbalance = facts.imbalance(K)
     try:
@@ -208,13 +205,13 @@ def _optimality_to_json(optimality: Optimality) -> dict[str, object]:
 
 
 def _plain(value: object) -> object:
-    """As JSON has it: lists for tuples and arrays, null for what is not finite."""
+    """Convert a value for JSON: tuples and arrays to lists, infinity and NaN to None."""
     if isinstance(value, dict):
         return {name: _plain(each) for name, each in value.items()}
     if isinstance(value, np.ndarray):
         return _plain(value.tolist())
     if isinstance(value, (list, tuple)):
         return [_plain(each) for each in value]
-    if isinstance(value, float):  # numpy's too
+    if isinstance(value, float):  # also numpy.float64
         return float(value) if math.isfinite(value) else None
     return value

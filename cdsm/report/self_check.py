@@ -1,9 +1,9 @@
-"""K_θ derived a second time, by central differences at this very posture.
+"""Check of K_θ by central differences at the same posture, in two ways.
 
-Twice, in fact: as the Hessian of the potential, from lengths, places and energies alone, and as the
-derivative of the torque out of balance. The first shares nothing with Eq. 16 but where cables and
-links are; the second takes the gradients for granted, which are compared by themselves, and is some
-digits finer. A moment at the tip has no potential: the load term is then checked by the torque.
+First, K_θ is the Hessian of the potential, computed from lengths, places and energies alone. This
+way shares with Eq. 16 only the places of cables and links. Second, K_θ is the derivative of the
+torque residual. This way uses the gradients, which are checked separately, and gains some digits. A
+moment at the tip has no potential: then only the torque checks the load term.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ if TYPE_CHECKING:
 Verdict = Literal["agrees", "DIFFERS", "not possible"]
 
 RESOLVED = 1e-6
-"""An expected error of at most this part of the largest entry is a check; a larger one is none."""
+"""A comparison is a check only if its expected error is at most this part of the largest entry."""
 
 _NEGLIGIBLE = 1e-8
-"""So is one of this part of the largest entry of K_θ, for a term that is small beside it."""
+"""For a small term, an expected error of this part of the largest entry of K_θ is enough."""
 
 _TERMS = ("active", "passive", "gravity", "load")
 
@@ -41,22 +41,20 @@ _UNSETTLED = (
 )
 
 _NAMED = 3
-"""Cables listed in a reason at most."""
+"""Maximum number of cables listed in a reason."""
 
 _SUM = 16.0 * float(np.finfo(np.float64).eps)
-"""Rounding of a sum of some terms, relative to the sum of their magnitudes."""
+"""Rounding error of a sum, relative to the sum of the magnitudes of its terms."""
 
 
 @final
 @dataclass(frozen=True, kw_only=True)
 class Difference:
-    """What is given against what differences say, the largest entry of it.
-
-    In the unit of what is compared.
+    """Difference between a given matrix and its central differences, in the matrix's unit.
 
     Attributes:
-        found: |given − by differences|.
-        expected: What truncation and rounding of the differences may make of it.
+        found: Largest entry of |given − by differences|.
+        expected: Bound of the difference by truncation and rounding of the central differences.
     """
 
     found: float
@@ -66,21 +64,21 @@ class Difference:
 @final
 @dataclass(frozen=True, kw_only=True)
 class Agreement:
-    """How one term of K_θ, or what else is derived a second time, compares.
+    """Comparison of one term of K_θ, the torque residual or the cable lengths with a second value.
 
-    Entries of joints that slide are taken with the arm's length, so that all have one unit.
+    Entries of joints that slide are multiplied by the arm's length, so that all have one unit.
 
     Attributes:
-        name: Which: ``"active"``, ``"passive"``, ``"gravity"``, ``"load"``, ``"joint"`` (their
-            sum); ``"torque"``, what is out of balance itself; ``"lengths"`` of the cables.
-        unit: ``"N m/rad"``; of the torque ``"N m"``, of the lengths ``"m"``.
-        largest: Its largest entry; of the torque that of its parts, of the lengths the longest.
-        potential: Against differences of the potential; None where there is none.
-        torque: Against differences of the torque, or None.
-        verdict: ``"agrees"``: at least one of the two resolves :data:`RESOLVED` of the largest
-            entry, and neither is beyond what is expected of it. ``"DIFFERS"``: one is.
-            ``"not possible"``: neither resolves it.
-        reason: Why it is not possible, or what differs; mostly empty.
+        name: ``"active"``, ``"passive"``, ``"gravity"``, ``"load"``, ``"joint"`` (the sum of these
+            four terms), ``"torque"`` (the residual of Eq. 13) or ``"lengths"`` of the cables.
+        unit: ``"N m/rad"``; for the torque ``"N m"``, for the lengths ``"m"``.
+        largest: Largest entry; for the torque the size of its parts, for the lengths the longest.
+        potential: Comparison with differences of the potential; None if there is no potential.
+        torque: Comparison with differences of the torque, or None.
+        verdict: ``"DIFFERS"``: a difference is larger than expected. ``"agrees"``: no difference
+            is, and at least one comparison resolves :data:`RESOLVED` of the largest entry.
+            ``"not possible"``: no comparison resolves it.
+        reason: Why the check is not possible, or what differs; mostly empty.
     """
 
     name: str
@@ -95,12 +93,12 @@ class Agreement:
 @final
 @dataclass(frozen=True, kw_only=True)
 class SelfCheck(ReadOnlyState):
-    """K_θ and its four terms against central differences at this very posture.
+    """Comparison of K_θ and its four terms with central differences at the same posture.
 
     Attributes:
-        terms: Active, passive, gravity, load, and their sum.
-        statics: The torque out of balance, against first differences of the potential.
-        lengths: The lengths of the cables, against what is measured between their sites.
+        terms: Active, passive, gravity and load term, and their sum.
+        statics: The torque residual, compared with first differences of the potential.
+        lengths: The cable lengths, compared with distances between sites placed by Pinocchio.
     """
 
     terms: tuple[Agreement, ...]
@@ -109,12 +107,12 @@ class SelfCheck(ReadOnlyState):
 
     @property
     def passed(self) -> bool:
-        """Whether all agree: nothing differs, and nothing could not be checked."""
+        """Return whether all comparisons agree: nothing differs, everything could be checked."""
         return all(each.verdict == "agrees" for each in self.compared)
 
     @property
     def compared(self) -> tuple[Agreement, ...]:
-        """Everything compared."""
+        """Return all comparisons."""
         return (*self.terms, self.statics, self.lengths)
 
     def __str__(self) -> str:
@@ -125,13 +123,13 @@ class SelfCheck(ReadOnlyState):
 
 
 def self_check(K: Stiffness) -> SelfCheck:
-    """Derive K_θ, its terms and the torque out of balance anew, and compare.
+    """Compute K_θ, its terms and the torque residual by differences, and compare.
 
-    Position-controlled cables store energy, force-controlled ones do the work F·L, and all motors
-    stay as they are. Nothing is raised: what cannot be derived says why.
+    Position-controlled cables store energy; force-controlled cables do the work F·L; motors do not
+    move. No error is raised: a comparison that is not possible names the reason.
 
     Args:
-        K: The stiffness in question, of tensions that need not balance the arm.
+        K: The stiffness to check; its tensions need not balance the arm.
     """
     near = Neighbourhood(K)
     energies, torques = _terms_anew(near)
@@ -155,7 +153,7 @@ def self_check(K: Stiffness) -> SelfCheck:
 
 
 def _terms_anew(near: Neighbourhood) -> tuple[list[_Anew], list[_Anew]]:
-    """Active, passive, gravity and load term by the potential, and by the torque."""
+    """Compute active, passive, gravity and load term from the potential, and from the torque."""
     size, step = near.unit.size, near.first_step
     stored: Estimates | str
     pulled: Estimates | str
@@ -176,7 +174,7 @@ def _terms_anew(near: Neighbourhood) -> tuple[list[_Anew], list[_Anew]]:
 
 
 def _statics(K: Stiffness, near: Neighbourhood) -> Agreement:
-    """The torque out of balance, which the torques above are of, by first differences."""
+    """Compare the torque residual with first differences of the potential."""
     size, step = near.unit.size, near.first_step
     work = _split(_attempt(lambda: gradients(near.work, size, step, near.kinematic_noise)))
     given, largest = K.residual * near.unit, torque_size(K)
@@ -184,16 +182,16 @@ def _statics(K: Stiffness, near: Neighbourhood) -> Agreement:
 
 
 def _lengths(K: Stiffness, near: Neighbourhood) -> Agreement:
-    """The lengths that all else is differenced from, by Pinocchio's placements of the links."""
+    """Compare the cable lengths with lengths from Pinocchio's placements of the links."""
     given = K.posture.cable_lengths
-    # ways of two programs through the links round apart by some units more
+    # two programs compute places along the links, so the results differ by some more rounding
     measured = _Anew(near.measured_lengths(), error=16.0 * float(near.length_noise.max()))
     longest = float(given.max())
     return _compare("lengths", given, longest, measured, _Anew(None), longest)
 
 
 class _Anew(NamedTuple):
-    """Something by differences, and by how much its entries may be off; or why it is not."""
+    """Value computed by differences with its error bound; or the reason why there is no value."""
 
     value: Array | None
     reason: str = ""
@@ -201,7 +199,7 @@ class _Anew(NamedTuple):
 
 
 def _attempt(derive: Callable[[], Estimates]) -> Estimates | str:
-    """Derivatives by differences, or why there are none."""
+    """Compute derivatives by differences; return the error text if this fails."""
     try:
         return derive()
     except CdsmError as error:
@@ -209,7 +207,7 @@ def _attempt(derive: Callable[[], Estimates]) -> Estimates | str:
 
 
 def _split(derived: Estimates | str) -> list[_Anew]:
-    """Each of the three kinematic parts, or the one elastic part, by itself."""
+    """Split derivatives into the three kinematic parts, or into the one elastic part."""
     if isinstance(derived, str):
         return [_Anew(None, derived)] * 3
     return [
@@ -224,7 +222,7 @@ def _spread(kinematic: Estimates | str, elastic: Estimates | str) -> list[_Anew]
 
 
 def _summed(parts: list[_Anew]) -> _Anew:
-    """Their sum, its error that of all; or why one of them is not."""
+    """Add values and error bounds; if a value is missing, return the reason."""
     values = [each.value for each in parts if each.value is not None]
     if len(values) < len(parts):
         return _Anew(None, next(each.reason for each in parts if each.value is None))
@@ -234,7 +232,7 @@ def _summed(parts: list[_Anew]) -> _Anew:
 def _compare(
     name: str, given: Array, largest: float, potential: _Anew, torque: _Anew, of_all: float
 ) -> Agreement:
-    """What is given against both estimates."""
+    """Compare a given matrix with its estimates from the potential and from the torque."""
     unit = _UNITS.get(name, "N m/rad")
     enough = max(RESOLVED * largest, _NEGLIGIBLE * of_all)
     differences = [_difference(given, each) for each in (potential, torque)]
@@ -247,7 +245,7 @@ def _compare(
         reason = f"is off by {worst:.2g} {unit}, with {largest:.4g} {unit} its largest entry"
     elif not any(each.expected <= enough for each in known):
         verdict = "not possible"
-        # a moment that has no potential is no reason, if the torque resolves too little
+        # if the torque gives a value that is too coarse, a missing potential is not the reason
         alone = "" if torque.value is not None else potential.reason
         reason = torque.reason or alone or _UNSETTLED
     return Agreement(
@@ -268,7 +266,7 @@ def _difference(given: Array, anew: _Anew) -> Difference | None:
 
 
 def _adds_up(found: Agreement, matrix: Array, parts: Array, what: str) -> Agreement:
-    """Differs too where a matrix (nv, nv) is not the sum of its parts (n, nv, nv)."""
+    """Change the verdict to DIFFERS if a matrix (nv, nv) is not the sum of parts (n, nv, nv)."""
     off = float(abs(matrix - parts.sum(axis=0)).max())
     if off <= _SUM * float(abs(parts).sum(axis=0).max()) or found.verdict == "DIFFERS":
         return found

@@ -38,8 +38,8 @@ class Status(IntEnum):
     SOLVER_FAILED = 4
     """The solver finds no tensions, though tensions exist (SolverError): as INFEASIBLE."""
     OUTSIDE_ELASTICITY = 5
-    """A tension is outside the domain of the cable's law (ElasticityRangeError): tensions, residual,
-    active and load part exist, quantities that need the stiffness of the cables do not."""
+    """A tension is outside the domain of its law (ElasticityRangeError): tensions, residual, active
+    and load part exist, quantities that need the stiffness of the cables do not."""
     SINGULAR = 6
     """K_θ is singular (SingularStiffness): along, compliance and cartesian do not exist. If the tip
     is also IMMOBILE, pseudoinverse does not exist."""
