@@ -64,14 +64,9 @@ class State(NamedTuple):
 
 @compiled
 def search(J: Array, b: Array, low: Array, high: Array, state: State) -> int:
-    """Find the least tensions within bounds that balance the arm.
+    """Find the least tensions within bounds that balance the arm; fill the state.
 
-    Args:
-        J: J_L (C, nv).
-        b: Torque to balance (nv,).
-        low: Lower bounds (C,).
-        high: Upper bounds (C,).
-        state: Iterate and working memory, filled here.
+    J is J_L (C, nv), b the torque to balance (nv,), ``low`` and ``high`` are the bounds (C,).
 
     Returns:
         FOUND, IMPOSSIBLE or LOST.

@@ -121,15 +121,9 @@ def distribute_tensions(
 
 
 class Distributor:
-    """Tension distribution for slices of the postures; its arguments are already checked.
+    """Tension distribution for slices of the postures, with checked arguments.
 
-    Args:
-        arm: The arm.
-        q: Joint angles (B, nv) [rad].
-        low: Lower bounds (C,) or (B, C) [N].
-        high: Upper bounds (C,) or (B, C) [N].
-        wrench: W (6,) or (B, 6).
-        check_limits: Pass over postures beyond the joint limits.
+    The arguments are those of :func:`distribute_tensions`; ``low`` and ``high`` are (C,) or (B, C).
 
     Attributes:
         width: Floats of temporary memory per posture.

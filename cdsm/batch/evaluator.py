@@ -17,17 +17,10 @@ from cdsm.support.validation import Array, frozen
 
 
 class Evaluator:
-    """Evaluation of slices of the postures.
+    """Evaluation of slices of the postures; arguments as in :func:`cdsm.batch.evaluate`.
 
-    Args:
-        arm: The arm.
-        q: Joint angles (B, nv) [rad].
-        tension: F (C,) or (B, C) [N]; None if tensions are distributed or not needed.
-        wrench: W (6,) or (B, 6).
-        direction: Unit directions (3,) or (D, 3) of ``along``; or None.
-        names: Names of the outputs.
-        distributor: Distributes the tensions if they are not given.
-        check_limits: Pass over postures beyond the joint limits.
+    ``tension`` is F (C,) or (B, C) [N], or None if tensions are distributed or not needed. The
+    ``distributor`` finds tensions that are not given.
 
     Attributes:
         values: The outputs in the order of ``names``, filled slice by slice.

@@ -186,17 +186,8 @@ def is_provably_infeasible(
     from the torques of the block's cables; mostly the line is along one of these torques. For the
     joints behind block k, v is such that their free cables do no work.
 
-    Args:
-        blocks: The blocks.
-        J: J_L (C, nv).
-        b: Torque to balance (nv,).
-        low: Lower bounds (C,).
-        high: Upper bounds (C,).
-        free: Whether each cable is free in the blocks behind block k (C,).
-        lacking: Torque that block k lacks (2,).
-        k: Number of the block.
-        zero: Zeros (C,).
-        v: Working memory for the vector of the proof (nv,).
+    J is J_L (C, nv), b the torque to balance (nv,). ``free`` (C,) marks the free cables behind
+    block k, ``lacking`` (2,) is its missing torque, ``zero`` (C,) holds zeros, v (nv,) is filled.
     """
     row, row_start, cable, cable_start = blocks
     i, j = row[row_start[k]], row[row_start[k + 1] - 1]

@@ -37,9 +37,7 @@ _BESIDE = 1e-6
 class LockedLaws:
     """Position-controlled cables with locked motors, computed from strain and energy of their laws.
 
-    Args:
-        K: The stiffness. Its posture, tensions and original lengths are used; its cable stiffness
-            is used only to choose steps.
+    Posture, tensions and original lengths are those of K; its cable stiffness only chooses steps.
 
     Attributes:
         held: Number and cable of each position-controlled cable. Slack cables without stiffness, as
@@ -134,12 +132,9 @@ _ROOT = 2e-13
 class Neighbourhood:
     """The arm near a posture, with motors locked at this posture.
 
-    ``places`` (P, nv) are joint displacements from the posture in units of :attr:`unit`. So all
-    derivatives with respect to them are in N m.
-
-    Args:
-        K: The stiffness to check. Its posture, tensions, wrench and original lengths are used; its
-            cable stiffness is used only to choose steps.
+    Posture, tensions, wrench and original lengths are those of K; its cable stiffness only chooses
+    steps. ``places`` (P, nv) are joint displacements from the posture in units of :attr:`unit`. So
+    all derivatives with respect to ``places`` are in N m.
 
     Attributes:
         laws: The position-controlled cables.
@@ -238,7 +233,7 @@ class Neighbourhood:
 
     @property
     def first_elastic_step(self) -> float:
-        """Return a first step so small that also no tension goes half way to an end of its law."""
+        """Return a step ≤ :attr:`first_step` that moves no tension past half way to a law's end."""
         step = self.first_step
         for c, cable in self.laws.held:
             rise = self.laws.stiffness[c] * self._arms[c]
@@ -281,7 +276,7 @@ class Neighbourhood:
         return np.array([_ROOT * stored + 2.0 * step * (k * self._arms) @ self.length_noise])
 
     def kinematic_torque_noise(self, step: float) -> Array:
-        """Return the rounding error of the kinematic torques (3,) [N m]; large at short segments."""
+        """Return the rounding error of kinematic torques (3,) [N m]; large at short segments."""
         noise = self.kinematic_noise(step)
         noise[0] *= 1.0 + 1.0 / self._straightness
         return noise

@@ -158,11 +158,7 @@ class Report(ReadOnlyState):
 
 
 def report_on(K: Stiffness) -> Report:
-    """Compute the report on a stiffness.
-
-    Args:
-        K: The stiffness to check.
-    """
+    """Compute the report on a stiffness."""
     residual, joint, imbalance = facts.imbalance(K)
     try:
         readings = facts.readings(K)

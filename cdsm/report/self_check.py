@@ -126,10 +126,8 @@ def self_check(K: Stiffness) -> SelfCheck:
     """Compute K_θ, its terms and the torque residual by differences, and compare.
 
     Position-controlled cables store energy; force-controlled cables do the work F·L; motors do not
-    move. No error is raised: a comparison that is not possible names the reason.
-
-    Args:
-        K: The stiffness to check; its tensions need not balance the arm.
+    move. The tensions need not balance the arm. No error is raised: a comparison that is not
+    possible names the reason.
     """
     near = Neighbourhood(K)
     energies, torques = _terms_anew(near)

@@ -1,4 +1,4 @@
-"""Sweeps over many postures and cases, as labelled Datasets; here or on a cluster."""
+"""Sweeps over many postures and cases, as labelled Datasets; on this machine or a cluster."""
 
 from cdsm.sweeps.export import read_sweep, write_sweep
 from cdsm.sweeps.poses import GridPoses, PathPoses, PoseSet, RandomPoses

@@ -1,4 +1,4 @@
-"""The arguments of a sweep that may be one value, several, or several by name."""
+"""Arguments of a sweep: each is one value, several values, or several values by name."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ _Values = TypeVar("_Values")
 @final
 @dataclass(frozen=True, eq=False)
 class Label:
-    """A coordinate: values along a dimension, or a single value.
+    """Coordinate of a Dataset: values along dimensions, or a single value.
 
     Attributes:
-        dims: Its dimensions; none for a single value.
-        values: Numbers or names, of that shape.
-        long_name: In words.
-        units: As UDUNITS writes them, SI; empty for names, which have none.
+        dims: Dimensions; empty for a single value.
+        values: Numbers or names; one axis for each dimension.
+        long_name: Name in words.
+        units: SI units in the notation of UDUNITS; empty for names.
     """
 
     dims: tuple[str, ...]
@@ -45,19 +45,19 @@ class Label:
 
     @property
     def attributes(self) -> dict[str, str]:
-        """As a Dataset holds them."""
+        """Return long name and units as attributes of a Dataset."""
         return {"long_name": self.long_name} | ({"units": self.units} if self.units else {})
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Choice(Generic[_Values]):
-    """One value or several of something.
+    """Value or values of an argument.
 
     Attributes:
-        name: Of the argument, and of the dimension if there are several.
-        values: One entry each, also if there is one only.
-        names: Names or numbers along the dimension; None: one value, so no dimension.
+        name: Name of the argument; several values make a dimension of this name.
+        values: The values, one entry each; also one entry for a single value.
+        names: Names or numbers along the dimension; None for a single value without dimension.
     """
 
     name: str
@@ -66,7 +66,7 @@ class Choice(Generic[_Values]):
 
     @property
     def labels(self) -> dict[str, Label]:
-        """The coordinate of the dimension, if there is one."""
+        """Return the coordinate of the dimension; empty for a single value."""
         if self.names is None:
             return {}
         kind = "name" if self.names.dtype.kind == "U" else "number"
@@ -74,7 +74,7 @@ class Choice(Generic[_Values]):
         return {self.name: Label((self.name,), self.names, f"{kind} of the {self.name}", units)}
 
     def label(self, values: Array, dims: tuple[str, ...], long_name: str, units: str) -> Label:
-        """A coordinate with something of each value."""
+        """Build a coordinate with one entry for each value, such as its force."""
         if self.names is None:
             return Label(dims, values[0], long_name, units)
         return Label((self.name, *dims), values, long_name, units)
@@ -83,7 +83,7 @@ class Choice(Generic[_Values]):
 def laws_of(
     elasticity: Elasticity | Mapping[str, Elasticity] | None,
 ) -> Choice[tuple[Elasticity | None, ...]]:
-    """The elasticities of all cables in turn; None stands for the arm's own."""
+    """Check the elasticities; each is used for all cables, None keeps those of the arm."""
     if elasticity is None or isinstance(elasticity, Elasticity):
         return Choice("elasticity", (elasticity,), None)
     if not isinstance(elasticity, Mapping) or not all(
@@ -97,7 +97,7 @@ def laws_of(
 
 
 def wrenches_of(wrench: ArrayLike | Mapping[str, ArrayLike]) -> Choice[Array]:
-    """Wrenches (W, 6) at ``tool0`` in base axes: force [N], then moment [N m]."""
+    """Check wrenches (W, 6) at ``tool0`` in base axes: force [N], then moment [N m]."""
 
     def checked(name: str, value: ArrayLike) -> Array:
         return wrench_vector(name, value)
@@ -106,12 +106,12 @@ def wrenches_of(wrench: ArrayLike | Mapping[str, ArrayLike]) -> Choice[Array]:
 
 
 def directions_of(direction: ArrayLike | Mapping[str, ArrayLike]) -> Choice[Array]:
-    """Unit directions (D, 3) in base axes."""
+    """Check directions; return unit vectors (D, 3) in base axes."""
     return _vectors("direction", direction, unit_direction)
 
 
 def bounds_of(minimum: ArrayLike, maximum: float) -> tuple[Choice[Array], float]:
-    """Lower bounds of tension (M,) [N] and the upper one."""
+    """Check the lower bounds of tension (M,) [N] and the upper bound [N]."""
     several = np.ndim(number_array("minimum", minimum)) > 0
     lows = distinct("minimum", minimum)
     if lows.min() < 0.0:
@@ -130,7 +130,7 @@ def bounds_of(minimum: ArrayLike, maximum: float) -> tuple[Choice[Array], float]
 
 
 def distinct(name: str, values: ArrayLike) -> Array:
-    """Numbers (n,), one or more, none twice: the labels of a dimension."""
+    """Check the labels of a dimension (n,): one or more different numbers."""
     array = np.atleast_1d(number_array(name, values))
     array = vector(name, array, array.size, "the values of a dimension")
     if not array.size:

@@ -1,4 +1,4 @@
-"""A sweep cut into blocks of postures: rectangles of the pose set that are contiguous in it."""
+"""Division of a sweep into blocks of postures: contiguous rectangles of the pose set."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ import numpy as np
 @final
 @dataclass(frozen=True, kw_only=True)
 class Block:
-    """Some postures, whose cases are computed, sent and stored at once.
+    """Block of postures whose cases are computed, sent and stored together.
 
     Attributes:
-        slices: What it takes of every dimension of the pose set.
-        start: Its first posture, counted in C order.
-        stop: One past its last.
+        slices: Slice of the block along each dimension of the pose set.
+        start: Number of the first posture, counted in C order.
+        stop: Number of the last posture plus one.
     """
 
     slices: Mapping[str, slice]
@@ -28,10 +28,10 @@ class Block:
 
 
 def extents(poses: Mapping[str, int], most: int) -> dict[str, int]:
-    """Size along each dimension of a block of at most so many postures, but at least one.
+    """Return the size of a block along each dimension: at most ``most`` postures, at least one.
 
-    The last dimensions whole, as many as fit; part of one; and one entry of each before: such
-    blocks cover the postures in order without gaps.
+    A block takes the last dimensions completely, a part of the dimension before, and one entry of
+    all others. So the blocks cover all postures in order without gaps.
     """
     room, extent = most, {}
     for dim, size in reversed(list(poses.items())):
@@ -41,7 +41,7 @@ def extents(poses: Mapping[str, int], most: int) -> dict[str, int]:
 
 
 def blocks(poses: Mapping[str, int], extent: Mapping[str, int]) -> Iterator[Block]:
-    """All blocks of a pose set of these dimensions, in order."""
+    """Build all blocks of a pose set, in order."""
     steps = [range(0, size, extent[dim]) for dim, size in poses.items()]
     for corner in itertools.product(*steps):
         slices = {

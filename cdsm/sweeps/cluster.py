@@ -1,4 +1,4 @@
-"""Blocks computed by the workers of a dask cluster; a worker that dies costs only its block."""
+"""Computation of blocks on a dask cluster; if a worker dies, only its block can be lost."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ if TYPE_CHECKING:
     from distributed import Client, Future
 
 _QUEUED = 2
-"""Blocks submitted for each thread of the cluster, so that the next is there when one is done."""
+"""Blocks submitted for each thread of the cluster, so that no thread waits for its next block."""
 
 _GO_ON = "What a store holds is kept: run the same again with store= to go on from there."
 
 
 def checked_client(client: object) -> None:
-    """Raise what is wrong with a client."""
+    """Check that an object is a synchronous dask client."""
     need("dask", "distributed")
     from distributed import Client
 
@@ -37,13 +37,14 @@ def checked_client(client: object) -> None:
 def on_cluster(
     client: Client, specification: Specification, blocks: Iterable[Block]
 ) -> Iterator[tuple[Block, BlockResult | None]]:
-    """Each block with its answer, in the order in which they finish; None: its workers died.
+    """Yield each block, when it is computed, with its result; None if its workers died.
 
-    Dask hands a block whose worker died to another, ``allowed-failures`` times, and then gives it
-    up. As it also gives up blocks that only waited there, all of them are tried once more, alone.
+    If a worker dies, dask gives its blocks to other workers, at most ``allowed-failures`` times.
+    Then dask gives up, also for blocks that only waited on the worker. So each of these blocks is
+    tried once more, alone.
     """
     from distributed import as_completed
-    from distributed.protocol.pickle import dumps  # by value what a notebook defines
+    from distributed.protocol.pickle import dumps  # pickles classes of a notebook by value
 
     payload, ours = dumps(specification.task), version("cdsm-stiffness")
 
@@ -108,13 +109,13 @@ def _on_worker(payload: bytes, client_version: str, q: Array) -> BlockResult:
         raise ClusterError(
             f"a worker has cdsm {ours}, the client {client_version}; install the same."
         )
-    # one thread: dask runs a task in each of its own
+    # one thread, since dask runs one task in each of its threads
     return evaluate(_task(payload), q, threads=1)
 
 
 @lru_cache(maxsize=4)
 def _task(payload: bytes) -> SweepTask:
-    """The task as shipped, made once in each worker: an arm takes milliseconds to build."""
+    """Unpickle the task once in each worker, since building an arm takes milliseconds."""
     from distributed.protocol.pickle import loads
 
     task: SweepTask = loads(payload)

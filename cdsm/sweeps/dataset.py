@@ -1,4 +1,4 @@
-"""The results of a sweep as a labelled Dataset."""
+"""Labelled Dataset with the results of a sweep."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ if TYPE_CHECKING:
     import xarray
 
 _OF_SLIDES = {"N m": "N", "N m rad-1": "N m-1"}
-"""Units of torque and joint stiffness, and what they are where joints slide."""
+"""Units of torque and joint stiffness for joints that turn, and for joints that slide."""
 
 EMPTY = {"status": np.int8(SweepStatus.PENDING)}
-"""What stands where nothing is computed yet; NaN in all outputs."""
+"""Initial value of ``status``; the initial value of all outputs is NaN."""
 
 
 def empty(specification: Specification, name: str) -> NDArray[Any]:
-    """An array for an output or ``status``, with nothing in it yet."""
+    """Build an array for an output or ``status``, filled with its initial value."""
     try:
         return np.full(specification.shape(name), EMPTY.get(name, np.float64(np.nan)))
-    except (MemoryError, ValueError):  # numpy's word for sizes beyond all memory
+    except (MemoryError, ValueError):  # numpy raises ValueError for sizes beyond all memory
         entries = " x ".join(map(str, specification.shape(name)))
         raise InvalidInput(
             "outputs",
@@ -38,7 +38,7 @@ def empty(specification: Specification, name: str) -> NDArray[Any]:
 
 
 def to_dataset(specification: Specification, values: Mapping[str, NDArray[Any]]) -> xarray.Dataset:
-    """The coordinates of a specification, and as many of its outputs as are given."""
+    """Build a Dataset with the coordinates of a specification and the given outputs."""
     import xarray
 
     labels = specification.labels.items()
@@ -55,7 +55,7 @@ def to_dataset(specification: Specification, values: Mapping[str, NDArray[Any]])
 
 
 def variable_attributes(specification: Specification, name: str) -> dict[str, Any]:
-    """What an output or ``status`` says of itself."""
+    """Return the attributes of an output or of ``status`` in the Dataset."""
     if name != "status":
         quantity = QUANTITIES[name]
         units = _units(quantity.units, specification.task.arm.slides)
@@ -78,7 +78,7 @@ def variable_attributes(specification: Specification, name: str) -> dict[str, An
 
 
 def _units(turning: str, slides: NDArray[np.bool_]) -> str:
-    """Units of a quantity of an arm, some of whose joints may slide."""
+    """Return the units of a quantity for an arm whose joints turn or slide."""
     sliding = _OF_SLIDES.get(turning)
     if sliding is None or not slides.any():
         return turning

@@ -1,4 +1,4 @@
-"""All cases at some postures of a sweep, each with its status."""
+"""Evaluation of all cases at a block of postures, each with its status."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from cdsm.support.validation import Array, ReadOnlyState
 from cdsm.sweeps.quantities import LOST, QUANTITIES, SweepStatus
 
 BlockResult = dict[str, NDArray[Any]]
-"""Outputs by name, and their ``status``: postures first, then the cases."""
+"""Outputs and ``status`` by name; the first axis is the posture, the next axes are the cases."""
 
 Rows = dict[str, Array]
 Statuses = NDArray[np.int8]
@@ -32,7 +32,7 @@ _BATCH_NAMES = {
     "joint_stiffness": "joint",
     "translational_compliance": "compliance",
 }
-"""Quantities whose name in a batch would be a dimension here, or means more."""
+"""Names of quantities in a batch, where the name in a sweep is different."""
 
 _Place = tuple[NDArray[np.intp], ...] | tuple[NDArray[np.bool_]]
 
@@ -40,12 +40,12 @@ _Place = tuple[NDArray[np.intp], ...] | tuple[NDArray[np.bool_]]
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SweepTask(ReadOnlyState):
-    """What to compute at each posture: all that a worker needs beside the postures.
+    """Quantities and cases to compute at each posture; with the postures, all a worker needs.
 
     Attributes:
-        arm: The arm as given.
-        laws: Elasticities of all cables in turn; None stands for the arm's own.
-        wrenches: (W, 6): force [N], then moment [N m].
+        arm: The given arm.
+        laws: Elasticities; each is used for all cables in turn, None keeps those of the arm.
+        wrenches: Wrenches (W, 6): force [N], then moment [N m].
         minima: Lower bounds of tension (M,) [N].
         maximum: Upper bound [N].
         directions: Unit directions (D, 3).
@@ -62,21 +62,21 @@ class SweepTask(ReadOnlyState):
 
     @property
     def cases(self) -> int:
-        """How many stiffnesses there are at each posture."""
+        """Return the number of cases (stiffness matrices) at each posture."""
         return len(self.laws) * len(self.wrenches) * len(self.minima)
 
     @cached_property
     def arms(self) -> tuple[Manipulator, ...]:
-        """The arm with each elasticity; springs, leads and control as they are."""
+        """Return the arm with each elasticity; springs, leads and control stay unchanged."""
         return tuple(self.arm if law is None else _with(self.arm, law) for law in self.laws)
 
 
 def evaluate(task: SweepTask, q: Array, threads: int | None = None) -> BlockResult:
-    """All cases at joint angles q (P, nv) [rad]; none fails, each has its status instead.
+    """Compute all cases at joint angles q (P, nv) [rad]; a failure sets the status of the case.
 
     Returns:
-        ``status`` (P, E, W, M), and every output with those of the four axes it depends on: E
-        elasticities, W wrenches, M minima.
+        ``status`` (P, E, W, M), for E elasticities, W wrenches and M minima, and all outputs; an
+        output has only those of these axes on which it depends.
     """
     shape = len(q), len(task.wrenches), len(task.minima)
     stages = {name: QUANTITIES[name].stage for name in task.outputs}
@@ -125,14 +125,14 @@ def evaluate(task: SweepTask, q: Array, threads: int | None = None) -> BlockResu
 
 
 def _principal(rows: Rows, status: Statuses, names: list[str]) -> Rows:
-    """The extreme stiffnesses of the rows that have them: stable ones; NaN in the others."""
+    """Compute the softest and stiffest direction of stable rows; NaN in all other rows."""
     exist = (rows["margin"] > 0.0) & (status != SweepStatus.SINGULAR)  # a margin may be NaN
     extremes = principal_stiffness(rows["translational_compliance"][exist])
     return {name: _spread(extremes[name], (exist,), exist.shape) for name in names}
 
 
 def _spread(rows: Array, place: _Place, shape: tuple[int, ...]) -> Array:
-    """An array of all cases from the rows of some, NaN in the others."""
+    """Build an array of all cases from rows of some cases; NaN in all other cases."""
     full = np.full((*shape, *rows.shape[1:]), np.nan)
     full[place] = rows
     return full
@@ -143,13 +143,13 @@ def _with(arm: Manipulator, law: Elasticity) -> Manipulator:
     return arm.with_cables(cables)
 
 
-# --- rows: the only place where a sweep meets the physics -------------------------------------
+# --- rows: the only functions of a sweep that call the physics ---------------------------------
 
 
 def _postures(
     arm: Manipulator, q: Array, names: Collection[str], threads: int | None
 ) -> tuple[Rows, Statuses]:
-    """What depends on the joint angles q (R, nv) [rad] alone."""
+    """Compute quantities that depend on the joint angles q (R, nv) [rad] alone."""
     return _read(batch.evaluate(arm, q, outputs=_batch_names(names), threads=threads), names)
 
 
@@ -161,7 +161,7 @@ def _tensions(
     wrench: Array,
     threads: int | None,
 ) -> tuple[Array, Statuses]:
-    """Least tensions in balance (R, C) [N], under a lower bound (R,) [N] and wrench (R, 6) each."""
+    """Compute the least balancing tensions (R, C) [N] for lower bounds (R,) and wrenches (R, 6)."""
     low = np.repeat(minimum[:, None], len(arm.cables), axis=1)
     pull = batch.distribute_tensions(arm, q, low, maximum, wrench, threads=threads)
     return pull.values, pull.status.astype(np.int8)
@@ -176,7 +176,7 @@ def _stiffnesses(
     names: Collection[str],
     threads: int | None,
 ) -> tuple[Rows, Statuses]:
-    """What depends on tensions (R, C) [N] and elasticity too."""
+    """Compute quantities that also depend on tensions (R, C) [N] and elasticity."""
     found = batch.evaluate(
         arm,
         q,
@@ -194,7 +194,7 @@ def _batch_names(names: Collection[str]) -> list[str]:
 
 
 def _read(found: batch.Batch, names: Collection[str]) -> tuple[Rows, Statuses]:
-    """The quantities of a batch under the names of a sweep, NaN where the status says so."""
+    """Return quantities of a batch by their names in a sweep; NaN where the status demands it."""
     status = found.status.astype(np.int8)
     rows = {}
     for name in names:
@@ -203,7 +203,7 @@ def _read(found: batch.Batch, names: Collection[str]) -> tuple[Rows, Statuses]:
             values = values[:, :3, 3]
         elif name == "translational_compliance":
             values = values[:, :3, :3]
-        # where K_θ is singular a batch has the pseudoinverse still
+        # a batch holds the pseudoinverse even where K_θ is singular; a sweep does not
         lost = [kind for kind in SweepStatus if QUANTITIES[name].stage in LOST[kind]]
         rows[name] = values.copy()
         rows[name][np.isin(status, lost)] = np.nan

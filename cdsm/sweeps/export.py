@@ -1,4 +1,4 @@
-"""Sweeps as files: NetCDF, which holds everything, and CSV, a long table."""
+"""Files of sweeps: NetCDF with the complete Dataset, or CSV with a long table."""
 
 from __future__ import annotations
 
@@ -22,21 +22,22 @@ if TYPE_CHECKING:
     import xarray
 
 _ROWS = 2**16
-"""Rows of a table made at once."""
+"""Number of rows of a CSV table built at once."""
 
 
 def write_sweep(dataset: xarray.Dataset, path: str | os.PathLike[str]) -> Path:
-    """Write a sweep, whole or not at all; return the path.
+    """Write a sweep to a file, completely or not at all; return the path.
 
     Args:
-        dataset: What :func:`~cdsm.sweeps.run.sweep` returns, or a part of it.
-        path: The file; replaced if it exists. ``.nc``: NetCDF, read back by :func:`read_sweep`
-            to the same bits. ``.csv``: a row for each posture and case, a column for each
-            coordinate and each component of an output, its unit [SI] in the header; empty where
-            the status, written as a word, says that there is nothing.
+        dataset: Result of :func:`~cdsm.sweeps.run.sweep`, or a part of it.
+        path: The file; replaced if it exists. ``.nc`` writes NetCDF, which :func:`read_sweep` reads
+            with the same bits. ``.csv`` writes a row for each posture and case, and a column for
+            each coordinate and component of an output, with the SI unit in the header. The status
+            is a word; a value that does not exist is an empty cell.
 
     Raises:
-        InvalidInput: Not a sweep, a status without a meaning, or a path of neither kind.
+        InvalidInput: ``dataset`` is not a sweep, or its status has a number without a word; or
+            ``path`` ends neither in ``.nc`` nor in ``.csv``.
         MissingExtra: xarray or netCDF4 is not installed.
         FileError: The file cannot be written.
     """
@@ -48,15 +49,15 @@ def write_sweep(dataset: xarray.Dataset, path: str | os.PathLike[str]) -> Path:
 
 
 def read_sweep(path: str | os.PathLike[str]) -> xarray.Dataset:
-    """Read a sweep from NetCDF, or from the folder of its store.
+    """Read a sweep from a NetCDF file or from the folder of its store.
 
     Args:
-        path: What :func:`write_sweep` wrote as ``.nc``, or what was given as ``store=``, also
-            while its sweep is still running.
+        path: The ``.nc`` file of :func:`write_sweep`, or the folder given as ``store=``, even while
+            its sweep is running.
 
     Raises:
-        MissingExtra: xarray, or netCDF4 or zarr, is not installed.
-        FileError: There is no such file, or it is no sweep.
+        MissingExtra: xarray, netCDF4 or zarr is needed and not installed.
+        FileError: The file does not exist, cannot be read, or is not a sweep.
     """
     need("sweep", "xarray")
     path = as_path(path)
@@ -75,12 +76,12 @@ def read_sweep(path: str | os.PathLike[str]) -> xarray.Dataset:
 
 
 def check_target(path: str | os.PathLike[str]) -> None:
-    """Raise what :func:`write_sweep` would, as far as that is known before the sweep runs.
+    """Check a path for :func:`write_sweep` before the sweep runs.
 
     Raises:
-        InvalidInput: A path of neither kind.
+        InvalidInput: The path ends neither in ``.nc`` nor in ``.csv``.
         MissingExtra: netCDF4 is needed and not installed.
-        FileError: Its folder does not exist.
+        FileError: The path is a folder, or its folder does not exist.
     """
     path = as_path(path)
     kind = path.suffix.lower()
@@ -100,25 +101,25 @@ def _read_netcdf(path: Path) -> xarray.Dataset:
 
     if not path.exists():
         raise FileError(path, f"does not exist (looked in {Path.cwd()}).")
-    if not path.is_file():  # a pipe that nobody writes to would be waited for
+    if not path.is_file():  # opening a pipe without a writer would wait forever
         raise FileError(path, "is not a regular file; give the path of a file.")
     try:
         with xarray.open_dataset(path, engine="netcdf4") as dataset:
             return dataset.load()
-    except Exception as error:  # whatever netCDF4 and xarray raise
+    except Exception as error:  # netCDF4 and xarray may raise anything
         raise FileError(path, f"cannot be read as NetCDF: {error}.") from None
 
 
 def _write_netcdf(dataset: xarray.Dataset, path: Path) -> None:
     try:
         dataset.to_netcdf(path, engine="netcdf4")
-    except (RuntimeError, PermissionError) as error:  # HDF5 does not tell that a disk is full
+    except (RuntimeError, PermissionError) as error:  # HDF5 does not report a full disk
         free = shutil.disk_usage(path.parent).free
         raise OSError(f"{error} ({free} bytes are free there)") from None
 
 
 def _write_table(dataset: xarray.Dataset, path: Path) -> None:
-    """A long table, some of its rows at a time."""
+    """Write a long table, in parts of limited size."""
     status = dataset["status"]
     rest = status.size // max(1, status.shape[0]) if status.ndim else 1
     step = max(1, _ROWS // max(1, rest))
@@ -138,7 +139,7 @@ def _table(dataset: xarray.Dataset) -> pandas.DataFrame:
     for name in (*dataset.coords, *dataset.data_vars):
         variable = dataset[name]
         if name == "status" or (variable.dims == (name,) and name not in status.dims):
-            continue  # a coordinate along the components is in the names of their columns
+            continue  # coordinates of components appear in the names of the columns
         units = f" [{variable.units}]" if variable.attrs.get("units", "1") != "1" else ""
         for suffix, component in _components(variable, status):
             columns[f"{name}{suffix}{units}"] = component
@@ -157,11 +158,11 @@ def _table(dataset: xarray.Dataset) -> pandas.DataFrame:
 def _components(
     variable: xarray.DataArray, status: xarray.DataArray
 ) -> Iterator[tuple[str, NDArray[Any]]]:
-    """Each component of a variable, with its name, as a column of one entry per status."""
+    """Yield name and column of each component of a variable; one entry per entry of the status."""
     inner = [dim for dim in variable.dims if dim not in status.dims]
     names = [map(str, variable[dim].values.tolist()) for dim in inner]
     for places in itertools.product(*(enumerate(each) for each in names)):
         one = variable.isel({dim: i for dim, (i, _) in zip(inner, places, strict=True)})
-        # a dimension it lacks repeats it
+        # along dimensions that the variable lacks, its values are repeated
         full = one.broadcast_like(status).transpose(*status.dims)
         yield "".join(f"_{name}" for _, name in places), full.values.ravel()

@@ -1,7 +1,7 @@
 """Pose sets: grids over named joints, paths along a polyline, Sobol points within the limits.
 
-A pose set knows no arm. :func:`poses_of` puts it to one; what comes out knows its dimensions and
-labels, and makes the joint angles of any part of itself, so that a large grid is never held.
+A pose set does not depend on an arm. :func:`poses_of` builds its postures for an arm. They have
+dimensions and labels. Joint angles are computed for parts, so a large grid is never in memory.
 """
 
 from __future__ import annotations
@@ -29,21 +29,21 @@ from cdsm.support.validation import (
 from cdsm.sweeps.arguments import Label, distinct
 
 MAXIMUM_POSES = 2**30
-"""Of a path or drawn; the Sobol sequence of scipy has 30 bits."""
+"""Maximum number of postures of a path or a random set; scipy's Sobol sequence has 30 bits."""
 
 _DRAWN = 2**16
-"""Points drawn at once."""
+"""Number of Sobol points drawn at once."""
 
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Listed:
-    """Postures one by one, along the dimension ``pose``.
+    """List of postures along the dimension ``pose``.
 
     Attributes:
         q: Joint angles (N, nv) [rad].
-        labels: Its coordinates, by name.
-        description: What it is, in words.
+        labels: Coordinates by name.
+        description: Description in words.
     """
 
     q: Array
@@ -52,25 +52,25 @@ class Listed:
 
     @property
     def sizes(self) -> dict[str, int]:
-        """Its dimensions."""
+        """Return the length of each dimension."""
         return {"pose": len(self.q)}
 
     def angles(self, start: int, stop: int) -> Array:
-        """Joint angles (stop − start, nv) [rad] of some of its postures."""
+        """Return joint angles (stop − start, nv) [rad] of postures from ``start`` on."""
         return self.q[start:stop]
 
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Product:
-    """All combinations of some joints' angles, the last joint fastest; the others stand still.
+    """Grid of angles of some joints, with the last joint fastest; all other joints do not move.
 
     Attributes:
         values: Angles [rad] of each joint of the grid.
-        joints: Which joints these are.
-        rest: Joint angles (nv,) [rad] of those that stand still.
-        labels: Its coordinates, by name: those of the grid first.
-        description: What it is, in words.
+        joints: Numbers of the joints of the grid.
+        rest: Joint angles (nv,) [rad] of the joints that do not move.
+        labels: Coordinates by name, those of the grid first.
+        description: Description in words.
     """
 
     values: tuple[Array, ...]
@@ -81,11 +81,11 @@ class Product:
 
     @property
     def sizes(self) -> dict[str, int]:
-        """Its dimensions."""
+        """Return the length of each dimension."""
         return dict(zip(self.labels, map(len, self.values), strict=False))
 
     def angles(self, start: int, stop: int) -> Array:
-        """Joint angles (stop − start, nv) [rad] of some of its postures, counted in C order."""
+        """Return joint angles (stop − start, nv) [rad] of postures, counted in C order."""
         q = np.tile(self.rest, (stop - start, 1))
         places = np.unravel_index(np.arange(start, stop), [len(each) for each in self.values])
         for joint, values, place in zip(self.joints, self.values, places, strict=True):
@@ -94,28 +94,28 @@ class Product:
 
 
 class PoseSet(ABC):
-    """A set of postures to sweep over: a grid, a path or random ones."""
+    """Set of postures to sweep over: a grid, a path or random postures."""
 
     @abstractmethod
     def _of(self, arm: Manipulator) -> Listed | Product:
-        """The set for this arm."""
+        """Build the postures for an arm."""
 
 
 @final
 @dataclass(frozen=True, init=False)
 class GridPoses(PoseSet):
-    """All combinations of the angles given for some joints; each becomes a dimension of its name.
+    """Grid of all combinations of angles of named joints; each joint name becomes a dimension.
 
     Args:
-        angles: Angles [rad] by name of the joint, each (n,) or one.
-        rest: Angles [rad] of joints that stand still, by name; 0 where none is given.
+        angles: Angles [rad] of each joint of the grid, by joint name: (n,) or one number.
+        rest: Angles [rad] of joints that do not move, by joint name; 0 for all joints not named.
 
     Attributes:
-        swept: Name of each joint of the grid with its angles [rad].
-        resting: Name of each joint that was given one angle, with it [rad].
+        swept: Name of each joint of the grid, with its angles [rad].
+        resting: Name of each joint in ``rest``, with its angle [rad].
 
     Raises:
-        InvalidInput: No joint is named, one has no angles or one of them twice, or is in both.
+        InvalidInput: No joint is named; a joint has no angles, an angle twice, or also a ``rest``.
     """
 
     swept: tuple[tuple[str, tuple[float, ...]], ...]
@@ -170,13 +170,13 @@ class PathPoses(ReadOnlyState, PoseSet):
     """Postures along straight lines in joint space from one waypoint to the next.
 
     Attributes:
-        waypoints: Joint angles (n, nv) [rad], two or more postures.
-        count: How many postures, evenly spaced in √Σδθ² along the path, both ends included; None:
+        waypoints: Joint angles (n, nv) [rad] of two or more postures.
+        count: Number of postures, evenly spaced in √Σδθ² along the path, with both ends; None uses
             the waypoints themselves.
 
     Raises:
-        InvalidInput: Not two or more postures, a path without length, or a count below 2 or above
-            2³⁰.
+        InvalidInput: ``waypoints`` is not (n, nv) with n ≥ 2, the path has no length, or ``count``
+            is below 2 or above 2³⁰.
     """
 
     waypoints: Array
@@ -197,7 +197,7 @@ class PathPoses(ReadOnlyState, PoseSet):
 
     @property
     def _distances(self) -> Array:
-        """Way to each waypoint (K,) [rad]."""
+        """Return the distance along the path to each waypoint (n,) [rad]."""
         steps = np.linalg.norm(np.diff(self.waypoints, axis=0), axis=1)
         return np.concatenate([[0.0], np.cumsum(steps)])
 
@@ -214,14 +214,14 @@ class PathPoses(ReadOnlyState, PoseSet):
 @final
 @dataclass(frozen=True)
 class RandomPoses(PoseSet):
-    """Points of a scrambled Sobol sequence, spread evenly within the joint limits.
+    """Random postures: a scrambled Sobol sequence, spread evenly within the joint limits.
 
     Attributes:
-        count: How many; powers of two fill the space most evenly.
-        seed: The same seed gives the same postures.
+        count: Number of postures; powers of two fill the space most evenly.
+        seed: Seed of the sequence; equal seeds give equal postures.
 
     Raises:
-        InvalidInput: A count below 1 or above 2³⁰, or a seed that is no whole number from 0 on.
+        InvalidInput: ``count`` is below 1 or above 2³⁰, or ``seed`` is not a whole number ≥ 0.
     """
 
     count: int
@@ -236,7 +236,7 @@ class RandomPoses(PoseSet):
 
         sequence = qmc.Sobol(arm.nv, seed=np.random.default_rng(self.seed))
         q = np.empty((self.count, arm.nv))
-        # the first by itself: scipy warns of counts that are no power of two, which are meant here
+        # the first point is drawn alone: else scipy warns of counts that are not powers of two
         edges = [0, *range(1, self.count, _DRAWN), self.count]
         for start, stop in itertools.pairwise(edges):
             q[start:stop] = sequence.random(stop - start)
@@ -247,14 +247,14 @@ class RandomPoses(PoseSet):
 
 
 def poses_of(arm: Manipulator, q: PoseSet | ArrayLike) -> Listed | Product:
-    """A pose set, or postures (N, nv) [rad] given as an array, put to an arm."""
+    """Build the postures of a pose set, or of an array (N, nv) [rad], for an arm."""
     if isinstance(q, PoseSet):
         return q._of(arm)
     return _listed(checked_angles("q", q, arm), arm, "postures as given", {})
 
 
 def checked_angles(name: str, q: ArrayLike, arm: Manipulator) -> Array:
-    """Joint angles (N, nv) [rad], one or more postures of the arm."""
+    """Check joint angles (N, nv) [rad] of one or more postures of the arm."""
     angles = number_array(name, q)
     if angles.ndim != 2 or angles.shape[1] != arm.nv or not len(angles):
         raise InvalidInput(
@@ -266,12 +266,12 @@ def checked_angles(name: str, q: ArrayLike, arm: Manipulator) -> Array:
 
 
 def _unit(arm: Manipulator) -> str:
-    """Of joint angles, or of what is mixed of angles and ways."""
+    """Return the unit of joint coordinates: angles, or angles and ways."""
     return "rad or m" if arm.slides.any() else "rad"
 
 
 def _meaning(arm: Manipulator, joint: int) -> tuple[str, str]:
-    """What the coordinate of a joint is, and its unit."""
+    """Return the long name and the unit of a joint coordinate."""
     what = "way" if arm.slides[joint] else "angle"
     return f"{what} of {arm.joint_names[joint]}", arm.joint_units[joint]
 

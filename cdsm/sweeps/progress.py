@@ -1,4 +1,4 @@
-"""A progress bar with rate and time left, on a terminal and if wanted."""
+"""Progress bar with rate and time left."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from rich.text import Text
 
 
 class _Rate(ProgressColumn):
-    """Evaluations per second, over the last half minute."""
+    """Column with evaluations per second over the last half minute."""
 
     def render(self, task: Task) -> Text:
         return Text("" if task.speed is None else f"{task.speed:,.0f}/s")
@@ -27,7 +27,7 @@ class _Rate(ProgressColumn):
 
 @contextmanager
 def progress_bar(total: int, done: int, *, wanted: bool) -> Iterator[Callable[[int], None]]:
-    """Give a function that counts evaluations; what was done before does not count in the rate."""
+    """Show a bar if stderr is a terminal; yield a function to count evaluations after ``done``."""
     console = Console(stderr=True)
     bar = Progress(
         TextColumn("sweep"),

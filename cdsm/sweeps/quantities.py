@@ -1,6 +1,6 @@
-"""The quantities of a sweep, and the status of its entries.
+"""Quantities of a sweep and status of its entries.
 
-The one table of names, units and dimensions: the Dataset, the store, the CSV and the maps read it.
+Dataset, store, CSV and maps take names, units and dimensions from the one table of this module.
 """
 
 from __future__ import annotations
@@ -12,46 +12,45 @@ from typing import Final, final
 from cdsm.batch import Status
 
 CASES: Final = ("elasticity", "wrench", "minimum")
-"""Dimensions beside those of the pose set, each only where several values were given."""
+"""Dimensions of the cases; each exists only if several values of the argument are given."""
 
 
 class SweepStatus(IntEnum):
-    """What became of an entry of a sweep; its names are the ``flag_meanings`` of ``status``.
+    """Status of an entry of a sweep; the names are the ``flag_meanings`` of ``status``.
 
-    That of :class:`~cdsm.Status`, with what only a sweep can tell.
-
-    NaN stands in a Dataset only where the status says so, as listed here. Infinite is a value: the
-    stiffness in a direction in which no joint moves the tip.
+    The first eight are those of :class:`~cdsm.Status`. NaN stands in a Dataset only where the
+    status says so, as listed here. Infinity is a value: the stiffness in a direction in which no
+    joint moves the tip.
     """
 
     OK = Status.OK
-    """All there."""
+    """All requested quantities exist."""
     BEYOND_LIMITS = Status.BEYOND_LIMITS
-    """A joint angle beyond its limit: nothing."""
+    """A joint angle is beyond its limit: no quantity exists."""
     COINCIDENT_SITES = Status.COINCIDENT_SITES
-    """Two neighbouring sites of a cable coincide: nothing."""
+    """Two neighbouring sites of a cable coincide: no quantity exists."""
     INFEASIBLE = Status.INFEASIBLE
-    """No tension within the bounds balances the arm: no tension, no stiffness."""
+    """No tensions within the bounds balance the arm: tensions and stiffness do not exist."""
     SOLVER_FAILED = Status.SOLVER_FAILED
-    """The solver found no tension, though there is one: no tension, no stiffness."""
+    """The solver found no tensions, though tensions exist: as INFEASIBLE."""
     OUTSIDE_ELASTICITY = Status.OUTSIDE_ELASTICITY
-    """A tension outside the domain of the elasticity: no stiffness."""
+    """A tension is outside the domain of its law: the stiffness does not exist."""
     SINGULAR = Status.SINGULAR
-    """K_θ is singular, just about to buckle: no Cartesian quantity."""
+    """K_θ is singular (the arm is about to buckle): Cartesian quantities do not exist."""
     IMMOBILE = Status.IMMOBILE
-    """The tip cannot move in some direction: no cartesian, no pseudoinverse. Only where one of
-    them was asked for."""
+    """The tip cannot move in some direction: cartesian and pseudoinverse do not exist. Set only if
+    one of these two is requested."""
     UNSTABLE = 8
-    """The arm buckles, its margin is not positive: no softest, stiffest or anisotropy; and as
-    IMMOBILE where it is that too."""
+    """The arm buckles (margin ≤ 0): softest, stiffest and anisotropy do not exist. If the tip is
+    also immobile, cartesian and pseudoinverse do not exist."""
     WORKER_LOST = 9
-    """The worker that computed it died, time and again: nothing."""
+    """The workers that computed the entry died several times: no quantity exists."""
     PENDING = 10
-    """Not computed yet, in a store whose run was stopped: nothing."""
+    """The entry is not computed yet (a store of a stopped run): no quantity exists."""
 
 
 STAGES: Final = ("pose", "tension", "joint", "tip", "matrix", "principal")
-"""In the order in which a quantity needs more to exist; the last two both need the tip's."""
+"""Conditions for a quantity to exist; each needs those before it, but principal needs no matrix."""
 
 LOST: Final[dict[SweepStatus, tuple[str, ...]]] = {
     SweepStatus.OK: (),
@@ -66,19 +65,19 @@ LOST: Final[dict[SweepStatus, tuple[str, ...]]] = {
     SweepStatus.WORKER_LOST: STAGES,
     SweepStatus.PENDING: STAGES,
 }
-"""The stages whose quantities are NaN."""
+"""Stages whose quantities are NaN, for each status."""
 
 
 @final
 @dataclass(frozen=True)
 class Quantity:
-    """A variable of the Dataset.
+    """Output of a sweep: a variable of the Dataset.
 
     Attributes:
-        long_name: In words.
-        units: As UDUNITS writes them, SI.
-        stage: What must exist for it: one of :data:`STAGES`.
-        dims: Its dimensions after those of poses and cases.
+        long_name: Name in words.
+        units: SI units in the notation of UDUNITS.
+        stage: Condition for the quantity to exist: one of :data:`STAGES`.
+        dims: Dimensions after those of poses and cases.
     """
 
     long_name: str
@@ -88,7 +87,7 @@ class Quantity:
 
     @property
     def cases(self) -> tuple[str, ...]:
-        """Which of :data:`CASES` it depends on."""
+        """Return the :data:`CASES` on which the quantity depends."""
         return {"pose": (), "tension": CASES[1:]}.get(self.stage, CASES)
 
 
@@ -129,4 +128,4 @@ QUANTITIES: Final[dict[str, Quantity]] = {
 }
 
 DEFAULT: Final = ("tip_position", "along", "margin", "softest", "stiffest", "anisotropy")
-"""The default outputs, from which a map is drawn."""
+"""Default outputs; maps are drawn from them."""

@@ -1,4 +1,4 @@
-"""A sweep from beginning to end: in memory or into a store, here or on a cluster."""
+"""Run of a sweep, in memory or into a store, on this machine or on a cluster."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from distributed import Client
 
 _NUMBERS = 2**18
-"""Joint angles in a block by default: some tenths of a second of work."""
+"""Default number of joint angles in a block: some tenths of a second of work."""
 
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 _NO_WRENCH = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -51,48 +51,47 @@ def sweep(
     chunk: int | None = None,
     progress: bool = True,
 ) -> xarray.Dataset:
-    """Stiffness over many postures, and every combination of what is given several of.
+    """Compute the stiffness at many postures, for all combinations of several argument values.
 
-    At each posture, least tensions F in balance (Eqs. 13, 17), and the stiffness under them (Eq.
-    16). No entry fails: each has a ``status``, see :class:`~cdsm.SweepStatus`, and
-    NaN stands only where that says so. Coordinates and variables carry ``long_name`` and ``units``
-    (SI); the attributes hold geometry, cables and version.
+    At each posture the tensions F are the least that balance the arm (Eqs. 13, 17), and the
+    stiffness is that under F (Eq. 16). A failure sets the ``status`` of its entry, see
+    :class:`~cdsm.SweepStatus`; NaN stands only where the status says so. Coordinates and variables
+    have ``long_name`` and ``units`` (SI). The attributes hold geometry, cables and version.
 
     Args:
         arm: The arm.
         q: Postures: :class:`~cdsm.GridPoses` (a dimension for each joint of the grid),
             :class:`~cdsm.PathPoses`, :class:`~cdsm.RandomPoses`, or joint
             angles (N, nv) [rad] (dimension ``pose``).
-        minimum: Lower bound of all tensions [N]; several: dimension ``minimum``.
-        maximum: Upper bound of all tensions [N]; inf for none.
-        elasticity: Of all cables; several by name: dimension ``elasticity``. None: the arm's own.
-        wrench: At ``tool0`` in base axes (6,): force [N], then moment [N m]. Several, (W, 6) or by
-            name: dimension ``wrench``.
-        direction: Of ``along`` (3,), any length. Several, (D, 3) or by name: dimension
-            ``direction``.
-        outputs: Names of what is computed, from the keys of
-            :data:`~cdsm.sweeps.quantities.QUANTITIES`.
-        store: A Zarr folder that the entries are written to as they are computed. Asked again, the
-            run goes on from what is there, entries of lost workers first among it, to the same bits
-            as without a stop. The Dataset then reads from it what is looked at. A law of your own
-            is known by its class, its state, and EA and strain at up to 185 tensions: if its code
-            has changed there since, that is another sweep.
-        client: Of a dask cluster whose workers compute, and are waited for while there are none;
-            None: the threads of this machine.
-        chunk: How many stiffnesses are computed, sent and stored at once; a store keeps the one it
-            was made with.
+        minimum: Lower bound of all tensions [N]. Several bounds make the dimension ``minimum``.
+        maximum: Upper bound of all tensions [N]; inf for no bound.
+        elasticity: Law of all cables; None keeps the laws of the arm. Several by name make the
+            dimension ``elasticity``.
+        wrench: Wrench at ``tool0`` in base axes (6,): force [N], then moment [N m]. Several, (W, 6)
+            or by name, make the dimension ``wrench``.
+        direction: Direction of ``along`` (3,), any length. Several, (D, 3) or by name, make the
+            dimension ``direction``.
+        outputs: Names of quantities: keys of :data:`~cdsm.sweeps.quantities.QUANTITIES`.
+        store: Zarr folder to which entries are written during the run. A new run with the same
+            arguments computes only missing entries, also those of lost workers, with the bits of an
+            uninterrupted run. The returned Dataset reads from the store when needed. A user-defined
+            law is identified by its class, its state, and EA and strain at up to 185 tensions; if
+            these have changed, the store holds another sweep.
+        client: Client of a dask cluster; the run waits while the cluster has no workers. None uses
+            the threads of this machine.
+        chunk: Number of stiffness matrices per block; an existing store keeps its own number.
         progress: Show a bar with rate and time left, if there is a terminal.
 
     Returns:
-        A Dataset of the outputs [SI] and ``status``, dimensions (poses, cases, the quantity's own).
+        Dataset of the outputs [SI] and ``status``; dimensions: poses, cases, those of the quantity.
 
     Raises:
-        InvalidInput: Names the argument, and says what is wrong with it.
-        UnknownName: No such joint or output.
+        InvalidInput: An argument is wrong; the error names it and the reason.
+        UnknownName: A joint or an output does not exist.
         MissingExtra: xarray, zarr or distributed is not installed.
-        FileError: The store cannot be made, read or written.
-        StoreError: The store holds another sweep, a law of your own has changed since, or another
-            run is writing to it.
+        FileError: The store cannot be created, read or written.
+        StoreError: The store holds another sweep, a user-defined law has changed, or another run is
+            writing to the store.
         ClusterError: The scheduler is gone, or a worker cannot compute.
     """
     need("sweep", "xarray", *(["zarr"] if store is not None else []))
@@ -127,7 +126,7 @@ def sweep(
 
 
 def _postures(specification: Specification, chunk: int | None) -> int:
-    """How many postures make a block."""
+    """Return the number of postures of a block."""
     if chunk is None:
         return _NUMBERS // (specification.task.arm.nv * specification.task.cases)
     return whole_number("chunk", chunk, 1) // specification.task.cases
@@ -141,7 +140,7 @@ def _run(
     progress: bool,
     path: Path | None = None,
 ) -> None:
-    """Compute what is pending, and write it into arrays of numpy, or of zarr at that path."""
+    """Compute all pending blocks; write them to numpy arrays, or to zarr arrays at ``path``."""
     from cdsm.sweeps.progress import progress_bar  # rich takes a while to import
 
     every = list(blocks(specification.poses.sizes, extent))
@@ -184,7 +183,7 @@ def _write(
         for name in specification.task.outputs:
             shape = specification.shape(name, block.slices)
             arrays[name][_region(specification, name, block)] = answer[name].reshape(shape)
-    # last: any other status than pending promises that the outputs are written
+    # status is written last: any status but pending means that the outputs are written
     region = _region(specification, "status", block)
     if answer is None:
         arrays["status"][region] = np.int8(SweepStatus.WORKER_LOST)

@@ -1,4 +1,4 @@
-"""The specification a sweep answers: an arm, its poses and what is varied; checked, then frozen."""
+"""Specification of a sweep: the arm, its poses and the varied arguments, checked and frozen."""
 
 from __future__ import annotations
 
@@ -30,25 +30,25 @@ from cdsm.sweeps.quantities import CASES, QUANTITIES
 AXES = ("x", "y", "z")
 
 _SAMPLES = np.ldexp(np.arange(4.0, 8.0), np.arange(-12, 18)[:, None]).ravel()
-"""Tensions [N] from 1e-3 to 1e6, four an octave, the same to the last bit on every machine."""
+"""Tensions [N] from 1e-3 to 1e6, four per octave, with equal bits on every machine."""
 
 _WITHIN = 65
-"""Tensions evenly over the domain, of which a narrow one has few of the others."""
+"""Number of evenly spaced tensions over a domain; a narrow domain holds few of the others."""
 
 _SAMPLED = re.compile(r"\b([\w.<>]+) (\w+), samples ([0-9a-f]{16})")
-"""A law of the user's own in words: its class, its state, and a digest of its answers."""
+"""Text of a user-defined law: its class, its state, and a digest of EA and strain."""
 
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Specification:
-    """What is to be computed, and what it is called.
+    """Specification of a sweep: task, postures, and labels of the Dataset.
 
     Attributes:
-        task: What to compute at each posture.
+        task: Quantities and cases to compute at each posture.
         poses: The postures.
-        labels: Every coordinate, by name.
-        attributes: What the Dataset says of the whole.
+        labels: All coordinates by name.
+        attributes: Attributes of the Dataset.
     """
 
     task: SweepTask
@@ -58,7 +58,7 @@ class Specification:
 
     @cached_property
     def sizes(self) -> dict[str, int]:
-        """Length of every dimension."""
+        """Return the length of each dimension."""
         return {
             name: len(np.atleast_1d(label.values))
             for name, label in self.labels.items()
@@ -67,11 +67,11 @@ class Specification:
 
     @property
     def case_dims(self) -> tuple[str, ...]:
-        """Dimensions of ``status``: those of the poses, then of what is varied."""
+        """Return the dimensions of ``status``: those of the poses, then those of the cases."""
         return (*self.poses.sizes, *(case for case in CASES if case in self.sizes))
 
     def dims(self, name: str) -> tuple[str, ...]:
-        """Dimensions of an output or of ``status``."""
+        """Return the dimensions of an output or of ``status``."""
         if name == "status":
             return self.case_dims
         quantity = QUANTITIES[name]
@@ -79,7 +79,7 @@ class Specification:
         return tuple(dim for dim in wanted if dim in self.sizes)
 
     def shape(self, name: str, slices: Mapping[str, slice] | None = None) -> tuple[int, ...]:
-        """Shape of an output or of ``status``, or of the part that some slices cut from it."""
+        """Return the shape of an output or of ``status``, or of the part given by slices."""
         parts = slices or {}
         return tuple(
             parts[dim].stop - parts[dim].start if dim in parts else self.sizes[dim]
@@ -98,7 +98,7 @@ def specify(
     direction: ArrayLike | Mapping[str, ArrayLike],
     outputs: Iterable[str],
 ) -> Specification:
-    """Check what was given, and give every dimension and coordinate its name."""
+    """Check the arguments of a sweep, and label all dimensions and coordinates."""
     poses = poses_of(instance("arm", arm, Manipulator), q)
     lows, maximum = bounds_of(minimum, maximum)
     laws, wrenches, directions = laws_of(elasticity), wrenches_of(wrench), directions_of(direction)
@@ -141,7 +141,7 @@ def specify(
 
 
 def _needed(specification: Specification) -> dict[str, Label]:
-    """The coordinates that some output, or another coordinate, has use for."""
+    """Return the coordinates that an output or another coordinate needs."""
     outputs = specification.task.outputs
     labels = {
         name: label
@@ -170,11 +170,11 @@ def _names(dim: str, names: Iterable[str], long_name: str) -> Label:
     return Label((dim,), np.array(list(names)), long_name, "")
 
 
-# --- an arm in words, so that a Dataset can be traced back to it ------------------------------
+# --- the arm as attributes, so that a Dataset tells from which arm it comes -------------------
 
 
 def attributes_of(arm: Manipulator) -> dict[str, str]:
-    """The attributes of a Dataset that say which arm, computed by what."""
+    """Return the attributes of a Dataset that describe the arm and the version of cdsm."""
     laws = list(dict.fromkeys(law_text(cable.elasticity) for cable in arm.cables))
     return {
         "Conventions": "CF-1.11",
@@ -189,25 +189,25 @@ def attributes_of(arm: Manipulator) -> dict[str, str]:
 
 
 def law_text(law: Elasticity) -> str:
-    """An elasticity in one line: equal for equal ones, also in another process.
+    """Return an elasticity as text; equal laws have equal texts, also in another process.
 
-    What a law of the user's own depends on is its state and its code. The code shows in what it
-    answers: domain, EA and strain, at up to 185 tensions.
+    A user-defined law depends on its state and its code. The text identifies the code by the
+    domain, and by EA and strain at up to 185 tensions.
     """
     text = repr(law)
     if type(law).__module__.startswith("cdsm.") and "..." not in text:  # numpy shortens arrays
         return text
-    # what a class of the user's own prints need not be all that it depends on
+    # the repr of a user-defined class may omit something on which the law depends
     kind = f"{type(law).__module__}.{type(law).__qualname__}"
     try:
         state = _digest(pickle.dumps(law))
-    except Exception:  # whatever a foreign class raises; its address is at least never wrong
+    except Exception:  # a user-defined class may raise anything; its address is never wrong
         return f"{kind} at {id(law):#x}"
     return f"{kind} {state}, samples {_digest(_answers(law).encode())}"
 
 
 def changed_laws(one: str, other: str) -> tuple[str, ...]:
-    """Classes of the laws that answer otherwise, where two texts differ in nothing else."""
+    """Return the classes of laws whose EA or strain changed, if two texts differ only in that."""
     if _SAMPLED.sub(r"\1 \2", one) != _SAMPLED.sub(r"\1 \2", other):
         return ()
     pairs = zip(_SAMPLED.findall(one), _SAMPLED.findall(other), strict=True)
@@ -215,7 +215,7 @@ def changed_laws(one: str, other: str) -> tuple[str, ...]:
 
 
 def _answers(law: Elasticity) -> str:
-    """The answers of a law at the sampled tensions, to the last bit."""
+    """Return domain, EA and strain of a law at the sampled tensions, with all bits."""
     domain = law.domain
     first, high = domain.first, domain.high
     tensions = _SAMPLES[(first <= _SAMPLES) & (high >= _SAMPLES)]
@@ -226,11 +226,11 @@ def _answers(law: Elasticity) -> str:
 
 
 def _answer(law: Elasticity, name: str, tension: float) -> str:
-    """One number in full, or why there is none: a law need not have an answer everywhere."""
+    """Return one number of a law with all bits, or the name of the error that the law raises."""
     try:
         value: Array = np.asarray(getattr(law, name)(np.array([tension])), dtype=np.float64)
         return float(value.reshape(())).hex()
-    except Exception as error:  # whatever a foreign class raises
+    except Exception as error:  # a user-defined class may raise anything
         return type(error).__name__
 
 
@@ -239,7 +239,7 @@ def _digest(data: bytes) -> str:
 
 
 def _cable(cable: Cable, laws: list[str]) -> dict[str, object]:
-    """A cable as JSON, in SI units; its elasticity by the place in the list of them."""
+    """Return a cable for JSON in SI units; its elasticity is an index into ``laws``."""
     series = cable.series_stiffness
     return {
         "name": cable.name,

@@ -1,7 +1,7 @@
-"""A sweep on disk, a Zarr folder: what is computed stays, and a run that was stopped goes on.
+"""Store of a sweep: a Zarr folder that keeps computed blocks, so a stopped run can continue.
 
-Every block is a chunk of each array, and lands by writing aside and renaming. Its ``status`` is
-written last: where that says anything but pending, all the rest is there.
+Every block is a chunk of each array, written to a temporary file that is then renamed. The
+``status`` of a block is written last: if it is not pending, all outputs of the block exist.
 """
 
 from __future__ import annotations
@@ -28,20 +28,19 @@ if TYPE_CHECKING:
     import zarr
 
 _ORDER = "order"
-"""Attribute with the names of all variables, which a folder does not keep in order."""
+"""Attribute with the names of all variables in order, since a folder has no order."""
 
 _LISTED = 8
-"""Differences an error lists."""
+"""Maximum number of differences that an error lists."""
 
 
 @contextmanager
 def opened(
     path: Path, specification: Specification, extent: Mapping[str, int]
 ) -> Iterator[Mapping[str, zarr.Array[Any]]]:
-    """The arrays of a store, one per output and ``status``; made if there is none.
+    """Open a store, or create it; yield its arrays, one for each output and ``status``.
 
-    Nobody else can have it open for writing meanwhile, and the system lets go of it when the
-    process ends, however it ends.
+    It is locked against other runs. The system removes the lock when the process ends or crashes.
     """
     import zarr
 
@@ -66,22 +65,22 @@ def opened(
 
 
 def read(path: Path) -> xarray.Dataset:
-    """What a store holds; numbers are read when they are looked at."""
+    """Return the Dataset of a store; its numbers are read from disk when needed."""
     import xarray
 
     for described in (path / "zarr.json", *path.glob("*/zarr.json")):
-        if described.exists() and not described.is_file():  # a pipe would be waited for
+        if described.exists() and not described.is_file():  # reading a pipe would wait forever
             raise FileError(path, f"is not a sweep's store: {described.name} is not a file.")
     try:
         found: xarray.Dataset = xarray.open_zarr(path, chunks=None, consolidated=False)
-    except Exception as error:  # whatever zarr, its codecs or the file system raise
+    except Exception as error:  # zarr, its codecs and the file system may raise anything
         raise FileError(path, f"is not a sweep's store: {error}.") from None
     order = [name for name in found.attrs.pop(_ORDER, ()) if name in found.variables]
     for name in order:
-        if found[name].dtype.kind in "OT":  # texts, of numpy's new kind or its oldest
+        if found[name].dtype.kind in "OT":  # texts are objects or numpy's StringDType
             texts = np.array(found[name].values.tolist())
             found = found.assign_coords({name: (found[name].dims, texts, found[name].attrs)})
-        found[name].encoding = {}  # how it lies here is of no concern to a file it is written to
+        found[name].encoding = {}  # a NetCDF file must not inherit the encoding of the store
     return found[order]
 
 
@@ -91,10 +90,10 @@ def _array(group: zarr.Group, name: str) -> zarr.Array[Any]:
 
 
 def _make(path: Path, specification: Specification, extent: Mapping[str, int]) -> None:
-    """Write a store with nothing in it aside, then rename it into place."""
+    """Write an empty store to a temporary folder, then rename this folder to ``path``."""
     import zarr
 
-    if not path.parent.is_dir():  # which zarr would make
+    if not path.parent.is_dir():  # zarr would create the missing folder
         raise FileError(path, f"the folder {path.parent} does not exist; create it.")
     aside = path.with_name(f".{path.name}-{secrets.token_hex(4)}")
     try:
@@ -102,7 +101,7 @@ def _make(path: Path, specification: Specification, extent: Mapping[str, int]) -
         labels = to_dataset(specification, {})
         labels.attrs[_ORDER] = [*specification.labels, *names]
         for name, label in labels.coords.items():
-            if label.dtype.kind == "U":  # texts of one width have no place in the format
+            if label.dtype.kind == "U":  # the format has no texts of fixed width
                 labels[name] = label.astype(object)
         labels.to_zarr(aside, mode="w-", zarr_format=3, consolidated=False)
         group = zarr.open_group(aside, mode="r+", use_consolidated=False)
@@ -118,7 +117,7 @@ def _make(path: Path, specification: Specification, extent: Mapping[str, int]) -
                 dimension_names=dims,
                 attributes=variable_attributes(specification, name),
             )
-        with suppress(FileExistsError):  # another run was faster; its store will be looked at
+        with suppress(FileExistsError):  # another run was faster; its store is checked later
             _rename(aside, path)
     except (OSError, ValueError) as error:
         raise FileError(path, f"cannot be made a store: {error}.") from None
@@ -136,7 +135,7 @@ def _rename(aside: Path, path: Path) -> None:
 
 
 def _check(path: Path, specification: Specification) -> None:
-    """Raise what tells a store from one for this specification."""
+    """Raise a StoreError that lists the differences between a store and the specification."""
     stored, wanted = read(path), to_dataset(specification, {})
     held, asked = {str(name) for name in stored.data_vars}, {*specification.task.outputs, "status"}
     different = [f"outputs: {each} in the store alone" for each in sorted(held - asked)]
@@ -156,7 +155,7 @@ def _check(path: Path, specification: Specification) -> None:
                 "changed, and what the store holds is not what it gives now"
                 for law in changed
             ]
-        elif theirs != ours:  # shown from a little before they part
+        elif theirs != ours:  # shown from a few characters before the first difference
             same = itertools.takewhile(
                 lambda pair: pair[0] == pair[1], zip(theirs, ours, strict=False)
             )
@@ -173,7 +172,7 @@ def _check(path: Path, specification: Specification) -> None:
 
 
 def _difference(name: str, stored: NDArray[Any], wanted: NDArray[Any]) -> list[str]:
-    """The first difference of two arrays, in words, if there is one."""
+    """Return a list with the first difference of two arrays as text; empty if they are equal."""
     if stored.shape != wanted.shape:
         return [_mismatch(name, stored, wanted)]
     places = np.argwhere(stored != wanted)
