@@ -3,16 +3,16 @@
 It is used where the guess of :mod:`cdsm.batch.serpentine_guess` fails. It starts at the least
 tensions that balance the arm without bounds. It adds one violated bound after the other, and drops
 a bound whose multiplier would change its sign. It ends at the optimum, or at a proof of
-infeasibility. Every step solves anew with
+infeasibility. Every step builds and solves a system with
 
     S = Σ J_c J_cᵀ  over the free cables,
 
 so that no error builds up. The caller verifies the optimum or the proof.
 
-DAQP does the same, but one Python call per posture, and needs linear programs to prove
-infeasibility. Time per posture with this search and without it: 7 and 75 µs where 18 of 400
-postures need the search (virtual prototype up to nine tenths of its joint limits); 16 and 138 µs,
-10 and 518 µs where all postures need it (cables from any link to any link, 14 cables, 6 joints).
+The alternative is the solver DAQP, with one Python call per posture and a linear program to prove
+infeasibility. Time per posture with this search and without it: 7 and 75 µs if 18 of 400 postures
+need the search (virtual prototype up to nine tenths of its joint limits); 16 and 138 µs, 10 and
+518 µs if all postures need it (cables from any link to any link; 14 cables, 6 joints).
 """
 
 from __future__ import annotations
@@ -130,7 +130,7 @@ def _most_violated(F: Array, low: Array, high: Array, side: Indices) -> tuple[in
 
 @compiled
 def _solve_for_sides(J: Array, b: Array, low: Array, high: Array, state: State) -> bool:
-    """Fill F and y: fixed cables at their bounds, least balancing tensions of the free cables."""
+    """Fill F and y: put fixed cables at their bounds, and balance with the least free tensions."""
     F, y, side, _, system, w = state
     for i in range(b.shape[0]):
         w[i] = b[i]

@@ -80,14 +80,14 @@ def distribute_tensions(
     """Compute the least tensions that balance an arm at many postures: min ‖F‖² (Eqs. 13, 17).
 
     Tensions are accepted only if they meet the optimality conditions of
-    :func:`~cdsm.distribute_tension`. A posture is called infeasible only with a proof. If neither
-    succeeds, :func:`~cdsm.distribute_tension` solves the posture.
+    :func:`~cdsm.distribute_tension`. A posture is called infeasible only with a proof. All other
+    postures are solved by :func:`~cdsm.distribute_tension`.
 
     Args:
         arm: The arm.
         q: Joint angles (B, nv) [rad], a row for each posture.
         minimum: Lower bound [N]: one number for all cables, (C,) or (B, C); not negative.
-        maximum: Upper bound [N] in the same forms; inf for no bound.
+        maximum: Upper bound [N]: one number, (C,) or (B, C); inf for no bound.
         wrench: W (6,) for all postures or (B, 6) at ``tool0`` in base axes: force [N], then moment
             [N m]; zero if not given.
         check_limits: Pass over postures beyond the joint limits.

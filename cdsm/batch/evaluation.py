@@ -49,7 +49,7 @@ class Batch(ReadOnlyState):
         q: Joint angles (B, nv) [rad].
         tension: Given tensions, (C,) for all postures or (B, C) [N]; None if not given.
         wrench: W (6,) for all postures, or (B, 6): force [N], then moment [N m].
-        minimum: Lower bounds (C,) for all postures or (B, C) [N]; None if nothing was distributed.
+        minimum: Lower bounds (C,) for all postures or (B, C) [N]; None if F was not distributed.
         maximum: Upper bounds (C,) for all postures or (B, C) [N], or None.
         direction: Unit direction (3,) of ``along``, or several (D, 3); or None.
         status: :class:`Status` of each posture (B,).

@@ -3,9 +3,10 @@
 The cables that end at a joint turn this joint and the joints before it, but no joint behind it. So
 J_Lᵀ is block triangular. From the last joint to the first, one cable per axis (at most two) is
 raised above its lower bound to balance the joint. From the first joint to the last, the multipliers
-follow from these cables. With three cables for each universal joint, the guess was the optimum in
-all of 9000 random postures up to half the joint limits, and in three of four up to nine tenths. A
-guess takes 0.3 to 1.5 µs, and the search of :mod:`cdsm.batch.active_set` 9 to 16 µs.
+follow from these cables. The guess was tested at 9000 random postures, with three cables for each
+universal joint. It was the optimum in all postures up to half the joint limits, and in three of
+four up to nine tenths. A guess takes 0.3 to 1.5 µs, a search (:mod:`cdsm.batch.active_set`) 9 to
+16 µs.
 """
 
 from __future__ import annotations
@@ -118,7 +119,7 @@ def guess(
 def _cheapest(
     J: Array, lacking: Array, low: Array, high: Array, own: Indices, i: int, j: int
 ) -> tuple[int, int, float, float]:
-    """Find the one or two cables (or −1) that supply the torque at least ‖F‖², and their rise."""
+    """Return cables p, q (or −1) that give the lacking torque at least ‖F‖², and added tensions."""
     best, p, q, x, y = math.inf, -1, -1, 0.0, 0.0
     for s in range(own.shape[0]):
         c = own[s]

@@ -239,7 +239,7 @@ class Optimality:
     """Optimality conditions of distributed tensions: balance, bounds and stationarity (Eq. 17).
 
     Violations are relative to the largest tension and moment arm. The multipliers do not come from
-    the solver: least squares finds them anew, with the required sign at the bounds.
+    the solver: least squares computes them, with the required sign at the bounds.
 
     Attributes:
         solver: Name of the solver.

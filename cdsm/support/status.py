@@ -29,9 +29,9 @@ class Status(IntEnum):
     OK = 0
     """All requested quantities exist."""
     BEYOND_LIMITS = 1
-    """A joint angle is beyond its limit (JointLimitError): nothing exists."""
+    """A joint angle is beyond its limit (JointLimitError): no quantity exists."""
     COINCIDENT_SITES = 2
-    """Two neighbouring sites of a cable coincide (CableError): nothing exists."""
+    """Two neighbouring sites of a cable coincide (CableError): no quantity exists."""
     INFEASIBLE = 3
     """No tensions within the bounds balance the arm (InfeasibleTension): only quantities of the
     joint angles alone exist."""

@@ -16,7 +16,7 @@ _AnyArray = TypeVar("_AnyArray", bound=NDArray[Any])
 
 
 def frozen(array: _AnyArray) -> _AnyArray:
-    """Make an array read-only, and return the same array."""
+    """Make an array read-only, and return this array (not a copy)."""
     array.setflags(write=False)
     return array
 

@@ -31,9 +31,9 @@ def write_sweep(dataset: xarray.Dataset, path: str | os.PathLike[str]) -> Path:
     Args:
         dataset: Result of :func:`~cdsm.sweeps.run.sweep`, or a part of it.
         path: The file; replaced if it exists. ``.nc`` writes NetCDF, which :func:`read_sweep` reads
-            with the same bits. ``.csv`` writes a row for each posture and case, and a column for
-            each coordinate and component of an output, with the SI unit in the header. The status
-            is a word; a value that does not exist is an empty cell.
+            back bit by bit. ``.csv`` writes a row for each posture and case. Each coordinate and
+            each component of an output is a column, with the SI unit in the header. The status is a
+            word; a value that does not exist is an empty cell.
 
     Raises:
         InvalidInput: ``dataset`` is not a sweep, or its status has a number without a word; or
