@@ -3,10 +3,10 @@
 The cables that end at a joint turn this joint and the joints before it, but no joint behind it. So
 J_Lᵀ is block triangular. From the last joint to the first, one cable per axis (at most two) is
 raised above its lower bound to balance the joint. From the first joint to the last, the multipliers
-follow from these cables. The guess was tested at 9000 random postures, with three cables for each
-universal joint. It was the optimum in all postures up to half the joint limits, and in three of
-four up to nine tenths. A guess takes 0.3 to 1.5 µs, a search (:mod:`cdsm.batch.active_set`) 9 to
-16 µs.
+follow from these cables. Mostly this guess is the optimum. With three cables for each universal
+joint, it was the optimum in all of 9000 random postures up to half the joint limits. Up to nine
+tenths of the limits, it was the optimum in three of four postures. A guess takes 0.3 to 1.5 µs, a
+search by :mod:`cdsm.batch.active_set` 9 to 16 µs.
 """
 
 from __future__ import annotations
