@@ -125,7 +125,7 @@ def evaluate(task: SweepTask, q: Array, threads: int | None = None) -> BlockResu
 
 
 def _principal(rows: Rows, status: Statuses, names: list[str]) -> Rows:
-    """Compute the softest and stiffest direction of stable rows; NaN in all other rows."""
+    """Compute the extreme stiffnesses (softest, stiffest) of stable rows; NaN in all other rows."""
     exist = (rows["margin"] > 0.0) & (status != SweepStatus.SINGULAR)  # a margin may be NaN
     extremes = principal_stiffness(rows["translational_compliance"][exist])
     return {name: _spread(extremes[name], (exist,), exist.shape) for name in names}

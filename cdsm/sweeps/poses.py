@@ -1,7 +1,7 @@
 """Pose sets: grids over named joints, paths along a polyline, Sobol points within the limits.
 
-A pose set does not depend on an arm. :func:`poses_of` builds its postures for an arm. They have
-dimensions and labels. Joint angles are computed for parts, so a large grid is never in memory.
+A pose set does not depend on an arm; :func:`poses_of` builds its postures for an arm. The result
+has dimensions and labels. It computes joint angles in parts, so a large grid is never in memory.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Progress bar with rate and time left."""
+"""Progress bar with rate and time left, shown on a terminal if wanted."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class _Rate(ProgressColumn):
 
 @contextmanager
 def progress_bar(total: int, done: int, *, wanted: bool) -> Iterator[Callable[[int], None]]:
-    """Show a bar if stderr is a terminal; yield a function to count evaluations after ``done``."""
+    """Yield a function that advances the bar; evaluations ``done`` before do not count as rate."""
     console = Console(stderr=True)
     bar = Progress(
         TextColumn("sweep"),

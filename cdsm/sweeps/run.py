@@ -51,7 +51,7 @@ def sweep(
     chunk: int | None = None,
     progress: bool = True,
 ) -> xarray.Dataset:
-    """Compute the stiffness at many postures, for all combinations of several argument values.
+    """Compute the stiffness at many postures, for all combinations of the given argument values.
 
     At each posture the tensions F are the least that balance the arm (Eqs. 13, 17), and the
     stiffness is that under F (Eq. 16). A failure sets the ``status`` of its entry, see

@@ -33,10 +33,10 @@ _SAMPLES = np.ldexp(np.arange(4.0, 8.0), np.arange(-12, 18)[:, None]).ravel()
 """Tensions [N] from 1e-3 to 1e6, four per octave, with equal bits on every machine."""
 
 _WITHIN = 65
-"""Number of evenly spaced tensions over a domain; a narrow domain holds few of the others."""
+"""Number of evenly spaced tensions over a domain; narrow domains hold few of ``_SAMPLES``."""
 
 _SAMPLED = re.compile(r"\b([\w.<>]+) (\w+), samples ([0-9a-f]{16})")
-"""Text of a user-defined law: its class, its state, and a digest of EA and strain."""
+"""Text of a user-defined law: its class, its state, and a digest of domain, EA and strain."""
 
 
 @final
@@ -207,7 +207,7 @@ def law_text(law: Elasticity) -> str:
 
 
 def changed_laws(one: str, other: str) -> tuple[str, ...]:
-    """Return the classes of laws whose EA or strain changed, if two texts differ only in that."""
+    """Return the classes of laws whose digest changed; empty if the texts differ in more."""
     if _SAMPLED.sub(r"\1 \2", one) != _SAMPLED.sub(r"\1 \2", other):
         return ()
     pairs = zip(_SAMPLED.findall(one), _SAMPLED.findall(other), strict=True)
