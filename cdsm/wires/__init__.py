@@ -1,1 +1,1 @@
-"""Wires: laws of rigidity over tension, their files, and the fit of a tensile test."""
+"""Laws of the rigidity of a wire over its tension, files of these laws, and tensile tests."""

@@ -1,4 +1,4 @@
-"""A search for jumps in the rigidity of a user's own law: K_θ needs EA(F) to be continuous."""
+"""Search for jumps in the rigidity of a user-defined law. K_θ needs a continuous EA(F)."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ import numpy as np
 from cdsm.elasticity import Elasticity, LinearElasticity
 from cdsm.wires.laws import StrandElasticity, TabulatedElasticity
 
-_SAMPLES = np.linspace(0.0, 1.0, 257) ** 3  # of the domain: most laws change most at low tension
-_LARGEST_TENSION = 1e5  # [N], where the domain has no end: more than any cable here carries
-_JUMP = 1e-4  # smaller steps, as parts of the rigidity, count as rounding of the law
+_SAMPLES = np.linspace(0.0, 1.0, 257) ** 3  # shares of the domain, more at low tension
+_LARGEST_TENSION = 1e5  # [N], end of an infinite domain: more than any cable carries
+_JUMP = 1e-4  # share of EA: a smaller step counts as rounding of the law
 
 
 class Jump(NamedTuple):
-    """A tension [N], and the rigidities [N] just below and just above it."""
+    """Tension [N] of a jump, and the rigidities [N] just below and just above this tension."""
 
     tension: float
     below: float
@@ -24,21 +24,22 @@ class Jump(NamedTuple):
 
 
 def find_jump(law: Elasticity) -> Jump | None:
-    """The largest jump of the rigidity of a law, or None if it is continuous.
+    """Find the largest jump of the rigidity of a law. Return None if EA(F) is continuous.
 
-    EA is sampled at 257 tensions. Each interval is halved, and its half with the larger change of
-    EA is kept, until the change is below 1e-4 of EA or the interval is as narrow as rounding. A
-    steep law that is continuous passes: its change shrinks with the interval. A jump may be missed
-    if it is much smaller than the change of EA over an interval. Laws of this library are
-    continuous by construction and are not sampled. A law that fails is left to its first use,
-    which reports it.
+    EA is sampled at 257 tensions. Each interval is then halved repeatedly, and the half with the
+    larger change of EA is kept. This ends when the change is below 1e-4 of EA, or the interval is
+    as narrow as rounding. A steep continuous law passes, because its change shrinks with the
+    interval. A jump much smaller than the change of EA over an interval may be missed.
+
+    Laws of this library are continuous by construction and are not sampled. If a user-defined law
+    raises an error, return None: the first use of the law reports the error.
     """
     if isinstance(law, (LinearElasticity, StrandElasticity, TabulatedElasticity)):
         return None
     try:
         with np.errstate(all="ignore"):
             return _bisect(law)
-    except Exception:  # whatever a user's law raises
+    except Exception:  # a user-defined law may raise anything
         return None
 
 
@@ -47,7 +48,7 @@ def _bisect(law: Elasticity) -> Jump | None:
     if math.isinf(high):
         high = max(_LARGEST_TENSION, 2.0 * low)
     F = low + (high - low) * _SAMPLES
-    F[-1] = high  # which the sum may miss by rounding
+    F[-1] = high  # the sum may miss the end by rounding
     EA = np.asarray(law.rigidity(F), dtype=np.float64)
     a, b, below, above = F[:-1], F[1:], EA[:-1], EA[1:]
     threshold = _JUMP * np.maximum(abs(below), abs(above))

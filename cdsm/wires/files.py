@@ -1,4 +1,4 @@
-"""Elasticities as TOML: one file per wire, strict, read back to the last bit."""
+"""Write and read the elasticity of a wire as TOML, exact to the last bit."""
 
 from __future__ import annotations
 
@@ -56,11 +56,7 @@ _KINDS: dict[str, type[_Linear | _Strand | _Tabulated]] = {
 
 
 def table_of(elasticity: Elasticity) -> list[str]:
-    """The lines of its TOML table.
-
-    Raises:
-        InvalidInput: An elasticity of another kind, which no file can hold.
-    """
+    """Return the lines of the TOML table of an elasticity. Refuse kinds that no file can hold."""
     found: _Linear | _Strand | _Tabulated
     if isinstance(elasticity, LinearElasticity):
         found = _Linear(rigidity=float(elasticity.rigidity(0.0)))
@@ -83,11 +79,11 @@ def table_of(elasticity: Elasticity) -> list[str]:
 
 
 def from_table(data: object) -> Elasticity:
-    """The elasticity of a TOML table.
+    """Build the elasticity that a TOML table describes.
 
     Raises:
-        GeometryError: Lists every fault of the table.
-        InvalidInput: Its numbers make no elasticity.
+        GeometryError: The table has faults; the error lists them all.
+        InvalidInput: The numbers of the table do not make an elasticity.
     """
     kind = data.get("kind") if isinstance(data, dict) else data
     if not isinstance(kind, str) or kind not in _KINDS:
@@ -96,14 +92,14 @@ def from_table(data: object) -> Elasticity:
 
 
 def write_elasticity(elasticity: Elasticity, path: str | os.PathLike[str]) -> Path:
-    """Write an elasticity as TOML; :func:`read_elasticity` gives the same one back.
+    """Write an elasticity to a TOML file. :func:`read_elasticity` returns an equal elasticity.
 
     Args:
-        elasticity: Linear, strand or tabulated.
-        path: The file; replaced if it exists.
+        elasticity: Elasticity of kind linear, strand or tabulated.
+        path: The file. An existing file is replaced.
 
     Raises:
-        InvalidInput: An elasticity of another kind, which no file can hold.
+        InvalidInput: The elasticity is of another kind, and a file cannot hold it.
         FileError: The file cannot be written.
     """
     units = "# Elasticity of a wire: tensions and rigidity in N, strains without unit\n"
@@ -111,15 +107,15 @@ def write_elasticity(elasticity: Elasticity, path: str | os.PathLike[str]) -> Pa
 
 
 def read_elasticity(path: str | os.PathLike[str]) -> Elasticity:
-    """Read an elasticity that :func:`write_elasticity` wrote, or one written by hand.
+    """Read an elasticity from a TOML file of :func:`write_elasticity` or written by hand.
 
     Args:
-        path: TOML: ``kind`` is ``linear`` (``rigidity`` [N]), ``strand`` (``coefficients`` [N, 1,
-            1/N, …], ``joins``, ``low``, ``high`` [N]) or ``tabulated`` (``tensions`` [N],
-            ``strains`` [-]).
+        path: The TOML file. Its ``kind`` is ``linear`` (with ``rigidity`` [N]), ``strand`` (with
+            ``coefficients`` [N, 1, 1/N, …], ``joins``, ``low``, ``high`` [N]) or ``tabulated``
+            (with ``tensions`` [N], ``strains`` [-]).
 
     Raises:
-        FileError: The file cannot be read or is no elasticity; every fault is listed.
+        FileError: The file cannot be read or does not describe an elasticity (all faults listed).
     """
     text = read_text(path)
     try:

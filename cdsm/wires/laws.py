@@ -1,4 +1,4 @@
-"""Wires whose rigidity depends on tension: polynomials as in Eq. 19, or a measured curve."""
+"""Laws of wires whose rigidity EA depends on tension: polynomials (Eq. 19), or a measured curve."""
 
 from __future__ import annotations
 
@@ -20,39 +20,39 @@ EQ19_PRINTED: Final = (
     (-556.89, 377.99, -70.49, 8.74, -0.46, 1.12e-2, -1e-4),
     (-1924.5, 493.35, -2.26, 0.0054, -6.94e-6, 4.58e-9, -1.22e-12),
 )
-"""Coefficients of Eq. 19 in the printed digits, but for the misprinted −1e-3 (see cdsm.paper)."""
+"""Printed coefficients of Eq. 19. Only the misprinted −1e-3 is corrected (see cdsm.paper)."""
 
 EQ19: Final = (
     (-556.89, 377.99, -70.49, 8.74, -0.46, 1.12e-2, -9.946263022943622e-05),
     (-1924.5, 493.34505, -2.26495, 5.38168e-3, -6.93505e-6, 4.58495e-9, -1.21505e-12),
 )
-"""Coefficients of the same digits whose branches meet; see StrandElasticity.eq19_repaired."""
+"""Coefficients of Eq. 19 with more digits, so that the branches meet; see eq19_repaired."""
 
 _MEET = 1e-9
-"""Largest difference of two ranges at their join, as a part of the rigidity: rounding."""
+"""Largest relative difference of two polynomials at their join. It allows for rounding."""
 
 
 @final
 @dataclass(frozen=True)
 class StrandElasticity(Elasticity):
-    """EA(F) as polynomials in the tension, one per range: the form of Eq. 19.
+    """Rigidity EA(F) as polynomials in the tension, one polynomial per range (form of Eq. 19).
 
-    Neighbouring polynomials meet at their join, within 1e-9 of EA: a rigidity is continuous.
+    EA is continuous: neighbouring polynomials meet at their join, within 1e-9 of EA.
 
-    The polynomials are read as the *tangent* rigidity. Read as the secant of Eq. 18 they would need
-    the tangent S²/(S − F S'), which is negative wherever S grows faster than F: for Eq. 19 that is
-    the whole range up to 31 N, so that reading is not offered.
+    The polynomials give the *tangent* rigidity. If they gave the secant S of Eq. 18, the tangent
+    would be S²/(S − F S'). This is negative where S grows faster than F. For Eq. 19 that is the
+    whole range up to 31 N, so the secant is not offered.
 
     Attributes:
         coefficients: One tuple per range, lowest power first [N, 1, 1/N, …].
-        joins: Tension [N] at which each range ends and the next begins; a join belongs to the
-            range below it. One fewer than the ranges.
+        joins: Tensions [N] at which one range ends and the next begins. A join belongs to the range
+            below it. There is one join fewer than ranges.
         low: Low end of the domain [N], excluded.
         high: High end of the domain [N], included.
 
     Raises:
-        InvalidInput: Numbers or their count do not fit, the tensions do not rise, or two ranges do
-            not meet at their join.
+        InvalidInput: The numbers or their count do not fit, the tensions do not rise, or two ranges
+            do not meet at their join.
     """
 
     coefficients: tuple[tuple[float, ...], ...]
@@ -89,38 +89,39 @@ class StrandElasticity(Elasticity):
 
     @classmethod
     def eq19_repaired(cls) -> StrandElasticity:
-        """Eq. 19 of a 1×19 strand of 1.2 mm, with digits that the paper did not print filled in.
+        """Return Eq. 19 of a 1×19 strand of 1.2 mm, with the digits missing in print filled in.
 
-        The first coefficient is read as −1e-4: the printed −1e-3 gives −787 884 N at 31 N, where
-        the other branch gives 11 352 N. Every coefficient then keeps the printed digits, which
-        leave EA(31 N) open by 6 kN and EA(810 N) by 35 kN. Within them this law is continuous, most
-        level from 400 to 810 N, where the text calls EA near-constant, and else nearest to what is
-        printed: :func:`cdsm.paper.digits.most_level` finds it by linear programs. Its slope still
-        falls from 1022 to 368 at 31 N: no law of these digits has one slope there, and the least
-        fall, from 662, takes every other digit to the end of its rounding. The
-        polynomial is negative below 2.11 N: the domain is (2.2 N, 810 N].
+        The coefficient printed as −1e-3 is read as −1e-4. With −1e-3 the branch gives −787 884 N at
+        31 N, where the other branch gives 11 352 N. All coefficients keep their printed digits.
+        These leave EA(31 N) uncertain by 6 kN and EA(810 N) by 35 kN. Within them, this law is
+        continuous, and as level as possible from 400 to 810 N, where the text calls EA
+        near-constant. Otherwise it is nearest to the printed values.
+        :func:`cdsm.paper.digits.most_level` finds it by linear programs. At 31 N, the slope falls
+        from 1022 to 368. No law with these digits has one slope there. The least fall, from 662,
+        takes every other digit to the end of its rounding. The polynomial is negative below
+        2.11 N, so the domain is (2.2 N, 810 N].
         """
         return cls(EQ19, joins=(31.0,), low=2.2, high=810.0)
 
     @cached_property
     def domain(self) -> Domain:
-        """(low, high]."""
+        """Domain (low, high] [N] of the law."""
         return Domain(self.low, self.high, low_included=False)
 
     def polynomial(self, tension: ArrayLike) -> Array:
-        """The bare polynomials [N], unchecked: for plots and for seeing what a misprint does.
+        """Evaluate the polynomials [N] without checks: for plots, and to show a misprint.
 
         Args:
-            tension: F [N], any shape; the outer ranges extend beyond the domain.
+            tension: F [N], any shape. The outer ranges extend beyond the domain.
 
         Raises:
-            InvalidInput: Not finite numbers.
+            InvalidInput: ``tension`` is not finite numbers.
         """
         values = number_array("tension", tension)
         return piecewise(self._joins, self._table, values)
 
     def rigidity(self, tension: ArrayLike) -> Array:
-        """EA(F) [N] of Eq. 19; see :meth:`Elasticity.rigidity`."""
+        """Compute EA(F) [N]; see :meth:`Elasticity.rigidity`."""
         values = self.domain.check(tension)
         result = self.polynomial(values)
         if not (result > 0.0).all():
@@ -134,16 +135,16 @@ class StrandElasticity(Elasticity):
         return result
 
     def rigidity_slope(self, tension: ArrayLike) -> Array:
-        """Derivative of the polynomials [-]; see :meth:`Elasticity.rigidity_slope`."""
+        """Compute the derivative of the polynomials [-]; see :meth:`Elasticity.rigidity_slope`."""
         values = self.domain.check(tension)
         return piecewise(self._joins, self._slopes, values)
 
     def strain(self, tension: ArrayLike) -> Array:
-        """∫ dF/EA(F) [-], to rounding; see :meth:`Elasticity.strain`."""
+        """Compute ∫ dF/EA(F) [-], exact to rounding; see :meth:`Elasticity.strain`."""
         return self._integral(tension, power=0)
 
     def energy(self, tension: ArrayLike) -> Array:
-        """∫ F dF/EA(F) [N], to rounding; see :meth:`Elasticity.energy`."""
+        """Compute ∫ F dF/EA(F) [N], exact to rounding; see :meth:`Elasticity.energy`."""
         return self._integral(tension, power=1)
 
     @cached_property
@@ -164,7 +165,7 @@ class StrandElasticity(Elasticity):
         return panels(self.coefficients, (self.low, *self.joins, self.high))
 
     def _integral(self, tension: ArrayLike, power: int) -> Array:
-        """∫ F^power dF/EA(F) from the low end of the domain."""
+        """Integrate F^power dF/EA(F) from the low end of the domain."""
         values = self.domain.check(tension)
         bad = values > self._panels.end
         if np.count_nonzero(bad):
@@ -180,35 +181,37 @@ class StrandElasticity(Elasticity):
 @final
 @dataclass(frozen=True)
 class TabulatedElasticity(Elasticity):
-    """A rising curve through measured points of strain over tension: any wire, from its test.
+    """Rising curve of strain over tension through measured points of any wire.
 
     Between two points dε/dF = c N/D², with θ from 0 to 1, θ' = 1 − θ, N = b θ² + 2 θ θ' + a θ'²,
     D = θ² + (a + b) θ θ' + θ'², c = Δε/ΔF of the chord, and slopes a c and b c at the points
-    (Gregory and Delbourgo, IMA J. Numer. Anal. 2, 1982). Strain is C1, and so is its inverse, the
-    force-displacement curve; EA = 1/(dε/dF) is continuous and positive.
+    (Gregory and Delbourgo, IMA J. Numer. Anal. 2, 1982). Strain and its inverse (force over strain)
+    are C1. EA = 1/(dε/dF) is continuous and positive.
 
-    The slopes at the points follow from ln EA of the chords, each assigned to the middle of its
-    strain and interpolated over the strain. At an end it changes as a straight line does, or at
-    least half as much where it levels off. A slope is at most 3 times that of either chord beside
-    the point, and at least the smaller of them; at an end at least half of its chord's.
+    The slopes at the points follow from ln EA of the chords. Each value is assigned to the middle
+    of the chord's strain, and the values are interpolated over the strain. At an end, ln EA changes
+    by at most the change of a straight line, and by at least half of it. A slope is at most 3 times
+    the slope of either neighbouring chord. It is at least the smaller slope of the two. At the
+    first and the last point it is at least half the slope of the chord.
 
-    So EA is at most 2.1 times the largest rigidity of its own chord and the two beside it: let that
-    be M times its own, M at least 2 in the first and last interval; then 1/M <= a, b <= 3. EA over
-    its own chord's is D²/N. That is convex in (a, b), thus largest in a corner: D <= 1 and
-    N >= 1/M if both are 1/M; N >= D and D <= 2 if both are 3; max(2.1, M) if one is 3.
+    EA on an interval is at most 2.1 times the largest rigidity of three chords: its own chord and
+    the two neighbours. Proof: let this largest rigidity be M times that of the own chord (M at
+    least 2 in the first and last interval). Then 1/M <= a, b <= 3. EA over the rigidity of the own
+    chord is D²/N. This is convex in (a, b), so it is largest in a corner: if a = b = 1/M, D <= 1
+    and N >= 1/M; if a = b = 3, N >= D and D <= 2; if only one is 3, D²/N is at most max(2.1, M).
 
-    How well five or more exact points give EA in the last interval, if the wire stiffens (Eq. 19,
-    power laws, exponential toes): within 2 % for even steps, 8 % for steps that grow up to twofold,
-    9 % for steps of 1, 2, 5, 10, … N, but 25 % and more for steps that grow faster. If the wire
-    levels off between the last two points, which the points cannot show, up to 31 %. Nor do they
-    show how EA rises in the first interval of a wire without stiffness at 0 N.
+    Accuracy of EA in the last interval from five or more exact points, if the wire stiffens
+    (Eq. 19, power laws, exponential toes): 2 % for even steps, 8 % for steps that grow up to
+    twofold, 9 % for steps of 1, 2, 5, 10, … N, 25 % and more for steps that grow faster. If the
+    wire levels off between the last two points, which the points cannot show, up to 31 %. Nor do
+    the points show how EA rises in the first interval of a wire without stiffness at 0 N.
 
     Attributes:
-        tensions: F of the points [N], rising from 0 or more.
-        strains: ε of the points [-], rising; only differences count.
+        tensions: Tensions F of the points [N], rising from 0 or more.
+        strains: Strains ε of the points [-], rising. Only their differences matter.
 
     Raises:
-        InvalidInput: Fewer than two points, or they do not rise.
+        InvalidInput: There are fewer than two points, or they do not rise.
     """
 
     tensions: tuple[float, ...]
@@ -241,27 +244,27 @@ class TabulatedElasticity(Elasticity):
 
     @cached_property
     def domain(self) -> Domain:
-        """[first, last] tension of the points."""
+        """Domain [first, last] tension of the points [N]."""
         return Domain(self.tensions[0], self.tensions[-1])
 
     def rigidity(self, tension: ArrayLike) -> Array:
-        """1/(dε/dF) [N]; see :meth:`Elasticity.rigidity`."""
+        """Compute EA = 1/(dε/dF) [N]; see :meth:`Elasticity.rigidity`."""
         return np.asarray(1.0 / self._curve.slope(self.domain.check(tension)))
 
     def rigidity_slope(self, tension: ArrayLike) -> Array:
-        """−ε″/ε′² [-], at a point of the table that of the piece below.
+        """Compute −ε″/ε′² [-]; see :meth:`Elasticity.rigidity_slope`.
 
-        See :meth:`Elasticity.rigidity_slope`.
+        At a point of the table, the value is that of the piece below the point.
         """
         values = self.domain.check(tension)
         return np.asarray(-self._curve.second_derivative(values) / self._curve.slope(values) ** 2)
 
     def strain(self, tension: ArrayLike) -> Array:
-        """ε [-] of the curve; see :meth:`Elasticity.strain`."""
+        """Compute ε [-]; see :meth:`Elasticity.strain`."""
         return self._curve.value(self.domain.check(tension))
 
     def energy(self, tension: ArrayLike) -> Array:
-        """∫ F dε [N], to rounding; see :meth:`Elasticity.energy`."""
+        """Compute ∫ F dε [N], exact to rounding; see :meth:`Elasticity.energy`."""
         return self._curve.moment(self.domain.check(tension))
 
 

@@ -1,13 +1,13 @@
-"""∫ Fⁿ dF/p(F) over piecewise polynomials p, to rounding, by a Gauss rule on each of some panels.
+"""Integrate Fⁿ dF/p(F) over piecewise polynomials p, to rounding, by a Gauss rule on panels.
 
-1/p is analytic except at the roots of p. The error of a Gauss rule on an interval falls by ρ² per
-node, where ρ is the sum of the half-axes (over the half-width) of the ellipse through the nearest
-root whose foci are the ends of the interval. So the panels follow from the roots, and on a part of
-a panel the rule is better still.
+1/p is analytic except at the roots of p. Take the ellipse whose foci are the ends of an interval
+and which passes through the nearest root. ρ is the sum of its half-axes, divided by the half-width
+of the interval. The error of a Gauss rule on the interval falls by ρ² per node. So the panels
+follow from the roots. On a part of a panel the rule is even more accurate.
 
-scipy's quad takes some 300 times as long (tests/benchmarks/test_equilibrium_speed.py). Bisection
-until rules of 12 and 24 nodes agree needs no roots, but near them the rounding of p keeps the rules
-apart: with roots at 50 ± 1e-4 i N it makes more than 1e5 panels, where the roots make 76.
+scipy's quad takes about 300 times as long (tests/benchmarks/test_equilibrium_speed.py). Bisection
+until rules of 12 and 24 nodes agree needs no roots. But near a root, the rounding of p keeps the
+two rules apart: roots at 50 ± 1e-4 i N give more than 1e5 panels, and only 76 with this method.
 """
 
 from __future__ import annotations
@@ -28,26 +28,26 @@ _NODES, _WEIGHTS = (leggauss(12)[0] + 1.0) / 2.0, leggauss(12)[1] / 2.0
 _POWERS = (0, 1)
 
 _NEAREST = 6.0
-"""ρ of the nearest root: ρ^-24 = 2e-19 leaves a factor of 1000 for the growth of 1/p."""
+"""Least ρ of a panel. ρ^-24 = 2e-19 leaves a factor of 1000 for the growth of 1/p."""
 
 _ROUNDING = 1e-14
-"""A polynomial this part of the sum of the magnitudes of its terms is zero."""
+"""A polynomial below this share of the sum of the magnitudes of its terms counts as zero."""
 
 _NEGLIGIBLE = 1e-30
-"""A term of a polynomial this part of its largest one is nothing."""
+"""A term below this share of the largest term of a polynomial is neglected."""
 
 _NARROWEST = 4
-"""Narrowest panel in units in the last place: panels shrink towards a root at their end."""
+"""Least width of a panel, in units in the last place. Panels shrink towards a root."""
 
 
 def coefficient_table(rows: Sequence[Sequence[float]]) -> Array:
-    """Coefficients of several polynomials, lowest power first, (powers, polynomials)."""
+    """Stack the coefficients of polynomials, lowest power first, (powers, polynomials)."""
     longest = max(map(len, rows))
     return np.array([[*row, *[0.0] * (longest - len(row))] for row in rows]).T
 
 
 def piecewise(joins: Array, table: Array, F: Array) -> Array:
-    """Polynomials of a table in a row, each up to its join, at F; same shape as F."""
+    """Evaluate at F the polynomials of a table, each valid up to its join; same shape as F."""
     return np.asarray(_polynomials(joins, table, F.ravel()).reshape(F.shape))
 
 
@@ -69,7 +69,7 @@ def _horner(table: Array, column: int, F: float) -> float:
 
 @compiled
 def _integrals(edges: Array, table: Array, before: Array, power: int, F: Array) -> Array:
-    """∫ Fⁿ dF/p from the low end to each of F (N,); see :class:`Panels`."""
+    """Integrate Fⁿ dF/p from the low end to each F (N,); see :class:`Panels`."""
     result = np.empty(F.shape[0])
     for i in range(F.shape[0]):
         panel = np.searchsorted(edges[1:-1], F[i])  # an edge belongs to the panel below it
@@ -84,13 +84,13 @@ def _integrals(edges: Array, table: Array, before: Array, power: int, F: Array) 
 
 
 class Panels(NamedTuple):
-    """The panels from the low end up to :attr:`end`; made by :func:`panels`.
+    """Panels from the low end up to :attr:`end`; made by :func:`panels`.
 
     Attributes:
-        edges: Where they begin and end, (P+1,).
-        coefficients: Of the polynomial on each, lowest power first, (powers, P).
-        before: ∫ Fⁿ dF/p from the low end to the beginning of each, n = 0 and 1, (2, P).
-        end: Where p ceases to be positive; inf if nowhere.
+        edges: Ends of the panels, (P+1,).
+        coefficients: Coefficients of the polynomial on each panel, lowest power first, (powers, P).
+        before: ∫ Fⁿ dF/p from the low end to the beginning of each panel, n = 0 and 1, (2, P).
+        end: Tension from which p is not positive; inf if p is positive everywhere.
     """
 
     edges: Array
@@ -99,7 +99,7 @@ class Panels(NamedTuple):
     end: float
 
     def integral(self, F: Array, power: int) -> Array:
-        """∫ Fⁿ dF/p from the low end to each of F, any shape, none above :attr:`end`."""
+        """Integrate Fⁿ dF/p from the low end to each F of any shape, at most :attr:`end`."""
         found = _integrals(self.edges, self.coefficients, self.before, power, F.ravel())
         return np.asarray(found.reshape(F.shape))
 
@@ -108,8 +108,8 @@ def panels(rows: Sequence[Sequence[float]], edges: Sequence[float]) -> Panels:
     """Divide piecewise polynomials into panels.
 
     Args:
-        rows: Coefficients of each, lowest power first.
-        edges: Where the first begins and where each ends; rising, one more than the rows.
+        rows: Coefficients of each polynomial, lowest power first.
+        edges: Start of the first range, then the end of each range. They rise.
     """
     ends: list[float] = [edges[0]]
     piece: list[int] = []
@@ -134,20 +134,20 @@ def panels(rows: Sequence[Sequence[float]], edges: Sequence[float]) -> Panels:
 
 
 def _significant(row: Sequence[float], high: float) -> list[float]:
-    """The coefficients without negligible highest ones, whose roots overflow."""
+    """Drop negligible coefficients of the highest powers, because their roots overflow."""
     sizes = abs(np.array(row)) * high ** np.arange(len(row))
     last = np.flatnonzero(sizes > _NEGLIGIBLE * sizes.max()).max(initial=0)
     return list(row[: last + 1])
 
 
 def _panel_ends(roots: NDArray[np.complex128], low: float, high: float) -> list[float]:
-    """Ends of panels from low to high on which the Gauss rule is exact to rounding."""
+    """Find the ends of panels from low to high on which the Gauss rule is exact to rounding."""
     narrowest = _NARROWEST * np.spacing(high)
     ends: list[float] = []
     intervals = [(low, high)] if low < high else []
     while intervals:
         a, b = intervals.pop()
-        # |z − a| + |z − b| is ρ + 1/ρ half-widths, by the ellipse's definition
+        # definition of the ellipse: |z − a| + |z − b| is ρ + 1/ρ half-widths
         reach = (abs(roots - a) + abs(roots - b)).min(initial=np.inf) / (b - a)
         if reach >= (_NEAREST + 1.0 / _NEAREST) / 2.0 or b - a <= narrowest:
             ends.append(b)
@@ -157,8 +157,8 @@ def _panel_ends(roots: NDArray[np.complex128], low: float, high: float) -> list[
 
 
 def _end_of_positive(p: Polynomial, low: float, high: float) -> float:
-    """Where p falls to the rounding of its terms; inf if nowhere up to high."""
-    from scipy.optimize import brentq  # only where it is wanted: it imports slowly
+    """Find where p falls to the rounding of its terms. Return inf if p does not up to high."""
+    from scipy.optimize import brentq  # here, because it imports slowly
 
     rounding = Polynomial(_ROUNDING * abs(p.coef))  # high and low are not negative
     turns = np.sort(p.deriv().roots().real)
@@ -167,7 +167,7 @@ def _end_of_positive(p: Polynomial, low: float, high: float) -> float:
         if p(point) <= rounding(point):
             if point == low:
                 return low
-            # the root may be too high by xtol and rtol together
+            # subtract the error of the root: at most xtol and rtol together
             found = brentq(p - rounding, before, point, xtol=1e-15 * point, rtol=1e-15)
             return max(low, float(found - 2e-15 * point))
         before = point

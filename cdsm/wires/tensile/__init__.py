@@ -1,1 +1,1 @@
-"""Tensile tests: from forces and extensions to a law of rigidity."""
+"""Fit of a law of rigidity to the forces and extensions of a tensile test."""

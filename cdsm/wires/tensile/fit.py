@@ -1,4 +1,4 @@
-"""From a tensile test to the elasticity of a wire."""
+"""Fit the elasticity of a wire to its tensile test."""
 
 from __future__ import annotations
 
@@ -25,20 +25,20 @@ if TYPE_CHECKING:
 METHODS: Final = ("monotone", "polynomial")
 CONFIDENCE: Final = 0.95
 UNKNOWN: Final = 1e9
-"""Largest factor from EA to an end of the band: a wider band would say as little."""
+"""Largest factor from EA to an end of the band. A wider band would tell no more."""
 _KNOTS: Final = 200
-"""Tensions in the table of a fit: linear interpolation between them is exact enough."""
+"""Approximate number of tensions in a fitted table, enough for linear interpolation."""
 
 
 @final
 @dataclass(frozen=True)
 class Stage:
-    """One stage of a tensile test.
+    """Stage of a tensile test.
 
     Attributes:
         name: ``pre-tensioning``, ``elastic`` or ``plastic``.
-        low: Tension at which it begins [N].
-        high: Tension at which it ends, or the test does [N].
+        low: Tension at which the stage begins [N].
+        high: Tension at which the stage or the test ends [N].
     """
 
     name: str
@@ -52,26 +52,26 @@ class Stage:
 @final
 @dataclass(frozen=True, eq=False)
 class Band(ReadOnlyState):
-    """Where EA lies with 95 % confidence: scatter of the points, and bias of the smoothing.
+    """Confidence band of EA (95 %), for the scatter of the points and the bias of the smoothing.
 
-    EA·exp(±t s), with s the standard deviation of ln EA, from residuals as large as they are around
-    each tension and from the mean squared bias of the smoothing (Nychka, J. Am. Stat. Assoc. 83,
-    1988), the smoothing being the least that its likelihood allows.
+    The band is EA·exp(±t s), with t of Student and s the standard deviation of ln EA. s follows
+    from the residuals around each tension and from the mean squared bias of the smoothing (Nychka,
+    J. Am. Stat. Assoc. 83, 1988). The smoothing is the least that its likelihood allows.
 
-    It covers 95 % of the tensions, not each, and is calibrated for smooth wires. Counted from 15 N
-    to 800 N over 20 tests of each kind, under noise that is the same for all forces or grows with
-    them, it covers 98 % and more of the tensions of a wire without corners. Where EA jumps, as at a
-    kink of force over strain, the curve rounds it off, by 10 % and more: 84 to 95 % are covered,
-    nothing next to the kink, and mostly no note says so.
+    The band covers 95 % of the tensions, not each tension with 95 %. It is calibrated for smooth
+    wires: in 20 tests of each kind (15 N to 800 N, noise constant or growing with the force), it
+    covers 98 % and more of the tensions. Where EA jumps (a kink of force over strain), the curve
+    rounds EA off by 10 % and more. Then the band covers 84 to 95 % of the tensions, and none next
+    to the kink. Mostly no note reports this.
 
-    Errors that neighbouring points share (drift, ripple, slip) are not included;
-    ``TensileFit.notes`` names those that the residuals show, which a drift as slow as the test is
-    not. Nor are errors of calibration or gauge length. Steps of a load cell that are coarser than
-    the noise are shared by neighbours, too: with steps of 0.5 N and no noise 50 to 93 % are
-    covered, with 0.1 N of noise 93 to 98 % of smooth wires.
+    The band leaves out errors of calibration and gauge length, and errors that neighbouring points
+    share (drift, ripple, slip). ``TensileFit.notes`` names shared errors if the residuals show
+    them; a drift as slow as the test stays hidden. Neighbours also share steps of a load cell
+    coarser than the noise. With steps of 0.5 N, the band covers 50 to 93 % of the tensions without
+    noise, and 93 to 98 % for smooth wires with 0.1 N of noise.
 
     Attributes:
-        tensions: F, shape (n,) [N].
+        tensions: Tensions F, shape (n,) [N].
         low: Lower end of EA, shape (n,) [N].
         high: Upper end of EA, shape (n,) [N].
     """
@@ -84,19 +84,19 @@ class Band(ReadOnlyState):
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class TensileFit(ReadOnlyState):
-    """The elasticity that a tensile test shows, with the test and how well it fits.
+    """Elasticity fitted to a tensile test, with the test and the quality of the fit.
 
     Attributes:
-        elasticity: Defined from the first load to where plasticity begins, or the test ends.
-        stages: What the rigidity curve shows of pre-tensioning, elastic and plastic, in this order.
-        rms: Root mean square of measured minus fitted force, over the domain [N]; of averages where
-            points were averaged.
-        tensions: F over the domain, rising, shape (n,) [N], some 200.
-        band: 95 % confidence of EA at these; None for ``polynomial``.
+        elasticity: Law of the wire, from the first load to the yield or the end of the test.
+        stages: Stages found in the rigidity curve: pre-tensioning, elastic, plastic, in this order.
+        rms: Root mean square of measured minus fitted force over the domain [N]. Averaged points
+            count as one point.
+        tensions: About 200 tensions F over the domain, rising, shape (n,) [N].
+        band: 95 % confidence band of EA at these tensions; None for ``polynomial``.
         test: The test.
         method: ``monotone`` or ``polynomial``.
         start: Displacement at the low end of the domain [m].
-        notes: What was left out or cut, and what makes the fit doubtful; one sentence each.
+        notes: One sentence for each part that was left out or cut, and for each doubt.
     """
 
     elasticity: Elasticity
@@ -125,9 +125,9 @@ class TensileFit(ReadOnlyState):
         )
 
     def plot(self) -> Figure:
-        """Force over displacement with the fit, and rigidity with its band and stages.
+        """Plot force over displacement with the fit, and rigidity with its band and stages.
 
-        Displacement in mm, force in N, rigidity in kN.
+        Units: displacement in mm, force in N, rigidity in kN.
         """
         from cdsm.plots.measured import plot_tensile_fit  # matplotlib imports slowly
 
@@ -144,20 +144,21 @@ def fit_tensile_test(
 ) -> TensileFit:
     r"""Fit the tangent rigidity EA(F) = l_0 dF/dΔl [N] of a wire to its tensile test.
 
-    ``monotone`` fits the forces themselves by a curve whose log EA is a spline, so that EA > 0 and
-    the curve is C1; its smoothness follows from the data (restricted likelihood).
-    ``polynomial`` is the method of the paper, for comparison: two polynomials of degree 6 through
-    slopes of the measured curve, without a band. Points of equal displacement are averaged. These
-    are left out: unloading, points after the largest force, single points far from their
-    neighbours, and slack, which are points before the force begins to rise beyond three standard
-    deviations of its noise. ``notes`` lists them, and points far from the curve, falls of the force
-    as of a slipping grip, and correlated residuals as under drift.
+    ``monotone`` fits the forces by a curve whose log EA is a spline. So EA > 0, and the curve is
+    C1. Its smoothness follows from the data (restricted likelihood). ``polynomial`` is the method
+    of the paper, for comparison: two polynomials of degree 6 through slopes of the measured curve,
+    without a band.
 
-    The domain ends where plasticity begins: where EA falls, for good and beyond its uncertainty,
-    below 0.8 of its largest value. Pre-tensioning ends where EA grows slower than √F.
+    Points of equal displacement are averaged. Left out are unloading, points after the largest
+    force, single points far from their neighbours, and slack. Slack ends where the force rises
+    beyond three standard deviations of its noise. ``notes`` lists these points. It also lists
+    points far from the curve, falls of the force (a grip slips) and correlated residuals (drift).
 
-    Wrong units are found only by a strain above 1 or a rigidity outside 1 N to 1e9 N: a force in kN
-    passes for a thin thread. Read the report.
+    The domain ends where plasticity begins: from there on, EA stays below 0.8 of its largest value,
+    beyond its uncertainty. Pre-tensioning ends where EA grows slower than √F.
+
+    Wrong units are found only if the strain is above 1 or the rigidity is outside 1 N to 1e9 N. A
+    force in kN passes for a thin thread. Read the report.
 
     Args:
         displacement: Δl, shape (n,) [m], in the order recorded.
@@ -167,12 +168,12 @@ def fit_tensile_test(
         join: Tension at which the two polynomials meet [N].
 
     Raises:
-        InvalidInput: Not finite numbers.
-        UnknownName: No such method.
-        TensileTestError: Arrays of different length, fewer than 8 points, a gauge length that is
-            not positive, compression, a force that does not rise or jumps, units that cannot be
-            (the likely one is named), fewer than 8 points below the yield (20 for polynomials), or
-            polynomials that are not positive on half the range.
+        InvalidInput: An argument is not finite numbers.
+        UnknownName: ``method`` is unknown.
+        TensileTestError: The arrays differ in length, there are fewer than 8 points, the gauge
+            length is not positive, the wire is compressed, the force does not rise or jumps, the
+            units are impossible (the likely mistake is named), fewer than 8 points lie below the
+            yield (20 for polynomials), or the polynomials are not positive on half the range.
     """
     one_of("method", method, METHODS)
     join = scalar("join", join)
@@ -189,7 +190,7 @@ def fit_tensile_test(
                 f"the wire yields from {onset:.4g} N on, after {len(points.force)} points; a fit "
                 f"needs at least {FEWEST}. Sample more finely below the yield."
             )
-        curve = _curve(points, noise)  # again, so that the bend does not round off what precedes
+        curve = _curve(points, noise)  # fit again: the yield would distort the curve below it
         spread = curve.spread(points)
         notes += (f"plastic from {onset:.4g} N on: left out",)
     refuse_jumps(curve, points)
@@ -237,9 +238,9 @@ def _curve(points: Points, noise: float) -> Curve:
 def _monotone(
     curve: Curve, points: Points, join: float
 ) -> tuple[Elasticity, float, tuple[str, ...]]:
-    """The curve as a table, the strain at its low end, and notes."""
+    """Return the fitted curve as a law, the strain at its low end, and notes."""
     grid = curve.basis.tensions
-    # the fit, not the largest noise, says how far the test went
+    # the ends follow from the fit: noise would shift the extreme forces
     first, last = curve.force(points.strain[[0, -1]])
     low = max(grid[0], float(first))
     low = low if low >= RANGES["tension"].low else 0.0  # rounding of a test that begins at zero
@@ -252,10 +253,10 @@ def _monotone(
 def _polynomial(
     curve: Curve, points: Points, join: float
 ) -> tuple[Elasticity, float, tuple[str, ...]]:
-    """The two polynomials of the paper, the strain at their low end, and notes."""
+    """Return the two polynomials of the paper as a law, the strain at its low end, and notes."""
     law, notes = polynomials(points, join)
     tensions = _grid(float(np.nextafter(law.low, law.high)), law.high, curve.basis.tensions)
-    # where the law begins is not measured: it is put where it fits best
+    # the strain at the low end is not measured: take the best fit
     offsets = np.interp(tensions, curve.basis.tensions, curve.strain) - law.strain(tensions)
     return law, float(np.average(offsets, weights=np.gradient(tensions))), notes
 
@@ -270,6 +271,6 @@ def _band(law: Elasticity, tensions: Array, curve: Curve, points: Points) -> Ban
 
 
 def _grid(low: float, high: float, grid: Array) -> Array:
-    """Tensions (n,) [N] from low to high, some 200 over the grid."""
+    """Thin out a grid to tensions (n,) [N] from low to high, about 200 over the whole grid."""
     inside = grid[(grid > low) & (grid < high)][5 :: len(grid) // _KNOTS]
     return np.array([low, *inside[:-1], high])

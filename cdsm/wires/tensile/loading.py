@@ -1,4 +1,4 @@
-"""The part of a tensile test that can be fitted: loading, from the first load to the largest."""
+"""Select the points of a tensile test to fit: loading, from the first to the largest force."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from cdsm.wires.tensile.record import TensileTest
 from cdsm.wires.tensile.spline import Points
 
 FEWEST = 8
-"""Points of a fit: fewer show no bend."""
+"""Least number of points of a fit. Fewer points show no bend."""
 _MOST = 800
-"""Points that are fitted; more are averaged, since their mean says as much and fits faster."""
+"""Largest number of fitted points. More points are averaged, which makes the fit faster."""
 _OUTLYING = 5e-3
-"""Share of the range by which a single point must stand out."""
+"""An outlier is farther from its neighbours than this share of the range."""
 _AROUND = 25
-"""Points over which the noise is taken to be the same."""
+"""Number of neighbouring points over which the noise is assumed constant."""
 _SURE = 3.0
-"""Standard deviations beyond which a force has risen."""
-_MISTAKEN = (  # what is given in another unit, and what turns force and strain right
+"""A rise of the force is certain beyond this number of standard deviations."""
+_MISTAKEN = (  # mistake, then factors that correct force and strain
     ("the displacement is in mm", 1.0, 1e-3),
     ("the displacement is in µm", 1.0, 1e-6),
     ("the gauge length is in mm", 1.0, 1e3),
@@ -29,11 +29,11 @@ _MISTAKEN = (  # what is given in another unit, and what turns force and strain 
     ("the force is in kN", 1e3, 1.0),
     ("the force is in MN", 1e6, 1.0),
 )
-_MAD = 1.4826  # standard deviation of normal noise by its median magnitude
+_MAD = 1.4826  # standard deviation of normal noise over its median magnitude
 
 
 def loading(test: TensileTest) -> tuple[Points, float, tuple[str, ...]]:
-    """The points to be fitted, the noise of one of them [N], and notes on what was left out."""
+    """Return the points to fit, the noise of one point [N], and notes on points left out."""
     notes: list[str] = []
     _require(test.force.size, "points are given")
     outlier = _outliers(test.force)
@@ -95,16 +95,12 @@ def _selected(test: TensileTest, kept: NDArray[np.bool_]) -> tuple[Array, Array]
 
 
 def _outliers(values: Array) -> NDArray[np.bool_]:
-    """Single values far from those around them, in the order recorded.
-
-    A rising or falling value lies between its neighbours. A peak or the last value before a rupture
-    stands out by no more than a step.
-    """
-    # the neighbour beyond an end is extrapolated
+    """Find single values far from their neighbours. A peak stands out by one step at most."""
+    # extrapolate the missing neighbour at each end
     first, last = 2.0 * values[1] - values[2], 2.0 * values[-2] - values[-3]
     before, after = np.append(first, values[:-1]), np.append(values[1:], last)
     size = abs(np.diff(values))
-    step = np.maximum(np.pad(size, (2, 0))[:-1], np.pad(size, (0, 2))[1:])  # not its own
+    step = np.maximum(np.pad(size, (2, 0))[:-1], np.pad(size, (0, 2))[1:])  # of the neighbours
     noise = local_noise((values - (before + after) / 2.0) / np.sqrt(1.5))
     reach = float(np.ptp(np.quantile(values, (0.1, 0.9))))  # without outliers
     beyond = np.maximum(values - np.maximum(before, after), np.minimum(before, after) - values)
@@ -113,7 +109,7 @@ def _outliers(values: Array) -> NDArray[np.bool_]:
 
 
 def local_noise(errors: Array) -> Array:
-    """Standard deviation (n,) of errors (n,) around each, or of all if that is larger."""
+    """Estimate the standard deviation (n,) of the errors (n,) nearby, at least that of all."""
     width = min(_AROUND, len(errors))
     near = np.pad(abs(errors), (width // 2, width - 1 - width // 2), mode="reflect")
     local = np.median(np.lib.stride_tricks.sliding_window_view(near, width), axis=1)
@@ -121,7 +117,7 @@ def local_noise(errors: Array) -> Array:
 
 
 def _slips(points: Points, gauge_length: float, least: float) -> list[str]:
-    """Where the force falls though the displacement grows, and rises again."""
+    """Note where the force falls while the displacement grows, and rises again."""
     highest = np.maximum.accumulate(points.force)
     fall = highest - points.force
     notes = []
@@ -137,11 +133,7 @@ def _slips(points: Points, gauge_length: float, least: float) -> list[str]:
 
 
 def _slack(points: Points, noise: float, least: float) -> int:
-    """How many points pass before the force begins to rise.
-
-    They show no trend beyond the noise, and the points after them rise faster beyond it: a wire
-    that rises evenly from the first point on has no slack, however noisy it is.
-    """
+    """Count the points before the force begins to rise beyond its noise."""
     slope, error = _trends(points, noise, least)
     flat = np.flatnonzero(slope <= _SURE * error)
     count = int(flat[-1]) + 1 if len(flat) else 0
@@ -149,16 +141,13 @@ def _slack(points: Points, noise: float, least: float) -> int:
     if count < 2 or len(after.force) < 2:
         return 0
     slope_after, error_after = (each[-1] for each in _trends(after, noise, least))
+    # a force that rises evenly from the first point has no slack, even with large noise
     rises = slope_after - slope[count - 1] > _SURE * np.hypot(error_after, error[count - 1])
     return count if rises else 0
 
 
 def _trends(points: Points, noise: float, least: float) -> tuple[Array, Array]:
-    """Rise [N] from point to point of the first 1, 2, … points, and its standard deviation.
-
-    The scatter about that rise counts if it is smaller than the noise, which in few points may be
-    the bend of a soft wire.
-    """
+    """Compute the rise [N] per point of the first 1, 2, … points, and its standard deviation."""
     w, x, y = points.count, np.arange(len(points.force)), points.force - points.force[0]
     total = np.cumsum(w)
     xx, xy, yy = (
@@ -168,6 +157,7 @@ def _trends(points: Points, noise: float, least: float) -> tuple[Array, Array]:
     xx = np.maximum(xx, 1e-12)
     scatter = np.sqrt(np.maximum(yy - xy**2 / xx, 0.0) / np.maximum(np.arange(len(x)) - 1, 1))
     scatter[:2] = noise
+    # the smaller one: with few points, the noise may be the bend of a soft wire
     return xy / xx, np.maximum(np.minimum(noise, scatter), least) / np.sqrt(xx)
 
 
@@ -188,7 +178,7 @@ def _check_span(strain: Array, force: Array) -> None:
 
 
 def _check_rigidity(points: Points) -> None:
-    """Refuse a rigidity over the upper half of the rise that no wire has."""
+    """Raise if no wire has such a rigidity over the upper half of the rise."""
     upper = points.force >= (points.force[0] + points.force[-1]) / 2.0
     rise, reach = np.ptp(points.force[upper]), np.ptp(points.strain[upper])
     rigidity = float(rise / max(reach, 1e-30))
@@ -200,7 +190,7 @@ def _check_rigidity(points: Points) -> None:
 
 
 def _likely(rigidity: float, reach: float) -> str:
-    """A hint which unit, mistaken for another, explains a rigidity [N] and a largest strain."""
+    """Suggest the wrong unit that explains a rigidity [N] and a largest strain."""
     found = [
         unit
         for unit, by_force, by_strain in _MISTAKEN
@@ -211,7 +201,7 @@ def _likely(rigidity: float, reach: float) -> str:
 
 
 def _is_loading(strain: Array) -> NDArray[np.bool_]:
-    """Where the strain is, up to its noise, beyond all before it."""
+    """Mark the points whose strain exceeds all strains before, up to the noise."""
     jitter = 4.0 * _MAD * float(np.median(abs(np.diff(strain, 2)))) / np.sqrt(6.0)
     jitter = min(jitter, 0.005 * float(np.ptp(strain)))
     kept: NDArray[np.bool_] = strain >= np.maximum.accumulate(strain) - jitter
@@ -219,14 +209,14 @@ def _is_loading(strain: Array) -> NDArray[np.bool_]:
 
 
 def _merged(strain: Array, force: Array, count: Array) -> Points:
-    """Points of equal strain become their mean."""
+    """Replace points of equal strain by their mean."""
     unique, place = np.unique(strain, return_inverse=True)
     total = np.asarray(np.bincount(place, count), np.float64)
     return Points(unique, np.bincount(place, count * force) / total, total)
 
 
 def _averaged(points: Points) -> Points:
-    """At most so many points, each the mean of as many neighbours."""
+    """Average neighbouring points, so that at most _MOST points remain."""
     if len(points.force) <= _MOST:
         return points
     group = np.arange(len(points.force)) * _MOST // len(points.force)
@@ -238,7 +228,7 @@ def _averaged(points: Points) -> Points:
 
 
 def _noise(points: Points) -> float:
-    """Standard deviation [N] of one point about the line through its neighbours."""
+    """Estimate the noise [N] of one point from its distance to the line through its neighbours."""
     before, at, after = points.strain[:-2], points.strain[1:-1], points.strain[2:]
     share = (at - before) / (after - before)
     error = points.force[1:-1] - (1.0 - share) * points.force[:-2] - share * points.force[2:]

@@ -1,4 +1,4 @@
-"""The method of the paper for EA(F): two polynomials through measured slopes."""
+"""Fit EA(F) by the method of the paper: two polynomials through measured slopes."""
 
 from __future__ import annotations
 
@@ -13,17 +13,18 @@ from cdsm.wires.laws import StrandElasticity
 from cdsm.wires.tensile.spline import Points
 
 _DEGREE = 6  # as in Eq. 19
-_NARROW = 0.1  # share of its largest tension that a range must span
-_HALF = 3  # neighbours on each side that a slope is taken over
+_NARROW = 0.1  # least width of a range, as a share of its largest tension
+_HALF = 3  # number of neighbours on each side that give a slope
 _FEWEST = 2 * _HALF + 2 * (_DEGREE + 1)  # points: twice as many slopes as coefficients
 
 
 def polynomials(points: Points, join: float) -> tuple[StrandElasticity, tuple[str, ...]]:
-    """Two polynomials of degree 6 through the slopes, on the longest range they are positive on.
+    """Fit two polynomials of degree 6 to the slopes. Keep the longest range where EA > 0.
 
     Args:
-        points: Of loading, strain rising.
-        join: Tension [N] at which they meet; one polynomial if either side has too few points.
+        points: Points of loading, with rising strain.
+        join: Tension [N] at which the polynomials meet. If a side has too few points, one
+            polynomial is fitted.
     """
     if len(points.force) < _FEWEST:
         raise TensileTestError(
@@ -57,15 +58,15 @@ def polynomials(points: Points, join: float) -> tuple[StrandElasticity, tuple[st
 
 
 def _positive(rows: list[list[float]], edges: tuple[float, ...]) -> list[tuple[float, float]]:
-    """Ranges of tension [N] on which the polynomials are positive; an empty one if there are none.
+    """Find the ranges of tension [N] where the polynomials are positive, or one empty range.
 
-    Each polynomial is positive or not between its roots: a grid would miss a dip between its lines.
+    The sign of a polynomial is constant between its roots. A grid could miss a short dip.
     """
     tops = abs(_evaluate(rows, edges[1:-1], np.linspace(edges[0], edges[-1], 400)))
-    margin = 1e-6 * float(tops.max())  # the strain is the integral of 1/EA
+    margin = 1e-6 * float(tops.max())  # keeps the strain ∫ dF/EA finite
     ranges = [(edges[0], edges[0])]
     for row, low, high in zip(rows, edges[:-1], edges[1:], strict=True):
-        rounding = 1e-13 * float(Polynomial(np.abs(row))(high))  # of powers that cancel
+        rounding = 1e-13 * float(Polynomial(np.abs(row))(high))  # rounding of powers that cancel
         above = Polynomial(row) - max(margin, rounding)
         roots = above.roots()
         real = np.sort(roots.real[abs(roots.imag) <= 1e-9 * abs(roots)])
@@ -80,20 +81,20 @@ def _positive(rows: list[list[float]], edges: tuple[float, ...]) -> list[tuple[f
 
 
 def _joins_of(points: Points, join: float) -> tuple[float, ...]:
-    """The join, if both sides of it have points and width enough for a polynomial."""
+    """Return the join if each side of it is wide enough and has enough points, else nothing."""
     below = int(np.count_nonzero(points.force <= join))
     enough = 2 * (_DEGREE + 1)
     low, high = float(points.force.min()), float(points.force.max())
-    # powers of tensions that are nearly equal cancel to nothing but rounding
+    # powers of nearly equal tensions cancel, and only rounding is left
     wide = join - low >= _NARROW * join and high - join >= _NARROW * high
     return (join,) if wide and min(below, len(points.force) - below) >= enough else ()
 
 
 def _coefficients(points: Points, joins: tuple[float, ...]) -> list[list[float]]:
-    """Least-squares polynomials of the slopes over the force, lowest power first, one per range.
+    """Fit polynomials to the slopes over the force, lowest power first, one per range.
 
-    Two ranges share their value at the join: with y = F − join the polynomials are
-    v + Σ a_k yᵏ and v + Σ b_k yᵏ, one linear least-squares problem in v, a and b.
+    Two ranges share the value v at the join. With y = F − join, the polynomials are v + Σ a_k yᵏ
+    and v + Σ b_k yᵏ: one linear least-squares problem in v, a and b.
     """
     slopes, forces = _slopes(points)
     if not joins:
@@ -112,14 +113,14 @@ def _coefficients(points: Points, joins: tuple[float, ...]) -> list[list[float]]
 
 
 def _evaluate(rows: list[list[float]], joins: tuple[float, ...], tensions: Array) -> Array:
-    """The polynomials at tensions (n,) [N], EA (n,) [N]."""
+    """Evaluate the polynomials EA (n,) [N] at tensions (n,) [N]."""
     piece = np.searchsorted(joins, tensions, side="left")
     values = np.array([np.polyval(row[::-1], tensions) for row in rows])
     return np.asarray(values[piece, np.arange(len(tensions))])
 
 
 def _slopes(points: Points) -> tuple[Array, Array]:
-    """Slope dF/dε [N] of the line through each point and its neighbours, and its mean force [N]."""
+    """Fit a line through each point and its neighbours. Return slope dF/dε and mean force [N]."""
     window = 2 * _HALF + 1
     strain, force = (
         np.lib.stride_tricks.sliding_window_view(each, window)

@@ -1,4 +1,4 @@
-"""The force-displacement record of a tensile test, read from CSV with its units."""
+"""Force-displacement record of a tensile test, read from CSV with its units."""
 
 from __future__ import annotations
 
@@ -29,16 +29,16 @@ _GAUGE = re.compile(
 @final
 @dataclass(frozen=True, eq=False)
 class TensileTest(ReadOnlyState):
-    """What a testing machine records, in the order it does.
+    """Record of a tensile test, in the order in which the machine recorded it.
 
     Attributes:
-        displacement: Of the crosshead or extensometer, shape (n,) [m].
-        force: Shape (n,) [N], tension positive.
+        displacement: Displacement of the crosshead or extensometer, shape (n,) [m].
+        force: Force, shape (n,) [N], tension positive.
         gauge_length: Free length of the wire between the grips or the clips [m].
 
     Raises:
-        InvalidInput: Not finite numbers.
-        TensileTestError: The arrays are not of one length, or the gauge length is not positive.
+        InvalidInput: A field is not finite numbers.
+        TensileTestError: The arrays differ in length, or the gauge length is not positive.
     """
 
     displacement: Array
@@ -72,24 +72,24 @@ def read_tensile_csv(
     force_unit: str | None = None,
     gauge_length: float | None = None,
 ) -> TensileTest:
-    """Read a tensile test. Units that the header does not give are required as arguments.
+    """Read a tensile test from CSV. If the header lacks a unit, give the unit as an argument.
 
-    The first line that is no comment names the columns: one of displacement, extension, elongation
-    or stroke, and one of force, load or tension, each with its unit: ``displacement [mm]``,
-    ``Load (kN)``, ``force_N``, or on a line of its own below. Further columns are ignored. Commas,
-    semicolons (then with decimal commas, if any) or tabs separate. A comment may give the length:
-    ``# gauge_length = 500 mm``.
+    The first line that is not a comment is the header. It names one column displacement, extension,
+    elongation or stroke, and one column force, load or tension. Each name has a unit:
+    ``displacement [mm]``, ``Load (kN)``, ``force_N``. The units may also form the next line. Other
+    columns are ignored. Commas, semicolons or tabs separate the columns. Decimal commas are allowed
+    with semicolons and tabs. A comment may give the gauge length: ``# gauge_length = 500 mm``.
 
     Args:
         path: The file.
-        displacement_unit: ``m``, ``cm``, ``mm`` or ``um``, where the header has none.
-        force_unit: ``mN``, ``N``, ``kN`` or ``MN``, where the header has none.
-        gauge_length: l_0 [m], where no comment gives it.
+        displacement_unit: ``m``, ``cm``, ``mm`` or ``um``, if the header has no unit.
+        force_unit: ``mN``, ``N``, ``kN`` or ``MN``, if the header has no unit.
+        gauge_length: l_0 [m], if no comment gives it.
 
     Raises:
         FileError: The file cannot be read.
-        TensileTestError: No header, a column or unit or the gauge length missing, given twice or
-            not understood, or entries that are not finite numbers; the line is named.
+        TensileTestError: There is no header; a column, a unit or the gauge length is missing, given
+            twice or not understood; or an entry is not a finite number (the line is named).
     """
     table = read_table(path, "\t;,")
     if not table.rows:
@@ -119,7 +119,7 @@ def read_tensile_csv(
 
 
 def _header(path: object, table: Table) -> tuple[list[str], int]:
-    """Names with units, and the first row of numbers: a second row may hold the units."""
+    """Return column names with units, and the first row of numbers. Row 1 may hold units."""
     header = table.header
     if not any(math.isnan(table.number(cell)) for cell in header):
         _refuse(
@@ -139,18 +139,18 @@ def _refuse(path: object, problem: str) -> NoReturn:
 
 
 def _name(cell: str) -> str:
-    """The first word of a column's name, in lower case."""
+    """Return the first word of the name of a column, in lower case."""
     return re.split(r"[\s\[(_/,]", cell.strip().lower(), maxsplit=1)[0]
 
 
 def _unit(cell: str) -> str | None:
-    """What stands in brackets, or after the last underscore, blank or slash."""
+    """Return the text in brackets, or after the last underscore, blank or slash."""
     found = re.search(r"[\[(]([^\])]*)[\])]", cell) or re.search(r"[_/\s]([^\s_/]+)$", cell)
     return found[1].strip() if found else None
 
 
 def _factor(path: object, kind: str, found: str | None, given: str | None) -> float:
-    """What turns the unit of a column into SI."""
+    """Return the factor from the unit of a column to SI."""
     known = _UNITS[kind]
     keyword = f"{kind}_unit"
     for unit in (found, given):

@@ -1,9 +1,9 @@
-"""A smooth, positive rigidity curve through noisy points of force over strain.
+"""Fit a smooth, positive rigidity EA(F) to noisy points of force over strain.
 
-log EA is a cubic B-spline in a coordinate that spreads both small and large tensions, so EA > 0 and
-F(ε) is C1 whatever the data. The forces at the strains are fitted, not quotients of differences,
-which would be mostly noise. The smoothing follows from the data by restricted likelihood. scipy's
-smoothing splines fit values, and cannot fit a function through its integral.
+log EA is a cubic B-spline in a coordinate that spreads small and large tensions. So EA > 0 and F(ε)
+is C1 for all data. The fit compares forces at the measured strains. Difference quotients would be
+mostly noise. The smoothing follows from the data by restricted likelihood. scipy's smoothing
+splines fit values; they cannot fit a function through its integral.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ from scipy.optimize import least_squares
 from cdsm.support.validation import Array
 
 _INTERVALS = 48
-"""Most intervals of the splines: more change no curve of a wire."""
+"""Largest number of spline intervals. More intervals do not change the curve of a wire."""
 _NEAR = 41
-"""Points over which the noise is taken to be the same."""
+"""Number of neighbouring points over which the noise is assumed constant."""
 _GRID = 1200
-"""Tensions of the grid: error of the strain below 1e-4 where EA varies thousandfold."""
+"""Number of tensions of the grid: strain error below 1e-4 where EA varies thousandfold."""
 
 
 def _running_integral(values: Array, tensions: Array, axis: int = -1) -> Array:
-    """∫ values dF from the first tension to each, by the trapezoidal rule."""
-    from scipy.integrate import cumulative_trapezoid  # only where wanted: it imports slowly
+    """Integrate values dF from the first tension to each tension, by the trapezoidal rule."""
+    from scipy.integrate import cumulative_trapezoid  # here, because it imports slowly
 
     integral: Array = cumulative_trapezoid(values, tensions, axis=axis, initial=0.0)
     return integral
@@ -37,22 +37,19 @@ def _running_integral(values: Array, tensions: Array, axis: int = -1) -> Array:
 
 @dataclass(frozen=True)
 class Points:
-    """Averaged points of a test, strain rising: strain [-], force [N], and how many each averages.
-
-    All three have shape (n,).
-    """
+    """Averaged points of a test: rising strain [-], force [N], and number averaged, all (n,)."""
 
     strain: Array
     force: Array
     count: Array
 
     def part(self, kept: NDArray[np.bool_] | slice) -> Points:
-        """The points at the given places."""
+        """Select points by mask or slice."""
         return Points(self.strain[kept], self.force[kept], self.count[kept])
 
 
 def _least_variance(points: Points) -> float:
-    """Noise [N²] below which a test is as good as exact."""
+    """Compute the variance [N²] below which a test counts as exact."""
     return (1e-6 * float(np.ptp(points.force))) ** 2
 
 
@@ -66,7 +63,9 @@ class Basis:
 
     @classmethod
     def over(cls, low: float, high: float, corner: float, points: int) -> Basis:
-        """Splines over [low, high] N, evenly spread in ½ log(F + corner) + ½ F, each scaled to 1.
+        """Build splines over [low, high] N, evenly spread in ½ log(F + corner) + ½ F.
+
+        Each of the two terms is scaled to 1.
 
         Args:
             low: Smallest tension [N].
@@ -81,7 +80,7 @@ class Basis:
         tensions = np.interp(t, place, fine)
         intervals = int(np.clip(points // 2, 3, _INTERVALS))
         knots = np.pad(np.linspace(0.0, 1.0, intervals + 1), 3, mode="edge")
-        # uniform knots beyond the ends make the difference penalty vanish for a straight log EA
+        # with uniform knots beyond the ends, a straight log EA has no difference penalty
         knots[:3] = -np.arange(3, 0, -1) / intervals
         knots[-3:] = 1.0 + np.arange(1, 4) / intervals
         splines = BSpline.design_matrix(t, knots, 3).toarray()
@@ -91,14 +90,14 @@ class Basis:
 
 @dataclass(frozen=True)
 class Curve:
-    """A fitted curve: log EA, and the strain at one tension.
+    """Fitted curve, given by log EA and by the strain at one tension (the anchor).
 
     Attributes:
-        basis: Of log EA.
-        coefficients: Of the splines (k,).
-        anchor: Index of that tension on the grid. It is where the wire is stiff: at a soft end any
-            change of EA would shift the rest of the curve, and the fit would converge slowly.
-        anchor_strain: ε at the anchor [-].
+        basis: Splines of log EA.
+        coefficients: Coefficients of the splines (k,).
+        anchor: Index of the anchor on the grid, where the wire is stiff. At a soft end, any change
+            of EA would shift the rest of the curve, and the fit would converge slowly.
+        anchor_strain: Strain ε at the anchor [-].
         smoothing: Weight of the roughness [N²].
     """
 
@@ -110,24 +109,24 @@ class Curve:
 
     @cached_property
     def rigidity(self) -> Array:
-        """EA (g,) [N] on the grid."""
+        """Rigidity EA (g,) [N] on the grid."""
         return np.asarray(np.exp(self.basis.splines @ self.coefficients))
 
     @cached_property
     def strain(self) -> Array:
-        """ε (g,) [-] on the grid, of the same origin as the points."""
+        """Strain ε (g,) [-] on the grid, with the origin of the points."""
         stretch = _running_integral(1.0 / self.rigidity, self.basis.tensions)
         return np.asarray(self.anchor_strain + stretch - stretch[self.anchor])
 
     def force(self, strain: Array) -> Array:
-        """Tension (n,) [N] at strains (n,); straight beyond the ends."""
+        """Compute the tension (n,) [N] at strains (n,), by straight lines beyond the ends."""
         tensions, rigidity, grid = self.basis.tensions, self.rigidity, self.strain
         inside = np.interp(strain, grid, tensions)
         before = np.minimum(strain - grid[0], 0.0) * rigidity[0]
         return np.asarray(inside + before + np.maximum(strain - grid[-1], 0.0) * rigidity[-1])
 
     def jacobian(self, strain: Array) -> Array:
-        """Derivative (n, k + 1) of :meth:`force` by the coefficients and that strain."""
+        """Derive :meth:`force` by the coefficients and by the strain at the anchor (n, k + 1)."""
         tensions, grid = self.basis.tensions, self.strain
         inside = np.clip(strain, grid[0], grid[-1])
         at = np.clip(np.searchsorted(grid, inside) - 1, 0, len(grid) - 2)
@@ -140,16 +139,16 @@ class Curve:
         rigidity = (1.0 - share) * self.rigidity[at, None] + share * self.rigidity[at + 1, None]
         beyond = (self.force(strain) - np.interp(strain, grid, tensions))[:, None]
         edge = np.where(strain < grid[0], 0, -1)
-        slope = beyond * self.basis.splines[edge]  # the straight ends turn with their EA
+        slope = beyond * self.basis.splines[edge]  # the slope of a straight end is its EA
         return np.hstack((rigidity * stretch + slope, -rigidity))
 
     def refitted(self, points: Points) -> Curve:
-        """The curve of the same smoothing that fits the points best (Levenberg and Marquardt)."""
+        """Fit the curve to the points with fixed smoothing (Levenberg and Marquardt)."""
         size = self.basis.splines.shape[1]
         weight = np.sqrt(points.count)
         rough = np.sqrt(self.smoothing) * np.diff(np.eye(size), 2, axis=0)
         rough = np.hstack((rough, np.zeros((size - 2, 1))))
-        # strain and log EA are orders apart: the last unknown counts in the span of the strain
+        # strain and log EA are orders apart: scale the last unknown by the span of the strain
         unit = float(np.ptp(points.strain))
 
         def of(x: Array) -> Curve:
@@ -171,19 +170,19 @@ class Curve:
         return of(found.x)
 
     def spread(self, points: Points) -> Spread:
-        """Uncertainty of the curve due to the noise of the points."""
+        """Compute the uncertainty of the curve from the noise of the points."""
         rows, error = self._linearised(points)
         factor, scale = self._factored(rows)
         inverse = cho_solve(factor, np.eye(len(scale))) / np.outer(scale, scale)
         leverage = np.clip(((rows @ inverse) * rows).sum(axis=1), 0.0, 1.0)
         freedom = float(max(len(error) - leverage.sum(), 1.0))
         variance = float((error**2).sum() / freedom)
-        # residuals lack the part of the noise that the curve follows
+        # enlarge the residuals by the part of the noise that the curve follows
         error = error / np.sqrt(np.maximum(1.0 - leverage, 0.1))
         near = min(_NEAR, len(error))
         padded = np.pad(error**2, (near // 2, near - 1 - near // 2), mode="reflect")
         local = np.convolve(padded, np.full(near, 1.0 / near), mode="valid")
-        # scatter by the local noise, and bias by the prior of the smoothing
+        # scatter from the local noise, and bias from the prior of the smoothing
         moved = (inverse @ rows.T) * np.sqrt(local)
         covariance = moved @ moved.T + variance * inverse @ self._penalty @ inverse
         splines = self.basis.splines
@@ -191,10 +190,10 @@ class Curve:
         return Spread(inverse, float(np.sqrt(variance)), freedom, error, deviation)
 
     def loosest(self, points: Points) -> Curve:
-        """The curve with the least smoothing that its restricted likelihood allows.
+        """Find the curve with the least smoothing that its restricted likelihood allows.
 
-        That is one standard deviation below the most likely: −2 log likelihood is larger by 1. Of
-        points without a bend the most likely curve is straight, and its band would be too narrow.
+        There −2 log likelihood is 1 above its minimum (one standard deviation). Without a bend in
+        the points, the most likely curve is straight, and its band would be too narrow.
         """
         least, chosen = np.inf, self
         for smoothing in self.smoothing * 10.0 ** np.arange(0.0, -6.0, -0.25):
@@ -207,14 +206,14 @@ class Curve:
         return chosen
 
     def _likelihood(self, points: Points) -> float:
-        """−2 log of the restricted likelihood of the smoothing, for the linearised curve."""
+        """Compute −2 log of the restricted likelihood of the smoothing (linearised curve)."""
         rows, error = self._linearised(points)
         unknowns = np.append(self.coefficients, self.anchor_strain)
         factor, scale = self._factored(rows)
         bent = self._penalty @ unknowns
         gradient = (rows.T @ error - bent) / scale
         deviance = error @ error + unknowns @ bent - gradient @ cho_solve(factor, gradient)
-        # three unknowns have no penalty: the strain, and the two of a straight log EA
+        # three unknowns have no penalty: the strain, and two of a straight log EA
         return float(
             (len(error) - 3) * np.log(deviance + len(error) * _least_variance(points))
             + 2.0 * np.log(np.diag(factor[0]) * scale).sum()
@@ -223,17 +222,17 @@ class Curve:
 
     @property
     def _penalty(self) -> Array:
-        """Penalty of the unknowns (k + 1, k + 1)."""
+        """Matrix (k + 1, k + 1) of the roughness penalty on the unknowns."""
         return np.pad(self.smoothing * self.basis.roughness, (0, 1))
 
     def _linearised(self, points: Points) -> tuple[Array, Array]:
-        """Jacobian (n, k + 1) and residual (n,), each point as one not averaged."""
+        """Return Jacobian (n, k + 1) and residual (n,), weighted to the noise of one point."""
         weight = np.sqrt(points.count)
         error = weight * (points.force - self.force(points.strain))
         return weight[:, None] * self.jacobian(points.strain), error
 
     def _factored(self, rows: Array) -> tuple[tuple[Array, bool], Array]:
-        """Cholesky factor of the normal matrix, scaled to a unit diagonal, and the scale."""
+        """Scale the normal matrix to a unit diagonal. Return its Cholesky factor and the scale."""
         normal = rows.T @ rows + self._penalty
         # strain and log EA are orders apart
         scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
@@ -243,18 +242,18 @@ class Curve:
 
 @dataclass(frozen=True)
 class Spread:
-    """How well the points determine a curve.
+    """Uncertainty of a fitted curve.
 
     Attributes:
-        inverse: Of the normal matrix, penalty included, by the unknowns (k + 1, k + 1).
+        inverse: Inverse of the normal matrix with the penalty (k + 1, k + 1).
         noise: Standard deviation of one point [N].
-        freedom: Degrees of freedom: points less those that the curve follows.
-        errors: Errors of the points, each as one not averaged (n,) [N]: the residuals, enlarged by
-            the part that the curve follows.
-        deviation: Standard deviation of log EA on the grid (g,): of the scatter, as large as it is
-            around each point, so that it may grow with the force; and of the smoothing, whose
-            squared bias is taken as that of a curve as rough as this one is on average (Nychka,
-            J. Am. Stat. Assoc. 83, 1988).
+        freedom: Degrees of freedom: number of points less the sum of their leverages.
+        errors: Errors of the points (n,) [N], weighted to the noise of a single point: residuals,
+            enlarged by the part that the curve follows.
+        deviation: Standard deviation of log EA on the grid (g,), from scatter and smoothing. The
+            scatter is that of the neighbouring points, so it may grow with the force. The squared
+            bias of the smoothing is that of a curve with the roughness of this one on average
+            (Nychka, J. Am. Stat. Assoc. 83, 1988).
     """
 
     inverse: Array
@@ -265,16 +264,16 @@ class Spread:
 
 
 def fit_curve(points: Points, basis: Basis, noise: float) -> Curve:
-    """Fit the curve, its smoothing by restricted likelihood (Fellner and Schall's iteration).
+    """Fit the curve. Restricted likelihood gives its smoothing (Fellner-Schall iteration).
 
     Args:
         points: The points.
-        basis: The splines of log EA.
-        noise: First estimate of the noise of one point [N], and a floor for it.
+        basis: Splines of log EA.
+        noise: First estimate of the noise of one point [N].
     """
     tensions = basis.tensions
     size = basis.splines.shape[1]
-    # start: secants between the points, coarse enough to be positive
+    # start from secants so coarse that they are positive
     force = np.maximum.accumulate(points.force) + 1e-9 * tensions[-1] * np.arange(len(points.force))
     places = tensions[np.linspace(0, _GRID - 1, 13).astype(int)]
     secants = np.diff(places) / np.maximum(
@@ -284,7 +283,7 @@ def fit_curve(points: Points, basis: Basis, noise: float) -> Curve:
     ridge = basis.splines.T @ basis.splines + 1e-3 * basis.roughness + 1e-9 * np.eye(size)
     coefficients: Array = np.linalg.solve(ridge, basis.splines.T @ guess).astype(np.float64)
     floor = _least_variance(points)
-    # from smooth to flexible: a flexible curve may not converge from a rough start
+    # begin smooth: a flexible curve may not converge from a rough start
     smoothing = 10.0 * max(noise**2, 1e8 * floor)
     anchor = int((basis.splines @ coefficients).argmax())
     strain = float(np.interp(tensions[anchor], force, points.strain))

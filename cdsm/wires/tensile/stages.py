@@ -1,4 +1,4 @@
-"""Where pre-tensioning ends, where the wire yields, and what makes a fit doubtful."""
+"""Find the end of pre-tensioning, the yield, and reasons to doubt a fit."""
 
 from __future__ import annotations
 
@@ -10,45 +10,39 @@ from cdsm.wires.tensile.loading import local_noise
 from cdsm.wires.tensile.spline import Curve, Points, Spread
 
 YIELD = 0.8
-"""Plasticity begins where EA falls below this share of its largest value, for good."""
+"""Plasticity begins where EA falls below this share of its largest value and stays there."""
 PRETENSIONED = 0.5
-"""Pre-tensioning ends where d ln EA/d ln F falls below this: midway from EA ∝ F to EA constant."""
+"""Pre-tensioning ends where d ln EA/d ln F falls below this: midway from EA ∝ F to constant EA."""
 _CERTAIN = 3.0
-"""Standard deviations of a fact that noise has not made."""
+"""A fact is certain beyond this number of standard deviations."""
 _FAR = 8.0
-"""Standard deviations of a point that does not belong to the test."""
+"""A point is doubtful beyond this number of standard deviations."""
 _JUMP = 10.0
-"""EA over the steepest measured chord from which on the curve has overshot a jump."""
+"""Largest EA over the steepest measured chord. Beyond it, the curve has overshot a jump."""
 _SEEN = 1e-4
-"""Share of the range of force that a load cell shows at least."""
+"""Smallest share of the range of force that a load cell shows."""
 _STEP = 1.25
-"""Ratio of tensions over which the exponent is taken: over less, noise passes for slope."""
+"""Ratio of tensions to compute the exponent. With a smaller ratio, noise looks like slope."""
 
 
 def yield_onset(tensions: Array, rigidity: Array, deviation: Array) -> float | None:
-    """Tension [N] from which EA stays below its plateau, or None if it never surely does.
+    """Find the tension [N] from which EA stays below its plateau. Return None if uncertain.
 
-    Args:
-        tensions: F (g,) [N].
-        rigidity: EA (g,) [N].
-        deviation: Standard deviation of log EA (g,).
+    The arguments are F (g,) [N], EA (g,) [N] and the standard deviation of log EA (g,).
     """
     level = np.log(rigidity)
-    # a plateau is well known: a chance rise of an end that is not must not pass for one
+    # the plateau is where EA is certain: noise at an uncertain end must not count as plateau
     top = int(np.argmax(level - 2.0 * _CERTAIN * deviation))
     below = level < level[top] + np.log(YIELD)
     sure = level + _CERTAIN * np.hypot(deviation, deviation[top]) < level[top] + np.log(YIELD)
-    tail = np.flatnonzero(~below)[-1] + 1  # from here on it never recovers
+    tail = np.flatnonzero(~below)[-1] + 1  # EA never recovers from here on
     return float(tensions[tail]) if sure[tail:].any() else None
 
 
 def pretension_end(tensions: Array, rigidity: Array, deviation: Array) -> float | None:
-    """Tension [N] from which EA grows slower than √F, or None if it surely never grew faster.
+    """Find the tension [N] from which EA grows slower than √F.
 
-    Args:
-        tensions: F (g,) [N].
-        rigidity: EA (g,) [N].
-        deviation: Standard deviation of log EA (g,).
+    Return None if no earlier growth faster than √F is certain. Arguments: see yield_onset.
     """
     level = np.log(rigidity)
     inner = (tensions > _STEP * tensions[0]) & (tensions < tensions[-1] / _STEP) & (tensions > 0)
@@ -61,14 +55,14 @@ def pretension_end(tensions: Array, rigidity: Array, deviation: Array) -> float 
     perhaps = np.interp(F, tensions, level + _CERTAIN * deviation)
     edges = np.flatnonzero(np.diff(np.pad(steep.astype(int), 1)))
     for start, end in zip(edges[-2::-2], edges[::-2], strict=True):
-        # a rise that the noise may have made is no stage
+        # skip a rise that noise may have caused
         if surely[start:end].max() > perhaps[start:end].min():
             return float(F[end - 1])
     return None
 
 
 def refuse_jumps(curve: Curve, points: Points) -> None:
-    """Refuse a force that jumps: there EA of the curve is ten times that of any measured chord."""
+    """Raise if the force jumps: EA of the curve exceeds ten times EA of every measured chord."""
     first, last = curve.force(points.strain[[0, -1]])
     inside = (curve.basis.tensions >= first) & (curve.basis.tensions <= last)
     steepest = int(np.where(inside, curve.rigidity, 0.0).argmax())
@@ -82,7 +76,7 @@ def refuse_jumps(curve: Curve, points: Points) -> None:
 
 
 def doubts(points: Points, spread: Spread, gauge_length: float) -> tuple[str, ...]:
-    """What in the residuals makes the fit doubtful, one sentence each."""
+    """Return one sentence for each reason in the residuals to doubt the fit."""
     errors, reach = spread.errors, float(np.ptp(points.force))
     notes = []
     times = abs(errors) / np.maximum(local_noise(errors), _SEEN * reach)
@@ -92,7 +86,7 @@ def doubts(points: Points, spread: Spread, gauge_length: float) -> tuple[str, ..
             f"{points.force[worst]:.4g} N at {points.strain[worst] * gauge_length:.4g} m lies "
             f"{times[worst]:.0f} times the scatter around it off the curve: check this point"
         )
-    # errors of a test without noise may all be zero
+    # without noise, all errors may be zero
     correlation = float(errors[1:] @ errors[:-1]) / (float(errors @ errors) or 1.0)
     if correlation > 4.0 / np.sqrt(len(errors)) and spread.noise > _SEEN * reach:
         widen = float(np.sqrt((1.0 + correlation) / (1.0 - correlation)))
