@@ -1,4 +1,4 @@
-"""Parameters of an arm from stiffnesses measured on it."""
+"""Identification of the parameters of an arm from stiffnesses measured on the arm."""
 
 from cdsm.identification.intervals import Profile
 from cdsm.identification.measurement import Measurement

@@ -1,4 +1,4 @@
-"""Warnings: what not to trust in an identification."""
+"""Find reasons not to trust an identification, and write them as warnings."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from cdsm.identification.result import Identification
 from cdsm.support.validation import Array
 
 _CORRELATED = 0.95
-"""Correlation of two parameters beyond which a warning names them."""
+"""A warning names two parameters whose correlation exceeds this value."""
 
 _UNLIKELY = 1e-3
-"""Probability of a χ² as large, below which the model does not explain the measurements."""
+"""If so large a χ² is less probable than this, the model does not explain the measurements."""
 
 
 def warnings_of(result: Identification) -> list[str]:
-    """A sentence for each reason not to trust a result."""
+    """Return one sentence for each reason not to trust a result."""
     sentences = [
         f"not identifiable (rank {result.rank} of {len(result.names)}): no prediction changes with "
         f"{combination}, so their values are one choice of many. Fix one, or measure what tells "
@@ -50,7 +50,7 @@ def warnings_of(result: Identification) -> list[str]:
 
 
 def _at_bound(result: Identification, i: int) -> list[str]:
-    """Say so if a parameter is on a bound."""
+    """Warn if a parameter is on a bound."""
     name, value = result.names[i], result.values[i]
     return [
         f"{name} is at its {side} bound, {limit:g}: the optimum lies there or beyond, and the "
@@ -61,7 +61,7 @@ def _at_bound(result: Identification, i: int) -> list[str]:
 
 
 def _open_ends(result: Identification, i: int) -> list[str]:
-    """Say so if the measurements set no end to an interval."""
+    """Warn if the measurements do not limit the interval of a parameter."""
     name, profile, limits = result.names[i], result.profiles[i], result.bounds[i]
     interval = result.confidence()[name]
     ends = [k for k in (0, 1) if math.isinf(interval[k])]
@@ -75,7 +75,7 @@ def _open_ends(result: Identification, i: int) -> list[str]:
     sentences = []
     for k in ends:
         if result.values[i] == limits[k]:
-            continue  # said already
+            continue  # _at_bound reports this end
         reach = f"its bound, {limits[k]:g}."
         if profile.ends[k] != "bound":
             reach = f"{profile.values[(0, -1)[k]]:.4g}, where the model ends: {profile.ends[k]}"
@@ -87,7 +87,7 @@ def _open_ends(result: Identification, i: int) -> list[str]:
 
 
 def unfinished(problem: LeastSquares, point: Array, jacobian: Array) -> list[str]:
-    """Say so if χ² could fall further, as where the model ends on the way to the optimum."""
+    """Warn if χ² could still fall, for example because the model ends before the optimum."""
     r = problem.residuals(point)
     gradient = r @ jacobian
     held = ((point == 0.0) & (gradient >= 0.0)) | ((point == 1.0) & (gradient <= 0.0))
@@ -98,7 +98,7 @@ def unfinished(problem: LeastSquares, point: Array, jacobian: Array) -> list[str
     fall = float(np.sum((jacobian @ step) ** 2))
     if fall < NEGLIGIBLE:
         return []
-    # if the search stopped at the end of the model, that is near
+    # look nearby for the end of the model: the search may have stopped there
     size = 1e-3 / max(1e-3, float(abs(step).max()))
     failure = problem.failure(np.clip(point + size * step, 0.0, 1.0))
     reason = (

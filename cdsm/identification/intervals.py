@@ -1,12 +1,12 @@
-"""Confidence intervals by profile likelihood.
+"""Compute confidence intervals by profile likelihood.
 
-The profile of a parameter is how χ² rises as it leaves its best value and the others follow:
+The profile of a parameter p_i is the rise of χ² as p_i leaves its best value:
 
     Δχ²(p_i) = min over the other parameters of χ² − least χ²
 
 The interval of p_i is where Δχ² stays below the square of a quantile (Bates and Watts, Nonlinear
-Regression Analysis, 1988, chapter 6). For a linear model that is value ± quantile · std. In a
-nonlinear one it does not depend on how the parameter is written, as itself or as its logarithm.
+Regression Analysis, 1988, chapter 6). For a linear model, the interval is value ± quantile · std.
+For a nonlinear model, it is the same whether the search uses the parameter or its logarithm.
 """
 
 from __future__ import annotations
@@ -25,31 +25,31 @@ from cdsm.identification.least_squares import Box, LeastSquares
 from cdsm.support.validation import Array, ReadOnlyState, frozen
 
 RANK_TOLERANCE = 1e-6
-"""Smallest singular value of the Jacobian, columns of unit length, that counts for the rank.
+"""Smallest singular value that counts for the rank of the Jacobian (columns of unit length).
 
-The central differences behind it leave some 1e-10.
+The central differences have an error of about 1e-10.
 """
 
 NEGLIGIBLE = 1e-3
-"""Difference of χ² that does not matter; 1 would be one standard deviation."""
+"""Difference of χ² that is neglected. A difference of 1 is one standard deviation."""
 
 Side = Literal[-1, 1]
 
 _LONGEST = 0.25
-"""Longest step, as part of the range of the parameter."""
+"""Longest step, as a share of the range of the parameter."""
 
 _HALVINGS = 8
-"""How often a step is halved before the model is said to end."""
+"""Number of halvings of a step before the model counts as ended."""
 
 _NEAR, _REFINEMENTS = 0.25, 4
-"""How near to a goal a knot must be, as part of it, and how many more knots to spend on that."""
+"""Largest relative distance of a knot from a goal, and number of extra knots to reach it."""
 
 _TOLERANCES = (1e-4, 1e-6, 1e-8)
-"""ftol, xtol and gtol of the fit at a knot: the cubic between knots is no more exact."""
+"""ftol, xtol and gtol of the fit at a knot. The cubic between knots is not more exact."""
 
 
 class LowerOptimumError(Exception):
-    """χ² is lower at this point than at what was taken for the optimum."""
+    """χ² at this point is lower than at the supposed optimum."""
 
     def __init__(self, point: Array) -> None:
         self.point = point
@@ -58,15 +58,15 @@ class LowerOptimumError(Exception):
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Profile(ReadOnlyState):
-    """χ² of the best fit with one parameter held, over the value it is held at.
+    """Profile of one parameter: least χ² with the parameter held, over the held value.
 
     Attributes:
-        values: Values of the parameter (n,) [m, N/m, …], rising, in the unit of ``model_of``.
-        rise: Δχ² (n,) [-]: least χ² with the parameter held there, less the least of all.
+        values: Held values of the parameter (n,) [m, N/m, …], rising, in the unit of ``model_of``.
+        rise: Δχ² (n,) [-]: least χ² with the parameter held, less the least χ² of all.
         slope: Derivative of Δχ² by the value (n,) [1/m, m/N, …].
-        best: Which of the values is the optimum.
-        ends: Why it goes no farther down and up: ``""`` as no interval needs more of it,
-            ``"bound"``, or what the model says where it ends.
+        best: Index of the optimum in ``values``.
+        ends: Reasons why the profile ends, downward and upward: ``""`` (no interval needs more),
+            ``"bound"``, or the error of the model.
         bounds: Bounds of the parameter (2,) [m, N/m, …].
     """
 
@@ -78,11 +78,11 @@ class Profile(ReadOnlyState):
     bounds: Array
 
     def crossing(self, rise: float, side: Side) -> float | None:
-        """The farthest value to one side where Δχ² is no more than ``rise``.
+        """Find the farthest value on one side where Δχ² is at most ``rise``.
 
-        Between the values Δχ² is a cubic over the parameter as it is searched, by itself or by its
-        logarithm. The crossing is infinite where Δχ² stays below up to the bound or the end of the
-        model, and None where the profile was not followed that far.
+        Between the values, Δχ² is a cubic over the searched parameter (or its logarithm). If Δχ²
+        stays below ``rise`` up to the bound or the end of the model, the crossing is infinite.
+        Return None if the profile does not reach that far.
         """
         outward = slice(self.best, None, side)
         values, height = self.values[outward], self.rise[outward]
@@ -96,7 +96,7 @@ class Profile(ReadOnlyState):
 
 
 def _cubic_crossing(u: ArrayLike, height: ArrayLike, slope: ArrayLike, rise: float) -> float:
-    """Where the cubic with these heights and slopes at two places reaches a rise between them."""
+    """Find where a cubic, given by heights and slopes at two places, reaches a rise."""
     (start, end), (low, high) = np.asarray(u), np.asarray(height)
     first, last = (end - start) * np.asarray(slope)
 
@@ -109,14 +109,14 @@ def _cubic_crossing(u: ArrayLike, height: ArrayLike, slope: ArrayLike, rise: flo
 
 
 class _Knot(NamedTuple):
-    """A place on a profile.
+    """Point on a profile.
 
     Attributes:
-        point: In the unit cube (P,).
-        rise: Δχ² there [-].
-        slope: Its derivative by the coordinate of the parameter.
-        curvature: Its second derivative, by Gauss and Newton.
-        tangent: Derivative of the point by that coordinate (P,).
+        point: Coordinates in the unit cube (P,).
+        rise: Δχ² [-] at the point.
+        slope: Derivative of Δχ² by the coordinate of the held parameter.
+        curvature: Second derivative of Δχ², by Gauss and Newton.
+        tangent: Derivative of the point by the coordinate of the held parameter (P,).
     """
 
     point: Array
@@ -127,16 +127,16 @@ class _Knot(NamedTuple):
 
 
 class Profiler:
-    """Follows the profile of parameter ``i`` from the optimum.
+    """Computation of the profile of parameter ``i``, from the optimum outward.
 
     Args:
-        problem: What was searched.
+        problem: The least-squares problem.
         best: The optimum (P,), in the unit cube.
-        jacobian: ∂r/∂point there (n, P).
-        i: The parameter.
-        others: Those that follow it.
-        exact: Values of Δχ² that it is exact at, rising.
-        far: Larger one that it is followed up to.
+        jacobian: ∂r/∂point (n, P) at the optimum.
+        i: Index of the held parameter.
+        others: Indices of the parameters that are fitted again.
+        exact: Values of Δχ² where the profile must be exact, rising.
+        far: Largest Δχ² of the profile, above all in ``exact``.
     """
 
     def __init__(
@@ -157,10 +157,10 @@ class Profiler:
         self._start = self._knot(best, jacobian[:, i], jacobian[:, self._others])
 
     def profile(self) -> Profile:
-        """The profile to both sides.
+        """Compute the profile to both sides.
 
         Raises:
-            LowerOptimumError: It leads below the optimum.
+            LowerOptimumError: A point of the profile has a lower χ² than the optimum.
         """
         (down, first), (up, last) = self._follow(-1), self._follow(1)
         knots = [*reversed(down), *up[1:]]
@@ -175,7 +175,7 @@ class Profiler:
         )
 
     def _follow(self, side: Side) -> tuple[list[_Knot], str]:
-        """Knots to one side, rising from the optimum, and why they end."""
+        """Compute the knots on one side, from the optimum outward, and the reason why they end."""
         knots = [self._start]
         for goal in (*self._exact, self._far):
             while knots[-1].rise < goal:
@@ -188,12 +188,12 @@ class Profiler:
         return knots, ""
 
     def _next(self, here: _Knot, side: Side, goal: float) -> _Knot | str:
-        """A knot farther out, about where Δχ² reaches a goal, or why there is none."""
+        """Compute a knot farther out, near where Δχ² reaches a goal, or the reason for none."""
         u = float(here.point[self._i])
         room = 1.0 - u if side > 0 else u
         if room == 0.0:
             return "bound"
-        # the root of the parabola through slope and curvature, a little beyond the goal
+        # root of the parabola with this slope and curvature, a little beyond the goal
         need, slope = 1.05 * goal - here.rise, side * here.slope
         rate = slope + math.sqrt(max(slope**2 + 2.0 * here.curvature * need, 0.0))
         step = min(2.0 * need / rate if rate > 0.0 else math.inf, _LONGEST, room)
@@ -205,7 +205,7 @@ class Profiler:
         return knot
 
     def _refine(self, knots: list[_Knot], goal: float) -> None:
-        """Add knots until one is so near to a goal that the cubic beside it is exact enough."""
+        """Add knots until one is so near the goal that the cubic is exact enough."""
         for _ in range(_REFINEMENTS):
             last = max(k for k, knot in enumerate(knots) if knot.rise < goal)
             pair = knots[last : last + 2]
@@ -215,12 +215,12 @@ class Profiler:
             u = [float(knot.point[self._i]) for knot in pair]
             place = _cubic_crossing(u, [k.rise for k in pair], [k.slope for k in pair], goal)
             between = self._moved(near, place - float(near.point[self._i]))
-            if isinstance(between, str):  # a hole in the model
+            if isinstance(between, str):  # the model does not exist there
                 return
             knots.insert(last + 1, between)
 
     def _moved(self, here: _Knot, step: float) -> _Knot | str:
-        """The knot a step farther along the tangent, or why the model has none there."""
+        """Compute the knot one step along the tangent, or the reason why the model has none."""
         problem, others = self._problem, self._others
         point = np.clip(here.point + step * here.tangent, 0.0, 1.0)
         if (failure := problem.failure(point)) is not None:

@@ -1,9 +1,9 @@
-"""Least squares between bounds, for a model that does not exist everywhere.
+"""Solve least squares within bounds, for a model that may not exist for some parameters.
 
     min Σ r_i(p)²   so that   low ≤ p ≤ high
 
-Each parameter is scaled to 0…1 between its bounds, so that the search runs over a unit cube. Where
-the model has no residuals they are infinite, and scipy's search shortens its step.
+Each parameter is scaled to 0…1 between its bounds, so the search runs over a unit cube. Where the
+model does not exist, the residuals are infinite, and scipy's search shortens its step.
 """
 
 from __future__ import annotations
@@ -20,21 +20,21 @@ from cdsm.errors import InvalidInput
 from cdsm.support.validation import Array
 
 _DECADES = 100.0
-"""Ratio of positive bounds from which on a parameter is scaled by its logarithm."""
+"""If the ratio of positive bounds is at least this, the logarithm of the parameter is scaled."""
 
 _ONE_SIDED, _CENTRAL = 1e-7, 1e-5
-"""Steps of the differences in the unit cube: each balances rounding and truncation."""
+"""Steps of the finite differences in the unit cube. They balance rounding and truncation."""
 
 _CACHED = 64
-"""Points whose residuals are kept: a search returns to a point after the differences around it."""
+"""Number of points in the cache of residuals. A search returns to a point after differences."""
 
 
 class NoModelError(Exception):
-    """The model has no residuals at these parameters. Its text says why."""
+    """The model has no residuals at these parameters. The text gives the reason."""
 
 
 class Box:
-    """Bounds (P, 2) of the parameters, and the map from the unit cube to them."""
+    """Bounds (P, 2) of the parameters, and the map from the unit cube to the parameters."""
 
     def __init__(self, bounds: Array) -> None:
         self.bounds = bounds
@@ -44,36 +44,36 @@ class Box:
         self._size = self._scaled(self.high) - self._start
 
     def _scaled(self, values: Array) -> Array:
-        """The parameters, or their logarithms, as they are searched."""
+        """Return the searched values: the parameters or their logarithms."""
         return np.where(self._by_log, np.log(np.where(self._by_log, values, 1.0)), values)
 
     def parameters(self, point: Array) -> Array:
-        """Parameters (P,) at a point of the unit cube."""
+        """Compute the parameters (P,) at a point of the unit cube."""
         scaled = self._start + point * self._size
         values = np.where(self._by_log, np.exp(np.where(self._by_log, scaled, 0.0)), scaled)
-        # exactly the bounds at 0 and 1
+        # without rounding at 0 and 1
         values = np.where(point == 1.0, self.high, np.where(point == 0.0, self.low, values))
         return np.asarray(np.clip(values, self.low, self.high), dtype=np.float64)
 
     def point(self, values: Array) -> Array:
-        """Inverse of :meth:`parameters`."""
+        """Compute the point of the unit cube: inverse of :meth:`parameters`."""
         return np.asarray(np.clip((self._scaled(values) - self._start) / self._size, 0.0, 1.0))
 
     def derivative(self, point: Array) -> Array:
-        """Derivative of :meth:`parameters` (P,)."""
+        """Compute the derivative of :meth:`parameters` (P,)."""
         return np.where(self._by_log, self.parameters(point) * self._size, self._size)
 
     def only(self, i: int) -> Box:
-        """The box of one parameter. Its maps take any number of values."""
+        """Return the box of parameter ``i``. Its maps take any number of values."""
         return Box(self.bounds[i : i + 1])
 
 
 class LeastSquares:
-    """min Σ r² over the unit cube.
+    """Problem min Σ r² over the unit cube.
 
     Args:
-        residuals_of: Residuals r (n,) from the parameters by name; raises :class:`NoModelError`.
-        count: n.
+        residuals_of: Function from parameters by name to r (n,). May raise :class:`NoModelError`.
+        count: Number n of residuals.
         bounds: (low, high) of each parameter.
     """
 
@@ -90,15 +90,15 @@ class LeastSquares:
         self._cached = lru_cache(maxsize=_CACHED)(self._evaluate)
 
     def parameters(self, point: Array) -> dict[str, float]:
-        """Parameters by name at a point of the unit cube."""
+        """Compute the parameters by name at a point of the unit cube."""
         return dict(zip(self.names, self.box.parameters(point).tolist(), strict=True))
 
     def describe(self, point: Array) -> str:
-        """The parameters at a point, for a sentence."""
+        """Write the parameters at a point as text."""
         return ", ".join(f"{name} = {x:.6g}" for name, x in self.parameters(point).items())
 
     def residuals(self, point: Array) -> Array:
-        """Residuals r (n,); inf where the model has none."""
+        """Compute the residuals r (n,). They are inf where the model does not exist."""
         return self._cached(point.tobytes()).copy()
 
     def _evaluate(self, point: bytes) -> Array:
@@ -108,7 +108,7 @@ class LeastSquares:
             return np.full(self.count, math.inf)
 
     def failure(self, point: Array) -> NoModelError | None:
-        """Why the model has no residuals at a point, or None."""
+        """Return the error that explains why the model has no residuals at a point, or None."""
         if math.isfinite(self.cost(point)):
             return None
         try:
@@ -118,16 +118,17 @@ class LeastSquares:
         return None
 
     def cost(self, point: Array) -> float:
-        """Σ r²."""
+        """Compute Σ r²."""
         r = self.residuals(point)
         return float(r @ r)
 
     def jacobian(
         self, point: Array, over: Sequence[int] | None = None, *, central: bool = False
     ) -> Array:
-        """∂r/∂point (n, P) by one-sided or central differences; of some parameters, if given.
+        """Compute ∂r/∂point (n, P) by one-sided or central differences.
 
-        Beside a bound or an end of the model central differences are one-sided of second order.
+        If ``over`` is given, only its columns are computed. Near a bound or an end of the model,
+        central differences become one-sided differences of second order.
         """
         chosen = range(len(self.names)) if over is None else over
         return np.column_stack([self._column(point, i, central) for i in chosen])
@@ -136,7 +137,7 @@ class LeastSquares:
         here, step = self.residuals(point), _CENTRAL if central else _ONE_SIDED
 
         def at(k: int) -> Array | None:
-            """Residuals k steps away, or None beyond the bounds or the model."""
+            """Compute the residuals k steps away, or None beyond the bounds or the model."""
             moved = point.copy()
             moved[i] += k * step
             if not 0.0 <= moved[i] <= 1.0:
@@ -170,16 +171,16 @@ class LeastSquares:
         over: Sequence[int] | None = None,
         central: bool = False,
     ) -> Array:
-        """Point of the unit cube where a search ends.
+        """Search the minimum. Return the point of the unit cube where the search ends.
 
         Args:
-            start: Where to begin.
-            method: ``trf`` finds its way from far. ``dogbox`` goes exactly onto a bound, which
-                ``trf`` only approaches.
+            start: First point of the search.
+            method: ``trf`` converges from far away. ``dogbox`` goes exactly onto a bound, while
+                ``trf`` only approaches it.
             tolerances: scipy's ftol, xtol and gtol.
-            most: Most evaluations, without those of the differences.
-            over: Parameters that move.
-            central: Whether the differences are.
+            most: Largest number of evaluations, without those of the differences.
+            over: Indices of the parameters that move; all if not given.
+            central: Whether the differences are central.
         """
         ftol, xtol, gtol = tolerances
         moving = list(range(start.size)) if over is None else list(over)

@@ -1,4 +1,4 @@
-"""A stiffness measured on an arm."""
+"""Stiffness measured on an arm."""
 
 from __future__ import annotations
 
@@ -22,26 +22,26 @@ from cdsm.support.validation import (
 @final
 @dataclass(frozen=True)
 class Measurement:
-    """A stiffness measured at the tip of a real arm, and the conditions it was measured in.
+    """Stiffness measured at the tip of a real arm, and the conditions of the measurement.
 
     Attributes:
-        value: Stiffness along the direction [N/m]: the force over how far the tip goes along it.
-        direction: The direction of force and displacement (3,), base axes, any length. With a
-            ``force`` its sign counts: (0, 0, -1) hangs a weight, (0, 0, 1) lifts the tip.
+        value: Stiffness along the direction [N/m]: force over displacement of the tip along it.
+        direction: Direction of force and displacement (3,), base axes, any length. With a ``force``
+            its sign matters: (0, 0, -1) hangs a weight, (0, 0, 1) lifts the tip.
         angles: Joint angles (nv,) [rad].
-        tension: Cable tensions (C,) [N]; or None, and ``minimum`` is given.
-        minimum: Instead of tensions, the lower bound [N], one or (C,), from which
-            :func:`~cdsm.distribute_tension` balances the model at these angles.
+        tension: Cable tensions (C,) [N]. Give either ``tension`` or ``minimum``.
+        minimum: Lower bound of the tensions [N], one number or (C,).
+            :func:`~cdsm.distribute_tension` then balances the model at these angles.
         std: Standard deviation of the value [N/m].
-        wrench: W (6,) at ``tool0`` in base axes that the arm carried already, without the force
-            that measured: force [N], moment [N m].
-        label: What reports and figures call it.
-        force: How large the force was [N], which came on top of ``wrench``: the value is then the
-            secant that :func:`~cdsm.weight_test` measures with it, the motors locked at the
-            angles and tensions. 0: so small that the value is the tangent.
+        wrench: W (6,) at ``tool0`` in base axes, without the measuring force: force [N], moment
+            [N m].
+        label: Name in reports and figures.
+        force: Magnitude of the measuring force [N], added to ``wrench``. The value is then the
+            secant of :func:`~cdsm.weight_test`, with motors locked at these angles and tensions.
+            0 means a small force: the value is the tangent.
 
     Raises:
-        InvalidInput: Names the field and what is wrong with it.
+        InvalidInput: A field is invalid. The error names the field and the fault.
     """
 
     value: float
@@ -111,5 +111,5 @@ def _numbers(name: str, value: object, meaning: str) -> tuple[float, ...]:
 
 
 def label(i: int, measurement: Measurement) -> str:
-    """What a measurement is called: its label, or its place in the list."""
+    """Return the name of a measurement: its label, or its index in the list."""
     return measurement.label or f"[{i}]"

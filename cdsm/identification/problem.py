@@ -1,4 +1,4 @@
-"""What a model of the arm predicts for the measurements."""
+"""Predict the measured stiffnesses from a model of the arm."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Parameters = dict[str, float]
 
 
 class UserFaultError(Exception):
-    """A function of the user's own fails with an error that is not of this library."""
+    """A user-defined function raises an error that is not a CdsmError."""
 
     def __init__(self, name: str, parameters: Parameters) -> None:
         self.name = name
@@ -31,7 +31,7 @@ class UserFaultError(Exception):
 
 
 class StiffnessModel:
-    """Stiffness of every measurement, as a function of the parameters."""
+    """Model of the stiffnesses of all measurements, as a function of the parameters."""
 
     def __init__(
         self,
@@ -47,11 +47,11 @@ class StiffnessModel:
         self._last_rest: dict[Measurement, Array] = {}
 
     def residuals(self, parameters: Parameters) -> Array:
-        """(K(p) − K)/σ (n,), in standard deviations."""
+        """Compute (K(p) − K)/σ (n,), in standard deviations."""
         return np.asarray((self.predict(parameters)[1] - self._measured) / self._std)
 
     def predict(self, parameters: Parameters) -> tuple[Manipulator, Array]:
-        """The arm and its stiffnesses K(p) (n,) [N/m]."""
+        """Build the arm and compute its stiffnesses K(p) (n,) [N/m]."""
         try:
             arm = _called("model_of", self._model_of, parameters)
         except CdsmError as error:
@@ -96,16 +96,13 @@ class StiffnessModel:
         else:
             assert measurement.minimum is not None
             tension = distribute_tension(pose, measurement.minimum, wrench=measurement.wrench)
-        # a Tension brings its own wrench
+        # a Tension holds its wrench
         wrench = None if isinstance(tension, Tension) else measurement.wrench
         return stiffness(pose, tension, wrench)
 
     def _secant(self, measurement: Measurement, K: Stiffness) -> float:
-        """What :func:`~cdsm.weight_test` measures.
-
-        The search starts where the arm of the last parameters came to rest: a tenth of the time
-        that :func:`~cdsm.weight_test` needs.
-        """
+        """Compute the stiffness [N/m] of a weight test on the model."""
+        # start at the equilibrium of the last parameters: a tenth of the time of weight_test
         pose, last = K.posture, self._last_rest.get(measurement)
         force = measurement.force * unit_direction("direction", measurement.direction)
         test = None

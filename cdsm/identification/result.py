@@ -1,4 +1,4 @@
-"""What an identification found, how well, and what it cannot tell apart."""
+"""Result of an identification: values, uncertainty, and undetermined combinations."""
 
 from __future__ import annotations
 
@@ -33,20 +33,19 @@ if TYPE_CHECKING:
 class Identification(ReadOnlyState):
     """Parameters of an arm that explain its measurements best; made by :func:`identify`.
 
-    Of n measurements and P parameters, each in the unit in which ``model_of`` takes it. All arrays
-    are read-only.
+    There are n measurements and P parameters. Each parameter has the unit in which ``model_of``
+    takes it. All arrays are read-only.
 
     Attributes:
         names: Names of the parameters, in the order of every (P,) array.
-        values: Their values (P,) [m, kg, N/m, …].
-        bounds: Their bounds (P, 2), low and high [m, kg, N/m, …].
+        values: Values of the parameters (P,) [m, kg, N/m, …].
+        bounds: Bounds of the parameters (P, 2), low and high [m, kg, N/m, …].
         measurements: The measurements.
         predicted: Stiffnesses of the model (n,) [N/m].
         jacobian: J = ∂r/∂p (n, P) [1/m, m/N, …], r in standard deviations.
-        arm: The model with these values.
-        warnings: What not to trust, a sentence each, naming the parameters; empty if all is well.
-        profiles: How χ² rises as each parameter leaves its value and the others follow, one
-            :class:`Profile` each; None where a parameter is not determined.
+        arm: Arm with these values.
+        warnings: One sentence for each reason not to trust the result; empty if there is none.
+        profiles: One :class:`Profile` of χ² for each parameter; None if it is not determined.
     """
 
     names: tuple[str, ...]
@@ -61,12 +60,12 @@ class Identification(ReadOnlyState):
 
     @property
     def parameters(self) -> dict[str, float]:
-        """The values by name, as ``model_of`` takes them."""
+        """Values by name, as ``model_of`` takes them."""
         return dict(zip(self.names, self.values.tolist(), strict=True))
 
     @cached_property
     def measured(self) -> Array:
-        """The values measured (n,) [N/m]."""
+        """Measured stiffnesses (n,) [N/m]."""
         return frozen(np.array([each.value for each in self.measurements]))
 
     @cached_property
@@ -77,30 +76,30 @@ class Identification(ReadOnlyState):
 
     @property
     def chi_square(self) -> float:
-        """χ² = Σ r² [-]; about :attr:`freedom` if the model is right and the σ are."""
+        """χ² = Σ r² [-]. It is about :attr:`freedom` if the model and all σ are right."""
         return float(self.residuals @ self.residuals)
 
     @property
     def freedom(self) -> int:
-        """Degrees of freedom: n less the rank."""
+        """Degrees of freedom: n less :attr:`rank`."""
         return len(self.measurements) - self.rank
 
     @property
     def reduced_chi_square(self) -> float:
-        """χ² per degree of freedom [-]; inf where none is left to judge by."""
+        """χ² per degree of freedom [-]; inf without degrees of freedom."""
         return self.chi_square / self.freedom if self.freedom else math.inf
 
     @property
     def rank(self) -> int:
-        """How many combinations of the parameters the measurements determine, at most P."""
+        """Number of combinations of parameters that the measurements determine, at most P."""
         return int(self._determined.sum())
 
     @cached_property
     def covariance(self) -> Array:
-        """(JᵀJ)⁻¹ (P, P) [m², m kg, …], by the σ given and not scaled by χ².
+        """Covariance (JᵀJ)⁻¹ (P, P) [m², m kg, …] for the given σ, not scaled by χ².
 
-        Multiply by :attr:`reduced_chi_square` if only the ratios of the σ are known. The bounds
-        have no influence. Parameters that the measurements do not determine have infinite variance.
+        If only the ratios of the σ are known, multiply it by :attr:`reduced_chi_square`. The bounds
+        have no influence. An undetermined parameter has infinite variance.
         """
         _, values, right = self._svd
         inner = right[self._determined].T / values[self._determined]
@@ -116,7 +115,7 @@ class Identification(ReadOnlyState):
 
     @cached_property
     def correlation(self) -> Array:
-        """Correlations of the parameters (P, P) [-]; ±1: only a combination is determined."""
+        """Correlations of the parameters (P, P) [-]. At ±1 only a combination is determined."""
         free = np.diag(self._null_projector)
         matrix = np.where(np.outer(free, free) > 0.0, self._null_projector, 0.0)
         firm = np.flatnonzero(free == 0.0)
@@ -127,22 +126,22 @@ class Identification(ReadOnlyState):
     def confidence(
         self, level: float = 0.95, *, scaled: bool = False
     ) -> dict[str, tuple[float, float]]:
-        """Intervals that hold each true parameter with this probability [m, kg, N/m, …].
+        """Compute intervals that hold each true parameter with a probability [m, kg, N/m, …].
 
-        By profile likelihood: the values p_i where the best fit with p_i held, the other parameters
-        within their bounds, has Δχ² ≤ q², with q the quantile of a normal variable. For a linear
-        model that is value ± q·std; else it need not be symmetric. An end is -inf or inf where Δχ²
-        stays below q² up to the bound of the parameter or the end of the model: the measurements
-        set no end there, and :attr:`warnings` say so at 95 %.
+        The interval of p_i follows from profile likelihood: hold p_i, fit the other parameters
+        within their bounds, and require Δχ² ≤ q². q is the quantile of a normal variable. For a
+        linear model the interval is value ± q·std. For other models it may be asymmetric. An end is
+        -inf or inf if Δχ² stays below q² up to the bound of the parameter or the end of the model.
+        Then the measurements set no end, and :attr:`warnings` report it at 95 %.
 
         Args:
             level: The probability, between 0 and 1.
-            scaled: Take the σ as known up to a common factor, estimated by χ²: q is the quantile of
-                Student's t times √(reduced χ²).
+            scaled: Whether the σ are known only up to a common factor, which χ² estimates. Then q
+                is the quantile of Student's t times √(reduced χ²).
 
         Raises:
-            InvalidInput: The level is not between 0 and 1, or so near to 1 that the profiles do not
-                reach there, or ``scaled`` is no flag.
+            InvalidInput: ``level`` is not between 0 and 1, or so near to 1 that the profiles do not
+                reach it; or ``scaled`` is not a bool.
         """
         level = scalar("level", level)
         if not 0.0 < level < 1.0:
@@ -154,7 +153,7 @@ class Identification(ReadOnlyState):
         }
 
     def plot(self) -> Figure:
-        """Predicted over measured [N/mm], and every residual in standard deviations."""
+        """Plot predicted over measured stiffness [N/mm], and residuals in standard deviations."""
         from cdsm.plots.measured import plot_identification  # matplotlib imports slowly
 
         return plot_identification(self, self._labels, self._verdict)
@@ -197,7 +196,7 @@ class Identification(ReadOnlyState):
         )
 
     def _rise(self, level: float, *, scaled: bool) -> float:
-        """Δχ² [-] at the ends of an interval."""
+        """Compute Δχ² [-] at the ends of an interval."""
         half = (1.0 + level) / 2.0
         if not scaled:
             return float(ndtri(half) ** 2)
@@ -220,25 +219,25 @@ class Identification(ReadOnlyState):
 
     @property
     def _goals(self) -> tuple[list[float], float]:
-        """Δχ² [-] at the ends of 95 % intervals, rising, and how far profiles go for others."""
+        """Δχ² [-] at the ends of 95 % intervals, rising, and the largest Δχ² of the profiles."""
         exact, far = [self._rise(0.95, scaled=False)], self._rise(0.999, scaled=False)
         if self.freedom:
             exact.append(self._rise(0.95, scaled=True))
             far = max(far, self._rise(0.99, scaled=True))
-        # of measurements without noise χ² is rounding, and what it scales
+        # without noise, χ² and all it scales are rounding
         return sorted(rise for rise in exact if rise > NEGLIGIBLE), far
 
     @cached_property
     def _column_norms(self) -> Array:
-        """Norms of the columns of J (P,); inf for a column that is zero."""
+        """Norms of the columns of J (P,); inf for a zero column."""
         norms = np.linalg.norm(self.jacobian, axis=0)
-        # zero: over its whole range the parameter moves no residual by a millionth of its σ
+        # zero column: over its range, the parameter moves no residual by a millionth of its σ
         zero = norms * np.ptp(self.bounds, axis=1) < RANK_TOLERANCE
         return np.where(zero, math.inf, norms)
 
     @cached_property
     def _svd(self) -> tuple[Array, Array, Array]:
-        """Singular values and vectors of J with columns of unit length, or zero."""
+        """Singular value decomposition of J, its columns scaled to unit length (or zero)."""
         left, values, right = np.linalg.svd(self.jacobian / self._column_norms, full_matrices=False)
         return left, values, right
 
@@ -249,30 +248,30 @@ class Identification(ReadOnlyState):
 
     @cached_property
     def _null_projector(self) -> Array:
-        """Projector (P, P) on the undetermined combinations, rounding set to zero."""
+        """Projector (P, P) on the undetermined combinations, with rounding set to zero."""
         null = self._svd[2][~self._determined]
         projector: Array = null.T @ null
         return np.where(abs(projector) > 1e-8, projector, 0.0)
 
     @cached_property
     def _dependent(self) -> Any:
-        """One parameter for each undetermined combination; with them held, the others are known."""
+        """One parameter per undetermined combination. Holding these determines the others."""
         null = self._svd[2][~self._determined]
         return qr(null, mode="r", pivoting=True)[1][: len(null)]
 
     @property
     def _null_combinations(self) -> list[str]:
-        """The combinations that change no prediction, written out: "a by +1 and b by -0.3"."""
+        """Combinations that change no prediction, as text: "a by +1 and b by -0.3"."""
         null = self._svd[2][~self._determined]
         if not len(null):
             return []
-        # each combination with one dependent parameter of its own reads best
+        # easiest to read: one dependent parameter per combination
         null = np.linalg.solve(null[:, self._dependent], null)
         scale = np.where(np.isinf(self._column_norms), 1.0, self._column_norms)
         written = []
         for row in null:
             row = np.where(abs(row) > 1e-4, row, 0.0) / scale
-            # a step of readable size: 1 % of the range of the one that moves most of its own
+            # readable size: no parameter moves by more than 1 % of its range
             row = 0.01 * row / (abs(row) / np.ptp(self.bounds, axis=1)).max()
             terms = [(row[i], self.names[i]) for i in np.flatnonzero(row)]
             written.append(" and ".join(f"{name} by {part:+.4g}" for part, name in terms))

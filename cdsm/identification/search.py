@@ -1,12 +1,12 @@
-"""Identification of the parameters of an arm from stiffnesses measured on it.
+"""Identify the parameters of an arm from stiffnesses measured on it.
 
     min Σ r_i²,   r_i = (K_i(p) − K_i) / σ_i,   low ≤ p ≤ high
 
-with K_i measured, K_i(p) what the model with parameters p predicts by
-:meth:`~cdsm.Stiffness.along` or, for a force that is not small, by
-:func:`~cdsm.weight_test`, and σ_i the standard deviation of the measurement. The
-parameters are whatever a constructor of the user's own takes: dimensions, masses, springs, leads.
-Parameters that the measurements cannot tell apart are named in :attr:`Identification.warnings`.
+K_i is the measured stiffness, and σ_i its standard deviation. K_i(p) is the stiffness of the model
+with parameters p: :meth:`~cdsm.Stiffness.along`, or :func:`~cdsm.weight_test` if the force is not
+small. A user-defined function builds the arm from its parameters, such as dimensions, masses,
+springs or leads. A lead is the straight cable between its actuator and the base disk.
+:attr:`Identification.warnings` names parameters that the measurements cannot separate.
 """
 
 from __future__ import annotations
@@ -37,16 +37,16 @@ from cdsm.support.validation import (
 from cdsm.tension import Tension
 
 _ON_BOUND = 1e-9
-"""A parameter this near to a bound, as part of their distance, is on it."""
+"""A parameter this near to a bound (share of the range) counts as on the bound."""
 
 _CANDIDATES, _STARTS = 24, 3
-"""Points evaluated over the bounds, and how many of the best of them a search starts from."""
+"""Number of points evaluated over the bounds, and number of best points that start a search."""
 
 _COARSE, _FINE = (1e-10,) * 3, (1e-14,) * 3
-"""ftol, xtol and gtol of the searches by one-sided and by central differences."""
+"""ftol, xtol and gtol of the searches with one-sided and with central differences."""
 
 _EVALUATIONS = 200
-"""Most evaluations of a search, without those of the differences."""
+"""Largest number of evaluations of a search, without those of the differences."""
 
 
 def identify(
@@ -57,16 +57,16 @@ def identify(
     start: Mapping[str, float] | None = None,
     tension_of: Callable[..., Tension | ArrayLike] | None = None,
 ) -> Identification:
-    """Parameters p of an arm from measured stiffnesses: min Σ ((K_i(p) − K_i)/σ_i)² in bounds.
+    """Identify parameters p of an arm within bounds: min Σ ((K_i(p) − K_i)/σ_i)².
 
-    K_i(p) = ``stiffness(arm.at(angles), tension, wrench).along(direction)`` with
-    ``arm = model_of(**p)``; or, of a measurement with a ``force``, ``weight_test(arm.at(angles),
-    tension, force, wrench=wrench).stiffness``. Where the model has no stable stiffness, buckles
-    under the force, or a tension leaves the domain of an elasticity, the search turns back.
+    With ``arm = model_of(**p)``, the prediction K_i(p) is ``stiffness(arm.at(angles), tension,
+    wrench).along(direction)``. For a measurement with a ``force`` it is ``weight_test(
+    arm.at(angles), tension, force, wrench=wrench).stiffness``. The search turns back if the model
+    has no stable stiffness, buckles under the force, or a tension leaves the domain of a law.
 
-    A prediction of all measurements is what takes time. The search takes some 50 P of them, the
-    profiles of :meth:`Identification.confidence` some 20 P². A measurement with a force takes ten
-    times as long as one without, and more where the arm moves far.
+    Most of the time goes into predictions of all measurements. The search needs about 50 P of them,
+    and the profiles of :meth:`Identification.confidence` about 20 P². A measurement with a force
+    takes ten times as long as one without, and longer if the arm moves far.
 
     ::
 
@@ -80,21 +80,22 @@ def identify(
         )
 
     Args:
-        model_of: Makes the arm from the free parameters, given by keyword.
-        measurements: As many as there are parameters, or more.
-        free: Bounds (low, high) of each parameter, in the unit that ``model_of`` takes it in.
-            Positive ones a factor of 100 or more apart are searched by the logarithm.
-        start: Where to start, one value for each parameter. If not given, the best of several
-            searches spread over the bounds is taken, the same ones every time.
-        tension_of: The tensions (C,) [N] or :class:`~cdsm.Tension` of a measurement, as
-            ``tension_of(posture, measurement, **p)``, with all the free parameters. For parameters
-            of the tensions, such as the offset of a load cell, which no arm holds; ``model_of``
-            then gets all of them too. If not given, those of the measurement.
+        model_of: Function that builds the arm from the free parameters, given by keyword.
+        measurements: At least as many measurements as parameters.
+        free: Bounds (low, high) of each parameter, in the unit in which ``model_of`` takes it. If
+            they are positive and a factor of 100 or more apart, the logarithm is searched.
+        start: First value of each parameter. If not given, several searches start from points
+            spread over the bounds (always the same points), and the best result is returned.
+        tension_of: Function ``tension_of(posture, measurement, **p)`` that returns the tensions
+            (C,) [N] or a :class:`~cdsm.Tension`. Use it for parameters of the tensions, such as the
+            offset of a load cell. It and ``model_of`` get all free parameters. If not given, the
+            tensions of the measurement count.
 
     Raises:
-        InvalidInput: No measurements or fewer than parameters; bad bounds or start; ``model_of``
-            fails or returns no arm; or no start gives every measurement a stable stiffness.
-        UnknownName: A parameter that ``model_of`` or ``tension_of`` does not take.
+        InvalidInput: There are no measurements or fewer than parameters; bounds or start are
+            invalid; ``model_of`` fails or does not return an arm; or no start gives every
+            measurement a stable stiffness.
+        UnknownName: ``model_of`` or ``tension_of`` does not take a parameter.
     """
     measurements = sequence_of("measurements", measurements, Measurement)
     bounds = _checked_bounds(free)
@@ -114,7 +115,7 @@ def identify(
         while True:
             try:
                 return _result(model, problem, best)
-            except LowerOptimumError as lower:  # a profile has led to a deeper valley
+            except LowerOptimumError as lower:  # a profile found a lower minimum
                 best = min(_optimum(problem, [lower.point]), lower.point, key=problem.cost)
     except UserFaultError as fault:
         raise InvalidInput(
@@ -134,7 +135,7 @@ def _checked_bounds(free: Mapping[str, tuple[float, float]]) -> dict[str, tuple[
         if not isinstance(name, str):
             raise InvalidInput("free", f"{name!r} is no name of a parameter.")
         low, high = vector(f"free[{name!r}]", limits, 2, "the bounds (low, high)").tolist()
-        # closer together, rounding would drown the differences the search lives on
+        # within closer bounds, rounding would hide the finite differences
         if not high - low > 1e-9 * max(abs(low), abs(high)):
             raise InvalidInput(
                 f"free[{name!r}]",
@@ -146,12 +147,12 @@ def _checked_bounds(free: Mapping[str, tuple[float, float]]) -> dict[str, tuple[
 
 
 def _check_call(name: str, function: object, positional: int, names: Sequence[str]) -> None:
-    """Refuse a function that cannot be called with these parameters, before any search."""
+    """Raise before any search if a function cannot be called with these parameters."""
     if not callable(function):
         raise InvalidInput(name, f"{function!r} given; a function is needed.")
     try:
         signature = inspect.signature(function)
-    except (TypeError, ValueError):  # some compiled functions have none
+    except (TypeError, ValueError):  # some compiled functions have no signature
         return
     kinds = signature.parameters.values()
     if not any(each.kind is each.VAR_KEYWORD for each in kinds):
@@ -173,17 +174,17 @@ def _check_call(name: str, function: object, positional: int, names: Sequence[st
 
 
 def _starts(problem: LeastSquares, start: Mapping[str, float] | None) -> list[Array]:
-    """Points of the unit cube to search from, at each of which the model has its stiffnesses."""
+    """Choose points of the unit cube to search from, where the model has all stiffnesses."""
     count = len(problem.names)
     if start is None:
-        from scipy.stats import qmc  # only where it is wanted: it imports slowly
+        from scipy.stats import qmc  # here, because it imports slowly
 
         # Halton's first point is a corner
         spread = qmc.Halton(count, scramble=False).random(_CANDIDATES)[1:]
         points = [np.full(count, 0.5), *spread]
     else:
         points = [problem.box.point(_checked_start(problem, start))]
-    # a search that starts on a bound may take it for the optimum
+    # a search that starts on a bound may stop there
     points = [np.clip(point, 1e-6, 1.0 - 1e-6) for point in points]
     usable = [point for point in points if math.isfinite(problem.cost(point))]
     if usable:
@@ -222,7 +223,7 @@ def _optimum(problem: LeastSquares, starts: Sequence[Array]) -> Array:
     best = min(found, key=problem.cost)
     finer = problem.search(best, method="dogbox", tolerances=_FINE, most=_EVALUATIONS, central=True)
     best = min(finer, best, key=problem.cost)
-    # rounding may leave it beside the bound it is on
+    # rounding may leave an optimum beside its bound
     on_bound = np.where(best < _ON_BOUND, 0.0, np.where(best > 1.0 - _ON_BOUND, 1.0, best))
     return on_bound if math.isfinite(problem.cost(on_bound)) else best
 
@@ -249,7 +250,7 @@ def _result(model: StiffnessModel, problem: LeastSquares, best: Array) -> Identi
 def _profiles(
     problem: LeastSquares, best: Array, jacobian: Array, result: Identification
 ) -> tuple[Profile | None, ...]:
-    """The profile of each parameter that is determined."""
+    """Compute the profile of each determined parameter, and None for the others."""
     follow = [i for i in range(best.size) if i not in result._dependent]
     profiles: list[Profile | None] = []
     for i in range(best.size):
