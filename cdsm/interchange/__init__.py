@@ -1,1 +1,1 @@
-"""Files of other programs: cable files, MuJoCo, CASPR."""
+"""Cable files, and files of other programs: MuJoCo and CASPR."""

@@ -1,4 +1,4 @@
-"""Cables as TOML: where each passes, of what wire it is and how it is pulled."""
+"""Write and read cables as TOML: sites, wire, lead, spring, control and tension bounds."""
 
 from __future__ import annotations
 
@@ -63,14 +63,14 @@ class _Entries:
 
 
 def write_cables(cables: Sequence[Cable], path: str | os.PathLike[str]) -> Path:
-    """Write cables as TOML; :func:`read_cables` gives equal ones back.
+    """Write cables to a TOML file. :func:`read_cables` returns equal cables.
 
     Args:
-        cables: One or more.
-        path: The file; replaced if it exists.
+        cables: One or more cables.
+        path: The file. An existing file is replaced.
 
     Raises:
-        InvalidInput: No cables, or an elasticity of a kind that no file can hold.
+        InvalidInput: No cables are given, or a file cannot hold an elasticity of this kind.
         FileError: The file cannot be written.
     """
     cables = sequence_of("cables", cables, Cable)
@@ -89,9 +89,10 @@ def write_cables(cables: Sequence[Cable], path: str | os.PathLike[str]) -> Path:
 def read_cables(path: str | os.PathLike[str]) -> tuple[Cable, ...]:
     """Read the cables of an arm from a TOML file.
 
-    A table ``[elasticities.NAME]`` for every wire, as :func:`~cdsm.read_elasticity` reads
-    it, and a table ``[[cables]]`` for every cable: ``name``, ``elasticity`` (such a NAME),
-    ``sites`` (at least two of ``{link = "…", xyz = [x, y, z]}``, [m]), and if wanted ``lead`` [m],
+    The file has one table ``[elasticities.NAME]`` per wire, in the form of
+    :func:`~cdsm.read_elasticity`, and one table ``[[cables]]`` per cable. A cable has ``name``,
+    ``elasticity`` (a NAME), and ``sites`` (two or more ``{link = "…", xyz = [x, y, z]}``, [m]).
+    Optional are ``lead`` [m] (the straight cable between its actuator and the base disk),
     ``series_stiffness`` [N/m], ``control`` (``"position"`` or ``"force"``), ``minimum`` and
     ``maximum`` [N].
 
@@ -99,7 +100,7 @@ def read_cables(path: str | os.PathLike[str]) -> tuple[Cable, ...]:
         path: The file.
 
     Raises:
-        FileError: The file cannot be read, or is no description of cables; every fault is listed.
+        FileError: The file cannot be read or does not describe cables. Every fault is listed.
     """
     text = read_text(path)
     try:

@@ -1,7 +1,7 @@
-"""Models of CASPR, the MATLAB simulator of cable-driven robots: their XML into a manipulator.
+"""Read models of CASPR, the MATLAB simulator of cable-driven robots, as a manipulator.
 
-CASPR (D. Lau et al., Cable-Driven Parallel Robots, Springer 2016) describes a robot by two files:
-rigid links, each with its joint, and sets of cables between points on them.
+CASPR (D. Lau et al., Cable-Driven Parallel Robots, Springer 2016) describes a robot by two XML
+files: rigid links with their joints, and sets of cables between points on the links.
 """
 
 from __future__ import annotations
@@ -42,31 +42,32 @@ def read_caspr(
 ) -> Manipulator:
     """Read a robot from its CASPR model files.
 
-    Links keep CASPR's names (or become ``link1``, ``link2``, … where a name is missing or used
-    twice), link 0 is called ``base``; a joint becomes single joints called after their link and
-    axis: ``link 1_x`` turns about x, ``link 1_slide_x`` moves along it. ``tool0`` sits at the end
-    of the link with the highest number. A cable whose name has been used gets ``#2`` behind it.
-    The joint coordinates q are CASPR's own, sign and order: link by link as the links are numbered,
-    and for each link as its joint type is named, ways first (``S_FIXED_XYZ``: the angles x, y, z;
-    ``PLANAR_XZ``: the ways x and z, then the angle). ``joint_names`` of the arm lists them.
-    Force bounds become ``Cable.minimum`` and ``.maximum``.
-    CASPR's cables do not stretch: their elasticity is up to you.
+    Links keep CASPR's names. A link becomes ``link1``, ``link2``, … if its name is missing or used
+    twice. Link 0 is called ``base``. Each CASPR joint is split into single joints. Their names have
+    the link and the axis: ``link 1_x`` turns about x, ``link 1_slide_x`` moves along x. ``tool0``
+    is at the end of the link with the highest number. A repeated cable name gets the suffix ``#2``.
+
+    The joint coordinates q have CASPR's sign and order: link by link in the order of the numbers,
+    and within a link as in the name of its joint type, translations first (``S_FIXED_XYZ``: angles
+    x, y, z; ``PLANAR_XZ``: translations x and z, then the angle). ``joint_names`` lists them. Force
+    bounds become ``Cable.minimum`` and ``.maximum``. CASPR's cables do not stretch, so you choose
+    their elasticity.
 
     Args:
-        bodies: The file of the bodies, or the folder with one ``*_bodies.xml`` and one
-            ``*_cables.xml``.
-        cables: The file of the cables, if ``bodies`` is a file.
-        elasticity: Of all cables.
-        cable_set: Which set of cables; the file's default if not given.
-        gravity: In base axes (3,) [m/s²].
+        bodies: File of the bodies, or folder with one ``*_bodies.xml`` and one ``*_cables.xml``.
+        cables: File of the cables, if ``bodies`` is a file.
+        elasticity: Elasticity of all cables.
+        cable_set: Name of the set of cables; the file's default if not given.
+        gravity: Gravity in base axes (3,) [m/s²].
         check_inertia: As for :meth:`Manipulator.from_urdf`.
 
     Raises:
-        FileError: A file cannot be read or is no CASPR model, or has what cannot be mapped: other
-            joints, other cables than ideal ones, pulleys. Every such thing is named.
-        UrdfError: A link has moments of inertia that no body has.
-        UnknownName: No such set of cables.
-        CableError: A cable that cannot be routed.
+        InvalidInput: ``elasticity`` is not an Elasticity, or ``cables`` is missing.
+        FileError: A file cannot be read, is not a CASPR model, or has parts that cannot be mapped:
+            other joints, cables that are not ideal, pulleys. Every such part is named.
+        UrdfError: A link has impossible moments of inertia.
+        UnknownName: The set of cables does not exist.
+        CableError: A cable cannot be routed.
     """
     if not isinstance(elasticity, Elasticity):
         raise InvalidInput("elasticity", f"{elasticity!r} given; an Elasticity is needed.")
@@ -110,7 +111,7 @@ def _files(
 def _read_cables(
     path: Path, bodies: Sequence[Body], elasticity: Elasticity, wanted: str | None
 ) -> tuple[Cable, ...]:
-    """The cables of the wanted set, or of the file's default."""
+    """Read the cables of the wanted set, or of the default set of the file."""
     root = read_root(path, "cables", "cables")
     sets = {str(each.get("id")): each for each in root.findall("cable_set")}
     name = root.get("default_cable_set") if wanted is None else wanted
@@ -133,9 +134,9 @@ def _read_cables(
 
 
 def _unique(name: str, used: dict[str, int]) -> str:
-    """The name, with a number behind it if it is used already: in CASPR names may repeat.
+    """Return the name, with a number if it is used already: in CASPR names may repeat.
 
-    ``used`` holds the highest number behind each name so far, and is updated.
+    ``used`` holds the highest number of each name so far. It is updated.
     """
     label, count = name, used.get(name, 1)
     while label in used:
@@ -185,7 +186,7 @@ def _cable(
 
 
 def _urdf(name: str, bodies: Sequence[Body]) -> str:
-    """URDF text; ``tool0`` sits at the end of the last link."""
+    """Write the URDF text. ``tool0`` is at the end of the last link."""
     import yourdfpy  # slow to import
 
     links, joints = [yourdfpy.Link(name=BASE)], []
@@ -193,7 +194,7 @@ def _urdf(name: str, bodies: Sequence[Body]) -> str:
     for body in bodies:
         parent, place = names[body.parent], body.place
         for i, (kind, label, axis, low, high) in enumerate(body.joints, start=1):
-            # several joints of one link need links without mass between them
+            # single joints of one link need massless links between them
             child = body.name if i == len(body.joints) else f"{body.name}_{i}"
             joints.append(
                 yourdfpy.Joint(
@@ -226,7 +227,7 @@ def _urdf(name: str, bodies: Sequence[Body]) -> str:
 
 
 def _shift(place: Array) -> Array:
-    """The transform (4, 4) of a translation."""
+    """Return the transform (4, 4) of a translation."""
     transform = np.eye(4)
     transform[:3, 3] = place
     return transform

@@ -1,4 +1,4 @@
-"""The links of a CASPR model, each with the joint that carries it, and the XML helpers."""
+"""Read the links of a CASPR model with their joints, and helpers for its XML."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from lxml import etree
 
 _TEMPLATE: Final = r"(\.\./)*templates/{}\.dtd"
-"""What CASPR's files name as their DTD; it is not read."""
+"""DTD named by CASPR's files (a regular expression). It is not read."""
 
 BASE: Final = "base"
 """Name of link 0."""
@@ -43,29 +43,29 @@ _JOINTS: Final[Mapping[str, tuple[tuple[str, str], ...]]] = {
     "T_XYZ": tuple((SLIDES, a) for a in "XYZ"),
     "SPATIAL_EULER_XYZ": (*((SLIDES, a) for a in "XYZ"), *((TURNS, a) for a in "XYZ")),
 }
-"""Joint types of CASPR as single joints, from the parent on."""
+"""Single joints of each CASPR joint type, in the order from parent to link."""
 
 _ORDER: Final = {"S_FIXED_XYZ": (2, 1, 0)}
-"""Which of CASPR's coordinates each single joint is, where not in the same order.
+"""Index of CASPR's coordinate for each single joint, where the order differs.
 
-Turns about fixed axes X, then Y, then Z are turns about moving axes Z, then Y, then X.
+Rotations about fixed axes X, Y, Z equal rotations about moving axes Z, Y, X.
 """
 
 
 @dataclass(frozen=True)
 class Body:
-    """A link of CASPR with the joint that carries it.
+    """Link of CASPR with the joint that carries it.
 
     Attributes:
-        number: From 1; 0 is the base.
-        name: Of the link, unique.
-        joints: Kind, name, axis and limits of each single joint, from the parent on.
-        joint_names: Their names, in the order of CASPR's coordinates.
-        parent: Number of the parent.
-        place: Where the joint sits on the parent (3,) [m].
-        mass: [kg].
-        centre: Centre of mass from the joint (3,) [m].
-        inertia: About it (3, 3) [kg m²].
+        number: Number from 1. The base has number 0.
+        name: Unique name of the link.
+        joints: Kind, name, axis and limits of each single joint, in order from the parent.
+        joint_names: Names of the single joints, in the order of CASPR's coordinates.
+        parent: Number of the parent link.
+        place: Position of the joint on the parent (3,) [m].
+        mass: Mass [kg].
+        centre: Centre of mass, from the joint (3,) [m].
+        inertia: Inertia about the centre of mass (3, 3) [kg m²].
         end: End of the link (3,) [m].
     """
 
@@ -82,7 +82,7 @@ class Body:
 
 
 def read_bodies(path: Path) -> tuple[Body, ...]:
-    """The links, in the order of their numbers from 1."""
+    """Read the links, in the order of their numbers from 1."""
     faults: list[str] = []
     root = read_root(path, "bodies_system", "bodies")
     holders = root.findall("links")
@@ -188,7 +188,7 @@ def _inertia(element: etree._Element, name: str, mass: float, centre: Array) -> 
 
 
 def text_of(element: etree._Element, name: str, path: str) -> str:
-    """Text of the element at the path below that of the link of this name."""
+    """Read the text at a path below the element of a link. Raise XmlFault if it is missing."""
     found = element.findtext(path)
     if found is None:
         raise XmlFault(f"{name}: has no <{path.replace('/', '> <')}>")
@@ -196,7 +196,7 @@ def text_of(element: etree._Element, name: str, path: str) -> str:
 
 
 def whole(where: str, text: str | None) -> int:
-    """A whole number; ``where`` is for the error."""
+    """Parse a whole number. ``where`` names the place in the error."""
     (value,) = numbers(where, text, 1)
     if value != int(value):
         raise XmlFault(f"{where}: {value:g} given; a whole number is needed")
@@ -204,13 +204,13 @@ def whole(where: str, text: str | None) -> int:
 
 
 def refuse(path: Path, faults: Sequence[str]) -> None:
-    """Raise a FileError of all faults, if there are any."""
+    """Raise a FileError that lists all faults, if there are any."""
     if faults:
         raise FileError(path, f"cannot be read as a CASPR model, {counted(faults, most=20)}")
 
 
 def read_root(path: Path, tag: str, template: str) -> etree._Element:
-    """The root of a file."""
+    """Read the root element of a file."""
     try:
         return parse_xml(read_text(path), tag, _TEMPLATE.format(template))
     except XmlFault as error:

@@ -1,14 +1,14 @@
-"""To MuJoCo: the arm as MJCF, its cables as spatial tendons that hold the tensions given.
+"""Export the arm to MuJoCo (MJCF). Its cables become spatial tendons with given tensions.
 
-MuJoCo knows springs of constant stiffness. So the model is the arm at one posture: each cable is a
-spring of the tangent stiffness k that it has there, of the rest length at which it pulls with F,
+MuJoCo has springs of constant stiffness, so the model is valid near one posture. Each cable is a
+spring with the tangent stiffness k of the cable there. Its rest length gives the tension F:
 
-    F = k (L − L_rest),    L_rest = L(q) − F/k,
+    F = k (L − L_rest),    L_rest = L(q) − F/k
 
-slack below it. Near the posture this is the arm itself; further away the elasticity would change.
+Below L_rest the cable is slack. Away from the posture, the elasticity would change.
 
-MuJoCo takes these springs explicitly: its step dt diverges from ω·dt = 2 on, ω the highest natural
-frequency. The file states a step of ω·dt ≤ 0.2, at which frequencies are right within 0.2 %.
+MuJoCo integrates these springs explicitly. Its step dt diverges from ω·dt = 2 on, with ω the
+highest natural frequency. The file sets ω·dt ≤ 0.2, where frequencies are right within 0.2 %.
 """
 
 from __future__ import annotations
@@ -39,23 +39,23 @@ A body without mass in the URDF gets these, and its weight is compensated.
 """
 
 _SMALLEST = 1e-12
-"""Mass [kg] below which a body counts as having none; and moment of inertia [kg m²], likewise."""
+"""A smaller mass [kg] or moment of inertia [kg m²] of a body counts as zero."""
 
 _ROUNDING = 1e-9
-"""Relative distance from what MuJoCo refuses: a moment of inertia above the sum of the others.
+"""Relative margin to moments that MuJoCo refuses: one above the sum of the other two.
 
-The moments of a plate get there by rounding.
+The moments of a plate may exceed the sum by rounding.
 """
 
 _DEFAULT_STEP = 2e-3
 """MuJoCo's own time step [s]."""
 
 _PHASE = 0.2
-"""ω·dt [rad] of the highest natural frequency ω, at most."""
+"""Largest ω·dt [rad], with ω the highest natural frequency."""
 
 _JOINTS = {"revolute": "hinge", "prismatic": "slide"}
-_SITE = 1e-3  # radius [m] in which a hole is drawn
-_CABLE = 5e-4  # likewise a cable
+_SITE = 1e-3  # radius [m] of a drawn hole
+_CABLE = 5e-4  # radius [m] of a drawn cable
 
 
 def to_mjcf(
@@ -65,33 +65,34 @@ def to_mjcf(
     *,
     damping: float = 0.0,
 ) -> str:
-    """The arm as MJCF text, which MuJoCo loads unchanged.
+    """Write the arm as MJCF text, which MuJoCo loads unchanged.
 
-    Bodies are called as the links, joints as the joints, tendons as the cables; the sites of a
-    cable ``name/1``, ``name/2``, …, and ``tool0`` at the tip. The keyframe ``pose`` is the posture.
-    Leads are left out: they change no length. Force-controlled cables are actuators of constant
-    force, and so are springs softer than F/L, which no rest length makes, of force and stiffness.
-    A wrench is not part of the model: MuJoCo takes it at run time, as ``xfrc_applied``.
+    Bodies, joints and tendons have the names of links, joints and cables. The sites of a cable are
+    ``name/1``, ``name/2``, …; the site at the tip is ``tool0``. The keyframe ``pose`` holds the
+    posture. A lead (the straight cable between its actuator and the base disk) is left out, because
+    its length is constant. Force-controlled cables are actuators of constant force. Springs softer
+    than F/L would need a negative rest length; they are actuators of force and stiffness. The model
+    does not contain the wrench: give it to MuJoCo at run time, as ``xfrc_applied``.
 
-    The time step dt is 1, 2 or 5 times a power of ten [s], at most 0.2/ω and MuJoCo's own 2 ms. ω
-    is the highest natural frequency, K_θ φ = ω² M φ. M is that of the bodies as exported: where the
-    URDF has no mass they have 1e-6 kg and 1e-9 kg m², so an arm of massless links needs steps of
-    microseconds. Where K_θ is not positive definite the model leaves the posture by itself: a
-    comment on top of it says UNSTABLE, and :attr:`Stiffness.is_stable
+    The time step dt is 1, 2 or 5 times a power of ten [s], at most 0.2/ω and at most MuJoCo's 2 ms.
+    ω is the highest natural frequency, K_θ φ = ω² M φ. M belongs to the exported bodies. Moving
+    bodies without mass in the URDF get 1e-6 kg and 1e-9 kg m², so an arm of massless links needs
+    steps of microseconds. If K_θ is not positive definite, the model leaves the posture by itself.
+    Then a comment at the top says UNSTABLE, and :attr:`Stiffness.is_stable
     <cdsm.Stiffness.is_stable>` is false.
 
     Args:
         arm: The arm.
-        pose: Where the tendons hold the tensions; the straight arm without any if not given.
-        tension: F there: the answer of :func:`~cdsm.distribute_tension`, or (C,) [N].
-        damping: Of every joint [N m s/rad], so that a simulation settles; MuJoCo integrates it
-            implicitly, so that the time step need not be smaller for it.
+        pose: Posture of the tensions. If not given, the tendons have no tension.
+        tension: F at this posture: a result of :func:`~cdsm.distribute_tension`, or (C,) [N].
+        damping: Damping of every joint [N m s/rad], so that a simulation settles. MuJoCo integrates
+            it implicitly, so it does not need a smaller time step.
 
     Raises:
         InvalidInput: Only one of ``pose`` and ``tension`` is given, the posture is of another arm,
-            or an argument is not what it must be.
+            or an argument is invalid.
         ElasticityRangeError: A tension is outside the domain of its cable's elasticity.
-        SingularMass: A motion of the arm moves no link of any mass.
+        SingularMass: A motion of the arm moves no link with mass.
     """
     instance("arm", arm, Manipulator)
     if (pose is None) != (tension is None):
@@ -107,7 +108,7 @@ def to_mjcf(
     if K is not None and not K.is_stable:
         root.append(etree.Comment(f" {instability(K)} "))
     etree.SubElement(root, "compiler", angle="radian", autolimits="true", inertiafromgeom="false")
-    # implicit in velocities alone: what is implicit in positions as well takes energy from springs
+    # implicit in velocities only: integrators implicit in positions take energy from springs
     option = etree.SubElement(root, "option", gravity=_row(arm.gravity), integrator="implicitfast")
     order, masses = _bodies(root, arm, damping)
     option.set("timestep", repr(_DEFAULT_STEP if K is None else _time_step(K, masses)))
@@ -130,11 +131,11 @@ def write_mjcf(
     *,
     damping: float = 0.0,
 ) -> Path:
-    """Write :func:`to_mjcf` to a file, whole or not at all; return its path.
+    """Write the text of :func:`to_mjcf` to a file, completely or not at all. Return its path.
 
     Args:
         arm: As for :func:`to_mjcf`.
-        path: The file; replaced if it exists.
+        path: The file. An existing file is replaced.
         pose: As for :func:`to_mjcf`.
         tension: As for :func:`to_mjcf` [N].
         damping: As for :func:`to_mjcf` [N m s/rad].
@@ -147,7 +148,7 @@ def write_mjcf(
 
 
 def instability(K: Stiffness) -> str:
-    """The warning for an arm that is not stable."""
+    """Write the warning for an unstable arm."""
     unit = K.posture.arm.stiffness_unit()
     return (
         f"UNSTABLE: the smallest eigenvalue of K_θ is {K.margin:.4g} {unit}; the arm leaves this "
@@ -156,7 +157,7 @@ def instability(K: Stiffness) -> str:
 
 
 def _time_step(K: Stiffness, masses: list[Carried]) -> float:
-    """A step [s] for the fastest motion, rounded down to 1, 2 or 5 times a power of ten."""
+    """Choose a time step [s] for the fastest motion: 1, 2 or 5 times a power of ten."""
     omega = fastest(K, mass_matrix(K.posture, masses))
     if omega * _DEFAULT_STEP <= _PHASE:
         return _DEFAULT_STEP
@@ -171,7 +172,7 @@ def _time_step(K: Stiffness, masses: list[Carried]) -> float:
 def _bodies(
     root: etree._Element, arm: Manipulator, damping: float
 ) -> tuple[list[str], list[Carried]]:
-    """Add the tree of links; return the joints in MuJoCo's order, and the masses of the links."""
+    """Add the tree of links. Return the joints in MuJoCo's order, and the link masses."""
     robot = parse_xml(arm.urdf, "robot")
     links = {str(link.get("name")): link for link in robot.findall("link")}
     joints = robot.findall("joint")
@@ -187,7 +188,7 @@ def _bodies(
     sites[arm.tip_link].append(("tool0", (0.0, 0.0, 0.0)))
 
     world = etree.SubElement(root, "worldbody")
-    # MuJoCo's own root is called world, and no other body may be
+    # MuJoCo reserves the name world for its root
     bodies = {base: world if base == "world" else etree.SubElement(world, "body", name=base)}
     moving, queue = {base: False}, [base]
     masses: list[Carried] = []
@@ -220,14 +221,14 @@ def _joint(joint: etree._Element, kind: str, damping: float) -> etree._Element:
 
 
 def _inertial(body: etree._Element, link: etree._Element, moves: bool) -> list[Carried]:
-    """Give a body the mass of its link, or a stand-in if it moves; return what it has."""
+    """Give a body the mass of its link, or a tiny mass if it moves without. Return the mass."""
     inertial = link.find("inertial")
     mass = 0.0 if inertial is None else float(inertial.find("mass").get("value"))
     if inertial is not None and mass > _SMALLEST:
         place, turn = _origin(inertial)
         tensor = _inertia(inertial.find("inertia"), turn.as_matrix())
     elif moves:
-        # a stand-in mass, without weight
+        # tiny mass, its weight compensated
         body.set("gravcomp", "1")
         mass, place, tensor = _MASS, np.zeros(3), _INERTIA * np.eye(3)
     else:
@@ -238,14 +239,14 @@ def _inertial(body: etree._Element, link: etree._Element, moves: bool) -> list[C
 
 
 def _inertia(inertia: etree._Element, R: Array) -> Array:
-    """I (3, 3) in the frame of the link, adjusted to what MuJoCo takes; statics does not use it."""
+    """Compute I (3, 3) in the link frame, adjusted to the limits of MuJoCo (not for statics)."""
     xx, yy, zz, xy, xz, yz = (
         float(inertia.get(key)) for key in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
     )
     tensor: Array = R @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ R.T
     moments, axes = np.linalg.eigh(tensor)
     taken = np.maximum(moments, _INERTIA) if moments[0] < _SMALLEST else moments.copy()
-    # a needle first: the largest moment must not come below the second
+    # first correct a needle: the largest moment must not fall below the second
     taken[0] = max(taken[0], 2.0 * _ROUNDING * taken[1])
     taken[2] = min(taken[2], (1.0 - _ROUNDING) * (taken[0] + taken[1]))
     if (taken == moments).all():
@@ -254,7 +255,7 @@ def _inertia(inertia: etree._Element, R: Array) -> Array:
 
 
 def _shape(body: etree._Element, visual: etree._Element) -> None:
-    """Draw cylinders, boxes and spheres. Meshes are separate files, and are left out."""
+    """Draw cylinders, boxes and spheres. Meshes are separate files and are left out."""
     geometry = visual.find("geometry")
     shape = None if geometry is None or not len(geometry) else geometry[0]
     if shape is None or shape.tag not in ("cylinder", "box", "sphere"):

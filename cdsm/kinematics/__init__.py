@@ -1,1 +1,1 @@
-"""Joint angles from tip poses and from cable lengths."""
+"""Inverse kinematics: joint angles from tip poses or from cable lengths."""

@@ -1,11 +1,12 @@
-"""Kinematic maps: joint angles from cable lengths, and from where the tip is wanted.
+"""Inverse kinematics: joint angles from cable lengths, and joint angles from the tip.
 
-The third, cable lengths from joint angles, is :meth:`~cdsm.Manipulator.cable_lengths`.
+Cable lengths from joint angles are computed by :meth:`~cdsm.Manipulator.cable_lengths`. A length
+includes the lead, which is the straight cable between its actuator and the base disk.
 
-Both maps may have many solutions, one or none. Of many, the one nearest a guess is returned. If
-there is none, the nearest that the arm can do is returned, and its ``reachable`` is false. All
-solutions are within the joint limits. Where disks touch at a limit and their holes meet, they keep
-1e-5 of the limit away from it, because a cable has no direction there.
+Each problem may have many solutions, one or none. From many solutions, the one nearest to a guess
+is returned. If there is none, the arm's best approximation is returned with ``reachable`` false.
+All solutions are within the joint limits. If disks touch at a limit and their holes coincide, a
+cable has no direction. Solutions then stay away from the limit by 1e-5 of it.
 """
 
 from __future__ import annotations
@@ -34,30 +35,30 @@ from cdsm.support.validation import (
 )
 
 _TOLERANCE = 1e-9
-"""Default tolerance: lengths and positions over the arm's length, and angles in rad."""
+"""Default tolerance: lengths and positions in arm lengths, and angles in rad."""
 
 _SMALLEST_TOLERANCE = 1e-12
-"""Of a chain of 40 joints, rounding takes some 1e-14."""
+"""Smallest tolerance. Rounding of a chain of 40 joints is about 1e-14."""
 
 _RIGID = 1e-9
-"""Largest entry of RᵀR − 1 that is rounding."""
+"""Largest entry of RᵀR − 1 that counts as rounding."""
 
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class JointSolution(ReadOnlyState):
-    """Joint angles that give an arm certain cable lengths; made by :func:`solve_joint_angles`.
+    """Joint angles for given cable lengths; made by :func:`solve_joint_angles`.
 
     All arrays are read-only.
 
     Attributes:
         arm: The arm.
-        cable_lengths: The lengths asked for (C,) [m], lead included.
-        guess: Where they were searched from (nv,) [rad].
-        angles: Joint angles (nv,) [rad], within the limits.
-        lengths: L (C,) [m] at these angles: those asked for, or the nearest the arm can have.
-        tolerance: Misfit up to which they count as reached, in arm lengths [-].
-        iterations: How often L was evaluated.
+        cable_lengths: Wanted cable lengths (C,) [m], lead included.
+        guess: Joint angles at which the search started (nv,) [rad].
+        angles: Joint angles of the solution (nv,) [rad], within the limits.
+        lengths: Cable lengths L (C,) [m] at ``angles``: the wanted lengths, or the nearest ones.
+        tolerance: Largest misfit at which the lengths count as reached, in arm lengths [-].
+        iterations: Number of evaluations of L.
     """
 
     arm: Manipulator
@@ -70,31 +71,31 @@ class JointSolution(ReadOnlyState):
 
     @cached_property
     def residual(self) -> Array:
-        """Lengths at these angles less those asked for (C,) [m]."""
+        """Cable lengths at the solution less the wanted lengths (C,) [m]."""
         return frozen(self.lengths - self.cable_lengths)
 
     @property
     def reachable(self) -> bool:
-        """Whether the root of the summed squares of :attr:`residual` is within the tolerance."""
+        """Whether the norm of :attr:`residual` over the arm length is within the tolerance."""
         misfit = float(np.linalg.norm(self.residual)) / self.arm.length
         return misfit <= self.tolerance
 
     @cached_property
     def posture(self) -> Posture:
-        """The arm at these angles."""
+        """Posture of the arm at ``angles``."""
         return self.arm.at(self.angles)
 
     @property
     def redundancy(self) -> int:
-        """How many joint motions change no cable length, nv − rank J_L; 0: the angles are unique.
+        """Number of joint motions that change no cable length: nv − rank J_L.
 
-        Unique in a neighbourhood, and as far as no limit is active.
+        If it is 0 and no limit is active, the angles are unique in a neighbourhood.
         """
         return self.arm.nv - int(np.linalg.matrix_rank(self.posture.length_jacobian))
 
     @property
     def at_limit(self) -> tuple[str, ...]:
-        """Names of the joints that stand at a limit."""
+        """Names of the joints at a limit."""
         return _at_limit(self.arm, self.angles)
 
     def __repr__(self) -> str:
@@ -123,13 +124,12 @@ class KinematicSolution(ReadOnlyState):
 
     Attributes:
         arm: The arm.
-        target: Where the tip is wanted: a position (3,) [m] or a pose (4, 4), translation in m.
-        guess: The joint angles wanted near (nv,) [rad].
-        angles: Joint angles (nv,) [rad], within the limits.
-        tip: Pose of ``tool0`` (4, 4) at these angles, translation in m: the target, or the nearest
-            to it that the arm can do.
-        tolerance: Misfit up to which the target counts as reached, in arm lengths and rad [-].
-        iterations: How often the tip was evaluated.
+        target: Wanted position (3,) [m] or pose (4, 4) of the tip, translation in m.
+        guess: Joint angles that the solution should be near (nv,) [rad].
+        angles: Joint angles of the solution (nv,) [rad], within the limits.
+        tip: Pose of ``tool0`` (4, 4) at ``angles``, translation in m: the target or the nearest.
+        tolerance: Largest misfit at which the target counts as reached, in arm lengths and rad [-].
+        iterations: Number of evaluations of the tip.
     """
 
     arm: Manipulator
@@ -148,7 +148,7 @@ class KinematicSolution(ReadOnlyState):
 
     @property
     def orientation_error(self) -> float:
-        """Angle between the tip and the target [rad]; 0 if only a position was asked for."""
+        """Angle between tip and target orientation [rad]; 0 if the target is a position."""
         if self.target.ndim == 1:
             return 0.0
         return float(np.linalg.norm(rotation_vector(self.tip[:3, :3] @ self.target[:3, :3].T)[0]))
@@ -161,12 +161,12 @@ class KinematicSolution(ReadOnlyState):
 
     @cached_property
     def posture(self) -> Posture:
-        """The arm at these angles."""
+        """Posture of the arm at ``angles``."""
         return self.arm.at(self.angles)
 
     @property
     def at_limit(self) -> tuple[str, ...]:
-        """Names of the joints that stand at a limit."""
+        """Names of the joints at a limit."""
         return _at_limit(self.arm, self.angles)
 
     def __repr__(self) -> str:
@@ -186,26 +186,26 @@ def solve_joint_angles(
     *,
     tolerance: float = _TOLERANCE,
 ) -> JointSolution:
-    """Joint angles from cable lengths: min ‖L(θ) − L‖² within the joint limits (Eq. 5).
+    """Find joint angles from cable lengths: min ‖L(θ) − L‖² within the joint limits (Eq. 5).
 
-    Where the cables leave joints undetermined, of all angles with these lengths those nearest the
-    guess are taken: min ½‖θ − guess‖².
+    If many angles give these lengths, those with min ½‖θ − guess‖² are returned.
 
     Args:
         arm: The arm.
         cable_lengths: L (C,) [m], lead included, in the order of ``arm.cables``.
-        guess: Where to search from (nv,) [rad], within the limits; the straight arm if not given.
-        tolerance: Misfit √Σ(L(θ) − L)² over the arm's length [-] up to which the lengths are
-            called reachable. Measured lengths are never met exactly: give their error.
+        guess: Start of the search (nv,) [rad], within the limits; the straight arm if not given.
+        tolerance: Largest misfit √Σ(L(θ) − L)² over the arm's length [-] at which the lengths count
+            as reachable. For measured lengths, give their error: an exact fit does not exist.
 
     Returns:
-        The angles. If the arm cannot have these lengths, ``reachable`` is false, and ``angles`` and
-        ``lengths`` are the nearest it can have: no neighbouring posture, and none of those that a
-        dozen other starts lead to, has a smaller misfit.
+        The solution. If the arm cannot have these lengths, ``reachable`` is false, and ``angles``
+        and ``lengths`` have the least misfit found: no neighbouring posture, and no search from a
+        dozen other starts, gives a smaller misfit.
 
     Raises:
-        InvalidInput: Wrong shape, not numbers, a length not positive, or a guess beyond the limits.
-        CableError: The search met a posture at which two sites of a cable coincide.
+        InvalidInput: ``cable_lengths`` or ``guess`` has a wrong shape or is not numbers, a length
+            is not positive, the guess is beyond the limits, or ``tolerance`` is not in 1e-12 … 1.
+        CableError: Two sites of a cable coincide at a posture of the search.
     """
     guess = _checked_guess(instance("arm", arm, Manipulator), guess)
     wanted = vector("cable_lengths", cable_lengths, len(arm.cables), "one length [m] per cable")
@@ -238,26 +238,27 @@ def inverse_kinematics(
     *,
     tolerance: float = _TOLERANCE,
 ) -> KinematicSolution:
-    """Joint angles from the tip: min ½‖θ − guess‖² so that tip(θ) = target, in the limits (Eq. 7).
+    """Find joint angles for a tip target: min ½‖θ − guess‖² so that tip(θ) = target (Eq. 7).
 
-    Of the many ways a redundant arm can reach its target this is the nearest to the guess, at
-    least in a neighbourhood: θ − guess has no part in the null space of the Jacobian, but for
-    joints at a limit.
+    The angles are within the joint limits. A redundant arm reaches its target in many ways. This
+    solution is the nearest to the guess, at least in a neighbourhood: except for joints at a limit,
+    θ − guess has no component in the null space of the tip Jacobian.
 
     Args:
         arm: The arm.
-        target: Where ``tool0`` is wanted, base axes: a position (3,) [m], or a pose (4, 4) with
-            translation in m, as ``pose.tip`` is.
-        guess: The angles wanted near (nv,) [rad], within the limits; the straight arm if not given.
-        tolerance: Misfit up to which the target is called reachable, see ``Returns`` [-].
+        target: Position (3,) [m] of ``tool0`` or pose (4, 4) like ``pose.tip`` [m], base axes.
+        guess: Joint angles that the solution should be near (nv,) [rad], within the limits; the
+            straight arm if not given.
+        tolerance: Largest misfit at which the target counts as reachable, see ``Returns`` [-].
 
     Returns:
-        The angles. If the arm cannot reach the target, ``reachable`` is false, and ``angles`` and
-        ``tip`` are the nearest it can do by √(position error²/arm length² + orientation error²):
-        no neighbouring posture, and none of those that a dozen other starts lead to, has less.
+        The solution. The misfit is √(position error²/arm length² + orientation error²). If the arm
+        cannot reach the target, ``reachable`` is false, and ``angles`` and ``tip`` have the least
+        misfit found: no neighbouring posture, and no search from a dozen other starts, has less.
 
     Raises:
-        InvalidInput: Wrong shape, not numbers, not a rigid transform, or a guess beyond the limits.
+        InvalidInput: ``target`` or ``guess`` has a wrong shape or is not numbers, the target is not
+            a rigid transform, the guess is beyond the limits, or ``tolerance`` is not in 1e-12 … 1.
     """
     guess = _checked_guess(instance("arm", arm, Manipulator), guess)
     target = _checked_target(target)
@@ -341,7 +342,7 @@ def _verdict(reachable: bool) -> str:
 
 
 def _angle_rows(arm: Manipulator, angles: Array) -> list[str]:
-    """A table of the joint angles, with a mark at those that stand at a limit."""
+    """Write a table of the joint angles. Mark the joints at a limit."""
     at_limit = _at_limit(arm, angles)
     rows = [
         f"{joint:<12}{angle:>z14.6f}{'  at limit' if joint in at_limit else ''}"

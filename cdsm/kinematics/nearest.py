@@ -1,21 +1,21 @@
-"""Inverse kinematics: the joint angles nearest a guess among those with the least residual.
+"""Inverse kinematics: find the joint angles nearest to a guess with the least residual.
 
-A residual r(q) is dimensionless. Of the joint angles with r = 0 the solution solves
+The residual r(q) is dimensionless. If r = 0 is possible, the solution solves
 
-    min ½‖q − guess‖²   so that   r(q) = 0   and   lower ≤ q ≤ upper,
+    min ½‖q − guess‖²   so that   r(q) = 0   and   lower ≤ q ≤ upper.
 
-and where there are none, it has the least ½‖r‖². Both are the limit ε → 0 of
+Otherwise it has the least ½‖r‖². Either solution is the limit ε → 0 of
 
-    min ½‖r‖² + ½ε‖q − guess‖²   so that   lower ≤ q ≤ upper,
+    min ½‖r‖² + ½ε‖q − guess‖²   so that   lower ≤ q ≤ upper.
 
-a least-squares problem of full rank, however many joints are redundant and however many equations
-are. scipy solves it for falling ε, each from the last, so that the search goes out from the guess.
-Newton's method, with the limits held that the search ends on, then takes the step to ε = 0.
+This least-squares problem has full rank, even with redundant joints or redundant equations. scipy
+solves it for falling ε. The first search starts at the guess, each other at the last solution.
+Newton's method then takes the step to ε = 0. It holds the joints that rest on limits.
 
-Of 108 poses that arms of 3 to 20 joints can reach, this reached all, to rounding, and all solutions
-meet the conditions for nearest. SLSQP reached 56, and 103 from a least-squares solution; quadratic
-programs in sequence (DAQP) 83. pink weighs the target against the posture: it came within 1e-6 of
-93, or within 1e-9 of 102 of which 20 were nearest.
+In a test with 108 reachable poses of arms of 3 to 20 joints, this method reached all poses to
+rounding, and all solutions meet the conditions for nearest. SLSQP reached 56, and 103 from a
+least-squares solution. Sequential quadratic programs (DAQP) reached 83. pink weighs the target
+against the posture: it came within 1e-6 of 93, or within 1e-9 of 102 (only 20 of them nearest).
 """
 
 from __future__ import annotations
@@ -31,43 +31,43 @@ from scipy.optimize import least_squares
 from cdsm.support.validation import Array
 
 Limits = NDArray[np.int_]
-"""Which limit each joint rests on (nv,): −1 the lower, 1 the upper, 0 none."""
+"""Limits on which the joints rest (nv,): −1 lower, 1 upper, 0 none."""
 
-# fewer stages end at an answer farther from the guess more often, more only take longer
+# fewer stages more often end far from the guess, more stages only take longer
 _WEIGHTS = (1e-2, 1e-4, 1e-6, 1e-8)
-"""The falling ε."""
+"""Falling values of ε."""
 
 _STARTS = 12
-"""Random postures to search from where the guess leads to no solution."""
+"""Number of random postures to search from, if the guess leads to no solution."""
 
 _NEAR = 1e-6
-"""A residual this small may turn out to be zero."""
+"""Below this residual, the exact solution r = 0 is tried."""
 
 _SINGULAR, _FLAT = 1e-9, 1e-12
-"""Singular values, and eigenvalues, this part of the largest are zero."""
+"""Singular values and eigenvalues below this share of the largest count as zero."""
 
 _LONGEST, _ATTEMPTS = 0.2, 60
-"""Longest step of Newton's method [rad], as a curvature holds no further, and most steps."""
+"""Longest Newton step [rad], within which the curvature holds, and largest number of steps."""
 
 _CONVERGED = 1e-11
-"""Residual and gradient at which Newton's method has converged; it usually gets to 1e-15."""
+"""Newton's method has converged below this residual and gradient. It usually reaches 1e-15."""
 
 
 class Residual(Protocol):
-    """A dimensionless residual r (m,) of joint angles q (nv,)."""
+    """Dimensionless residual r (m,) of joint angles q (nv,)."""
 
     def evaluate(self, q: Array) -> tuple[Array, Array]:
-        """Residual r (m,) and ∂r/∂q (m, nv)."""
+        """Compute r (m,) and ∂r/∂q (m, nv)."""
 
     def curvature(self, q: Array, weight: Array) -> Array:
-        """Σ_a weight_a ∂²r_a/∂q² (nv, nv) where r = 0."""
+        """Compute Σ_a weight_a ∂²r_a/∂q² (nv, nv), valid where r = 0."""
 
     def hessian(self, q: Array) -> Array:
-        """Second derivative of ½‖r‖² (nv, nv), also where r is not zero."""
+        """Compute the second derivative of ½‖r‖² (nv, nv), valid for all r."""
 
 
 class InverseProblem(NamedTuple):
-    """A residual, the joint limits (nv,) and the guess (nv,) within them [rad]."""
+    """Residual, joint limits (nv,) [rad], and guess (nv,) [rad] within the limits."""
 
     residual: Residual
     lower: Array
@@ -75,12 +75,12 @@ class InverseProblem(NamedTuple):
     guess: Array
 
     def size(self, q: Array) -> float:
-        """‖r(q)‖."""
+        """Compute ‖r(q)‖."""
         return float(np.linalg.norm(self.residual.evaluate(q)[0]))
 
 
 class InverseSolution(NamedTuple):
-    """Joint angles (nv,) [rad] within the limits, ‖r‖ there, and how often r was evaluated."""
+    """Joint angles (nv,) [rad] within the limits, their ‖r‖, and the number of evaluations of r."""
 
     angles: Array
     size: float
@@ -88,10 +88,10 @@ class InverseSolution(NamedTuple):
 
 
 def nearest(problem: InverseProblem, tolerance: float) -> InverseSolution:
-    """The joint angles nearest the guess with ‖r‖ up to a tolerance, or else with the least.
+    """Find the joint angles nearest to the guess with ‖r‖ within a tolerance, or with least ‖r‖.
 
-    Nearest in a neighbourhood: another way to fold the arm may be nearer. Where the guess leads to
-    no solution, random postures, always the same ones, are tried in turn.
+    They are nearest in a neighbourhood; another way to fold the arm may be nearer. If the guess
+    leads to no solution, random postures are tried in turn (always the same postures).
     """
     q, iterations = problem.guess, 0
     for weight in _WEIGHTS[:-1]:
@@ -105,18 +105,18 @@ def nearest(problem: InverseProblem, tolerance: float) -> InverseSolution:
             break
         other = _solve_from(problem, random.uniform(problem.lower, problem.upper))
         iterations += other.iterations
-        # the first is nearest the guess: another that is better by rounding alone is not wanted
+        # the first is nearest to the guess: ignore others that are better by rounding only
         if other.size < (1.0 - 1e-6) * best.size:
             best = other
     return best._replace(iterations=iterations)
 
 
 def _solve_from(problem: InverseProblem, start: Array) -> InverseSolution:
-    """The solution that a start leads to, to the last digit where Newton's method gets there."""
+    """Find the solution from a start, to the last digit if Newton's method converges."""
     q, held, iterations = _fit(problem, start, _WEIGHTS[-1], 1e-6)
     best, held, count = _active_set(_least_residual_step, problem, q, held)
     iterations += count
-    if best is None:  # singular: least squares alone must do
+    if best is None:  # singular: use least squares only
         best, held, count = _fit(problem, q, 1e-14, 1e-15)
         iterations += count
     if problem.size(best) < _NEAR:
@@ -130,7 +130,7 @@ def _solve_from(problem: InverseProblem, start: Array) -> InverseSolution:
 def _fit(
     problem: InverseProblem, start: Array, weight: float, tolerance: float
 ) -> tuple[Array, Limits, int]:
-    """Solve for one ε: joint angles, the limits they rest on, and the number of evaluations."""
+    """Solve for one ε. Return joint angles, limits they rest on, and number of evaluations."""
     residual, lower, upper, guess = problem
     root = math.sqrt(weight)
     regularisation = root * np.eye(guess.size)
@@ -139,7 +139,7 @@ def _fit(
         np.clip(start, lower, upper),
         lambda q: np.vstack([residual.evaluate(q)[1], regularisation]),
         bounds=(lower, upper),
-        method="dogbox",  # unlike trf it goes exactly onto a limit, and says which
+        method="dogbox",  # unlike trf, goes exactly onto a limit and reports it
         ftol=tolerance,
         xtol=tolerance,
         gtol=tolerance,
@@ -149,13 +149,13 @@ def _fit(
 
 
 class _NewtonStep(NamedTuple):
-    """A step of Newton's method for the free joints.
+    """Step of Newton's method for the free joints.
 
     Attributes:
-        move: The step (free,) [rad].
-        gradient: Derivative of the objective by all joint angles (nv,), constraints kept.
-        error: How far the joint angles are from optimal.
-        convex: Whether they are near a minimum, not a saddle.
+        move: Step (free,) [rad].
+        gradient: Gradient of the objective (or Lagrangian) by all joint angles (nv,).
+        error: Violation of the optimality conditions.
+        convex: Whether the joint angles are near a minimum, not a saddle.
     """
 
     move: Array
@@ -168,7 +168,7 @@ _Newton = Callable[[InverseProblem, Array, NDArray[np.bool_]], _NewtonStep]
 
 
 def _nearest_step(problem: InverseProblem, q: Array, free: NDArray[np.bool_]) -> _NewtonStep:
-    """Step to min ½‖q − guess‖² so that r = 0: the shortest to r = 0, then one along r = 0."""
+    """Compute the step to min ½‖q − guess‖² with r = 0: to r = 0, then along r = 0."""
     r, J = problem.residual.evaluate(q)
     away = q - problem.guess
     left, values, right = np.linalg.svd(J[:, free])
@@ -185,7 +185,7 @@ def _nearest_step(problem: InverseProblem, q: Array, free: NDArray[np.bool_]) ->
 
 
 def _least_residual_step(problem: InverseProblem, q: Array, free: NDArray[np.bool_]) -> _NewtonStep:
-    """Step to min ½‖r‖²."""
+    """Compute the step to min ½‖r‖²."""
     r, J = problem.residual.evaluate(q)
     gradient = r @ J
     move, convex = _downhill(problem.residual.hessian(q)[np.ix_(free, free)], gradient[free])
@@ -194,7 +194,7 @@ def _least_residual_step(problem: InverseProblem, q: Array, free: NDArray[np.boo
 
 
 def _downhill(H: Array, gradient: Array) -> tuple[Array, bool]:
-    """Step of Newton's method, turned round where H curves down; none where H is flat."""
+    """Compute a Newton step, reversed where H has negative curvature, zero where H is flat."""
     values, vectors = np.linalg.eigh((H + H.T) / 2.0)
     flat = abs(values) <= _FLAT * abs(values).max(initial=0.0)
     rate = np.where(flat, math.inf, abs(values))
@@ -204,7 +204,7 @@ def _downhill(H: Array, gradient: Array) -> tuple[Array, bool]:
 def _active_set(
     newton: _Newton, problem: InverseProblem, q: Array, held: Limits
 ) -> tuple[Array | None, Limits, int]:
-    """Newton's method with the right limits held: angles, None if it fails; limits; iterations."""
+    """Find the held limits by Newton's method. Return angles (None on failure), limits, count."""
     _, lower, upper, _ = problem
     held, iterations = held.copy(), 0
     for _ in range(2 * q.size + 5):
@@ -215,7 +215,7 @@ def _active_set(
             break
         beyond = (q > upper).astype(np.int_) - (q < lower)
         q = np.clip(q, lower, upper)
-        multiplier = held * gradient  # positive: the objective falls off the limit
+        multiplier = held * gradient  # positive: the objective falls away from the limit
         if beyond.any():
             held = np.where(beyond != 0, beyond, held)
         elif multiplier.max() > _CONVERGED:
@@ -228,11 +228,11 @@ def _active_set(
 def _iterate(
     newton: _Newton, problem: InverseProblem, q: Array, free: NDArray[np.bool_]
 ) -> tuple[Array, Array | None, int]:
-    """Newton's method for the free joints: angles, the gradient unless it fails, iterations."""
+    """Iterate Newton's method for the free joints: angles, gradient (None on failure), count."""
     least = math.inf
     for count in range(1, _ATTEMPTS + 1):
         step = newton(problem, q, free)
-        # below this, and no longer falling fast, only rounding is left
+        # small and no longer falling fast: only rounding is left
         done = step.error < _CONVERGED and step.error > 0.5 * least
         if step.convex and (done or step.error == 0.0):
             return q, step.gradient, count

@@ -1,7 +1,7 @@
-"""Residuals of the two inverse problems, which :mod:`cdsm.kinematics.nearest` solves.
+"""Residuals of the two inverse problems that :mod:`cdsm.kinematics.nearest` solves.
 
-Both second derivatives are those of the stiffness: weights on cable lengths act like tensions,
-weights on the tip like a dead wrench.
+The second derivatives equal terms of the stiffness. Weights on cable lengths act like tensions, and
+weights on the tip act like a dead wrench.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from cdsm.rigid_body import rotation_vector
 from cdsm.support.validation import Array, frozen
 
 LIMIT_MARGIN = 1e-5
-"""Part of a joint's limit within which the joint stands at it."""
+"""A joint nearer to its limit than this share of the limit counts as at the limit."""
 
 _NO_WRENCH = frozen(np.zeros(6))
 
@@ -26,25 +26,25 @@ _NO_WRENCH = frozen(np.zeros(6))
 @final
 @dataclass(frozen=True, eq=False)
 class LengthResidual:
-    """Cable lengths less those wanted (C,), over the length of the arm."""
+    """Cable lengths less the wanted lengths (C,), over the length of the arm."""
 
     arm: Manipulator
     wanted: Array
 
     def evaluate(self, q: Array) -> tuple[Array, Array]:
-        """Residual r (m,) and ∂r/∂q (m, nv)."""
+        """Compute r (m,) and ∂r/∂q (m, nv)."""
         pose, length = self.arm.at(q, check_limits=False), self.arm.length
         return (pose.cable_lengths - self.wanted) / length, pose.length_jacobian / length
 
     def curvature(self, q: Array, weight: Array) -> Array:
-        """Second derivative of weight · r (nv, nv)."""
+        """Compute the second derivative of weight · r (nv, nv)."""
         # H_L·F of tensions F = weight
         tension = frozen(weight / self.arm.length)
         pose = self.arm.at(q, check_limits=False)
         return pose._joint_stiffness(tension, frozen(np.zeros(weight.size)), _NO_WRENCH)[0]
 
     def hessian(self, q: Array) -> Array:
-        """Second derivative of ½‖r‖² (nv, nv)."""
+        """Compute the second derivative of ½‖r‖² (nv, nv)."""
         r, J = self.evaluate(q)
         return self.curvature(q, r) + J.T @ J
 
@@ -52,13 +52,13 @@ class LengthResidual:
 @final
 @dataclass(frozen=True, eq=False)
 class TipResidual:
-    """Tip less its target: position over the length of the arm, then rotation vector (3,), (6,)."""
+    """Tip less target (3,) or (6,): position over the arm length, then rotation vector."""
 
     arm: Manipulator
     target: Array
 
     def evaluate(self, q: Array) -> tuple[Array, Array]:
-        """Residual r (m,) and ∂r/∂q (m, nv)."""
+        """Compute r (m,) and ∂r/∂q (m, nv)."""
         state, length = self.arm._model.body.state(q), self.arm.length
         linear, angular = state.jacobian[:3] / length, state.jacobian[3:]
         if self.target.ndim == 1:
@@ -68,8 +68,8 @@ class TipResidual:
         return np.concatenate([offset, turn]), np.vstack([linear, turn_jacobian @ angular])
 
     def curvature(self, q: Array, weight: Array) -> Array:
-        """Second derivative of weight · r (nv, nv)."""
-        # ∂(J_Xᵀ W)/∂θ of a dead wrench W = weight: where r = 0, ∂r/∂q is J_X but for the length
+        """Compute the second derivative of weight · r (nv, nv)."""
+        # ∂(J_Xᵀ W)/∂θ of a dead wrench W = weight: at r = 0, ∂r/∂q is J_X up to the length
         wrench = np.zeros(6)
         wrench[: weight.size] = weight
         wrench[:3] /= self.arm.length
@@ -77,19 +77,16 @@ class TipResidual:
         return -load_stiffness(frozen(jacobian), frozen(wrench), way)
 
     def hessian(self, q: Array) -> Array:
-        """Second derivative of ½‖r‖² (nv, nv)."""
-        # ∂(½φ²) = φ·ω exactly, so its second derivative needs that of φ once, not twice
+        """Compute the second derivative of ½‖r‖² (nv, nv)."""
+        # ∂(½φ²) = φ·ω exactly, so the second derivative contains that of φ only once
         r, J = self.evaluate(q)
         angular = self.arm._model.body.state(q).jacobian[3 : r.size]
         return self.curvature(q, r) + J[:3].T @ J[:3] + angular.T @ J[3:]
 
 
 def usable_limits(arm: Manipulator) -> tuple[Array, Array]:
-    """The joint limits, a little narrower where the holes of touching disks meet there.
-
-    The default limit is where disks touch. A cable that passes there has no direction, so the arm
-    cannot be evaluated at such a posture.
-    """
+    """Return the joint limits, slightly narrower where holes of touching disks coincide."""
+    # a cable through coincident holes has no direction, so the arm cannot be evaluated there
     limits = arm.lower.copy(), arm.upper.copy()
     for limit in limits:
         for i, alone in enumerate(np.diag(limit)):
