@@ -16,7 +16,7 @@ _CORRELATED = 0.95
 """A warning names two parameters whose correlation exceeds this value."""
 
 _UNLIKELY = 1e-3
-"""If so large a χ² is less probable than this, the model does not explain the measurements."""
+"""Least probability of χ². Below it, the model does not explain the measurements."""
 
 
 def warnings_of(result: Identification) -> list[str]:
@@ -50,7 +50,6 @@ def warnings_of(result: Identification) -> list[str]:
 
 
 def _at_bound(result: Identification, i: int) -> list[str]:
-    """Warn if a parameter is on a bound."""
     name, value = result.names[i], result.values[i]
     return [
         f"{name} is at its {side} bound, {limit:g}: the optimum lies there or beyond, and the "

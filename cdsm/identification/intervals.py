@@ -49,7 +49,7 @@ _TOLERANCES = (1e-4, 1e-6, 1e-8)
 
 
 class LowerOptimumError(Exception):
-    """χ² at this point is lower than at the supposed optimum."""
+    """Error: χ² at this point is lower than at the supposed optimum."""
 
     def __init__(self, point: Array) -> None:
         self.point = point

@@ -26,7 +26,7 @@ _ONE_SIDED, _CENTRAL = 1e-7, 1e-5
 """Steps of the finite differences in the unit cube. They balance rounding and truncation."""
 
 _CACHED = 64
-"""Number of points in the cache of residuals. A search returns to a point after differences."""
+"""Number of points in the cache of residuals. A search evaluates some points repeatedly."""
 
 
 class NoModelError(Exception):
@@ -171,7 +171,7 @@ class LeastSquares:
         over: Sequence[int] | None = None,
         central: bool = False,
     ) -> Array:
-        """Search the minimum. Return the point of the unit cube where the search ends.
+        """Search for the minimum. Return the point of the unit cube where the search ends.
 
         Args:
             start: First point of the search.

@@ -33,8 +33,7 @@ class Measurement:
         minimum: Lower bound of the tensions [N], one number or (C,).
             :func:`~cdsm.distribute_tension` then balances the model at these angles.
         std: Standard deviation of the value [N/m].
-        wrench: W (6,) at ``tool0`` in base axes, without the measuring force: force [N], moment
-            [N m].
+        wrench: W (6,) at ``tool0`` without the measuring force, base axes: force [N], moment [N m].
         label: Name in reports and figures.
         force: Magnitude of the measuring force [N], added to ``wrench``. The value is then the
             secant of :func:`~cdsm.weight_test`, with motors locked at these angles and tensions.

@@ -23,7 +23,7 @@ Parameters = dict[str, float]
 
 
 class UserFaultError(Exception):
-    """A user-defined function raises an error that is not a CdsmError."""
+    """Error of a user-defined function that is not a CdsmError."""
 
     def __init__(self, name: str, parameters: Parameters) -> None:
         self.name = name

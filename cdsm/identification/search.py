@@ -87,9 +87,9 @@ def identify(
         start: First value of each parameter. If not given, several searches start from points
             spread over the bounds (always the same points), and the best result is returned.
         tension_of: Function ``tension_of(posture, measurement, **p)`` that returns the tensions
-            (C,) [N] or a :class:`~cdsm.Tension`. Use it for parameters of the tensions, such as the
-            offset of a load cell. It and ``model_of`` get all free parameters. If not given, the
-            tensions of the measurement count.
+            (C,) [N] or a :class:`~cdsm.Tension`, for example with the offset of a load cell as a
+            parameter. It and ``model_of`` get all free parameters. The default is the tensions of
+            the measurement.
 
     Raises:
         InvalidInput: There are no measurements or fewer than parameters; bounds or start are
@@ -250,7 +250,6 @@ def _result(model: StiffnessModel, problem: LeastSquares, best: Array) -> Identi
 def _profiles(
     problem: LeastSquares, best: Array, jacobian: Array, result: Identification
 ) -> tuple[Profile | None, ...]:
-    """Compute the profile of each determined parameter, and None for the others."""
     follow = [i for i in range(best.size) if i not in result._dependent]
     profiles: list[Profile | None] = []
     for i in range(best.size):

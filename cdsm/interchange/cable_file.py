@@ -92,7 +92,7 @@ def read_cables(path: str | os.PathLike[str]) -> tuple[Cable, ...]:
     The file has one table ``[elasticities.NAME]`` per wire, in the form of
     :func:`~cdsm.read_elasticity`, and one table ``[[cables]]`` per cable. A cable has ``name``,
     ``elasticity`` (a NAME), and ``sites`` (two or more ``{link = "…", xyz = [x, y, z]}``, [m]).
-    Optional are ``lead`` [m] (the straight cable between its actuator and the base disk),
+    Optional are ``lead`` [m] (the straight cable between its actuator and the first site),
     ``series_stiffness`` [N/m], ``control`` (``"position"`` or ``"force"``), ``minimum`` and
     ``maximum`` [N].
 

@@ -111,7 +111,6 @@ def _files(
 def _read_cables(
     path: Path, bodies: Sequence[Body], elasticity: Elasticity, wanted: str | None
 ) -> tuple[Cable, ...]:
-    """Read the cables of the wanted set, or of the default set of the file."""
     root = read_root(path, "cables", "cables")
     sets = {str(each.get("id")): each for each in root.findall("cable_set")}
     name = root.get("default_cable_set") if wanted is None else wanted
@@ -134,10 +133,7 @@ def _read_cables(
 
 
 def _unique(name: str, used: dict[str, int]) -> str:
-    """Return the name, with a number if it is used already: in CASPR names may repeat.
-
-    ``used`` holds the highest number of each name so far. It is updated.
-    """
+    """Number a name that is used already. Update the highest number of each name in ``used``."""
     label, count = name, used.get(name, 1)
     while label in used:
         count += 1
@@ -227,7 +223,6 @@ def _urdf(name: str, bodies: Sequence[Body]) -> str:
 
 
 def _shift(place: Array) -> Array:
-    """Return the transform (4, 4) of a translation."""
     transform = np.eye(4)
     transform[:3, 3] = place
     return transform

@@ -69,8 +69,8 @@ def to_mjcf(
 
     Bodies, joints and tendons have the names of links, joints and cables. The sites of a cable are
     ``name/1``, ``name/2``, …; the site at the tip is ``tool0``. The keyframe ``pose`` holds the
-    posture. A lead (the straight cable between its actuator and the base disk) is left out, because
-    its length is constant. Force-controlled cables are actuators of constant force. Springs softer
+    posture. A lead (the straight cable between its actuator and the first site) has a constant
+    length and is left out. Force-controlled cables are actuators of constant force. Springs softer
     than F/L would need a negative rest length; they are actuators of force and stiffness. The model
     does not contain the wrench: give it to MuJoCo at run time, as ``xfrc_applied``.
 
@@ -83,7 +83,7 @@ def to_mjcf(
 
     Args:
         arm: The arm.
-        pose: Posture of the tensions. If not given, the tendons have no tension.
+        pose: Posture of the tensions. If not given, the arm is straight and has no tensions.
         tension: F at this posture: a result of :func:`~cdsm.distribute_tension`, or (C,) [N].
         damping: Damping of every joint [N m s/rad], so that a simulation settles. MuJoCo integrates
             it implicitly, so it does not need a smaller time step.
@@ -221,7 +221,7 @@ def _joint(joint: etree._Element, kind: str, damping: float) -> etree._Element:
 
 
 def _inertial(body: etree._Element, link: etree._Element, moves: bool) -> list[Carried]:
-    """Give a body the mass of its link, or a tiny mass if it moves without. Return the mass."""
+    """Give a body the mass of its link, or a tiny mass if it moves and has none."""
     inertial = link.find("inertial")
     mass = 0.0 if inertial is None else float(inertial.find("mass").get("value"))
     if inertial is not None and mass > _SMALLEST:
@@ -239,7 +239,7 @@ def _inertial(body: etree._Element, link: etree._Element, moves: bool) -> list[C
 
 
 def _inertia(inertia: etree._Element, R: Array) -> Array:
-    """Compute I (3, 3) in the link frame, adjusted to the limits of MuJoCo (not for statics)."""
+    """Compute I (3, 3) in the link frame, adjusted for MuJoCo. Statics does not use I."""
     xx, yy, zz, xy, xz, yz = (
         float(inertia.get(key)) for key in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
     )

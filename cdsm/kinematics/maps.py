@@ -342,7 +342,6 @@ def _verdict(reachable: bool) -> str:
 
 
 def _angle_rows(arm: Manipulator, angles: Array) -> list[str]:
-    """Write a table of the joint angles. Mark the joints at a limit."""
     at_limit = _at_limit(arm, angles)
     rows = [
         f"{joint:<12}{angle:>z14.6f}{'  at limit' if joint in at_limit else ''}"

@@ -185,7 +185,6 @@ def _nearest_step(problem: InverseProblem, q: Array, free: NDArray[np.bool_]) ->
 
 
 def _least_residual_step(problem: InverseProblem, q: Array, free: NDArray[np.bool_]) -> _NewtonStep:
-    """Compute the step to min ½‖r‖²."""
     r, J = problem.residual.evaluate(q)
     gradient = r @ J
     move, convex = _downhill(problem.residual.hessian(q)[np.ix_(free, free)], gradient[free])

@@ -32,7 +32,7 @@ def find_jump(law: Elasticity) -> Jump | None:
     interval. A jump much smaller than the change of EA over an interval may be missed.
 
     Laws of this library are continuous by construction and are not sampled. If a user-defined law
-    raises an error, return None: the first use of the law reports the error.
+    raises an error, return None, because the first use of the law reports the error.
     """
     if isinstance(law, (LinearElasticity, StrandElasticity, TabulatedElasticity)):
         return None

@@ -56,7 +56,7 @@ _KINDS: dict[str, type[_Linear | _Strand | _Tabulated]] = {
 
 
 def table_of(elasticity: Elasticity) -> list[str]:
-    """Return the lines of the TOML table of an elasticity. Refuse kinds that no file can hold."""
+    """Return the lines of the TOML table of an elasticity. Raise if no file can hold its kind."""
     found: _Linear | _Strand | _Tabulated
     if isinstance(elasticity, LinearElasticity):
         found = _Linear(rigidity=float(elasticity.rigidity(0.0)))

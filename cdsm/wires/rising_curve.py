@@ -99,7 +99,6 @@ class RisingCurve:
         return np.cumsum(whole) - whole
 
     def _moment(self, k: NDArray[np.intp], x: Array) -> Array:
-        """Integrate x dy from the beginning of the piece."""
         width = np.asarray(x - self.x[k])[..., None]
         nodes = self.x[k][..., None] + width * _NODES
         return np.asarray((width * nodes * self.slope(nodes)) @ _WEIGHTS)

@@ -23,8 +23,7 @@ def polynomials(points: Points, join: float) -> tuple[StrandElasticity, tuple[st
 
     Args:
         points: Points of loading, with rising strain.
-        join: Tension [N] at which the polynomials meet. If a side has too few points, one
-            polynomial is fitted.
+        join: Tension [N] at which they meet. With too few points on a side, fit one polynomial.
     """
     if len(points.force) < _FEWEST:
         raise TensileTestError(
@@ -58,16 +57,14 @@ def polynomials(points: Points, join: float) -> tuple[StrandElasticity, tuple[st
 
 
 def _positive(rows: list[list[float]], edges: tuple[float, ...]) -> list[tuple[float, float]]:
-    """Find the ranges of tension [N] where the polynomials are positive, or one empty range.
-
-    The sign of a polynomial is constant between its roots. A grid could miss a short dip.
-    """
+    """Find the ranges of tension [N] where the polynomials are positive, or one empty range."""
     tops = abs(_evaluate(rows, edges[1:-1], np.linspace(edges[0], edges[-1], 400)))
     margin = 1e-6 * float(tops.max())  # keeps the strain ∫ dF/EA finite
     ranges = [(edges[0], edges[0])]
     for row, low, high in zip(rows, edges[:-1], edges[1:], strict=True):
         rounding = 1e-13 * float(Polynomial(np.abs(row))(high))  # rounding of powers that cancel
         above = Polynomial(row) - max(margin, rounding)
+        # the sign is constant between roots; a grid could miss a short dip
         roots = above.roots()
         real = np.sort(roots.real[abs(roots.imag) <= 1e-9 * abs(roots)])
         cuts = [low, *real[(real > low) & (real < high)].tolist(), high]
@@ -113,7 +110,6 @@ def _coefficients(points: Points, joins: tuple[float, ...]) -> list[list[float]]
 
 
 def _evaluate(rows: list[list[float]], joins: tuple[float, ...], tensions: Array) -> Array:
-    """Evaluate the polynomials EA (n,) [N] at tensions (n,) [N]."""
     piece = np.searchsorted(joins, tensions, side="left")
     values = np.array([np.polyval(row[::-1], tensions) for row in rows])
     return np.asarray(values[piece, np.arange(len(tensions))])

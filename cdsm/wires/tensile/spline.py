@@ -28,7 +28,6 @@ _GRID = 1200
 
 
 def _running_integral(values: Array, tensions: Array, axis: int = -1) -> Array:
-    """Integrate values dF from the first tension to each tension, by the trapezoidal rule."""
     from scipy.integrate import cumulative_trapezoid  # here, because it imports slowly
 
     integral: Array = cumulative_trapezoid(values, tensions, axis=axis, initial=0.0)
@@ -63,9 +62,7 @@ class Basis:
 
     @classmethod
     def over(cls, low: float, high: float, corner: float, points: int) -> Basis:
-        """Build splines over [low, high] N, evenly spread in ½ log(F + corner) + ½ F.
-
-        Each of the two terms is scaled to 1.
+        """Build splines over [low, high] N, even in ½ log(F + corner) + ½ F, terms scaled to 1.
 
         Args:
             low: Smallest tension [N].
