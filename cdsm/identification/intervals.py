@@ -25,10 +25,7 @@ from cdsm.identification.least_squares import Box, LeastSquares
 from cdsm.support.validation import Array, ReadOnlyState, frozen
 
 RANK_TOLERANCE = 1e-6
-"""Smallest singular value that counts for the rank of the Jacobian (columns of unit length).
-
-The central differences have an error of about 1e-10.
-"""
+"""Smallest singular value of J with unit columns that counts for its rank (J errs by 1e-10)."""
 
 NEGLIGIBLE = 1e-3
 """Difference of χ² that is neglected. A difference of 1 is one standard deviation."""
@@ -157,11 +154,7 @@ class Profiler:
         self._start = self._knot(best, jacobian[:, i], jacobian[:, self._others])
 
     def profile(self) -> Profile:
-        """Compute the profile to both sides.
-
-        Raises:
-            LowerOptimumError: A point of the profile has a lower χ² than the optimum.
-        """
+        """Compute the profile to both sides. Raise LowerOptimumError if χ² falls below the least."""
         (down, first), (up, last) = self._follow(-1), self._follow(1)
         knots = [*reversed(down), *up[1:]]
         box, u = self._problem.box.only(self._i), np.array([k.point[self._i] for k in knots])

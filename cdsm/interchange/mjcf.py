@@ -33,19 +33,13 @@ from cdsm.support.xml import parse_xml
 from cdsm.tension import Tension
 
 _MASS, _INERTIA = 1e-6, 1e-9
-"""Least mass and moment of inertia of a moving body in MuJoCo [kg, kg m²].
-
-A body without mass in the URDF gets these, and its weight is compensated.
-"""
+"""Least mass [kg] and moment of inertia [kg m²] of a moving body in MuJoCo."""
 
 _SMALLEST = 1e-12
 """A smaller mass [kg] or moment of inertia [kg m²] of a body counts as zero."""
 
 _ROUNDING = 1e-9
-"""Relative margin to moments that MuJoCo refuses: one above the sum of the other two.
-
-The moments of a plate may exceed the sum by rounding.
-"""
+"""Relative margin: MuJoCo refuses a moment of inertia above the sum of the other two."""
 
 _DEFAULT_STEP = 2e-3
 """MuJoCo's own time step [s]."""

@@ -79,12 +79,7 @@ def table_of(elasticity: Elasticity) -> list[str]:
 
 
 def from_table(data: object) -> Elasticity:
-    """Build the elasticity that a TOML table describes.
-
-    Raises:
-        GeometryError: The table has faults; the error lists them all.
-        InvalidInput: The numbers of the table do not make an elasticity.
-    """
+    """Build the elasticity of a TOML table. Raise GeometryError or InvalidInput for its faults."""
     kind = data.get("kind") if isinstance(data, dict) else data
     if not isinstance(kind, str) or kind not in _KINDS:
         raise GeometryError([f"kind: must be one of {', '.join(_KINDS)}, but is {kind!r}"])

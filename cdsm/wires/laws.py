@@ -244,7 +244,7 @@ class TabulatedElasticity(Elasticity):
 
     @cached_property
     def domain(self) -> Domain:
-        """Domain [first, last] tension of the points [N]."""
+        """Domain of the law, from the first to the last tension of the points [N]."""
         return Domain(self.tensions[0], self.tensions[-1])
 
     def rigidity(self, tension: ArrayLike) -> Array:

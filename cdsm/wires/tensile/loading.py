@@ -100,7 +100,7 @@ def _outliers(values: Array) -> NDArray[np.bool_]:
     first, last = 2.0 * values[1] - values[2], 2.0 * values[-2] - values[-3]
     before, after = np.append(first, values[:-1]), np.append(values[1:], last)
     size = abs(np.diff(values))
-    step = np.maximum(np.pad(size, (2, 0))[:-1], np.pad(size, (0, 2))[1:])  # of the neighbours
+    step = np.maximum(np.pad(size, (2, 0))[:-1], np.pad(size, (0, 2))[1:])  # of the neighbours only
     noise = local_noise((values - (before + after) / 2.0) / np.sqrt(1.5))
     reach = float(np.ptp(np.quantile(values, (0.1, 0.9))))  # without outliers
     beyond = np.maximum(values - np.maximum(before, after), np.minimum(before, after) - values)

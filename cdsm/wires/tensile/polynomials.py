@@ -19,11 +19,9 @@ _FEWEST = 2 * _HALF + 2 * (_DEGREE + 1)  # points: twice as many slopes as coeff
 
 
 def polynomials(points: Points, join: float) -> tuple[StrandElasticity, tuple[str, ...]]:
-    """Fit two polynomials of degree 6 to the slopes. Keep the longest range where EA > 0.
+    """Fit two polynomials that meet at a join [N] to the slopes. Keep the longest range of EA > 0.
 
-    Args:
-        points: Points of loading, with rising strain.
-        join: Tension [N] at which they meet. With too few points on a side, fit one polynomial.
+    If one side of the join has too few points, fit one polynomial.
     """
     if len(points.force) < _FEWEST:
         raise TensileTestError(

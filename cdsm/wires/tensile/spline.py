@@ -36,7 +36,7 @@ def _running_integral(values: Array, tensions: Array, axis: int = -1) -> Array:
 
 @dataclass(frozen=True)
 class Points:
-    """Averaged points of a test: rising strain [-], force [N], and number averaged, all (n,)."""
+    """Averaged points of a test: rising strain [-], force [N], and points per average, (n,)."""
 
     strain: Array
     force: Array
@@ -64,11 +64,7 @@ class Basis:
     def over(cls, low: float, high: float, corner: float, points: int) -> Basis:
         """Build splines over [low, high] N, even in ½ log(F + corner) + ½ F, terms scaled to 1.
 
-        Args:
-            low: Smallest tension [N].
-            high: Largest tension [N].
-            corner: Tension [N] below which the spacing is even.
-            points: Number of points to be fitted.
+        Below ``corner`` [N] the spacing is even. ``points`` is the number of points to fit.
         """
         fine = low + corner * np.expm1(np.linspace(0.0, np.log1p((high - low) / corner), 8 * _GRID))
         place = np.log1p((fine - low) / corner) / np.log1p((high - low) / corner)
@@ -263,10 +259,7 @@ class Spread:
 def fit_curve(points: Points, basis: Basis, noise: float) -> Curve:
     """Fit the curve. Restricted likelihood gives its smoothing (Fellner-Schall iteration).
 
-    Args:
-        points: The points.
-        basis: Splines of log EA.
-        noise: First estimate of the noise of one point [N].
+    ``noise`` is a first estimate of the noise of one point [N].
     """
     tensions = basis.tensions
     size = basis.splines.shape[1]

@@ -40,10 +40,7 @@ def yield_onset(tensions: Array, rigidity: Array, deviation: Array) -> float | N
 
 
 def pretension_end(tensions: Array, rigidity: Array, deviation: Array) -> float | None:
-    """Find the tension [N] from which EA grows slower than √F.
-
-    Return None if no earlier growth faster than √F is certain. Arguments: see yield_onset.
-    """
+    """Find the tension [N] from which EA grows slower than √F. None if no faster growth is sure."""
     level = np.log(rigidity)
     inner = (tensions > _STEP * tensions[0]) & (tensions < tensions[-1] / _STEP) & (tensions > 0)
     if not inner.any():
