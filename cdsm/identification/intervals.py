@@ -154,7 +154,7 @@ class Profiler:
         self._start = self._knot(best, jacobian[:, i], jacobian[:, self._others])
 
     def profile(self) -> Profile:
-        """Compute the profile to both sides. Raise LowerOptimumError if χ² falls below the least."""
+        """Compute the profile to both sides. Raise LowerOptimumError if χ² is below the least."""
         (down, first), (up, last) = self._follow(-1), self._follow(1)
         knots = [*reversed(down), *up[1:]]
         box, u = self._problem.box.only(self._i), np.array([k.point[self._i] for k in knots])

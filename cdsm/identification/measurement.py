@@ -26,8 +26,8 @@ class Measurement:
 
     Attributes:
         value: Stiffness along the direction [N/m]: force over displacement of the tip along it.
-        direction: Direction of force and displacement (3,), base axes, any length. With a ``force``
-            its sign matters: (0, 0, -1) hangs a weight, (0, 0, 1) lifts the tip.
+        direction: Common direction of force and displacement (3,), base axes, any length. With a
+            ``force`` the sign matters: (0, 0, -1) hangs a weight, (0, 0, 1) lifts the tip.
         angles: Joint angles (nv,) [rad].
         tension: Cable tensions (C,) [N]. Give either ``tension`` or ``minimum``.
         minimum: Lower bound of the tensions [N], one number or (C,).
