@@ -46,7 +46,8 @@ CASES: dict[str, Any] = {"minimum": [1.0, 20.0, 60.0], "elasticity": LAWS, "wren
 class Deadly(cdsm.Elasticity):
     """A wire that kills the process that asks for its rigidity, once it comes to a file "die…".
 
-    Not if one tension is asked for: that is how it is described, before a sweep begins.
+    Not if one tension is asked for, or rising ones: that is how it is described before a sweep
+    begins, and sampled when its arm is made.
 
     Attributes:
         folder: Its files are taken away one by one, in the order of their names.
@@ -57,7 +58,8 @@ class Deadly(cdsm.Elasticity):
     low: float = 0.0
 
     def rigidity(self, tension: ArrayLike) -> Array:
-        if np.size(tension) > 1 and np.max(tension, initial=0.0) > self.low:
+        rising = (np.diff(np.ravel(tension)) > 0.0).all()
+        if not rising and np.max(tension, initial=0.0) > self.low:
             for order in sorted(Path(self.folder).iterdir())[:1]:
                 with suppress(FileNotFoundError):  # another process was faster
                     order.unlink()
