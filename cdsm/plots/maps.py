@@ -67,8 +67,8 @@ def plot_map(
         section: Axis, position and half thickness [m] of a slab. Only tips inside it are shown.
 
     Raises:
-        InvalidInput: ``dataset`` is not a sweep or makes too many panels, ``quantity`` has more
-            than one number per entry, or ``section`` is invalid or holds no tip.
+        InvalidInput: ``dataset`` is not a sweep or has too many panels, ``quantity`` has more than
+            one number per entry, or ``section`` is invalid or holds no tip.
         UnknownName: The sweep has no such quantity or no tip positions, or the axis is unknown.
         MissingExtra: xarray is not installed.
     """

@@ -64,8 +64,7 @@ def plot_stiffness_plan(plan: StiffnessPlan, attainable: StiffnessRange) -> Figu
 def plot_path_plan(plan: PathPlan) -> Figure:
     """Plot wanted and planned stiffness, and tensions, over the samples of a path.
 
-    Infeasible samples are shaded. A jump of the target is drawn as a step. Up to 20 cables have
-    their own colours and a legend.
+    Infeasible samples are shaded. Target jumps are steps. Up to 20 cables have colours and names.
 
     Args:
         plan: Result of :func:`~cdsm.planning.path.plan_path` for one direction or several.
