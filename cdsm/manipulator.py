@@ -351,7 +351,7 @@ class Manipulator(Printed):
         """Compute the joint frames, the cable sites, L and J_L at checked joint angles."""
         routing = self._model.routing
         *arrays, lengths, length_jacobian, coincident = segments.cable_kinematics(
-            self._model.tree, routing, q
+            *self._model.tree, *routing, q
         )
         if coincident >= 0:
             raise CableError(

@@ -55,8 +55,9 @@ class Posture(ReadOnlyState):
         """H_L[c, i, j] = ∂²L_c/∂θ_i∂θ_j, (C, nv, nv) [m/rad²], computed on first use."""
         count, nv = self.length_jacobian.shape
         hessian = np.zeros((count, nv, nv))
+        routing, weight, slot = self.arm._model.routing, frozen(np.ones(count)), np.arange(count)
         segments.add_length_hessian(
-            self.arm._model.routing, self._frames, frozen(np.ones(count)), np.arange(count), hessian
+            routing.segment, routing.joint, self._frames, weight, slot, hessian
         )
         return frozen(hessian)
 
@@ -114,16 +115,18 @@ class Posture(ReadOnlyState):
         self, tension: Array, cable_stiffness: Array, wrench: Array
     ) -> tuple[Array, Array, Array, Array]:
         """Compute the active, passive and load terms and K_θ (nv, nv) from checked vectors."""
+        model = self.arm._model
         active, passive, load, joint = stiffness_kernels.joint_stiffness(
-            self.arm._model.routing,
-            self._frames,
+            model.routing.segment,
+            model.routing.joint,
+            *self._frames,
             self.jacobian,
             self.length_jacobian,
             self.gravity_stiffness,
             tension,
             cable_stiffness,
             wrench,
-            self.arm._model.masses.tip_joints,
+            model.masses.tip_joints,
         )
         return frozen(active), frozen(passive), frozen(load), frozen(joint)
 

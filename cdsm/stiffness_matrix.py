@@ -384,7 +384,7 @@ def stiffness(
                 "tension", f"{F[c]:g} N given for {arm.cables[c].name}; cables only pull."
             )
     k = arm._model.laws.stiffness(pose.cable_lengths, F)
-    return assemble(pose, F, W, k, distribution=tension if isinstance(tension, Tension) else None)
+    return assemble(pose, F, W, k, tension if isinstance(tension, Tension) else None)
 
 
 def assemble(
@@ -392,9 +392,8 @@ def assemble(
     tension: Array,
     wrench: Array,
     cable_stiffness: Array,
-    *,
-    free_length: Array | None = None,
     distribution: Tension | None = None,
+    free_length: Array | None = None,
 ) -> Stiffness:
     """Compute K_θ from checked, read-only tensions, wrench and cable stiffnesses (Eq. 16)."""
     active, passive, load, joint = pose._joint_stiffness(tension, cable_stiffness, wrench)

@@ -179,7 +179,15 @@ def evaluate_rows(
         if last >= GRAVITY:
             _clear(record, start[GRAVITY], start[JOINT])
         coincident = add_segment_derivatives(
-            routing, frames, tension[b], slot, left_factor, L, J, active_slots
+            routing.segment,
+            routing.joint,
+            frames,
+            tension[b],
+            slot,
+            left_factor,
+            L,
+            J,
+            active_slots,
         )
         if coincident >= 0:
             status[b] = COINCIDENT_SITES

@@ -125,7 +125,8 @@ def mirror(matrix: Array) -> None:
 
 @compiled
 def add_segment_derivatives(
-    routing: Routing,
+    segment: Indices,
+    joint: Indices,
     frames: Frames,
     weight: Array,
     slot: Indices,
@@ -142,7 +143,6 @@ def add_segment_derivatives(
     Returns:
         The first segment with coinciding sites, or −1. If there is one, all arrays are unfinished.
     """
-    segment, joint = routing.segment, routing.joint
     for s in range(segment.shape[0] - 1):
         cable, a, b = segment[s, 0], segment[s, 1], segment[s, 2]
         first, split, end = segment[s, 3], segment[s, 4], segment[s + 1, 3]
@@ -165,28 +165,43 @@ def add_segment_derivatives(
 
 @compiled
 def cable_kinematics(
-    tree: Tree, routing: Routing, q: Array
+    parent: Indices,
+    order: Indices,
+    turn: Array,
+    translation: Array,
+    joint_axis: Array,
+    joint_slide: Array,
+    row: Indices,
+    point: Array,
+    segment: Indices,
+    joint: Indices,
+    fixed: Array,
+    q: Array,
 ) -> tuple[Array, Array, Array, Array, Array, Array, int]:
     """Compute the joint and site frames at q (nv,), the cable lengths and their Jacobian.
 
+    The arguments are the fields of :class:`Tree` and :class:`Routing`. Python passes and receives
+    plain arrays: named tuples took a third of the total time.
+
     Returns:
         The fields of :class:`Frames`, L (C,), J_L (C, nv), and the first segment with coinciding
-        sites, or −1. If there is one, L and J_L are unfinished. (A named tuple would take a quarter
-        of the total time to return to Python.)
+        sites, or −1. If there is one, L and J_L are unfinished.
     """
-    count, nv = tree.parent.shape[0], q.shape[0]
-    origin, axis, slide = np.empty((count, 3)), np.empty((count, 3)), np.empty(tree.slide.shape)
-    frames = Frames(origin, axis, slide, np.empty((routing.row.shape[0], 3)))
+    tree = Tree(parent, order, turn, translation, joint_axis, joint_slide)
+    routing = Routing(row, point, segment, joint, fixed)
+    count, nv = parent.shape[0], q.shape[0]
+    origin, axis, slide = np.empty((count, 3)), np.empty((count, 3)), np.empty(joint_slide.shape)
+    frames = Frames(origin, axis, slide, np.empty((row.shape[0], 3)))
     forward_kinematics(tree, routing, q, np.empty((count, 3, 3)), frames)
-    L, J = routing.fixed.copy(), np.zeros((routing.fixed.shape[0], nv))
+    L, J = fixed.copy(), np.zeros((fixed.shape[0], nv))
     nothing, slot, scratch = np.empty((0, nv, nv)), np.empty(0, dtype=np.intp), np.empty((nv, 3))
-    coincident = add_segment_derivatives(routing, frames, L, slot, scratch, L, J, nothing)
+    coincident = add_segment_derivatives(segment, joint, frames, L, slot, scratch, L, J, nothing)
     return origin, axis, slide, frames.site, L, J, coincident
 
 
 @compiled
 def add_length_hessian(
-    routing: Routing, frames: Frames, weight: Array, slot: Indices, hessian: Array
+    segment: Indices, joint: Indices, frames: Frames, weight: Array, slot: Indices, hessian: Array
 ) -> None:
     """Add weight[c] ∂²L_c/∂θ_i∂θ_j to hessian[slot[c], i, j] for every cable c.
 
@@ -195,6 +210,8 @@ def add_length_hessian(
     """
     nv = hessian.shape[1]
     lengths, no_jacobian, scratch = np.zeros(weight.shape[0]), np.empty((0, nv)), np.empty((nv, 3))
-    add_segment_derivatives(routing, frames, weight, slot, scratch, lengths, no_jacobian, hessian)
+    add_segment_derivatives(
+        segment, joint, frames, weight, slot, scratch, lengths, no_jacobian, hessian
+    )
     for k in range(hessian.shape[0]):
         mirror(hessian[k])

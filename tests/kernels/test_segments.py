@@ -34,13 +34,15 @@ class _Fork(NamedTuple):
     def evaluate(self, q: Array) -> tuple[Array, Array, Array]:
         """L, J_L and H_L of its one cable."""
         *arrays, lengths, jacobian, coincident = segments.cable_kinematics(
-            self.tree, self.routing, q
+            *self.tree, *self.routing, q
         )
         frames = Frames(*arrays)
         assert coincident == -1
         hessian = np.zeros((1, q.size, q.size))
         page = np.zeros(1, dtype=np.intp)
-        segments.add_length_hessian(self.routing, frames, np.ones(1), page, hessian)
+        segments.add_length_hessian(
+            self.routing.segment, self.routing.joint, frames, np.ones(1), page, hessian
+        )
         return lengths, jacobian, hessian
 
 
