@@ -10,20 +10,22 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+from lxml import etree
+from lxml.builder import ElementMaker
 
 from cdsm.errors import UrdfError
-from cdsm.geometry import Geometry, Link
+from cdsm.geometry import Geometry
 from cdsm.rigid_body import RigidBody
 from cdsm.support.files import write_file
 from cdsm.support.validation import instance
 from cdsm.support.values import Array
 
-if TYPE_CHECKING:
-    import yourdfpy
+E = ElementMaker(typemap={float: lambda _, x: str(x), tuple: lambda _, xs: " ".join(map(str, xs))})
+"""Maker of XML elements: ``E.mass(value=0.5)``; attributes are texts, floats or tuples."""
 
 TIP = "tool0"
 
@@ -40,7 +42,6 @@ _COMMENT = f"""
 """
 _EFFORT = 1000.0
 _VELOCITY = 10.0
-_ALONG_X = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
 _COLORS = {"backbone": (0.35, 0.38, 0.42, 1.0), "disk": (0.85, 0.65, 0.25, 1.0)}
 
 
@@ -58,49 +59,53 @@ def to_urdf(geometry: Geometry) -> str:
     Raises:
         InvalidInput: ``geometry`` is not a Geometry.
     """
-    import yourdfpy
-
     instance("geometry", geometry, Geometry)
-    links = [yourdfpy.Link(name="base_link"), _link(geometry, 0)]
-    joints = [_fixed("base_joint", "base_link", "base_disk", 0.0)]
+    links = [E.link(name="base_link"), _link(geometry, 0)]
+    joints = [joint("fixed", "base_joint", "base_link", "base_disk")]
     parent, start = "base_disk", geometry.base_length
-    for k, (joint, limit) in enumerate(
+    for k, (each, limit) in enumerate(
         zip(geometry.joints, geometry.joint_limits, strict=True), start=1
     ):
         child = f"link{k}"
-        if len(joint.axes) == 2:
+        if len(each.axes) == 2:
             cross = f"cross{k}"
             links.append(_cross(cross, geometry.hole_radius))
-            joints.append(_revolute(f"joint{k}_1", parent, cross, start, joint.axes[0], limit))
-            joints.append(_revolute(f"joint{k}_2", cross, child, 0.0, joint.axes[1], limit))
+            joints.append(_revolute(f"joint{k}_1", parent, cross, start, each.axes[0], limit))
+            joints.append(_revolute(f"joint{k}_2", cross, child, 0.0, each.axes[1], limit))
         else:
-            joints.append(_revolute(f"joint{k}", parent, child, start, joint.axes[0], limit))
+            joints.append(_revolute(f"joint{k}", parent, child, start, each.axes[0], limit))
         links.append(_link(geometry, k))
         parent, start = child, geometry.links[k - 1].length
-    links.append(yourdfpy.Link(name=TIP))
-    joints.append(_fixed("tool0_joint", parent, TIP, start))
-    robot = yourdfpy.Robot(
-        name=geometry.name,
-        links=links,
-        joints=joints,
-        materials=[
-            yourdfpy.Material(name=name, color=yourdfpy.Color(rgba=np.array(rgba)))
-            for name, rgba in _COLORS.items()
-        ],
-    )
-    return urdf_text(robot, _COMMENT)
+    links.append(E.link(name=TIP))
+    joints.append(joint("fixed", "tool0_joint", parent, TIP, *_at(start)))
+    colors = [E.material(E.color(rgba=rgba), name=name) for name, rgba in _COLORS.items()]
+    return urdf_text(geometry.name, [*links, *joints, *colors], _COMMENT)
 
 
-def urdf_text(robot: yourdfpy.Robot, comment: str) -> str:
+def urdf_text(name: str, parts: Iterable[etree._Element], comment: str) -> str:
     """Return the indented URDF text of a robot, with a comment at the top."""
-    import yourdfpy
-    from lxml import etree
-
-    tree = yourdfpy.URDF(robot=robot, build_scene_graph=False).write_xml()
-    tree.getroot().insert(0, etree.Comment(comment))
-    etree.indent(tree, space="  ")
-    text: str = etree.tostring(tree, xml_declaration=True, encoding="UTF-8").decode() + "\n"
+    robot = E.robot(etree.Comment(comment), *parts, name=name)
+    etree.indent(robot, space="  ")
+    text: str = etree.tostring(robot, xml_declaration=True, encoding="UTF-8").decode() + "\n"
     return text
+
+
+def joint(kind: str, name: str, parent: str, child: str, *parts: etree._Element) -> etree._Element:
+    """Build a joint of a type; ``parts`` are its origin, axis and limit."""
+    return E.joint(E.parent(link=parent), E.child(link=child), *parts, name=name, type=kind)
+
+
+def origin(xyz: Iterable[float], rpy: str = "0.0 -0.0 0.0") -> etree._Element:
+    """Build the origin of a joint, a body or a shape."""
+    return E.origin(xyz=tuple(map(float, xyz)), rpy=rpy)
+
+
+def inertial(mass: float, inertia: Array, *place: etree._Element) -> etree._Element:
+    """Build the inertial element of a mass [kg] and its moments (3, 3) [kg m²] at an origin."""
+    moments = {
+        f"i{'xyz'[i]}{'xyz'[j]}": float(inertia[i, j]) for i in range(3) for j in range(i, 3)
+    }
+    return E.inertial(*place, E.mass(value=mass), E.inertia(**moments))
 
 
 def write_urdf(geometry: Geometry, path: str | os.PathLike[str]) -> Path:
@@ -128,7 +133,7 @@ def write_urdf(geometry: Geometry, path: str | os.PathLike[str]) -> Path:
 
 
 def _read_back(path: Path, length: float) -> None:
-    import yourdfpy
+    import yourdfpy  # slow to import
 
     ours = RigidBody(path.read_text(encoding="utf-8"), TIP, np.zeros(3))
     theirs = yourdfpy.URDF.load(str(path), load_meshes=False)
@@ -150,80 +155,49 @@ def _read_back(path: Path, length: float) -> None:
             )
 
 
-def _link(geometry: Geometry, index: int) -> yourdfpy.Link:
+def _link(geometry: Geometry, index: int) -> etree._Element:
     """Build body ``index`` of the arm: 0 is the base with its disk, k is link k."""
-    import yourdfpy
-
     name, disks = geometry.disks[index]
     radius = geometry.hole_radius
     thickness = 0.2 * geometry.joints[max(index - 1, 0)].disk_offset
     length = geometry.links[index - 1].length if index else geometry.base_length
-    visuals = [_cylinder("disk", x, 1.1 * radius, thickness) for x in disks]
+    parts = [_cylinder("disk", x, 1.1 * radius, thickness) for x in disks]
     if length > 0.0:
-        visuals.insert(0, _cylinder("backbone", length / 2, 0.2 * radius, length))
-    inertial = _inertial(geometry.links[index - 1], radius) if index else None
-    return yourdfpy.Link(name=name, inertial=inertial, visuals=visuals)
+        parts.insert(0, _cylinder("backbone", length / 2, 0.2 * radius, length))
+    if index:
+        mass = geometry.links[index - 1].mass
+        lateral = mass * (3.0 * radius**2 + length**2) / 12.0
+        moments = [mass * radius**2 / 2.0, lateral, lateral] if mass else [CROSS_INERTIA] * 3
+        parts.insert(0, inertial(mass or CROSS_MASS, np.diag(moments), *_at(length / 2)))
+    return E.link(*parts, name=name)
 
 
-def _cross(name: str, radius: float) -> yourdfpy.Link:
-    import yourdfpy
-
-    shape = yourdfpy.Geometry(sphere=yourdfpy.Sphere(radius=0.25 * radius))
-    visual = yourdfpy.Visual(geometry=shape, material=yourdfpy.Material(name="backbone"))
-    inertia = np.diag([CROSS_INERTIA] * 3)
-    inertial = yourdfpy.Inertial(mass=CROSS_MASS, inertia=inertia)
-    return yourdfpy.Link(name=name, inertial=inertial, visuals=[visual])
-
-
-def _inertial(link: Link, radius: float) -> yourdfpy.Inertial:
-    import yourdfpy
-
-    axial = link.mass * radius**2 / 2.0
-    lateral = link.mass * (3.0 * radius**2 + link.length**2) / 12.0
-    moments = [axial, lateral, lateral] if link.mass > 0.0 else [CROSS_INERTIA] * 3
-    return yourdfpy.Inertial(
-        origin=_at(link.length / 2), mass=link.mass or CROSS_MASS, inertia=np.diag(moments)
+def _cross(name: str, radius: float) -> etree._Element:
+    shape = E.geometry(E.sphere(radius=0.25 * radius))
+    return E.link(
+        inertial(CROSS_MASS, CROSS_INERTIA * np.eye(3)),
+        E.visual(shape, E.material(name="backbone")),
+        name=name,
     )
 
 
-def _cylinder(material: str, x: float, radius: float, length: float) -> yourdfpy.Visual:
-    import yourdfpy
-
-    origin = np.eye(4)
-    origin[:3, :3] = _ALONG_X
-    origin[0, 3] = x
-    shape = yourdfpy.Geometry(cylinder=yourdfpy.Cylinder(radius=radius, length=length))
-    return yourdfpy.Visual(origin=origin, geometry=shape, material=yourdfpy.Material(name=material))
+def _cylinder(material: str, x: float, radius: float, length: float) -> etree._Element:
+    """Build a cylinder along x, centred at x."""
+    shape = E.geometry(E.cylinder(radius=radius, length=length))
+    place = origin((x, 0.0, 0.0), f"-0.0 {math.pi / 2.0} 0.0")
+    return E.visual(shape, place, E.material(name=material))
 
 
 def _revolute(
     name: str, parent: str, child: str, x: float, axis: tuple[float, ...], limit: float
-) -> yourdfpy.Joint:
-    import yourdfpy
-
+) -> etree._Element:
     length = math.hypot(*axis)
-    return yourdfpy.Joint(
-        name=name,
-        type="revolute",
-        parent=parent,
-        child=child,
-        origin=_at(x),
-        # a unit vector keeps its digits
-        axis=np.array(axis) / (1.0 if abs(length - 1.0) < 1e-15 else length),
-        limit=yourdfpy.Limit(effort=_EFFORT, velocity=_VELOCITY, lower=-limit, upper=limit),
-    )
+    if abs(length - 1.0) >= 1e-15:  # a unit vector keeps its digits
+        axis = tuple(a / length for a in axis)
+    ends = E.limit(effort=_EFFORT, velocity=_VELOCITY, lower=-limit, upper=limit)
+    return joint("revolute", name, parent, child, *_at(x), E.axis(xyz=axis), ends)
 
 
-def _fixed(name: str, parent: str, child: str, x: float) -> yourdfpy.Joint:
-    import yourdfpy
-
-    return yourdfpy.Joint(name=name, type="fixed", parent=parent, child=child, origin=_at(x))
-
-
-def _at(x: float) -> Array | None:
-    """Return a frame at x on the link, or None for the link's own frame."""
-    if x == 0.0:
-        return None
-    origin = np.eye(4)
-    origin[0, 3] = x
-    return origin
+def _at(x: float) -> tuple[etree._Element, ...]:
+    """Return an origin at x on the link; none for the link's own frame."""
+    return (origin((x, 0.0, 0.0)),) if x else ()

@@ -21,9 +21,8 @@ from cdsm.errors import CableError, FileError, InvalidInput, UnknownName
 from cdsm.interchange.caspr_bodies import BASE, Body, read_bodies, read_root, refuse, whole
 from cdsm.manipulator import GRAVITY, Manipulator
 from cdsm.support.files import as_path
-from cdsm.support.validation import Array
 from cdsm.support.xml import XmlFault, numbers
-from cdsm.urdf import TIP, urdf_text
+from cdsm.urdf import TIP, E, inertial, joint, origin, urdf_text
 
 if TYPE_CHECKING:
     from lxml import etree
@@ -183,46 +182,20 @@ def _cable(
 
 def _urdf(name: str, bodies: Sequence[Body]) -> str:
     """Write the URDF text. ``tool0`` is at the end of the last link."""
-    import yourdfpy  # slow to import
-
-    links, joints = [yourdfpy.Link(name=BASE)], []
+    links, joints = [E.link(name=BASE)], []
     names = [BASE, *(body.name for body in bodies)]
     for body in bodies:
         parent, place = names[body.parent], body.place
         for i, (kind, label, axis, low, high) in enumerate(body.joints, start=1):
             # single joints of one link need massless links between them
             child = body.name if i == len(body.joints) else f"{body.name}_{i}"
-            joints.append(
-                yourdfpy.Joint(
-                    name=label,
-                    type=kind,
-                    parent=parent,
-                    child=child,
-                    origin=_shift(place),
-                    axis=np.array(axis),
-                    limit=yourdfpy.Limit(effort=0.0, velocity=0.0, lower=low, upper=high),
-                )
-            )
-            links.append(yourdfpy.Link(name=child))
+            direction = E.axis(xyz=tuple(map(float, axis)))
+            limit = E.limit(effort=0.0, velocity=0.0, lower=float(low), upper=float(high))
+            joints.append(joint(kind, label, parent, child, origin(place), direction, limit))
+            links.append(E.link(name=child))
             parent, place = child, np.zeros(3)
         if body.mass:
-            links[-1].inertial = yourdfpy.Inertial(
-                origin=_shift(body.centre), mass=body.mass, inertia=body.inertia
-            )
-    links.append(yourdfpy.Link(name=TIP))
-    joints.append(
-        yourdfpy.Joint(
-            name=f"{TIP}_joint",
-            type="fixed",
-            parent=names[-1],
-            child=TIP,
-            origin=_shift(bodies[-1].end),
-        )
-    )
-    return urdf_text(yourdfpy.Robot(name=name or "caspr", links=links, joints=joints), _COMMENT)
-
-
-def _shift(place: Array) -> Array:
-    transform = np.eye(4)
-    transform[:3, 3] = place
-    return transform
+            links[-1].append(inertial(body.mass, body.inertia, origin(body.centre)))
+    links.append(E.link(name=TIP))
+    joints.append(joint("fixed", f"{TIP}_joint", names[-1], TIP, origin(bodies[-1].end)))
+    return urdf_text(name or "caspr", [*links, *joints], _COMMENT)
