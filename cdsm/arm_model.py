@@ -9,28 +9,19 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, final
+from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cdsm.cable import Cable
-from cdsm.elasticity import Elasticity, LinearElasticity
-from cdsm.errors import CableError, ElasticityRangeError, InvalidInput, UnknownName
+from cdsm.cable_laws import CableLaws, OriginalLength
+from cdsm.errors import CableError, UnknownName
 from cdsm.kernels import segments
 from cdsm.kernels.bodies import Masses
-from cdsm.kernels.stiffness import cable_stiffness
 from cdsm.kernels.tree import Routing, Tree
 from cdsm.rigid_body import RigidBody
-from cdsm.support.validation import LARGEST, RANGES
 from cdsm.support.values import Array, frozen
-from cdsm.wires.continuity import find_jump
-from cdsm.wires.laws import StrandElasticity
-
-OriginalLength = Literal["unstrained", "stretched"]
-
-_STEP = 1e-5
-"""Relative step of the finite difference of the slope of EA (1 + ε)."""
 
 _LIMIT_SLACK = 1e-9
 """Angle [rad] beyond a limit that is accepted as rounding, e.g. of a conversion from degrees."""
@@ -125,206 +116,3 @@ def _joints_to(tree: Tree, row: int) -> list[int]:
         rows.insert(0, row)
         row = int(tree.parent[row])
     return rows
-
-
-class CableLaws:
-    """Elasticities of the cables of an arm: stiffness, tension bounds and original lengths.
-
-    A locked motor holds the original length l_0 of its wire. Under tension the length of the wire
-    is ℓ = l_0 (1 + ε). The stiffness EA/l_0 is therefore EA (1 + ε)/ℓ.
-
-    Args:
-        cables: Cables of the arm.
-        original_length: ``"unstrained"``: the original length of a wire is ℓ/(1 + ε).
-            ``"stretched"``: it is ℓ, as in the paper.
-
-    Attributes:
-        held: Each different law of the position-controlled cables, with the indices of its cables.
-        series: 1/k_series of all cables (C,) [m/N].
-        rest: Tension at which each series spring is at rest (C,) [N]: the low end of the law's
-            domain.
-    """
-
-    def __init__(self, cables: tuple[Cable, ...], original_length: OriginalLength) -> None:
-        self._cables = cables
-        self._unstrained = original_length == "unstrained"
-        held = [c for c, cable in enumerate(self._cables) if cable.control == "position"]
-        by_law: dict[object, list[int]] = {}
-        for c in held:
-            by_law.setdefault(_key(self._cables[c].elasticity), []).append(c)
-        # usually all cables have one law, and a slice is faster than indices
-        self.held = [
-            (
-                self._cables[cables[0]].elasticity,
-                slice(None) if len(cables) == len(self._cables) else np.array(cables),
-            )
-            for cables in by_law.values()
-        ]
-        self._least = frozen(np.array([cable.minimum for cable in self._cables]))
-        self._most = frozen(np.array([cable.maximum for cable in self._cables]))
-        self._bounded = bool(self._least.any() or np.isfinite(self._most).any())
-        series = np.array([cable.series_stiffness for cable in self._cables])
-        self.series = frozen(1.0 / series)
-        self.rest = frozen(np.array([cable.elasticity.domain.low for cable in self._cables]))
-        # constant EA of linear laws; all other laws are evaluated at each tension
-        constant, linear, self._asked = np.zeros(len(self._cables)), np.zeros(len(self._cables)), []
-        for law, of in self.held:
-            if isinstance(law, LinearElasticity):
-                constant[of], linear[of] = law.rigidity(0.0), float(self._unstrained)
-            else:
-                self._asked.append((law, of))
-        self._constant, self._linear = frozen(constant), frozen(linear)
-
-    def require_continuity(self) -> None:
-        """Raise InvalidInput if the rigidity of a law jumps."""
-        for law, held in self.held:
-            jump = find_jump(law)
-            if jump is not None:
-                name = np.array(self._cables, dtype=object)[held][0].name
-                raise InvalidInput(
-                    "elasticity",
-                    f"the rigidity of {name} jumps at {jump.tension:.6g} N from {jump.below:.6g} "
-                    f"to {jump.above:.6g} N, and K_θ with it. Make it continuous, e.g. by a "
-                    "TabulatedElasticity through points of its strain.",
-                )
-
-    def narrowed(self, low: Array, high: Array) -> tuple[Array, Array]:
-        """Return bounds of tension (…, C) [N], narrowed by the bounds that each cable defines."""
-        if not self._bounded:
-            return low, high
-        return frozen(np.maximum(low, self._least)), frozen(np.minimum(high, self._most))
-
-    def stiffness(self, lengths: Array, tension: Array) -> Array:
-        """Compute the diagonal of K_L (C,) [N/m]: 1/(l_0/EA(F) + 1/k_series).
-
-        Force-controlled cables have the stiffness 0. The lengths L (C,) [m] and the tensions (C,)
-        [N] must be checked before, and no tension may be negative.
-        """
-        rigidity = self._constant
-        if self._asked:
-            rigidity = rigidity.copy()
-            for law, held in self._asked:
-                try:
-                    rigidity[held] = self.stretched_rigidity(law, tension[held])
-                except ElasticityRangeError as error:
-                    raise self.naming(error, held) from None
-        k = cable_stiffness(lengths, tension, rigidity, self._linear, self.series, self.rest)
-        return frozen(k)
-
-    def stretched_rigidity(self, law: Elasticity, tension: Array) -> Array:
-        """Compute EA (1 + ε) [N] of a law, or EA if l_0 is the stretched length."""
-        if isinstance(law, LinearElasticity):
-            rigidity = law.rigidity(tension)
-            return rigidity + tension if self._unstrained else rigidity
-        rigidity = _checked_rigidity(law, tension)
-        return rigidity * (1.0 + _checked_strain(law, tension)) if self._unstrained else rigidity
-
-    def original_lengths(self, lengths: Array, tension: Array) -> Array:
-        """Compute l_0 (C,) [m] of cables of length L (C,) [m] under tension F (C,) [N].
-
-        The cable length includes the series spring. l_0 is therefore negative if the spring
-        stretches by more than the length of the cable. The motor of a force-controlled cable holds
-        no length: the result is L.
-        """
-        wire = np.array(lengths)
-        for law, held in self.held:
-            F = tension[held]
-            wire[held] -= self.series[held] * (F - self.rest[held])
-            if self._unstrained:
-                try:
-                    wire[held] /= 1.0 + _checked_strain(law, F)
-                except ElasticityRangeError as error:
-                    raise self.naming(error, held) from None
-        return frozen(wire)
-
-    def slopes(self, tension: Array, stiffness: Array) -> tuple[Array, Array]:
-        """Compute dk/dF (C,) [1/m] and d²k/dF² (C,) [1/(N m)] of the cable stiffness k at F (C,).
-
-        The posture is constant, so l_0 changes with F. With R = EA (1 + ε), G = R′/R and the wire's
-        part of the cable compliance, w = 1 − k/k_series,
-
-            k′ = k A,  k″ = k (A² + A′),  A = (1 − w)/R + w G,
-            A′ = (1 − w) (A/R − G/R − A G) + w G′.
-
-        G′ is computed by finite differences and has about five correct digits.
-        """
-        first, second = np.zeros_like(stiffness), np.zeros_like(stiffness)
-        for law, held in self.held:
-            F, k = tension[held], stiffness[held]
-            last = np.array([*kinks(law), law.domain.high])[np.searchsorted(kinks(law), F)]
-            step = _STEP * np.maximum(F, 1.0)
-            beside = np.where(F + step <= last, F + step, F - step)
-            both = np.stack([F, beside])
-            try:
-                slopes = np.asarray(law.rigidity_slope(both))
-                R = self.stretched_rigidity(law, F)
-                if self._unstrained:  # (EA (1 + ε))′ = EA′ (1 + ε) + 1
-                    slopes = slopes * (1.0 + _checked_strain(law, both)) + 1.0
-            except ElasticityRangeError as error:
-                raise self.naming(error, held) from None
-            if slopes.shape != (2, F.size) or not np.isfinite(slopes).all():
-                raise InvalidInput(
-                    "elasticity",
-                    f"{law!r} gives the slopes {slopes} of its rigidity at tensions {F} N and "
-                    "beside them; one finite number for each is needed.",
-                )
-            G, spring = slopes[0] / R, k * self.series[held]
-            bend = (slopes[1] - slopes[0]) / (beside - F) / R - G**2
-            A = spring / R + (1.0 - spring) * G
-            first[held] = k * A
-            change = spring * (A / R - G / R - A * G) + (1.0 - spring) * bend
-            second[held] = k * (A**2 + change)
-        return frozen(first), frozen(second)
-
-    def naming(
-        self, error: ElasticityRangeError, held: slice | NDArray[np.intp]
-    ) -> ElasticityRangeError:
-        """Return the error of a law with the names and the indices of its cables added."""
-        outside = np.arange(len(self._cables))[held][list(error.indices)].tolist()
-        names = [self._cables[c].name for c in outside]
-        return ElasticityRangeError(error.problem, error.tension, outside, names)
-
-
-def kinks(law: Elasticity) -> tuple[float, ...]:
-    """Return the tensions [N], in rising order, at which the slope of a law's rigidity jumps.
-
-    The slope at a kink is the slope of the range below it. A table has weak kinks at its points;
-    they are not returned.
-    """
-    return law.joins if isinstance(law, StrandElasticity) else ()
-
-
-def _checked_rigidity(law: Elasticity, tension: Array) -> Array:
-    """Return EA(F) [N] of a law, same shape as F [N]; check it, since users define laws."""
-    rigidity = np.asarray(law.rigidity(tension))
-    _, least, most = RANGES["rigidity"]
-    usable = (rigidity >= least) & (rigidity <= most)  # False for NaN
-    if rigidity.shape != tension.shape or np.count_nonzero(usable) < tension.size:
-        raise InvalidInput(
-            "elasticity",
-            f"{law!r} gives the rigidity {rigidity} N at tensions {tension} N; one positive "
-            "number for each is needed.",
-        )
-    return rigidity
-
-
-def _checked_strain(law: Elasticity, tension: Array) -> Array:
-    """Return ε(F) [-] of a law, same shape as F [N]; check it, since users define laws."""
-    strain = np.asarray(law.strain(tension))
-    usable = (strain > -1.0) & (strain <= LARGEST)  # False for NaN
-    if strain.shape != tension.shape or np.count_nonzero(usable) < tension.size:
-        raise InvalidInput(
-            "elasticity",
-            f"{law!r} gives the strain {strain} at tensions {tension} N; one number for each, "
-            "zero at the low end of its domain and rising, is needed.",
-        )
-    return strain
-
-
-def _key(law: Elasticity) -> object:
-    """Return a key that is equal for equal laws; a user-defined law may not be hashable."""
-    try:
-        hash(law)
-    except TypeError:
-        return id(law)
-    return law

@@ -15,8 +15,9 @@ from typing import final, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cdsm.arm_model import ArmModel, OriginalLength
+from cdsm.arm_model import ArmModel
 from cdsm.cable import Cable, serpentine_cables
+from cdsm.cable_laws import OriginalLength
 from cdsm.elasticity import Elasticity
 from cdsm.errors import (
     CableError,

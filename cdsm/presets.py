@@ -12,8 +12,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm.arm_model import OriginalLength
 from cdsm.cable import serpentine_cables
+from cdsm.cable_laws import OriginalLength
 from cdsm.elasticity import Elasticity, LinearElasticity
 from cdsm.geometry import Geometry, Link
 from cdsm.manipulator import Manipulator

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from cdsm.arm_model import CableLaws
 from cdsm.batch import layout
 from cdsm.batch.distribution import Distributor
 from cdsm.batch.fused_kernel import evaluate_rows
 from cdsm.batch.inputs import kernel_arm, of_rows
 from cdsm.batch.layout import QUANTITIES, Codes, Flags
+from cdsm.cable_laws import CableLaws
 from cdsm.elasticity import Elasticity
 from cdsm.errors import ElasticityRangeError
 from cdsm.manipulator import Manipulator

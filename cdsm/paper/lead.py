@@ -15,7 +15,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from cdsm import presets
-from cdsm.arm_model import OriginalLength
+from cdsm.cable_laws import OriginalLength
 from cdsm.paper.claims import Claim, Figure
 from cdsm.paper.simulation import KEPT, readings
 from cdsm.stiffness_matrix import stiffness

@@ -18,7 +18,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from cdsm import presets
-from cdsm.arm_model import OriginalLength
+from cdsm.cable_laws import OriginalLength
 from cdsm.elasticity import Elasticity, LinearElasticity
 from cdsm.manipulator import Manipulator
 from cdsm.paper.claims import Claim, Figure, floats

@@ -10,7 +10,7 @@ import daqp
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm.arm_model import kinks
+from cdsm.cable_laws import kinks
 from cdsm.errors import ElasticityRangeError
 from cdsm.posture import Posture
 from cdsm.support.validation import Array, frozen

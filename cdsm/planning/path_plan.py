@@ -14,8 +14,8 @@ from typing import final
 
 import numpy as np
 
-from cdsm.arm_model import CableLaws
 from cdsm.cable import Cable
+from cdsm.cable_laws import CableLaws
 from cdsm.errors import CdsmError
 from cdsm.manipulator import Manipulator
 from cdsm.planning.follow import Status

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import minimize_scalar
 
-from cdsm.arm_model import kinks
+from cdsm.cable_laws import kinks
 from cdsm.errors import InvalidInput
 from cdsm.kernels.tension import OPTIMALITY
 from cdsm.planning.gradient import require_finite, stiffness_gradient

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cdsm.arm_model import kinks
 from cdsm.cable import Cable
+from cdsm.cable_laws import kinks
 from cdsm.errors import CdsmError, InvalidInput
 from cdsm.manipulator import Manipulator
 from cdsm.support.format import JointUnits

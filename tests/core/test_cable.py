@@ -9,7 +9,7 @@ import pytest
 
 import cdsm
 from cdsm import presets
-from cdsm.arm_model import _checked_rigidity
+from cdsm.cable_laws import _checked_rigidity
 from cdsm.support.validation import RANGES
 from tests.support.arms import random_arm, random_posture, random_wrench
 from tests.support.locked import original_length

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import ArrayLike
 
 import cdsm
-from cdsm.arm_model import CableLaws
+from cdsm.cable_laws import CableLaws
 from cdsm.support.validation import Array
 from tests.support import arms
 from tests.support.differences import assert_second_order, central_difference
