@@ -12,7 +12,8 @@ import typer
 import cdsm
 from cdsm.cli.arm import check, export, stiffness, urdf
 from cdsm.cli.loads import buckle, weigh
-from cdsm.cli.options import debug_wanted, grouped
+from cdsm.cli.options import as_command
+from cdsm.cli.output import debug_wanted
 from cdsm.cli.paper import reproduce
 from cdsm.cli.plan import plan
 from cdsm.cli.sweep import map_sweep, sweep
@@ -66,4 +67,4 @@ _COMMANDS: dict[str, Callable[..., None]] = {
     "reproduce": reproduce,
 }
 for name, command in _COMMANDS.items():
-    app.command(name)(grouped(command))
+    app.command(name)(as_command(command))

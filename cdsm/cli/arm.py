@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
+import numpy as np
 import typer
 
-from cdsm.cli.json_answers import of_stiffness
-from cdsm.cli.options import UNMET, Angles, ArmOptions, AsJson, TensionOptions, answer, reported
+from cdsm.cli.options import Angles, ArmOptions, AsJson, TensionOptions
+from cdsm.cli.output import UNMET, Json, answer, by_cable, joints
+from cdsm.errors import SingularStiffness
 from cdsm.geometry import Geometry
 from cdsm.interchange.cable_file import write_cables
 from cdsm.interchange.mjcf import instability, write_mjcf
+from cdsm.stiffness_matrix import Stiffness
 from cdsm.stiffness_matrix import stiffness as stiffness_at
 from cdsm.support.files import write_text
+from cdsm.support.format import MODEL, key
+from cdsm.support.validation import Array
+from cdsm.tension import Tension
 from cdsm.urdf import write_urdf
 
 
@@ -23,25 +30,45 @@ def urdf(
     as_json: AsJson = False,
 ) -> None:
     """Write the URDF of an arm, checked by reading it back with two parsers."""
-    with reported():
-        arm = Geometry.read(geometry)
-        path = write_urdf(arm, output)
-        numbers = {"name": arm.name, "length_m": arm.length, "written": [str(path)]}
-        answer(as_json, lambda: numbers, f"{arm}\nwritten: {path}")
+    arm = Geometry.read(geometry)
+    path = write_urdf(arm, output)
+    numbers: Json = {"name": arm.name, "length_m": arm.length, "written": [str(path)]}
+    answer(as_json, lambda: numbers, f"{arm}\nwritten: {path}")
 
 
 def stiffness(
-    arm: ArmOptions,
-    tensions: TensionOptions,
-    angles: Angles = "0",
-    as_json: AsJson = False,
+    arm: ArmOptions, tensions: TensionOptions, angles: Angles = "0", as_json: AsJson = False
 ) -> None:
     """Distribute the tensions at a posture, and print them and the stiffness."""
-    with reported():
-        pose = arm.at(angles)
-        tension = tensions.distribute(pose)
-        K = stiffness_at(pose, tension)
-        answer(as_json, lambda: of_stiffness(tension, K), pose.arm, tension, K)
+    pose = arm.at(angles)
+    tension = tensions.distribute(pose)
+    K = stiffness_at(pose, tension)
+    answer(as_json, lambda: _numbers(tension, K), pose.arm, tension, K)
+
+
+def _numbers(tension: Tension, K: Stiffness) -> Json:
+    def matrix(read: Callable[[], Array]) -> Array | None:
+        try:
+            return read()
+        except SingularStiffness:
+            return None
+
+    pose, arm = tension.posture, tension.posture.arm
+    return {
+        **joints(arm, pose.q),
+        "tip_position_m": pose.tip[:3, 3],
+        "tension_N": by_cable(arm, tension.values),
+        "cable_length_m": pose.cable_lengths,
+        key("static_residual", arm.torque_unit()): K.residual,
+        "model": MODEL,
+        "along_N_per_m": [K.along(axis) for axis in np.eye(3)],
+        "cartesian_N_per_m": matrix(lambda: K.cartesian),
+        "pseudoinverse_N_per_m": matrix(K.pseudoinverse),
+        "compliance": matrix(lambda: K.compliance),
+        key("joint_stiffness", arm.stiffness_unit()): K.joint,
+        key("margin", arm.stiffness_unit()): K.margin,
+        "stable": K.is_stable,
+    }
 
 
 def check(
@@ -58,12 +85,11 @@ def check(
     The options are those of `cdsm stiffness`.
     Exit code 0: it can be trusted; 3: it cannot, and the report says why.
     """
-    with reported():
-        pose = arm.at(angles)
-        report = stiffness_at(pose, tensions.distribute(pose)).report()
-        if html is not None:
-            typer.echo(f"written: {write_text(html, report.to_html())}", err=True)
-        answer(as_json, report.to_dict, pose.arm, report)
+    pose = arm.at(angles)
+    report = stiffness_at(pose, tensions.distribute(pose)).report()
+    if html is not None:
+        typer.echo(f"written: {write_text(html, report.to_html())}", err=True)
+    answer(as_json, report.to_dict, pose.arm, report)
     if not report.trustworthy:
         raise typer.Exit(UNMET)
 
@@ -89,20 +115,19 @@ def export(
     """
     if mjcf is None and cables_out is None:
         raise typer.BadParameter("give --mjcf, --cables-out or both.", param_hint="--mjcf")
-    with reported():
-        pose = arm.at(angles)
-        numbers: dict[str, object] = {"name": pose.arm.name}
-        lines, written = [str(pose.arm)], []
-        if mjcf is not None:
-            tension = tensions.distribute(pose)
-            K = stiffness_at(pose, tension)
-            numbers["stable"] = K.is_stable
-            if not K.is_stable:
-                lines.insert(0, instability(K))
-            written.append(str(write_mjcf(pose.arm, mjcf, pose, tension, damping=damping)))
-        if cables_out is not None:
-            written.append(str(write_cables(pose.arm.cables, cables_out)))
-        lines += [f"written: {path}" for path in written]
-        answer(as_json, lambda: numbers | {"written": written}, "\n".join(lines))
+    pose = arm.at(angles)
+    numbers: Json = {"name": pose.arm.name}
+    lines, written = [str(pose.arm)], []
+    if mjcf is not None:
+        tension = tensions.distribute(pose)
+        K = stiffness_at(pose, tension)
+        numbers["stable"] = K.is_stable
+        if not K.is_stable:
+            lines.insert(0, instability(K))
+        written.append(str(write_mjcf(pose.arm, mjcf, pose, tension, damping=damping)))
+    if cables_out is not None:
+        written.append(str(write_cables(pose.arm.cables, cables_out)))
+    lines += [f"written: {path}" for path in written]
+    answer(as_json, lambda: numbers | {"written": written}, "\n".join(lines))
     if numbers.get("stable") is False:
         raise typer.Exit(UNMET)

@@ -7,23 +7,11 @@ from typing import Annotated
 
 import typer
 
-from cdsm.cli.json_answers import of_buckling, of_weight_test
-from cdsm.cli.options import (
-    NO_WRENCH,
-    Angles,
-    ArmOptions,
-    AsJson,
-    Picture,
-    Solver,
-    TensionOptions,
-    Wrench,
-    answer,
-    numbers,
-    reported,
-    write_picture,
-)
-from cdsm.statics.buckling import critical_load, critical_tension
-from cdsm.statics.weight_test import weight_test
+from cdsm.cli import options
+from cdsm.cli.options import Angles, ArmOptions, AsJson, Picture, TensionOptions, numbers
+from cdsm.cli.output import Json, answer, joints, write_picture
+from cdsm.statics.buckling import CriticalLoad, CriticalTension, critical_load, critical_tension
+from cdsm.statics.weight_test import WeightTest, weight_test
 from cdsm.tension import DEFAULT_SOLVER
 
 
@@ -39,13 +27,36 @@ def weigh(
     as_json: AsJson = False,
 ) -> None:
     """Hang a weight at the tip with the motors locked, and see how far it goes (Eq. 20)."""
-    with reported():
-        pose = arm.at(angles)
-        tension = tensions.distribute(pose)
-        test = weight_test(pose, tension, numbers("--force", force, 3), steps=steps)
-        write_picture(figure, "plot_weight_test", test)
-        loaded = f"at the full load:\n{test.loaded[-1]}"
-        answer(as_json, lambda: of_weight_test(test), pose.arm, test, loaded)
+    pose = arm.at(angles)
+    tension = tensions.distribute(pose)
+    test = weight_test(pose, tension, numbers("--force", force, 3), steps=steps)
+    write_picture(figure, "plot_weight_test", test)
+    loaded = f"at the full load:\n{test.loaded[-1]}"
+    answer(as_json, lambda: _weight_numbers(test), pose.arm, test, loaded)
+
+
+def _weight_numbers(test: WeightTest) -> Json:
+    last, before = test.loaded[-1], test.without
+    return {
+        "before": {
+            "tip_displacement_m": before.displacement,
+            "at_limit": before.at_limit,
+            "slack": before.slack,
+            "stable": before.stable,
+        },
+        "force_N": test.force,
+        "loads_N": test.loads,
+        "tip_displacements_m": test.displacements,
+        "linear_displacement_m": test.linear.displacement,
+        "stiffness_N_per_m": test.stiffness,
+        "linear_stiffness_N_per_m": test.linear.stiffness,
+        "cables": [cable.name for cable in last.pose.arm.cables],
+        "tensions_N": test.tensions,
+        **joints(last.pose.arm, last.pose.q),
+        "slack": last.slack,
+        "at_limit": last.at_limit,
+        "stable": last.stable,
+    }
 
 
 def buckle(
@@ -64,8 +75,8 @@ def buckle(
     max_tension: Annotated[
         float | None, typer.Option(help="Upper bound of all tensions under the load [N].")
     ] = None,
-    wrench: Wrench = NO_WRENCH,
-    solver: Solver = DEFAULT_SOLVER,
+    wrench: options.Wrench = options.NO_WRENCH,
+    solver: options.Solver = DEFAULT_SOLVER,
     figure: Picture = None,
     as_json: AsJson = False,
 ) -> None:
@@ -73,16 +84,34 @@ def buckle(
     for option, value in (("--min-tension", min_tension), ("--max-tension", max_tension)):
         if value is not None and load is None:
             raise typer.BadParameter("bounds the tensions under --load only.", param_hint=option)
-    with reported():
-        pose = arm.at(angles)
-        carried = numbers("--wrench", wrench, 6)
-        tension = critical_tension(pose, carried, solver)
-        most = None
-        if load is not None:
-            weight = numbers("--load", load, 6)
-            low = 10.0 if min_tension is None else min_tension
-            high = math.inf if max_tension is None else max_tension
-            most = critical_load(pose, weight, low, high, solver, carried=carried)
-        write_picture(figure, "plot_critical_tension", tension)
-        found = (tension,) if most is None else (tension, most)
-        answer(as_json, lambda: of_buckling(tension, most), pose.arm, *found)
+    pose = arm.at(angles)
+    carried = numbers("--wrench", wrench, 6)
+    tension = critical_tension(pose, carried, solver)
+    most = None
+    if load is not None:
+        low = 10.0 if min_tension is None else min_tension
+        high = math.inf if max_tension is None else max_tension
+        weight = numbers("--load", load, 6)
+        most = critical_load(pose, weight, low, high, solver, carried=carried)
+    write_picture(figure, "plot_critical_tension", tension)
+    found = (tension,) if most is None else (tension, most)
+    answer(as_json, lambda: _buckling_numbers(tension, most), pose.arm, *found)
+
+
+def _buckling_numbers(tension: CriticalTension, load: CriticalLoad | None) -> Json:
+    names = tension.posture.arm.joint_names
+    found: Json = {
+        "critical_minimum_tension_N": tension.minimum,
+        "stable_minimum_tension_N": tension.stable,
+        "examined_minimum_tension_N": tension.examined,
+        "mode": dict(zip(names, tension.mode, strict=True)),
+        "tension_N": tension.tension,
+    }
+    if load is not None:
+        found |= {
+            "load": load.wrench,
+            "critical_load_factor": load.factor,
+            "limit": load.limit,
+            "load_mode": dict(zip(names, load.mode, strict=True)),
+        }
+    return found

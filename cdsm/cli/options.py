@@ -1,44 +1,34 @@
-"""Shared by all commands: options, the arm that they describe, output and errors."""
+"""Options of the commands, and the arm and the tensions that they describe."""
 
 from __future__ import annotations
 
 import inspect
 import math
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from contextvars import ContextVar
+from collections.abc import Callable
 from dataclasses import dataclass, fields, is_dataclass
-from functools import wraps
+from functools import partial, wraps
 from pathlib import Path
-from typing import Annotated, Any, TypeVar, get_type_hints
+from typing import Annotated, Any
 
 import numpy as np
 import typer
-from rich.console import Console
 
 from cdsm.cable import serpentine_cables
-from cdsm.cli.json_answers import Json, show_json
+from cdsm.cli.output import reported
 from cdsm.elasticity import Elasticity, LinearElasticity
-from cdsm.errors import CdsmError
 from cdsm.geometry import Geometry
 from cdsm.interchange.cable_file import read_cables
 from cdsm.interchange.caspr import read_caspr
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.presets import STRAND_1X19
-from cdsm.support.files import write_file
 from cdsm.support.format import JointUnits
 from cdsm.support.validation import Array
 from cdsm.tension import DEFAULT_SOLVER, Tension, distribute_tension
 from cdsm.wires.files import read_elasticity
 
-_Value = TypeVar("_Value")
-
-console = Console(stderr=True)
-"""Console for progress and errors. Answers go to standard output."""
-
-_ARM = "The arm"
-_TENSIONS = "Tensions and load"
+_arm_option = partial(typer.Option, rich_help_panel="The arm")
+_tension_option = partial(typer.Option, rich_help_panel="Tensions and load")
 
 ANGLES = typer.Option(
     help="Joint angles in degrees (mm where a joint slides), separated by commas, or one for all "
@@ -47,28 +37,14 @@ ANGLES = typer.Option(
     show_default=False,
 )
 Angles = Annotated[str, ANGLES]
-MinTension = Annotated[
-    float, typer.Option(help="Lower bound of all tensions [N].", rich_help_panel=_TENSIONS)
-]
-MaxTension = Annotated[
-    float, typer.Option(help="Upper bound of all tensions [N].", rich_help_panel=_TENSIONS)
-]
+MinTension = Annotated[float, _tension_option(help="Lower bound of all tensions [N].")]
+MaxTension = Annotated[float, _tension_option(help="Upper bound of all tensions [N].")]
 Wrench = Annotated[
-    str,
-    typer.Option(
-        help="At the tip: FX,FY,FZ,MX,MY,MZ [N, N m].",
-        metavar="FX,...,MZ",
-        rich_help_panel=_TENSIONS,
-    ),
+    str, _tension_option(help="At the tip: FX,FY,FZ,MX,MY,MZ [N, N m].", metavar="FX,...,MZ")
 ]
-Solver = Annotated[
-    str, typer.Option(help="Quadratic-programming solver.", rich_help_panel=_TENSIONS)
-]
+Solver = Annotated[str, _tension_option(help="Quadratic-programming solver.")]
 Picture = Annotated[Path | None, typer.Option(metavar="FILE.png", help="Picture to write.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print SI numbers as JSON.")]
-
-debug_wanted: ContextVar[bool] = ContextVar("debug_wanted", default=False)
-"""Whether the running command shows tracebacks."""
 
 NO_WRENCH = "0,0,0,0,0,0"
 
@@ -86,51 +62,34 @@ class ArmOptions:
         ),
     ]
     cables: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="CABLES.toml", help="Its cables, and their wires.", rich_help_panel=_ARM
-        ),
+        Path | None, _arm_option(metavar="CABLES.toml", help="Its cables, and their wires.")
     ] = None
-    tip: Annotated[
-        str | None,
-        typer.Option(help="The link of a .urdf that is its tip.", rich_help_panel=_ARM),
-    ] = None
+    tip: Annotated[str | None, _arm_option(help="The link of a .urdf that is its tip.")] = None
     rigidity: Annotated[
         float | None,
-        typer.Option(
-            help="Constant EA of all cables [N]; default: the 1x19 strand of Eq. 19.",
-            rich_help_panel=_ARM,
-        ),
+        _arm_option(help="Constant EA of all cables [N]; default: the 1x19 strand of Eq. 19."),
     ] = None
     wire: Annotated[
         Path | None,
-        typer.Option(
-            metavar="WIRE.toml",
-            help="Elasticity of all cables, as `cdsm fit` writes it.",
-            rich_help_panel=_ARM,
-        ),
+        _arm_option(metavar="WIRE.toml", help="Elasticity of all cables, as `cdsm fit` writes it."),
     ] = None
     spring: Annotated[
-        float,
-        typer.Option(
-            help="Stiffness of a spring in series with every cable [N/mm].", rich_help_panel=_ARM
-        ),
+        float, _arm_option(help="Stiffness of a spring in series with every cable [N/mm].")
     ] = math.inf
     gravity: Annotated[
-        str,
-        typer.Option(
-            help="In m/s², base axes: GX,GY,GZ.", metavar="GX,GY,GZ", rich_help_panel=_ARM
-        ),
+        str, _arm_option(help="In m/s², base axes: GX,GY,GZ.", metavar="GX,GY,GZ")
     ] = "0,0,-9.81"
 
     def read(self) -> Manipulator:
         """Build the arm from its files and options."""
         gravity = numbers("--gravity", self.gravity, 3)
         if self.arm.suffix.lower() == ".urdf":
-            cables = read_cables(_needed("--cables", self.cables))
-            tip = _needed("--tip", self.tip)
+            if self.cables is None or self.tip is None:
+                missing = "--cables" if self.cables is None else "--tip"
+                raise typer.BadParameter("a robot in a .urdf needs it.", param_hint=missing)
             self._refuse("the file of --cables has the wires", "rigidity", "wire", "spring")
-            return Manipulator.from_urdf(self.arm, cables, tip=tip, gravity=gravity)
+            cables = read_cables(self.cables)
+            return Manipulator.from_urdf(self.arm, cables, tip=self.tip, gravity=gravity)
         self._refuse("the tip of a .urdf is free, that of others is not", "tip")
         if self.arm.is_dir():
             self._refuse("a CASPR model has its own cables", "cables", "spring")
@@ -146,7 +105,15 @@ class ArmOptions:
 
     def at(self, angles: str) -> Posture:
         """Return the posture at joint coordinates [degrees, or mm if a joint slides]."""
-        return at_angles(self.read(), angles)
+        arm, given = self.read(), numbers("--angles", angles)
+        given = given * arm.nv if len(given) == 1 else given
+        if len(given) != arm.nv:
+            names = ", ".join(arm.joint_names)
+            raise typer.BadParameter(
+                f"{len(given)} given; give one angle, or one for each of {names}.",
+                param_hint="--angles",
+            )
+        return arm.at(np.array(given) * joint_scales(arm))
 
     def _refuse(self, why: str, *names: str) -> None:
         """Raise BadParameter for options that this kind of arm would ignore."""
@@ -177,56 +144,32 @@ class TensionOptions:
         return distribute_tension(pose, self.min_tension, self.max_tension, load, self.solver)
 
 
-def _needed(option: str, value: _Value | None) -> _Value:
-    if value is None:
-        raise typer.BadParameter("a robot in a .urdf needs it.", param_hint=option)
-    return value
-
-
-def grouped(command: Callable[..., None]) -> Callable[..., None]:
-    """Replace each dataclass parameter of a command by one option per field, for typer.
+def as_command(function: Callable[..., None]) -> Callable[..., None]:
+    """Return a function as typer needs it: one parameter per option, and errors as messages.
 
     typer reads options only from the signature. Shared options are declared once, as fields of a
-    dataclass, and this function puts them into the signature.
+    dataclass; here they replace the parameter of the function that is annotated with it.
     """
-    hints = get_type_hints(command, include_extras=True)
-    own = inspect.signature(command).parameters
-    groups = {name: hints[name] for name in own if is_dataclass(hints[name])}
-    shown: list[inspect.Parameter] = []
-    for name, parameter in own.items():
-        if name in groups:
-            inner = get_type_hints(groups[name], include_extras=True)
-            shown += [
-                item.replace(annotation=inner[item.name], kind=inspect.Parameter.KEYWORD_ONLY)
-                for item in inspect.signature(groups[name]).parameters.values()
-            ]
+    groups: dict[str, Any] = {}
+    options: list[inspect.Parameter] = []
+    for each in inspect.signature(function, eval_str=True).parameters.values():
+        if is_dataclass(each.annotation):
+            groups[each.name] = each.annotation
+            options += inspect.signature(groups[each.name], eval_str=True).parameters.values()
         else:
-            shown.append(
-                parameter.replace(annotation=hints[name], kind=inspect.Parameter.KEYWORD_ONLY)
-            )
+            options.append(each)
 
-    @wraps(command)
-    def flat(**given: Any) -> None:
+    @wraps(function)
+    def command(**given: Any) -> None:
         for name, group in groups.items():
             given[name] = group(**{field.name: given.pop(field.name) for field in fields(group)})
-        command(**given)
+        with reported():
+            function(**given)
 
-    flat.__signature__ = inspect.Signature(shown)  # type: ignore[attr-defined]
-    flat.__annotations__ = {parameter.name: parameter.annotation for parameter in shown}
-    return flat
-
-
-def at_angles(arm: Manipulator, angles: str) -> Posture:
-    """Return the posture of an arm at joint coordinates [degrees, or mm if a joint slides]."""
-    given = numbers("--angles", angles)
-    given = given * arm.nv if len(given) == 1 else given
-    if len(given) != arm.nv:
-        names = ", ".join(arm.joint_names)
-        raise typer.BadParameter(
-            f"{len(given)} given; give one angle, or one for each of {names}.",
-            param_hint="--angles",
-        )
-    return arm.at(np.array(given) * joint_scales(arm))
+    command.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
+        [option.replace(kind=inspect.Parameter.KEYWORD_ONLY) for option in options]
+    )
+    return command
 
 
 def joint_scales(arm: Manipulator) -> Array:
@@ -245,41 +188,3 @@ def numbers(option: str, text: str, count: int | None = None) -> list[float]:
     if count is not None and len(values) != count:
         raise typer.BadParameter(f"{len(values)} given; give {count}.", param_hint=option)
     return values
-
-
-def answer(as_json: bool, as_dict: Callable[[], Json], *parts: object) -> None:
-    """Print an answer: its parts as text, or its numbers as JSON."""
-    if as_json:
-        show_json(as_dict())
-    else:
-        typer.echo("\n\n".join(map(str, parts)))
-
-
-def write_picture(path: Path | None, draw: str, *results: object, err: bool = True) -> None:
-    """Draw results with the function ``draw`` of :mod:`cdsm.plots`, if a path is given."""
-    if path is not None:
-        from cdsm import plots  # imports matplotlib, so on demand
-
-        figure = getattr(plots, draw)(*results)
-        typer.echo(f"written: {write_file(path, figure.savefig)}", err=err)
-
-
-UNMET = 3
-"""Exit code of a negative answer (unstable, untrusted, infeasible); 1: error, 2: wrong option."""
-
-
-@contextmanager
-def reported() -> Iterator[None]:
-    """Turn an error into a message and exit code 1, Ctrl-C into 130; --debug changes nothing."""
-    try:
-        yield
-    except KeyboardInterrupt:
-        if debug_wanted.get():
-            raise
-        console.print("interrupted: no file is half-written, and what --resume keeps stays")
-        raise typer.Exit(130) from None
-    except (CdsmError, OSError) as error:  # OSError: of the terminal or pipe
-        if debug_wanted.get():
-            raise
-        console.print(f"error: {error}", style="red", markup=False, highlight=False, soft_wrap=True)
-        raise typer.Exit(1) from None

@@ -13,7 +13,8 @@ from rich.progress import track
 from rich.table import Table
 
 from cdsm import paper
-from cdsm.cli.options import AsJson, console, reported
+from cdsm.cli.options import AsJson
+from cdsm.cli.output import console
 from cdsm.support.files import make_folder, write_file, write_text
 
 _WIDE = 110
@@ -27,24 +28,23 @@ def reproduce(
     as_json: AsJson = False,
 ) -> None:
     """Recompute Figs. 3 to 13 of the paper: pictures, table and numbers."""
-    with reported():
-        from cdsm.plots import plot_paper  # imports matplotlib, so on demand
+    from cdsm.plots import plot_paper  # imports matplotlib, so on demand
 
-        make_folder(out)
-        results, written = [], []
-        for compute in track(paper.FIGURES.values(), "recomputing the paper", console=console):
-            result = compute()
-            results.append(result)
-            written.append(write_file(out / f"{result.name}.png", plot_paper(result).savefig))
-        written.append(write_text(out / "reproduction.md", paper.to_markdown(results)))
-        numbers = json.dumps(paper.to_dict(results), indent=1, allow_nan=False)
-        written.append(write_text(out / "reproduction.json", numbers + "\n"))
-        if as_json:
-            typer.echo(numbers)
-            return
-        _show(paper.HEADER, paper.to_rows(results))
-        typer.echo(paper.EXPLANATION)
-        typer.echo("written: " + ", ".join(map(str, written)))
+    make_folder(out)
+    results, written = [], []
+    for compute in track(paper.FIGURES.values(), "recomputing the paper", console=console):
+        result = compute()
+        results.append(result)
+        written.append(write_file(out / f"{result.name}.png", plot_paper(result).savefig))
+    written.append(write_text(out / "reproduction.md", paper.to_markdown(results)))
+    numbers = json.dumps(paper.to_dict(results), indent=1, allow_nan=False)
+    written.append(write_text(out / "reproduction.json", numbers + "\n"))
+    if as_json:
+        typer.echo(numbers)
+        return
+    _show(paper.HEADER, paper.to_rows(results))
+    typer.echo(paper.EXPLANATION)
+    typer.echo("written: " + ", ".join(map(str, written)))
 
 
 def _show(header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:

@@ -38,47 +38,41 @@ def read_path(path: Path, arm: Manipulator) -> PathFile:
     The header names the columns and their units. Joint columns have the names of the joints of
     the arm. Other columns are ignored. Lines that begin with # are comments.
     """
-    table = read_table(path)
-    if len(table.rows) < 2:
-        raise FileError(path, "holds no path; a header and one line per sample are needed.")
-    units: dict[str, tuple[int, str]] = {}
-    for at, cell in enumerate(table.header):
-        name, unit = name_and_unit(cell)
-        if name in units:
-            raise FileError(path, f"has two columns called {name}; give each once.")
-        units[name] = at, unit
 
     def refuse(problem: str) -> NoReturn:
         raise FileError(path, f"{problem}.")
 
+    table = read_table(path)
+    if len(table.rows) < 2:
+        refuse("holds no path; a header and one line per sample are needed")
+    found: dict[str, tuple[int, str]] = {}
+    for at, cell in enumerate(table.header):
+        name, unit = name_and_unit(cell)
+        if name in found:
+            refuse(f"has two columns called {name}; give each once")
+        found[name] = at, unit
+
     def columns(wanted: dict[str, dict[str, float]]) -> Array | None:
         """Read the columns of these names in SI; None if the file has none of them."""
-        if not wanted.keys() & units.keys():
+        if not wanted.keys() & found.keys():
             return None
         values = []
         for name, known in wanted.items():
-            at, unit = units.get(name, (-1, ""))
+            at, unit = found.get(name, (-1, ""))
             if unit not in known:
-                what = f"the column {name} has no unit that is known" if at >= 0 else ""
-                raise FileError(
-                    path,
-                    f"{what or f'has no column {name}'}; call it "
-                    f"{' or '.join(f'{name} [{unit}]' for unit in known)}.",
-                )
+                fault = f"the column {name} has no unit that is known"
+                names = " or ".join(f"{name} [{unit}]" for unit in known)
+                refuse(f"{fault if at >= 0 else f'has no column {name}'}; call it {names}")
             values.append(known[unit] * table.column(at, refuse))
         return np.array(values).T
 
-    joints = {
-        name: _LENGTH if slides else _ANGLE
-        for name, slides in zip(arm.joint_names, arm.slides, strict=True)
-    }
-    angles, tips = columns(joints), columns(dict.fromkeys("xyz", _LENGTH))
+    kinds = [_LENGTH if slides else _ANGLE for slides in arm.slides]
+    angles = columns(dict(zip(arm.joint_names, kinds, strict=True)))
+    tips, target = columns(dict.fromkeys("xyz", _LENGTH)), columns({"target": _STIFFNESS})
     if (angles is None) == (tips is None):
         first = f"{arm.joint_names[0]} [{'mm' if arm.slides[0] else 'deg'}]"
-        raise FileError(
-            path,
+        refuse(
             f"has columns for {'neither' if angles is None else 'both'} of joint angles ({first}, "
-            "…) and tip positions (x [mm], y [mm], z [mm]); give one of them.",
+            "…) and tip positions (x [mm], y [mm], z [mm]); give one of them"
         )
-    target = columns({"target": _STIFFNESS})
     return PathFile(angles, tips, None if target is None else target[:, 0])

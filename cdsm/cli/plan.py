@@ -3,43 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from functools import partial
 from pathlib import Path
-from typing import Annotated, NamedTuple
+from typing import Annotated
 
 import typer
 
-from cdsm.cli.json_answers import Json, of_path, of_plan
-from cdsm.cli.options import (
-    ANGLES,
-    NO_WRENCH,
-    UNMET,
-    ArmOptions,
-    AsJson,
-    MaxTension,
-    MinTension,
-    Picture,
-    Wrench,
-    answer,
-    at_angles,
-    console,
-    numbers,
-    reported,
-    write_picture,
-)
-from cdsm.cli.path_file import PathFile, read_path
-from cdsm.manipulator import Manipulator
+from cdsm.cli import options
+from cdsm.cli.options import ArmOptions, AsJson, MaxTension, MinTension, Picture, numbers
+from cdsm.cli.output import UNMET, Json, answer, by_cable, console, joints, write_picture
+from cdsm.cli.path_file import read_path
 from cdsm.planning import (
     PathPlan,
+    StiffnessPlan,
+    StiffnessRange,
     plan_path,
     plan_stiffness,
     stiffness_range,
 )
-from cdsm.posture import Posture
-
-_Bounds = tuple[float, float, list[float]]
-"""Lower and upper bound of the tensions [N], and the wrench."""
+from cdsm.support.format import key
+from cdsm.support.validation import Array
 
 
 def plan(
@@ -51,7 +33,7 @@ def plan(
         float | None,
         typer.Option(help="Wanted stiffness [N/mm]; PATH.csv can give it for every sample."),
     ] = None,
-    angles: Annotated[str | None, ANGLES] = None,
+    angles: Annotated[str | None, options.ANGLES] = None,
     path: Annotated[
         Path | None,
         typer.Option(
@@ -66,7 +48,7 @@ def plan(
     ] = math.inf,
     min_tension: MinTension = 10.0,
     max_tension: MaxTension = math.inf,
-    wrench: Wrench = NO_WRENCH,
+    wrench: options.Wrench = options.NO_WRENCH,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -80,74 +62,92 @@ def plan(
 
     Exit code 3: some samples of the path cannot be planned; all that can is written all the same.
     """
-    with reported():
+    u = numbers("--direction", direction, 3)
+    bounds = min_tension, max_tension, numbers("--wrench", wrench, 6)
+    if path is not None and angles is not None:
+        raise typer.BadParameter("is of one posture; --path has its own.", param_hint="--angles")
+    wanted = None if target is None else 1000.0 * target
+    drawn: tuple[object, ...]
+    if path is not None:
         robot = arm.read()
-        u, load = numbers("--direction", direction, 3), numbers("--wrench", wrench, 6)
-        wanted = None if target is None else 1000.0 * target
-        bounds = min_tension, max_tension, load
-        if path is not None and angles is not None:
-            raise typer.BadParameter(
-                "is of one posture; --path has its own.", param_hint="--angles"
-            )
-        if path is not None:
-            result = _along_path(robot, read_path(path, robot), u, wanted, bounds, rate)
-        elif wanted is None:
-            raise typer.BadParameter("give it, or --path.", param_hint="--target")
-        elif math.isfinite(rate):
-            raise typer.BadParameter("is of a path; give --path, too.", param_hint="--rate")
-        else:
-            pose = at_angles(robot, "0" if angles is None else angles)
-            result = _at_posture(pose, u, wanted, bounds)
-        answer(as_json, result.as_dict, robot, *result.parts)
-        if out is not None:
-            typer.echo(f"written: {result.motors().write_csv(out)}", err=as_json)
-        write_picture(figure, result.draw, *result.drawn, err=as_json)
-    if not result.complete:
+        file = read_path(path, robot)
+        targets = _one_target(wanted, file.target)
+        plan = plan_path(robot, u, targets, *bounds, angles=file.angles, tips=file.tips, rate=rate)
+        with console.status("looking half-way between the samples"):
+            _ = plan.between
+        answer(as_json, lambda: _path_numbers(plan), robot, plan)
+        draw, drawn = "plot_path_plan", (plan,)
+    elif wanted is None:
+        raise typer.BadParameter("give it, or --path.", param_hint="--target")
+    elif math.isfinite(rate):
+        raise typer.BadParameter("is of a path; give --path, too.", param_hint="--rate")
+    else:
+        pose = arm.at("0" if angles is None else angles)
+        attainable = stiffness_range(pose, u, *bounds)
+        best = plan_stiffness(pose, u, wanted, *bounds)
+        answer(as_json, lambda: _numbers(best, attainable), pose.arm, attainable, best)
+        draw, drawn = "plot_stiffness_plan", (best, attainable)
+        if out is not None:  # repeats the search as a path of one sample
+            plan = plan_path(pose.arm, u, wanted, *bounds, angles=[pose.q])
+    if out is not None:
+        typer.echo(f"written: {plan.write_csv(out)}", err=as_json)
+    write_picture(figure, draw, *drawn, err=as_json)
+    if path is not None and plan.infeasible:
         raise typer.Exit(UNMET)
 
 
-class _Answer(NamedTuple):
-    """Results to print, write and draw."""
-
-    parts: tuple[object, ...]
-    as_dict: Callable[[], Json]
-    motors: Callable[[], PathPlan]
-    draw: str
-    drawn: tuple[object, ...]
-    complete: bool = True
-
-
-def _at_posture(pose: Posture, u: list[float], target: float, bounds: _Bounds) -> _Answer:
-    """Plan the stiffness at one posture, and compute its attainable range."""
-    attainable = stiffness_range(pose, u, *bounds)
-    best = plan_stiffness(pose, u, target, *bounds)
-
-    def motors() -> PathPlan:  # repeats the search of plan_stiffness as a path of one sample
-        return plan_path(pose.arm, u, target, *bounds, angles=[pose.q])
-
-    drawn = best, attainable
-    as_dict = partial(of_plan, best, attainable)
-    return _Answer((attainable, best), as_dict, motors, "plot_stiffness_plan", drawn)
+def _one_target(given: float | None, of_file: Array | None) -> float | Array:
+    """Return the target [N/m] of the option, or the targets of the file; exactly one is given."""
+    if given is not None and of_file is None:
+        return given
+    if given is None and of_file is not None:
+        return of_file
+    raise typer.BadParameter(
+        "give it, or a column target [N/mm] in the file of --path; "
+        f"{'neither was' if given is None else 'both were'} given.",
+        param_hint="--target",
+    )
 
 
-def _along_path(
-    arm: Manipulator,
-    file: PathFile,
-    u: list[float],
-    target: float | None,
-    bounds: _Bounds,
-    rate: float,
-) -> _Answer:
-    """Plan a path with one target [N/m] for all samples, or with the targets of its file."""
-    wanted = file.target if target is None else target
-    if wanted is None or (target is not None and file.target is not None):
-        raise typer.BadParameter(
-            "give it, or a column target [N/mm] in the file of --path; "
-            f"{'neither was' if wanted is None else 'both were'} given.",
-            param_hint="--target",
-        )
-    path = plan_path(arm, u, wanted, *bounds, angles=file.angles, tips=file.tips, rate=rate)
-    with console.status("looking half-way between the samples"):
-        _ = path.between
-    as_dict, complete = partial(of_path, path), not path.infeasible
-    return _Answer((path,), as_dict, lambda: path, "plot_path_plan", (path,), complete)
+def _numbers(plan: StiffnessPlan, attainable: StiffnessRange) -> Json:
+    pose, arm = plan.tension.posture, plan.tension.posture.arm
+    return {
+        "direction": attainable.direction,
+        "low_N_per_m": attainable.low,
+        "high_N_per_m": attainable.high,
+        "target_N_per_m": plan.target,
+        "achieved_N_per_m": plan.achieved,
+        "tension_N": by_cable(arm, plan.tension.values),
+        "cable_length_m": by_cable(arm, pose.cable_lengths),
+        **joints(arm, pose.q),
+        key("margin", arm.stiffness_unit()): plan.stiffness.margin,
+        "efforts_N": plan.efforts,
+        "iterations": plan.iterations,
+    }
+
+
+def _path_numbers(plan: PathPlan) -> Json:
+    return {
+        "cables": [cable.name for cable in plan.arm.cables],
+        "target_N_per_m": plan.target,
+        "planned": plan.planned,
+        "achieved_N_per_m": plan.achieved,
+        **joints(plan.arm, plan.angles),
+        "tensions_N": plan.tensions,
+        "cable_lengths_m": plan.cable_lengths,
+        "half_way": [
+            {
+                "after": between.index,
+                "target_N_per_m": between.target,
+                "achieved_N_per_m": between.achieved,
+                "misfit": between.misfit,
+                "reason": between.reason,
+            }
+            for between in plan.between
+        ],
+        "infeasible": [
+            {"index": sample.index, "status": sample.status, "reason": sample.reason}
+            for sample in plan.infeasible
+        ],
+        "iterations": plan.iterations,
+    }

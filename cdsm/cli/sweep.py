@@ -10,21 +10,13 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 import typer
 
-from cdsm.cli.json_answers import Json, status_counts
-from cdsm.cli.options import (
-    NO_WRENCH,
-    ArmOptions,
-    AsJson,
-    MaxTension,
-    Wrench,
-    answer,
-    joint_scales,
-    numbers,
-    reported,
-)
+from cdsm.cli import options
+from cdsm.cli.options import ArmOptions, AsJson, joint_scales, numbers
+from cdsm.cli.output import Json, answer
 from cdsm.cli.path_file import read_path
 from cdsm.errors import FileError
 from cdsm.manipulator import Manipulator
+from cdsm.support.datasets import status_names
 from cdsm.support.files import write_file
 from cdsm.support.validation import Array
 from cdsm.sweeps import GridPoses, PathPoses, PoseSet, RandomPoses, read_sweep, write_sweep
@@ -77,7 +69,12 @@ class PoseOptions:
         if self.grid is not None:
             return _grid(self.grid, arm)
         if self.path is not None:
-            return PathPoses(_waypoints(self.path, arm), self.count)
+            file = read_path(self.path, arm)
+            if file.angles is None or file.target is not None:
+                raise FileError(
+                    self.path, "holds tips or targets; a sweep goes along joint angles."
+                )
+            return PathPoses(file.angles, self.count)
         return RandomPoses(self.random or 0, self.seed or 0)
 
 
@@ -90,12 +87,12 @@ def sweep(
     min_tension: Annotated[
         str, typer.Option(help="Lower bound of all tensions [N], or several.", metavar="N,N,...")
     ] = "10",
-    max_tension: MaxTension = math.inf,
+    max_tension: options.MaxTension = math.inf,
     quantities: Annotated[
         str,
         typer.Option(help=f"What to compute, of {', '.join(QUANTITIES)}.", metavar="NAME,NAME,..."),
     ] = ",".join(DEFAULT),
-    wrench: Wrench = NO_WRENCH,
+    wrench: options.Wrench = options.NO_WRENCH,
     resume: Annotated[
         Path | None,
         typer.Option(help="Folder to keep results in as they come; goes on from what is there."),
@@ -103,21 +100,20 @@ def sweep(
     as_json: AsJson = False,
 ) -> None:
     """Stiffness over a grid, a path or random postures, under one or several tension bounds."""
-    with reported():
-        robot = arm.read()
-        wanted = poses.read(robot)
-        check_target(out)  # before the long computation
-        low = numbers("--min-tension", min_tension)
-        dataset = run(
-            robot,
-            wanted,
-            minimum=low[0] if len(low) == 1 else low,
-            maximum=max_tension,
-            wrench=numbers("--wrench", wrench, 6),
-            outputs=[name.strip() for name in quantities.split(",")],
-            store=resume,
-        )
-        _answer(as_json, dataset, write_sweep(dataset, out), f"{_summary(dataset)}\n")
+    robot = arm.read()
+    wanted = poses.read(robot)
+    check_target(out)  # before the long computation
+    low = numbers("--min-tension", min_tension)
+    dataset = run(
+        robot,
+        wanted,
+        minimum=low[0] if len(low) == 1 else low,
+        maximum=max_tension,
+        wrench=numbers("--wrench", wrench, 6),
+        outputs=[name.strip() for name in quantities.split(",")],
+        store=resume,
+    )
+    _answer(as_json, dataset, write_sweep(dataset, out), summary=True)
 
 
 def map_sweep(
@@ -141,17 +137,16 @@ def map_sweep(
     as_json: AsJson = False,
 ) -> None:
     """Colour the reachable workspace by a quantity of a sweep."""
-    with reported():
-        dataset = read_sweep(sweep)
-        from cdsm.plots import plot_map  # imports matplotlib, so on demand
+    dataset = read_sweep(sweep)
+    from cdsm.plots import plot_map  # imports matplotlib, so on demand
 
-        slab = None
-        if section is not None:
-            axis, _, rest = section.partition("=")
-            place, half = numbers("--section", rest.replace(":", " "), 2)
-            slab = (axis.strip(), place / 1000.0, half / 1000.0)
-        figure = plot_map(dataset, quantity, section=slab)
-        _answer(as_json, dataset, write_file(out, figure.savefig))
+    slab = None
+    if section is not None:
+        axis, _, rest = section.partition("=")
+        place, half = numbers("--section", rest.replace(":", " "), 2)
+        slab = (axis.strip(), place / 1000.0, half / 1000.0)
+    figure = plot_map(dataset, quantity, section=slab)
+    _answer(as_json, dataset, write_file(out, figure.savefig), summary=False)
 
 
 def _grid(text: str, arm: Manipulator) -> GridPoses:
@@ -161,14 +156,14 @@ def _grid(text: str, arm: Manipulator) -> GridPoses:
     rest: dict[str, float] = {}
     for part in text.split(","):
         name, _, value = part.partition("=")
-        given = numbers("--grid", value.replace(":", " "))
-        unit = units.get(name.strip(), 1.0)  # the sweep refuses unknown names
-        if name.strip() in (*angles, *rest):
-            raise typer.BadParameter(f"{name.strip()} is given twice.", param_hint="--grid")
+        name, given = name.strip(), numbers("--grid", value.replace(":", " "))
+        unit = units.get(name, 1.0)  # the sweep refuses unknown names
+        if name in (*angles, *rest):
+            raise typer.BadParameter(f"{name} is given twice.", param_hint="--grid")
         if len(given) == 1:
-            rest[name.strip()] = unit * given[0]
+            rest[name] = unit * given[0]
         elif len(given) == 3 and given[2] >= 1.0 and given[2].is_integer():
-            angles[name.strip()] = unit * np.linspace(given[0], given[1], int(given[2]))
+            angles[name] = unit * np.linspace(given[0], given[1], int(given[2]))
         else:
             raise typer.BadParameter(
                 f"{part!r} given; a joint is JOINT=LOW:HIGH:COUNT or JOINT=ANGLE.",
@@ -177,19 +172,13 @@ def _grid(text: str, arm: Manipulator) -> GridPoses:
     return GridPoses(angles, rest)
 
 
-def _waypoints(path: Path, arm: Manipulator) -> Array:
-    """Read waypoints (n, nv) in SI from a file with the format of ``cdsm plan --path``."""
-    file = read_path(path, arm)
-    if file.angles is None or file.target is not None:
-        raise FileError(path, "holds tips or targets; a sweep goes along joint angles.")
-    return file.angles
-
-
-def _answer(as_json: bool, dataset: xarray.Dataset, written: Path, first: str = "") -> None:
-    counts: Json = {"entries": status_counts(dataset), "written": [str(written)]}
-    answer(as_json, lambda: counts, f"{first}written: {written}")
-
-
-def _summary(dataset: xarray.Dataset) -> str:
-    counts = ", ".join(f"{count} {word}" for word, count in status_counts(dataset).items() if count)
-    return f"{dataset.attrs['title']}, {dataset.attrs['poses']}: {counts}"
+def _answer(as_json: bool, dataset: xarray.Dataset, written: Path, *, summary: bool) -> None:
+    status = dataset["status"].values
+    words = status_names(dataset)
+    counts = {word: int((status == value).sum()) for value, word in words.items()}
+    lines = [f"written: {written}"]
+    if summary:
+        listed = ", ".join(f"{count} {word}" for word, count in counts.items() if count)
+        lines.insert(0, f"{dataset.attrs['title']}, {dataset.attrs['poses']}: {listed}")
+    numbers: Json = {"entries": counts, "written": [str(written)]}
+    answer(as_json, lambda: numbers, "\n".join(lines))

@@ -9,17 +9,8 @@ from typing import Annotated
 
 import typer
 
-from cdsm.cli.options import (
-    Angles,
-    ArmOptions,
-    AsJson,
-    MaxTension,
-    MinTension,
-    Solver,
-    answer,
-    numbers,
-    reported,
-)
+from cdsm.cli.options import Angles, ArmOptions, AsJson, MaxTension, MinTension, Solver, numbers
+from cdsm.cli.output import answer
 from cdsm.tension import DEFAULT_SOLVER
 
 
@@ -52,8 +43,7 @@ def view(
     as_json: AsJson = False,
 ) -> None:
     """Show an arm in the browser, live: move joints, tension and load; see how stiff it is."""
-    # Ctrl-C ends the view; it can also arrive while the view starts
-    with reported(), contextlib.suppress(KeyboardInterrupt):
+    with contextlib.suppress(KeyboardInterrupt):  # Ctrl-C ends the view, also while it starts
         from cdsm.view import serve  # imports matplotlib and viser (if installed), so on demand
 
         pose = arm.at(angles)
@@ -69,8 +59,8 @@ def view(
             largest_tension=largest_tension,
             largest_force=largest_force,
         ) as page:
-            numbers_shown: dict[str, object] = {"name": pose.arm.name, "url": page.url}
-            answer(as_json, lambda: numbers_shown, pose.arm, f"shown at {page.url}; Ctrl-C ends it")
+            text = f"shown at {page.url}; Ctrl-C ends it"
+            answer(as_json, lambda: {"name": pose.arm.name, "url": page.url}, pose.arm, text)
             if browser:
                 webbrowser.open(page.url)
             page.wait()

@@ -7,11 +7,11 @@ from typing import Annotated
 
 import typer
 
-from cdsm.cli.json_answers import of_tensile_fit
-from cdsm.cli.options import AsJson, Picture, answer, console, reported
+from cdsm.cli.options import AsJson, Picture
+from cdsm.cli.output import Json, answer, console
 from cdsm.support.files import write_file
 from cdsm.wires.files import write_elasticity
-from cdsm.wires.tensile.fit import fit_tensile_test
+from cdsm.wires.tensile.fit import TensileFit, fit_tensile_test
 from cdsm.wires.tensile.record import read_tensile_csv
 
 
@@ -31,13 +31,27 @@ def fit(
     as_json: AsJson = False,
 ) -> None:
     """Fit the rigidity of a wire to its tensile test: report, and if wanted figure and TOML."""
-    with reported():
-        length = None if gauge_length is None else gauge_length / 1000.0
-        data = read_tensile_csv(test, gauge_length=length)
-        with console.status("fitting"):
-            fitted = fit_tensile_test(data.displacement, data.force, data.gauge_length, method)
-        if out is not None:
-            typer.echo(f"written: {write_elasticity(fitted.elasticity, out)}", err=True)
-        if figure is not None:
-            typer.echo(f"written: {write_file(figure, fitted.plot().savefig)}", err=True)
-        answer(as_json, lambda: of_tensile_fit(fitted), fitted)
+    length = None if gauge_length is None else gauge_length / 1000.0
+    data = read_tensile_csv(test, gauge_length=length)
+    with console.status("fitting"):
+        fitted = fit_tensile_test(data.displacement, data.force, data.gauge_length, method)
+    if out is not None:
+        typer.echo(f"written: {write_elasticity(fitted.elasticity, out)}", err=True)
+    if figure is not None:
+        typer.echo(f"written: {write_file(figure, fitted.plot().savefig)}", err=True)
+    answer(as_json, lambda: _numbers(fitted), fitted)
+
+
+def _numbers(fit: TensileFit) -> Json:
+    return {
+        "method": fit.method,
+        "gauge_length_m": fit.test.gauge_length,
+        "domain_N": [fit.elasticity.domain.low, fit.elasticity.domain.high],
+        "rms_N": fit.rms,
+        "stages_N": {stage.name: [stage.low, stage.high] for stage in fit.stages},
+        "tension_N": fit.tensions,
+        "rigidity_N": fit.elasticity.rigidity(fit.tensions),
+        "rigidity_low_N": None if fit.band is None else fit.band.low,
+        "rigidity_high_N": None if fit.band is None else fit.band.high,
+        "notes": fit.notes,
+    }

@@ -1,0 +1,87 @@
+"""Shared by all commands: answers as text or JSON, pictures, errors and exit codes."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from pathlib import Path
+
+import numpy as np
+import typer
+from rich.console import Console
+
+from cdsm.errors import CdsmError
+from cdsm.manipulator import Manipulator
+from cdsm.support.files import write_file
+from cdsm.support.format import JointUnits
+from cdsm.support.validation import Array
+
+Json = dict[str, object]
+"""Numbers of an answer in SI, with units in the keys. Arrays and infinite numbers are allowed."""
+
+console = Console(stderr=True)
+"""Console for progress and errors. Answers go to standard output."""
+
+debug_wanted: ContextVar[bool] = ContextVar("debug_wanted", default=False)
+"""Whether the running command shows tracebacks."""
+
+UNMET = 3
+"""Exit code of a negative answer (unstable, untrusted, infeasible); 1: error, 2: wrong option."""
+
+
+def answer(as_json: bool, as_dict: Callable[[], Json], *parts: object) -> None:
+    """Print an answer: its parts as text, or its numbers as strict JSON."""
+    if as_json:
+        typer.echo(json.dumps(_plain(as_dict()), indent=1, allow_nan=False))
+    else:
+        typer.echo("\n\n".join(map(str, parts)))
+
+
+def _plain(value: object) -> object:
+    """Turn arrays and tuples into lists, and infinite numbers into null."""
+    if isinstance(value, dict):
+        return {name: _plain(each) for name, each in value.items()}
+    if isinstance(value, np.ndarray):
+        return _plain(value.tolist())
+    if isinstance(value, (list, tuple)):
+        return [_plain(each) for each in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def joints(arm: Manipulator, q: Array) -> Json:
+    """Return joint coordinates q (..., nv) by joint name, for JSON."""
+    return JointUnits(arm.slides).to_dict(arm.joint_names, q)
+
+
+def by_cable(arm: Manipulator, values: Array) -> Json:
+    """Return one number per cable (C,) by the name of the cable, for JSON."""
+    return dict(zip((cable.name for cable in arm.cables), values.tolist(), strict=True))
+
+
+def write_picture(path: Path | None, draw: str, *results: object, err: bool = True) -> None:
+    """Draw results with the function ``draw`` of :mod:`cdsm.plots`, if a path is given."""
+    if path is not None:
+        from cdsm import plots  # imports matplotlib, so on demand
+
+        figure = getattr(plots, draw)(*results)
+        typer.echo(f"written: {write_file(path, figure.savefig)}", err=err)
+
+
+@contextmanager
+def reported() -> Iterator[None]:
+    """Turn an error into a message and exit code 1, Ctrl-C into 130; --debug changes nothing."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        if debug_wanted.get():
+            raise
+        console.print("interrupted: no file is half-written, and what --resume keeps stays")
+        raise typer.Exit(130) from None
+    except (CdsmError, OSError) as error:  # OSError: of the terminal or pipe
+        if debug_wanted.get():
+            raise
+        console.print(f"error: {error}", style="red", markup=False, highlight=False, soft_wrap=True)
+        raise typer.Exit(1) from None
