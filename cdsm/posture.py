@@ -111,6 +111,9 @@ class Posture(ReadOnlyState):
         """
         return frozen(self.arm._model.body.placement(self.q, link))
 
+    def _equals(self, other: Posture) -> bool:
+        return self is other or (self.arm == other.arm and np.array_equal(self.q, other.q))
+
     def _joint_stiffness(
         self, tension: Array, cable_stiffness: Array, wrench: Array
     ) -> tuple[Array, Array, Array, Array]:

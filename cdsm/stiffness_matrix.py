@@ -364,9 +364,7 @@ def stiffness(
     """
     arm = instance("pose", pose, Posture).arm
     if isinstance(tension, Tension):
-        if tension.posture is not pose and not (
-            tension.posture.arm == arm and np.array_equal(tension.posture.q, pose.q)
-        ):
+        if not tension.posture._equals(pose):
             raise InvalidInput(
                 "tension", "was distributed at another posture; distribute it at this one."
             )

@@ -95,7 +95,7 @@ def _at_rest(ends: tuple[Stiffness, Stiffness], unstrained: Array) -> Stiffness:
     for c, l_0 in zip(held, unstrained.tolist(), strict=True):
         lengths[c] = l_0 + arm.cables[c].elongation(F[c], l_0)
     loaded = LoadedArm(mean, F, W, lengths)
-    search = find_rest(loaded.moved, loaded.at(mean, F), *loaded.stops())
+    search = find_rest(loaded, loaded.at(mean, F))
     K = search.state.K
     if not (search.converged and search.convex):
         worst = int(abs(K.residual).argmax())
@@ -105,5 +105,5 @@ def _at_rest(ends: tuple[Stiffness, Stiffness], unstrained: Array) -> Stiffness:
             0.0,
             arm.joint_names[worst],
         )
-    loaded.cables.require_domains(K.tension)
+    loaded.require_domains(K.tension)
     return K

@@ -40,8 +40,7 @@ def plot_stiffness_plan(plan: StiffnessPlan, attainable: StiffnessRange) -> Figu
     """
     expect("plan", plan, "StiffnessPlan")
     expect("attainable", attainable, "StiffnessRange")
-    planned, other = plan.tension.posture, attainable.posture
-    same = planned.arm == other.arm and np.array_equal(planned.q, other.q)
+    same = plan.tension.posture._equals(attainable.posture)
     u = np.zeros(3) if plan.direction is None else plan.direction
     if not same or not np.allclose(u, attainable.direction, rtol=0.0, atol=_SAME):
         raise InvalidInput("attainable", "is not of the posture and the direction of the plan.")

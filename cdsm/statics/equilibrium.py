@@ -86,8 +86,7 @@ class Equilibrium(ReadOnlyState):
     @property
     def converged(self) -> bool:
         """Whether the residual is only rounding; :func:`equilibrium` raises an error if not."""
-        K = self.stiffness
-        return bool((abs(self.residual) <= rounding(K)).all())
+        return bool((abs(self.residual) <= rounding(self.stiffness)).all())
 
     @property
     def stable(self) -> bool:
@@ -96,9 +95,7 @@ class Equilibrium(ReadOnlyState):
         It is False for a neutral state, for example if all cables are slack. It is also False if
         only stops that do not push yet bar the softest motion.
         """
-        free = self._off_stops
-        K = self.stiffness.joint[np.ix_(free, free)]
-        values = np.linalg.eigvalsh((K + K.T) / 2.0)
+        values = _eigenvalues(self.stiffness.joint, self._off_stops)
         return bool((values > FLAT * abs(values).max(initial=0.0)).all())
 
     @cached_property
@@ -210,7 +207,7 @@ def equilibrium(
     imbalance, reached, step, iterations = start.torque, 0.0, 1.0, 0
     while True:
         goal = min(1.0, reached + step)
-        search = _find_rest(loaded, start, (1.0 - goal) * imbalance)
+        search = find_rest(loaded, start, (1.0 - goal) * imbalance)
         iterations += search.iterations
         if search.converged and goal == 1.0:
             return _equilibrium(loaded, search, iterations)
@@ -223,20 +220,11 @@ def equilibrium(
 
 
 def follow(before: Equilibrium, wrench: Array, start: Array | None = None) -> Equilibrium | None:
-    """Find the equilibrium that continues an earlier equilibrium under another wrench (6,).
+    """Find the equilibrium that continues an earlier one under another wrench (6,), or None.
 
-    Args:
-        before: The earlier equilibrium.
-        wrench: The other wrench.
-        start: Joint angles (nv,) [rad] to start from, such as the equilibrium of a similar arm
-            under this wrench. Default: the joint angles of ``before``.
-
-    Returns:
-        The equilibrium, or None if no path of stable postures leads to it: the arm buckles, or the
-        step between the wrenches is too large to decide.
-
-    Raises:
-        ElasticityRangeError: As for :func:`equilibrium`.
+    The search starts at the joint angles ``start`` (nv,) [rad], by default those of ``before``. It
+    returns None if no path of stable postures leads to an equilibrium: the arm buckles, or the step
+    between the wrenches is too large to decide. ElasticityRangeError as for :func:`equilibrium`.
     """
     loaded = LoadedArm(before.reference, before.reference_tension, wrench)
     iterate = loaded.at(before.pose, before.tension)
@@ -245,13 +233,13 @@ def follow(before: Equilibrium, wrench: Array, start: Array | None = None) -> Eq
             iterate = loaded.moved(start, iterate)
         except CableError:
             return None
-    search = _find_rest(loaded, iterate, 0.0)
+    search = find_rest(loaded, iterate)
     if not (search.converged and search.convex and _is_stable_between(loaded, iterate, search)):
         return None
     return _equilibrium(loaded, search, search.iterations)
 
 
-def _is_stable_between(loaded: LoadedArm, start: Iterate, search: RestSearch[Iterate]) -> bool:
+def _is_stable_between(loaded: LoadedArm, start: Iterate, search: RestSearch) -> bool:
     """Check that the straight path to the equilibrium is short, and K_θ positive definite on it.
 
     An arm that snaps through has an unstable posture on this path. The search may have jumped it.
@@ -263,21 +251,18 @@ def _is_stable_between(loaded: LoadedArm, start: Iterate, search: RestSearch[Ite
     free = np.flatnonzero(~search.at_stop)
     for part in np.arange(_DENSE, length, _DENSE) / max(length, _DENSE):
         try:
-            K = loaded.moved(start.q + part * path, start).stiffness[np.ix_(free, free)]
+            K = loaded.moved(start.q + part * path, start).stiffness
         except CableError:
             return False
-        if np.linalg.eigvalsh((K + K.T) / 2.0)[:1].min(initial=math.inf) <= 0.0:
+        if _eigenvalues(K, free).min(initial=math.inf) <= 0.0:
             return False
     return True
 
 
-def _find_rest(loaded: LoadedArm, start: Iterate, held_back: Array | float) -> RestSearch[Iterate]:
-    """Find the equilibrium from an iterate while a torque (nv,) holds part of the load back."""
-
-    def evaluate(q: Array, near: Iterate) -> Iterate:
-        return loaded.moved(q, near).holding_back(held_back)
-
-    return find_rest(evaluate, start.holding_back(held_back), *loaded.stops())
+def _eigenvalues(K: Array, free: NDArray[np.intp]) -> Array:
+    """Return the eigenvalues of K (symmetric part) for some joints."""
+    K = K[np.ix_(free, free)]
+    return np.asarray(np.linalg.eigvalsh((K + K.T) / 2.0), dtype=np.float64)
 
 
 def _require_between_stops(pose: Posture) -> None:
@@ -293,9 +278,9 @@ def _require_between_stops(pose: Posture) -> None:
         )
 
 
-def _equilibrium(loaded: LoadedArm, search: RestSearch[Iterate], iterations: int) -> Equilibrium:
+def _equilibrium(loaded: LoadedArm, search: RestSearch, iterations: int) -> Equilibrium:
     K = search.state.K
-    loaded.cables.require_domains(K.tension)
+    loaded.require_domains(K.tension)
     reaction = np.where(search.at_stop, K.residual, 0.0)
     return Equilibrium(
         reference=loaded.reference,
@@ -309,35 +294,27 @@ def _equilibrium(loaded: LoadedArm, search: RestSearch[Iterate], iterations: int
     )
 
 
-def _no_rest(loaded: LoadedArm, search: RestSearch[Iterate], reached: float) -> EquilibriumError:
-    last = search.state
-    residual = np.where(search.at_stop, 0.0, last.torque)
-    arm, worst = last.K.posture.arm, int(abs(residual).argmax())
-    joint = arm.joint_names[worst]
+def _no_rest(loaded: LoadedArm, search: RestSearch, reached: float) -> EquilibriumError:
+    pose = search.state.K.posture
+    residual = frozen(np.where(search.at_stop, 0.0, search.state.torque))
+    worst = int(abs(residual).argmax())
+    joint = pose.arm.joint_names[worst]
     problem = (
         f"the arm finds no stable place to rest beyond {100.0 * reached:.3g} % of the load; at the "
-        f"last iterate {abs(residual[worst]):.4g} {arm.torque_unit(worst)} are out of balance at "
-        f"{joint}"
+        f"last iterate {abs(residual[worst]):.4g} {pose.arm.torque_unit(worst)} are out of balance "
+        f"at {joint}"
     )
-    meeting = _meeting_cable(loaded.reference, last.K.posture)
-    if meeting is None:
-        return EquilibriumError(problem, frozen(residual), reached, joint)
-    return EquilibriumError(
-        f"{problem}, where two neighbouring sites of {meeting} meet: disks touch there, and the "
-        "cable has no direction",
-        frozen(residual),
-        reached,
-        joint,
-        "Set joint_limit to where disks touch, or leave it out; then the joint rests on its stop.",
-    )
-
-
-def _meeting_cable(reference: Posture, pose: Posture) -> str | None:
-    """Return the name of a cable with two sites that meet, or None."""
-    for cable, before, after in zip(
-        pose.arm.cables, reference.cable_paths, pose.cable_paths, strict=True
-    ):
-        apart, left = (np.linalg.norm(np.diff(path, axis=0), axis=1) for path in (before, after))
+    before, after = loaded.reference.cable_paths, pose.cable_paths
+    for cable, *paths in zip(pose.arm.cables, before, after, strict=True):
+        apart, left = (np.linalg.norm(np.diff(path, axis=0), axis=1) for path in paths)
         if (left < _CLOSE * apart).any():
-            return cable.name
-    return None
+            return EquilibriumError(
+                f"{problem}, where two neighbouring sites of {cable.name} meet: disks touch there, "
+                "and the cable has no direction",
+                residual,
+                reached,
+                joint,
+                "Set joint_limit to where disks touch, or leave it out; then the joint rests on "
+                "its stop.",
+            )
+    return EquilibriumError(problem, residual, reached, joint)

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from cdsm.elasticity import Elasticity, rising_root
 from cdsm.errors import ElasticityRangeError, InvalidInput
-from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness, assemble
 from cdsm.support.validation import Array, frozen
@@ -50,11 +49,22 @@ class Iterate(NamedTuple):
 class LoadedArm:
     """Arm under a wrench, its motors locked at a reference.
 
+    A position-controlled cable keeps its original length l_0. Its elongation is that at the
+    reference plus the change of its length. A force-controlled cable keeps its tension. Below the
+    domain of its law a cable keeps the stiffness of the low end until its tension is zero; then it
+    is slack. Above the domain it keeps the stiffness of the high end. Only iterates may leave the
+    domain: :meth:`require_domains` rejects such tensions in a solution.
+
     Args:
         reference: The posture at which the motors were locked.
-        tension: F (C,) [N] at the reference.
+        tension: F (C,) [N] at the reference, within the domains of position-controlled cables.
         wrench: W (6,) on the arm: force [N], then moment [N m].
         lengths: L (C,) [m] at which the cables have these tensions. Default: L at the reference.
+
+    Raises:
+        ElasticityRangeError: A law gives no strain; or a series spring stretches by more than the
+            whole cable, so that no wire is left. The error names the cables.
+        InvalidInput: A user-defined law gives a strain that is not finite.
     """
 
     def __init__(
@@ -63,13 +73,23 @@ class LoadedArm:
         self.reference = reference
         self.tension = tension
         self.wrench = wrench
-        locked = reference.cable_lengths if lengths is None else lengths
-        self.cables = LockedCables(reference.arm, locked, tension)
+        laws, L = reference.arm._model.laws, reference.cable_lengths if lengths is None else lengths
+        self._free_length = laws.original_lengths(L, tension)
+        self._laws = []
+        for law, held in laws.held:
+            parts = (self._free_length[held], laws.series[held], L[held], tension[held])
+            try:
+                self._laws.append(_LockedLaw(law, held, *parts))
+            except ElasticityRangeError as error:
+                raise laws.naming(error, held) from None
 
     def at(self, pose: Posture, near: Array) -> Iterate:
         """Compute the arm at a posture. The search for its tensions starts at ``near`` (C,) [N]."""
-        F, k = self.cables.tension(pose.cable_lengths, near)
-        K = assemble(pose, F, self.wrench, k, free_length=self.cables.free_length)
+        F, k = self.tension.copy(), np.zeros(near.size)
+        for law in self._laws:
+            held = law.held
+            F[held], k[held] = law.tension(pose.cable_lengths[held], near[held])
+        K = assemble(pose, frozen(F), self.wrench, frozen(k), free_length=self._free_length)
         return Iterate(K, K.residual, rounding(K))
 
     def moved(self, q: Array, near: Iterate) -> Iterate:
@@ -89,6 +109,26 @@ class LoadedArm:
         apart = np.where(touching, _APART, 0.0)
         # the reference may be nearer to the stop
         return np.minimum(arm.lower + apart, q), np.maximum(arm.upper - apart, q)
+
+    def require_domains(self, tension: Array) -> None:
+        """Raise ElasticityRangeError if tensions (C,) [N] are outside the domains of their laws.
+
+        Zero is allowed if the law begins at zero: the cable is slack.
+        """
+        names = [cable.name for cable in self.reference.arm.cables]
+        for each in self._laws:
+            domain, F = each.law.domain, tension[each.held]
+            outside = (domain.low * (1.0 - _BEYOND) > F) | (domain.high * (1.0 + _BEYOND) < F)
+            if np.count_nonzero(outside):
+                where = np.arange(tension.size)[each.held][outside].tolist()
+                raise ElasticityRangeError(
+                    f"at the equilibrium; the elasticity is defined on {domain}, and says neither "
+                    "how a cable goes slack below it nor how it yields above. Change the tensions "
+                    "or the load, or use an elasticity that covers them.",
+                    F[outside].tolist(),
+                    where,
+                    [names[c] for c in where],
+                )
 
 
 def rounding(K: Stiffness) -> Array:
@@ -122,132 +162,69 @@ def _tilt_torque(pose: Posture, tension: Array) -> Array:
 # --- cables ---------------------------------------------------------------------------------
 
 
-class _Springs(NamedTuple):
-    """Position-controlled cables with one law; the arrays are over these cables."""
+class _LockedLaw:
+    """Position-controlled cables with one law; all arrays are over these cables.
 
-    law: Elasticity
-    held: slice | NDArray[np.intp]  # indices of the cables in the arm
-    free_length: Array  # l_0 [m]
-    series: Array  # compliance of spring or drive [m/N]
-
-    def elongation(self, F: Array) -> Array:
-        """Return Δl = l_0 ε(F) + ΔF/k_series [m] from the low end of the law."""
-        wire = self.free_length * self.law.strain(F)
-        return np.asarray(wire + (F - self.law.domain.low) * self.series)
-
-    def compliance(self, F: Array) -> Array:
-        """Return dΔl/dF = l_0/EA(F) + 1/k_series [m/N]."""
-        return np.asarray(self.free_length / self.law.rigidity(F) + self.series)
-
-
-class _Ends(NamedTuple):
-    """Linear continuation of F(L) below and above a law; the arrays are over its cables."""
-
-    start: Array  # L where the law begins [m]
-    span: Array  # elongation from there to the end of the law [m]
-    low: Array  # tension where the law begins [N]
-    high: Array  # tension where the law ends [N]
-    before: Array  # stiffness below the law [N/m]
-    after: Array  # stiffness above the law [N/m]
-
-
-class LockedCables:
-    """Tension F(L) of the cables of an arm, the motors locked at a reference.
-
-    A position-controlled cable keeps its original length l_0. Its elongation is that at the
-    reference plus the change of its length. A force-controlled cable keeps its tension. Below the
-    domain of its law a cable keeps the stiffness of the low end until its tension is zero; then it
-    is slack. Above the domain it keeps the stiffness of the high end. Only iterates may leave the
-    domain: :meth:`require_domains` rejects such tensions in a solution.
-
-    Args:
-        arm: The arm.
-        lengths: L at the reference (C,) [m].
-        tension: F at the reference (C,) [N], within the domains of position-controlled cables.
-
-    Attributes:
-        free_length: l_0 (C,) [m].
-
-    Raises:
-        ElasticityRangeError: A law gives no strain; or a series spring stretches by more than the
-            whole cable, so that no wire is left. The error names the cables.
-        InvalidInput: A user-defined law gives a strain that is not finite.
+    Beyond the ends of its law a cable keeps the stiffness of the end. ``lengths`` L [m] and
+    ``tension`` F [N] are those at the reference.
     """
 
-    def __init__(self, arm: Manipulator, lengths: Array, tension: Array) -> None:
-        self._arm = arm
-        self._reference_tension = tension
-        self._groups = []
-        laws = arm._model.laws
-        self.free_length = laws.original_lengths(lengths, tension)
-        for law, held in laws.held:
-            springs = _Springs(law, held, self.free_length[held], laws.series[held])
-            try:
-                ends = _ends(springs, lengths[held], tension[held])
-            except ElasticityRangeError as error:
-                raise laws.naming(error, held) from None
-            self._groups.append((springs, ends))
+    def __init__(
+        self,
+        law: Elasticity,
+        held: slice | NDArray[np.intp],
+        free_length: Array,
+        series: Array,
+        lengths: Array,
+        tension: Array,
+    ) -> None:
+        self.law, self.held = law, held
+        self._free_length, self._series = free_length, series
+        domain, size = law.domain, tension.shape
+        self._low, self._high = np.full(size, domain.first), np.full(size, domain.high)
+        softest = self._compliance(self._low)
+        if (softest <= 0.0).any():
+            which = np.flatnonzero(softest <= 0.0).tolist()
+            raise ElasticityRangeError(
+                "stretches the series spring by more than the whole cable is long, so that no wire "
+                "is left. Give the cable a lead that holds its spring, a stiffer spring or less "
+                "tension.",
+                tension[which].tolist(),
+                which,
+            )
+        self._before = 1.0 / softest  # stiffness below the law [N/m]
+        self._after, self._span = np.zeros(size), self._high  # and above; elongation of the law
+        if math.isfinite(domain.high):
+            self._after = 1.0 / self._compliance(self._high)
+            self._span = self._elongation(self._high)
+        elongation = self._elongation(tension)
+        ends = [elongation, self._before, self._after]
+        if not np.isfinite(ends).all() or np.isnan(self._span).any():
+            raise InvalidInput(
+                "elasticity", f"{law!r} gives strains or rigidities that are not finite."
+            )
+        self._start = lengths - elongation  # L where the law begins [m]
+
+    def _elongation(self, F: Array) -> Array:
+        """Compute Δl = l_0 ε(F) + ΔF/k_series [m] from the low end of the law."""
+        wire = self._free_length * self.law.strain(F)
+        return np.asarray(wire + (F - self.law.domain.low) * self._series)
+
+    def _compliance(self, F: Array) -> Array:
+        """Compute dΔl/dF = l_0/EA(F) + 1/k_series [m/N]."""
+        return np.asarray(self._free_length / self.law.rigidity(F) + self._series)
 
     def tension(self, lengths: Array, near: Array) -> tuple[Array, Array]:
-        """Return F (C,) [N] and dF/dL (C,) [N/m] at L (C,) [m], searched from F = ``near``."""
-        tension, stiffness = self._reference_tension.copy(), np.zeros(lengths.size)
-        for springs, (start, span, low, high, before, after) in self._groups:
-            held = springs.held
-            elongation = lengths[held] - start
-            inside = np.minimum(np.maximum(elongation, 0.0), span)
-            F, compliance = rising_root(
-                inside, near[held], low, high, springs.elongation, springs.compliance
-            )
-            k = 1.0 / compliance
-            excess = elongation - inside
-            if np.count_nonzero(excess):
-                k = np.where(excess == 0.0, k, np.where(excess < 0.0, before, after))
-                F = np.maximum(F + k * excess, 0.0)
-                k[(F == 0.0) & (excess < 0.0)] = 0.0
-            tension[held], stiffness[held] = F, k
-        return frozen(tension), frozen(stiffness)
-
-    def require_domains(self, tension: Array) -> None:
-        """Raise ElasticityRangeError if tensions (C,) [N] are outside the domains of their laws.
-
-        Zero is allowed if the law begins at zero: the cable is slack.
-        """
-        names = [cable.name for cable in self._arm.cables]
-        for springs, _ in self._groups:
-            domain, F = springs.law.domain, tension[springs.held]
-            outside = (domain.low * (1.0 - _BEYOND) > F) | (domain.high * (1.0 + _BEYOND) < F)
-            if np.count_nonzero(outside):
-                where = np.arange(tension.size)[springs.held][outside].tolist()
-                raise ElasticityRangeError(
-                    f"at the equilibrium; the elasticity is defined on {domain}, and says neither "
-                    "how a cable goes slack below it nor how it yields above. Change the tensions "
-                    "or the load, or use an elasticity that covers them.",
-                    F[outside].tolist(),
-                    where,
-                    [names[c] for c in where],
-                )
-
-
-def _ends(springs: _Springs, lengths: Array, tension: Array) -> _Ends:
-    """Compute the ends of a law from L and F at the reference."""
-    domain, size = springs.law.domain, tension.shape
-    first, last = np.full(size, domain.first), np.full(size, domain.high)
-    softest = springs.compliance(first)
-    if (softest <= 0.0).any():
-        which = np.flatnonzero(softest <= 0.0).tolist()
-        raise ElasticityRangeError(
-            "stretches the series spring by more than the whole cable is long, so that no wire is "
-            "left. Give the cable a lead that holds its spring, a stiffer spring or less tension.",
-            tension[which].tolist(),
-            which,
+        """Compute F [N] and dF/dL [N/m] at L [m], searched from F = ``near``."""
+        elongation = lengths - self._start
+        inside = np.minimum(np.maximum(elongation, 0.0), self._span)
+        F, compliance = rising_root(
+            inside, near, self._low, self._high, self._elongation, self._compliance
         )
-    before = 1.0 / softest
-    after, span = np.zeros(size), last
-    if math.isfinite(domain.high):
-        after, span = 1.0 / springs.compliance(last), springs.elongation(last)
-    elongation = springs.elongation(tension)
-    if not np.isfinite([elongation, before, after]).all() or np.isnan(span).any():
-        raise InvalidInput(
-            "elasticity", f"{springs.law!r} gives strains or rigidities that are not finite."
-        )
-    return _Ends(lengths - elongation, span, first, last, before, after)
+        k = 1.0 / compliance
+        excess = elongation - inside
+        if np.count_nonzero(excess):
+            k = np.where(excess == 0.0, k, np.where(excess < 0.0, self._before, self._after))
+            F = np.maximum(F + k * excess, 0.0)
+            k[(F == 0.0) & (excess < 0.0)] = 0.0
+        return F, k

@@ -107,8 +107,7 @@ def modes(pose: Posture, stiffness: Stiffness) -> Modes:
         SingularMass: A motion of the arm moves only massless links, so it has no frequency.
     """
     arm = instance("pose", pose, Posture).arm
-    other = instance("stiffness", stiffness, Stiffness).posture
-    if other is not pose and not (other.arm == arm and np.array_equal(other.q, pose.q)):
+    if not instance("stiffness", stiffness, Stiffness).posture._equals(pose):
         raise InvalidInput("stiffness", "was taken at another posture; take it at this one.")
     M = arm._model.body.mass_matrix(pose.q)
     spectrum, motions = np.linalg.eigh(M)

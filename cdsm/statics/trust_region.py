@@ -16,15 +16,14 @@ no potential.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Generic, NamedTuple, Protocol, TypeVar, final
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from cdsm.errors import CdsmError
+from cdsm.statics.locked_motors import Iterate, LoadedArm
 from cdsm.support.validation import Array
 
 _ATTEMPTS = 200
@@ -41,55 +40,30 @@ _POOR, _GOOD, _ACCEPTED = 0.25, 0.75, 0.05
 a step is accepted above the third (Nocedal and Wright, Numerical Optimization, 2006, alg. 4.1)."""
 
 
-class State(Protocol):
-    """State of a body at coordinates q."""
-
-    @property
-    def q(self) -> Array:
-        """Coordinates q (nv,)."""
-
-    @property
-    def torque(self) -> Array:
-        """Torque imbalance r (nv,)."""
-
-    @property
-    def stiffness(self) -> Array:
-        """Derivative K = ∂r/∂q (nv, nv)."""
-
-    @property
-    def rounding(self) -> Array:
-        """Rounding of r (nv,)."""
-
-
-_State = TypeVar("_State", bound=State)
-
-
-@final
-@dataclass(frozen=True)
-class RestSearch(Generic[_State]):
+class RestSearch(NamedTuple):
     """Result of an equilibrium search."""
 
-    state: _State  # the last state
-    at_stop: NDArray[np.bool_]  # which coordinates rest on a stop that pushes (nv,)
-    history: tuple[float, ...]  # largest |r| of the free coordinates at every accepted state
+    state: Iterate  # the last iterate
+    at_stop: NDArray[np.bool_]  # which joints rest on a stop that pushes (nv,)
+    history: tuple[float, ...]  # largest |r| of the free joints at every accepted iterate
     iterations: int  # number of steps tried
-    converged: bool  # whether r of the free coordinates is rounding and no direction leads down
-    convex: bool  # whether K of the free coordinates was positive definite at every state
+    converged: bool  # whether r of the free joints is rounding and no direction leads down
+    convex: bool  # whether K of the free joints was positive definite at every iterate
 
 
 class _Free(NamedTuple):
-    """Coordinates of a state that no stop holds."""
+    """Joints of an iterate that no stop holds."""
 
-    at_stop: NDArray[np.bool_]  # which coordinates a stop holds (nv,)
-    indices: NDArray[np.intp]  # indices of the free coordinates
+    at_stop: NDArray[np.bool_]  # which joints a stop holds (nv,)
+    indices: NDArray[np.intp]  # indices of the free joints
     spectrum: tuple[Array, Array]  # eigenvalues and eigenvectors of their K (symmetric part)
     imbalance: float  # their largest |r|
     balanced: bool  # whether their r is rounding
     flat: float  # eigenvalues up to this size are rounding
-    lowest: float  # lowest eigenvalue; inf if no coordinate is free
+    lowest: float  # lowest eigenvalue; inf if no joint is free
 
     @classmethod
-    def of(cls, state: State, lower: Array, upper: Array) -> _Free:
+    def of(cls, state: Iterate, lower: Array, upper: Array) -> _Free:
         q, torque, rounding = state.q, state.torque, state.rounding
         # a stop can push, but not pull
         at_stop = ((q <= lower) & (torque > rounding)) | ((q >= upper) & (torque < -rounding))
@@ -107,24 +81,15 @@ class _Free(NamedTuple):
         )
 
 
-def find_rest(
-    evaluate: Callable[[Array, _State], _State], start: _State, lower: Array, upper: Array
-) -> RestSearch[_State]:
-    """Find the equilibrium of a body from a start state.
-
-    Args:
-        evaluate: Function of coordinates (nv,) and a nearby state that returns the state at these
-            coordinates. It raises a CdsmError if there is no state.
-        start: The first state.
-        lower: Lower stops (nv,).
-        upper: Upper stops (nv,).
-    """
-    state, radius = start, _FIRST
-    free = _Free.of(state, lower, upper)
+def find_rest(loaded: LoadedArm, start: Iterate, held_back: Array | float = 0.0) -> RestSearch:
+    """Find the equilibrium from an iterate while a torque (nv,) holds part of the load back."""
+    stops = loaded.stops()
+    state, radius = start.holding_back(held_back), _FIRST
+    free = _Free.of(state, *stops)
     history, convex = [free.imbalance], free.lowest > free.flat
     for iteration in range(_ATTEMPTS):
         done = free.balanced and free.lowest >= -free.flat
-        q, expected = (state.q, 0.0) if done else _trial(state, free, lower, upper, radius)
+        q, expected = (state.q, 0.0) if done else _trial(state, free, stops, radius)
         # balanced at a saddle, and the stops bar every way down
         if done or (free.balanced and expected == 0.0):
             return RestSearch(state, free.at_stop, tuple(history), iteration, True, convex)
@@ -132,7 +97,7 @@ def find_rest(
             radius /= 4.0
             continue
         try:
-            trial = evaluate(q, state)
+            trial = loaded.moved(q, state).holding_back(held_back)
             quality = work(state, trial) / expected
         except CdsmError:  # for example, two sites of a cable coincide
             quality = -math.inf
@@ -142,28 +107,28 @@ def find_rest(
         elif quality > _GOOD and length > 0.8 * radius:
             radius = min(2.0 * radius, _WIDEST)
         if quality > _ACCEPTED:
-            state, free = trial, _Free.of(trial, lower, upper)
+            state, free = trial, _Free.of(trial, *stops)
             history.append(free.imbalance)
             convex = convex and free.lowest > free.flat
     return RestSearch(state, free.at_stop, tuple(history), _ATTEMPTS, False, convex)
 
 
-def work(before: State, after: State) -> float:
-    """Compute ∫ r·dq on the straight line between two states."""
+def work(before: Iterate, after: Iterate) -> float:
+    """Compute ∫ r·dq on the straight line between two iterates."""
     step = after.q - before.q
     change = step @ before.stiffness @ step - step @ after.stiffness @ step
     return float((before.torque + after.torque) @ step / 2.0 + change / 12.0)
 
 
 def _trial(
-    state: State, free: _Free, lower: Array, upper: Array, radius: float
+    state: Iterate, free: _Free, stops: tuple[Array, Array], radius: float
 ) -> tuple[Array, float]:
-    """Return the next coordinates (nv,) and the predicted work: 0 if no step goes down."""
+    """Return the next joint angles (nv,) and the predicted work: 0 if no step goes down."""
     # at a saddle r is rounding and must not decide the way to leave it
     torque, signs = (0.0 * state.torque, (1.0, -1.0)) if free.balanced else (state.torque, (1.0,))
     q, expected = state.q, 0.0
     for sign in signs:
-        end = _descend(state, torque, free, lower, upper, radius, sign)
+        end = _descend(state, torque, free, stops, radius, sign)
         change = end - state.q
         predicted = float(change @ torque + change @ state.stiffness @ change / 2.0)
         if predicted < expected * (1.0 + 1e-9):  # if equal, keep the first
@@ -172,23 +137,22 @@ def _trial(
 
 
 def _spectrum(stiffness: Array, free: NDArray[np.intp]) -> tuple[Array, Array]:
-    """Return eigenvalues (rising) and eigenvectors of K (symmetric part) for some coordinates."""
+    """Return eigenvalues (rising) and eigenvectors of K (symmetric part) for some joints."""
     K = stiffness[np.ix_(free, free)]
     values, vectors = np.linalg.eigh((K + K.T) / 2.0)
     return values, vectors
 
 
 def _descend(
-    state: State,
+    state: Iterate,
     torque: Array,
     free: _Free,
-    lower: Array,
-    upper: Array,
+    stops: tuple[Array, Array],
     radius: float,
     sign: float,
 ) -> Array:
-    """Go down the quadratic model. A coordinate that meets its stop stays there."""
-    q, indices, spectrum = state.q.copy(), free.indices, free.spectrum
+    """Go down the quadratic model. A joint that meets its stop stays there."""
+    (lower, upper), q, indices, spectrum = stops, state.q.copy(), free.indices, free.spectrum
     while indices.size and radius > 0.0:
         r = torque + state.stiffness @ (q - state.q)
         K = state.stiffness[np.ix_(indices, indices)]

@@ -181,7 +181,7 @@ def test_last_steps_converge_quadratically(name: str, moment: bool) -> None:
     first = []
     for distance in (2.0**-10, 2.0**-12, 2.0**-13):
         start = loaded.at(pose.arm.at(rest.pose.q + distance * way), rest.tension)
-        search = trust_region.find_rest(loaded.moved, start, *loaded.stops())
+        search = trust_region.find_rest(loaded, start)
         assert search.converged
         np.testing.assert_allclose(search.state.q, rest.pose.q, atol=1e-10)
         first.append(search.history[:2])
