@@ -43,12 +43,8 @@ from cdsm.identification import Identification, Measurement, identify
 from cdsm.interchange.cable_file import read_cables, write_cables
 from cdsm.interchange.caspr import read_caspr
 from cdsm.interchange.mjcf import to_mjcf, write_mjcf
-from cdsm.kinematics.maps import (
-    JointSolution,
-    KinematicSolution,
-    inverse_kinematics,
-    solve_joint_angles,
-)
+from cdsm.kinematics.maps import inverse_kinematics, solve_joint_angles
+from cdsm.kinematics.solutions import JointSolution, KinematicSolution
 from cdsm.manipulator import Manipulator
 from cdsm.planning import (
     HalfWay,

@@ -210,7 +210,7 @@ def test_every_field_is_documented_and_numbers_have_a_unit_and_arrays_a_shape(
     text = inspect.getdoc(kind) or ""
     entry = re.search(rf"^    {field}: (.*(?:\n      +.*)*)", text, re.MULTILINE)
     assert entry is not None
-    annotation = str(kind.__annotations__[field])
+    annotation = next(str(each.type) for each in dataclasses.fields(kind) if each.name == field)
     if ARRAY.search(annotation):
         assert SHAPE.search(entry[1])
     if re.search(r"\bArray\b|float|Number|Length|Mass|JointLimit", annotation):

@@ -2,37 +2,21 @@
 
 Cable lengths from joint angles are computed by :meth:`~cdsm.Manipulator.cable_lengths`. A length
 includes the lead, which is the straight cable between its actuator and the base disk.
-
-Each problem may have many solutions, one or none. From many solutions, the one nearest to a guess
-is returned. If there is none, the arm's best approximation is returned with ``reachable`` false.
-All solutions are within the joint limits. If disks touch at a limit and their holes coincide, a
-cable has no direction. Solutions then stay away from the limit by 1e-5 of it.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
-from typing import final
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm.errors import InvalidInput
-from cdsm.kinematics.nearest import InverseProblem, nearest
-from cdsm.kinematics.residuals import LIMIT_MARGIN, LengthResidual, TipResidual, usable_limits
+from cdsm.kinematics.nearest import nearest
+from cdsm.kinematics.residuals import LengthResidual, Residual, TipResidual
+from cdsm.kinematics.solutions import JointSolution, KinematicSolution
 from cdsm.manipulator import Manipulator
-from cdsm.posture import Posture
-from cdsm.rigid_body import rotation_vector
-from cdsm.support.validation import (
-    Array,
-    ReadOnlyState,
-    frozen,
-    instance,
-    number_array,
-    scalar,
-    vector,
-)
+from cdsm.support.validation import Array, frozen, instance, number_array, scalar, vector
 
 _TOLERANCE = 1e-9
 """Default tolerance: lengths and positions in arm lengths, and angles in rad."""
@@ -42,141 +26,6 @@ _SMALLEST_TOLERANCE = 1e-12
 
 _RIGID = 1e-9
 """Largest entry of RᵀR − 1 that counts as rounding."""
-
-
-@final
-@dataclass(frozen=True, eq=False, kw_only=True)
-class JointSolution(ReadOnlyState):
-    """Joint angles for given cable lengths; made by :func:`solve_joint_angles`.
-
-    All arrays are read-only.
-
-    Attributes:
-        arm: The arm.
-        cable_lengths: Wanted cable lengths (C,) [m], lead included.
-        guess: Joint angles at which the search started (nv,) [rad].
-        angles: Joint angles of the solution (nv,) [rad], within the limits.
-        lengths: Cable lengths L (C,) [m] at ``angles``: the wanted lengths, or the nearest ones.
-        tolerance: Largest misfit at which the lengths count as reached, in arm lengths [-].
-        iterations: Number of evaluations of L.
-    """
-
-    arm: Manipulator
-    cable_lengths: Array
-    guess: Array
-    angles: Array
-    lengths: Array
-    tolerance: float
-    iterations: int
-
-    @cached_property
-    def residual(self) -> Array:
-        """Cable lengths at the solution less the wanted lengths (C,) [m]."""
-        return frozen(self.lengths - self.cable_lengths)
-
-    @property
-    def reachable(self) -> bool:
-        """Whether the norm of :attr:`residual` over the arm length is within the tolerance."""
-        misfit = float(np.linalg.norm(self.residual)) / self.arm.length
-        return misfit <= self.tolerance
-
-    @cached_property
-    def posture(self) -> Posture:
-        """Posture of the arm at ``angles``."""
-        return self.arm.at(self.angles)
-
-    @property
-    def redundancy(self) -> int:
-        """Number of joint motions that change no cable length: nv − rank J_L.
-
-        If it is 0 and no limit is active, the angles are unique in a neighbourhood.
-        """
-        return self.arm.nv - int(np.linalg.matrix_rank(self.posture.length_jacobian))
-
-    @property
-    def at_limit(self) -> tuple[str, ...]:
-        """Names of the joints at a limit."""
-        return _at_limit(self.arm, self.angles)
-
-    def __repr__(self) -> str:
-        return f"<JointSolution of {self.arm.name}, {_verdict(self.reachable)}>"
-
-    def __str__(self) -> str:
-        rows = [f"{'cable':<12}{'wanted [m]':>14}{'length [m]':>14}{'off [m]':>12}"]
-        rows += [
-            f"{cable.name:<12}{wanted:>14.6f}{length:>14.6f}{off:>12.1e}"
-            for cable, wanted, length, off in zip(
-                self.arm.cables, self.cable_lengths, self.lengths, self.residual, strict=True
-            )
-        ]
-        worst = int(abs(self.residual).argmax())
-        verdict = f"{_verdict(self.reachable)}: {self.arm.cables[worst].name} is off most, "
-        verdict += f"by {self.residual[worst]:+.2g} m"
-        return "\n".join([*rows, "", *_angle_rows(self.arm, self.angles), "", verdict])
-
-
-@final
-@dataclass(frozen=True, eq=False, kw_only=True)
-class KinematicSolution(ReadOnlyState):
-    """Joint angles that bring the tip to a target; made by :func:`inverse_kinematics`.
-
-    All arrays are read-only and in base axes.
-
-    Attributes:
-        arm: The arm.
-        target: Wanted position (3,) [m] or pose (4, 4) of the tip, translation in m.
-        guess: Joint angles that the solution should be near (nv,) [rad].
-        angles: Joint angles of the solution (nv,) [rad], within the limits.
-        tip: Pose of ``tool0`` (4, 4) at ``angles``, translation in m: the target or the nearest.
-        tolerance: Largest misfit at which the target counts as reached, in arm lengths and rad [-].
-        iterations: Number of evaluations of the tip.
-    """
-
-    arm: Manipulator
-    target: Array
-    guess: Array
-    angles: Array
-    tip: Array
-    tolerance: float
-    iterations: int
-
-    @property
-    def position_error(self) -> float:
-        """Distance from the tip to the target [m]."""
-        wanted = self.target if self.target.ndim == 1 else self.target[:3, 3]
-        return float(np.linalg.norm(self.tip[:3, 3] - wanted))
-
-    @property
-    def orientation_error(self) -> float:
-        """Angle between tip and target orientation [rad]; 0 if the target is a position."""
-        if self.target.ndim == 1:
-            return 0.0
-        return float(np.linalg.norm(rotation_vector(self.tip[:3, :3] @ self.target[:3, :3].T)[0]))
-
-    @property
-    def reachable(self) -> bool:
-        """Whether √(position error²/arm length² + orientation error²) is within the tolerance."""
-        distance = self.position_error / self.arm.length
-        return float(np.hypot(distance, self.orientation_error)) <= self.tolerance
-
-    @cached_property
-    def posture(self) -> Posture:
-        """Posture of the arm at ``angles``."""
-        return self.arm.at(self.angles)
-
-    @property
-    def at_limit(self) -> tuple[str, ...]:
-        """Names of the joints at a limit."""
-        return _at_limit(self.arm, self.angles)
-
-    def __repr__(self) -> str:
-        return f"<KinematicSolution of {self.arm.name}, {_verdict(self.reachable)}>"
-
-    def __str__(self) -> str:
-        verdict = f"{_verdict(self.reachable)}: the tip is {self.position_error:.2g} m"
-        if self.target.ndim == 2:
-            verdict += f" and {self.orientation_error:.2g} rad"
-        return "\n".join([*_angle_rows(self.arm, self.angles), "", f"{verdict} from its target"])
 
 
 def solve_joint_angles(
@@ -216,19 +65,9 @@ def solve_joint_angles(
             f"{wanted[c]:g} m given for {arm.cables[c].name}; a length is positive, and includes "
             "the lead.",
         )
-    tolerance = _checked_tolerance(tolerance)
-    solution = nearest(
-        InverseProblem(LengthResidual(arm, wanted), *usable_limits(arm), guess), tolerance
-    )
-    return JointSolution(
-        arm=arm,
-        cable_lengths=wanted,
-        guess=guess,
-        angles=frozen(solution.angles),
-        lengths=arm.cable_lengths(solution.angles),
-        tolerance=tolerance,
-        iterations=solution.iterations,
-    )
+    found = _solve(LengthResidual(arm, wanted), guess, tolerance)
+    lengths = arm.cable_lengths(found["angles"])
+    return JointSolution(cable_lengths=wanted, lengths=lengths, **found)
 
 
 def inverse_kinematics(
@@ -262,19 +101,28 @@ def inverse_kinematics(
     """
     guess = _checked_guess(instance("arm", arm, Manipulator), guess)
     target = _checked_target(target)
-    tolerance = _checked_tolerance(tolerance)
-    solution = nearest(
-        InverseProblem(TipResidual(arm, target), *usable_limits(arm), guess), tolerance
-    )
-    return KinematicSolution(
-        arm=arm,
-        target=target,
-        guess=guess,
-        angles=frozen(solution.angles),
-        tip=frozen(arm._model.body.state(solution.angles).tip),
-        tolerance=tolerance,
-        iterations=solution.iterations,
-    )
+    found = _solve(TipResidual(arm, target), guess, tolerance)
+    tip = arm._model.body.state(found["angles"]).tip
+    return KinematicSolution(target=target, tip=frozen(tip), **found)
+
+
+def _solve(residual: Residual, guess: Array, tolerance: float) -> dict[str, Any]:
+    """Search for the solution; return the fields that both kinds of solution have."""
+    tolerance = scalar("tolerance", tolerance)
+    if not _SMALLEST_TOLERANCE <= tolerance < 1.0:
+        raise InvalidInput(
+            "tolerance",
+            f"{tolerance:g} given; give a part of the arm's length from {_SMALLEST_TOLERANCE:g}, "
+            "which rounding needs, to 1.",
+        )
+    angles, iterations = nearest(residual, guess, tolerance)
+    return {
+        "arm": residual.arm,
+        "guess": guess,
+        "angles": frozen(angles),
+        "tolerance": tolerance,
+        "iterations": iterations,
+    }
 
 
 def _checked_guess(arm: Manipulator, guess: ArrayLike | None) -> Array:
@@ -290,17 +138,6 @@ def _checked_guess(arm: Manipulator, guess: ArrayLike | None) -> Array:
             f"{arm.upper[i]:.6g}] rad; guess angles within the joint limits.",
         )
     return angles
-
-
-def _checked_tolerance(tolerance: float) -> float:
-    checked = scalar("tolerance", tolerance)
-    if not _SMALLEST_TOLERANCE <= checked < 1.0:
-        raise InvalidInput(
-            "tolerance",
-            f"{checked:g} given; give a part of the arm's length from {_SMALLEST_TOLERANCE:g}, "
-            "which rounding needs, to 1.",
-        )
-    return checked
 
 
 def _checked_target(target: ArrayLike) -> Array:
@@ -328,23 +165,3 @@ def _checked_target(target: ArrayLike) -> Array:
             "target", "its upper left 3×3 block mirrors: its determinant is −1; turn an axis round."
         )
     return frozen(array)
-
-
-def _at_limit(arm: Manipulator, angles: Array) -> tuple[str, ...]:
-    tight = (angles <= (1.0 - LIMIT_MARGIN) * arm.lower) | (
-        angles >= (1.0 - LIMIT_MARGIN) * arm.upper
-    )
-    return tuple(arm.joint_names[i] for i in np.flatnonzero(tight))
-
-
-def _verdict(reachable: bool) -> str:
-    return "reachable" if reachable else "NOT REACHABLE"
-
-
-def _angle_rows(arm: Manipulator, angles: Array) -> list[str]:
-    at_limit = _at_limit(arm, angles)
-    rows = [
-        f"{joint:<12}{angle:>z14.6f}{'  at limit' if joint in at_limit else ''}"
-        for joint, angle in zip(arm.joint_names, angles, strict=True)
-    ]
-    return [f"{'joint':<12}{'angle [rad]':>14}", *rows]

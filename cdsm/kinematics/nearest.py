@@ -22,12 +22,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from cdsm.kinematics.residuals import Residual, usable_limits
 from cdsm.support.validation import Array
 
 Limits = NDArray[np.int_]
@@ -53,101 +54,6 @@ _CONVERGED = 1e-11
 """Newton's method has converged below this residual and gradient. It usually reaches 1e-15."""
 
 
-class Residual(Protocol):
-    """Dimensionless residual r (m,) of joint angles q (nv,)."""
-
-    def evaluate(self, q: Array) -> tuple[Array, Array]:
-        """Compute r (m,) and ∂r/∂q (m, nv)."""
-
-    def curvature(self, q: Array, weight: Array) -> Array:
-        """Compute Σ_a weight_a ∂²r_a/∂q² (nv, nv), valid where r = 0."""
-
-    def hessian(self, q: Array) -> Array:
-        """Compute the second derivative of ½‖r‖² (nv, nv), valid for all r."""
-
-
-class InverseProblem(NamedTuple):
-    """Residual, joint limits (nv,) [rad], and guess (nv,) [rad] within the limits."""
-
-    residual: Residual
-    lower: Array
-    upper: Array
-    guess: Array
-
-    def size(self, q: Array) -> float:
-        """Compute ‖r(q)‖."""
-        return float(np.linalg.norm(self.residual.evaluate(q)[0]))
-
-
-class InverseSolution(NamedTuple):
-    """Joint angles (nv,) [rad] within the limits, their ‖r‖, and the number of evaluations of r."""
-
-    angles: Array
-    size: float
-    iterations: int
-
-
-def nearest(problem: InverseProblem, tolerance: float) -> InverseSolution:
-    """Find the joint angles nearest to the guess with ‖r‖ within a tolerance, or with least ‖r‖.
-
-    They are nearest in a neighbourhood; another way to fold the arm may be nearer. If the guess
-    leads to no solution, random postures are tried in turn (always the same postures).
-    """
-    q, iterations = problem.guess, 0
-    for weight in _WEIGHTS[:-1]:
-        q, _, count = _fit(problem, q, weight, 1e-4)
-        iterations += count
-    best = _solve_from(problem, q)
-    iterations += best.iterations
-    random = np.random.default_rng(0)
-    for _ in range(_STARTS):
-        if best.size <= tolerance:
-            break
-        other = _solve_from(problem, random.uniform(problem.lower, problem.upper))
-        iterations += other.iterations
-        # the first is nearest to the guess: ignore others that are better by rounding only
-        if other.size < (1.0 - 1e-6) * best.size:
-            best = other
-    return best._replace(iterations=iterations)
-
-
-def _solve_from(problem: InverseProblem, start: Array) -> InverseSolution:
-    """Find the solution from a start, to the last digit if Newton's method converges."""
-    q, held, iterations = _fit(problem, start, _WEIGHTS[-1], 1e-6)
-    best, held, count = _active_set(_least_residual_step, problem, q, held)
-    iterations += count
-    if best is None:  # singular: use least squares only
-        best, held, count = _fit(problem, q, 1e-14, 1e-15)
-        iterations += count
-    if problem.size(best) < _NEAR:
-        closer, _, count = _active_set(_nearest_step, problem, best, held)
-        iterations += count
-        if closer is not None:
-            best = closer
-    return InverseSolution(best, problem.size(best), iterations)
-
-
-def _fit(
-    problem: InverseProblem, start: Array, weight: float, tolerance: float
-) -> tuple[Array, Limits, int]:
-    """Solve for one ε. Return joint angles, limits they rest on, and number of evaluations."""
-    residual, lower, upper, guess = problem
-    root = math.sqrt(weight)
-    regularisation = root * np.eye(guess.size)
-    found = least_squares(
-        lambda q: np.concatenate([residual.evaluate(q)[0], root * (q - guess)]),
-        np.clip(start, lower, upper),
-        lambda q: np.vstack([residual.evaluate(q)[1], regularisation]),
-        bounds=(lower, upper),
-        method="dogbox",  # unlike trf, goes exactly onto a limit and reports it
-        ftol=tolerance,
-        xtol=tolerance,
-        gtol=tolerance,
-        max_nfev=100,
-    )
-    return found.x, found.active_mask, int(found.nfev)
-
-
 class _NewtonStep(NamedTuple):
     """Step of Newton's method for the free joints.
 
@@ -164,32 +70,133 @@ class _NewtonStep(NamedTuple):
     convex: bool
 
 
-_Newton = Callable[[InverseProblem, Array, NDArray[np.bool_]], _NewtonStep]
+_Newton = Callable[[Array, NDArray[np.bool_]], _NewtonStep]
 
 
-def _nearest_step(problem: InverseProblem, q: Array, free: NDArray[np.bool_]) -> _NewtonStep:
-    """Compute the step to min ½‖q − guess‖² with r = 0: to r = 0, then along r = 0."""
-    r, J = problem.residual.evaluate(q)
-    away = q - problem.guess
-    left, values, right = np.linalg.svd(J[:, free])
-    rank = int(np.count_nonzero(values > _SINGULAR * values.max(initial=0.0)))
-    inverse = left[:, :rank] / values[:rank]
-    row, null = right[:rank], right[rank:]
-    multipliers = -inverse @ (row @ away[free])
-    gradient = away + multipliers @ J
-    H = (np.eye(q.size) + problem.residual.curvature(q, multipliers))[np.ix_(free, free)]
-    move = -(r @ inverse) @ row
-    along, convex = _downhill(null @ H @ null.T, null @ (gradient[free] + H @ move))
-    error = max(float(np.linalg.norm(r)), float(abs(null @ gradient[free]).max(initial=0.0)))
-    return _NewtonStep(move + along @ null, gradient, error, convex)
+def nearest(residual: Residual, guess: Array, tolerance: float) -> tuple[Array, int]:
+    """Find the joint angles nearest to the guess with ‖r‖ within a tolerance, or with least ‖r‖.
+
+    They are nearest in a neighbourhood; another way to fold the arm may be nearer. If the guess
+    leads to no solution, random postures are tried in turn (always the same postures).
+
+    Returns:
+        The joint angles (nv,) [rad] within the limits, and the number of evaluations of r.
+    """
+    search = _Search(residual, guess)
+    q = guess
+    for weight in _WEIGHTS[:-1]:
+        q, _ = search.fit(q, weight, 1e-4)
+    best, size = search.solve_from(q)
+    random = np.random.default_rng(0)
+    for _ in range(_STARTS):
+        if size <= tolerance:
+            break
+        other, other_size = search.solve_from(random.uniform(search.lower, search.upper))
+        # the first is nearest to the guess: ignore others that are better by rounding only
+        if other_size < (1.0 - 1e-6) * size:
+            best, size = other, other_size
+    return best, search.iterations
 
 
-def _least_residual_step(problem: InverseProblem, q: Array, free: NDArray[np.bool_]) -> _NewtonStep:
-    r, J = problem.residual.evaluate(q)
-    gradient = r @ J
-    move, convex = _downhill(problem.residual.hessian(q)[np.ix_(free, free)], gradient[free])
-    error = float(abs(gradient[free]).max(initial=0.0)) / max(1.0, float(np.linalg.norm(r)))
-    return _NewtonStep(move, gradient, error, convex)
+class _Search:
+    """Search within the joint limits (nv,) [rad]; counts the evaluations of r."""
+
+    def __init__(self, residual: Residual, guess: Array) -> None:
+        self.residual = residual
+        self.guess = guess
+        self.lower, self.upper = usable_limits(residual.arm)
+        self.iterations = 0
+
+    def solve_from(self, start: Array) -> tuple[Array, float]:
+        """Find a solution, to the last digit if Newton's method converges, and its ‖r‖."""
+        q, held = self.fit(start, _WEIGHTS[-1], 1e-6)
+        best, held = self._active_set(self._least_residual_step, q, held)
+        if best is None:  # singular: use least squares only
+            best, held = self.fit(q, 1e-14, 1e-15)
+        if self._size(best) < _NEAR:
+            closer, _ = self._active_set(self._nearest_step, best, held)
+            best = best if closer is None else closer
+        return best, self._size(best)
+
+    def fit(self, start: Array, weight: float, tolerance: float) -> tuple[Array, Limits]:
+        """Solve for one ε. Return the joint angles and the limits they rest on."""
+        root = math.sqrt(weight)
+        regularisation = root * np.eye(start.size)
+        found = least_squares(
+            lambda q: np.concatenate([self.residual.evaluate(q)[0], root * (q - self.guess)]),
+            np.clip(start, self.lower, self.upper),
+            lambda q: np.vstack([self.residual.evaluate(q)[1], regularisation]),
+            bounds=(self.lower, self.upper),
+            method="dogbox",  # unlike trf, goes exactly onto a limit and reports it
+            ftol=tolerance,
+            xtol=tolerance,
+            gtol=tolerance,
+            max_nfev=100,
+        )
+        self.iterations += int(found.nfev)
+        return found.x, found.active_mask
+
+    def _size(self, q: Array) -> float:
+        return float(np.linalg.norm(self.residual.evaluate(q)[0]))
+
+    def _nearest_step(self, q: Array, free: NDArray[np.bool_]) -> _NewtonStep:
+        """Compute the step to min ½‖q − guess‖² with r = 0: to r = 0, then along r = 0."""
+        r, J = self.residual.evaluate(q)
+        away = q - self.guess
+        left, values, right = np.linalg.svd(J[:, free])
+        rank = int(np.count_nonzero(values > _SINGULAR * values.max(initial=0.0)))
+        inverse = left[:, :rank] / values[:rank]
+        row, null = right[:rank], right[rank:]
+        multipliers = -inverse @ (row @ away[free])
+        gradient = away + multipliers @ J
+        H = (np.eye(q.size) + self.residual.curvature(q, multipliers))[np.ix_(free, free)]
+        move = -(r @ inverse) @ row
+        along, convex = _downhill(null @ H @ null.T, null @ (gradient[free] + H @ move))
+        error = max(float(np.linalg.norm(r)), float(abs(null @ gradient[free]).max(initial=0.0)))
+        return _NewtonStep(move + along @ null, gradient, error, convex)
+
+    def _least_residual_step(self, q: Array, free: NDArray[np.bool_]) -> _NewtonStep:
+        r, J = self.residual.evaluate(q)
+        gradient = r @ J
+        move, convex = _downhill(self.residual.hessian(q)[np.ix_(free, free)], gradient[free])
+        error = float(abs(gradient[free]).max(initial=0.0)) / max(1.0, float(np.linalg.norm(r)))
+        return _NewtonStep(move, gradient, error, convex)
+
+    def _active_set(self, newton: _Newton, q: Array, held: Limits) -> tuple[Array | None, Limits]:
+        """Find the held limits by Newton's method. Return angles (None on failure) and limits."""
+        held = held.copy()
+        for _ in range(2 * q.size + 5):
+            q = np.where(held < 0, self.lower, np.where(held > 0, self.upper, q))
+            q, gradient = self._iterate(newton, q, held == 0)
+            if gradient is None:
+                break
+            beyond = (q > self.upper).astype(np.int_) - (q < self.lower)
+            q = np.clip(q, self.lower, self.upper)
+            multiplier = held * gradient  # positive: the objective falls away from the limit
+            if beyond.any():
+                held = np.where(beyond != 0, beyond, held)
+            elif multiplier.max() > _CONVERGED:
+                held[multiplier.argmax()] = 0
+            else:
+                return q, held
+        return None, held
+
+    def _iterate(
+        self, newton: _Newton, q: Array, free: NDArray[np.bool_]
+    ) -> tuple[Array, Array | None]:
+        """Iterate Newton's method for the free joints; the gradient is None on failure."""
+        least = math.inf
+        for _ in range(_ATTEMPTS):
+            step = newton(q, free)
+            self.iterations += 1
+            # small and no longer falling fast: only rounding is left
+            done = step.error < _CONVERGED and step.error > 0.5 * least
+            if step.convex and (done or step.error == 0.0):
+                return q, step.gradient
+            least = min(least, step.error)
+            q = q.copy()
+            q[free] += step.move * min(1.0, _LONGEST / float(abs(step.move).max(initial=_LONGEST)))
+        return q, None
 
 
 def _downhill(H: Array, gradient: Array) -> tuple[Array, bool]:
@@ -198,44 +205,3 @@ def _downhill(H: Array, gradient: Array) -> tuple[Array, bool]:
     flat = abs(values) <= _FLAT * abs(values).max(initial=0.0)
     rate = np.where(flat, math.inf, abs(values))
     return -vectors @ ((gradient @ vectors) / rate), bool((values[~flat] > 0.0).all())
-
-
-def _active_set(
-    newton: _Newton, problem: InverseProblem, q: Array, held: Limits
-) -> tuple[Array | None, Limits, int]:
-    """Find the held limits by Newton's method. Return angles (None on failure), limits, count."""
-    _, lower, upper, _ = problem
-    held, iterations = held.copy(), 0
-    for _ in range(2 * q.size + 5):
-        q = np.where(held < 0, lower, np.where(held > 0, upper, q))
-        q, gradient, count = _iterate(newton, problem, q, held == 0)
-        iterations += count
-        if gradient is None:
-            break
-        beyond = (q > upper).astype(np.int_) - (q < lower)
-        q = np.clip(q, lower, upper)
-        multiplier = held * gradient  # positive: the objective falls away from the limit
-        if beyond.any():
-            held = np.where(beyond != 0, beyond, held)
-        elif multiplier.max() > _CONVERGED:
-            held[multiplier.argmax()] = 0
-        else:
-            return q, held, iterations
-    return None, held, iterations
-
-
-def _iterate(
-    newton: _Newton, problem: InverseProblem, q: Array, free: NDArray[np.bool_]
-) -> tuple[Array, Array | None, int]:
-    """Iterate Newton's method for the free joints: angles, gradient (None on failure), count."""
-    least = math.inf
-    for count in range(1, _ATTEMPTS + 1):
-        step = newton(problem, q, free)
-        # small and no longer falling fast: only rounding is left
-        done = step.error < _CONVERGED and step.error > 0.5 * least
-        if step.convex and (done or step.error == 0.0):
-            return q, step.gradient, count
-        least = min(least, step.error)
-        q = q.copy()
-        q[free] += step.move * min(1.0, _LONGEST / float(abs(step.move).max(initial=_LONGEST)))
-    return q, None, _ATTEMPTS

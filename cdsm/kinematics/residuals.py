@@ -6,6 +6,7 @@ weights on the tip act like a dead wrench.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import final
 
@@ -23,42 +24,49 @@ LIMIT_MARGIN = 1e-5
 _NO_WRENCH = frozen(np.zeros(6))
 
 
-@final
 @dataclass(frozen=True, eq=False)
-class LengthResidual:
-    """Cable lengths less the wanted lengths (C,), over the length of the arm."""
+class Residual(ABC):
+    """Dimensionless residual r (m,) of the joint angles q (nv,) of an arm; 0 at the target."""
 
     arm: Manipulator
-    wanted: Array
+    target: Array
 
+    @abstractmethod
     def evaluate(self, q: Array) -> tuple[Array, Array]:
         """Compute r (m,) and ∂r/∂q (m, nv)."""
-        pose, length = self.arm.at(q, check_limits=False), self.arm.length
-        return (pose.cable_lengths - self.wanted) / length, pose.length_jacobian / length
 
+    @abstractmethod
     def curvature(self, q: Array, weight: Array) -> Array:
-        """Compute the second derivative of weight · r (nv, nv)."""
-        # H_L·F of tensions F = weight
-        tension = frozen(weight / self.arm.length)
-        pose = self.arm.at(q, check_limits=False)
-        return pose._joint_stiffness(tension, frozen(np.zeros(weight.size)), _NO_WRENCH)[0]
+        """Compute the second derivative of weight · r (nv, nv), valid where r = 0."""
 
     def hessian(self, q: Array) -> Array:
-        """Compute the second derivative of ½‖r‖² (nv, nv)."""
+        """Compute the second derivative of ½‖r‖² (nv, nv), valid for all r."""
         r, J = self.evaluate(q)
         return self.curvature(q, r) + J.T @ J
 
 
 @final
-@dataclass(frozen=True, eq=False)
-class TipResidual:
-    """Tip less target (3,) or (6,): position over the arm length, then rotation vector."""
-
-    arm: Manipulator
-    target: Array
+class LengthResidual(Residual):
+    """Cable lengths less the wanted lengths (C,), over the length of the arm."""
 
     def evaluate(self, q: Array) -> tuple[Array, Array]:
-        """Compute r (m,) and ∂r/∂q (m, nv)."""
+        """As in :class:`Residual`."""
+        pose, length = self.arm.at(q, check_limits=False), self.arm.length
+        return (pose.cable_lengths - self.target) / length, pose.length_jacobian / length
+
+    def curvature(self, q: Array, weight: Array) -> Array:
+        """As in :class:`Residual`: H_L·F of tensions F = weight."""
+        tension = frozen(weight / self.arm.length)
+        pose = self.arm.at(q, check_limits=False)
+        return pose._joint_stiffness(tension, frozen(np.zeros(weight.size)), _NO_WRENCH)[0]
+
+
+@final
+class TipResidual(Residual):
+    """Tip less target (3,) or (6,): position over the arm length, then rotation vector."""
+
+    def evaluate(self, q: Array) -> tuple[Array, Array]:
+        """As in :class:`Residual`."""
         state, length = self.arm._model.body.state(q), self.arm.length
         linear, angular = state.jacobian[:3] / length, state.jacobian[3:]
         if self.target.ndim == 1:
@@ -68,8 +76,8 @@ class TipResidual:
         return np.concatenate([offset, turn]), np.vstack([linear, turn_jacobian @ angular])
 
     def curvature(self, q: Array, weight: Array) -> Array:
-        """Compute the second derivative of weight · r (nv, nv)."""
-        # ∂(J_Xᵀ W)/∂θ of a dead wrench W = weight: at r = 0, ∂r/∂q is J_X up to the length
+        """As in :class:`Residual`: ∂(J_Xᵀ W)/∂θ of a dead wrench W = weight."""
+        # at r = 0, ∂r/∂q is J_X up to the length
         wrench = np.zeros(6)
         wrench[: weight.size] = weight
         wrench[:3] /= self.arm.length
@@ -77,7 +85,7 @@ class TipResidual:
         return -load_stiffness(frozen(jacobian), frozen(wrench), way)
 
     def hessian(self, q: Array) -> Array:
-        """Compute the second derivative of ½‖r‖² (nv, nv)."""
+        """As in :class:`Residual`."""
         # ∂(½φ²) = φ·ω exactly, so the second derivative contains that of φ only once
         r, J = self.evaluate(q)
         angular = self.arm._model.body.state(q).jacobian[3 : r.size]

@@ -22,7 +22,8 @@ from cdsm.errors import (
     SolverError,
     UnreachableStiffness,
 )
-from cdsm.kinematics.maps import KinematicSolution, inverse_kinematics
+from cdsm.kinematics.maps import inverse_kinematics
+from cdsm.kinematics.solutions import KinematicSolution
 from cdsm.manipulator import Manipulator
 from cdsm.planning.follow import Follower, SampleTarget, Status
 from cdsm.planning.objectives import (

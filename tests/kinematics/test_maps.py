@@ -10,8 +10,7 @@ from scipy.optimize import minimize, minimize_scalar
 from scipy.spatial.transform import Rotation
 
 import cdsm
-from cdsm.kinematics.nearest import Residual
-from cdsm.kinematics.residuals import LengthResidual, TipResidual
+from cdsm.kinematics.residuals import LengthResidual, Residual, TipResidual
 from cdsm.support.validation import Array
 from tests.support.arms import STEEL, mixed_arm, random_arm, random_posture
 from tests.support.differences import assert_second_order
