@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import fields
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -22,9 +23,6 @@ class _Linear:
     kind: Literal["linear"] = "linear"
     rigidity: Rigidity
 
-    def build(self) -> Elasticity:
-        return LinearElasticity(self.rigidity)
-
 
 @record
 class _Strand:
@@ -34,9 +32,6 @@ class _Strand:
     joins: _Row
     coefficients: Annotated[tuple[_Row, ...], Field(strict=False)]
 
-    def build(self) -> Elasticity:
-        return StrandElasticity(self.coefficients, self.joins, self.low, self.high)
-
 
 @record
 class _Tabulated:
@@ -44,38 +39,26 @@ class _Tabulated:
     tensions: _Row
     strains: _Row
 
-    def build(self) -> Elasticity:
-        return TabulatedElasticity(self.tensions, self.strains)
 
-
-_KINDS: dict[str, type[_Linear | _Strand | _Tabulated]] = {
-    "linear": _Linear,
-    "strand": _Strand,
-    "tabulated": _Tabulated,
+_KINDS: dict[str, tuple[type[Elasticity], type[_Linear | _Strand | _Tabulated]]] = {
+    "linear": (LinearElasticity, _Linear),
+    "strand": (StrandElasticity, _Strand),
+    "tabulated": (TabulatedElasticity, _Tabulated),
 }
 
 
 def table_of(elasticity: Elasticity) -> list[str]:
     """Return the lines of the TOML table of an elasticity. Raise if no file can hold its kind."""
-    found: _Linear | _Strand | _Tabulated
-    if isinstance(elasticity, LinearElasticity):
-        found = _Linear(rigidity=float(elasticity.rigidity(0.0)))
-    elif isinstance(elasticity, StrandElasticity):
-        found = _Strand(
-            low=float(elasticity.low),
-            high=float(elasticity.high),
-            joins=elasticity.joins,
-            coefficients=elasticity.coefficients,
-        )
-    elif isinstance(elasticity, TabulatedElasticity):
-        found = _Tabulated(tensions=elasticity.tensions, strains=elasticity.strains)
-    else:
-        raise InvalidInput(
-            "elasticity",
-            f"a {type(elasticity).__name__} given; files hold a LinearElasticity, "
-            "StrandElasticity or TabulatedElasticity. Tabulate its strain to save it.",
-        )
-    return toml_lines(found)
+    for law, entry in _KINDS.values():
+        if isinstance(elasticity, law):
+            names = (field.name for field in fields(elasticity))  # type: ignore[arg-type]
+            values = {name.removeprefix("_"): getattr(elasticity, name) for name in names}
+            return toml_lines(entry(**values))
+    raise InvalidInput(
+        "elasticity",
+        f"a {type(elasticity).__name__} given; files hold a LinearElasticity, "
+        "StrandElasticity or TabulatedElasticity. Tabulate its strain to save it.",
+    )
 
 
 def from_table(data: object) -> Elasticity:
@@ -83,7 +66,9 @@ def from_table(data: object) -> Elasticity:
     kind = data.get("kind") if isinstance(data, dict) else data
     if not isinstance(kind, str) or kind not in _KINDS:
         raise GeometryError([f"kind: must be one of {', '.join(_KINDS)}, but is {kind!r}"])
-    return parse(_KINDS[kind], data).build()
+    law, entry = _KINDS[kind]
+    values = vars(parse(entry, data))
+    return law(**{name: value for name, value in values.items() if name != "kind"})
 
 
 def write_elasticity(elasticity: Elasticity, path: str | os.PathLike[str]) -> Path:

@@ -8,6 +8,7 @@ from itertools import pairwise
 from typing import Final, final
 
 import numpy as np
+from numpy.polynomial.polynomial import polyder
 from numpy.typing import ArrayLike
 
 from cdsm.elasticity import Domain, Elasticity
@@ -157,8 +158,7 @@ class StrandElasticity(Elasticity):
 
     @cached_property
     def _slopes(self) -> Array:
-        powers = np.arange(1, len(self._table))
-        return np.vstack([powers[:, None] * self._table[1:], np.zeros(self._table.shape[1])])
+        return np.asarray(polyder(self._table))
 
     @cached_property
     def _panels(self) -> Panels:

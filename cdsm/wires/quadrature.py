@@ -13,7 +13,7 @@ two rules apart: roots at 50 ± 1e-4 i N give more than 1e5 panels, and only 76 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
+from itertools import pairwise, zip_longest
 from typing import NamedTuple
 
 import numpy as np
@@ -25,7 +25,6 @@ from cdsm.kernels.compiling import compiled
 from cdsm.support.validation import Array
 
 _NODES, _WEIGHTS = (leggauss(12)[0] + 1.0) / 2.0, leggauss(12)[1] / 2.0
-_POWERS = (0, 1)
 
 _NEAREST = 6.0
 """Least ρ of a panel. ρ^-24 = 2e-19 leaves a factor of 1000 for the growth of 1/p."""
@@ -42,8 +41,7 @@ _NARROWEST = 4
 
 def coefficient_table(rows: Sequence[Sequence[float]]) -> Array:
     """Stack the coefficients of polynomials, lowest power first, (powers, polynomials)."""
-    longest = max(map(len, rows))
-    return np.array([[*row, *[0.0] * (longest - len(row))] for row in rows]).T
+    return np.array(list(zip_longest(*rows, fillvalue=0.0)))
 
 
 def piecewise(joins: Array, table: Array, F: Array) -> Array:
@@ -116,20 +114,15 @@ def panels(rows: Sequence[Sequence[float]], edges: Sequence[float]) -> Panels:
     end = np.inf
     for index, (row, (low, high)) in enumerate(zip(rows, pairwise(edges), strict=True)):
         p = Polynomial(_significant(row, high))
-        stop = _end_of_positive(p, low, high)
-        inner = _panel_ends(np.asarray(p.roots(), dtype=np.complex128), low, min(stop, high))
+        end = _end_of_positive(p, low, high)
+        inner = _panel_ends(np.asarray(p.roots(), dtype=np.complex128), low, min(end, high))
         ends += inner
         piece += [index] * len(inner)
-        if stop < np.inf:
-            end = stop
+        if end < np.inf:
             break
-    table = Panels(
-        edges=np.array(ends),
-        coefficients=coefficient_table(rows)[:, piece],
-        before=np.zeros((len(_POWERS), len(piece))),
-        end=end,
-    )
-    whole = np.array([table.integral(table.edges[1:], power) for power in _POWERS])
+    coefficients = coefficient_table(rows)[:, piece]
+    table = Panels(np.array(ends), coefficients, np.zeros((2, len(piece))), end)
+    whole = np.array([table.integral(table.edges[1:], power) for power in (0, 1)])
     return table._replace(before=np.cumsum(whole, axis=1) - whole)
 
 

@@ -17,7 +17,6 @@ steps, EA is up to 1.02 times the largest EA of the chords nearby, and up to 2.0
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -26,65 +25,50 @@ from numpy.typing import NDArray
 
 from cdsm.support.validation import Array
 
-STEEPEST = 3.0
-"""The slope at a point is at most this factor times the slope of either neighbouring chord."""
-
-FLATTEST = 0.5
-"""The slope at the first and the last point is at least this factor times its chord's slope."""
+_STEEPEST = 3.0  # slope at a point over that of either neighbouring chord, at most
+_FLATTEST = 0.5  # slope at the first and the last point over that of its chord, at least
 
 # a + b <= 6 keeps the poles of N/D² outside the ellipse of ρ = 1 + √2: an error of ρ^-48 = 4e-19
 _NODES, _WEIGHTS = (leggauss(24)[0] + 1.0) / 2.0, leggauss(24)[1] / 2.0
 
 
-@dataclass(frozen=True)
 class RisingCurve:
     """Curve through n points. A point belongs to the piece below it.
 
-    Attributes:
+    Args:
         x: Abscissae of the points, rising (n,).
         y: Ordinates of the points, rising (n,).
+
+    Attributes:
+        chords: Slopes (n − 1,) of the straight lines between neighbouring points.
     """
 
-    x: Array
-    y: Array
+    def __init__(self, x: Array, y: Array) -> None:
+        self._x, self._y = x, y
+        self._widths, self._rise = np.diff(x), np.diff(y)
+        self.chords = self._rise / self._widths
 
     def value(self, x: Array) -> Array:
         """Compute y at x of any shape, within the points."""
-        k, t, u = self._locate(x)
-        a, b = self._ends[:, k]
-        return np.asarray(self.y[k] + self._rise[k] * (t * (t + a * u) / _denominator(a, b, t, u)))
+        k, t, u, a, _, D = self._locate(x)
+        return np.asarray(self._y[k] + self._rise[k] * (t * (t + a * u) / D))
 
     def slope(self, x: Array) -> Array:
         """Compute the derivative y' > 0, same shape as x."""
-        k, t, u = self._locate(x)
-        a, b = self._ends[:, k]
-        return np.asarray(self.chords[k] * _numerator(a, b, t, u) / _denominator(a, b, t, u) ** 2)
+        k, t, u, a, b, D = self._locate(x)
+        return np.asarray(self.chords[k] * (b * t * t + 2.0 * t * u + a * u * u) / D**2)
 
     def second_derivative(self, x: Array) -> Array:
         """Compute the second derivative y'', same shape as x. It jumps at the points."""
-        k, t, u = self._locate(x)
-        a, b = self._ends[:, k]
-        N, D = _numerator(a, b, t, u), _denominator(a, b, t, u)
+        k, t, u, a, b, D = self._locate(x)
+        N = b * t * t + 2.0 * t * u + a * u * u
         dN, dD = 2.0 * ((b - 1.0) * t + (1.0 - a) * u), (a + b - 2.0) * (u - t)
         return np.asarray(self.chords[k] / self._widths[k] * (dN * D - 2.0 * N * dD) / D**3)
 
     def moment(self, x: Array) -> Array:
         """Integrate x dy from the first point, exact to rounding; same shape as x."""
-        k, _, _ = self._locate(x)
+        k = self._piece(x)
         return np.asarray(self._moments[k] + self._moment(k, x))
-
-    @cached_property
-    def _widths(self) -> Array:
-        return np.diff(self.x)
-
-    @cached_property
-    def _rise(self) -> Array:
-        return np.diff(self.y)
-
-    @cached_property
-    def chords(self) -> Array:
-        """Slopes (n − 1,) of the straight lines between neighbouring points."""
-        return self._rise / self._widths
 
     @cached_property
     def _ends(self) -> Array:
@@ -95,26 +79,23 @@ class RisingCurve:
     @cached_property
     def _moments(self) -> Array:
         """Integrals ∫ x dy up to the beginning of each piece (n − 1,)."""
-        whole = self._moment(np.arange(len(self._rise)), self.x[1:])
+        whole = self._moment(np.arange(len(self._rise)), self._x[1:])
         return np.cumsum(whole) - whole
 
     def _moment(self, k: NDArray[np.intp], x: Array) -> Array:
-        width = np.asarray(x - self.x[k])[..., None]
-        nodes = self.x[k][..., None] + width * _NODES
+        width = np.asarray(x - self._x[k])[..., None]
+        nodes = self._x[k][..., None] + width * _NODES
         return np.asarray((width * nodes * self.slope(nodes)) @ _WEIGHTS)
 
-    def _locate(self, x: Array) -> tuple[NDArray[np.intp], Array, Array]:
-        """Return the piece, θ and 1 − θ at x."""
-        k = np.searchsorted(self.x[1:-1], x, side="left")
-        return k, (x - self.x[k]) / self._widths[k], (self.x[k + 1] - x) / self._widths[k]
+    def _piece(self, x: Array) -> NDArray[np.intp]:
+        return np.searchsorted(self._x[1:-1], x)
 
-
-def _numerator(a: Array, b: Array, t: Array, u: Array) -> Array:
-    return b * t * t + 2.0 * t * u + a * u * u
-
-
-def _denominator(a: Array, b: Array, t: Array, u: Array) -> Array:
-    return t * t + (a + b) * t * u + u * u
+    def _locate(self, x: Array) -> tuple[NDArray[np.intp], Array, Array, Array, Array, Array]:
+        """Return the piece at x, and θ, 1 − θ, a, b and D."""
+        k = self._piece(x)
+        t, u = (x - self._x[k]) / self._widths[k], (self._x[k + 1] - x) / self._widths[k]
+        a, b = self._ends[:, k]
+        return k, t, u, a, b, t * t + (a + b) * t * u + u * u
 
 
 def slopes_at_points(chords: Array, rise: Array) -> Array:
@@ -140,5 +121,5 @@ def slopes_at_points(chords: Array, rise: Array) -> Array:
     first, last = log[[0, -1]] + change
     nearest = np.minimum(np.append(chords[0], chords), np.append(chords, chords[-1]))
     least = nearest.copy()
-    least[[0, -1]] *= FLATTEST
-    return np.clip(np.exp([first, *inside, last]), least, STEEPEST * nearest)
+    least[[0, -1]] *= _FLATTEST
+    return np.clip(np.exp([first, *inside, last]), least, _STEEPEST * nearest)

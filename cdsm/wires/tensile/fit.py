@@ -13,10 +13,10 @@ from cdsm.elasticity import Elasticity
 from cdsm.errors import TensileTestError
 from cdsm.support.validation import RANGES, Array, ReadOnlyState, frozen, one_of, scalar
 from cdsm.wires.laws import TabulatedElasticity
-from cdsm.wires.tensile.loading import FEWEST, loading
+from cdsm.wires.tensile.loading import FEWEST, Points, loading
 from cdsm.wires.tensile.polynomials import polynomials
 from cdsm.wires.tensile.record import TensileTest
-from cdsm.wires.tensile.spline import Basis, Curve, Points, fit_curve
+from cdsm.wires.tensile.spline import Curve, fit_curve
 from cdsm.wires.tensile.stages import doubts, pretension_end, refuse_jumps, yield_onset
 
 if TYPE_CHECKING:
@@ -179,7 +179,7 @@ def fit_tensile_test(
     join = scalar("join", join)
     test = TensileTest(displacement, force, gauge_length)  # type: ignore[arg-type]
     points, noise, notes = loading(test)
-    curve = _curve(points, noise)
+    curve = fit_curve(points, noise)
     most = float(points.force.max())
     spread = curve.spread(points)
     onset = yield_onset(curve.basis.tensions, curve.rigidity, spread.deviation)
@@ -190,12 +190,16 @@ def fit_tensile_test(
                 f"the wire yields from {onset:.4g} N on, after {len(points.force)} points; a fit "
                 f"needs at least {FEWEST}. Sample more finely below the yield."
             )
-        curve = _curve(points, noise)  # fit again: the yield would distort the curve below it
+        curve = fit_curve(points, noise)  # fit again: the yield would distort the curve below it
         spread = curve.spread(points)
         notes += (f"plastic from {onset:.4g} N on: left out",)
     refuse_jumps(curve, points)
-    fitted_by = _monotone if method == "monotone" else _polynomial
-    elasticity, start, more = fitted_by(curve, points, join)
+    if method == "monotone":
+        elasticity, start = _monotone(curve, points)
+    else:
+        elasticity, cut = polynomials(points, join)
+        start = _start(elasticity, curve)
+        notes += cut
     domain = elasticity.domain
     tensions = frozen(_grid(domain.first, domain.high, curve.basis.tensions))
     strain = points.strain - start
@@ -212,7 +216,7 @@ def fit_tensile_test(
         test=test,
         method=method,
         start=start * test.gauge_length,
-        notes=notes + more + doubts(points, spread, test.gauge_length),
+        notes=notes + doubts(points, spread, test.gauge_length),
     )
 
 
@@ -220,25 +224,16 @@ def _stages(
     tensions: Array, elastic_from: float | None, onset: float | None, most: float
 ) -> tuple[Stage, ...]:
     low, high = float(tensions[0]), float(tensions[-1])
-    if elastic_from is None:
-        stages = [Stage("elastic", low, high)]
-    else:
-        stages = [Stage("pre-tensioning", low, elastic_from), Stage("elastic", elastic_from, high)]
+    stages = [Stage("elastic", low if elastic_from is None else elastic_from, high)]
+    if elastic_from is not None:
+        stages.insert(0, Stage("pre-tensioning", low, elastic_from))
     if onset is not None:
         stages.append(Stage("plastic", high, max(most, high)))
     return tuple(stages)
 
 
-def _curve(points: Points, noise: float) -> Curve:
-    low, high = max(float(points.force[0]) - 3.0 * noise, 0.0), float(points.force.max())
-    corner = max(low, 8.0 * noise, 5e-3 * high)
-    return fit_curve(points, Basis.over(low, high, corner, len(points.force)), noise)
-
-
-def _monotone(
-    curve: Curve, points: Points, join: float
-) -> tuple[Elasticity, float, tuple[str, ...]]:
-    """Return the fitted curve as a law, the strain at its low end, and notes."""
+def _monotone(curve: Curve, points: Points) -> tuple[Elasticity, float]:
+    """Return the fitted curve as a law, and the strain at its low end."""
     grid = curve.basis.tensions
     # the ends follow from the fit: noise would shift the extreme forces
     first, last = curve.force(points.strain[[0, -1]])
@@ -247,18 +242,14 @@ def _monotone(
     tensions = _grid(low, min(grid[-1], float(last)), grid)
     strain = np.interp(tensions, grid, curve.strain)
     law = TabulatedElasticity(tuple(tensions.tolist()), tuple((strain - strain[0]).tolist()))
-    return law, float(strain[0]), ()
+    return law, float(strain[0])
 
 
-def _polynomial(
-    curve: Curve, points: Points, join: float
-) -> tuple[Elasticity, float, tuple[str, ...]]:
-    """Return the two polynomials of the paper as a law, the strain at its low end, and notes."""
-    law, notes = polynomials(points, join)
-    tensions = _grid(float(np.nextafter(law.low, law.high)), law.high, curve.basis.tensions)
-    # the strain at the low end is not measured: take the best fit
+def _start(law: Elasticity, curve: Curve) -> float:
+    """Find the strain at the low end of a law by the best fit to a curve: it is not measured."""
+    tensions = _grid(law.domain.first, law.domain.high, curve.basis.tensions)
     offsets = np.interp(tensions, curve.basis.tensions, curve.strain) - law.strain(tensions)
-    return law, float(np.average(offsets, weights=np.gradient(tensions))), notes
+    return float(np.average(offsets, weights=np.gradient(tensions)))
 
 
 def _band(law: Elasticity, tensions: Array, curve: Curve, points: Points) -> Band:

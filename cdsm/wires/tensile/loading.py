@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import isotonic_regression
@@ -9,18 +11,15 @@ from scipy.optimize import isotonic_regression
 from cdsm.errors import TensileTestError
 from cdsm.support.validation import Array
 from cdsm.wires.tensile.record import TensileTest
-from cdsm.wires.tensile.spline import Points
 
 FEWEST = 8
 """Least number of points of a fit. Fewer points show no bend."""
-_MOST = 800
-"""Largest number of fitted points. More points are averaged, which makes the fit faster."""
+_MOST = 800  # fitted points; more are averaged, which makes the fit faster
 _OUTLYING = 5e-3
 """An outlier is farther from its neighbours than this share of the range."""
-_AROUND = 25
-"""Number of neighbouring points over which the noise is assumed constant."""
-_SURE = 3.0
-"""A rise of the force is certain beyond this number of standard deviations."""
+_AROUND = 25  # neighbouring points over which the noise is assumed constant
+_SURE = 3.0  # standard deviations beyond which a rise of the force is certain
+_MAD = 1.4826  # standard deviation of normal noise over its median magnitude
 _MISTAKEN = (  # mistake, then factors that correct force and strain
     ("the displacement is in mm", 1.0, 1e-3),
     ("the displacement is in µm", 1.0, 1e-6),
@@ -29,7 +28,27 @@ _MISTAKEN = (  # mistake, then factors that correct force and strain
     ("the force is in kN", 1e3, 1.0),
     ("the force is in MN", 1e6, 1.0),
 )
-_MAD = 1.4826  # standard deviation of normal noise over its median magnitude
+
+
+@dataclass(frozen=True)
+class Points:
+    """Averaged points of a test: rising strain [-], force [N], and points per average, (n,)."""
+
+    strain: Array
+    force: Array
+    count: Array
+
+    def part(self, kept: NDArray[np.bool_] | slice) -> Points:
+        """Select points by mask or slice."""
+        return Points(self.strain[kept], self.force[kept], self.count[kept])
+
+    def means(self, group: NDArray[np.intp]) -> Points:
+        """Replace the points of each group 0, 1, … by their mean."""
+        count = np.asarray(np.bincount(group, self.count), np.float64)
+        strain, force = (
+            np.bincount(group, self.count * each) / count for each in (self.strain, self.force)
+        )
+        return Points(strain, force, count)
 
 
 def loading(test: TensileTest) -> tuple[Points, float, tuple[str, ...]]:
@@ -39,18 +58,19 @@ def loading(test: TensileTest) -> tuple[Points, float, tuple[str, ...]]:
     outlier = _outliers(test.force)
     outlier[1:-1] |= _outliers(test.displacement)[1:-1]  # a soft wire moves far at its first load
     if outlier.any():
-        listed = [f"{f:.4g} N at {d:.4g} m" for d, f in zip(*_selected(test, outlier), strict=True)]
+        places = zip(test.force[outlier], test.displacement[outlier], strict=True)
+        listed = [f"{force:.4g} N at {place:.4g} m" for force, place in places]
         more = f" and {len(listed) - 3} more" if len(listed) > 3 else ""
         notes.append(f"far from their neighbours and left out: {', '.join(listed[:3])}{more}")
-    _require(int(np.count_nonzero(~outlier)), "points are left that lie near their neighbours")
-    displacement, force = _selected(test, ~outlier)
-    strain = displacement / test.gauge_length
+    force, strain = test.force[~outlier], test.displacement[~outlier] / test.gauge_length
+    _require(len(force), "points are left that lie near their neighbours")
     _check_span(strain, force)
     kept = _is_loading(strain)
     if not kept.all():
         notes.append(f"points of unloading and reloading left out: {np.count_nonzero(~kept)}")
-    order = np.argsort(strain[kept], kind="stable")
-    points = _merged(strain[kept][order], force[kept][order], np.ones(len(order)))
+    unique, place = np.unique(strain[kept], return_inverse=True)
+    points = Points(strain[kept], force[kept], np.ones(len(place))).means(place)
+    points = replace(points, strain=unique)  # without the rounding of a mean
     _require(
         len(points.force),
         "points of loading are left, each farther than all before it; give the points in the order "
@@ -87,11 +107,9 @@ def loading(test: TensileTest) -> tuple[Points, float, tuple[str, ...]]:
         points = points.part(slice(count, None))
     _require(len(points.force), "points are left after the slack")
     _check_rigidity(points)
-    return _averaged(points), noise, tuple(notes)
-
-
-def _selected(test: TensileTest, kept: NDArray[np.bool_]) -> tuple[Array, Array]:
-    return test.displacement[kept], test.force[kept]
+    if len(points.force) > _MOST:
+        points = points.means(np.arange(len(points.force)) * _MOST // len(points.force))
+    return points, noise, tuple(notes)
 
 
 def _outliers(values: Array) -> NDArray[np.bool_]:
@@ -206,25 +224,6 @@ def _is_loading(strain: Array) -> NDArray[np.bool_]:
     jitter = min(jitter, 0.005 * float(np.ptp(strain)))
     kept: NDArray[np.bool_] = strain >= np.maximum.accumulate(strain) - jitter
     return kept
-
-
-def _merged(strain: Array, force: Array, count: Array) -> Points:
-    """Replace points of equal strain by their mean."""
-    unique, place = np.unique(strain, return_inverse=True)
-    total = np.asarray(np.bincount(place, count), np.float64)
-    return Points(unique, np.bincount(place, count * force) / total, total)
-
-
-def _averaged(points: Points) -> Points:
-    """Average neighbouring points, so that at most _MOST points remain."""
-    if len(points.force) <= _MOST:
-        return points
-    group = np.arange(len(points.force)) * _MOST // len(points.force)
-    total = np.asarray(np.bincount(group, points.count), np.float64)
-    strain, force = (
-        np.bincount(group, points.count * each) / total for each in (points.strain, points.force)
-    )
-    return Points(strain, force, total)
 
 
 def _noise(points: Points) -> float:

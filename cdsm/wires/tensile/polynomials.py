@@ -10,7 +10,8 @@ from numpy.polynomial import Polynomial
 from cdsm.errors import TensileTestError
 from cdsm.support.validation import RANGES, Array
 from cdsm.wires.laws import StrandElasticity
-from cdsm.wires.tensile.spline import Points
+from cdsm.wires.quadrature import coefficient_table, piecewise
+from cdsm.wires.tensile.loading import Points
 
 _DEGREE = 6  # as in Eq. 19
 _NARROW = 0.1  # least width of a range, as a share of its largest tension
@@ -28,36 +29,33 @@ def polynomials(points: Points, join: float) -> tuple[StrandElasticity, tuple[st
             f"only {len(points.force)} points are left, and polynomials of degree {_DEGREE} need "
             f"at least {_FEWEST}. Use method='monotone', or sample more finely."
         )
-    joins = _joins_of(points, join)
-    rows = _coefficients(points, joins)
     low, high = float(points.force[0]), float(points.force.max())
     low = low if low >= RANGES["tension"].low else 0.0
+    joins = _joins_of(points, join)
+    rows = _coefficients(points, joins)
     start, end = max(_positive(rows, (low, *joins, high)), key=lambda each: each[1] - each[0])
     if end - start < (high - low) / 2.0:
         raise TensileTestError(
             "the polynomials give no positive rigidity on half of the range "
             f"{low:.4g} N to {high:.4g} N. Use method='monotone', or another join."
         )
-    inside = [k for k, each in enumerate(joins) if start < each < end]
-    pieces = (
-        rows[inside[0] : inside[-1] + 2]
-        if inside
-        else [rows[int(start >= max(joins, default=np.inf))]]
-    )
+    if joins and not start < join < end:
+        rows, joins = [rows[int(start >= join)]], ()
+    law = StrandElasticity(tuple(map(tuple, rows)), joins, start, end)
+    if (start, end) == (low, high):
+        return law, ()
     note = (
         f"the polynomials are not positive beyond {start:.4g} N to {end:.4g} N: "
         "the domain is cut to that"
     )
-    law = StrandElasticity(
-        tuple(tuple(row) for row in pieces), tuple(joins[k] for k in inside), start, end
-    )
-    return law, () if (start, end) == (low, high) else (note,)
+    return law, (note,)
 
 
 def _positive(rows: list[list[float]], edges: tuple[float, ...]) -> list[tuple[float, float]]:
     """Find the ranges of tension [N] where the polynomials are positive, or one empty range."""
-    tops = abs(_evaluate(rows, edges[1:-1], np.linspace(edges[0], edges[-1], 400)))
-    margin = 1e-6 * float(tops.max())  # keeps the strain ∫ dF/EA finite
+    tensions = np.linspace(edges[0], edges[-1], 400)
+    values = piecewise(np.array(edges[1:-1]), coefficient_table(rows), tensions)
+    margin = 1e-6 * float(abs(values).max())  # keeps the strain ∫ dF/EA finite
     ranges = [(edges[0], edges[0])]
     for row, low, high in zip(rows, edges[:-1], edges[1:], strict=True):
         rounding = 1e-13 * float(Polynomial(np.abs(row))(high))  # rounding of powers that cancel
@@ -105,12 +103,6 @@ def _coefficients(points: Points, joins: tuple[float, ...]) -> list[list[float]]
         Polynomial([value, *terms], [join, join + width], [0.0, 1.0]).convert().coef.tolist()
         for terms, width in zip((rest[:_DEGREE], rest[_DEGREE:]), widths, strict=True)
     ]
-
-
-def _evaluate(rows: list[list[float]], joins: tuple[float, ...], tensions: Array) -> Array:
-    piece = np.searchsorted(joins, tensions, side="left")
-    values = np.array([np.polyval(row[::-1], tensions) for row in rows])
-    return np.asarray(values[piece, np.arange(len(tensions))])
 
 
 def _slopes(points: Points) -> tuple[Array, Array]:

@@ -92,40 +92,25 @@ def read_tensile_csv(
             twice or not understood; or an entry is not a finite number (the line is named).
     """
     table = read_table(path, "\t;,")
-    if not table.rows:
-        _refuse(path, "holds no data; a header and one line per point are needed.")
-    header, first = _header(path, table)
-
-    def refuse(problem: str) -> NoReturn:
-        _refuse(
-            path,
-            f"{problem}; write one point per line, with a decimal point (a comma only where "
-            "semicolons or tabs separate).",
-        )
-
-    columns = []
-    for kind, given in (("displacement", displacement_unit), ("force", force_unit)):
-        at = [k for k, cell in enumerate(header) if _name(cell) in _WORDS[kind]]
-        if len(at) != 1:
-            _refuse(
-                path,
-                f"{len(at) or 'no'} columns of {kind} in the header {header}; exactly one must be "
-                f"called {' or '.join(_WORDS[kind])}, with its unit, such as: {kind} "
-                f"[{_USUAL[kind]}]",
-            )
-        factor = _factor(path, kind, _unit(header[at[0]]), given)
-        columns.append(factor * table.column(at[0], refuse, first))
-    return TensileTest(columns[0], columns[1], _gauge_length(path, table.comments, gauge_length))
+    try:
+        header, first = _header(table)
+        displacement = _column(table, header, first, "displacement", displacement_unit)
+        force = _column(table, header, first, "force", force_unit)
+        length = _gauge_length(table, gauge_length)
+    except TensileTestError as error:
+        raise TensileTestError(f"{path}: {error}") from None
+    return TensileTest(displacement, force, length)
 
 
-def _header(path: object, table: Table) -> tuple[list[str], int]:
+def _header(table: Table) -> tuple[list[str], int]:
     """Return column names with units, and the first row of numbers. Row 1 may hold units."""
+    if not table.rows:
+        raise TensileTestError("holds no data; a header and one line per point are needed.")
     header = table.header
     if not any(math.isnan(table.number(cell)) for cell in header):
-        _refuse(
-            path,
+        raise TensileTestError(
             f"line {table.rows[0][0]}: there is no header. Begin with a line that names the "
-            "columns and their units, such as: displacement [mm], force [N]",
+            "columns and their units, such as: displacement [mm], force [N]"
         )
     units = table.rows[1][1] if len(table.rows) > 1 else ["1"]
     if not all(re.fullmatch(r"[\[(]?\s*[^\W\d]*\s*[\])]?", cell) for cell in units):
@@ -134,60 +119,60 @@ def _header(path: object, table: Table) -> tuple[list[str], int]:
     return [f"{a} [{b}]" if b else a for a, b in zip(header, units, strict=False)], 2
 
 
-def _refuse(path: object, problem: str) -> NoReturn:
-    raise TensileTestError(f"{path}: {problem}")
-
-
-def _name(cell: str) -> str:
-    """Return the first word of the name of a column, in lower case."""
-    return re.split(r"[\s\[(_/,]", cell.strip().lower(), maxsplit=1)[0]
-
-
-def _unit(cell: str) -> str | None:
-    """Return the text in brackets, or after the last underscore, blank or slash."""
-    found = re.search(r"[\[(]([^\])]*)[\])]", cell) or re.search(r"[_/\s]([^\s_/]+)$", cell)
-    return found[1].strip() if found else None
-
-
-def _factor(path: object, kind: str, found: str | None, given: str | None) -> float:
-    """Return the factor from the unit of a column to SI."""
-    known = _UNITS[kind]
-    keyword = f"{kind}_unit"
-    for unit in (found, given):
-        if unit is not None and unit not in known:
-            _refuse(
-                path,
-                f"the unit {unit!r} of the {kind} is not known; use {', '.join(known)}, in the "
-                f"header or as {keyword}=.",
+def _column(table: Table, header: list[str], first: int, kind: str, given: str | None) -> Array:
+    """Return the displacement or the force from row ``first`` on, in SI units."""
+    names = [re.split(r"[\s\[(_/,]", cell.lower(), maxsplit=1)[0] for cell in header]
+    at = [k for k, name in enumerate(names) if name in _WORDS[kind]]
+    if len(at) != 1:
+        raise TensileTestError(
+            f"{len(at) or 'no'} columns of {kind} in the header {header}; exactly one must be "
+            f"called {' or '.join(_WORDS[kind])}, with its unit, such as: {kind} [{_USUAL[kind]}]"
+        )
+    # the unit stands in brackets, or after the last underscore, blank or slash
+    cell, known, keyword = header[at[0]], _UNITS[kind], f"{kind}_unit"
+    unit = re.search(r"[\[(]([^\])]*)[\])]", cell) or re.search(r"[_/\s]([^\s_/]+)$", cell)
+    found = unit[1].strip() if unit else None
+    for each in (found, given):
+        if each is not None and each not in known:
+            raise TensileTestError(
+                f"the unit {each!r} of the {kind} is not known; use {', '.join(known)}, in the "
+                f"header or as {keyword}=."
             )
     if found is not None and given is not None and found != given:
-        _refuse(path, f"the header has the {kind} in {found}, but {keyword}={given!r}; drop one.")
-    unit = found or given
-    if unit is None:
-        _refuse(
-            path,
-            f"the {kind} has no unit. Put it into the header, such as {kind} "
-            f"[{_USUAL[kind]}], or pass {keyword}=.",
+        raise TensileTestError(
+            f"the header has the {kind} in {found}, but {keyword}={given!r}; drop one."
         )
-    return known[unit]
+    chosen = found or given
+    if chosen is None:
+        raise TensileTestError(
+            f"the {kind} has no unit. Put it into the header, such as {kind} [{_USUAL[kind]}], or "
+            f"pass {keyword}=."
+        )
+    return known[chosen] * table.column(at[0], _bad_cell, first)
 
 
-def _gauge_length(path: object, comments: list[str], given: float | None) -> float:
+def _bad_cell(problem: str) -> NoReturn:
+    raise TensileTestError(
+        f"{problem}; write one point per line, with a decimal point (a comma only where "
+        "semicolons or tabs separate)."
+    )
+
+
+def _gauge_length(table: Table, given: float | None) -> float:
     lengths = [] if given is None else [scalar("gauge_length", given)]
-    for number, unit in (found.groups() for line in comments for found in _GAUGE.finditer(line)):
-        value = Table([], [], ";").number(number)
+    decimal_comma = table._replace(delimiter=";")
+    for number, unit in _GAUGE.findall("\n".join(table.comments)):
+        value = decimal_comma.number(number)
         if math.isnan(value) or unit not in _UNITS["displacement"]:
-            _refuse(
-                path,
+            raise TensileTestError(
                 f"the gauge length {number!r} {unit!r} is not understood; write it with its unit: "
-                "# gauge_length = 500 mm",
+                "# gauge_length = 500 mm"
             )
         lengths.append(value * _UNITS["displacement"][unit])
     if not lengths:
-        _refuse(
-            path,
-            "has no gauge length. Pass gauge_length= [m], or add a line: # gauge_length = 500 mm",
+        raise TensileTestError(
+            "has no gauge length. Pass gauge_length= [m], or add a line: # gauge_length = 500 mm"
         )
     if max(lengths) - min(lengths) > 1e-9 * abs(max(lengths)):
-        _refuse(path, f"gauge lengths of {lengths} m are given; give one.")
+        raise TensileTestError(f"gauge lengths of {lengths} m are given; give one.")
     return lengths[0]

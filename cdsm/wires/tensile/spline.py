@@ -10,21 +10,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import least_squares
 
 from cdsm.support.validation import Array
+from cdsm.wires.tensile.loading import Points
 
-_INTERVALS = 48
-"""Largest number of spline intervals. More intervals do not change the curve of a wire."""
-_NEAR = 41
-"""Number of neighbouring points over which the noise is assumed constant."""
-_GRID = 1200
-"""Number of tensions of the grid: strain error below 1e-4 where EA varies thousandfold."""
+_INTERVALS = 48  # of the spline, at most; more do not change the curve of a wire
+_NEAR = 41  # neighbouring points over which the noise is assumed constant
+_GRID = 1200  # tensions: strain error below 1e-4 where EA varies thousandfold
 
 
 def _running_integral(values: Array, tensions: Array, axis: int = -1) -> Array:
@@ -34,51 +32,59 @@ def _running_integral(values: Array, tensions: Array, axis: int = -1) -> Array:
     return integral
 
 
-@dataclass(frozen=True)
-class Points:
-    """Averaged points of a test: rising strain [-], force [N], and points per average, (n,)."""
-
-    strain: Array
-    force: Array
-    count: Array
-
-    def part(self, kept: NDArray[np.bool_] | slice) -> Points:
-        """Select points by mask or slice."""
-        return Points(self.strain[kept], self.force[kept], self.count[kept])
-
-
 def _least_variance(points: Points) -> float:
     """Compute the variance [N²] below which a test counts as exact."""
     return (1e-6 * float(np.ptp(points.force))) ** 2
 
 
-@dataclass(frozen=True)
-class Basis:
+class Basis(NamedTuple):
     """B-splines (g, k) over a grid of tensions (g,) [N], and their roughness (k, k)."""
 
     tensions: Array
     splines: Array
     roughness: Array
 
-    @classmethod
-    def over(cls, low: float, high: float, corner: float, points: int) -> Basis:
-        """Build splines over [low, high] N, even in ½ log(F + corner) + ½ F, terms scaled to 1.
 
-        Below ``corner`` [N] the spacing is even. ``points`` is the number of points to fit.
-        """
-        fine = low + corner * np.expm1(np.linspace(0.0, np.log1p((high - low) / corner), 8 * _GRID))
-        place = np.log1p((fine - low) / corner) / np.log1p((high - low) / corner)
-        place = (place + (fine - low) / (high - low)) / 2.0
-        t = np.linspace(0.0, 1.0, _GRID)
-        tensions = np.interp(t, place, fine)
-        intervals = int(np.clip(points // 2, 3, _INTERVALS))
-        knots = np.pad(np.linspace(0.0, 1.0, intervals + 1), 3, mode="edge")
-        # with uniform knots beyond the ends, a straight log EA has no difference penalty
-        knots[:3] = -np.arange(3, 0, -1) / intervals
-        knots[-3:] = 1.0 + np.arange(1, 4) / intervals
-        splines = BSpline.design_matrix(t, knots, 3).toarray()
-        second = np.diff(np.eye(splines.shape[1]), 2, axis=0)
-        return cls(tensions, splines, second.T @ second)
+def _basis(points: Points, noise: float) -> Basis:
+    """Build splines from the first force to the largest, even in ½ log(F + corner) + ½ F.
+
+    Both terms are scaled to 1. Below the corner [N] the spacing is even.
+    """
+    low, high = max(float(points.force[0]) - 3.0 * noise, 0.0), float(points.force.max())
+    corner = max(low, 8.0 * noise, 5e-3 * high)
+    fine = low + corner * np.expm1(np.linspace(0.0, np.log1p((high - low) / corner), 8 * _GRID))
+    place = np.log1p((fine - low) / corner) / np.log1p((high - low) / corner)
+    place = (place + (fine - low) / (high - low)) / 2.0
+    t = np.linspace(0.0, 1.0, _GRID)
+    intervals = int(np.clip(len(points.force) // 2, 3, _INTERVALS))
+    # with uniform knots beyond the ends, a straight log EA has no difference penalty
+    beyond = np.arange(1, 4) / intervals
+    knots = np.concatenate((-beyond[::-1], np.linspace(0.0, 1.0, intervals + 1), 1.0 + beyond))
+    splines = BSpline.design_matrix(t, knots, 3).toarray()
+    second = np.diff(np.eye(splines.shape[1]), 2, axis=0)
+    return Basis(np.interp(t, place, fine), splines, second.T @ second)
+
+
+class Spread(NamedTuple):
+    """Uncertainty of a fitted curve.
+
+    Attributes:
+        inverse: Inverse of the normal matrix with the penalty (k + 1, k + 1).
+        noise: Standard deviation of one point [N].
+        freedom: Degrees of freedom: number of points less the sum of their leverages.
+        errors: Errors of the points (n,) [N], weighted to the noise of a single point: residuals,
+            enlarged by the part that the curve follows.
+        deviation: Standard deviation of log EA on the grid (g,), from scatter and smoothing. The
+            scatter is that of the neighbouring points, so it may grow with the force. The squared
+            bias of the smoothing is that of a curve with the roughness of this one on average
+            (Nychka, J. Am. Stat. Assoc. 83, 1988).
+    """
+
+    inverse: Array
+    noise: float
+    freedom: float
+    errors: Array
+    deviation: Array
 
 
 @dataclass(frozen=True)
@@ -124,15 +130,15 @@ class Curve:
         inside = np.clip(strain, grid[0], grid[-1])
         at = np.clip(np.searchsorted(grid, inside) - 1, 0, len(grid) - 2)
         share = ((inside - grid[at]) / (grid[at + 1] - grid[at]))[:, None]
-        by_coefficients = _running_integral(
-            self.basis.splines / self.rigidity[:, None], tensions, axis=0
-        )
+        EA, splines = self.rigidity[:, None], self.basis.splines
+        by_coefficients = _running_integral(splines / EA, tensions, axis=0)
         by_coefficients -= by_coefficients[self.anchor]
-        stretch = (1.0 - share) * by_coefficients[at] + share * by_coefficients[at + 1]
-        rigidity = (1.0 - share) * self.rigidity[at, None] + share * self.rigidity[at + 1, None]
+        stretch, rigidity = (
+            (1.0 - share) * each[at] + share * each[at + 1] for each in (by_coefficients, EA)
+        )
         beyond = (self.force(strain) - np.interp(strain, grid, tensions))[:, None]
         edge = np.where(strain < grid[0], 0, -1)
-        slope = beyond * self.basis.splines[edge]  # the slope of a straight end is its EA
+        slope = beyond * splines[edge]  # the slope of a straight end is its EA
         return np.hstack((rigidity * stretch + slope, -rigidity))
 
     def refitted(self, points: Points) -> Curve:
@@ -233,36 +239,13 @@ class Curve:
         return cho_factor(regular), scale
 
 
-@dataclass(frozen=True)
-class Spread:
-    """Uncertainty of a fitted curve.
-
-    Attributes:
-        inverse: Inverse of the normal matrix with the penalty (k + 1, k + 1).
-        noise: Standard deviation of one point [N].
-        freedom: Degrees of freedom: number of points less the sum of their leverages.
-        errors: Errors of the points (n,) [N], weighted to the noise of a single point: residuals,
-            enlarged by the part that the curve follows.
-        deviation: Standard deviation of log EA on the grid (g,), from scatter and smoothing. The
-            scatter is that of the neighbouring points, so it may grow with the force. The squared
-            bias of the smoothing is that of a curve with the roughness of this one on average
-            (Nychka, J. Am. Stat. Assoc. 83, 1988).
-    """
-
-    inverse: Array
-    noise: float
-    freedom: float
-    errors: Array
-    deviation: Array
-
-
-def fit_curve(points: Points, basis: Basis, noise: float) -> Curve:
+def fit_curve(points: Points, noise: float) -> Curve:
     """Fit the curve. Restricted likelihood gives its smoothing (Fellner-Schall iteration).
 
     ``noise`` is a first estimate of the noise of one point [N].
     """
-    tensions = basis.tensions
-    size = basis.splines.shape[1]
+    basis = _basis(points, noise)
+    tensions, size = basis.tensions, basis.splines.shape[1]
     # start from secants so coarse that they are positive
     force = np.maximum.accumulate(points.force) + 1e-9 * tensions[-1] * np.arange(len(points.force))
     places = tensions[np.linspace(0, _GRID - 1, 13).astype(int)]

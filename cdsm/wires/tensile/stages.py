@@ -6,23 +6,18 @@ import numpy as np
 
 from cdsm.errors import TensileTestError
 from cdsm.support.validation import Array
-from cdsm.wires.tensile.loading import local_noise
-from cdsm.wires.tensile.spline import Curve, Points, Spread
+from cdsm.wires.tensile.loading import Points, local_noise
+from cdsm.wires.tensile.spline import Curve, Spread
 
 YIELD = 0.8
 """Plasticity begins where EA falls below this share of its largest value and stays there."""
 PRETENSIONED = 0.5
 """Pre-tensioning ends where d ln EA/d ln F falls below this: midway from EA ∝ F to constant EA."""
-_CERTAIN = 3.0
-"""A fact is certain beyond this number of standard deviations."""
-_FAR = 8.0
-"""A point is doubtful beyond this number of standard deviations."""
-_JUMP = 10.0
-"""Largest EA over the steepest measured chord. Beyond it, the curve has overshot a jump."""
-_SEEN = 1e-4
-"""Smallest share of the range of force that a load cell shows."""
-_STEP = 1.25
-"""Ratio of tensions to compute the exponent. With a smaller ratio, noise looks like slope."""
+_CERTAIN = 3.0  # standard deviations beyond which a fact is certain
+_FAR = 8.0  # standard deviations beyond which a point is doubtful
+_JUMP = 10.0  # EA over the steepest measured chord; beyond it, the curve has overshot a jump
+_SEEN = 1e-4  # smallest share of the range of force that a load cell shows
+_STEP = 1.25  # ratio of tensions to compute the exponent; a smaller one takes noise for slope
 
 
 def yield_onset(tensions: Array, rigidity: Array, deviation: Array) -> float | None:
