@@ -18,7 +18,11 @@ from cdsm.support.values import Array
 Estimates = tuple[Array, Array]
 """Derivatives of T functions, and the error bound of their entries (T,)."""
 
+Sampled = Callable[[Array], Array]
+"""Function from points (P, n) to the values (P, T, ...) of T functions."""
+
 Noise = Callable[[float], Array]
+"""Function from the step h to the rounding error of each function (T,)."""
 
 _LEVELS = 16
 """Maximum number of step sizes; each is half the previous one."""
@@ -34,14 +38,14 @@ the second differences has four times the noise of f.
 """
 
 
-def gradients(f: Callable[[Array], Array], size: int, first: float, noise: Noise) -> Estimates:
+def gradients(f: Sampled, size: int, first: float, noise: Noise) -> Estimates:
     """Compute first derivatives (T, ..., n) of T functions at zero, and their error bounds (T,).
 
     Args:
-        f: Function from points (P, n) to values (P, T, ...).
+        f: The functions.
         size: Number of variables n.
         first: Largest step.
-        noise: Function from the step h to the rounding error of each function (T,).
+        noise: Rounding error of the functions.
     """
     corners = np.vstack([np.eye(size), -np.eye(size)])
 
@@ -52,7 +56,7 @@ def gradients(f: Callable[[Array], Array], size: int, first: float, noise: Noise
     return _extrapolated(level, first, noise, 1)
 
 
-def hessians(f: Callable[[Array], Array], size: int, first: float, noise: Noise) -> Estimates:
+def hessians(f: Sampled, size: int, first: float, noise: Noise) -> Estimates:
     """Compute Hessians (T, n, n) of T functions (P, n) → (P, T) at zero, and error bounds (T,)."""
     unit = np.eye(size)
     i, j = np.triu_indices(size, 1)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, final
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import null_space
 from scipy.optimize import linprog, lsq_linear
 
@@ -127,26 +127,12 @@ class Readings(ReadOnlyState):
         return frozen(spread)
 
 
-def jacobian_rank(K: Stiffness) -> Rank:
-    """Compute the rank of J_X (6, nv): the number of independent tip motions."""
-    return Rank.of(_scaled_jacobian(K))
-
-
-def translation_rank(K: Stiffness) -> Rank:
-    """Compute the rank of the linear rows of J_X (3, nv)."""
-    return Rank.of(_scaled_jacobian(K)[:3])
-
-
-def _scaled_jacobian(K: Stiffness) -> Array:
-    arm = K.posture.arm
-    rows = np.repeat([1.0 / arm.length, 1.0], 3)
-    scaled: Array = K.posture.jacobian * rows[:, None] * joint_unit(arm)
-    return scaled
-
-
-def cable_rank(K: Stiffness) -> Rank:
-    """Compute the rank of J_Lᵀ (nv, C): the number of independent joint torques of the cables."""
-    return Rank.of(K.posture.length_jacobian.T * joint_unit(K.posture.arm)[:, None])
+def ranks(K: Stiffness) -> tuple[Rank, Rank, Rank]:
+    """Compute the ranks of J_X (6, nv), of its linear rows (3, nv), and of J_Lᵀ (nv, C)."""
+    pose, unit = K.posture, joint_unit(K.posture.arm)
+    rows = np.repeat([1.0 / pose.arm.length, 1.0], 3)
+    tip = pose.jacobian * rows[:, None] * unit
+    return Rank.of(tip), Rank.of(tip[:3]), Rank.of(pose.length_jacobian.T * unit[:, None])
 
 
 def closure(K: Stiffness) -> float:
@@ -190,22 +176,22 @@ def torque_size(K: Stiffness) -> float:
 
 def cable_states(K: Stiffness) -> tuple[CableState, ...]:
     """Return the state of each cable, in the order of the arm."""
-    pulled = zip(K.posture.arm.cables, K.tension.tolist(), K.cable_stiffness.tolist(), strict=True)
-    return tuple(_state(cable, F, k) for cable, F, k in pulled)
-
-
-def _state(cable: Cable, F: float, k: float) -> CableState:
-    law = cable.elasticity
-    return CableState(
-        name=cable.name,
-        control=cable.control,
-        tension=F,
-        stiffness=k,
-        tangent=_number(cable, lambda: law.rigidity(np.array(F))),
-        secant=_number(cable, lambda: law.secant_rigidity(np.array(F))),
-        low=float(law.domain.low),
-        high=float(law.domain.high),
-    )
+    states = []
+    for cable, tension, k in zip(K.posture.arm.cables, K.tension, K.cable_stiffness, strict=True):
+        law, F = cable.elasticity, np.array(tension)
+        states.append(
+            CableState(
+                name=cable.name,
+                control=cable.control,
+                tension=float(F),
+                stiffness=float(k),
+                tangent=_number(cable, partial(law.rigidity, F)),
+                secant=_number(cable, partial(law.secant_rigidity, F)),
+                low=float(law.domain.low),
+                high=float(law.domain.high),
+            )
+        )
+    return tuple(states)
 
 
 def _number(cable: Cable, answer: Callable[[], Array]) -> float | None:
@@ -216,9 +202,12 @@ def _number(cable: Cable, answer: Callable[[], Array]) -> float | None:
         return None
 
 
-def readings(K: Stiffness) -> Readings:
-    """Compute the three tip stiffnesses along each base axis."""
-    along = np.array([K.along(axis) for axis in np.eye(3)])
+def readings(K: Stiffness) -> Readings | None:
+    """Compute the three tip stiffnesses along each base axis; None if K_θ is singular."""
+    try:
+        along = np.array([K.along(axis) for axis in np.eye(3)])
+    except SingularStiffness:
+        return None
 
     def diagonal(read: Callable[[], Array]) -> Array:
         try:
@@ -275,7 +264,13 @@ def optimality(K: Stiffness, pull: Tension) -> Optimality:
     size = max(1.0, float(x.max()))
     at_low = x - problem.low <= DISTANCE * size
     at_high = problem.high - x <= DISTANCE * size
-    z = _bound_multipliers(problem.A, x, at_low, at_high)
+    # multipliers z of the bounds, ≤ 0 at lower and ≥ 0 at upper ones, with x + z ≈ −Aᵀ y: least
+    # squares in the null space of A, where Aᵀ y has no part
+    null, bound = null_space(problem.A).T, np.flatnonzero(at_low | at_high)
+    z = np.zeros(x.size)
+    if null.size and bound.size:
+        signs = np.where(at_low, -np.inf, 0.0)[bound], np.where(at_high, np.inf, 0.0)[bound]
+        z[bound] = lsq_linear(null[:, bound], -null @ x, bounds=signs, method="bvls").x
     y = np.asarray(np.linalg.lstsq(problem.A.T, -x - z, rcond=None)[0])
     primal, dual, _ = tension_kernels.optimality(*problem[:4], x, y, z)
     return Optimality(
@@ -285,21 +280,3 @@ def optimality(K: Stiffness, pull: Tension) -> Optimality:
         feasibility=primal / size,
         stationarity=dual / size if pull.least else None,
     )
-
-
-def _bound_multipliers(
-    A: Array, x: Array, at_low: NDArray[np.bool_], at_high: NDArray[np.bool_]
-) -> Array:
-    """Find bound multipliers z (C,), ≤ 0 at lower and ≥ 0 at upper bounds, with x + z ≈ −Aᵀ y.
-
-    y is eliminated: least squares in the null space of A, where Aᵀ y has no part.
-    """
-    null = null_space(A).T
-    lows, highs = np.flatnonzero(at_low), np.flatnonzero(at_high)
-    z = np.zeros(x.size)
-    if null.size and lows.size + highs.size:
-        columns = np.hstack([-null[:, lows], null[:, highs]])
-        parts = lsq_linear(columns, -null @ x, bounds=(0.0, np.inf), method="bvls").x
-        np.subtract.at(z, lows, parts[: lows.size])
-        np.add.at(z, highs, parts[lows.size :])
-    return z

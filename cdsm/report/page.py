@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 import textwrap
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cdsm.report.facts import RANK, Rank
+from cdsm.report.facts import RANK
 from cdsm.report.self_check import Agreement, Difference
-from cdsm.support.format import MODEL
+from cdsm.support.format import MODEL, coordinates
 from cdsm.support.markup import element, row
 
 if TYPE_CHECKING:
@@ -34,111 +34,72 @@ li.fault{color:#b3261e}
 """.strip()
 
 
-class Section(NamedTuple):
-    """Section of a report: a heading, a table, and lines below it.
-
-    Attributes:
-        title: The heading.
-        rows: Rows of equal length; the first row is the head, the first column holds the names.
-        lines: Sentences below the table.
-    """
-
-    title: str
-    rows: Sequence[tuple[str, ...]] = ()
-    lines: Sequence[str] = ()
+Section = tuple[str, Sequence[tuple[str, ...]], Sequence[str]]
+"""Heading, rows of a table (the first is the head, the first column holds names), sentences."""
 
 
-class Page(NamedTuple):
-    """Contents of a report.
-
-    Attributes:
-        title: The heading.
-        verdict: The verdict in one sentence.
-        good: Whether the stiffness can be trusted.
-        faults: Reasons why it cannot be trusted.
-        notes: Other remarks.
-        sections: The details.
-    """
-
-    title: str
-    verdict: str
-    good: bool
-    faults: Sequence[str]
-    notes: Sequence[str]
-    sections: Sequence[Section]
-
-
-def to_text(page: Page) -> str:
-    """Return the page as wrapped text with aligned columns."""
-    lines = [page.title, page.verdict]
-    for mark, remarks in (("!", page.faults), ("-", page.notes)):
-        lines += [_wrapped(remark, f"{mark} ", "  ") for remark in remarks]
-    for section in page.sections:
-        lines += ["", section.title]
-        widths = [max(map(len, column)) for column in zip(*section.rows, strict=True)]
-        for name, *cells in section.rows:
+def to_text(report: Report) -> str:
+    """Return the report as wrapped text with aligned columns."""
+    lines = [_title(report), _verdict(report)]
+    lines += [_wrapped(remark, "! ") for remark in report.faults]
+    lines += [_wrapped(remark, "- ") for remark in report.notes]
+    for title, rows, sentences in _sections(report):
+        lines += ["", title]
+        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+        for name, *cells in rows:
             padded = (cell.rjust(width + 2) for cell, width in zip(cells, widths[1:], strict=True))
             lines.append(f"  {name.ljust(widths[0])}{''.join(padded)}".rstrip())
-        lines += [_wrapped(line, "  ", "  ") for line in section.lines]
+        lines += [_wrapped(sentence, "  ") for sentence in sentences]
     return "\n".join(lines)
 
 
-def to_fragment(page: Page) -> str:
-    """Return the page as an HTML element, for another page."""
-    parts = [element("p", page.verdict, class_="good" if page.good else "bad")]
-    remarks = [element("li", remark, class_="fault") for remark in page.faults]
-    remarks += [element("li", remark) for remark in page.notes]
+def _wrapped(text: str, first: str) -> str:
+    return textwrap.fill(text, _WIDTH, initial_indent=first, subsequent_indent="  ")
+
+
+def to_fragment(report: Report) -> str:
+    """Return the report as an HTML element, for another page."""
+    parts = [
+        element("h1", _title(report)),
+        element("p", _verdict(report), class_="good" if report.trustworthy else "bad"),
+    ]
+    remarks = [element("li", remark, class_="fault") for remark in report.faults]
+    remarks += [element("li", remark) for remark in report.notes]
     if remarks:
         parts.append(element("ul", *remarks))
-    for section in page.sections:
-        parts.append(element("h2", section.title))
-        if section.rows:
-            head, *body = section.rows
+    for title, rows, sentences in _sections(report):
+        parts.append(element("h2", title))
+        if rows:
+            head, *body = rows
             table = element("table", row("th", head), *(row("td", cells) for cells in body))
             parts.append(element("div", table, class_="wide"))
-        parts += [element("p", line) for line in section.lines]
-    return str(element("section", element("h1", page.title), *parts))
+        parts += [element("p", sentence) for sentence in sentences]
+    return str(element("section", *parts))
 
 
-def to_document(page: Page) -> str:
-    """Return the page as a self-contained HTML file."""
+def to_document(report: Report) -> str:
+    """Return the report as a self-contained HTML file."""
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"{element('title', page.title)}\n<style>\n{_STYLE}\n</style>\n</head>\n"
-        f"<body>\n{to_fragment(page)}\n</body>\n</html>\n"
+        f"{element('title', _title(report))}\n<style>\n{_STYLE}\n</style>\n</head>\n"
+        f"<body>\n{to_fragment(report)}\n</body>\n</html>\n"
     )
 
 
-def _wrapped(text: str, first: str, other: str) -> str:
-    return textwrap.fill(text, _WIDTH, initial_indent=first, subsequent_indent=other)
+def _title(report: Report) -> str:
+    return f"Truth report: stiffness of {report.stiffness.posture.arm.name}"
 
 
-def page(report: Report) -> Page:
-    """Build all contents of a report."""
-    name = report.stiffness.posture.arm.name
-    good = report.trustworthy
-    verdict = (
-        "Trustworthy: derived a second time with the same result, in balance, and stable."
-        if good
-        else "NOT to be trusted as it stands, for the reasons that follow."
-    )
-    return Page(
-        title=f"Truth report: stiffness of {name}",
-        verdict=verdict,
-        good=good,
-        faults=report.faults,
-        notes=report.notes,
-        sections=(
-            _readings(report),
-            _self_check(report),
-            _statics(report),
-            _stability(report),
-            _cables(report),
-            _ranks(report),
-            _conventions(report),
-        ),
-    )
+def _verdict(report: Report) -> str:
+    if report.trustworthy:
+        return "Trustworthy: derived a second time with the same result, in balance, and stable."
+    return "NOT to be trusted as it stands, for the reasons that follow."
+
+
+def _sections(report: Report) -> list[Section]:
+    makers = (_readings, _self_check, _statics, _stability, _cables, _ranks, _conventions)
+    return [make(report) for make in makers]
 
 
 def _readings(report: Report) -> Section:
@@ -147,7 +108,7 @@ def _readings(report: Report) -> Section:
         for name in ("along", "cartesian", "pseudoinverse"):
             values = getattr(report.readings, name)
             rows.append((name, *(_number(value / 1000.0) for value in values)))
-    return Section("Stiffness at the tip [N/mm]", rows)
+    return "Stiffness at the tip [N/mm]", rows, ()
 
 
 def _self_check(report: Report) -> Section:
@@ -162,17 +123,15 @@ def _self_check(report: Report) -> Section:
         )
         for each in report.self_check.compared
     ]
-    return Section(
-        "Self-check: each term derived anew by central differences at this posture",
-        rows,
-        (
-            "Potential: second differences of the cables' energy, the weight and the load's work. "
-            "Torque: first differences of the torque out of balance. Off by parts of the largest "
-            "entry; in brackets what truncation and rounding of the differences may come to. The "
-            "last rows: torque out of balance by first differences of the potential, lengths "
-            "between sites where Pinocchio places the links.",
-        ),
+    sentence = (
+        "Potential: second differences of the cables' energy, the weight and the load's work. "
+        "Torque: first differences of the torque out of balance. Off by parts of the largest "
+        "entry; in brackets what truncation and rounding of the differences may come to. The "
+        "last rows: torque out of balance by first differences of the potential, lengths "
+        "between sites where Pinocchio places the links."
     )
+    title = "Self-check: each term derived anew by central differences at this posture"
+    return title, rows, [sentence]
 
 
 def _statics(report: Report) -> Section:
@@ -183,7 +142,7 @@ def _statics(report: Report) -> Section:
     ]
     found = report.optimality
     if found is None:
-        return Section("Tensions", rows, ("Not distributed: no optimality is claimed.",))
+        return "Tensions", rows, ["Not distributed: no optimality is claimed."]
     rows += [
         ("solver", found.solver),
         ("violation of balance and bounds", f"{found.feasibility:.1e}"),
@@ -196,7 +155,7 @@ def _statics(report: Report) -> Section:
         f"At their {which} bound: {', '.join(names) or 'none'}."
         for which, names in (("lower", found.at_minimum), ("upper", found.at_maximum))
     ]
-    return Section(title, rows, lines)
+    return title, rows, lines
 
 
 def _stability(report: Report) -> Section:
@@ -206,13 +165,12 @@ def _stability(report: Report) -> Section:
     way = report.critical_direction
     order = np.argsort(-abs(way), kind="stable")[:4]
     rows += [(names[i], f"{way[i]:+.3f}") for i in order]
-    lines = (
+    state = "stable" if K.is_stable else "UNSTABLE"
+    sentence = (
         f"Smallest eigenvalue of the symmetric part of K_θ: {K.margin:.4g} "
-        f"{K.posture.arm.stiffness_unit()}, "
-        + ("stable." if K.is_stable else "UNSTABLE.")
-        + f" Condition of K_θ: {report.condition:.3g}.",
+        f"{K.posture.arm.stiffness_unit()}, {state}. Condition of K_θ: {report.condition:.3g}."
     )
-    return Section("Stability", rows, lines)
+    return "Stability", rows, [sentence]
 
 
 def _cables(report: Report) -> Section:
@@ -232,44 +190,34 @@ def _cables(report: Report) -> Section:
                 f"{each.stiffness / 1000.0:.4g}",
             )
         )
-    return Section(
-        "Cables",
-        rows,
-        (
-            "down, up: how far F may go before its law ends, in N and as a part of F. held: the "
-            "motor holds the force, and the cable gives no passive stiffness.",
-        ),
+    sentence = (
+        "down, up: how far F may go before its law ends, in N and as a part of F. held: the "
+        "motor holds the force, and the cable gives no passive stiffness."
     )
+    return "Cables", rows, [sentence]
 
 
 def _ranks(report: Report) -> Section:
     rows = [("", "rank", "of", "condition")]
-    ranks: dict[str, Rank] = {
-        "J_X, motion of the tip": report.jacobian_rank,
-        "its linear rows": report.translation_rank,
-        "J_Lᵀ, torque of the cables": report.cable_rank,
-    }
-    rows += [
-        (name, str(rank.rank), str(rank.full), _number(rank.condition))
-        for name, rank in ranks.items()
+    for name, rank in (
+        ("J_X, motion of the tip", report.jacobian_rank),
+        ("its linear rows", report.translation_rank),
+        ("J_Lᵀ, torque of the cables", report.cable_rank),
+    ):
+        rows.append((name, str(rank.rank), str(rank.full), _number(rank.condition)))
+    sentences = [
+        f"Singular values below {RANK:g} of the largest count as zero; lengths in arm lengths.",
+        f"Tensions can grow without a torque, the least by {report.closure:.3g} of the largest."
+        if report.closure > 0.0
+        else "Tensions cannot all grow without a torque.",
     ]
-    return Section(
-        "Rank and condition",
-        rows,
-        (
-            f"Singular values below {RANK:g} of the largest count as zero; lengths in arm lengths.",
-            f"Tensions can grow without a torque, the least by {report.closure:.3g} of the largest."
-            if report.closure > 0.0
-            else "Tensions cannot all grow without a torque.",
-        ),
-    )
+    return "Rank and condition", rows, sentences
 
 
 def _conventions(report: Report) -> Section:
     K = report.stiffness
     arm = K.posture.arm
     along = " x along the straight arm," if arm.is_serpentine else ""
-    written = [", ".join(f"{x:g}" for x in each) for each in (arm.gravity, K.wrench)]
     angles = zip(arm.joint_names, K.posture.q, arm.joint_units, strict=True)
     posture = ", ".join(f"{name} {q:.6g} {unit}" for name, q, unit in angles)
     lever = (
@@ -279,21 +227,18 @@ def _conventions(report: Report) -> Section:
         else ""
     )
     where = "here" if K.free_length is None else "at the reference of the equilibrium"
-    return Section(
-        "Units, frame and signs",
-        (),
-        (
-            "SI but where a heading says otherwise: m, rad, N. All at the tip in base axes:"
-            f"{along} tip is the frame of {arm.tip_link}. Gravity ({written[0]}) m/s².",
-            "F is tension, never negative; the cables' torque is −J_Lᵀ F. The wrench W acts on the "
-            f"tip and is dead, constant in base axes: ({written[1]}), force [N], then moment "
-            "[N m]. K_θ = ∂(J_Lᵀ F + g − J_Xᵀ W)/∂θ: rows torque, columns angle, positive holds."
-            f"{lever}",
-            f"Posture: {posture}.",
-            f"The stiffness is {MODEL}. Position-controlled cables keep the original length l_0 of "
-            f"their wire, locked {where}; force-controlled ones their tension.",
-        ),
-    )
+    gravity, wrench = coordinates(arm.gravity, "g"), coordinates(K.wrench, "g")
+    sentences = [
+        "SI but where a heading says otherwise: m, rad, N. All at the tip in base axes:"
+        f"{along} tip is the frame of {arm.tip_link}. Gravity {gravity} m/s².",
+        "F is tension, never negative; the cables' torque is −J_Lᵀ F. The wrench W acts on the "
+        f"tip and is dead, constant in base axes: {wrench}, force [N], then moment [N m]. "
+        f"K_θ = ∂(J_Lᵀ F + g − J_Xᵀ W)/∂θ: rows torque, columns angle, positive holds.{lever}",
+        f"Posture: {posture}.",
+        f"The stiffness is {MODEL}. Position-controlled cables keep the original length l_0 of "
+        f"their wire, locked {where}; force-controlled ones their tension.",
+    ]
+    return "Units, frame and signs", (), sentences
 
 
 def _off(difference: Difference | None, of: Agreement) -> str:

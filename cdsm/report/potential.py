@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -34,45 +34,41 @@ _BESIDE = 1e-6
 """A tension counts as at a point of a tabulated law if their relative distance is at most this."""
 
 
-class LockedLaws:
-    """Position-controlled cables with locked motors, computed from strain and energy of their laws.
-
-    Posture, tensions and original lengths are those of K; its cable stiffness only chooses steps.
+class LockedCable(NamedTuple):
+    """A position-controlled cable with locked motor, computed from strain and energy of its law.
 
     Attributes:
-        held: Number and cable of each position-controlled cable. Slack cables without stiffness, as
-            at some equilibria, are left out: moving the arm does not tension them.
-        stiffness: K_L (C,) [N/m] of the held cables, to choose steps; zero for all other cables.
+        number: Number of the cable.
+        cable: The cable.
+        tension: F [N] at the posture.
+        free_length: l_0 [m] that the motor holds.
+        stiffness: k [N/m], only to choose steps.
     """
 
-    def __init__(self, K: Stiffness) -> None:
-        self._tension, self._free_length = K.tension, K.free_lengths
-        self.held = [
-            (c, cable)
-            for c, cable in enumerate(K.posture.arm.cables)
-            if cable.control == "position" and (K.tension[c] > 0.0 or K.cable_stiffness[c] > 0.0)
-        ]
-        which = [c for c, _ in self.held]
-        self.stiffness = np.zeros(K.tension.size)
-        self.stiffness[which] = abs(K.cable_stiffness[which])
+    number: int
+    cable: Cable
+    tension: float
+    free_length: float
+    stiffness: float
 
-    def pulls(self, c: int, cable: Cable, longer: Array) -> Array:
-        """Compute the tensions (P,) [N] of a cable that becomes longer by ``longer`` (P,) [m]."""
-        start, F = self._free_length[c], self._tension[c]
+    def pulls(self, longer: Array) -> Array:
+        """Compute the tensions (P,) [N] of the cable when longer by ``longer`` (P, C) [m]."""
+        cable, start = self.cable, self.free_length
+        more = longer[:, self.number]
         return evaluate_law(
-            cable, lambda: cable.tension(float(cable.elongation(F, start)) + longer, start)
+            cable, lambda: cable.tension(float(cable.elongation(self.tension, start)) + more, start)
         )
 
-    def stored(self, c: int, cable: Cable, longer: Array) -> Array:
-        """Compute the energy (P,) [J] that a longer cable stores beyond F times its elongation."""
-        start, F = self._free_length[c], self._tension[c]
-        pulls = self.pulls(c, cable, longer)
+    def stored(self, longer: Array) -> Array:
+        """Compute the energy (P,) [J] that the longer cable stores beyond F times elongation."""
+        cable, F, start = self.cable, self.tension, self.free_length
+        pulls = self.pulls(longer)
         more = evaluate_law(cable, lambda: cable.energy(pulls, start) - cable.energy(F, start))
-        return np.asarray(more - F * longer)
+        return np.asarray(more - F * longer[:, self.number])
 
-    def room(self, c: int, cable: Cable) -> float:
-        """Return the distance [N] from the tension to the nearest end or kink of its law."""
-        F, law = float(self._tension[c]), cable.elasticity
+    def room(self) -> float:
+        """Return the distance [N] from the tension to the nearest end or kink of the law."""
+        F, law = self.tension, self.cable.elasticity
         edges = [law.domain.low, law.domain.high, *kinks(law)]
         if isinstance(law, TabulatedElasticity):
             # the rigidity has kinks at the points of a table. A point too near leaves no room for
@@ -81,25 +77,20 @@ class LockedLaws:
         return min(abs(F - edge) for edge in edges)
 
     def one_sided(self) -> list[str]:
-        """Return for each cable at an end or kink of its law a message; mostly an empty list."""
-        return [reason for c, cable in self.held for reason in self._edges(c, cable)]
-
-    def _edges(self, c: int, cable: Cable) -> list[str]:
-        """Return a message for each end or kink of the law at the cable's tension."""
-        F, law = float(self._tension[c]), cable.elasticity
+        """Return a message for each end or kink of the law at the tension; mostly none."""
+        F, law = self.tension, self.cable.elasticity
         if F == 0.0:
-            return [f"{cable.name} is slack (0 N), and K_θ counts it as if it were taut"]
-        where, close = f"{cable.name} at {F:.6g} N stands at", ONE_SIDED * F
-        ends = {"low": F - law.domain.low, "high": law.domain.high - F}
-        messages = [
-            f"{where} the {end} end of its law {law.domain}" for end in ends if ends[end] <= close
+            return [f"{self.cable.name} is slack (0 N), and K_θ counts it as if it were taut"]
+        edges = [
+            (law.domain.low, f"the low end of its law {law.domain}"),
+            (law.domain.high, f"the high end of its law {law.domain}"),
+            *((T, f"a sharp bend of its tangent rigidity, at {T:g} N") for T in kinks(law)),
         ]
-        messages += [
-            f"{where} a sharp bend of its tangent rigidity, at {bend:g} N"
-            for bend in kinks(law)
-            if abs(F - bend) <= close
+        return [
+            f"{self.cable.name} at {F:.6g} N stands at {what}"
+            for edge, what in edges
+            if abs(F - edge) <= ONE_SIDED * F
         ]
-        return messages
 
 
 def evaluate_law(cable: Cable, answer: Callable[[], Array]) -> Array:
@@ -137,54 +128,59 @@ class Neighbourhood:
     all derivatives with respect to ``places`` are in N m.
 
     Attributes:
-        laws: The position-controlled cables.
+        held: The position-controlled cables. Slack ones without stiffness, as at some equilibria,
+            are left out: moving the arm does not tension them.
         unit: 1 rad for each joint that turns, the arm's length for each joint that slides (nv,).
     """
 
     def __init__(self, K: Stiffness) -> None:
         self._pose, self._tension, self._wrench = K.posture, K.tension, K.wrench
-        self.laws = LockedLaws(K)
         self.unit = joint_unit(K.posture.arm)
-        # moment arms are used only to choose steps and to estimate rounding errors
+        rows = zip(K.tension.tolist(), K.free_lengths.tolist(), abs(K.cable_stiffness), strict=True)
+        self.held = [
+            LockedCable(c, K.posture.arm.cables[c], F, start, k)
+            for c, (F, start, k) in enumerate(rows)
+            if K.posture.arm.cables[c].control == "position" and (F > 0.0 or k > 0.0)
+        ]
+        # stiffness and moment arms are used only to choose steps and to estimate rounding errors
+        self._k = np.zeros(K.tension.size)
+        self._k[[each.number for each in self.held]] = [each.stiffness for each in self.held]
         self._arms = abs(K.posture.length_jacobian * self.unit).max(axis=1)
 
     # --- potentials ---------------------------------------------------------------------------
 
     def kinematic(self, places: Array) -> Array:
         """Compute active, gravity and load part of U (P, 3) [N m]; the load is the force alone."""
-        return self._sampled(places, self._work_of_force)
+        return self._kinematic(places, np.zeros(3))
 
     def work(self, places: Array) -> Array:
         """Compute active, gravity and load part (P, 3) [N m]; moments are exact to first order."""
-        return self._sampled(places, self._work_of_wrench)
+        return self._kinematic(places, self._wrench[3:])
+
+    def _kinematic(self, places: Array, moment: Array) -> Array:
+        pose, arm = self._pose, self._pose.arm
+        body, force = arm._model.body, self._wrench[:3]
+        start = body.potential_energy(pose.q)
+        rows = []
+        for q in self._angles(places):
+            longer = arm.cable_lengths(q, check_limits=False) - pose.cable_lengths
+            tip = body.placement(q, arm.tip_link)
+            turn = tip[:3, :3] @ pose.tip[:3, :3].T
+            # rotation axis times the sine of the angle
+            axis = np.array([turn[i, j] - turn[j, i] for i, j in ((2, 1), (0, 2), (1, 0))]) / 2.0
+            load = force @ (tip[:3, 3] - pose.tip[:3, 3]) + moment @ axis
+            rows.append([self._tension @ longer, body.potential_energy(q) - start, -load])
+        return np.array(rows)
 
     def elastic(self, places: Array) -> Array:
         """Compute the passive part of U (P, 1) [N m]."""
         arm = self._pose.arm
         lengths = [arm.cable_lengths(q, check_limits=False) for q in self._angles(places)]
         longer = np.array(lengths) - self._pose.cable_lengths
-        energies = [self.laws.stored(c, cable, longer[:, c]) for c, cable in self.laws.held]
-        return np.array(np.sum([np.zeros(len(places)), *energies], axis=0))[:, None]
-
-    def _sampled(self, places: Array, work: Callable[[Array], float]) -> Array:
-        pose, arm = self._pose, self._pose.arm
-        start = arm._model.body.potential_energy(pose.q)
-        rows = []
-        for q in self._angles(places):
-            longer = arm.cable_lengths(q, check_limits=False) - pose.cable_lengths
-            weight = arm._model.body.potential_energy(q) - start
-            tip = arm._model.body.placement(q, arm.tip_link)
-            rows.append([self._tension @ longer, weight, -work(tip)])
-        return np.array(rows)
-
-    def _work_of_force(self, tip: Array) -> float:
-        return float(self._wrench[:3] @ (tip[:3, 3] - self._pose.tip[:3, 3]))
-
-    def _work_of_wrench(self, tip: Array) -> float:
-        turn = tip[:3, :3] @ self._pose.tip[:3, :3].T
-        # twice the rotation axis times the sine of the angle
-        twice = (turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1])
-        return self._work_of_force(tip) + float(self._wrench[3:] @ np.array(twice)) / 2.0
+        total = np.zeros(len(places))
+        for each in self.held:
+            total += each.stored(longer)
+        return total[:, None]
 
     # --- torques and lengths ------------------------------------------------------------------
 
@@ -202,8 +198,8 @@ class Neighbourhood:
         poses = [self._pose.arm.at(q, check_limits=False) for q in self._angles(places)]
         longer = np.array([pose.cable_lengths for pose in poses]) - self._pose.cable_lengths
         more = np.zeros_like(longer)
-        for c, cable in self.laws.held:
-            more[:, c] = self.laws.pulls(c, cable, longer[:, c]) - self._tension[c]
+        for each in self.held:
+            more[:, each.number] = each.pulls(longer) - each.tension
         torques = [more[p] @ pose.length_jacobian for p, pose in enumerate(poses)]
         return np.array(torques)[:, None] * self.unit
 
@@ -235,9 +231,9 @@ class Neighbourhood:
     def first_elastic_step(self) -> float:
         """Return a step ≤ :attr:`first_step` that moves no tension past half way to a law's end."""
         step = self.first_step
-        for c, cable in self.laws.held:
-            rise = self.laws.stiffness[c] * self._arms[c]
-            step = min(step, self.laws.room(c, cable) / (4.0 * rise) if rise > 0.0 else np.inf)
+        for each in self.held:
+            rise = each.stiffness * self._arms[each.number]
+            step = min(step, each.room() / (4.0 * rise) if rise > 0.0 else np.inf)
         return float(step)
 
     @cached_property
@@ -271,7 +267,7 @@ class Neighbourhood:
 
     def elastic_noise(self, step: float) -> Array:
         """Return the rounding error of the elastic part of U (1,) [N m]."""
-        k, F = self.laws.stiffness, self._tension
+        k, F = self._k, self._tension
         stored = np.divide(F * F, k, out=np.zeros_like(k), where=k > 0.0).sum()
         return np.array([_ROOT * stored + 2.0 * step * (k * self._arms) @ self.length_noise])
 
@@ -283,7 +279,7 @@ class Neighbourhood:
 
     def elastic_torque_noise(self, step: float) -> Array:
         """Return the rounding error of the elastic torques (1,) [N m]."""
-        k = self.laws.stiffness
+        k = self._k
         errors = k * self.length_noise + _ROOT * self._tension * (k > 0.0)
         tilted = 2.0 * step * (k * self._arms) @ self.length_noise
         return np.array([errors @ self._arms + tilted / self._straightness])

@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING, final
 
 import numpy as np
 
-from cdsm.errors import SingularStiffness
 from cdsm.report import facts, remarks
 from cdsm.report.facts import CableState, Optimality, Rank, Readings
-from cdsm.report.page import page, to_document, to_fragment, to_text
+from cdsm.report.page import to_document, to_fragment, to_text
 from cdsm.report.potential import joint_unit
 from cdsm.report.self_check import SelfCheck, self_check
 from cdsm.support.format import JointUnits, key
@@ -60,12 +59,12 @@ class Report(ReadOnlyState):
     @cached_property
     def faults(self) -> tuple[str, ...]:
         """Return the reasons not to trust the stiffness, one text each; empty if trustworthy."""
-        return remarks.faults(self)
+        return tuple(remarks.faults(self))
 
     @cached_property
     def notes(self) -> tuple[str, ...]:
         """Return notes, one text each: slack cables, ends of laws, different tip stiffnesses."""
-        return remarks.notes(self)
+        return tuple(remarks.notes(self))
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -121,7 +120,9 @@ class Report(ReadOnlyState):
                 "terms": [asdict(each) for each in self.self_check.compared],
             },
             "statics": {"residual_Nm": self.residual, "relative": self.imbalance},
-            "optimality": None if self.optimality is None else _optimality_to_json(self.optimality),
+            "optimality": None
+            if self.optimality is None
+            else {**asdict(self.optimality), "optimal": self.optimality.optimal},
             "stability": {
                 "stable": K.is_stable,
                 key("margin", arm.stiffness_unit()): self.margin,
@@ -144,26 +145,23 @@ class Report(ReadOnlyState):
 
     def to_html(self) -> str:
         """Return the report as a self-contained HTML file."""
-        return to_document(page(self))
+        return to_document(self)
 
     def __repr__(self) -> str:
         state = "trustworthy" if self.trustworthy else "NOT TO BE TRUSTED"
         return f"<Report on the stiffness of {self.stiffness.posture.arm.name}, {state}>"
 
     def __str__(self) -> str:
-        return to_text(page(self))
+        return to_text(self)
 
     def _repr_html_(self) -> str:
-        return to_fragment(page(self))
+        return to_fragment(self)
 
 
 def report_on(K: Stiffness) -> Report:
     """Compute the report on a stiffness."""
     residual, joint, imbalance = facts.imbalance(K)
-    try:
-        readings = facts.readings(K)
-    except SingularStiffness:
-        readings = None
+    tip, translation, cables = facts.ranks(K)
     pull = K.distribution
     return Report(
         stiffness=K,
@@ -173,11 +171,11 @@ def report_on(K: Stiffness) -> Report:
         imbalance=imbalance,
         optimality=None if pull is None else facts.optimality(K, pull),
         cables=facts.cable_states(K),
-        jacobian_rank=facts.jacobian_rank(K),
-        translation_rank=facts.translation_rank(K),
-        cable_rank=facts.cable_rank(K),
+        jacobian_rank=tip,
+        translation_rank=translation,
+        cable_rank=cables,
         closure=facts.closure(K),
-        readings=readings,
+        readings=facts.readings(K),
     )
 
 
@@ -194,10 +192,6 @@ def _cable_to_json(each: CableState) -> dict[str, object]:
         "may_fall_N": each.below,
         "may_rise_N": each.above,
     }
-
-
-def _optimality_to_json(optimality: Optimality) -> dict[str, object]:
-    return {**asdict(optimality), "optimal": optimality.optimal}
 
 
 def _plain(value: object) -> object:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple, final
 import numpy as np
 
 from cdsm.errors import CdsmError, first_of
-from cdsm.report.differences import Estimates, gradients, hessians
+from cdsm.report.differences import Estimates, Noise, Sampled, gradients, hessians
 from cdsm.report.facts import torque_size
 from cdsm.report.potential import Neighbourhood
 from cdsm.support.values import Array, ReadOnlyState
@@ -45,6 +45,17 @@ _NAMED = 3
 
 _SUM = 16.0 * float(np.finfo(np.float64).eps)
 """Rounding error of a sum, relative to the sum of the magnitudes of its terms."""
+
+
+class _Anew(NamedTuple):
+    """Value computed by differences with its error bound; or the reason why there is no value."""
+
+    value: Array | None
+    reason: str = ""
+    error: float = 0.0
+
+
+_NONE = _Anew(None)
 
 
 @final
@@ -147,76 +158,48 @@ def self_check(K: Stiffness) -> SelfCheck:
     by_cable = k * J[:, :, None] * J[:, None, :] * scaled
     terms[1] = _adds_up(terms[1], given[1], by_cable, "J_Lᵀ K_L J_L of its cables")
     terms.append(_adds_up(whole, joint, given, "the sum of its four terms"))
-    return SelfCheck(terms=tuple(terms), statics=_statics(K, near), lengths=_lengths(K, near))
+
+    work = _derived(gradients, near, near.work, near.kinematic_noise, near.first_step)
+    statics = _compare("torque", K.residual * near.unit, torque_size(K), _summed(work))
+
+    # two programs compute places along the links, so the results differ by some more rounding
+    measured = _Anew(near.measured_lengths(), error=16.0 * float(near.length_noise.max()))
+    lengths = K.posture.cable_lengths
+    same = _compare("lengths", lengths, float(lengths.max()), measured)
+    return SelfCheck(terms=tuple(terms), statics=statics, lengths=same)
 
 
 def _terms_anew(near: Neighbourhood) -> tuple[list[_Anew], list[_Anew]]:
     """Compute active, passive, gravity and load term from the potential, and from the torque."""
-    size, step = near.unit.size, near.first_step
-    stored: Estimates | str
-    pulled: Estimates | str
-    moved = _attempt(lambda: hessians(near.kinematic, size, step, near.kinematic_noise))
-    turned = _attempt(
-        lambda: gradients(near.kinematic_torques, size, step, near.kinematic_torque_noise)
-    )
-    if one_sided := near.laws.one_sided():
+    step = near.first_step
+    moved = _derived(hessians, near, near.kinematic, near.kinematic_noise, step)
+    turned = _derived(gradients, near, near.kinematic_torques, near.kinematic_torque_noise, step)
+    if one_sided := [reason for cable in near.held for reason in cable.one_sided()]:
         named = first_of(one_sided, _NAMED, "cables")
-        stored = pulled = f"K_θ has another value on either side: {named}."
+        stored = pulled = [_Anew(None, f"K_θ has another value on either side: {named}.")]
     else:
         step = near.first_elastic_step
-        stored = _attempt(lambda: hessians(near.elastic, size, step, near.elastic_noise))
-        pulled = _attempt(
-            lambda: gradients(near.elastic_torques, size, step, near.elastic_torque_noise)
-        )
-    return _spread(moved, stored), _spread(turned, pulled)
+        stored = _derived(hessians, near, near.elastic, near.elastic_noise, step)
+        pulled = _derived(gradients, near, near.elastic_torques, near.elastic_torque_noise, step)
+    return [moved[0], stored[0], *moved[1:]], [turned[0], pulled[0], *turned[1:]]
 
 
-def _statics(K: Stiffness, near: Neighbourhood) -> Agreement:
-    """Compare the torque residual with first differences of the potential."""
-    size, step = near.unit.size, near.first_step
-    work = _split(_attempt(lambda: gradients(near.work, size, step, near.kinematic_noise)))
-    given, largest = K.residual * near.unit, torque_size(K)
-    return _compare("torque", given, largest, _summed(work), _Anew(None), largest)
-
-
-def _lengths(K: Stiffness, near: Neighbourhood) -> Agreement:
-    """Compare the cable lengths with lengths from Pinocchio's placements of the links."""
-    given = K.posture.cable_lengths
-    # two programs compute places along the links, so the results differ by some more rounding
-    measured = _Anew(near.measured_lengths(), error=16.0 * float(near.length_noise.max()))
-    longest = float(given.max())
-    return _compare("lengths", given, longest, measured, _Anew(None), longest)
-
-
-class _Anew(NamedTuple):
-    """Value computed by differences with its error bound; or the reason why there is no value."""
-
-    value: Array | None
-    reason: str = ""
-    error: float = 0.0
-
-
-def _attempt(derive: Callable[[], Estimates]) -> Estimates | str:
-    """Compute derivatives by differences; return the error text if this fails."""
+def _derived(
+    derive: Callable[[Sampled, int, float, Noise], Estimates],
+    near: Neighbourhood,
+    f: Sampled,
+    noise: Noise,
+    step: float,
+) -> list[_Anew]:
+    """Compute derivatives of the three kinematic parts, or of the elastic part, by differences."""
     try:
-        return derive()
+        values, errors = derive(f, near.unit.size, step, noise)
     except CdsmError as error:
-        return str(error)
-
-
-def _split(derived: Estimates | str) -> list[_Anew]:
-    """Split derivatives into the three kinematic parts, or into the one elastic part."""
-    if isinstance(derived, str):
-        return [_Anew(None, derived)] * 3
+        return [_Anew(None, str(error))] * 3
     return [
         _Anew(value, error=float(error)) if np.isfinite(error) else _Anew(None, _UNSETTLED)
-        for value, error in zip(*derived, strict=True)
+        for value, error in zip(values, errors, strict=True)
     ]
-
-
-def _spread(kinematic: Estimates | str, elastic: Estimates | str) -> list[_Anew]:
-    active, gravity, load = _split(kinematic)
-    return [active, _split(elastic)[0], gravity, load]
 
 
 def _summed(parts: list[_Anew]) -> _Anew:
@@ -228,12 +211,22 @@ def _summed(parts: list[_Anew]) -> _Anew:
 
 
 def _compare(
-    name: str, given: Array, largest: float, potential: _Anew, torque: _Anew, of_all: float
+    name: str,
+    given: Array,
+    largest: float,
+    potential: _Anew,
+    torque: _Anew = _NONE,
+    whole: float = 0.0,
 ) -> Agreement:
-    """Compare a given matrix with its estimates from the potential and from the torque."""
+    """Compare a given matrix with its estimates; ``whole`` is the largest entry of K_θ."""
     unit = _UNITS.get(name, "N m/rad")
-    enough = max(RESOLVED * largest, _NEGLIGIBLE * of_all)
-    differences = [_difference(given, each) for each in (potential, torque)]
+    enough = max(RESOLVED * largest, _NEGLIGIBLE * whole)
+    differences = [
+        Difference(found=float(abs(given - each.value).max()), expected=each.error)
+        if each.value is not None
+        else None
+        for each in (potential, torque)
+    ]
     known = [each for each in differences if each is not None]
     verdict: Verdict = "agrees"
     reason = ""
@@ -255,12 +248,6 @@ def _compare(
         verdict=verdict,
         reason=reason,
     )
-
-
-def _difference(given: Array, anew: _Anew) -> Difference | None:
-    if anew.value is None:
-        return None
-    return Difference(found=float(abs(given - anew.value).max()), expected=anew.error)
 
 
 def _adds_up(found: Agreement, matrix: Array, parts: Array, what: str) -> Agreement:
