@@ -58,21 +58,6 @@ Control = viser.GuiSliderHandle[float] | viser.GuiButtonHandle
 """Controls that a client may use."""
 
 
-class _Camera(msgspec.Struct, tag_field="type", tag="ViewerCameraMessage"):
-    """Camera of a client; viser keeps it separately for each client."""
-
-
-class _Value(msgspec.Struct, forbid_unknown_fields=True):
-    value: bool | float
-
-
-class _Change(msgspec.Struct, tag_field="type", tag="GuiUpdateMessage", forbid_unknown_fields=True):
-    """New value of a control; for a button True, if it is pressed."""
-
-    uuid: str
-    updates: _Value
-
-
 class _Address(str):
     """Listening address of one guard, told by identity from equal strings of other servers."""
 
@@ -94,7 +79,7 @@ class Guard:
         self._address = _Address(host)
         self._controls: dict[str, Control] = {}
 
-    def start(self, port: int, label: str) -> viser.ViserServer:
+    def start(self, port: int) -> viser.ViserServer:
         """Start a viser server that is filtered by this guard.
 
         viser has no option to filter its websocket server. This method therefore replaces the
@@ -117,7 +102,7 @@ class Guard:
         with _STARTING:
             websocket_server.serve = serve  # type: ignore[assignment,misc]
             try:
-                server = viser.ViserServer(self._address, port, label, verbose=False)
+                server = viser.ViserServer(self._address, port, "cdsm view", verbose=False)
             finally:
                 websocket_server.serve = original  # type: ignore[misc]
         if not made.is_set():
@@ -176,28 +161,31 @@ class Guard:
     def _kept(self, raw: bytes) -> bytes | None:
         """Return a message of a client, packed again for viser, or None if it is refused."""
         try:
+            # packed again: of two fields with one name, viser may read the one not checked here
             message = msgspec.msgpack.decode(raw)
-            known = msgspec.convert(message, _Camera | _Change)
+            match message:
+                case {"type": "ViewerCameraMessage"}:  # viser keeps a camera for each client
+                    return msgspec.msgpack.encode(message)
+                case {"type": "GuiUpdateMessage", "uuid": uuid, "updates": {"value": value}}:
+                    value = self._allowed(uuid, value)
+                    if value is not None and (len(message), len(message["updates"])) == (3, 1):
+                        message["updates"]["value"] = value
+                        return msgspec.msgpack.encode(message)
+            self._refuse(f"a message, {message!a:.80}")
         except Exception as error:  # unknown bytes can cause any error
             self._refuse(f"a message, {str(error)[:80]!a}")
-            return None
-        if isinstance(known, _Change):
-            value = self._value(known)
-            if value is None:
-                self._refuse(f"a change, {known!a:.80}")
-                return None
-            message["updates"]["value"] = value
-        # packed again: of two fields with one name, viser may read the one not checked here
-        return msgspec.msgpack.encode(message)
+        return None
 
-    def _value(self, change: _Change) -> bool | float | None:
+    def _allowed(self, uuid: str, value: object) -> bool | float | None:
         """Return the value that a control may take, or None if control or value is not allowed."""
-        control, value = self._controls.get(change.uuid), change.updates.value
+        control = self._controls.get(uuid)
         if isinstance(control, viser.GuiButtonHandle):
-            return value if value is True else None
-        if control is None or isinstance(value, bool) or not math.isfinite(value):
+            return True if value is True else None
+        if control is None or isinstance(value, bool) or not isinstance(value, (int, float)):
             return None
-        within = min(max(value, control.min), control.max)
+        if not math.isfinite(value):
+            return None
+        within = float(min(max(value, control.min), control.max))
         if within != value:  # viser updates the other clients, but not the sender
             asyncio.get_running_loop().call_later(
                 _PAUSE, lambda: control._queue_update("value", control.value)

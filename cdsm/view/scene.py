@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 import math
-from itertools import product
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -93,12 +92,11 @@ class Scene:
 
     def update(self, shown: Shown) -> None:
         """Show these results, and hide everything that they do not have."""
-        pose = shown.posture
+        pose, force, ellipsoid = shown.posture, shown.setting.force, shown.ellipsoid
         for part in self._parts:
             part.visible = pose is not None
-        self._ellipsoid.visible = shown.ellipsoid is not None
+        self._ellipsoid.visible = ellipsoid is not None
         # an invalid force has no arrow
-        force = shown.setting.force
         pushed = pose is not None and shown.condition is not Condition.INVALID
         self._force.visible = pushed and bool(force.any())
         self._label.visible = pose is not None and shown.condition is not Condition.STABLE
@@ -115,11 +113,10 @@ class Scene:
         ):
             cable.points = np.stack([path[:-1], path[1:]], axis=1).astype(np.float32)
             cable.colors = color
-        if shown.ellipsoid is not None:
-            self._ellipsoid.vertices = shown.ellipsoid.reshape(3, -1).T.astype(np.float32)
+        if ellipsoid is not None:
+            self._ellipsoid.vertices = ellipsoid.reshape(3, -1).T.astype(np.float32)
         if self._force.visible:
-            ends = np.array([[tip, tip + self._reach * force]])
-            self._force.points = ends.astype(np.float32)
+            self._force.points = np.array([[tip, tip + self._reach * force]], dtype=np.float32)
         self._label.position = tip + self._up
 
     def _look(self, arm: Manipulator) -> None:
@@ -132,16 +129,13 @@ class Scene:
         middle = (points.min(axis=0) + points.max(axis=0)) / 2.0
         size = max(float(np.ptp(points, axis=0).max()), arm.length)
         camera = self._server.initial_camera
-        camera.look_at = middle
-        camera.position = middle + size * np.array([0.2, -1.6, 0.6])
+        camera.look_at, camera.position = middle, middle + size * np.array([0.2, -1.6, 0.6])
         camera.fov = math.radians(45.0)
         camera.near, camera.far = size / 100.0, 100.0 * size
 
 
 def _faces(rows: int, columns: int) -> NDArray[np.uint32]:
     """Build two triangles for each cell of a grid of points, numbered row by row."""
-    faces = []
-    for i, j in product(range(rows - 1), range(columns - 1)):
-        a, b = columns * i + j, columns * (i + 1) + j
-        faces += [(a, b, a + 1), (a + 1, b, b + 1)]
-    return np.array(faces, dtype=np.uint32)
+    points = np.arange(rows * columns, dtype=np.uint32).reshape(rows, columns)
+    a, b, c, d = points[:-1, :-1], points[1:, :-1], points[:-1, 1:], points[1:, 1:]
+    return np.stack([a, b, c, c, b, d], axis=-1).reshape(-1, 3)

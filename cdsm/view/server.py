@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import logging
 import math
+import os
 import socket
 import threading
 from collections.abc import Callable, Iterator
@@ -17,7 +18,7 @@ from numpy.typing import ArrayLike
 from cdsm.errors import InvalidInput
 from cdsm.manipulator import Manipulator
 from cdsm.support.extras import need
-from cdsm.support.validation import Array, bound, frozen, instance, quantity, vector, whole_number
+from cdsm.support.validation import bound, instance, quantity, vector, whole_number
 from cdsm.tension import DEFAULT_SOLVER, installed_solver
 from cdsm.view.scene import Scene
 from cdsm.view.sliders import Controls
@@ -73,8 +74,9 @@ def serve(
         UnknownName: The solver is not installed.
     """
     need("view", "viser")
+    straight = np.clip(np.zeros(instance("arm", arm, Manipulator).nv), arm.lower, arm.upper)
     start = Setting(
-        q=_first_angles(instance("arm", arm, Manipulator), q),
+        q=straight if q is None else arm._angles(q, check_limits=True),
         minimum=quantity("minimum", minimum, "tension", zero=True),
         maximum=float(bound("maximum", maximum, 1)[0]),
         force=vector("force", force, 3, "force at the tip [N], base axes"),
@@ -82,8 +84,7 @@ def serve(
     )
     tension = quantity("largest_tension", largest_tension, "tension")
     push = max(quantity("largest_force", largest_force, "force"), float(abs(start.force).max()))
-    guard, server = _server(host, port)
-    return View(arm, start, guard, server, tension, push)
+    return View(arm, start, *_server(host, port), (tension, push))
 
 
 class Worker:
@@ -96,35 +97,29 @@ class Worker:
         self._job = job
         self._thread = futures.ThreadPoolExecutor(1, "cdsm view")
         self._lock = threading.Lock()
-        self._queued = self._closed = False
-        self._last: list[futures.Future[None]] = []
+        self._last: futures.Future[None] | None = None
 
     def request(self) -> None:
-        """Request a run of the job. Any thread may call this."""
-        with self._lock:
-            if not self._queued and not self._closed:
-                self._queued = True
-                self._last = [self._thread.submit(self._run)]
+        """Request a run of the job. Any thread may call this; after the end nothing happens."""
+        with self._lock, contextlib.suppress(RuntimeError):  # the thread has ended
+            if self._last is None or self._last.running() or self._last.done():
+                self._last = self._thread.submit(self._job)
 
     def wait(self) -> None:
         """Wait until all requests made before are done."""
-        futures.wait(self._last)
+        futures.wait([self._last] if self._last else [])
 
     def close(self) -> None:
-        """Wait for the running job, and refuse further ones."""
-        with self._lock:
-            self._closed = True
-        self._thread.shutdown(cancel_futures=True)
-
-    def _run(self) -> None:
-        with self._lock:
-            self._queued = False  # a change after this line needs another run
-        self._job()
+        """Wait until all requests made before are done, and refuse further ones."""
+        self._thread.shutdown()
 
 
 @final
 class View:
-    """Running live view of ``arm``, made by :func:`serve`. Close it, or use it in ``with``."""
+    """Running live view of ``arm``, made by :func:`serve`. Close it, or use it in ``with``.
+
+    ``limits`` are as in :class:`Controls`.
+    """
 
     def __init__(
         self,
@@ -132,16 +127,14 @@ class View:
         start: Setting,
         guard: Guard,
         server: viser.ViserServer,
-        largest_tension: float,
-        largest_force: float,
+        limits: tuple[float, float],
     ) -> None:
         self.arm = arm
         self._guard, self._server = guard, server
         self._closed = threading.Event()
         self._worker = Worker(self._refresh)
         try:
-            self._scene = Scene(server, arm, largest_force)
-            limits = largest_tension, largest_force
+            self._scene = Scene(server, arm, limits[1])
             request = self._worker.request
             self._controls = Controls(server, arm, start, limits, request, guard.admit)
             self._refresh()
@@ -200,12 +193,6 @@ class View:
         self._shown = shown
 
 
-def _first_angles(arm: Manipulator, q: ArrayLike | None) -> Array:
-    if q is None:
-        return frozen(np.clip(np.zeros(arm.nv), arm.lower, arm.upper))
-    return arm._angles(q, check_limits=True)
-
-
 def _server(host: object, port: object) -> tuple[Guard, viser.ViserServer]:
     """Start a guarded viser server at exactly this address, and set up its page."""
     from cdsm.view.guard import Guard
@@ -216,10 +203,7 @@ def _server(host: object, port: object) -> tuple[Guard, viser.ViserServer]:
     _check_free(host, port)
     guard = Guard(host)
     with _quiet():
-        server = guard.start(port, "cdsm view")
-        if port not in (0, taken := server.get_port()):
-            server.stop()
-            raise InvalidInput("port", f"{port} was taken meanwhile ({taken} is free); try again.")
+        server = guard.start(port)
     # viser's share button opens a tunnel to a public server; the guard refuses it
     server.gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
     server.gui.main_panel.dock_right()
@@ -229,22 +213,18 @@ def _server(host: object, port: object) -> tuple[Guard, viser.ViserServer]:
 
 def _check_free(host: str, port: int) -> None:
     """Check that the address is free; viser would use the next port, or wait for ever."""
-    remedy = "Give another port, or 0 for any free one."
     try:
-        with contextlib.ExitStack() as sockets:
-            for family, kind, protocol, _, address in socket.getaddrinfo(
-                host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
-            ):
-                probe = sockets.enter_context(socket.socket(family, kind, protocol))
-                probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # viser sets it too
-                if family == socket.AF_INET6:
-                    probe.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_V6ONLY, 1)
-                probe.bind(address)
+        for family, *_, address in socket.getaddrinfo(
+            host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
+        ):
+            socket.create_server(address, family=family).close()
     except (socket.gaierror, UnicodeError) as error:
         raise InvalidInput("host", f"{host!r} is no address of this machine: {error}.") from None
     except OSError as error:
         raise InvalidInput(
-            "port", f"{port} on {host} cannot be had: {error.strerror}. {remedy}"
+            "port",
+            f"{port} on {host} cannot be had: {os.strerror(error.errno or 0)}. "
+            "Give another port, or 0 for any free one.",
         ) from None
 
 

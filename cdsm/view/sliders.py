@@ -124,7 +124,13 @@ class Controls:
                 self._add(slider_range(f"force {axis} [N]", -force, force, f))
                 for axis, f in zip(AXES, start.force.tolist(), strict=True)
             ]
-        self._joints = self._joint_folders(joint_ranges(arm, start.q))
+        ranges = joint_ranges(arm, start.q)
+        self._joints: list[Slider] = []
+        for first in range(0, len(ranges), _IN_FOLDER):
+            group = ranges[first : first + _IN_FOLDER]
+            name = f"Joints {first + 1} to {first + len(group)}" if len(ranges) > 1 else "Joint"
+            with server.gui.add_folder(name, expand_by_default=first == 0):
+                self._joints += [self._add(joint) for joint in group]
         straight = server.gui.add_button("Straight", hint="All joints as near zero as they go.")
         straight.on_click(lambda _: _move(self._joints, np.zeros(arm.nv)))
         reset = server.gui.add_button("Reset", hint="All sliders as they were at the beginning.")
@@ -146,15 +152,6 @@ class Controls:
     def update(self, shown: Shown) -> None:
         """Write the text about these results."""
         self._text.content = page_text(shown)
-
-    def _joint_folders(self, ranges: Sequence[Range]) -> list[Slider]:
-        sliders = []
-        for first in range(0, len(ranges), _IN_FOLDER):
-            group = ranges[first : first + _IN_FOLDER]
-            name = f"Joints {first + 1} to {first + len(group)}" if len(ranges) > 1 else "Joint"
-            with self._gui.add_folder(name, expand_by_default=first == 0):
-                sliders += [self._add(joint) for joint in group]
-        return sliders
 
     def _add(self, ends: Range) -> Slider:
         handle = self._gui.add_slider(ends.label, ends.low, ends.high, ends.step, ends.initial)

@@ -130,22 +130,20 @@ class Shown(ReadOnlyState):
 def show(arm: Manipulator, setting: Setting) -> Shown:
     """Compute the results for an arm at a setting; every error becomes a condition."""
     pose = tension = K = None
+    condition, problem = Condition.STABLE, ""
     try:
         pose = arm.at(setting.q)
         wrench = np.concatenate([setting.force, np.zeros(3)])
         tension = distribute_tension(pose, setting.minimum, setting.maximum, wrench, setting.solver)
         K = stiffness(pose, tension)
         _ = K.compliance  # raises if K_θ is singular: its margin is only rounding error
-    except CdsmError as error:
-        condition = _CONDITIONS.get(Status.of(error), Condition.FAILED)
-        if isinstance(error, InvalidInput):
-            condition = Condition.INVALID
-        problem = str(error)
-    else:
-        condition, problem = Condition.STABLE, ""
         if not K.is_stable:
             condition = Condition.UNSTABLE
             problem = "K_θ is not positive definite: the arm buckles under these tensions."
+    except InvalidInput as error:
+        condition, problem = Condition.INVALID, str(error)
+    except CdsmError as error:
+        condition, problem = _CONDITIONS.get(Status.of(error), Condition.FAILED), str(error)
     return Shown(
         setting=setting,
         condition=condition,
