@@ -87,33 +87,29 @@ class Cable:
     def __post_init__(self) -> None:
         try:
             text("name", self.name)
-        except InvalidInput as error:
-            raise CableError(str(self.name), str(error)) from None
-        if not isinstance(self.elasticity, Elasticity):
-            raise CableError(
-                self.name, f"elasticity: {self.elasticity!r} given; an Elasticity is needed."
-            )
-        try:
+            if not isinstance(self.elasticity, Elasticity):
+                raise InvalidInput(
+                    "elasticity", f"{self.elasticity!r} given; an Elasticity is needed."
+                )
             sites = sequence_of("sites", self.sites, Site)
             one_of("control", self.control, get_args(Control))
             lead = quantity("lead", self.lead, "length", zero=True)
             series = quantity("series_stiffness", self.series_stiffness, "stiffness", infinite=True)
             least = quantity("minimum", self.minimum, "tension", zero=True)
             most = quantity("maximum", self.maximum, "tension", zero=True, infinite=True)
+            if len(sites) < 2:
+                raise InvalidInput("sites", f"{len(sites)} given; two or more Site are needed.")
         except CdsmError as error:
-            raise CableError(self.name, str(error)) from None
-        if len(sites) < 2:
-            raise CableError(self.name, f"sites: {len(sites)} given; two or more Site are needed.")
+            raise CableError(str(self.name), str(error)) from None
         if least > most:
             raise CableError(
                 self.name,
                 f"tensions from {least:g} to {most:g} N given; minimum <= maximum is needed.",
             )
-        object.__setattr__(self, "minimum", least)
-        object.__setattr__(self, "maximum", most)
-        object.__setattr__(self, "sites", sites)
-        object.__setattr__(self, "lead", lead)
-        object.__setattr__(self, "series_stiffness", series)
+        # the class is frozen: plain assignment is refused
+        self.__dict__.update(
+            sites=sites, lead=lead, series_stiffness=series, minimum=least, maximum=most
+        )
 
     def elongation(self, tension: ArrayLike, free_length: float) -> Array:
         """Compute Δl = l_0 ε(F) + ΔF/k_series [m], from the low end of the elasticity's domain.

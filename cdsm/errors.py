@@ -11,6 +11,8 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
+from cdsm.support.format import coordinates
+
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
@@ -395,10 +397,9 @@ class UnreachableStiffness(CdsmError):
         self.low = low
         self.high = high
         self.nearest = tuple(float(value) for value in nearest)
-        along = ", ".join(f"{x:.4g}" for x in direction)
         message = (
-            f"no admissible tensions give {target:.8g} N/m along ({along}): the range is "
-            f"{low:.8g} to {high:.8g} N/m"
+            f"no admissible tensions give {target:.8g} N/m along {coordinates(direction)}: the "
+            f"range is {low:.8g} to {high:.8g} N/m"
         )
         if low <= target <= high:
             sides = " and ".join(f"{value:.8g}" for value in self.nearest)

@@ -9,7 +9,7 @@ import math
 import os
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Self
+from typing import Annotated, Any, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -36,8 +36,6 @@ from cdsm.support.values import Printed
 
 MAXIMUM_JOINTS = 100
 """Largest number of joints, since many more would overflow the stack of the URDF parsers."""
-
-MAXIMUM_DEFAULT_LIMIT = math.radians(80.0)
 
 UNIVERSAL_AXES = ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
@@ -305,7 +303,7 @@ class Geometry(Printed):
     def joint_limits(self) -> tuple[float, ...]:
         """Limit of each joint [rad]: the given limit, or 2 atan(h/R), at most 80°."""
         return tuple(
-            min(2.0 * math.atan(joint.disk_offset / self.hole_radius), MAXIMUM_DEFAULT_LIMIT)
+            min(2.0 * math.atan(joint.disk_offset / self.hole_radius), math.radians(80.0))
             if joint.limit is None
             else joint.limit
             for joint in self.joints
@@ -315,15 +313,10 @@ class Geometry(Printed):
     def disks(self) -> tuple[tuple[str, tuple[float, ...]], ...]:
         """Name and disk positions along x [m] of each link, starting with the base."""
         offsets = [joint.disk_offset for joint in self.joints]
-        rows: list[tuple[str, tuple[float, ...]]] = [
-            ("base_disk", (self.base_length - offsets[0],))
-        ]
-        for k, link in enumerate(self.links):
-            places = [offsets[k]]
-            if k + 1 < len(offsets):
-                places.append(link.length - offsets[k + 1])
-            rows.append((f"link{k + 1}", tuple(places)))
-        return tuple(rows)
+        ends = [link.length - after for link, after in zip(self.links, offsets[1:], strict=False)]
+        places = [(self.base_length - offsets[0],), *zip(offsets, ends, strict=False), offsets[-1:]]
+        names = ["base_disk", *(f"link{k + 1}" for k in range(len(offsets)))]
+        return tuple((name, tuple(at)) for name, at in zip(names, places, strict=True))
 
     def to_toml(self) -> str:
         """Return the TOML text from which :meth:`read` builds an equal geometry."""
@@ -358,34 +351,33 @@ class Geometry(Printed):
             GeometryError: ``text`` is not TOML or not a geometry; lists every fault.
         """
         instance("text", text, str)
-        short: dict[str, Callable[..., Geometry]] = {
+        try:
+            return cls._of_tables(read_toml(text))
+        except GeometryError as error:
+            raise GeometryError(error.faults, source) from None
+
+    @classmethod
+    def _of_tables(cls, data: dict[str, Any]) -> Geometry:
+        builders: dict[str, Callable[..., Geometry]] = {
             "universal": cls.universal,
             "hinged": cls.hinged,
         }
-        try:
-            data = read_toml(text)
-            kind = next((key for key in data if key in short), None)
-            if kind is None and not data.keys() & {"joints", "links", "cables"}:
-                found = ", ".join(data) or "nothing"
-                raise GeometryError(
-                    [f"holds {found}; give a table [universal] or [hinged], or the full form"]
-                )
-            if kind is None and not data.keys() & {"joints", "links"}:
-                raise GeometryError(
-                    ["holds cables but no joints: give a file of cables beside the arm it is for"]
-                )
-            if kind is None:
-                return parse(cls, data)
-            if len(data) > 1:
-                others = ", ".join(key for key in data if key != kind)
-                raise GeometryError(
-                    [f"{others}: stands outside [{kind}], which says it all; move it in, or away"]
-                )
-            if not isinstance(data[kind], dict):
-                raise GeometryError([f"{kind}: is {data[kind]!r}; give a table [{kind}]"])
-            return short[kind](**data[kind])
-        except GeometryError as error:
-            raise GeometryError(error.faults, source) from None
+        kind = next((key for key in data if key in builders), None)
+        if kind is None and data.keys() & {"joints", "links"}:
+            return parse(cls, data)
+        if kind is None and "cables" in data:
+            fault = "holds cables but no joints: give a file of cables beside the arm it is for"
+        elif kind is None:
+            found = ", ".join(data) or "nothing"
+            fault = f"holds {found}; give a table [universal] or [hinged], or the full form"
+        elif len(data) > 1:
+            others = ", ".join(key for key in data if key != kind)
+            fault = f"{others}: stands outside [{kind}], which says it all; move it in, or away"
+        elif not isinstance(data[kind], dict):
+            fault = f"{kind}: is {data[kind]!r}; give a table [{kind}]"
+        else:
+            return builders[kind](**data[kind])
+        raise GeometryError([fault])
 
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> Geometry:

@@ -10,7 +10,7 @@ import os
 from collections import Counter
 from collections.abc import Sequence
 from functools import cached_property
-from typing import final, get_args
+from typing import NamedTuple, final, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,11 +19,7 @@ from cdsm.arm_model import ArmModel
 from cdsm.cable import Cable, serpentine_cables
 from cdsm.cable_laws import OriginalLength
 from cdsm.elasticity import Elasticity
-from cdsm.errors import (
-    CableError,
-    InvalidInput,
-    JointLimitError,
-)
+from cdsm.errors import CableError, InvalidInput, JointLimitError
 from cdsm.geometry import Geometry
 from cdsm.kernels import segments
 from cdsm.kernels.tree import Frames
@@ -38,15 +34,17 @@ from cdsm.urdf_reader import read_urdf
 GRAVITY = (0.0, 0.0, -9.81)
 """Default gravity in base axes [m/s²]."""
 
-_Value = tuple[
-    Geometry | None,
-    str,
-    tuple[Cable, ...],
-    str,
-    tuple[float, ...],
-    OriginalLength,
-    tuple[str, ...],
-]
+
+class _Parts(NamedTuple):
+    """What an arm is built from; equal arms have equal parts."""
+
+    geometry: Geometry | None
+    urdf: str
+    cables: tuple[Cable, ...]
+    tip: str
+    gravity: tuple[float, ...]
+    original_length: OriginalLength
+    joint_names: tuple[str, ...]
 
 
 @final
@@ -128,7 +126,9 @@ class Manipulator(Printed):
             CableError: Two cables have the same name, or a cable is on an unknown link.
         """
         text = read_urdf(urdf, check_inertia=check_inertia)
-        return _rebuild(None, text, cables, tip, gravity, original_length, joint_names)
+        arm = cls.__new__(cls)
+        arm._build(None, text, cables, tip, gravity, original_length, joint_names)
+        return arm
 
     def _build(
         self,
@@ -141,14 +141,13 @@ class Manipulator(Printed):
         joint_names: Sequence[str] | None = None,
     ) -> None:
         """Set all attributes from checked URDF text and, if given, its geometry."""
-        self._geometry = geometry
-        self._cables = _checked_cables(cables)
+        cables = _checked_cables(cables)
         self._gravity = vector("gravity", gravity, 3, "gravity in base axes [m/s²]", "gravity")
-        self._urdf, self._tip_link = urdf, tip
         one_of("original_length", original_length, get_args(OriginalLength))
-        self._original_length: OriginalLength = original_length
         body = RigidBody(urdf, tip, self._gravity, joint_names)
-        self._model = ArmModel.of(body, self._cables, original_length)
+        self._model = ArmModel.of(body, cables, original_length)
+        g = tuple(self._gravity.tolist())
+        self._parts = _Parts(geometry, urdf, cables, tip, g, original_length, body.joint_names)
 
     @property
     def geometry(self) -> Geometry:
@@ -157,16 +156,16 @@ class Manipulator(Printed):
         Raises:
             InvalidInput: The arm was built from a URDF.
         """
-        if self._geometry is None:
+        if self._parts.geometry is None:
             raise InvalidInput(
                 "geometry", f"{self.name} was made from a URDF and has none; see arm.urdf."
             )
-        return self._geometry
+        return self._parts.geometry
 
     @property
     def is_serpentine(self) -> bool:
         """Whether the arm was built from a :class:`~cdsm.Geometry`."""
-        return self._geometry is not None
+        return self._parts.geometry is not None
 
     @property
     def name(self) -> str:
@@ -180,25 +179,25 @@ class Manipulator(Printed):
         For a robot from a URDF, it is at least the largest distance of a cable site from its joint.
         The length is a scale for errors, so it must not be zero if the tip is on a joint.
         """
-        if self._geometry is not None:
-            return self._geometry.length
+        if self.is_serpentine:
+            return self.geometry.length
         reach = float(np.linalg.norm(self._model.routing.point, axis=1).max())
         return max(self._model.body.length, reach)
 
     @property
     def tip_link(self) -> str:
         """Name of the link whose frame is the tip."""
-        return self._tip_link
+        return self._parts.tip
 
     @property
     def urdf(self) -> str:
         """URDF text of the arm."""
-        return self._urdf
+        return self._parts.urdf
 
     @property
     def cables(self) -> tuple[Cable, ...]:
         """Cables of the arm, in the order of every (C,) array."""
-        return self._cables
+        return self._parts.cables
 
     @property
     def gravity(self) -> Array:
@@ -208,7 +207,7 @@ class Manipulator(Printed):
     @property
     def original_length(self) -> OriginalLength:
         """Definition of the length l_0 of a wire in EA/l_0; see :class:`Manipulator`."""
-        return self._original_length
+        return self._parts.original_length
 
     @property
     def nv(self) -> int:
@@ -253,30 +252,21 @@ class Manipulator(Printed):
 
     def __str__(self) -> str:
         free = f"{self.nv} degrees of freedom"
-        if self._geometry is not None:
-            free = f"{len(self._geometry.joints)} joints ({free})"
-        return f"{self.name}: {free}, {len(self._cables)} cables, {self.length:.6g} m long"
+        if self.is_serpentine:
+            free = f"{len(self.geometry.joints)} joints ({free})"
+        return f"{self.name}: {free}, {len(self.cables)} cables, {self.length:.6g} m long"
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Manipulator) and self._value == other._value
+        return isinstance(other, Manipulator) and self._parts == other._parts
 
     def __hash__(self) -> int:
-        return hash(self._urdf)  # a user-defined elasticity may not be hashable
+        return hash(self.urdf)  # a user-defined elasticity may not be hashable
 
-    @property
-    def _value(self) -> _Value:
-        return (
-            self._geometry,
-            self._urdf,
-            self._cables,
-            self._tip_link,
-            tuple(self._gravity.tolist()),
-            self._original_length,
-            self.joint_names,
-        )
+    def __getstate__(self) -> _Parts:
+        return self._parts
 
-    def __reduce__(self) -> tuple[object, ...]:
-        return (_rebuild, self._value)
+    def __setstate__(self, parts: _Parts) -> None:
+        self._build(*parts)
 
     def with_cables(self, cables: Sequence[Cable]) -> Manipulator:
         """Return an arm with the same robot and other cables.
@@ -289,8 +279,9 @@ class Manipulator(Printed):
                 jumps.
             CableError: Two cables have the same name, or a cable is on an unknown link.
         """
-        geometry, urdf, _, tip, gravity, original_length, names = self._value
-        return _rebuild(geometry, urdf, cables, tip, gravity, original_length, names)
+        arm = type(self).__new__(type(self))
+        arm._build(*self._parts._replace(cables=_checked_cables(cables)))
+        return arm
 
     def at(self, q: ArrayLike, *, check_limits: bool = True) -> Posture:
         """Evaluate the arm at joint angles q: kinematics, cable lengths and gravity.
@@ -356,25 +347,11 @@ class Manipulator(Printed):
         )
         if coincident >= 0:
             raise CableError(
-                self._cables[routing.segment[coincident, 0]].name,
+                self.cables[routing.segment[coincident, 0]].name,
                 f"two neighbouring sites coincide at q = {q.tolist()}, so the cable has no "
                 "direction there. Move a site, or change the posture.",
             )
         return Frames(*map(frozen, arrays)), frozen(lengths), frozen(length_jacobian)
-
-
-def _rebuild(
-    geometry: Geometry | None,
-    urdf: str,
-    cables: Sequence[Cable],
-    tip: str,
-    gravity: ArrayLike,
-    original_length: OriginalLength,
-    joint_names: Sequence[str] | None,
-) -> Manipulator:
-    arm = Manipulator.__new__(Manipulator)
-    arm._build(geometry, urdf, cables, tip, gravity, original_length, joint_names)
-    return arm
 
 
 def _checked_cables(cables: Sequence[Cable]) -> tuple[Cable, ...]:

@@ -13,8 +13,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, partial
-from typing import TYPE_CHECKING, Literal, TypeVar, final, get_args
+from functools import cached_property
+from typing import TYPE_CHECKING, Literal, final, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -32,8 +32,6 @@ if TYPE_CHECKING:
     from cdsm.report import Report
 
 Term = Literal["active", "passive", "gravity", "load", "joint"]
-
-_Value = TypeVar("_Value")
 
 _NO_WRENCH = frozen(np.zeros(6))
 _NO_DIRECTIONS = frozen(np.zeros((0, 3)))
@@ -268,21 +266,25 @@ class Stiffness(ReadOnlyState):
     @property
     def _rows(self) -> list[tuple[str, ...]]:
         """Rows of the printed table: a header, then a name and three numbers per row."""
-        axes = np.eye(3)
-        shares = [_or_none(partial(self.shares, u)) for u in axes]
-        diagonals = [_or_none(lambda: self.cartesian), _or_none(self.pseudoinverse)]
-        rows: dict[str, list[float | None]] = {
-            "along": [_or_none(partial(self.along, u)) for u in axes],
-            "  of it passive": [None if share is None else share.passive.sum() for share in shares],
-            "  of it active": [None if share is None else share.active.sum() for share in shares],
-            "  of it gravity": [None if share is None else share.gravity for share in shares],
-            "  of it load": [None if share is None else share.load for share in shares],
-            "cartesian, diagonal": _diagonal(diagonals[0]),
-            "pseudoinverse, diagonal": _diagonal(diagonals[1]),
+
+        def cell(read: Callable[[Array], float], u: Array) -> str:
+            try:
+                return f"{read(u) / 1000.0:.4g}"
+            except SingularStiffness:
+                return "-"
+
+        lines: dict[str, Callable[[Array], float]] = {
+            "along": self.along,
+            "  of it passive": lambda u: self.shares(u).passive.sum(),
+            "  of it active": lambda u: self.shares(u).active.sum(),
+            "  of it gravity": lambda u: self.shares(u).gravity,
+            "  of it load": lambda u: self.shares(u).load,
+            "cartesian, diagonal": lambda u: float(u @ self.cartesian @ u),
+            "pseudoinverse, diagonal": lambda u: float(u @ self.pseudoinverse() @ u),
         }
         return [
             ("stiffness [N/mm]", "x", "y", "z"),
-            *((name, *map(_millimetres, values)) for name, values in rows.items()),
+            *((name, *(cell(read, u) for u in np.eye(3))) for name, read in lines.items()),
         ]
 
     @property
@@ -408,19 +410,3 @@ def assemble(
         free_length=free_length,
         distribution=distribution,
     )
-
-
-def _or_none(read: Callable[[], _Value]) -> _Value | None:
-    """Return the result of ``read``, or None if it does not exist."""
-    try:
-        return read()
-    except SingularStiffness:
-        return None
-
-
-def _diagonal(matrix: Array | None) -> list[float | None]:
-    return [None] * 3 if matrix is None else np.diag(matrix).tolist()
-
-
-def _millimetres(stiffness: float | None) -> str:
-    return "-" if stiffness is None else f"{stiffness / 1000.0:.4g}"

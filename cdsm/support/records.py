@@ -87,29 +87,24 @@ class CrossFaults(ValueError):
 def record(cls: type[_Record]) -> type[_Record]:
     """Build a frozen, strict pydantic dataclass; all faults raise one :class:`GeometryError`."""
     made: Any = dataclass(frozen=True, kw_only=True, config=_STRICT)(cls)
-    validate: Callable[..., None] = made.__init__
-
-    @wraps(validate)
-    def construct(self: object, *args: object, **values: object) -> None:
-        try:
-            validate(self, *args, **values)
-        except ValidationError as error:
-            raise GeometryError(_faults(error, type(self))) from None
-
-    made.__init__ = construct
+    made.__init__ = _reporting(made.__init__, made)
     return made  # type: ignore[no-any-return]
 
 
 def checked_keywords(function: _Function) -> _Function:
     """Decorate a function to check its keywords like the fields of a :func:`record`."""
-    validated = validate_call(config=_STRICT)(function)
+    return _reporting(validate_call(config=_STRICT)(function), function)
 
-    @wraps(function)
-    def call(*args: object, **keywords: object) -> object:
+
+def _reporting(validated: _Function, kind: Callable[..., Any]) -> _Function:
+    """Return the function with pydantic's error replaced by one :class:`GeometryError`."""
+
+    @wraps(validated)
+    def call(*args: object, **values: object) -> object:
         try:
-            return validated(*args, **keywords)
+            return validated(*args, **values)
         except ValidationError as error:
-            raise GeometryError(_faults(error, function)) from None
+            raise GeometryError(_faults(error, kind)) from None
 
     return cast(_Function, call)
 
@@ -130,10 +125,7 @@ def parse(kind: type[_Record], data: object) -> _Record:
     """Build a record from parsed TOML; raise one :class:`GeometryError` with all faults."""
     # only from JSON does pydantic's strict mode accept a table as a record and an array as a tuple;
     # JSON has no dates, so they become strings, which only names accept
-    try:
-        return TypeAdapter(kind).validate_json(json.dumps(data, default=str))
-    except ValidationError as error:
-        raise GeometryError(_faults(error, kind)) from None
+    return _reporting(TypeAdapter(kind).validate_json, kind)(json.dumps(data, default=str))
 
 
 def toml_lines(record: object, keys: Iterable[str] | None = None) -> list[str]:
