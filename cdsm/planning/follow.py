@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, Literal
 
 import numpy as np
@@ -26,21 +26,13 @@ _BACK = 50
 
 
 @dataclass(frozen=True, eq=False)
-class SampleTarget:
-    """Target of one sample of a path."""
+class Sample:
+    """Target of one sample of a path, and its tensions once it is planned."""
 
     index: int
     model: StiffnessModel  # K_θ over the admissible tensions at the sample
     constraints: Constraints
-    single: tuple[Array, float] | None  # u (3,) and stiffness [N/m], for a single direction
-
-
-@dataclass(frozen=True, eq=False)
-class PlannedSample:
-    """Sample with its planned tensions F (C,) [N]."""
-
-    target: SampleTarget
-    F: Array
+    F: Array  # (C,) [N]; the least tensions until it is planned
 
 
 class Follower:
@@ -53,17 +45,15 @@ class Follower:
 
     Attributes:
         planned: The samples planned so far.
-        iterations: Iterations of all searches so far.
     """
 
     def __init__(self, rate: Array, starts: int, seed: int) -> None:
         self.rate = rate
         self.starts = starts
         self.seed = seed
-        self.planned: list[PlannedSample] = []
-        self.iterations = 0
+        self.planned: list[Sample] = []
 
-    def add(self, target: SampleTarget) -> tuple[Status, str] | None:
+    def add(self, sample: Sample) -> tuple[Status, str] | None:
         """Plan one more sample. Return None, or the reason of a failure.
 
         It takes the least tensions within the rate from the last sample. If these miss the target
@@ -73,60 +63,56 @@ class Follower:
             UnreachableStiffness: No tensions hit the single target at any rate.
             SingularStiffness: No admissible tensions hold the arm at any rate.
         """
-        if not self.planned:
-            F = self._from_scratch(target)
-            if F is None:
+        region = sample.model.region
+        last = self.planned[-1] if self.planned else None
+        limited = last is not None and bool(np.isfinite(self.rate).any())
+        near = self._near(last, sample) if last is not None and limited else region
+        found = self._search(sample, near, last.F) if last is not None else None
+        if found is None:
+            found = self._from_scratch(sample)
+            if found is None:
                 return _MISSED
-            self.planned.append(PlannedSample(target, F))
-            return None
-
-        last, region = self.planned[-1], target.model.region
-        change = self._allowed_change(last.target, target)
-        near = region.within(change, last.F) if np.isfinite(change).any() else region
-        F = None if near is None else self._search(target, near, last.F)
-        if F is None:
-            F = self._from_scratch(target)
-            if F is None:
-                return _MISSED
-            if near is not region:
-                nearest = self._search(target, region, F, centre=last.F)
-                goal = PlannedSample(target, F if nearest is None else nearest)
-                F = None if near is None else self._search(target, near, goal.F)
-                if F is None:
-                    return None if self._replan_towards(goal) else _too_fast(last, goal, change)
-        self.planned.append(PlannedSample(target, F))
+            if last is not None and limited:
+                goal = self._search(sample, region, found.F, centre=last.F) or found
+                found = self._search(sample, near, goal.F)
+                if found is None:
+                    return None if self._replan_towards(goal) else self._too_fast(last, goal)
+        self.planned.append(found)
         return None
 
-    def _allowed_change(self, one: SampleTarget, other: SampleTarget) -> Array:
-        """Return the allowed change of tensions (C,) [N] between two samples."""
+    def _near(self, other: Sample, sample: Sample) -> Admissible | None:
+        """Return the admissible tensions of a sample within the rate from another sample."""
+        return sample.model.region.within(self._allowed_change(other, sample), other.F)
+
+    def _allowed_change(self, one: Sample, other: Sample) -> Array:
         return self.rate * abs(other.index - one.index)
 
     def _search(
-        self, target: SampleTarget, region: Admissible, start: Array, centre: Array | float = 0.0
-    ) -> Array | None:
+        self, sample: Sample, region: Admissible | None, start: Array, centre: Array | float = 0.0
+    ) -> Sample | None:
         """Search once for the least tensions, or for the nearest to a centre."""
-        F = region.nearest(start, region.low, region.high)
-        point = None if F is None else target.model.at(F)
-        if point is None or point.reserve <= 0.0:
+        F = None if region is None else region.nearest(start, region.low, region.high)
+        if region is None or F is None:
+            return None
+        point = sample.model.at(F)
+        if point.reserve <= 0.0:
             return None
         unit = max(region.scale, float(point.F.max()))
-        program = Program(target.model, region, point, target.constraints, EFFORT, unit, centre)
+        program = Program(region, point, sample.constraints, EFFORT, unit, centre)
         found = search(program, point)
-        self.iterations += found.iterations
-        return region.tension(found.end.evaluation.F).values if program.met(found.end) else None
+        if not program.met(found):
+            return None
+        return replace(sample, F=region.tension(found.evaluation.F).values)
 
-    def _from_scratch(self, target: SampleTarget) -> Array | None:
-        """Return the least tensions at any rate, or None if several targets are not hit at once."""
-        planner = Planner(target.model, target.constraints, self.starts, self.seed)
-        try:
-            found = planner.least()
-            if found is None and target.single is not None:
-                found = planner.within_range(*target.single)
-        finally:
-            self.iterations += planner.iterations
-        return None if found is None else target.model.region.tension(found.end.evaluation.F).values
+    def _from_scratch(self, sample: Sample) -> Sample | None:
+        """Find the least tensions at any rate; return None if several targets are not hit."""
+        planner = Planner(sample.model, sample.constraints, self.starts, self.seed)
+        found = planner.least()
+        if found is None:
+            return None
+        return replace(sample, F=sample.model.region.tension(found.evaluation.F).values)
 
-    def _replan_towards(self, goal: PlannedSample) -> bool:
+    def _replan_towards(self, goal: Sample) -> bool:
         """Plan the last samples again so that they lead to a goal within the rate; return success.
 
         The loop goes backwards from the last sample. Each sample stays within the rate of the next
@@ -134,34 +120,28 @@ class Follower:
         rate of both.
         """
         later = [goal]
-        for k in range(len(self.planned) - 1, max(len(self.planned) - 1 - _BACK, -1), -1):
-            target, F = self.planned[k].target, self.planned[k].F
-            change = self._allowed_change(target, later[-1].target)
-            region = target.model.region.within(change, later[-1].F)
-            if region is None:
-                return False
-            before = self.planned[k - 1] if k else None
-            joint: Admissible | None = region
-            if before is not None:
-                joint = region.within(self._allowed_change(before.target, target), before.F)
-            joined = None if joint is None else self._search(target, joint, F)
+        for k in reversed(range(max(len(self.planned) - _BACK, 0), len(self.planned))):
+            sample, before = self.planned[k], self.planned[k - 1] if k else None
+            region = joint = self._near(later[-1], sample)
+            if region is not None and before is not None:
+                joint = region.within(self._allowed_change(before, sample), before.F)
+            joined = self._search(sample, joint, sample.F)
             if joined is not None:
-                self.planned[k:] = [PlannedSample(target, joined), *reversed(later)]
+                self.planned[k:] = [joined, *reversed(later)]
                 return True
-            nearer = None if before is None else self._search(target, region, F, centre=before.F)
+            nearer = before and self._search(sample, region, sample.F, centre=before.F)
             if nearer is None:
                 return False
-            later.append(PlannedSample(target, nearer))
+            later.append(nearer)
         return False
 
-
-def _too_fast(last: PlannedSample, goal: PlannedSample, allowed: Array) -> tuple[Status, str]:
-    change = abs(goal.F - last.F)
-    cable = int((change / allowed).argmax())
-    name = goal.target.model.pose.arm.cables[cable].name
-    before, steps = last.target.index, goal.target.index - last.target.index
-    return "rate", (
-        f"tensions that hit the target exist, but none were found within the rate: the nearest "
-        f"change {name} by {change[cable]:.4g} N in {steps} step(s) from sample {before}, "
-        f"and {allowed[cable]:.4g} N are allowed. Raise rate, or change the target more slowly."
-    )
+    def _too_fast(self, last: Sample, goal: Sample) -> tuple[Status, str]:
+        change, allowed = abs(goal.F - last.F), self._allowed_change(last, goal)
+        cable = int((change / allowed).argmax())
+        name = goal.model.pose.arm.cables[cable].name
+        return "rate", (
+            f"tensions that hit the target exist, but none were found within the rate: the nearest "
+            f"change {name} by {change[cable]:.4g} N in {goal.index - last.index} step(s) from "
+            f"sample {last.index}, and {allowed[cable]:.4g} N are allowed. Raise rate, or change "
+            "the target more slowly."
+        )

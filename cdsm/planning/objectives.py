@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -77,7 +79,8 @@ def target_constraints(
         return cartesian_constraints(model, target)
     for u in directions.reshape(-1, 3):
         checked_direction(model, u)
-    return along_constraints(model, directions.reshape(-1, 3), target.reshape(-1))
+    found = along_constraints(model, directions.reshape(-1, 3), target.reshape(-1))
+    return replace(found, single=(directions, float(target))) if directions.ndim == 1 else found
 
 
 def along_constraint(model: StiffnessModel, direction: Array, unit: float) -> Constraint:

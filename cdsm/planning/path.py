@@ -25,7 +25,7 @@ from cdsm.errors import (
 from cdsm.kinematics.maps import inverse_kinematics
 from cdsm.kinematics.solutions import KinematicSolution
 from cdsm.manipulator import Manipulator
-from cdsm.planning.follow import Follower, SampleTarget, Status
+from cdsm.planning.follow import Follower, Sample, Status
 from cdsm.planning.objectives import (
     achieved,
     checked_margin,
@@ -37,6 +37,7 @@ from cdsm.planning.objectives import (
 )
 from cdsm.planning.path_plan import InfeasibleSample, PathPlan
 from cdsm.planning.range import MARGIN
+from cdsm.planning.stiffness_model import StiffnessModel
 from cdsm.stiffness_matrix import stiffness
 from cdsm.support.validation import (
     Array,
@@ -140,6 +141,7 @@ def plan_path(
     flag("progress", progress)
 
     near = guess
+    models: list[StiffnessModel] = []
     infeasible: list[InfeasibleSample] = []
     for i in _shown(size, progress):
         try:
@@ -151,33 +153,29 @@ def plan_path(
                     continue
                 q = near = solved.angles
             model = stiffness_model(arm.at(q), minimum, maximum, loads[i], margin)
+            models.append(model)
             constraints = target_constraints(model, directions, targets[i])
-            single = None
-            if directions is not None and directions.ndim == 1:
-                single = directions, float(targets[i])
-            reason = follower.add(SampleTarget(i, model, constraints, single))
+            reason = follower.add(Sample(i, model, constraints, model.region.least.values))
         except tuple(_STATUS) as error:
             infeasible.append(InfeasibleSample(i, _status(error), _explained(error), error))
         else:
             if reason is not None:
                 infeasible.append(InfeasibleSample(i, *reason))
 
-    found = [
-        stiffness(each.target.model.pose, each.F, wrench=loads[each.target.index])
-        for each in follower.planned
-    ]
+    planned = tuple(each.index for each in follower.planned)
+    found = [stiffness(each.model.pose, each.F, loads[each.index]) for each in follower.planned]
     return PathPlan(
         arm=arm,
         direction=directions,
         target=targets,
         rate=limit,
-        planned=tuple(each.target.index for each in follower.planned),
+        planned=planned,
         angles=_stacked([K.posture.q for K in found], (arm.nv,)),
         tensions=_stacked([K.tension for K in found], (len(arm.cables),)),
         achieved=_stacked([achieved(K, directions) for K in found], targets.shape[1:]),
         stiffness=tuple(found),
         infeasible=tuple(infeasible),
-        iterations=follower.iterations,
+        iterations=sum(model.iterations for model in models),
     )
 
 

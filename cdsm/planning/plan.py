@@ -152,13 +152,8 @@ def plan_stiffness(
         targets = checked_targets(directions, target)
 
     planner = Planner(model, target_constraints(model, directions, targets), number, seed)
-    found = planner.least()
-    if found is None and directions is not None and targets.ndim == 0:
-        found = planner.within_range(directions, float(targets))
-    elif found is None:
-        found = planner.nearest()
-
-    tension = model.region.tension(found.end.evaluation.F)
+    found = planner.least() or planner.nearest()
+    tension = model.region.tension(found.evaluation.F)
     K = stiffness(pose, tension)
     value = achieved(K, directions)
     return StiffnessPlan(
@@ -169,6 +164,6 @@ def plan_stiffness(
         achieved=float(value) if value.ndim == 0 else value,
         floor=model.floor,
         efforts=frozen(np.array(planner.efforts)),
-        iterations=planner.iterations,
+        iterations=model.iterations,
         evaluations=model.evaluations,
     )

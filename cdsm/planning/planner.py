@@ -15,7 +15,7 @@ from scipy.optimize import brentq
 
 from cdsm.errors import UnreachableStiffness
 from cdsm.planning.range import range_ends
-from cdsm.planning.sqp import EFFORT, MET, NEAREST, Program, SearchResult, search
+from cdsm.planning.sqp import EFFORT, MET, NEAREST, Program, search
 from cdsm.planning.starts import StartPoints
 from cdsm.planning.stiffness_model import (
     Constraints,
@@ -62,7 +62,6 @@ class Planner:
 
     Attributes:
         efforts: ‖F‖ [N] at the end of each search that hit the target, rising.
-        iterations: Iterations of all searches so far.
     """
 
     def __init__(
@@ -76,19 +75,39 @@ class Planner:
         self.starts = starts
         self.seed = seed
         self.begin = StartPoints(model, bounded, 0, seed)
-        self.program = Program(model, region, self.begin.anchor, constraints, EFFORT, region.scale)
-        self.iterations = 0
+        self.program = Program(region, self.begin.anchor, constraints, EFFORT, region.scale)
         self.efforts: list[float] = []
         self._ends: list[ConstraintValues] = []
 
-    def least(self) -> SearchResult | None:
-        """Return the least tensions that hit the target, or None."""
-        return self._best(self._starts())
+    def least(self) -> ConstraintValues | None:
+        """Return the least tensions that hit the target, or None if several are not hit at once.
 
-    def within_range(self, u: Array, target: float) -> SearchResult:
-        """Return least tensions for a target [N/m] along u (3,), or raise UnreachableStiffness."""
-        softest, stiffest, iterations = range_ends(self.model, u, _RANGE_STARTS, self.seed)
-        self.iterations += iterations
+        Raises:
+            UnreachableStiffness: No tensions hit the single target.
+        """
+        found = self._best(self._starts())
+        if found is None and self.constraints.single is not None:
+            return self._within_range(*self.constraints.single)
+        return found
+
+    def nearest(self) -> ConstraintValues:
+        """Return the least tensions among those with the least sum of squared misses."""
+        program = replace(self.program, objective=NEAREST)
+
+        def misses(place: ConstraintValues) -> float:
+            return program.merit(place, 0.0)
+
+        corners = sorted(self.begin.points, key=lambda point: misses(self.constraints.at(point)))
+        points = [*self._starts(), *corners[:_NEAREST_STARTS]]
+        best = min((self._search(program, point) for point in points), key=misses)
+        as_near = replace(self.constraints, targets=self.constraints.targets + best.values)
+        least = self._search(replace(self.program, constraints=as_near), best.evaluation)
+        kept = misses(self.constraints.at(least.evaluation)) <= misses(best) + MET**2
+        return least if kept else best
+
+    def _within_range(self, u: Array, target: float) -> ConstraintValues:
+        """Return the least tensions for a target [N/m] along u (3,) if it is within the range."""
+        softest, stiffest = range_ends(self.model, u, _RANGE_STARTS, self.seed)
         low = 0.0 if softest.open else softest.value
         high = math.inf if stiffest.open else stiffest.value
         balanced = [self.model.at(end.tension.values) for end in (softest, stiffest)]
@@ -104,9 +123,8 @@ class Planner:
         if not low * (1.0 - _EDGE) <= target <= high * (1.0 + _EDGE):
             raise UnreachableStiffness(u, target, low, high, [low if target < low else high])
         ends = [softest.evaluation, stiffest.evaluation]
-        found = self._best(
-            [*self._crossings(ends[0], ends), *self._crossings(ends[1], ends)] or ends
-        )
+        crossings = [place for end in ends for place in self._crossings(end, ends)]
+        found = self._best(crossings or ends)
         if found is None:  # near buckling the straight line may leave the range
             seen += [*map(self.constraints.at, ends), *self._ends]
             bridges = self._bridges(seen)
@@ -118,60 +136,42 @@ class Planner:
             raise UnreachableStiffness(u, target, low, high, (below, above))
         return found
 
-    def nearest(self) -> SearchResult:
-        """Return the least tensions among those with the least sum of squared misses."""
-        program = replace(self.program, objective=NEAREST)
-
-        def misses(place: ConstraintValues) -> float:
-            return program.merit(place, 0.0)
-
-        corners = sorted(self.begin.points, key=lambda point: misses(self.constraints.at(point)))
-        points = [*self._starts(), *corners[:_NEAREST_STARTS]]
-        best = min(
-            (self._search(program, point) for point in points), key=lambda each: misses(each.end)
-        )
-        as_near = Constraints(self.constraints.parts, self.constraints.targets + best.end.values)
-        least = self._search(replace(self.program, constraints=as_near), best.end.evaluation)
-        kept = misses(self.constraints.at(least.end.evaluation)) <= misses(best.end) + MET**2
-        return least if kept else best
-
-    def _best(self, points: Iterable[Evaluation]) -> SearchResult | None:
+    def _best(self, points: Iterable[Evaluation]) -> ConstraintValues | None:
         """Return the least tensions that hit the target from some starts, or None."""
         begin = list(points)
-        near = [point.F.max() for point in begin if self._is_near(point)]
-        program = replace(self.program, unit=float(min(near, default=self.program.unit)))
+        near = [
+            float(point.F.max())
+            for point in begin
+            if (abs(self.constraints.at(point).values) <= _NEARLY).all()
+        ]
+        program = replace(self.program, unit=min(near, default=self.program.unit))
         found = [self._search(program, point) for point in begin]
-        hits = [each for each in found if program.met(each.end)]
+        hits = sorted((each for each in found if program.met(each)), key=_effort)
         if not hits:
             return None
-        hits.sort(key=lambda each: float(np.linalg.norm(each.end.evaluation.F)))
-        self.efforts = [float(np.linalg.norm(each.end.evaluation.F)) for each in hits]
+        self.efforts = [_effort(each) for each in hits]
         return hits[0]
 
-    def _is_near(self, point: Evaluation) -> bool:
-        return bool((abs(self.constraints.at(point).values) <= _NEARLY).all())
-
-    def _nearly_hit(self, seen: list[ConstraintValues]) -> SearchResult | None:
+    def _nearly_hit(self, seen: list[ConstraintValues]) -> ConstraintValues | None:
         """Return the least tensions seen that hit the single target within 1e-6, or None."""
-        misses = [float(abs(place.values[0])) for place in seen]
-        if min(misses) > REACHED:
+        least = min(float(abs(place.values[0])) for place in seen)
+        if least > REACHED:
             return None
-        as_near = max(min(misses), _AS_NEAR)
-        hits = [place for place, miss in zip(seen, misses, strict=True) if miss <= as_near]
-        best = min(hits, key=lambda place: float(np.linalg.norm(place.evaluation.F)))
-        self.efforts = [float(np.linalg.norm(best.evaluation.F))]
-        return SearchResult(best, 0)
+        hits = [place for place in seen if abs(place.values[0]) <= max(least, _AS_NEAR)]
+        best = min(hits, key=_effort)
+        self.efforts = [_effort(best)]
+        return best
 
     def _starts(self) -> Iterator[Evaluation]:
         """Return the starts: least tensions, points that hit one target, and random points."""
         anchor = self.begin.anchor
-        least = backtrack_to_stable(self.model, self.model.region.least.values, anchor)
+        least = backtrack_to_stable(self.model.region.least.values, anchor)
         points = [] if least is None else [least]
         if self.constraints.targets.size == 1:
             points += self._crossings(anchor, self.begin.points)[: max(self.starts - 2, 1)]
         points = [*points, anchor][: self.starts]
         yield from points
-        yield from self.begin.between(self.starts - len(points), self.seed)
+        yield from self.begin.between(self.starts - len(points))
 
     def _crossings(
         self, hub: Evaluation, others: list[Evaluation], precision: float = 1e-2
@@ -210,8 +210,10 @@ class Planner:
         """Return the miss of the single target; -1 (zero stiffness) if the arm buckles."""
         return float(self.constraints.at(point).values[0]) if point.reserve >= 0.0 else -1.0
 
-    def _search(self, program: Program, point: Evaluation) -> SearchResult:
-        found = search(program, point)
-        self.iterations += found.iterations
-        self._ends.append(found.end)
-        return found
+    def _search(self, program: Program, point: Evaluation) -> ConstraintValues:
+        self._ends.append(search(program, point))
+        return self._ends[-1]
+
+
+def _effort(place: ConstraintValues) -> float:
+    return float(np.linalg.norm(place.evaluation.F))

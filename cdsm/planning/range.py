@@ -153,7 +153,7 @@ def stiffness_range(
     """
     model = stiffness_model(pose, minimum, maximum, wrench, margin)
     u = checked_direction(model, direction)
-    low, high, iterations = range_ends(model, u, *checked_starts(starts, seed))
+    low, high = range_ends(model, u, *checked_starts(starts, seed))
     if low.open or high.open:
         raise InvalidInput(
             "maximum",
@@ -169,7 +169,7 @@ def stiffness_range(
         floor=model.floor,
         low_found=low.values,
         high_found=high.values,
-        iterations=iterations,
+        iterations=model.iterations,
         evaluations=model.evaluations,
     )
 
@@ -186,40 +186,35 @@ class RangeEnd(NamedTuple):
 
 def range_ends(
     model: StiffnessModel, u: Array, starts: int, seed: int
-) -> tuple[RangeEnd, RangeEnd, int]:
-    """Find both ends of the range along a unit direction (3,), and count the iterations."""
+) -> tuple[RangeEnd, RangeEnd]:
+    """Find both ends of the range along a unit direction (3,)."""
     region = model.region
     if np.isfinite(region.high).all():
         return _bounded_ends(model, region, u, starts, seed)
-    iterations = 0
     for limit in _LIMITS:
         cap = limit * region.scale
-        *ends, more = _bounded_ends(model, region.capped(cap), u, starts, seed)
-        iterations += more
+        ends = _bounded_ends(model, region.capped(cap), u, starts, seed)
         low, high = (end._replace(open=end.tension.values.max() >= _CAPPED * cap) for end in ends)
         if not (low.open or high.open):
             break
-    return low, high, iterations
+    return low, high
 
 
 def _bounded_ends(
     model: StiffnessModel, region: Admissible, u: Array, starts: int, seed: int
-) -> tuple[RangeEnd, RangeEnd, int]:
+) -> tuple[RangeEnd, RangeEnd]:
     begin = StartPoints(model, region, starts, seed)
     in_newtons = Constraints((along_constraint(model, u, 1.0),), np.zeros(1))
     unit = float(in_newtons.at(begin.anchor).values[0])
     constraints = Constraints((along_constraint(model, u, unit),), np.zeros(1))
     rising = sorted(begin.points, key=lambda point: float(constraints.at(point).values[0]))
-    iterations = 0
 
     def end(objective: Objective, points: list[Evaluation]) -> RangeEnd:
-        nonlocal iterations
-        program = Program(model, region, begin.anchor, constraints, objective, region.scale)
+        program = Program(region, begin.anchor, constraints, objective, region.scale)
         found = [search(program, point) for point in points]
-        found.sort(key=lambda each: objective.linear * float(each.end.values[0]))
-        iterations += sum(each.iterations for each in found)
-        values = unit * np.array([each.end.values[0] for each in found])
-        evaluation = found[0].end.evaluation
+        found.sort(key=lambda each: objective.linear * float(each.values[0]))
+        values = unit * np.array([each.values[0] for each in found])
+        evaluation = found[0].evaluation
         tension = region.tension(evaluation.F)
         try:
             value = stiffness(model.pose, tension).along(u)
@@ -228,11 +223,11 @@ def _bounded_ends(
         return RangeEnd(evaluation, tension, value, frozen(values))
 
     concave = _rigidities_rise(region)  # mostly: then any start leads to the maximum
-    inside = [] if concave else list(begin.between(starts, seed))
+    inside = [] if concave else list(begin.between(starts))
     falling = rising[: -(_UPWARD // 2 if concave else starts) - 1 : -1]
     low = end(LOWEST, [*rising[:starts], *inside, begin.anchor])
     high = end(HIGHEST, [*falling, rising[0], *inside, begin.anchor])
-    return low, high, iterations
+    return low, high
 
 
 def _rigidities_rise(region: Admissible) -> bool:

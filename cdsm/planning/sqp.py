@@ -24,12 +24,10 @@ on the steps that keep the balance, c and, if z > 0, the reserve. If W is alread
 there, it stays unchanged, and the last steps converge quadratically.
 
 **The trust region.** A step is accepted if the merit f + ρ (‖c‖₁ + ½ ‖c‖²) falls by at least 1e-4
-of the prediction. After a fall of more than half of the prediction, the radius is at least three
-steps. After less than a quarter it is half a step, and after a failure a quarter. If c bends away
-from its tangent, a second program uses the value of c after the step (second-order correction). A
-step that leaves the stable tensions is moved back towards an anchor, a stable point well inside.
-With constant rigidities K_θ is affine in F. Then the stable tensions are convex, and all points on
-the way to the anchor are stable.
+of the prediction. If c bends away from its tangent, a second program uses the value of c after the
+step (second-order correction). A step that leaves the stable tensions is moved back towards an
+anchor, a stable point well inside. With constant rigidities K_θ is affine in F. Then the stable
+tensions are convex, and all points on the way to the anchor are stable.
 
 **Kinks.** At a kink of a rigidity (Eq. 19 has one at 31 N) c is continuous, but its slope is not.
 Kinks divide the tensions into boxes ("pieces") on which c is smooth. A search crosses kinks freely
@@ -53,7 +51,6 @@ from cdsm.planning.stiffness_model import (
     Constraints,
     ConstraintValues,
     Evaluation,
-    StiffnessModel,
     backtrack_to_stable,
 )
 from cdsm.support.validation import Array
@@ -73,17 +70,15 @@ _ARRIVED = 1e-10  # smaller steps and misses end a search: the next would be the
 _AT_KINK = 1e-6  # relative distance from a kink that counts as zero
 
 
-@dataclass(frozen=True)
-class Objective:
-    """f = effort·½‖(F − centre)/unit‖² + linear·Σc + square·½‖c‖², and whether c = 0 is needed."""
+class Objective(NamedTuple):
+    """f = linear·Σc + square·½‖c‖²; or the effort ½‖(F − centre)/unit‖², which needs c = 0."""
 
-    effort: float = 0.0
     linear: float = 0.0
     square: float = 0.0
-    constrained: bool = False
+    effort: bool = False
 
 
-EFFORT: Final = Objective(effort=1.0, constrained=True)
+EFFORT: Final = Objective(effort=True)
 HIGHEST: Final = Objective(linear=-1.0)
 LOWEST: Final = Objective(linear=1.0)
 NEAREST: Final = Objective(square=1.0)
@@ -94,7 +89,6 @@ class Program:
     """Nonlinear program over the tensions.
 
     Attributes:
-        model: K_θ as a function of the tensions.
         region: The admissible tensions.
         anchor: Stable point well inside, towards which steps are moved back.
         constraints: c.
@@ -103,7 +97,6 @@ class Program:
         centre: Tensions (C,) [N] at which the effort is zero, or 0.
     """
 
-    model: StiffnessModel
     region: Admissible
     anchor: Evaluation
     constraints: Constraints
@@ -113,16 +106,15 @@ class Program:
 
     def merit(self, at: ConstraintValues, price: float) -> float:
         """Return f plus the penalty of c."""
-        objective, c = self.objective, at.values
-        x = (at.evaluation.F - self.centre) / self.unit
-        merit = 0.5 * objective.effort * float(x @ x)
-        if objective.constrained:
-            return merit + price * _miss(c)
-        return merit + objective.linear * float(c.sum()) + 0.5 * objective.square * float(c @ c)
+        c = at.values
+        if self.objective.effort:
+            x = (at.evaluation.F - self.centre) / self.unit
+            return 0.5 * float(x @ x) + price * _miss(c)
+        return self.objective.linear * float(c.sum()) + 0.5 * self.objective.square * float(c @ c)
 
     def met(self, at: ConstraintValues) -> bool:
         """Check that c = 0, if this is required."""
-        return not self.objective.constrained or bool((abs(at.values) <= MET).all())
+        return not self.objective.effort or bool((abs(at.values) <= MET).all())
 
     def better(self, one: ConstraintValues, other: ConstraintValues) -> bool:
         """Check that one point is better than another by more than rounding."""
@@ -133,62 +125,21 @@ class Program:
         return a < b - MET * abs(b)
 
 
-@dataclass(frozen=True, eq=False)
-class SearchResult:
-    """Last point of a search, and the number of iterations."""
-
-    end: ConstraintValues
-    iterations: int
-
-
-class _Model(NamedTuple):
-    """f, c and the convex curvature of the Lagrangian, as functions of d = ΔF/size."""
-
-    size: float
-    g: Array
-    c: Array
-    G: Array
-    W: Array
-
-
-class _Bounds(NamedTuple):
-    """Trust-region radius in units of ``size``, and bounds (C,) [N]."""
-
-    radius: float
-    low: Array
-    high: Array
-
-
-class _Step(NamedTuple):
-    """Step d, multipliers of c and of the reserve, and predicted fall of the merit."""
-
-    d: Array
-    y: Array
-    z: float
-    predicted: float
-
-    @property
-    def length(self) -> float:
-        return float(abs(self.d).max(initial=0.0))
-
-
-def search(program: Program, start: Evaluation) -> SearchResult:
+def search(program: Program, start: Evaluation) -> ConstraintValues:
     """Find a local optimum from stable tensions; cross kinks of rigidities if better."""
     best = _search(program, start, in_piece=False)
-    iterations = best.iterations
     for _ in range(_CROSSINGS):
-        for F in _beyond_kinks(program.region, best.end.evaluation.F):
-            place = backtrack_to_stable(program.model, F, program.anchor)
+        for F in _beyond_kinks(program.region, best.evaluation.F):
+            place = backtrack_to_stable(F, program.anchor)
             if place is None:
                 continue
             other = _search(program, place, in_piece=True)
-            iterations += other.iterations
-            if program.better(other.end, best.end):
+            if program.better(other, best):
                 best = other
                 break
         else:
             break
-    return SearchResult(best.end, iterations)
+    return best
 
 
 def _beyond_kinks(region: Admissible, F: Array) -> Iterator[Array]:
@@ -201,21 +152,22 @@ def _beyond_kinks(region: Admissible, F: Array) -> Iterator[Array]:
         yield beyond
 
 
-def _search(program: Program, start: Evaluation, *, in_piece: bool) -> SearchResult:
+def _search(program: Program, start: Evaluation, *, in_piece: bool) -> ConstraintValues:
     """Find a local optimum; with ``in_piece`` only in the piece of the start."""
-    region, objective = program.region, program.objective
-    iterate = program.constraints.at(start)
-    y, z = np.zeros(iterate.values.size if objective.constrained else 0), 0.0
-    price, radius, iterations = _FIRST_PRICE, _FIRST_RADIUS, 0
+    region, iterate = program.region, program.constraints.at(start)
+    y, z = np.zeros(iterate.values.size if program.objective.effort else 0), 0.0
+    price, radius = _FIRST_PRICE, _FIRST_RADIUS
     in_piece = in_piece or not region.kinks
-    while iterations < _ITERATIONS and radius >= _SMALLEST_RADIUS:
-        iterations += 1
+    for _ in range(_ITERATIONS):
+        if radius < _SMALLEST_RADIUS:
+            break
+        start.model.iterations += 1
         low, high = region.piece(iterate.evaluation.F)
-        bounds = _Bounds(radius, *((low, high) if in_piece else (region.low, region.high)))
-        model = _model(program, iterate, y, z)
-        step, price = _step(program, iterate, model, price, bounds)
-        y, z = step.y, step.z
-        small = step.length <= _ARRIVED and bool((abs(model.c) <= _ARRIVED).all())
+        bounds = (low, high) if in_piece else (region.low, region.high)
+        local = _LocalModel(program, iterate, y, z, bounds, radius)
+        step = local.step(price, local.c)
+        y, z, price = step.y, step.z, step.price
+        small = step.length <= _ARRIVED and bool((abs(local.c) <= _ARRIVED).all())
         if small or step.predicted <= _ROUNDING * max(1.0, abs(program.merit(iterate, price))):
             if not in_piece:
                 in_piece = True
@@ -224,8 +176,8 @@ def _search(program: Program, start: Evaluation, *, in_piece: bool) -> SearchRes
             else:
                 break
             continue
-        candidate, fall = _take(program, iterate, model, step, price, bounds)
-        F = iterate.evaluation.F + model.size * step.d
+        candidate, fall = local.take(step)
+        F = iterate.evaluation.F + local.size * step.d
         if candidate is not None and fall >= 1e-4 * step.predicted:
             iterate = candidate
             if fall > 0.5 * step.predicted:
@@ -236,105 +188,130 @@ def _search(program: Program, start: Evaluation, *, in_piece: bool) -> SearchRes
             in_piece = True  # the model of this side of the kink fails on the other side
         else:
             radius = step.length / 4.0
-    return SearchResult(iterate, iterations)
+    return iterate
 
 
-def _model(program: Program, iterate: ConstraintValues, y: Array, z: float) -> _Model:
-    objective, region = program.objective, program.region
-    evaluation, c = iterate.evaluation, iterate.values
-    size = max(region.scale, float(evaluation.F.max()))
-    relative = size / program.unit
-    G = iterate.jacobian * size
-    weights = y if objective.constrained else objective.linear + objective.square * c
-    g = objective.effort * relative * (evaluation.F - program.centre) / program.unit
-    W = iterate.hessian(weights) * size**2
-    W[np.diag_indices(len(W))] += objective.effort * relative**2
-    if not objective.constrained:
-        # c is part of f, whose Hessian gets a Gauss-Newton term; no constraint is left
-        g = g + weights @ G
-        W += objective.square * G.T @ G
-        c, G = np.zeros(0), np.zeros((0, g.size))
-    held = G
-    if z > 0.0:  # stability was active: its curvature counts; steps that change the reserve do not
-        W -= z * size**2 / program.model.scale * evaluation.reserve_hessian()
-        held = np.vstack([G, evaluation.reserve_gradient])
-    return _Model(size, g, c, G, kernels.convex(W, region.null, held, _CURVATURE))
+class _Step(NamedTuple):
+    """Step d, multipliers of c and of the reserve, predicted fall of the merit, price of c."""
+
+    d: Array
+    y: Array
+    z: float
+    predicted: float
+    price: float
+
+    @property
+    def length(self) -> float:
+        return float(abs(self.d).max(initial=0.0))
 
 
-def _step(
-    program: Program, iterate: ConstraintValues, model: _Model, price: float, bounds: _Bounds
-) -> tuple[_Step, float]:
-    """Solve the quadratic program; return the step and the price of c that it needs."""
-    region, evaluation, size = program.region, iterate.evaluation, model.size
-    count, rank, m = model.g.size, len(region.rows), model.c.size
-    low = np.maximum(np.minimum((bounds.low - evaluation.F) / size, 0.0), -bounds.radius)
-    high = np.minimum(np.maximum((bounds.high - evaluation.F) / size, 0.0), bounds.radius)
-    stability = -evaluation.reserve_gradient * size / program.model.scale
-    # variables: d, s and t
-    size_of_x, misses = count + 2 * m, np.arange(count, count + 2 * m)
-    P, q = np.zeros((size_of_x, size_of_x)), np.append(model.g, np.zeros(2 * m))
-    A = np.zeros((rank + m, size_of_x))
-    P[:count, :count] = model.W
-    A[:rank, :count], A[rank:, :count] = region.rows, model.G
-    A[rank:, misses[:m]], A[rank:, misses[m:]] = -np.eye(m), np.eye(m)
-    b = np.append(region.imbalance(evaluation.F) / size, -model.c)
-    box = np.append(low, np.zeros(2 * m)), np.append(high, np.full(2 * m, np.inf))
-    cuts = (
-        np.append(stability, np.zeros(2 * m))[None],
-        np.array([max(evaluation.reserve, 0.0) / program.model.scale]),
-    )
-    best, miss = None, math.inf
-    while True:
-        P[misses, misses] = q[misses] = price
-        found = solve(P, q, (A, b), box, cuts)
-        if found is None:
-            break
-        before, miss = miss, float(found.x[misses].sum())
-        if best is not None and miss > 0.9 * before:
-            price /= 10.0  # the last rise did not help
-            break
-        best = found
-        if miss <= MET:
-            needed = _PREMIUM * float(abs(found.y[rank:]).max(initial=0.0))
-            price = max(_FIRST_PRICE, min(price, needed))
-            break
-        if price >= _LARGEST_PRICE:
-            break
-        price *= 10.0
-    if best is None:
-        return _Step(np.zeros(count), np.zeros(model.c.size), 0.0, 0.0), price
-    d = best.x[:count]
-    cheaper = _miss(model.c) - _miss(model.c + model.G @ d)
-    predicted = price * cheaper - float(model.g @ d + 0.5 * d @ model.W @ d)
-    return _Step(d, best.y[rank:], float(best.z[0]), predicted), price
+class _LocalModel:
+    """f, c and the convex curvature of the Lagrangian at an iterate, as functions of d = ΔF/size.
 
+    Args:
+        program: The nonlinear program.
+        iterate: The iterate.
+        y: Multipliers of c in the step before.
+        z: Multiplier of the reserve in the step before.
+        bounds: Bounds (C,) [N] of the tensions.
+        radius: Largest magnitude of an entry of d.
+    """
 
-def _take(
-    program: Program,
-    iterate: ConstraintValues,
-    model: _Model,
-    step: _Step,
-    price: float,
-    bounds: _Bounds,
-) -> tuple[ConstraintValues | None, float]:
-    """Evaluate a step; return the new point (None if unstable) and the fall of the merit."""
+    def __init__(
+        self,
+        program: Program,
+        iterate: ConstraintValues,
+        y: Array,
+        z: float,
+        bounds: tuple[Array, Array],
+        radius: float,
+    ) -> None:
+        objective, region, evaluation = program.objective, program.region, iterate.evaluation
+        self.program, self.iterate, self.bounds, self.radius = program, iterate, bounds, radius
+        self.size = size = max(region.scale, float(evaluation.F.max()))
+        c, G = iterate.values, iterate.jacobian * size
+        if objective.effort:
+            relative = size / program.unit
+            g = relative * (evaluation.F - program.centre) / program.unit
+            W = iterate.hessian(y) * size**2
+            W[np.diag_indices(len(W))] += relative**2
+        else:
+            # c is part of f, whose Hessian gets a Gauss-Newton term; no constraint is left
+            weights = objective.linear + objective.square * c
+            g = weights @ G
+            W = iterate.hessian(weights) * size**2 + objective.square * G.T @ G
+            c, G = np.zeros(0), np.zeros((0, g.size))
+        held = G
+        if z > 0.0:  # stability was active: its curvature counts, on steps that keep the reserve
+            W -= z * size**2 / evaluation.model.scale * evaluation.reserve_hessian()
+            held = np.vstack([G, evaluation.reserve_gradient])
+        self.g, self.c, self.G = g, c, G
+        self.W = kernels.convex(W, region.null, held, _CURVATURE)
 
-    def after(d: Array) -> tuple[ConstraintValues | None, float]:
-        F = np.clip(iterate.evaluation.F + model.size * d, bounds.low, bounds.high)
-        evaluation = backtrack_to_stable(program.model, F, program.anchor)
+    def step(self, price: float, c: Array) -> _Step:
+        """Solve the quadratic program for a value of c, at the price that it needs."""
+        region, evaluation, size = self.program.region, self.iterate.evaluation, self.size
+        count, rank, m = self.g.size, len(region.rows), c.size
+        low, high = ((bound - evaluation.F) / size for bound in self.bounds)
+        scale, none = evaluation.model.scale, np.zeros(2 * m)
+        # variables: d, s and t
+        misses = np.arange(count, count + 2 * m)
+        P, q = np.zeros((count + 2 * m, count + 2 * m)), np.append(self.g, none)
+        A = np.zeros((rank + m, count + 2 * m))
+        P[:count, :count] = self.W
+        A[:rank, :count], A[rank:, :count] = region.rows, self.G
+        A[rank:, misses[:m]], A[rank:, misses[m:]] = -np.eye(m), np.eye(m)
+        b = np.append(region.imbalance(evaluation.F) / size, -c)
+        box = (
+            np.append(np.maximum(np.minimum(low, 0.0), -self.radius), none),
+            np.append(np.minimum(np.maximum(high, 0.0), self.radius), none + np.inf),
+        )
+        stability = np.append(-evaluation.reserve_gradient * size / scale, none)
+        cuts = stability[None], np.array([max(evaluation.reserve, 0.0) / scale])
+        best, miss = None, math.inf
+        while True:
+            P[misses, misses] = q[misses] = price
+            found = solve(P, q, (A, b), box, cuts)
+            if found is None:
+                break
+            before, miss = miss, float(found.x[misses].sum())
+            if best is not None and miss > 0.9 * before:
+                price /= 10.0  # the last rise did not help
+                break
+            best = found
+            if miss <= MET:
+                needed = _PREMIUM * float(abs(found.y[rank:]).max(initial=0.0))
+                price = max(_FIRST_PRICE, min(price, needed))
+                break
+            if price >= _LARGEST_PRICE:
+                break
+            price *= 10.0
+        if best is None:
+            return _Step(np.zeros(count), np.zeros(m), 0.0, 0.0, price)
+        d = best.x[:count]
+        cheaper = _miss(c) - _miss(c + self.G @ d)
+        predicted = price * cheaper - float(self.g @ d + 0.5 * d @ self.W @ d)
+        return _Step(d, best.y[rank:], float(best.z[0]), predicted, price)
+
+    def take(self, step: _Step) -> tuple[ConstraintValues | None, float]:
+        """Evaluate a step; return the new point (None if unstable) and the fall of the merit."""
+        candidate, fall = self._after(step.d, step.price)
+        if candidate is not None and fall < 0.75 * step.predicted and self.c.size:
+            # second-order correction: the value of c after the step, not that of its tangent
+            corrected = self.step(step.price, candidate.values - self.G @ step.d)
+            other, more = self._after(corrected.d, step.price)
+            if more > fall:
+                return other, more
+        return candidate, fall
+
+    def _after(self, d: Array, price: float) -> tuple[ConstraintValues | None, float]:
+        program, iterate = self.program, self.iterate
+        F = np.clip(iterate.evaluation.F + self.size * d, *self.bounds)
+        evaluation = backtrack_to_stable(F, program.anchor)
         if evaluation is None:
             return None, -math.inf
         candidate = program.constraints.at(evaluation)
         return candidate, program.merit(iterate, price) - program.merit(candidate, price)
-
-    candidate, fall = after(step.d)
-    if candidate is not None and fall < 0.75 * step.predicted and model.c.size:
-        # second-order correction: the value of c after the step, not that of its tangent
-        corrected = model._replace(c=candidate.values - model.G @ step.d)
-        other, more = after(_step(program, iterate, corrected, price, bounds)[0].d)
-        if more > fall:
-            return other, more
-    return candidate, fall
 
 
 def _miss(c: Array) -> float:

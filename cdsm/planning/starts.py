@@ -43,6 +43,7 @@ class StartPoints:
     def __init__(
         self, model: StiffnessModel, region: Admissible, directions: int, seed: int
     ) -> None:
+        self._seed = seed
         least = region.least.values
         size = max(region.scale, float(region.high.max()))
         random = np.random.default_rng(seed).normal(size=(directions, least.size))
@@ -66,17 +67,17 @@ class StartPoints:
             stable = (point for point in points[known + 1 :] if point.reserve > 0.0)
             self.anchor = next(stable, None) or _stabilize(model, region, self.anchor)
         drawn = [
-            point if point.reserve >= 0.0 else backtrack_to_stable(model, point.F, self.anchor)
+            point if point.reserve >= 0.0 else backtrack_to_stable(point.F, self.anchor)
             for point in points[1:]
         ]
         self._known = [self.anchor, *(point for point in drawn[:known] if point is not None)]
         self.points = [*self._known, *(point for point in drawn[known:] if point is not None)]
 
-    def between(self, count: int, seed: int) -> Iterator[Evaluation]:
+    def between(self, count: int) -> Iterator[Evaluation]:
         """Return up to ``count`` random stable points between the corners of the cables."""
-        shares = np.random.default_rng(seed).dirichlet(np.ones(len(self._known)), count)
+        shares = np.random.default_rng(self._seed).dirichlet(np.ones(len(self._known)), count)
         for F in shares @ np.array([point.F for point in self._known]):
-            point = backtrack_to_stable(self.anchor.model, F, self.anchor)
+            point = backtrack_to_stable(F, self.anchor)
             if point is not None:
                 yield point
 

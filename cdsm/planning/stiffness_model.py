@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import brentq
@@ -30,12 +31,13 @@ class StiffnessModel:
         scale: Largest magnitude of an eigenvalue of K_θ under the least tensions [N m/rad].
         floor: Smallest eigenvalue of K_θ that counts as stable [N m/rad].
         evaluations: Number of evaluations of K_θ.
+        iterations: Number of iterations of all searches.
     """
 
     def __init__(self, region: Admissible, margin: float) -> None:
         self.pose = pose = region.least.posture
         self.region = region
-        self.evaluations = 0
+        self.evaluations = self.iterations = 0
         # products with the cached tensor are faster than a loop over the cables
         self.geometry = pose.length_hessian, pose.length_jacobian
         load = load_stiffness(pose.jacobian, region.least.wrench, pose.arm._model.masses.tip_joints)
@@ -74,6 +76,10 @@ class Evaluation:
         """dk/dF (C,) [1/m] and d²k/dF² (C,) [1/(N m)]."""
         return self.model.pose.arm._model.laws.slopes(self.F, self._springs)
 
+    def torques(self, motion: Array) -> Array:
+        """Return (∂K_θ/∂F_c) m (C, nv, r) for the columns m of a joint motion (nv, r)."""
+        return kernels.torques_by_tension(*self.model.geometry, self.spring_slopes[0], motion)
+
     @property
     def reserve(self) -> float:
         """λ_min minus the floor [N m/rad]. The arm is stable if it is not negative."""
@@ -105,14 +111,14 @@ class Evaluation:
         return result
 
 
-def backtrack_to_stable(model: StiffnessModel, F: Array, anchor: Evaluation) -> Evaluation | None:
+def backtrack_to_stable(F: Array, anchor: Evaluation) -> Evaluation | None:
     """Find the first stable point on the line from tensions F (C,) [N] to an anchor, or None."""
-    start = model.at(F)
+    start = anchor.model.at(F)
     if start.reserve >= 0.0:
         return start
 
     def on_the_way(part: float) -> Evaluation:
-        return model.at(F + part * (anchor.F - F))
+        return anchor.model.at(F + part * (anchor.F - F))
 
     # a concave reserve is above its chord, so it is zero before its chord
     far = start.reserve / (start.reserve - anchor.reserve) if anchor.reserve > 0.0 else 1.0
@@ -128,9 +134,8 @@ def backtrack_to_stable(model: StiffnessModel, F: Array, anchor: Evaluation) -> 
     return None
 
 
-@dataclass(frozen=True, eq=False)
-class Constraint:
-    """Constraint values E_j : X [-] of one tip stiffness X = (R K_θ⁻¹ Rᵀ)⁻¹."""
+class Constraint(NamedTuple):
+    """Values E_j : X [-] of one tip stiffness X = (R K_θ⁻¹ Rᵀ)⁻¹."""
 
     rows: Array  # R (r, nv) [m/rad]
     weights: Array  # E (n, r, r) [m/N]
@@ -138,10 +143,17 @@ class Constraint:
 
 @dataclass(frozen=True, eq=False)
 class Constraints:
-    """c(F): values of all constraints minus their targets, to be zero."""
+    """c(F): values of all constraints minus their targets, to be zero.
+
+    Attributes:
+        parts: The constraints.
+        targets: Their targets (n,) [-].
+        single: u (3,) and the target [N/m] if this is one direction, else None.
+    """
 
     parts: tuple[Constraint, ...]
-    targets: Array  # (n,) [-]
+    targets: Array
+    single: tuple[Array, float] | None = None
 
     def at(self, evaluation: Evaluation) -> ConstraintValues:
         """Return the constraint values c at stable tensions."""
@@ -164,61 +176,47 @@ class ConstraintValues:
 
     def __init__(self, constraints: Constraints, evaluation: Evaluation) -> None:
         self.evaluation = evaluation
-        self._parts = [_TipStiffness(part, evaluation) for part in constraints.parts]
-        self.values: Array = (
-            np.concatenate([part.values for part in self._parts]) - constraints.targets
-        )
+        self._parts = constraints.parts
+        self._tips = [kernels.tip_stiffness(evaluation.K, part.rows) for part in self._parts]
+        values = [
+            part.weights.reshape(-1, X.size) @ X.ravel()
+            for part, (X, *_) in zip(self._parts, self._tips, strict=True)
+        ]
+        self.values: Array = np.concatenate(values) - constraints.targets
+
+    @cached_property
+    def _torques(self) -> list[Array]:
+        """(∂K_θ/∂F_c) M (C, nv, r) of each part."""
+        return [self.evaluation.torques(right) for _, right, _, _ in self._tips]
 
     @cached_property
     def jacobian(self) -> Array:
         """∂c/∂F (n, C) [1/N]."""
-        return np.concatenate([part.jacobian() for part in self._parts])
+        each = zip(self._parts, self._tips, self._torques, strict=True)
+        return np.concatenate(
+            [
+                kernels.constraint_jacobian(part.weights, left, torques)
+                for part, (_, _, left, _), torques in each
+            ]
+        )
 
     def hessian(self, y: Array) -> Array:
         """Return the second derivative of y · c by the tensions (C, C) [1/N²] for y (n,)."""
-        total, first = np.zeros((self.evaluation.F.size,) * 2), 0
-        for part in self._parts:
-            last = first + part.values.size
-            total += part.hessian(y[first:last])
+        evaluation = self.evaluation
+        total, first = np.zeros((evaluation.F.size,) * 2), 0
+        each = zip(self._parts, self._tips, self._torques, strict=True)
+        for (rows, weights), (X, right, left, inverse), torques in each:
+            last = first + len(weights)
+            total += kernels.constraint_hessian(
+                (y[first:last] @ weights.reshape(-1, X.size)).reshape(X.shape),
+                inverse,
+                rows,
+                left,
+                right,
+                evaluation.torques(left),
+                torques,
+                evaluation.model.pose.length_jacobian,
+                evaluation.spring_slopes[1],
+            )
             first = last
         return total
-
-
-class _TipStiffness:
-    """One constraint at stable tensions."""
-
-    def __init__(self, constraint: Constraint, evaluation: Evaluation) -> None:
-        self.constraint = constraint
-        self.evaluation = evaluation
-        X, self.right, self.left, self.inverse = kernels.tip_stiffness(
-            evaluation.K, constraint.rows
-        )
-        self.values: Array = constraint.weights.reshape(-1, X.size) @ X.ravel()
-
-    def _torques(self, motion: Array) -> Array:
-        """Return (∂K_θ/∂F_c) m (C, nv, r) for the columns m of a joint motion (nv, r)."""
-        evaluation = self.evaluation
-        return kernels.torques_by_tension(
-            *evaluation.model.geometry, evaluation.spring_slopes[0], motion
-        )
-
-    @cached_property
-    def _right_torques(self) -> Array:
-        return self._torques(self.right)
-
-    def jacobian(self) -> Array:
-        return kernels.constraint_jacobian(self.constraint.weights, self.left, self._right_torques)
-
-    def hessian(self, y: Array) -> Array:
-        weights = self.constraint.weights
-        return kernels.constraint_hessian(
-            (y @ weights.reshape(y.size, -1)).reshape(weights.shape[1:]),
-            self.inverse,
-            self.constraint.rows,
-            self.left,
-            self.right,
-            self._torques(self.left),
-            self._right_torques,
-            self.evaluation.model.pose.length_jacobian,
-            self.evaluation.spring_slopes[1],
-        )

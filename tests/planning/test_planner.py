@@ -55,11 +55,11 @@ def test_what_a_search_has_met_beyond_the_range_widens_it(
     true = range_ends
 
     def narrow(*given: Any) -> Any:
-        end, _, iterations = true(*given)
-        return end, end, iterations
+        end, _ = true(*given)
+        return end, end
 
     monkeypatch.setattr(planner, "range_ends", narrow)
-    monkeypatch.setattr(Planner, "least", lambda self: None)
+    monkeypatch.setattr(Planner, "_starts", lambda self: iter(()))
     plan = cdsm.plan_stiffness(pose, DOWN, target, low, high)
     assert plan.achieved == pytest.approx(target, rel=1e-9)
     with pytest.raises(cdsm.UnreachableStiffness) as caught:

@@ -21,15 +21,15 @@ def at_kinks(seed: int) -> tuple[StiffnessModel, Program]:
     anchor = model.at(cdsm.distribute_tension(pose, 30.0).values)
     target = cdsm.stiffness(pose, anchor.F).along(UP[0])
     constraints = along_constraints(model, UP, np.array([target]))
-    return model, Program(model, model.region, anchor, constraints, EFFORT, 30.0)
+    return model, Program(model.region, anchor, constraints, EFFORT, 30.0)
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_no_feasible_step_has_less_effort_not_even_across_a_kink(seed: int) -> None:
     model, program = at_kinks(seed)
     found = search(program, program.anchor)
-    F = found.end.evaluation.F
-    assert abs(found.end.values).max() <= MET
+    F = found.evaluation.F
+    assert abs(found.values).max() <= MET
     assert abs(model.region.imbalance(F)).max() < 1e-9 * F.max()
     rng, tried = np.random.default_rng(seed), 0
     for size in (0.3, 1e-2, 1e-3):
@@ -52,7 +52,7 @@ def test_some_optima_are_at_kinks_and_found_from_either_side() -> None:
         ends = []
         for minimum in (15.0, 30.0, 40.0):
             F = cdsm.distribute_tension(model.pose, minimum).values
-            ends.append(search(program, model.at(F)).end.evaluation.F)
+            ends.append(search(program, model.at(F)).evaluation.F)
         np.testing.assert_allclose(ends[1:], [ends[0]] * 2, rtol=1e-6)
         met += int((abs(ends[0] - KINK) < 1e-9 * KINK).sum())
     assert met > 0
@@ -62,7 +62,7 @@ def test_other_objectives() -> None:
     model, program = at_kinks(1)
     start = program.anchor
     for objective, better in ((HIGHEST, -1.0), (NEAREST, 0.0)):
-        other = Program(model, model.region, start, program.constraints, objective, 30.0)
-        end = search(other, model.at(cdsm.distribute_tension(model.pose, 15.0).values)).end
+        other = Program(model.region, start, program.constraints, objective, 30.0)
+        end = search(other, model.at(cdsm.distribute_tension(model.pose, 15.0).values))
         value = float(end.values[0])
         assert value > 0.0 if better else abs(value) < 1e-6

@@ -62,5 +62,5 @@ def test_random_starts_go_on_from_fewer() -> None:
     np.testing.assert_array_equal(few.anchor.F, many.anchor.F)
     starts = [each.F for each in few.points]
     np.testing.assert_array_equal(starts, [each.F for each in many.points[: len(starts)]])
-    inside = [[each.F for each in begin.between(n, 0)] for begin, n in ((few, 4), (many, 9))]
+    inside = [[each.F for each in begin.between(n)] for begin, n in ((few, 4), (many, 9))]
     np.testing.assert_array_equal(inside[0], inside[1][: len(inside[0])])

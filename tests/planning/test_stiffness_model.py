@@ -83,10 +83,10 @@ def test_derivatives_are_those_of_the_values(model: StiffnessModel) -> None:
 def test_way_back_ends_where_stability_begins() -> None:
     model = stiffness_model(soft_hinge().at([0.0]), 10.0, 1000.0, np.zeros(6), 1e-4)
     anchor = model.at(np.full(2, 100.0))
-    edge = backtrack_to_stable(model, np.full(2, 900.0), anchor)
+    edge = backtrack_to_stable(np.full(2, 900.0), anchor)
     assert edge is not None
     assert 0.0 <= edge.reserve < 1e-9 * model.scale
-    inside = backtrack_to_stable(model, np.full(2, 50.0), anchor)
+    inside = backtrack_to_stable(np.full(2, 50.0), anchor)
     assert inside is not None
     np.testing.assert_array_equal(inside.F, 50.0)
-    assert backtrack_to_stable(model, np.full(2, 900.0), model.at(np.full(2, 800.0))) is None
+    assert backtrack_to_stable(np.full(2, 900.0), model.at(np.full(2, 800.0))) is None
