@@ -222,13 +222,8 @@ class Stiffness(ReadOnlyState):
             SingularStiffness: The stiffness along u is infinite, or K_θ is singular.
         """
         u = unit_direction("direction", direction)
+        self._require_mobile(u)
         stiffness, motion = self._along(u)
-        if math.isinf(stiffness):
-            raise SingularStiffness(
-                f"the tip cannot move along {coordinates(u)}: nothing carries an infinite "
-                "stiffness.",
-                u,
-            )
         motion = motion * stiffness
         pose = self.posture
         return Shares(
@@ -293,9 +288,14 @@ class Stiffness(ReadOnlyState):
         unit = self.posture.arm.stiffness_unit()
         return f"{state}, smallest joint stiffness {self.margin:.4g} {unit} ({MODEL})"
 
-    def _moves(self, u: Array) -> bool:
-        """Check whether a force along a unit direction u (3,) moves any joint."""
-        return readings.moves(self.posture.jacobian, u[None])
+    def _require_mobile(self, u: Array) -> None:
+        """Raise SingularStiffness if a force along a unit direction u (3,) moves no joint."""
+        if not readings.moves(self.posture.jacobian, u[None]):
+            raise SingularStiffness(
+                f"the tip cannot move along {coordinates(u)}: the stiffness there "
+                "is infinite under any tension. Choose another direction, or bend the arm.",
+                u,
+            )
 
     def _along(self, u: Array) -> tuple[float, Array]:
         """Return stiffness along a unit direction [N/m] and joint motion per unit force (nv,)."""

@@ -41,8 +41,7 @@ class Admissible:
     """Tensions F with J_Lᵀ F = τ and low ≤ F ≤ high, in the domains of their elasticities.
 
     Attributes:
-        least: The least admissible tensions (Eq. 17).
-        bounds: Bounds (C,) [N] that the caller gave.
+        least: The least admissible tensions (Eq. 17), with the bounds of the caller.
         low: Lower bounds (C,) [N], including the domains.
         high: Upper bounds (C,) [N], including the domains; may hold inf.
         scale: Size of the least tensions [N].
@@ -51,7 +50,6 @@ class Admissible:
     """
 
     least: Tension
-    bounds: tuple[Array, Array]
     low: Array
     high: Array
     scale: float
@@ -110,12 +108,8 @@ class Admissible:
             return None
         moved = (least - self.least.values) @ self.least.posture.length_jacobian
         residual = frozen(self.least.residual + moved)
-        return replace(
-            self,
-            least=replace(self.least, values=frozen(least), residual=residual),
-            low=low,
-            high=high,
-        )
+        tension = replace(self.least, values=frozen(least), residual=residual)
+        return replace(self, least=tension, low=low, high=high)
 
     def tension(self, F: Array) -> Tension:
         """Convert tensions F (C,) [N] to a :class:`Tension` whose balance is exact again."""
@@ -123,14 +117,8 @@ class Admissible:
         exact = self.nearest(F, *self.piece(F))  # removes the rounding of short steps
         F = F if exact is None else exact
         torque = least.values @ least.posture.length_jacobian - least.residual
-        return replace(
-            least,
-            values=frozen(F),
-            minimum=self.bounds[0],
-            maximum=self.bounds[1],
-            residual=frozen(F @ least.posture.length_jacobian - torque),
-            least=False,
-        )
+        residual = frozen(F @ least.posture.length_jacobian - torque)
+        return replace(least, values=frozen(F), residual=residual, least=False)
 
 
 def admissible(
@@ -144,30 +132,30 @@ def admissible(
         ElasticityRangeError: The bounds and the domain of an elasticity do not overlap.
     """
     least = distribute_tension(pose, minimum, maximum, wrench)
-    bounds = least.minimum, least.maximum
-    cables = pose.arm.cables
+    minimum, maximum, cables = least.minimum, least.maximum, pose.arm.cables
     # a force-controlled cable does not use its elasticity, so its domain does not matter
     held = np.array([cable.control == "position" for cable in cables])
     first = np.array([cable.elasticity.domain.first for cable in cables])
     last = np.array([cable.elasticity.domain.high for cable in cables])
-    low = np.where(held, np.maximum(bounds[0], first), bounds[0])
-    high = np.where(held, np.minimum(bounds[1], last), bounds[1])
-    outside = np.flatnonzero(low > high).tolist()
-    if outside:
-        raise _no_domain_left(least, outside)
+    low = np.where(held, np.maximum(minimum, first), minimum)
+    high = np.where(held, np.minimum(maximum, last), maximum)
+    outside = np.flatnonzero(low > high)
+    if outside.size:
+        raise ElasticityRangeError(
+            f"nothing between minimum and maximum is in the domain "
+            f"{cables[outside[0]].elasticity.domain} of the elasticity. Change minimum= or "
+            "maximum=, or use an elasticity that covers them.",
+            np.where(maximum < first, maximum, minimum)[outside].tolist(),
+            outside.tolist(),
+            [cables[c].name for c in outside],
+        )
     if ((least.values < low) | (least.values > high)).any():
         least = distribute_tension(pose, low, high, wrench)
+        least = replace(least, minimum=minimum, maximum=maximum)
     _, values, right = np.linalg.svd(pose.length_jacobian.T)
     rank = int((values > _FLAT * values.max(initial=0.0)).sum())
-    return Admissible(
-        least=least,
-        bounds=bounds,
-        low=low,
-        high=high,
-        scale=float(least.values.max()) or 1.0,
-        rows=right[:rank].copy(),
-        null=right[rank:].T.copy(),
-    )
+    scale = float(least.values.max()) or 1.0
+    return Admissible(least, low, high, scale, right[:rank].copy(), right[rank:].T.copy())
 
 
 def solve(
@@ -201,18 +189,3 @@ def solve(
     if abs(A @ x - b).max(initial=0.0) > _KEPT:  # the solver does not always notice
         return None
     return Optimum(x, info["lam"][last:], info["lam"][first:last])
-
-
-def _no_domain_left(least: Tension, outside: list[int]) -> ElasticityRangeError:
-    cables = [least.posture.arm.cables[c] for c in outside]
-    domains = [cable.elasticity.domain for cable in cables]
-    return ElasticityRangeError(
-        f"nothing between minimum and maximum is in the domain {domains[0]} of the elasticity. "
-        "Change minimum= or maximum=, or use an elasticity that covers them.",
-        [
-            least.maximum[c] if least.maximum[c] < domain.first else least.minimum[c]
-            for c, domain in zip(outside, domains, strict=True)
-        ],
-        outside,
-        [cable.name for cable in cables],
-    )

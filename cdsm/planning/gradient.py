@@ -16,10 +16,8 @@ from typing import final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm.errors import SingularStiffness
 from cdsm.planning.kernels import form_by_tension
 from cdsm.stiffness_matrix import Stiffness
-from cdsm.support.format import coordinates
 from cdsm.support.validation import Array, ReadOnlyState, frozen, instance, unit_direction
 
 
@@ -75,10 +73,9 @@ class StiffnessGradient(ReadOnlyState):
             SingularStiffness: The stiffness along u is infinite, or K_θ is singular.
         """
         u = unit_direction("direction", direction)
-        value = self.stiffness.along(u)
-        require_finite(value, u)
+        self.stiffness._require_mobile(u)
         rows = u[None] @ self.stiffness.posture.jacobian[:3]
-        return frozen(self._through(rows, np.array([[value]]))[:, 0, 0])
+        return frozen(self._through(rows, np.array([[self.stiffness.along(u)]]))[:, 0, 0])
 
     def _through(self, rows: Array, X: Array) -> Array:
         """Return ∂X/∂F (C, r, r) of tip stiffness X (r, r) for rows (r, nv) of the tip Jacobian."""
@@ -112,13 +109,3 @@ def stiffness_gradient(stiffness: Stiffness) -> StiffnessGradient:
     K = instance("stiffness", stiffness, Stiffness)
     slope, _ = K.posture.arm._model.laws.slopes(K.tension, K.cable_stiffness)
     return StiffnessGradient(stiffness=K, cable_stiffness=slope)
-
-
-def require_finite(value: float, u: Array) -> None:
-    """Raise SingularStiffness if the stiffness along u is infinite: the tip cannot move along u."""
-    if not np.isfinite(value):
-        raise SingularStiffness(
-            f"the tip cannot move along {coordinates(u)}: the stiffness there "
-            "is infinite under any tension. Choose another direction, or bend the arm.",
-            u,
-        )

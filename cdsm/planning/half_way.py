@@ -56,38 +56,25 @@ def half_way(
 
     ``unstrained``: mean l_0 (H,) [m] of position-controlled cables; ``target``: mean target [N/m].
     """
+    K, value, off, reason = None, None, math.inf, ""
     try:
-        K = _at_rest(ends, unstrained)
-        value = achieved(K, directions)
+        rest = _at_rest(ends, unstrained)
+        value = achieved(rest, directions)
+        K, off = rest, misfit(value, target, directions)
     except CdsmError as error:
-        return HalfWay(
-            index=index,
-            target=target,
-            stiffness=None,
-            achieved=None,
-            misfit=math.inf,
-            reason=f"{error} Or take smaller steps.",
-        )
+        reason = f"{error} Or take smaller steps."
     return HalfWay(
-        index=index,
-        target=target,
-        stiffness=K,
-        achieved=value,
-        misfit=misfit(value, target, directions),
+        index=index, target=target, stiffness=K, achieved=value, misfit=off, reason=reason
     )
 
 
 def _at_rest(ends: tuple[Stiffness, Stiffness], unstrained: Array) -> Stiffness:
     """Compute K_θ at the equilibrium near the mean posture."""
-    q, F, W = (
-        frozen((a + b) / 2.0)
-        for a, b in (
-            (ends[0].posture.q, ends[1].posture.q),
-            (ends[0].tension, ends[1].tension),
-            (ends[0].wrench, ends[1].wrench),
-        )
-    )
-    arm = ends[0].posture.arm
+    one, other = ends
+    q = (one.posture.q + other.posture.q) / 2.0
+    F = frozen((one.tension + other.tension) / 2.0)
+    W = frozen((one.wrench + other.wrench) / 2.0)
+    arm = one.posture.arm
     mean = arm.at(q)
     # lock the cables at their mean tension, inside every domain; no posture has these lengths
     lengths = mean.cable_lengths.copy()
@@ -98,12 +85,8 @@ def _at_rest(ends: tuple[Stiffness, Stiffness], unstrained: Array) -> Stiffness:
     search = find_rest(loaded, loaded.at(mean, F))
     K = search.state.K
     if not (search.converged and search.convex):
-        worst = int(abs(K.residual).argmax())
-        raise EquilibriumError(
-            "half-way the arm buckles, or finds no place to rest",
-            frozen(K.residual),
-            0.0,
-            arm.joint_names[worst],
-        )
+        problem = "half-way the arm buckles, or finds no place to rest"
+        worst = arm.joint_names[int(abs(K.residual).argmax())]
+        raise EquilibriumError(problem, frozen(K.residual), 0.0, worst)
     loaded.require_domains(K.tension)
     return K

@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike
 from cdsm.errors import InvalidInput, SingularStiffness
 from cdsm.manipulator import Manipulator
 from cdsm.planning.admissible import admissible
-from cdsm.planning.gradient import require_finite
 from cdsm.planning.stiffness_model import Constraint, Constraints, StiffnessModel
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness, stiffness
@@ -21,7 +20,6 @@ from cdsm.support.validation import (
     instance,
     number_array,
     scalar,
-    unit_direction,
     whole_number,
 )
 
@@ -61,15 +59,6 @@ def checked_starts(starts: object, seed: object) -> tuple[int, int]:
     return whole_number("starts", starts, 1, _MOST_STARTS), whole_number("seed", seed, 0)
 
 
-def checked_direction(model: StiffnessModel, direction: ArrayLike) -> Array:
-    """Check that the tip can move along a direction; return it as a unit vector (3,)."""
-    u = unit_direction("direction", direction)
-    # this depends on the posture only, so any tensions serve
-    if not stiffness(model.pose, model.region.least)._moves(u):
-        require_finite(np.inf, u)
-    return u
-
-
 def target_constraints(
     model: StiffnessModel, directions: Array | None, target: Array
 ) -> Constraints:
@@ -78,23 +67,18 @@ def target_constraints(
         _ = stiffness(model.pose, model.region.least).cartesian  # raises if it does not exist
         return cartesian_constraints(model, target)
     for u in directions.reshape(-1, 3):
-        checked_direction(model, u)
+        stiffness(model.pose, model.region.least)._require_mobile(u)
     found = along_constraints(model, directions.reshape(-1, 3), target.reshape(-1))
     return replace(found, single=(directions, float(target))) if directions.ndim == 1 else found
 
 
-def along_constraint(model: StiffnessModel, direction: Array, unit: float) -> Constraint:
-    """Build the constraint of the stiffness along a direction (3,), divided by a unit [N/m]."""
-    rows = direction[None] @ model.pose.jacobian[:3]
-    return Constraint(rows, np.full((1, 1, 1), 1.0 / unit))
-
-
 def along_constraints(model: StiffnessModel, directions: Array, targets: Array) -> Constraints:
     """Build the constraints along/target − 1 for directions (m, 3) and targets (m,) [N/m]."""
-    pairs = zip(directions, targets.tolist(), strict=True)
-    return Constraints(
-        tuple(along_constraint(model, u, target) for u, target in pairs), np.ones(targets.size)
+    parts = tuple(
+        Constraint(u[None] @ model.pose.jacobian[:3], np.full((1, 1, 1), 1.0 / target))
+        for u, target in zip(directions, targets.tolist(), strict=True)
     )
+    return Constraints(parts, np.ones(targets.size))
 
 
 def cartesian_constraints(model: StiffnessModel, target: Array) -> Constraints:
@@ -140,38 +124,35 @@ def unstable(arm: Manipulator, problem: str, mode: Array) -> SingularStiffness:
     return SingularStiffness(f"{problem}; it gives way mostly in {joint}. {remedy}", frozen(mode))
 
 
-def checked_targets(directions: Array, target: ArrayLike) -> Array:
-    """Check that there is one positive target for each direction, () or (m,) [N/m]."""
+def checked_targets(directions: Array | None, target: ArrayLike) -> Array:
+    """Check the targets at one posture, () or (m,), or (3, 3) without a direction [N/m]."""
     targets = number_array("target", target)
-    if targets.shape != directions.shape[:-1]:
+    if directions is None and targets.shape != (3, 3):
+        raise InvalidInput(
+            "target", f"shape {targets.shape} given without a direction; (3, 3) is needed [N/m]."
+        )
+    if directions is not None and targets.shape != directions.shape[:-1]:
         raise InvalidInput(
             "target",
             f"shape {targets.shape} given for {directions.size // 3} direction(s) of shape "
             f"{directions.shape}; give one stiffness [N/m] for each, {directions.shape[:-1]}, or "
             "direction=None with the (3, 3) of cartesian.",
         )
-    return frozen(checked_positive(targets))
+    check_positive(directions, targets)
+    return frozen(targets)
 
 
-def checked_positive(targets: Array) -> Array:
-    """Check that all targets [N/m] are positive and large enough to divide by."""
-    if not (targets >= SMALLEST).all():
-        raise InvalidInput(
-            "target",
-            f"{targets.min():g} N/m given; stiffness is positive, at least {SMALLEST:g} N/m.",
-        )
-    return targets
-
-
-def checked_matrix(target: ArrayLike) -> Array:
-    """Check that a target (3, 3) [N/m] is symmetric and positive definite."""
-    matrix = number_array("target", target)
-    if matrix.shape != (3, 3):
-        raise InvalidInput(
-            "target", f"shape {matrix.shape} given without a direction; (3, 3) is needed [N/m]."
-        )
-    if abs(matrix - matrix.T).max() > _SYMMETRIC * abs(matrix).max():
-        raise InvalidInput("target", "is not symmetric, which a stiffness matrix is.")
-    if not np.linalg.eigvalsh(matrix)[0] >= SMALLEST:
-        raise InvalidInput("target", "is not positive definite, which a stiffness matrix is.")
-    return frozen(matrix)
+def check_positive(directions: Array | None, targets: Array) -> None:
+    """Check that targets along directions are positive, or that (…, 3, 3) are positive definite."""
+    if directions is not None:
+        if not (targets >= SMALLEST).all():
+            raise InvalidInput(
+                "target",
+                f"{targets.min():g} N/m given; stiffness is positive, at least {SMALLEST:g} N/m.",
+            )
+        return
+    for matrix in targets.reshape(-1, 3, 3):
+        if abs(matrix - matrix.T).max() > _SYMMETRIC * abs(matrix).max():
+            raise InvalidInput("target", "is not symmetric, which a stiffness matrix is.")
+        if not np.linalg.eigvalsh(matrix)[0] >= SMALLEST:
+            raise InvalidInput("target", "is not positive definite, which a stiffness matrix is.")

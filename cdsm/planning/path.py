@@ -28,9 +28,8 @@ from cdsm.manipulator import Manipulator
 from cdsm.planning.follow import Follower, Sample, Status
 from cdsm.planning.objectives import (
     achieved,
+    check_positive,
     checked_margin,
-    checked_matrix,
-    checked_positive,
     checked_starts,
     stiffness_model,
     target_constraints,
@@ -130,7 +129,9 @@ def plan_path(
         raise InvalidInput("guess", "given with angles=, which need none; drop it, or give tips=.")
     size = len(path)
     directions = None if direction is None else unit_directions("direction", direction)
-    targets = _checked_targets(directions, target, size)
+    tail = (3, 3) if directions is None else directions.shape[:-1]
+    targets = _per_sample("target", target, tail, size)
+    check_positive(directions, targets)
     loads = _per_sample("wrench", wrench, (6,), size)
     limit = bound("rate", rate, len(arm.cables))
     if not (limit > 0.0).all():
@@ -195,18 +196,6 @@ def _checked_path(arm: Manipulator, angles: ArrayLike | None, tips: ArrayLike | 
             name, f"shape {path.shape} given; (S, {width}) is needed, {meaning} for each sample."
         )
     return frozen(path)
-
-
-def _checked_targets(directions: Array | None, target: ArrayLike, size: int) -> Array:
-    """Check the targets [N/m] and return one per sample: (S,), (S, n) or (S, 3, 3)."""
-    tail = (3, 3) if directions is None else directions.shape[:-1]
-    targets = _per_sample("target", target, tail, size)
-    if directions is None:
-        for matrix in targets:
-            checked_matrix(matrix)
-    else:
-        checked_positive(targets)
-    return targets
 
 
 def _per_sample(name: str, value: ArrayLike, tail: tuple[int, ...], size: int) -> Array:

@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike
 
 from cdsm.planning.objectives import (
     achieved,
-    checked_matrix,
     checked_starts,
     checked_targets,
     misfit,
@@ -145,12 +144,8 @@ def plan_stiffness(
     """
     model = stiffness_model(pose, minimum, maximum, wrench, margin)
     number, seed = checked_starts(starts, seed)
-    if direction is None:
-        directions, targets = None, checked_matrix(target)
-    else:
-        directions = unit_directions("direction", direction)
-        targets = checked_targets(directions, target)
-
+    directions = None if direction is None else unit_directions("direction", direction)
+    targets = checked_targets(directions, target)
     planner = Planner(model, target_constraints(model, directions, targets), number, seed)
     found = planner.least() or planner.nearest()
     tension = model.region.tension(found.evaluation.F)

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple, final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm.elasticity import Elasticity, LinearElasticity
-from cdsm.errors import ElasticityRangeError, InvalidInput, SingularStiffness
+from cdsm.elasticity import LinearElasticity
+from cdsm.errors import InvalidInput, SingularStiffness
 from cdsm.planning.admissible import Admissible
 from cdsm.planning.objectives import (
-    along_constraint,
-    checked_direction,
+    along_constraints,
     checked_starts,
     stiffness_model,
 )
@@ -23,7 +22,7 @@ from cdsm.planning.stiffness_model import Constraints, Evaluation, StiffnessMode
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import stiffness
 from cdsm.support.format import MODEL, coordinates
-from cdsm.support.validation import Array, ReadOnlyState, frozen
+from cdsm.support.validation import Array, ReadOnlyState, frozen, unit_direction
 from cdsm.tension import Tension
 from cdsm.wires.laws import StrandElasticity, TabulatedElasticity
 
@@ -152,7 +151,8 @@ def stiffness_range(
         SingularStiffness: The tip cannot move along u, or no admissible tensions hold the arm.
     """
     model = stiffness_model(pose, minimum, maximum, wrench, margin)
-    u = checked_direction(model, direction)
+    u = unit_direction("direction", direction)
+    stiffness(pose, model.region.least)._require_mobile(u)
     low, high = range_ends(model, u, *checked_starts(starts, seed))
     if low.open or high.open:
         raise InvalidInput(
@@ -204,9 +204,13 @@ def _bounded_ends(
     model: StiffnessModel, region: Admissible, u: Array, starts: int, seed: int
 ) -> tuple[RangeEnd, RangeEnd]:
     begin = StartPoints(model, region, starts, seed)
-    in_newtons = Constraints((along_constraint(model, u, 1.0),), np.zeros(1))
-    unit = float(in_newtons.at(begin.anchor).values[0])
-    constraints = Constraints((along_constraint(model, u, unit),), np.zeros(1))
+
+    def along(unit: float) -> Constraints:
+        constraints = along_constraints(model, u[None], np.array([unit]))
+        return replace(constraints, targets=np.zeros(1))
+
+    unit = float(along(1.0).at(begin.anchor).values[0])
+    constraints = along(unit)
     rising = sorted(begin.points, key=lambda point: float(constraints.at(point).values[0]))
 
     def end(objective: Objective, points: list[Evaluation]) -> RangeEnd:
@@ -233,20 +237,13 @@ def _bounded_ends(
 def _rigidities_rise(region: Admissible) -> bool:
     """Check that the rigidity of every cable is known not to fall as the tension rises."""
     cables = region.least.posture.arm.cables
-    return all(
-        _rises(cable.elasticity, low, high)
-        for cable, low, high in zip(cables, region.low.tolist(), region.high.tolist(), strict=True)
-        if cable.control == "position"
-    )
-
-
-def _rises(law: Elasticity, low: float, high: float) -> bool:
-    if isinstance(law, LinearElasticity):
-        return True
-    if not isinstance(law, (StrandElasticity, TabulatedElasticity)):
-        return False  # a user-defined law may do anything between samples
-    try:
+    for cable, low, high in zip(cables, region.low, region.high, strict=True):
+        law = cable.elasticity
+        if cable.control == "force" or isinstance(law, LinearElasticity):
+            continue
+        if not isinstance(law, (StrandElasticity, TabulatedElasticity)):
+            return False  # a user-defined law may do anything between samples
         rigidity = law.rigidity(np.linspace(low, high, _LAW_SAMPLES))
-    except ElasticityRangeError:
-        return False
-    return bool((np.diff(rigidity) >= -_LAW_ROUNDING * rigidity[1:]).all())
+        if (np.diff(rigidity) < -_LAW_ROUNDING * rigidity[1:]).any():
+            return False
+    return True

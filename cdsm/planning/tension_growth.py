@@ -10,13 +10,13 @@ from itertools import pairwise
 from typing import Final, Literal, final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.optimize import minimize_scalar
 
 from cdsm.cable_laws import kinks
 from cdsm.errors import InvalidInput
 from cdsm.kernels.tension import OPTIMALITY
-from cdsm.planning.gradient import require_finite, stiffness_gradient
+from cdsm.planning.gradient import stiffness_gradient
 from cdsm.planning.objectives import unstable
 from cdsm.posture import Posture
 from cdsm.statics.bound_scan import (
@@ -100,24 +100,21 @@ class Saturation(ReadOnlyState):
         return f"<Saturation at {self.bound:.4g} N>"
 
     def __str__(self) -> str:
-        along = coordinates(self.direction)
+        along, part = coordinates(self.direction), f"{100.0 * self.fraction:.3g} %"
         if self.steepest_slope <= 0.0:
-            first = f"tension nowhere raises the stiffness along {along}"
+            lines = [f"tension nowhere raises the stiffness along {along}"]
         else:
-            first = (
+            lines = [
                 f"the stiffness along {along} rises most, by {self.steepest_slope / 1000.0:.4g} "
-                f"N/mm per N, at a lower bound of {self.steepest:.4g} N"
-            )
-        if math.isinf(self.bound):
-            second = f"it never pays less than {100.0 * self.fraction:.3g} % of that"
-        else:
-            second = f"above {self.bound:.6g} N it pays less than {100.0 * self.fraction:.3g} %"
-        lines = [first] if self.steepest_slope <= 0.0 else [first, second]
+                f"N/mm per N, at a lower bound of {self.steepest:.4g} N",
+                f"it never pays less than {part} of that"
+                if math.isinf(self.bound)
+                else f"above {self.bound:.6g} N it pays less than {part}",
+            ]
         if self.curve[0, 0] < self.stiffest < self.end:
             lines.append(f"above {self.stiffest:.6g} N tension makes the arm softer")
-        return "\n".join(
-            [*lines, f"looked at up to {self.end:.6g} N, {_ENDS[self.limit]} ({MODEL})"]
-        )
+        lines.append(f"looked at up to {self.end:.6g} N, {_ENDS[self.limit]} ({MODEL})")
+        return "\n".join(lines)
 
 
 def saturation(
@@ -173,25 +170,24 @@ def saturation(
     lowest, highest = tension_domain(arm)
     low = max(start, lowest)
     least(start)  # raises if minimum exceeds maximum
-    require_finite(0.0 if at(low)._moves(u) else math.inf, u)
+    at(low)._require_mobile(u)
     top = min(highest, float(ceiling.min()))
     high = max(scan_end(at, low, max(top, low)), low)
     first, last = _stable(at, low, high)
-    limit = "buckling" if last < high else _limit(at, least(high), high)
-    if limit in ("maximum", "infeasible"):
-        last -= _INSET * (last - first)
-
-    def value(lower: float) -> float:
-        return at(lower).along(u)
+    limit: End = "buckling"
+    if last >= high:
+        limit = "maximum" if least(high).at_maximum else failure_at(at, high * (1.0 + _JUST))
+        if limit in ("maximum", "infeasible"):
+            last -= _INSET * (last - first)
 
     def slope(lower: float) -> float:
-        return _slope(least(lower), u)
+        return _slope(at(lower), u)
 
     places = log_samples(first, last)
     bends = _bends(least, places[(places >= first) & (places <= last)])
     beside = np.outer([1.0 - _JUST, 1.0 + _JUST], bends).ravel()
     places = np.unique(np.clip(np.concatenate([places, beside]), first, last))
-    curve = np.array([(place, value(place), slope(place)) for place in places.tolist()])
+    curve = np.array([(place, at(place).along(u), slope(place)) for place in places.tolist()])
     steepest, largest = _steepest(curve, slope)
     where = _falls(curve, slope, steepest, part * largest) if largest > 0.0 else first
     tension = least(min(where, last))
@@ -200,10 +196,10 @@ def saturation(
         fraction=part,
         bound=where,
         tension=tension,
-        stiffness=stiffness(pose, tension),
+        stiffness=at(min(where, last)),
         steepest=steepest,
         steepest_slope=largest,
-        stiffest=_stiffest(curve, value, slope),
+        stiffest=_stiffest(curve, lambda lower: at(lower).along(u), slope),
         limit=limit,
         curve=frozen(curve),
     )
@@ -237,7 +233,7 @@ def _bends(least: Callable[[float], Tension], places: Array) -> Array:
     while todo:
         a, b = todo.pop()
         one, other = least(a), least(b)
-        if all(np.array_equal(x, y) for x, y in zip(_active(one), _active(other), strict=True)):
+        if np.array_equal(_active(one), _active(other)):
             for cable, F, G in zip(one.posture.arm.cables, one.values, other.values, strict=True):
                 if cable.control == "position":
                     passed = (x for x in kinks(cable.elasticity) if min(F, G) <= x < max(F, G))
@@ -249,26 +245,24 @@ def _bends(least: Callable[[float], Tension], places: Array) -> Array:
     return np.array(sorted(found))
 
 
-def _active(tension: Tension) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Find which cables (C,) rise with the lower bound, and which stay at their maximum."""
+def _active(tension: Tension) -> Array:
+    """Return 1 for cables (C,) that rise with the lower bound, -1 at their maximum, 0 if free."""
     tight = OPTIMALITY * float(tension.values.max())
-    stays = tension.maximum - tension.values <= tight
-    return (tension.values - tension.minimum <= tight) & ~stays, stays
+    at_bound = (tension.values - tension.minimum <= tight).astype(np.float64)
+    return np.where(tension.maximum - tension.values <= tight, -1.0, at_bound)
 
 
-def _slope(tension: Tension, u: Array) -> float:
+def _slope(K: Stiffness, u: Array) -> float:
     """Compute the slope d along/db [1/m] of the least tensions over their lower bound b.
 
     Cables at b rise; the free cables balance them with least norm (optimality conditions of
     Eq. 17).
     """
-    A = tension.posture.length_jacobian.T
-    rises, stays = _active(tension)
-    free = ~(rises | stays)
-    rate = rises.astype(np.float64)
-    rate[free] = np.linalg.lstsq(A[:, free], -A[:, rises].sum(axis=1), rcond=None)[0]
-    gradient = stiffness_gradient(stiffness(tension.posture, tension)).along(u)
-    return float(gradient @ rate)
+    assert K.distribution is not None
+    A, active = K.posture.length_jacobian.T, _active(K.distribution)
+    rate, free = np.maximum(active, 0.0), active == 0.0
+    rate[free] = np.linalg.lstsq(A[:, free], -A[:, active > 0.0].sum(axis=1), rcond=None)[0]
+    return float(stiffness_gradient(K).along(u) @ rate)
 
 
 def _steepest(curve: Array, slope: Callable[[float], float]) -> tuple[float, float]:
@@ -307,8 +301,3 @@ def _stiffest(
         if value(top) >= curve[best, 1]:
             place = top
     return place
-
-
-def _limit(at: StiffnessAt, last: Tension, high: float) -> End:
-    """Return why the lower bound cannot rise above that of the last tensions."""
-    return "maximum" if last.at_maximum else failure_at(at, high * (1.0 + _JUST))
