@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Final, Literal
 
 import numpy as np
 
 from cdsm.planning.admissible import Admissible
+from cdsm.planning.path_plan import InfeasibleSample
 from cdsm.planning.planner import Planner
 from cdsm.planning.sqp import EFFORT, Program, search
 from cdsm.planning.stiffness_model import Constraints, StiffnessModel
 from cdsm.support.validation import Array
 
-Status = Literal["posture", "balance", "elasticity", "singular", "stiffness", "rate"]
-
-_MISSED: Final[tuple[Status, str]] = (
-    "stiffness",
+_MISSED = (
     "no tensions were found that hit all targets at once. Ask for fewer, or for others; "
-    "plan_stiffness finds what comes nearest to them at one posture.",
+    "plan_stiffness finds what comes nearest to them at one posture."
 )
 
 _BACK = 50
@@ -53,8 +50,8 @@ class Follower:
         self.seed = seed
         self.planned: list[Sample] = []
 
-    def add(self, sample: Sample) -> tuple[Status, str] | None:
-        """Plan one more sample. Return None, or the reason of a failure.
+    def add(self, sample: Sample) -> InfeasibleSample | None:
+        """Plan one more sample. Return None, or the failure.
 
         It takes the least tensions within the rate from the last sample. If these miss the target
         but others hit it, the samples before are planned again until they lead to the others.
@@ -71,7 +68,7 @@ class Follower:
         if found is None:
             found = self._from_scratch(sample)
             if found is None:
-                return _MISSED
+                return InfeasibleSample(sample.index, "stiffness", _MISSED)
             if last is not None and limited:
                 goal = self._search(sample, region, found.F, centre=last.F) or found
                 found = self._search(sample, near, goal.F)
@@ -135,13 +132,15 @@ class Follower:
             later.append(nearer)
         return False
 
-    def _too_fast(self, last: Sample, goal: Sample) -> tuple[Status, str]:
+    def _too_fast(self, last: Sample, goal: Sample) -> InfeasibleSample:
         change, allowed = abs(goal.F - last.F), self._allowed_change(last, goal)
         cable = int((change / allowed).argmax())
         name = goal.model.pose.arm.cables[cable].name
-        return "rate", (
+        return InfeasibleSample(
+            goal.index,
+            "rate",
             f"tensions that hit the target exist, but none were found within the rate: the nearest "
             f"change {name} by {change[cable]:.4g} N in {goal.index - last.index} step(s) from "
             f"sample {last.index}, and {allowed[cable]:.4g} N are allowed. Raise rate, or change "
-            "the target more slowly."
+            "the target more slowly.",
         )

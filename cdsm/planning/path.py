@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from typing import Final
 
 import numpy as np
@@ -11,21 +10,11 @@ from numpy.typing import ArrayLike
 from rich.console import Console
 from rich.progress import track
 
-from cdsm.errors import (
-    CableError,
-    CdsmError,
-    ElasticityRangeError,
-    InfeasibleTension,
-    InvalidInput,
-    JointLimitError,
-    SingularStiffness,
-    SolverError,
-    UnreachableStiffness,
-)
+from cdsm import errors
+from cdsm.errors import CdsmError, InvalidInput
 from cdsm.kinematics.maps import inverse_kinematics
-from cdsm.kinematics.solutions import KinematicSolution
 from cdsm.manipulator import Manipulator
-from cdsm.planning.follow import Follower, Sample, Status
+from cdsm.planning.follow import Follower, Sample
 from cdsm.planning.objectives import (
     achieved,
     check_positive,
@@ -34,10 +23,11 @@ from cdsm.planning.objectives import (
     stiffness_model,
     target_constraints,
 )
-from cdsm.planning.path_plan import InfeasibleSample, PathPlan
+from cdsm.planning.path_plan import InfeasibleSample, PathPlan, Status
 from cdsm.planning.range import MARGIN
 from cdsm.planning.stiffness_model import StiffnessModel
 from cdsm.stiffness_matrix import stiffness
+from cdsm.support.format import coordinates
 from cdsm.support.validation import (
     Array,
     bound,
@@ -50,13 +40,13 @@ from cdsm.support.validation import (
 from cdsm.tension import checked_bounds
 
 _STATUS: Final[dict[type[CdsmError], Status]] = {
-    JointLimitError: "posture",
-    CableError: "posture",
-    InfeasibleTension: "balance",
-    SolverError: "balance",
-    ElasticityRangeError: "elasticity",
-    SingularStiffness: "singular",
-    UnreachableStiffness: "stiffness",
+    errors.JointLimitError: "posture",
+    errors.CableError: "posture",
+    errors.InfeasibleTension: "balance",
+    errors.SolverError: "balance",
+    errors.ElasticityRangeError: "elasticity",
+    errors.SingularStiffness: "singular",
+    errors.UnreachableStiffness: "stiffness",
 }
 
 
@@ -102,8 +92,7 @@ def plan_path(
         target: The stiffness [N/m], one for all samples or one per sample: () or (S,) along u, (n,)
             or (S, n) along several directions, (3, 3) or (S, 3, 3) for ``cartesian``.
         minimum: Lower bound of the tensions [N], for all cables or (C,).
-        maximum: Upper bound of the tensions [N], for all cables or (C,). With inf, only the domain
-            of the elasticity and buckling limit the tensions.
+        maximum: Upper bound of the tensions [N], as for :func:`~cdsm.plan_stiffness`.
         wrench: W at ``tool0`` in base axes, (6,) or one per sample (S, 6): force [N], then moment
             [N m].
         angles: The path as joint angles (S, nv) [rad]. Give either ``angles`` or ``tips``.
@@ -112,8 +101,7 @@ def plan_path(
         guess: Joint angles (nv,) [rad] from which the first of ``tips`` is solved. Default: the
             straight arm.
         rate: Largest change of a tension per step [N], for all cables or (C,); inf for no limit.
-        margin: Smallest eigenvalue of K_θ that counts as stable, as a part of the largest
-            eigenvalue under the least tensions [-], 1e-9 or more.
+        margin: Smallest eigenvalue of K_θ [-], as for :func:`~cdsm.plan_stiffness`.
         starts: Number of starting tensions of a search from scratch, at most 1000.
         seed: Seed of the random starting tensions.
         progress: Show a bar on the standard error, if that is a terminal.
@@ -143,39 +131,45 @@ def plan_path(
 
     near = guess
     models: list[StiffnessModel] = []
-    infeasible: list[InfeasibleSample] = []
-    for i in _shown(size, progress):
+    infeasible: list[InfeasibleSample | None] = []
+    console = Console(stderr=True)
+    hidden = not (progress and console.is_terminal)
+    for i in track(range(size), "planning the path", console=console, disable=hidden):
         try:
             q = path[i]
             if tips is not None:
                 solved = inverse_kinematics(arm, path[i], near)
                 if not solved.reachable:
-                    infeasible.append(InfeasibleSample(i, "posture", _out_of_reach(solved)))
+                    reason = (
+                        f"the tip comes no nearer to {coordinates(solved.target, '.6g')} m than "
+                        f"{solved.position_error:.3g} m. Ask for a place within reach, or start "
+                        "from a guess= nearer to it."
+                    )
+                    infeasible.append(InfeasibleSample(i, "posture", reason))
                     continue
                 q = near = solved.angles
             model = stiffness_model(arm.at(q), minimum, maximum, loads[i], margin)
             models.append(model)
             constraints = target_constraints(model, directions, targets[i])
-            reason = follower.add(Sample(i, model, constraints, model.region.least.values))
+            sample = Sample(i, model, constraints, model.region.least.values)
+            infeasible.append(follower.add(sample))
         except tuple(_STATUS) as error:
-            infeasible.append(InfeasibleSample(i, _status(error), _explained(error), error))
-        else:
-            if reason is not None:
-                infeasible.append(InfeasibleSample(i, *reason))
+            infeasible.append(_infeasible(i, error))
 
-    planned = tuple(each.index for each in follower.planned)
-    found = [stiffness(each.model.pose, each.F, loads[each.index]) for each in follower.planned]
+    planned = follower.planned
+    found = [stiffness(each.model.pose, each.F, loads[each.index]) for each in planned]
+    values = np.array([achieved(K, directions) for K in found])
     return PathPlan(
         arm=arm,
         direction=directions,
         target=targets,
         rate=limit,
-        planned=planned,
-        angles=_stacked([K.posture.q for K in found], (arm.nv,)),
-        tensions=_stacked([K.tension for K in found], (len(arm.cables),)),
-        achieved=_stacked([achieved(K, directions) for K in found], targets.shape[1:]),
+        planned=tuple(each.index for each in planned),
+        angles=frozen(np.array([K.posture.q for K in found]).reshape(-1, arm.nv)),
+        tensions=frozen(np.array([K.tension for K in found]).reshape(-1, limit.size)),
+        achieved=frozen(values.reshape(-1, *tail)),
         stiffness=tuple(found),
-        infeasible=tuple(infeasible),
+        infeasible=tuple(each for each in infeasible if each is not None),
         iterations=sum(model.iterations for model in models),
     )
 
@@ -210,34 +204,12 @@ def _per_sample(name: str, value: ArrayLike, tail: tuple[int, ...], size: int) -
     return frozen(np.broadcast_to(given, (size, *tail)).copy())
 
 
-def _shown(size: int, progress: bool) -> Iterable[int]:
-    """Return the sample numbers, with a progress bar on a terminal."""
-    console = Console(stderr=True)
-    disable = not (progress and console.is_terminal)
-    return track(range(size), "planning the path", console=console, disable=disable)
-
-
-def _status(error: CdsmError) -> Status:
-    return next(status for kind, status in _STATUS.items() if isinstance(error, kind))
-
-
-def _explained(error: CdsmError) -> str:
-    """Return the message of an error, with a remedy for paths."""
-    if isinstance(error, JointLimitError):
-        return (
+def _infeasible(index: int, error: CdsmError) -> InfeasibleSample:
+    status = next(word for kind, word in _STATUS.items() if isinstance(error, kind))
+    reason = str(error)
+    if isinstance(error, errors.JointLimitError):  # without the remedy that a path does not have
+        reason = (
             f"{error.problem}. Keep the path within the limits, or widen joint_limit in the "
             "geometry (limit in a full description or a URDF)."
         )
-    return str(error)
-
-
-def _out_of_reach(solved: KinematicSolution) -> str:
-    wanted = ", ".join(f"{x:.6g}" for x in solved.target)
-    return (
-        f"the tip comes no nearer to ({wanted}) m than {solved.position_error:.3g} m. Ask for a "
-        "place within reach, or start from a guess= nearer to it."
-    )
-
-
-def _stacked(rows: list[Array], tail: tuple[int, ...]) -> Array:
-    return frozen(np.array(rows).reshape(-1, *tail))
+    return InfeasibleSample(index, status, reason, error)

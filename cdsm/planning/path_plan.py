@@ -5,24 +5,23 @@ from __future__ import annotations
 import csv
 import io
 import os
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import groupby
 from pathlib import Path
-from typing import final
+from typing import Any, Literal, final
 
 import numpy as np
 
-from cdsm.cable import Cable
 from cdsm.cable_laws import CableLaws
 from cdsm.errors import CdsmError
 from cdsm.manipulator import Manipulator
-from cdsm.planning.follow import Status
 from cdsm.planning.half_way import HalfWay, half_way
 from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.files import write_text
 from cdsm.support.validation import Array, ReadOnlyState, frozen
+
+Status = Literal["posture", "balance", "elasticity", "singular", "stiffness", "rate"]
 
 
 @final
@@ -110,8 +109,7 @@ class PathPlan(ReadOnlyState):
         motors = CableLaws(self.arm.cables, "unstrained")
         pairs = zip(self.cable_lengths, self.tensions, strict=True)
         rows = np.array([motors.original_lengths(L, F) for L, F in pairs])
-        every = rows.reshape(self.tensions.shape)
-        return frozen(every[:, [c for c, _ in self._held]])
+        return frozen(rows.reshape(self.tensions.shape)[:, self._held])
 
     @cached_property
     def between(self) -> tuple[HalfWay, ...]:
@@ -135,9 +133,9 @@ class PathPlan(ReadOnlyState):
         )
 
     @property
-    def _held(self) -> list[tuple[int, Cable]]:
-        """Position-controlled cables with their indices."""
-        return [(c, each) for c, each in enumerate(self.arm.cables) if each.control == "position"]
+    def _held(self) -> list[int]:
+        """Indices of the position-controlled cables."""
+        return [c for c, each in enumerate(self.arm.cables) if each.control == "position"]
 
     def write_csv(self, path: str | os.PathLike[str]) -> Path:
         """Write one line per sample in SI units; return the path.
@@ -153,32 +151,25 @@ class PathPlan(ReadOnlyState):
             FileError: The file cannot be written.
         """
         names = [cable.name for cable in self.arm.cables]
-        header = [
-            *("sample", "status"),
-            *(
-                f"{name} [{unit}]"
-                for name, unit in zip(self.arm.joint_names, self.arm.joint_units, strict=True)
-            ),
+        joints = zip(self.arm.joint_names, self.arm.joint_units, strict=True)
+        columns = [
+            *(f"{name} [{unit}]" for name, unit in joints),
             *(f"{name} tension [N]" for name in names),
             *(f"{name} length [m]" for name in names),
-            *(f"{cable.name} unstrained length [m]" for _, cable in self._held),
-            "reason",
+            *(f"{names[c]} unstrained length [m]" for c in self._held),
         ]
-        numbers = np.hstack(
-            [self.angles, self.tensions, self.cable_lengths, self.unstrained_lengths]
-        )
-        rows: dict[int, list[object]] = {
-            i: [i, "planned", *row, ""]
-            for i, row in zip(self.planned, numbers.tolist(), strict=True)
-        }
-        empty = [""] * numbers.shape[1]
-        rows |= {
-            each.index: [each.index, each.status, *empty, each.reason] for each in self.infeasible
-        }
+        blocks = self.angles, self.tensions, self.cable_lengths, self.unstrained_lengths
+        rows: list[Any] = [
+            [i, "planned", *numbers, ""]
+            for i, numbers in zip(self.planned, np.hstack(blocks).tolist(), strict=True)
+        ]
+        rows += [
+            [each.index, each.status, *[""] * len(columns), each.reason] for each in self.infeasible
+        ]
         text = io.StringIO()
         writer = csv.writer(text, lineterminator="\n")
-        writer.writerow(header)
-        writer.writerows(rows[i] for i in sorted(rows))
+        writer.writerow(["sample", "status", *columns, "reason"])
+        writer.writerows(sorted(rows, key=lambda row: row[0]))
         return write_text(path, text.getvalue())
 
     def __repr__(self) -> str:
@@ -203,19 +194,13 @@ class PathPlan(ReadOnlyState):
             for each in self.between
             if each.stiffness is None
         ]
-        for run in _runs(self.infeasible):
+        # consecutive samples with one status are one line
+        numbered = enumerate(self.infeasible)
+        for _, group in groupby(numbered, lambda pair: (pair[1].index - pair[0], pair[1].status)):
+            run = [each for _, each in group]
             first, last = run[0], run[-1]
-            where = f"sample {first.index}"
-            if last is not first:
-                where = f"samples {first.index} to {last.index}"
+            where = f"samples {first.index} to {last.index}" if run[1:] else f"sample {first.index}"
             alike = all(each.reason == first.reason for each in run)
             status = first.status if alike else f"{first.status}, the first of them"
             lines.append(f"{where}: {status}: {first.reason}")
         return "\n".join(lines)
-
-
-def _runs(samples: tuple[InfeasibleSample, ...]) -> Iterator[list[InfeasibleSample]]:
-    """Group consecutive infeasible samples with one status."""
-    numbered = enumerate(samples)
-    for _, run in groupby(numbered, key=lambda pair: (pair[1].index - pair[0], pair[1].status)):
-        yield [each for _, each in run]
