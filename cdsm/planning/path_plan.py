@@ -159,17 +159,18 @@ class PathPlan(ReadOnlyState):
             *(f"{names[c]} unstrained length [m]" for c in self._held),
         ]
         blocks = self.angles, self.tensions, self.cable_lengths, self.unstrained_lengths
-        rows: list[Any] = [
+        rows: list[list[Any]] = [
             [i, "planned", *numbers, ""]
             for i, numbers in zip(self.planned, np.hstack(blocks).tolist(), strict=True)
         ]
         rows += [
             [each.index, each.status, *[""] * len(columns), each.reason] for each in self.infeasible
         ]
+        rows.sort(key=lambda row: int(row[0]))
         text = io.StringIO()
         writer = csv.writer(text, lineterminator="\n")
         writer.writerow(["sample", "status", *columns, "reason"])
-        writer.writerows(sorted(rows, key=lambda row: row[0]))
+        writer.writerows(rows)
         return write_text(path, text.getvalue())
 
     def __repr__(self) -> str:
