@@ -93,7 +93,7 @@ def route(body: RigidBody, tree: Tree, cables: Sequence[Cable]) -> Routing:
                     raise CableError(cable.name, f"sites {i} and {i + 1} coincide; leave one out.")
                 fixed[c] += length
                 continue
-            to_a, to_b = _joints_to(tree, row[-2]), _joints_to(tree, row[-1])
+            to_a, to_b = joints_to(tree, row[-2]), joints_to(tree, row[-1])
             only_a = [j for j in to_a if j not in to_b]
             only_b = [j for j in to_b if j not in to_a]
             first = len(joints)
@@ -109,7 +109,7 @@ def route(body: RigidBody, tree: Tree, cables: Sequence[Cable]) -> Routing:
     )
 
 
-def _joints_to(tree: Tree, row: int) -> list[int]:
+def joints_to(tree: Tree, row: int) -> list[int]:
     """Return the rows of the joints from the base to joint ``row``, base first, ``row`` last."""
     rows: list[int] = []
     while row:

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm.errors import ElasticityRangeError, InvalidInput
+from cdsm.support.roots import rising_root
 from cdsm.support.validation import RANGES, flag, number_array, quantity, scalar
 from cdsm.support.values import Array
 
@@ -288,41 +289,3 @@ def tension_at(
     above = np.searchsorted(reached[1:-1], wanted) + 1
     guess = np.interp(wanted, reached, grid)
     return rising_root(wanted, guess, grid[above - 1], grid[above], stretch, slope)[0]
-
-
-def rising_root(
-    wanted: Array,
-    guess: Array,
-    lower: Array,
-    upper: Array,
-    stretch: Callable[[Array], Array],
-    slope: Callable[[Array], Array],
-) -> tuple[Array, Array]:
-    """Find tensions F [N] between bounds at which a rising stretch(F) has the wanted values.
-
-    It returns the tensions and the slopes of stretch(F) there. All arrays have the same shape; an
-    upper bound may be infinite. Newton's method runs inside a shrinking bracket, so it converges
-    for every rising law.
-
-    scipy 1.17 is slower. For 15 cables of the 1×19 strand, started 2 % from the root,
-    ``scipy.optimize.elementwise.find_root`` takes 13 times as long, since it uses no derivative.
-    ``brentq``, cable by cable, takes 11 times as long.
-    """
-    first, last, previous = lower, upper, np.full(np.shape(wanted), math.inf)
-    guess = np.minimum(np.maximum(guess, first), last)
-    for _ in range(200):  # bisection alone needs 60
-        error, rise = np.asarray(stretch(guess)) - wanted, slope(guess)
-        step = error / rise
-        converged = abs(step) <= 1e-13 * np.maximum(guess, 1.0)  # close to rounding
-        if converged.all():
-            break
-        lower = np.where(error <= 0.0, guess, lower)
-        upper = np.where(error >= 0.0, guess, upper)
-        newton = guess - step
-        # where the law is very steep, Newton's method may cycle inside the bracket
-        cycling = ~converged & (abs(step) > previous / 2.0) & np.isfinite(upper)
-        halve = cycling | (newton < lower) | (newton > upper)
-        following = np.where(halve, (lower + upper) / 2.0, newton)
-        previous = abs(following - guess)
-        guess = np.minimum(np.maximum(following, first), last)
-    return np.asarray(guess), np.asarray(rise)

@@ -16,7 +16,7 @@ import pinocchio as pin
 
 from cdsm.errors import InvalidInput, UrdfError
 from cdsm.kernels.bodies import Masses
-from cdsm.kernels.tree import Indices, Tree
+from cdsm.kernels.tree import Tree
 from cdsm.support.validation import one_of, sequence_of
 from cdsm.support.values import Array, frozen
 
@@ -111,10 +111,9 @@ class RigidBody:
     def length(self) -> float:
         """Length of the path from the base through the joints to the tip at q = 0 [m]."""
         frame = self._model.frames[self._tip]
-        way, joint = float(np.linalg.norm(frame.placement.translation)), frame.parentJoint
-        while joint:
+        way = float(np.linalg.norm(frame.placement.translation))
+        for joint in reversed(self._path(frame.parentJoint)):
             way += float(np.linalg.norm(self._model.jointPlacements[joint].translation))
-            joint = self._model.parents[joint]
         return way
 
     def _local_twists(self) -> Array:
@@ -137,7 +136,7 @@ class RigidBody:
             centre=np.array([inertia.lever for inertia in inertias]),
             gravity=np.array(model.gravity.linear),
             tip=self._row(tip.parentJoint),
-            tip_joints=self._coordinates_to(tip.parentJoint),
+            tip_joints=np.array([self._row(j) - 1 for j in self._path(tip.parentJoint)], np.intp),
             rotation=tip.placement.rotation.copy(),
             point=tip.placement.translation.copy(),
         )
@@ -210,13 +209,9 @@ class RigidBody:
             ) from None
         return lambda q: drawn.display(q[self._ours])
 
-    def _coordinates_to(self, joint: int) -> Indices:
-        """Return our coordinates of the joints from the base to a Pinocchio joint."""
-        coordinates: list[int] = []
-        while joint:
-            coordinates.insert(0, self._row(joint) - 1)
-            joint = self._model.parents[joint]
-        return np.array(coordinates, dtype=np.intp)
+    def _path(self, joint: int) -> list[int]:
+        """Return the Pinocchio joints from the base to a joint."""
+        return list(self._model.supports[joint])[1:]
 
     def _row(self, joint: int) -> int:
         """Return our row of a Pinocchio joint; the base is 0 in both numberings."""

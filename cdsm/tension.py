@@ -6,8 +6,7 @@ chosen:
     min ½‖F‖²   so that   J_Lᵀ F = J_Xᵀ W − g   and   minimum ≤ F ≤ maximum.
 
 The problem is made dimensionless before a solver gets it. A solution is accepted only if it meets
-the optimality conditions. Linear programs decide whether the problem is infeasible; they also give
-the missing torque and the necessary widening of the bounds.
+the optimality conditions. If there is none, :mod:`cdsm.infeasibility` says why.
 """
 
 from __future__ import annotations
@@ -16,16 +15,16 @@ import math
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Final, NoReturn, final
+from typing import Any, Final, final
 
 import numpy as np
 import qpsolvers
-from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import linprog
+from numpy.typing import ArrayLike
 from scipy.sparse import csc_matrix
 
 from cdsm.cable import Cable
-from cdsm.errors import InfeasibleTension, InvalidInput, SolverError
+from cdsm.errors import InvalidInput, SolverError
+from cdsm.infeasibility import explain, instead
 from cdsm.kernels import tension as tension_kernels
 from cdsm.kernels.tension import DISTANCE, OPTIMALITY
 from cdsm.manipulator import Manipulator
@@ -35,9 +34,6 @@ from cdsm.support.values import Array, ReadOnlyState, frozen
 
 DEFAULT_SOLVER: Final = "daqp"
 """Default solver of all tension distributions: exact, and the fastest in measurements."""
-
-# HiGHS accepts violations of 1e-7 by default, and would not see a smaller missing torque
-_TIGHT = {"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10}
 
 # with qpsolvers' defaults, these solvers miss OPTIMALITY by orders of magnitude; OSQP's polishing
 # step can spoil a solution and still report success
@@ -155,7 +151,7 @@ def distribute_tension(
     solution = _solve(problem, solver)
     if isinstance(solution, str):
         free = np.array([cable.name not in fixed for cable in pose.arm.cables])
-        _explain(pose, problem, solver, solution, free)
+        explain(pose, problem, solver, solution, free)
     values = solution * problem.force
     return Tension(
         posture=pose,
@@ -241,15 +237,15 @@ def _solve(problem: tension_kernels.Scaled, solver: str) -> Array | str:
             with warnings.catch_warnings(action="ignore"):
                 solution = qpsolvers.solve_problem(qp, solver, **settings)
     except Exception as error:  # each solver has its own error types
-        raise SolverError(solver, f"failed: {error}. {_instead(solver)}") from error
+        raise SolverError(solver, f"failed: {error}. {instead(solver)}") from error
     x = solution.x
     if not solution.found or x is None:
         return "found no solution"
     if solution.y is None or solution.z_box is None:
-        raise SolverError(solver, f"returns no multipliers to verify it by. {_instead(solver)}")
+        raise SolverError(solver, f"returns no multipliers to verify it by. {instead(solver)}")
     point = tuple(np.asarray(each, dtype=np.float64) for each in (x, solution.y, solution.z_box))
     if not np.isfinite(point[0]).all():
-        raise SolverError(solver, f"calls {x.tolist()} optimal. {_instead(solver)}")
+        raise SolverError(solver, f"calls {x.tolist()} optimal. {instead(solver)}")
     if _shortfall(problem, point):
         # first-order and interior-point solvers end near the optimum, with known active bounds
         point = _polished(problem, point)
@@ -259,12 +255,6 @@ def _solve(problem: tension_kernels.Scaled, solver: str) -> Array | str:
     # after the check: near infeasibility, large multipliers make the last bit of x matter
     x, _, z = point
     return tension_kernels.onto_bounds(x, z, low, high, OPTIMALITY * max(1.0, float(abs(x).max())))
-
-
-def _instead(solver: str) -> str:
-    if solver == "daqp":
-        return "Change the posture, the load or the bounds a little, or try another solver."
-    return "Use solver='daqp'."
 
 
 def _shortfall(problem: tension_kernels.Scaled, point: tuple[Array, ...]) -> str:
@@ -294,75 +284,3 @@ def _polished(problem: tension_kernels.Scaled, point: tuple[Array, ...]) -> tupl
     z = -x - y @ A
     z[free] = 0.0
     return x, y, z
-
-
-def _explain(
-    pose: Posture, problem: tension_kernels.Scaled, solver: str, fault: str, free: NDArray[np.bool_]
-) -> NoReturn:
-    """Find by linear programs why a solver found no tensions, and raise the error.
-
-    Only bounds of ``free`` cables (C,) may widen: those without a fixed tension. ``fault`` is the
-    solver's result, as text.
-    """
-    A, b, lower, upper, arm_scale, force_scale = problem
-    nv, count = A.shape
-    # variables: F, then the positive and the negative part of the missing torque
-    identity = np.eye(nv)
-    # HiGHS drops entries below 1e-9, so each cable is scaled by its own largest moment arm
-    lever = abs(A).max(axis=0)
-    lever = np.where(lever > 0.0, lever, 1.0)
-    nearest = linprog(
-        np.concatenate([np.zeros(count), np.ones(2 * nv)]),
-        A_eq=np.hstack([A / lever, identity, -identity]),
-        b_eq=b,
-        bounds=[*zip(lower * lever, upper * lever, strict=True), *[(0.0, None)] * (2 * nv)],
-        method="highs",
-        options=_TIGHT,
-    )
-    if nearest.status != 0:  # it is feasible and bounded by construction
-        raise SolverError("highs", f"cannot tell whether tensions exist: {nearest.message}")
-    values = nearest.x[:count] / lever
-    if nearest.fun <= OPTIMALITY:
-        raise SolverError(
-            solver,
-            f"{fault}, though one exists with tensions of up to {values.max() * force_scale:.2g} N:"
-            f" the arm is at the edge of what its cables can hold. {_instead(solver)}",
-        )
-
-    widening = _widening(problem, free)
-    blocking = False  # whether the fixed tensions make the problem infeasible
-    if math.isinf(widening) and not free.all():
-        blocking = math.isfinite(_widening(problem, np.ones_like(free)))
-    missing = (b - A @ values) * arm_scale * force_scale
-    tight = free & (np.minimum(values - lower, upper - values) <= OPTIMALITY)
-    worst = int(abs(missing).argmax())
-    raise InfeasibleTension(
-        missing=frozen(missing),
-        joint=pose.arm.joint_names[worst],
-        relaxation=widening,
-        binding=[pose.arm.cables[c].name for c in np.flatnonzero(tight)],
-        fixed=[pose.arm.cables[c].name for c in np.flatnonzero(~free)] if blocking else (),
-        units=(pose.arm.torque_unit(), pose.arm.torque_unit(worst)),
-    )
-
-
-def _widening(problem: tension_kernels.Scaled, free: NDArray[np.bool_]) -> float:
-    """Compute how far the bounds of free cables (C,) must widen [N]; inf if this does not help."""
-    A, b, lower, upper, _, force_scale = problem
-    nv, count = A.shape
-    # variables: F, then the widening t: low − t <= F <= high + t, and F >= 0; a fixed
-    # tension does not widen
-    rows = np.vstack([-np.eye(count), np.eye(count)])
-    sides = np.concatenate([-lower, upper])
-    finite = np.isfinite(sides)
-    found = linprog(
-        np.concatenate([np.zeros(count), [1.0]]),
-        A_ub=np.hstack([rows, -1.0 * np.tile(free, 2)[:, None]])[finite],
-        b_ub=sides[finite],
-        A_eq=np.hstack([A, np.zeros((nv, 1))]),
-        b_eq=b,
-        bounds=(0.0, None),
-        method="highs",
-        options=_TIGHT,
-    )
-    return float(found.x[-1]) * force_scale if found.status == 0 else math.inf

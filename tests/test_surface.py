@@ -5,8 +5,6 @@ import copy
 import dataclasses
 import html
 import inspect
-import json
-import os
 import pickle
 import re
 import subprocess
@@ -36,6 +34,7 @@ from tests.support.arms import (
     random_wrench,
 )
 from tests.support.patience import HANGS
+from tests.support.processes import uncompiled
 
 ROOT = Path(__file__).parents[1]
 
@@ -543,19 +542,9 @@ json.dump(answer, sys.stdout)
 
 @pytest.mark.slow
 def test_kernels_give_the_same_without_compilation() -> None:
-    done = subprocess.run(
-        [sys.executable, "-c", PLAIN_PYTHON],
-        cwd=ROOT,
-        env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
-        capture_output=True,
-        text=True,
-        timeout=HANGS,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
     pose = random_posture(mixed_arm(), 3)
     stiff = cdsm.stiffness(pose, random_tension(pose.arm, 3), random_wrench(3))
-    answer = json.loads(done.stdout)
+    answer = uncompiled(PLAIN_PYTHON)
     for name, numbers in answer.items():
         expected = getattr(pose if hasattr(pose, name) else stiff, name)
         np.testing.assert_allclose(

@@ -122,9 +122,8 @@ class CriticalLoad(ReadOnlyState):
             "none": "nothing happens that far",
         }[self.limit]
         mode = _describe_mode(self.posture.arm.joint_names, self.mode)
-        if self.factor == 0.0:
-            return f"holds no part of the load; {reason}\n{mode}"
-        return f"holds the load up to a factor of {self.factor:.6g}; {reason}\n{mode}"
+        held = f"the load up to a factor of {self.factor:.6g}"
+        return f"holds {held if self.factor else 'no part of the load'}; {reason}\n{mode}"
 
 
 def critical_tension(

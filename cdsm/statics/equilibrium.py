@@ -9,7 +9,6 @@ nonlinear elasticity and series springs included.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import final
@@ -17,9 +16,9 @@ from typing import final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cdsm.errors import CableError, EquilibriumError, InvalidInput, SingularStiffness
+from cdsm.errors import EquilibriumError, InvalidInput, SingularStiffness
 from cdsm.posture import Posture
-from cdsm.statics.locked_motors import Iterate, LoadedArm, rounding
+from cdsm.statics.locked_motors import LoadedArm, rounding
 from cdsm.statics.trust_region import FLAT, RestSearch, find_rest
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.format import coordinates
@@ -31,12 +30,6 @@ _SMALLEST_STEP = 2.0**-6
 
 _CLOSE = 1e-3
 """Two sites meet if their distance falls below this part of their distance at the reference."""
-
-_FAR = 0.1
-"""Largest joint motion [rad] between two equilibria that :func:`follow` connects."""
-
-_DENSE = 0.02
-"""Distance [rad] between postures whose stability is checked. A shorter loss is not seen."""
 
 
 @final
@@ -95,7 +88,7 @@ class Equilibrium(ReadOnlyState):
         It is False for a neutral state, for example if all cables are slack. It is also False if
         only stops that do not push yet bar the softest motion.
         """
-        values = _eigenvalues(self.stiffness.joint, self._off_stops)
+        values = eigenvalues(self.stiffness.joint, self._off_stops)
         return bool((values > FLAT * abs(values).max(initial=0.0)).all())
 
     @cached_property
@@ -210,7 +203,7 @@ def equilibrium(
         search = find_rest(loaded, start, (1.0 - goal) * imbalance)
         iterations += search.iterations
         if search.converged and goal == 1.0:
-            return _equilibrium(loaded, search, iterations)
+            return settled(loaded, search, iterations)
         if search.converged:
             start, reached, step = search.state, goal, 2.0 * step
         elif step > _SMALLEST_STEP:
@@ -219,47 +212,7 @@ def equilibrium(
             raise _no_rest(loaded, search, reached)
 
 
-def follow(before: Equilibrium, wrench: Array, start: Array | None = None) -> Equilibrium | None:
-    """Find the equilibrium that continues an earlier one under another wrench (6,), or None.
-
-    The search starts at the joint angles ``start`` (nv,) [rad], by default those of ``before``. It
-    returns None if no path of stable postures leads to an equilibrium: the arm buckles, or the step
-    between the wrenches is too large to decide. ElasticityRangeError as for :func:`equilibrium`.
-    """
-    loaded = LoadedArm(before.reference, before.reference_tension, wrench)
-    iterate = loaded.at(before.pose, before.tension)
-    if start is not None:
-        try:
-            iterate = loaded.moved(start, iterate)
-        except CableError:
-            return None
-    search = find_rest(loaded, iterate)
-    if not (search.converged and search.convex and _is_stable_between(loaded, iterate, search)):
-        return None
-    return _equilibrium(loaded, search, search.iterations)
-
-
-def _is_stable_between(loaded: LoadedArm, start: Iterate, search: RestSearch) -> bool:
-    """Check that the straight path to the equilibrium is short, and K_θ positive definite on it.
-
-    An arm that snaps through has an unstable posture on this path. The search may have jumped it.
-    """
-    path = search.state.q - start.q
-    length = float(abs(path).max())
-    if length > _FAR:
-        return False
-    free = np.flatnonzero(~search.at_stop)
-    for part in np.arange(_DENSE, length, _DENSE) / max(length, _DENSE):
-        try:
-            K = loaded.moved(start.q + part * path, start).stiffness
-        except CableError:
-            return False
-        if _eigenvalues(K, free).min(initial=math.inf) <= 0.0:
-            return False
-    return True
-
-
-def _eigenvalues(K: Array, free: NDArray[np.intp]) -> Array:
+def eigenvalues(K: Array, free: NDArray[np.intp]) -> Array:
     """Return the eigenvalues of K (symmetric part) for some joints."""
     K = K[np.ix_(free, free)]
     return np.asarray(np.linalg.eigvalsh((K + K.T) / 2.0), dtype=np.float64)
@@ -278,7 +231,8 @@ def _require_between_stops(pose: Posture) -> None:
         )
 
 
-def _equilibrium(loaded: LoadedArm, search: RestSearch, iterations: int) -> Equilibrium:
+def settled(loaded: LoadedArm, search: RestSearch, iterations: int) -> Equilibrium:
+    """Return the equilibrium that a search has found; check that all laws are defined there."""
     K = search.state.K
     loaded.require_domains(K.tension)
     reaction = np.where(search.at_stop, K.residual, 0.0)

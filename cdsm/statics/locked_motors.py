@@ -8,10 +8,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cdsm.elasticity import Elasticity, rising_root
+from cdsm.elasticity import Elasticity
 from cdsm.errors import ElasticityRangeError, InvalidInput
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness, assemble
+from cdsm.support.roots import rising_root
 from cdsm.support.validation import Array, frozen
 
 _ROUNDING = 16.0 * float(np.finfo(np.float64).eps)

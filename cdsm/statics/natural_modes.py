@@ -14,6 +14,7 @@ from typing import NamedTuple, final
 import numpy as np
 from scipy.linalg import eigh, eigvalsh
 
+from cdsm.arm_model import joints_to
 from cdsm.errors import InvalidInput, SingularMass
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness
@@ -190,11 +191,7 @@ def mass_matrix(pose: Posture, carried: Iterable[Carried]) -> Array:
     M = np.zeros((arm.nv, arm.nv))
     for link, mass, centre, inertia in carried:
         place, row = pose.link_pose(link), arm._model.body.locate(link)[0]
-        chain = []
-        while row:
-            chain.append(row)
-            row = int(arm._model.tree.parent[row])
-        R, joints = place[:3, :3], np.array(chain, dtype=np.intp)
+        R, joints = place[:3, :3], np.array(joints_to(arm._model.tree, row)[::-1], dtype=np.intp)
         angular = frames.axis[joints]
         linear = np.cross(angular, R @ centre + place[:3, 3] - frames.origin[joints])
         if len(frames.slide):

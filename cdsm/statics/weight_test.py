@@ -10,9 +10,10 @@ from typing import final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm.errors import EquilibriumError, InvalidInput
+from cdsm.errors import InvalidInput
 from cdsm.posture import Posture
-from cdsm.statics.equilibrium import Equilibrium, equilibrium, follow
+from cdsm.statics.equilibrium import Equilibrium, equilibrium
+from cdsm.statics.following import follow_load
 from cdsm.support.format import MODEL, coordinates
 from cdsm.support.validation import (
     Array,
@@ -26,12 +27,6 @@ from cdsm.tension import Tension
 
 MOST_STEPS = 1000
 """Largest number of steps. A curve with more points is not smoother, but takes long."""
-
-_FINEST = 2.0**-12
-"""Relative precision of a buckling load."""
-
-_SLIGHT = 1e-9
-"""Part of the load below which the precision of a buckling load is absolute."""
 
 _MEASURED = 1e-12
 """Smallest tip displacement, over the length of the arm, that has about three correct digits."""
@@ -201,7 +196,7 @@ def weight_test(
     added = np.append(force, np.zeros(3))
     loaded, part = [without], 0.0
     for step in range(1, steps + 1):
-        loaded.append(_follow_load(loaded[-1], without.wrench, added, part, step / steps))
+        loaded.append(follow_load(loaded[-1], without.wrench, added, part, step / steps))
         part = step / steps
     test = WeightTest(force=force, without=without, loaded=tuple(loaded[1:]))
     if not test._tip_motion and math.isfinite(test.linear.stiffness):
@@ -211,28 +206,3 @@ def weight_test(
             f"hang at least {_MEASURED * pose.arm.length * test.linear.stiffness:.1g} N.",
         )
     return test
-
-
-def _follow_load(
-    before: Equilibrium, wrench: Array, added: Array, reached: float, goal: float
-) -> Equilibrium:
-    """Follow the stable equilibria from one part of the load to a larger part."""
-    step = goal - reached
-    while reached < goal:
-        part = min(goal, reached + step)
-        after = follow(before, frozen(wrench + part * added))
-        if after is not None:
-            before, reached, step = after, part, 2.0 * step
-        elif step > _FINEST * max(reached, _SLIGHT):
-            step /= 2.0
-        else:
-            mode = before.stiffness.critical_direction
-            joint = before.pose.arm.joint_names[int(abs(mode).argmax())]
-            raise EquilibriumError(
-                f"the arm buckles at {100.0 * reached:.4g} % of the load, under "
-                f"{reached * float(np.linalg.norm(added)):.4g} N: {joint} gives way",
-                residual=before.residual,
-                load_factor=reached,
-                joint=joint,
-            )
-    return before

@@ -1,15 +1,10 @@
 """Many postures at once give what each gives alone; and what becomes of those that give nothing."""
 
 import dataclasses
-import json
 import math
-import os
 import pickle
-import subprocess
-import sys
 import tracemalloc
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,9 +18,7 @@ from cdsm.batch.inputs import run_slices
 from cdsm.batch.layout import QUANTITIES
 from cdsm.support.validation import Array
 from tests.support.arms import STEEL, mixed_arm, random_arm, random_posture
-from tests.support.patience import HANGS
-
-ROOT = Path(__file__).parents[2]
+from tests.support.processes import uncompiled
 
 ROUNDING = 1e-12
 """Of the largest entry: other orders of summation, and what inverses make of them."""
@@ -573,21 +566,11 @@ json.dump([answer, batch.status.tolist(), pull.values.tolist(), pull.status.toli
 
 
 def test_kernels_give_the_same_without_compilation() -> None:
-    done = subprocess.run(
-        [sys.executable, "-c", PLAIN_PYTHON],
-        cwd=ROOT,
-        env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
-        capture_output=True,
-        text=True,
-        timeout=HANGS,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
     arm = custom_arm()
     q, tension, wrench = problem(arm, 2)
     batch = cdsm.evaluate(arm, q, tension, wrench, OUTPUTS, direction=DIRECTIONS)
     pull = cdsm.distribute_tensions(arm, q, 5.0, wrench=wrench)
-    answer, status, values, pulled = json.loads(done.stdout)
+    answer, status, values, pulled = uncompiled(PLAIN_PYTHON)
     assert status == batch.status.tolist()
     assert pulled == pull.status.tolist()
     np.testing.assert_allclose(values, pull.values, rtol=0.0, atol=1e-11 * pull.values.max())

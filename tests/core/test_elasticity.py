@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike
 from scipy.integrate import quad
 
 import cdsm
-from cdsm.elasticity import Domain, rising_root, tension_at
+from cdsm.elasticity import Domain, tension_at
+from cdsm.support.roots import rising_root
 from cdsm.support.validation import RANGES
 from cdsm.support.values import Array
 

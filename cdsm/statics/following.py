@@ -1,0 +1,90 @@
+"""Follow the stable equilibria of an arm with locked motors while its load changes."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from cdsm.errors import CableError, EquilibriumError
+from cdsm.statics.equilibrium import Equilibrium, eigenvalues, settled
+from cdsm.statics.locked_motors import Iterate, LoadedArm
+from cdsm.statics.trust_region import RestSearch, find_rest
+from cdsm.support.values import Array, frozen
+
+_FAR = 0.1
+"""Largest joint motion [rad] between two equilibria that :func:`follow` connects."""
+
+_DENSE = 0.02
+"""Distance [rad] between postures whose stability is checked. A shorter loss is not seen."""
+
+_FINEST = 2.0**-12
+"""Relative precision of a buckling load."""
+
+_SLIGHT = 1e-9
+"""Part of the load below which the precision of a buckling load is absolute."""
+
+
+def follow_load(
+    before: Equilibrium, wrench: Array, added: Array, reached: float, goal: float
+) -> Equilibrium:
+    """Follow the stable equilibria from one part of the load to a larger part."""
+    step = goal - reached
+    while reached < goal:
+        part = min(goal, reached + step)
+        after = follow(before, frozen(wrench + part * added))
+        if after is not None:
+            before, reached, step = after, part, 2.0 * step
+        elif step > _FINEST * max(reached, _SLIGHT):
+            step /= 2.0
+        else:
+            mode = before.stiffness.critical_direction
+            joint = before.pose.arm.joint_names[int(abs(mode).argmax())]
+            raise EquilibriumError(
+                f"the arm buckles at {100.0 * reached:.4g} % of the load, under "
+                f"{reached * float(np.linalg.norm(added)):.4g} N: {joint} gives way",
+                residual=before.residual,
+                load_factor=reached,
+                joint=joint,
+            )
+    return before
+
+
+def follow(before: Equilibrium, wrench: Array, start: Array | None = None) -> Equilibrium | None:
+    """Find the equilibrium that continues an earlier one under another wrench (6,), or None.
+
+    The search starts at the joint angles ``start`` (nv,) [rad], by default those of ``before``. It
+    returns None if no path of stable postures leads to an equilibrium: the arm buckles, or the step
+    between the wrenches is too large to decide. Errors are those of :func:`~cdsm.equilibrium`.
+    """
+    loaded = LoadedArm(before.reference, before.reference_tension, wrench)
+    iterate = loaded.at(before.pose, before.tension)
+    if start is not None:
+        try:
+            iterate = loaded.moved(start, iterate)
+        except CableError:
+            return None
+    search = find_rest(loaded, iterate)
+    if not (search.converged and search.convex and _is_stable_between(loaded, iterate, search)):
+        return None
+    return settled(loaded, search, search.iterations)
+
+
+def _is_stable_between(loaded: LoadedArm, start: Iterate, search: RestSearch) -> bool:
+    """Check that the straight path to the equilibrium is short, and K_θ positive definite on it.
+
+    An arm that snaps through has an unstable posture on this path. The search may have jumped it.
+    """
+    path = search.state.q - start.q
+    length = float(abs(path).max())
+    if length > _FAR:
+        return False
+    free = np.flatnonzero(~search.at_stop)
+    for part in np.arange(_DENSE, length, _DENSE) / max(length, _DENSE):
+        try:
+            K = loaded.moved(start.q + part * path, start).stiffness
+        except CableError:
+            return False
+        if eigenvalues(K, free).min(initial=math.inf) <= 0.0:
+            return False
+    return True
