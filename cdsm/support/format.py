@@ -47,11 +47,11 @@ class JointUnits(NamedTuple):
 
     def torque(self, joint: int | None = None) -> str:
         """Return the unit of the torque of one joint, or of all joints together."""
-        return self._joined("N m", "N", joint)
+        return self.joined("N m", "N", joint)
 
     def stiffness(self) -> str:
         """Return the unit of the diagonal of K_θ and of the eigenvalues of K_θ."""
-        return self._joined("N m/rad", "N/m")
+        return self.joined("N m/rad", "N/m")
 
     def levers(self, length: float) -> Array:
         """Return 1 rad for joints that turn, the arm's length [m] for joints that slide (nv,)."""
@@ -66,7 +66,8 @@ class JointUnits(NamedTuple):
                 found[key_of] = {names[i]: q[..., i].tolist() for i in columns}
         return found
 
-    def _joined(self, turning: str, sliding: str, joint: int | None = None) -> str:
+    def joined(self, turning: str, sliding: str, joint: int | None = None) -> str:
+        """Return the unit of one joint, or of all together, from those of both kinds."""
         slides = self.slides if joint is None else self.slides[joint : joint + 1]
         if slides.all():
             return sliding

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Generic, TypeVar, final
+from typing import Any, Generic, TypeVar, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -25,39 +25,24 @@ from cdsm.support.validation import (
 
 _Values = TypeVar("_Values")
 
+Label = tuple[tuple[str, ...], Any, dict[str, str]]
+"""Coordinate of a Dataset as xarray takes it: dimensions, values and attributes."""
 
-@final
-@dataclass(frozen=True, eq=False)
-class Label:
-    """Coordinate of a Dataset: values along dimensions, or a single value.
 
-    Attributes:
-        dims: Dimensions; empty for a single value.
-        values: Numbers or names; one axis for each dimension.
-        long_name: Name in words.
-        units: SI units in the notation of UDUNITS; empty for names.
-    """
-
-    dims: tuple[str, ...]
-    values: Array | NDArray[np.int64] | NDArray[np.str_] | float
-    long_name: str
-    units: str
-
-    @property
-    def attributes(self) -> dict[str, str]:
-        """Return long name and units as attributes of a Dataset."""
-        return {"long_name": self.long_name} | ({"units": self.units} if self.units else {})
+def label(dims: tuple[str, ...], values: object, long_name: str, units: str = "") -> Label:
+    """Build a coordinate; numbers have SI units in the notation of UDUNITS."""
+    return dims, values, {"long_name": long_name} | ({"units": units} if units else {})
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Choice(Generic[_Values]):
-    """Value or values of an argument.
+    """Value or values of an argument; several make a dimension of its name.
 
     Attributes:
-        name: Name of the argument; several values make a dimension of this name.
+        name: Name of the argument.
         values: The values, one entry each; also one entry for a single value.
-        names: Names or numbers along the dimension; None for a single value without dimension.
+        names: Names or numbers along the dimension; None for a single value.
     """
 
     name: str
@@ -69,15 +54,14 @@ class Choice(Generic[_Values]):
         """Return the coordinate of the dimension; empty for a single value."""
         if self.names is None:
             return {}
-        kind = "name" if self.names.dtype.kind == "U" else "number"
-        units = "" if kind == "name" else "1"
-        return {self.name: Label((self.name,), self.names, f"{kind} of the {self.name}", units)}
+        kind, units = ("name", "") if self.names.dtype.kind == "U" else ("number", "1")
+        return {self.name: label((self.name,), self.names, f"{kind} of the {self.name}", units)}
 
     def label(self, values: Array, dims: tuple[str, ...], long_name: str, units: str) -> Label:
         """Build a coordinate with one entry for each value, such as its force."""
         if self.names is None:
-            return Label(dims, values[0], long_name, units)
-        return Label((self.name, *dims), values, long_name, units)
+            return label(dims, values[0], long_name, units)
+        return label((self.name, *dims), values, long_name, units)
 
 
 def laws_of(
@@ -93,16 +77,14 @@ def laws_of(
             "elasticity",
             f"{elasticity!r} given; give an Elasticity, or a mapping of names to several.",
         )
+    if not elasticity:
+        raise InvalidInput("elasticity", "is empty; give at least one name and value.")
     return Choice("elasticity", tuple(elasticity.values()), _names("elasticity", elasticity))
 
 
 def wrenches_of(wrench: ArrayLike | Mapping[str, ArrayLike]) -> Choice[Array]:
     """Check wrenches (W, 6) at ``tool0`` in base axes: force [N], then moment [N m]."""
-
-    def checked(name: str, value: ArrayLike) -> Array:
-        return wrench_vector(name, value)
-
-    return _vectors("wrench", wrench, checked)
+    return _vectors("wrench", wrench, wrench_vector)
 
 
 def directions_of(direction: ArrayLike | Mapping[str, ArrayLike]) -> Choice[Array]:
@@ -112,7 +94,6 @@ def directions_of(direction: ArrayLike | Mapping[str, ArrayLike]) -> Choice[Arra
 
 def bounds_of(minimum: ArrayLike, maximum: float) -> tuple[Choice[Array], float]:
     """Check the lower bounds of tension (M,) [N] and the upper bound [N]."""
-    several = np.ndim(number_array("minimum", minimum)) > 0
     lows = distinct("minimum", minimum)
     if lows.min() < 0.0:
         raise InvalidInput(
@@ -126,7 +107,7 @@ def bounds_of(minimum: ArrayLike, maximum: float) -> tuple[Choice[Array], float]
             f"{high:g} N given, below a minimum of {lows.max():g} N; raise maximum or lower "
             "minimum.",
         )
-    return Choice("minimum", lows, np.arange(len(lows)) if several else None), high
+    return Choice("minimum", lows, np.arange(len(lows)) if np.ndim(minimum) else None), high
 
 
 def distinct(name: str, values: ArrayLike) -> Array:
@@ -150,21 +131,16 @@ def _vectors(
 ) -> Choice[Array]:
     if isinstance(value, Mapping):
         rows = [checked(f"{name}[{key!r}]", each) for key, each in value.items()]
-        return Choice(name, _rows(name, rows), _names(name, value))
-    array = number_array(name, value)
-    if array.ndim < 2:
-        return Choice(name, _rows(name, [checked(name, array)]), None)
-    rows = [checked(f"{name}[{i}]", each) for i, each in enumerate(array)]
-    return Choice(name, _rows(name, rows), np.arange(len(rows)))
-
-
-def _rows(name: str, rows: list[Array]) -> Array:
+    else:
+        array = number_array(name, value)
+        if array.ndim < 2:
+            return Choice(name, frozen(checked(name, array)[None]), None)
+        rows = [checked(f"{name}[{i}]", each) for i, each in enumerate(array)]
     if not rows:
         raise InvalidInput(name, "is empty; give at least one.")
-    return frozen(np.array(rows))
+    names = _names(name, value) if isinstance(value, Mapping) else np.arange(len(rows))
+    return Choice(name, frozen(np.array(rows)), names)
 
 
 def _names(name: str, values: Mapping[str, object]) -> NDArray[np.str_]:
-    if not values:
-        raise InvalidInput(name, "is empty; give at least one name and value.")
     return np.array([text(f"name of {name}", key) for key in values])

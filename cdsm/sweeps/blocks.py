@@ -4,27 +4,10 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from typing import final
+from collections.abc import Mapping
 
-import numpy as np
-
-
-@final
-@dataclass(frozen=True, kw_only=True)
-class Block:
-    """Block of postures whose cases are computed, sent and stored together.
-
-    Attributes:
-        slices: Slice of the block along each dimension of the pose set.
-        start: Number of the first posture, counted in C order.
-        stop: Number of the last posture plus one.
-    """
-
-    slices: Mapping[str, slice]
-    start: int
-    stop: int
+Block = Mapping[str, slice]
+"""Slice along each dimension of the pose set; its cases are computed, sent and stored together."""
 
 
 def extents(poses: Mapping[str, int], most: int) -> dict[str, int]:
@@ -40,14 +23,15 @@ def extents(poses: Mapping[str, int], most: int) -> dict[str, int]:
     return dict(reversed(extent.items()))
 
 
-def blocks(poses: Mapping[str, int], extent: Mapping[str, int]) -> Iterator[Block]:
-    """Build all blocks of a pose set, in order."""
-    steps = [range(0, size, extent[dim]) for dim, size in poses.items()]
-    for corner in itertools.product(*steps):
-        slices = {
-            dim: slice(start, min(start + extent[dim], size))
-            for (dim, size), start in zip(poses.items(), corner, strict=True)
-        }
-        start = int(np.ravel_multi_index(corner, tuple(poses.values())))
-        count = math.prod(part.stop - part.start for part in slices.values())
-        yield Block(slices=slices, start=start, stop=start + count)
+def blocks(poses: Mapping[str, int], extent: Mapping[str, int]) -> list[Block]:
+    """Return all blocks of a pose set, in order."""
+    cuts = [
+        [slice(start, min(start + extent[dim], size)) for start in range(0, size, extent[dim])]
+        for dim, size in poses.items()
+    ]
+    return [dict(zip(poses, corner, strict=True)) for corner in itertools.product(*cuts)]
+
+
+def postures(block: Block) -> int:
+    """Return the number of postures of a block."""
+    return math.prod(part.stop - part.start for part in block.values())

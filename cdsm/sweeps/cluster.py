@@ -49,9 +49,8 @@ def on_cluster(
     payload, ours = dumps(specification.task), version("cdsm-stiffness")
 
     def submitted(block: Block) -> Future[BlockResult]:
-        q = specification.poses.angles(block.start, block.stop)
         key = f"cdsm-sweep-{secrets.token_hex(8)}"
-        return client.submit(_on_worker, payload, ours, q, key=key)
+        return client.submit(_on_worker, payload, ours, specification.poses.angles(block), key=key)
 
     waiting, given_up = iter(blocks), []
     running: dict[object, tuple[Future[BlockResult], Block]] = {}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, final
@@ -68,7 +67,12 @@ class SweepTask(ReadOnlyState):
     @cached_property
     def arms(self) -> tuple[Manipulator, ...]:
         """Return the arm with each elasticity; springs, leads and control stay unchanged."""
-        return tuple(self.arm if law is None else _with(self.arm, law) for law in self.laws)
+        return tuple(
+            self.arm
+            if law is None
+            else self.arm.with_cables([replace(each, elasticity=law) for each in self.arm.cables])
+            for law in self.laws
+        )
 
 
 def evaluate(task: SweepTask, q: Array, threads: int | None = None) -> BlockResult:
@@ -82,123 +86,84 @@ def evaluate(task: SweepTask, q: Array, threads: int | None = None) -> BlockResu
     stages = {name: QUANTITIES[name].stage for name in task.outputs}
     of_pose = [name for name, stage in stages.items() if stage == "pose"]
     of_law = [name for name, stage in stages.items() if stage not in ("pose", "tension")]
-    extreme = [name for name, stage in stages.items() if stage == "principal"]
 
-    result, status_of_pose = _postures(task.arm, q, of_pose, threads)
-    answer: BlockResult = {**result}
+    rows, status_of_pose = _rows(of_pose, task.arm, q, threads=threads)
+    answer: BlockResult = {**rows}
     status = np.tile(status_of_pose[:, None, None], (1, *shape[1:]))
     if len(stages) > len(of_pose):
         place = p, w, m = np.nonzero(status == SweepStatus.OK)
-        tension, status[place] = _tensions(
-            task.arm, q[p], task.minima[m], task.maximum, task.wrenches[w], threads
+        low = np.repeat(task.minima[m, None], len(task.arm.cables), axis=1)
+        pull = batch.distribute_tensions(
+            task.arm, q[p], low, task.maximum, task.wrenches[w], threads=threads
         )
-        tension = _spread(tension, place, shape)
+        status[place] = pull.status
+        tension = _spread(pull.values, place, shape)
         if "tension" in stages:
             answer["tension"] = tension
     if not of_law:
         return answer | {"status": np.stack([status] * len(task.laws), axis=1)}
 
-    needed = [name for name in of_law if name not in extreme]
-    needed += ["margin", "translational_compliance"] if extreme else ["margin"]
-    place = p, w, m = np.nonzero(status == SweepStatus.OK)
-    statuses, by_law = [], []
+    place = p, w, _ = np.nonzero(status == SweepStatus.OK)
+    by_law: list[BlockResult] = []
     for arm in task.arms:
-        rows, found_status = _stiffnesses(
-            arm,
-            q[p],
-            tension[place],
-            task.wrenches[w],
-            task.directions,
-            list(dict.fromkeys(needed)),
-            threads,
+        rows, status_of_law = _stiffnesses(
+            task, arm, q[p], tension[place], task.wrenches[w], of_law, threads
         )
-        if extreme:
-            rows |= _principal(rows, found_status, extreme)
         by_law.append({name: _spread(rows[name], place, shape) for name in of_law})
-        statuses.append(status.copy())
-        buckles = (rows["margin"] <= 0.0) & np.isin(
-            found_status, (SweepStatus.OK, SweepStatus.IMMOBILE)
-        )
-        statuses[-1][place] = np.where(buckles, SweepStatus.UNSTABLE, found_status)
-    answer |= {name: np.stack([rows[name] for rows in by_law], axis=1) for name in of_law}
-    return answer | {"status": np.stack(statuses, axis=1)}
-
-
-def _principal(rows: Rows, status: Statuses, names: list[str]) -> Rows:
-    """Compute the extreme stiffnesses (softest, stiffest) of stable rows; NaN in all other rows."""
-    exist = (rows["margin"] > 0.0) & (status != SweepStatus.SINGULAR)  # a margin may be NaN
-    extremes = principal_stiffness(rows["translational_compliance"][exist])
-    return {name: _spread(extremes[name], (exist,), exist.shape) for name in names}
-
-
-def _spread(rows: Array, place: _Place, shape: tuple[int, ...]) -> Array:
-    """Build an array of all cases from rows of some cases; NaN in all other cases."""
-    full = np.full((*shape, *rows.shape[1:]), np.nan)
-    full[place] = rows
-    return full
-
-
-def _with(arm: Manipulator, law: Elasticity) -> Manipulator:
-    cables = [replace(cable, elasticity=law) for cable in arm.cables]
-    return arm.with_cables(cables)
-
-
-# --- rows: the only functions of a sweep that call the physics ---------------------------------
-
-
-def _postures(
-    arm: Manipulator, q: Array, names: Collection[str], threads: int | None
-) -> tuple[Rows, Statuses]:
-    """Compute quantities that depend on the joint angles q (R, nv) [rad] alone."""
-    return _read(batch.evaluate(arm, q, outputs=_batch_names(names), threads=threads), names)
-
-
-def _tensions(
-    arm: Manipulator,
-    q: Array,
-    minimum: Array,
-    maximum: float,
-    wrench: Array,
-    threads: int | None,
-) -> tuple[Array, Statuses]:
-    """Compute the least balancing tensions (R, C) [N] for lower bounds (R,) and wrenches (R, 6)."""
-    low = np.repeat(minimum[:, None], len(arm.cables), axis=1)
-    pull = batch.distribute_tensions(arm, q, low, maximum, wrench, threads=threads)
-    return pull.values, pull.status.astype(np.int8)
+        by_law[-1]["status"] = status.copy()
+        by_law[-1]["status"][place] = status_of_law
+    return answer | {name: np.stack([each[name] for each in by_law], axis=1) for name in by_law[0]}
 
 
 def _stiffnesses(
+    task: SweepTask,
     arm: Manipulator,
     q: Array,
     tension: Array,
     wrench: Array,
-    directions: Array,
-    names: Collection[str],
+    names: list[str],
     threads: int | None,
 ) -> tuple[Rows, Statuses]:
     """Compute quantities that also depend on tensions (R, C) [N] and elasticity."""
-    found = batch.evaluate(
+    extreme = [name for name in names if QUANTITIES[name].stage == "principal"]
+    needed = [name for name in names if name not in extreme]
+    needed += ["margin", "translational_compliance"] if extreme else ["margin"]
+    rows, status = _rows(
+        list(dict.fromkeys(needed)),
         arm,
         q,
         tension,
         wrench,
-        _batch_names(names),
-        direction=directions if "along" in names else None,
+        direction=task.directions if "along" in names else None,
         threads=threads,
     )
-    return _read(found, names)
+    if extreme:
+        # extreme stiffnesses exist in stable rows; a margin may be NaN
+        exist = (rows["margin"] > 0.0) & (status != SweepStatus.SINGULAR)
+        found = principal_stiffness(rows["translational_compliance"][exist])
+        rows |= {name: _spread(found[name], (exist,), exist.shape) for name in extreme}
+    buckles = (rows["margin"] <= 0.0) & np.isin(status, (SweepStatus.OK, SweepStatus.IMMOBILE))
+    status[buckles] = SweepStatus.UNSTABLE
+    return rows, status
 
 
-def _batch_names(names: Collection[str]) -> list[str]:
-    return [_BATCH_NAMES.get(name, name) for name in names]
-
-
-def _read(found: batch.Batch, names: Collection[str]) -> tuple[Rows, Statuses]:
-    """Return quantities of a batch by their names in a sweep; NaN where the status demands it."""
+def _rows(
+    names: list[str],
+    arm: Manipulator,
+    q: Array,
+    tension: Array | None = None,
+    wrench: Array | None = None,
+    *,
+    direction: Array | None = None,
+    threads: int | None,
+) -> tuple[Rows, Statuses]:
+    """Compute quantities in a batch, by their names in a sweep; NaN where the status demands it."""
+    outputs = [_BATCH_NAMES.get(name, name) for name in names]
+    found = batch.evaluate(arm, q, tension, wrench, outputs, direction=direction, threads=threads)
     status = found.status.astype(np.int8)
     rows = {}
-    for name in names:
-        values = found[_BATCH_NAMES.get(name, name)]
+    for name, output in zip(names, outputs, strict=True):
+        values = found[output]
         if name == "tip_position":
             values = values[:, :3, 3]
         elif name == "translational_compliance":
@@ -208,3 +173,10 @@ def _read(found: batch.Batch, names: Collection[str]) -> tuple[Rows, Statuses]:
         rows[name] = values.copy()
         rows[name][np.isin(status, lost)] = np.nan
     return rows, status
+
+
+def _spread(rows: Array, place: _Place, shape: tuple[int, ...]) -> Array:
+    """Build an array of all cases from rows of some cases; NaN in all other cases."""
+    full = np.full((*shape, *rows.shape[1:]), np.nan)
+    full[place] = rows
+    return full

@@ -1,22 +1,23 @@
 """Pose sets: grids over named joints, paths along a polyline, Sobol points within the limits.
 
-A pose set does not depend on an arm; :func:`poses_of` builds its postures for an arm. The result
-has dimensions and labels. It computes joint angles in parts, so a large grid is never in memory.
+A pose set does not depend on an arm; :func:`poses_of` builds its postures for an arm. Joint angles
+are computed block by block, so a large grid is never in memory.
 """
 
 from __future__ import annotations
 
 import itertools
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import final
+from typing import NamedTuple, final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm.errors import InvalidInput
 from cdsm.manipulator import Manipulator
+from cdsm.support.format import JointUnits
 from cdsm.support.validation import (
     Array,
     ReadOnlyState,
@@ -26,7 +27,8 @@ from cdsm.support.validation import (
     scalar,
     whole_number,
 )
-from cdsm.sweeps.arguments import Label, distinct
+from cdsm.sweeps.arguments import Label, distinct, label
+from cdsm.sweeps.blocks import Block
 
 MAXIMUM_POSES = 2**30
 """Maximum number of postures of a path or a random set; scipy's Sobol sequence has 30 bits."""
@@ -35,69 +37,27 @@ _DRAWN = 2**16
 """Number of Sobol points drawn at once."""
 
 
-@final
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Listed:
-    """List of postures along the dimension ``pose``.
+class Poses(NamedTuple):
+    """Postures of an arm.
 
     Attributes:
-        q: Joint angles (N, nv) [rad].
-        labels: Coordinates by name.
+        sizes: Length of each dimension.
+        angles: Function of a block that returns its joint angles (n, nv) [rad], in C order.
+        labels: Coordinates by name, those of the dimensions first.
         description: Description in words.
     """
 
-    q: Array
-    labels: Mapping[str, Label]
+    sizes: dict[str, int]
+    angles: Callable[[Block], Array]
+    labels: dict[str, Label]
     description: str
-
-    @property
-    def sizes(self) -> dict[str, int]:
-        """Return the length of each dimension."""
-        return {"pose": len(self.q)}
-
-    def angles(self, start: int, stop: int) -> Array:
-        """Return joint angles (stop − start, nv) [rad] of postures from ``start`` on."""
-        return self.q[start:stop]
-
-
-@final
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Product:
-    """Grid of angles of some joints, with the last joint fastest; all other joints do not move.
-
-    Attributes:
-        values: Angles [rad] of each joint of the grid.
-        joints: Numbers of the joints of the grid.
-        rest: Joint angles (nv,) [rad] of the joints that do not move.
-        labels: Coordinates by name, those of the grid first.
-        description: Description in words.
-    """
-
-    values: tuple[Array, ...]
-    joints: tuple[int, ...]
-    rest: Array
-    labels: Mapping[str, Label]
-    description: str
-
-    @property
-    def sizes(self) -> dict[str, int]:
-        """Return the length of each dimension."""
-        return dict(zip(self.labels, map(len, self.values), strict=False))
-
-    def angles(self, start: int, stop: int) -> Array:
-        """Return joint angles (stop − start, nv) [rad] of postures, counted in C order."""
-        q = np.tile(self.rest, (stop - start, 1))
-        places = np.unravel_index(np.arange(start, stop), [len(each) for each in self.values])
-        for joint, values, place in zip(self.joints, self.values, places, strict=True):
-            q[:, joint] = values[place]
-        return frozen(q)
 
 
 class PoseSet(ABC):
     """Set of postures to sweep over: a grid, a path or random postures."""
 
     @abstractmethod
-    def _of(self, arm: Manipulator) -> Listed | Product:
+    def _of(self, arm: Manipulator) -> Poses:
         """Build the postures for an arm."""
 
 
@@ -139,29 +99,35 @@ class GridPoses(PoseSet):
         )
         object.__setattr__(self, "resting", tuple(resting.items()))
 
-    def _of(self, arm: Manipulator) -> Product:
+    def _of(self, arm: Manipulator) -> Poses:
         names = arm.joint_names
         rest = np.zeros(arm.nv)
         for name, angle in self.resting:
             rest[names.index(one_of("joint", name, names))] = angle
-        joints = tuple(names.index(one_of("joint", name, names)) for name, _ in self.swept)
-        values = tuple(frozen(np.array(each)) for _, each in self.swept)
+        swept = {one_of("joint", name, names): np.array(values) for name, values in self.swept}
+        columns = [names.index(name) for name in swept]
+
+        def angles(block: Block) -> Array:
+            parts = [values[block[name]] for name, values in swept.items()]
+            grid = np.meshgrid(*parts, indexing="ij")
+            q = np.tile(rest, (grid[0].size, 1))
+            for column, values in zip(columns, grid, strict=True):
+                q[:, column] = values.ravel()
+            return q
+
+        still = {name: x for name, x in zip(names, rest.tolist(), strict=True) if name not in swept}
+        units = dict(zip(names, arm.joint_units, strict=True))
         labels = {
-            names[joint]: Label((names[joint],), each, *_meaning(arm, joint))
-            for joint, each in zip(joints, values, strict=True)
+            name: label(
+                (name,) if name in swept else (),
+                values,
+                f"{'way' if units[name] == 'm' else 'angle'} of {name}",
+                units[name],
+            )
+            for name, values in {**swept, **still}.items()
         }
-        labels |= {
-            name: Label((), float(rest[joint]), *_meaning(arm, joint))
-            for joint, name in enumerate(names)
-            if joint not in joints
-        }
-        return Product(
-            values=values,
-            joints=joints,
-            rest=frozen(rest),
-            labels=labels,
-            description=f"grid over {', '.join(names[joint] for joint in joints)}",
-        )
+        sizes = {name: len(values) for name, values in swept.items()}
+        return Poses(sizes, angles, labels, f"grid over {', '.join(swept)}")
 
 
 @final
@@ -201,13 +167,13 @@ class PathPoses(ReadOnlyState, PoseSet):
         steps = np.linalg.norm(np.diff(self.waypoints, axis=0), axis=1)
         return np.concatenate([[0.0], np.cumsum(steps)])
 
-    def _of(self, arm: Manipulator) -> Listed:
+    def _of(self, arm: Manipulator) -> Poses:
         known = self._distances
         q, distances = checked_angles("waypoints", self.waypoints, arm), known
         if self.count is not None:
             distances = np.linspace(0.0, known[-1], self.count)
             q = np.column_stack([np.interp(distances, known, column) for column in q.T])
-        distance = Label(("pose",), distances, "way along the path in joint space", _unit(arm))
+        distance = label(("pose",), distances, "way along the path in joint space", _unit(arm))
         return _listed(q, arm, f"path of {len(known)} waypoints", {"distance": distance})
 
 
@@ -231,7 +197,7 @@ class RandomPoses(PoseSet):
         whole_number("count", self.count, 1, MAXIMUM_POSES)
         whole_number("seed", self.seed, 0)
 
-    def _of(self, arm: Manipulator) -> Listed:
+    def _of(self, arm: Manipulator) -> Poses:
         from scipy.stats import qmc  # takes half a second to import
 
         sequence = qmc.Sobol(arm.nv, seed=np.random.default_rng(self.seed))
@@ -246,7 +212,7 @@ class RandomPoses(PoseSet):
         return _listed(q, arm, description, {})
 
 
-def poses_of(arm: Manipulator, q: PoseSet | ArrayLike) -> Listed | Product:
+def poses_of(arm: Manipulator, q: PoseSet | ArrayLike) -> Poses:
     """Build the postures of a pose set, or of an array (N, nv) [rad], for an arm."""
     if isinstance(q, PoseSet):
         return q._of(arm)
@@ -265,18 +231,11 @@ def checked_angles(name: str, q: ArrayLike, arm: Manipulator) -> Array:
     return angles
 
 
+def _listed(q: Array, arm: Manipulator, description: str, labels: dict[str, Label]) -> Poses:
+    labels["pose"] = label(("pose",), np.arange(len(q)), "number of the posture", "1")
+    labels["q"] = label(("pose", "joint"), frozen(q), "joint angles", _unit(arm))
+    return Poses({"pose": len(q)}, lambda block: q[block["pose"]], labels, description)
+
+
 def _unit(arm: Manipulator) -> str:
-    """Return the unit of joint coordinates: angles, or angles and ways."""
-    return "rad or m" if arm.slides.any() else "rad"
-
-
-def _meaning(arm: Manipulator, joint: int) -> tuple[str, str]:
-    """Return the long name and the unit of a joint coordinate."""
-    what = "way" if arm.slides[joint] else "angle"
-    return f"{what} of {arm.joint_names[joint]}", arm.joint_units[joint]
-
-
-def _listed(q: Array, arm: Manipulator, description: str, labels: dict[str, Label]) -> Listed:
-    labels["pose"] = Label(("pose",), np.arange(len(q)), "number of the posture", "1")
-    labels["q"] = Label(("pose", "joint"), q, "joint angles", _unit(arm))
-    return Listed(q=frozen(q), labels=labels, description=description)
+    return JointUnits(arm.slides).joined("rad", "m")

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import ExitStack
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,9 +16,8 @@ from cdsm.manipulator import Manipulator
 from cdsm.support.extras import need
 from cdsm.support.files import as_path
 from cdsm.support.validation import flag, whole_number
-from cdsm.sweeps.blocks import Block, blocks, extents
+from cdsm.sweeps.blocks import Block, blocks, extents, postures
 from cdsm.sweeps.cluster import checked_client, on_cluster
-from cdsm.sweeps.dataset import empty, to_dataset
 from cdsm.sweeps.evaluation import BlockResult, evaluate
 from cdsm.sweeps.poses import PoseSet
 from cdsm.sweeps.quantities import DEFAULT, SweepStatus
@@ -108,13 +106,13 @@ def sweep(
         direction=direction,
         outputs=outputs,
     )
-    extent = extents(specification.poses.sizes, _postures(specification, chunk))
+    cases = specification.task.cases
+    most = _NUMBERS // arm.nv if chunk is None else whole_number("chunk", chunk, 1)
+    extent = extents(specification.poses.sizes, most // cases)
     if store is None:
-        values = {
-            name: empty(specification, name) for name in (*specification.task.outputs, "status")
-        }
+        values = {name: specification.empty(name) for name in specification.variables}
         _run(specification, values, extent, client, progress)
-        return to_dataset(specification, values)
+        return specification.dataset(values)
 
     from cdsm.sweeps import store as stores  # needs zarr
 
@@ -123,13 +121,6 @@ def sweep(
         kept = dict(zip(specification.poses.sizes, arrays["status"].chunks, strict=False))
         _run(specification, arrays, kept, client, progress, path)
     return stores.read(path)
-
-
-def _postures(specification: Specification, chunk: int | None) -> int:
-    """Return the number of postures of a block."""
-    if chunk is None:
-        return _NUMBERS // (specification.task.arm.nv * specification.task.cases)
-    return whole_number("chunk", chunk, 1) // specification.task.cases
 
 
 def _run(
@@ -143,33 +134,26 @@ def _run(
     """Compute all pending blocks; write them to numpy arrays, or to zarr arrays at ``path``."""
     from cdsm.sweeps.progress import progress_bar  # rich takes a while to import
 
-    every = list(blocks(specification.poses.sizes, extent))
+    task, poses = specification.task, specification.poses
+    every = blocks(poses.sizes, extent)
     todo = [block for block in every if _is_pending(specification, arrays["status"], block)]
-    cases = specification.task.cases
-    total, left = (sum(b.stop - b.start for b in some) * cases for some in (every, todo))
-    answers: Iterator[tuple[Block, BlockResult | None]]
+    total, left = (sum(map(postures, some)) * task.cases for some in (every, todo))
+    answers: Iterable[tuple[Block, BlockResult | None]]
     if client is None:
-        answers = (
-            (
-                block,
-                evaluate(specification.task, specification.poses.angles(block.start, block.stop)),
-            )
-            for block in todo
-        )
+        answers = ((block, evaluate(task, poses.angles(block))) for block in todo)
     else:
         answers = on_cluster(client, specification, todo)
-    with ExitStack() as stack:
-        advance = stack.enter_context(progress_bar(total, total - left, wanted=progress))
+    with progress_bar(total, total - left, wanted=progress) as advance:
         for block, answer in answers:
             try:
                 _write(specification, arrays, block, answer)
             except OSError as error:
                 raise FileError(path, f"cannot be written: {error}.") from error
-            advance((block.stop - block.start) * cases)
+            advance(postures(block) * task.cases)
 
 
 def _is_pending(specification: Specification, status: Any, block: Block) -> bool:
-    found = status[_region(specification, "status", block)]
+    found = status[specification.region("status", block)]
     return bool(np.isin(found, (SweepStatus.PENDING, SweepStatus.WORKER_LOST)).any())
 
 
@@ -179,18 +163,9 @@ def _write(
     block: Block,
     answer: BlockResult | None,
 ) -> None:
-    if answer is not None:
-        for name in specification.task.outputs:
-            shape = specification.shape(name, block.slices)
-            arrays[name][_region(specification, name, block)] = answer[name].reshape(shape)
-    # status is written last: any status but pending means that the outputs are written
-    region = _region(specification, "status", block)
     if answer is None:
-        arrays["status"][region] = np.int8(SweepStatus.WORKER_LOST)
-    else:
-        shape = specification.shape("status", block.slices)
-        arrays["status"][region] = answer["status"].reshape(shape)
-
-
-def _region(specification: Specification, name: str, block: Block) -> tuple[slice, ...]:
-    return tuple(block.slices.get(dim, slice(None)) for dim in specification.dims(name))
+        arrays["status"][specification.region("status", block)] = np.int8(SweepStatus.WORKER_LOST)
+        return
+    for name in specification.variables:  # status last: unless pending, all outputs are written
+        region = specification.region(name, block)
+        arrays[name][region] = answer[name].reshape([part.stop - part.start for part in region])

@@ -12,7 +12,7 @@ import os
 import secrets
 import shutil
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,12 +20,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdsm.errors import FileError, StoreError
-from cdsm.sweeps.dataset import EMPTY, to_dataset, variable_attributes
-from cdsm.sweeps.specification import Specification, changed_laws
+from cdsm.sweeps.description import changed_laws
+from cdsm.sweeps.specification import EMPTY, Specification
 
 if TYPE_CHECKING:
     import xarray
-    import zarr
 
 _ORDER = "order"
 """Attribute with the names of all variables in order, since a folder has no order."""
@@ -37,7 +36,7 @@ _LISTED = 8
 @contextmanager
 def opened(
     path: Path, specification: Specification, extent: Mapping[str, int]
-) -> Iterator[Mapping[str, zarr.Array[Any]]]:
+) -> Iterator[Mapping[str, Any]]:
     """Open a store, or create it; yield its arrays, one for each output and ``status``.
 
     It is locked against other runs. The system removes the lock when the process ends or crashes.
@@ -59,7 +58,7 @@ def opened(
             raise FileError(path, f"cannot be locked: {error.strerror}.") from None
         _check(path, specification)
         group = zarr.open_group(path, mode="r+", use_consolidated=False)
-        yield {name: _array(group, name) for name in (*specification.task.outputs, "status")}
+        yield {name: group[name] for name in specification.variables}
     finally:
         os.close(folder)
 
@@ -84,11 +83,6 @@ def read(path: Path) -> xarray.Dataset:
     return found[order]
 
 
-def _array(group: zarr.Group, name: str) -> zarr.Array[Any]:
-    array: zarr.Array[Any] = group[name]  # type: ignore[assignment]
-    return array
-
-
 def _make(path: Path, specification: Specification, extent: Mapping[str, int]) -> None:
     """Write an empty store to a temporary folder, then rename this folder to ``path``."""
     import zarr
@@ -97,15 +91,14 @@ def _make(path: Path, specification: Specification, extent: Mapping[str, int]) -
         raise FileError(path, f"the folder {path.parent} does not exist; create it.")
     aside = path.with_name(f".{path.name}-{secrets.token_hex(4)}")
     try:
-        names = (*specification.task.outputs, "status")
-        labels = to_dataset(specification, {})
-        labels.attrs[_ORDER] = [*specification.labels, *names]
-        for name, label in labels.coords.items():
+        frame = specification.frame
+        labels = frame.assign_attrs({_ORDER: [*frame.coords, *specification.variables]})
+        for name, label in frame.coords.items():
             if label.dtype.kind == "U":  # the format has no texts of fixed width
                 labels[name] = label.astype(object)
         labels.to_zarr(aside, mode="w-", zarr_format=3, consolidated=False)
         group = zarr.open_group(aside, mode="r+", use_consolidated=False)
-        for name in names:
+        for name in specification.variables:
             dims, shape = specification.dims(name), specification.shape(name)
             fill = EMPTY.get(name, np.float64(np.nan))
             group.create_array(
@@ -115,29 +108,23 @@ def _make(path: Path, specification: Specification, extent: Mapping[str, int]) -
                 dtype=fill.dtype,
                 fill_value=fill,
                 dimension_names=dims,
-                attributes=variable_attributes(specification, name),
+                attributes=specification.attributes(name),
             )
-        with suppress(FileExistsError):  # another run was faster; its store is checked later
-            _rename(aside, path)
+        try:
+            aside.rename(path)
+        except OSError:
+            if not path.exists():  # else another run was faster; its store is checked later
+                raise
     except (OSError, ValueError) as error:
         raise FileError(path, f"cannot be made a store: {error}.") from None
     finally:
         shutil.rmtree(aside, ignore_errors=True)
 
 
-def _rename(aside: Path, path: Path) -> None:
-    try:
-        aside.rename(path)
-    except OSError:
-        if path.exists():
-            raise FileExistsError(path) from None
-        raise
-
-
 def _check(path: Path, specification: Specification) -> None:
     """Raise a StoreError that lists the differences between a store and the specification."""
-    stored, wanted = read(path), to_dataset(specification, {})
-    held, asked = {str(name) for name in stored.data_vars}, {*specification.task.outputs, "status"}
+    stored, wanted = read(path), specification.frame
+    held, asked = {str(name) for name in stored.data_vars}, {*specification.variables}
     different = [f"outputs: {each} in the store alone" for each in sorted(held - asked)]
     different += [f"outputs: {each} not in the store" for each in sorted(asked - held)]
     for name in {**stored.coords, **wanted.coords}:
@@ -156,10 +143,8 @@ def _check(path: Path, specification: Specification) -> None:
                 for law in changed
             ]
         elif theirs != ours:  # shown from a few characters before the first difference
-            same = itertools.takewhile(
-                lambda pair: pair[0] == pair[1], zip(theirs, ours, strict=False)
-            )
-            start = max(0, len(list(same)) - 30)
+            pairs = enumerate(itertools.zip_longest(theirs, ours))
+            start = max(0, next(i for i, (one, other) in pairs if one != other) - 30)
             different.append(_mismatch(str(name), theirs[start:], ours[start:]))
     if different:
         more = f"\n  - and {len(different) - _LISTED} more" if len(different) > _LISTED else ""

@@ -15,7 +15,7 @@ import xarray as xr
 import zarr
 
 import cdsm
-from cdsm.sweeps import run, specification, store
+from cdsm.sweeps import description, run, store
 from cdsm.sweeps.blocks import extents
 from cdsm.sweeps.evaluation import BlockResult, SweepTask, evaluate
 from cdsm.sweeps.specification import Specification, specify
@@ -208,7 +208,7 @@ def test_a_store_of_another_version_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     kept(tmp_path / "s.zarr")
-    monkeypatch.setattr(specification, "version", lambda _: "9.9")
+    monkeypatch.setattr(description, "version", lambda _: "9.9")
     with pytest.raises(cdsm.StoreError, match=r"source: cdsm .* in the store, cdsm 9.9"):
         kept(tmp_path / "s.zarr")
 
@@ -389,10 +389,10 @@ def test_a_law_whose_code_has_changed_is_noticed(
 def test_a_law_of_ones_own_is_described_alike_in_every_process(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    here = specification.law_text(own_law(tmp_path, monkeypatch))
+    here = description.law_text(own_law(tmp_path, monkeypatch))
     script = (
         f"import sys; sys.path.insert(0, {str(tmp_path)!r})\n"
-        "from own_law import Own; from cdsm.sweeps.specification import law_text\n"
+        "from own_law import Own; from cdsm.sweeps.description import law_text\n"
         "print(law_text(Own()))"
     )
     for seed in ("1", "2"):
@@ -423,16 +423,16 @@ class Partial(Reticent):
 
 
 def test_a_law_need_not_answer_everywhere_to_be_described() -> None:
-    text = specification.law_text(Partial(1e5))
-    assert text == specification.law_text(Partial(1e5))
-    assert text != specification.law_text(Partial(1e4))
+    text = description.law_text(Partial(1e5))
+    assert text == description.law_text(Partial(1e5))
+    assert text != description.law_text(Partial(1e4))
 
 
 def test_what_differs_otherwise_is_no_change_of_code() -> None:
-    one, other = (specification.law_text(Reticent(value)) for value in (1e5, 1e4))
-    assert specification.changed_laws(one, other) == ()
-    assert specification.changed_laws(one, one) == ()
-    assert specification.changed_laws(repr(STEEL), repr(STEEL)) == ()
+    one, other = (description.law_text(Reticent(value)) for value in (1e5, 1e4))
+    assert description.changed_laws(one, other) == ()
+    assert description.changed_laws(one, one) == ()
+    assert description.changed_laws(repr(STEEL), repr(STEEL)) == ()
 
 
 def test_bounds_of_a_cable_are_part_of_the_question(tmp_path: Path) -> None:

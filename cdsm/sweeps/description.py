@@ -1,0 +1,107 @@
+"""Arm and laws of elasticity as texts, so that a Dataset tells from which arm it comes."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import pickle
+import re
+from importlib.metadata import version
+
+import numpy as np
+
+from cdsm.cable import Cable
+from cdsm.elasticity import Elasticity
+from cdsm.manipulator import Manipulator
+from cdsm.support.format import MODEL
+from cdsm.support.validation import Array
+
+_SAMPLES = np.ldexp(np.arange(4.0, 8.0), np.arange(-12, 18)[:, None]).ravel()
+"""Tensions [N] from 1e-3 to 1e6, four per octave, with equal bits on every machine."""
+
+_WITHIN = 65
+"""Number of evenly spaced tensions over a domain; narrow domains hold few of ``_SAMPLES``."""
+
+_SAMPLED = re.compile(r"\b([\w.<>]+) (\w+), samples ([0-9a-f]{16})")
+"""Text of a user-defined law: its class, its state, and a digest of domain, EA and strain."""
+
+
+def attributes_of(arm: Manipulator) -> dict[str, str]:
+    """Return the attributes of a Dataset that describe the arm and the version of cdsm."""
+    laws = list(dict.fromkeys(law_text(cable.elasticity) for cable in arm.cables))
+    return {
+        "Conventions": "CF-1.11",
+        "title": f"stiffness sweep of {arm.name}",
+        "source": f"cdsm {version('cdsm-stiffness')}",
+        **({"geometry": arm.geometry.to_toml()} if arm.is_serpentine else {"urdf": arm.urdf}),
+        "model": MODEL,
+        "original_length": arm.original_length,
+        "cables": json.dumps([_cable(cable, laws) for cable in arm.cables]),
+        "cable_elasticities": json.dumps(laws),
+    }
+
+
+def law_text(law: Elasticity) -> str:
+    """Return an elasticity as text; equal laws have equal texts, also in another process.
+
+    A user-defined law depends on its state and its code. The text identifies the code by the
+    domain, and by EA and strain at up to 185 tensions.
+    """
+    text = repr(law)
+    if type(law).__module__.startswith("cdsm.") and "..." not in text:  # numpy shortens arrays
+        return text
+    # the repr of a user-defined class may omit something on which the law depends
+    kind = f"{type(law).__module__}.{type(law).__qualname__}"
+    try:
+        state = _digest(pickle.dumps(law))
+    except Exception:  # a user-defined class may raise anything; its address is never wrong
+        return f"{kind} at {id(law):#x}"
+    return f"{kind} {state}, samples {_digest(_answers(law).encode())}"
+
+
+def changed_laws(one: str, other: str) -> tuple[str, ...]:
+    """Return the classes of laws whose digest changed; empty if the texts differ in more."""
+    if _SAMPLED.sub(r"\1 \2", one) != _SAMPLED.sub(r"\1 \2", other):
+        return ()
+    pairs = zip(_SAMPLED.findall(one), _SAMPLED.findall(other), strict=True)
+    return tuple(dict.fromkeys(mine[0] for mine, theirs in pairs if mine != theirs))
+
+
+def _answers(law: Elasticity) -> str:
+    """Return domain, EA and strain of a law at the sampled tensions, with all bits."""
+    domain = law.domain
+    first, high = domain.first, domain.high
+    tensions = _SAMPLES[(first <= _SAMPLES) & (high >= _SAMPLES)]
+    if math.isfinite(high):
+        tensions = np.concatenate([tensions, np.linspace(first, high, _WITHIN)])
+    answers = [_answer(law, name, F) for name in ("rigidity", "strain") for F in tensions]
+    return f"{domain!r} {' '.join(answers)}"
+
+
+def _answer(law: Elasticity, name: str, tension: float) -> str:
+    """Return one number of a law with all bits, or the name of the error that the law raises."""
+    try:
+        value: Array = np.asarray(getattr(law, name)(np.array([tension])), dtype=np.float64)
+        return float(value.reshape(())).hex()
+    except Exception as error:  # a user-defined class may raise anything
+        return type(error).__name__
+
+
+def _digest(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()[:16]
+
+
+def _cable(cable: Cable, laws: list[str]) -> dict[str, object]:
+    """Return a cable for JSON in SI units; its elasticity is an index into ``laws``."""
+    series = cable.series_stiffness
+    return {
+        "name": cable.name,
+        "sites": [[site.link, *site.position] for site in cable.sites],
+        "lead": cable.lead,
+        "elasticity": laws.index(law_text(cable.elasticity)),
+        "series_stiffness": None if math.isinf(series) else series,
+        "control": cable.control,
+        "minimum": cable.minimum,
+        "maximum": None if math.isinf(cable.maximum) else cable.maximum,
+    }
