@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.cm import ScalarMappable
@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from cdsm.errors import InvalidInput
 from cdsm.plots.style import AXES, COLORS, MM, equal_axes, expect
-from cdsm.support.validation import Array
+from cdsm.support.validation import Array, frozen
 
 if TYPE_CHECKING:
     from cdsm.posture import Posture
@@ -53,14 +53,14 @@ def plot_arm(
             raise InvalidInput("stiffness", "was taken at another posture; take it at this one.")
     figure = Figure(figsize=(7.0, 5.0), layout="constrained")
     axes: Any = figure.add_subplot(projection="3d")
-    if stiffness is not None and stiffness.is_stable:
+    unstable = stiffness is not None and not stiffness.is_stable
+    if stiffness is not None and not unstable:
         _draw_ellipsoid(axes, stiffness)
     draw_arm(axes, pose, tension)
     if tension is not None:
         figure.colorbar(
             tension_colors(tension), ax=axes, label="cable tension [N]", shrink=0.7, pad=0.12
         )
-    unstable = stiffness is not None and not stiffness.is_stable
     figure.suptitle(f"{pose.arm}{'; UNSTABLE' if unstable else ''}", fontsize=10)
     return figure
 
@@ -69,24 +69,16 @@ ELLIPSOID_GRID = 13, 25
 """Number of points of an ellipsoid from pole to pole, and around."""
 
 
-class Ellipsoid(NamedTuple):
-    """Displacement ellipsoid of the tip: surface (3, 13, 25) [m] and ``longest`` [m/N].
+def ellipsoid(stiffness: Stiffness) -> Array | None:
+    """Compute the surface (3, 13, 25) [m] of the ellipsoid C_vv f, |f| = 1, drawn at the tip.
 
-    ``longest`` is the longest half axis of C_vv f, |f| = 1. It is drawn a fifth of the arm long.
-    """
-
-    surface: Array
-    longest: float
-
-
-def ellipsoid(stiffness: Stiffness) -> Ellipsoid | None:
-    """Compute the ellipsoid C_vv f, |f| = 1, at the tip; None if no force moves the tip.
+    Its longest half axis is a fifth of the arm's length. None if no force moves the tip.
 
     Raises:
         SingularStiffness: K_θ is singular, so the ellipsoid does not exist.
     """
     C = stiffness.compliance[:3, :3]
-    longest = float(np.linalg.norm(C, 2))
+    longest = np.linalg.norm(C, 2)
     if longest == 0.0:
         return None
     rows, columns = ELLIPSOID_GRID
@@ -95,21 +87,17 @@ def ellipsoid(stiffness: Stiffness) -> Ellipsoid | None:
     )
     force = np.stack([np.sin(down) * np.cos(around), np.sin(down) * np.sin(around), np.cos(down)])
     size = 0.2 * stiffness.posture.arm.length / longest
-    moved = size * np.einsum("ij,j...->i...", C, force)
-    return Ellipsoid(moved + stiffness.posture.tip[:3, 3, None, None], longest)
+    moved: Array = size * np.einsum("ij,j...->i...", C, force)
+    return frozen(moved + stiffness.posture.tip[:3, 3, None, None])
 
 
 def _draw_ellipsoid(axes: Any, stiffness: Stiffness) -> None:
-    drawn = ellipsoid(stiffness)
-    if drawn is None:
-        return
-    axes.plot_wireframe(
-        *(MM * drawn.surface),
-        color=COLORS[1],
-        linewidth=0.5,
-        label=f"where 1 N moves the tip: longest {MM * drawn.longest:.3g} mm",
-    )
-    axes.legend(loc="upper left", fontsize=8)
+    surface = ellipsoid(stiffness)
+    if surface is not None:
+        longest = MM * np.linalg.norm(stiffness.compliance[:3, :3], 2)
+        label = f"where 1 N moves the tip: longest {longest:.3g} mm"
+        axes.plot_wireframe(*(MM * surface), color=COLORS[1], linewidth=0.5, label=label)
+        axes.legend(loc="upper left", fontsize=8)
 
 
 def draw_arm(axes: Any, pose: Posture, tension: Tension | None) -> None:

@@ -5,8 +5,7 @@ from __future__ import annotations
 import itertools
 import textwrap
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 from matplotlib.cm import ScalarMappable
@@ -79,8 +78,8 @@ def plot_map(
     poses = [str(dim) for dim in tips.dims[:-1]]
     words = status_names(dataset)
     maps = list(_panels(dataset, quantity, poses, words))
-    points = np.asarray(tips.values, dtype=np.float64).reshape(-1, 3)
-    shown = np.asarray(np.isfinite(points).all(axis=1))
+    points = tips.values.reshape(-1, 3)
+    shown = np.isfinite(points).all(axis=1)
     title = [dataset.attrs["title"], dataset.attrs["poses"]]
     if section is not None:
         inside, slab = _slab(points, section)
@@ -94,8 +93,9 @@ def plot_map(
     points = points[shown]
     plane = _plane(points, section)
     factor, unit = _UNITS.get(dataset[quantity].units, (1.0, dataset[quantity].units))
-    maps = [panel.part(shown, factor) for panel in maps]
-    colors = _colors(np.concatenate([panel.values for panel in maps]))
+    maps = [_Panel(title, factor * values[shown], code[shown]) for title, values, code in maps]
+    every = np.concatenate([panel.values for panel in maps])
+    colors = _colors(every)
 
     columns = 2 if len(maps) == 4 else min(len(maps), 3)
     rows = -(-len(maps) // columns)
@@ -109,7 +109,8 @@ def plot_map(
         _draw(axes, points, panel, plane, colors, words)
         axes.set_title(panel.title, fontsize=9)
     name = dataset[quantity].long_name.split(",")[0]
-    bar = figure.colorbar(colors.mappable, ax=grid, shrink=0.8, extend=colors.extend)
+    extend = "max" if np.isposinf(every).any() else "neither"
+    bar = figure.colorbar(colors, ax=grid, shrink=0.8, extend=extend)
     sign = "; below 0: unstable" if quantity == "margin" else ""
     bar.set_label(f"{name} [{unit}]{sign}", fontsize=9)
     bar.ax.tick_params(labelsize=8)
@@ -118,25 +119,12 @@ def plot_map(
     return figure
 
 
-@dataclass(frozen=True)
-class _Panel:
+class _Panel(NamedTuple):
     """One map: values of all tips (NaN if missing) and their status."""
 
     title: str
     values: Array
     status: NDArray[np.int8]
-
-    def part(self, shown: NDArray[np.bool_], factor: float) -> _Panel:
-        return _Panel(self.title, factor * self.values[shown], self.status[shown])
-
-
-@dataclass(frozen=True)
-class _Colors:
-    """Colour scale. Infinite values are drawn with the value ``beyond``."""
-
-    mappable: ScalarMappable
-    beyond: float
-    extend: str
 
 
 def _panels(
@@ -162,15 +150,16 @@ def _panels(
             f"dataset.isel({cases[0]}=[0]).",
         )
     # a dimension that the quantity does not have cannot change its status: take index 0
-    irrelevant = {dim: 0 for dim in status.dims if dim not in dims}
+    status = status.isel({dim: 0 for dim in status.dims if dim not in dims}, drop=True)
+    codes = status.broadcast_like(dataset[quantity])
     hidden = [] if quantity == "margin" else [v for v, word in words.items() if word == "unstable"]
     for place in np.ndindex(*sizes):
         at = dict(zip(cases, place, strict=True))
-        values = dataset[quantity].isel(at).transpose(*poses).values.ravel()
-        relevant = {dim: i for dim, i in at.items() if dim in status.dims}
-        codes = status.isel({**relevant, **irrelevant}).transpose(*poses).values.ravel()
-        values = np.where(np.isin(codes, hidden), np.nan, values)
-        yield _Panel(", ".join(_title(dataset, dim, i) for dim, i in at.items()), values, codes)
+        title = ", ".join(_title(dataset, dim, i) for dim, i in at.items())
+        values, code = (
+            each.isel(at).transpose(*poses).values.ravel() for each in (dataset[quantity], codes)
+        )
+        yield _Panel(title, np.where(np.isin(code, hidden), np.nan, values), code)
 
 
 def _title(dataset: xarray.Dataset, dim: str, place: int) -> str:
@@ -207,26 +196,18 @@ def _plane(points: Array, section: tuple[str, float, float] | None) -> tuple[int
     return first, second
 
 
-def _colors(values: Array) -> _Colors:
+def _colors(values: Array) -> ScalarMappable:
     """Build the scale of the finite values, up to their 99th percentile if some are infinite."""
-    finite = values[np.isfinite(values)]
-    infinite = bool(np.isposinf(values).any())
-    if not finite.size:
-        finite = np.array([0.0, 1.0])
+    finite = values[np.isfinite(values)] if np.isfinite(values).any() else np.array([0.0, 1.0])
     low = float(finite.min())
-    high = float(np.quantile(finite, 0.99) if infinite else finite.max())
+    high = float(np.quantile(finite, 0.99 if np.isposinf(values).any() else 1.0))
     scale = Normalize
     if low > 0.0 and high > _WIDE * low:
         scale = LogNorm
     elif low < 0.0 < high:  # a margin: the colour shows its sign first
         low, high = -max(-low, high), max(-low, high)
     name = "coolwarm_r" if low < 0.0 < high else "viridis"
-    high = max(high, low + 1e-12 * abs(low))
-    return _Colors(
-        ScalarMappable(scale(low, high), name),
-        high + abs(high),
-        "max" if infinite else "neither",
-    )
+    return ScalarMappable(scale(low, max(high, low + 1e-12 * abs(low))), name)
 
 
 def _draw(
@@ -234,20 +215,21 @@ def _draw(
     points: Array,
     panel: _Panel,
     plane: tuple[int, int] | None,
-    colors: _Colors,
+    colors: ScalarMappable,
     words: Mapping[int, str],
 ) -> None:
     shown = plane or (0, 1, 2)
     known = ~np.isnan(panel.values)
+    highest: Any = colors.norm.vmax
     for code in np.unique(panel.status[~known]).tolist():
         mark, color, size = _MARKS.get(words[code], _MARKS["outside_elasticity"])
         marked = points[~known & (panel.status == code)][:, shown]
         axes.scatter(*marked.T, marker=mark, c=color, s=size, linewidths=0.7)
     axes.scatter(
         *points[known][:, shown].T,
-        c=np.minimum(panel.values[known], colors.beyond),
-        norm=colors.mappable.norm,
-        cmap=colors.mappable.cmap,
+        c=np.minimum(panel.values[known], highest),  # infinite values are not drawn
+        norm=colors.norm,
+        cmap=colors.cmap,
         s=14.0,
         linewidths=0.0,
     )
@@ -263,7 +245,7 @@ def _draw(
 
 
 def _legend(figure: Figure, panels: list[_Panel], words: Mapping[int, str]) -> None:
-    """Draw the legend: each marker and its percentage of all entries."""
+    """Draw the legend: each marker, and its share of all entries."""
     status = np.concatenate([panel.status[np.isnan(panel.values)] for panel in panels])
     total = sum(panel.status.size for panel in panels)
     handles = [Line2D([], [], marker="s", color="0.1", linestyle="", label="base")]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -11,16 +11,7 @@ from matplotlib.figure import Figure
 
 from cdsm.errors import InvalidInput
 from cdsm.plots.arm import draw_arm
-from cdsm.plots.style import (
-    AXES,
-    COLORS,
-    KN,
-    MM,
-    N_PER_MM,
-    STYLES,
-    legend_below,
-    panels,
-)
+from cdsm.plots.style import AXES, COLORS, KN, MM, N_PER_MM, STYLES, legend_below, panels
 from cdsm.support.validation import Array
 
 if TYPE_CHECKING:
@@ -28,6 +19,10 @@ if TYPE_CHECKING:
 
 _LENGTHS: Final = {"stretched": "$l_0 = L$ (paper)", "unstrained": "original $l_0$"}
 _READINGS: Final = {"pseudoinverse": "paper's reading", "along": "hung weight"}
+_SWEPT: Final = {
+    "young_modulus": "Young's modulus [GPa]",
+    "tension": "cable tension, mean and range [N]",
+}
 
 
 def plot_paper(result: paper.Figure) -> Figure:
@@ -46,7 +41,9 @@ def plot_paper(result: paper.Figure) -> Figure:
     draw = _DRAWN.get(getattr(result, "name", ""))
     if draw is None:
         raise InvalidInput("result", f"{result!r} given; a figure of cdsm.paper is needed.")
-    return draw(result)
+    figure = draw(result)
+    figure.suptitle(result.title)
+    return figure
 
 
 def _plot_strand(result: paper.StrandFigure) -> Figure:
@@ -80,7 +77,6 @@ def _plot_strand(result: paper.StrandFigure) -> Figure:
     right.set_ylim(-5.0, 1.05 * KN * result.high.max())  # the printed law falls to -788 kN
     right.set(xlabel="tension [N]", ylabel="rigidity EA [kN]", title="(b)")
     right.legend(fontsize=8, loc="upper left")
-    figure.suptitle(result.title)
     return figure
 
 
@@ -102,8 +98,8 @@ def _plot_directions(result: paper.StiffnessFigure) -> Figure:
             axes.set_ylabel(f"$K_{AXES[i]}$, {reading} [N/mm]")
     note = "dots: passive part alone" if result.part == "passive" else None
     grid[0, 0].legend(fontsize=8, title=note, title_fontsize=8)
-    _label_swept(grid[-1], result)
-    figure.suptitle(result.title)
+    for axes in grid[-1]:
+        axes.set_xlabel(_SWEPT[result.swept])
     return figure
 
 
@@ -137,7 +133,6 @@ def _plot_changes(result: paper.StiffnessFigure) -> Figure:
     grid[1, 0].set_ylabel("change, paper's reading of $K_R$ [%]")
     grid[2, 0].set_ylabel("change, hung weight [%]")
     legend_below(figure, grid[1, 0], 3, fontsize=9)
-    figure.suptitle(result.title)
     return figure
 
 
@@ -161,7 +156,6 @@ def _plot_lead(result: paper.LeadFigure) -> Figure:
     pair[0].set(title="paper's reading of $K_R$", ylabel="change of stiffness [%]")
     pair[1].set(title="hung weight")
     legend_below(figure, pair[0], 3, fontsize=9)
-    figure.suptitle(result.title)
     return figure
 
 
@@ -169,7 +163,6 @@ def _plot_postures(result: paper.StiffnessFigure) -> Figure:
     """Plot a column for each posture: a picture of the arm, and a curve for each direction."""
     figure = Figure(figsize=(11.0, 9.0), layout="constrained")
     grid = figure.add_gridspec(3, 3, height_ratios=(1.15, 1.0, 1.0))
-    bottom = []
     for column, (curve, original, pose) in enumerate(
         zip(result.curves, result.original, result.postures, strict=True)
     ):
@@ -184,11 +177,9 @@ def _plot_postures(result: paper.StiffnessFigure) -> Figure:
                 axes.plot(_swept(result, curve), unstrained, "k:", linewidth=0.8)
             axes.set_ylabel(f"stiffness, {reading} [N/mm]")
             axes.grid(alpha=0.3)
-        bottom.append(axes)
+        axes.set_xlabel(_SWEPT[result.swept])
     title = "direction; solid: l_0 = L (paper), dotted: original length"
-    legend_below(figure, bottom[0], 3, title=title)
-    _label_swept(bottom, result)
-    figure.suptitle(result.title)
+    legend_below(figure, axes, 3, title=title)  # the last panel: all have the same three lines
     return figure
 
 
@@ -211,7 +202,6 @@ def _plot_experiment(result: paper.ExperimentFigure) -> Figure:
         axes.set_title(textwrap.fill(trace.label, 44), fontsize=9)
         axes.set_ylim(bottom=0.0)
         axes.legend(fontsize=8)
-    figure.suptitle(result.title)
     return figure
 
 
@@ -235,7 +225,6 @@ def _plot_prototype(result: paper.PrototypeFigure) -> Figure:
     axes.invert_yaxis()
     axes.set_xlabel("100 ln(model/paper); Figs. 12, 13: (model − paper)/paper [%]")
     figure.legend(loc="outside lower center", ncols=1, fontsize=8)
-    figure.suptitle(result.title)
     return figure
 
 
@@ -267,15 +256,6 @@ def _draw_curve(
 
 def _swept(result: paper.StiffnessFigure, curve: paper.Curve) -> Array:
     return curve.swept / 1e9 if result.swept == "young_modulus" else curve.tension[:, 1]
-
-
-def _label_swept(row: Iterable[Any], result: paper.StiffnessFigure) -> None:
-    label = {
-        "young_modulus": "Young's modulus [GPa]",
-        "tension": "cable tension, mean and range [N]",
-    }[result.swept]
-    for axes in row:
-        axes.set_xlabel(label)
 
 
 _DRAWN: Final[dict[str, Callable[[Any], Figure]]] = {

@@ -78,10 +78,8 @@ def plot_path_plan(plan: PathPlan) -> Figure:
     size = len(plan.target)
     wanted = N_PER_MM * plan.target.reshape(size, -1)
     # NaN leaves a gap in the line at samples that are not planned
-    achieved, tensions = (
-        np.full(wanted.shape, np.nan),
-        np.full((size, plan.tensions.shape[1]), np.nan),
-    )
+    achieved = np.full(wanted.shape, np.nan)
+    tensions = np.full((size, plan.tensions.shape[1]), np.nan)
     rows = list(plan.planned)
     achieved[rows] = N_PER_MM * plan.achieved.reshape(len(rows), wanted.shape[1])
     tensions[rows] = plan.tensions

@@ -122,9 +122,7 @@ class Shown(ReadOnlyState):
     @cached_property
     def ellipsoid(self) -> Array | None:
         """Ellipsoid of :func:`cdsm.plots.plot_arm` (3, rows, columns) [m]; None if not stable."""
-        K = self._stable
-        drawn = None if K is None else ellipsoid(K)
-        return None if drawn is None else frozen(drawn.surface)
+        return None if self._stable is None else ellipsoid(self._stable)
 
 
 def show(arm: Manipulator, setting: Setting) -> Shown:
