@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +16,6 @@ from cdsm.cable import Cable
 from cdsm.cable_laws import CableLaws, OriginalLength
 from cdsm.errors import CableError, UnknownName
 from cdsm.kernels import segments
-from cdsm.kernels.bodies import Masses
 from cdsm.kernels.tree import Routing, Tree
 from cdsm.rigid_body import RigidBody
 from cdsm.support.values import Array, frozen
@@ -27,10 +24,8 @@ _LIMIT_SLACK = 1e-9
 """Angle [rad] beyond a limit that is accepted as rounding, e.g. of a conversion from degrees."""
 
 
-@final
-@dataclass(frozen=True, eq=False)
 class ArmModel:
-    """Arrays and cable laws of an arm that do not depend on the joint angles.
+    """Arrays and cable laws of an arm that do not depend on the joint angles, checked.
 
     Attributes:
         body: Rigid-body model.
@@ -42,30 +37,15 @@ class ArmModel:
         highest: Upper joint limits (nv,) [rad], plus the rounding tolerance.
     """
 
-    body: RigidBody
-    tree: Tree
-    routing: Routing
-    masses: Masses
-    laws: CableLaws
-    lowest: Array
-    highest: Array
-
-    @classmethod
-    def of(
-        cls, body: RigidBody, cables: tuple[Cable, ...], original_length: OriginalLength
-    ) -> ArmModel:
-        """Build the model from the rigid bodies and their cables; check sites, links and laws."""
-        tree, laws = body.tree(), CableLaws(cables, original_length)
-        laws.require_continuity()
-        return cls(
-            body=body,
-            tree=tree,
-            routing=route(body, tree, cables),
-            masses=body.masses(),
-            laws=laws,
-            lowest=frozen(body.lower - _LIMIT_SLACK),
-            highest=frozen(body.upper + _LIMIT_SLACK),
-        )
+    def __init__(
+        self, body: RigidBody, cables: tuple[Cable, ...], original_length: OriginalLength
+    ) -> None:
+        self.body, self.tree, self.masses = body, body.tree(), body.masses()
+        self.laws = CableLaws(cables, original_length)
+        self.laws.require_continuity()
+        self.routing = route(body, self.tree, cables)
+        self.lowest = frozen(body.lower - _LIMIT_SLACK)
+        self.highest = frozen(body.upper + _LIMIT_SLACK)
 
     def beyond_limits(self, q: Array) -> NDArray[np.bool_]:
         """Check which joint angles (nv,) [rad] are beyond their limits."""

@@ -145,7 +145,7 @@ class Manipulator(Printed):
         self._gravity = vector("gravity", gravity, 3, "gravity in base axes [m/s²]", "gravity")
         one_of("original_length", original_length, get_args(OriginalLength))
         body = RigidBody(urdf, tip, self._gravity, joint_names)
-        self._model = ArmModel.of(body, cables, original_length)
+        self._model = ArmModel(body, cables, original_length)
         g = tuple(self._gravity.tolist())
         self._parts = _Parts(geometry, urdf, cables, tip, g, original_length, body.joint_names)
 

@@ -33,13 +33,9 @@ class BodyState(NamedTuple):
 class RigidBody:
     """A Pinocchio model of a tree of revolute and prismatic joints, with one tip frame.
 
-    Other joints raise UrdfError, an unknown tip UnknownName, wrong joint names InvalidInput.
-
-    Args:
-        urdf: Text of a URDF that has passed the checks of :mod:`cdsm.urdf`.
-        tip: Name of the link whose frame is the tip.
-        gravity: Gravity in base axes, (3,) [m/s²].
-        joint_names: The moving joints in the order of q. None: Pinocchio's order, parents first.
+    Other joints raise UrdfError, an unknown tip UnknownName, wrong joint names InvalidInput. The
+    URDF text must have passed the checks of :mod:`cdsm.urdf_reader`. Other arguments are as for
+    :meth:`cdsm.Manipulator.from_urdf`.
     """
 
     def __init__(

@@ -375,9 +375,7 @@ def stiffness(
         F, W = tension.values, tension.wrench
     else:
         F = vector("tension", tension, len(arm.cables), "one tension [N] per cable", "tension")
-        W = _NO_WRENCH
-        if wrench is not None:
-            W = wrench_vector("wrench", wrench)
+        W = _NO_WRENCH if wrench is None else wrench_vector("wrench", wrench)
         if np.count_nonzero(F < 0.0):
             c = int(F.argmin())
             raise InvalidInput(

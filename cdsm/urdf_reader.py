@@ -42,17 +42,9 @@ _LOOSE = 1e-2
 
 
 def read_urdf(source: str | os.PathLike[str], *, check_inertia: bool = True) -> str:
-    """Read the text of a URDF and check it.
+    """Read the text of a URDF from a path, or from the text itself, which begins with ``<``.
 
-    Args:
-        source: Path of the file, or the text itself, which begins with ``<``.
-        check_inertia: Refuse moments of inertia that no rigid body can have.
-
-    Raises:
-        InvalidInput: ``check_inertia`` is not a bool.
-        FileError: The file cannot be read.
-        UrdfError: The text is not a URDF of a tree of revolute, prismatic and fixed joints; lists
-            every fault.
+    Arguments and errors are those of :meth:`cdsm.Manipulator.from_urdf`.
     """
     flag("check_inertia", check_inertia)
     inline = isinstance(source, str) and source.lstrip("\ufeff \t\r\n").startswith("<")

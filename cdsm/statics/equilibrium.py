@@ -190,9 +190,7 @@ def equilibrium(
             reached. If two sites of a cable meet (disks overlap), it also names this cable.
     """
     reference = stiffness(pose, tension, None if isinstance(tension, Tension) else wrench)
-    W = reference.wrench
-    if wrench is not None:
-        W = wrench_vector("wrench", wrench)
+    W = reference.wrench if wrench is None else wrench_vector("wrench", wrench)
     _require_between_stops(pose)
     loaded = LoadedArm(pose, reference.tension, W)
     start = loaded.at(pose, reference.tension)

@@ -14,12 +14,7 @@ if TYPE_CHECKING:
 
 
 def check_sweep(dataset: object) -> None:
-    """Check that an object is the Dataset of a sweep.
-
-    Raises:
-        MissingExtra: xarray is not installed.
-        InvalidInput: The object is not a Dataset, or has no status.
-    """
+    """Raise :class:`~cdsm.InvalidInput` if an object is not the Dataset of a sweep."""
     need("sweep", "xarray")
     import xarray
 
@@ -30,11 +25,7 @@ def check_sweep(dataset: object) -> None:
 
 
 def status_names(dataset: xarray.Dataset) -> dict[int, str]:
-    """Return the word for each number of ``status``, read from the Dataset.
-
-    Raises:
-        InvalidInput: The Dataset does not have one word for each number.
-    """
+    """Return the word for each number of ``status``, or raise :class:`~cdsm.InvalidInput`."""
     flags = dataset["status"].attrs
     try:
         values = np.atleast_1d(flags["flag_values"]).tolist()

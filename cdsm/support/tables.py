@@ -57,11 +57,7 @@ class Table(NamedTuple):
 
 
 def read_table(path: str | os.PathLike[str], delimiters: str = ",") -> Table:
-    """Read a table.
-
-    Args:
-        path: The file.
-        delimiters: Allowed delimiters. The first one found in the header is used, else the last.
+    """Read a table. The first delimiter that the header holds is used, else the last.
 
     Raises:
         FileError: The file cannot be read, or a line cannot be split into cells; the line is named.

@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from typing import Final, NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from cdsm.errors import InvalidInput, UnknownName
 from cdsm.support.values import Array as Array
@@ -66,17 +66,9 @@ def within(quantity: str, value: float, *, zero: bool = False, infinite: bool = 
 def quantity(
     name: str, value: object, kind: str, *, zero: bool = False, infinite: bool = False
 ) -> float:
-    """Check a positive number against the range of its quantity; return it as a float.
+    """Check a positive number against a range of :data:`RANGES`; return it as a float.
 
-    Args:
-        name: Name of the argument, for the error.
-        value: Value from the user.
-        kind: A key of :data:`RANGES`.
-        zero: Whether zero is allowed.
-        infinite: Whether inf is allowed.
-
-    Raises:
-        InvalidInput: The value is not a number, or is outside the range.
+    ``zero`` and ``infinite`` also allow 0 and inf. Other values raise :class:`InvalidInput`.
     """
     if infinite and isinstance(value, float) and value == math.inf:
         return value
@@ -99,13 +91,16 @@ def number_array(name: str, value: ArrayLike, kind: str | None = None) -> Array:
         return array
     usable = abs(array) <= largest
     if np.count_nonzero(usable) < array.size:
-        bad = np.argwhere(~usable)[0]
-        where = f"entry [{', '.join(map(str, bad))}] is " if array.ndim else ""
-        allowed = f"{largest:g} {unit}".rstrip()
-        raise InvalidInput(
-            name, f"{where}{array[tuple(bad)]:g}; finite numbers up to {allowed} are allowed."
-        )
+        allowed = f"finite numbers up to {f'{largest:g} {unit}'.rstrip()} are allowed"
+        raise InvalidInput(name, f"{_first_of(array, ~usable)}; {allowed}.")
     return array
+
+
+def _first_of(array: Array, chosen: NDArray[np.bool_]) -> str:
+    """Name the first chosen entry of an array: ``entry [0, 2] is 5``."""
+    at = np.argwhere(chosen)[0]
+    where = f"entry [{', '.join(map(str, at))}] is " if array.ndim else ""
+    return f"{where}{array[tuple(at)]:g}"
 
 
 def instance(name: str, value: _Kind, kind: type[_Kind]) -> _Kind:
@@ -124,17 +119,10 @@ def sequence_of(name: str, value: Iterable[_Kind], kind: type[_Kind]) -> tuple[_
 
 
 def vector(name: str, value: ArrayLike, size: int, meaning: str, kind: str | None = None) -> Array:
-    """Return a new, read-only, finite vector of the given size.
+    """Return a new, read-only, finite vector (size,), or raise :class:`InvalidInput`.
 
-    Args:
-        name: Name of the argument, for the error.
-        value: Value from the user.
-        size: Required number of entries.
-        meaning: Meaning of the entries ("one angle [rad] per joint"), for the error.
-        kind: Key of the entries in :data:`RANGES`, or None.
-
-    Raises:
-        InvalidInput: The shape is not (size,), or an entry is masked, too large or not finite.
+    The error says the ``meaning`` of the entries ("one angle [rad] per joint"). ``kind`` is their
+    key in :data:`RANGES`.
     """
     array = number_array(name, value, kind)
     if array.shape != (size,):
@@ -161,12 +149,8 @@ def bound(name: str, value: ArrayLike, size: int, rows: int | None = None) -> Ar
     size_of = abs(array)
     usable = ((size_of <= most) & (size_of >= least)) | (size_of == 0.0) | np.isinf(size_of)
     if np.count_nonzero(usable) < array.size:
-        bad = np.argwhere(~usable)[0]
-        raise InvalidInput(
-            name,
-            f"entry [{', '.join(map(str, bad))}] is {array[tuple(bad)]:g}; give newtons from "
-            f"{least:g} to {most:g}, 0 or inf.",
-        )
+        wanted = f"newtons from {least:g} to {most:g}, 0 or inf"
+        raise InvalidInput(name, f"{_first_of(array, ~usable)}; give {wanted}.")
     return frozen(array)
 
 

@@ -20,7 +20,8 @@ _WIDEST = 100_000
 """Maximum number of characters of a tag with the text behind it, or of a comment; libxml2 compares
 the attributes of an element in pairs."""
 
-_SHOWN = 40
+_SHOWN = 160
+"""Maximum number of characters of a text that a fault shows."""
 
 
 class XmlFault(ValueError):
@@ -28,14 +29,11 @@ class XmlFault(ValueError):
 
 
 def parse_xml(text: str, root: str, doctype: str | None = None) -> etree._Element:
-    """Parse an XML text and return its root element.
+    """Parse an XML text and return its root element, which must have the name ``root``.
 
-    Args:
-        text: The document.
-        root: Required name of the root element.
-        doctype: Pattern of the whole system identifier of an allowed DOCTYPE, which must have no
-            public identifier (or an empty one) and no other content. The DTD is not read. Any other
-            DOCTYPE is refused, since it can define entities or name files to read.
+    ``doctype`` is a pattern of the whole system identifier of an allowed DOCTYPE, which must have
+    no public identifier (or an empty one) and no other content. The DTD is not read. Any other
+    DOCTYPE is refused, since it can define entities or name files to read.
 
     Raises:
         XmlFault: The text is not well-formed, too large or too deep; its DOCTYPE or root is wrong.
@@ -91,11 +89,7 @@ def _names_dtd(text: str, system: str) -> bool:
 
 
 def numbers(where: str, text: str | None, count: int) -> tuple[float, ...]:
-    """Read ``count`` finite numbers separated by white space.
-
-    Raises:
-        XmlFault: The text is not ``count`` finite numbers; ``where`` names the place.
-    """
+    """Read ``count`` finite numbers, or raise :class:`XmlFault`; ``where`` names the place."""
     words = (text or "").split()
     try:
         values = tuple(float(word) for word in words if "_" not in word)
@@ -110,4 +104,4 @@ def numbers(where: str, text: str | None, count: int) -> tuple[float, ...]:
 
 
 def _short(text: str) -> str:
-    return text if len(text) <= 4 * _SHOWN else f"{text[: 4 * _SHOWN]}…"
+    return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}…"
