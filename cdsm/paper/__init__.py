@@ -12,26 +12,26 @@ from cdsm.paper.claims import (
     to_markdown,
     to_rows,
 )
+from cdsm.paper.curves import Curve, StiffnessFigure
 from cdsm.paper.experiments import (
     ExperimentFigure,
-    PrototypeFigure,
     Trace,
     figure_10,
     figure_12,
     figure_13,
-    figure_prototype,
 )
 from cdsm.paper.lead import LeadFigure, figure_lead
-from cdsm.paper.prototype import BOUNDS, STEPS, Prototype, PrototypeFit, Step, identify_prototype
-from cdsm.paper.simulation import (
-    Curve,
-    StiffnessFigure,
-    figure_3,
-    figure_4,
-    figure_6,
-    figure_7,
-    figure_8,
+from cdsm.paper.prototype import Prototype
+from cdsm.paper.prototype_fit import (
+    BOUNDS,
+    STEPS,
+    PrototypeFigure,
+    PrototypeFit,
+    Step,
+    figure_prototype,
+    identify_prototype,
 )
+from cdsm.paper.simulation import figure_3, figure_4, figure_6, figure_7, figure_8
 from cdsm.paper.strand import StrandFigure, figure_5
 
 FIGURES: Final[dict[str, Callable[[], Figure]]] = {

@@ -1,8 +1,8 @@
-"""Laws that round to the printed digits of Eq. 19: their bounds and the most level law.
+"""Laws that round to the printed digits of Eq. 19, and their bounds.
 
 A printed coefficient stands for all numbers that round to it: c = c_printed + h ∘ d with |d| ≤ 1,
 where h is half a unit of the last digit. The rigidity EA(F) = Σ c_i Fⁱ is linear in d. Therefore
-linear programs find the bounds of EA and the most level law.
+linear programs find the bounds of EA.
 """
 
 from __future__ import annotations
@@ -30,60 +30,13 @@ HALF_UNITS: Final = (
 )
 """Half a unit of the last printed digit of each coefficient, lowest power first."""
 
-_INSIDE = 0.99
-"""Largest |d| of the most level law. Below 1, its coefficients round to the printed ones."""
-
 _SAMPLES = 200
-"""Number of tensions at which a range is sampled."""
+"""Number of tensions at which the lower branch is sampled."""
 
 _FORCE = 1e4
 """Unit of rigidity [N] inside the linear programs; it scales them for the solver's tolerances."""
 
-Coefficients = tuple[tuple[float, ...], tuple[float, ...]]
-
-
-def most_level() -> Coefficients:
-    """Find the coefficients of the printed digits whose law is continuous and most level.
-
-    Upper branch: minimise max |EA(F) − c| on :data:`LEVEL` over d and a level c. EA rises up to
-    this range. Lower branch: minimise Σ|d| so that EA is continuous at :data:`JOIN` and rises from
-    the low end of the domain. Only the coefficient of F⁶ moves there, which the paper misprints.
-    """
-    level = np.linspace(*LEVEL, 2 * _SAMPLES)
-    values, ones = _powers(level), np.ones((level.size, 1))
-    printed, half = np.array(EQ19_PRINTED[1]), HALF_UNITS[1]
-    climb = _powers(np.linspace(JOIN, LEVEL[0], _SAMPLES), slope=True)
-    none = np.zeros((_SAMPLES, 2))
-    # variables: d (7,), the level c, and the largest distance of EA from c
-    d = _solve(
-        np.eye(9)[8],
-        np.vstack(
-            [
-                np.hstack([values * half / _FORCE, -ones, -ones]),
-                np.hstack([-values * half / _FORCE, ones, -ones]),
-                np.hstack([-climb * half, none]),
-            ]
-        ),
-        np.concatenate([-values @ printed / _FORCE, values @ printed / _FORCE, climb @ printed]),
-        # the constant term only shifts the level, so it stays as printed
-        bounds=[(0.0, 0.0)] + [(-_INSIDE, _INSIDE)] * 6 + [(None, None), (0.0, None)],
-    )[:7]
-    upper = printed + half * d
-
-    printed, half = np.array(EQ19_PRINTED[0]), HALF_UNITS[0]
-    meet = _powers(JOIN)[0]
-    climb = _powers(np.linspace(presets.STRAND_1X19.low, JOIN, _SAMPLES), slope=True) * half
-    both = np.concatenate([half, -half])
-    # variables (14,): increase and decrease of each coefficient
-    d = _solve(
-        np.ones(14),
-        np.hstack([-climb, climb]),
-        climb @ (printed / half),
-        equation=(np.tile(meet, 2) * both / _FORCE, meet @ (upper - printed) / _FORCE),
-        bounds=[(0.0, _INSIDE)] * 14,
-    )
-    lower = printed + half * (d[:7] - d[7:])
-    return tuple(lower.tolist()), tuple(upper.tolist())
+_PRINTED, _HALF = np.concatenate(EQ19_PRINTED), np.concatenate(HALF_UNITS)
 
 
 def least_bend() -> tuple[float, float]:
@@ -91,20 +44,10 @@ def least_bend() -> tuple[float, float]:
 
     The slopes differ even with a free coefficient of F⁶: no law of these digits is smooth at 31 N.
     """
-    printed, half = np.concatenate(EQ19_PRINTED), np.concatenate(HALF_UNITS)
-    meet, bend = _powers(JOIN)[0], _powers(JOIN, slope=True)[0]
-    below, above = np.concatenate([bend, np.zeros(7)]), np.concatenate([np.zeros(7), bend])
-    join, fall = np.concatenate([meet, -meet]), below - above
+    below, above = _branches(powers(JOIN, slope=True)[0])
     free: list[tuple[float | None, float | None]] = [(-1.0, 1.0)] * 14
     free[6] = (None, None)
-    d = _solve(
-        fall * half,
-        -(fall * half)[None],
-        np.array([fall @ printed]),
-        equation=(join * half / _FORCE, -join @ printed / _FORCE),
-        bounds=free,
-    )
-    law = printed + half * d
+    law = _least(below - above, (below - above)[None], free)
     return float(below @ law), float(above @ law)
 
 
@@ -117,50 +60,42 @@ def band(tension: ArrayLike) -> tuple[Array, Array]:
         InvalidInput: ``tension`` is not finite numbers.
     """
     values = number_array("tension", tension)
-    printed, half = np.concatenate(EQ19_PRINTED), np.concatenate(HALF_UNITS)
-    meet = _powers(JOIN)[0]
-    join = np.concatenate([meet, -meet])
-    law = presets.STRAND_1X19
-    lower = _powers(np.linspace(law.low, JOIN, _SAMPLES))
-    positive = np.hstack([lower, np.zeros_like(lower)])
-    ends = np.empty((values.size, 2))
-    for i, F in enumerate(values.ravel()):
-        power, none = _powers(F)[0], np.zeros(7)
-        row = np.concatenate([power, none] if F <= JOIN else [none, power])
-        for side, sign in enumerate((1.0, -1.0)):
-            d = _solve(
-                sign * row * half / _FORCE,
-                -positive * half / _FORCE,
-                positive @ printed / _FORCE,
-                equation=(join * half / _FORCE, -join @ printed / _FORCE),
-                bounds=[(-1.0, 1.0)] * 14,
-            )
-            ends[i, side] = row @ (printed + half * d)
-    low, high = ends.T
+    lower, _ = _branches(powers(np.linspace(presets.STRAND_1X19.low, JOIN, _SAMPLES)))
+    ends = []
+    for F in values.ravel():
+        row = _branches(powers(F)[0])[0 if F <= JOIN else 1]
+        ends.append([row @ _least(sign * row, lower, [(-1.0, 1.0)] * 14) for sign in (1.0, -1.0)])
+    low, high = np.array(ends).reshape(-1, 2).T
     return frozen(low.reshape(values.shape)), frozen(high.reshape(values.shape))
 
 
-def _powers(tension: ArrayLike, slope: bool = False) -> Array:
+def powers(tension: ArrayLike, slope: bool = False) -> Array:
     """Return a row of powers Fⁱ, i = 0 to 6, for each tension, or of derivatives i Fⁱ⁻¹."""
     F, i = np.atleast_1d(np.asarray(tension, dtype=np.float64))[:, None], np.arange(7)
     return np.asarray(i * F ** np.maximum(i - 1, 0) if slope else F**i)
 
 
-def _solve(
-    cost: Array,
-    A: Array,
-    b: Array,
-    bounds: Sequence[tuple[float | None, float | None]],
-    equation: tuple[Array, ArrayLike] | None = None,
+def _branches(rows: Array) -> tuple[Array, Array]:
+    """Extend rows (..., 7) for one branch to rows (..., 14) for the lower and the upper branch."""
+    none = np.zeros_like(rows)
+    return np.hstack([rows, none]), np.hstack([none, rows])
+
+
+def _least(
+    cost: Array, positive: Array, bounds: Sequence[tuple[float | None, float | None]]
 ) -> Array:
-    """Minimise cost·x so that A x ≤ b, within bounds and one equation. A solution exists here."""
-    row, value = equation if equation is not None else (None, None)
+    """Find the coefficients c (14,) with least cost·c so that positive·c ≥ 0, continuous at 31 N.
+
+    ``bounds`` are those of d. A solution exists here.
+    """
+    lower, upper = _branches(powers(JOIN)[0])
+    join = lower - upper
     solution = linprog(
-        cost,
-        A_ub=A,
-        b_ub=b,
-        A_eq=None if row is None else row[None],
-        b_eq=None if value is None else [value],
+        cost * _HALF / _FORCE,
+        A_ub=-positive * _HALF / _FORCE,
+        b_ub=positive @ _PRINTED / _FORCE,
+        A_eq=(join * _HALF / _FORCE)[None],
+        b_eq=[-join @ _PRINTED / _FORCE],
         bounds=bounds,
     )
-    return np.asarray(solution.x)
+    return np.asarray(_PRINTED + _HALF * solution.x)

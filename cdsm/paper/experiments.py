@@ -1,27 +1,24 @@
-"""Figs. 10, 12 and 13, Table II and the accuracy check of Section V, as virtual experiments.
+"""Figs. 10, 12 and 13 and Table II of Section V, as virtual experiments.
 
-:mod:`cdsm.paper.prototype` identifies a prototype from the numbers of these experiments.
+:mod:`cdsm.paper.prototype_fit` identifies a prototype from the numbers of these experiments.
 Agreement only shows that such a prototype is possible. Disagreement contradicts the model, an
 assumption or the other data.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import asdict, dataclass
-from functools import cache
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Final, Literal, final
 
 import numpy as np
 
-from cdsm.paper.claims import Claim, Figure, floats, markdown_table
-from cdsm.paper.prototype import BOUNDS, STEPS, PrototypeFit, identify_prototype
-from cdsm.paper.section_v import AXES, CHECK, DROPS, HYBRID, MEASURED, RISES, TENSIONS
+from cdsm.paper.claims import Claim, Figure, floats
+from cdsm.paper.prototype_fit import STEPS, PrototypeFit, identified, section_v_claim
+from cdsm.paper.section_v import AXES, DROPS, HYBRID, RISES, TENSIONS
 from cdsm.support.validation import Array, frozen
 
 _POINTS: Final = 40
-_ALL: Final = "all parameters of the prototype"
-"""Text of ``Claim.searched`` for Section V. Measured with weights, it has one reading only."""
 
 
 @final
@@ -80,51 +77,6 @@ class ExperimentFigure(Figure):
         }
 
 
-@final
-@dataclass(frozen=True, eq=False, kw_only=True)
-class PrototypeFigure(Figure):
-    """Residuals of all numbers of Section V for the identified prototypes.
-
-    Attributes:
-        fits: Prototype identified at each step.
-    """
-
-    fits: tuple[PrototypeFit, ...]
-
-    def numbers(self) -> dict[str, object]:
-        """Return parameters and residuals of all steps, for JSON."""
-        return {
-            "bounds_SI": BOUNDS,
-            "fits": [
-                {
-                    "step": fit.step.label,
-                    "free": fit.step.free,
-                    "numbers": len(fit.step.numbers),
-                    "table_N_per_m": fit.step.table.tolist(),
-                    "parameters_SI": asdict(fit.prototype),
-                    "at_bound": fit.at_bound,
-                    "misfit_xyz": fit.misfit.tolist(),
-                    "residuals": dict(zip(fit.step.numbers, fit.residuals.tolist(), strict=True)),
-                }
-                for fit in self.fits
-            ],
-        }
-
-    def tables(self) -> tuple[str, ...]:
-        """Return the table of identified parameters; * marks a parameter at a bound."""
-        rows = []
-        for name, (low, high) in BOUNDS.items():
-            cells = [
-                "–"
-                if name not in fit.step.free
-                else f"{getattr(fit.prototype, name):.4g}" + ("*" if name in fit.at_bound else "")
-                for fit in self.fits
-            ]
-            rows.append((name, f"{low:.4g}", f"{high:.4g}", *cells))
-        header = ("parameter [SI]", "from", "to", *(fit.step.label for fit in self.fits))
-        return (markdown_table(header, rows),)
-
-
 def figure_10() -> ExperimentFigure:
     """Compute stiffness in x, y and z over tension with the 1×19 strand, beside Table II.
 
@@ -133,7 +85,7 @@ def figure_10() -> ExperimentFigure:
     :data:`~cdsm.paper.section_v.TABLE_II_SWAPPED`). The third is fitted to the exchanged Table II
     alone, with uneven tensions and finite weights: 14 parameters for 15 numbers. No fit is a proof.
     """
-    fits = [_identified(step.label) for step in (STEPS[0], STEPS[1], STEPS[-1])]
+    fits = [identified(step) for step in (STEPS[0], STEPS[1], STEPS[-1])]
     return ExperimentFigure(
         name="fig10",
         title="Fig. 10, Table II: stiffness over tension, 1×19 strand, identified prototypes",
@@ -147,23 +99,20 @@ def figure_10() -> ExperimentFigure:
 
 def figure_12() -> ExperimentFigure:
     """Compute stiffness in y over tension with cables of constant stiffness, 2 configurations."""
-    fit = _identified()
+    fit = identified(STEPS[1])
     prototype = fit.prototype
     tensions = np.linspace(TENSIONS[0], prototype.highest_hybrid_tension, _POINTS)
     soft = prototype.arm(HYBRID)
-
-    def stiffness_y(q: Array) -> Array:
-        return prototype.measure(soft.at(q), tensions)[:, 1]
-
+    curves = [prototype.measure(soft.at(q), tensions)[:, 1] for q in prototype.configurations]
     return ExperimentFigure(
         name="fig12",
         title="Fig. 12: stiffness in y over tension, cables of 1.89 N/mm, identified prototype",
         swept="tension",
         relative=True,
-        traces=_configurations(fit, tensions, stiffness_y, 1.0 - np.array(DROPS)),
+        traces=_configurations(fit, tensions, curves, [1.0 - drop for drop in DROPS]),
         fit=fit,
         claims=(
-            Claim(
+            section_v_claim(
                 figure="Fig. 12",
                 quantity="largest reduction of stiffness in y, two configurations",
                 unit="%",
@@ -171,7 +120,6 @@ def figure_12() -> ExperimentFigure:
                 computed=floats(100.0 * np.array(fit.predicted.drops)),
                 assumption=f"identified prototype; tension 3 to {tensions[-1]:.3g} N and second "
                 "configuration identified with it",
-                searched=_ALL,
             ),
         ),
     )
@@ -179,94 +127,68 @@ def figure_12() -> ExperimentFigure:
 
 def figure_13() -> ExperimentFigure:
     """Compute stiffness in y over cable stiffness at constant tension, for 2 configurations."""
-    fit = _identified()
-    prototype = fit.prototype
+    fit = identified(STEPS[1])
+    prototype, tension = fit.prototype, fit.prototype.hybrid_tension
     springs = np.linspace(HYBRID, HYBRID * prototype.spring_ratio, _POINTS)
     arms = [prototype.arm(spring) for spring in springs.tolist()]
-
-    def stiffness_y(q: Array) -> Array:
-        tension = prototype.hybrid_tension
-        return np.array([prototype.measure(arm.at(q), tension)[0, 1] for arm in arms])
-
+    curves = [
+        np.array([prototype.measure(arm.at(q), tension)[0, 1] for arm in arms])
+        for q in prototype.configurations
+    ]
     return ExperimentFigure(
         name="fig13",
         title="Fig. 13: stiffness in y over that of the cables, identified prototype",
         swept="cable_stiffness",
         relative=True,
-        traces=_configurations(fit, springs, stiffness_y, 1.0 + np.array(RISES)),
+        traces=_configurations(fit, springs, curves, [1.0 + rise for rise in RISES]),
         fit=fit,
         claims=(
-            Claim(
+            section_v_claim(
                 figure="Fig. 13",
                 quantity="increment of stiffness in y, two configurations",
                 unit="times",
                 paper=RISES,
                 computed=fit.predicted.rises,
                 assumption="identified prototype; stiffest spring "
-                f"{prototype.spring_ratio:.3g} times the softest and tension "
-                f"{prototype.hybrid_tension:.3g} N identified with it",
-                searched=_ALL,
+                f"{prototype.spring_ratio:.3g} times the softest and tension {tension:.3g} N "
+                "identified with it",
             ),
         ),
     )
 
 
-def figure_prototype() -> PrototypeFigure:
-    """Compare all numbers of Section V with the prototype identified at each step."""
-    fits = tuple(_identified(step.label) for step in STEPS)
-    checks = [
-        Claim(
-            figure="Section V-B",
-            quantity="accuracy check in z, off the paper's calculated 0.139 N/mm",
-            unit="%",
-            paper=(100.0 * (MEASURED / CHECK - 1.0),),
-            computed=(100.0 * (fit.predicted.check / CHECK - 1.0),),
-            assumption=f"{fit.step.label}; the paper's is its measurement, 0.131 N/mm; posture of "
-            "Table II, cables of 1.89 N/mm",
-            searched=_ALL,
-        )
-        for fit in fits
-        if fit.predicted.check is not None
-    ]
-    misfits = [
-        Claim(
-            figure="Section V",
-            quantity="typical misfit of Table II in x, y, z",
-            unit="%",
-            computed=floats(100.0 * fit.misfit),
-            assumption=f"{fit.step.label}; {fit.step.count}; at a bound: "
-            f"{', '.join(fit.at_bound) or 'none'}",
-            searched=_ALL,
-        )
-        for fit in fits
-    ]
-    return PrototypeFigure(
-        name="prototype",
-        title="Section V: every number against one identified prototype",
-        fits=fits,
-        claims=(*checks, *misfits),
-    )
-
-
-@cache
-def _identified(label: str = STEPS[1].label) -> PrototypeFit:
-    return identify_prototype(next(step for step in STEPS if step.label == label))
-
-
-def _over_tension(fit: PrototypeFit) -> tuple[Trace, ...]:
+def _over_tension(fit: PrototypeFit) -> list[Trace]:
     """Compute stiffness in x, y and z over tension, beside the table of the fit."""
     prototype = fit.prototype
     tensions = np.linspace(TENSIONS[0], TENSIONS[-1], _POINTS)
     curves = prototype.weigh(prototype.arm().at(prototype.configurations[0]), tensions)
-    return tuple(
+    return [
         Trace(
             label=f"{axis}: {fit.step.label}",
             swept=frozen(tensions),
-            computed=frozen(curves[:, i].copy()),
+            computed=frozen(curve.copy()),
             paper_at=frozen(prototype.levels),
-            paper=frozen(fit.step.table[:, i].copy()),
+            paper=frozen(column.copy()),
         )
-        for i, axis in enumerate(AXES)
+        for axis, curve, column in zip(AXES, curves.T, fit.step.table.T, strict=True)
+    ]
+
+
+def _configurations(
+    fit: PrototypeFit, swept: Array, curves: Sequence[Array], paper: Sequence[float]
+) -> tuple[Trace, ...]:
+    """Build a trace per configuration, relative to its first value; the paper gives the last."""
+    named = zip(("first", "second"), fit.prototype.configurations, strict=True)
+    labels = [f"{which}: {', '.join(f'{x:.0f}°' for x in np.rad2deg(q))}" for which, q in named]
+    return tuple(
+        Trace(
+            label=label,
+            swept=frozen(swept),
+            computed=frozen(curve / curve[0]),
+            paper_at=frozen(swept[-1:].copy()),
+            paper=frozen(np.array([stated])),
+        )
+        for label, curve, stated in zip(labels, curves, paper, strict=True)
     )
 
 
@@ -275,44 +197,24 @@ def _table_claims(fit: PrototypeFit) -> list[Claim]:
     table, computed = fit.step.table, fit.predicted.table
     assumption = f"{fit.step.label}; {fit.step.count}"
     claims = [
-        Claim(
+        section_v_claim(
             figure="Table II",
             quantity=f"stiffness in {axis}",
             unit="N/mm",
             paper=floats(theirs / 1e3),
             computed=floats(ours / 1e3),
             assumption=assumption,
-            searched=_ALL,
         )
         for axis, theirs, ours in zip(AXES, table.T, computed.T, strict=True)
     ]
-    rise = Claim(
-        figure="Fig. 10",
-        quantity="increment of stiffness, (last − first)/first",
-        unit="times",
-        paper=floats(table[-1] / table[0] - 1.0),
-        computed=floats(computed[-1] / computed[0] - 1.0),
-        assumption=assumption,
-        searched=_ALL,
-    )
-    return [*claims, rise]
-
-
-def _configurations(
-    fit: PrototypeFit, swept: Array, stiffness_of: Callable[[Array], Array], paper: Array
-) -> tuple[Trace, ...]:
-    """Build a trace per configuration, relative to its first value; the paper gives the last."""
-    traces = []
-    for i, q in enumerate(fit.prototype.configurations):
-        computed = stiffness_of(q)
-        degrees = ", ".join(f"{angle:.0f}°" for angle in np.rad2deg(q))
-        traces.append(
-            Trace(
-                label=f"{('first', 'second')[i]}: {degrees}",
-                swept=frozen(swept.copy()),
-                computed=frozen(computed / computed[0]),
-                paper_at=frozen(swept[-1:].copy()),
-                paper=frozen(paper[i : i + 1].copy()),
-            )
+    claims.append(
+        section_v_claim(
+            figure="Fig. 10",
+            quantity="increment of stiffness, (last − first)/first",
+            unit="times",
+            paper=floats(table[-1] / table[0] - 1.0),
+            computed=floats(computed[-1] / computed[0] - 1.0),
+            assumption=assumption,
         )
-    return tuple(traces)
+    )
+    return claims

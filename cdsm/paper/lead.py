@@ -17,10 +17,8 @@ from scipy.optimize import brentq
 from cdsm import presets
 from cdsm.cable_laws import OriginalLength
 from cdsm.paper.claims import Claim, Figure
-from cdsm.paper.simulation import KEPT, readings
-from cdsm.stiffness_matrix import stiffness
+from cdsm.paper.curves import KEPT, at_minimum, readings
 from cdsm.support.validation import Array, frozen
-from cdsm.tension import distribute_tension
 
 LEADS: Final = frozen(np.concatenate([[0.0], np.geomspace(0.003, 0.3, 30)]))
 """Examined leads [m]. With a lead of 0.33 m or more the arm buckles below 800 N."""
@@ -87,8 +85,8 @@ def figure_lead() -> LeadFigure:
 def _changes(lead: float, length: OriginalLength) -> Array:
     """Compute the change of K_R and of the stiffness for a weight, in x, y and z (2, 3) [%]."""
     arm = presets.virtual_prototype(presets.ELASTIC_STAGE, lead=lead, original_length=length)
-    pose = arm.at(np.full(arm.nv, presets.TEN_DEGREES))
-    first, last = (readings(stiffness(pose, distribute_tension(pose, F))) for F in MINIMA)
+    q = np.full(arm.nv, presets.TEN_DEGREES)
+    first, last = (readings(at_minimum(arm, q, F)) for F in MINIMA)
     return np.asarray(100.0 * (last / first - 1.0))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Final, final
 
 import numpy as np
@@ -72,6 +73,7 @@ def figure_5(gauge_length: float = GAUGE_LENGTH) -> StrandFigure:
     law = presets.STRAND_1X19
     tension = np.concatenate([np.linspace(2.25, JOIN, 80), np.linspace(31.01, law.high, 120)])
     low, high = band(tension)
+    claim = partial(Claim, figure="Fig. 5")
     flat = law.rigidity(np.linspace(*LEVEL, 400))
     return StrandFigure(
         name="fig5",
@@ -86,16 +88,14 @@ def figure_5(gauge_length: float = GAUGE_LENGTH) -> StrandFigure:
         printed=frozen(eq19_as_printed(tension)),
         join=JOIN,
         claims=(
-            Claim(
-                figure="Fig. 5",
+            claim(
                 quantity="first coefficient for which the branches meet at 31 N, times 1e4",
                 unit="N⁻⁵",
                 paper=(-10.0,),
                 computed=(1e4 * law.coefficients[0][-1],),
                 assumption="misprint: −1e-3 for −1e-4; all other digits as printed",
             ),
-            Claim(
-                figure="Fig. 5",
+            claim(
                 quantity="EA at 31 N from the lower over that from the upper polynomial, "
                 "as printed",
                 unit="-",
@@ -103,22 +103,19 @@ def figure_5(gauge_length: float = GAUGE_LENGTH) -> StrandFigure:
                 computed=(float(eq19_as_printed(JOIN)) / float(law.polynomial(JOIN)),),
                 assumption="none: a misprint",
             ),
-            Claim(
-                figure="Fig. 5",
+            claim(
                 quantity="slope of EA below and above 31 N, where the least change is sought",
                 unit="-",
                 computed=least_bend(),
                 assumption="any first coefficient, the others within their printed digits",
             ),
-            Claim(
-                figure="Fig. 5",
+            claim(
                 quantity="EA at 810 N, least and largest within the printed digits",
                 unit="kN",
                 computed=(1e-3 * float(low[-1]), 1e-3 * float(high[-1])),
                 assumption="none",
             ),
-            Claim(
-                figure="Fig. 5",
+            claim(
                 quantity="rise of EA from least to largest, 400 to 810 N (paper: near-constant)",
                 unit="%",
                 computed=(100.0 * float(flat.max() / flat.min() - 1.0),),

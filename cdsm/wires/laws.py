@@ -97,7 +97,7 @@ class StrandElasticity(Elasticity):
         These leave EA(31 N) uncertain by 6 kN and EA(810 N) by 35 kN. Within them, this law is
         continuous, and as level as possible from 400 to 810 N, where the text calls EA
         near-constant. Otherwise it is nearest to the printed values.
-        :func:`cdsm.paper.digits.most_level` finds it by linear programs. At 31 N, the slope falls
+        Linear programs find it (``tests/laws/test_errata.py``). At 31 N, the slope falls
         from 1022 to 368. No law with these digits has one slope there. The least fall, from 662,
         takes every other digit to the end of its rounding. The polynomial is negative below
         2.11 N, so the domain is (2.2 N, 810 N].

@@ -8,7 +8,8 @@ import pytest
 import cdsm
 from cdsm import paper
 from cdsm.paper import section_v
-from cdsm.paper.prototype import BOUNDS, START, STEPS, Prototype
+from cdsm.paper.prototype import Prototype
+from cdsm.paper.prototype_fit import BOUNDS, START, STEPS
 from cdsm.paper.section_v import HYBRID, NAMES, TABLE_II
 from cdsm.support.validation import Array
 from tests.conftest import Results

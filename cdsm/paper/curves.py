@@ -1,0 +1,172 @@
+"""Curves of stiffness of the virtual prototype, over Young's modulus or tension.
+
+Every number is computed in three readings: ``pseudoinverse`` with the stretched length as original
+length, as in the paper; ``pseudoinverse`` with the original length; and ``along`` with the original
+length, the stiffness that a small weight at the tip measures.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, Final, Literal, NamedTuple, final
+
+import numpy as np
+
+from cdsm import presets
+from cdsm.cable_laws import OriginalLength
+from cdsm.elasticity import Elasticity
+from cdsm.manipulator import Manipulator
+from cdsm.paper.claims import Claim, Figure, floats
+from cdsm.posture import Posture
+from cdsm.stiffness_matrix import Stiffness, stiffness
+from cdsm.support.validation import Array, frozen
+from cdsm.tension import distribute_tension
+
+Part = Literal["active", "passive"]
+Swept = Literal["young_modulus", "tension"]
+
+KEPT: Final = "prototype searched for Fig. 6"
+"""Text of ``Claim.searched`` for all figures but Fig. 6."""
+
+
+@final
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Curve:
+    """Stiffness in x, y and z over a swept quantity.
+
+    Attributes:
+        label: Name of the curve in its figure.
+        original_length: ``original_length`` of the :class:`~cdsm.Manipulator`.
+        swept: Swept quantity (N,): Young's modulus [Pa] or lower bound of tension [N].
+        tension: Smallest, mean and largest cable tension (N, 3) [N].
+        pseudoinverse: Diagonal of the paper's K_R (N, 3) [N/m].
+        pseudoinverse_part: Diagonal of K_R of the figure's ``part`` of K_θ alone (N, 3) [N/m].
+        along: Stiffness that a small weight measures along x, y, z (N, 3) [N/m].
+        along_part: Share of ``part`` in ``along`` (N, 3) [N/m].
+    """
+
+    label: str
+    original_length: OriginalLength
+    swept: Array
+    tension: Array
+    pseudoinverse: Array
+    pseudoinverse_part: Array
+    along: Array
+    along_part: Array
+
+
+@final
+@dataclass(frozen=True, eq=False, kw_only=True)
+class StiffnessFigure(Figure):
+    """A figure of stiffness over Young's modulus or tension.
+
+    Attributes:
+        swept: Name of the swept quantity.
+        part: Name of the term of K_θ shown beside the total.
+        curves: Curves with the stretched length as original length, as in the paper.
+        original: Curves of the same cases with the original length.
+        postures: Posture of each curve.
+    """
+
+    swept: Swept
+    part: Part
+    curves: tuple[Curve, ...]
+    original: tuple[Curve, ...]
+    postures: tuple[Posture, ...]
+
+    def numbers(self) -> dict[str, object]:
+        """Return the curves as plain SI numbers, for JSON."""
+        swept = {"young_modulus": "young_modulus_Pa", "tension": "minimum_tension_N"}[self.swept]
+        return {
+            "postures_rad": [pose.q.tolist() for pose in self.postures],
+            "curves": [
+                {
+                    "label": curve.label,
+                    "original_length": curve.original_length,
+                    swept: curve.swept.tolist(),
+                    "tension_min_mean_max_N": curve.tension.tolist(),
+                    "pseudoinverse_xyz_N_per_m": curve.pseudoinverse.tolist(),
+                    "along_xyz_N_per_m": curve.along.tolist(),
+                    f"{self.part}_part": {
+                        "pseudoinverse_xyz_N_per_m": curve.pseudoinverse_part.tolist(),
+                        "along_xyz_N_per_m": curve.along_part.tolist(),
+                    },
+                }
+                for curve in (*self.curves, *self.original)
+            ],
+        }
+
+
+class Pair(NamedTuple):
+    """Two curves of one case: with the stretched length (as in the paper), with the original one.
+
+    Attributes:
+        stretched: Curve with the stretched length.
+        original: Curve with the original length.
+        posture: Posture of both.
+    """
+
+    stretched: Curve
+    original: Curve
+    posture: Posture
+
+    def claim(
+        self, measure: Callable[[Array, Array], Array], searched: str = KEPT, **texts: Any
+    ) -> Claim:
+        """Build a claim from a measure of total stiffness and part, in the three readings."""
+        paper, original = self.stretched, self.original
+        return Claim(
+            computed=floats(measure(paper.pseudoinverse, paper.pseudoinverse_part)),
+            original=floats(measure(original.pseudoinverse, original.pseudoinverse_part)),
+            along=floats(measure(original.along, original.along_part)),
+            searched=searched,
+            **texts,
+        )
+
+
+def over_cases(
+    label: str, q: Array, cases: Sequence[tuple[Elasticity, float]], swept: Array, part: Part
+) -> Pair:
+    """Compute curves over cases (law, lower bound of tension [N]) at one posture q (nv,) [rad]."""
+
+    def curve(length: OriginalLength) -> Curve:
+        results = [at_minimum(_prototype(law, length), q, minimum) for law, minimum in cases]
+        both = np.array([readings(K) for K in results])
+        parts = [[getattr(K.shares(axis), part).sum() for axis in np.eye(3)] for K in results]
+        return Curve(
+            label=label,
+            original_length=length,
+            swept=frozen(np.array(swept)),
+            tension=frozen(
+                np.array([(F.min(), F.mean(), F.max()) for F in (K.tension for K in results)])
+            ),
+            pseudoinverse=frozen(both[:, 0].copy()),
+            pseudoinverse_part=frozen(np.array([np.diag(K.pseudoinverse(part)) for K in results])),
+            along=frozen(both[:, 1].copy()),
+            along_part=frozen(np.array(parts)),
+        )
+
+    return Pair(curve("stretched"), curve("unstrained"), presets.virtual_prototype().at(q))
+
+
+@lru_cache(maxsize=1)  # all points of a curve over tension use one arm
+def _prototype(law: Elasticity, length: OriginalLength) -> Manipulator:
+    return presets.virtual_prototype(law, original_length=length)
+
+
+def over_minimum(label: str, law: Elasticity, q: Array, minima: Array) -> Pair:
+    """Compute curves over the lower bound of tension (N,) [N], with the active part."""
+    return over_cases(label, q, [(law, minimum) for minimum in minima], minima, "active")
+
+
+def at_minimum(arm: Manipulator, q: Array, minimum: float) -> Stiffness:
+    """Compute the stiffness at a posture, with the least tensions above a lower bound [N]."""
+    pose = arm.at(q)
+    return stiffness(pose, distribute_tension(pose, minimum))
+
+
+def readings(K: Stiffness) -> Array:
+    """Compute the diagonal of K_R and the stiffness for a small weight in x, y, z (2, 3) [N/m]."""
+    return np.array([np.diag(K.pseudoinverse()), [K.along(axis) for axis in np.eye(3)]])
