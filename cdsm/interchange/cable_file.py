@@ -36,6 +36,9 @@ _HEAD = """\
 # that the cable may carry; 0 and none if left out.
 """
 
+_KEYS = ("name", "lead", "series_stiffness", "control", "minimum", "maximum")
+"""Keys of a cable that are its attributes; left out where the attribute is infinite."""
+
 _Label = Annotated[str, Field(min_length=1, max_length=200)]
 
 
@@ -152,32 +155,17 @@ def _built(entries: _Entries, wires: dict[str, Elasticity]) -> tuple[Cable, ...]
 
 
 def _cable(entry: _Entry, wire: Elasticity) -> Cable:
-    return Cable(
-        name=entry.name,
-        sites=tuple(Site(site.link, site.xyz) for site in entry.sites),
-        elasticity=wire,
-        lead=entry.lead,
-        series_stiffness=math.inf if entry.series_stiffness is None else entry.series_stiffness,
-        control=entry.control,
-        minimum=entry.minimum,
-        maximum=math.inf if entry.maximum is None else entry.maximum,
-    )
+    given = {key: getattr(entry, key) for key in _KEYS if getattr(entry, key) is not None}
+    sites = tuple(Site(site.link, site.xyz) for site in entry.sites)
+    return Cable(sites=sites, elasticity=wire, **given)
 
 
 def _lines(cable: Cable, wire: str) -> list[str]:
-    entry = _Entry(
-        name=cable.name,
-        elasticity=wire,
-        lead=cable.lead,
-        series_stiffness=None if math.isinf(cable.series_stiffness) else cable.series_stiffness,
-        control=cable.control,
-        minimum=cable.minimum,
-        maximum=None if math.isinf(cable.maximum) else cable.maximum,
-        sites=tuple(_Site(link=site.link, xyz=site.position) for site in cable.sites),
-    )
-    keys = ("name", "elasticity", "lead", "series_stiffness", "control", "minimum", "maximum")
+    given = {key: getattr(cable, key) for key in _KEYS if getattr(cable, key) != math.inf}
+    sites = tuple(_Site(link=site.link, xyz=site.position) for site in cable.sites)
+    entry = _Entry(elasticity=wire, sites=sites, **given)
     return [
-        *toml_lines(entry, keys),
+        *toml_lines(entry, ("name", "elasticity", *_KEYS[1:])),
         "sites = [",
         *(
             f"    {{link = {json.dumps(site.link)}, xyz = {list(site.position)}}},"

@@ -186,12 +186,12 @@ def _urdf(name: str, bodies: Sequence[Body]) -> str:
     names = [BASE, *(body.name for body in bodies)]
     for body in bodies:
         parent, place = names[body.parent], body.place
-        for i, (kind, label, axis, low, high) in enumerate(body.joints, start=1):
+        for i, each in enumerate(body.joints, start=1):
             # single joints of one link need massless links between them
             child = body.name if i == len(body.joints) else f"{body.name}_{i}"
-            direction = E.axis(xyz=tuple(map(float, axis)))
-            limit = E.limit(effort=0.0, velocity=0.0, lower=float(low), upper=float(high))
-            joints.append(joint(kind, label, parent, child, origin(place), direction, limit))
+            axis = E.axis(xyz=each.axis)
+            limit = E.limit(effort=0.0, velocity=0.0, lower=each.lower, upper=each.upper)
+            joints.append(joint(each.kind, each.name, parent, child, origin(place), axis, limit))
             links.append(E.link(name=child))
             parent, place = child, np.zeros(3)
         if body.mass:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
@@ -25,31 +25,34 @@ _TEMPLATE: Final = r"(\.\./)*templates/{}\.dtd"
 BASE: Final = "base"
 """Name of link 0."""
 
-_AXES: Final = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
+_AXES: Final = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
-SLIDES: Final = "prismatic"
-TURNS: Final = "revolute"
-
-_JOINTS: Final[Mapping[str, tuple[tuple[str, str], ...]]] = {
-    **{f"R_{a}": ((TURNS, a),) for a in "XYZ"},
-    **{f"U_{a}{b}": ((TURNS, a), (TURNS, b)) for a, b in ("XY", "YZ", "XZ")},
-    "S_EULER_XYZ": tuple((TURNS, a) for a in "XYZ"),
-    "S_FIXED_XYZ": tuple((TURNS, a) for a in "ZYX"),
-    "P_X": ((SLIDES, "X"),),
-    **{f"P_{a}{b}": ((SLIDES, a), (SLIDES, b)) for a, b in ("XY", "XZ")},
-    "PLANAR_XY": ((SLIDES, "X"), (SLIDES, "Y"), (TURNS, "Z")),
-    "PLANAR_YZ": ((SLIDES, "Y"), (SLIDES, "Z"), (TURNS, "X")),
-    "PLANAR_XZ": ((SLIDES, "X"), (SLIDES, "Z"), (TURNS, "Y")),
-    "T_XYZ": tuple((SLIDES, a) for a in "XYZ"),
-    "SPATIAL_EULER_XYZ": (*((SLIDES, a) for a in "XYZ"), *((TURNS, a) for a in "XYZ")),
+_JOINTS: Final = {
+    **{f"R_{axis}": axis.lower() for axis in "XYZ"},
+    **{f"U_{axes}": axes.lower() for axes in ("XY", "YZ", "XZ")},
+    "S_EULER_XYZ": "xyz",
+    "S_FIXED_XYZ": "xyz",
+    **{f"P_{axes}": axes for axes in ("X", "XY", "XZ")},
+    "PLANAR_XY": "XYz",
+    "PLANAR_YZ": "YZx",
+    "PLANAR_XZ": "XZy",
+    "T_XYZ": "XYZ",
+    "SPATIAL_EULER_XYZ": "XYZxyz",
 }
-"""Single joints of each CASPR joint type, in the order from parent to link."""
+"""Coordinates of each CASPR joint type: x, y, z turn about an axis, X, Y, Z slide along it."""
 
-_ORDER: Final = {"S_FIXED_XYZ": (2, 1, 0)}
-"""Index of CASPR's coordinate for each single joint, where the order differs.
+_OBLIQUE: Final = {"R_AXIS": ("turn", "revolute"), "P_AXIS": ("slide", "prismatic")}
+"""Joint types about or along a given axis: name and URDF type of their single joint."""
 
-Rotations about fixed axes X, Y, Z equal rotations about moving axes Z, Y, X.
-"""
+
+class SingleJoint(NamedTuple):
+    """Joint of one coordinate, as in a URDF; limits in rad or m."""
+
+    name: str
+    kind: str
+    axis: tuple[float, ...]
+    lower: float
+    upper: float
 
 
 @dataclass(frozen=True)
@@ -59,7 +62,7 @@ class Body:
     Attributes:
         number: Number from 1. The base has number 0.
         name: Unique name of the link.
-        joints: Kind, name, axis and limits of each single joint, in order from the parent.
+        joints: The single joints, in order from the parent.
         joint_names: Names of the single joints, in the order of CASPR's coordinates.
         parent: Number of the parent link.
         place: Position of the joint on the parent (3,) [m].
@@ -71,7 +74,7 @@ class Body:
 
     number: int
     name: str
-    joints: tuple[tuple[str, str, tuple[float, ...], float, float], ...]
+    joints: tuple[SingleJoint, ...]
     joint_names: tuple[str, ...]
     parent: int
     place: Array
@@ -85,8 +88,7 @@ def read_bodies(path: Path) -> tuple[Body, ...]:
     """Read the links, in the order of their numbers from 1."""
     faults: list[str] = []
     root = read_root(path, "bodies_system", "bodies")
-    holders = root.findall("links")
-    elements = [element for holder in holders for element in holder]
+    elements = root.findall("links/*")
     names = [str(element.get("name") or "") for element in elements]
     counts = Counter(names)
     bodies = []
@@ -99,11 +101,9 @@ def read_bodies(path: Path) -> tuple[Body, ...]:
     if not elements:
         faults.append("<links> holds no link")
     if not faults:
-        count = len(bodies)
-        if [body.number for body in bodies] != list(range(1, count + 1)):
-            faults.append(
-                f"links are numbered {[body.number for body in bodies]}, not 1 to {count}"
-            )
+        order = [body.number for body in bodies]
+        if order != list(range(1, len(order) + 1)):
+            faults.append(f"links are numbered {order}, not 1 to {len(order)}")
         faults += [
             f"{body.name}: its parent is link {body.parent}; a link before it is needed"
             for body in bodies
@@ -118,24 +118,23 @@ def _body(element: etree._Element, name: str) -> Body:
         raise XmlFault(f"<{element.tag}> {name}: only <link_rigid> is taken")
     joint = element.find("joint")
     kind = None if joint is None else joint.get("type")
-    if joint is None or (kind not in _JOINTS and kind not in ("R_AXIS", "P_AXIS")):
-        known = ", ".join((*_JOINTS, "R_AXIS", "P_AXIS"))
-        raise XmlFault(f"{name}: the joint type {kind!r} is not taken; {known} are")
-    (mass,) = numbers(f"{name}: <mass>", text_of(element, name, "physical/mass"), 1)
+    if joint is None or kind not in (known := (*_JOINTS, *_OBLIQUE)):
+        raise XmlFault(f"{name}: the joint type {kind!r} is not taken; {', '.join(known)} are")
+    (mass,) = numbers(f"{name}: <mass>", _text_of(element, name, "physical/mass"), 1)
     centre, end, place = (
-        np.array(numbers(f"{name}: <{where}>", text_of(element, name, where), 3))
+        np.array(numbers(f"{name}: <{where}>", _text_of(element, name, where), 3))
         for where in ("physical/com_location", "physical/end_location", "parent/location")
     )
     if mass < 0.0:
         raise XmlFault(f"{name}: <mass> {mass:g} kg given; it cannot be negative")
     joints = _single_joints(name, str(kind), joint)
-    order = _ORDER.get(str(kind), range(len(joints)))
     return Body(
         number=whole(f"{name}: num", element.get("num")),
         name=name,
-        joints=joints,
-        joint_names=tuple(joints[i][1] for i in np.argsort(order)),
-        parent=whole(f"{name}: parent", text_of(element, name, "parent/num")),
+        # turns about fixed axes X, Y, Z equal turns about moving axes Z, Y, X
+        joints=joints[::-1] if kind == "S_FIXED_XYZ" else joints,
+        joint_names=tuple(each.name for each in joints),
+        parent=whole(f"{name}: parent", _text_of(element, name, "parent/num")),
         place=place,
         mass=mass,
         centre=centre,
@@ -144,30 +143,30 @@ def _body(element: etree._Element, name: str) -> Body:
     )
 
 
-def _single_joints(
-    name: str, kind: str, joint: etree._Element
-) -> tuple[tuple[str, str, tuple[float, ...], float, float], ...]:
+def _single_joints(name: str, kind: str, joint: etree._Element) -> tuple[SingleJoint, ...]:
+    """Read the single joints, in the order of CASPR's coordinates."""
     if kind in _JOINTS:
         parts: list[tuple[str, str, tuple[float, ...]]] = [
-            (how, axis, _AXES[axis]) for how, axis in _JOINTS[kind]
+            (axis, "revolute", _AXES[axis])
+            if axis in _AXES
+            else (f"slide_{axis.lower()}", "prismatic", _AXES[axis.lower()])
+            for axis in _JOINTS[kind]
         ]
     else:
-        axis = numbers(f"{name}: joint axis", joint.get("axis"), 3)
-        if not any(axis):
-            raise XmlFault(f"{name}: joint axis {axis} has no direction")
-        parts = [(TURNS if kind == "R_AXIS" else SLIDES, "", axis)]
+        given = numbers(f"{name}: joint axis", joint.get("axis"), 3)
+        if not any(given):
+            raise XmlFault(f"{name}: joint axis {given} has no direction")
+        parts = [(*_OBLIQUE[kind], given)]
     lower, upper = (
         numbers(f"{name}: joint {key}", joint.get(key), len(parts)) for key in ("q_min", "q_max")
     )
-    order = _ORDER.get(kind, range(len(parts)))
-    found = []
-    for (how, letter, vector), i in zip(parts, order, strict=True):
-        if lower[i] > upper[i]:
-            raise XmlFault(f"{name}: joint q_min {lower[i]:g} is above q_max {upper[i]:g}")
-        suffix = "slide" if how == SLIDES else "" if letter else "turn"
-        tail = "_".join(part for part in (suffix, letter.lower()) if part)
-        found.append((how, f"{name}_{tail}", vector, lower[i], upper[i]))
-    return tuple(found)
+    for low, high in zip(lower, upper, strict=True):
+        if low > high:
+            raise XmlFault(f"{name}: joint q_min {low:g} is above q_max {high:g}")
+    return tuple(
+        SingleJoint(f"{name}_{tail}", how, axis, low, high)
+        for (tail, how, axis), low, high in zip(parts, lower, upper, strict=True)
+    )
 
 
 def _inertia(element: etree._Element, name: str, mass: float, centre: Array) -> Array:
@@ -187,8 +186,7 @@ def _inertia(element: etree._Element, name: str, mass: float, centre: Array) -> 
     raise XmlFault(f"{name}: <inertia ref={inertia.get('ref')!r}>; com or joint is needed")
 
 
-def text_of(element: etree._Element, name: str, path: str) -> str:
-    """Read the text at a path below the element of a link. Raise XmlFault if it is missing."""
+def _text_of(element: etree._Element, name: str, path: str) -> str:
     found = element.findtext(path)
     if found is None:
         raise XmlFault(f"{name}: has no <{path.replace('/', '> <')}>")
