@@ -92,16 +92,12 @@ class Posture(ReadOnlyState):
     def _bones(self) -> tuple[tuple[Array, ...], ...]:
         """Bones that start at each joint, base first."""
         origin, parent = self._frames.origin, self.arm._model.tree.parent
-        ends = [(parent[i], origin[i]) for i in range(1, len(origin))]
-        ends.append((self.arm._model.masses.tip, self.tip[:3, 3]))
-        return tuple(
-            tuple(
-                frozen(np.array([start, end]))
-                for row, end in ends
-                if row == joint and (start != end).any()
-            )
-            for joint, start in enumerate(origin)
-        )
+        ends = [*zip(parent[1:], origin[1:], strict=True)]
+        bones: list[list[Array]] = [[] for _ in origin]
+        for row, end in [*ends, (self.arm._model.masses.tip, self.tip[:3, 3])]:
+            if (origin[row] != end).any():
+                bones[row].append(frozen(np.array([origin[row], end])))
+        return tuple(map(tuple, bones))
 
     def link_pose(self, link: str) -> Array:
         """Compute the pose of a link's frame in the base frame, (4, 4) [m].

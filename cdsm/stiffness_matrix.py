@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from typing import TYPE_CHECKING, Literal, final, get_args
 
 import numpy as np
@@ -261,25 +261,27 @@ class Stiffness(ReadOnlyState):
     @property
     def _rows(self) -> list[tuple[str, ...]]:
         """Rows of the printed table: a header, then a name and three numbers per row."""
+        axes = np.eye(3)
+        shares: Callable[[int], Shares] = cache(lambda i: self.shares(axes[i]))
+        lines: dict[str, Callable[[int], float]] = {
+            "along": lambda i: self.along(axes[i]),
+            "  of it passive": lambda i: shares(i).passive.sum(),
+            "  of it active": lambda i: shares(i).active.sum(),
+            "  of it gravity": lambda i: shares(i).gravity,
+            "  of it load": lambda i: shares(i).load,
+            "cartesian, diagonal": lambda i: self.cartesian[i, i],
+            "pseudoinverse, diagonal": lambda i: self.pseudoinverse()[i, i],
+        }
 
-        def cell(read: Callable[[Array], float], u: Array) -> str:
+        def cell(read: Callable[[int], float], i: int) -> str:
             try:
-                return f"{read(u) / 1000.0:.4g}"
+                return f"{read(i) / 1000.0:.4g}"
             except SingularStiffness:
                 return "-"
 
-        lines: dict[str, Callable[[Array], float]] = {
-            "along": self.along,
-            "  of it passive": lambda u: self.shares(u).passive.sum(),
-            "  of it active": lambda u: self.shares(u).active.sum(),
-            "  of it gravity": lambda u: self.shares(u).gravity,
-            "  of it load": lambda u: self.shares(u).load,
-            "cartesian, diagonal": lambda u: float(u @ self.cartesian @ u),
-            "pseudoinverse, diagonal": lambda u: float(u @ self.pseudoinverse() @ u),
-        }
         return [
             ("stiffness [N/mm]", "x", "y", "z"),
-            *((name, *(cell(read, u) for u in np.eye(3))) for name, read in lines.items()),
+            *((name, *(cell(read, i) for i in range(3))) for name, read in lines.items()),
         ]
 
     @property
