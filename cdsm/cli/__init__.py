@@ -38,8 +38,7 @@ def _version(wanted: bool) -> None:
 @app.callback()
 def main(
     version: Annotated[
-        bool,
-        typer.Option("--version", callback=_version, is_eager=True, help="Show it and exit."),
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show it and exit.")
     ] = False,
     debug: Annotated[
         bool, typer.Option("--debug", help="Show where an error comes from; before the command.")

@@ -113,13 +113,12 @@ def draw_arm(axes: Any, pose: Posture, tension: Tension | None) -> None:
         colors = tension_colors(tension).to_rgba(tension.values).tolist()
     for path, color in zip(pose.cable_paths, colors, strict=True):
         axes.plot(*(MM * path.T), color=color, linewidth=1.1)
-    for name in AXES:
-        getattr(axes, f"set_{name}label")(f"{name} [mm]", fontsize=8)
     axes.tick_params(labelsize=7, pad=-1)
     limits = np.array([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()])
     ranges = np.ptp(limits, axis=1)
     ranges = np.maximum(ranges, _FLATTEST * ranges.max())  # keep space around a flat arm
     for name, middle, size in zip(AXES, limits.mean(axis=1), ranges, strict=True):
+        getattr(axes, f"set_{name}label")(f"{name} [mm]", fontsize=8)
         getattr(axes, f"set_{name}lim")(middle - size / 2.0, middle + size / 2.0)
     equal_axes(axes)
 

@@ -196,8 +196,7 @@ def _plot_experiment(result: paper.ExperimentFigure) -> Figure:
         axes.plot(across * trace.swept, scale * trace.computed, color=color, label="computed")
         axes.plot(across * trace.paper_at, scale * trace.paper, "ko", markersize=4, label="paper")
         axes.set(
-            xlabel="tension as reported [N]" if tension else "cable stiffness [N/mm]",
-            ylabel=unit,
+            xlabel="tension as reported [N]" if tension else "cable stiffness [N/mm]", ylabel=unit
         )
         axes.set_title(textwrap.fill(trace.label, 44), fontsize=9)
         axes.set_ylim(bottom=0.0)

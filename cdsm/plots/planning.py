@@ -115,13 +115,9 @@ def _stepped(values: Array) -> tuple[Array, Array]:
     # only neighbouring changes of equal sign make a ramp; up and back down is two jumps
     ramp = np.maximum(around[:-2] * np.sign(changes), around[2:] * np.sign(changes))
     last = np.flatnonzero(abs(changes) > _JUMP * np.maximum(ramp, 0.0))
-    places = np.insert(np.arange(values.size, dtype=float), np.repeat(last + 1, 2), 0.0)
-    line = np.insert(values, np.repeat(last + 1, 2), 0.0)
-    for k, i in enumerate(last.tolist()):
-        first = i + 2 * k + 1
-        places[first : first + 2] = i + 0.5
-        line[first : first + 2] = values[i : i + 2]
-    return places, line
+    at = np.repeat(last + 1, 2)
+    beside = np.stack([values[last], values[last + 1]], axis=1).ravel()
+    return np.insert(np.arange(0.0, values.size), at, at - 0.5), np.insert(values, at, beside)
 
 
 def _named(u: Array) -> str:

@@ -16,11 +16,7 @@ from cdsm.tension import Tension
 from cdsm.view.state import Condition, Shown
 
 _GREEN, _RED, _GREY = "#2f855a", "#c53030", "#718096"
-_COLORS: Final = {
-    Condition.STABLE: _GREEN,
-    Condition.UNSTABLE: _RED,
-    Condition.SINGULAR: _RED,
-}
+_COLORS: Final = {Condition.STABLE: _GREEN, Condition.UNSTABLE: _RED, Condition.SINGULAR: _RED}
 _BOX: Final = "padding:0 0.8em;margin-bottom:0.6em;font-size:0.85em;height:23em;overflow-y:auto"
 """Style of the panel. Its height is fixed, so that sliders do not move while they are dragged."""
 
