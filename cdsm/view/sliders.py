@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final, final
 
 import numpy as np
@@ -90,11 +90,10 @@ class Slider:
         """Current value in SI."""
         return float(self.handle.value) * self.range.unit
 
-    def set(self, value: float) -> None:
-        """Move the slider to a value in SI, or to the nearest end."""
+    def move(self, position: float) -> None:
+        """Move the slider to a position in its own unit, or to the nearest end."""
         ends = self.range
-        position = min(max(value / ends.unit, ends.low), ends.high)
-        self.handle.value = position  # type: ignore[misc]  # mypy does not see viser's setter
+        self.handle.value = min(max(position, ends.low), ends.high)  # type: ignore[misc]
 
 
 class Controls:
@@ -131,22 +130,22 @@ class Controls:
             name = f"Joints {first + 1} to {first + len(group)}" if len(ranges) > 1 else "Joint"
             with server.gui.add_folder(name, expand_by_default=first == 0):
                 self._joints += [self._add(joint) for joint in group]
-        straight = server.gui.add_button("Straight", hint="All joints as near zero as they go.")
-        straight.on_click(lambda _: _move(self._joints, np.zeros(arm.nv)))
-        reset = server.gui.add_button("Reset", hint="All sliders as they were at the beginning.")
-        reset.on_click(lambda _: self._reset())
-        for button in (straight, reset):
+        for label, hint, act in (
+            ("Straight", "All joints as near zero as they go.", self._straighten),
+            ("Reset", "All sliders as they were at the beginning.", self._reset),
+        ):
+            button = server.gui.add_button(label, hint=hint)
+            button.on_click(act)
             admit(button)
 
     @property
     def setting(self) -> Setting:
         """Current values of all sliders."""
-        return Setting(
+        return replace(
+            self._start,
             q=np.array([joint.value for joint in self._joints]),
             minimum=self._minimum.value,
-            maximum=self._start.maximum,
             force=np.array([component.value for component in self._force]),
-            solver=self._start.solver,
         )
 
     def update(self, shown: Shown) -> None:
@@ -159,12 +158,10 @@ class Controls:
         self._admit(handle)
         return Slider(handle, ends)
 
-    def _reset(self) -> None:
-        _move(self._joints, self._start.q)
-        _move(self._force, self._start.force)
-        self._minimum.set(self._start.minimum)
+    def _straighten(self, _: object) -> None:
+        for joint in self._joints:
+            joint.move(0.0)
 
-
-def _move(sliders: Sequence[Slider], values: Array) -> None:
-    for slider, value in zip(sliders, values.tolist(), strict=True):
-        slider.set(value)
+    def _reset(self, _: object) -> None:
+        for slider in (*self._joints, *self._force, self._minimum):
+            slider.move(slider.range.initial)
