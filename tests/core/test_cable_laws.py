@@ -9,9 +9,7 @@ import pytest
 
 import cdsm
 from cdsm.support.values import Array
-from tests.support.arms import (
-    random_arm,
-)
+from tests.support.arms import random_arm
 
 ARM = random_arm(1, 3)
 GEOMETRY = ARM.geometry
