@@ -3,23 +3,9 @@
 from collections.abc import Callable
 from typing import Final
 
-from cdsm.paper.claims import (
-    EXPLANATION,
-    HEADER,
-    Claim,
-    Figure,
-    to_dict,
-    to_markdown,
-    to_rows,
-)
+from cdsm.paper.claims import EXPLANATION, HEADER, Claim, Figure, to_dict, to_markdown, to_rows
 from cdsm.paper.curves import Curve, StiffnessFigure
-from cdsm.paper.experiments import (
-    ExperimentFigure,
-    Trace,
-    figure_10,
-    figure_12,
-    figure_13,
-)
+from cdsm.paper.experiments import ExperimentFigure, Trace, figure_10, figure_12, figure_13
 from cdsm.paper.lead import LeadFigure, figure_lead
 from cdsm.paper.prototype import Prototype
 from cdsm.paper.prototype_fit import (

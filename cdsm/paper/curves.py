@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, partial
 from typing import Any, Final, Literal, NamedTuple, final
 
 import numpy as np
@@ -132,16 +132,16 @@ def over_cases(
     """Compute curves over cases (law, lower bound of tension [N]) at one posture q (nv,) [rad]."""
 
     def curve(length: OriginalLength) -> Curve:
-        results = [at_minimum(_prototype(law, length), q, minimum) for law, minimum in cases]
+        arm = cache(partial(presets.virtual_prototype, original_length=length))
+        results = [at_minimum(arm(law), q, minimum) for law, minimum in cases]
+        tensions = [K.tension for K in results]
         both = np.array([readings(K) for K in results])
         parts = [[getattr(K.shares(axis), part).sum() for axis in np.eye(3)] for K in results]
         return Curve(
             label=label,
             original_length=length,
             swept=frozen(np.array(swept)),
-            tension=frozen(
-                np.array([(F.min(), F.mean(), F.max()) for F in (K.tension for K in results)])
-            ),
+            tension=frozen(np.array([(F.min(), F.mean(), F.max()) for F in tensions])),
             pseudoinverse=frozen(both[:, 0].copy()),
             pseudoinverse_part=frozen(np.array([np.diag(K.pseudoinverse(part)) for K in results])),
             along=frozen(both[:, 1].copy()),
@@ -149,11 +149,6 @@ def over_cases(
         )
 
     return Pair(curve("stretched"), curve("unstrained"), presets.virtual_prototype().at(q))
-
-
-@lru_cache(maxsize=1)  # all points of a curve over tension use one arm
-def _prototype(law: Elasticity, length: OriginalLength) -> Manipulator:
-    return presets.virtual_prototype(law, original_length=length)
 
 
 def over_minimum(label: str, law: Elasticity, q: Array, minima: Array) -> Pair:

@@ -150,7 +150,6 @@ def closure(K: Stiffness) -> float:
         A_eq=np.hstack([A, np.zeros((len(A), 1))]),
         b_eq=np.zeros(len(A)),
         bounds=(0.0, 1.0),
-        method="highs",
     )
     value = float(found.x[-1]) if found.status == 0 else 0.0
     return value if value > RANK else 0.0

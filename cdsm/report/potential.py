@@ -42,14 +42,12 @@ class LockedCable(NamedTuple):
         cable: The cable.
         tension: F [N] at the posture.
         free_length: l_0 [m] that the motor holds.
-        stiffness: k [N/m], only to choose steps.
     """
 
     number: int
     cable: Cable
     tension: float
     free_length: float
-    stiffness: float
 
     def pulls(self, longer: Array) -> Array:
         """Compute the tensions (P,) [N] of the cable when longer by ``longer`` (P, C) [m]."""
@@ -136,16 +134,15 @@ class Neighbourhood:
     def __init__(self, K: Stiffness) -> None:
         self._pose, self._tension, self._wrench = K.posture, K.tension, K.wrench
         self.unit = joint_unit(K.posture.arm)
-        rows = zip(K.tension.tolist(), K.free_lengths.tolist(), abs(K.cable_stiffness), strict=True)
-        self.held = [
-            LockedCable(c, K.posture.arm.cables[c], F, start, k)
-            for c, (F, start, k) in enumerate(rows)
-            if K.posture.arm.cables[c].control == "position" and (F > 0.0 or k > 0.0)
-        ]
         # stiffness and moment arms are used only to choose steps and to estimate rounding errors
-        self._k = np.zeros(K.tension.size)
-        self._k[[each.number for each in self.held]] = [each.stiffness for each in self.held]
+        self._k = abs(K.cable_stiffness)
         self._arms = abs(K.posture.length_jacobian * self.unit).max(axis=1)
+        states = zip(K.posture.arm.cables, K.tension.tolist(), K.free_lengths.tolist(), strict=True)
+        self.held = [
+            LockedCable(c, cable, F, free_length)
+            for c, (cable, F, free_length) in enumerate(states)
+            if cable.control == "position" and (F > 0.0 or self._k[c] > 0.0)
+        ]
 
     # --- potentials ---------------------------------------------------------------------------
 
@@ -232,7 +229,7 @@ class Neighbourhood:
         """Return a step ≤ :attr:`first_step` that moves no tension past half way to a law's end."""
         step = self.first_step
         for each in self.held:
-            rise = each.stiffness * self._arms[each.number]
+            rise = self._k[each.number] * self._arms[each.number]
             step = min(step, each.room() / (4.0 * rise) if rise > 0.0 else np.inf)
         return float(step)
 

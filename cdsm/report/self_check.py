@@ -146,7 +146,7 @@ def self_check(K: Stiffness) -> SelfCheck:
         energies[3] = _Anew(None, "a moment has no potential")
 
     scaled = near.unit[:, None] * near.unit
-    given = np.array([K.active, K.passive, K.gravity, K.load]) * scaled
+    given = np.array([getattr(K, name) for name in _TERMS]) * scaled
     joint = K.joint * scaled
     size = float(abs(joint).max())
     terms = [
