@@ -260,29 +260,27 @@ class Geometry(Printed):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        faults: list[str] = []
-        if len(self.links) != len(self.joints):
+        faults, count = [], len(self.joints)
+        if len(self.links) != count:
             faults.append(
-                f"links: {len(self.links)} given for {len(self.joints)} joints; "
-                "every joint has one link after it"
+                f"links: {len(self.links)} given for {count} joints; every joint has one link "
+                "after it"
             )
         offsets = [joint.disk_offset for joint in self.joints]
         for k, (link, before, after) in enumerate(
             zip(self.links, offsets, [*offsets[1:], 0.0], strict=False), start=1
         ):
             if link.length <= before + after:
-                last = k == len(self.joints)
-                what = "its disk" if last else "its two disks overlap: they"
+                what = "its disk" if k == count else "its two disks overlap: they"
                 faults.append(
                     f"links[{k}].length: {link.length:g} m is too short, {what} "
                     f"need more than {before + after:g} m; lengthen the link or lower disk_offset"
                 )
-        for c, cable in enumerate(self.cables, start=1):
-            if cable.joint > len(self.joints):
-                faults.append(
-                    f"cables[{c}].joint: {cable.joint} is past the last joint, "
-                    f"{len(self.joints)}; give 1 to {len(self.joints)}"
-                )
+        faults += [
+            f"cables[{c}].joint: {cable.joint} is past the last joint, {count}; give 1 to {count}"
+            for c, cable in enumerate(self.cables, start=1)
+            if cable.joint > count
+        ]
         if faults:
             raise CrossFaults(faults)
         return self

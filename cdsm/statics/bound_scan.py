@@ -16,7 +16,8 @@ from scipy.optimize import brentq
 from cdsm.errors import ElasticityRangeError, InfeasibleTension, SolverError
 from cdsm.manipulator import Manipulator
 from cdsm.stiffness_matrix import Stiffness
-from cdsm.support.validation import RANGES, Array
+from cdsm.support.validation import RANGES
+from cdsm.support.values import Array
 
 SAMPLES: Final = 96
 """Number of places that a scan evaluates. A stable range narrower than one step is not seen."""

@@ -29,7 +29,8 @@ from cdsm.statics.bound_scan import (
     tension_domain,
 )
 from cdsm.stiffness_matrix import Stiffness, stiffness
-from cdsm.support.validation import Array, ReadOnlyState, bound, frozen, instance, wrench_vector
+from cdsm.support.validation import bound, instance, wrench_vector
+from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import DEFAULT_SOLVER, distribute_tension
 
 _NOWHERE: Final = 1e6

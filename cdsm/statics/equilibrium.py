@@ -22,7 +22,8 @@ from cdsm.statics.locked_motors import LoadedArm, rounding
 from cdsm.statics.trust_region import FLAT, RestSearch, find_rest
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.format import coordinates
-from cdsm.support.validation import Array, ReadOnlyState, frozen, wrench_vector
+from cdsm.support.validation import wrench_vector
+from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension
 
 _SMALLEST_STEP = 2.0**-6

@@ -13,7 +13,7 @@ from cdsm.errors import ElasticityRangeError, InvalidInput
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness, assemble
 from cdsm.support.roots import rising_root
-from cdsm.support.validation import Array, frozen
+from cdsm.support.values import Array, frozen
 
 _ROUNDING = 16.0 * float(np.finfo(np.float64).eps)
 """Relative rounding of a torque, from the angles, lengths and tensions in its sum."""

@@ -18,7 +18,8 @@ from cdsm.arm_model import joints_to
 from cdsm.errors import InvalidInput, SingularMass
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness
-from cdsm.support.validation import Array, ReadOnlyState, frozen, instance
+from cdsm.support.validation import instance
+from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.urdf import CROSS_INERTIA, CROSS_MASS
 
 _MASSLESS = 1e-12

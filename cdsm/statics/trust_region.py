@@ -24,7 +24,7 @@ from scipy.optimize import brentq
 
 from cdsm.errors import CdsmError
 from cdsm.statics.locked_motors import Iterate, LoadedArm
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 
 _ATTEMPTS = 200
 """Largest number of iterations. Arms with an equilibrium need up to 130, mostly below 10."""

@@ -15,14 +15,8 @@ from cdsm.posture import Posture
 from cdsm.statics.equilibrium import Equilibrium, equilibrium
 from cdsm.statics.following import follow_load
 from cdsm.support.format import MODEL, coordinates
-from cdsm.support.validation import (
-    Array,
-    ReadOnlyState,
-    frozen,
-    unit_direction,
-    vector,
-    whole_number,
-)
+from cdsm.support.validation import unit_direction, vector, whole_number
+from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension
 
 MOST_STEPS = 1000

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import cdsm
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 from tests.support.arms import mixed_arm, random_arm, random_posture
 
 SPRING, RADIUS, OFFSET, LENGTH = 1890.0, 0.02, 0.01, 0.1

@@ -11,7 +11,7 @@ from scipy.optimize import minimize_scalar
 import cdsm
 from cdsm.statics import trust_region
 from cdsm.statics.locked_motors import LoadedArm
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 from tests.support import arms
 from tests.support.differences import assert_second_order
 from tests.support.locked import (

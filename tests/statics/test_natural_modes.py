@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 
 import cdsm
 from cdsm.statics.natural_modes import _stand_in_mass
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 from tests.support.arms import (
     STEEL,
     mixed_arm,
