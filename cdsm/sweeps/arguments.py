@@ -12,16 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from cdsm.elasticity import Elasticity
 from cdsm.errors import InvalidInput
-from cdsm.support.validation import (
-    Array,
-    frozen,
-    number_array,
-    scalar,
-    text,
-    unit_direction,
-    vector,
-    wrench_vector,
-)
+from cdsm.support.validation import Array, frozen, number_array, scalar, text, vector
 
 _Values = TypeVar("_Values")
 
@@ -82,16 +73,6 @@ def laws_of(
     return Choice("elasticity", tuple(elasticity.values()), _names("elasticity", elasticity))
 
 
-def wrenches_of(wrench: ArrayLike | Mapping[str, ArrayLike]) -> Choice[Array]:
-    """Check wrenches (W, 6) at ``tool0`` in base axes: force [N], then moment [N m]."""
-    return _vectors("wrench", wrench, wrench_vector)
-
-
-def directions_of(direction: ArrayLike | Mapping[str, ArrayLike]) -> Choice[Array]:
-    """Check directions; return unit vectors (D, 3) in base axes."""
-    return _vectors("direction", direction, unit_direction)
-
-
 def bounds_of(minimum: ArrayLike, maximum: float) -> tuple[Choice[Array], float]:
     """Check the lower bounds of tension (M,) [N] and the upper bound [N]."""
     lows = distinct("minimum", minimum)
@@ -124,11 +105,12 @@ def distinct(name: str, values: ArrayLike) -> Array:
     return array
 
 
-def _vectors(
+def vectors_of(
     name: str,
     value: ArrayLike | Mapping[str, ArrayLike],
     checked: Callable[[str, ArrayLike], Array],
 ) -> Choice[Array]:
+    """Check one or more vectors, such as wrenches (W, 6), each by a function."""
     if isinstance(value, Mapping):
         rows = [checked(f"{name}[{key!r}]", each) for key, each in value.items()]
     else:

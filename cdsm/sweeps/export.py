@@ -43,9 +43,8 @@ def write_sweep(dataset: xarray.Dataset, path: str | os.PathLike[str]) -> Path:
     """
     check_sweep(dataset)
     check_target(path)
-    if as_path(path).suffix.lower() == ".csv":
-        return write_file(path, lambda aside: _write_table(dataset, aside))
-    return write_file(path, lambda aside: _write_netcdf(dataset, aside))
+    write = _write_table if as_path(path).suffix.lower() == ".csv" else _write_netcdf
+    return write_file(path, lambda aside: write(dataset, aside))
 
 
 def read_sweep(path: str | os.PathLike[str]) -> xarray.Dataset:
@@ -120,14 +119,13 @@ def _write_netcdf(dataset: xarray.Dataset, path: Path) -> None:
 
 def _write_table(dataset: xarray.Dataset, path: Path) -> None:
     """Write a long table, in parts of limited size."""
+    if not dataset["status"].ndim:
+        dataset = dataset.expand_dims("entry")
     status = dataset["status"]
-    rest = status.size // max(1, status.shape[0]) if status.ndim else 1
-    step = max(1, _ROWS // max(1, rest))
-    first = status.dims[0] if status.ndim else None
-    starts = range(0, status.shape[0], step) if status.ndim else (0,)
+    step = max(1, _ROWS * len(status) // max(1, status.size))
     with path.open("w", encoding="utf-8", newline="") as file:
-        for start in starts:
-            part = dataset if first is None else dataset.isel({first: slice(start, start + step)})
+        for start in range(0, len(status), step):
+            part = dataset.isel({status.dims[0]: slice(start, start + step)})
             _table(part).to_csv(file, index=False, header=start == 0, lineterminator="\n")
 
 

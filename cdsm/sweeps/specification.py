@@ -14,8 +14,8 @@ from cdsm.elasticity import Elasticity
 from cdsm.errors import InvalidInput
 from cdsm.manipulator import Manipulator
 from cdsm.support.format import JointUnits
-from cdsm.support.validation import instance, one_of
-from cdsm.sweeps.arguments import bounds_of, directions_of, label, laws_of, wrenches_of
+from cdsm.support.validation import instance, one_of, unit_direction, wrench_vector
+from cdsm.sweeps.arguments import bounds_of, label, laws_of, vectors_of
 from cdsm.sweeps.blocks import Block
 from cdsm.sweeps.description import attributes_of, law_text
 from cdsm.sweeps.evaluation import SweepTask
@@ -128,7 +128,8 @@ def specify(
 
     poses = poses_of(instance("arm", arm, Manipulator), q)
     lows, maximum = bounds_of(minimum, maximum)
-    laws, wrenches, directions = laws_of(elasticity), wrenches_of(wrench), directions_of(direction)
+    laws, wrenches = laws_of(elasticity), vectors_of("wrench", wrench, wrench_vector)
+    directions = vectors_of("direction", direction, unit_direction)
     force, moment = wrenches.values[:, :3], wrenches.values[:, 3:]
     labels = {
         **poses.labels,

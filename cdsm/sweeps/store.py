@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cdsm.errors import FileError, StoreError
+from cdsm.errors import FileError, StoreError, listed
 from cdsm.sweeps.description import changed_laws
 from cdsm.sweeps.specification import EMPTY, Specification
 
@@ -28,9 +28,6 @@ if TYPE_CHECKING:
 
 _ORDER = "order"
 """Attribute with the names of all variables in order, since a folder has no order."""
-
-_LISTED = 8
-"""Maximum number of differences that an error lists."""
 
 
 @contextmanager
@@ -147,25 +144,24 @@ def _check(path: Path, specification: Specification) -> None:
             start = max(0, next(i for i, (one, other) in pairs if one != other) - 30)
             different.append(_mismatch(str(name), theirs[start:], ours[start:]))
     if different:
-        more = f"\n  - and {len(different) - _LISTED} more" if len(different) > _LISTED else ""
-        listed = "".join(f"\n  - {each}" for each in different[:_LISTED]) + more
         raise StoreError(
             path,
-            f"holds another sweep; ask the same again, or give another path to store=:{listed}",
+            "holds another sweep; ask the same again, or give another path to store=:"
+            + listed(different, most=8),
             different,
         )
 
 
 def _difference(name: str, stored: NDArray[Any], wanted: NDArray[Any]) -> list[str]:
     """Return a list with the first difference of two arrays as text; empty if they are equal."""
-    if stored.shape != wanted.shape:
-        return [_mismatch(name, stored, wanted)]
-    places = np.argwhere(stored != wanted)
-    if not len(places):
-        return []
-    place = tuple(places[0].tolist())
-    where = f"{name}{list(place)}" if place else name
-    return [_mismatch(where, stored[place], wanted[place])]
+    if stored.shape == wanted.shape:
+        places = np.argwhere(stored != wanted)
+        if not len(places):
+            return []
+        place = tuple(places[0].tolist())
+        name += str(list(place)) if place else ""
+        stored, wanted = stored[place], wanted[place]
+    return [_mismatch(name, stored, wanted)]
 
 
 def _mismatch(what: str, stored: object, wanted: object) -> str:
