@@ -67,9 +67,9 @@ def _faults(robot: etree._Element, check_inertia: bool) -> list[str]:
     if not robot.get("name"):
         faults.append("<robot> has no name")
     for link in links:
-        faults += _of_link(link, check_inertia)
+        _check_link(faults, link, check_inertia)
     for joint in joints:
-        faults += _of_joint(joint)
+        _check_joint(faults, joint)
     moving = sum(joint.get("type") in ("revolute", "prismatic") for joint in joints)
     if not moving:
         faults.append("has no joint that moves")
@@ -89,21 +89,20 @@ def _names(kind: str, elements: list[etree._Element]) -> list[str]:
     return faults + [f"{kind} {name}: the name is used twice" for name in twice]
 
 
-def _of_link(link: etree._Element, check_inertia: bool) -> list[str]:
+def _check_link(faults: list[str], link: etree._Element, check_inertia: bool) -> None:
     inertial = link.find("inertial")
     if inertial is None:
-        return []
+        return
     where = f"link {link.get('name')}"
-    faults: list[str] = []
-    mass = inertial.find("mass")
-    inertia = inertial.find("inertia")
+    mass, inertia = inertial.find("mass"), inertial.find("inertia")
     value = _read(faults, f"{where}: mass", None if mass is None else mass.get("value"), 1)
     most = RANGES["mass"].high
     if value is not None and not 0.0 <= value[0] <= most:
         faults.append(f"{where}: mass {value[0]:g} kg; 0 to {most:g} kg is needed")
-    faults += _of_origin(where, inertial)
+    _check_origin(faults, where, inertial)
     if inertia is None:
-        return [*faults, f"{where}: <inertial> has no <inertia>"]
+        faults.append(f"{where}: <inertial> has no <inertia>")
+        return
     read = [_read(faults, f"{where}: {key}", inertia.get(key), 1) for key in _MOMENTS]
     if check_inertia and None not in read:
         xx, xy, xz, yy, yz, zz = (each[0] for each in read if each is not None)
@@ -115,12 +114,10 @@ def _of_link(link: etree._Element, check_inertia: bool) -> list[str]:
                 "kg m², which no body has: none is negative, nor larger than the sum of the "
                 "others. Stiffness does not need them: check_inertia=False lets them pass"
             )
-    return faults
 
 
-def _of_joint(joint: etree._Element) -> list[str]:
-    where, faults = f"joint {joint.get('name')}", []
-    kind = joint.get("type")
+def _check_joint(faults: list[str], joint: etree._Element) -> None:
+    where, kind = f"joint {joint.get('name')}", joint.get("type")
     if kind not in TAKEN:
         remedy = _INSTEAD.get(str(kind), f"one of {', '.join(TAKEN)} is needed")
         faults.append(f"{where}: type {kind!r} is not taken; {remedy}")
@@ -133,9 +130,9 @@ def _of_joint(joint: etree._Element) -> list[str]:
         element = joint.find(end)
         if element is None or not element.get("link"):
             faults.append(f"{where}: has no <{end} link=…>")
-    faults += _of_origin(where, joint)
+    _check_origin(faults, where, joint)
     if kind not in ("revolute", "prismatic"):
-        return faults
+        return
     axis = joint.find("axis")
     if axis is not None:
         vector = _read(faults, f"{where}: axis", axis.get("xyz"), 3)
@@ -143,25 +140,23 @@ def _of_joint(joint: etree._Element) -> list[str]:
             faults.append(f"{where}: axis {axis.get('xyz')!r} has no direction")
     limit = joint.find("limit")
     if limit is None:
-        return [*faults, f"{where}: has no <limit>, which a {kind} joint needs"]
+        faults.append(f"{where}: has no <limit>, which a {kind} joint needs")
+        return
     ends = [
         _read(faults, f"{where}: {key} limit", limit.get(key, "0"), 1) for key in ("lower", "upper")
     ]
     if ends[0] and ends[1] and ends[0][0] > ends[1][0]:
         faults.append(f"{where}: lower limit {ends[0][0]:g} above the upper one {ends[1][0]:g}")
-    return faults
 
 
-def _of_origin(where: str, element: etree._Element) -> list[str]:
+def _check_origin(faults: list[str], where: str, element: etree._Element) -> None:
     origin = element.find("origin")
-    faults: list[str] = []
     if origin is not None:
         _read(faults, f"{where}: origin rpy", origin.get("rpy", "0 0 0"), 3)
         xyz, most = origin.get("xyz", "0 0 0"), RANGES["length"].high
         position = _read(faults, f"{where}: origin xyz", xyz, 3)
         if position is not None and max(map(abs, position)) > most:
             faults.append(f"{where}: origin xyz {xyz!r} is further than {most:g} m away")
-    return faults
 
 
 def _read(faults: list[str], where: str, text: str | None, count: int) -> tuple[float, ...] | None:
