@@ -4,9 +4,8 @@ The profile of a parameter p_i is the rise of χ² as p_i leaves its best value:
 
     Δχ²(p_i) = min over the other parameters of χ² − least χ²
 
-The interval of p_i is where Δχ² stays below the square of a quantile (Bates and Watts, Nonlinear
-Regression Analysis, 1988, chapter 6). For a linear model, the interval is value ± quantile · std.
-For a nonlinear model, it is the same whether the search uses the parameter or its logarithm.
+Bates and Watts, Nonlinear Regression Analysis, 1988, chapter 6. It gives the same interval whether
+the search uses the parameter or its logarithm.
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple, final
 
 import numpy as np
-from numpy.typing import ArrayLike
+from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import brentq
 
 from cdsm.errors import InvalidInput
@@ -32,14 +31,9 @@ NEGLIGIBLE = 1e-3
 
 Side = Literal[-1, 1]
 
-_LONGEST = 0.25
-"""Longest step, as a share of the range of the parameter."""
-
-_HALVINGS = 8
-"""Number of halvings of a step before the model counts as ended."""
-
-_NEAR, _REFINEMENTS = 0.25, 4
-"""Largest relative distance of a knot from a goal, and number of extra knots to reach it."""
+_LONGEST = 0.25  # step at most, as a share of the range of the parameter
+_HALVINGS = 8  # of a step before the model counts as ended
+_NEAR, _REFINEMENTS = 0.25, 4  # relative distance of a knot from a goal; knots added to reach it
 
 _TOLERANCES = (1e-4, 1e-6, 1e-8)
 """ftol, xtol and gtol of the fit at a knot. The cubic between knots is not more exact."""
@@ -89,20 +83,14 @@ class Profile(ReadOnlyState):
         box, pair = Box(self.bounds[None, :]), slice(last, last + 2)
         u = box.point(values[pair])
         slope = self.slope[outward][pair] * box.derivative(u)
-        return float(box.parameters(np.array([_cubic_crossing(u, height[pair], slope, rise)]))[0])
+        return float(box.parameters(np.array([_crossing(u, height[pair], slope, rise)]))[0])
 
 
-def _cubic_crossing(u: ArrayLike, height: ArrayLike, slope: ArrayLike, rise: float) -> float:
-    """Find where a cubic, given by heights and slopes at two places, reaches a rise."""
-    (start, end), (low, high) = np.asarray(u), np.asarray(height)
-    first, last = (end - start) * np.asarray(slope)
-
-    def above(t: float) -> float:
-        chord = t * t * (3.0 - 2.0 * t)
-        bend = t * (1.0 - t) * ((1.0 - t) * first - t * last)
-        return float(low - rise + chord * (high - low) + bend)
-
-    return float(start + brentq(above, 0.0, 1.0, xtol=1e-12) * (end - start))
+def _crossing(u: Array, height: Array, slope: Array, rise: float) -> float:
+    """Find where the cubic with given heights and slopes at two places (2,) reaches a rise."""
+    width = u[1] - u[0]
+    cubic = CubicHermiteSpline((0.0, 1.0), height - rise, width * slope)
+    return float(u[0] + width * brentq(cubic, 0.0, 1.0, xtol=1e-12))
 
 
 class _Knot(NamedTuple):
@@ -123,10 +111,11 @@ class _Knot(NamedTuple):
     tangent: Array
 
 
+@dataclass(frozen=True, eq=False)
 class Profiler:
     """Computation of the profile of parameter ``i``, from the optimum outward.
 
-    Args:
+    Attributes:
         problem: The least-squares problem.
         best: The optimum (P,), in the unit cube.
         jacobian: ∂r/∂point (n, P) at the optimum.
@@ -136,53 +125,45 @@ class Profiler:
         far: Largest Δχ² of the profile, above all in ``exact``.
     """
 
-    def __init__(
-        self,
-        problem: LeastSquares,
-        best: Array,
-        jacobian: Array,
-        i: int,
-        others: Sequence[int],
-        exact: Sequence[float],
-        far: float,
-    ) -> None:
-        self._problem = problem
-        self._least = problem.cost(best)
-        self._i = i
-        self._others = list(others)
-        self._exact, self._far = exact, far
-        self._start = self._knot(best, jacobian[:, i], jacobian[:, self._others])
+    problem: LeastSquares
+    best: Array
+    jacobian: Array
+    i: int
+    others: list[int]
+    exact: Sequence[float]
+    far: float
 
     def profile(self) -> Profile:
         """Compute the profile to both sides. Raise LowerOptimumError if χ² is below the least."""
         (down, first), (up, last) = self._follow(-1), self._follow(1)
         knots = [*reversed(down), *up[1:]]
-        box, u = self._problem.box.only(self._i), np.array([k.point[self._i] for k in knots])
+        box = Box(self.problem.box.bounds[[self.i]])
+        u = np.array([knot.point[self.i] for knot in knots])
         return Profile(
             values=frozen(box.parameters(u)),
             rise=frozen(np.array([knot.rise for knot in knots])),
             slope=frozen(np.array([knot.slope for knot in knots]) / box.derivative(u)),
             best=len(down) - 1,
             ends=(first, last),
-            bounds=frozen(box.bounds[0].copy()),
+            bounds=frozen(box.bounds[0]),
         )
 
     def _follow(self, side: Side) -> tuple[list[_Knot], str]:
         """Compute the knots on one side, from the optimum outward, and the reason why they end."""
-        knots = [self._start]
-        for goal in (*self._exact, self._far):
+        knots = [self._knot(self.best, self.jacobian[:, self.i], self.jacobian[:, self.others])]
+        for goal in (*self.exact, self.far):
             while knots[-1].rise < goal:
                 knot = self._next(knots[-1], side, goal)
                 if isinstance(knot, str):
                     return knots, knot
                 knots.append(knot)
-            if goal < self._far:
+            if goal < self.far:
                 self._refine(knots, goal)
         return knots, ""
 
     def _next(self, here: _Knot, side: Side, goal: float) -> _Knot | str:
         """Compute a knot farther out, near where Δχ² reaches a goal, or the reason for none."""
-        u = float(here.point[self._i])
+        u = float(here.point[self.i])
         room = 1.0 - u if side > 0 else u
         if room == 0.0:
             return "bound"
@@ -205,16 +186,16 @@ class Profiler:
             near = min(pair, key=lambda knot: abs(knot.rise - goal))
             if abs(near.rise - goal) < _NEAR * goal:
                 return
-            u = [float(knot.point[self._i]) for knot in pair]
-            place = _cubic_crossing(u, [k.rise for k in pair], [k.slope for k in pair], goal)
-            between = self._moved(near, place - float(near.point[self._i]))
+            u, height, slope = np.array([(k.point[self.i], k.rise, k.slope) for k in pair]).T
+            place = _crossing(u, height, slope, goal)
+            between = self._moved(near, place - float(near.point[self.i]))
             if isinstance(between, str):  # the model does not exist there
                 return
             knots.insert(last + 1, between)
 
     def _moved(self, here: _Knot, step: float) -> _Knot | str:
         """Compute the knot one step along the tangent, or the reason why the model has none."""
-        problem, others = self._problem, self._others
+        problem, others = self.problem, self.others
         point = np.clip(here.point + step * here.tangent, 0.0, 1.0)
         if (failure := problem.failure(point)) is not None:
             return str(failure)
@@ -225,7 +206,7 @@ class Profiler:
                     point, method="dogbox", tolerances=_TOLERANCES, most=50, over=others
                 )
                 beside = problem.jacobian(point, others)
-            along = problem.jacobian(point, [self._i])[:, 0]
+            along = problem.jacobian(point, [self.i])[:, 0]
         except InvalidInput as error:
             return str(error)
         knot = self._knot(point, along, beside)
@@ -234,17 +215,17 @@ class Profiler:
         return knot
 
     def _knot(self, point: Array, along: Array, beside: Array) -> _Knot:
-        r = self._problem.residuals(point)
-        x = point[self._others]
+        r = self.problem.residuals(point)
+        x = point[self.others]
         free = (x > 0.0) & (x < 1.0)
         follow = np.linalg.lstsq(beside[:, free], -along, rcond=RANK_TOLERANCE)[0]
         across = along + beside[:, free] @ follow
         tangent = np.zeros_like(point)
-        tangent[self._i] = 1.0
-        tangent[np.array(self._others, dtype=int)[free]] = follow
+        tangent[self.i] = 1.0
+        tangent[np.array(self.others, dtype=int)[free]] = follow
         return _Knot(
             point=point,
-            rise=float(r @ r) - self._least,
+            rise=float(r @ r) - self.problem.cost(self.best),
             slope=2.0 * float(r @ across),
             curvature=2.0 * float(across @ across),
             tangent=tangent,

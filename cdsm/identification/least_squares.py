@@ -25,8 +25,7 @@ _DECADES = 100.0
 _ONE_SIDED, _CENTRAL = 1e-7, 1e-5
 """Steps of the finite differences in the unit cube. They balance rounding and truncation."""
 
-_CACHED = 64
-"""Number of points in the cache of residuals. A search evaluates some points repeatedly."""
+_CACHED = 64  # points whose residuals are kept: a search evaluates some points repeatedly
 
 
 class NoModelError(Exception):
@@ -45,15 +44,15 @@ class Box:
 
     def _scaled(self, values: Array) -> Array:
         """Return the searched values: the parameters or their logarithms."""
-        return np.where(self._by_log, np.log(np.where(self._by_log, values, 1.0)), values)
+        return np.asarray(np.log(values, out=values.copy(), where=self._by_log))
 
     def parameters(self, point: Array) -> Array:
         """Compute the parameters (P,) at a point of the unit cube."""
         scaled = self._start + point * self._size
-        values = np.where(self._by_log, np.exp(np.where(self._by_log, scaled, 0.0)), scaled)
+        values = np.exp(scaled, out=scaled, where=self._by_log)
         # without rounding at 0 and 1
         values = np.where(point == 1.0, self.high, np.where(point == 0.0, self.low, values))
-        return np.asarray(np.clip(values, self.low, self.high), dtype=np.float64)
+        return np.asarray(np.clip(values, self.low, self.high))
 
     def point(self, values: Array) -> Array:
         """Compute the point of the unit cube: inverse of :meth:`parameters`."""
@@ -62,10 +61,6 @@ class Box:
     def derivative(self, point: Array) -> Array:
         """Compute the derivative of :meth:`parameters` (P,)."""
         return np.where(self._by_log, self.parameters(point) * self._size, self._size)
-
-    def only(self, i: int) -> Box:
-        """Return the box of parameter ``i``. Its maps take any number of values."""
-        return Box(self.bounds[i : i + 1])
 
 
 class LeastSquares:
@@ -99,23 +94,19 @@ class LeastSquares:
 
     def residuals(self, point: Array) -> Array:
         """Compute the residuals r (n,). They are inf where the model does not exist."""
-        return self._cached(point.tobytes()).copy()
-
-    def _evaluate(self, point: bytes) -> Array:
-        try:
-            return self._residuals_of(self.parameters(np.frombuffer(point)))
-        except NoModelError:
-            return np.full(self.count, math.inf)
+        found = self._cached(point.tobytes())
+        return np.full(self.count, math.inf) if isinstance(found, NoModelError) else found.copy()
 
     def failure(self, point: Array) -> NoModelError | None:
         """Return the error that explains why the model has no residuals at a point, or None."""
-        if math.isfinite(self.cost(point)):
-            return None
+        found = self._cached(point.tobytes())
+        return found if isinstance(found, NoModelError) else None
+
+    def _evaluate(self, point: bytes) -> Array | NoModelError:
         try:
-            self._residuals_of(self.parameters(point))
+            return self._residuals_of(self.parameters(np.frombuffer(point)))
         except NoModelError as error:
             return error
-        return None
 
     def cost(self, point: Array) -> float:
         """Compute Σ r²."""
@@ -140,10 +131,9 @@ class LeastSquares:
             """Compute the residuals k steps away, or None beyond the bounds or the model."""
             moved = point.copy()
             moved[i] += k * step
-            if not 0.0 <= moved[i] <= 1.0:
+            if not 0.0 <= moved[i] <= 1.0 or self.failure(moved) is not None:
                 return None
-            r = self.residuals(moved)
-            return r if np.isfinite(r).all() else None
+            return self.residuals(moved)
 
         for side in (1, -1):
             near = at(side)
@@ -182,7 +172,6 @@ class LeastSquares:
             over: Indices of the parameters that move; all if not given.
             central: Whether the differences are central.
         """
-        ftol, xtol, gtol = tolerances
         moving = list(range(start.size)) if over is None else list(over)
 
         def at(x: Array) -> Array:
@@ -197,9 +186,7 @@ class LeastSquares:
             bounds=(0.0, 1.0),
             method=method,
             x_scale="jac",
-            ftol=ftol,
-            xtol=xtol,
-            gtol=gtol,
             max_nfev=most,
+            **dict(zip(("ftol", "xtol", "gtol"), tolerances, strict=True)),
         )
         return at(found.x)

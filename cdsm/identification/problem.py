@@ -12,7 +12,6 @@ from cdsm.errors import CdsmError, InvalidInput, SingularStiffness
 from cdsm.identification.least_squares import NoModelError
 from cdsm.identification.measurement import Measurement, label
 from cdsm.manipulator import Manipulator
-from cdsm.posture import Posture
 from cdsm.statics.equilibrium import equilibrium
 from cdsm.statics.following import follow
 from cdsm.statics.weight_test import WeightTest, weight_test
@@ -24,11 +23,7 @@ Parameters = dict[str, float]
 
 
 class UserFaultError(Exception):
-    """Error of a user-defined function that is not a CdsmError."""
-
-    def __init__(self, name: str, parameters: Parameters) -> None:
-        self.name = name
-        self.at = ", ".join(f"{key}={value:g}" for key, value in parameters.items())
+    """Wraps the :class:`InvalidInput` for a user-defined function that fails."""
 
 
 class StiffnessModel:
@@ -68,8 +63,19 @@ class StiffnessModel:
         return arm, predicted
 
     def _along(self, arm: Manipulator, measurement: Measurement, parameters: Parameters) -> float:
+        """Compute the stiffness [N/m] of one measurement."""
         pose = arm.at(measurement.angles)
-        K = self._stiffness(pose, measurement, parameters)
+        tension: Tension | ArrayLike
+        if self._tension_of is not None:
+            tension = _called("tension_of", self._tension_of, parameters, pose, measurement)
+        elif measurement.tension is not None:
+            tension = measurement.tension
+        else:
+            assert measurement.minimum is not None
+            tension = distribute_tension(pose, measurement.minimum, wrench=measurement.wrench)
+        # a Tension holds its wrench
+        wrench = None if isinstance(tension, Tension) else measurement.wrench
+        K = stiffness(pose, tension, wrench)
         if not K.is_stable:
             raise SingularStiffness(
                 f"the arm buckles: the smallest stiffness is {K.margin:.3g} "
@@ -86,20 +92,6 @@ class StiffnessModel:
                 K.critical_direction,
             )
         return value
-
-    def _stiffness(
-        self, pose: Posture, measurement: Measurement, parameters: Parameters
-    ) -> Stiffness:
-        if self._tension_of is not None:
-            tension = _called("tension_of", self._tension_of, parameters, pose, measurement)
-        elif measurement.tension is not None:
-            tension = measurement.tension
-        else:
-            assert measurement.minimum is not None
-            tension = distribute_tension(pose, measurement.minimum, wrench=measurement.wrench)
-        # a Tension holds its wrench
-        wrench = None if isinstance(tension, Tension) else measurement.wrench
-        return stiffness(pose, tension, wrench)
 
     def _secant(self, measurement: Measurement, K: Stiffness) -> float:
         """Compute the stiffness [N/m] of a weight test on the model."""
@@ -124,4 +116,11 @@ def _called(name: str, function: Callable[..., Any], parameters: Parameters, *ar
     except CdsmError:
         raise
     except Exception as error:
-        raise UserFaultError(name, parameters) from error
+        where = ", ".join(f"{key}={value:g}" for key, value in parameters.items())
+        raise UserFaultError(
+            InvalidInput(
+                name,
+                f"fails at {where}: {error!r}. Mend it, narrow the bounds, or let it raise a "
+                "CdsmError where there is no such arm.",
+            )
+        ) from error

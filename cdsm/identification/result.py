@@ -12,17 +12,11 @@ from scipy.linalg import qr
 from scipy.special import ndtri, stdtrit
 
 from cdsm.errors import InvalidInput
-from cdsm.identification.intervals import NEGLIGIBLE, RANK_TOLERANCE, Profile, Side
+from cdsm.identification.intervals import NEGLIGIBLE, RANK_TOLERANCE, Profile
 from cdsm.identification.measurement import Measurement, label
 from cdsm.manipulator import Manipulator
 from cdsm.support.format import MODEL
-from cdsm.support.validation import (
-    Array,
-    ReadOnlyState,
-    flag,
-    frozen,
-    scalar,
-)
+from cdsm.support.validation import Array, ReadOnlyState, flag, frozen, scalar
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -101,12 +95,11 @@ class Identification(ReadOnlyState):
         If only the ratios of the σ are known, multiply it by :attr:`reduced_chi_square`. The bounds
         have no influence. An undetermined parameter has infinite variance.
         """
-        _, values, right = self._svd
+        values, right = self._svd
         inner = right[self._determined].T / values[self._determined]
         covariance = inner @ inner.T / np.outer(self._column_norms, self._column_norms)
         null = self._null_projector
-        covariance[null != 0.0] = np.copysign(math.inf, null[null != 0.0])
-        return frozen(covariance)
+        return frozen(np.where(null != 0.0, np.copysign(math.inf, null), covariance))
 
     @cached_property
     def std(self) -> Array:
@@ -147,10 +140,20 @@ class Identification(ReadOnlyState):
         if not 0.0 < level < 1.0:
             raise InvalidInput("level", f"{level:g} given; it must lie between 0 and 1, as 0.95.")
         rise = self._rise(level, scaled=flag("scaled", scaled))
-        return {
-            name: (self._end(i, rise, -1, level), self._end(i, rise, 1, level))
-            for i, name in enumerate(self.names)
-        }
+        intervals = {}
+        for name, profile in zip(self.names, self.profiles, strict=True):
+            low: float | None = -math.inf
+            high: float | None = math.inf
+            if profile is not None and math.isfinite(rise):
+                low, high = profile.crossing(rise, -1), profile.crossing(rise, 1)
+            if low is None or high is None:
+                raise InvalidInput(
+                    "level",
+                    f"{level:.10g} given; the profile of {name} does not reach there. Give a level "
+                    "farther from 1.",
+                )
+            intervals[name] = (low, high)
+        return intervals
 
     def plot(self) -> Figure:
         """Plot predicted over measured stiffness [N/mm], and residuals in standard deviations."""
@@ -163,24 +166,14 @@ class Identification(ReadOnlyState):
         return f"<Identification {values}; {self._verdict}>"
 
     def __str__(self) -> str:
-        lines = [
-            f"{'parameter [own unit]':<22}{'value':>12}{'std':>12}{'95 % from':>12}{'to':>12}"
-            f"{'low':>12}{'high':>12}"
-        ]
-        rows = zip(
-            self.names, self.values, self.std, self.confidence().values(), self.bounds, strict=True
-        )
-        for name, value, std, interval, limits in rows:
-            cells = "".join(f"{x:>12.4g}" for x in (value, std, *interval, *limits))
-            lines.append(f"{name:<22}{cells}")
-        lines += ["", f"{'measurement':<22}{'measured':>12}{'predicted':>12}{'residual':>12}"]
-        lines.append(f"{'':<22}{'[N/mm]':>12}{'[N/mm]':>12}{'[σ]':>12}")
-        for name, measured, predicted, residual in zip(
-            self._labels, self.measured, self.predicted, self.residuals, strict=True
-        ):
-            lines.append(
-                f"{name:<22}{measured / 1e3:>12.4g}{predicted / 1e3:>12.4g}{residual:>12.2f}"
-            )
+        columns = ("value", "std", "95 % from", "to", "low", "high")
+        intervals = list(self.confidence().values())
+        numbers = np.column_stack([self.values, self.std, intervals, self.bounds])
+        lines = [_row("parameter [own unit]", *columns), *map(_row, self.names, *numbers.T), ""]
+        lines.append(_row("measurement", "measured", "predicted", "residual"))
+        lines.append(_row("", "[N/mm]", "[N/mm]", "[σ]"))
+        residuals = [f"{residual:.2f}" for residual in self.residuals]
+        lines += map(_row, self._labels, self.measured / 1e3, self.predicted / 1e3, residuals)
         lines += [f"({MODEL}; secant where a force is given)", "", self._verdict]
         return "\n".join([*lines, *(f"warning: {sentence}" for sentence in self.warnings)])
 
@@ -204,19 +197,6 @@ class Identification(ReadOnlyState):
             return math.inf
         return float(stdtrit(self.freedom, half) ** 2) * self.reduced_chi_square
 
-    def _end(self, i: int, rise: float, side: Side, level: float) -> float:
-        profile = self.profiles[i]
-        if profile is None or math.isinf(rise):
-            return side * math.inf
-        end = profile.crossing(rise, side)
-        if end is None:
-            raise InvalidInput(
-                "level",
-                f"{level:.10g} given; the profile of {self.names[i]} does not reach there. Give a "
-                "level farther from 1.",
-            )
-        return end
-
     @property
     def _goals(self) -> tuple[list[float], float]:
         """Δχ² [-] at the ends of 95 % intervals, rising, and the largest Δχ² of the profiles."""
@@ -236,37 +216,39 @@ class Identification(ReadOnlyState):
         return np.where(zero, math.inf, norms)
 
     @cached_property
-    def _svd(self) -> tuple[Array, Array, Array]:
-        """Singular value decomposition of J, its columns scaled to unit length (or zero)."""
-        left, values, right = np.linalg.svd(self.jacobian / self._column_norms, full_matrices=False)
-        return left, values, right
+    def _svd(self) -> tuple[Array, Array]:
+        """Singular values of J and right vectors. Its columns are scaled to unit length or zero."""
+        _, values, right = np.linalg.svd(self.jacobian / self._column_norms, full_matrices=False)
+        return values, right
 
     @cached_property
     def _determined(self) -> Any:
-        values = self._svd[1]
+        values = self._svd[0]
         return values > RANK_TOLERANCE * max(values[0], RANK_TOLERANCE)
+
+    @property
+    def _null(self) -> Array:
+        """Undetermined combinations of the scaled parameters, as orthonormal rows (·, P)."""
+        return np.asarray(self._svd[1][~self._determined])
 
     @cached_property
     def _null_projector(self) -> Array:
         """Projector (P, P) on the undetermined combinations, with rounding set to zero."""
-        null = self._svd[2][~self._determined]
-        projector: Array = null.T @ null
+        projector = self._null.T @ self._null
         return np.where(abs(projector) > 1e-8, projector, 0.0)
 
-    @cached_property
+    @property
     def _dependent(self) -> Any:
         """One parameter per undetermined combination. Holding these determines the others."""
-        null = self._svd[2][~self._determined]
-        return qr(null, mode="r", pivoting=True)[1][: len(null)]
+        return qr(self._null, mode="r", pivoting=True)[1][: len(self._null)]
 
     @property
     def _null_combinations(self) -> list[str]:
         """Combinations that change no prediction, as text: "a by +1 and b by -0.3"."""
-        null = self._svd[2][~self._determined]
-        if not len(null):
+        if not len(self._null):
             return []
         # easiest to read: one dependent parameter per combination
-        null = np.linalg.solve(null[:, self._dependent], null)
+        null = np.linalg.solve(self._null[:, self._dependent], self._null)
         scale = np.where(np.isinf(self._column_norms), 1.0, self._column_norms)
         written = []
         for row in null:
@@ -276,3 +258,9 @@ class Identification(ReadOnlyState):
             terms = [(row[i], self.names[i]) for i in np.flatnonzero(row)]
             written.append(" and ".join(f"{name} by {part:+.4g}" for part, name in terms))
         return written
+
+
+def _row(name: str, *cells: object) -> str:
+    """Write a row of a table. Numbers have four digits."""
+    texts = (f"{cell:.4g}" if isinstance(cell, float) else str(cell) for cell in cells)
+    return f"{name:<22}" + "".join(f"{text:>12}" for text in texts)

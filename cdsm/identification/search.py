@@ -1,13 +1,4 @@
-"""Identify the parameters of an arm from stiffnesses measured on it.
-
-    min Σ r_i²,   r_i = (K_i(p) − K_i) / σ_i,   low ≤ p ≤ high
-
-K_i is the measured stiffness, and σ_i its standard deviation. K_i(p) is the stiffness of the model
-with parameters p: :meth:`~cdsm.Stiffness.along`, or :func:`~cdsm.weight_test` if the force is not
-small. A user-defined function builds the arm from its parameters, such as dimensions, masses,
-springs or leads. A lead is the straight cable between its actuator and the base disk.
-:attr:`Identification.warnings` names parameters that the measurements cannot separate.
-"""
+"""Identify the parameters of an arm from stiffnesses measured on it, by weighted least squares."""
 
 from __future__ import annotations
 
@@ -21,19 +12,13 @@ from numpy.typing import ArrayLike
 
 from cdsm.errors import InvalidInput, UnknownName
 from cdsm.identification.diagnosis import unfinished, warnings_of
-from cdsm.identification.intervals import LowerOptimumError, Profile, Profiler
+from cdsm.identification.intervals import LowerOptimumError, Profiler
 from cdsm.identification.least_squares import LeastSquares
 from cdsm.identification.measurement import Measurement
 from cdsm.identification.problem import StiffnessModel, UserFaultError
 from cdsm.identification.result import Identification
 from cdsm.manipulator import Manipulator
-from cdsm.support.validation import (
-    Array,
-    frozen,
-    scalar,
-    sequence_of,
-    vector,
-)
+from cdsm.support.validation import Array, frozen, scalar, sequence_of, vector
 from cdsm.tension import Tension
 
 _ON_BOUND = 1e-9
@@ -45,8 +30,7 @@ _CANDIDATES, _STARTS = 24, 3
 _COARSE, _FINE = (1e-10,) * 3, (1e-14,) * 3
 """ftol, xtol and gtol of the searches with one-sided and with central differences."""
 
-_EVALUATIONS = 200
-"""Largest number of evaluations of a search, without those of the differences."""
+_EVALUATIONS = 200  # of a search, at most, without those of the differences
 
 
 def identify(
@@ -80,7 +64,8 @@ def identify(
         )
 
     Args:
-        model_of: Function that builds the arm from the free parameters, given by keyword.
+        model_of: Function that builds the arm from the free parameters (dimensions, masses,
+            springs, leads, …), given by keyword.
         measurements: At least as many measurements as parameters.
         free: Bounds (low, high) of each parameter, in the unit in which ``model_of`` takes it. If
             they are positive and a factor of 100 or more apart, the logarithm is searched.
@@ -118,11 +103,7 @@ def identify(
             except LowerOptimumError as lower:  # a profile found a lower minimum
                 best = min(_optimum(problem, [lower.point]), lower.point, key=problem.cost)
     except UserFaultError as fault:
-        raise InvalidInput(
-            fault.name,
-            f"fails at {fault.at}: {fault.__cause__!r}. Mend it, narrow the bounds, or let it "
-            "raise a CdsmError where there is no such arm.",
-        ) from fault.__cause__
+        raise fault.args[0] from fault.__cause__
 
 
 def _checked_bounds(free: Mapping[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
@@ -205,9 +186,7 @@ def _checked_start(problem: LeastSquares, start: Mapping[str, float]) -> Array:
             "start", f"{start!r} given; one value for each of {', '.join(problem.names)} is needed."
         )
     values = np.array([scalar(f"start[{name!r}]", start[name]) for name in problem.names])
-    for name, value, low, high in zip(
-        problem.names, values, problem.box.low, problem.box.high, strict=True
-    ):
+    for name, value, (low, high) in zip(problem.names, values, problem.box.bounds, strict=True):
         if not low <= value <= high:
             raise InvalidInput(
                 f"start[{name!r}]", f"{value:g} is outside the bounds {low:g} to {high:g}."
@@ -243,20 +222,14 @@ def _result(model: StiffnessModel, problem: LeastSquares, best: Array) -> Identi
         warnings=(),
         profiles=(),
     )
-    result = replace(result, profiles=_profiles(problem, best, jacobian, result))
+    follow = [j for j in range(best.size) if j not in result._dependent]
+    profiles = tuple(
+        Profiler(
+            problem, best, jacobian, i, [j for j in follow if j != i], *result._goals
+        ).profile()
+        if math.isfinite(result.std[i])
+        else None
+        for i in range(best.size)
+    )
+    result = replace(result, profiles=profiles)
     return replace(result, warnings=(*warnings_of(result), *unfinished(problem, best, jacobian)))
-
-
-def _profiles(
-    problem: LeastSquares, best: Array, jacobian: Array, result: Identification
-) -> tuple[Profile | None, ...]:
-    follow = [i for i in range(best.size) if i not in result._dependent]
-    profiles: list[Profile | None] = []
-    for i in range(best.size):
-        if not math.isfinite(result.std[i]):
-            profiles.append(None)
-            continue
-        others = [j for j in follow if j != i]
-        profiler = Profiler(problem, best, jacobian, i, others, *result._goals)
-        profiles.append(profiler.profile())
-    return tuple(profiles)

@@ -64,8 +64,8 @@ class StrandElasticity(Elasticity):
     def __post_init__(self) -> None:
         if not all(isinstance(each, (list, tuple)) for each in (self.coefficients, self.joins)):
             raise InvalidInput("coefficients", "give a tuple for each range, and a tuple of joins.")
-        rows = tuple(tuple(_row("coefficients", row)) for row in self.coefficients)
-        joins = tuple(_row("joins", self.joins))
+        rows = tuple(_row("coefficients", row) for row in self.coefficients)
+        joins = _row("joins", self.joins)
         edges = (scalar("low", self.low), *joins, scalar("high", self.high))
         if not rows or not all(rows):
             raise InvalidInput("coefficients", "need at least one range with one coefficient.")
@@ -218,18 +218,17 @@ class TabulatedElasticity(Elasticity):
     strains: tuple[float, ...]
 
     def __post_init__(self) -> None:
-        rows = []
         for name in ("tensions", "strains"):
             row = _row(name, getattr(self, name))
             if len(row) < 2 or any(a >= b for a, b in pairwise(row)):
                 raise InvalidInput(name, f"{len(row)} points given; two or more, rising, needed.")
-            rows.append(row)
-            object.__setattr__(self, name, tuple(row))
-        if len(rows[0]) != len(rows[1]):
-            raise InvalidInput("strains", f"{len(rows[1])} given for {len(rows[0])} tensions.")
-        if rows[0][0] < 0.0:
-            raise InvalidInput("tensions", f"{rows[0][0]:g} N is negative; cables only pull.")
-        steps = np.diff(rows[0])
+            object.__setattr__(self, name, row)
+        F, strains = self.tensions, self.strains
+        if len(F) != len(strains):
+            raise InvalidInput("strains", f"{len(strains)} given for {len(F)} tensions.")
+        if F[0] < 0.0:
+            raise InvalidInput("tensions", f"{F[0]:g} N is negative; cables only pull.")
+        steps = np.diff(F)
         if steps.min() < SMALLEST:
             raise InvalidInput("tensions", f"two points are only {steps.min():g} N apart.")
         chords = self._curve.chords
@@ -268,9 +267,8 @@ class TabulatedElasticity(Elasticity):
         return self._curve.moment(self.domain.check(tension))
 
 
-def _row(name: str, values: ArrayLike) -> list[float]:
+def _row(name: str, values: ArrayLike) -> tuple[float, ...]:
     numbers = number_array(name, values)
     if numbers.ndim != 1:
         raise InvalidInput(name, f"{values!r} given; a sequence of numbers is needed.")
-    row: list[float] = numbers.tolist()
-    return row
+    return tuple(numbers.tolist())

@@ -32,11 +32,8 @@ _NEAREST = 6.0
 _ROUNDING = 1e-14
 """A polynomial below this share of the sum of the magnitudes of its terms counts as zero."""
 
-_NEGLIGIBLE = 1e-30
-"""A term below this share of the largest term of a polynomial is neglected."""
-
-_NARROWEST = 4
-"""Least width of a panel, in units in the last place. Panels shrink towards a root."""
+_NEGLIGIBLE = 1e-30  # share of the largest term of a polynomial: a smaller term is neglected
+_NARROWEST = 4  # width of a panel in units in the last place; panels shrink towards a root
 
 
 def coefficient_table(rows: Sequence[Sequence[float]]) -> Array:

@@ -1,11 +1,9 @@
 """Rising C1 curve through rising points. Its slope is bounded by those of the chords nearby.
 
 Between two points, the curve is the rational quadratic of Gregory and Delbourgo (IMA J. Numer.
-Anal. 2, 1982). With θ from 0 to 1, θ' = 1 − θ, the slope c of the chord, and the slopes a c and
-b c at the points,
+Anal. 2, 1982) in the notation of :class:`cdsm.TabulatedElasticity`:
 
-    y = y_0 + Δy θ (θ + a θ')/D,     y' = c N/D²,
-    D = θ² + (a + b) θ θ' + θ'²,     N = b θ² + 2 θ θ' + a θ'².
+    y = y_0 + Δy θ (θ + a θ')/D,     y' = c N/D²
 
 All terms are nonnegative. So y' is positive, and no digits cancel.
 
@@ -101,10 +99,9 @@ class RisingCurve:
 def slopes_at_points(chords: Array, rise: Array) -> Array:
     """Compute slopes (n,) at n points from the slopes and rises (n − 1,) of the chords.
 
-    The logarithm of a chord's slope is assigned to the middle of its rise and interpolated over y.
-    Inside, it is the mean of two parabolas through three chords each, clipped to the values of the
-    neighbouring chords. At an end, the change of one parabola is clipped to between half and all
-    of the change of a straight line.
+    Their logarithms are interpolated as :class:`~cdsm.TabulatedElasticity` says. Inside, a value is
+    the mean of two parabolas through three chords each, clipped to the neighbouring chords. At an
+    end it follows one parabola, and the change is clipped.
     """
     if len(chords) == 1:
         return np.repeat(chords, 2)

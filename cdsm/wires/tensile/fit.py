@@ -22,12 +22,10 @@ from cdsm.wires.tensile.stages import doubts, pretension_end, refuse_jumps, yiel
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-METHODS: Final = ("monotone", "polynomial")
-CONFIDENCE: Final = 0.95
-UNKNOWN: Final = 1e9
-"""Largest factor from EA to an end of the band. A wider band would tell no more."""
-_KNOTS: Final = 200
-"""Approximate number of tensions in a fitted table, enough for linear interpolation."""
+_METHODS: Final = ("monotone", "polynomial")
+_CONFIDENCE: Final = 0.95
+_UNKNOWN: Final = 1e9  # largest factor from EA to an end of the band; more would tell nothing
+_KNOTS: Final = 200  # tensions in a fitted table, about: enough for linear interpolation
 
 
 @final
@@ -175,7 +173,7 @@ def fit_tensile_test(
             units are impossible (the likely mistake is named), fewer than 8 points lie below the
             yield (20 for polynomials), or the polynomials are not positive on half the range.
     """
-    one_of("method", method, METHODS)
+    one_of("method", method, _METHODS)
     join = scalar("join", join)
     test = TensileTest(displacement, force, gauge_length)  # type: ignore[arg-type]
     points, noise, notes = loading(test)
@@ -194,18 +192,23 @@ def fit_tensile_test(
         spread = curve.spread(points)
         notes += (f"plastic from {onset:.4g} N on: left out",)
     refuse_jumps(curve, points)
+    elasticity: Elasticity
     if method == "monotone":
-        elasticity, start = _monotone(curve, points)
+        elasticity = _as_law(curve, points)
     else:
         elasticity, cut = polynomials(points, join)
-        start = _start(elasticity, curve)
         notes += cut
-    domain = elasticity.domain
-    tensions = frozen(_grid(domain.first, domain.high, curve.basis.tensions))
+    grid, domain = curve.basis.tensions, elasticity.domain
+    tensions = frozen(_grid(domain.first, domain.high, grid))
+    offsets = np.interp(tensions, grid, curve.strain) - elasticity.strain(tensions)
+    # the polynomials do not give the strain at the low end: take the best fit
+    start = (
+        offsets[0] if method == "monotone" else np.average(offsets, weights=np.gradient(tensions))
+    )
     strain = points.strain - start
     fitted = np.interp(strain, elasticity.strain(tensions), tensions)
     inside = (strain >= 0.0) & (fitted < tensions[-1])
-    deviation = np.interp(tensions, curve.basis.tensions, spread.deviation)
+    deviation = np.interp(tensions, grid, spread.deviation)
     elastic_from = pretension_end(tensions, elasticity.rigidity(tensions), deviation)
     return TensileFit(
         elasticity=elasticity,
@@ -215,7 +218,7 @@ def fit_tensile_test(
         band=_band(elasticity, tensions, curve, points) if method == "monotone" else None,
         test=test,
         method=method,
-        start=start * test.gauge_length,
+        start=float(start) * test.gauge_length,
         notes=notes + doubts(points, spread, test.gauge_length),
     )
 
@@ -232,8 +235,8 @@ def _stages(
     return tuple(stages)
 
 
-def _monotone(curve: Curve, points: Points) -> tuple[Elasticity, float]:
-    """Return the fitted curve as a law, and the strain at its low end."""
+def _as_law(curve: Curve, points: Points) -> TabulatedElasticity:
+    """Tabulate the strain of a curve over the range of the points."""
     grid = curve.basis.tensions
     # the ends follow from the fit: noise would shift the extreme forces
     first, last = curve.force(points.strain[[0, -1]])
@@ -241,22 +244,14 @@ def _monotone(curve: Curve, points: Points) -> tuple[Elasticity, float]:
     low = low if low >= RANGES["tension"].low else 0.0  # rounding of a test that begins at zero
     tensions = _grid(low, min(grid[-1], float(last)), grid)
     strain = np.interp(tensions, grid, curve.strain)
-    law = TabulatedElasticity(tuple(tensions.tolist()), tuple((strain - strain[0]).tolist()))
-    return law, float(strain[0])
-
-
-def _start(law: Elasticity, curve: Curve) -> float:
-    """Find the strain at the low end of a law by the best fit to a curve: it is not measured."""
-    tensions = _grid(law.domain.first, law.domain.high, curve.basis.tensions)
-    offsets = np.interp(tensions, curve.basis.tensions, curve.strain) - law.strain(tensions)
-    return float(np.average(offsets, weights=np.gradient(tensions)))
+    return TabulatedElasticity(tuple(tensions.tolist()), tuple((strain - strain[0]).tolist()))
 
 
 def _band(law: Elasticity, tensions: Array, curve: Curve, points: Points) -> Band:
     spread = curve.loosest(points).spread(points)
-    reach = float(stdtrit(spread.freedom, (1.0 + CONFIDENCE) / 2.0))
+    reach = float(stdtrit(spread.freedom, (1.0 + _CONFIDENCE) / 2.0))
     deviation = reach * np.interp(tensions, curve.basis.tensions, spread.deviation)
-    factor = np.exp(np.minimum(deviation, np.log(UNKNOWN)))
+    factor = np.exp(np.minimum(deviation, np.log(_UNKNOWN)))
     rigidity = law.rigidity(tensions)
     return Band(tensions, frozen(rigidity / factor), frozen(rigidity * factor))
 
