@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import sys
-from collections.abc import Callable
 from typing import Annotated
 
 import typer
@@ -51,19 +50,6 @@ def main(
             stream.reconfigure(errors="replace")
 
 
-_COMMANDS: dict[str, Callable[..., None]] = {
-    "urdf": urdf,
-    "stiffness": stiffness,
-    "check": check,
-    "weigh": weigh,
-    "buckle": buckle,
-    "plan": plan,
-    "sweep": sweep,
-    "map": map_sweep,
-    "view": view,
-    "fit": fit,
-    "export": export,
-    "reproduce": reproduce,
-}
-for name, command in _COMMANDS.items():
-    app.command(name)(as_command(command))
+_ALL = urdf, stiffness, check, weigh, buckle, plan, sweep, map_sweep, view, fit, export, reproduce
+for command in _ALL:
+    app.command("map" if command is map_sweep else command.__name__)(as_command(command))

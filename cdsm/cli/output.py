@@ -75,13 +75,11 @@ def reported() -> Iterator[None]:
     """Turn an error into a message and exit code 1, Ctrl-C into 130; --debug changes nothing."""
     try:
         yield
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, CdsmError, OSError) as error:  # OSError: of the terminal or pipe
         if debug_wanted.get():
             raise
-        console.print("interrupted: no file is half-written, and what --resume keeps stays")
-        raise typer.Exit(130) from None
-    except (CdsmError, OSError) as error:  # OSError: of the terminal or pipe
-        if debug_wanted.get():
-            raise
+        if isinstance(error, KeyboardInterrupt):
+            console.print("interrupted: no file is half-written, and what --resume keeps stays")
+            raise typer.Exit(130) from None
         console.print(f"error: {error}", style="red", markup=False, highlight=False, soft_wrap=True)
         raise typer.Exit(1) from None

@@ -89,9 +89,8 @@ def _plot_directions(result: paper.StiffnessFigure) -> Figure:
         for i, axes in enumerate(row):
             for curve, style in zip(curves, STYLES, strict=False):
                 label = _LENGTHS[curve.original_length] if over_tension else curve.label
-                _draw_curve(
-                    axes, result, curve, getattr(curve, name)[:, i], COLORS[i], style, label
-                )
+                line = {"color": COLORS[i], "linestyle": style, "label": label}
+                _draw_curve(axes, result, curve, getattr(curve, name)[:, i], **line)
                 if result.part == "passive" and name == "pseudoinverse":
                     passive = N_PER_MM * curve.pseudoinverse_part[:, i]
                     axes.plot(_swept(result, curve), passive, "k.", markersize=3)
@@ -109,7 +108,7 @@ def _plot_changes(result: paper.StiffnessFigure) -> Figure:
     first, stated = result.curves[0], result.claims[0].paper or ()
     for i, color in enumerate(COLORS):
         active, *changes = grid[:, i]
-        _draw_curve(active, result, first, first.pseudoinverse_part[:, i], color, "-")
+        _draw_curve(active, result, first, first.pseudoinverse_part[:, i], color=color)
         active.set(title=AXES[i])
         for axes, name in zip(changes, _READINGS, strict=True):
             for pair, shade in zip(
@@ -172,7 +171,8 @@ def _plot_postures(result: paper.StiffnessFigure) -> Figure:
         for row, (name, reading) in enumerate(_READINGS.items(), start=1):
             axes: Any = figure.add_subplot(grid[row, column])
             for i, (axis, color) in enumerate(zip(AXES, COLORS, strict=True)):
-                _draw_curve(axes, result, curve, getattr(curve, name)[:, i], color, "-", axis)
+                values = getattr(curve, name)[:, i]
+                _draw_curve(axes, result, curve, values, color=color, label=axis)
                 unstrained = N_PER_MM * getattr(original, name)[:, i]
                 axes.plot(_swept(result, curve), unstrained, "k:", linewidth=0.8)
             axes.set_ylabel(f"stiffness, {reading} [N/mm]")
@@ -228,17 +228,11 @@ def _plot_prototype(result: paper.PrototypeFigure) -> Figure:
 
 
 def _draw_curve(
-    axes: Any,
-    result: paper.StiffnessFigure,
-    curve: paper.Curve,
-    values: Array,
-    color: str,
-    style: str,
-    label: str | None = None,
+    axes: Any, result: paper.StiffnessFigure, curve: paper.Curve, values: Array, **line: Any
 ) -> None:
     """Draw a stiffness [N/m] over the swept quantity; bars show the range of tension."""
     x, y = _swept(result, curve), N_PER_MM * values
-    axes.plot(x, y, style, color=color, label=label or curve.label)
+    axes.plot(x, y, **line)
     if result.swept == "tension":
         low, mean, high = curve.tension.T
         every = slice(None, None, max(1, len(x) // 8))
@@ -247,7 +241,7 @@ def _draw_curve(
             y[every],
             xerr=np.array([mean - low, high - mean])[:, every],
             fmt="none",
-            ecolor=color,
+            ecolor=line["color"],
             elinewidth=0.7,
             alpha=0.5,
         )
