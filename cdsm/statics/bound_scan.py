@@ -117,14 +117,14 @@ def stable_ranges(
 
     places = log_samples(low, high)
     margins = np.array([margin(place) for place in places.tolist()])
-    edges, ends = [], []
-    for i in range(len(places)):
-        if margins[i] > 0.0 and (i == 0 or margins[i - 1] <= 0.0):
-            edges.append(places[i] if i == 0 else sign_change(margin, places[i - 1], places[i]))
-        if margins[i] > 0.0 and (i + 1 == len(places) or margins[i + 1] <= 0.0):
-            last = i + 1 == len(places)
-            ends.append(places[i] if last else sign_change(margin, places[i], places[i + 1]))
-    return places, margins, tuple((float(a), float(b)) for a, b in zip(edges, ends, strict=True))
+    stable = np.concatenate([[False], margins > 0.0, [False]])
+    edges = [
+        float(sign_change(margin, places[i - 1], places[i]))
+        if 0 < i < len(places)
+        else float(places[0 if i == 0 else -1])
+        for i in np.flatnonzero(stable[1:] != stable[:-1])
+    ]
+    return places, margins, tuple(zip(edges[::2], edges[1::2], strict=True))
 
 
 def sign_change(f: Callable[[float], float], a: float, b: float) -> float:
