@@ -1,4 +1,4 @@
-"""The prototype of Section V: its unknown parameters, and what they make of every experiment."""
+"""The prototype of Section V: its unknown parameters, and the experiments made with it."""
 
 from __future__ import annotations
 

@@ -191,7 +191,7 @@ def _derived(
     noise: Noise,
     step: float,
 ) -> list[_Anew]:
-    """Compute derivatives of the three kinematic parts, or of the elastic part, by differences."""
+    """Compute derivatives of three kinematic parts, or one elastic part; an error is a reason."""
     try:
         values, errors = derive(f, near.unit.size, step, noise)
     except CdsmError as error:

@@ -96,11 +96,11 @@ class StrandElasticity(Elasticity):
         31 N, where the other branch gives 11 352 N. All coefficients keep their printed digits.
         These leave EA(31 N) uncertain by 6 kN and EA(810 N) by 35 kN. Within them, this law is
         continuous, and as level as possible from 400 to 810 N, where the text calls EA
-        near-constant. Otherwise it is nearest to the printed values.
-        Linear programs find it (``tests/laws/test_errata.py``). At 31 N, the slope falls
-        from 1022 to 368. No law with these digits has one slope there. The least fall, from 662,
-        takes every other digit to the end of its rounding. The polynomial is negative below
-        2.11 N, so the domain is (2.2 N, 810 N].
+        near-constant. Otherwise it is nearest to the printed values. Linear programs find it
+        (``tests/laws/test_errata.py``). At 31 N, the slope falls from 1022 to 368. No law with
+        these digits has one slope there. The least fall, from 662, takes every other digit to the
+        end of its rounding. The polynomial is negative below 2.11 N, so the domain is
+        (2.2 N, 810 N].
         """
         return cls(EQ19, joins=(31.0,), low=2.2, high=810.0)
 
