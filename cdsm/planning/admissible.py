@@ -16,16 +16,10 @@ from cdsm.posture import Posture
 from cdsm.support.validation import Array, frozen
 from cdsm.tension import Tension, distribute_tension
 
-_TOLERANCE = 1e-12
-"""Primal tolerance of the solver; all its variables are of order one."""
-
+_TOLERANCE = 1e-12  # primal tolerance of the solver; all its variables are of order one
 _INFINITE, _EQUATION = 1e30, 5  # DAQP's infinity, and its flag for equations
-
-_KEPT = 1e-9
-"""Largest accepted residual of an equation: the solver may report success with a larger one."""
-
-_FLAT = 1e-10
-"""Singular values of J_Lᵀ below this part of the largest count as zero."""
+_KEPT = 1e-9  # largest residual of an equation: the solver may report success with a larger one
+_FLAT = 1e-10  # singular values of J_Lᵀ below this part of the largest count as zero
 
 
 class Optimum(NamedTuple):

@@ -23,14 +23,9 @@ from cdsm.support.validation import (
     whole_number,
 )
 
-_LEAST_MARGIN = 1e-9
-"""Smallest margin: rounding changes the smallest eigenvalue by 1e-11 of the largest."""
-
-_MOST_STARTS = 1000
-"""Largest number of starts. It takes about a minute, and a late start is seldom the best."""
-
-_SYMMETRIC = 1e-9
-"""A skew part of a matrix below this part of its largest entry is rounding."""
+_LEAST_MARGIN = 1e-9  # rounding changes the smallest eigenvalue by 1e-11 of the largest
+_MOST_STARTS = 1000  # these take about a minute, and a late start is seldom the best
+_SYMMETRIC = 1e-9  # a skew part of a matrix below this part of its largest entry is rounding
 
 
 def stiffness_model(

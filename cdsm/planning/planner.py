@@ -29,26 +29,13 @@ from cdsm.support.validation import Array
 REACHED: Final = 1e-6
 """Largest relative miss of a target that counts as hit. Searches mostly end at rounding."""
 
-_CORNERS = 1e3
-"""Upper bound of unbounded tensions for the starts, as a multiple of the least tensions."""
-
-_RANGE_STARTS = 24
-"""Number of starts of the range search before a target is rejected."""
-
-_NEAREST_STARTS = 8
-"""Number of additional corner starts for targets that cannot all be hit."""
-
-_NEARLY = 0.1
-"""Tensions within this relative miss show how large the solution will be."""
-
-_SIDES = 6
-"""Number of nearest points on either side of a target that are connected."""
-
-_EDGE = 1e-9
-"""A target beyond an end of the range by this part is at the end."""
-
-_AS_NEAR = 1e-8
-"""Misses up to this count as zero: next to buckling a search may come no nearer."""
+_CORNERS = 1e3  # upper bound of unbounded tensions for the starts, over the least tensions
+_RANGE_STARTS = 24  # number of starts of the range search before a target is rejected
+_NEAREST_STARTS = 8  # number of additional corner starts for targets that cannot all be hit
+_NEARLY = 0.1  # tensions within this relative miss show how large the solution will be
+_SIDES = 6  # number of nearest points on either side of a target that are connected
+_EDGE = 1e-9  # a target beyond an end of the range by this part is at the end
+_AS_NEAR = 1e-8  # misses up to this count as zero: next to buckling a search may come no nearer
 
 
 class Planner:
@@ -70,10 +57,7 @@ class Planner:
         region = bounded = model.region
         if not np.isfinite(region.high).all():
             bounded = region.capped(_CORNERS * region.scale)
-        self.model = model
-        self.constraints = constraints
-        self.starts = starts
-        self.seed = seed
+        self.model, self.constraints, self.starts, self.seed = model, constraints, starts, seed
         self.begin = StartPoints(model, bounded, 0, seed)
         self.program = Program(region, self.begin.anchor, constraints, EFFORT, region.scale)
         self.efforts: list[float] = []
@@ -110,12 +94,9 @@ class Planner:
         softest, stiffest = range_ends(self.model, u, _RANGE_STARTS, self.seed)
         low = 0.0 if softest.open else softest.value
         high = math.inf if stiffest.open else stiffest.value
-        balanced = [self.model.at(end.tension.values) for end in (softest, stiffest)]
-        seen = [
-            *map(self.constraints.at, balanced),
-            *self._ends,
-            *map(self.constraints.at, self.begin.points),
-        ]
+        at = self.constraints.at
+        balanced = [at(self.model.at(end.tension.values)) for end in (softest, stiffest)]
+        seen = [*balanced, *self._ends, *map(at, self.begin.points)]
         # a stiffness that a search met beyond the range, by more than rounding, is attainable too
         met = [target * (1.0 + float(place.values[0])) for place in seen]
         low = min([low, *(value for value in met if value < low * (1.0 - REACHED))])
@@ -126,10 +107,9 @@ class Planner:
         crossings = [place for end in ends for place in self._crossings(end, ends)]
         found = self._best(crossings or ends)
         if found is None:  # near buckling the straight line may leave the range
-            seen += [*map(self.constraints.at, ends), *self._ends]
+            seen += [*map(at, ends), *self._ends]
             bridges = self._bridges(seen)
-            found = self._best(bridges)
-            found = found or self._nearly_hit([*map(self.constraints.at, bridges), *seen])
+            found = self._best(bridges) or self._nearly_hit([*map(at, bridges), *seen])
         if found is None:
             below = max((value for value in met if value < target), default=low)
             above = min((value for value in met if value > target), default=high)
@@ -182,22 +162,18 @@ class Planner:
             at_other, way = self._miss(other), other.F - hub.F
             if at_hub * at_other < 0.0:
                 guess = hub.F + at_hub / (at_hub - at_other) * way
-                guesses.append((float(guess @ guess), at_other, way))
+                # reuse the values at the ends: rounding of F there could change the sign
+                guesses.append((float(guess @ guess), way, {0.0: at_hub, 1.0: at_other}))
+
+        def miss(part: float, way: Array, known: dict[float, float]) -> float:
+            return known[part] if part in known else self._miss(self.model.at(hub.F + part * way))
+
         found = []
-        for _, at_other, way in sorted(guesses, key=lambda guess: guess[0])[: self.starts]:
-            # reuse the values at the ends: rounding of F there could change the sign
-            known = {0.0: at_hub, 1.0: at_other}
-
-            def miss(part: float, way: Array = way, known: dict[float, float] = known) -> float:
-                if part in known:
-                    return known[part]
-                return self._miss(self.model.at(hub.F + part * way))
-
-            part = float(brentq(miss, 0.0, 1.0, xtol=1e-15, rtol=precision))
-            point = self.model.at(hub.F + part * way)
-            if point.reserve >= 0.0:
-                found.append(point)
-        return sorted(found, key=lambda point: float(point.F @ point.F))
+        for _, way, known in sorted(guesses, key=lambda guess: guess[0])[: self.starts]:
+            part = brentq(miss, 0.0, 1.0, args=(way, known), xtol=1e-15, rtol=precision)
+            found.append(self.model.at(hub.F + part * way))
+        stable = (point for point in found if point.reserve >= 0.0)
+        return sorted(stable, key=lambda point: float(point.F @ point.F))
 
     def _bridges(self, seen: list[ConstraintValues]) -> list[Evaluation]:
         """Find points that hit the single target between the nearest points on either side."""

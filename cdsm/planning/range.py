@@ -29,20 +29,11 @@ from cdsm.wires.laws import StrandElasticity, TabulatedElasticity
 MARGIN = 1e-4
 """Default ratio of the smallest to the largest eigenvalue of K_θ: arms of 40 joints reach 3e-4."""
 
-_UPWARD = 4
-"""Starts for the upper end if rigidities rise: there is mostly one maximum."""
-
-_LAW_SAMPLES = 257
-"""Number of tensions at which a law is sampled to check that its rigidity rises."""
-
-_LAW_ROUNDING = 1e-12
-"""A relative fall of the rigidity below this is rounding."""
-
-_LIMITS = (1e2, 1e4, 1e6)
-"""Upper bounds of unbounded tensions, as multiples of the least tensions."""
-
-_CAPPED = 0.999
-"""A tension above this part of the upper bound would rise further."""
+_UPWARD = 4  # starts for the upper end if rigidities rise: there is mostly one maximum
+_LAW_SAMPLES = 257  # number of tensions at which a law is sampled to check that its rigidity rises
+_LAW_ROUNDING = 1e-12  # a relative fall of the rigidity below this is rounding
+_LIMITS = (1e2, 1e4, 1e6)  # upper bounds of unbounded tensions, over the least tensions
+_CAPPED = 0.999  # a tension above this part of the upper bound would rise further
 
 
 @final
@@ -116,14 +107,13 @@ def stiffness_range(
 ) -> StiffnessRange:
     """Compute smallest and largest ``along(u)`` of all tensions that hold the arm (Eqs. 13, 20).
 
-    The constraints on F are J_Lᵀ F = J_Xᵀ W − g, the bounds, the domains of the elasticities of
-    position-controlled cables, and λ_min(K_θ), symmetric part, not below ``margin``. With a
-    rigidity that is constant or levels off, ``along`` is a concave function of F. It has one
-    maximum and many minima in the corners, so ``low`` is searched from many starts. With other laws
-    it may have many maxima too. Then ``low`` and ``high`` are searched from many starts, in the
-    corners and between. ``high_found`` shows how often ``high`` was found. More starts include the
-    starts of a smaller number. If tension can buckle the arm, it is softest just before, and
-    ``low`` depends on ``margin``.
+    The constraints on F are those of :func:`~cdsm.plan_stiffness`. With a rigidity that is constant
+    or levels off, ``along`` is a concave function of F. It has one maximum and many minima in the
+    corners, so ``low`` is searched from many starts. With other laws it may have many maxima too.
+    Then ``low`` and ``high`` are searched from many starts, in the corners and between.
+    ``high_found`` shows how often ``high`` was found. More starts include the starts of a smaller
+    number. If tension can buckle the arm, it is softest just before, and ``low`` depends on
+    ``margin``.
 
     No number of starts proves that ``low`` is the smallest. With the default, ``low`` was too high
     by up to 0.16 % with constant rigidity (15 cables), and by up to 5.5 % with a user-defined law
@@ -133,11 +123,9 @@ def stiffness_range(
         pose: The posture.
         direction: u (3,) in base axes, any length.
         minimum: Lower bound of the tensions [N], for all cables or (C,).
-        maximum: Upper bound of the tensions [N], for all cables or (C,). With inf, only the domain
-            of the elasticity and buckling limit the tensions.
+        maximum: Upper bound of the tensions [N], as for :func:`~cdsm.plan_stiffness`.
         wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m].
-        margin: Smallest eigenvalue of K_θ that counts as stable, as a part of the largest
-            eigenvalue under the least tensions [-], 1e-9 or more.
+        margin: Smallest eigenvalue of K_θ [-], as for :func:`~cdsm.plan_stiffness`.
         starts: Number of starting tensions for ``low``, at most 1000. ``high`` has the same number,
             or a few if the rigidity of all cables is known to rise with the tension.
         seed: Seed of the random starting tensions.

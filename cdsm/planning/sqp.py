@@ -18,10 +18,9 @@ exact if it exceeds the largest multiplier of c. It rises tenfold until c is met
 does not help. Once c is met, it falls to three times the multiplier: a large ρ shortens the steps
 along a curved c.
 
-**The curvature W.** W is the exact Hessian of L, with the second derivatives of K_θ⁻¹ and λ_min.
-The solver needs a positive definite W. So :func:`cdsm.planning.kernels.convex` raises its curvature
-on the steps that keep the balance, c and, if z > 0, the reserve. If W is already positive definite
-there, it stays unchanged, and the last steps converge quadratically.
+**The curvature W.** W is the exact Hessian of L, with the second derivatives of K_θ⁻¹ and λ_min,
+made positive definite by :func:`cdsm.planning.kernels.convex` on the steps that keep the balance, c
+and, if z > 0, the reserve. If it is so already, the last steps converge quadratically.
 
 **The trust region.** A step is accepted if the merit f + ρ (‖c‖₁ + ½ ‖c‖²) falls by at least 1e-4
 of the prediction. If c bends away from its tangent, a second program uses the value of c after the
@@ -55,9 +54,7 @@ from cdsm.planning.stiffness_model import (
 )
 from cdsm.support.validation import Array
 
-MET: Final = 1e-9
-"""Largest magnitude of a constraint that counts as met."""
-
+MET: Final = 1e-9  # largest magnitude of a constraint that counts as met
 _ITERATIONS = 100
 _CROSSINGS = 60  # largest number of restarts beyond a kink
 _FIRST_RADIUS = 4.0
@@ -208,13 +205,8 @@ class _Step(NamedTuple):
 class _LocalModel:
     """f, c and the convex curvature of the Lagrangian at an iterate, as functions of d = ΔF/size.
 
-    Args:
-        program: The nonlinear program.
-        iterate: The iterate.
-        y: Multipliers of c in the step before.
-        z: Multiplier of the reserve in the step before.
-        bounds: Bounds (C,) [N] of the tensions.
-        radius: Largest magnitude of an entry of d.
+    y and z are the multipliers of c and of the reserve in the step before; ``bounds`` are those of
+    the tensions [N], and ``radius`` that of the entries of d.
     """
 
     def __init__(
@@ -226,9 +218,9 @@ class _LocalModel:
         bounds: tuple[Array, Array],
         radius: float,
     ) -> None:
-        objective, region, evaluation = program.objective, program.region, iterate.evaluation
+        objective, evaluation = program.objective, iterate.evaluation
         self.program, self.iterate, self.bounds, self.radius = program, iterate, bounds, radius
-        self.size = size = max(region.scale, float(evaluation.F.max()))
+        self.size = size = max(program.region.scale, float(evaluation.F.max()))
         c, G = iterate.values, iterate.jacobian * size
         if objective.effort:
             relative = size / program.unit
@@ -246,7 +238,7 @@ class _LocalModel:
             W -= z * size**2 / evaluation.model.scale * evaluation.reserve_hessian()
             held = np.vstack([G, evaluation.reserve_gradient])
         self.g, self.c, self.G = g, c, G
-        self.W = kernels.convex(W, region.null, held, _CURVATURE)
+        self.W = kernels.convex(W, program.region.null, held, _CURVATURE)
 
     def step(self, price: float, c: Array) -> _Step:
         """Solve the quadratic program for a value of c, at the price that it needs."""

@@ -11,16 +11,11 @@ from cdsm.planning.objectives import unstable
 from cdsm.planning.stiffness_model import Evaluation, StiffnessModel, backtrack_to_stable
 from cdsm.support.validation import Array
 
-_FAR = 1e4
-"""Corners are searched in a direction at this multiple of the largest tension."""
-
-_SAME = 1e-6
-"""Corners closer to each other than this part of their size are one."""
-
+_FAR = 1e4  # corners are searched in a direction at this multiple of the largest tension
+_SAME = 1e-6  # corners closer to each other than this part of their size are one
 _ITERATIONS = 60
 _MODES = 24  # number of cutting planes that are kept
-_NO_GAIN = 1e-9
-"""A gain of reserve below this part of the scale of K_θ is not worth a step."""
+_NO_GAIN = 1e-9  # a gain of reserve below this part of the scale of K_θ is not worth a step
 
 
 class StartPoints:

@@ -14,8 +14,7 @@ from cdsm.planning import kernels
 from cdsm.planning.admissible import Admissible
 from cdsm.support.validation import SMALLEST, Array
 
-_NEAREST = 1e-9
-"""Smallest distance of two eigenvalues in a derivative, as a part of the scale."""
+_NEAREST = 1e-9  # smallest distance of two eigenvalues in a derivative, as a part of the scale
 
 
 class StiffnessModel:
@@ -103,10 +102,9 @@ class Evaluation:
         J, v = self.model.pose.length_jacobian, np.ascontiguousarray(self.eigenvectors[:, :1])
         first, second = self.spring_slopes
         mixed = kernels.form_by_tension(*self.model.geometry, first, self.eigenvectors, v)[:, 1:, 0]
-        distances = np.maximum(
-            self.eigenvalues[1:] - self.eigenvalues[0], _NEAREST * self.model.scale
-        )
-        result: Array = (mixed * (-2.0 / distances)) @ mixed.T
+        distances = self.eigenvalues[1:] - self.eigenvalues[0]
+        weights = -2.0 / np.maximum(distances, _NEAREST * self.model.scale)
+        result: Array = (mixed * weights) @ mixed.T
         result[np.diag_indices(len(J))] += second * (J @ v)[:, 0] ** 2
         return result
 
@@ -194,29 +192,19 @@ class ConstraintValues:
         """∂c/∂F (n, C) [1/N]."""
         each = zip(self._parts, self._tips, self._torques, strict=True)
         return np.concatenate(
-            [
-                kernels.constraint_jacobian(part.weights, left, torques)
-                for part, (_, _, left, _), torques in each
-            ]
+            [kernels.constraint_jacobian(part.weights, tip[2], M) for part, tip, M in each]
         )
 
     def hessian(self, y: Array) -> Array:
         """Return the second derivative of y · c by the tensions (C, C) [1/N²] for y (n,)."""
-        evaluation = self.evaluation
-        total, first = np.zeros((evaluation.F.size,) * 2), 0
+        J, (_, bend) = self.evaluation.model.pose.length_jacobian, self.evaluation.spring_slopes
+        total, first = np.zeros((len(J), len(J))), 0
         each = zip(self._parts, self._tips, self._torques, strict=True)
         for (rows, weights), (X, right, left, inverse), torques in each:
-            last = first + len(weights)
+            n, other = len(weights), self.evaluation.torques(left)
+            Y = (y[first : first + n] @ weights.reshape(n, -1)).reshape(X.shape)
             total += kernels.constraint_hessian(
-                (y[first:last] @ weights.reshape(-1, X.size)).reshape(X.shape),
-                inverse,
-                rows,
-                left,
-                right,
-                evaluation.torques(left),
-                torques,
-                evaluation.model.pose.length_jacobian,
-                evaluation.spring_slopes[1],
+                Y, inverse, rows, left, right, other, torques, J, bend
             )
-            first = last
+            first += n
         return total

@@ -43,11 +43,8 @@ from cdsm.tension import DEFAULT_SOLVER, Tension, distribute_tension
 
 End = Literal["buckling", "maximum", "infeasible", "elasticity", "none"]
 
-_JUST: Final = 1e-9
-"""Relative distance from a bound to a point just beside it."""
-
-_INSET: Final = 1e-6
-"""Distance of the curve from an end without a slope, as a part of the length of the curve."""
+_JUST = 1e-9  # relative distance from a bound to a point just beside it
+_INSET = 1e-6  # distance of the curve from an end without a slope, over the length of the curve
 
 _ENDS: Final[dict[End, str]] = {
     "buckling": "where the arm buckles",
@@ -268,11 +265,12 @@ def _slope(K: Stiffness, u: Array) -> float:
 def _steepest(curve: Array, slope: Callable[[float], float]) -> tuple[float, float]:
     """Return the lower bound [N] with the largest slope, and this slope [1/m]."""
     best = int(curve[:, 2].argmax())
-    a, b = curve[max(best - 1, 0), 0], curve[min(best + 1, len(curve) - 1), 0]
+    around = curve[max(best - 1, 0) : best + 2, 0]
     place, value = float(curve[best, 0]), float(curve[best, 2])
-    if a < b:
+    if len(around) > 1:
+        options = {"xatol": 1e-9 * around[-1]}
         found = minimize_scalar(
-            lambda x: -slope(float(x)), bounds=(a, b), method="bounded", options={"xatol": 1e-9 * b}
+            lambda x: -slope(float(x)), bounds=around[[0, -1]], method="bounded", options=options
         )
         if -found.fun > value:
             place, value = float(found.x), -float(found.fun)
@@ -281,12 +279,10 @@ def _steepest(curve: Array, slope: Callable[[float], float]) -> tuple[float, flo
 
 def _falls(curve: Array, slope: Callable[[float], float], start: float, level: float) -> float:
     """Return the first lower bound [N] after a start with a slope [1/m] below a level, or inf."""
-    before = start
-    for place, _, value in curve.tolist():
-        if place > start:
-            if value < level:
-                return sign_change(lambda x: slope(x) - level, before, place)
-            before = place
+    for place, _, value in curve[curve[:, 0] > start].tolist():
+        if value < level:
+            return sign_change(lambda x: slope(x) - level, start, place)
+        start = place
     return math.inf
 
 
@@ -295,9 +291,8 @@ def _stiffest(
 ) -> float:
     """Return the lower bound [N] with the largest stiffness."""
     best = int(curve[:, 1].argmax())
-    place = float(curve[best, 0])
     if 0 < best < len(curve) - 1 and curve[best - 1, 2] > 0.0 > curve[best + 1, 2]:
         top = sign_change(slope, float(curve[best - 1, 0]), float(curve[best + 1, 0]))
         if value(top) >= curve[best, 1]:
-            place = top
-    return place
+            return top
+    return float(curve[best, 0])
