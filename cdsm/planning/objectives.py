@@ -9,44 +9,12 @@ from numpy.typing import ArrayLike
 
 from cdsm.errors import InvalidInput, SingularStiffness
 from cdsm.manipulator import Manipulator
-from cdsm.planning.admissible import admissible
 from cdsm.planning.stiffness_model import Constraint, Constraints, StiffnessModel
-from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness, stiffness
-from cdsm.support.validation import (
-    SMALLEST,
-    Array,
-    frozen,
-    instance,
-    number_array,
-    scalar,
-    whole_number,
-)
+from cdsm.support.validation import SMALLEST, Array, frozen, number_array, whole_number
 
-_LEAST_MARGIN = 1e-9  # rounding changes the smallest eigenvalue by 1e-11 of the largest
 _MOST_STARTS = 1000  # these take about a minute, and a late start is seldom the best
 _SYMMETRIC = 1e-9  # a skew part of a matrix below this part of its largest entry is rounding
-
-
-def stiffness_model(
-    pose: Posture, minimum: ArrayLike, maximum: ArrayLike, wrench: ArrayLike, margin: float
-) -> StiffnessModel:
-    """Build K_θ as a function of the admissible tensions from the common arguments."""
-    instance("pose", pose, Posture)
-    region = admissible(pose, minimum, maximum, wrench)
-    return StiffnessModel(region, checked_margin(margin))
-
-
-def checked_margin(margin: float) -> float:
-    """Check that ``margin`` is above rounding and below 1."""
-    part = scalar("margin", margin)
-    if not _LEAST_MARGIN <= part < 1.0:
-        raise InvalidInput(
-            "margin",
-            f"{part:g} given; it is a part of the largest eigenvalue of K_θ: "
-            f"{_LEAST_MARGIN:g} <= margin < 1. Less is rounding.",
-        )
-    return part
 
 
 def checked_starts(starts: object, seed: object) -> tuple[int, int]:
@@ -58,12 +26,14 @@ def target_constraints(
     model: StiffnessModel, directions: Array | None, target: Array
 ) -> Constraints:
     """Build constraints for a target [N/m] along directions, or of ``cartesian`` if None."""
+    K = stiffness(model.pose, model.region.least)
     if directions is None:
-        _ = stiffness(model.pose, model.region.least).cartesian  # raises if it does not exist
+        _ = K.cartesian  # raises if it does not exist
         return cartesian_constraints(model, target)
-    for u in directions.reshape(-1, 3):
-        stiffness(model.pose, model.region.least)._require_mobile(u)
-    found = along_constraints(model, directions.reshape(-1, 3), target.reshape(-1))
+    rows = directions.reshape(-1, 3)
+    for u in rows:
+        K._require_mobile(u)
+    found = along_constraints(model, rows, target.reshape(-1))
     return replace(found, single=(directions, float(target))) if directions.ndim == 1 else found
 
 

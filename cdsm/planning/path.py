@@ -18,14 +18,12 @@ from cdsm.planning.follow import Follower, Sample
 from cdsm.planning.objectives import (
     achieved,
     check_positive,
-    checked_margin,
     checked_starts,
-    stiffness_model,
     target_constraints,
 )
 from cdsm.planning.path_plan import InfeasibleSample, PathPlan, Status
 from cdsm.planning.range import MARGIN
-from cdsm.planning.stiffness_model import StiffnessModel
+from cdsm.planning.stiffness_model import StiffnessModel, checked_margin
 from cdsm.stiffness_matrix import stiffness
 from cdsm.support.format import coordinates
 from cdsm.support.validation import (
@@ -148,7 +146,7 @@ def plan_path(
                     infeasible.append(InfeasibleSample(i, "posture", reason))
                     continue
                 q = near = solved.angles
-            model = stiffness_model(arm.at(q), minimum, maximum, loads[i], margin)
+            model = StiffnessModel(arm.at(q), minimum, maximum, loads[i], margin)
             models.append(model)
             constraints = target_constraints(model, directions, targets[i])
             sample = Sample(i, model, constraints, model.region.least.values)

@@ -13,11 +13,11 @@ from cdsm.planning.objectives import (
     checked_starts,
     checked_targets,
     misfit,
-    stiffness_model,
     target_constraints,
 )
 from cdsm.planning.planner import REACHED, Planner
 from cdsm.planning.range import MARGIN
+from cdsm.planning.stiffness_model import StiffnessModel
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.format import MODEL, coordinates
@@ -142,7 +142,7 @@ def plan_stiffness(
         SingularStiffness: The tip cannot move along a direction, or no admissible tensions hold the
             arm.
     """
-    model = stiffness_model(pose, minimum, maximum, wrench, margin)
+    model = StiffnessModel(pose, minimum, maximum, wrench, margin)
     number, seed = checked_starts(starts, seed)
     directions = None if direction is None else unit_directions("direction", direction)
     targets = checked_targets(directions, target)

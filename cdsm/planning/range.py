@@ -14,7 +14,6 @@ from cdsm.planning.admissible import Admissible
 from cdsm.planning.objectives import (
     along_constraints,
     checked_starts,
-    stiffness_model,
 )
 from cdsm.planning.sqp import HIGHEST, LOWEST, Objective, Program, search
 from cdsm.planning.starts import StartPoints
@@ -138,7 +137,7 @@ def stiffness_range(
         ElasticityRangeError: The bounds and the domain of an elasticity do not overlap.
         SingularStiffness: The tip cannot move along u, or no admissible tensions hold the arm.
     """
-    model = stiffness_model(pose, minimum, maximum, wrench, margin)
+    model = StiffnessModel(pose, minimum, maximum, wrench, margin)
     u = unit_direction("direction", direction)
     stiffness(pose, model.region.least)._require_mobile(u)
     low, high = range_ends(model, u, *checked_starts(starts, seed))

@@ -7,22 +7,34 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
+from cdsm.errors import InvalidInput
 from cdsm.kernels.stiffness import load_stiffness
 from cdsm.planning import kernels
-from cdsm.planning.admissible import Admissible
-from cdsm.support.validation import SMALLEST, Array
+from cdsm.planning.admissible import admissible
+from cdsm.posture import Posture
+from cdsm.support.validation import SMALLEST, Array, instance, scalar
 
+_LEAST_MARGIN = 1e-9  # rounding changes the smallest eigenvalue by 1e-11 of the largest
 _NEAREST = 1e-9  # smallest distance of two eigenvalues in a derivative, as a part of the scale
 
 
-class StiffnessModel:
-    """K_θ(F) over the admissible tensions at a posture.
+def checked_margin(margin: float) -> float:
+    """Check that ``margin`` is above rounding and below 1."""
+    part = scalar("margin", margin)
+    if not _LEAST_MARGIN <= part < 1.0:
+        raise InvalidInput(
+            "margin",
+            f"{part:g} given; it is a part of the largest eigenvalue of K_θ: "
+            f"{_LEAST_MARGIN:g} <= margin < 1. Less is rounding.",
+        )
+    return part
 
-    Args:
-        region: The admissible tensions.
-        margin: Smallest eigenvalue of K_θ that counts as stable, as a part of :attr:`scale`.
+
+class StiffnessModel:
+    """K_θ(F) over the admissible tensions at a posture, from the arguments of all planners.
 
     Attributes:
         pose: The posture.
@@ -33,16 +45,24 @@ class StiffnessModel:
         iterations: Number of iterations of all searches.
     """
 
-    def __init__(self, region: Admissible, margin: float) -> None:
-        self.pose = pose = region.least.posture
-        self.region = region
+    def __init__(
+        self,
+        pose: Posture,
+        minimum: ArrayLike,
+        maximum: ArrayLike,
+        wrench: ArrayLike,
+        margin: float,
+    ) -> None:
+        self.pose = instance("pose", pose, Posture)
+        self.region = region = admissible(pose, minimum, maximum, wrench)
+        part = checked_margin(margin)
         self.evaluations = self.iterations = 0
         # products with the cached tensor are faster than a loop over the cables
         self.geometry = pose.length_hessian, pose.length_jacobian
         load = load_stiffness(pose.jacobian, region.least.wrench, pose.arm._model.masses.tip_joints)
         self.constant = pose.gravity_stiffness + load
         self.scale = max(float(abs(self.at(region.least.values).eigenvalues).max()), SMALLEST)
-        self.floor = margin * self.scale
+        self.floor = part * self.scale
 
     def at(self, F: Array) -> Evaluation:
         """Evaluate K_θ under admissible tensions F (C,) [N]."""

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import cdsm
-from cdsm.planning.objectives import along_constraints, stiffness_model
+from cdsm.planning.objectives import along_constraints
 from cdsm.planning.sqp import EFFORT, HIGHEST, MET, NEAREST, Program, search
 from cdsm.planning.stiffness_model import StiffnessModel
 from tests.support import arms
@@ -17,7 +17,7 @@ KINK = 31.0
 def at_kinks(seed: int) -> tuple[StiffnessModel, Program]:
     """Strands of which some end at 31 N, where more tension pays much less than below."""
     pose = arms.random_posture(arms.random_arm(seed, 2, "universal", STRAND), seed, 0.3)
-    model = stiffness_model(pose, 10.0, 200.0, np.zeros(6), 1e-4)
+    model = StiffnessModel(pose, 10.0, 200.0, np.zeros(6), 1e-4)
     anchor = model.at(cdsm.distribute_tension(pose, 30.0).values)
     target = cdsm.stiffness(pose, anchor.F).along(UP[0])
     constraints = along_constraints(model, UP, np.array([target]))

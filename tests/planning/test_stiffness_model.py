@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import cdsm
-from cdsm.planning.objectives import along_constraints, cartesian_constraints, stiffness_model
+from cdsm.planning.objectives import along_constraints, cartesian_constraints
 from cdsm.planning.stiffness_model import (
     Constraints,
     Evaluation,
@@ -25,7 +25,7 @@ def model(request: pytest.FixtureRequest) -> StiffnessModel:
         arm = arms.random_arm(1, 2, "universal", cdsm.LinearElasticity(2e4))
     else:
         arm = some_arm("universal-3-8-all")
-    return stiffness_model(arms.random_posture(arm, 11, 0.25), 60.0, 300.0, MOMENT, 1e-4)
+    return StiffnessModel(arms.random_posture(arm, 11, 0.25), 60.0, 300.0, MOMENT, 1e-4)
 
 
 def constraints(model: StiffnessModel) -> Constraints:
@@ -81,7 +81,7 @@ def test_derivatives_are_those_of_the_values(model: StiffnessModel) -> None:
 
 
 def test_way_back_ends_where_stability_begins() -> None:
-    model = stiffness_model(soft_hinge().at([0.0]), 10.0, 1000.0, np.zeros(6), 1e-4)
+    model = StiffnessModel(soft_hinge().at([0.0]), 10.0, 1000.0, np.zeros(6), 1e-4)
     anchor = model.at(np.full(2, 100.0))
     edge = backtrack_to_stable(np.full(2, 900.0), anchor)
     assert edge is not None
