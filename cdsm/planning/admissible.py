@@ -90,10 +90,6 @@ class Admissible:
         )
         return None if found is None else np.minimum(np.maximum(found.x * size, low), high)
 
-    def capped(self, limit: float) -> Admissible:
-        """Return a copy with an upper limit [N] on all tensions."""
-        return replace(self, high=np.minimum(self.high, limit))
-
     def within(self, change: Array, F: Array) -> Admissible | None:
         """Return a copy limited to a change of F (C,) [N]; None if no tensions balance the arm."""
         low, high = np.maximum(self.low, F - change), np.minimum(self.high, F + change)

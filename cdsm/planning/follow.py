@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -18,8 +18,7 @@ _MISSED = (
     "plan_stiffness finds what comes nearest to them at one posture."
 )
 
-_BACK = 50
-"""Largest number of earlier samples that are planned again for a later sample."""
+_BACK = 50  # largest number of earlier samples that are planned again for a later sample
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,23 +31,14 @@ class Sample:
     F: Array  # (C,) [N]; the least tensions until it is planned
 
 
+@dataclass(eq=False)
 class Follower:
-    """Planner of a path, sample by sample, with a record of the planned samples.
+    """Planner of a path, sample by sample, with a record of the planned samples."""
 
-    Args:
-        rate: Largest change of a tension per step (C,) [N]; may hold inf.
-        starts: Number of starting tensions of a search from scratch.
-        seed: Seed of the random starting tensions.
-
-    Attributes:
-        planned: The samples planned so far.
-    """
-
-    def __init__(self, rate: Array, starts: int, seed: int) -> None:
-        self.rate = rate
-        self.starts = starts
-        self.seed = seed
-        self.planned: list[Sample] = []
+    rate: Array  # largest change of a tension per step (C,) [N]; may hold inf
+    starts: int  # number of starting tensions of a search from scratch
+    seed: int
+    planned: list[Sample] = field(default_factory=list)
 
     def add(self, sample: Sample) -> InfeasibleSample | None:
         """Plan one more sample. Return None, or the failure.
@@ -63,7 +53,7 @@ class Follower:
         region = sample.model.region
         last = self.planned[-1] if self.planned else None
         limited = last is not None and bool(np.isfinite(self.rate).any())
-        near = self._near(last, sample) if last is not None and limited else region
+        near = self._near(region, sample, last) if limited else region
         found = self._search(sample, near, last.F) if last is not None else None
         if found is None:
             found = self._from_scratch(sample)
@@ -77,12 +67,13 @@ class Follower:
         self.planned.append(found)
         return None
 
-    def _near(self, other: Sample, sample: Sample) -> Admissible | None:
-        """Return the admissible tensions of a sample within the rate from another sample."""
-        return sample.model.region.within(self._allowed_change(other, sample), other.F)
-
-    def _allowed_change(self, one: Sample, other: Sample) -> Array:
-        return self.rate * abs(other.index - one.index)
+    def _near(
+        self, region: Admissible | None, sample: Sample, other: Sample | None
+    ) -> Admissible | None:
+        """Return the tensions of a region of a sample within the rate from another sample."""
+        if region is None or other is None:
+            return region
+        return region.within(self.rate * abs(other.index - sample.index), other.F)
 
     def _search(
         self, sample: Sample, region: Admissible | None, start: Array, centre: Array | float = 0.0
@@ -103,8 +94,7 @@ class Follower:
 
     def _from_scratch(self, sample: Sample) -> Sample | None:
         """Find the least tensions at any rate; return None if several targets are not hit."""
-        planner = Planner(sample.model, sample.constraints, self.starts, self.seed)
-        found = planner.least()
+        found = Planner(sample.model, sample.constraints, self.starts, self.seed).least()
         if found is None:
             return None
         return replace(sample, F=sample.model.region.tension(found.evaluation.F).values)
@@ -119,10 +109,8 @@ class Follower:
         later = [goal]
         for k in reversed(range(max(len(self.planned) - _BACK, 0), len(self.planned))):
             sample, before = self.planned[k], self.planned[k - 1] if k else None
-            region = joint = self._near(later[-1], sample)
-            if region is not None and before is not None:
-                joint = region.within(self._allowed_change(before, sample), before.F)
-            joined = self._search(sample, joint, sample.F)
+            region = self._near(sample.model.region, sample, later[-1])
+            joined = self._search(sample, self._near(region, sample, before), sample.F)
             if joined is not None:
                 self.planned[k:] = [joined, *reversed(later)]
                 return True
@@ -133,7 +121,7 @@ class Follower:
         return False
 
     def _too_fast(self, last: Sample, goal: Sample) -> InfeasibleSample:
-        change, allowed = abs(goal.F - last.F), self._allowed_change(last, goal)
+        change, allowed = abs(goal.F - last.F), self.rate * (goal.index - last.index)
         cable = int((change / allowed).argmax())
         name = goal.model.pose.arm.cables[cable].name
         return InfeasibleSample(

@@ -15,12 +15,7 @@ from cdsm.errors import CdsmError, InvalidInput
 from cdsm.kinematics.maps import inverse_kinematics
 from cdsm.manipulator import Manipulator
 from cdsm.planning.follow import Follower, Sample
-from cdsm.planning.objectives import (
-    achieved,
-    check_positive,
-    checked_starts,
-    target_constraints,
-)
+from cdsm.planning.objectives import achieved, check_positive, checked_starts, target_constraints
 from cdsm.planning.path_plan import InfeasibleSample, PathPlan, Status
 from cdsm.planning.range import MARGIN
 from cdsm.planning.stiffness_model import StiffnessModel, checked_margin

@@ -56,7 +56,7 @@ class Planner:
     ) -> None:
         region = bounded = model.region
         if not np.isfinite(region.high).all():
-            bounded = region.capped(_CORNERS * region.scale)
+            bounded = replace(region, high=np.minimum(region.high, _CORNERS * region.scale))
         self.model, self.constraints, self.starts, self.seed = model, constraints, starts, seed
         self.begin = StartPoints(model, bounded, 0, seed)
         self.program = Program(region, self.begin.anchor, constraints, EFFORT, region.scale)

@@ -11,10 +11,7 @@ from numpy.typing import ArrayLike
 from cdsm.elasticity import LinearElasticity
 from cdsm.errors import InvalidInput, SingularStiffness
 from cdsm.planning.admissible import Admissible
-from cdsm.planning.objectives import (
-    along_constraints,
-    checked_starts,
-)
+from cdsm.planning.objectives import along_constraints, checked_starts
 from cdsm.planning.sqp import HIGHEST, LOWEST, Objective, Program, search
 from cdsm.planning.starts import StartPoints
 from cdsm.planning.stiffness_model import Constraints, Evaluation, StiffnessModel
@@ -180,7 +177,8 @@ def range_ends(
         return _bounded_ends(model, region, u, starts, seed)
     for limit in _LIMITS:
         cap = limit * region.scale
-        ends = _bounded_ends(model, region.capped(cap), u, starts, seed)
+        capped = replace(region, high=np.minimum(region.high, cap))
+        ends = _bounded_ends(model, capped, u, starts, seed)
         low, high = (end._replace(open=end.tension.values.max() >= _CAPPED * cap) for end in ends)
         if not (low.open or high.open):
             break

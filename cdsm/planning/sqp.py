@@ -163,8 +163,8 @@ def _search(program: Program, start: Evaluation, *, in_piece: bool) -> Constrain
         bounds = (low, high) if in_piece else (region.low, region.high)
         local = _LocalModel(program, iterate, y, z, bounds, radius)
         step = local.step(price, local.c)
-        y, z, price = step.y, step.z, step.price
-        small = step.length <= _ARRIVED and bool((abs(local.c) <= _ARRIVED).all())
+        y, z, price, length = step.y, step.z, step.price, float(abs(step.d).max(initial=0.0))
+        small = length <= _ARRIVED and bool((abs(local.c) <= _ARRIVED).all())
         if small or step.predicted <= _ROUNDING * max(1.0, abs(program.merit(iterate, price))):
             if not in_piece:
                 in_piece = True
@@ -178,13 +178,13 @@ def _search(program: Program, start: Evaluation, *, in_piece: bool) -> Constrain
         if candidate is not None and fall >= 1e-4 * step.predicted:
             iterate = candidate
             if fall > 0.5 * step.predicted:
-                radius = max(radius, 3.0 * step.length)
+                radius = max(radius, 3.0 * length)
             elif fall < 0.25 * step.predicted:
-                radius = step.length / 2.0
+                radius = length / 2.0
         elif not in_piece and ((low > F) | (high < F)).any():
             in_piece = True  # the model of this side of the kink fails on the other side
         else:
-            radius = step.length / 4.0
+            radius = length / 4.0
     return iterate
 
 
@@ -196,10 +196,6 @@ class _Step(NamedTuple):
     z: float
     predicted: float
     price: float
-
-    @property
-    def length(self) -> float:
-        return float(abs(self.d).max(initial=0.0))
 
 
 class _LocalModel:
