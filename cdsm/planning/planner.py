@@ -17,13 +17,7 @@ from cdsm.errors import UnreachableStiffness
 from cdsm.planning.range import range_ends
 from cdsm.planning.sqp import EFFORT, MET, NEAREST, Program, search
 from cdsm.planning.starts import StartPoints
-from cdsm.planning.stiffness_model import (
-    Constraints,
-    ConstraintValues,
-    Evaluation,
-    StiffnessModel,
-    backtrack_to_stable,
-)
+from cdsm.planning.stiffness_model import Constraints, ConstraintValues, Evaluation, StiffnessModel
 from cdsm.support.validation import Array
 
 REACHED: Final = 1e-6
@@ -145,7 +139,7 @@ class Planner:
     def _starts(self) -> Iterator[Evaluation]:
         """Return the starts: least tensions, points that hit one target, and random points."""
         anchor = self.begin.anchor
-        least = backtrack_to_stable(self.model.region.least.values, anchor)
+        least = anchor.backtracked(self.model.region.least.values)
         points = [] if least is None else [least]
         if self.constraints.targets.size == 1:
             points += self._crossings(anchor, self.begin.points)[: max(self.starts - 2, 1)]

@@ -46,12 +46,7 @@ import numpy as np
 
 from cdsm.planning import kernels
 from cdsm.planning.admissible import Admissible, solve
-from cdsm.planning.stiffness_model import (
-    Constraints,
-    ConstraintValues,
-    Evaluation,
-    backtrack_to_stable,
-)
+from cdsm.planning.stiffness_model import Constraints, ConstraintValues, Evaluation
 from cdsm.support.validation import Array
 
 MET: Final = 1e-9  # largest magnitude of a constraint that counts as met
@@ -127,7 +122,7 @@ def search(program: Program, start: Evaluation) -> ConstraintValues:
     best = _search(program, start, in_piece=False)
     for _ in range(_CROSSINGS):
         for F in _beyond_kinks(program.region, best.evaluation.F):
-            place = backtrack_to_stable(F, program.anchor)
+            place = program.anchor.backtracked(F)
             if place is None:
                 continue
             other = _search(program, place, in_piece=True)
@@ -295,7 +290,7 @@ class _LocalModel:
     def _after(self, d: Array, price: float) -> tuple[ConstraintValues | None, float]:
         program, iterate = self.program, self.iterate
         F = np.clip(iterate.evaluation.F + self.size * d, *self.bounds)
-        evaluation = backtrack_to_stable(F, program.anchor)
+        evaluation = program.anchor.backtracked(F)
         if evaluation is None:
             return None, -math.inf
         candidate = program.constraints.at(evaluation)

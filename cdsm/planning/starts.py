@@ -8,7 +8,7 @@ import numpy as np
 
 from cdsm.planning.admissible import Admissible, solve
 from cdsm.planning.objectives import unstable
-from cdsm.planning.stiffness_model import Evaluation, StiffnessModel, backtrack_to_stable
+from cdsm.planning.stiffness_model import Evaluation, StiffnessModel
 from cdsm.support.validation import Array
 
 _FAR = 1e4  # corners are searched in a direction at this multiple of the largest tension
@@ -62,7 +62,7 @@ class StartPoints:
             stable = (point for point in points[known + 1 :] if point.reserve > 0.0)
             self.anchor = next(stable, None) or _stabilize(model, region, self.anchor)
         drawn = [
-            point if point.reserve >= 0.0 else backtrack_to_stable(point.F, self.anchor)
+            point if point.reserve >= 0.0 else self.anchor.backtracked(point.F)
             for point in points[1:]
         ]
         self._known = [self.anchor, *(point for point in drawn[:known] if point is not None)]
@@ -72,7 +72,7 @@ class StartPoints:
         """Return up to ``count`` random stable points between the corners of the cables."""
         shares = np.random.default_rng(self._seed).dirichlet(np.ones(len(self._known)), count)
         for F in shares @ np.array([point.F for point in self._known]):
-            point = backtrack_to_stable(F, self.anchor)
+            point = self.anchor.backtracked(F)
             if point is not None:
                 yield point
 

@@ -128,28 +128,25 @@ class Evaluation:
         result[np.diag_indices(len(J))] += second * (J @ v)[:, 0] ** 2
         return result
 
+    def backtracked(self, F: Array) -> Evaluation | None:
+        """Return the first stable point on the line from tensions F (C,) [N] to here, or None."""
+        start = self.model.at(F)
+        if start.reserve >= 0.0:
+            return start
 
-def backtrack_to_stable(F: Array, anchor: Evaluation) -> Evaluation | None:
-    """Find the first stable point on the line from tensions F (C,) [N] to an anchor, or None."""
-    start = anchor.model.at(F)
-    if start.reserve >= 0.0:
-        return start
+        def on_the_way(part: float) -> Evaluation:
+            return self.model.at(F + part * (self.F - F))
 
-    def on_the_way(part: float) -> Evaluation:
-        return anchor.model.at(F + part * (anchor.F - F))
-
-    # a concave reserve is above its chord, so it is zero before its chord
-    far = start.reserve / (start.reserve - anchor.reserve) if anchor.reserve > 0.0 else 1.0
-    while on_the_way(far).reserve < 0.0:
-        if far >= 1.0:
-            return None
-        far = min(2.0 * far, 1.0)
-    part = brentq(lambda part: on_the_way(part).reserve, 0.0, far, xtol=1e-15, rtol=1e-13)
-    for back in (0.0, 1e-14, 1e-12, 1e-10):  # rounding may put the root on the unstable side
-        end = on_the_way(min(part + back, 1.0))
-        if end.reserve >= 0.0:
-            return end
-    return None
+        # a concave reserve is above its chord, so it is zero before its chord
+        far = start.reserve / (start.reserve - self.reserve) if self.reserve > 0.0 else 1.0
+        while on_the_way(far).reserve < 0.0:
+            if far >= 1.0:
+                return None
+            far = min(2.0 * far, 1.0)
+        part = brentq(lambda part: on_the_way(part).reserve, 0.0, far, xtol=1e-15, rtol=1e-13)
+        # rounding may put the root on the unstable side
+        ends = (on_the_way(min(part + back, 1.0)) for back in (0.0, 1e-14, 1e-12, 1e-10))
+        return next((end for end in ends if end.reserve >= 0.0), None)
 
 
 class Constraint(NamedTuple):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from itertools import pairwise
 from typing import Final, Literal, final
 
@@ -157,10 +157,9 @@ def saturation(
         raise InvalidInput("fraction", f"{part:g} given; 0 <= fraction < 1 is needed.")
     ceiling = bound("maximum", maximum, len(arm.cables))
 
-    @cache
-    def least(lower: float) -> Tension:
-        return distribute_tension(pose, lower, ceiling, wrench, solver)
+    least = partial(distribute_tension, pose, maximum=ceiling, wrench=wrench, solver=solver)
 
+    @cache
     def at(lower: float) -> Stiffness:
         return stiffness(pose, least(lower))
 
@@ -168,8 +167,7 @@ def saturation(
     low = max(start, lowest)
     least(start)  # raises if minimum exceeds maximum
     at(low)._require_mobile(u)
-    top = min(highest, float(ceiling.min()))
-    high = max(scan_end(at, low, max(top, low)), low)
+    high = max(scan_end(at, low, max(min(highest, float(ceiling.min())), low)), low)
     first, last = _stable(at, low, high)
     limit: End = "buckling"
     if last >= high:
@@ -181,19 +179,19 @@ def saturation(
         return _slope(at(lower), u)
 
     places = log_samples(first, last)
-    bends = _bends(least, places[(places >= first) & (places <= last)])
+    bends = _bends(at, places[(places >= first) & (places <= last)])
     beside = np.outer([1.0 - _JUST, 1.0 + _JUST], bends).ravel()
     places = np.unique(np.clip(np.concatenate([places, beside]), first, last))
     curve = np.array([(place, at(place).along(u), slope(place)) for place in places.tolist()])
     steepest, largest = _steepest(curve, slope)
     where = _falls(curve, slope, steepest, part * largest) if largest > 0.0 else first
-    tension = least(min(where, last))
+    K = at(min(where, last))
     return Saturation(
         direction=u,
         fraction=part,
         bound=where,
-        tension=tension,
-        stiffness=at(min(where, last)),
+        tension=_least(K),
+        stiffness=K,
         steepest=steepest,
         steepest_slope=largest,
         stiffest=_stiffest(curve, lambda lower: at(lower).along(u), slope),
@@ -218,7 +216,7 @@ def _stable(at: StiffnessAt, low: float, high: float) -> tuple[float, float]:
     return first + inset * (first > low), last - inset * (last < high)
 
 
-def _bends(least: Callable[[float], Tension], places: Array) -> Array:
+def _bends(at: StiffnessAt, places: Array) -> Array:
     """Find the lower bounds [N], rising, at which the slope jumps; start from ``places``.
 
     There a cable reaches or leaves a bound, or passes a kink of its rigidity. If the same cables
@@ -229,9 +227,9 @@ def _bends(least: Callable[[float], Tension], places: Array) -> Array:
     smallest = _JUST**2 * float(places.max(initial=0.0))  # for bends at zero
     while todo:
         a, b = todo.pop()
-        one, other = least(a), least(b)
+        one, other = at(a), at(b)
         if np.array_equal(_active(one), _active(other)):
-            for cable, F, G in zip(one.posture.arm.cables, one.values, other.values, strict=True):
+            for cable, F, G in zip(one.posture.arm.cables, one.tension, other.tension, strict=True):
                 if cable.control == "position":
                     passed = (x for x in kinks(cable.elasticity) if min(F, G) <= x < max(F, G))
                     found += [a + (kink - F) / (G - F) * (b - a) for kink in passed]
@@ -242,11 +240,16 @@ def _bends(least: Callable[[float], Tension], places: Array) -> Array:
     return np.array(sorted(found))
 
 
-def _active(tension: Tension) -> Array:
+def _least(K: Stiffness) -> Tension:
+    assert K.distribution is not None
+    return K.distribution
+
+
+def _active(K: Stiffness) -> Array:
     """Return 1 for cables (C,) that rise with the lower bound, -1 at their maximum, 0 if free."""
-    tight = OPTIMALITY * float(tension.values.max())
-    at_bound = (tension.values - tension.minimum <= tight).astype(np.float64)
-    return np.where(tension.maximum - tension.values <= tight, -1.0, at_bound)
+    least, tight = _least(K), OPTIMALITY * float(K.tension.max())
+    rises = (K.tension - least.minimum <= tight).astype(np.float64)
+    return np.where(least.maximum - K.tension <= tight, -1.0, rises)
 
 
 def _slope(K: Stiffness, u: Array) -> float:
@@ -255,8 +258,7 @@ def _slope(K: Stiffness, u: Array) -> float:
     Cables at b rise; the free cables balance them with least norm (optimality conditions of
     Eq. 17).
     """
-    assert K.distribution is not None
-    A, active = K.posture.length_jacobian.T, _active(K.distribution)
+    A, active = K.posture.length_jacobian.T, _active(K)
     rate, free = np.maximum(active, 0.0), active == 0.0
     rate[free] = np.linalg.lstsq(A[:, free], -A[:, active > 0.0].sum(axis=1), rcond=None)[0]
     return float(stiffness_gradient(K).along(u) @ rate)

@@ -9,7 +9,6 @@ from cdsm.planning.stiffness_model import (
     Constraints,
     Evaluation,
     StiffnessModel,
-    backtrack_to_stable,
 )
 from cdsm.support.validation import Array
 from tests.support import arms
@@ -83,10 +82,10 @@ def test_derivatives_are_those_of_the_values(model: StiffnessModel) -> None:
 def test_way_back_ends_where_stability_begins() -> None:
     model = StiffnessModel(soft_hinge().at([0.0]), 10.0, 1000.0, np.zeros(6), 1e-4)
     anchor = model.at(np.full(2, 100.0))
-    edge = backtrack_to_stable(np.full(2, 900.0), anchor)
+    edge = anchor.backtracked(np.full(2, 900.0))
     assert edge is not None
     assert 0.0 <= edge.reserve < 1e-9 * model.scale
-    inside = backtrack_to_stable(np.full(2, 50.0), anchor)
+    inside = anchor.backtracked(np.full(2, 50.0))
     assert inside is not None
     np.testing.assert_array_equal(inside.F, 50.0)
-    assert backtrack_to_stable(np.full(2, 900.0), model.at(np.full(2, 800.0))) is None
+    assert model.at(np.full(2, 800.0)).backtracked(np.full(2, 900.0)) is None
