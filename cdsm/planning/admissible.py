@@ -96,19 +96,17 @@ class Admissible:
         least = self.nearest(np.zeros_like(F), low, high) if (low <= high).all() else None
         if least is None:
             return None
-        moved = (least - self.least.values) @ self.least.posture.length_jacobian
-        residual = frozen(self.least.residual + moved)
-        tension = replace(self.least, values=frozen(least), residual=residual)
-        return replace(self, least=tension, low=low, high=high)
+        return replace(self, least=self._balanced(least), low=low, high=high)
 
     def tension(self, F: Array) -> Tension:
         """Convert tensions F (C,) [N] to a :class:`Tension` whose balance is exact again."""
-        least = self.least
         exact = self.nearest(F, *self.piece(F))  # removes the rounding of short steps
-        F = F if exact is None else exact
-        torque = least.values @ least.posture.length_jacobian - least.residual
-        residual = frozen(F @ least.posture.length_jacobian - torque)
-        return replace(least, values=frozen(F), residual=residual, least=False)
+        return replace(self._balanced(F if exact is None else exact), least=False)
+
+    def _balanced(self, F: Array) -> Tension:
+        J = self.least.posture.length_jacobian
+        torque = self.least.values @ J - self.least.residual
+        return replace(self.least, values=frozen(F), residual=frozen(F @ J - torque))
 
 
 def admissible(
@@ -117,7 +115,6 @@ def admissible(
     """Find the admissible tensions of an arm at a posture.
 
     Raises:
-        InvalidInput: As for :func:`~cdsm.distribute_tension`.
         InfeasibleTension: No tensions within the bounds and domains balance the arm.
         ElasticityRangeError: The bounds and the domain of an elasticity do not overlap.
     """

@@ -10,6 +10,8 @@ import numpy as np
 from cdsm.kernels.compiling import compiled
 from cdsm.support.validation import Array
 
+_CURVATURE = 1e-6  # curvatures below this part of the largest are raised to it
+
 
 @compiled
 def stiffness_at(
@@ -133,14 +135,11 @@ def constraint_hessian(
 
 
 @compiled
-def convex(W: Array, null: Array, held: Array, floor: float) -> Array:
+def convex(W: Array, null: Array, held: Array) -> Array:
     """Return a positive definite matrix that equals W, where W is convex, on the steps that matter.
 
-    Args:
-        W: Symmetric (C, C).
-        null: Orthonormal basis (C, p) of the steps that keep the balance.
-        held: Gradients (n, C) of constraints that the steps also keep.
-        floor: Curvatures below this part of the largest are raised to it.
+    These steps keep the balance, with the orthonormal basis ``null`` (C, p), and constraints with
+    the gradients ``held`` (n, C).
     """
     count, p = null.shape
     inner = np.dot(np.ascontiguousarray(null.T), np.dot(W, null))
@@ -157,7 +156,7 @@ def convex(W: Array, null: Array, held: Array, floor: float) -> Array:
         if largest == 0.0:
             largest = 1.0
         vectors = np.ascontiguousarray(vectors)
-        raised = vectors * np.maximum(values, floor * largest)
+        raised = vectors * np.maximum(values, _CURVATURE * largest)
         inner = np.dot(raised, np.ascontiguousarray(vectors.T)) + largest * fixed
     # steps that break the balance only need some positive curvature
     for i in range(p):

@@ -81,16 +81,10 @@ class StiffnessPlan(ReadOnlyState):
         if self.direction is None:
             rows.append(f"cartesian stiffness within {self.misfit:.2g} of the target")
         else:
-            triples = zip(
-                self.direction.reshape(-1, 3),
-                np.atleast_1d(self.target),
-                np.atleast_1d(self.achieved),
-                strict=True,
-            )
+            pairs = np.reshape([self.achieved, self.target], (2, -1)).T / 1000.0
             rows += [
-                f"along {coordinates(u)}: {achieved / 1000.0:.6g} N/mm "
-                f"({target / 1000.0:.6g} N/mm wanted)"
-                for u, target, achieved in triples
+                f"along {coordinates(u)}: {value:.6g} N/mm ({wanted:.6g} N/mm wanted)"
+                for u, (value, wanted) in zip(self.direction.reshape(-1, 3), pairs, strict=True)
             ]
         return "\n".join([*rows, f"({MODEL})"])
 

@@ -33,13 +33,7 @@ _AS_NEAR = 1e-8  # misses up to this count as zero: next to buckling a search ma
 
 
 class Planner:
-    """Searches for one set of constraints, with a record of the searches.
-
-    Args:
-        model: K_θ as a function of the admissible tensions.
-        constraints: Constraints that must be zero.
-        starts: Number of starting tensions.
-        seed: Seed of the random starting tensions.
+    """Searches from a number of starts for tensions with which the constraints are zero.
 
     Attributes:
         efforts: ‖F‖ [N] at the end of each search that hit the target, rising.
@@ -93,8 +87,8 @@ class Planner:
         seen = [*balanced, *self._ends, *map(at, self.begin.points)]
         # a stiffness that a search met beyond the range, by more than rounding, is attainable too
         met = [target * (1.0 + float(place.values[0])) for place in seen]
-        low = min([low, *(value for value in met if value < low * (1.0 - REACHED))])
-        high = max([high, *(value for value in met if value > high * (1.0 + REACHED))])
+        low = min(met) if min(met) < low * (1.0 - REACHED) else low
+        high = max(met) if max(met) > high * (1.0 + REACHED) else high
         if not low * (1.0 - _EDGE) <= target <= high * (1.0 + _EDGE):
             raise UnreachableStiffness(u, target, low, high, [low if target < low else high])
         ends = [softest.evaluation, stiffest.evaluation]

@@ -74,20 +74,17 @@ class StiffnessRange(ReadOnlyState):
         return f"<StiffnessRange {self.low:.6g} to {self.high:.6g} N/m>"
 
     def __str__(self) -> str:
-        lines = [
-            f"along {coordinates(self.direction)} the stiffness can be "
-            f"{self.low / 1000.0:.4g} to {self.high / 1000.0:.4g} N/mm"
-        ]
-        for name, F, found in (
-            ("softest", self.low_tension.values, self.low_found),
-            ("stiffest", self.high_tension.values, self.high_found),
-        ):
+        def ends(name: str, F: Array, found: Array) -> str:
             same = int((abs(found - found[0]) <= 1e-6 * found[0]).sum())
-            lines.append(
-                f"{name} with {F.min():.4g} to {F.max():.4g} N, "
-                f"found from {same} of {found.size} starts"
-            )
-        return "\n".join([*lines, f"({MODEL})"])
+            told = f"{name} with {F.min():.4g} to {F.max():.4g} N, "
+            return told + f"found from {same} of {found.size} starts"
+
+        return (
+            f"along {coordinates(self.direction)} the stiffness can be "
+            f"{self.low / 1000.0:.4g} to {self.high / 1000.0:.4g} N/mm\n"
+            f"{ends('softest', self.low_tension.values, self.low_found)}\n"
+            f"{ends('stiffest', self.high_tension.values, self.high_found)}\n({MODEL})"
+        )
 
 
 def stiffness_range(

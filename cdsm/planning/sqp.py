@@ -31,8 +31,7 @@ tensions are convex, and all points on the way to the anchor are stable.
 **Kinks.** At a kink of a rigidity (Eq. 19 has one at 31 N) c is continuous, but its slope is not.
 Kinks divide the tensions into boxes ("pieces") on which c is smooth. A search crosses kinks freely
 until a step across a kink fails. Then it stays in its piece, whose walls act as bounds. If it ends
-at a wall, it starts again on the other side with the other slope, until that is not better. An end
-away from all walls is a local optimum, because c is smooth around it.
+at a wall, it starts again on the other side with the other slope, until that is not better.
 """
 
 from __future__ import annotations
@@ -54,7 +53,6 @@ _ITERATIONS = 100
 _CROSSINGS = 60  # largest number of restarts beyond a kink
 _FIRST_RADIUS = 4.0
 _SMALLEST_RADIUS = 1e-13
-_CURVATURE = 1e-6  # curvatures below this part of the largest are raised to it
 _FIRST_PRICE, _LARGEST_PRICE = 10.0, 1e8
 _PREMIUM = 3.0  # price over multiplier: above one the penalty is exact
 _ROUNDING = 1e-15
@@ -229,7 +227,7 @@ class _LocalModel:
             W -= z * size**2 / evaluation.model.scale * evaluation.reserve_hessian()
             held = np.vstack([G, evaluation.reserve_gradient])
         self.g, self.c, self.G = g, c, G
-        self.W = kernels.convex(W, program.region.null, held, _CURVATURE)
+        self.W = kernels.convex(W, program.region.null, held)
 
     def step(self, price: float, c: Array) -> _Step:
         """Solve the quadratic program for a value of c, at the price that it needs."""

@@ -19,13 +19,9 @@ _NO_GAIN = 1e-9  # a gain of reserve below this part of the scale of K_θ is not
 
 
 class StartPoints:
-    """Stable tensions from which searches start.
+    """Stable tensions in a bounded region from which searches start.
 
-    Args:
-        model: K_θ as a function of the tensions.
-        region: The admissible tensions, bounded.
-        directions: Number of random directions for corners, in addition to those of the cables.
-        seed: Seed of the random directions.
+    Corners are searched in the directions of the cables and in a number of random directions.
 
     Attributes:
         anchor: A stable point well inside.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import cache
 from itertools import pairwise
 from typing import Final, Literal, final
 
@@ -157,21 +157,19 @@ def saturation(
         raise InvalidInput("fraction", f"{part:g} given; 0 <= fraction < 1 is needed.")
     ceiling = bound("maximum", maximum, len(arm.cables))
 
-    least = partial(distribute_tension, pose, maximum=ceiling, wrench=wrench, solver=solver)
-
     @cache
     def at(lower: float) -> Stiffness:
-        return stiffness(pose, least(lower))
+        return stiffness(pose, distribute_tension(pose, lower, ceiling, wrench, solver))
 
+    distribute_tension(pose, start, ceiling, wrench, solver)  # raises if minimum exceeds maximum
     lowest, highest = tension_domain(arm)
     low = max(start, lowest)
-    least(start)  # raises if minimum exceeds maximum
     at(low)._require_mobile(u)
     high = max(scan_end(at, low, max(min(highest, float(ceiling.min())), low)), low)
     first, last = _stable(at, low, high)
     limit: End = "buckling"
     if last >= high:
-        limit = "maximum" if least(high).at_maximum else failure_at(at, high * (1.0 + _JUST))
+        limit = "maximum" if _least(at(high)).at_maximum else failure_at(at, high * (1.0 + _JUST))
         if limit in ("maximum", "infeasible"):
             last -= _INSET * (last - first)
 
