@@ -76,8 +76,7 @@ class Admissible:
 
     def imbalance(self, F: Array) -> Array:
         """Return the residual (r,) [N] of the balance for tensions F (C,) [N]."""
-        missing: Array = self.rows @ (self.least.values - F)
-        return missing
+        return np.asarray(self.rows @ (self.least.values - F))
 
     def nearest(self, wanted: Array, low: Array, high: Array) -> Array | None:
         """Return the balancing tensions (C,) [N] within bounds nearest to ``wanted``, or None."""

@@ -52,10 +52,7 @@ def half_way(
     target: Array,
     directions: Array | None,
 ) -> HalfWay:
-    """Compute the arm half-way between two samples from K_θ at these samples.
-
-    ``unstrained``: mean l_0 (H,) [m] of position-controlled cables; ``target``: mean target [N/m].
-    """
+    """Compute the arm half-way between two samples, from the means of l_0 (H,) [m] and target."""
     K, value, off, reason = None, None, math.inf, ""
     try:
         rest = _at_rest(ends, unstrained)

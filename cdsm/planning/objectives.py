@@ -33,8 +33,8 @@ def target_constraints(
     rows = directions.reshape(-1, 3)
     for u in rows:
         K._require_mobile(u)
-    found = along_constraints(model, rows, target.reshape(-1))
-    return replace(found, single=(directions, float(target))) if directions.ndim == 1 else found
+    single = (directions, float(target)) if directions.ndim == 1 else None
+    return replace(along_constraints(model, rows, target.reshape(-1)), single=single)
 
 
 def along_constraints(model: StiffnessModel, directions: Array, targets: Array) -> Constraints:
@@ -68,10 +68,7 @@ def achieved(K: Stiffness, directions: Array | None) -> Array:
 
 
 def misfit(achieved: Array, target: Array, directions: Array | None) -> float:
-    """Return ‖achieved/target − 1‖ [-], or ‖achieved − target‖/‖target‖ for ``cartesian``.
-
-    The symmetric part of ``cartesian`` counts.
-    """
+    """Return the misfit of a plan [-], as in :class:`~cdsm.StiffnessPlan`."""
     if directions is None:
         off = (achieved + achieved.T) / 2.0 - target
         return float(np.linalg.norm(off) / np.linalg.norm(target))
