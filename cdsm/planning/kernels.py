@@ -42,7 +42,7 @@ def tip_stiffness(K: Array, rows: Array) -> tuple[Array, Array, Array, Array]:
 
 
 @compiled
-def torques_by_tension(
+def _torques_by_tension(
     hessian: Array, length_jacobian: Array, slope: Array, motion: Array
 ) -> Array:
     """Return (∂K_θ/∂F_c) m = (H_c + k′_c J_c J_cᵀ) m (C, nv, b) for columns m of motion (nv, b)."""
@@ -68,12 +68,7 @@ def form_by_tension(
     hessian: Array, length_jacobian: Array, slope: Array, left: Array, right: Array
 ) -> Array:
     """Return leftᵀ (∂K_θ/∂F_c) right (C, a, b) for left (nv, a) and right (nv, b)."""
-    return _through(left, torques_by_tension(hessian, length_jacobian, slope, right))
-
-
-@compiled
-def _through(left: Array, torques: Array) -> Array:
-    """Return leftᵀ torques_c (C, a, b) for left (nv, a) and torques (C, nv, b)."""
+    torques = _torques_by_tension(hessian, length_jacobian, slope, right)
     count, nv, columns = torques.shape
     result = np.zeros((count, left.shape[1], columns))
     for c in range(count):
@@ -85,9 +80,11 @@ def _through(left: Array, torques: Array) -> Array:
 
 
 @compiled
-def constraint_jacobian(weights: Array, left: Array, torques: Array) -> Array:
-    """Return E_j : leftᵀ torques_c (n, C) for weights E (n, r, r)."""
-    rates = _through(left, torques)
+def constraint_jacobian(
+    hessian: Array, length_jacobian: Array, slope: Array, weights: Array, left: Array, right: Array
+) -> Array:
+    """Return E_j : leftᵀ (∂K_θ/∂F_c) right (n, C) for weights E (n, r, r)."""
+    rates = form_by_tension(hessian, length_jacobian, slope, left, right)
     result = np.zeros((weights.shape[0], rates.shape[0]))
     for n in range(weights.shape[0]):
         for c in range(rates.shape[0]):
@@ -99,17 +96,19 @@ def constraint_jacobian(weights: Array, left: Array, torques: Array) -> Array:
 
 @compiled
 def constraint_hessian(
+    hessian: Array,
+    length_jacobian: Array,
+    slope: Array,
+    bend: Array,
     Y: Array,
     inverse: Array,
     rows: Array,
     left: Array,
     right: Array,
-    left_torques: Array,
-    right_torques: Array,
-    length_jacobian: Array,
-    bend: Array,
 ) -> Array:
     """Return the second derivative of Y : X by the tensions (C, C)."""
+    left_torques = _torques_by_tension(hessian, length_jacobian, slope, left)
+    right_torques = _torques_by_tension(hessian, length_jacobian, slope, right)
     count, nv, r = right_torques.shape
     held = inverse - np.dot(right, np.dot(rows, inverse))
     one = np.zeros((count, nv, r))

@@ -95,10 +95,6 @@ class Evaluation:
         """dk/dF (C,) [1/m] and d²k/dF² (C,) [1/(N m)]."""
         return self.model.pose.arm._model.laws.slopes(self.F, self._springs)
 
-    def torques(self, motion: Array) -> Array:
-        """Return (∂K_θ/∂F_c) m (C, nv, r) for the columns m of a joint motion (nv, r)."""
-        return kernels.torques_by_tension(*self.model.geometry, self.spring_slopes[0], motion)
-
     @property
     def reserve(self) -> float:
         """λ_min minus the floor [N m/rad]. The arm is stable if it is not negative."""
@@ -200,28 +196,24 @@ class ConstraintValues:
         self.values: Array = np.concatenate(values) - constraints.targets
 
     @cached_property
-    def _torques(self) -> list[Array]:
-        """(∂K_θ/∂F_c) M (C, nv, r) of each part."""
-        return [self.evaluation.torques(right) for _, right, _, _ in self._tips]
-
-    @cached_property
     def jacobian(self) -> Array:
         """∂c/∂F (n, C) [1/N]."""
-        each = zip(self._parts, self._tips, self._torques, strict=True)
+        slopes = *self.evaluation.model.geometry, self.evaluation.spring_slopes[0]
         return np.concatenate(
-            [kernels.constraint_jacobian(part.weights, tip[2], M) for part, tip, M in each]
+            [
+                kernels.constraint_jacobian(*slopes, part.weights, left, right)
+                for part, (_, right, left, _) in zip(self._parts, self._tips, strict=True)
+            ]
         )
 
     def hessian(self, y: Array) -> Array:
         """Return the second derivative of y · c by the tensions (C, C) [1/N²] for y (n,)."""
-        J, (_, bend) = self.evaluation.model.pose.length_jacobian, self.evaluation.spring_slopes
-        total, first = np.zeros((len(J), len(J))), 0
-        each = zip(self._parts, self._tips, self._torques, strict=True)
-        for (rows, weights), (X, right, left, inverse), torques in each:
-            n, other = len(weights), self.evaluation.torques(left)
+        slopes = *self.evaluation.model.geometry, *self.evaluation.spring_slopes
+        total, first = np.zeros((self.evaluation.F.size,) * 2), 0
+        each = zip(self._parts, self._tips, strict=True)
+        for (rows, weights), (X, right, left, inverse) in each:
+            n = len(weights)
             Y = (y[first : first + n] @ weights.reshape(n, -1)).reshape(X.shape)
-            total += kernels.constraint_hessian(
-                Y, inverse, rows, left, right, other, torques, J, bend
-            )
+            total += kernels.constraint_hessian(*slopes, Y, inverse, rows, left, right)
             first += n
         return total
