@@ -17,7 +17,6 @@ from numpy.typing import ArrayLike
 
 from cdsm.errors import InvalidInput
 from cdsm.manipulator import Manipulator
-from cdsm.support.format import JointUnits
 from cdsm.support.validation import (
     Array,
     ReadOnlyState,
@@ -238,4 +237,4 @@ def _listed(q: Array, arm: Manipulator, description: str, labels: dict[str, Labe
 
 
 def _unit(arm: Manipulator) -> str:
-    return JointUnits(arm.slides).joined("rad", "m")
+    return "rad or m" if arm.slides.any() else "rad"
