@@ -150,18 +150,17 @@ class RigidBody:
         tip = pin.updateFramePlacement(model, data, self._tip).homogeneous
         stiffness = pin.computeGeneralizedGravityDerivatives(model, data, q)
         # for a model with one joint, Pinocchio returns vectors instead of matrices
-        state = BodyState(
-            tip,
-            np.ascontiguousarray(jacobian).reshape(6, self.nv),
-            data.g.copy(),
-            np.ascontiguousarray(stiffness).reshape(self.nv, self.nv),
-        )
-        return self._in_our_order(state) if self._reordered else state
-
-    def _in_our_order(self, state: BodyState) -> BodyState:
-        i = self._theirs
-        tip, jacobian, torque, stiffness = state
-        return BodyState(tip, jacobian.take(i, axis=1), torque[i], stiffness[np.ix_(i, i)])
+        jacobian = np.ascontiguousarray(jacobian).reshape(6, self.nv)
+        stiffness = np.ascontiguousarray(stiffness).reshape(self.nv, self.nv)
+        torque = data.g.copy()
+        if self._reordered:
+            i = self._theirs
+            jacobian, torque, stiffness = (
+                jacobian.take(i, axis=1),
+                torque[i],
+                stiffness[np.ix_(i, i)],
+            )
+        return BodyState(tip, jacobian, torque, stiffness)
 
     def placement(self, q: Array, link: str) -> Array:
         """Compute the pose of a link's frame in the base frame (4, 4), or raise UnknownName."""
