@@ -100,13 +100,7 @@ class StiffnessFigure(Figure):
 
 
 class Pair(NamedTuple):
-    """Two curves of one case: with the stretched length (as in the paper), with the original one.
-
-    Attributes:
-        stretched: Curve with the stretched length.
-        original: Curve with the original length.
-        posture: Posture of both.
-    """
+    """Curves of one case: with the stretched length (as in the paper), with the original one."""
 
     stretched: Curve
     original: Curve

@@ -41,11 +41,7 @@ the second differences has four times the noise of f.
 def gradients(f: Sampled, size: int, first: float, noise: Noise) -> Estimates:
     """Compute first derivatives (T, ..., n) of T functions at zero, and their error bounds (T,).
 
-    Args:
-        f: The functions.
-        size: Number of variables n.
-        first: Largest step.
-        noise: Rounding error of the functions.
+    The functions have n = ``size`` variables; ``first`` is the largest step.
     """
     corners = np.vstack([np.eye(size), -np.eye(size)])
 
@@ -57,7 +53,7 @@ def gradients(f: Sampled, size: int, first: float, noise: Noise) -> Estimates:
 
 
 def hessians(f: Sampled, size: int, first: float, noise: Noise) -> Estimates:
-    """Compute Hessians (T, n, n) of T functions (P, n) → (P, T) at zero, and error bounds (T,)."""
+    """Compute Hessians (T, n, n) of T functions (P, n) → (P, T), else as :func:`gradients`."""
     unit = np.eye(size)
     i, j = np.triu_indices(size, 1)
     pairs = (s * unit[i] + t * unit[j] for s in (1.0, -1.0) for t in (1.0, -1.0))

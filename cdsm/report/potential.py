@@ -37,11 +37,7 @@ _BESIDE = 1e-6
 class LockedCable(NamedTuple):
     """A position-controlled cable with locked motor, computed from strain and energy of its law.
 
-    Attributes:
-        number: Number of the cable.
-        cable: The cable.
-        tension: F [N] at the posture.
-        free_length: l_0 [m] that the motor holds.
+    It has the tension F [N] at the posture, and the motor holds its original length l_0 [m].
     """
 
     number: int
