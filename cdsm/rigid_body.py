@@ -155,11 +155,8 @@ class RigidBody:
         torque = data.g.copy()
         if self._reordered:
             i = self._theirs
-            jacobian, torque, stiffness = (
-                jacobian.take(i, axis=1),
-                torque[i],
-                stiffness[np.ix_(i, i)],
-            )
+            jacobian = jacobian.take(i, axis=1)
+            torque, stiffness = torque[i], stiffness[np.ix_(i, i)]
         return BodyState(tip, jacobian, torque, stiffness)
 
     def placement(self, q: Array, link: str) -> Array:
