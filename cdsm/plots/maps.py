@@ -227,7 +227,7 @@ def _draw(
         axes.scatter(*marked.T, marker=mark, c=color, s=size, linewidths=0.7)
     axes.scatter(
         *points[known][:, shown].T,
-        c=np.minimum(panel.values[known], highest),  # infinite values are not drawn
+        c=np.minimum(panel.values[known], highest + abs(highest)),  # infinities are not drawn
         norm=colors.norm,
         cmap=colors.cmap,
         s=14.0,
