@@ -94,21 +94,13 @@ def _crossing(u: Array, height: Array, slope: Array, rise: float) -> float:
 
 
 class _Knot(NamedTuple):
-    """Point on a profile.
+    """Point on a profile, with derivatives by the coordinate u of the held parameter."""
 
-    Attributes:
-        point: Coordinates in the unit cube (P,).
-        rise: Δχ² [-] at the point.
-        slope: Derivative of Δχ² by the coordinate of the held parameter.
-        curvature: Second derivative of Δχ², by Gauss and Newton.
-        tangent: Derivative of the point by the coordinate of the held parameter (P,).
-    """
-
-    point: Array
-    rise: float
-    slope: float
-    curvature: float
-    tangent: Array
+    point: Array  # in the unit cube (P,)
+    rise: float  # Δχ² [-]
+    slope: float  # dΔχ²/du
+    curvature: float  # d²Δχ²/du², by Gauss and Newton
+    tangent: Array  # d point/du (P,)
 
 
 @dataclass(frozen=True, eq=False)

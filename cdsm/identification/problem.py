@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -26,30 +27,24 @@ class UserFaultError(Exception):
     """Wraps the :class:`InvalidInput` for a user-defined function that fails."""
 
 
+@dataclass(frozen=True)
 class StiffnessModel:
     """Model of the stiffnesses of all measurements, as a function of the parameters."""
 
-    def __init__(
-        self,
-        model_of: Callable[..., Manipulator],
-        tension_of: Callable[..., Tension | ArrayLike] | None,
-        measurements: tuple[Measurement, ...],
-    ) -> None:
-        self.measurements = measurements
-        self._model_of = model_of
-        self._tension_of = tension_of
-        self._measured = np.array([each.value for each in measurements])
-        self._std = np.array([each.std for each in measurements])
-        self._last_rest: dict[Measurement, Array] = {}
+    model_of: Callable[..., Manipulator]
+    tension_of: Callable[..., Tension | ArrayLike] | None
+    measurements: tuple[Measurement, ...]
+    _last_rest: dict[Measurement, Array] = field(default_factory=dict)
 
     def residuals(self, parameters: Parameters) -> Array:
         """Compute (K(p) − K)/σ (n,), in standard deviations."""
-        return np.asarray((self.predict(parameters)[1] - self._measured) / self._std)
+        value, std = np.array([(each.value, each.std) for each in self.measurements]).T
+        return np.asarray((self.predict(parameters)[1] - value) / std)
 
     def predict(self, parameters: Parameters) -> tuple[Manipulator, Array]:
         """Build the arm and compute its stiffnesses K(p) (n,) [N/m]."""
         try:
-            arm = _called("model_of", self._model_of, parameters)
+            arm = _called("model_of", self.model_of, parameters)
         except CdsmError as error:
             raise NoModelError(f"model_of: {error}") from error
         if not isinstance(arm, Manipulator):
@@ -66,8 +61,8 @@ class StiffnessModel:
         """Compute the stiffness [N/m] of one measurement."""
         pose = arm.at(measurement.angles)
         tension: Tension | ArrayLike
-        if self._tension_of is not None:
-            tension = _called("tension_of", self._tension_of, parameters, pose, measurement)
+        if self.tension_of is not None:
+            tension = _called("tension_of", self.tension_of, parameters, pose, measurement)
         elif measurement.tension is not None:
             tension = measurement.tension
         else:

@@ -109,10 +109,9 @@ class Identification(ReadOnlyState):
     @cached_property
     def correlation(self) -> Array:
         """Correlations of the parameters (P, P) [-]. At ±1 only a combination is determined."""
-        free = np.diag(self._null_projector)
-        matrix = np.where(np.outer(free, free) > 0.0, self._null_projector, 0.0)
-        firm = np.flatnonzero(free == 0.0)
-        matrix[np.ix_(firm, firm)] = self.covariance[np.ix_(firm, firm)]
+        firm = np.diag(self._null_projector) == 0.0
+        matrix = np.where(np.outer(firm, firm), self.covariance, 0.0)
+        matrix = np.where(np.outer(~firm, ~firm), self._null_projector, matrix)
         root = np.sqrt(np.diag(matrix))
         return frozen(np.clip(matrix / np.outer(root, root), -1.0, 1.0))
 

@@ -125,13 +125,13 @@ class StrandElasticity(Elasticity):
         """Compute EA(F) [N]; see :meth:`Elasticity.rigidity`."""
         values = self.domain.check(tension)
         result = self.polynomial(values)
-        if not (result > 0.0).all():
-            bad = np.flatnonzero(result <= 0.0)
+        bad = result <= 0.0
+        if np.count_nonzero(bad):
             raise ElasticityRangeError(
-                f"the polynomial gives {result.ravel()[bad[0]]:.6g} N, and a rigidity must be "
-                "positive. Narrow the domain, or correct the coefficients.",
-                values.ravel()[bad].tolist(),
-                bad.tolist(),
+                f"the polynomial gives {result[bad][0]:.6g} N, and a rigidity must be positive. "
+                "Narrow the domain, or correct the coefficients.",
+                values[bad].tolist(),
+                np.flatnonzero(bad).tolist(),
             )
         return result
 
@@ -172,7 +172,7 @@ class StrandElasticity(Elasticity):
             raise ElasticityRangeError(
                 "the rigidity is not positive everywhere below, so there is no strain. Narrow the "
                 "domain, or correct the coefficients.",
-                np.atleast_1d(values)[np.atleast_1d(bad)].tolist(),
+                values[bad].tolist(),
                 np.flatnonzero(bad).tolist(),
             )
         return self._panels.integral(values, power)
