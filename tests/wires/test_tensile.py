@@ -376,6 +376,7 @@ NOISE = np.random.default_rng(0)
         (RAMP / 1e9, PULL, GAUGE, "rigidity would be"),
         (np.random.default_rng(0).permutation(RAMP), PULL, GAUGE, "order"),
         (0.0 * RAMP, PULL, GAUGE, "never changes"),
+        (RAMP[::5], PULL[::5] + 1000.0 * (RAMP[::5] > 0.006), GAUGE, "force jumps near 771"),
     ],
 )
 def test_tests_that_cannot_be_fitted_are_refused(
