@@ -24,7 +24,7 @@ import cdsm
 from cdsm import errors
 from cdsm.kernels import segments
 from cdsm.kernels import stiffness as stiffness_kernels
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 from tests.support.arms import (
     STEEL,
     mixed_arm,

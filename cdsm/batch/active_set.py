@@ -24,7 +24,7 @@ from cdsm.kernels.compiling import compiled
 from cdsm.kernels.linear_algebra import eliminate
 from cdsm.kernels.tension import row_product
 from cdsm.kernels.tree import Indices
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 
 FOUND, IMPOSSIBLE, LOST = range(3)
 """Outcome: F and y are the optimum; y proves infeasibility; the search failed."""

@@ -26,7 +26,8 @@ from cdsm.errors import InfeasibleTension, SolverError
 from cdsm.kernels.tension import NO_ARM
 from cdsm.manipulator import Manipulator
 from cdsm.support.status import Status, summary
-from cdsm.support.validation import Array, ReadOnlyState, frozen, instance
+from cdsm.support.validation import instance
+from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import checked_bounds, distribute_tension
 
 _NO_DIRECTIONS = frozen(np.zeros((0, 3)))

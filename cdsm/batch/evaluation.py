@@ -19,14 +19,8 @@ from cdsm.batch.layout import QUANTITIES, Codes, Flags
 from cdsm.errors import InvalidInput, UnknownName
 from cdsm.manipulator import Manipulator
 from cdsm.support.status import summary
-from cdsm.support.validation import (
-    Array,
-    ReadOnlyState,
-    frozen,
-    instance,
-    one_of,
-    unit_directions,
-)
+from cdsm.support.validation import instance, one_of, unit_directions
+from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import checked_bounds
 
 OUTPUTS = (*QUANTITIES, "tension")

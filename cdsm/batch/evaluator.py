@@ -13,7 +13,7 @@ from cdsm.cable_laws import CableLaws
 from cdsm.elasticity import Elasticity
 from cdsm.errors import ElasticityRangeError
 from cdsm.manipulator import Manipulator
-from cdsm.support.validation import Array, frozen
+from cdsm.support.values import Array, frozen
 
 
 class Evaluator:

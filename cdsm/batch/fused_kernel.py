@@ -50,7 +50,7 @@ from cdsm.kernels.readings import SINGULAR as NOT_REGULAR
 from cdsm.kernels.segments import add_segment_derivatives, mirror
 from cdsm.kernels.stiffness import add_load_stiffness, add_passive_stiffness, set_cable_stiffness
 from cdsm.kernels.tree import Frames, Indices, Routing, Tree, forward_kinematics
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 
 
 class Arm(NamedTuple):

@@ -12,7 +12,8 @@ from numpy.typing import ArrayLike
 from cdsm.batch.fused_kernel import Arm
 from cdsm.errors import InvalidInput
 from cdsm.manipulator import Manipulator
-from cdsm.support.validation import WRENCH, Array, flag, frozen, number_array, whole_number
+from cdsm.support.validation import WRENCH, flag, number_array, whole_number
+from cdsm.support.values import Array, frozen
 
 _NUMBERS = 2**17
 """Maximum number of floats in a slice: one megabyte."""

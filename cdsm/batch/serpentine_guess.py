@@ -21,7 +21,7 @@ from cdsm.batch.layout import Flags
 from cdsm.kernels.compiling import compiled
 from cdsm.kernels.tension import is_infeasible
 from cdsm.kernels.tree import Indices, Routing
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 
 _MOST = 2
 """Maximum number of axes of one joint."""

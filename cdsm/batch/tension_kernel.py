@@ -15,7 +15,7 @@ from cdsm.batch.layout import INFEASIBLE, OK, UNDECIDED, Codes, Flags
 from cdsm.batch.serpentine_guess import Blocks, guess, is_provably_infeasible, multipliers
 from cdsm.kernels.compiling import compiled, threaded
 from cdsm.kernels.tension import is_infeasible, is_optimal
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 
 
 @threaded

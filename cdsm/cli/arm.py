@@ -19,7 +19,7 @@ from cdsm.stiffness_matrix import Stiffness
 from cdsm.stiffness_matrix import stiffness as stiffness_at
 from cdsm.support.files import write_text
 from cdsm.support.format import MODEL, key
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 from cdsm.tension import Tension
 from cdsm.urdf import write_urdf
 

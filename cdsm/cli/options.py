@@ -23,7 +23,7 @@ from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.presets import STRAND_1X19
 from cdsm.support.format import JointUnits
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 from cdsm.tension import DEFAULT_SOLVER, Tension, distribute_tension
 from cdsm.wires.files import read_elasticity
 

@@ -17,7 +17,7 @@ from cdsm.errors import CdsmError
 from cdsm.manipulator import Manipulator
 from cdsm.support.files import write_file
 from cdsm.support.format import JointUnits
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 
 Json = dict[str, object]
 """Numbers of an answer in SI, with units in the keys. Arrays and infinite numbers are allowed."""

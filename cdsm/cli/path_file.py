@@ -11,7 +11,7 @@ import numpy as np
 from cdsm.errors import FileError
 from cdsm.manipulator import Manipulator
 from cdsm.support.tables import name_and_unit, read_table
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 
 _ANGLE: Final = {"deg": math.pi / 180.0, "°": math.pi / 180.0, "rad": 1.0}
 _LENGTH: Final = {"mm": 1e-3, "m": 1.0}

@@ -21,7 +21,7 @@ from cdsm.planning import (
     stiffness_range,
 )
 from cdsm.support.format import key
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 
 
 def plan(

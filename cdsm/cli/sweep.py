@@ -18,7 +18,7 @@ from cdsm.errors import FileError
 from cdsm.manipulator import Manipulator
 from cdsm.support.datasets import status_names
 from cdsm.support.files import write_file
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 from cdsm.sweeps import GridPoses, PathPoses, PoseSet, RandomPoses, read_sweep, write_sweep
 from cdsm.sweeps import sweep as run
 from cdsm.sweeps.export import check_target

@@ -10,7 +10,7 @@ from scipy.special import chdtrc
 from cdsm.identification.intervals import NEGLIGIBLE, RANK_TOLERANCE
 from cdsm.identification.least_squares import LeastSquares
 from cdsm.identification.result import Identification
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 
 _CORRELATED = 0.95
 """A warning names two parameters whose correlation exceeds this value."""

@@ -21,7 +21,7 @@ from scipy.optimize import brentq
 
 from cdsm.errors import InvalidInput
 from cdsm.identification.least_squares import Box, LeastSquares
-from cdsm.support.validation import Array, ReadOnlyState, frozen
+from cdsm.support.values import Array, ReadOnlyState, frozen
 
 RANK_TOLERANCE = 1e-6
 """Smallest singular value of J with unit columns that counts for its rank (J errs by 1e-10)."""

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from cdsm.errors import InvalidInput
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 
 _DECADES = 100.0
 """If the ratio of positive bounds is at least this, the logarithm of the parameter is scaled."""

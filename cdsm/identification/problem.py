@@ -17,7 +17,8 @@ from cdsm.statics.equilibrium import equilibrium
 from cdsm.statics.following import follow
 from cdsm.statics.weight_test import WeightTest, weight_test
 from cdsm.stiffness_matrix import Stiffness, stiffness
-from cdsm.support.validation import SMALLEST, Array, frozen, unit_direction
+from cdsm.support.validation import SMALLEST, unit_direction
+from cdsm.support.values import Array, frozen
 from cdsm.tension import Tension, distribute_tension
 
 Parameters = dict[str, float]

@@ -16,7 +16,8 @@ from cdsm.identification.intervals import NEGLIGIBLE, RANK_TOLERANCE, Profile
 from cdsm.identification.measurement import Measurement, label
 from cdsm.manipulator import Manipulator
 from cdsm.support.format import MODEL
-from cdsm.support.validation import Array, ReadOnlyState, flag, frozen, scalar
+from cdsm.support.validation import flag, scalar
+from cdsm.support.values import Array, ReadOnlyState, frozen
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -18,7 +18,8 @@ from cdsm.identification.measurement import Measurement
 from cdsm.identification.problem import StiffnessModel, UserFaultError
 from cdsm.identification.result import Identification
 from cdsm.manipulator import Manipulator
-from cdsm.support.validation import Array, frozen, scalar, sequence_of, vector
+from cdsm.support.validation import scalar, sequence_of, vector
+from cdsm.support.values import Array, frozen
 from cdsm.tension import Tension
 
 _ON_BOUND = 1e-9

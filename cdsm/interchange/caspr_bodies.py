@@ -12,7 +12,7 @@ import numpy as np
 
 from cdsm.errors import FileError, counted
 from cdsm.support.files import read_text
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 from cdsm.support.xml import XmlFault, numbers, parse_xml
 from cdsm.urdf import TIP
 

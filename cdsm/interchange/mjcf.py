@@ -25,7 +25,8 @@ from cdsm.posture import Posture
 from cdsm.statics.natural_modes import Carried, fastest, mass_matrix
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.files import write_text
-from cdsm.support.validation import Array, instance, scalar
+from cdsm.support.validation import instance, scalar
+from cdsm.support.values import Array
 from cdsm.support.xml import parse_xml
 from cdsm.tension import Tension
 

@@ -16,7 +16,8 @@ from cdsm.kinematics.nearest import nearest
 from cdsm.kinematics.residuals import LengthResidual, Residual, TipResidual
 from cdsm.kinematics.solutions import JointSolution, KinematicSolution
 from cdsm.manipulator import Manipulator
-from cdsm.support.validation import Array, frozen, instance, number_array, scalar, vector
+from cdsm.support.validation import instance, number_array, scalar, vector
+from cdsm.support.values import Array, frozen
 
 _TOLERANCE = 1e-9
 """Default tolerance: lengths and positions in arm lengths, and angles in rad."""

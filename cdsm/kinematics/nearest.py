@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from cdsm.kinematics.residuals import Residual, usable_limits
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 
 Limits = NDArray[np.int_]
 """Limits on which the joints rest (nv,): −1 lower, 1 upper, 0 none."""

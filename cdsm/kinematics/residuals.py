@@ -16,7 +16,7 @@ from cdsm.errors import CableError
 from cdsm.kernels.stiffness import load_stiffness
 from cdsm.manipulator import Manipulator
 from cdsm.rigid_body import rotation_vector
-from cdsm.support.validation import Array, frozen
+from cdsm.support.values import Array, frozen
 
 LIMIT_MARGIN = 1e-5
 """A joint nearer to its limit than this share of the limit counts as at the limit."""

@@ -17,7 +17,7 @@ from cdsm.kinematics.residuals import LIMIT_MARGIN
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.rigid_body import rotation_vector
-from cdsm.support.validation import Array, ReadOnlyState, frozen
+from cdsm.support.values import Array, ReadOnlyState, frozen
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

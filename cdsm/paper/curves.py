@@ -21,7 +21,7 @@ from cdsm.manipulator import Manipulator
 from cdsm.paper.claims import Claim, Figure, floats
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness, stiffness
-from cdsm.support.validation import Array, frozen
+from cdsm.support.values import Array, frozen
 from cdsm.tension import distribute_tension
 
 Part = Literal["active", "passive"]

@@ -15,7 +15,8 @@ from numpy.typing import ArrayLike
 from scipy.optimize import linprog
 
 from cdsm import presets
-from cdsm.support.validation import Array, frozen, number_array
+from cdsm.support.validation import number_array
+from cdsm.support.values import Array, frozen
 from cdsm.wires.laws import EQ19_PRINTED
 
 JOIN: Final = 31.0

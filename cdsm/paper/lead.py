@@ -18,7 +18,7 @@ from cdsm import presets
 from cdsm.cable_laws import OriginalLength
 from cdsm.paper.claims import Claim, Figure
 from cdsm.paper.curves import KEPT, at_minimum, readings
-from cdsm.support.validation import Array, frozen
+from cdsm.support.values import Array, frozen
 
 LEADS: Final = frozen(np.concatenate([[0.0], np.geomspace(0.003, 0.3, 30)]))
 """Examined leads [m]. With a lead of 0.33 m or more the arm buckles below 800 N."""

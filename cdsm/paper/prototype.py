@@ -18,7 +18,7 @@ from cdsm.paper.section_v import CHECK, DROPS, HYBRID, POSTURE, RISES, TENSIONS
 from cdsm.posture import Posture
 from cdsm.statics.weight_test import weight_test
 from cdsm.stiffness_matrix import stiffness
-from cdsm.support.validation import Array, frozen
+from cdsm.support.values import Array, frozen
 from cdsm.tension import distribute_tension
 
 _RIGID = LinearElasticity(1e12)  # the series stiffness is the whole stiffness of a hybrid cable

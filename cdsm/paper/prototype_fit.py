@@ -21,7 +21,7 @@ from cdsm.identification.least_squares import LeastSquares, NoModelError
 from cdsm.paper.claims import Claim, Figure, floats, markdown_table
 from cdsm.paper.prototype import Predicted, Prototype
 from cdsm.paper.section_v import CHECK, MEASURED, NAMES, TABLE_II, TABLE_II_SWAPPED, TENSIONS
-from cdsm.support.validation import Array, frozen
+from cdsm.support.values import Array, frozen
 
 _LIMIT = math.radians(30.0)
 _EVEN = TENSIONS.tolist()

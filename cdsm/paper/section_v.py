@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from cdsm.support.validation import frozen
+from cdsm.support.values import frozen
 
 AXES: Final = ("x", "y", "z")
 

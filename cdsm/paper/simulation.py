@@ -18,7 +18,7 @@ from cdsm.paper.claims import Claim
 from cdsm.paper.curves import KEPT, Pair, Part, StiffnessFigure, Swept, over_cases, over_minimum
 from cdsm.paper.digits import LEVEL
 from cdsm.posture import Posture
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 from cdsm.tension import distribute_tension
 
 STRAND_END: Final = presets.STRAND_1X19.high

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from cdsm import presets
 from cdsm.paper.claims import Claim, Figure
 from cdsm.paper.digits import JOIN, LEVEL, band, least_bend
-from cdsm.support.validation import Array, frozen
+from cdsm.support.values import Array, frozen
 from cdsm.wires.laws import EQ19_PRINTED
 
 GAUGE_LENGTH: Final = 0.5

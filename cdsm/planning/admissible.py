@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from cdsm.cable_laws import kinks
 from cdsm.errors import ElasticityRangeError
 from cdsm.posture import Posture
-from cdsm.support.validation import Array, frozen
+from cdsm.support.values import Array, frozen
 from cdsm.tension import Tension, distribute_tension
 
 _TOLERANCE = 1e-12  # primal tolerance of the solver; all its variables are of order one

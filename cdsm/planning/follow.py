@@ -11,7 +11,7 @@ from cdsm.planning.path_plan import InfeasibleSample
 from cdsm.planning.planner import Planner
 from cdsm.planning.sqp import EFFORT, Program, search
 from cdsm.planning.stiffness_model import Constraints, StiffnessModel
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 
 _MISSED = (
     "no tensions were found that hit all targets at once. Ask for fewer, or for others; "

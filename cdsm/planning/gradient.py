@@ -18,7 +18,8 @@ from numpy.typing import ArrayLike
 
 from cdsm.planning.kernels import form_by_tension
 from cdsm.stiffness_matrix import Stiffness
-from cdsm.support.validation import Array, ReadOnlyState, frozen, instance, unit_direction
+from cdsm.support.validation import instance, unit_direction
+from cdsm.support.values import Array, ReadOnlyState, frozen
 
 
 @final

@@ -11,7 +11,7 @@ from cdsm.planning.objectives import achieved, misfit
 from cdsm.statics.locked_motors import LoadedArm
 from cdsm.statics.trust_region import find_rest
 from cdsm.stiffness_matrix import Stiffness
-from cdsm.support.validation import Array, ReadOnlyState, frozen
+from cdsm.support.values import Array, ReadOnlyState, frozen
 
 
 @final

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from cdsm.kernels.compiling import compiled
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 
 _CURVATURE = 1e-6  # curvatures below this part of the largest are raised to it
 

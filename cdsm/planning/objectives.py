@@ -11,7 +11,8 @@ from cdsm.errors import InvalidInput, SingularStiffness
 from cdsm.manipulator import Manipulator
 from cdsm.planning.stiffness_model import Constraint, Constraints, StiffnessModel
 from cdsm.stiffness_matrix import Stiffness, stiffness
-from cdsm.support.validation import SMALLEST, Array, frozen, number_array, whole_number
+from cdsm.support.validation import SMALLEST, number_array, whole_number
+from cdsm.support.values import Array, frozen
 
 _MOST_STARTS = 1000  # these take about a minute, and a late start is seldom the best
 _SYMMETRIC = 1e-9  # a skew part of a matrix below this part of its largest entry is rounding

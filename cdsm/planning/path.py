@@ -21,15 +21,8 @@ from cdsm.planning.range import MARGIN
 from cdsm.planning.stiffness_model import StiffnessModel, checked_margin
 from cdsm.stiffness_matrix import stiffness
 from cdsm.support.format import coordinates
-from cdsm.support.validation import (
-    Array,
-    bound,
-    flag,
-    frozen,
-    instance,
-    number_array,
-    unit_directions,
-)
+from cdsm.support.validation import bound, flag, instance, number_array, unit_directions
+from cdsm.support.values import Array, frozen
 from cdsm.tension import checked_bounds
 
 _STATUS: Final[dict[type[CdsmError], Status]] = {

@@ -19,7 +19,7 @@ from cdsm.manipulator import Manipulator
 from cdsm.planning.half_way import HalfWay, half_way
 from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.files import write_text
-from cdsm.support.validation import Array, ReadOnlyState, frozen
+from cdsm.support.values import Array, ReadOnlyState, frozen
 
 Status = Literal["posture", "balance", "elasticity", "singular", "stiffness", "rate"]
 

@@ -21,7 +21,8 @@ from cdsm.planning.stiffness_model import StiffnessModel
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.format import MODEL, coordinates
-from cdsm.support.validation import Array, ReadOnlyState, frozen, unit_directions
+from cdsm.support.validation import unit_directions
+from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension
 
 

@@ -18,7 +18,7 @@ from cdsm.planning.range import range_ends
 from cdsm.planning.sqp import EFFORT, MET, NEAREST, Program, search
 from cdsm.planning.starts import StartPoints
 from cdsm.planning.stiffness_model import Constraints, ConstraintValues, Evaluation, StiffnessModel
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 
 REACHED: Final = 1e-6
 """Largest relative miss of a target that counts as hit. Searches mostly end at rounding."""

@@ -18,7 +18,8 @@ from cdsm.planning.stiffness_model import Constraints, Evaluation, StiffnessMode
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import stiffness
 from cdsm.support.format import MODEL, coordinates
-from cdsm.support.validation import Array, ReadOnlyState, frozen, unit_direction
+from cdsm.support.validation import unit_direction
+from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension
 from cdsm.wires.laws import StrandElasticity, TabulatedElasticity
 

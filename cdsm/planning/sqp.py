@@ -46,7 +46,7 @@ import numpy as np
 from cdsm.planning import kernels
 from cdsm.planning.admissible import Admissible, solve
 from cdsm.planning.stiffness_model import Constraints, ConstraintValues, Evaluation
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 
 MET: Final = 1e-9  # largest magnitude of a constraint that counts as met
 _ITERATIONS = 100

@@ -9,7 +9,7 @@ import numpy as np
 from cdsm.planning.admissible import Admissible, solve
 from cdsm.planning.objectives import unstable
 from cdsm.planning.stiffness_model import Evaluation, StiffnessModel
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 
 _FAR = 1e4  # corners are searched in a direction at this multiple of the largest tension
 _SAME = 1e-6  # corners closer to each other than this part of their size are one

@@ -15,7 +15,8 @@ from cdsm.kernels.stiffness import load_stiffness
 from cdsm.planning import kernels
 from cdsm.planning.admissible import admissible
 from cdsm.posture import Posture
-from cdsm.support.validation import SMALLEST, Array, instance, scalar
+from cdsm.support.validation import SMALLEST, instance, scalar
+from cdsm.support.values import Array
 
 _LEAST_MARGIN = 1e-9  # rounding changes the smallest eigenvalue by 1e-11 of the largest
 _NEAREST = 1e-9  # smallest distance of two eigenvalues in a derivative, as a part of the scale

@@ -30,15 +30,8 @@ from cdsm.statics.bound_scan import (
 )
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.format import MODEL, coordinates
-from cdsm.support.validation import (
-    Array,
-    ReadOnlyState,
-    bound,
-    frozen,
-    instance,
-    scalar,
-    unit_direction,
-)
+from cdsm.support.validation import bound, instance, scalar, unit_direction
+from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import DEFAULT_SOLVER, Tension, distribute_tension
 
 End = Literal["buckling", "maximum", "infeasible", "elasticity", "none"]

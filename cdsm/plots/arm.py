@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from cdsm.errors import InvalidInput
 from cdsm.plots.style import AXES, COLORS, MM, equal_axes, expect
-from cdsm.support.validation import Array, frozen
+from cdsm.support.values import Array, frozen
 
 if TYPE_CHECKING:
     from cdsm.posture import Posture

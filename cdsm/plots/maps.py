@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from cdsm.errors import InvalidInput
 from cdsm.plots.style import AXES, COLORS, MM, N_PER_MM, TICKS, equal_axes, panels
 from cdsm.support.datasets import check_sweep, status_names
-from cdsm.support.validation import Array, one_of, scalar
+from cdsm.support.validation import one_of, scalar
+from cdsm.support.values import Array
 
 if TYPE_CHECKING:
     import xarray

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from cdsm.errors import InvalidInput
 from cdsm.plots.arm import draw_arm
 from cdsm.plots.style import AXES, COLORS, KN, MM, N_PER_MM, STYLES, legend_below, panels
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 
 if TYPE_CHECKING:
     from cdsm import paper

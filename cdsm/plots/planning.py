@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 from cdsm.errors import InvalidInput
 from cdsm.plots.style import COLORS, N_PER_MM, expect, panels
 from cdsm.support.format import coordinates
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 
 if TYPE_CHECKING:
     from cdsm.planning import PathPlan, StiffnessPlan, StiffnessRange

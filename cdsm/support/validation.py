@@ -14,10 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cdsm.errors import InvalidInput, UnknownName
-from cdsm.support.values import Array as Array
-from cdsm.support.values import Printed as Printed
-from cdsm.support.values import ReadOnlyState as ReadOnlyState
-from cdsm.support.values import frozen as frozen
+from cdsm.support.values import Array, frozen
 
 _Kind = TypeVar("_Kind")
 

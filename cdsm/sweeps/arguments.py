@@ -12,7 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from cdsm.elasticity import Elasticity
 from cdsm.errors import InvalidInput
-from cdsm.support.validation import Array, frozen, number_array, scalar, text, vector
+from cdsm.support.validation import number_array, scalar, text, vector
+from cdsm.support.values import Array, frozen
 
 _Values = TypeVar("_Values")
 

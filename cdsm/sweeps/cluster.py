@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from cdsm.errors import CdsmError, ClusterError, InvalidInput
 from cdsm.support.extras import need
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 from cdsm.sweeps.blocks import Block
 from cdsm.sweeps.evaluation import BlockResult, SweepTask, evaluate
 from cdsm.sweeps.specification import Specification

@@ -15,7 +15,7 @@ from cdsm.cable import Cable
 from cdsm.elasticity import Elasticity
 from cdsm.manipulator import Manipulator
 from cdsm.support.format import MODEL
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 
 _SAMPLES = np.ldexp(np.arange(4.0, 8.0), np.arange(-12, 18)[:, None]).ravel()
 """Tensions [N] from 1e-3 to 1e6, four per octave, with equal bits on every machine."""

@@ -13,7 +13,7 @@ from cdsm import batch
 from cdsm.elasticity import Elasticity
 from cdsm.kernels.principal import principal_stiffness
 from cdsm.manipulator import Manipulator
-from cdsm.support.validation import Array, ReadOnlyState
+from cdsm.support.values import Array, ReadOnlyState
 from cdsm.sweeps.quantities import LOST, QUANTITIES, SweepStatus
 
 BlockResult = dict[str, NDArray[Any]]

@@ -17,15 +17,8 @@ from numpy.typing import ArrayLike
 
 from cdsm.errors import InvalidInput
 from cdsm.manipulator import Manipulator
-from cdsm.support.validation import (
-    Array,
-    ReadOnlyState,
-    frozen,
-    number_array,
-    one_of,
-    scalar,
-    whole_number,
-)
+from cdsm.support.validation import number_array, one_of, scalar, whole_number
+from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.sweeps.arguments import Label, distinct, label
 from cdsm.sweeps.blocks import Block
 

@@ -18,7 +18,7 @@ from cdsm.plots.arm import ellipsoid, tension_colors
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.status import Status
-from cdsm.support.validation import Array, ReadOnlyState, frozen
+from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import DEFAULT_SOLVER, Tension, distribute_tension
 
 GREY: Final = (150, 150, 150)

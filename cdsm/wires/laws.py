@@ -13,7 +13,8 @@ from numpy.typing import ArrayLike
 
 from cdsm.elasticity import Domain, Elasticity
 from cdsm.errors import ElasticityRangeError, InvalidInput
-from cdsm.support.validation import LARGEST, SMALLEST, Array, number_array, scalar
+from cdsm.support.validation import LARGEST, SMALLEST, number_array, scalar
+from cdsm.support.values import Array
 from cdsm.wires.quadrature import Panels, coefficient_table, panels, piecewise
 from cdsm.wires.rising_curve import RisingCurve
 

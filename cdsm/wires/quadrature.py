@@ -22,7 +22,7 @@ from numpy.polynomial.legendre import leggauss
 from numpy.typing import NDArray
 
 from cdsm.kernels.compiling import compiled
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 
 _NODES, _WEIGHTS = (leggauss(12)[0] + 1.0) / 2.0, leggauss(12)[1] / 2.0
 

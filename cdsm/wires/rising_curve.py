@@ -21,7 +21,7 @@ import numpy as np
 from numpy.polynomial.legendre import leggauss
 from numpy.typing import NDArray
 
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 
 _STEEPEST = 3.0  # slope at a point over that of either neighbouring chord, at most
 _FLATTEST = 0.5  # slope at the first and the last point over that of its chord, at least

@@ -10,7 +10,7 @@ import pytest
 import cdsm
 from cdsm.batch import active_set, distribution, serpentine_guess
 from cdsm.kernels.tension import is_infeasible, is_optimal
-from cdsm.support.validation import Array, frozen
+from cdsm.support.values import Array, frozen
 from tests.batch.test_evaluation import custom_arm, one_hinge
 from tests.support.arms import STEEL, mixed_arm, random_arm
 

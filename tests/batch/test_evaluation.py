@@ -16,7 +16,7 @@ from cdsm.batch import evaluation, fused_kernel
 from cdsm.batch.evaluation import OUTPUTS
 from cdsm.batch.inputs import run_slices
 from cdsm.batch.layout import QUANTITIES
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 from tests.support.arms import STEEL, mixed_arm, random_arm, random_posture
 from tests.support.processes import uncompiled
 

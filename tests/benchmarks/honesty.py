@@ -24,7 +24,7 @@ from rich.progress import Progress
 from rich.table import Table
 
 import cdsm
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 from tests.benchmarks.exact import EXTENDED, Motion
 from tests.benchmarks.questions import FAMILIES, ROWS, Group
 from tests.benchmarks.verdicts import (

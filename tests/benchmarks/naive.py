@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 
 
 class NaiveArm:

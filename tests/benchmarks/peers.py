@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 from cdsm.urdf import CROSS_MASS
 from tests.benchmarks.naive import NaiveArm
 

@@ -14,7 +14,7 @@ import scipy.linalg
 from scipy.optimize import linprog
 
 import cdsm
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 from tests.benchmarks.exact import EQ19_LOW, ExactArm, Wide, eq19, eq19_strain, wide
 
 ROWS = 10

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import cdsm
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 from tests.benchmarks.naive import NaiveArm, naive_joint_stiffness
 from tests.benchmarks.test_speed import GRAVITY, RIGIDITY, SIZES, arm
 from tests.benchmarks.timing import Clock, seconds

@@ -8,7 +8,7 @@ from scipy.optimize import minimize
 
 import cdsm
 from cdsm import presets
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 from tests.benchmarks.naive import NaiveArm
 from tests.benchmarks.test_speed import GRAVITY, RIGIDITY, SIZES, arm
 from tests.benchmarks.timing import Clock

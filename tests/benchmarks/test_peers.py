@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import cdsm
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 from tests.benchmarks.naive import NaiveArm
 from tests.benchmarks.peers import with_casadi, with_jax
 from tests.benchmarks.test_batch_speed import per_posture, problem

@@ -7,7 +7,7 @@ from scipy.optimize import minimize, nnls
 
 import cdsm
 from cdsm import presets
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 from tests.benchmarks.naive import NaiveArm, difference, naive_joint_stiffness
 from tests.benchmarks.test_speed import GRAVITY, RIGIDITY, SIZES, arm
 from tests.benchmarks.timing import Clock, seconds

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 from tests.benchmarks.exact import Least, Motion, Wide, least_tension, smallest_eigenvalue, solve
 from tests.benchmarks.questions import Group
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import cdsm
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 from tests.benchmarks import honesty
 from tests.benchmarks.exact import (
     EXTENDED,

@@ -32,7 +32,7 @@ from rich.progress import Progress
 from rich.table import Table
 
 import cdsm
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 from tests.campaigns import verified
 from tests.support import strategies
 from tests.support.patience import HANGS

@@ -14,7 +14,7 @@ from scipy.optimize import linprog
 
 import cdsm
 from cdsm.kernels.readings import REGULAR
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 from tests.support.differences import EPSILON
 
 

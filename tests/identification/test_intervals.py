@@ -9,7 +9,7 @@ from scipy.stats import binom, norm, t
 
 import cdsm
 from cdsm.identification import Measurement, Profile, identify
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 
 GEOMETRY = cdsm.Geometry.hinged(
     joints=1,

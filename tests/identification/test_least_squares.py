@@ -5,7 +5,7 @@ import pytest
 
 import cdsm
 from cdsm.identification.least_squares import Box, LeastSquares, NoModelError
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 
 
 def test_box_maps_the_unit_cube_on_the_bounds_and_back() -> None:

@@ -13,7 +13,7 @@ from scipy.stats import binom, chi2
 
 import cdsm
 from cdsm.identification import Identification, Measurement, identify
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 
 STRAND = cdsm.presets.STRAND_1X19
 TRUE = {"hole_radius": 0.031, "drive": 4e4, "lead": 0.35}

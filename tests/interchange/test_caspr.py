@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import cdsm
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 from tests.support import caspr_models
 from tests.support.differences import assert_second_order
 

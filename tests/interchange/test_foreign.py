@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import cdsm
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 from tests.support.differences import assert_second_order
 from tests.support.foreign import POSTURE, TENSION, TREE, crab, energy
 

@@ -13,7 +13,7 @@ from scipy.linalg import eigh
 import cdsm
 from cdsm.interchange.mjcf import _bodies
 from cdsm.statics.natural_modes import mass_matrix
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 from tests.support.arms import mixed_arm, random_arm, random_posture, random_wrench
 from tests.support.foreign import POSTURE, TENSION, crab
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import cdsm
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 from tests.support.differences import assert_second_order
 
 data: Any = pytest.importorskip("example_robot_data", reason="the extra [robots] is not installed")

@@ -5,7 +5,7 @@ import pytest
 from numpy.typing import ArrayLike
 
 from cdsm.kernels import linear_algebra
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 
 
 def symmetric(values: ArrayLike, seed: int = 0) -> Array:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cdsm.kernels import readings
-from cdsm.support.validation import Array, frozen
+from cdsm.support.values import Array, frozen
 
 Matrices = tuple[Array, Array, Array, Array, Array]
 

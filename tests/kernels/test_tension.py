@@ -6,7 +6,7 @@ import math
 import numpy as np
 
 from cdsm.kernels import tension as tension_kernels
-from cdsm.support.validation import Array, frozen
+from cdsm.support.values import Array, frozen
 
 
 def test_balance_is_scaled_by_powers_of_two_and_so_without_rounding() -> None:

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 import cdsm
 from cdsm.kinematics.residuals import LengthResidual, Residual, TipResidual
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 from tests.support.arms import STEEL, mixed_arm, random_arm, random_posture
 from tests.support.differences import assert_second_order
 

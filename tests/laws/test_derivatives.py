@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import cdsm
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 from tests.support import arms
 from tests.support.differences import assert_second_order, gravity_energy
 

@@ -12,7 +12,7 @@ import cdsm
 from cdsm.paper import digits
 from cdsm.paper.section_v import CHECK, MEASURED, TABLE_II, TABLE_II_SWAPPED
 from cdsm.paper.strand import eq19_as_printed
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 from cdsm.wires.laws import EQ19_PRINTED
 from tests.core.test_urdf import eq1, eq2, eq3, table1
 from tests.support.arms import random_arm, random_posture, random_wrench

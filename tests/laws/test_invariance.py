@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import cdsm
 from cdsm.kernels.readings import UNMOVED
 from cdsm.kernels.tension import OPTIMALITY
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 from tests.support import arms
 
 # the same examples every time, and no files; numba compiles during the first one

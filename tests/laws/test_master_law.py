@@ -16,7 +16,7 @@ import pytest
 from scipy.optimize import brentq
 
 import cdsm
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 from tests.support import arms
 from tests.support.differences import assert_second_order, gravity_energy
 

@@ -9,7 +9,7 @@ import pinocchio as pin
 import pytest
 
 import cdsm
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 from tests.support import arms
 from tests.support.differences import central_difference
 from tests.support.mujoco_arms import in_mujoco, tendon_jacobian

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import cdsm
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 
 REFERENCE: dict[str, dict[str, Any]] = json.loads(
     (Path(__file__).parents[1] / "data" / "reference_cases.json").read_text(encoding="utf-8")

@@ -11,7 +11,7 @@ from cdsm.paper import section_v
 from cdsm.paper.prototype import Prototype
 from cdsm.paper.prototype_fit import BOUNDS, START, STEPS
 from cdsm.paper.section_v import HYBRID, NAMES, TABLE_II
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 from tests.conftest import Results
 
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 import cdsm
 from cdsm.cable_laws import CableLaws
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 from tests.support import arms
 from tests.support.differences import assert_second_order, central_difference
 from tests.support.locked import ARMS, STRAND, TABLE, balanced, original_lengths, some_arm

@@ -10,7 +10,7 @@ from scipy.optimize import root
 
 import cdsm
 from cdsm import presets
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 from tests.support import arms
 from tests.support.locked import (
     EA,

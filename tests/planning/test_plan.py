@@ -8,7 +8,7 @@ import pytest
 
 import cdsm
 from cdsm import presets
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 from tests.planning.test_range import corners
 from tests.support import arms
 from tests.support.differences import central_difference

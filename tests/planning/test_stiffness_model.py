@@ -10,7 +10,7 @@ from cdsm.planning.stiffness_model import (
     Evaluation,
     StiffnessModel,
 )
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 from tests.support import arms
 from tests.support.differences import central_difference
 from tests.support.locked import soft_hinge, some_arm

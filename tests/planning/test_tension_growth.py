@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 
 import cdsm
 from cdsm import presets
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 from tests.planning.test_range import stayed
 from tests.support import arms
 from tests.support.differences import assert_second_order

@@ -9,7 +9,7 @@ from mpl_toolkits.mplot3d.art3d import Line3D, Line3DCollection  # type: ignore[
 
 import cdsm
 from cdsm import paper, plots
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 from tests.conftest import Results
 from tests.support.arms import mixed_arm, random_posture
 from tests.support.foreign import POSTURE, crab

@@ -8,7 +8,7 @@ import pytest
 import xarray as xr
 
 import cdsm
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 from cdsm.sweeps import export
 from tests.support.sweeps import CASES, EVERYTHING, GRID, short_arm
 

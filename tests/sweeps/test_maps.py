@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 import cdsm
 from cdsm import plots
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 from tests.support.sweeps import short_arm
 
 PLANAR = cdsm.GridPoses(

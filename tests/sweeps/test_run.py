@@ -11,7 +11,7 @@ import xarray as xr
 
 import cdsm
 from cdsm.kernels.principal import principal_stiffness
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 from cdsm.sweeps.blocks import blocks, extents, postures
 from cdsm.sweeps.description import law_text
 from cdsm.sweeps.evaluation import _BATCH_NAMES

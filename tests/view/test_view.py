@@ -20,7 +20,7 @@ import pytest
 
 import cdsm
 from cdsm.plots.arm import tension_colors
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 from cdsm.view import Condition, Setting, View, serve, show
 from cdsm.view.panel import page_text
 from cdsm.view.server import Worker

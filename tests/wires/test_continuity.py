@@ -8,7 +8,7 @@ import pytest
 from numpy.typing import ArrayLike
 
 import cdsm
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 from cdsm.wires.continuity import find_jump
 from tests.support import arms
 

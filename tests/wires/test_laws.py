@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from scipy.integrate import quad
 
 import cdsm
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 from cdsm.wires.rising_curve import slopes_at_points
 from tests.support.strategies import tabulated_elasticities
 

@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import quad
 
 import cdsm
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 
 STRAND = cdsm.StrandElasticity.eq19_repaired()
 lower, upper = STRAND.coefficients

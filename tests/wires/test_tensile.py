@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import cdsm
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 
 DATA = Path(__file__).parents[2] / "notebooks" / "data" / "strand_1x19_tensile_test.csv"
 STRAND = cdsm.StrandElasticity.eq19_repaired()

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import cdsm
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 
 REPEATABLE = settings(derandomize=True, database=None, deadline=None, max_examples=5)
 

@@ -11,7 +11,8 @@ from scipy.special import stdtrit
 
 from cdsm.elasticity import Elasticity
 from cdsm.errors import TensileTestError
-from cdsm.support.validation import RANGES, Array, ReadOnlyState, frozen, one_of, scalar
+from cdsm.support.validation import RANGES, one_of, scalar
+from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.wires.laws import TabulatedElasticity
 from cdsm.wires.tensile.loading import FEWEST, Points, loading
 from cdsm.wires.tensile.polynomials import polynomials

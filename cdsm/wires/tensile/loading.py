@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.optimize import isotonic_regression
 
 from cdsm.errors import TensileTestError
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 from cdsm.wires.tensile.record import TensileTest
 
 FEWEST = 8

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.polynomial import Polynomial
 
 from cdsm.errors import TensileTestError
-from cdsm.support.validation import RANGES, Array
+from cdsm.support.validation import RANGES
+from cdsm.support.values import Array
 from cdsm.wires.laws import StrandElasticity
 from cdsm.wires.quadrature import coefficient_table, piecewise
 from cdsm.wires.tensile.loading import Points

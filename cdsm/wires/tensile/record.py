@@ -10,7 +10,8 @@ from typing import Final, NoReturn, final
 
 from cdsm.errors import TensileTestError
 from cdsm.support.tables import Table, read_table
-from cdsm.support.validation import Array, ReadOnlyState, frozen, number_array, scalar
+from cdsm.support.validation import number_array, scalar
+from cdsm.support.values import Array, ReadOnlyState, frozen
 
 _UNITS: Final = {
     "displacement": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "μm": 1e-6},

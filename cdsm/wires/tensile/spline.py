@@ -17,7 +17,7 @@ from scipy.interpolate import BSpline
 from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import least_squares
 
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 from cdsm.wires.tensile.loading import Points
 
 _INTERVALS = 48  # of the spline, at most; more do not change the curve of a wire

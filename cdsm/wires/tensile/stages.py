@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from cdsm.errors import TensileTestError
-from cdsm.support.validation import Array
+from cdsm.support.values import Array
 from cdsm.wires.tensile.loading import Points, local_noise
 from cdsm.wires.tensile.spline import Curve, Spread
 
