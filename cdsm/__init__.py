@@ -10,83 +10,72 @@ All units are SI. The x-axis of the base frame lies along the straight arm.
 """
 
 from importlib import import_module as _import_module
-from importlib.metadata import version as _version
 from typing import TYPE_CHECKING as _TYPE_CHECKING
 
-from cdsm import presets
-from cdsm.batch import Batch, Status, Tensions, distribute_tensions, evaluate
-from cdsm.cable import Cable, Site, in_series, serpentine_cables
-from cdsm.elasticity import Domain, Elasticity, LinearElasticity
-from cdsm.errors import (
-    CableError,
-    CdsmError,
-    ClusterError,
-    ElasticityRangeError,
-    EquilibriumError,
-    FileError,
-    GeometryError,
-    InfeasibleTension,
-    InvalidInput,
-    JointLimitError,
-    MissingExtra,
-    SingularMass,
-    SingularStiffness,
-    SolverError,
-    StoreError,
-    TensileTestError,
-    UnknownName,
-    UnreachableStiffness,
-    UrdfError,
-)
-from cdsm.geometry import CableRoute, Geometry, Joint, Link
-from cdsm.identification import Identification, Measurement, identify
-from cdsm.interchange.cable_file import read_cables, write_cables
-from cdsm.interchange.caspr import read_caspr
-from cdsm.interchange.mjcf import to_mjcf, write_mjcf
-from cdsm.kinematics.maps import inverse_kinematics, solve_joint_angles
-from cdsm.kinematics.solutions import JointSolution, KinematicSolution
-from cdsm.manipulator import Manipulator
-from cdsm.planning import (
-    HalfWay,
-    InfeasibleSample,
-    PathPlan,
-    Saturation,
-    StiffnessGradient,
-    StiffnessPlan,
-    StiffnessRange,
-    plan_path,
-    plan_stiffness,
-    saturation,
-    stiffness_gradient,
-    stiffness_range,
-)
-from cdsm.posture import Posture
-from cdsm.statics.buckling import CriticalLoad, CriticalTension, critical_load, critical_tension
-from cdsm.statics.equilibrium import Equilibrium, equilibrium
-from cdsm.statics.natural_modes import Modes, modes
-from cdsm.statics.weight_test import LinearPrediction, WeightTest, weight_test
-from cdsm.stiffness_matrix import Shares, Stiffness, stiffness
-from cdsm.sweeps import (
-    GridPoses,
-    PathPoses,
-    PoseSet,
-    RandomPoses,
-    SweepStatus,
-    read_sweep,
-    sweep,
-    write_sweep,
-)
-from cdsm.tension import Tension, distribute_tension
-from cdsm.urdf import to_urdf, write_urdf
-from cdsm.wires.files import read_elasticity, write_elasticity
-from cdsm.wires.laws import StrandElasticity, TabulatedElasticity
-from cdsm.wires.tensile.fit import TensileFit, fit_tensile_test
-from cdsm.wires.tensile.record import TensileTest, read_tensile_csv
-
 if _TYPE_CHECKING:
+    from cdsm import paper as paper
+    from cdsm import plots as plots
+    from cdsm import presets
+    from cdsm import view as view
+    from cdsm.batch import Batch, Tensions, distribute_tensions, evaluate
+    from cdsm.cable import Cable, Site, in_series, serpentine_cables
+    from cdsm.elasticity import Domain, Elasticity, LinearElasticity
+    from cdsm.errors import (
+        CableError,
+        CdsmError,
+        ClusterError,
+        ElasticityRangeError,
+        EquilibriumError,
+        FileError,
+        GeometryError,
+        InfeasibleTension,
+        InvalidInput,
+        JointLimitError,
+        MissingExtra,
+        SingularMass,
+        SingularStiffness,
+        SolverError,
+        StoreError,
+        TensileTestError,
+        UnknownName,
+        UnreachableStiffness,
+        UrdfError,
+    )
+    from cdsm.geometry import CableRoute, Geometry, Joint, Link
+    from cdsm.identification import Identification, Measurement, identify
+    from cdsm.interchange.cable_file import read_cables, write_cables
+    from cdsm.interchange.caspr import read_caspr
+    from cdsm.interchange.mjcf import to_mjcf, write_mjcf
+    from cdsm.kinematics.maps import inverse_kinematics, solve_joint_angles
+    from cdsm.kinematics.solutions import JointSolution, KinematicSolution
+    from cdsm.manipulator import Manipulator
+    from cdsm.planning.gradient import StiffnessGradient, stiffness_gradient
+    from cdsm.planning.half_way import HalfWay
+    from cdsm.planning.path import plan_path
+    from cdsm.planning.path_plan import InfeasibleSample, PathPlan
+    from cdsm.planning.plan import StiffnessPlan, plan_stiffness
+    from cdsm.planning.range import StiffnessRange, stiffness_range
+    from cdsm.planning.tension_growth import Saturation, saturation
+    from cdsm.posture import Posture
     from cdsm.report import Report, SelfCheck
+    from cdsm.statics.buckling import CriticalLoad, CriticalTension, critical_load, critical_tension
+    from cdsm.statics.equilibrium import Equilibrium, equilibrium
+    from cdsm.statics.natural_modes import Modes, modes
+    from cdsm.statics.weight_test import LinearPrediction, WeightTest, weight_test
+    from cdsm.stiffness_matrix import Shares, Stiffness, stiffness
+    from cdsm.support.status import Status
+    from cdsm.sweeps.export import read_sweep, write_sweep
+    from cdsm.sweeps.poses import GridPoses, PathPoses, PoseSet, RandomPoses
+    from cdsm.sweeps.run import sweep
+    from cdsm.sweeps.status import SweepStatus
+    from cdsm.tension import Tension, distribute_tension
+    from cdsm.urdf import to_urdf, write_urdf
+    from cdsm.wires.files import read_elasticity, write_elasticity
+    from cdsm.wires.laws import StrandElasticity, TabulatedElasticity
+    from cdsm.wires.tensile.fit import TensileFit, fit_tensile_test
+    from cdsm.wires.tensile.record import TensileTest, read_tensile_csv
 
-__version__ = _version("cdsm-stiffness")
+    __version__: str
 
 __all__ = [
     "Batch",
@@ -189,14 +178,72 @@ __all__ = [
     "write_urdf",
 ]
 
-_LAZY = ("Report", "SelfCheck")
 
+_NAMES = {
+    "batch": "Batch Tensions distribute_tensions evaluate",
+    "cable": "Cable Site in_series serpentine_cables",
+    "elasticity": "Domain Elasticity LinearElasticity",
+    "errors": (
+        "CableError CdsmError ClusterError ElasticityRangeError EquilibriumError FileError "
+        "GeometryError InfeasibleTension InvalidInput JointLimitError MissingExtra "
+        "SingularMass SingularStiffness SolverError StoreError TensileTestError UnknownName "
+        "UnreachableStiffness UrdfError"
+    ),
+    "geometry": "CableRoute Geometry Joint Link",
+    "identification": "Identification Measurement identify",
+    "interchange.cable_file": "read_cables write_cables",
+    "interchange.caspr": "read_caspr",
+    "interchange.mjcf": "to_mjcf write_mjcf",
+    "kinematics.maps": "inverse_kinematics solve_joint_angles",
+    "kinematics.solutions": "JointSolution KinematicSolution",
+    "manipulator": "Manipulator",
+    "planning.gradient": "StiffnessGradient stiffness_gradient",
+    "planning.half_way": "HalfWay",
+    "planning.path": "plan_path",
+    "planning.path_plan": "InfeasibleSample PathPlan",
+    "planning.plan": "StiffnessPlan plan_stiffness",
+    "planning.range": "StiffnessRange stiffness_range",
+    "planning.tension_growth": "Saturation saturation",
+    "posture": "Posture",
+    "report": "Report SelfCheck",
+    "statics.buckling": "CriticalLoad CriticalTension critical_load critical_tension",
+    "statics.equilibrium": "Equilibrium equilibrium",
+    "statics.natural_modes": "Modes modes",
+    "statics.weight_test": "LinearPrediction WeightTest weight_test",
+    "stiffness_matrix": "Shares Stiffness stiffness",
+    "support.status": "Status",
+    "sweeps.export": "read_sweep write_sweep",
+    "sweeps.poses": "GridPoses PathPoses PoseSet RandomPoses",
+    "sweeps.run": "sweep",
+    "sweeps.status": "SweepStatus",
+    "tension": "Tension distribute_tension",
+    "urdf": "to_urdf write_urdf",
+    "wires.files": "read_elasticity write_elasticity",
+    "wires.laws": "StrandElasticity TabulatedElasticity",
+    "wires.tensile.fit": "TensileFit fit_tensile_test",
+    "wires.tensile.record": "TensileTest read_tensile_csv",
+}
+"""Public names by the module they come from, which is imported when one is first touched."""
 
-def __getattr__(name: str) -> object:
-    if name in _LAZY:
-        return getattr(_import_module("cdsm.report"), name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+_HOME = {name: f"cdsm.{module}" for module, names in _NAMES.items() for name in names.split()}
+_MODULES = ("paper", "plots", "presets", "view")
+
+if not _TYPE_CHECKING:  # a type checker would take any name for one that exists
+
+    def __getattr__(name: str) -> object:
+        if name in _MODULES:
+            return _import_module(f"cdsm.{name}")
+        if name in _HOME:
+            found = getattr(_import_module(_HOME[name]), name)
+        elif name == "__version__":
+            from importlib.metadata import version
+
+            found = version("cdsm-stiffness")
+        else:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        globals()[name] = found  # the next time it is found without this function
+        return found
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *_LAZY})
+    return sorted({*__all__, *_MODULES})

@@ -7,7 +7,6 @@ from typing import NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linprog
 
 from cdsm.errors import InfeasibleTension, SolverError
 from cdsm.kernels.tension import OPTIMALITY, Scaled
@@ -26,6 +25,8 @@ def explain(
     Only bounds of ``free`` cables (C,) may widen: those without a fixed tension. ``fault`` is the
     solver's result, as text.
     """
+    from scipy.optimize import linprog  # slow to import
+
     A, b, lower, upper, arm_scale, force_scale = problem
     nv, count = A.shape
     # variables: F, then the positive and the negative part of the missing torque
@@ -70,6 +71,8 @@ def explain(
 
 def _widening(problem: Scaled, free: NDArray[np.bool_]) -> float:
     """Compute how far the bounds of free cables (C,) must widen [N]; inf if this does not help."""
+    from scipy.optimize import linprog
+
     A, b, lower, upper, _, force_scale = problem
     nv, count = A.shape
     # variables: F, then the widening t: low − t <= F <= high + t, and F >= 0; a fixed

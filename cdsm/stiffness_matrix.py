@@ -241,7 +241,7 @@ class Stiffness(ReadOnlyState):
         posture. It takes some tenths of a second. Problems are not raised as errors; the report
         lists them.
         """
-        from cdsm.report import report_on  # here, so that "import cdsm" does not import it
+        from cdsm.report import report_on  # here, since a stiffness does not need it
 
         return report_on(self)
 

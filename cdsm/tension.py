@@ -18,9 +18,7 @@ from dataclasses import dataclass
 from typing import Any, Final, final
 
 import numpy as np
-import qpsolvers
 from numpy.typing import ArrayLike
-from scipy.sparse import csc_matrix
 
 from cdsm.cable import Cable
 from cdsm.errors import InvalidInput, SolverError
@@ -219,11 +217,16 @@ def _with_fixed(
 
 def installed_solver(solver: str) -> str:
     """Return the name of a solver; UnknownName if it is not installed."""
+    import qpsolvers  # slow to import
+
     return one_of("installed solver", solver, qpsolvers.available_solvers)
 
 
 def _solve(problem: tension_kernels.Scaled, solver: str) -> Array | str:
     """Return the verified optimum, or the fault as text: no solution, or not the optimum."""
+    import qpsolvers
+    from scipy.sparse import csc_matrix
+
     installed_solver(solver)
     A, b, low, high, *_ = problem
     sparse = csc_matrix if solver in qpsolvers.sparse_solvers else np.asarray

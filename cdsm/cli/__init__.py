@@ -1,4 +1,7 @@
-"""Command line of cdsm. Options take mm, degrees and N/mm. matplotlib is imported on demand."""
+"""Command line of cdsm. Options take mm, degrees and N/mm.
+
+A command imports what it runs when it runs, so that help pages are there at once.
+"""
 
 from __future__ import annotations
 

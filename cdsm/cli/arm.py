@@ -4,24 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
 import typer
 
+import cdsm
 from cdsm.cli.options import Angles, ArmOptions, AsJson, TensionOptions
 from cdsm.cli.output import UNMET, Json, answer, by_cable, joints
-from cdsm.errors import SingularStiffness
-from cdsm.geometry import Geometry
-from cdsm.interchange.cable_file import write_cables
-from cdsm.interchange.mjcf import instability, write_mjcf
-from cdsm.stiffness_matrix import Stiffness
-from cdsm.stiffness_matrix import stiffness as stiffness_at
-from cdsm.support.files import write_text
-from cdsm.support.format import MODEL, key
-from cdsm.support.values import Array
-from cdsm.tension import Tension
-from cdsm.urdf import write_urdf
+
+if TYPE_CHECKING:
+    from cdsm.support.values import Array
 
 
 def urdf(
@@ -30,8 +22,8 @@ def urdf(
     as_json: AsJson = False,
 ) -> None:
     """Write the URDF of an arm, checked by reading it back with two parsers."""
-    arm = Geometry.read(geometry)
-    path = write_urdf(arm, output)
+    arm = cdsm.Geometry.read(geometry)
+    path = cdsm.write_urdf(arm, output)
     numbers: Json = {"name": arm.name, "length_m": arm.length, "written": [str(path)]}
     answer(as_json, lambda: numbers, f"{arm}\nwritten: {path}")
 
@@ -42,15 +34,17 @@ def stiffness(
     """Distribute the tensions at a posture, and print them and the stiffness."""
     pose = arm.at(angles)
     tension = tensions.distribute(pose)
-    K = stiffness_at(pose, tension)
+    K = cdsm.stiffness(pose, tension)
     answer(as_json, lambda: _numbers(tension, K), pose.arm, tension, K)
 
 
-def _numbers(tension: Tension, K: Stiffness) -> Json:
+def _numbers(tension: cdsm.Tension, K: cdsm.Stiffness) -> Json:
+    from cdsm.support.format import MODEL, key
+
     def matrix(read: Callable[[], Array]) -> Array | None:
         try:
             return read()
-        except SingularStiffness:
+        except cdsm.SingularStiffness:
             return None
 
     pose, arm = tension.posture, tension.posture.arm
@@ -61,7 +55,7 @@ def _numbers(tension: Tension, K: Stiffness) -> Json:
         "cable_length_m": pose.cable_lengths,
         key("static_residual", arm.torque_unit()): K.residual,
         "model": MODEL,
-        "along_N_per_m": [K.along(axis) for axis in np.eye(3)],
+        "along_N_per_m": [K.along(axis) for axis in ((1, 0, 0), (0, 1, 0), (0, 0, 1))],
         "cartesian_N_per_m": matrix(lambda: K.cartesian),
         "pseudoinverse_N_per_m": matrix(K.pseudoinverse),
         "compliance": matrix(lambda: K.compliance),
@@ -86,8 +80,10 @@ def check(
     Exit code 0: it can be trusted; 3: it cannot, and the report says why.
     """
     pose = arm.at(angles)
-    report = stiffness_at(pose, tensions.distribute(pose)).report()
+    report = cdsm.stiffness(pose, tensions.distribute(pose)).report()
     if html is not None:
+        from cdsm.support.files import write_text
+
         typer.echo(f"written: {write_text(html, report.to_html())}", err=True)
     answer(as_json, report.to_dict, pose.arm, report)
     if not report.trustworthy:
@@ -120,13 +116,15 @@ def export(
     lines, written = [str(pose.arm)], []
     if mjcf is not None:
         tension = tensions.distribute(pose)
-        K = stiffness_at(pose, tension)
+        K = cdsm.stiffness(pose, tension)
         numbers["stable"] = K.is_stable
         if not K.is_stable:
+            from cdsm.interchange.mjcf import instability
+
             lines.insert(0, instability(K))
-        written.append(str(write_mjcf(pose.arm, mjcf, pose, tension, damping=damping)))
+        written.append(str(cdsm.write_mjcf(pose.arm, mjcf, pose, tension, damping=damping)))
     if cables_out is not None:
-        written.append(str(write_cables(pose.arm.cables, cables_out)))
+        written.append(str(cdsm.write_cables(pose.arm.cables, cables_out)))
     lines += [f"written: {path}" for path in written]
     answer(as_json, lambda: numbers | {"written": written}, "\n".join(lines))
     if numbers.get("stable") is False:

@@ -7,12 +7,10 @@ from typing import Annotated
 
 import typer
 
+import cdsm
 from cdsm.cli import options
 from cdsm.cli.options import Angles, ArmOptions, AsJson, Picture, TensionOptions, numbers
 from cdsm.cli.output import Json, answer, joints, write_picture
-from cdsm.statics.buckling import CriticalLoad, CriticalTension, critical_load, critical_tension
-from cdsm.statics.weight_test import WeightTest, weight_test
-from cdsm.tension import DEFAULT_SOLVER
 
 
 def weigh(
@@ -29,13 +27,13 @@ def weigh(
     """Hang a weight at the tip with the motors locked, and see how far it goes (Eq. 20)."""
     pose = arm.at(angles)
     tension = tensions.distribute(pose)
-    test = weight_test(pose, tension, numbers("--force", force, 3), steps=steps)
+    test = cdsm.weight_test(pose, tension, numbers("--force", force, 3), steps=steps)
     write_picture(figure, "plot_weight_test", test)
     loaded = f"at the full load:\n{test.loaded[-1]}"
     answer(as_json, lambda: _weight_numbers(test), pose.arm, test, loaded)
 
 
-def _weight_numbers(test: WeightTest) -> Json:
+def _weight_numbers(test: cdsm.WeightTest) -> Json:
     last, before = test.loaded[-1], test.without
     return {
         "before": {
@@ -76,7 +74,7 @@ def buckle(
         float | None, typer.Option(help="Upper bound of all tensions under the load [N].")
     ] = None,
     wrench: options.Wrench = options.NO_WRENCH,
-    solver: options.Solver = DEFAULT_SOLVER,
+    solver: options.Solver = options.DEFAULT_SOLVER,
     figure: Picture = None,
     as_json: AsJson = False,
 ) -> None:
@@ -86,19 +84,19 @@ def buckle(
             raise typer.BadParameter("bounds the tensions under --load only.", param_hint=option)
     pose = arm.at(angles)
     carried = numbers("--wrench", wrench, 6)
-    tension = critical_tension(pose, carried, solver)
+    tension = cdsm.critical_tension(pose, carried, solver)
     most = None
     if load is not None:
         low = 10.0 if min_tension is None else min_tension
         high = math.inf if max_tension is None else max_tension
         weight = numbers("--load", load, 6)
-        most = critical_load(pose, weight, low, high, solver, carried=carried)
+        most = cdsm.critical_load(pose, weight, low, high, solver, carried=carried)
     write_picture(figure, "plot_critical_tension", tension)
     found = (tension,) if most is None else (tension, most)
     answer(as_json, lambda: _buckling_numbers(tension, most), pose.arm, *found)
 
 
-def _buckling_numbers(tension: CriticalTension, load: CriticalLoad | None) -> Json:
+def _buckling_numbers(tension: cdsm.CriticalTension, load: cdsm.CriticalLoad | None) -> Json:
     names = tension.posture.arm.joint_names
     found: Json = {
         "critical_minimum_tension_N": tension.minimum,

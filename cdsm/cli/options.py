@@ -8,24 +8,18 @@ from collections.abc import Callable
 from dataclasses import dataclass, fields, is_dataclass
 from functools import partial, wraps
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
-import numpy as np
 import typer
 
-from cdsm.cable import serpentine_cables
+import cdsm
 from cdsm.cli.output import reported
-from cdsm.elasticity import Elasticity, LinearElasticity
-from cdsm.geometry import Geometry
-from cdsm.interchange.cable_file import read_cables
-from cdsm.interchange.caspr import read_caspr
-from cdsm.manipulator import Manipulator
-from cdsm.posture import Posture
-from cdsm.presets import STRAND_1X19
-from cdsm.support.format import JointUnits
-from cdsm.support.values import Array
-from cdsm.tension import DEFAULT_SOLVER, Tension, distribute_tension
-from cdsm.wires.files import read_elasticity
+
+if TYPE_CHECKING:
+    from cdsm.support.values import Array
+
+DEFAULT_SOLVER: Final = "daqp"
+"""As in :mod:`cdsm.tension`, which the help pages do not wait for."""
 
 _arm_option = partial(typer.Option, rich_help_panel="The arm")
 _tension_option = partial(typer.Option, rich_help_panel="Tensions and load")
@@ -80,7 +74,7 @@ class ArmOptions:
         str, _arm_option(help="In m/s², base axes: GX,GY,GZ.", metavar="GX,GY,GZ")
     ] = "0,0,-9.81"
 
-    def read(self) -> Manipulator:
+    def read(self) -> cdsm.Manipulator:
         """Build the arm from its files and options."""
         gravity = numbers("--gravity", self.gravity, 3)
         if self.arm.suffix.lower() == ".urdf":
@@ -88,22 +82,22 @@ class ArmOptions:
                 missing = "--cables" if self.cables is None else "--tip"
                 raise typer.BadParameter("a robot in a .urdf needs it.", param_hint=missing)
             self._refuse("the file of --cables has the wires", "rigidity", "wire", "spring")
-            cables = read_cables(self.cables)
-            return Manipulator.from_urdf(self.arm, cables, tip=self.tip, gravity=gravity)
+            cables = cdsm.read_cables(self.cables)
+            return cdsm.Manipulator.from_urdf(self.arm, cables, tip=self.tip, gravity=gravity)
         self._refuse("the tip of a .urdf is free, that of others is not", "tip")
         if self.arm.is_dir():
             self._refuse("a CASPR model has its own cables", "cables", "spring")
-            return read_caspr(self.arm, elasticity=self._elasticity(), gravity=gravity)
-        geometry = Geometry.read(self.arm)
+            return cdsm.read_caspr(self.arm, elasticity=self._elasticity(), gravity=gravity)
+        geometry = cdsm.Geometry.read(self.arm)
         if self.cables is not None:
             self._refuse("the file of --cables has the wires", "rigidity", "wire", "spring")
-            return Manipulator(geometry, cables=read_cables(self.cables), gravity=gravity)
-        routed = serpentine_cables(
+            return cdsm.Manipulator(geometry, cables=cdsm.read_cables(self.cables), gravity=gravity)
+        routed = cdsm.serpentine_cables(
             geometry, self._elasticity(), series_stiffness=1000.0 * self.spring
         )
-        return Manipulator(geometry, cables=routed, gravity=gravity)
+        return cdsm.Manipulator(geometry, cables=routed, gravity=gravity)
 
-    def at(self, angles: str) -> Posture:
+    def at(self, angles: str) -> cdsm.Posture:
         """Return the posture at joint coordinates [degrees, or mm if a joint slides]."""
         arm, given = self.read(), numbers("--angles", angles)
         given = given * arm.nv if len(given) == 1 else given
@@ -113,7 +107,7 @@ class ArmOptions:
                 f"{len(given)} given; give one angle, or one for each of {names}.",
                 param_hint="--angles",
             )
-        return arm.at(np.array(given) * joint_scales(arm))
+        return arm.at(given * joint_scales(arm))
 
     def _refuse(self, why: str, *names: str) -> None:
         """Raise BadParameter for options that this kind of arm would ignore."""
@@ -121,12 +115,14 @@ class ArmOptions:
             if field.name in names and getattr(self, field.name) != field.default:
                 raise typer.BadParameter(f"{why}; leave it out.", param_hint=f"--{field.name}")
 
-    def _elasticity(self) -> Elasticity:
+    def _elasticity(self) -> cdsm.Elasticity:
         if self.rigidity is not None and self.wire is not None:
             raise typer.BadParameter("give it or --wire, not both.", param_hint="--rigidity")
         if self.wire is not None:
-            return read_elasticity(self.wire)
-        return STRAND_1X19 if self.rigidity is None else LinearElasticity(self.rigidity)
+            return cdsm.read_elasticity(self.wire)
+        if self.rigidity is not None:
+            return cdsm.LinearElasticity(self.rigidity)
+        return cdsm.presets.STRAND_1X19
 
 
 @dataclass(frozen=True)
@@ -138,10 +134,10 @@ class TensionOptions:
     wrench: Wrench = NO_WRENCH
     solver: Solver = DEFAULT_SOLVER
 
-    def distribute(self, pose: Posture) -> Tension:
+    def distribute(self, pose: cdsm.Posture) -> cdsm.Tension:
         """Compute the tensions at a posture."""
         load = numbers("--wrench", self.wrench, 6)
-        return distribute_tension(pose, self.min_tension, self.max_tension, load, self.solver)
+        return cdsm.distribute_tension(pose, self.min_tension, self.max_tension, load, self.solver)
 
 
 def as_command(function: Callable[..., None]) -> Callable[..., None]:
@@ -172,8 +168,12 @@ def as_command(function: Callable[..., None]) -> Callable[..., None]:
     return command
 
 
-def joint_scales(arm: Manipulator) -> Array:
+def joint_scales(arm: cdsm.Manipulator) -> Array:
     """Return the command-line unit of each joint (nv,) in SI: one degree [rad] or one mm [m]."""
+    import numpy as np
+
+    from cdsm.support.format import JointUnits
+
     return np.array([scale for _, scale in JointUnits(arm.slides).shown])
 
 

@@ -7,29 +7,35 @@ import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from functools import cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import numpy as np
 import typer
-from rich.console import Console
 
-from cdsm.errors import CdsmError
-from cdsm.manipulator import Manipulator
-from cdsm.support.files import write_file
-from cdsm.support.format import JointUnits
-from cdsm.support.values import Array
+import cdsm
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from cdsm.support.values import Array
 
 Json = dict[str, object]
 """Numbers of an answer in SI, with units in the keys. Arrays and infinite numbers are allowed."""
-
-console = Console(stderr=True)
-"""Console for progress and errors. Answers go to standard output."""
 
 debug_wanted: ContextVar[bool] = ContextVar("debug_wanted", default=False)
 """Whether the running command shows tracebacks."""
 
 UNMET = 3
 """Exit code of a negative answer (unstable, untrusted, infeasible); 1: error, 2: wrong option."""
+
+
+@cache
+def console() -> Console:
+    """Return the console for progress and errors. Answers go to standard output."""
+    from rich.console import Console
+
+    return Console(stderr=True)
 
 
 def answer(as_json: bool, as_dict: Callable[[], Json], *parts: object) -> None:
@@ -44,19 +50,21 @@ def _plain(value: object) -> object:
     """Turn arrays and tuples into lists, and infinite numbers into null."""
     if isinstance(value, dict):
         return {name: _plain(each) for name, each in value.items()}
-    if isinstance(value, np.ndarray):
+    if hasattr(value, "tolist"):  # an array
         return _plain(value.tolist())
     if isinstance(value, (list, tuple)):
         return [_plain(each) for each in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def joints(arm: Manipulator, q: Array) -> Json:
+def joints(arm: cdsm.Manipulator, q: Array) -> Json:
     """Return joint coordinates q (..., nv) by joint name, for JSON."""
+    from cdsm.support.format import JointUnits
+
     return JointUnits(arm.slides).to_dict(arm.joint_names, q)
 
 
-def by_cable(arm: Manipulator, values: Array) -> Json:
+def by_cable(arm: cdsm.Manipulator, values: Array) -> Json:
     """Return one number per cable (C,) by the name of the cable, for JSON."""
     return dict(zip((cable.name for cable in arm.cables), values.tolist(), strict=True))
 
@@ -64,9 +72,9 @@ def by_cable(arm: Manipulator, values: Array) -> Json:
 def write_picture(path: Path | None, draw: str, *results: object, err: bool = True) -> None:
     """Draw results with the function ``draw`` of :mod:`cdsm.plots`, if a path is given."""
     if path is not None:
-        from cdsm import plots  # imports matplotlib, so on demand
+        from cdsm.support.files import write_file
 
-        figure = getattr(plots, draw)(*results)
+        figure = getattr(cdsm.plots, draw)(*results)
         typer.echo(f"written: {write_file(path, figure.savefig)}", err=err)
 
 
@@ -75,11 +83,14 @@ def reported() -> Iterator[None]:
     """Turn an error into a message and exit code 1, Ctrl-C into 130; --debug changes nothing."""
     try:
         yield
-    except (KeyboardInterrupt, CdsmError, OSError) as error:  # OSError: of the terminal or pipe
+    # OSError: of the terminal or pipe
+    except (KeyboardInterrupt, cdsm.CdsmError, OSError) as error:
         if debug_wanted.get():
             raise
         if isinstance(error, KeyboardInterrupt):
-            console.print("interrupted: no file is half-written, and what --resume keeps stays")
+            console().print("interrupted: no file is half-written, and what --resume keeps stays")
             raise typer.Exit(130) from None
-        console.print(f"error: {error}", style="red", markup=False, highlight=False, soft_wrap=True)
+        console().print(
+            f"error: {error}", style="red", markup=False, highlight=False, soft_wrap=True
+        )
         raise typer.Exit(1) from None

@@ -8,14 +8,10 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
-from rich.progress import track
-from rich.table import Table
 
-from cdsm import paper
+import cdsm
 from cdsm.cli.options import AsJson
 from cdsm.cli.output import console
-from cdsm.support.files import make_folder, write_file, write_text
 
 _WIDE = 110
 """Smallest width of the terminal for the table of claims; below it, a claim is a few lines."""
@@ -28,14 +24,18 @@ def reproduce(
     as_json: AsJson = False,
 ) -> None:
     """Recompute Figs. 3 to 13 of the paper: pictures, table and numbers."""
-    from cdsm.plots import plot_paper  # imports matplotlib, so on demand
+    from rich.progress import track
 
+    from cdsm.support.files import make_folder, write_file, write_text
+
+    paper = cdsm.paper
     make_folder(out)
     results, written = [], []
-    for compute in track(paper.FIGURES.values(), "recomputing the paper", console=console):
+    for compute in track(paper.FIGURES.values(), "recomputing the paper", console=console()):
         result = compute()
         results.append(result)
-        written.append(write_file(out / f"{result.name}.png", plot_paper(result).savefig))
+        figure = cdsm.plots.plot_paper(result)
+        written.append(write_file(out / f"{result.name}.png", figure.savefig))
     written.append(write_text(out / "reproduction.md", paper.to_markdown(results)))
     numbers = json.dumps(paper.to_dict(results), indent=1, allow_nan=False)
     written.append(write_text(out / "reproduction.json", numbers + "\n"))
@@ -49,6 +49,9 @@ def reproduce(
 
 def _show(header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     """Print a table on a wide terminal, else a few lines for each row."""
+    from rich.console import Console
+    from rich.table import Table
+
     screen = Console()
     if screen.width >= _WIDE:
         table = Table(*header)

@@ -4,24 +4,17 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+import cdsm
 from cdsm.cli import options
 from cdsm.cli.options import ArmOptions, AsJson, MaxTension, MinTension, Picture, numbers
 from cdsm.cli.output import UNMET, Json, answer, by_cable, console, joints, write_picture
-from cdsm.cli.path_file import read_path
-from cdsm.planning import (
-    PathPlan,
-    StiffnessPlan,
-    StiffnessRange,
-    plan_path,
-    plan_stiffness,
-    stiffness_range,
-)
-from cdsm.support.format import key
-from cdsm.support.values import Array
+
+if TYPE_CHECKING:
+    from cdsm.support.values import Array
 
 
 def plan(
@@ -69,11 +62,15 @@ def plan(
     wanted = None if target is None else 1000.0 * target
     drawn: tuple[object, ...]
     if path is not None:
+        from cdsm.cli.path_file import read_path
+
         robot = arm.read()
         file = read_path(path, robot)
         targets = _one_target(wanted, file.target)
-        plan = plan_path(robot, u, targets, *bounds, angles=file.angles, tips=file.tips, rate=rate)
-        with console.status("looking half-way between the samples"):
+        plan = cdsm.plan_path(
+            robot, u, targets, *bounds, angles=file.angles, tips=file.tips, rate=rate
+        )
+        with console().status("looking half-way between the samples"):
             _ = plan.between
         answer(as_json, lambda: _path_numbers(plan), robot, plan)
         draw, drawn = "plot_path_plan", (plan,)
@@ -83,12 +80,12 @@ def plan(
         raise typer.BadParameter("is of a path; give --path, too.", param_hint="--rate")
     else:
         pose = arm.at("0" if angles is None else angles)
-        attainable = stiffness_range(pose, u, *bounds)
-        best = plan_stiffness(pose, u, wanted, *bounds)
+        attainable = cdsm.stiffness_range(pose, u, *bounds)
+        best = cdsm.plan_stiffness(pose, u, wanted, *bounds)
         answer(as_json, lambda: _numbers(best, attainable), pose.arm, attainable, best)
         draw, drawn = "plot_stiffness_plan", (best, attainable)
         if out is not None:  # repeats the search as a path of one sample
-            plan = plan_path(pose.arm, u, wanted, *bounds, angles=[pose.q])
+            plan = cdsm.plan_path(pose.arm, u, wanted, *bounds, angles=[pose.q])
     if out is not None:
         typer.echo(f"written: {plan.write_csv(out)}", err=as_json)
     write_picture(figure, draw, *drawn, err=as_json)
@@ -109,7 +106,9 @@ def _one_target(given: float | None, of_file: Array | None) -> float | Array:
     )
 
 
-def _numbers(plan: StiffnessPlan, attainable: StiffnessRange) -> Json:
+def _numbers(plan: cdsm.StiffnessPlan, attainable: cdsm.StiffnessRange) -> Json:
+    from cdsm.support.format import key
+
     pose, arm = plan.tension.posture, plan.tension.posture.arm
     return {
         "direction": attainable.direction,
@@ -126,7 +125,7 @@ def _numbers(plan: StiffnessPlan, attainable: StiffnessRange) -> Json:
     }
 
 
-def _path_numbers(plan: PathPlan) -> Json:
+def _path_numbers(plan: cdsm.PathPlan) -> Json:
     return {
         "cables": [cable.name for cable in plan.arm.cables],
         "target_N_per_m": plan.target,

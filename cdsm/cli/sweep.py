@@ -7,25 +7,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
 import typer
 
+import cdsm
 from cdsm.cli import options
 from cdsm.cli.options import ArmOptions, AsJson, joint_scales, numbers
 from cdsm.cli.output import Json, answer
-from cdsm.cli.path_file import read_path
-from cdsm.errors import FileError
-from cdsm.manipulator import Manipulator
-from cdsm.support.datasets import status_names
-from cdsm.support.files import write_file
-from cdsm.support.values import Array
-from cdsm.sweeps import GridPoses, PathPoses, PoseSet, RandomPoses, read_sweep, write_sweep
-from cdsm.sweeps import sweep as run
-from cdsm.sweeps.export import check_target
 from cdsm.sweeps.quantities import DEFAULT, QUANTITIES
 
 if TYPE_CHECKING:
     import xarray
+
+    from cdsm.support.values import Array
 
 
 @dataclass(frozen=True)
@@ -56,7 +49,7 @@ class PoseOptions:
     ] = None
     seed: Annotated[int | None, typer.Option(help="Of --random; 0.")] = None
 
-    def read(self, arm: Manipulator) -> PoseSet:
+    def read(self, arm: cdsm.Manipulator) -> cdsm.PoseSet:
         """Build the set of postures from its options."""
         if sum(given is not None for given in (self.grid, self.path, self.random)) != 1:
             raise typer.BadParameter("give one of --grid, --path and --random.", param_hint="poses")
@@ -69,13 +62,15 @@ class PoseOptions:
         if self.grid is not None:
             return _grid(self.grid, arm)
         if self.path is not None:
+            from cdsm.cli.path_file import read_path
+
             file = read_path(self.path, arm)
             if file.angles is None or file.target is not None:
-                raise FileError(
+                raise cdsm.FileError(
                     self.path, "holds tips or targets; a sweep goes along joint angles."
                 )
-            return PathPoses(file.angles, self.count)
-        return RandomPoses(self.random or 0, self.seed or 0)
+            return cdsm.PathPoses(file.angles, self.count)
+        return cdsm.RandomPoses(self.random or 0, self.seed or 0)
 
 
 def sweep(
@@ -100,11 +95,13 @@ def sweep(
     as_json: AsJson = False,
 ) -> None:
     """Stiffness over a grid, a path or random postures, under one or several tension bounds."""
+    from cdsm.sweeps.export import check_target
+
     robot = arm.read()
     wanted = poses.read(robot)
     check_target(out)  # before the long computation
     low = numbers("--min-tension", min_tension)
-    dataset = run(
+    dataset = cdsm.sweep(
         robot,
         wanted,
         minimum=low[0] if len(low) == 1 else low,
@@ -113,7 +110,7 @@ def sweep(
         outputs=[name.strip() for name in quantities.split(",")],
         store=resume,
     )
-    _answer(as_json, dataset, write_sweep(dataset, out), summary=True)
+    _answer(as_json, dataset, cdsm.write_sweep(dataset, out), summary=True)
 
 
 def map_sweep(
@@ -137,20 +134,22 @@ def map_sweep(
     as_json: AsJson = False,
 ) -> None:
     """Colour the reachable workspace by a quantity of a sweep."""
-    dataset = read_sweep(sweep)
-    from cdsm.plots import plot_map  # imports matplotlib, so on demand
+    from cdsm.support.files import write_file
 
+    dataset = cdsm.read_sweep(sweep)
     slab = None
     if section is not None:
         axis, _, rest = section.partition("=")
         place, half = numbers("--section", rest.replace(":", " "), 2)
         slab = (axis.strip(), place / 1000.0, half / 1000.0)
-    figure = plot_map(dataset, quantity, section=slab)
+    figure = cdsm.plots.plot_map(dataset, quantity, section=slab)
     _answer(as_json, dataset, write_file(out, figure.savefig), summary=False)
 
 
-def _grid(text: str, arm: Manipulator) -> GridPoses:
+def _grid(text: str, arm: cdsm.Manipulator) -> cdsm.GridPoses:
     """Read a grid such as ``joint1=-20:20:9,joint2=5``, in degrees, or mm if a joint slides."""
+    import numpy as np
+
     units = dict(zip(arm.joint_names, joint_scales(arm), strict=True))
     angles: dict[str, Array] = {}
     rest: dict[str, float] = {}
@@ -169,10 +168,12 @@ def _grid(text: str, arm: Manipulator) -> GridPoses:
                 f"{part!r} given; a joint is JOINT=LOW:HIGH:COUNT or JOINT=ANGLE.",
                 param_hint="--grid",
             )
-    return GridPoses(angles, rest)
+    return cdsm.GridPoses(angles, rest)
 
 
 def _answer(as_json: bool, dataset: xarray.Dataset, written: Path, *, summary: bool) -> None:
+    from cdsm.support.datasets import status_names
+
     status = dataset["status"].values
     words = status_names(dataset)
     counts = {word: int((status == value).sum()) for value, word in words.items()}

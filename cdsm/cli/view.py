@@ -9,9 +9,18 @@ from typing import Annotated
 
 import typer
 
-from cdsm.cli.options import Angles, ArmOptions, AsJson, MaxTension, MinTension, Solver, numbers
+import cdsm
+from cdsm.cli.options import (
+    DEFAULT_SOLVER,
+    Angles,
+    ArmOptions,
+    AsJson,
+    MaxTension,
+    MinTension,
+    Solver,
+    numbers,
+)
 from cdsm.cli.output import answer
-from cdsm.tension import DEFAULT_SOLVER
 
 
 def view(
@@ -44,10 +53,8 @@ def view(
 ) -> None:
     """Show an arm in the browser, live: move joints, tension and load; see how stiff it is."""
     with contextlib.suppress(KeyboardInterrupt):  # Ctrl-C ends the view, also while it starts
-        from cdsm.view import serve  # imports matplotlib and viser (if installed), so on demand
-
         pose = arm.at(angles)
-        with serve(
+        with cdsm.view.serve(
             pose.arm,
             host=host,
             port=port,

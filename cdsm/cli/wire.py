@@ -7,12 +7,9 @@ from typing import Annotated
 
 import typer
 
+import cdsm
 from cdsm.cli.options import AsJson, Picture
 from cdsm.cli.output import Json, answer, console
-from cdsm.support.files import write_file
-from cdsm.wires.files import write_elasticity
-from cdsm.wires.tensile.fit import TensileFit, fit_tensile_test
-from cdsm.wires.tensile.record import read_tensile_csv
 
 
 def fit(
@@ -32,17 +29,19 @@ def fit(
 ) -> None:
     """Fit the rigidity of a wire to its tensile test: report, and if wanted figure and TOML."""
     length = None if gauge_length is None else gauge_length / 1000.0
-    data = read_tensile_csv(test, gauge_length=length)
-    with console.status("fitting"):
-        fitted = fit_tensile_test(data.displacement, data.force, data.gauge_length, method)
+    data = cdsm.read_tensile_csv(test, gauge_length=length)
+    with console().status("fitting"):
+        fitted = cdsm.fit_tensile_test(data.displacement, data.force, data.gauge_length, method)
     if out is not None:
-        typer.echo(f"written: {write_elasticity(fitted.elasticity, out)}", err=True)
+        typer.echo(f"written: {cdsm.write_elasticity(fitted.elasticity, out)}", err=True)
     if figure is not None:
+        from cdsm.support.files import write_file
+
         typer.echo(f"written: {write_file(figure, fitted.plot().savefig)}", err=True)
     answer(as_json, lambda: _numbers(fitted), fitted)
 
 
-def _numbers(fit: TensileFit) -> Json:
+def _numbers(fit: cdsm.TensileFit) -> Json:
     return {
         "method": fit.method,
         "gauge_length_m": fit.test.gauge_length,

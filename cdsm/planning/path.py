@@ -7,8 +7,6 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
-from rich.console import Console
-from rich.progress import track
 
 from cdsm import errors
 from cdsm.errors import CdsmError, InvalidInput
@@ -97,6 +95,9 @@ def plan_path(
             finite or is zero; a target or a rate is not positive; ``minimum`` exceeds ``maximum``;
             or another argument is invalid.
     """
+    from rich.console import Console  # slow to import
+    from rich.progress import track
+
     instance("arm", arm, Manipulator)
     path = _checked_path(arm, angles, tips)
     if tips is None and guess is not None:

@@ -16,7 +16,9 @@ from cdsm.support.format import coordinates
 from cdsm.support.values import Array
 
 if TYPE_CHECKING:
-    from cdsm.planning import PathPlan, StiffnessPlan, StiffnessRange
+    from cdsm.planning.path_plan import PathPlan
+    from cdsm.planning.plan import StiffnessPlan
+    from cdsm.planning.range import StiffnessRange
 
 _SAME = 1e-9
 """Largest difference between the entries of two equal unit directions."""

@@ -14,7 +14,8 @@ from cdsm.elasticity import Elasticity
 from cdsm.kernels.principal import principal_stiffness
 from cdsm.manipulator import Manipulator
 from cdsm.support.values import Array, ReadOnlyState
-from cdsm.sweeps.quantities import LOST, QUANTITIES, SweepStatus
+from cdsm.sweeps.quantities import QUANTITIES
+from cdsm.sweeps.status import LOST, SweepStatus
 
 BlockResult = dict[str, NDArray[Any]]
 """Outputs and ``status`` by name; the first axis is the posture, the next axes are the cases."""

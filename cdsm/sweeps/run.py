@@ -20,8 +20,9 @@ from cdsm.sweeps.blocks import Block, blocks, extents, postures
 from cdsm.sweeps.cluster import checked_client, on_cluster
 from cdsm.sweeps.evaluation import BlockResult, evaluate
 from cdsm.sweeps.poses import PoseSet
-from cdsm.sweeps.quantities import DEFAULT, SweepStatus
+from cdsm.sweeps.quantities import DEFAULT
 from cdsm.sweeps.specification import Specification, specify
+from cdsm.sweeps.status import SweepStatus
 
 if TYPE_CHECKING:
     import xarray

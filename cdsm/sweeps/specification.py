@@ -20,7 +20,8 @@ from cdsm.sweeps.blocks import Block
 from cdsm.sweeps.description import attributes_of, law_text
 from cdsm.sweeps.evaluation import SweepTask
 from cdsm.sweeps.poses import Poses, PoseSet, poses_of
-from cdsm.sweeps.quantities import LOST, QUANTITIES, Quantity, SweepStatus
+from cdsm.sweeps.quantities import QUANTITIES, Quantity
+from cdsm.sweeps.status import LOST, SweepStatus
 
 if TYPE_CHECKING:
     import xarray

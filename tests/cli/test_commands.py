@@ -13,7 +13,8 @@ import pytest
 from typer.testing import CliRunner, Result
 
 import cdsm
-from cdsm.cli import app
+from cdsm.cli import app, options
+from cdsm.tension import DEFAULT_SOLVER
 from tests.interchange.test_caspr import cable, folder, link
 from tests.support.patience import HANGS
 
@@ -531,6 +532,10 @@ def test_folder_of_a_caspr_model_is_an_arm(tmp_path: Path) -> None:
     result = call("sweep", model, "--random", 4, "--rigidity", 2e4, "-o", tmp_path / "s.csv")
     assert result.exit_code == 0, result.output
     assert "stiffness sweep of toy" in result.output
+
+
+def test_default_solver_of_the_commands_is_that_of_the_library() -> None:
+    assert options.DEFAULT_SOLVER == DEFAULT_SOLVER
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,8 @@ from cdsm.support.values import Array
 from cdsm.sweeps.blocks import blocks, extents, postures
 from cdsm.sweeps.description import law_text
 from cdsm.sweeps.evaluation import _BATCH_NAMES
-from cdsm.sweeps.quantities import LOST, QUANTITIES
+from cdsm.sweeps.quantities import QUANTITIES
+from cdsm.sweeps.status import LOST
 from tests.support.sweeps import CASES, EVERYTHING, GRID, LAWS, STEEL, WRENCHES, short_arm
 
 Status = cdsm.SweepStatus

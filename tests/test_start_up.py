@@ -1,0 +1,84 @@
+"""What is imported when: names of cdsm when touched, heavy libraries where they are used."""
+
+import ast
+import inspect
+import subprocess
+import sys
+
+import pytest
+
+import cdsm
+from tests.benchmarks.test_start_up_speed import FIRST_STIFFNESS
+from tests.support.patience import HANGS
+from tests.support.processes import ROOT
+
+SOLVERS = {"qpsolvers", "scipy.optimize", "scipy.sparse.linalg", "daqp"}
+SCREEN = {"matplotlib", "rich", "viser", "xarray", "zarr"}
+OF_FILES = {"trimesh", "yourdfpy"}
+NUMERICS = {"lxml", "numba", "numpy", "pinocchio", "scipy"}
+
+HELP = """
+from cdsm.cli import app
+import contextlib, io
+commands = [each.name for each in app.registered_commands]
+for arguments in ["--version"], ["--help"], *([name, "--help"] for name in commands):
+    with contextlib.redirect_stdout(io.StringIO()), contextlib.suppress(SystemExit):
+        app(arguments)
+"""
+
+
+@pytest.mark.parametrize(
+    ("program", "absent"),
+    [
+        pytest.param(
+            "import cdsm", NUMERICS | SOLVERS | SCREEN | OF_FILES | {"pydantic"}, id="cdsm"
+        ),
+        pytest.param(
+            FIRST_STIFFNESS, SOLVERS | SCREEN | OF_FILES | {"cdsm.report"}, id="stiffness"
+        ),
+        pytest.param(HELP, NUMERICS | SOLVERS | OF_FILES | {"matplotlib"}, id="help"),
+    ],
+)
+def test_nothing_is_imported_that_is_not_used(program: str, absent: set[str]) -> None:
+    command = [sys.executable, "-c", f"{program}\nimport sys; print(*sys.modules)"]
+    done = subprocess.run(
+        command, cwd=ROOT, capture_output=True, text=True, timeout=HANGS, check=True
+    )
+    assert not absent & set(done.stdout.split())
+
+
+def test_names_for_type_checkers_are_those_found_at_run_time() -> None:
+    imports = {
+        alias.name: node.module
+        for node in ast.walk(ast.parse(inspect.getsource(cdsm)))
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("cdsm.")
+        for alias in node.names
+    }
+    assert imports == cdsm._HOME
+    assert {*imports, "presets"} == set(cdsm.__all__)
+
+
+def test_dir_shows_the_public_names_and_modules_only() -> None:
+    assert dir(cdsm) == sorted({*cdsm.__all__, "paper", "plots", "view"})
+
+
+def test_modules_are_there_without_an_import_of_their_own() -> None:
+    program = (
+        "import cdsm; cdsm.plots.plot_map, cdsm.view.serve, cdsm.paper.FIGURES, cdsm.__version__"
+    )
+    subprocess.run([sys.executable, "-c", program], cwd=ROOT, timeout=HANGS, check=True)
+
+
+def test_all_names_come_by_a_star() -> None:
+    namespace: dict[str, object] = {}
+    exec("from cdsm import *", namespace)
+    assert set(cdsm.__all__) <= namespace.keys()
+
+
+def test_a_wrong_name_is_an_attribute_error_that_knows_a_near_one() -> None:
+    program = "import cdsm; cdsm.stifness"
+    command = [sys.executable, "-c", program]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=HANGS)
+    assert "AttributeError: module 'cdsm' has no attribute 'stifness'" in done.stderr
+    assert "Did you mean: 'stiffness'?" in done.stderr
+    assert not hasattr(cdsm, "stifness")
