@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ from cdsm.cable import Cable
 from cdsm.cable_laws import CableLaws, OriginalLength
 from cdsm.errors import CableError, UnknownName
 from cdsm.kernels import segments
+from cdsm.kernels.serpentine_guess import find_blocks
 from cdsm.kernels.tree import Routing, Tree
 from cdsm.rigid_body import RigidBody
 from cdsm.support.values import Array, frozen
@@ -32,7 +34,9 @@ class ArmModel:
         tree: Kinematic tree of the joints.
         routing: Cable sites and segments.
         masses: Masses that the joints carry, and the position of the tip.
+        blocks: Blocks of joints and cables, from which tensions are guessed.
         laws: Elasticities of the cables.
+        arrays: The fields of tree, routing and masses, as the kernel of one posture takes them.
         lowest: Lower joint limits (nv,) [rad], minus the rounding tolerance.
         highest: Upper joint limits (nv,) [rad], plus the rounding tolerance.
     """
@@ -44,6 +48,8 @@ class ArmModel:
         self.laws = CableLaws(cables, original_length)
         self.laws.require_continuity()
         self.routing = route(body, self.tree, cables)
+        self.blocks = find_blocks(self.routing, body.nv)
+        self.arrays: tuple[Any, ...] = (*self.tree, *self.routing, *self.masses)
         self.lowest = frozen(body.lower - _LIMIT_SLACK)
         self.highest = frozen(body.upper + _LIMIT_SLACK)
 

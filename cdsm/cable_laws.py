@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from cdsm.cable import Cable
 from cdsm.elasticity import Elasticity, LinearElasticity
 from cdsm.errors import ElasticityRangeError, InvalidInput
-from cdsm.kernels.stiffness import cable_stiffness
+from cdsm.kernels.stiffness import single_cable_stiffness
 from cdsm.support.validation import LARGEST, RANGES
 from cdsm.support.values import Array, frozen
 from cdsm.wires.continuity import find_jump
@@ -62,13 +62,13 @@ class CableLaws:
         self.series = frozen(1.0 / series)
         self.rest = frozen(np.array([cable.elasticity.domain.low for cable in self._cables]))
         # constant EA of linear laws; all other laws are evaluated at each tension
-        constant, linear, self._asked = np.zeros(len(self._cables)), np.zeros(len(self._cables)), []
+        constant, linear, self.asked = np.zeros(len(self._cables)), np.zeros(len(self._cables)), []
         for law, of in self.held:
             if isinstance(law, LinearElasticity):
                 constant[of], linear[of] = law.rigidity(0.0), float(self._unstrained)
             else:
-                self._asked.append((law, of))
-        self._constant, self._linear = frozen(constant), frozen(linear)
+                self.asked.append((law, of))
+        self.constant, self.linear = frozen(constant), frozen(linear)
 
     def require_continuity(self) -> None:
         """Raise InvalidInput if the rigidity of a law jumps."""
@@ -95,15 +95,15 @@ class CableLaws:
         Force-controlled cables have the stiffness 0. The lengths L (C,) [m] and the tensions (C,)
         [N] must be checked before, and no tension may be negative.
         """
-        rigidity = self._constant
-        if self._asked:
+        rigidity = self.constant
+        if self.asked:
             rigidity = rigidity.copy()
-            for law, held in self._asked:
+            for law, held in self.asked:
                 try:
                     rigidity[held] = self.stretched_rigidity(law, tension[held])
                 except ElasticityRangeError as error:
                     raise self.naming(error, held) from None
-        k = cable_stiffness(lengths, tension, rigidity, self._linear, self.series, self.rest)
+        k = single_cable_stiffness(lengths, tension, rigidity, self.linear, self.series, self.rest)
         return frozen(k)
 
     def stretched_rigidity(self, law: Elasticity, tension: Array) -> Array:

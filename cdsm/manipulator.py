@@ -10,7 +10,7 @@ import os
 from collections import Counter
 from collections.abc import Sequence
 from functools import cached_property
-from typing import NamedTuple, final, get_args
+from typing import Any, NamedTuple, final, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,9 +21,10 @@ from cdsm.cable_laws import OriginalLength
 from cdsm.elasticity import Elasticity
 from cdsm.errors import CableError, InvalidInput, JointLimitError
 from cdsm.geometry import Geometry
-from cdsm.kernels import segments
+from cdsm.kernels.posture import single_pose
+from cdsm.kernels.segments import SHORTEST_SEGMENT
 from cdsm.kernels.tree import Frames
-from cdsm.posture import Posture
+from cdsm.posture import Posture, site_paths
 from cdsm.rigid_body import RigidBody
 from cdsm.support.format import JointUnits
 from cdsm.support.validation import flag, instance, one_of, sequence_of, vector
@@ -296,20 +297,17 @@ class Manipulator(Printed):
             CableError: Two neighbouring sites of a cable coincide at this posture.
         """
         q = self._angles(q, check_limits)
-        state = self._model.body.state(q)
-        # Pinocchio returns one Python object per joint frame: 14 µs for ten joints. The kernel
-        # computes all joint frames and cable sites in 2 µs. A test compares the two.
-        frames, lengths, length_jacobian = self._routed(q)
+        tip, jacobian, lengths, length_jacobian, torque, stiffness, *frames = self._pose(q)
         return Posture(
             arm=self,
             q=q,
-            tip=frozen(state.tip),
-            jacobian=frozen(state.jacobian),
-            cable_lengths=lengths,
-            length_jacobian=length_jacobian,
-            gravity_torque=frozen(state.gravity_torque),
-            gravity_stiffness=frozen(state.gravity_stiffness),
-            _frames=frames,
+            tip=frozen(tip),
+            jacobian=frozen(jacobian),
+            cable_lengths=frozen(lengths),
+            length_jacobian=frozen(length_jacobian),
+            gravity_torque=frozen(torque),
+            gravity_stiffness=frozen(stiffness),
+            _frames=Frames(*map(frozen, frames)),
         )
 
     def cable_lengths(self, q: ArrayLike, *, check_limits: bool = True) -> Array:
@@ -318,7 +316,7 @@ class Manipulator(Printed):
         The lead is the straight cable between its actuator and the base disk. Arguments and errors
         are those of :meth:`at`.
         """
-        return self._routed(self._angles(q, check_limits))[1]
+        return frozen(self._pose(self._angles(q, check_limits))[2])
 
     def _angles(self, q: ArrayLike, check_limits: bool) -> Array:
         """Check joint angles (nv,) [rad] and return them read-only."""
@@ -339,19 +337,20 @@ class Manipulator(Printed):
         coordinate = "angle [rad] or way [m]" if self.slides.any() else "angle [rad]"
         return f"one {coordinate} per joint, {', '.join(self.joint_names)}"
 
-    def _routed(self, q: Array) -> tuple[Frames, Array, Array]:
-        """Compute the joint frames, the cable sites, L and J_L at checked joint angles."""
-        routing = self._model.routing
-        *arrays, lengths, length_jacobian, coincident = segments.cable_kinematics(
-            *self._model.tree, *routing, q
-        )
-        if coincident >= 0:
-            raise CableError(
-                self.cables[routing.segment[coincident, 0]].name,
-                f"two neighbouring sites coincide at q = {q.tolist()}, so the cable has no "
-                "direction there. Move a site, or change the posture.",
-            )
-        return Frames(*map(frozen, arrays)), frozen(lengths), frozen(length_jacobian)
+    def _pose(self, q: Array) -> tuple[Array, ...]:
+        """Compute all but the last result of :func:`single_pose` at checked joint angles."""
+        arguments: tuple[Any, ...] = (*self._model.arrays, q)
+        *pose, shortest = single_pose(*arguments)
+        if shortest < SHORTEST_SEGMENT:
+            site = pose[-1]
+            for cable, path in zip(self.cables, site_paths(self.cables, site), strict=True):
+                if (np.linalg.norm(np.diff(path, axis=0), axis=1) < SHORTEST_SEGMENT).any():
+                    raise CableError(
+                        cable.name,
+                        f"two neighbouring sites coincide at q = {q.tolist()}, so the cable has "
+                        "no direction there. Move a site, or change the posture.",
+                    )
+        return tuple(pose)
 
 
 def _checked_cables(cables: Sequence[Cable]) -> tuple[Cable, ...]:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, final
 
 import numpy as np
 
+from cdsm.cable import Cable
 from cdsm.kernels import segments
 from cdsm.kernels import stiffness as stiffness_kernels
 from cdsm.kernels.tree import Frames
@@ -53,19 +55,16 @@ class Posture(ReadOnlyState):
     @cached_property
     def length_hessian(self) -> Array:
         """H_L[c, i, j] = ∂²L_c/∂θ_i∂θ_j, (C, nv, nv) [m/rad²], computed on first use."""
-        count, nv = self.length_jacobian.shape
-        hessian = np.zeros((count, nv, nv))
-        routing, weight, slot = self.arm._model.routing, frozen(np.ones(count)), np.arange(count)
-        segments.add_length_hessian(
-            routing.segment, routing.joint, self._frames, weight, slot, hessian
+        routing, cables = self.arm._model.routing, len(self.cable_lengths)
+        hessian = segments.single_length_hessian(
+            routing.segment, routing.joint, *self._frames, cables
         )
         return frozen(hessian)
 
     @cached_property
     def cable_paths(self) -> tuple[Array, ...]:
         """Sites of each cable in base axes, one array (sites, 3) per cable [m]."""
-        counts = [len(cable.sites) for cable in self.arm.cables]
-        paths = np.split(self._frames.site, np.cumsum(counts)[:-1])
+        paths = site_paths(self.arm.cables, self._frames.site)
         return tuple(frozen(path.copy()) for path in paths)
 
     @property
@@ -115,7 +114,7 @@ class Posture(ReadOnlyState):
     ) -> tuple[Array, Array, Array, Array]:
         """Compute the active, passive and load terms and K_θ (nv, nv) from checked vectors."""
         model = self.arm._model
-        active, passive, load, joint = stiffness_kernels.joint_stiffness(
+        active, passive, load, joint = stiffness_kernels.single_stiffness(
             model.routing.segment,
             model.routing.joint,
             *self._frames,
@@ -128,6 +127,11 @@ class Posture(ReadOnlyState):
             model.masses.tip_joints,
         )
         return frozen(active), frozen(passive), frozen(load), frozen(joint)
+
+
+def site_paths(cables: Sequence[Cable], sites: Array) -> list[Array]:
+    """Divide the sites of all cables (P, 3) into one array for each cable."""
+    return np.split(sites, np.cumsum([len(cable.sites) for cable in cables])[:-1])
 
 
 def _foot(point: Array, line: Array) -> Array:

@@ -151,7 +151,7 @@ class Stiffness(ReadOnlyState):
         Raises:
             SingularStiffness: K_θ is singular: the arm is about to buckle.
         """
-        status, *_, compliance, _ = self._readings(compliance=True)
+        status, *_, compliance, _ = self._readings(self.joint, compliance=True)
         self._refuse(status)
         return frozen(compliance)
 
@@ -166,7 +166,7 @@ class Stiffness(ReadOnlyState):
             SingularStiffness: K_θ is singular, or the tip hardly moves in one direction. In the
                 second case the error names the direction; use :meth:`along` for other directions.
         """
-        status, *_, cartesian = self._readings(cartesian=True)
+        status, *_, cartesian = self._readings(self.joint, cartesian=True)
         self._refuse(status, "the Cartesian stiffness matrix")
         return frozen(cartesian)
 
@@ -204,7 +204,7 @@ class Stiffness(ReadOnlyState):
             SingularStiffness: The tip hardly moves in one direction, so J⁺ omits this direction.
         """
         matrix: Array = getattr(self, one_of("stiffness term", term, get_args(Term)))
-        status, result = readings.single_pseudoinverse(matrix, self.posture.jacobian)
+        status, result, *_ = self._readings(matrix, pseudoinverse=True)
         self._refuse(status, "the pseudo-inverse reading")
         return frozen(result)
 
@@ -292,7 +292,8 @@ class Stiffness(ReadOnlyState):
 
     def _require_mobile(self, u: Array) -> None:
         """Raise SingularStiffness if a force along a unit direction u (3,) moves no joint."""
-        if not readings.moves(self.posture.jacobian, u[None]):
+        rows = self.posture.jacobian[:3]
+        if not abs(u @ rows).max() > readings.UNMOVED * abs(rows).max():
             raise SingularStiffness(
                 f"the tip cannot move along {coordinates(u)}: the stiffness there "
                 "is infinite under any tension. Choose another direction, or bend the arm.",
@@ -301,41 +302,45 @@ class Stiffness(ReadOnlyState):
 
     def _along(self, u: Array) -> tuple[float, Array]:
         """Return stiffness along a unit direction [N/m] and joint motion per unit force (nv,)."""
-        status, along, motion, *_ = self._readings(u[None])
+        status, _, along, motion, *_ = self._readings(self.joint, u[None])
         if math.isnan(along[0]):
             self._refuse(status)
-        return float(along[0]), motion[:, 0]
+        return float(along[0]), motion[:, self.joint.shape[0] + 1]
+
+    @cached_property
+    def _parts(self) -> Array:
+        """Sum of the magnitudes of the four terms (nv, nv) [N m/rad]."""
+        parts = abs(self.active) + abs(self.passive) + abs(self.gravity) + abs(self.load)
+        return frozen(parts)
 
     def _readings(
-        self, directions: Array = _NO_DIRECTIONS, compliance: bool = False, cartesian: bool = False
-    ) -> tuple[int, Array, Array, Array, Array]:
+        self,
+        matrix: Array,
+        directions: Array = _NO_DIRECTIONS,
+        pseudoinverse: bool = False,
+        compliance: bool = False,
+        cartesian: bool = False,
+    ) -> tuple[int, Array, Array, Array, Array, Array]:
+        jacobian = self.posture.jacobian
         return readings.single_readings(
-            self.joint,
-            self.active,
-            self.passive,
-            self.gravity,
-            self.load,
-            self.posture.jacobian,
-            directions,
-            compliance,
-            cartesian,
+            matrix, self._parts, jacobian, directions, pseudoinverse, compliance, cartesian
         )
 
     def _refuse(self, status: int, what: str = "") -> None:
         """Raise an error if a reading does not exist; a named reading also needs a mobile tip."""
         if status == readings.READ:
             return
-        if what and (status == readings.IMMOBILE or not readings.is_mobile(self.posture.jacobian)):
+        mobility = self._readings(self.joint, pseudoinverse=True)[0]
+        if what and mobility == readings.IMMOBILE:
             u = frozen(np.linalg.svd(self.posture.jacobian[:3])[0][:, 2].copy())
             raise SingularStiffness(
                 f"{what} does not exist: the tip cannot move along {coordinates(u)}, where the "
                 "stiffness is infinite or nearly so. Use along(direction), or bend the arm.",
                 u,
             )
-        parts = abs(self.active) + abs(self.passive) + abs(self.gravity) + abs(self.load)
-        held = parts.diagonal()
+        held = self._parts.diagonal()
         if not held.min() > 0.0:
-            why, motion = "next to nothing holds the arm", np.eye(len(parts))[held.argmin()]
+            why, motion = "next to nothing holds the arm", np.eye(held.size)[held.argmin()]
         else:
             unit = np.sqrt(held)
             why = "the arm is just about to buckle"

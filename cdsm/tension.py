@@ -263,7 +263,7 @@ def _solve(problem: tension_kernels.Scaled, solver: str) -> Array | str:
 def _shortfall(problem: tension_kernels.Scaled, point: tuple[Array, ...]) -> str:
     """Return as text why a point and its multipliers are not the optimum; empty if they are."""
     # equal to qpsolvers' primal_residual, dual_residual and duality_gap, ten times faster
-    primal, dual, gap = tension_kernels.optimality(*problem[:4], *point)
+    primal, dual, gap = tension_kernels.single_optimality(*problem[:4], *point)
     size = max(1.0, float(abs(point[0]).max()))
     distance = math.sqrt(2.0 * gap)  # ½‖x − x*‖² is at most the gap
     if max(primal, dual) <= OPTIMALITY * size and distance <= DISTANCE * size:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm.batch import layout
-from cdsm.batch.distribution import Distributor, Tensions
+from cdsm.batch.distribution import Tensions
 from cdsm.batch.evaluator import Evaluator
 from cdsm.batch.inputs import checked_threads, given_tension, given_wrench, postures, run_slices
 from cdsm.batch.layout import QUANTITIES, Codes, Flags
@@ -23,7 +23,7 @@ from cdsm.support.validation import instance, one_of, unit_directions
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import checked_bounds
 
-OUTPUTS = (*QUANTITIES, "tension")
+OUTPUTS = (*(name for name in QUANTITIES if name != "tension"), "tension")
 """Names of the quantities that :func:`evaluate` computes."""
 
 DEFAULT_OUTPUTS = ("tip", "compliance", "margin")
@@ -143,15 +143,14 @@ def evaluate(
     if (direction is None) == ("along" in names):
         raise InvalidInput("direction", "belongs to the output 'along': give both, or neither.")
     given, loads, status = _checked_load(arm, angles, tension, wrench)
-    low = high = distributor = None
+    bounds = None
     if minimum is not None:
         if given is not None:
             raise InvalidInput("minimum", "give tension= or minimum=, not both.")
-        low, high = checked_bounds(arm, minimum, math.inf if maximum is None else maximum, rows)
-        distributor = Distributor(arm, angles, low, high, loads, check_limits)
+        bounds = checked_bounds(arm, minimum, math.inf if maximum is None else maximum, rows)
     elif maximum is not None:
         raise InvalidInput("maximum", "belongs to minimum=: give that too.")
-    needy = [name for name in names if name not in QUANTITIES[: layout.RESIDUAL]]
+    needy = [name for name in names if name not in QUANTITIES[: layout.TENSION]]
     if needy and given is None and minimum is None:
         raise InvalidInput(
             "tension",
@@ -161,18 +160,25 @@ def evaluate(
         status[:] = layout.OK
     u = None if direction is None else unit_directions("direction", direction)
     evaluator = Evaluator(
-        arm, angles, given, loads, u, names, distributor if needy else None, check_limits
+        arm,
+        angles,
+        loads,
+        names,
+        tension=given,
+        bounds=bounds if needy else None,
+        direction=u,
+        check_limits=check_limits,
     )
     run_slices(
-        lambda part: evaluator.fill(part, status), rows, evaluator.width, checked_threads(threads)
+        lambda part: evaluator.fill(part, status), rows, evaluator.block, checked_threads(threads)
     )
     return Batch(
         arm=arm,
         q=angles,
         tension=given,
         wrench=loads,
-        minimum=low,
-        maximum=high,
+        minimum=None if bounds is None else bounds[0],
+        maximum=None if bounds is None else bounds[1],
         direction=u,
         status=frozen(status),
         outputs=names,

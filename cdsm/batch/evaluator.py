@@ -2,98 +2,152 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+from typing import Any
+
 import numpy as np
 
 from cdsm.batch import layout
-from cdsm.batch.distribution import Distributor
 from cdsm.batch.fused_kernel import evaluate_rows
-from cdsm.batch.inputs import kernel_arm, of_rows
-from cdsm.batch.layout import QUANTITIES, Codes, Flags
+from cdsm.batch.inputs import kernel_arm
+from cdsm.batch.layout import OK, QUANTITIES, UNDECIDED, Codes, Flags
 from cdsm.cable_laws import CableLaws
 from cdsm.elasticity import Elasticity
-from cdsm.errors import ElasticityRangeError
+from cdsm.errors import ElasticityRangeError, InfeasibleTension, SolverError
+from cdsm.kernels.tree import Indices
 from cdsm.manipulator import Manipulator
+from cdsm.support.status import Status
 from cdsm.support.values import Array, frozen
+from cdsm.tension import distribute_tension
+
+_WIDTH = 32
+"""Number of postures in a block: some vectors of the processor. More need too much cache."""
+
+_LONG = 2**15
+"""Numbers for one posture from which a block has half the width."""
 
 
 class Evaluator:
     """Evaluation of slices of the postures; arguments as in :func:`cdsm.batch.evaluate`.
 
-    ``tension`` is F (C,) or (B, C) [N], or None if tensions are distributed or not needed. The
-    ``distributor`` finds tensions that are not given.
+    ``tension`` is F (C,) or (B, C) [N]. ``bounds`` are the lower and the upper bounds of tensions
+    that are distributed, (C,) or (B, C) [N]. Without both, no output depends on tensions.
 
     Attributes:
         values: The outputs in the order of ``names``, filled slice by slice.
-        width: Floats of temporary memory per posture.
+        block: Number of postures that the kernel computes at a time.
     """
 
     def __init__(
         self,
         arm: Manipulator,
         q: Array,
-        tension: Array | None,
         wrench: Array,
-        direction: Array | None,
         names: tuple[str, ...],
-        distributor: Distributor | None,
-        check_limits: bool,
+        *,
+        tension: Array | None = None,
+        bounds: tuple[Array, Array] | None = None,
+        direction: Array | None = None,
+        check_limits: bool = True,
     ) -> None:
-        self._arm, self._q, self._wrench, self._names = arm, q, wrench, names
-        self._tension, self._distributor = tension, distributor
+        self._arm, self._q, self._wrench = arm, q, wrench
+        self._tension, self._bounds = tension, bounds
         nv, cables = arm.nv, len(arm.cables)
+        self._nothing = frozen(np.empty((0, cables)))
         self._directions = frozen(
             np.zeros((0, 3)) if direction is None else direction.reshape(-1, 3)
         )
         self._arrays = kernel_arm(arm, check_limits)
         count = len(self._directions)
         self._start = layout.starts(nv, cables, count)
-        wanted = sorted(QUANTITIES.index(name) for name in names if name != "tension")
-        self._wanted = np.array(wanted, dtype=np.intp)
-        ends = np.cumsum(self._start[self._wanted + 1] - self._start[self._wanted])
-        self._size = int(ends[-1]) if wanted else 0
+        self._wanted = np.array(sorted(map(QUANTITIES.index, names)), dtype=np.intp)
+        ends = [0, *np.cumsum(np.diff(self._start)[self._wanted]).tolist()]
         self._place = {
-            QUANTITIES[number]: slice(end - (self._start[number + 1] - self._start[number]), end)
-            for number, end in zip(wanted, ends.tolist(), strict=True)
+            QUANTITIES[number]: slice(*place)
+            for number, place in zip(self._wanted, pairwise(ends), strict=True)
         }
-        self.width = self._size + nv + 2 * cables
-        if distributor is not None:
-            self.width += distributor.width
+        # whether the kernel needs rigidities that only Python computes
+        needs_springs = bool(self._wanted.size) and self._wanted[-1] > layout.LOAD
+        self._asks = needs_springs and bool(arm._model.laws.asked)
+        widest = _WIDTH if self._start[-1] < _LONG else _WIDTH // 2
+        self.block = max(1, min(widest, len(q)))
 
         shapes = dict(zip(QUANTITIES, layout.shapes(nv, cables, count), strict=True))
-        shapes["tension"] = (cables,)
         if direction is not None and direction.ndim == 1:
             shapes["along"] = ()
-        self.values = [np.empty((len(q), *shapes[name])) for name in names]
+        # one row for each posture, which the kernel fills; the outputs are views of it
+        self._out = np.empty((len(q), ends[-1]))
+        self.values = [
+            self._out[:, self._place[name]].reshape(len(q), *shapes[name]) for name in names
+        ]
 
     def fill(self, part: slice, status: Codes) -> None:
         """Fill the values and the status (B,) of a slice of the postures."""
-        rows, q, found = len(self._q), self._q[part], status[part]
-        wrench = of_rows(self._wrench, part, rows)
-        if self._distributor is not None:
-            tension, found[:] = self._distributor.at(part)
-            frozen(tension)
-        elif self._tension is not None:
-            tension = of_rows(self._tension, part, rows)
+        rows, found, out = np.arange(part.start, part.stop), status[part], self._out[part]
+        if self._bounds is None:
+            tension = self._nothing if self._tension is None else self._of(self._tension, rows)
+            self._evaluate(rows, tension, self._wanted, found, out)
+        elif self._asks:
+            self._distribute_first(rows, found, out)
         else:
-            tension = frozen(np.zeros((len(q), len(self._arm.cables))))
-        springs = self._wanted.size and self._wanted[-1] > layout.LOAD
-        rigidity = _rigidities(self._arm, tension, found == layout.OK) if springs else tension
-        out = np.empty((len(q), self._size))
-        evaluate_rows(
-            self._arrays,
-            q,
-            tension,
+            self._evaluate(rows, None, self._wanted, found, out)
+            left = found == UNDECIDED
+            if left.any():
+                codes, values = np.zeros_like(found[left]), out[left]
+                self._distribute_first(rows[left], codes, values)
+                found[left], out[left] = codes, values
+        if self._tension is not None and "tension" in self._place:
+            out[:, self._place["tension"]] = self._of(self._tension, rows)
+
+    def _distribute_first(self, rows: Indices, found: Codes, out: Array) -> None:
+        """Find the tensions of some postures, and then fill their status and output."""
+        tension = np.empty((rows.size, len(self._arm.cables)))
+        self._evaluate(rows, None, np.array([layout.TENSION]), found, tension)
+        for r in np.flatnonzero(found == UNDECIDED):
+            row = rows[r : r + 1]
+            low, high, wrench = (
+                self._of(each, row)[0] for each in (*(self._bounds or ()), self._wrench)
+            )
+            pose = self._arm.at(self._q[row[0]], check_limits=False)
+            try:
+                tension[r] = distribute_tension(pose, low, high, wrench).values
+                found[r] = OK
+            except (InfeasibleTension, SolverError) as error:
+                found[r] = Status.of(error) or Status.SOLVER_FAILED
+        self._evaluate(rows, frozen(tension), self._wanted, found, out)
+
+    def _evaluate(
+        self, rows: Indices, tension: Array | None, wanted: Indices, found: Codes, out: Array
+    ) -> None:
+        """Fill status and output of some postures; without tensions (b, C), distribute them."""
+        given = low = high = rigidity = self._nothing
+        if tension is not None:
+            given = tension
+            if self._asks:
+                rigidity = _rigidities(self._arm, tension, found == OK)
+        elif self._bounds is not None:
+            low, high = (self._of(each, rows) for each in self._bounds)
+        arguments: tuple[Any, ...] = (
+            *self._arrays,
+            self._of(self._q, rows),
+            given,
+            low,
+            high,
             rigidity,
-            wrench,
+            self._of(self._wrench, rows),
             self._directions,
             self._start,
-            self._wanted,
+            wanted,
+            self.block,
             out,
             found,
         )
-        for name, value in zip(self._names, self.values, strict=True):
-            source = tension if name == "tension" else out[:, self._place[name]]
-            value[part] = source.reshape(value[part].shape)
+        evaluate_rows(*arguments)
+
+    def _of(self, values: Array, rows: Indices) -> Array:
+        """Return the values (b, n) of some postures; one row (n,) for all is repeated."""
+        whole = np.broadcast_to(values, (len(self._q), *values.shape[-1:]))
+        return frozen(np.ascontiguousarray(whole[rows]))
 
 
 def _rigidities(arm: Manipulator, tension: Array, usable: Flags) -> Array:

@@ -1,12 +1,11 @@
-"""Fused kernel that computes all requested quantities of many postures, one after the other.
+"""Fused kernel: it computes all requested quantities of many postures, block by block.
 
-The physics is in :mod:`cdsm.kernels`. This kernel calls it without allocating memory per posture.
+The physics is in :mod:`cdsm.kernels`. This kernel calls it without allocating memory per block.
 """
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
@@ -22,6 +21,7 @@ from cdsm.batch.layout import (
     GRAVITY,
     GRAVITY_TORQUE,
     IMMOBILE,
+    INFEASIBLE,
     JACOBIAN,
     JOINT,
     LENGTH_JACOBIAN,
@@ -33,292 +33,315 @@ from cdsm.batch.layout import (
     PSEUDOINVERSE,
     RESIDUAL,
     SINGULAR,
+    TENSION,
     TIP,
+    UNDECIDED,
     Codes,
 )
-from cdsm.kernels.bodies import Masses, add_gravity_stiffness, gravity_torque, tip_jacobian
-from cdsm.kernels.compiling import compiled, inlined, threaded
-from cdsm.kernels.readings import (
-    READ,
-    Readings,
-    Wanted,
-    read_stiffness,
-    sum_terms,
-    workspace,
+from cdsm.kernels import distribution, readings
+from cdsm.kernels.bodies import Masses, gravity_torque, set_gravity_stiffness, tip_jacobian
+from cdsm.kernels.compiling import Index, Width, inlined, inner, lanes, threaded, upwards
+from cdsm.kernels.distribution import distribute, set_torque
+from cdsm.kernels.readings import Readings, Wanted, read_stiffness, workspace
+from cdsm.kernels.segments import (
+    SHORTEST_SEGMENT,
+    add_length_hessian,
+    mirror,
+    segment_scratch,
+    set_lengths,
 )
-from cdsm.kernels.readings import SINGULAR as NOT_REGULAR
-from cdsm.kernels.segments import add_segment_derivatives, mirror
-from cdsm.kernels.stiffness import add_load_stiffness, add_passive_stiffness, set_cable_stiffness
-from cdsm.kernels.tree import Frames, Indices, Routing, Tree, forward_kinematics
+from cdsm.kernels.serpentine_guess import Blocks, empty_guess
+from cdsm.kernels.stiffness import (
+    add_passive_stiffness,
+    set_cable_stiffness,
+    set_load_stiffness,
+    sum_terms,
+)
+from cdsm.kernels.tension import certificate
+from cdsm.kernels.tree import Indices, Routing, Tree, empty_frames, forward_kinematics
 from cdsm.support.values import Array
-
-
-class Arm(NamedTuple):
-    """Arrays of the arm, equal for all postures.
-
-    Attributes:
-        tree: The joints.
-        routing: The cables.
-        masses: Masses on the joints, and place of the tip.
-        lowest: Lower joint limits (nv,) [rad].
-        highest: Upper joint limits (nv,) [rad].
-        series: 1/k_series of the cables (C,) [m/N].
-        rest: Tension at which the series springs are at rest (C,) [N].
-    """
-
-    tree: Tree
-    routing: Routing
-    masses: Masses
-    lowest: Array
-    highest: Array
-    series: Array
-    rest: Array
-
-
-class Row(NamedTuple):
-    """Quantities of one posture: views of its record, which stores them one after the other.
-
-    Attributes:
-        tip: (4, 4).
-        JX: J_X (6, nv).
-        L: Cable lengths (C,).
-        J: J_L (C, nv).
-        g: Gravity torque (nv,).
-        gravity: (nv, nv).
-        residual: (nv,).
-        active: (1, nv, nv).
-        load: (nv, nv).
-        k: Cable stiffness (C,).
-        passive: (nv, nv).
-        K: K_θ (nv, nv).
-        readings: Margin, pseudoinverse, along, compliance and cartesian, read from K_θ.
-    """
-
-    tip: Array
-    JX: Array
-    L: Array
-    J: Array
-    g: Array
-    gravity: Array
-    residual: Array
-    active: Array
-    load: Array
-    k: Array
-    passive: Array
-    K: Array
-    readings: Readings
-
-
-class Scratch(NamedTuple):
-    """Temporary arrays of the kernels, used again at every posture."""
-
-    frames: Frames
-    rotation: Array
-    left_factor: Array
-    carried: Array
-    slot: Indices
 
 
 @threaded
 def evaluate_rows(
-    arm: Arm,
+    tree: Tree,
+    routing: Routing,
+    masses: Masses,
+    lowest: Array,
+    highest: Array,
+    blocks: Blocks,
+    smallest_arm: float,
+    series: Array,
+    rest: Array,
+    constant: Array,
+    linear: Array,
     q: Array,
     tension: Array,
+    low: Array,
+    high: Array,
     rigidity: Array,
     wrench: Array,
     directions: Array,
     start: Indices,
     wanted: Indices,
+    width: int,
     out: Array,
     status: Codes,
 ) -> None:
     """Fill the status (b,) and the requested quantities (b, …) of every posture.
 
     Args:
-        arm: The arm.
+        tree: The joints.
+        routing: The cables.
+        masses: Masses on the joints, and place of the tip.
+        lowest: Lower joint limits (nv,) [rad].
+        highest: Upper joint limits (nv,) [rad].
+        blocks: Blocks of joints and cables, from which tensions are guessed.
+        smallest_arm: Moment arms below this are rounding in the balance of tensions [m].
+        series: 1/k_series of the cables (C,) [m/N].
+        rest: Tension at which the series springs are at rest (C,) [N].
+        constant: Constant part of EA (1 + ε) (C,) [N]; 0 for motors that hold force.
+        linear: Factor (C,) of the tension in EA (1 + ε): 1 for linear laws, else 0.
         q: Joint angles (b, nv) [rad].
-        tension: F (b, C) [N].
-        rigidity: EA (1 + ε) (b, C) [N]; 0 under force control, negative outside the domain.
+        tension: F (b, C) [N]; (0, C) if tensions are distributed or not needed.
+        low: Lower bounds (b, C) [N] of distributed tensions; (0, C) if none are distributed.
+        high: Upper bounds, as ``low``.
+        rigidity: EA (1 + ε) (b, C) [N]; 0 under force control, negative outside the domain. (0, C)
+            if it follows from ``constant`` and ``linear``.
         wrench: W (b, 6).
         directions: Unit vectors (D, 3) of ``along``.
         start: Index in the record at which each quantity begins.
         wanted: Numbers of the requested quantities, rising.
+        width: Number of postures in a block.
         out: The requested quantities in one row per posture; NaN where they do not exist.
         status: On entry OK, or why no tensions were found; on return the status of the posture.
+            UNDECIDED: neither tensions nor a proof that there are none were found.
     """
-    # numba counts references at every access to a field, which costs 0.5 µs per posture. So all
-    # fields are unpacked here, and the stages below are one function.
-    tree, routing, masses, lowest, highest, series, rest = arm
-    parent, fixed = tree.parent, routing.fixed
-    nv, count = q.shape[1], fixed.shape[0]
-    frames, rotation, left_factor, carried, slot = _scratch(arm, nv)
-    record = np.zeros(start[start.shape[0] - 1])
-    row = _views(record, start, nv, count)
-    tip, JX, L, J, g, gravity, residual, active, load, k, passive, K, readings = row
+    rows, nv, cables, bodies = q.shape[0], q.shape[1], series.shape[0], lowest.shape[0] + 1
     last, is_wanted = 0, np.zeros(start.shape[0] - 1, dtype=np.bool_)
-    for w in range(wanted.shape[0]):
-        last = wanted[w]
-        is_wanted[last] = True
+    for number in wanted:
+        last, is_wanted[number] = number, True
     read = Wanted(
         is_wanted[MARGIN], is_wanted[PSEUDOINVERSE], is_wanted[COMPLIANCE], is_wanted[CARTESIAN]
     )
-    work = workspace(nv, directions.shape[0], read)
-    # the active term costs as much as lengths and moment arms; without slots it is not computed
-    active_slots = active if last > GRAVITY else np.empty((0, nv, nv))
 
-    for b in range(q.shape[0]):
+    # the quantities: views of a record, one after the other; the posture is the last axis of all
+    record = np.zeros((start[start.shape[0] - 1], width))
+    tip = _matrix(record, start, TIP, 4, width)
+    JX = _matrix(record, start, JACOBIAN, 6, width)
+    L = _vector(record, start, CABLE_LENGTHS)
+    J = _matrix(record, start, LENGTH_JACOBIAN, cables, width)
+    g = _vector(record, start, GRAVITY_TORQUE)
+    gravity = _matrix(record, start, GRAVITY, nv, width)
+    F = _vector(record, start, TENSION)
+    residual = _vector(record, start, RESIDUAL)
+    active = _matrix(record, start, ACTIVE, nv, width)
+    load = _matrix(record, start, LOAD, nv, width)
+    k = _vector(record, start, CABLE_STIFFNESS)
+    passive = _matrix(record, start, PASSIVE, nv, width)
+    K = _matrix(record, start, JOINT, nv, width)
+    read_out = Readings(
+        _vector(record, start, MARGIN),
+        _matrix(record, start, PSEUDOINVERSE, 3, width),
+        _vector(record, start, ALONG),
+        _matrix(record, start, COMPLIANCE, 6, width),
+        _matrix(record, start, CARTESIAN, 3, width),
+    )
+
+    # scratch, used again for every block
+    angles, loads, stretched = (
+        np.empty((nv, width)),
+        np.empty((6, width)),
+        np.empty((cables, width)),
+    )
+    least, most = np.empty((cables, width)), np.empty((cables, width))
+    frames, segments = empty_frames(tree, routing, width), segment_scratch(nv, width)
+    rotation, carried = np.empty((bodies, 3, 3, width)), np.empty((bodies, 7, width))
+    guess, check = empty_guess(blocks, nv, cables, width), certificate(nv, cables, width)
+    arms, torque = np.empty((cables, nv, width)), np.empty((nv, width))
+    work, six, shortest = workspace(nv, directions.shape[0], read, width), loads.copy(), F[0].copy()
+    code, outcome = np.empty(width, dtype=np.intp), np.empty(width, dtype=np.intp)
+    known, slot = np.empty(width, dtype=np.intp), np.zeros(cables, dtype=np.intp)
+    parts = np.empty((nv, nv, width))
+
+    for first in range(0, rows, width):
+        _load(q, first, angles, width)
+        _load(wrench, first, loads, width)
+        _load(tension, first, F, width)
+        _load(low, first, least, width)
+        _load(high, first, most, width)
+        _load(rigidity, first, stretched, width)
+
         # quantities of the joint angles alone
-        if _is_beyond(q[b], lowest, highest):
-            status[b] = BEYOND_LIMITS
-            _copy(record, start, 0, wanted, b, out)
-            continue
-        forward_kinematics(tree, routing, q[b], rotation, frames)
-        for c in range(count):
-            L[c] = fixed[c]
-        _clear(record, start[LENGTH_JACOBIAN], start[LENGTH_JACOBIAN + 1])
+        forward_kinematics(tree, routing, angles, six, rotation, frames, width)
+        set_lengths(routing, frames, segments, L, J, shortest, width)
+        tip_jacobian(tree.parent, masses, rotation, frames, tip, JX, width)
+        gravity_torque(tree, masses, rotation, frames, carried, g, width)
+        for w in lanes(width):
+            code[w] = status[min(first + np.intp(w), rows - 1)]
+            known[w] = GRAVITY + 1
+            if shortest[w] < SHORTEST_SEGMENT:
+                code[w], known[w] = COINCIDENT_SITES, 0
+            if _is_beyond(angles, lowest, highest, w):
+                code[w], known[w] = BEYOND_LIMITS, 0
         if last >= GRAVITY:
-            _clear(record, start[GRAVITY], start[JOINT])
-        coincident = add_segment_derivatives(
-            routing.segment,
-            routing.joint,
-            frames,
-            tension[b],
-            slot,
-            left_factor,
-            L,
-            J,
-            active_slots,
-        )
-        if coincident >= 0:
-            status[b] = COINCIDENT_SITES
-            _copy(record, start, 0, wanted, b, out)
-            continue
-        tip_jacobian(parent, masses, rotation, frames, tip, JX)
-        gravity_torque(tree, masses, rotation, frames, carried, g)
-        if last >= GRAVITY:
-            add_gravity_stiffness(parent, carried, gravity)
-            mirror(gravity)
-        known = GRAVITY + 1
+            set_gravity_stiffness(tree.parent, carried, gravity, width)
+            mirror(gravity, width)
 
         # quantities that need tensions
-        if last > GRAVITY and status[b] == OK:
-            _set_residual(tension[b], J, wrench[b], JX, g, residual)
-            mirror(active[0])
-            add_load_stiffness(JX, wrench[b], masses.tip_joints, load)
-            known = LOAD + 1
+        if last > GRAVITY:
+            set_torque(JX, g, loads, torque, width)
+            if low.shape[0]:
+                _set_arms(J, smallest_arm, arms, width)
+                for w in lanes(width):
+                    outcome[w] = distribution.OPTIMAL if code[w] == OK else distribution.PASSED
+                distribute(blocks, arms, torque, least, most, guess, check, F, outcome, width)
+                for w in lanes(width):
+                    if outcome[w] == distribution.INFEASIBLE:
+                        code[w] = INFEASIBLE
+                    elif outcome[w] == distribution.UNDECIDED:
+                        code[w] = UNDECIDED
+            _note(code, LOAD, known, width)
+        if last > TENSION:
+            _set_residual(F, J, torque, residual, width)
+            _clear(active, width)
+            hessian = active.reshape(1, nv, nv, width)
+            add_length_hessian(
+                routing.segment, routing.joint, frames, F, slot, segments, hessian, width
+            )
+            mirror(active, width)
+            set_load_stiffness(JX, loads, masses.tip_joints, load, six, width)
 
         # quantities that need the rigidity of the cables
-        if last > LOAD and known > LOAD:
-            if (rigidity[b] < 0.0).any():
-                status[b] = OUTSIDE_ELASTICITY
-            else:
-                set_cable_stiffness(L, tension[b], rigidity[b], series, rest, k)
-                add_passive_stiffness(J, k, passive)
-                mirror(passive)
-                sum_terms(active[0], passive, gravity, load, K, work.parts)
-                known = JOINT + 1
+        if last > LOAD:
+            if not rigidity.shape[0]:
+                _set_rigidity(constant, linear, F, stretched, width)
+            for w in lanes(width):
+                if code[w] == OK and _is_negative(stretched, w):
+                    code[w] = OUTSIDE_ELASTICITY
+            set_cable_stiffness(L, F, stretched, series, rest, k, width)
+            _clear(passive, width)
+            add_passive_stiffness(J, k, passive, six, width)
+            mirror(passive, width)
+            sum_terms(active, passive, gravity, load, K, parts, width)
+            _note(code, JOINT, known, width)
 
         # readings of K_θ
-        if last > JOINT and known > JOINT:
-            found = read_stiffness(K, JX, directions, read, work, readings)
-            known = PSEUDOINVERSE + 1 if found == NOT_REGULAR else CARTESIAN + 1
-            if found != READ:
-                status[b] = SINGULAR if found == NOT_REGULAR else IMMOBILE
-        _copy(record, start, known, wanted, b, out)
+        if last > JOINT:
+            for w in lanes(width):
+                outcome[w] = readings.READ if code[w] == OK else readings.UNREAD
+            read_stiffness(K, parts, JX, directions, read, work, read_out, outcome, width)
+            for w in lanes(width):
+                if outcome[w] == readings.SINGULAR:
+                    code[w], known[w] = SINGULAR, PSEUDOINVERSE + 1
+                elif outcome[w] != readings.UNREAD:
+                    known[w] = CARTESIAN + 1
+                    if outcome[w] == readings.IMMOBILE:
+                        code[w] = IMMOBILE
+        _store(record, start, wanted, code, known, first, out, status)
 
 
-@compiled
-def _views(record: Array, start: Indices, nv: int, cables: int) -> Row:
-    """Return views of the quantities in a record."""
-    return Row(
-        _matrix(record, start, TIP, 4),
-        _matrix(record, start, JACOBIAN, 6),
-        _vector(record, start, CABLE_LENGTHS),
-        _matrix(record, start, LENGTH_JACOBIAN, cables),
-        _vector(record, start, GRAVITY_TORQUE),
-        _matrix(record, start, GRAVITY, nv),
-        _vector(record, start, RESIDUAL),
-        _vector(record, start, ACTIVE).reshape((1, nv, nv)),
-        _matrix(record, start, LOAD, nv),
-        _vector(record, start, CABLE_STIFFNESS),
-        _matrix(record, start, PASSIVE, nv),
-        _matrix(record, start, JOINT, nv),
-        Readings(
-            _vector(record, start, MARGIN),
-            _matrix(record, start, PSEUDOINVERSE, 3),
-            _vector(record, start, ALONG),
-            _matrix(record, start, COMPLIANCE, 6),
-            _matrix(record, start, CARTESIAN, 3),
-        ),
-    )
+@inner
+def _load(rows: Array, first: int, block: Array, width: Width) -> None:
+    """Copy rows (b, n) from the first one on to a block (n, W); after the last row, repeat it."""
+    if rows.shape[0]:
+        for w in lanes(width):
+            row = min(first + np.intp(w), rows.shape[0] - 1)
+            for i in range(rows.shape[1]):
+                block[i, w] = rows[row, i]
 
 
-@compiled
-def _scratch(arm: Arm, nv: int) -> Scratch:
-    bodies = arm.tree.parent.shape[0]
-    return Scratch(
-        Frames(
-            np.empty((bodies, 3)),
-            np.empty((bodies, 3)),
-            np.empty(arm.tree.slide.shape),
-            np.empty((arm.routing.row.shape[0], 3)),
-        ),
-        np.empty((bodies, 3, 3)),
-        np.empty((nv, 3)),
-        np.empty((bodies, 7)),
-        np.zeros(arm.routing.fixed.shape[0], dtype=np.intp),  # all cables add to one matrix
-    )
+@inner
+def _set_arms(J: Array, smallest: float, arms: Array, width: Width) -> None:
+    """Copy J_L (C, nv, W) without moment arms of rounding."""
+    for c in upwards(0, J.shape[0]):
+        for i in upwards(0, J.shape[1]):
+            for w in lanes(width):
+                arms[c, i, w] = J[c, i, w] if abs(J[c, i, w]) >= smallest else 0.0
+
+
+@inner
+def _set_residual(F: Array, J: Array, torque: Array, residual: Array, width: Width) -> None:
+    """Fill the residual of Eq. 13 (nv, W), J_Lᵀ F less the torque J_Xᵀ W − g."""
+    for i in upwards(0, residual.shape[0]):
+        for w in lanes(width):
+            residual[i, w] = -torque[i, w]
+        for c in upwards(0, F.shape[0]):
+            for w in lanes(width):
+                residual[i, w] += F[c, w] * J[c, i, w]
+
+
+@inner
+def _set_rigidity(constant: Array, linear: Array, F: Array, rigidity: Array, width: Width) -> None:
+    """Fill EA (1 + ε) (C, W) of linear laws."""
+    for c in upwards(0, F.shape[0]):
+        for w in lanes(width):
+            rigidity[c, w] = constant[c] + linear[c] * F[c, w]
+
+
+@inlined
+def _note(code: Indices, number: int, known: Indices, width: Width) -> None:
+    """Note for postures that are OK that all quantities up to a number are known."""
+    for w in lanes(width):
+        if code[w] == OK:
+            known[w] = number + 1
+
+
+@inlined
+def _is_negative(rigidity: Array, w: Index) -> bool:
+    negative = False
+    for c in range(rigidity.shape[0]):
+        negative = negative or rigidity[c, w] < 0.0
+    return negative
+
+
+@inlined
+def _is_beyond(q: Array, lowest: Array, highest: Array, w: Index) -> bool:
+    """Check whether an angle of posture w is beyond its limits."""
+    beyond = False
+    for i in range(q.shape[0]):
+        beyond = beyond or q[i, w] < lowest[i] or q[i, w] > highest[i]
+    return beyond
+
+
+@inner
+def _clear(matrix: Array, width: Width) -> None:
+    for i in upwards(0, matrix.shape[0]):
+        for j in upwards(0, matrix.shape[1]):
+            for w in lanes(width):
+                matrix[i, j, w] = 0.0
 
 
 @inlined
 def _vector(record: Array, start: Indices, quantity: int) -> Array:
-    """Return a quantity of the record as a vector."""
+    """Return a quantity of the record as vectors (…, W)."""
     return record[start[quantity] : start[quantity + 1]]
 
 
 @inlined
-def _matrix(record: Array, start: Indices, quantity: int, rows: int) -> Array:
-    """Return a quantity of the record as a matrix with the given number of rows."""
+def _matrix(record: Array, start: Indices, quantity: int, rows: int, width: int) -> Array:
+    """Return a quantity of the record as matrices with the given number of rows (rows, …, W)."""
     part = record[start[quantity] : start[quantity + 1]]
-    return part.reshape((rows, part.shape[0] // rows))
+    return part.reshape((rows, part.shape[0] // rows, width))
 
 
-@compiled
-def _is_beyond(q: Array, lowest: Array, highest: Array) -> bool:
-    """Check whether an angle is beyond its limits."""
-    beyond = False
-    for i in range(q.shape[0]):
-        beyond = beyond or q[i] < lowest[i] or q[i] > highest[i]
-    return beyond
-
-
-@compiled
-def _clear(record: Array, first: int, end: int) -> None:
-    for i in range(first, end):
-        record[i] = 0.0
-
-
-@compiled
-def _set_residual(
-    tension: Array, J: Array, wrench: Array, JX: Array, g: Array, residual: Array
+@inner
+def _store(
+    record: Array,
+    start: Indices,
+    wanted: Indices,
+    code: Indices,
+    known: Indices,
+    first: int,
+    out: Array,
+    status: Codes,
 ) -> None:
-    """Compute the residual of Eq. 13, J_Lᵀ F − J_Xᵀ W + g (nv,)."""
-    for i in range(g.shape[0]):
-        residual[i] = g[i]
-        for a in range(6):
-            residual[i] -= wrench[a] * JX[a, i]
-    for c in range(J.shape[0]):
-        for i in range(g.shape[0]):
-            residual[i] += tension[c] * J[c, i]
-
-
-@compiled
-def _copy(record: Array, start: Indices, known: int, wanted: Indices, b: int, out: Array) -> None:
-    """Copy the requested quantities to out[b]; NaN if their number is ``known`` or higher."""
-    at = 0
-    for w in range(wanted.shape[0]):
-        first, end = start[wanted[w]], start[wanted[w] + 1]
-        exists = wanted[w] < known
-        for i in range(end - first):
-            out[b, at + i] = record[first + i] if exists else math.nan
-        at += end - first
+    """Copy the requested quantities of a block to its rows; NaN where they are not known."""
+    for w in range(min(record.shape[1], out.shape[0] - first)):
+        at, row = 0, first + w
+        status[row] = code[w]
+        for number in wanted:
+            exists = number < known[w]
+            for i in range(start[number], start[number + 1]):
+                out[row, at] = record[i, w] if exists else math.nan
+                at += 1

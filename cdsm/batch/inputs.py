@@ -5,36 +5,39 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm.batch.fused_kernel import Arm
 from cdsm.errors import InvalidInput
+from cdsm.kernels.tension import NO_ARM
 from cdsm.manipulator import Manipulator
 from cdsm.support.validation import WRENCH, flag, number_array, whole_number
 from cdsm.support.values import Array, frozen
 
-_NUMBERS = 2**17
-"""Maximum number of floats in a slice: one megabyte."""
-
-_FEWEST, _MOST = 4, 4096
-"""Fewest and most postures in a slice."""
+_MOST = 4096
+"""Maximum number of postures in a slice; a slice allocates the kernel's scratch once."""
 
 
-def kernel_arm(arm: Manipulator, check_limits: bool) -> Arm:
-    """Return the arrays of an arm for the kernels; without limits if they are not checked."""
-    lowest, highest = arm._model.lowest, arm._model.highest
+def kernel_arm(arm: Manipulator, check_limits: bool) -> tuple[Any, ...]:
+    """Return the first arguments of the kernel; without limits if they are not checked."""
+    model = arm._model
+    lowest, highest = model.lowest, model.highest
     if not flag("check_limits", check_limits):
         lowest, highest = np.full_like(lowest, -np.inf), np.full_like(highest, np.inf)
-    return Arm(
-        arm._model.tree,
-        arm._model.routing,
-        arm._model.masses,
+    return (
+        model.tree,
+        model.routing,
+        model.masses,
         frozen(lowest),
         frozen(highest),
-        arm._model.laws.series,
-        arm._model.laws.rest,
+        model.blocks,
+        NO_ARM * arm.length,
+        model.laws.series,
+        model.laws.rest,
+        model.laws.constant,
+        model.laws.linear,
     )
 
 
@@ -81,13 +84,7 @@ def given_wrench(value: ArrayLike | None, rows: int) -> Array:
     return per_row("wrench", np.zeros(6) if value is None else value, rows, 6, WRENCH, "wrench")
 
 
-def of_rows(values: Array, part: slice, rows: int) -> Array:
-    """Return the values (b, n) of a slice of the postures; one row (n,) for all is repeated."""
-    whole = np.broadcast_to(values, (rows, *values.shape[-1:]))
-    return frozen(np.ascontiguousarray(whole[part]))
-
-
-def run_slices(work: Callable[[slice], None], rows: int, width: int, threads: int) -> None:
+def run_slices(work: Callable[[slice], None], rows: int, block: int, threads: int) -> None:
     """Call ``work`` for slices that cover all postures, in several threads.
 
     These are Python threads; the kernels release the interpreter lock. Parallel loops of numba
@@ -97,11 +94,11 @@ def run_slices(work: Callable[[slice], None], rows: int, width: int, threads: in
     Args:
         work: Computes the postures of its slice, and changes no others.
         rows: Number of postures.
-        width: Floats of temporary memory per posture.
+        block: Number of postures that the kernel computes at a time.
         threads: Maximum number of threads.
     """
-    share = max(_FEWEST, -(-rows // threads))
-    size = min(share, max(_FEWEST, min(_MOST, _NUMBERS // max(width, 1))))
+    size = max(1, min(-(-rows // threads), _MOST))
+    size += -size % block
     slices = [slice(first, min(first + size, rows)) for first in range(0, rows, size)]
     if threads == 1 or len(slices) < 2:
         for part in slices:

@@ -1,8 +1,8 @@
 """Numba kernels of the rigid bodies: tip pose, tip Jacobian, gravity torque and stiffness.
 
-Single postures use Pinocchio. For many postures, its calls from Python would take longer than all
-other computations. A test compares the two to rounding. Joint i moves bodies of total mass M and S
-= Σ m c. With r_i = S − M o_i and gravity γ,
+Pinocchio computes the same, but its calls from Python take longer than all other computations. A
+test compares the two to rounding. Joint i moves bodies of total mass M and S = Σ m c. With r_i = S
+− M o_i and gravity γ,
 
     g_i = −γ·(z_i × r_i),    ∂g_i/∂θ_j = −γ·(z_i × (z_j × r_j)) for i before or equal to j.
 
@@ -13,8 +13,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from cdsm.kernels.compiling import compiled
-from cdsm.kernels.tree import Frames, Indices, Tree
+import numpy as np
+
+from cdsm.kernels.compiling import Width, inner, lanes, upwards
+from cdsm.kernels.tree import Frames, Indices, Tree, turned
 from cdsm.support.values import Array
 
 
@@ -40,7 +42,7 @@ class Masses(NamedTuple):
     point: Array
 
 
-@compiled
+@inner
 def tip_jacobian(
     parent: Indices,
     masses: Masses,
@@ -48,83 +50,104 @@ def tip_jacobian(
     frames: Frames,
     tip: Array,
     jacobian: Array,
+    width: Width,
 ) -> None:
-    """Fill the tip pose (4, 4), and the columns of J_X (6, nv) of the joints that move the tip."""
+    """Fill the tip pose (4, 4, W), and J_X (6, nv, W) in the columns of joints that move the tip.
+
+    The other columns, and the zeros in the last row of the pose, must be there before.
+    """
     origin, axis, slide, _ = frames
-    i = masses.tip
+    i = np.uint64(masses.tip)
     for r in range(3):
-        tip[3, r] = 0.0
         for c in range(3):
-            tip[r, c] = 0.0
-            for k in range(3):
-                tip[r, c] += rotation[i, r, k] * masses.rotation[k, c]
-        tip[r, 3] = origin[i, r]
-        for k in range(3):
-            tip[r, 3] += rotation[i, r, k] * masses.point[k]
-    tip[3, 3] = 1.0
+            x, y, z = masses.rotation[0, c], masses.rotation[1, c], masses.rotation[2, c]
+            for w in lanes(width):
+                tip[r, c, w] = turned(rotation, i, r, x, y, z, w)
+        x, y, z = masses.point[0], masses.point[1], masses.point[2]
+        for w in lanes(width):
+            tip[r, 3, w] = origin[i, r, w] + turned(rotation, i, r, x, y, z, w)
+    for w in lanes(width):
+        tip[3, 3, w] = 1.0
     while i > 0:
-        rx, ry, rz = tip[0, 3] - origin[i, 0], tip[1, 3] - origin[i, 1], tip[2, 3] - origin[i, 2]
-        zx, zy, zz = axis[i, 0], axis[i, 1], axis[i, 2]
-        jacobian[0, i - 1] = zy * rz - zz * ry
-        jacobian[1, i - 1] = zz * rx - zx * rz
-        jacobian[2, i - 1] = zx * ry - zy * rx
-        if slide.shape[0]:
-            for r in range(3):
-                jacobian[r, i - 1] += slide[i, r]
-        jacobian[3, i - 1] = zx
-        jacobian[4, i - 1] = zy
-        jacobian[5, i - 1] = zz
-        i = parent[i]
+        column = i - np.uint64(1)
+        for r in range(3):
+            p, q = (r + 1) % 3, (r + 2) % 3
+            for w in lanes(width):
+                jacobian[r, column, w] = axis[i, p, w] * (tip[q, 3, w] - origin[i, q, w]) - axis[
+                    i, q, w
+                ] * (tip[p, 3, w] - origin[i, p, w])
+            if slide.shape[0]:
+                for w in lanes(width):
+                    jacobian[r, column, w] += slide[i, r, w]
+            for w in lanes(width):
+                jacobian[3 + r, column, w] = axis[i, r, w]
+        i = np.uint64(parent[i])
 
 
-@compiled
+@inner
 def gravity_torque(
-    tree: Tree, masses: Masses, rotation: Array, frames: Frames, carried: Array, torque: Array
+    tree: Tree,
+    masses: Masses,
+    rotation: Array,
+    frames: Frames,
+    carried: Array,
+    torque: Array,
+    width: Width,
 ) -> None:
-    """Fill g (nv,), and the rows of carried (nv+1, 7) with M, z × r and γ × z of each joint."""
+    """Fill g (nv, W), and of each joint γ × z and M, z × r in the rows of carried (nv+1, 7, W)."""
     parent, order = tree.parent, tree.order
     origin, axis, slide, _ = frames
-    gx, gy, gz = masses.gravity[0], masses.gravity[1], masses.gravity[2]
-    # first M and S of each link alone: column 0, and columns 1 to 3
-    for i in range(parent.shape[0]):
-        m = masses.mass[i]
-        carried[i, 0] = m
+    gravity = masses.gravity
+    # first S and M of each link alone: columns 3 to 5, and column 6
+    for i in upwards(0, parent.shape[0]):
+        m, x, y, z = masses.mass[i], masses.centre[i, 0], masses.centre[i, 1], masses.centre[i, 2]
         for r in range(3):
-            centre = origin[i, r]
-            for k in range(3):
-                centre += rotation[i, r, k] * masses.centre[i, k]
-            carried[i, 1 + r] = m * centre
+            for w in lanes(width):
+                carried[i, 3 + r, w] = m * (origin[i, r, w] + turned(rotation, i, r, x, y, z, w))
+        for w in lanes(width):
+            carried[i, 6, w] = m
     # then from the ends of the branches to the base: add each joint's complete sums to its parent
     for k in range(order.shape[0] - 1, -1, -1):
-        i = order[k]
-        before = parent[i]
-        for r in range(4):
-            carried[before, r] += carried[i, r]
-        M = carried[i, 0]
-        rx = carried[i, 1] - M * origin[i, 0]
-        ry = carried[i, 2] - M * origin[i, 1]
-        rz = carried[i, 3] - M * origin[i, 2]
-        zx, zy, zz = axis[i, 0], axis[i, 1], axis[i, 2]
-        carried[i, 1] = zy * rz - zz * ry
-        carried[i, 2] = zz * rx - zx * rz
-        carried[i, 3] = zx * ry - zy * rx
-        if slide.shape[0]:
-            for r in range(3):
-                carried[i, 1 + r] += M * slide[i, r]
-        carried[i, 4] = gy * zz - gz * zy
-        carried[i, 5] = gz * zx - gx * zz
-        carried[i, 6] = gx * zy - gy * zx
-        torque[i - 1] = -(gx * carried[i, 1] + gy * carried[i, 2] + gz * carried[i, 3])
+        i = np.uint64(order[k])
+        before = np.uint64(parent[i])
+        for r in range(3, 7):
+            for w in lanes(width):
+                carried[before, r, w] += carried[i, r, w]
+        for r in range(3):  # r = S − M o, for a moment in the place of γ × z
+            for w in lanes(width):
+                carried[i, r, w] = carried[i, 3 + r, w] - carried[i, 6, w] * origin[i, r, w]
+        for r in range(3):
+            p, q = (r + 1) % 3, (r + 2) % 3
+            for w in lanes(width):
+                carried[i, 3 + r, w] = (
+                    axis[i, p, w] * carried[i, q, w] - axis[i, q, w] * (carried[i, p, w])
+                )
+            if slide.shape[0]:
+                for w in lanes(width):
+                    carried[i, 3 + r, w] += carried[i, 6, w] * slide[i, r, w]
+        for r in range(3):
+            p, q = (r + 1) % 3, (r + 2) % 3
+            for w in lanes(width):
+                carried[i, r, w] = gravity[p] * axis[i, q, w] - gravity[q] * axis[i, p, w]
+        x, y, z, column = gravity[0], gravity[1], gravity[2], i - np.uint64(1)
+        for w in lanes(width):
+            torque[column, w] = -(
+                x * carried[i, 3, w] + y * carried[i, 4, w] + z * carried[i, 5, w]
+            )
 
 
-@compiled
-def add_gravity_stiffness(parent: Indices, carried: Array, gravity: Array) -> None:
-    """Add ∂g/∂θ to a matrix (nv, nv) for i ≤ j only; :func:`gravity_torque` fills ``carried``."""
+@inner
+def set_gravity_stiffness(parent: Indices, carried: Array, gravity: Array, width: Width) -> None:
+    """Fill ∂g/∂θ (nv, nv, W) for i ≤ j only; :func:`gravity_torque` fills ``carried``."""
     for j in range(parent.shape[0] - 1, 0, -1):
-        x, y, z = carried[j, 1], carried[j, 2], carried[j, 3]
-        i = j
+        last = np.uint64(j)
+        i = last
         while i > 0:
-            # γ·(z_i × w) = (γ × z_i)·w
-            value = carried[i, 4] * x + carried[i, 5] * y + carried[i, 6] * z
-            gravity[min(i, j) - 1, max(i, j) - 1] -= value
-            i = parent[i]
+            row, column = min(i, last) - np.uint64(1), max(i, last) - np.uint64(1)
+            for w in lanes(width):  # γ·(z_i × v) = (γ × z_i)·v
+                gravity[row, column, w] = -(
+                    carried[i, 0, w] * carried[last, 3, w]
+                    + carried[i, 1, w] * carried[last, 4, w]
+                    + carried[i, 2, w] * carried[last, 5, w]
+                )
+            i = np.uint64(parent[i])

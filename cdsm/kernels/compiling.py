@@ -1,10 +1,10 @@
-"""Compilation of kernels: three decorators based on numba's njit, and a range for fast loops."""
+"""Compilation of kernels: four decorators based on numba's njit, and ranges for fast loops."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import partial
-from typing import Any, Literal, TypeVar, cast
+from typing import Any, TypeVar, cast
 
 import numpy as np
 from numba import njit
@@ -21,6 +21,11 @@ def compiled(function: _Function) -> _Function:
     return _compile(function)
 
 
+def inner(function: _Function) -> _Function:
+    """Compile a kernel that only kernels call: without an entry for Python, a quarter faster."""
+    return _compile(function, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+
+
 def threaded(function: _Function) -> _Function:
     """Compile a kernel that releases the GIL, for kernels that take milliseconds."""
     return _compile(function, nogil=True)
@@ -31,18 +36,34 @@ def inlined(function: _Function) -> _Function:
     return _compile(function, inline="always")
 
 
-def _compile(
-    function: _Function, inline: Literal["never", "always"] = "never", nogil: bool = False
-) -> _Function:
-    compiler = partial(njit, error_model="numpy", inline=inline, nogil=nogil)
+def _compile(function: _Function, **options: Any) -> _Function:
+    compiler = partial(njit, error_model="numpy", **options)
     try:
         return cast(_Function, compiler(cache=True)(function))
     except RuntimeError:  # neither the package's folder nor the user's cache is writable
         return cast(_Function, compiler()(function))
 
 
+Index = int | np.integer[Any]
+"""Index in a loop over postures. If it may be negative, numba does not vectorise the loop."""
+
+Width = int | None
+"""Number of postures side by side in a block, or None for one posture.
+
+The last axis of all arrays of a block is the posture. A loop over it is vectorised, so a block of
+32 postures takes about three times as long as one. For None, kernels are compiled a second time,
+with a constant 1: loops over one posture then vanish. Both give the same bits.
+"""
+
+
+@inner
+def lanes(width: Width) -> Iterable[Index]:
+    """Return the range of the postures of a block; indices are unsigned, as in :func:`upwards`."""
+    return range(np.uint64(1)) if width is None else range(np.uint64(width))
+
+
 @inlined
-def upwards(first: int, end: int) -> range:
+def upwards(first: Index, end: Index) -> Iterable[Index]:
     """Return ``range(first, end)`` for indices that are never negative.
 
     A negative index counts from the end, and numba does not vectorise a loop that must check for

@@ -1,21 +1,22 @@
-"""Numba kernels of dense linear algebra for matrices too small for LAPACK.
+"""Numba kernels of dense linear algebra for blocks of small matrices; the last axis is the posture.
 
-A LAPACK with its own threads also competes for cores with the threads that run these kernels: the
-inverse of an 80×80 matrix then took 16 ms. Microseconds here / in LAPACK called from a kernel:
+LAPACK solves one matrix after the other, and its own threads compete for cores with the threads
+that run these kernels: the inverse of an 80×80 matrix then took 16 ms. Microseconds for one matrix
+alone / in a block of 32 / in LAPACK called from a kernel:
 
-    n                                        2         5        10        20        40        80
-    linear system, ten right sides   0.1 / 0.5 0.3 / 0.9 0.5 / 1.8 2.0 / 4.5  9.0 / 13   55 / 45
-    smallest eigenvalue              0.1 / 0.3 0.4 / 1.4 1.3 / 3.8 4.6 / 13    21 / 51 188 / 370
-    singular values of three rows    0.5 / 1.7 0.4 / 3.1 0.4 / 3.2 0.6 / 3.3 0.8 / 4.2 1.5 / 8.8
-
-An arm of five universal joints has ten columns; one posture of a batch then takes 5 µs in total.
+    n                                      5               10               20              40
+    linear system, 10 sides  0.3 / 0.1 / 1.0  0.9 / 0.4 / 2.0  3.3 / 1.8 / 4.9     14 / 9 / 13
+    smallest eigenvalue      0.6 / 0.2 / 1.5  2.0 / 0.5 / 4.5   6.7 / 2.5 / 13    30 / 16 / 54
+    singular values, 3 rows  0.8 / 0.2 / 3.1  1.2 / 0.3 / 3.2  1.2 / 0.5 / 3.3  1.9 / 0.8 / 4.2
 """
 
 from __future__ import annotations
 
 import math
 
-from cdsm.kernels.compiling import compiled, upwards
+import numpy as np
+
+from cdsm.kernels.compiling import Index, Width, inlined, inner, lanes, upwards
 from cdsm.support.values import Array
 
 _SWEEPS = 30
@@ -29,171 +30,258 @@ _ROUNDING = 2.0**-52
 _NOTHING = 1e-30
 """Off-diagonal entries below this part of the largest entry do not change any eigenvalue."""
 
+_PIVOT = 0.1
+"""Rows are exchanged where the pivot is below this part of the largest entry of its column.
 
-@compiled
-def eliminate(M: Array) -> float:
-    """Solve A X = B: replace the columns B, right of A (n, n) in M (n, n + …), by A⁻¹ B.
+K_θ of a stable arm needs no exchange, and exchanges are made posture by posture.
+"""
 
-    Returns:
-        Smallest over largest pivot, with row exchanges; 0 if a pivot is zero, and B is then
-        unfinished.
+
+@inner
+def eliminate(M: Array, pivots: Array, width: Width) -> None:
+    """Solve A X = B: replace the columns B, right of A (n, n) in M (n, n + …, W), by A⁻¹ B.
+
+    ``pivots`` (4, W) returns the smallest and the largest pivot in its first rows; the others are
+    scratch. If a pivot is zero, B is meaningless.
     """
-    n, width = M.shape
-    smallest, largest = math.inf, 0.0
-    for k in range(n):
-        best = k
-        for i in range(k + 1, n):
-            if abs(M[i, k]) > abs(M[best, k]):
-                best = i
-        pivot = abs(M[best, k])
-        smallest, largest = min(smallest, pivot), max(largest, pivot)
-        if pivot == 0.0:
-            return 0.0
-        if best != k:
-            for j in upwards(k, width):
-                M[k, j], M[best, j] = M[best, j], M[k, j]
-        inverse = 1.0 / M[k, k]
-        for i in range(k + 1, n):
-            factor = M[i, k] * inverse
-            for j in upwards(k + 1, width):
-                M[i, j] -= factor * M[k, j]
-    for k in range(n - 1, -1, -1):
-        inverse = 1.0 / M[k, k]
-        for j in upwards(n, width):
-            M[k, j] *= inverse
-        for i in range(k):
-            factor = M[i, k]
-            for j in upwards(n, width):
-                M[i, j] -= factor * M[k, j]
-    return smallest / largest
+    n, columns = M.shape[0], M.shape[1]
+    smallest, largest, factor, inverse = pivots[0], pivots[1], pivots[2], pivots[3]
+    for w in lanes(width):
+        smallest[w], largest[w] = math.inf, 0.0
+    for k in upwards(0, n):
+        for w in lanes(width):
+            factor[w] = 0.0
+        for i in upwards(k + np.uint64(1), n):
+            for w in lanes(width):
+                factor[w] = max(factor[w], abs(M[i, k, w]))
+        for w in lanes(width):
+            if abs(M[k, k, w]) < _PIVOT * factor[w]:
+                _exchange(M, k, w)
+        for w in lanes(width):
+            smallest[w] = min(smallest[w], abs(M[k, k, w]))
+        for w in lanes(width):
+            largest[w] = max(largest[w], abs(M[k, k, w]))
+        for w in lanes(width):
+            inverse[w] = 1.0 / M[k, k, w]
+        for i in upwards(k + np.uint64(1), n):
+            for w in lanes(width):
+                factor[w] = M[i, k, w] * inverse[w]
+            for j in upwards(k + np.uint64(1), columns):
+                for w in lanes(width):
+                    M[i, j, w] -= factor[w] * M[k, j, w]
+    for row in range(n - 1, -1, -1):
+        k = np.uint64(row)
+        for w in lanes(width):
+            inverse[w] = 1.0 / M[k, k, w]
+        for j in upwards(n, columns):
+            for w in lanes(width):
+                M[k, j, w] *= inverse[w]
+        for i in upwards(0, row):
+            for j in upwards(n, columns):
+                for w in lanes(width):
+                    M[i, j, w] -= M[i, k, w] * M[k, j, w]
 
 
-@compiled
-def smallest_eigenvalue(A: Array, scratch: Array) -> float:
-    """Compute the smallest eigenvalue of a symmetric A (n, n); overwrite A; scratch is (4, n).
+@inner
+def _exchange(M: Array, k: Index, w: Index) -> None:
+    """Exchange row k of matrix w with the row below that has the largest entry in column k."""
+    best = k
+    for i in upwards(k, M.shape[0]):
+        if abs(M[i, k, w]) > abs(M[best, k, w]):
+            best = i
+    for j in upwards(k, M.shape[1]):
+        M[k, j, w], M[best, j, w] = M[best, j, w], M[k, j, w]
+
+
+@inlined
+def smallest_eigenvalue(A: Array, scratch: Array, x: Array, width: Width) -> None:
+    """Fill x (W,) with the smallest eigenvalue of each symmetric A (n, n, W); overwrite A.
 
     Householder reflections make A tridiagonal. Laguerre's method then converges from below to the
     smallest root of the characteristic polynomial. It never passes the root, since all roots are
-    real.
+    real. ``scratch`` is (4 n + 10, W).
     """
     n = A.shape[0]
-    d, e = scratch[0], scratch[1]
-    _tridiagonalise(A, d, e, scratch[2], scratch[3])
-    scale = x = 0.0
-    for i in range(n):
-        radius = abs(e[i]) + (abs(e[i + 1]) if i + 1 < n else 0.0)
-        scale = max(scale, abs(d[i]) + radius)
-        x = min(x, d[i] - radius) if i else d[i] - radius  # Gershgorin
-    x -= _ROUNDING * scale
+    d, e, rest = scratch[:n], scratch[n : 2 * n], scratch[2 * n :]
+    _tridiagonalise(A, d, e, rest, width)
+    scale, least, G, H, going = rest[0], rest[1], rest[2], rest[3], rest[4]
+    for w in lanes(width):
+        scale[w], x[w], going[w] = 0.0, math.inf, 1.0
+    for i in upwards(0, n):
+        for w in lanes(width):
+            radius = abs(e[i, w]) + (abs(e[i + 1, w]) if i + 1 < n else 0.0)
+            scale[w] = max(scale[w], abs(d[i, w]) + radius)
+            x[w] = min(x[w], d[i, w] - radius)  # Gershgorin
+    for w in lanes(width):
+        x[w] -= _ROUNDING * scale[w]
     for _ in range(_STEPS):
-        # ratios g of the leading minors, and logarithmic derivatives of the last minor:
-        # G = Σ 1/(λ − x), H = Σ 1/(λ − x)²
-        inverse = slope = bend = G = H = 0.0
-        for i in range(n):
-            square = e[i] * e[i]
-            # inverse, slope and bend are 1/g, g′/g and g″/g of the row above
-            first = -1.0 + square * inverse * slope
-            second = square * inverse * (bend - 2.0 * slope * slope)
-            g = d[i] - x - square * inverse
-            if g <= 0.0:  # only rounding passes the root
-                return x
-            inverse = 1.0 / g
-            slope, bend = first * inverse, second * inverse
-            G -= slope
-            H += slope * slope - bend
-        step = n / (G + math.sqrt(max((n - 1) * (n * H - G * G), 0.0)))
-        x += step
-        if step <= _ROUNDING * scale:
+        _set_derivatives(d, e, x, rest[1:4], rest[5:10], width)
+        left = 0.0
+        for w in lanes(width):
+            root = math.sqrt(max((n - 1) * (n * H[w] - G[w] * G[w]), 0.0))
+            step = n / (G[w] + root) if least[w] > 0.0 else 0.0  # only rounding passes the root
+            x[w] += going[w] * step
+            going[w] = going[w] if step > _ROUNDING * scale[w] else 0.0
+            left += going[w]
+        if left == 0.0:
             break
-    return x
 
 
-@compiled
-def _tridiagonalise(A: Array, d: Array, e: Array, v: Array, w: Array) -> None:
-    """Fill diagonal d (n,) and off-diagonal e (n,) of a similar tridiagonal matrix; e[0] is 0."""
-    n, size = A.shape[0], 0.0
-    for i in range(n):
+@inner
+def _set_derivatives(
+    d: Array, e: Array, x: Array, sums: Array, scratch: Array, width: Width
+) -> None:
+    """Fill the smallest ratio g of the leading minors of T − x, and the sums G and H, (W,) each.
+
+    With the eigenvalues λ of T, G = Σ 1/(λ − x) and H = Σ 1/(λ − x)²: logarithmic derivatives of
+    the last minor. T has the diagonal d and the off-diagonal e, (n, W) each.
+    """
+    least, G, H = sums[0], sums[1], sums[2]
+    # inverse, slope and bend are 1/g, g′/g and g″/g of the row above
+    inverse, slope, bend, first, second = scratch[0], scratch[1], scratch[2], scratch[3], scratch[4]
+    for w in lanes(width):
+        least[w] = math.inf
+        G[w] = H[w] = inverse[w] = slope[w] = bend[w] = 0.0
+    for i in upwards(0, d.shape[0]):
+        for w in lanes(width):
+            first[w] = -1.0 + e[i, w] * e[i, w] * inverse[w] * slope[w]
+        for w in lanes(width):
+            second[w] = e[i, w] * e[i, w] * inverse[w] * (bend[w] - 2.0 * slope[w] * slope[w])
+        for w in lanes(width):  # g in the place of 1/g of the row above
+            inverse[w] = d[i, w] - x[w] - e[i, w] * e[i, w] * inverse[w]
+        for w in lanes(width):
+            least[w] = min(least[w], inverse[w])
+        for w in lanes(width):
+            inverse[w] = 1.0 / inverse[w]
+        for w in lanes(width):
+            slope[w] = first[w] * inverse[w]
+        for w in lanes(width):
+            bend[w] = second[w] * inverse[w]
+        for w in lanes(width):
+            G[w] -= slope[w]
+        for w in lanes(width):
+            H[w] += slope[w] * slope[w] - bend[w]
+
+
+@inner
+def _tridiagonalise(A: Array, d: Array, e: Array, scratch: Array, width: Width) -> None:
+    """Fill diagonal d (n, W) and off-diagonal e (n, W) of similar tridiagonal matrices; e[0] is 0.
+
+    ``scratch`` is (2 n + 4, W).
+    """
+    n = np.uint64(A.shape[0])
+    v, u = scratch[4 : 4 + n], scratch[4 + n :]
+    size, norm, beta, along = scratch[0], scratch[1], scratch[2], scratch[3]
+    for w in lanes(width):
+        size[w] = e[0, w] = 0.0
+    for i in upwards(0, n):
         for j in upwards(0, n):
-            size = max(size, abs(A[i, j]))
-    e[0] = 0.0
-    for k in range(n - 2):
-        d[k] = A[k, k]
-        norm = 0.0
-        for i in range(k + 1, n):
-            norm += A[k, i] * A[k, i]
-        norm = math.sqrt(norm)
-        if norm <= _NOTHING * size:  # its square may be too small for a division
-            e[k + 1] = 0.0
-            continue
-        alpha = -norm if A[k, k + 1] > 0.0 else norm
-        e[k + 1] = alpha
-        # A ← A − v wᵀ − w vᵀ with the reflection 1 − β v vᵀ
-        beta = 1.0 / (norm * (norm + abs(A[k, k + 1])))
-        for i in range(k + 1, n):
-            v[i] = A[k, i]
-            w[i] = 0.0
-        v[k + 1] -= alpha
-        for i in range(k + 1, n):
-            for j in upwards(k + 1, n):
-                w[j] += A[i, j] * v[i]
-        along = 0.0
-        for i in range(k + 1, n):
-            w[i] *= beta
-            along += v[i] * w[i]
-        along *= beta / 2.0
-        for i in range(k + 1, n):
-            w[i] -= along * v[i]
-        for i in range(k + 1, n):
-            for j in upwards(k + 1, n):
-                A[i, j] -= v[i] * w[j] + w[i] * v[j]
+            for w in lanes(width):
+                size[w] = max(size[w], abs(A[i, j, w]))
+    for k in upwards(0, max(n, np.uint64(2)) - np.uint64(2)):
+        after = k + np.uint64(1)
+        for w in lanes(width):
+            norm[w] = 0.0
+        for i in upwards(after, n):
+            for w in lanes(width):
+                norm[w] += A[k, i, w] * A[k, i, w]
+        # A ← A − v uᵀ − u vᵀ with the reflection 1 − β v vᵀ, but for rows of rounding
+        for w in lanes(width):
+            length = math.sqrt(norm[w])
+            norm[w] = length if length > _NOTHING * size[w] else 0.0
+        for w in lanes(width):
+            beta[w] = 1.0 / (norm[w] * (norm[w] + abs(A[k, after, w]))) if norm[w] > 0.0 else 0.0
+        for w in lanes(width):
+            e[after, w] = -norm[w] if A[k, after, w] > 0.0 else norm[w]
+        for i in upwards(after, n):
+            for w in lanes(width):
+                v[i, w] = A[k, i, w]
+            for w in lanes(width):
+                u[i, w] = 0.0
+        for w in lanes(width):
+            v[after, w] -= e[after, w]
+        for i in upwards(after, n):
+            for j in upwards(after, n):
+                for w in lanes(width):
+                    u[j, w] += A[i, j, w] * v[i, w]
+        for w in lanes(width):
+            along[w] = 0.0
+        for i in upwards(after, n):
+            for w in lanes(width):
+                u[i, w] *= beta[w]
+            for w in lanes(width):
+                along[w] += v[i, w] * u[i, w]
+        for i in upwards(after, n):
+            for w in lanes(width):
+                u[i, w] -= beta[w] / 2.0 * along[w] * v[i, w]
+        for i in upwards(after, n):
+            for j in upwards(after, n):
+                for w in lanes(width):
+                    A[i, j, w] -= v[i, w] * u[j, w] + u[i, w] * v[j, w]
+    for i in upwards(0, n):
+        for w in lanes(width):
+            d[i, w] = A[i, i, w]
     if n > 1:
-        d[n - 2], e[n - 1] = A[n - 2, n - 2], A[n - 2, n - 1]
-    d[n - 1] = A[n - 1, n - 1]
+        for w in lanes(width):
+            e[n - 1, w] = A[n - 2, n - 1, w]
 
 
-@compiled
-def singular_values(rows: Array, left: Array, values: Array) -> None:
-    """Replace three rows (3, n) by left (3, 3) and values (3,) times orthonormal rows.
+@inner
+def singular_values(rows: Array, left: Array, values: Array, scratch: Array, width: Width) -> None:
+    """Replace three rows (3, n, W) by left (3, 3, W) and values (3, W) times orthonormal rows.
 
     Jacobi rotations make the rows orthogonal. They are not sorted, and rows of length zero stay
-    zero.
+    zero. ``scratch`` is (5, W).
     """
-    n = rows.shape[1]
+    aa, bb, ab, cosine, sine = scratch[0], scratch[1], scratch[2], scratch[3], scratch[4]
     for i in range(3):
         for j in range(3):
-            left[i, j] = 1.0 if i == j else 0.0
+            for w in lanes(width):
+                left[i, j, w] = 1.0 if i == j else 0.0
     for _ in range(_SWEEPS):
-        turned = False
-        for a in range(2):
-            for b in range(a + 1, 3):
-                aa = bb = ab = 0.0
-                for j in range(n):
-                    aa += rows[a, j] * rows[a, j]
-                    bb += rows[b, j] * rows[b, j]
-                    ab += rows[a, j] * rows[b, j]
+        turned = 0.0
+        for a, b in ((0, 1), (0, 2), (1, 2)):
+            _set_product(rows, a, a, aa, width)
+            _set_product(rows, b, b, bb, width)
+            _set_product(rows, a, b, ab, width)
+            for w in lanes(width):
                 # orthogonal to rounding, or one row is zero to rounding
-                negligible = max(math.sqrt(aa * bb), _ROUNDING * max(aa, bb))
-                if abs(ab) <= _ROUNDING * negligible:
-                    continue
-                zeta = (bb - aa) / (2.0 * ab)
+                product, largest = math.sqrt(aa[w] * bb[w]), max(aa[w], bb[w])
+                negligible = _ROUNDING * max(product, _ROUNDING * largest)
+                zeta = (bb[w] - aa[w]) / (2.0 * ab[w])
                 tangent = math.copysign(1.0, zeta) / (abs(zeta) + math.sqrt(1.0 + zeta * zeta))
-                cosine = 1.0 / math.sqrt(1.0 + tangent * tangent)
-                sine = cosine * tangent
-                turned = True
-                for j in range(n):
-                    p, r = rows[a, j], rows[b, j]
-                    rows[a, j], rows[b, j] = cosine * p - sine * r, sine * p + cosine * r
-                for j in range(3):
-                    p, r = left[j, a], left[j, b]
-                    left[j, a], left[j, b] = cosine * p - sine * r, sine * p + cosine * r
-        if not turned:
+                turns = abs(ab[w]) > negligible
+                cosine[w] = 1.0 / math.sqrt(1.0 + tangent * tangent) if turns else 1.0
+                sine[w] = cosine[w] * tangent if turns else 0.0
+                turned = max(turned, abs(sine[w]))
+            for k in upwards(0, rows.shape[1]):
+                for w in lanes(width):
+                    p, r = rows[a, k, w], rows[b, k, w]
+                    rows[a, k, w] = cosine[w] * p - sine[w] * r
+                    rows[b, k, w] = sine[w] * p + cosine[w] * r
+            for j in range(3):
+                for w in lanes(width):
+                    p, r = left[j, a, w], left[j, b, w]
+                    left[j, a, w] = cosine[w] * p - sine[w] * r
+                    left[j, b, w] = sine[w] * p + cosine[w] * r
+        if turned == 0.0:
             break
     for a in range(3):
-        square = 0.0
-        for j in range(n):
-            square += rows[a, j] * rows[a, j]
-        values[a] = math.sqrt(square)
-        if square > 0.0:
-            inverse = 1.0 / values[a]
-            for j in range(n):
-                rows[a, j] *= inverse
+        _set_product(rows, a, a, aa, width)
+        for w in lanes(width):
+            values[a, w] = math.sqrt(aa[w])
+        for w in lanes(width):
+            bb[w] = 1.0 / values[a, w] if values[a, w] > 0.0 else 1.0
+        for k in upwards(0, rows.shape[1]):
+            for w in lanes(width):
+                rows[a, k, w] *= bb[w]
+
+
+@inner
+def _set_product(rows: Array, a: Index, b: Index, product: Array, width: Width) -> None:
+    """Fill product (W,) with row a times row b."""
+    for w in lanes(width):
+        product[w] = 0.0
+    for j in upwards(0, rows.shape[1]):
+        for w in lanes(width):
+            product[w] += rows[a, j, w] * rows[b, j, w]

@@ -1,5 +1,7 @@
 """Kernels that compute readings of K_θ: stability margin, compliance and Cartesian stiffness.
 
+All arrays are those of a block of postures: the last axis is the posture.
+
 With the linear rows J_v of J_X, and C = J_X K_θ⁻¹ J_Xᵀ with its linear part C_vv,
 
     margin = λ_min((K_θ + K_θᵀ)/2),    compliance = C,    along(u) = 1/(uᵀ C_vv u),
@@ -22,8 +24,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cdsm.kernels.compiling import compiled, inlined
+from cdsm.kernels.compiling import Index, Width, compiled, inlined, inner, lanes, upwards
 from cdsm.kernels.linear_algebra import eliminate, singular_values, smallest_eigenvalue
+from cdsm.kernels.tree import Indices
 from cdsm.support.values import Array
 
 REGULAR = 1e-8
@@ -45,8 +48,8 @@ The motion is at most the torque over the smallest singular value, and usually s
 1e5 is orders of magnitude below the inverse of :data:`REGULAR`.
 """
 
-READ, SINGULAR, IMMOBILE = range(3)
-"""Status of the readings: all exist; K_θ⁻¹ does not exist; J_v⁺ does not exist."""
+READ, SINGULAR, IMMOBILE, UNREAD = range(4)
+"""Status of the readings: all exist; K_θ⁻¹ does not exist; J_v⁺ does not exist; K_θ is unknown."""
 
 
 class Wanted(NamedTuple):
@@ -59,9 +62,10 @@ class Wanted(NamedTuple):
 
 
 class Readings(NamedTuple):
-    """Arrays for the readings, filled by :func:`read_stiffness`.
+    """Arrays for the readings of a block of W postures, filled by :func:`read_stiffness`.
 
-    Shapes: margin (1,), pseudoinverse (3, 3), along (D,), compliance (6, 6), cartesian (3, 3).
+    Shapes: margin (1, W), pseudoinverse (3, 3, W), along (D, W), compliance (6, 6, W), cartesian
+    (3, 3, W).
     """
 
     margin: Array
@@ -72,25 +76,25 @@ class Readings(NamedTuple):
 
 
 class Workspace(NamedTuple):
-    """Scratch arrays for one posture.
+    """Scratch arrays for a block of W postures.
 
     Attributes:
-        parts: P, the sum of the magnitudes of the four terms of K_θ (nv, nv).
-        symmetric: The symmetric part of K_θ (nv, nv).
-        vectors: Scratch of the smallest eigenvalue (4, nv).
-        scale: D^-½ (nv,).
+        symmetric: The symmetric part of K_θ (nv, nv, W).
+        rows: Scratch of the eigenvalues and of short loops (4 nv + 10, W).
+        scale: D^-½ (nv, W).
+        largest: Largest entry of D^-½ P D^-½ (W,).
         system: K_θ, a probing torque, and, if wanted, J_vᵀu of each direction, J_Xᵀ and Vᵀ.
-        left: U, then O (3, 3).
-        values: The singular values S (3,).
-        right: V (3, nv).
-        image: K_θ Vᵀ (nv, 3).
-        inner: A matrix (3, 3), and right of it the unit matrix.
+        left: U, then O (3, 3, W).
+        values: The singular values S (3, W).
+        right: V (3, nv, W).
+        image: K_θ Vᵀ (nv, 3, W).
+        inner: A matrix (3, 3, W), and right of it the unit matrix.
     """
 
-    parts: Array
     symmetric: Array
-    vectors: Array
+    rows: Array
     scale: Array
+    largest: Array
     system: Array
     left: Array
     values: Array
@@ -99,21 +103,21 @@ class Workspace(NamedTuple):
     inner: Array
 
 
-@compiled
-def workspace(nv: int, directions: int, wanted: Wanted) -> Workspace:
+@inlined
+def workspace(nv: int, directions: int, wanted: Wanted, width: int) -> Workspace:
     """Allocate scratch for the wanted readings."""
     columns = directions + (6 if wanted.compliance else 0) + (3 if wanted.cartesian else 0)
     return Workspace(
-        np.empty((nv, nv)),
-        np.empty((nv, nv)),
-        np.empty((4, nv)),
-        np.empty(nv),
-        np.empty((nv, nv + columns + (1 if columns > 0 else 0))),
-        np.empty((3, 3)),
-        np.empty(3),
-        np.empty((3, nv)),
-        np.empty((nv, 3)),
-        np.empty((3, 6)),
+        np.empty((nv, nv, width)),
+        np.empty((4 * nv + 10, width)),
+        np.empty((nv, width)),
+        np.empty(width),
+        np.empty((nv, nv + columns + (1 if columns > 0 else 0), width)),
+        np.empty((3, 3, width)),
+        np.empty((3, width)),
+        np.empty((3, nv, width)),
+        np.empty((nv, 3, width)),
+        np.empty((3, 6, width)),
     )
 
 
@@ -123,271 +127,322 @@ def workspace(nv: int, directions: int, wanted: Wanted) -> Workspace:
 @compiled
 def single_readings(
     K: Array,
-    active: Array,
-    passive: Array,
-    gravity: Array,
-    load: Array,
+    parts: Array,
     JX: Array,
     directions: Array,
+    pseudoinverse: bool,
     compliance: bool,
     cartesian: bool,
-) -> tuple[int, Array, Array, Array, Array]:
-    """Return status, along (D,), joint motions K_θ⁻¹ J_vᵀu (nv, D), compliance and cartesian."""
+) -> tuple[int, Array, Array, Array, Array, Array]:
+    """Return the status and the wanted readings of one posture.
+
+    K is K_θ or, for the pseudoinverse, any of its terms (nv, nv). P is ``parts`` (nv, nv).
+
+    Returns:
+        Status, pseudoinverse (3, 3), along (D,), a matrix with the joint motions K_θ⁻¹ J_vᵀu in its
+        columns from nv + 1 on, compliance (6, 6) and cartesian (3, 3).
+    """
     nv, count = K.shape[0], directions.shape[0]
-    wanted = Wanted(False, False, compliance, cartesian)
-    work = workspace(nv, count, wanted)
-    total = np.empty((nv, nv))
-    sum_terms(active, passive, gravity, load, total, work.parts)
+    wanted = Wanted(False, pseudoinverse, compliance, cartesian)
+    work, status = workspace(nv, count, wanted, 1), np.full(1, READ)
     readings = Readings(
-        np.empty(1), np.empty((3, 3)), np.empty(count), np.empty((6, 6)), np.empty((3, 3))
+        np.empty((1, 1)),
+        np.empty((3, 3, 1)),
+        np.empty((count, 1)),
+        np.empty((6, 6, 1)),
+        np.empty((3, 3, 1)),
     )
-    # copies are writable like the rows of a batch, so one compilation serves both
-    status = read_stiffness(K.copy(), JX.copy(), directions, wanted, work, readings)
-    motion = work.system[:, nv + 1 : nv + 1 + count].copy()
-    return status, readings.along, motion, readings.compliance, readings.cartesian
+    block, magnitudes = K.reshape(nv, nv, 1), parts.reshape(nv, nv, 1)
+    jacobian = JX.reshape(6, nv, 1)
+    read_stiffness(block, magnitudes, jacobian, directions, wanted, work, readings, status, None)
+    return (
+        status[0],
+        readings.pseudoinverse.reshape(3, 3),
+        readings.along.reshape(count),
+        work.system.reshape(nv, work.system.shape[1]),
+        readings.compliance.reshape(6, 6),
+        readings.cartesian.reshape(3, 3),
+    )
 
 
 @compiled
 def single_margin(K: Array) -> float:
     """Compute the smallest eigenvalue of the symmetric part of K (nv, nv)."""
-    nv = K.shape[0]
-    return _margin(K.copy(), np.empty((nv, nv)), np.empty((4, nv)))
+    nv, least = K.shape[0], np.empty(1)
+    symmetric = np.empty((nv, nv, 1))
+    set_symmetric(K.reshape(nv, nv, 1), symmetric, None)
+    smallest_eigenvalue(symmetric, np.empty((4 * nv + 10, 1)), least, None)
+    margin: float = least[0]
+    return margin
 
 
-@compiled
-def single_pseudoinverse(K: Array, JX: Array) -> tuple[int, Array]:
-    """Return the status and J_v⁺ᵀ K J_v⁺ (3, 3) of any term K (nv, nv)."""
-    wanted = Wanted(False, True, False, False)
-    readings = Readings(
-        np.empty(1), np.empty((3, 3)), np.empty(0), np.empty((6, 6)), np.empty((3, 3))
-    )
-    work = workspace(K.shape[0], 0, wanted)
-    status = read_stiffness(K.copy(), JX.copy(), np.zeros((0, 3)), wanted, work, readings)
-    return status, readings.pseudoinverse
+# --- blocks of postures ---------------------------------------------------------------------
 
 
-@compiled
-def is_mobile(JX: Array) -> bool:
-    """Check whether the tip can move in all directions."""
-    wanted = Wanted(False, False, False, False)
-    return _decompose(JX.copy(), workspace(JX.shape[1], 0, wanted))
-
-
-@compiled
-def moves(JX: Array, direction: Array) -> bool:
-    """Check whether a force along u (1, 3) moves any joint."""
-    return _is_moved(JX, direction, 0)
-
-
-# --- row by row -----------------------------------------------------------------------------
-
-
-@compiled
-def sum_terms(
-    active: Array, passive: Array, gravity: Array, load: Array, K: Array, parts: Array
-) -> None:
-    """Fill K_θ, and P, the sum of the magnitudes of its four terms, (nv, nv) each."""
-    for i in range(K.shape[0]):
-        for j in range(K.shape[0]):
-            K[i, j] = active[i, j] + passive[i, j] + gravity[i, j] + load[i, j]
-            parts[i, j] = abs(active[i, j]) + abs(passive[i, j])
-            parts[i, j] += abs(gravity[i, j]) + abs(load[i, j])
-
-
-@compiled
+@inlined
 def read_stiffness(
-    K: Array, JX: Array, directions: Array, wanted: Wanted, work: Workspace, readings: Readings
-) -> int:
-    """Fill the readings that are wanted and exist; return READ, SINGULAR or IMMOBILE.
+    K: Array,
+    parts: Array,
+    JX: Array,
+    directions: Array,
+    wanted: Wanted,
+    work: Workspace,
+    readings: Readings,
+    status: Indices,
+    width: Width,
+) -> None:
+    """Fill the readings that are wanted and exist, and the status: READ, SINGULAR or IMMOBILE.
+
+    Postures that are UNREAD on entry stay so; their readings are meaningless.
 
     If the tip is immobile, pseudoinverse and cartesian are NaN. If K_θ is singular, ``along`` is
-    NaN, or infinite in directions in which the tip cannot move. K is K_θ (nv, nv), JX is J_X (6,
-    nv), and directions are unit vectors u (D, 3). ``work.parts`` must be filled before.
+    NaN, or infinite in directions in which the tip cannot move; compliance and cartesian are
+    meaningless. K is K_θ (nv, nv, W), JX is J_X (6, nv, W), and directions are unit vectors u (D,
+    3). P is ``parts`` (nv, nv, W).
     """
-    nv, count, system = K.shape[0], directions.shape[0], work.system
+    symmetric, rows, scale, largest, system, left, values, right, image, inner = work
+    nv, count = K.shape[0], directions.shape[0]
     if wanted.margin:
-        readings.margin[0] = _margin(K, work.symmetric, work.vectors)
-    for a in range(3):
-        for c in range(3):
-            readings.pseudoinverse[a, c] = readings.cartesian[a, c] = math.nan
-    status = READ
-    if (wanted.cartesian or wanted.pseudoinverse) and not _decompose(JX, work):
-        status = IMMOBILE
-    if wanted.pseudoinverse and status == READ:
-        for i in range(nv):
-            for c in range(3):
-                work.image[i, c] = 0.0
-                for j in range(nv):
-                    work.image[i, c] += K[i, j] * work.right[c, j]
-        _project(work.right, work.image, 0, work.inner)
-        _congruence(work.left, work.inner, 0, readings.pseudoinverse)
-    if system.shape[1] == nv:
-        return status
-
-    _set_right_sides(JX, directions, work.right, wanted, system)
-    for u in range(count):
-        readings.along[u] = math.nan if _is_moved(JX, directions, u) else math.inf
-    if not _solve(K, work.parts, work.scale, system):
-        return SINGULAR
-    for u in range(count):
-        if math.isnan(readings.along[u]):
-            compliance = 0.0
-            for i in range(nv):
-                compliance += _tip_torque(JX, directions, u, i) * system[i, nv + 1 + u]
-            readings.along[u] = 1.0 / compliance if compliance != 0.0 else math.inf
+        set_symmetric(K, symmetric, width)
+        smallest_eigenvalue(symmetric, rows, readings.margin[0], width)
+    if wanted.cartesian or wanted.pseudoinverse:
+        _decompose(JX, left, values, right, rows, status, width)
+    if wanted.pseudoinverse:
+        _set_product(K, right, image, width)
+        _project(right, image, np.intp(0), inner, width)
+        _congruence(left, inner, np.intp(0), status, readings.pseudoinverse, width)
+    if system.shape[1] > nv:
+        _set_right_sides(JX, directions, right, wanted, system, rows, readings.along, width)
+        _equilibrate(K, parts, scale, largest, system, width)
+        eliminate(system, rows, width)
+        _rescale(K, scale, largest, system, rows, status, width)
+        _set_along(JX, directions, system, rows, status, readings.along, width)
     if wanted.compliance:
-        _project(JX, system, nv + 1 + count, readings.compliance)
-    if wanted.cartesian and status == READ:
-        _project(work.right, system, system.shape[1] - 3, work.inner)
+        _project(JX, system, nv + 1 + count, readings.compliance, width)
+    if wanted.cartesian:
+        _project(right, system, system.shape[1] - 3, inner, width)
         for a in range(3):
             for c in range(3):
-                work.inner[a, 3 + c] = 1.0 if a == c else 0.0
-        if eliminate(work.inner) == 0.0:
-            return SINGULAR
-        _congruence(work.left, work.inner, 3, readings.cartesian)
-    return status
+                for w in lanes(width):
+                    inner[a, 3 + c, w] = 1.0 if a == c else 0.0
+        eliminate(inner, rows, width)
+        for w in lanes(width):
+            if rows[0, w] == 0.0 and status[w] == READ:
+                status[w] = SINGULAR
+        _congruence(left, inner, np.intp(3), status, readings.cartesian, width)
 
 
-@compiled
-def _margin(K: Array, symmetric: Array, vectors: Array) -> float:
-    for i in range(K.shape[0]):
-        for j in range(K.shape[0]):
-            symmetric[i, j] = (K[i, j] + K[j, i]) / 2.0
-    return smallest_eigenvalue(symmetric, vectors)
+@inner
+def set_symmetric(K: Array, symmetric: Array, width: Width) -> None:
+    """Fill the symmetric part (nv, nv, W) of K."""
+    for i in upwards(0, K.shape[0]):
+        for j in upwards(0, K.shape[0]):
+            for w in lanes(width):
+                symmetric[i, j, w] = (K[i, j, w] + K[j, i, w]) / 2.0
 
 
-@compiled
-def _decompose(JX: Array, work: Workspace) -> bool:
-    """Fill O, S and V of J_v; return whether the tip can move in all directions."""
-    left, values, right = work.left, work.values, work.right
+@inner
+def _decompose(
+    JX: Array, left: Array, S: Array, right: Array, rows: Array, status: Indices, width: Width
+) -> None:
+    """Fill O, S and V of J_v; set the status where the tip cannot move in all directions."""
     for a in range(3):
-        for i in range(JX.shape[1]):
-            right[a, i] = JX[a, i]
-    singular_values(right, left, values)
-    smallest, largest = values[0], values[0]
-    for a in range(3):
-        smallest, largest = min(smallest, values[a]), max(largest, values[a])
-    if smallest <= FLAT * largest:
-        return False
+        for i in upwards(0, JX.shape[1]):
+            for w in lanes(width):
+                right[a, i, w] = JX[a, i, w]
+    singular_values(right, left, S, rows, width)
+    for w in lanes(width):
+        smallest = min(S[0, w], S[1, w], S[2, w])
+        if status[w] == READ and not smallest > FLAT * max(S[0, w], S[1, w], S[2, w]):
+            status[w] = IMMOBILE
     for i in range(3):
         for a in range(3):
-            left[i, a] /= values[a]
-    return True
+            for w in lanes(width):
+                left[i, a, w] /= S[a, w]
+
+
+@inner
+def _set_product(K: Array, right: Array, image: Array, width: Width) -> None:
+    """Fill image (nv, 3, W) with K Vᵀ."""
+    for i in upwards(0, K.shape[0]):
+        for c in range(3):
+            for w in lanes(width):
+                image[i, c, w] = 0.0
+            for j in upwards(0, K.shape[0]):
+                for w in lanes(width):
+                    image[i, c, w] += K[i, j, w] * right[c, j, w]
 
 
 # --- K_θ⁻¹ ----------------------------------------------------------------------------------
 
 
-@compiled
-def _solve(K: Array, parts: Array, scale: Array, system: Array) -> bool:
-    """Replace the right sides B of a system by K_θ⁻¹ B; return whether K_θ is regular."""
+@inner
+def _set_right_sides(
+    JX: Array,
+    directions: Array,
+    right: Array,
+    wanted: Wanted,
+    system: Array,
+    rows: Array,
+    along: Array,
+    width: Width,
+) -> None:
+    """Fill the probing torque and the wanted columns of J_vᵀu, J_Xᵀ and Vᵀ, right of K_θ.
+
+    ``along`` (D, W) becomes inf where u moves no joint, else NaN.
+    """
+    nv, torque, linear = np.uint64(JX.shape[1]), rows[0], rows[1]
+    first = nv + np.uint64(1)
+    columns, count = np.uint64(system.shape[1]), np.uint64(directions.shape[0])
+    for w in lanes(width):
+        linear[w] = 0.0
+    for i in upwards(0, nv):
+        # an irregular torque from 1 to 2 that excites almost every motion
+        probe = 1.0 + (0.6180339887498949 * np.intp(i)) % 1.0
+        for w in lanes(width):
+            system[i, nv, w] = probe
+        for a in range(3):
+            for w in lanes(width):
+                linear[w] = max(linear[w], abs(JX[a, i, w]))
+        if wanted.compliance:
+            for c in range(6):
+                for w in lanes(width):
+                    system[i, first + count + np.uint64(c), w] = JX[c, i, w]
+        if wanted.cartesian:
+            for c in range(3):
+                for w in lanes(width):
+                    system[i, columns - np.uint64(3 - c), w] = right[c, i, w]
+    for u in upwards(0, count):
+        x, y, z = directions[u, 0], directions[u, 1], directions[u, 2]
+        for w in lanes(width):
+            torque[w] = 0.0
+        for i in upwards(0, nv):
+            for w in lanes(width):
+                system[i, first + u, w] = x * JX[0, i, w] + y * JX[1, i, w] + z * JX[2, i, w]
+            for w in lanes(width):
+                torque[w] = max(torque[w], abs(system[i, first + u, w]))
+        for w in lanes(width):
+            along[u, w] = math.nan if torque[w] > UNMOVED * linear[w] else math.inf
+
+
+@inner
+def _equilibrate(
+    K: Array, parts: Array, scale: Array, largest: Array, system: Array, width: Width
+) -> None:
+    """Fill D^-½, the largest entry of D^-½ P D^-½ (inf if D is singular), and scale the system."""
+    nv = np.uint64(K.shape[0])
+    for w in lanes(width):
+        largest[w] = 0.0
+    for i in upwards(0, nv):
+        for w in lanes(width):
+            scale[i, w] = 1.0 / math.sqrt(parts[i, i, w])
+        for w in lanes(width):
+            largest[w] = largest[w] if parts[i, i, w] > 0.0 else math.inf
+        for c in upwards(nv + np.uint64(1), system.shape[1]):
+            for w in lanes(width):
+                system[i, c, w] *= scale[i, w]
+    for i in upwards(0, nv):
+        for j in upwards(0, nv):
+            for w in lanes(width):
+                system[i, j, w] = K[i, j, w] * scale[i, w] * scale[j, w]
+            for w in lanes(width):
+                largest[w] = max(largest[w], parts[i, j, w] * scale[i, w] * scale[j, w])
+
+
+@inner
+def _rescale(
+    K: Array,
+    scale: Array,
+    largest: Array,
+    system: Array,
+    rows: Array,
+    status: Indices,
+    width: Width,
+) -> None:
+    """Scale the solutions back to K_θ⁻¹ B; set the status where K_θ is singular."""
+    nv, moved = np.uint64(K.shape[0]), rows[4]
+    for w in lanes(width):
+        moved[w] = 0.0
+    for i in upwards(0, nv):
+        for w in lanes(width):
+            moved[w] = max(moved[w], abs(system[i, nv, w]))
+        for c in upwards(nv + np.uint64(1), system.shape[1]):
+            for w in lanes(width):
+                system[i, c, w] *= scale[i, w]
+    for w in lanes(width):
+        # LAPACK's singular values take ten times as long as all the rest, and are rarely needed
+        certain = moved[w] * largest[w] < _DOUBT and rows[0, w] > 0.0
+        if status[w] != UNREAD and not certain and not _is_regular(K, scale, largest[w], w):
+            status[w] = SINGULAR
+
+
+@inner
+def _is_regular(K: Array, scale: Array, largest: float, w: Index) -> bool:
+    """Check whether the smallest singular value of one scaled K_θ is large enough."""
     nv = K.shape[0]
-    largest = _equilibrate(K, parts, scale, system)
-    if largest == math.inf:  # a joint has zero stiffness in all terms
+    if not largest < math.inf:  # a joint has zero stiffness in all terms
         return False
-    for i in range(nv):
-        system[i, nv] = _probe_torque(i)
-        for c in range(nv + 1, system.shape[1]):
-            system[i, c] *= scale[i]
-    if eliminate(system) == 0.0:
-        return False
-    moved = 0.0
-    for i in range(nv):
-        moved = max(moved, abs(system[i, nv]))
-    # LAPACK's singular values take ten times as long as all the rest, and are rarely needed
-    if not moved * largest < _DOUBT and not _is_regular(K, parts):
-        return False
-    for i in range(nv):
-        for c in range(nv + 1, system.shape[1]):
-            system[i, c] *= scale[i]
-    return True
-
-
-@compiled
-def _equilibrate(K: Array, parts: Array, scale: Array, scaled: Array) -> float:
-    """Fill D^-½ and D^-½ K D^-½; return the largest entry of D^-½ P D^-½, inf if D is singular."""
-    nv, largest = K.shape[0], 0.0
-    for i in range(nv):
-        if not parts[i, i] > 0.0:
-            return math.inf
-        scale[i] = 1.0 / math.sqrt(parts[i, i])
+    scaled = np.empty((nv, nv))
     for i in range(nv):
         for j in range(nv):
-            scaled[i, j] = K[i, j] * scale[i] * scale[j]
-            largest = max(largest, parts[i, j] * scale[i] * scale[j])
-    return largest
-
-
-@compiled
-def _is_regular(K: Array, parts: Array) -> bool:
-    """Check whether the smallest singular value of the scaled K_θ is large enough."""
-    scaled = np.empty(K.shape)
-    largest = _equilibrate(K, parts, np.empty(K.shape[0]), scaled)
+            scaled[i, j] = K[i, j, w] * scale[i, w] * scale[j, w]
     regular: bool = np.linalg.svd(scaled)[1][-1] > REGULAR * largest
     return regular
 
 
-@inlined
-def _probe_torque(i: int) -> float:
-    """Return an irregular torque on joint i, from 1 to 2, that excites almost every motion."""
-    return 1.0 + (0.6180339887498949 * i) % 1.0
-
-
-@compiled
-def _set_right_sides(
-    JX: Array, directions: Array, right: Array, wanted: Wanted, system: Array
+@inner
+def _set_along(
+    JX: Array,
+    directions: Array,
+    system: Array,
+    rows: Array,
+    status: Indices,
+    along: Array,
+    width: Width,
 ) -> None:
-    """Fill the wanted columns of J_vᵀu, J_Xᵀ and Vᵀ, right of the probing torque."""
-    nv, count = JX.shape[1], directions.shape[0]
-    width = system.shape[1]
-    for i in range(nv):
-        for u in range(count):
-            system[i, nv + 1 + u] = _tip_torque(JX, directions, u, i)
-        if wanted.compliance:
-            for c in range(6):
-                system[i, nv + 1 + count + c] = JX[c, i]
-        if wanted.cartesian:
-            for c in range(3):
-                system[i, width - 3 + c] = right[c, i]
+    """Fill the stiffness along each direction, where the tip can move and K_θ is regular."""
+    compliance, first = rows[0], np.uint64(JX.shape[1] + 1)
+    for u in upwards(0, directions.shape[0]):
+        x, y, z = directions[u, 0], directions[u, 1], directions[u, 2]
+        for w in lanes(width):
+            compliance[w] = 0.0
+        for i in upwards(0, JX.shape[1]):
+            for w in lanes(width):
+                torque = x * JX[0, i, w] + y * JX[1, i, w] + z * JX[2, i, w]
+                compliance[w] += torque * system[i, first + u, w]
+        for w in lanes(width):
+            stiffness = 1.0 / compliance[w] if compliance[w] != 0.0 else math.inf
+            exists = math.isnan(along[u, w]) and status[w] != SINGULAR
+            along[u, w] = stiffness if exists else along[u, w]
 
 
-@inlined
-def _tip_torque(JX: Array, directions: Array, u: int, i: int) -> float:
-    """Compute entry i of J_vᵀu: the joint torque of a unit force along u."""
-    x, y, z = directions[u, 0], directions[u, 1], directions[u, 2]
-    torque: float = x * JX[0, i] + y * JX[1, i] + z * JX[2, i]
-    return torque
-
-
-@compiled
-def _is_moved(JX: Array, directions: Array, u: int) -> bool:
-    """Check whether a force along u moves any joint."""
-    torque = linear = 0.0
-    for i in range(JX.shape[1]):
-        torque = max(torque, abs(_tip_torque(JX, directions, u, i)))
-        for a in range(3):
-            linear = max(linear, abs(JX[a, i]))
-    return torque > UNMOVED * linear
-
-
-@compiled
-def _project(A: Array, B: Array, first: int, out: Array) -> None:
-    """Fill the first m columns of out with A (m, nv) times m columns of B (nv, …)."""
+@inner
+def _project(A: Array, B: Array, first: Index, out: Array, width: Width) -> None:
+    """Fill the first m columns of out with A (m, nv, W) times m columns of B (nv, …, W)."""
     m = A.shape[0]
-    for a in range(m):
-        for c in range(m):
-            out[a, c] = 0.0
-        for i in range(A.shape[1]):
-            for c in range(m):
-                out[a, c] += A[a, i] * B[i, first + c]
+    for a in upwards(0, m):
+        for c in upwards(0, m):
+            column = np.uint64(first) + c
+            for w in lanes(width):
+                out[a, c, w] = 0.0
+            for i in upwards(0, A.shape[1]):
+                for w in lanes(width):
+                    out[a, c, w] += A[a, i, w] * B[i, column, w]
 
 
-@compiled
-def _congruence(factor: Array, inner: Array, first: int, out: Array) -> None:
-    """Fill out (3, 3) with O X Oᵀ; X is three columns of inner, and O is the factor."""
+@inner
+def _congruence(
+    factor: Array, inner: Array, first: Index, status: Indices, out: Array, width: Width
+) -> None:
+    """Fill out (3, 3, W) with O X Oᵀ, or NaN where the tip is immobile.
+
+    X is three columns of inner, and O is the factor.
+    """
     for i in range(3):
         for j in range(3):
-            out[i, j] = 0.0
+            for w in lanes(width):
+                out[i, j, w] = math.nan if status[w] == IMMOBILE else 0.0
             for k in range(3):
                 for m in range(3):
-                    out[i, j] += factor[i, k] * inner[k, first + m] * factor[j, m]
+                    for w in lanes(width):
+                        out[i, j, w] += factor[i, k, w] * inner[k, first + m, w] * factor[j, m, w]

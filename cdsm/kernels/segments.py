@@ -21,197 +21,201 @@ factor is computed once per joint, and each pair of joints needs one dot product
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
-from cdsm.kernels.compiling import compiled, inlined
-from cdsm.kernels.tree import Frames, Indices, Routing, Tree, forward_kinematics
+from cdsm.kernels.compiling import Index, Width, compiled, inlined, inner, lanes, upwards
+from cdsm.kernels.tree import Frames, Indices, Routing
 from cdsm.support.values import Array
 
 SHORTEST_SEGMENT = 1e-9
 """Length [m] below which a segment has no direction: its two sites coincide."""
 
 
-@inlined
-def _direction(site: Array, a: int, b: int) -> tuple[float, float, float, float]:
-    """Return the unit vector from site a to site b and their distance; zeros if they coincide."""
-    x = site[b, 0] - site[a, 0]
-    y = site[b, 1] - site[a, 1]
-    z = site[b, 2] - site[a, 2]
-    length = math.sqrt(x * x + y * y + z * z)
-    if length < SHORTEST_SEGMENT:
-        return 0.0, 0.0, 0.0, 0.0
-    return x / length, y / length, z / length, length
+class Segments(NamedTuple):
+    """Scratch of one segment in a block of W postures: u (3, W), ℓ and 1/ℓ (W,), d, u·d, c."""
+
+    direction: Array
+    length: Array
+    inverse: Array
+    derivative: Array
+    along: Array
+    left_factor: Array
 
 
 @inlined
-def _add_side(
-    sign: float,
-    site: int,
-    part: tuple[int, int, int],
-    joint: Indices,
-    frames: Frames,
-    direction: tuple[float, float, float, float],
-    weight: float,
-    left_factor: Array,
-    cable: int,
-    jacobian: Array,
-    slot: int,
-    hessian: Array,
+def segment_scratch(nv: int, width: int) -> Segments:
+    """Allocate the scratch for a block."""
+    return Segments(
+        np.empty((3, width)),
+        np.empty(width),
+        np.empty(width),
+        np.empty((3, width)),
+        np.empty(width),
+        np.empty((nv, 3, width)),
+    )
+
+
+@inner
+def _set_direction(site: Array, a: Index, b: Index, scratch: Segments, width: Width) -> None:
+    """Fill u (3, W) from site a to site b, ℓ and 1/ℓ (W,)."""
+    u, length, inverse = scratch.direction, scratch.length, scratch.inverse
+    for w in lanes(width):
+        square = (site[b, 0, w] - site[a, 0, w]) ** 2 + (site[b, 1, w] - site[a, 1, w]) ** 2
+        length[w] = math.sqrt(square + (site[b, 2, w] - site[a, 2, w]) ** 2)
+    for w in lanes(width):
+        inverse[w] = 1.0 / length[w]
+    for r in range(3):
+        for w in lanes(width):
+            u[r, w] = (site[b, r, w] - site[a, r, w]) / length[w]
+
+
+@inner
+def _set_derivative(
+    frames: Frames, sign: float, site: Index, j: Index, d: Array, width: Width
 ) -> None:
-    """Add the joints on one side of a segment to J_L and H_L, for i ≤ j only.
-
-    ``sign`` is +1 for joints on the path to b and −1 for joints on the path to a; ``site`` is the
-    site at this end. ``part`` holds indices into ``joint``: start of the segment's joints, start
-    and end of this side. ``direction`` is u and ℓ. ``left_factor`` receives the weight times c_i.
-    Row ``cable`` of J_L and matrix ``slot`` of the Hessians are changed; empty arrays are skipped.
-    """
-    first, begin, end = part
-    ux, uy, uz, length = direction
-    inverse = 1.0 / length
-    for t in range(begin, end):
-        j = joint[t]
-        zx, zy, zz = frames.axis[j, 0], frames.axis[j, 1], frames.axis[j, 2]
-        # d_j = ±z × (x − o), or ± the slide
-        rx = sign * (frames.site[site, 0] - frames.origin[j, 0])
-        ry = sign * (frames.site[site, 1] - frames.origin[j, 1])
-        rz = sign * (frames.site[site, 2] - frames.origin[j, 2])
-        dx, dy, dz = zy * rz - zz * ry, zz * rx - zx * rz, zx * ry - zy * rx
+    """Fill d_j (3, W) = ±z × (x − o), or ± the slide, at the end x of a segment."""
+    origin, axis, x = frames.origin, frames.axis, frames.site
+    for r in range(3):
+        p, q = (r + 1) % 3, (r + 2) % 3
+        for w in lanes(width):
+            y, z = x[site, p, w] - origin[j, p, w], x[site, q, w] - origin[j, q, w]
+            d[r, w] = axis[j, p, w] * (sign * z) - axis[j, q, w] * (sign * y)
         if frames.slide.shape[0]:
-            dx += sign * frames.slide[j, 0]
-            dy += sign * frames.slide[j, 1]
-            dz += sign * frames.slide[j, 2]
-        along = ux * dx + uy * dy + uz * dz
-        if jacobian.shape[0]:
-            jacobian[cable, j - 1] += along
-        if hessian.shape[0]:
-            c, k = left_factor, t - first
-            c[k, 0] = weight * ((dx - along * ux) * inverse + uy * zz - uz * zy)
-            c[k, 1] = weight * ((dy - along * uy) * inverse + uz * zx - ux * zz)
-            c[k, 2] = weight * ((dz - along * uz) * inverse + ux * zy - uy * zx)
-            # pair joint j with itself and all joints before it, also those of the other side
-            for k in range(t - first + 1):
-                i = joint[first + k]
-                value = c[k, 0] * dx + c[k, 1] * dy + c[k, 2] * dz
-                hessian[slot, min(i, j) - 1, max(i, j) - 1] += value
+            for w in lanes(width):
+                d[r, w] += sign * frames.slide[j, r, w]
 
 
-@inlined
-def _remove_cross_products(
-    joint: Indices,
-    first: int,
-    end: int,
-    axis: Array,
-    direction: tuple[float, float, float, float],
-    weight: float,
-    left_factor: Array,
-) -> None:
-    """Subtract u × z_i from the left factors: the joints that follow are on the other side."""
-    ux, uy, uz, _ = direction
-    for t in range(first, end):
-        zx, zy, zz = axis[joint[t], 0], axis[joint[t], 1], axis[joint[t], 2]
-        left_factor[t - first, 0] -= weight * (uy * zz - uz * zy)
-        left_factor[t - first, 1] -= weight * (uz * zx - ux * zz)
-        left_factor[t - first, 2] -= weight * (ux * zy - uy * zx)
-
-
-@compiled
-def mirror(matrix: Array) -> None:
-    """Copy the upper triangle of a matrix to the lower triangle."""
-    for i in range(matrix.shape[0]):
+@inner
+def mirror(matrix: Array, width: Width) -> None:
+    """Copy the upper triangle of matrices (nv, nv, W) to the lower triangle."""
+    for i in upwards(0, matrix.shape[0]):
         for j in range(i):
-            matrix[i, j] = matrix[j, i]
+            for w in lanes(width):
+                matrix[i, j, w] = matrix[j, i, w]
 
 
-@compiled
-def add_segment_derivatives(
+@inner
+def set_lengths(
+    routing: Routing,
+    frames: Frames,
+    scratch: Segments,
+    lengths: Array,
+    jacobian: Array,
+    shortest: Array,
+    width: Width,
+) -> None:
+    """Fill L (C, W), J_L (C, nv, W), and the length of the shortest segment (W,).
+
+    Where two sites coincide, L and J_L of the posture are meaningless.
+    """
+    segment, joint, (u, length, _, d, _, _) = routing.segment, routing.joint, scratch
+    for c in upwards(0, lengths.shape[0]):
+        for w in lanes(width):
+            lengths[c, w] = routing.fixed[c]
+        for j in upwards(0, jacobian.shape[1]):
+            for w in lanes(width):
+                jacobian[c, j, w] = 0.0
+    for w in lanes(width):
+        shortest[w] = math.inf
+    for s in range(segment.shape[0] - 1):
+        cable, a, b = np.uint64(segment[s, 0]), np.uint64(segment[s, 1]), np.uint64(segment[s, 2])
+        _set_direction(frames.site, a, b, scratch, width)
+        for w in lanes(width):
+            lengths[cable, w] += length[w]
+            shortest[w] = min(shortest[w], length[w])
+        for t in range(segment[s, 3], segment[s + 1, 3]):
+            j = np.uint64(joint[t])
+            sign, site = (1.0, b) if t >= segment[s, 4] else (-1.0, a)
+            _set_derivative(frames, sign, site, j, d, width)
+            i = j - np.uint64(1)
+            for w in lanes(width):
+                jacobian[cable, i, w] += u[0, w] * d[0, w] + u[1, w] * d[1, w] + u[2, w] * d[2, w]
+
+
+@inner
+def add_length_hessian(
     segment: Indices,
     joint: Indices,
     frames: Frames,
     weight: Array,
     slot: Indices,
-    left_factor: Array,
-    lengths: Array,
-    jacobian: Array,
+    scratch: Segments,
     hessian: Array,
-) -> int:
-    """Add all segments to L (C,), J_L (C, nv) and weight[c] H_L[c] at hessian[slot[c]] (nv, nv).
+    width: Width,
+) -> None:
+    """Add weight[c] ∂²L_c/∂θ_i∂θ_j to hessian[slot[c], i, j] of every cable c, for i ≤ j only.
 
-    An array without rows skips J_L, and an array without matrices skips H_L. Only i ≤ j of H_L is
-    filled. ``left_factor`` (nv, 3) is scratch.
-
-    Returns:
-        The first segment with coinciding sites, or −1. If there is one, all arrays are unfinished.
+    ``weight`` is (C, W) and ``hessian`` (S, nv, nv, W). H_L·F needs the weight F and all slots 0.
+    The whole tensor needs the weight 1 and slot c for cable c.
     """
+    u, _, inverse, d, along, left = scratch
+    axis = frames.axis
     for s in range(segment.shape[0] - 1):
-        cable, a, b = segment[s, 0], segment[s, 1], segment[s, 2]
+        cable, a, b = np.uint64(segment[s, 0]), np.uint64(segment[s, 1]), np.uint64(segment[s, 2])
         first, split, end = segment[s, 3], segment[s, 4], segment[s + 1, 3]
-        direction = _direction(frames.site, a, b)
-        if direction[3] == 0.0:
-            return s
-        lengths[cable] += direction[3]
-        w, k = 0.0, 0
-        if hessian.shape[0]:
-            w, k = weight[cable], slot[cable]
-        # first the joints on the path to a (none in a serpentine arm), then those on the path to b
-        for towards_b in range(0 if split > first else 1, 2):
-            sign, site, begin, stop = (1.0, b, split, end) if towards_b else (-1.0, a, first, split)
-            part, c = (first, begin, stop), left_factor
-            _add_side(sign, site, part, joint, frames, direction, w, c, cable, jacobian, k, hessian)
-            if not towards_b:
-                _remove_cross_products(joint, first, split, frames.axis, direction, w, c)
-    return -1
+        _set_direction(frames.site, a, b, scratch, width)
+        for t in range(first, end):
+            j, own = np.uint64(joint[t]), np.uint64(t - first)
+            if t == split:  # the joints before it are on the other side: no u × z_i
+                for k in upwards(0, split - first):
+                    i = np.uint64(joint[first + np.intp(k)])
+                    for r in range(3):
+                        p, q = (r + 1) % 3, (r + 2) % 3
+                        for w in lanes(width):
+                            left[k, r, w] -= weight[cable, w] * (
+                                u[p, w] * axis[i, q, w] - u[q, w] * axis[i, p, w]
+                            )
+            sign, site = (1.0, b) if t >= split else (-1.0, a)
+            _set_derivative(frames, sign, site, j, d, width)
+            for w in lanes(width):
+                along[w] = u[0, w] * d[0, w] + u[1, w] * d[1, w] + u[2, w] * d[2, w]
+            for r in range(3):
+                p, q = (r + 1) % 3, (r + 2) % 3
+                for w in lanes(width):
+                    left[own, r, w] = weight[cable, w] * (
+                        (d[r, w] - along[w] * u[r, w]) * inverse[w]
+                        + u[p, w] * axis[j, q, w]
+                        - u[q, w] * axis[j, p, w]
+                    )
+            # pair joint j with itself and all joints before it, also those of the other side
+            for k in upwards(0, t + 1 - first):
+                i = np.uint64(joint[first + np.intp(k)])
+                row, column = min(i, j) - np.uint64(1), max(i, j) - np.uint64(1)
+                own_slot = np.uint64(slot[cable])
+                for w in lanes(width):
+                    hessian[own_slot, row, column, w] += (
+                        left[k, 0, w] * d[0, w] + left[k, 1, w] * d[1, w] + left[k, 2, w] * d[2, w]
+                    )
+
+
+@inlined
+def one_frames(origin: Array, axis: Array, slide: Array, site: Array) -> Frames:
+    """Return the frames of one posture, given without the last axis."""
+    return Frames(
+        origin.reshape(origin.shape[0], 3, 1),
+        axis.reshape(axis.shape[0], 3, 1),
+        slide.reshape(slide.shape[0], 3, 1),
+        site.reshape(site.shape[0], 3, 1),
+    )
 
 
 @compiled
-def cable_kinematics(
-    parent: Indices,
-    order: Indices,
-    turn: Array,
-    translation: Array,
-    joint_axis: Array,
-    joint_slide: Array,
-    row: Indices,
-    point: Array,
+def single_length_hessian(
     segment: Indices,
     joint: Indices,
-    fixed: Array,
-    q: Array,
-) -> tuple[Array, Array, Array, Array, Array, Array, int]:
-    """Compute the joint and site frames at q (nv,), the cable lengths and their Jacobian.
-
-    The arguments are the fields of :class:`Tree` and :class:`Routing`. Python passes and receives
-    plain arrays: named tuples took a third of the total time.
-
-    Returns:
-        The fields of :class:`Frames`, L (C,), J_L (C, nv), and the first segment with coinciding
-        sites, or −1. If there is one, L and J_L are unfinished.
-    """
-    tree = Tree(parent, order, turn, translation, joint_axis, joint_slide)
-    routing = Routing(row, point, segment, joint, fixed)
-    count, nv = parent.shape[0], q.shape[0]
-    origin, axis, slide = np.empty((count, 3)), np.empty((count, 3)), np.empty(joint_slide.shape)
-    frames = Frames(origin, axis, slide, np.empty((row.shape[0], 3)))
-    forward_kinematics(tree, routing, q, np.empty((count, 3, 3)), frames)
-    L, J = fixed.copy(), np.zeros((fixed.shape[0], nv))
-    nothing, slot, scratch = np.empty((0, nv, nv)), np.empty(0, dtype=np.intp), np.empty((nv, 3))
-    coincident = add_segment_derivatives(segment, joint, frames, L, slot, scratch, L, J, nothing)
-    return origin, axis, slide, frames.site, L, J, coincident
-
-
-@compiled
-def add_length_hessian(
-    segment: Indices, joint: Indices, frames: Frames, weight: Array, slot: Indices, hessian: Array
-) -> None:
-    """Add weight[c] ∂²L_c/∂θ_i∂θ_j to hessian[slot[c], i, j] for every cable c.
-
-    H_L·F needs weight = F and all slots 0. The whole tensor needs weight 1 and slot c for cable c.
-    Neighbouring sites must not coincide; :func:`cable_kinematics` checks this.
-    """
-    nv = hessian.shape[1]
-    lengths, no_jacobian, scratch = np.zeros(weight.shape[0]), np.empty((0, nv)), np.empty((nv, 3))
-    add_segment_derivatives(
-        segment, joint, frames, weight, slot, scratch, lengths, no_jacobian, hessian
-    )
-    for k in range(hessian.shape[0]):
-        mirror(hessian[k])
+    origin: Array,
+    axis: Array,
+    slide: Array,
+    site: Array,
+    cables: int,
+) -> Array:
+    """Compute ∂²L_c/∂θ_i∂θ_j (C, nv, nv) of one posture."""
+    nv = origin.shape[0] - 1
+    hessian, weight, slot = np.zeros((cables, nv, nv, 1)), np.ones((cables, 1)), np.arange(cables)
+    frames = one_frames(origin, axis, slide, site)
+    add_length_hessian(segment, joint, frames, weight, slot, segment_scratch(nv, 1), hessian, None)
+    for c in range(cables):
+        mirror(hessian[c], None)
+    return hessian.reshape(cables, nv, nv)

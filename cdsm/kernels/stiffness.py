@@ -1,50 +1,137 @@
-"""Numba kernels of the terms of Eq. 16, for single postures and for batches."""
+"""Numba kernels of the terms of Eq. 16, for blocks of postures; the posture is the last axis."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from cdsm.kernels.compiling import compiled, upwards
-from cdsm.kernels.segments import add_length_hessian, mirror
-from cdsm.kernels.tree import Frames, Indices
+from cdsm.kernels.compiling import Index, Width, compiled, inner, lanes, upwards
+from cdsm.kernels.segments import add_length_hessian, mirror, one_frames, segment_scratch
+from cdsm.kernels.tree import Indices
 from cdsm.support.values import Array
 
 
-@compiled
-def cable_stiffness(
-    length: Array, tension: Array, rigidity: Array, linear: Array, series: Array, rest: Array
-) -> Array:
-    """Compute the stiffness k of each cable (C,) [N/m]; see :func:`set_cable_stiffness`.
-
-    EA (1 + ε) is ``rigidity``, or rigidity + tension (EA + F) where ``linear`` (C,) is one.
-    """
-    stretched, stiffness = np.empty(length.shape[0]), np.empty(length.shape[0])
-    for c in range(length.shape[0]):
-        stretched[c] = rigidity[c] + linear[c] * tension[c]
-    set_cable_stiffness(length, tension, stretched, series, rest, stiffness)
-    return stiffness
-
-
-@compiled
+@inner
 def set_cable_stiffness(
-    length: Array, tension: Array, rigidity: Array, series: Array, rest: Array, stiffness: Array
+    length: Array,
+    tension: Array,
+    rigidity: Array,
+    series: Array,
+    rest: Array,
+    stiffness: Array,
+    width: Width,
 ) -> None:
-    """Fill k = 1/(l_0/EA + 1/k_series) (C,) [N/m]; 0 where EA is 0, for motors that hold force.
+    """Fill k = 1/(l_0/EA + 1/k_series) (C, W) [N/m]; 0 where EA is 0, for motors that hold force.
 
     The length of the wire is the cable length L without the series spring, ℓ = L − (F −
-    F_0)/k_series. Therefore l_0/EA = ℓ/(EA (1 + ε)). ``rigidity`` is EA (1 + ε) [N], ``series`` is
-    1/k_series [m/N], and ``rest`` is F_0 [N], the tension at which the springs are at rest. All
-    arrays are (C,).
+    F_0)/k_series. Therefore l_0/EA = ℓ/(EA (1 + ε)). ``rigidity`` is EA (1 + ε) (C, W) [N],
+    ``series`` is 1/k_series (C,) [m/N], and ``rest`` is F_0 (C,) [N], the tension at which the
+    springs are at rest.
     """
-    for c in range(length.shape[0]):
-        stiffness[c] = 0.0
-        if rigidity[c] > 0.0:
-            wire = length[c] - series[c] * (tension[c] - rest[c])
-            stiffness[c] = 1.0 / (wire / rigidity[c] + series[c])
+    for c in upwards(0, length.shape[0]):
+        for w in lanes(width):
+            wire = length[c, w] - series[c] * (tension[c, w] - rest[c])
+            k = 1.0 / (wire / rigidity[c, w] + series[c])
+            stiffness[c, w] = k if rigidity[c, w] > 0.0 else 0.0
+
+
+@inner
+def add_passive_stiffness(
+    length_jacobian: Array, cable_stiffness: Array, passive: Array, scratch: Array, width: Width
+) -> None:
+    """Add J_Lᵀ K_L J_L to a matrix (nv, nv, W), for i ≤ j only; scratch is (3, W)."""
+    J, k = length_jacobian, cable_stiffness
+    count, nv, one = np.uint64(J.shape[0]), np.uint64(J.shape[1]), np.uint64(1)
+    for first in range(0, J.shape[0], 3):  # three cables at a time: a third of the memory accesses
+        c = np.uint64(first)
+        d, e = (
+            min(c + np.uint64(1), count - np.uint64(1)),
+            min(c + np.uint64(2), count - np.uint64(1)),
+        )
+        end = nv  # only the joints before its end change a cable's length
+        while end > 0 and not _moves(J, c, d, e, end - one, width):
+            end -= one
+        for i in range(end):
+            for w in lanes(width):
+                scratch[0, w] = k[c, w] * J[c, i, w]
+                scratch[1, w] = k[d, w] * J[d, i, w] if d > c else 0.0
+                scratch[2, w] = k[e, w] * J[e, i, w] if e > d else 0.0
+            for j in range(i, end):
+                for w in lanes(width):
+                    passive[i, j, w] += (
+                        scratch[0, w] * J[c, j, w]
+                        + scratch[1, w] * J[d, j, w]
+                        + scratch[2, w] * J[e, j, w]
+                    )
+
+
+@inner
+def _moves(J: Array, c: Index, d: Index, e: Index, i: Index, width: Width) -> bool:
+    """Check whether joint i changes the length of one of three cables at some posture."""
+    moved = 0.0
+    for w in lanes(width):
+        moved = max(moved, abs(J[c, i, w]) + abs(J[d, i, w]) + abs(J[e, i, w]))
+    return moved > 0.0
+
+
+@inner
+def set_load_stiffness(
+    jacobian: Array, wrench: Array, tip_joints: Indices, load: Array, scratch: Array, width: Width
+) -> None:
+    """Fill −∂(J_Xᵀ W)/∂θ (nv, nv, W) of constant wrenches W (6, W): row torque, column angle.
+
+    ``tip_joints`` are the joints that move the tip, base first. Of two joints, a is the earlier and
+    b the later: ∂v_i/∂θ_j = z_a × v_b. ∂z_i/∂θ_j = z_j × z_i if joint j is before joint i, else 0.
+    Entries of other joints stay as they are. ``scratch`` is (6, W).
+    """
+    J = jacobian
+    for s in upwards(0, tip_joints.shape[0]):
+        a = np.uint64(tip_joints[s])
+        for r in range(6):  # f × z, then m × z
+            first, p, q = r - r % 3, (r + 1) % 3, (r + 2) % 3
+            for w in lanes(width):
+                scratch[r, w] = (
+                    wrench[first + p, w] * J[3 + q, a, w] - wrench[first + q, w] * J[3 + p, a, w]
+                )
+        for t in upwards(s, tip_joints.shape[0]):
+            b = np.uint64(tip_joints[t])
+            for w in lanes(width):  # f·(z × v) = (f × z)·v
+                load[a, b, w] = -(
+                    scratch[0, w] * J[0, b, w]
+                    + scratch[1, w] * J[1, b, w]
+                    + scratch[2, w] * J[2, b, w]
+                )
+            if t > s:
+                for w in lanes(width):  # m·(z × z_b) = (m × z)·z_b
+                    load[b, a, w] = load[a, b, w] - (
+                        scratch[3, w] * J[3, b, w]
+                        + scratch[4, w] * J[4, b, w]
+                        + scratch[5, w] * J[5, b, w]
+                    )
+
+
+@inner
+def sum_terms(
+    active: Array,
+    passive: Array,
+    gravity: Array,
+    load: Array,
+    K: Array,
+    parts: Array,
+    width: Width,
+) -> None:
+    """Fill K_θ, and P, the sum of the magnitudes of its four terms, (nv, nv, W) each."""
+    for i in upwards(0, K.shape[0]):
+        for j in upwards(0, K.shape[0]):
+            for w in lanes(width):
+                K[i, j, w] = active[i, j, w] + passive[i, j, w] + gravity[i, j, w] + load[i, j, w]
+            for w in lanes(width):
+                parts[i, j, w] = abs(active[i, j, w]) + abs(passive[i, j, w])
+            for w in lanes(width):
+                parts[i, j, w] += abs(gravity[i, j, w]) + abs(load[i, j, w])
 
 
 @compiled
-def joint_stiffness(
+def single_stiffness(
     segment: Indices,
     joint: Indices,
     origin: Array,
@@ -59,67 +146,47 @@ def joint_stiffness(
     wrench: Array,
     tip_joints: Indices,
 ) -> tuple[Array, Array, Array, Array]:
-    """Compute the active, passive and load terms of Eq. 16 and the sum of all four, (nv, nv).
+    """Compute the active, passive and load terms of one posture and the sum of all four, (nv, nv).
 
-    Python passes the arrays of routing and frames one by one: the two named tuples took 3 of 16 µs.
+    The arguments are the fields of :class:`Routing` and :class:`Frames` that are needed, and arrays
+    without the last axis.
     """
+    count, nv = length_jacobian.shape
+    J, JX = length_jacobian.reshape(count, nv, 1), jacobian.reshape(6, nv, 1)
+    F, k = tension.reshape(count, 1), cable_stiffness.reshape(count, 1)
+    active, passive, load = np.zeros((1, nv, nv, 1)), np.zeros((nv, nv, 1)), np.zeros((nv, nv, 1))
+    frames, slot = one_frames(origin, axis, slide, site), np.zeros(count, dtype=np.intp)
+    add_length_hessian(segment, joint, frames, F, slot, segment_scratch(nv, 1), active, None)
+    mirror(active[0], None)
+    add_passive_stiffness(J, k, passive, np.empty((3, 1)), None)
+    mirror(passive, None)
+    set_load_stiffness(JX, wrench.reshape(6, 1), tip_joints, load, np.empty((6, 1)), None)
+    terms = active.reshape(nv, nv), passive.reshape(nv, nv), load.reshape(nv, nv)
+    return *terms, terms[0] + terms[1] + gravity + terms[2]
+
+
+@compiled
+def single_load_stiffness(jacobian: Array, wrench: Array, tip_joints: Indices) -> Array:
+    """Compute −∂(J_Xᵀ W)/∂θ (nv, nv) of one posture; see :func:`set_load_stiffness`."""
     nv = jacobian.shape[1]
-    active, passive = np.zeros((1, nv, nv)), np.zeros((nv, nv))
-    slot = np.zeros(tension.shape[0], dtype=np.intp)
-    frames = Frames(origin, axis, slide, site)
-    add_length_hessian(segment, joint, frames, tension, slot, active)
-    add_passive_stiffness(length_jacobian, cable_stiffness, passive)
-    mirror(passive)
-    load = load_stiffness(jacobian, wrench, tip_joints)
-    return active[0], passive, load, active[0] + passive + gravity + load
+    load = np.zeros((nv, nv, 1))
+    JX, W = jacobian.reshape(6, nv, 1), wrench.reshape(6, 1)
+    set_load_stiffness(JX, W, tip_joints, load, np.empty((6, 1)), None)
+    return load.reshape(nv, nv)
 
 
 @compiled
-def add_passive_stiffness(length_jacobian: Array, cable_stiffness: Array, passive: Array) -> None:
-    """Add J_Lᵀ K_L J_L to a matrix (nv, nv), for i ≤ j only."""
-    J, k = length_jacobian, cable_stiffness
-    count, nv = J.shape
-    for c in range(0, count, 3):  # three cables at a time: a third of the memory accesses
-        d, e = min(c + 1, count - 1), min(c + 2, count - 1)
-        kd, ke = k[d] if d > c else 0.0, k[e] if e > d else 0.0
-        last = nv  # only the joints before its end change a cable's length
-        while (
-            last > 0 and J[c, last - 1] == 0.0 and J[d, last - 1] == 0.0 and J[e, last - 1] == 0.0
-        ):
-            last -= 1
-        for i in range(last):
-            x, y, z = k[c] * J[c, i], kd * J[d, i], ke * J[e, i]
-            for j in upwards(i, last):
-                passive[i, j] += x * J[c, j] + y * J[d, j] + z * J[e, j]
+def single_cable_stiffness(
+    length: Array, tension: Array, rigidity: Array, linear: Array, series: Array, rest: Array
+) -> Array:
+    """Compute the stiffness k of each cable (C,) [N/m]; see :func:`set_cable_stiffness`.
 
-
-@compiled
-def load_stiffness(jacobian: Array, wrench: Array, tip_joints: Indices) -> Array:
-    """Compute −∂(J_Xᵀ W)/∂θ (nv, nv) of a constant wrench W (6,): row torque, column angle."""
-    result = np.zeros((jacobian.shape[1], jacobian.shape[1]))
-    add_load_stiffness(jacobian, wrench, tip_joints, result)
-    return result
-
-
-@compiled
-def add_load_stiffness(jacobian: Array, wrench: Array, tip_joints: Indices, load: Array) -> None:
-    """Add −∂(J_Xᵀ W)/∂θ to a matrix (nv, nv).
-
-    ``tip_joints`` are the joints that move the tip, base first. Of two joints, a is the earlier and
-    b the later: ∂v_i/∂θ_j = z_a × v_b. ∂z_i/∂θ_j = z_j × z_i if joint j is before joint i, else 0.
+    EA (1 + ε) is ``rigidity``, or rigidity + tension (EA + F) where ``linear`` (C,) is one.
     """
-    fx, fy, fz = wrench[0], wrench[1], wrench[2]
-    mx, my, mz = wrench[3], wrench[4], wrench[5]
-    for s in range(tip_joints.shape[0]):
-        a = np.uint64(tip_joints[s])
-        zx, zy, zz = jacobian[3, a], jacobian[4, a], jacobian[5, a]
-        # f·(z × v) = (f × z)·v, m·(z × z_b) = (m × z)·z_b
-        gx, gy, gz = fy * zz - fz * zy, fz * zx - fx * zz, fx * zy - fy * zx
-        hx, hy, hz = my * zz - mz * zy, mz * zx - mx * zz, mx * zy - my * zx
-        load[a, a] -= gx * jacobian[0, a] + gy * jacobian[1, a] + gz * jacobian[2, a]
-        for t in upwards(s + 1, tip_joints.shape[0]):
-            b = np.uint64(tip_joints[t])
-            force = gx * jacobian[0, b] + gy * jacobian[1, b] + gz * jacobian[2, b]
-            moment = hx * jacobian[3, b] + hy * jacobian[4, b] + hz * jacobian[5, b]
-            load[a, b] -= force
-            load[b, a] -= force + moment
+    count = length.shape[0]
+    stretched, stiffness = np.empty((count, 1)), np.empty((count, 1))
+    for c in range(count):
+        stretched[c, 0] = rigidity[c] + linear[c] * tension[c]
+    L, F = length.reshape(count, 1), tension.reshape(count, 1)
+    set_cable_stiffness(L, F, stretched, series, rest, stiffness, None)
+    return stiffness.reshape(count)

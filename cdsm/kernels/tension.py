@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cdsm.kernels.compiling import compiled
+from cdsm.kernels.compiling import Width, compiled, inner, lanes, upwards
 from cdsm.support.values import Array
 
 NO_ARM = 1e-15
@@ -56,6 +56,31 @@ class Scaled(NamedTuple):
     force: float
 
 
+class Certificate(NamedTuple):
+    """Scratch and result of :func:`set_optimal`.
+
+    Shapes: y (nv, W), z (C, W), violations (5, W), the largest force (W,), optimal (W,).
+    """
+
+    y: Array
+    z: Array
+    violations: Array
+    force: Array
+    optimal: Array
+
+
+@inner
+def certificate(nv: int, cables: int, width: int) -> Certificate:
+    """Allocate the scratch for a block."""
+    return Certificate(
+        np.empty((nv, width)),
+        np.empty((cables, width)),
+        np.empty((5, width)),
+        np.empty(width),
+        np.empty(width),
+    )
+
+
 @compiled
 def scaled_balance(
     length_jacobian: Array, torque: Array, low: Array, high: Array, reach: float
@@ -81,75 +106,132 @@ def scaled_balance(
     return A / arm, torque / arm / force, low / force, high / force, arm, force
 
 
-@compiled
+@inner
 def _power_of_two(value: float) -> float:
     """Return the next power of two at or above a magnitude; 1 for zero."""
     return 2.0 ** math.ceil(math.log2(value)) if value > 0.0 else 1.0
 
 
 @compiled
-def optimality(
+def single_optimality(
     A: Array, b: Array, low: Array, high: Array, x: Array, y: Array, z: Array
 ) -> tuple[float, float, float]:
-    """Measure the violation of optimality of x for min ½‖x‖² so that A x = b, low ≤ x ≤ high.
+    """Measure the violation of optimality of one x (n,) by :func:`set_violations`; A is (m, n)."""
+    m, n = A.shape
+    J, violations = np.ascontiguousarray(A.T).reshape(n, m, 1), np.empty((5, 1))
+    # copies are writable like the blocks of a batch, so one compilation serves both
+    bounds = low.copy().reshape(n, 1), high.copy().reshape(n, 1)
+    point = x.copy().reshape(n, 1), y.copy().reshape(m, 1), z.copy().reshape(n, 1)
+    set_violations(J, b.copy().reshape(m, 1), *bounds, *point, violations, None)
+    return violations[0, 0], violations[1, 0], violations[2, 0]
 
-    A is (m, n), b is (m,), and low, high and x are (n,); high may hold inf. y (m,) are the
-    multipliers of the equations. z (n,) are the multipliers of the bounds: negative at low,
+
+@inner
+def set_violations(
+    J: Array,
+    b: Array,
+    low: Array,
+    high: Array,
+    x: Array,
+    y: Array,
+    z: Array,
+    violations: Array,
+    width: Width,
+) -> None:
+    """Measure how far points x are from the optimum of min ½‖x‖² so that Jᵀ x = b, low ≤ x ≤ high.
+
+    J is (n, m, W), b is (m, W), and low, high and x are (n, W); high may hold inf. y (m, W) are the
+    multipliers of the equations. z (n, W) are the multipliers of the bounds: negative at low,
     positive at high.
 
-    Returns:
-        Three numbers that are all zero exactly at the optimum. First, the largest violation of
-        balance (divided by the largest moment arm) and of the bounds. Second, the largest entry of
-        x + Aᵀy + z, or of z⁺ where high is infinite. Third, the duality gap |xᵀx + bᵀy + lowᵀz⁻ +
-        highᵀz⁺|; twice the gap bounds the squared distance from the optimum.
+    The first three rows of ``violations`` (5, W) are all zero exactly at the optimum. First, the
+    largest violation of balance (divided by the largest moment arm) and of the bounds. Second, the
+    largest entry of x + J y + z, or of z⁺ where high is infinite. Third, the duality gap |xᵀx + bᵀy
+    + lowᵀz⁻ + highᵀz⁺|; twice the gap bounds the squared distance from the optimum.
     """
-    primal = dual = gap = arm = 0.0
-    for i in range(b.shape[0]):
-        residual = -b[i]
-        for j in range(x.shape[0]):
-            residual += A[i, j] * x[j]
-            arm = max(arm, abs(A[i, j]))
-        primal = max(primal, abs(residual))
-        gap += b[i] * y[i]
-    primal = primal / arm if arm > 0.0 else primal
-    for j in range(x.shape[0]):
-        primal = max(primal, low[j] - x[j], x[j] - high[j])
-        slope = x[j] + z[j]
-        for i in range(b.shape[0]):
-            slope += A[i, j] * y[i]
-        dual = max(dual, abs(slope))
-        gap += x[j] * x[j]
-        if z[j] < 0.0:
-            gap += low[j] * z[j]
-        elif high[j] < np.inf:
-            gap += high[j] * z[j]
-        else:
-            dual = max(dual, z[j])  # an infinite bound has no multiplier
-    return primal, dual, abs(gap)
+    primal, dual, gap, arm, term = (
+        violations[0],
+        violations[1],
+        violations[2],
+        violations[3],
+        violations[4],
+    )
+    for w in lanes(width):
+        primal[w] = dual[w] = gap[w] = arm[w] = 0.0
+    for i in upwards(0, b.shape[0]):
+        for w in lanes(width):
+            term[w] = -b[i, w]
+        for c in upwards(0, x.shape[0]):
+            for w in lanes(width):
+                term[w] += J[c, i, w] * x[c, w]
+            for w in lanes(width):
+                arm[w] = max(arm[w], abs(J[c, i, w]))
+        for w in lanes(width):
+            primal[w] = max(primal[w], abs(term[w]))
+        for w in lanes(width):
+            gap[w] += b[i, w] * y[i, w]
+    for w in lanes(width):
+        primal[w] /= arm[w] if arm[w] > 0.0 else 1.0
+    for c in upwards(0, x.shape[0]):
+        for w in lanes(width):
+            primal[w] = max(primal[w], max(low[c, w] - x[c, w], x[c, w] - high[c, w]))
+        for w in lanes(width):
+            term[w] = x[c, w] + z[c, w]
+        for i in upwards(0, b.shape[0]):
+            for w in lanes(width):
+                term[w] += J[c, i, w] * y[i, w]
+        for w in lanes(width):  # an infinite bound has no multiplier
+            excess = z[c, w] if high[c, w] == math.inf else 0.0
+            dual[w] = max(dual[w], max(abs(term[w]), excess))
+        for w in lanes(width):
+            bound = low[c, w] if z[c, w] < 0.0 else high[c, w]
+            gap[w] += x[c, w] * x[c, w] + (bound * z[c, w] if bound < math.inf else 0.0)
+    for w in lanes(width):
+        gap[w] = abs(gap[w])
 
 
-@compiled
-def is_optimal(
-    J: Array, b: Array, low: Array, high: Array, F: Array, v: Array, y: Array, z: Array
-) -> bool:
-    """Check whether F (C,) is the optimum; v (nv,) gives J_L v = F for cables between their bounds.
+@inner
+def set_optimal(
+    J: Array,
+    b: Array,
+    low: Array,
+    high: Array,
+    F: Array,
+    v: Array,
+    scratch: Certificate,
+    width: Width,
+) -> None:
+    """Set ``scratch.optimal`` (W,) to 1 where F (C, W) is the optimum, else to 0.
 
-    Fill the multipliers y = −v (nv,) and z (C,); at a bound z = J_L v − F, elsewhere 0.
+    v (nv, W) gives J_L v = F for cables between their bounds. The multipliers are y = −v, and z =
+    J_L v − F at a bound, elsewhere 0.
     """
-    force = 0.0
-    for i in range(b.shape[0]):
-        y[i] = -v[i]
-    for c in range(F.shape[0]):
-        force = max(force, abs(F[c]))
-        left = row_product(J, c, v) - F[c]
-        at_bound = F[c] <= low[c] if left < 0.0 else F[c] >= high[c]
-        z[c] = left if at_bound else 0.0
-    primal, dual, gap = optimality(J.T, b, low, high, F, y, z)
-    close = math.sqrt(2.0 * gap) <= DISTANCE * force
-    return max(primal, dual) <= OPTIMALITY * force and close
+    y, z, violations, force, optimal = scratch
+    for w in lanes(width):
+        force[w] = 0.0
+    for i in upwards(0, b.shape[0]):
+        for w in lanes(width):
+            y[i, w] = -v[i, w]
+    for c in upwards(0, F.shape[0]):
+        for w in lanes(width):
+            force[w] = max(force[w], abs(F[c, w]))
+        for w in lanes(width):
+            z[c, w] = -F[c, w]
+        for i in upwards(0, b.shape[0]):
+            for w in lanes(width):
+                z[c, w] += J[c, i, w] * v[i, w]
+        for w in lanes(width):
+            below = z[c, w] < 0.0 and F[c, w] <= low[c, w]
+            above = z[c, w] >= 0.0 and F[c, w] >= high[c, w]
+            z[c, w] = z[c, w] if below or above else 0.0
+    set_violations(J, b, low, high, F, y, z, violations, width)
+    for w in lanes(width):
+        violated = max(violations[0, w], violations[1, w])
+        close = math.sqrt(2.0 * violations[2, w]) <= DISTANCE * force[w]
+        optimal[w] = 1.0 if violated <= OPTIMALITY * force[w] and close else 0.0
 
 
-@compiled
+@inner
 def is_infeasible(J: Array, b: Array, low: Array, high: Array, v: Array) -> bool:
     """Check whether v (nv,) proves infeasibility: vᵀb > vᵀJ_Lᵀ F for all F within the bounds."""
     largest = left = size = steepest = arm = torques = force = 0.0
@@ -177,7 +259,7 @@ def is_infeasible(J: Array, b: Array, low: Array, high: Array, v: Array) -> bool
     return left > max(_PROOF * size, _MISSING * steepest * max(torques, arm * force))
 
 
-@compiled
+@inner
 def row_product(J: Array, c: int, v: Array) -> float:
     """Compute row c of J_L (C, nv) times v (nv,)."""
     total = 0.0

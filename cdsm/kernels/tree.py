@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cdsm.kernels.compiling import compiled
+from cdsm.kernels.compiling import Index, Width, inlined, inner, lanes, upwards
 from cdsm.support.values import Array, frozen
 
 Indices = NDArray[np.intp]
@@ -84,14 +84,14 @@ class Routing(NamedTuple):
 
 
 class Frames(NamedTuple):
-    """Joint axes and cable sites at one posture, in base axes.
+    """Joint axes and cable sites of a block of postures, in base axes; the posture is last.
 
     Attributes:
-        origin: A point on each joint axis, (nv+1, 3) [m].
-        axis: Unit direction of each joint axis, (nv+1, 3); zero if the joint slides.
-        slide: Unit direction of each sliding joint, (nv+1, 3), zero if it turns; (0, 3) if none
-            slides.
-        site: Positions of the cable sites, (P, 3) [m].
+        origin: A point on each joint axis, (nv+1, 3, W) [m].
+        axis: Unit direction of each joint axis, (nv+1, 3, W); zero if the joint slides.
+        slide: Unit direction of each sliding joint, (nv+1, 3, W), zero if it turns; (0, 3, W) if
+            none slides.
+        site: Positions of the cable sites, (P, 3, W) [m].
     """
 
     origin: Array
@@ -100,47 +100,76 @@ class Frames(NamedTuple):
     site: Array
 
 
-@compiled
+@inlined
+def empty_frames(tree: Tree, routing: Routing, width: int) -> Frames:
+    """Allocate frames for a block."""
+    rows, sites = tree.parent.shape[0], routing.row.shape[0]
+    return Frames(
+        np.zeros((rows, 3, width)),
+        np.zeros((rows, 3, width)),
+        np.zeros((tree.slide.shape[0], 3, width)),
+        np.empty((sites, 3, width)),
+    )
+
+
+@inlined
+def turned(rotation: Array, i: Index, r: Index, x: float, y: float, z: float, w: Index) -> float:
+    """Compute component r of a vector in the frame of joint i, turned to base axes."""
+    turned: float = rotation[i, r, 0, w] * x + rotation[i, r, 1, w] * y + rotation[i, r, 2, w] * z
+    return turned
+
+
+@inner
 def forward_kinematics(
-    tree: Tree, routing: Routing, q: Array, rotation: Array, frames: Frames
+    tree: Tree,
+    routing: Routing,
+    q: Array,
+    trigonometry: Array,
+    rotation: Array,
+    frames: Frames,
+    width: Width,
 ) -> None:
-    """Fill the rotations of the joints (nv+1, 3, 3) and the frames at q (nv,).
+    """Fill the rotations of the joints (nv+1, 3, 3, W) and the frames at joint angles q (nv, W).
 
     A turning joint has the rotation R_parent (A + B cos q + C sin q); see :attr:`Tree.turn`. A
-    sliding joint moves its origin by q along its slide.
+    sliding joint moves its origin by q along its slide. ``trigonometry`` (2, W) is scratch.
     """
     parent, order, turn, translation, local_axis, local_slide = tree
     origin, axis, slide, site = frames
-    sliding = slide.shape[0] > 0
+    cosine, sine = trigonometry[0], trigonometry[1]
     for r in range(3):
-        origin[0, r] = axis[0, r] = 0.0
-        if sliding:
-            slide[0, r] = 0.0
         for c in range(3):
-            rotation[0, r, c] = 1.0 if r == c else 0.0
+            for w in lanes(width):
+                rotation[0, r, c, w] = 1.0 if r == c else 0.0
     for k in range(order.shape[0]):
         i = np.uint64(order[k])  # not negative: see upwards
-        before, angle = np.uint64(parent[i]), q[i - np.uint64(1)]
-        cosine, sine = math.cos(angle), math.sin(angle)
+        before, joint = np.uint64(parent[i]), i - np.uint64(1)
+        for w in lanes(width):
+            cosine[w], sine[w] = math.cos(q[joint, w]), math.sin(q[joint, w])
         for r in range(3):
-            x, y, z = rotation[before, r, 0], rotation[before, r, 1], rotation[before, r, 2]
-            t, a = translation[i], local_axis[i]
-            origin[i, r] = origin[before, r] + (x * t[0] + y * t[1] + z * t[2])
-            if sliding:
-                s = local_slide[i]
-                slide[i, r] = x * s[0] + y * s[1] + z * s[2]
-                origin[i, r] += angle * slide[i, r]
-            axis[i, r] = x * a[0] + y * a[1] + z * a[2]
+            x, y, z = translation[i, 0], translation[i, 1], translation[i, 2]
+            for w in lanes(width):
+                origin[i, r, w] = origin[before, r, w] + turned(rotation, before, r, x, y, z, w)
+            if slide.shape[0]:
+                x, y, z = local_slide[i, 0], local_slide[i, 1], local_slide[i, 2]
+                for w in lanes(width):
+                    slide[i, r, w] = turned(rotation, before, r, x, y, z, w)
+                    origin[i, r, w] += q[joint, w] * slide[i, r, w]
+            x, y, z = local_axis[i, 0], local_axis[i, 1], local_axis[i, 2]
+            for w in lanes(width):
+                axis[i, r, w] = turned(rotation, before, r, x, y, z, w)
             for c in range(3):
-                rotation[i, r, c] = (
-                    x * (turn[i, 0, 0, c] + cosine * turn[i, 1, 0, c] + sine * turn[i, 2, 0, c])
-                    + y * (turn[i, 0, 1, c] + cosine * turn[i, 1, 1, c] + sine * turn[i, 2, 1, c])
-                    + z * (turn[i, 0, 2, c] + cosine * turn[i, 1, 2, c] + sine * turn[i, 2, 2, c])
-                )
-    row, point = routing.row, routing.point
-    for p in range(row.shape[0]):
-        i = row[p]
-        x, y, z = point[p, 0], point[p, 1], point[p, 2]
+                ax, ay, az = turn[i, 0, 0, c], turn[i, 0, 1, c], turn[i, 0, 2, c]
+                bx, by, bz = turn[i, 1, 0, c], turn[i, 1, 1, c], turn[i, 1, 2, c]
+                cx, cy, cz = turn[i, 2, 0, c], turn[i, 2, 1, c], turn[i, 2, 2, c]
+                for w in lanes(width):
+                    x = ax + cosine[w] * bx + sine[w] * cx
+                    y = ay + cosine[w] * by + sine[w] * cy
+                    z = az + cosine[w] * bz + sine[w] * cz
+                    rotation[i, r, c, w] = turned(rotation, before, r, x, y, z, w)
+    for p in upwards(0, routing.row.shape[0]):
+        i = np.uint64(routing.row[p])
+        x, y, z = routing.point[p, 0], routing.point[p, 1], routing.point[p, 2]
         for r in range(3):
-            shift = rotation[i, r, 0] * x + rotation[i, r, 1] * y + rotation[i, r, 2] * z
-            site[p, r] = origin[i, r] + shift
+            for w in lanes(width):
+                site[p, r, w] = origin[i, r, w] + turned(rotation, i, r, x, y, z, w)

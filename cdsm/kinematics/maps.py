@@ -103,8 +103,8 @@ def inverse_kinematics(
     guess = _checked_guess(instance("arm", arm, Manipulator), guess)
     target = _checked_target(target)
     found = _solve(TipResidual(arm, target), guess, tolerance)
-    tip = arm._model.body.state(found["angles"]).tip
-    return KinematicSolution(target=target, tip=frozen(tip), **found)
+    tip = arm.at(found["angles"]).tip
+    return KinematicSolution(target=target, tip=tip, **found)
 
 
 def _solve(residual: Residual, guess: Array, tolerance: float) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from typing import final
 import numpy as np
 
 from cdsm.errors import CableError
-from cdsm.kernels.stiffness import load_stiffness
+from cdsm.kernels.stiffness import single_load_stiffness
 from cdsm.manipulator import Manipulator
 from cdsm.rigid_body import rotation_vector
 from cdsm.support.values import Array, frozen
@@ -82,7 +82,7 @@ class TipResidual(Residual):
         wrench[: weight.size] = weight
         wrench[:3] /= self.arm.length
         jacobian, way = self.arm._model.body.state(q).jacobian, self.arm._model.masses.tip_joints
-        return -load_stiffness(frozen(jacobian), frozen(wrench), way)
+        return -single_load_stiffness(frozen(jacobian), frozen(wrench), way)
 
     def hessian(self, q: Array) -> Array:
         """As in :class:`Residual`."""

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
 from cdsm.errors import InvalidInput
-from cdsm.kernels.stiffness import load_stiffness
+from cdsm.kernels.stiffness import single_load_stiffness
 from cdsm.planning import kernels
 from cdsm.planning.admissible import admissible
 from cdsm.posture import Posture
@@ -60,7 +60,9 @@ class StiffnessModel:
         self.evaluations = self.iterations = 0
         # products with the cached tensor are faster than a loop over the cables
         self.geometry = pose.length_hessian, pose.length_jacobian
-        load = load_stiffness(pose.jacobian, region.least.wrench, pose.arm._model.masses.tip_joints)
+        load = single_load_stiffness(
+            pose.jacobian, region.least.wrench, pose.arm._model.masses.tip_joints
+        )
         self.constant = pose.gravity_stiffness + load
         self.scale = max(float(abs(self.at(region.least.values).eigenvalues).max()), SMALLEST)
         self.floor = part * self.scale

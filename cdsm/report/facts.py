@@ -271,7 +271,7 @@ def optimality(K: Stiffness, pull: Tension) -> Optimality:
         signs = np.where(at_low, -np.inf, 0.0)[bound], np.where(at_high, np.inf, 0.0)[bound]
         z[bound] = lsq_linear(null[:, bound], -null @ x, bounds=signs, method="bvls").x
     y = np.asarray(np.linalg.lstsq(problem.A.T, -x - z, rcond=None)[0])
-    primal, dual, _ = tension_kernels.optimality(*problem[:4], x, y, z)
+    primal, dual, _ = tension_kernels.single_optimality(*problem[:4], x, y, z)
     return Optimality(
         solver=pull.solver,
         at_minimum=pull.at_minimum,

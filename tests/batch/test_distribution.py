@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 
 import cdsm
-from cdsm.batch import active_set, distribution, serpentine_guess
-from cdsm.kernels.tension import is_infeasible, is_optimal
-from cdsm.support.values import Array, frozen
+from cdsm.batch import evaluator
+from cdsm.batch.fused_kernel import evaluate_rows
+from cdsm.kernels import active_set, serpentine_guess, tension
+from cdsm.support.values import Array
 from tests.batch.test_evaluation import custom_arm, one_hinge
 from tests.support.arms import STEEL, mixed_arm, random_arm
+from tests.support.kernels import from_python
 
 EXACT = 1e-9
 """Of the largest tension: what the single posture's solver is verified to."""
@@ -60,7 +62,7 @@ def no_fallback(monkeypatch: pytest.MonkeyPatch) -> None:
     def never(*_: Any) -> None:
         raise AssertionError("a row was left to the single posture")
 
-    monkeypatch.setattr(distribution, "distribute_tension", never)
+    monkeypatch.setattr(evaluator, "distribute_tension", never)
 
 
 def assert_same_as_alone(pull: cdsm.Tensions) -> tuple[int, int]:
@@ -206,11 +208,15 @@ def test_rows_that_nothing_can_be_shown_of_go_to_the_single_posture(
     expected = cdsm.distribute_tensions(arm, q, 5.0, wrench=wrench)
     assert 5 < np.count_nonzero(expected.ok) < 55
 
-    def undecided(*arguments: Any) -> None:
-        arguments[-1][:] = 255
-        arguments[-2][:] = np.nan
+    decided = evaluate_rows
 
-    monkeypatch.setattr(distribution, "distribute_rows", undecided)
+    def undecided(*arguments: Any) -> None:
+        *_, out, status = arguments
+        decided(*arguments)
+        if len(arguments[12]) == 0:  # no tensions were given
+            status[:], out[:] = 255, np.nan
+
+    monkeypatch.setattr(evaluator, "evaluate_rows", undecided)
     found = cdsm.distribute_tensions(arm, q, 5.0, wrench=wrench)
     np.testing.assert_array_equal(found.status, expected.status)
     np.testing.assert_allclose(
@@ -220,7 +226,7 @@ def test_rows_that_nothing_can_be_shown_of_go_to_the_single_posture(
     def failing(*_: Any) -> None:
         raise cdsm.SolverError("daqp", "failed.")
 
-    monkeypatch.setattr(distribution, "distribute_tension", failing)
+    monkeypatch.setattr(evaluator, "distribute_tension", failing)
     found = cdsm.distribute_tensions(arm, q, 5.0, wrench=wrench)
     assert (found.status == cdsm.Status.SOLVER_FAILED).all()
     assert np.isnan(found.values).all()
@@ -232,28 +238,30 @@ def balance(arm: cdsm.Manipulator, q: Array, wrench: Array) -> tuple[Array, Arra
     return pose.length_jacobian.copy(), pose.jacobian.T @ wrench - pose.gravity_torque
 
 
-def state_of(count: int, nv: int) -> active_set.State:
-    return active_set.State(
-        np.empty(count),
-        np.empty(nv),
-        np.empty(count, dtype=np.intp),
-        np.empty(count),
-        np.empty((nv, nv + 1)),
-        np.empty(nv),
-    )
+search = from_python(active_set.search)
+empty_state = from_python(active_set.empty_state)
+is_infeasible = from_python(tension.is_infeasible)
+set_optimal = from_python(tension.set_optimal)
+certificate = from_python(tension.certificate)
+
+
+def is_optimal(J: Array, b: Array, low: Array, high: Array, F: Array, y: Array) -> bool:
+    check = certificate(J.shape[1], J.shape[0], 1)
+    set_optimal(*(each[..., None].copy() for each in (J, b, low, high, F, y)), check, 1)
+    return bool(check.optimal[0] == 1.0)
 
 
 @pytest.mark.parametrize("name", ["universal, four cables", "hinged", "mixed", "custom", "shallow"])
 def test_search_alone_finds_the_optimum_or_a_proof(name: str) -> None:
     arm = ARMS[name]()
     count = len(arm.cables)
-    low = frozen(np.full(count, 5.0))  # as in a batch: nothing new to compile
+    low = np.full(count, 5.0)
     outcomes = set()
     for seed, top in itertools.product(range(15), (np.inf, 60.0)):
         q, wrench = postures(arm, 1, 0.8, seed)[0], loads(1, seed)[0]
         J, b = balance(arm, q, wrench)
-        high, state = frozen(np.full(count, top)), state_of(count, arm.nv)
-        outcome = active_set.search(J, b, low, high, state)
+        high, state = np.full(count, top), empty_state(arm.nv, count)
+        outcome = search(J, b, low, high, state)
         outcomes.add(outcome)
         try:
             single = cdsm.distribute_tension(arm.at(q), low, high, wrench).values
@@ -262,37 +270,40 @@ def test_search_alone_finds_the_optimum_or_a_proof(name: str) -> None:
             assert is_infeasible(J, b, low, high, state.y)
             continue
         assert outcome == active_set.FOUND
-        assert is_optimal(J, b, low, high, state.F, state.y, state.w, state.multiplier)
+        assert is_optimal(J, b, low, high, state.F, state.y)
         np.testing.assert_allclose(state.F, single, rtol=0.0, atol=EXACT * single.max())
     assert active_set.FOUND in outcomes
 
 
 def test_guess_is_mostly_the_optimum_and_what_it_proves_is_so() -> None:
+    guess_tensions = from_python(serpentine_guess.guess_tensions)
+    set_multipliers = from_python(serpentine_guess.set_multipliers)
+    is_provably_infeasible = from_python(serpentine_guess.is_provably_infeasible)
+    empty_guess = from_python(serpentine_guess.empty_guess)
     arm = shallow_arm(5)
-    parts = serpentine_guess.blocks(arm._model.routing, arm.nv)
+    parts = serpentine_guess.find_blocks(arm._model.routing, arm.nv)
     count, nv = len(arm.cables), arm.nv
     assert parts.row_start.tolist() == [0, 2, 4, 6, 8, 10]
-    low, high = frozen(np.full(count, 5.0)), frozen(np.full(count, np.inf))
+    low, high = np.full(count, 5.0), np.full(count, np.inf)
     guessed = proved = feasible = infeasible = 0
     for q in postures(arm, 150, 0.9):
         J, b = balance(arm, q, np.zeros(6))
-        F, free, rest = np.empty(count), np.empty(count, dtype=np.bool_), np.empty(2)
-        y = np.empty(nv)
-        state = state_of(count, nv)
-        found = active_set.search(J, b, low, high, state) == active_set.FOUND
+        state, guess = empty_state(nv, count), empty_guess(parts, nv, count, 1)
+        found = search(J, b, low, high, state) == active_set.FOUND
         feasible, infeasible = feasible + found, infeasible + (not found)
-        k = serpentine_guess.guess(parts, J, b, low, high, F, free, rest)
-        if k < 0:
-            serpentine_guess.multipliers(parts, J, F, free, 0, y)
+        arguments = [each[..., None].copy() for each in (J, b, low, high)]
+        guess_tensions(parts, *arguments, guess, 1)
+        if guess.failed[0] < 0.0:
+            set_multipliers(parts, arguments[0], guess.F, guess, 0, 1)
+            F, y = guess.F[:, 0], guess.y[:, 0]
             np.testing.assert_allclose(J.T @ F, b, rtol=0.0, atol=1e-12 * F.max())
+            free = low < F
             np.testing.assert_allclose((J @ y)[free], F[free], rtol=1e-6)
-            if is_optimal(J, b, low, high, F, y, state.w, state.multiplier):
+            if is_optimal(J, b, low, high, F, y):
                 assert found
                 np.testing.assert_allclose(F, state.F, rtol=0.0, atol=EXACT * F.max())
                 guessed += 1
-        elif serpentine_guess.is_provably_infeasible(
-            parts, J, b, low, high, free, rest, k, np.zeros(count), y
-        ):
+        elif is_provably_infeasible(parts, *arguments, guess, np.zeros((count, 1))):
             assert not found
             proved += 1
     assert infeasible > 5
@@ -301,13 +312,13 @@ def test_guess_is_mostly_the_optimum_and_what_it_proves_is_so() -> None:
 
 
 def test_blocks_are_those_of_the_geometry() -> None:
-    parts = serpentine_guess.blocks(mixed_arm()._model.routing, 5)
+    parts = serpentine_guess.find_blocks(mixed_arm()._model.routing, 5)
     assert parts.row.tolist() == [0, 1, 2, 3, 4]
     assert parts.row_start.tolist() == [0, 2, 3, 5]
     assert parts.cable_start.tolist() == [0, 3, 5, 9]
     # from anywhere to anywhere there are none
     own = custom_arm()
-    assert not serpentine_guess.blocks(own._model.routing, own.nv).row.size
+    assert not serpentine_guess.find_blocks(own._model.routing, own.nv).row.size
 
 
 def test_rounding_on_a_joint_that_no_cable_turns_is_no_missing_torque() -> None:

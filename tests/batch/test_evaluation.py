@@ -162,7 +162,7 @@ def test_a_quantity_asked_for_alone_is_the_one_asked_for_with_all_others(output:
 def test_quantities_of_the_posture_need_no_tensions() -> None:
     arm = mixed_arm()
     q, tension, _ = problem(arm, 3)
-    names = QUANTITIES[: QUANTITIES.index("residual")]
+    names = QUANTITIES[: QUANTITIES.index("tension")]
     batch = cdsm.evaluate(arm, q, outputs=names)
     assert batch.tension is None
     loaded = cdsm.evaluate(arm, q, tension, outputs=names)
@@ -376,7 +376,7 @@ def everything(arm: cdsm.Manipulator, q: Any, tension: Any = None, **more: Any) 
     return cdsm.evaluate(arm, q, tension, wrench, OUTPUTS, direction=DIRECTIONS, **more)
 
 
-POSED = set(QUANTITIES[: QUANTITIES.index("residual")])
+POSED = set(QUANTITIES[: QUANTITIES.index("tension")])
 PULLED = {*POSED, "residual", "active", "load", "tension"}
 
 

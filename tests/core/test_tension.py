@@ -290,7 +290,7 @@ def test_every_optimality_condition_is_checked() -> None:
     ):
         assert _shortfall(problem, wrong)
     # and as qpsolvers itself measures
-    ours = tension_kernels.optimality(*problem[:4], x, y + 1e-3, z)
+    ours = tension_kernels.single_optimality(*problem[:4], x, y + 1e-3, z)
     solution.y = y + 1e-3
     theirs = (solution.primal_residual(), solution.dual_residual(), solution.duality_gap())
     np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-12)
@@ -348,7 +348,7 @@ def test_gap_counts_a_small_multiplier_at_the_bound_it_belongs_to() -> None:
         np.ones((1, 2)), np.array([10.0]), np.ones(2), np.array([4.75, INF]), 1.0, 1.0
     )
     point = np.array([4.75, 5.25]), np.array([-5.25]), np.array([0.5, 0.0])
-    assert tension_kernels.optimality(*problem[:4], *point) == (0.0, 0.0, 0.0)
+    assert tension_kernels.single_optimality(*problem[:4], *point) == (0.0, 0.0, 0.0)
 
 
 def test_polishing_makes_a_near_optimum_the_optimum_at_either_bound() -> None:

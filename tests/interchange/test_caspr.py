@@ -261,7 +261,7 @@ def test_derivatives_hold_whatever_the_order_of_q(tip: str, tmp_path: Path) -> N
         size=float(abs(heights).max()),
         tolerance=1e-9,
     )
-    np.testing.assert_array_equal(pose.tip, pose.link_pose(tip))
+    np.testing.assert_allclose(pose.tip, pose.link_pose(tip), rtol=0.0, atol=1e-15)
     of_pose = ("tip", "jacobian", "gravity_torque", "length_jacobian")
     terms = ("active", "passive", "gravity", "load", "joint")
     batch = cdsm.evaluate(arm, q[None], F[None], W[None], (*of_pose, *terms))

@@ -3,10 +3,16 @@
 import numpy as np
 
 from cdsm.kernels import bodies as body_kernels
-from cdsm.kernels.segments import mirror
-from cdsm.kernels.tree import Frames, Routing, forward_kinematics
+from cdsm.kernels import segments
+from cdsm.kernels.tree import Frames, Routing
 from cdsm.rigid_body import RigidBody
-from tests.kernels.test_segments import BRANCH_JOINT, BRANCHES
+from tests.kernels.test_segments import BRANCH_JOINT, BRANCHES, forward_kinematics
+from tests.support.kernels import from_python
+
+tip_jacobian = from_python(body_kernels.tip_jacobian)
+gravity_torque = from_python(body_kernels.gravity_torque)
+set_gravity_stiffness = from_python(body_kernels.set_gravity_stiffness)
+mirror = from_python(segments.mirror)
 
 
 def test_tree_that_branches_weighs_what_pinocchio_says() -> None:
@@ -35,22 +41,26 @@ def test_tree_that_branches_weighs_what_pinocchio_says() -> None:
         tree, masses = body.tree(), body.masses()
         q = np.array([0.2, -0.3, 0.4, 0.5, -0.6])
         count = q.size + 1
-        rotation = np.full((count, 3, 3), np.nan)  # nothing may stay as it was
-        origin, axis = np.full((2, count, 3), np.nan)
-        frames = Frames(origin, axis, np.empty(tree.slide.shape), np.empty((0, 3)))
+        # nothing may stay as it was
+        rotation = np.full((count, 3, 3, 1), np.nan)
+        origin, axis = np.full((2, count, 3, 1), np.nan)
+        frames = Frames(origin, axis, np.empty((len(tree.slide), 3, 1)), np.empty((0, 3, 1)))
+        origin[0] = axis[0] = 0.0
         none, points = np.empty(0, dtype=np.intp), np.empty((0, 3))
         routing = Routing(none, points, np.empty((0, 5), dtype=np.intp), none, np.empty(0))
-        forward_kinematics(tree, routing, q, rotation, frames)
+        forward_kinematics(tree, routing, q[:, None], np.empty((2, 1)), rotation, frames, None)
         for filled, of_base in ((origin, 0.0), (axis, 0.0), (rotation, np.eye(3))):
             assert np.isfinite(filled).all()
-            np.testing.assert_array_equal(filled[0], of_base)
-        pose, jacobian = np.full((4, 4), np.nan), np.zeros((6, q.size))
-        body_kernels.tip_jacobian(tree.parent, masses, rotation, frames, pose, jacobian)
-        heavy, torque = np.full((count, 7), np.nan), np.full(q.size, np.nan)
-        slope = np.zeros((q.size, q.size))
-        body_kernels.gravity_torque(tree, masses, rotation, frames, heavy, torque)
-        body_kernels.add_gravity_stiffness(tree.parent, heavy, slope)
-        mirror(slope)
+            np.testing.assert_array_equal(filled[0, ..., 0], of_base)
+        pose, jacobian = np.zeros((4, 4, 1)), np.zeros((6, q.size, 1))
+        tip_jacobian(tree.parent, masses, rotation, frames, pose, jacobian, None)
+        heavy, torque = np.full((count, 7, 1), np.nan), np.full((q.size, 1), np.nan)
+        slope = np.zeros((q.size, q.size, 1))
+        gravity_torque(tree, masses, rotation, frames, heavy, torque, None)
+        set_gravity_stiffness(tree.parent, heavy, slope, None)
+        mirror(slope, None)
+        pose, jacobian = pose[..., 0], jacobian[..., 0]
+        torque, slope = torque[..., 0], slope[..., 0]
 
         state = body.state(q)
         assert abs(state.gravity_torque).min() > 0.01

@@ -7,12 +7,13 @@ import pytest
 
 import cdsm
 from cdsm.arm_model import route
-from cdsm.kernels import segments
-from cdsm.kernels.tree import Frames, Routing, Tree
+from cdsm.kernels import segments, tree
+from cdsm.kernels.tree import Routing, Tree
 from cdsm.rigid_body import RigidBody
 from cdsm.support.values import Array
 from tests.support import arms
 from tests.support.differences import assert_second_order
+from tests.support.kernels import block, from_python
 
 BRANCHES = """<robot name="fork">
   <link name="root"/> <link name="trunk"/> <link name="a"/> <link name="b"/>
@@ -27,22 +28,37 @@ BRANCH_JOINT = """<joint name="{child}" type="revolute">
 </joint>"""
 
 
+add_length_hessian = from_python(segments.add_length_hessian)
+set_lengths = from_python(segments.set_lengths)
+forward_kinematics = from_python(tree.forward_kinematics)
+empty_frames = from_python(tree.empty_frames)
+segment_scratch = from_python(segments.segment_scratch)
+
+
 class _Fork(NamedTuple):
     tree: Tree
     routing: Routing
 
     def evaluate(self, q: Array) -> tuple[Array, Array, Array]:
         """L, J_L and H_L of its one cable."""
-        *arrays, lengths, jacobian, coincident = segments.cable_kinematics(
-            *self.tree, *self.routing, q
+        nv, rows, width = q.size, len(self.tree.parent), 2  # the posture twice, side by side
+        frames, scratch = empty_frames(self.tree, self.routing, width), segment_scratch(nv, width)
+        angles, rotation = block(np.stack([q, q])), np.empty((rows, 3, 3, width))
+        forward_kinematics(
+            self.tree, self.routing, angles, np.empty((2, width)), rotation, frames, width
         )
-        frames = Frames(*arrays)
-        assert coincident == -1
-        hessian = np.zeros((1, q.size, q.size))
-        page = np.zeros(1, dtype=np.intp)
-        segments.add_length_hessian(
-            self.routing.segment, self.routing.joint, frames, np.ones(1), page, hessian
-        )
+        L, J, shortest = np.empty((1, width)), np.empty((1, nv, width)), np.empty(width)
+        set_lengths(self.routing, frames, scratch, L, J, shortest, width)
+        assert (shortest > 0.01).all()
+        H, slot = np.zeros((1, nv, nv, width)), np.zeros(1, dtype=np.intp)
+        segment, joint = self.routing.segment, self.routing.joint
+        ones = np.ones((1, width))
+        add_length_hessian(segment, joint, frames, ones, slot, scratch, H, width)
+        upper = H[0, ..., 0]
+        lengths, jacobian = L[:, 0], J[..., 0]
+        hessian = (np.triu(upper) + np.triu(upper, 1).T)[None]
+        np.testing.assert_array_equal(J[..., 0], J[..., 1])
+        np.testing.assert_array_equal(H[..., 0], H[..., 1])
         return lengths, jacobian, hessian
 
 

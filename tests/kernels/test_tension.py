@@ -7,6 +7,7 @@ import numpy as np
 
 from cdsm.kernels import tension as tension_kernels
 from cdsm.support.values import Array, frozen
+from tests.support.kernels import block, from_python
 
 
 def test_balance_is_scaled_by_powers_of_two_and_so_without_rounding() -> None:
@@ -63,14 +64,23 @@ def test_only_what_is_pressed_against_a_bound_or_outside_is_set_onto_it() -> Non
 
 # --- certificates ---------------------------------------------------------------------------
 
+set_optimal = from_python(tension_kernels.set_optimal)
+is_infeasible = from_python(tension_kernels.is_infeasible)
+
 J2 = np.array([[0.03, 0.0], [-0.03, 0.0], [0.0, 0.02], [0.01, -0.02]])
 
 
 def certified(F: Array, y: Array, low: Array, high: Array, b: Array | None = None) -> bool:
     torque = J2.T @ F if b is None else b
-    return tension_kernels.is_optimal(
-        J2, torque, frozen(low.copy()), frozen(high.copy()), F, y, np.empty(2), np.empty(4)
+    scratch = tension_kernels.Certificate(
+        np.empty((2, 2)), np.empty((4, 2)), np.empty((5, 2)), np.empty(2), np.empty(2)
     )
+    # beside a posture that has no optimum
+    arguments = (
+        block(np.stack([each, np.ones_like(each)])) for each in (J2, torque, low, high, F, y)
+    )
+    set_optimal(*arguments, scratch, 2)
+    return bool(scratch.optimal[0] == 1.0)
 
 
 def test_an_optimum_is_accepted_and_every_fault_refused() -> None:
@@ -95,11 +105,11 @@ def test_a_proof_of_infeasibility_is_accepted_and_its_opposite_refused() -> None
     low, high = frozen(np.zeros(4)), frozen(np.full(4, 10.0))
     reach = 0.03 * 10 + 0.01 * 10  # the most the cables turn the first joint
     v = np.array([1.0, 0.0])
-    assert tension_kernels.is_infeasible(J2, np.array([reach + 1e-6, 0.0]), low, high, v)
-    assert not tension_kernels.is_infeasible(J2, np.array([reach - 1e-6, 0.0]), low, high, v)
-    assert not tension_kernels.is_infeasible(J2, np.array([reach + 1e-6, 0.0]), low, high, -v)
-    assert not tension_kernels.is_infeasible(J2, np.array([reach, 0.0]), low, high, v)
+    assert is_infeasible(J2, np.array([reach + 1e-6, 0.0]), low, high, v)
+    assert not is_infeasible(J2, np.array([reach - 1e-6, 0.0]), low, high, v)
+    assert not is_infeasible(J2, np.array([reach + 1e-6, 0.0]), low, high, -v)
+    assert not is_infeasible(J2, np.array([reach, 0.0]), low, high, v)
     # a cable without a maximum pulls as much as is wanted
     high = frozen(np.array([math.inf, 10.0, 10.0, 10.0]))
-    assert not tension_kernels.is_infeasible(J2, np.array([1e6, 0.0]), low, high, v)
-    assert tension_kernels.is_infeasible(J2, np.array([-1e6, 0.0]), low, high, -v)
+    assert not is_infeasible(J2, np.array([1e6, 0.0]), low, high, v)
+    assert is_infeasible(J2, np.array([-1e6, 0.0]), low, high, -v)

@@ -1,6 +1,6 @@
 """Dual active-set method for tension distribution (Goldfarb and Idnani), as a numba kernel.
 
-It is used where the guess of :mod:`cdsm.batch.serpentine_guess` fails. It starts at the least
+It is used where the guess of :mod:`cdsm.kernels.serpentine_guess` fails. It starts at the least
 tensions that balance the arm without bounds. It adds one violated bound after the other, and drops
 a bound whose multiplier would change its sign. It ends at the optimum, or at a proof of
 infeasibility. Every step builds and solves a system with
@@ -20,7 +20,9 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from cdsm.kernels.compiling import compiled
+import numpy as np
+
+from cdsm.kernels.compiling import inner
 from cdsm.kernels.linear_algebra import eliminate
 from cdsm.kernels.tension import row_product
 from cdsm.kernels.tree import Indices
@@ -50,7 +52,8 @@ class State(NamedTuple):
         y: Multipliers of balance (nv,).
         side: Of each cable: 1 at its lower bound, −1 at its upper bound, 0 free (C,).
         multiplier: Multipliers of the bounds (C,).
-        system: S and a right-hand side (nv, nv + 1).
+        system: S and a right-hand side (nv, nv + 1, 1).
+        pivots: Scratch of the elimination (4, 1).
         w: Right-hand side, then solution, of a system with S (nv,).
     """
 
@@ -59,10 +62,25 @@ class State(NamedTuple):
     side: Indices
     multiplier: Array
     system: Array
+    pivots: Array
     w: Array
 
 
-@compiled
+@inner
+def empty_state(nv: int, cables: int) -> State:
+    """Allocate a state."""
+    return State(
+        np.empty(cables),
+        np.empty(nv),
+        np.empty(cables, dtype=np.intp),
+        np.empty(cables),
+        np.empty((nv, nv + 1, 1)),
+        np.empty((4, 1)),
+        np.empty(nv),
+    )
+
+
+@inner
 def search(J: Array, b: Array, low: Array, high: Array, state: State) -> int:
     """Find the least tensions within bounds that balance the arm; fill the state.
 
@@ -71,7 +89,7 @@ def search(J: Array, b: Array, low: Array, high: Array, state: State) -> int:
     Returns:
         FOUND, IMPOSSIBLE or LOST.
     """
-    F, y, side, multiplier, system, w = state
+    F, y, side, multiplier, _, _, w = state
     for c in range(F.shape[0]):
         side[c], multiplier[c] = 0, 0.0
     if not _solve_for_sides(J, b, low, high, state):
@@ -85,7 +103,7 @@ def search(J: Array, b: Array, low: Array, high: Array, state: State) -> int:
             # cable p moves towards its bound, and the free cables keep the balance
             for i in range(y.shape[0]):
                 w[i] = J[p, i]
-            if not _solve_free(J, side, w, system):
+            if not _solve_free(J, state):
                 return LOST
             way = 1.0 - row_product(J, p, w)
             whole = sign * (bound - F[p]) / way if way > _DEPENDENT else math.inf
@@ -114,7 +132,7 @@ def search(J: Array, b: Array, low: Array, high: Array, state: State) -> int:
     return LOST
 
 
-@compiled
+@inner
 def _most_violated(F: Array, low: Array, high: Array, side: Indices) -> tuple[int, float]:
     """Find the free cable farthest outside its bounds (or −1), and 1 if below, −1 if above."""
     p, sign, worst = -1, 0.0, 0.0
@@ -128,10 +146,10 @@ def _most_violated(F: Array, low: Array, high: Array, side: Indices) -> tuple[in
     return p, sign
 
 
-@compiled
+@inner
 def _solve_for_sides(J: Array, b: Array, low: Array, high: Array, state: State) -> bool:
     """Fill F and y: put fixed cables at their bounds, and balance with the least free tensions."""
-    F, y, side, _, system, w = state
+    F, y, side, _, _, _, w = state
     for i in range(b.shape[0]):
         w[i] = b[i]
     for c in range(F.shape[0]):
@@ -139,7 +157,7 @@ def _solve_for_sides(J: Array, b: Array, low: Array, high: Array, state: State) 
             F[c] = low[c] if side[c] > 0 else high[c]
             for i in range(b.shape[0]):
                 w[i] -= J[c, i] * F[c]
-    if not _solve_free(J, side, w, system):
+    if not _solve_free(J, state):
         return False
     for i in range(b.shape[0]):
         y[i] = w[i]
@@ -149,22 +167,23 @@ def _solve_for_sides(J: Array, b: Array, low: Array, high: Array, state: State) 
     return True
 
 
-@compiled
-def _solve_free(J: Array, side: Indices, w: Array, system: Array) -> bool:
+@inner
+def _solve_free(J: Array, state: State) -> bool:
     """Replace w (nv,) by S⁻¹ w; return False if S is singular."""
+    _, _, side, _, system, pivots, w = state
     nv = w.shape[0]
     for i in range(nv):
         for j in range(nv):
-            system[i, j] = 0.0
-        system[i, nv] = w[i]
+            system[i, j, 0] = 0.0
+        system[i, nv, 0] = w[i]
     for c in range(side.shape[0]):
         if side[c] == 0:
             for i in range(nv):
                 if J[c, i] != 0.0:
                     for j in range(nv):
-                        system[i, j] += J[c, i] * J[c, j]
-    if eliminate(system) < _REGULAR:
-        return False
+                        system[i, j, 0] += J[c, i] * J[c, j]
+    eliminate(system, pivots, system.shape[2])
     for i in range(nv):
-        w[i] = system[i, nv]
-    return True
+        w[i] = system[i, nv, 0]
+    regular: bool = pivots[0, 0] > _REGULAR * pivots[1, 0]
+    return regular
