@@ -17,6 +17,11 @@ SCREEN = {"matplotlib", "rich", "viser", "xarray", "zarr"}
 OF_FILES = {"trimesh", "yourdfpy"}
 NUMERICS = {"lxml", "numba", "numpy", "pinocchio", "scipy"}
 
+STRAND = """
+import cdsm
+pose = cdsm.presets.virtual_prototype().at([0.1] * 10)
+print(cdsm.stiffness(pose, [50.0] * 15))
+"""
 HELP = """
 from cdsm.cli import app
 import contextlib, io
@@ -36,6 +41,7 @@ for arguments in ["--version"], ["--help"], *([name, "--help"] for name in comma
         pytest.param(
             FIRST_STIFFNESS, SOLVERS | SCREEN | OF_FILES | {"cdsm.report"}, id="stiffness"
         ),
+        pytest.param(STRAND, SOLVERS | SCREEN | OF_FILES | {"cdsm.report"}, id="strand"),
         pytest.param(HELP, NUMERICS | SOLVERS | OF_FILES | {"matplotlib"}, id="help"),
     ],
 )

@@ -11,7 +11,6 @@ from collections.abc import Callable
 from typing import Final, Literal
 
 import numpy as np
-from scipy.optimize import brentq
 
 from cdsm.errors import ElasticityRangeError, InfeasibleTension, SolverError
 from cdsm.manipulator import Manipulator
@@ -129,5 +128,7 @@ def stable_ranges(
 
 def sign_change(f: Callable[[float], float], a: float, b: float) -> float:
     """Find the place between a and b where a function changes its sign."""
+    from scipy.optimize import brentq  # slow to import
+
     root: float = brentq(lambda x: f(float(x)), a, b, xtol=1e-300, rtol=PRECISION)
     return root

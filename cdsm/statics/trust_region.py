@@ -20,7 +20,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from cdsm.errors import CdsmError
 from cdsm.statics.locked_motors import Iterate, LoadedArm
@@ -191,6 +190,8 @@ def _step(
         return float(1.0 / radius - 1.0 / np.linalg.norm(along / (lifted + shift)))
 
     if size > 0.0 and excess(least) > 0.0:
+        from scipy.optimize import brentq  # slow to import, and rarely needed
+
         # the relative tolerance alone decides
         shift = brentq(excess, least, 2.0 * size / radius, xtol=1e-300, rtol=1e-6)
         return np.asarray(vectors @ (-along / (lifted + shift)))

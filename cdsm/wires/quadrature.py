@@ -148,8 +148,6 @@ def _panel_ends(roots: NDArray[np.complex128], low: float, high: float) -> list[
 
 def _end_of_positive(p: Polynomial, low: float, high: float) -> float:
     """Find where p falls to the rounding of its terms. Return inf if p does not up to high."""
-    from scipy.optimize import brentq  # here, because it imports slowly
-
     rounding = Polynomial(_ROUNDING * abs(p.coef))  # high and low are not negative
     turns = np.sort(p.deriv().roots().real)
     before = low
@@ -157,6 +155,8 @@ def _end_of_positive(p: Polynomial, low: float, high: float) -> float:
         if p(point) <= rounding(point):
             if point == low:
                 return low
+            from scipy.optimize import brentq  # slow to import, and rarely needed
+
             # subtract the error of the root: at most xtol and rtol together
             found = brentq(p - rounding, before, point, xtol=1e-15 * point, rtol=1e-15)
             return max(low, float(found - 2e-15 * point))
