@@ -9,10 +9,10 @@
 All units are SI. The x-axis of the base frame lies along the straight arm.
 """
 
-from importlib import import_module as _import_module
-from typing import TYPE_CHECKING as _TYPE_CHECKING
+from importlib import import_module
+from typing import TYPE_CHECKING
 
-if _TYPE_CHECKING:
+if TYPE_CHECKING:
     from cdsm import paper as paper
     from cdsm import plots as plots
     from cdsm import presets
@@ -228,13 +228,13 @@ _NAMES = {
 _HOME = {name: f"cdsm.{module}" for module, names in _NAMES.items() for name in names.split()}
 _MODULES = ("paper", "plots", "presets", "view")
 
-if not _TYPE_CHECKING:  # a type checker would take any name for one that exists
+if not TYPE_CHECKING:  # a type checker would take any name for one that exists
 
     def __getattr__(name: str) -> object:
         if name in _MODULES:
-            return _import_module(f"cdsm.{name}")
+            return import_module(f"cdsm.{name}")
         if name in _HOME:
-            found = getattr(_import_module(_HOME[name]), name)
+            found = getattr(import_module(_HOME[name]), name)
         elif name == "__version__":
             from importlib.metadata import version
 
