@@ -20,6 +20,7 @@ from cdsm.cli.paper import reproduce
 from cdsm.cli.plan import plan
 from cdsm.cli.sweep import map_sweep, sweep
 from cdsm.cli.view import view
+from cdsm.cli.warm import warm
 from cdsm.cli.wire import fit
 
 app = typer.Typer(
@@ -53,6 +54,9 @@ def main(
             stream.reconfigure(errors="replace")
 
 
-_ALL = urdf, stiffness, check, weigh, buckle, plan, sweep, map_sweep, view, fit, export, reproduce
+_ALL = (
+    *(urdf, stiffness, check, weigh, buckle, plan, sweep, map_sweep),
+    *(view, fit, export, reproduce, warm),
+)
 for command in _ALL:
     app.command("map" if command is map_sweep else command.__name__)(as_command(command))

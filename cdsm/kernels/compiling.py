@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Iterable
 from functools import partial
 from typing import Any, TypeVar, cast
 
 import numpy as np
 from numba import njit
+from numba.core import event
 
+_log = logging.getLogger("cdsm")
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 
@@ -43,6 +46,23 @@ def _compile(function: _Function, **options: Any) -> _Function:
     except RuntimeError:  # neither the package's folder nor the user's cache is writable
         return cast(_Function, compiler()(function))
 
+
+class _Announcement(event.Listener):
+    """Tell once that kernels are compiled: the first use on a machine takes a minute or two."""
+
+    told = False
+
+    def on_start(self, event: event.Event) -> None:
+        module = event.data["dispatcher"].py_func.__module__
+        if not self.told and module.startswith("cdsm."):
+            self.told = True
+            _log.warning("compiling kernels, once on this machine: one or two minutes in all")
+
+    def on_end(self, event: event.Event) -> None:
+        pass
+
+
+event.register("numba:compile", _Announcement())  # type: ignore[no-untyped-call]
 
 Index = int | np.integer[Any]
 """Index in a loop over postures. If it may be negative, numba does not vectorise the loop."""

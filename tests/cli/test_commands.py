@@ -567,3 +567,9 @@ def test_options_that_this_kind_of_arm_does_not_heed_are_refused(
     assert result.exit_code == 2
     assert option in result.stderr
     assert said in " ".join(result.stderr.replace("│", " ").split())
+
+
+def test_warm_compiles_all_kernels_and_says_how_long_it_took() -> None:
+    result = call("warm")
+    assert result.exit_code == 0, result.output
+    assert "kernels are compiled" in result.output

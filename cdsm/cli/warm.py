@@ -1,0 +1,28 @@
+"""``cdsm warm``: compile the kernels."""
+
+from __future__ import annotations
+
+import time
+
+from cdsm.cli.options import AsJson
+from cdsm.cli.output import answer, console
+
+
+def warm(as_json: AsJson = False) -> None:
+    """Compile all kernels now, once on this machine, so that nothing waits for them later."""
+    import numpy as np
+
+    import cdsm
+
+    start = time.perf_counter()
+    arm = cdsm.presets.virtual_prototype()
+    with console().status("compiling kernels, up to two minutes"):
+        pose = arm.at(np.full(arm.nv, 0.05))
+        tension = cdsm.distribute_tension(pose, minimum=40.0)
+        K = cdsm.stiffness(pose, tension)
+        str(K)
+        up = (0.0, 0.0, 1.0)
+        cdsm.plan_stiffness(pose, up, 1.01 * K.along(up), minimum=40.0)
+        cdsm.evaluate(arm, pose.q[None], minimum=40.0, direction=up, outputs=("along",))
+    seconds = time.perf_counter() - start
+    answer(as_json, lambda: {"seconds": seconds}, f"kernels are compiled: {seconds:.0f} s")
