@@ -338,7 +338,7 @@ class Manipulator(Printed):
         return f"one {coordinate} per joint, {', '.join(self.joint_names)}"
 
     def _pose(self, q: Array) -> tuple[Array, ...]:
-        """Compute all but the last result of :func:`single_pose` at checked joint angles."""
+        """Compute the arrays of :func:`single_pose` at checked joint angles."""
         arguments: tuple[Any, ...] = (*self._model.arrays, q)
         *pose, shortest = single_pose(*arguments)
         if shortest < SHORTEST_SEGMENT:

@@ -314,13 +314,13 @@ def _clear(matrix: Array, width: Width) -> None:
 
 @inlined
 def _vector(record: Array, start: Indices, quantity: int) -> Array:
-    """Return a quantity of the record as vectors (…, W)."""
+    """Return a quantity of the record as vectors of W postures, (size, W)."""
     return record[start[quantity] : start[quantity + 1]]
 
 
 @inlined
 def _matrix(record: Array, start: Indices, quantity: int, rows: int, width: int) -> Array:
-    """Return a quantity of the record as matrices with the given number of rows (rows, …, W)."""
+    """Return a quantity of the record as matrices of W postures, (rows, columns, W)."""
     part = record[start[quantity] : start[quantity + 1]]
     return part.reshape((rows, part.shape[0] // rows, width))
 

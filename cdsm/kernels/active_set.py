@@ -68,7 +68,7 @@ class State(NamedTuple):
 
 @inner
 def empty_state(nv: int, cables: int) -> State:
-    """Allocate a state."""
+    """Allocate the working memory of :func:`search`."""
     return State(
         np.empty(cables),
         np.empty(nv),

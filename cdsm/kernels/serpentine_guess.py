@@ -118,8 +118,8 @@ def guess_tensions(
 ) -> None:
     """Fill tensions that balance the arm with the fewest cables above their lower bounds.
 
-    J is J_L (C, nv, W), b the torque to balance (nv, W), ``low`` and ``high`` are the bounds (C,
-    W). It ends at a block of joints that cannot be balanced at any posture.
+    W is the number of postures. J is J_L (C, nv, W), b the torque to balance (nv, W), ``low`` and
+    ``high`` are the bounds (C, W). The search ends early if none of the W postures can be balanced.
     """
     row, row_start, cable, cable_start = blocks
     F, failed, lacking, best = guess.F, guess.failed, guess.lacking, guess.best

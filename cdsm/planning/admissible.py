@@ -62,9 +62,9 @@ class Admissible:
         ]
 
     def piece(self, F: Array) -> tuple[Array, Array]:
-        """Return bounds (C,) [N] of the piece around F (C,) [N] in which no rigidity has a kink.
+        """Return bounds (C,) [N] around F (C,) [N] between which no rigidity has a kink.
 
-        A kink and its slope belong to the piece below.
+        A tension exactly at a kink belongs to the range below it, and so does the slope there.
         """
         low, high = self.low.copy(), self.high.copy()
         for c, kink in self.kinks:

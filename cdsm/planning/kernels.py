@@ -106,7 +106,7 @@ def constraint_hessian(
     left: Array,
     right: Array,
 ) -> Array:
-    """Return the second derivative of Y : X by the tensions (C, C)."""
+    """Return ∂²(Σ Y_ij X_ij)/∂F² (C, C), with X of :func:`tip_stiffness` and weights Y (r, r)."""
     left_torques = _torques_by_tension(hessian, length_jacobian, slope, left)
     right_torques = _torques_by_tension(hessian, length_jacobian, slope, right)
     count, nv, r = right_torques.shape

@@ -88,7 +88,10 @@ def unstable(arm: Manipulator, problem: str, mode: Array) -> SingularStiffness:
 
 
 def checked_targets(directions: Array | None, target: ArrayLike) -> Array:
-    """Check the targets at one posture, () or (m,), or (3, 3) without a direction [N/m]."""
+    """Check and return the wanted stiffness at one posture [N/m].
+
+    It is one value for each direction, () or (m,), or a (3, 3) matrix if no direction is given.
+    """
     targets = number_array("target", target)
     if directions is None and targets.shape != (3, 3):
         raise InvalidInput(

@@ -103,7 +103,7 @@ def _plot_directions(result: paper.StiffnessFigure) -> Figure:
 
 
 def _plot_changes(result: paper.StiffnessFigure) -> Figure:
-    """Plot a column for each direction: active part, and change of stiffness from its start."""
+    """Plot a column for each axis: active part, and change of stiffness since the first tension."""
     figure, grid = panels(11.0, 9.0, 3, 3, sharex=True, sharey="row")
     first, stated = result.curves[0], result.claims[0].paper or ()
     for i, color in enumerate(COLORS):

@@ -52,7 +52,7 @@ class Rank(ReadOnlyState):
 
     @property
     def condition(self) -> float:
-        """Return the condition number [-]; inf if the rank is not full."""
+        """Return the condition number of the matrix [-]; inf if its rank is not full."""
         if self.rank < self.full:
             return math.inf
         return float(self.values[0] / self.values[-1])

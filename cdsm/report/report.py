@@ -93,7 +93,7 @@ class Report(ReadOnlyState):
 
     @cached_property
     def condition(self) -> float:
-        """Return the condition number of K_θ [-]; ways of joints that slide are in arm lengths."""
+        """Return the condition number of K_θ [-], with ways of joints in lengths of the arm."""
         unit = joint_unit(self.stiffness.posture.arm)
         values = np.linalg.svd(self.stiffness.joint * unit[:, None] * unit, compute_uv=False)
         return float(values[0] / values[-1]) if values[-1] > 0.0 else math.inf

@@ -61,10 +61,10 @@ _NONE = _Anew(None)
 @final
 @dataclass(frozen=True, kw_only=True)
 class Difference:
-    """Difference between a given matrix and its central differences, in the matrix's unit.
+    """Difference between a matrix and the same matrix by central differences, in its unit.
 
     Attributes:
-        found: Largest entry of |given − by differences|.
+        found: Largest magnitude of an entry of the difference.
         expected: Bound of the difference by truncation and rounding of the central differences.
     """
 

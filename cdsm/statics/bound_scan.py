@@ -57,7 +57,7 @@ def tension_domain(arm: Manipulator) -> tuple[float, float]:
 
 
 def last_true(true: Callable[[float], bool], a: float, b: float) -> tuple[float, float]:
-    """Return the last place from a to b where a condition holds, and the next, where it fails."""
+    """Return the last number from a to b for which a condition holds; the next, for which not."""
     nothing = PRECISION**2 * b  # a may be zero, and the condition false right above it
     while b - a > max(PRECISION * b, nothing):
         middle = (a + b) / 2.0

@@ -29,12 +29,12 @@ def label(dims: tuple[str, ...], values: object, long_name: str, units: str = ""
 @final
 @dataclass(frozen=True, eq=False)
 class Choice(Generic[_Values]):
-    """Value or values of an argument; several make a dimension of its name.
+    """Value or values of an argument. Several values become a dimension named after the argument.
 
     Attributes:
         name: Name of the argument.
         values: The values, one entry each; also one entry for a single value.
-        names: Names or numbers along the dimension; None for a single value.
+        names: Labels or numbers of the values along the dimension; None for a single value.
     """
 
     name: str

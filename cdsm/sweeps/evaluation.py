@@ -158,7 +158,7 @@ def _rows(
     direction: Array | None = None,
     threads: int | None,
 ) -> tuple[Rows, Statuses]:
-    """Compute quantities in a batch, by their names in a sweep; NaN where the status demands it."""
+    """Compute sweep quantities for a batch of postures; NaN where the status forbids them."""
     outputs = [_BATCH_NAMES.get(name, name) for name in names]
     found = batch.evaluate(arm, q, tension, wrench, outputs, direction=direction, threads=threads)
     status = found.status.astype(np.int8)

@@ -31,7 +31,7 @@ class Quantity:
 
     @property
     def cases(self) -> tuple[str, ...]:
-        """Return the :data:`CASES` on which the quantity depends."""
+        """Return those arguments of a sweep, of :data:`CASES`, on which the quantity depends."""
         return {"pose": (), "tension": CASES[1:]}.get(self.stage, CASES)
 
 

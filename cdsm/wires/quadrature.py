@@ -147,7 +147,7 @@ def _panel_ends(roots: NDArray[np.complex128], low: float, high: float) -> list[
 
 
 def _end_of_positive(p: Polynomial, low: float, high: float) -> float:
-    """Find where p falls to the rounding of its terms. Return inf if p does not up to high."""
+    """Return the first F above low with p(F) below its rounding error; inf if there is none."""
     rounding = Polynomial(_ROUNDING * abs(p.coef))  # high and low are not negative
     turns = np.sort(p.deriv().roots().real)
     before = low

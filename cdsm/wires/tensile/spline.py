@@ -46,9 +46,10 @@ class Basis(NamedTuple):
 
 
 def _basis(points: Points, noise: float) -> Basis:
-    """Build splines from the first force to the largest, even in ½ log(F + corner) + ½ F.
+    """Build splines from the first force to the largest.
 
-    Both terms are scaled to 1. Below the corner [N] the spacing is even.
+    Their knots are equally spaced in the mean of log(F + corner) and F, each scaled to 0…1. So they
+    are nearly equally spaced below the corner [N], and denser there than above.
     """
     low, high = max(float(points.force[0]) - 3.0 * noise, 0.0), float(points.force.max())
     corner = max(low, 8.0 * noise, 5e-3 * high)
