@@ -50,7 +50,7 @@ def process(*arguments: str) -> Callable[[], object]:
     ("what", "run", "base", "most"),
     [
         ("import cdsm, in floors", ("-c", "import cdsm"), FLOOR, 0.3),
-        ("a first posture and its stiffness, in floors", ("-c", FIRST_STIFFNESS), FLOOR, 2.6),
+        ("a first posture and its stiffness, in floors", ("-c", FIRST_STIFFNESS), FLOOR, 2.8),
         ("cdsm --help, over typer and rich", ("-m", "cdsm", "--help"), HELP_LIBRARIES, 2.0),
         ("cdsm --version, over typer", ("-m", "cdsm", "--version"), "import typer, rich", 2.0),
     ],
