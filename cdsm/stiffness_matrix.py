@@ -330,8 +330,7 @@ class Stiffness(ReadOnlyState):
         """Raise an error if a reading does not exist; a named reading also needs a mobile tip."""
         if status == readings.READ:
             return
-        mobility = self._readings(self.joint, pseudoinverse=True)[0]
-        if what and mobility == readings.IMMOBILE:
+        if what and self._readings(self.joint, pseudoinverse=True)[0] == readings.IMMOBILE:
             u = frozen(np.linalg.svd(self.posture.jacobian[:3])[0][:, 2].copy())
             raise SingularStiffness(
                 f"{what} does not exist: the tip cannot move along {coordinates(u)}, where the "

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm.batch.evaluator import Evaluator
-from cdsm.batch.inputs import checked_threads, given_wrench, postures, run_slices
+from cdsm.batch.inputs import given_wrench, postures
 from cdsm.batch.layout import OK, Codes, Flags
 from cdsm.manipulator import Manipulator
 from cdsm.support.status import summary
@@ -92,12 +92,7 @@ def distribute_tensions(
     evaluator = Evaluator(
         arm, angles, loads, ("tension",), bounds=(low, high), check_limits=check_limits
     )
-    run_slices(
-        lambda part: evaluator.fill(part, status),
-        len(angles),
-        evaluator.block,
-        checked_threads(threads),
-    )
+    evaluator.run(status, threads)
     return Tensions(
         arm=arm,
         q=angles,

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from cdsm.batch import layout
 from cdsm.batch.distribution import Tensions
 from cdsm.batch.evaluator import Evaluator
-from cdsm.batch.inputs import checked_threads, given_tension, given_wrench, postures, run_slices
+from cdsm.batch.inputs import given_tension, given_wrench, postures
 from cdsm.batch.layout import QUANTITIES, Codes, Flags
 from cdsm.errors import InvalidInput, UnknownName
 from cdsm.manipulator import Manipulator
@@ -169,9 +169,7 @@ def evaluate(
         direction=u,
         check_limits=check_limits,
     )
-    run_slices(
-        lambda part: evaluator.fill(part, status), rows, evaluator.block, checked_threads(threads)
-    )
+    evaluator.run(status, threads)
     return Batch(
         arm=arm,
         q=angles,

@@ -9,7 +9,7 @@ import numpy as np
 
 from cdsm.batch import layout
 from cdsm.batch.fused_kernel import evaluate_rows
-from cdsm.batch.inputs import kernel_arm
+from cdsm.batch.inputs import checked_threads, kernel_arm, run_slices
 from cdsm.batch.layout import OK, QUANTITIES, UNDECIDED, Codes, Flags
 from cdsm.cable_laws import CableLaws
 from cdsm.elasticity import Elasticity
@@ -34,8 +34,7 @@ class Evaluator:
     that are distributed, (C,) or (B, C) [N]. Without both, no output depends on tensions.
 
     Attributes:
-        values: The outputs in the order of ``names``, filled slice by slice.
-        block: Number of postures that the kernel computes at a time.
+        values: The outputs in the order of ``names``, filled by :meth:`run`.
     """
 
     def __init__(
@@ -70,7 +69,7 @@ class Evaluator:
         needs_springs = bool(self._wanted.size) and self._wanted[-1] > layout.LOAD
         self._asks = needs_springs and bool(arm._model.laws.asked)
         widest = _WIDTH if self._start[-1] < _LONG else _WIDTH // 2
-        self.block = max(1, min(widest, len(q)))
+        self._block = max(1, min(widest, len(q)))
 
         shapes = dict(zip(QUANTITIES, layout.shapes(nv, cables, count), strict=True))
         if direction is not None and direction.ndim == 1:
@@ -81,7 +80,12 @@ class Evaluator:
             self._out[:, self._place[name]].reshape(len(q), *shapes[name]) for name in names
         ]
 
-    def fill(self, part: slice, status: Codes) -> None:
+    def run(self, status: Codes, threads: int | None) -> None:
+        """Fill the values and the status (B,), slice by slice, in several threads."""
+        count = checked_threads(threads)
+        run_slices(lambda part: self._fill(part, status), len(self._q), self._block, count)
+
+    def _fill(self, part: slice, status: Codes) -> None:
         """Fill the values and the status (B,) of a slice of the postures."""
         rows, found, out = np.arange(part.start, part.stop), status[part], self._out[part]
         if self._bounds is None:
@@ -138,7 +142,7 @@ class Evaluator:
             self._directions,
             self._start,
             wanted,
-            self.block,
+            self._block,
             out,
             found,
         )

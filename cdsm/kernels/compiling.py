@@ -71,7 +71,7 @@ Width = int | None
 """Number of postures side by side in a block, or None for one posture.
 
 The last axis of all arrays of a block is the posture. A loop over it is vectorised, so a block of
-32 postures takes about three times as long as one. For None, kernels are compiled a second time,
+32 postures takes about ten times as long as one. For None, kernels are compiled a second time,
 with a constant 1: loops over one posture then vanish. Both give the same bits.
 """
 

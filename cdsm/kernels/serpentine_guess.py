@@ -223,18 +223,13 @@ def set_multipliers(
                 before = np.uint64(row[t])
                 for w in lanes(width):
                     q[3, w] -= J[c, before, w] * y[before, w]
-            for w in lanes(width):
-                p[0, w] = J[c, i, w] if chosen[k, 0, w] == number else p[0, w]
-            for w in lanes(width):
-                p[1, w] = J[c, j, w] if chosen[k, 0, w] == number else p[1, w]
-            for w in lanes(width):
-                p[2, w] = q[3, w] if chosen[k, 0, w] == number else p[2, w]
-            for w in lanes(width):
-                q[0, w] = J[c, i, w] if chosen[k, 1, w] == number else q[0, w]
-            for w in lanes(width):
-                q[1, w] = J[c, j, w] if chosen[k, 1, w] == number else q[1, w]
-            for w in lanes(width):
-                q[2, w] = q[3, w] if chosen[k, 1, w] == number else q[2, w]
+            for r, taken in ((0, p), (1, q)):
+                for w in lanes(width):
+                    taken[0, w] = J[c, i, w] if chosen[k, r, w] == number else taken[0, w]
+                for w in lanes(width):
+                    taken[1, w] = J[c, j, w] if chosen[k, r, w] == number else taken[1, w]
+                for w in lanes(width):
+                    taken[2, w] = q[3, w] if chosen[k, r, w] == number else taken[2, w]
         if i == j:
             for w in lanes(width):
                 y[i, w] = p[2, w] / p[0, w]
