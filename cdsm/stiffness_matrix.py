@@ -24,7 +24,14 @@ from cdsm.kernels import readings
 from cdsm.posture import Posture
 from cdsm.support.format import MODEL, coordinates
 from cdsm.support.markup import element, row
-from cdsm.support.validation import instance, one_of, unit_direction, vector, wrench_vector
+from cdsm.support.validation import (
+    Direction,
+    instance,
+    one_of,
+    unit_direction,
+    vector,
+    wrench_vector,
+)
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension
 
@@ -170,21 +177,21 @@ class Stiffness(ReadOnlyState):
         self._refuse(status, "the Cartesian stiffness matrix")
         return frozen(cartesian)
 
-    def along(self, direction: ArrayLike) -> float:
+    def along(self, direction: Direction) -> float:
         """Compute 1/(uᵀ C_vv u) [N/m], the tangent stiffness that a tip weight measures (Eq. 20).
 
         A weight that is not small compared with the tensions measures a secant stiffness. With a
         stiffening wire, the secant can be several times larger: see :func:`~cdsm.weight_test`.
 
         Args:
-            direction: u (3,) in base axes, any length.
+            direction: u: an axis such as ``"z"`` or ``"-z"``, or (3,) in base axes, any length.
 
         Returns:
             The stiffness; inf if the tip cannot move in this direction. It may be negative if the
             arm is unstable: see :attr:`is_stable`.
 
         Raises:
-            InvalidInput: ``direction`` is not three finite numbers, or is zero.
+            InvalidInput: ``direction`` is neither an axis nor three finite numbers, or is zero.
             SingularStiffness: K_θ is singular.
         """
         return self._along(unit_direction("direction", direction))[0]
@@ -208,17 +215,17 @@ class Stiffness(ReadOnlyState):
         self._refuse(status, "the pseudo-inverse reading")
         return frozen(result)
 
-    def shares(self, direction: ArrayLike) -> Shares:
+    def shares(self, direction: Direction) -> Shares:
         """Compute the contribution of each cable's elasticity and tension to :meth:`along`.
 
         With the joint motion δθ per unit tip displacement along u, along(u) = δθᵀ K_θ δθ. K_θ is a
         sum over cables, gravity and load.
 
         Args:
-            direction: u (3,) in base axes, any length.
+            direction: u: an axis such as ``"z"`` or ``"-z"``, or (3,) in base axes, any length.
 
         Raises:
-            InvalidInput: ``direction`` is not three finite numbers, or is zero.
+            InvalidInput: ``direction`` is neither an axis nor three finite numbers, or is zero.
             SingularStiffness: The stiffness along u is infinite, or K_θ is singular.
         """
         u = unit_direction("direction", direction)

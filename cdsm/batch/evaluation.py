@@ -19,7 +19,7 @@ from cdsm.batch.layout import QUANTITIES, Codes, Flags
 from cdsm.errors import InvalidInput, UnknownName
 from cdsm.manipulator import Manipulator
 from cdsm.support.status import summary
-from cdsm.support.validation import instance, one_of, unit_directions
+from cdsm.support.validation import Direction, instance, one_of, unit_directions
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import checked_bounds
 
@@ -99,7 +99,7 @@ def evaluate(
     wrench: ArrayLike | None = None,
     outputs: Sequence[str] = DEFAULT_OUTPUTS,
     *,
-    direction: ArrayLike | None = None,
+    direction: Direction | Sequence[Direction] | None = None,
     minimum: ArrayLike | None = None,
     maximum: ArrayLike | None = None,
     check_limits: bool = True,
@@ -123,7 +123,8 @@ def evaluate(
             ``"active"``, ``"passive"``, ``"gravity"``, ``"load"``, ``"joint"``,
             ``"cable_stiffness"``, ``"residual"``, ``"margin"``, ``"compliance"``, ``"cartesian"``,
             ``"along"``, ``"pseudoinverse"``. And ``"tension"``.
-        direction: u (3,) of ``"along"``, any length; or several (D, 3), then ``along`` is (B, D).
+        direction: u of ``"along"``: an axis such as ``"z"``, or (3,), any length; or several
+            (D, 3), then ``along`` is (B, D).
         minimum: Lower bounds [N] for :func:`distribute_tensions`, which then finds the tensions.
         maximum: Upper bounds [N] of distributed tensions; no bounds if not given.
         check_limits: Pass over postures beyond the joint limits.

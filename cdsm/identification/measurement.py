@@ -11,6 +11,8 @@ import numpy as np
 from cdsm.errors import InvalidInput
 from cdsm.support.validation import (
     SMALLEST,
+    Axis,
+    axis_vector,
     number_array,
     scalar,
     unit_direction,
@@ -26,8 +28,9 @@ class Measurement:
 
     Attributes:
         value: Stiffness along the direction [N/m]: force over displacement of the tip along it.
-        direction: Common direction of force and displacement (3,), base axes, any length. With a
-            ``force`` the sign matters: (0, 0, -1) hangs a weight, (0, 0, 1) lifts the tip.
+        direction: Common direction of force and displacement: an axis such as ``"z"``, kept as its
+            vector, or (3,) in base axes, any length. With a ``force`` the sign matters: ``"-z"``
+            hangs a weight, ``"z"`` lifts the tip.
         angles: Joint angles (nv,) [rad].
         tension: Cable tensions (C,) [N]. Give either ``tension`` or ``minimum``.
         minimum: Lower bound of the tensions [N], one number or (C,).
@@ -44,7 +47,7 @@ class Measurement:
     """
 
     value: float
-    direction: tuple[float, float, float]
+    direction: tuple[float, float, float] | Axis
     angles: tuple[float, ...]
     tension: tuple[float, ...] | None = None
     minimum: float | tuple[float, ...] | None = None
@@ -81,8 +84,10 @@ class Measurement:
             )
         if not isinstance(self.label, str):
             raise InvalidInput("label", f"{self.label!r} given; a text is needed.")
-        unit_direction("direction", self.direction)
-        direction = vector("direction", self.direction, 3, "a direction in base axes")
+        given = self.direction
+        given = axis_vector("direction", given) if isinstance(given, str) else given
+        unit_direction("direction", given)
+        direction = vector("direction", given, 3, "a direction in base axes")
         wrench = wrench_vector("wrench", self.wrench)
         checked: dict[str, object] = {
             "value": value,

@@ -14,11 +14,10 @@ from functools import cached_property
 from typing import final
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from cdsm.planning.kernels import form_by_tension
 from cdsm.stiffness_matrix import Stiffness
-from cdsm.support.validation import instance, unit_direction
+from cdsm.support.validation import Direction, instance, unit_direction
 from cdsm.support.values import Array, ReadOnlyState, frozen
 
 
@@ -63,14 +62,14 @@ class StiffnessGradient(ReadOnlyState):
         """
         return frozen(self._through(self.stiffness.posture.jacobian[:3], self.stiffness.cartesian))
 
-    def along(self, direction: ArrayLike) -> Array:
+    def along(self, direction: Direction) -> Array:
         """Return ∂(1/(uᵀ C_vv u))/∂F = along² wᵀ ∂K_θ/∂F w with w = K_θ⁻¹ J_vᵀ u, (C,) [1/m].
 
         Args:
-            direction: u (3,) in base axes, any length.
+            direction: u: an axis such as ``"z"``, or (3,) in base axes, any length.
 
         Raises:
-            InvalidInput: ``direction`` is not three finite numbers, or is zero.
+            InvalidInput: ``direction`` is neither an axis nor three finite numbers, or is zero.
             SingularStiffness: The stiffness along u is infinite, or K_θ is singular.
         """
         u = unit_direction("direction", direction)

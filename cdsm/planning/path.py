@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -19,7 +20,14 @@ from cdsm.planning.range import MARGIN
 from cdsm.planning.stiffness_model import StiffnessModel, checked_margin
 from cdsm.stiffness_matrix import stiffness
 from cdsm.support.format import coordinates
-from cdsm.support.validation import bound, flag, instance, number_array, unit_directions
+from cdsm.support.validation import (
+    Direction,
+    bound,
+    flag,
+    instance,
+    number_array,
+    unit_directions,
+)
 from cdsm.support.values import Array, frozen
 from cdsm.tension import checked_bounds
 
@@ -36,7 +44,7 @@ _STATUS: Final[dict[type[CdsmError], Status]] = {
 
 def plan_path(
     arm: Manipulator,
-    direction: ArrayLike | None,
+    direction: Direction | Sequence[Direction] | None,
     target: ArrayLike,
     minimum: ArrayLike = 0.0,
     maximum: ArrayLike = math.inf,
@@ -71,8 +79,8 @@ def plan_path(
 
     Args:
         arm: The arm.
-        direction: u (3,) in base axes, any length; several directions (n, 3), which are hit
-            together; or None for ``cartesian``.
+        direction: u: an axis such as ``"z"``, or (3,) in base axes, any length; several directions
+            (n, 3), which are hit together; or None for ``cartesian``.
         target: The stiffness [N/m], one for all samples or one per sample: () or (S,) along u, (n,)
             or (S, n) along several directions, (3, 3) or (S, 3, 3) for ``cartesian``.
         minimum: Lower bound of the tensions [N], for all cables or (C,).

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import final
 
@@ -21,7 +22,7 @@ from cdsm.planning.stiffness_model import StiffnessModel
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.format import MODEL, coordinates
-from cdsm.support.validation import unit_directions
+from cdsm.support.validation import Direction, unit_directions
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension
 
@@ -92,7 +93,7 @@ class StiffnessPlan(ReadOnlyState):
 
 def plan_stiffness(
     pose: Posture,
-    direction: ArrayLike | None,
+    direction: Direction | Sequence[Direction] | None,
     target: ArrayLike,
     minimum: ArrayLike = 0.0,
     maximum: ArrayLike = np.inf,
@@ -115,8 +116,8 @@ def plan_stiffness(
 
     Args:
         pose: The posture.
-        direction: u (3,) in base axes, any length; several directions (n, 3); or None for
-            ``cartesian``.
+        direction: u: an axis such as ``"z"``, or (3,) in base axes, any length; several directions
+            (n, 3); or None for ``cartesian``.
         target: The stiffness [N/m] along u; one per direction (n,); or (3, 3).
         minimum: Lower bound of the tensions [N], for all cables or (C,).
         maximum: Upper bound of the tensions [N], for all cables or (C,). With inf, only the domain

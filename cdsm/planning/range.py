@@ -18,7 +18,7 @@ from cdsm.planning.stiffness_model import Constraints, Evaluation, StiffnessMode
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import stiffness
 from cdsm.support.format import MODEL, coordinates
-from cdsm.support.validation import unit_direction
+from cdsm.support.validation import Direction, unit_direction
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension
 from cdsm.wires.laws import StrandElasticity, TabulatedElasticity
@@ -90,7 +90,7 @@ class StiffnessRange(ReadOnlyState):
 
 def stiffness_range(
     pose: Posture,
-    direction: ArrayLike,
+    direction: Direction,
     minimum: ArrayLike = 0.0,
     maximum: ArrayLike = np.inf,
     wrench: ArrayLike = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
@@ -115,7 +115,7 @@ def stiffness_range(
 
     Args:
         pose: The posture.
-        direction: u (3,) in base axes, any length.
+        direction: u: an axis such as ``"z"``, or (3,) in base axes, any length.
         minimum: Lower bound of the tensions [N], for all cables or (C,).
         maximum: Upper bound of the tensions [N], as for :func:`~cdsm.plan_stiffness`.
         wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m].
@@ -125,9 +125,9 @@ def stiffness_range(
         seed: Seed of the random starting tensions.
 
     Raises:
-        InvalidInput: ``direction`` is not three finite numbers, or is zero; ``minimum`` exceeds
-            ``maximum``; another argument is invalid; or ``maximum`` is inf and the stiffness does
-            not stop changing with the tension.
+        InvalidInput: ``direction`` is neither an axis nor three finite numbers, or is zero;
+            ``minimum`` exceeds ``maximum``; another argument is invalid; or ``maximum`` is inf and
+            the stiffness does not stop changing with the tension.
         InfeasibleTension: No tensions within the bounds and domains balance the arm.
         ElasticityRangeError: The bounds and the domain of an elasticity do not overlap.
         SingularStiffness: The tip cannot move along u, or no admissible tensions hold the arm.

@@ -30,7 +30,7 @@ from cdsm.statics.bound_scan import (
 )
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.format import MODEL, coordinates
-from cdsm.support.validation import bound, instance, scalar, unit_direction
+from cdsm.support.validation import Direction, bound, instance, scalar, unit_direction
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import DEFAULT_SOLVER, Tension, distribute_tension
 
@@ -109,7 +109,7 @@ class Saturation(ReadOnlyState):
 
 def saturation(
     pose: Posture,
-    direction: ArrayLike,
+    direction: Direction,
     minimum: float = 0.0,
     maximum: ArrayLike = math.inf,
     wrench: ArrayLike = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
@@ -129,7 +129,7 @@ def saturation(
 
     Args:
         pose: The posture, which stays fixed.
-        direction: u (3,) in base axes, any length.
+        direction: u: an axis such as ``"z"``, or (3,) in base axes, any length.
         minimum: First lower bound [N]; the low end of the elasticities if that is higher.
         maximum: Upper bound of the tensions [N], for all cables or (C,); inf for no bound.
         wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m].
@@ -137,8 +137,8 @@ def saturation(
         solver: As for :func:`~cdsm.distribute_tension`.
 
     Raises:
-        InvalidInput: ``direction`` is not three finite numbers, or is zero; ``minimum`` exceeds
-            ``maximum``; or another argument is invalid.
+        InvalidInput: ``direction`` is neither an axis nor three finite numbers, or is zero;
+            ``minimum`` exceeds ``maximum``; or another argument is invalid.
         InfeasibleTension: No tensions balance the arm even at the smallest lower bound.
         ElasticityRangeError: The tensions at the smallest lower bound are outside the elasticities.
         SingularStiffness: The tip cannot move along u, or the arm is stable at no lower bound.

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from typing import Final, NamedTuple, TypeVar
+from typing import Final, Literal, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -46,6 +46,21 @@ RANGES: Final = {
 """Range of each quantity; generous, from a hair of rubber to the cables of a bridge."""
 
 WRENCH: Final = "force [N], then moment [N m], base axes"
+
+Axis = Literal["x", "y", "z", "-x", "-y", "-z"]
+
+Direction = Axis | ArrayLike
+"""Direction in base axes: the name of an axis, or three numbers (3,) of any length."""
+
+AXES: Final[dict[str, tuple[float, float, float]]] = {
+    "x": (1.0, 0.0, 0.0),
+    "y": (0.0, 1.0, 0.0),
+    "z": (0.0, 0.0, 1.0),
+    "-x": (-1.0, 0.0, 0.0),
+    "-y": (0.0, -1.0, 0.0),
+    "-z": (0.0, 0.0, -1.0),
+}
+"""Directions that have a name, in base axes."""
 
 
 def within(quantity: str, value: float, *, zero: bool = False, infinite: bool = False) -> str:
@@ -172,8 +187,10 @@ def scalar(name: str, value: object) -> float:
     return float(array)
 
 
-def unit_direction(name: str, value: ArrayLike) -> Array:
-    """Return the read-only unit vector (3,) along a given vector that is not zero."""
+def unit_direction(name: str, value: Direction) -> Array:
+    """Return the read-only unit vector (3,) along an axis or a vector that is not zero."""
+    if isinstance(value, str):
+        return frozen(np.array(axis_vector(name, value)))
     array = vector(name, value, 3, "a direction in base axes")
     largest = float(abs(array).max())
     if largest == 0.0:
@@ -182,9 +199,20 @@ def unit_direction(name: str, value: ArrayLike) -> Array:
     return frozen(scaled / np.linalg.norm(scaled))
 
 
-def unit_directions(name: str, value: ArrayLike) -> Array:
+def axis_vector(name: str, axis: str) -> tuple[float, float, float]:
+    """Return the unit vector of an axis of :data:`AXES`, or raise :class:`InvalidInput`."""
+    if axis not in AXES:
+        raise InvalidInput(name, f"{axis!r} given; give {', '.join(AXES)} or three numbers.")
+    return AXES[axis]
+
+
+def unit_directions(name: str, value: Direction | Iterable[Direction]) -> Array:
     """Return the read-only unit vector (3,) of one direction, or (n, 3) of n directions."""
-    given = number_array(name, value)
+    if isinstance(value, str):
+        return unit_direction(name, value)
+    if isinstance(value, (list, tuple)) and any(isinstance(each, str) for each in value):
+        return frozen(np.array([unit_direction(f"{name}[{i}]", u) for i, u in enumerate(value)]))
+    given = number_array(name, value)  # type: ignore[arg-type]
     if given.ndim < 2:
         return unit_direction(name, given)
     if given.ndim > 2 or given.shape[1] != 3 or not len(given):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar, final
 
@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from cdsm.elasticity import Elasticity
 from cdsm.errors import InvalidInput
-from cdsm.support.validation import number_array, scalar, text, vector
+from cdsm.support.validation import Direction, number_array, scalar, text, vector
 from cdsm.support.values import Array, frozen
 
 _Values = TypeVar("_Values")
@@ -108,14 +108,18 @@ def distinct(name: str, values: ArrayLike) -> Array:
 
 def vectors_of(
     name: str,
-    value: ArrayLike | Mapping[str, ArrayLike],
+    value: Direction | Sequence[Direction] | Mapping[str, Direction],
     checked: Callable[[str, ArrayLike], Array],
 ) -> Choice[Array]:
     """Check one or more vectors, such as wrenches (W, 6), each by a function."""
+    if isinstance(value, str):
+        return Choice(name, frozen(checked(name, value)[None]), None)
+    if isinstance(value, (list, tuple)) and all(isinstance(each, str) for each in value):
+        value = dict(zip(value, value, strict=True))  # axes are their own names
     if isinstance(value, Mapping):
         rows = [checked(f"{name}[{key!r}]", each) for key, each in value.items()]
     else:
-        array = number_array(name, value)
+        array = number_array(name, value)  # type: ignore[arg-type]
         if array.ndim < 2:
             return Choice(name, frozen(checked(name, array)[None]), None)
         rows = [checked(f"{name}[{i}]", each) for i, each in enumerate(array)]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +15,7 @@ from cdsm.errors import FileError
 from cdsm.manipulator import Manipulator
 from cdsm.support.extras import need
 from cdsm.support.files import as_path
-from cdsm.support.validation import flag, whole_number
+from cdsm.support.validation import Direction, flag, whole_number
 from cdsm.sweeps.blocks import Block, blocks, extents, postures
 from cdsm.sweeps.cluster import checked_client, on_cluster
 from cdsm.sweeps.evaluation import BlockResult, evaluate
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 _NUMBERS = 2**18
 """Default number of joint angles in a block: some tenths of a second of work."""
 
-_AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+_AXES = ("x", "y", "z")
 _NO_WRENCH = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
@@ -43,7 +43,7 @@ def sweep(
     maximum: float = np.inf,
     elasticity: Elasticity | Mapping[str, Elasticity] | None = None,
     wrench: ArrayLike | Mapping[str, ArrayLike] = _NO_WRENCH,
-    direction: ArrayLike | Mapping[str, ArrayLike] = _AXES,
+    direction: Direction | Sequence[Direction] | Mapping[str, Direction] = _AXES,
     outputs: Iterable[str] = DEFAULT,
     store: str | os.PathLike[str] | None = None,
     client: Client | None = None,
@@ -68,8 +68,8 @@ def sweep(
             dimension ``elasticity``.
         wrench: Wrench at ``tool0`` in base axes (6,): force [N], then moment [N m]. Several, (W, 6)
             or by name, make the dimension ``wrench``.
-        direction: Direction of ``along`` (3,), any length. Several, (D, 3) or by name, make the
-            dimension ``direction``.
+        direction: Direction of ``along``: an axis such as ``"z"``, or (3,), any length. Several,
+            axes, (D, 3) or by name, make the dimension ``direction``.
         outputs: Names of quantities: keys of :data:`~cdsm.sweeps.quantities.QUANTITIES`.
         store: Zarr folder to which entries are written during the run. A new run with the same
             arguments computes only missing entries, also those of lost workers, with the bits of an

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, final
 
@@ -14,7 +14,7 @@ from cdsm.elasticity import Elasticity
 from cdsm.errors import InvalidInput
 from cdsm.manipulator import Manipulator
 from cdsm.support.format import JointUnits
-from cdsm.support.validation import instance, one_of, unit_direction, wrench_vector
+from cdsm.support.validation import Direction, instance, one_of, unit_direction, wrench_vector
 from cdsm.sweeps.arguments import bounds_of, label, laws_of, vectors_of
 from cdsm.sweeps.blocks import Block
 from cdsm.sweeps.description import attributes_of, law_text
@@ -121,7 +121,7 @@ def specify(
     maximum: float,
     elasticity: Elasticity | Mapping[str, Elasticity] | None,
     wrench: ArrayLike | Mapping[str, ArrayLike],
-    direction: ArrayLike | Mapping[str, ArrayLike],
+    direction: Direction | Sequence[Direction] | Mapping[str, Direction],
     outputs: Iterable[str],
 ) -> Specification:
     """Check the arguments of a sweep, and label all dimensions and coordinates."""
