@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, final, get_args
 
 import numpy as np
@@ -36,30 +36,43 @@ class Site:
     Attributes:
         link: Name of the link in the URDF.
         position: Position in the link's frame [m].
+        friction: μ [-]: Coulomb friction coefficient between the cable and the hole.
+        wrap: Wrap angle [rad] that adds to the angle by which the cable turns at the site, e.g. in
+            a tube or at a rounded edge.
 
     Raises:
-        InvalidInput: ``position`` is not three finite numbers, or ``link`` is not a name.
+        InvalidInput: ``position`` is not three finite numbers, ``link`` is not a name, or
+            ``friction`` or ``wrap`` is negative or larger than any machine has.
     """
 
     link: str
     position: tuple[float, float, float]
+    friction: float = 0.0
+    wrap: float = 0.0
 
     def __post_init__(self) -> None:
         text("link", self.link)
         position = vector("position", self.position, 3, f"a point on {self.link} [m]", "length")
-        object.__setattr__(self, "position", tuple(position.tolist()))
+        friction = quantity("friction", self.friction, "friction", zero=True)
+        wrap = quantity("wrap", self.wrap, "wrap", zero=True)
+        # the class is frozen: plain assignment is refused
+        self.__dict__.update(position=tuple(position.tolist()), friction=friction, wrap=wrap)
 
 
 @final
 @dataclass(frozen=True)
 class Cable:
-    """A frictionless cable through an ordered list of sites, actuator side first.
+    """A cable through an ordered list of sites, actuator side first.
 
     The cable length L is ``lead`` plus the straight segments between neighbouring sites. The cable
     stiffness is k = 1/(l_0/EA(F) + 1/k_series); it is 0 if the motor controls force. The original
     length of the wire is l_0 = (L − ΔF/k_series)/(1 + ε(F)). Strain ε and ΔF start at the low end
     of the elasticity's domain. L includes the series spring, so the lead must be long enough to
     contain it.
+
+    All sites but the last, where the cable ends, are holes that it passes. If there is no lead, the
+    cable leaves its actuator at the first site, and that site is no hole. The lead arrives along x
+    of the first site's link. If it does not, give the place of the actuator as the first site.
 
     Attributes:
         name: Unique name within an arm.
@@ -72,7 +85,8 @@ class Cable:
         maximum: Largest allowed tension [N]; every tension distribution respects it; inf: no limit.
 
     Raises:
-        CableError: An attribute is invalid; the error names the cable and the fault.
+        CableError: An attribute is invalid, or a site that is no hole has friction; the error names
+            the cable and the fault.
     """
 
     name: str
@@ -106,10 +120,28 @@ class Cable:
                 self.name,
                 f"tensions from {least:g} to {most:g} N given; minimum <= maximum is needed.",
             )
+        start, end = sites[0], sites[-1]
+        if end.friction or end.wrap:
+            raise CableError(
+                self.name,
+                f"site {len(sites)} has friction or wrap, but the cable ends there; only holes "
+                "that it passes have them.",
+            )
+        if lead == 0.0 and (start.friction or start.wrap):
+            raise CableError(
+                self.name,
+                "site 1 has friction or wrap, but without a lead the cable leaves its actuator "
+                "there; only holes that it passes have them. Give a lead.",
+            )
         # the class is frozen: plain assignment is refused
         self.__dict__.update(
             sites=sites, lead=lead, series_stiffness=series, minimum=least, maximum=most
         )
+
+    @property
+    def friction(self) -> tuple[float, ...]:
+        """Friction coefficient μ [-] of each hole that the cable passes, actuator side first."""
+        return tuple(site.friction for site in self.sites[0 if self.lead > 0.0 else 1 : -1])
 
     def elongation(self, tension: ArrayLike, free_length: float) -> Array:
         """Compute Δl = l_0 ε(F) + ΔF/k_series [m], from the low end of the elasticity's domain.
@@ -227,7 +259,9 @@ def serpentine_cables(
         z = geometry.hole_radius * math.sin(route.angle)
         passed = geometry.disks[: route.joint]
         last, (end, *_) = geometry.disks[route.joint]
-        sites = [Site(link, (x, y, z)) for link, places in passed for x in places]
+        sites = [Site(link, (x, y, z), route.friction) for link, places in passed for x in places]
+        if route.lead == 0.0:
+            sites[0] = replace(sites[0], friction=0.0)
         cables.append(
             Cable(
                 name=f"cable{route.joint}_{of_joint[route.joint - 1]}",

@@ -19,6 +19,7 @@ from cdsm.support.files import read_text, write_text
 from cdsm.support.records import (
     CrossFaults,
     Direction,
+    Friction,
     Integer,
     Length,
     LengthOrZero,
@@ -103,6 +104,8 @@ class CableRoute:
         joint: Number of the joint it drives, from 1; it ends on the first disk after the joint.
         angle: φ: angle of the hole about x, from y towards z [rad].
         lead: Straight cable between the actuator and the base disk [m].
+        friction: μ [-]: Coulomb friction coefficient in every hole that the cable passes. With no
+            lead the cable starts at the base disk, and nothing slides there.
 
     Raises:
         GeometryError: Some attributes are invalid; lists every fault.
@@ -111,6 +114,7 @@ class CableRoute:
     joint: Annotated[Integer, Field(ge=1)]
     angle: Number
     lead: LengthOrZero = 0.0
+    friction: Friction = 0.0
 
 
 @record
@@ -158,6 +162,7 @@ class Geometry(Printed):
         hole_radius: Length,
         link_mass: Mass,
         lead: LengthOrZero = 0.0,
+        friction: Friction = 0.0,
         joint_limit: JointLimit = None,
         name: Name = "arm",
     ) -> Self:
@@ -175,6 +180,7 @@ class Geometry(Printed):
             hole_radius: R [m].
             link_mass: Mass of every link [kg].
             lead: Straight cable between each actuator and the base disk [m].
+            friction: μ of all cables, as in :class:`CableRoute`.
             joint_limit: Largest angle about each axis in both directions [rad]. None: until the
                 disks touch, 2 atan(h/R), at most 80°.
             name: Name of the robot.
@@ -190,7 +196,12 @@ class Geometry(Printed):
             joints=(Joint(axes=UNIVERSAL_AXES, disk_offset=disk_offset, limit=joint_limit),) * n,
             links=(Link(length=link_length, mass=link_mass),) * n,
             cables=tuple(
-                CableRoute(joint=k + 1, angle=2.0 * math.pi * (k + n * j) / (n * m), lead=lead)
+                CableRoute(
+                    joint=k + 1,
+                    angle=2.0 * math.pi * (k + n * j) / (n * m),
+                    lead=lead,
+                    friction=friction,
+                )
                 for k in range(n)
                 for j in range(m)
             ),
@@ -210,6 +221,7 @@ class Geometry(Printed):
         hole_radius: Length,
         link_mass: Mass,
         lead: LengthOrZero = 0.0,
+        friction: Friction = 0.0,
         joint_limit: JointLimit = None,
         name: Name = "arm",
     ) -> Self:
@@ -229,6 +241,7 @@ class Geometry(Printed):
             hole_radius: R [m].
             link_mass: Mass of every link [kg].
             lead: Straight cable between each actuator and the base disk [m].
+            friction: μ of all cables, as in :class:`CableRoute`.
             joint_limit: Largest angle in both directions [rad].
             name: Name of the robot.
 
@@ -252,7 +265,9 @@ class Geometry(Printed):
             ),
             links=(Link(length=link_length, mass=link_mass),) * joints,
             cables=tuple(
-                CableRoute(joint=k + 1, angle=roll + math.pi / 2 + turn, lead=lead)
+                CableRoute(
+                    joint=k + 1, angle=roll + math.pi / 2 + turn, lead=lead, friction=friction
+                )
                 for k, roll in enumerate(rolls)
                 for turn in turns
             ),
@@ -324,9 +339,13 @@ class Geometry(Printed):
             "# joint (of a cable): the joint it drives, from 1; it ends on the disk after it.",
         ]
         lines += toml_lines(self, ("name", "base_length", "hole_radius"))
-        for table in ("joints", "links", "cables"):
-            for entry in getattr(self, table):
-                lines += ["", f"[[{table}]]", *toml_lines(entry)]
+        for joint in self.joints:
+            lines += ["", "[[joints]]", *toml_lines(joint)]
+        for link in self.links:
+            lines += ["", "[[links]]", *toml_lines(link)]
+        for cable in self.cables:
+            keys = ("joint", "angle", "lead", *(["friction"] if cable.friction else []))
+            lines += ["", "[[cables]]", *toml_lines(cable, keys)]
         return "\n".join(lines) + "\n"
 
     def write(self, path: str | os.PathLike[str]) -> Path:

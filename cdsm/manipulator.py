@@ -50,7 +50,7 @@ class _Parts(NamedTuple):
 
 @final
 class Manipulator(Printed):
-    """A cable-driven arm: rigid links, revolute joints, frictionless cables.
+    """A cable-driven arm: rigid links, revolute joints, cables.
 
     Args:
         geometry: The arm.
@@ -209,6 +209,11 @@ class Manipulator(Printed):
     def original_length(self) -> OriginalLength:
         """Definition of the length l_0 of a wire in EA/l_0; see :class:`Manipulator`."""
         return self._parts.original_length
+
+    @property
+    def has_friction(self) -> bool:
+        """Whether a cable has friction in a hole; only ``cdsm.friction`` takes it into account."""
+        return any(any(cable.friction) for cable in self.cables)
 
     @property
     def nv(self) -> int:

@@ -35,7 +35,9 @@ TEN_DEGREES: Final = np.deg2rad(10.0)
 """All joint angles of the virtual prototype in Sections IV-A, B and D [rad]."""
 
 
-def virtual_prototype_geometry(link_mass: float = 0.5, lead: float = 0.0) -> Geometry:
+def virtual_prototype_geometry(
+    link_mass: float = 0.5, lead: float = 0.0, friction: float = 0.0
+) -> Geometry:
     """Build the geometry of Section IV: five universal joints, R = 30 mm, disks every 20 mm.
 
     The paper gives the joints, the hole radius and the disk spacing. Assumptions: three cables per
@@ -44,6 +46,7 @@ def virtual_prototype_geometry(link_mass: float = 0.5, lead: float = 0.0) -> Geo
     Args:
         link_mass: Mass of every link [kg].
         lead: Straight cable between each actuator and the base disk [m].
+        friction: Friction coefficient in all holes; the paper has none.
     """
     return Geometry.universal(
         name="virtual_prototype",
@@ -55,6 +58,7 @@ def virtual_prototype_geometry(link_mass: float = 0.5, lead: float = 0.0) -> Geo
         hole_radius=0.03,
         link_mass=link_mass,
         lead=lead,
+        friction=friction,
     )
 
 
@@ -63,6 +67,7 @@ def virtual_prototype(
     *,
     link_mass: float = 0.5,
     lead: float = 0.0,
+    friction: float = 0.0,
     gravity: ArrayLike = (0.0, -9.81, 0.0),
     original_length: OriginalLength = "unstrained",
 ) -> Manipulator:
@@ -72,10 +77,11 @@ def virtual_prototype(
         elasticity: Elasticity of all cables; the repaired Eq. 19 by default.
         link_mass: Mass of every link [kg]; assumed.
         lead: Straight cable between each actuator and the base disk [m]; assumed.
+        friction: Friction coefficient in all holes; the paper has none.
         gravity: Gravity in base axes (3,) [m/s²]; the direction −y is assumed.
         original_length: As for :class:`~cdsm.Manipulator`; the paper uses ``"stretched"``.
     """
-    geometry = virtual_prototype_geometry(link_mass, lead)
+    geometry = virtual_prototype_geometry(link_mass, lead, friction)
     return Manipulator(geometry, elasticity, gravity=gravity, original_length=original_length)
 
 
@@ -88,6 +94,7 @@ def experimental_prototype_geometry(
     hole_radius: float = 0.03,
     link_mass: float = 0.3,
     lead: float = 0.3,
+    friction: float = 0.0,
 ) -> Geometry:
     """Build the geometry of Section V: three hinges of ±30°, turned by 30°, with one pair each.
 
@@ -102,6 +109,7 @@ def experimental_prototype_geometry(
         hole_radius: Distance of all holes from the arm's axis [m]; assumed.
         link_mass: Mass of every link [kg]; assumed.
         lead: Straight cable between each actuator and the base disk [m]; assumed.
+        friction: Friction coefficient in all holes; the paper has none.
 
     Raises:
         GeometryError: Some dimensions are invalid; lists every fault.
@@ -118,6 +126,7 @@ def experimental_prototype_geometry(
         hole_radius=hole_radius,
         link_mass=link_mass,
         lead=lead,
+        friction=friction,
     )
     if tool_length is None:
         return geometry

@@ -16,10 +16,12 @@ from cdsm.elasticity import Elasticity
 from cdsm.errors import CableError, FileError, GeometryError, InvalidInput, counted
 from cdsm.support.files import read_text, write_text
 from cdsm.support.records import (
+    Friction,
     LengthOrZero,
     Point,
     SpringStiffness,
     Tension,
+    Wrap,
     parse,
     read_toml,
     record,
@@ -33,7 +35,8 @@ _HEAD = """\
 # sites: links of the URDF with a point in each one's frame, from the actuator's side to the end.
 # lead: straight cable from the actuator to the first site. series_stiffness: of a spring in series;
 # none if left out. control: what the motor holds, "position" or "force". minimum, maximum: tensions
-# that the cable may carry; 0 and none if left out.
+# that the cable may carry; 0 and none if left out. friction, wrap (of a site): coefficient, and an
+# angle [rad] that adds to the angle by which the cable turns there; 0 if left out.
 """
 
 _KEYS = ("name", "lead", "series_stiffness", "control", "minimum", "maximum")
@@ -46,6 +49,8 @@ _Label = Annotated[str, Field(min_length=1, max_length=200)]
 class _Site:
     link: _Label
     xyz: Point
+    friction: Friction | None = None
+    wrap: Wrap = 0.0
 
 
 @record
@@ -57,6 +62,7 @@ class _Entry:
     control: Control = "position"
     minimum: Tension = 0.0
     maximum: Tension | None = None
+    friction: Friction = 0.0
     sites: Annotated[tuple[_Site, ...], Field(strict=False, min_length=2)]
 
 
@@ -97,7 +103,8 @@ def read_cables(path: str | os.PathLike[str]) -> tuple[Cable, ...]:
     ``elasticity`` (a NAME), and ``sites`` (two or more ``{link = "…", xyz = [x, y, z]}``, [m]).
     Optional are ``lead`` [m] (the straight cable between its actuator and the first site),
     ``series_stiffness`` [N/m], ``control`` (``"position"`` or ``"force"``), ``minimum`` and
-    ``maximum`` [N].
+    ``maximum`` [N], and ``friction``, the coefficient in all holes that the cable passes. A site
+    may have ``friction`` and ``wrap`` [rad] of its own, as in :class:`~cdsm.Site`.
 
     Args:
         path: The file.
@@ -156,8 +163,13 @@ def _built(entries: _Entries, wires: dict[str, Elasticity]) -> tuple[Cable, ...]
 
 def _cable(entry: _Entry, wire: Elasticity) -> Cable:
     given = {key: getattr(entry, key) for key in _KEYS if getattr(entry, key) is not None}
-    sites = tuple(Site(site.link, site.xyz) for site in entry.sites)
-    return Cable(sites=sites, elasticity=wire, **given)
+    passed = range(0 if entry.lead > 0.0 else 1, len(entry.sites) - 1)
+    sites = []
+    for i, site in enumerate(entry.sites):
+        common = entry.friction if i in passed else 0.0
+        friction = common if site.friction is None else site.friction
+        sites.append(Site(site.link, site.xyz, friction, site.wrap))
+    return Cable(sites=tuple(sites), elasticity=wire, **given)
 
 
 def _lines(cable: Cable, wire: str) -> list[str]:
@@ -167,9 +179,12 @@ def _lines(cable: Cable, wire: str) -> list[str]:
     return [
         *toml_lines(entry, ("name", "elasticity", *_KEYS[1:])),
         "sites = [",
-        *(
-            f"    {{link = {json.dumps(site.link)}, xyz = {list(site.position)}}},"
-            for site in cable.sites
-        ),
+        *(f"    {{{_site_text(site)}}}," for site in cable.sites),
         "]",
     ]
+
+
+def _site_text(site: Site) -> str:
+    text = f"link = {json.dumps(site.link)}, xyz = {list(site.position)}"
+    text += f", friction = {site.friction!r}" if site.friction else ""
+    return text + (f", wrap = {site.wrap!r}" if site.wrap else "")

@@ -35,15 +35,20 @@ class Range(NamedTuple):
 
 RANGES: Final = {
     "force": Range("N", 1e-9, 1e9),
+    "friction": Range("", 1e-6, 2.0),
     "gravity": Range("m/s²", 1e-6, 1e4),
     "length": Range("m", 1e-6, 1e4),
     "mass": Range("kg", 1e-9, 1e6),
     "rigidity": Range("N", 1e-6, 1e12),
     "stiffness": Range("N/m", 1e-6, 1e12),
     "tension": Range("N", 1e-9, 1e9),
+    "wrap": Range("rad", 1e-6, 4.0 * math.pi),
     "wrench": Range("N, N m", 1e-9, 1e9),
 }
-"""Range of each quantity; generous, from a hair of rubber to the cables of a bridge."""
+"""Range of each quantity; generous, from a hair of rubber to the cables of a bridge.
+
+A coefficient of friction above 2 is that of no machine, nor is a wrap of more than two turns.
+"""
 
 WRENCH: Final = "force [N], then moment [N m], base axes"
 
@@ -70,9 +75,9 @@ def within(quantity: str, value: float, *, zero: bool = False, infinite: bool = 
         return ""
     if quantity == "tension" and value < 0.0:
         return f"{value:g} N given; cables only pull"
-    words = [*(["0"] if zero else []), f"{low:g} to {high:g} {unit}"]
+    words = [*(["0"] if zero else []), f"{low:g} to {high:g} {unit}".rstrip()]
     words += ["inf"] if infinite else []
-    return f"{value:g} {unit} given; {', or '.join(words)} is needed"
+    return f"{f'{value:g} {unit}'.rstrip()} given; {', or '.join(words)} is needed"
 
 
 def quantity(

@@ -95,6 +95,7 @@ def _digest(data: bytes) -> str:
 def _cable(cable: Cable, laws: list[str]) -> dict[str, object]:
     """Return a cable for JSON in SI units; its elasticity is an index into ``laws``."""
     series = cable.series_stiffness
+    holes = [[site.friction, site.wrap] for site in cable.sites]
     return {
         "name": cable.name,
         "sites": [[site.link, *site.position] for site in cable.sites],
@@ -104,4 +105,5 @@ def _cable(cable: Cable, laws: list[str]) -> dict[str, object]:
         "control": cable.control,
         "minimum": cable.minimum,
         "maximum": None if math.isinf(cable.maximum) else cable.maximum,
+        **({"holes": holes} if any(cable.friction) else {}),
     }

@@ -331,3 +331,35 @@ def test_bad_fixed_tension_is_named(
     pose = presets.experimental_prototype().at(np.zeros(3))
     with pytest.raises(kind, match=said):
         cdsm.distribute_tension(pose, minimum=5.0, maximum=800.0, fixed=fixed)
+
+
+STEEL = cdsm.LinearElasticity(5e4)
+POINT = (0.0, 0.02, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("keys", "said"),
+    [
+        ({"friction": -0.1}, r"friction: -0.1 given; 0, or 1e-06 to 2 is needed"),
+        ({"friction": 2.1}, r"friction: 2.1 given; 0, or"),
+        ({"friction": math.nan}, r"friction: nan; finite numbers"),
+        ({"friction": "high"}, r"friction: .* real numbers are needed"),
+        ({"wrap": -0.1}, r"wrap: -0.1 rad given; 0, or 1e-06 to 12.5664 rad is needed"),
+        ({"wrap": 13.0}, r"wrap: 13 rad given"),
+    ],
+)
+def test_bad_friction_of_a_site_is_named(keys: dict[str, Any], said: str) -> None:
+    with pytest.raises(cdsm.InvalidInput, match=said):
+        cdsm.Site("link1", POINT, **keys)
+
+
+@pytest.mark.parametrize("keys", [{"friction": 0.1}, {"wrap": 0.1}])
+def test_only_holes_have_friction(keys: dict[str, Any]) -> None:
+    plain = cdsm.Site("base_disk", POINT), cdsm.Site("link1", POINT), cdsm.Site("link2", POINT)
+    rough = tuple(dataclasses.replace(site, **keys) for site in plain)
+    assert cdsm.Cable("a", (rough[0], plain[1]), STEEL, lead=0.1)
+    assert cdsm.Cable("a", (plain[0], rough[1], plain[2]), STEEL)
+    with pytest.raises(cdsm.CableError, match=r"site 1 has friction or wrap.* Give a lead"):
+        cdsm.Cable("a", (rough[0], plain[1]), STEEL)
+    with pytest.raises(cdsm.CableError, match=r"site 2 has friction or wrap.*cable ends there"):
+        cdsm.Cable("a", (plain[0], rough[1]), STEEL, lead=0.1)

@@ -175,6 +175,21 @@ def test_short_form_hinged_defaults_to_pairs_as_the_constructor_does() -> None:
     assert cdsm.Geometry.from_toml("\n".join(lines)) == cdsm.Geometry.hinged(**HINGED)
 
 
+@pytest.mark.parametrize("lead", [0.0, 0.3])
+def test_friction_is_that_of_every_hole_which_a_cable_passes(lead: float) -> None:
+    """The base disk is a hole only if there is a lead before it."""
+    geometry = cdsm.Geometry.universal(**UNIVERSAL, lead=lead, friction=0.1)
+    assert cdsm.Geometry.from_toml(geometry.to_toml()) == geometry
+    assert "friction" not in cdsm.Geometry.universal(**UNIVERSAL, lead=lead).to_toml()
+    assert all(route.friction == 0.1 for route in geometry.cables)
+    arm = cdsm.Manipulator(geometry, cdsm.LinearElasticity(5e4))
+    assert arm.has_friction
+    for cable, route in zip(arm.cables, geometry.cables, strict=True):
+        assert cable.friction == (0.1,) * (2 * route.joint - (1 if lead else 2))
+        assert [site.friction for site in cable.sites][-1] == 0.0
+    assert not cdsm.Manipulator(general(), cdsm.LinearElasticity(5e4)).has_friction
+
+
 def test_integers_stand_for_lengths_in_toml() -> None:
     text = general().to_toml().replace("base_length = 0.02", "base_length = 0")
     assert cdsm.Geometry.from_toml(text).base_length == 0.0
@@ -198,6 +213,10 @@ FAULTS: dict[str, tuple[dict[str, Any], list[str]]] = {
     "no joints": ({"joints": 0}, ["joints", "greater than or equal to 1", "0"]),
     "no cables": ({"cables_per_joint": 0}, ["cables_per_joint", "greater than or equal to 1"]),
     "65 cables": ({"cables_per_joint": 65}, ["cables_per_joint", "less than or equal to 64"]),
+    "friction negative": ({"friction": -0.1}, ["friction", "-0.1 given", "0, or 1e-06 to 2 is"]),
+    "friction above 2": ({"friction": 2.5}, ["friction", "2.5 given", "0, or 1e-06 to 2 is"]),
+    "friction NaN": ({"friction": math.nan}, ["friction", "finite", "nan"]),
+    "friction per joint": ({"friction": [0.1, 0.2]}, ["friction", "valid number"]),
     "NaN": ({"link_length": math.nan}, ["link_length", "finite", "nan"]),
     "infinite": ({"link_mass": math.inf}, ["link_mass", "finite", "inf"]),
     "text for a number": ({"link_length": "0.04"}, ["link_length", "valid number", "'0.04'"]),

@@ -61,6 +61,9 @@ def test_what_is_left_out_is_nothing(tmp_path: Path) -> None:
         ('name = "left"', 'name = "left"\nlead = -1.0', "cables[1].lead"),
         ('name = "left"', 'name = "left"\ncontrol = "feel"', "cables[1].control"),
         ('name = "left"', 'name = "left"\nminimum = 5.0\nmaximum = 2.0', "tensions from 5 to 2 N"),
+        ('name = "left"', 'name = "left"\nfriction = 2.5', "cables[1].friction: 2.5 given"),
+        ("{link", "{friction = 0.1, link", "site 1 has friction or wrap"),
+        ("{link", "{wrap = 20.0, link", "wrap: 20 rad given"),
         ("[[cables]]", "[[cable]]", "cables: is missing"),
         ("[elasticities.wire]", "elasticities = 3\n[other]", "elasticities: must be tables"),
         ("[[cables]]", "[[cables]", "is not TOML"),
@@ -74,6 +77,28 @@ def test_faults_are_named(before: str, after: str, said: str, tmp_path: Path) ->
         cdsm.read_cables(path)
     assert said in str(caught.value)
     assert "cables.toml" in str(caught.value)
+
+
+def test_friction_of_a_cable_is_that_of_its_holes_without_one_of_their_own(tmp_path: Path) -> None:
+    sites = [
+        {"friction": 0.1},
+        {"friction": 0.1, "wrap": 0.05},
+        {"friction": 0.3},
+        {"friction": 0.0},
+    ]
+    given = ["", ", wrap = 0.05", ", friction = 0.3", ""]
+    lines = [
+        f'    {{link = "link{i}", xyz = [0.0, 0.02, 0.0]{more}}},' for i, more in enumerate(given)
+    ]
+    text = ONE[: ONE.index("[[cables]]")]
+    text += '[[cables]]\nname = "a"\nelasticity = "wire"\nfriction = 0.1\n'
+    path = tmp_path / "cables.toml"
+    path.write_text(text + "lead = 0.2\nsites = [\n" + "\n".join(lines) + "\n]\n")
+    (cable,) = cdsm.read_cables(path)
+    for i, (site, own) in enumerate(zip(cable.sites, sites, strict=True)):
+        assert site == cdsm.Site(f"link{i}", (0.0, 0.02, 0.0), **own)
+    assert cable.friction == (0.1, 0.1, 0.3)
+    assert cdsm.read_cables(cdsm.write_cables([cable], path)) == (cable,)
 
 
 def test_names_used_twice_are_a_fault(tmp_path: Path) -> None:
