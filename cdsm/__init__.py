@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     )
     from cdsm.geometry import CableRoute, Geometry, Joint, Link
     from cdsm.identification import Identification, Measurement, identify
+    from cdsm.instability import Remedy
     from cdsm.interchange.cable_file import read_cables, write_cables
     from cdsm.interchange.caspr import read_caspr
     from cdsm.interchange.mjcf import to_mjcf, write_mjcf
@@ -116,6 +117,7 @@ __all__ = [
     "PoseSet",
     "Posture",
     "RandomPoses",
+    "Remedy",
     "Report",
     "Saturation",
     "SelfCheck",
@@ -190,6 +192,7 @@ _NAMES = {
         "UnreachableStiffness UrdfError"
     ),
     "geometry": "CableRoute Geometry Joint Link",
+    "instability": "Remedy",
     "identification": "Identification Measurement identify",
     "interchange.cable_file": "read_cables write_cables",
     "interchange.caspr": "read_caspr",

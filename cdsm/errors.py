@@ -11,7 +11,7 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
-from cdsm.support.format import coordinates
+from cdsm.support.format import coordinates, enough
 
 if TYPE_CHECKING:
     import numpy as np
@@ -295,7 +295,7 @@ class InfeasibleTension(CdsmError):
             )
         else:
             message += (
-                f"Widening every bound by {_rounded_up(relaxation)} N would be enough "
+                f"Widening every bound by {enough(relaxation, up=True)} N would be enough "
                 f"(cables at a bound: {', '.join(self.binding) or 'none'}). Lower minimum, raise "
                 "maximum, or reduce the load."
             )
@@ -304,12 +304,6 @@ class InfeasibleTension(CdsmError):
 
 def _first(words: Sequence[str]) -> str:
     return ", ".join(words[:_NAMED]) + (", …" if len(words) > _NAMED else "")
-
-
-def _rounded_up(value: float) -> str:
-    """Round up to four digits, so that the printed widening is sufficient."""
-    step = 10.0 ** (math.floor(math.log10(value)) - 3) if value > 0.0 else 1.0
-    return f"{math.ceil(value / step) * step:.4g}"
 
 
 class SolverError(CdsmError):

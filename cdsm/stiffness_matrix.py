@@ -36,6 +36,7 @@ from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension
 
 if TYPE_CHECKING:
+    from cdsm.instability import Remedy
     from cdsm.report import Report
 
 Term = Literal["active", "passive", "gravity", "load", "joint"]
@@ -241,6 +242,26 @@ class Stiffness(ReadOnlyState):
             load=float(motion @ self.load @ motion),
         )
 
+    @cached_property
+    def remedies(self) -> tuple[Remedy, ...]:
+        """What would hold an unstable arm here, each change alone; empty for a stable arm.
+
+        Wires and series springs made stiffer, other lower bounds of the tensions, other disk
+        offsets: for each the factor at which the smallest eigenvalue of K_θ is zero, found by a
+        bracketed root. The posture and the wrench stay. Tensions of your own are not distributed
+        again: for them only wires and springs are tried. Some tenths of a second.
+        """
+        from cdsm.instability import find_remedies  # here, since a stable arm does not need it
+
+        return find_remedies(self)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """That the arm is UNSTABLE, and what would hold it; empty for a stable arm."""
+        from cdsm.instability import advice, verdict
+
+        return () if self.is_stable else (verdict(self), *advice(self))
+
     def report(self) -> Report:
         """Check this stiffness; return facts, warnings and a second derivation of K_θ.
 
@@ -258,12 +279,13 @@ class Stiffness(ReadOnlyState):
 
     def __str__(self) -> str:
         lines = [f"{name:<24}{''.join(f'{cell:>12}' for cell in row)}" for name, *row in self._rows]
-        return "\n".join([*lines, self._verdict])
+        return "\n".join([*self.warnings, *lines, self._verdict])
 
     def _repr_html_(self) -> str:
         head, *rows = self._rows
         table = element("table", row("th", head), *(row("td", cells) for cells in rows))
-        return table + element("p", self._verdict)
+        warning = element("pre", "\n".join(self.warnings)) if self.warnings else ""
+        return warning + table + element("p", self._verdict)
 
     @property
     def _rows(self) -> list[tuple[str, ...]]:
@@ -293,7 +315,7 @@ class Stiffness(ReadOnlyState):
 
     @property
     def _verdict(self) -> str:
-        state = "stable" if self.is_stable else "UNSTABLE: K_θ is not positive definite"
+        state = "stable" if self.is_stable else "UNSTABLE"
         unit = self.posture.arm.stiffness_unit()
         return f"{state}, smallest joint stiffness {self.margin:.4g} {unit} ({MODEL})"
 

@@ -58,13 +58,8 @@ def faults(report: Report) -> Iterator[str]:
         )
     arm = K.posture.arm
     if not K.is_stable:
-        way = abs(report.critical_direction)
-        softest = int(way.argmax())
-        yield (
-            f"the arm is UNSTABLE: the smallest eigenvalue of K_θ is {K.margin:.4g} "
-            f"{arm.stiffness_unit()}, moving {arm.joint_names[softest]} most "
-            f"({way[softest]:.2f} of 1). It buckles; change tensions, posture or load."
-        )
+        what, how, *ways = K.warnings
+        yield f"{what}; {how} {'; '.join(map(str.strip, ways))}".rstrip()
     elif K.margin <= _SINGULAR * np.linalg.norm(K.joint, 2):
         yield (
             f"the arm is about to buckle: the smallest eigenvalue of K_θ, {K.margin:.2g} "

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -18,6 +18,18 @@ MODEL: Final = "frictionless, rigid links, tangent"
 def coordinates(values: Iterable[float], form: str = ".4g") -> str:
     """Return a vector as text: ``(0, 0.5, 1)``."""
     return f"({', '.join(format(x, form) for x in values)})"
+
+
+def enough(value: float, *, up: bool) -> str:
+    """Return a positive number rounded up or down to four digits, so that it suffices."""
+    step = 10.0 ** (math.floor(math.log10(value)) - 3) if value > 0.0 else 1.0
+    return f"{(math.ceil if up else math.floor)(value / step) * step:.4g}"
+
+
+def span(values: Array, form: Callable[[float], str] = "{:.4g}".format) -> str:
+    """Return the range of some numbers as text: ``2 to 5``, or ``2`` if all are printed alike."""
+    low, high = form(float(values.min())), form(float(values.max()))
+    return low if low == high else f"{low} to {high}"
 
 
 def key(name: str, unit: str) -> str:

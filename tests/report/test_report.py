@@ -502,7 +502,7 @@ def test_unstable_arm_is_not_trusted_and_its_margin_is_that_of_the_closed_form()
         assert report.margin == pytest.approx(1.8 - 0.2 - push * locked.LENGTH, rel=1e-12)
         assert report.trustworthy is stands
         assert any("UNSTABLE" in fault for fault in report.faults) is not stands
-        assert any("joint1 most (1.00 of 1)" in fault for fault in report.faults) is not stands
+        assert any("joint1 most" in fault for fault in report.faults) is not stands
 
 
 def test_arm_without_any_stiffness_has_a_report() -> None:

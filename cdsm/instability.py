@@ -1,0 +1,233 @@
+"""What would hold an arm that buckles: stiffer wires or springs, other tensions or disk offsets.
+
+K_θ of an unstable arm has a smallest eigenvalue λ ≤ 0 (of its symmetric part). Each remedy
+multiplies one quantity by a factor s and leaves the others alone. The tensions are distributed
+again where their problem changes. λ(s) = 0 is solved inside a bracket; dλ/d ln s is a central
+difference.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TYPE_CHECKING, Final, Literal, final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cdsm.cable import Cable, serpentine_cables
+from cdsm.elasticity import Domain, Elasticity
+from cdsm.errors import CdsmError, GeometryError
+from cdsm.kernels.readings import single_margin
+from cdsm.posture import Posture
+from cdsm.support.format import enough, span
+from cdsm.support.values import Array, ReadOnlyState, frozen
+from cdsm.tension import distribute_tension
+
+if TYPE_CHECKING:
+    from cdsm.stiffness_matrix import Stiffness
+
+Change = Literal["wire", "spring", "tension", "disk offset"]
+
+_STIFFER: Final = tuple(np.geomspace(1.0, 1e3, 31)[1:].tolist())
+"""Factors of wires and springs that are tried: λ rises with each, so steps may be wide."""
+
+_MORE: Final = tuple(np.geomspace(1.0, 1e2, 61)[1:].tolist())
+_LESS: Final = tuple(np.geomspace(1.0, 1e-3, 91)[1:].tolist())
+"""Factors of tensions and disk offsets that are tried: λ may rise and fall, so steps are 8 %."""
+
+_STEP = 1e-5
+"""Step of ln s in the difference of λ: truncation and rounding stay below 1e-9 of λ."""
+
+_SAID: Final = {
+    "wire": ("wires {times} times as stiff{bound}: EA {new} kN, now {old} kN", 1e3),
+    "spring": ("series springs of {new} N/mm{bound}, now {old} N/mm", 1e3),
+    "tension": ("a least tension of {new} N{bound}, now {old} N", 1.0),
+    "disk offset": ("disk offsets of {new} mm{bound}, now {old} mm", 1e-3),
+}
+
+
+@final
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Remedy(ReadOnlyState):
+    """Change of one quantity of an unstable arm; made by :attr:`Stiffness.remedies`.
+
+    Attributes:
+        change: ``"wire"`` (EA of all wires), ``"spring"`` (all series springs), ``"tension"`` (the
+            lower bounds of the tensions) or ``"disk offset"``.
+        now: Present values: EA(F) (n,) [N] of cables that are not force-controlled, k_series
+            (n,) [N/m] of those with a spring, lower
+            bounds (C,) [N], or disk offsets (joints,) [m].
+        factor: Factor of all these values next to 1 from which on the arm is stable [-]; None if no
+            factor that was tried makes it stable.
+        slope: dλ/d ln(factor) now [N m/rad], λ the smallest eigenvalue of K_θ: 0.01 times this is
+            its change for 1 % more. None at the end of a domain.
+    """
+
+    change: Change
+    now: Array
+    factor: float | None
+    slope: float | None
+
+    def __str__(self) -> str:
+        if self.factor is None:
+            return f"no other {self.change} holds the arm"
+        form, unit = _SAID[self.change]
+        up = self.factor > 1.0
+        return form.format(
+            times=enough(self.factor, up=up),
+            bound=" or more" if up else " or less",
+            new=span(self.now * self.factor / unit, partial(enough, up=up)),
+            old=span(self.now / unit),
+        )
+
+
+def find_remedies(K: Stiffness) -> tuple[Remedy, ...]:
+    """Compute what would hold an unstable arm, each change alone; nothing for a stable arm."""
+    return () if K.is_stable else tuple(_remedies(K))
+
+
+def verdict(K: Stiffness) -> str:
+    """Return one line about an unstable arm: how unstable it is, and where."""
+    arm, way = K.posture.arm, abs(K.critical_direction)
+    return (
+        f"UNSTABLE: the arm buckles, {arm.joint_names[int(way.argmax())]} most; the smallest "
+        f"eigenvalue of K_θ is {K.margin:.4g} {arm.stiffness_unit()}"
+    )
+
+
+def advice(K: Stiffness) -> tuple[str, ...]:
+    """Return what would hold an unstable arm, a line for each change."""
+    holding = [f"  {each}" for each in K.remedies if each.factor is not None]
+    if holding:
+        return "it would hold, by each of these alone, with", *holding
+    tried = ", ".join(each.change for each in K.remedies)
+    return (f"no other {tried} alone would hold it: change the posture, the load or the arm",)
+
+
+def _remedies(K: Stiffness) -> Iterator[Remedy]:
+    pose, arm = K.posture, K.posture.arm
+    held = [cable for cable in arm.cables if cable.control == "position"]
+
+    def margin(changed: Posture, tension: Array) -> float:
+        """Smallest eigenvalue of K_θ of an arm at a posture under tensions (C,) [N]."""
+        k = changed.arm._model.laws.stiffness(changed.cable_lengths, tension)
+        return single_margin(changed._joint_stiffness(tension, k, K.wrench)[-1])
+
+    def changed(cables: tuple[Cable, ...]) -> Posture:
+        return arm.with_cables(cables).at(pose.q, check_limits=False)
+
+    def wire(factor: float) -> float:
+        return margin(changed(tuple(_stiffer(each, factor) for each in arm.cables)), K.tension)
+
+    def spring(factor: float) -> float:
+        stiffer = (
+            replace(each, series_stiffness=factor * each.series_stiffness) for each in arm.cables
+        )
+        return margin(changed(tuple(stiffer)), K.tension)
+
+    if margin(pose, K.tension) > 0.0:  # K has terms that are not those of this arm
+        return
+    if held:
+        pairs = zip(arm.cables, K.tension, strict=True)
+        rigidity = [float(c.elasticity.rigidity(F)) for c, F in pairs if c.control == "position"]
+        yield _remedy("wire", rigidity, wire, _STIFFER)
+    if sprung := [k for each in held if math.isfinite(k := each.series_stiffness)]:
+        yield _remedy("spring", sprung, spring, _STIFFER)
+    pull = K.distribution
+    if pull is None or not pull.least:
+        return
+
+    def tension(factor: float) -> float:
+        low = np.where(pull.minimum < pull.maximum, factor * pull.minimum, pull.minimum)
+        found = distribute_tension(pose, low, pull.maximum, K.wrench, pull.solver)
+        return margin(pose, found.values)
+
+    def offset(factor: float) -> float:
+        there = changed(_with_disks(K, factor))
+        found = distribute_tension(there, pull.minimum, pull.maximum, K.wrench, pull.solver)
+        return margin(there, found.values)
+
+    if pull.minimum.any():
+        yield _remedy("tension", pull.minimum, tension, _LESS, _MORE)
+    if arm.is_serpentine and _with_disks(K, 1.0) == arm.cables:
+        offsets = [joint.disk_offset for joint in arm.geometry.joints]
+        yield _remedy("disk offset", offsets, offset, _LESS, _MORE)
+
+
+def _remedy(
+    change: Change, now: ArrayLike, margin: Callable[[float], float], *factors: tuple[float, ...]
+) -> Remedy:
+    found = [f for row in factors if (f := _first_zero(margin, row)) is not None]
+    slope: float | None
+    try:
+        slope = (margin(math.exp(_STEP)) - margin(math.exp(-_STEP))) / (2.0 * _STEP)
+    except CdsmError:
+        slope = None
+    nearest = min(found, key=lambda factor: abs(math.log(factor)), default=None)
+    return Remedy(change=change, now=frozen(np.array(now)), factor=nearest, slope=slope)
+
+
+def _first_zero(margin: Callable[[float], float], factors: tuple[float, ...]) -> float | None:
+    """Return the first factor from 1 on at which the arm becomes stable; None if there is none."""
+    from scipy.optimize import brentq  # slow to import
+
+    before = 1.0
+    for factor in factors:
+        try:
+            if margin(factor) > 0.0:
+                return float(brentq(margin, before, factor, xtol=1e-300, rtol=1e-12))
+        except CdsmError:  # beyond what the arm, its laws or its bounds allow
+            return None
+        before = factor
+    return None
+
+
+def _with_disks(K: Stiffness, factor: float) -> tuple[Cable, ...]:
+    """Return the cables of an arm whose disk offsets are multiplied by a factor.
+
+    Disks that would touch at this posture raise GeometryError.
+    """
+    arm = K.posture.arm
+    joints = (
+        replace(each, disk_offset=factor * each.disk_offset, limit=None)
+        for each in arm.geometry.joints
+    )
+    geometry = replace(arm.geometry, joints=tuple(joints))
+    axes = [len(joint.axes) for joint in geometry.joints]
+    if factor < 1.0 and (abs(K.posture.q) > np.repeat(geometry.joint_limits, axes)).any():
+        raise GeometryError(["disks touch"])
+    moved = serpentine_cables(geometry, [cable.elasticity for cable in arm.cables])
+    return tuple(
+        replace(cable, sites=other.sites) for cable, other in zip(arm.cables, moved, strict=True)
+    )
+
+
+def _stiffer(cable: Cable, factor: float) -> Cable:
+    if cable.control == "force":
+        return cable
+    return replace(cable, elasticity=_Stiffer(cable.elasticity, factor))
+
+
+@final
+@dataclass(frozen=True)
+class _Stiffer(Elasticity):
+    """Law with EA multiplied by a factor at every tension."""
+
+    law: Elasticity
+    factor: float
+
+    @property
+    def domain(self) -> Domain:
+        return self.law.domain
+
+    def rigidity(self, tension: ArrayLike) -> Array:
+        return self.factor * self.law.rigidity(tension)
+
+    def strain(self, tension: ArrayLike) -> Array:
+        return self.law.strain(tension) / self.factor
+
+    def energy(self, tension: ArrayLike) -> Array:
+        return self.law.energy(tension) / self.factor
