@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cdsm.cable import Cable
+from cdsm.cable_chains import Chains
 from cdsm.cable_laws import CableLaws, OriginalLength
 from cdsm.errors import CableError, UnknownName
 from cdsm.kernels import segments
@@ -45,6 +47,7 @@ class ArmModel:
         self, body: RigidBody, cables: tuple[Cable, ...], original_length: OriginalLength
     ) -> None:
         self.body, self.tree, self.masses = body, body.tree(), body.masses()
+        self._cables, self._original_length = cables, original_length
         self.laws = CableLaws(cables, original_length)
         self.laws.require_continuity()
         self.routing = route(body, self.tree, cables)
@@ -52,6 +55,25 @@ class ArmModel:
         self.arrays: tuple[Any, ...] = (*self.tree, *self.routing, *self.masses)
         self.lowest = frozen(body.lower - _LIMIT_SLACK)
         self.highest = frozen(body.upper + _LIMIT_SLACK)
+
+    @cached_property
+    def chains(self) -> Chains:
+        """The cables as segments between holes."""
+        return Chains.of(self._cables)
+
+    @cached_property
+    def segment_laws(self) -> CableLaws:
+        """Elasticities of the segments."""
+        return CableLaws(self.chains.segments, self._original_length)
+
+    @cached_property
+    def chain_arrays(self) -> tuple[Any, ...]:
+        """The fields of the routing of the segments, and what the kernel of chains adds to them."""
+        chains, routing = self.chains, route(self.body, self.tree, self.chains.segments)
+        span = np.zeros((len(chains.segments), 3), dtype=np.intp)
+        moving = routing.segment[:-1, 0]
+        span[moving, :2], span[moving, 2] = routing.segment[:-1, 3:], routing.segment[1:, 3]
+        return *routing, frozen(span), chains.hole, chains.wrap
 
     def beyond_limits(self, q: Array) -> NDArray[np.bool_]:
         """Check which joint angles (nv,) [rad] are beyond their limits."""

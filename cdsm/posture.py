@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, final
+from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
 from cdsm.cable import Cable
-from cdsm.kernels import segments
+from cdsm.cable_chains import Chains
+from cdsm.kernels import chains as chain_kernels
+from cdsm.kernels import segments as segment_kernels
 from cdsm.kernels import stiffness as stiffness_kernels
 from cdsm.kernels.tree import Frames
 from cdsm.support.format import coordinates
@@ -18,6 +20,27 @@ from cdsm.support.values import Array, ReadOnlyState, frozen
 
 if TYPE_CHECKING:
     from cdsm.manipulator import Manipulator
+
+
+@final
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class Segments(ReadOnlyState):
+    """Segments of all cables between their holes at a posture; S segments, P holes.
+
+    Attributes:
+        chains: Which segment and which hole is whose.
+        lengths: l (S,) [m].
+        length_jacobian: ∂l/∂θ (S, nv) [m/rad]; zero for leads and segments within one link.
+        wrap: φ (P,) [rad]: angle by which the cable turns in the hole, plus the wrap of the site.
+        wrap_jacobian: ∂φ/∂θ (P, nv) [rad/rad]; 0 where the cable goes straight through.
+    """
+
+    chains: Chains
+    lengths: Array
+    length_jacobian: Array
+    wrap: Array
+    wrap_jacobian: Array
+    _frames: Frames
 
 
 @final
@@ -56,7 +79,7 @@ class Posture(ReadOnlyState):
     def length_hessian(self) -> Array:
         """H_L[c, i, j] = ∂²L_c/∂θ_i∂θ_j, (C, nv, nv) [m/rad²], computed on first use."""
         routing, cables = self.arm._model.routing, len(self.cable_lengths)
-        hessian = segments.single_length_hessian(
+        hessian = segment_kernels.single_length_hessian(
             routing.segment, routing.joint, *self._frames, cables
         )
         return frozen(hessian)
@@ -105,6 +128,21 @@ class Posture(ReadOnlyState):
             UnknownName: No link has this name.
         """
         return frozen(self.arm._model.body.placement(self.q, link))
+
+    @cached_property
+    def segments(self) -> Segments:
+        """Segments of the cables between their holes, and wrap angles, computed on first use."""
+        model = self.arm._model
+        arguments: tuple[Any, ...] = (*model.tree, *model.chain_arrays, self.q)
+        lengths, jacobian, wrap, gradient, *frames = chain_kernels.single_chains(*arguments)
+        return Segments(
+            chains=model.chains,
+            lengths=frozen(lengths),
+            length_jacobian=frozen(jacobian),
+            wrap=frozen(wrap),
+            wrap_jacobian=frozen(gradient),
+            _frames=Frames(*map(frozen, frames)),
+        )
 
     def _equals(self, other: Posture) -> bool:
         return self is other or (self.arm == other.arm and np.array_equal(self.q, other.q))

@@ -58,7 +58,7 @@ def segment_scratch(nv: int, width: int) -> Segments:
 
 
 @inner
-def _set_direction(site: Array, a: Index, b: Index, scratch: Segments, width: Width) -> None:
+def set_direction(site: Array, a: Index, b: Index, scratch: Segments, width: Width) -> None:
     """Fill u (3, W) from site a to site b, ℓ and 1/ℓ (W,)."""
     u, length, inverse = scratch.direction, scratch.length, scratch.inverse
     for w in lanes(width):
@@ -72,7 +72,7 @@ def _set_direction(site: Array, a: Index, b: Index, scratch: Segments, width: Wi
 
 
 @inner
-def _set_derivative(
+def set_derivative(
     frames: Frames, sign: float, site: Index, j: Index, d: Array, width: Width
 ) -> None:
     """Fill d_j (3, W) = ±z × (x − o), or ± the slide, at the end x of a segment."""
@@ -121,14 +121,14 @@ def set_lengths(
         shortest[w] = math.inf
     for s in range(segment.shape[0] - 1):
         cable, a, b = np.uint64(segment[s, 0]), np.uint64(segment[s, 1]), np.uint64(segment[s, 2])
-        _set_direction(frames.site, a, b, scratch, width)
+        set_direction(frames.site, a, b, scratch, width)
         for w in lanes(width):
             lengths[cable, w] += length[w]
             shortest[w] = min(shortest[w], length[w])
         for t in range(segment[s, 3], segment[s + 1, 3]):
             j = np.uint64(joint[t])
             sign, site = (1.0, b) if t >= segment[s, 4] else (-1.0, a)
-            _set_derivative(frames, sign, site, j, d, width)
+            set_derivative(frames, sign, site, j, d, width)
             i = j - np.uint64(1)
             for w in lanes(width):
                 jacobian[cable, i, w] += u[0, w] * d[0, w] + u[1, w] * d[1, w] + u[2, w] * d[2, w]
@@ -155,7 +155,7 @@ def add_length_hessian(
     for s in range(segment.shape[0] - 1):
         cable, a, b = np.uint64(segment[s, 0]), np.uint64(segment[s, 1]), np.uint64(segment[s, 2])
         first, split, end = segment[s, 3], segment[s, 4], segment[s + 1, 3]
-        _set_direction(frames.site, a, b, scratch, width)
+        set_direction(frames.site, a, b, scratch, width)
         for t in range(first, end):
             j, own = np.uint64(joint[t]), np.uint64(t - first)
             if t == split:  # the joints before it are on the other side: no u × z_i
@@ -168,7 +168,7 @@ def add_length_hessian(
                                 u[p, w] * axis[i, q, w] - u[q, w] * axis[i, p, w]
                             )
             sign, site = (1.0, b) if t >= split else (-1.0, a)
-            _set_derivative(frames, sign, site, j, d, width)
+            set_derivative(frames, sign, site, j, d, width)
             for w in lanes(width):
                 along[w] = u[0, w] * d[0, w] + u[1, w] * d[1, w] + u[2, w] * d[2, w]
             for r in range(3):

@@ -1,0 +1,74 @@
+"""Cables as chains of segments between holes, which friction keeps apart.
+
+Segment by segment, a cable runs from its actuator to its end: the lead, then one segment between
+each two neighbouring sites. Between two segments is a hole. Where the hole holds the cable, both
+segments are springs of their own. Each segment is therefore described as a cable of its own, so
+that its length, its derivatives and its stiffness come from the same code as those of a cable.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Self, final
+
+import numpy as np
+
+from cdsm.cable import Cable
+from cdsm.kernels.tree import Indices
+from cdsm.support.values import Array, frozen
+
+
+@final
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Chains:
+    """Segments and holes of all cables of an arm; S segments, P holes, actuator side first.
+
+    Attributes:
+        segments: Each segment as a cable between two sites. Only the first of each cable has the
+            series spring and the motor control. The lead is a segment that arrives along x of the
+            link of the first site.
+        cable: Cable of each segment (S,).
+        hole: Segment before each hole (P,). The segment after it is the next one.
+        site: Index of each hole among the sites of its cable (P,).
+        friction: μ of each hole (P,) [-].
+        wrap: Wrap angle of its own of each hole (P,) [rad].
+    """
+
+    segments: tuple[Cable, ...]
+    cable: Indices
+    hole: Indices
+    site: Indices
+    friction: Array
+    wrap: Array
+
+    @classmethod
+    def of(cls, cables: Sequence[Cable]) -> Self:
+        """Divide cables into segments and holes."""
+        segments: list[Cable] = []
+        cable_of, hole, where = [], [], []
+        for c, cable in enumerate(cables):
+            sites = list(cable.sites)
+            if cable.lead > 0.0:
+                x, y, z = sites[0].position
+                sites.insert(0, replace(sites[0], position=(x - cable.lead, y, z)))
+            pairs = list(pairwise(replace(site, friction=0.0, wrap=0.0) for site in sites))
+            first = replace(cable, sites=pairs[0], lead=0.0)
+            rest = replace(first, series_stiffness=math.inf, control="position")
+            own = [first, *(replace(rest, sites=pair) for pair in pairs[1:])]
+            passed = range(len(cable.sites) - len(pairs), len(cable.sites) - 1)
+            hole += [len(segments) + i for i in range(len(passed))]
+            where += [(c, i) for i in passed]
+            segments += own
+            cable_of += [c] * len(own)
+        at = [cables[c].sites[i] for c, i in where]
+        return cls(
+            segments=tuple(segments),
+            cable=frozen(np.array(cable_of, dtype=np.intp)),
+            hole=frozen(np.array(hole, dtype=np.intp)),
+            site=frozen(np.array([i for _, i in where], dtype=np.intp)),
+            friction=frozen(np.array([site.friction for site in at])),
+            wrap=frozen(np.array([site.wrap for site in at])),
+        )
