@@ -11,7 +11,6 @@ import typer
 
 import cdsm
 from cdsm.cli.options import AsJson
-from cdsm.cli.output import console
 
 _WIDE = 110
 """Smallest width of the terminal for the table of claims; below it, a claim is a few lines."""
@@ -24,14 +23,13 @@ def reproduce(
     as_json: AsJson = False,
 ) -> None:
     """Recompute Figs. 3 to 13 of the paper: pictures, table and numbers."""
-    from rich.progress import track
-
     from cdsm.support.files import make_folder, write_file, write_text
+    from cdsm.support.progress import track
 
     paper = cdsm.paper
     make_folder(out)
     results, written = [], []
-    for compute in track(paper.FIGURES.values(), "recomputing the paper", console=console()):
+    for compute in track(paper.FIGURES.values(), "recomputing the paper"):
         result = compute()
         results.append(result)
         figure = cdsm.plots.plot_paper(result)

@@ -11,7 +11,7 @@ import typer
 import cdsm
 from cdsm.cli import options
 from cdsm.cli.options import ArmOptions, AsJson, MaxTension, MinTension, Picture, numbers
-from cdsm.cli.output import UNMET, Json, answer, by_cable, console, joints, write_picture
+from cdsm.cli.output import UNMET, Json, answer, by_cable, joints, write_picture
 
 if TYPE_CHECKING:
     from cdsm.support.values import Array
@@ -70,8 +70,6 @@ def plan(
         plan = cdsm.plan_path(
             robot, u, targets, *bounds, angles=file.angles, tips=file.tips, rate=rate
         )
-        with console().status("looking half-way between the samples"):
-            _ = plan.between
         answer(as_json, lambda: _path_numbers(plan), robot, plan)
         draw, drawn = "plot_path_plan", (plan,)
     elif wanted is None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 
 from cdsm.cli.options import AsJson
-from cdsm.cli.output import answer, console
+from cdsm.cli.output import answer
 
 
 def warm(as_json: AsJson = False) -> None:
@@ -13,10 +13,11 @@ def warm(as_json: AsJson = False) -> None:
     import numpy as np
 
     import cdsm
+    from cdsm.support.progress import progress_bar
 
     start = time.perf_counter()
     arm = cdsm.presets.virtual_prototype()
-    with console().status("compiling kernels, up to two minutes"):
+    with progress_bar("compiling kernels, up to two minutes"):
         pose = arm.at(np.full(arm.nv, 0.05))
         tension = cdsm.distribute_tension(pose, minimum=40.0)
         K = cdsm.stiffness(pose, tension)

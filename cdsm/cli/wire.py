@@ -9,7 +9,7 @@ import typer
 
 import cdsm
 from cdsm.cli.options import AsJson, Picture
-from cdsm.cli.output import Json, answer, console
+from cdsm.cli.output import Json, answer
 
 
 def fit(
@@ -28,9 +28,11 @@ def fit(
     as_json: AsJson = False,
 ) -> None:
     """Fit the rigidity of a wire to its tensile test: report, and if wanted figure and TOML."""
+    from cdsm.support.progress import progress_bar
+
     length = None if gauge_length is None else gauge_length / 1000.0
     data = cdsm.read_tensile_csv(test, gauge_length=length)
-    with console().status("fitting"):
+    with progress_bar("fitting"):
         fitted = cdsm.fit_tensile_test(data.displacement, data.force, data.gauge_length, method)
     if out is not None:
         typer.echo(f"written: {cdsm.write_elasticity(fitted.elasticity, out)}", err=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import logging
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -18,9 +19,12 @@ from cdsm.identification.measurement import Measurement
 from cdsm.identification.problem import StiffnessModel, UserFaultError
 from cdsm.identification.result import Identification
 from cdsm.manipulator import Manipulator
-from cdsm.support.validation import scalar, sequence_of, vector
+from cdsm.support.progress import progress_allowed, track
+from cdsm.support.validation import flag, scalar, sequence_of, vector
 from cdsm.support.values import Array, frozen
 from cdsm.tension import Tension
+
+_log = logging.getLogger("cdsm")
 
 _ON_BOUND = 1e-9
 """A parameter this near to a bound (share of the range) counts as on the bound."""
@@ -41,6 +45,7 @@ def identify(
     *,
     start: Mapping[str, float] | None = None,
     tension_of: Callable[..., Tension | ArrayLike] | None = None,
+    progress: bool = True,
 ) -> Identification:
     """Identify parameters p of an arm within bounds: min Σ ((K_i(p) − K_i)/σ_i)².
 
@@ -76,6 +81,7 @@ def identify(
             (C,) [N] or a :class:`~cdsm.Tension`, for example with the offset of a load cell as a
             parameter. It and ``model_of`` get all free parameters. The default is the tensions of
             the measurement.
+        progress: Show a bar on the standard error, if that is a terminal.
 
     Raises:
         InvalidInput: There are no measurements or fewer than parameters; bounds or start are
@@ -97,12 +103,14 @@ def identify(
     model = StiffnessModel(model_of, tension_of, measurements)
     problem = LeastSquares(model.residuals, len(measurements), bounds)
     try:
-        best = _optimum(problem, _starts(problem, start))
-        while True:
-            try:
-                return _result(model, problem, best)
-            except LowerOptimumError as lower:  # a profile found a lower minimum
-                best = min(_optimum(problem, [lower.point]), lower.point, key=problem.cost)
+        with progress_allowed(flag("progress", progress)):
+            best = _optimum(problem, _starts(problem, start))
+            while True:
+                try:
+                    return _result(model, problem, best)
+                except LowerOptimumError as lower:  # a profile found a lower minimum
+                    _log.info("a profile found a lower minimum; the search goes on from there")
+                    best = min(_optimum(problem, [lower.point]), lower.point, key=problem.cost)
     except UserFaultError as fault:
         raise fault.args[0] from fault.__cause__
 
@@ -198,8 +206,9 @@ def _checked_start(problem: LeastSquares, start: Mapping[str, float]) -> Array:
 def _optimum(problem: LeastSquares, starts: Sequence[Array]) -> Array:
     found = [
         problem.search(point, method="trf", tolerances=_COARSE, most=_EVALUATIONS)
-        for point in starts
+        for point in track(starts, "searching the parameters")
     ]
+    _log.info("χ² at the ends of the searches: %s", [f"{problem.cost(x):.6g}" for x in found])
     best = min(found, key=problem.cost)
     finer = problem.search(best, method="dogbox", tolerances=_FINE, most=_EVALUATIONS, central=True)
     best = min(finer, best, key=problem.cost)
@@ -230,7 +239,7 @@ def _result(model: StiffnessModel, problem: LeastSquares, best: Array) -> Identi
         ).profile()
         if math.isfinite(result.std[i])
         else None
-        for i in range(best.size)
+        for i in track(range(best.size), "finding the confidence of the parameters")
     )
     result = replace(result, profiles=profiles)
     return replace(result, warnings=(*warnings_of(result), *unfinished(problem, best, jacobian)))

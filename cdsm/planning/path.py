@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 from collections.abc import Sequence
 from typing import Final
@@ -20,6 +21,7 @@ from cdsm.planning.range import MARGIN
 from cdsm.planning.stiffness_model import StiffnessModel, checked_margin
 from cdsm.stiffness_matrix import stiffness
 from cdsm.support.format import coordinates
+from cdsm.support.progress import track
 from cdsm.support.validation import (
     Direction,
     bound,
@@ -30,6 +32,8 @@ from cdsm.support.validation import (
 )
 from cdsm.support.values import Array, frozen
 from cdsm.tension import checked_bounds
+
+_log = logging.getLogger("cdsm")
 
 _STATUS: Final[dict[type[CdsmError], Status]] = {
     errors.JointLimitError: "posture",
@@ -103,9 +107,6 @@ def plan_path(
             finite or is zero; a target or a rate is not positive; ``minimum`` exceeds ``maximum``;
             or another argument is invalid.
     """
-    from rich.console import Console  # slow to import
-    from rich.progress import track
-
     instance("arm", arm, Manipulator)
     path = _checked_path(arm, angles, tips)
     if tips is None and guess is not None:
@@ -127,9 +128,7 @@ def plan_path(
     near = guess
     models: list[StiffnessModel] = []
     infeasible: list[InfeasibleSample | None] = []
-    console = Console(stderr=True)
-    hidden = not (progress and console.is_terminal)
-    for i in track(range(size), "planning the path", console=console, disable=hidden):
+    for i in track(range(size), "planning the path", wanted=progress):
         try:
             q = path[i]
             if tips is not None:
@@ -152,6 +151,7 @@ def plan_path(
             infeasible.append(_infeasible(i, error))
 
     planned = follower.planned
+    _log.info("path: %d of %d samples planned", len(planned), size)
     found = [stiffness(each.model.pose, each.F, loads[each.index]) for each in planned]
     values = np.array([achieved(K, directions) for K in found])
     return PathPlan(

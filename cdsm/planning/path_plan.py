@@ -19,6 +19,7 @@ from cdsm.manipulator import Manipulator
 from cdsm.planning.half_way import HalfWay, half_way
 from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.files import write_text
+from cdsm.support.progress import track
 from cdsm.support.values import Array, ReadOnlyState, frozen
 
 Status = Literal["posture", "balance", "elasticity", "singular", "stiffness", "rate"]
@@ -118,7 +119,7 @@ class PathPlan(ReadOnlyState):
         The motors move evenly between the samples. Half the step leaves a quarter of the misfit.
         The first use takes some milliseconds per pair.
         """
-        pairs = zip(self.planned, self.planned[1:], strict=False)
+        pairs = list(zip(self.planned, self.planned[1:], strict=False))
         l_0, targets = self.unstrained_lengths, self.target
         return tuple(
             half_way(
@@ -128,7 +129,7 @@ class PathPlan(ReadOnlyState):
                 frozen(np.asarray((targets[i] + targets[j]) / 2.0)),
                 self.direction,
             )
-            for k, (i, j) in enumerate(pairs)
+            for k, (i, j) in enumerate(track(pairs, "looking half-way between the samples"))
             if j == i + 1
         )
 

@@ -22,7 +22,8 @@ from cdsm.planning.stiffness_model import StiffnessModel
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.format import MODEL, coordinates
-from cdsm.support.validation import Direction, unit_directions
+from cdsm.support.progress import progress_allowed
+from cdsm.support.validation import Direction, flag, unit_directions
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension
 
@@ -102,6 +103,7 @@ def plan_stiffness(
     margin: float = MARGIN,
     starts: int = 3,
     seed: int = 0,
+    progress: bool = True,
 ) -> StiffnessPlan:
     """Plan least tensions for a wanted stiffness: min ‖F‖², along(u) = target (Eqs. 13, 17, 20).
 
@@ -127,6 +129,7 @@ def plan_stiffness(
             eigenvalue under the least tensions [-], 1e-9 or more.
         starts: Number of starting tensions, at most 1000.
         seed: Seed of the random starting tensions.
+        progress: Show a bar on the standard error, if that is a terminal.
 
     Raises:
         InvalidInput: ``direction`` is not finite or is zero; a target is not positive; ``minimum``
@@ -143,7 +146,8 @@ def plan_stiffness(
     directions = None if direction is None else unit_directions("direction", direction)
     targets = checked_targets(directions, target)
     planner = Planner(model, target_constraints(model, directions, targets), number, seed)
-    found = planner.least() or planner.nearest()
+    with progress_allowed(flag("progress", progress)):
+        found = planner.least() or planner.nearest()
     tension = model.region.tension(found.evaluation.F)
     K = stiffness(pose, tension)
     value = achieved(K, directions)

@@ -18,6 +18,7 @@ from cdsm.planning.range import range_ends
 from cdsm.planning.sqp import EFFORT, MET, NEAREST, Program, search
 from cdsm.planning.starts import StartPoints
 from cdsm.planning.stiffness_model import Constraints, ConstraintValues, Evaluation, StiffnessModel
+from cdsm.support.progress import track
 from cdsm.support.values import Array
 
 REACHED: Final = 1e-6
@@ -113,7 +114,9 @@ class Planner:
             if (abs(self.constraints.at(point).values) <= _NEARLY).all()
         ]
         program = replace(self.program, unit=min(near, default=self.program.unit))
-        found = [self._search(program, point) for point in begin]
+        found = [
+            self._search(program, point) for point in track(begin, "searching the least tensions")
+        ]
         hits = sorted((each for each in found if program.met(each)), key=_effort)
         if not hits:
             return None

@@ -18,7 +18,8 @@ from cdsm.planning.stiffness_model import Constraints, Evaluation, StiffnessMode
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import stiffness
 from cdsm.support.format import MODEL, coordinates
-from cdsm.support.validation import Direction, unit_direction
+from cdsm.support.progress import progress_allowed, track
+from cdsm.support.validation import Direction, flag, unit_direction
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension
 from cdsm.wires.laws import StrandElasticity, TabulatedElasticity
@@ -98,6 +99,7 @@ def stiffness_range(
     margin: float = MARGIN,
     starts: int = 24,
     seed: int = 0,
+    progress: bool = True,
 ) -> StiffnessRange:
     """Compute smallest and largest ``along(u)`` of all tensions that hold the arm (Eqs. 13, 20).
 
@@ -123,6 +125,7 @@ def stiffness_range(
         starts: Number of starting tensions for ``low``, at most 1000. ``high`` has the same number,
             or a few if the rigidity of all cables is known to rise with the tension.
         seed: Seed of the random starting tensions.
+        progress: Show a bar on the standard error, if that is a terminal.
 
     Raises:
         InvalidInput: ``direction`` is neither an axis nor three finite numbers, or is zero;
@@ -135,7 +138,8 @@ def stiffness_range(
     model = StiffnessModel(pose, minimum, maximum, wrench, margin)
     u = unit_direction("direction", direction)
     stiffness(pose, model.region.least)._require_mobile(u)
-    low, high = range_ends(model, u, *checked_starts(starts, seed))
+    with progress_allowed(flag("progress", progress)):
+        low, high = range_ends(model, u, *checked_starts(starts, seed))
     if low.open or high.open:
         raise InvalidInput(
             "maximum",
@@ -196,9 +200,11 @@ def _bounded_ends(
     constraints = along(unit)
     rising = sorted(begin.points, key=lambda point: float(constraints.at(point).values[0]))
 
-    def end(objective: Objective, points: list[Evaluation]) -> RangeEnd:
+    def end(name: str, objective: Objective, points: list[Evaluation]) -> RangeEnd:
         program = Program(region, begin.anchor, constraints, objective, region.scale)
-        found = [search(program, point) for point in points]
+        found = [
+            search(program, point) for point in track(points, f"searching the {name} tensions")
+        ]
         found.sort(key=lambda each: objective.linear * float(each.values[0]))
         values = unit * np.array([each.values[0] for each in found])
         evaluation = found[0].evaluation
@@ -212,8 +218,8 @@ def _bounded_ends(
     concave = _rigidities_rise(region)  # mostly: then any start leads to the maximum
     inside = [] if concave else list(begin.between(starts))
     falling = rising[: -(_UPWARD // 2 if concave else starts) - 1 : -1]
-    low = end(LOWEST, [*rising[:starts], *inside, begin.anchor])
-    high = end(HIGHEST, [*falling, rising[0], *inside, begin.anchor])
+    low = end("softest", LOWEST, [*rising[:starts], *inside, begin.anchor])
+    high = end("stiffest", HIGHEST, [*falling, rising[0], *inside, begin.anchor])
     return low, high
 
 

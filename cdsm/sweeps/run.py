@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -15,6 +16,7 @@ from cdsm.errors import FileError
 from cdsm.manipulator import Manipulator
 from cdsm.support.extras import need
 from cdsm.support.files import as_path
+from cdsm.support.progress import progress_bar
 from cdsm.support.validation import Direction, flag, whole_number
 from cdsm.sweeps.blocks import Block, blocks, extents, postures
 from cdsm.sweeps.cluster import checked_client, on_cluster
@@ -27,6 +29,8 @@ from cdsm.sweeps.status import SweepStatus
 if TYPE_CHECKING:
     import xarray
     from distributed import Client
+
+_log = logging.getLogger("cdsm")
 
 _NUMBERS = 2**18
 """Default number of joint angles in a block: some tenths of a second of work."""
@@ -133,18 +137,17 @@ def _run(
     path: Path | None = None,
 ) -> None:
     """Compute all pending blocks; write them to numpy arrays, or to zarr arrays at ``path``."""
-    from cdsm.sweeps.progress import progress_bar  # rich takes a while to import
-
     task, poses = specification.task, specification.poses
     every = blocks(poses.sizes, extent)
     todo = [block for block in every if _is_pending(specification, arrays["status"], block)]
     total, left = (sum(map(postures, some)) * task.cases for some in (every, todo))
+    _log.info("sweep of %s: %d of %d entries to compute", task.arm.name, left, total)
     answers: Iterable[tuple[Block, BlockResult | None]]
     if client is None:
         answers = ((block, evaluate(task, poses.angles(block))) for block in todo)
     else:
         answers = on_cluster(client, specification, todo)
-    with progress_bar(total, total - left, wanted=progress) as advance:
+    with progress_bar("sweep", total, total - left, wanted=progress, rate=True) as advance:
         for block, answer in answers:
             try:
                 _write(specification, arrays, block, answer)

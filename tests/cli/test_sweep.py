@@ -7,7 +7,6 @@ import pytest
 import xarray as xr
 
 import cdsm
-from cdsm.sweeps import progress
 from tests.cli.test_commands import SHORT, call, geometry
 from tests.support.sweeps import short_arm
 
@@ -140,18 +139,3 @@ def test_map_of_no_sweep_is_one_message(tmp_path: Path) -> None:
     result = call("map", tmp_path / "absent.nc", "--out", tmp_path / "s.png")
     assert result.exit_code == 1
     assert "absent.nc: does not exist" in result.stderr
-
-
-def test_the_bar_counts_what_is_left_and_shows_only_on_a_terminal(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    with progress.progress_bar(10, 0, wanted=True) as advance:
-        advance(10)
-    assert capsys.readouterr().err == ""
-    monkeypatch.setenv("FORCE_COLOR", "1")  # which rich takes for a terminal
-    with progress.progress_bar(1000, 400, wanted=True) as advance:
-        advance(600)
-    assert "1000/1000" in capsys.readouterr().err
-    with progress.progress_bar(10, 0, wanted=False) as advance:
-        advance(10)
-    assert capsys.readouterr().err == ""

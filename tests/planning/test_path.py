@@ -8,6 +8,7 @@ import pytest
 
 import cdsm
 from cdsm import presets
+from cdsm.support import progress
 from tests.support import arms
 from tests.support.locked import (
     BUCKLING,
@@ -250,6 +251,7 @@ def test_bar_is_shown_on_a_terminal_unless_it_is_not_wanted(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("FORCE_COLOR", "1")  # what rich takes for a terminal
+    monkeypatch.setattr(progress, "DELAY", 0.0)
     cdsm.plan_path(ARM, DOWN, 80e3, 50.0, angles=waving(2), progress=False)
     assert capsys.readouterr().err == ""
     cdsm.plan_path(ARM, DOWN, 80e3, 50.0, angles=waving(2))

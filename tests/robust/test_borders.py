@@ -133,6 +133,12 @@ FLAGS: dict[str, Callable[[Any], object]] = {
     "progress of plan_path": lambda flag: cdsm.plan_path(
         ARM, UP, K.along(UP), 10.0, 100.0, angles=Q, progress=flag
     ),
+    "progress of plan_stiffness": lambda flag: cdsm.plan_stiffness(
+        POSE, UP, K.along(UP), 10.0, 100.0, progress=flag
+    ),
+    "progress of stiffness_range": lambda flag: cdsm.stiffness_range(
+        POSE, UP, 10.0, 100.0, starts=2, progress=flag
+    ),
     "progress of sweep": lambda flag: cdsm.sweep(ARM, Q, minimum=10.0, progress=flag),
     "low_included": lambda flag: cdsm.Domain(1.0, 2.0, flag),
 }
