@@ -105,8 +105,8 @@ class Posture(ReadOnlyState):
         """Straight lines from each cable site to the bones of its link, (2, 3) each [m]."""
         lines = []
         for row, site in zip(self.arm._model.routing.row, self._frames.site, strict=True):
-            feet = [_foot(site, bone) for bone in self._bones[row]] or [self._frames.origin[row]]
-            nearest = min(feet, key=lambda foot: float(np.linalg.norm(foot - site)))
+            feet = [foot(site, bone) for bone in self._bones[row]] or [self._frames.origin[row]]
+            nearest = min(feet, key=lambda each: float(np.linalg.norm(each - site)))
             lines.append(frozen(np.array([site, nearest])))
         return tuple(lines)
 
@@ -172,7 +172,7 @@ def site_paths(cables: Sequence[Cable], sites: Array) -> list[Array]:
     return np.split(sites, np.cumsum([len(cable.sites) for cable in cables])[:-1])
 
 
-def _foot(point: Array, line: Array) -> Array:
+def foot(point: Array, line: Array) -> Array:
     """Return the point of a line segment (2, 3) that is nearest to a point (3,)."""
     way = line[1] - line[0]
     return np.asarray(line[0] + np.clip((point - line[0]) @ way / (way @ way), 0.0, 1.0) * way)

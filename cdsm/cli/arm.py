@@ -100,12 +100,21 @@ def export(
         Path | None, typer.Option(metavar="FILE.toml", help="File of its cables to write.")
     ] = None,
     angles: Angles = "0",
+    actuators: Annotated[
+        str,
+        typer.Option(help="Of the MuJoCo model: length (locked motors), tension, or none."),
+    ] = "length",
+    damping_ratio: Annotated[
+        float | None, typer.Option(help="Of its lowest mode, by its cables; 0.05 if left out.")
+    ] = None,
     damping: Annotated[
-        float, typer.Option(help="Of every joint in the MuJoCo model, in N m s/rad.")
-    ] = 0.0,
+        float | None, typer.Option(help="Of each of its joints instead [N m s/rad].")
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Write an arm for other programs: a MuJoCo model at a posture, or a file of its cables.
+
+    The answer states the time step, the damping and the actuators of the model.
 
     Exit code 0; 3 if the arm of the MuJoCo model is unstable: it is written all the same.
     """
@@ -115,14 +124,22 @@ def export(
     numbers: Json = {"name": pose.arm.name}
     lines, written = [str(pose.arm)], []
     if mjcf is not None:
-        tension = tensions.distribute(pose)
-        K = cdsm.stiffness(pose, tension)
-        numbers["stable"] = K.is_stable
-        if not K.is_stable:
-            from cdsm.interchange.mjcf import instability
+        from cdsm.interchange.mjcf import mujoco_model
+        from cdsm.support.files import write_text
+        from cdsm.support.format import JointUnits, key
 
-            lines.insert(0, instability(K))
-        written.append(str(cdsm.write_mjcf(pose.arm, mjcf, pose, tension, damping=damping)))
+        tension = tensions.distribute(pose)
+        model = mujoco_model(pose.arm, pose, tension, actuators, damping_ratio, damping)
+        motion, unit = model.motion, JointUnits(pose.arm.slides).joined("N m s/rad", "N s/m")
+        numbers |= {
+            "stable": model.unstable is None,
+            "time_step_s": motion.time_step,
+            "cable_damping_N_s_per_m": by_cable(pose.arm, motion.wires),
+            key("joint_damping", unit): motion.joints,
+            "actuators": model.actuators,
+        }
+        lines = [*filter(None, [model.unstable]), *lines, *model.remarks]
+        written.append(str(write_text(mjcf, model.text)))
     if cables_out is not None:
         written.append(str(cdsm.write_cables(pose.arm.cables, cables_out)))
     lines += [f"written: {path}" for path in written]

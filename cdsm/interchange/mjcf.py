@@ -1,53 +1,58 @@
-"""Export the arm to MuJoCo (MJCF). Its cables become spatial tendons with given tensions.
+"""Export the arm to MuJoCo (MJCF). Its cables become spatial tendons, pulled by motors or springs.
 
-MuJoCo has springs of constant stiffness, so the model is valid near one posture. Each cable is a
-spring with the tangent stiffness k of the cable there. Its rest length gives the tension F:
+MuJoCo has springs and servos of constant stiffness, so the model is exact near one posture. Each
+cable has its tangent stiffness k there. Its rest length gives the tension F:
 
     F = k (L − L_rest),    L_rest = L(q) − F/k
 
-Below L_rest the cable is slack. Away from the posture, the elasticity would change.
+Below L_rest the cable is slack. With constant EA that is all there is, and the model is exact
+everywhere. Otherwise the elasticity would change away from the posture.
 """
 
 from __future__ import annotations
 
-import math
 import os
+import warnings
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Literal
 
-import numpy as np
 from lxml import etree
 from numpy.typing import ArrayLike
-from scipy.spatial.transform import Rotation
 
 from cdsm.errors import InvalidInput
+from cdsm.interchange.mjcf_bodies import add_bodies, row
+from cdsm.interchange.mjcf_motion import Motion, choose_motion
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
-from cdsm.statics.natural_modes import Carried, fastest, mass_matrix
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.files import write_text
-from cdsm.support.validation import instance, scalar
+from cdsm.support.validation import RANGES, instance, one_of, scalar
 from cdsm.support.values import Array
-from cdsm.support.xml import parse_xml
 from cdsm.tension import Tension
 
-_MASS, _INERTIA = 1e-6, 1e-9
-"""Least mass [kg] and moment of inertia [kg m²] of a moving body in MuJoCo."""
+Actuators = Literal["length", "tension", "none"]
 
-_SMALLEST = 1e-12
-"""A smaller mass [kg] or moment of inertia [kg m²] of a body counts as zero."""
-
-_ROUNDING = 1e-9
-"""Relative margin: MuJoCo refuses a moment of inertia above the sum of the other two."""
-
-_DEFAULT_STEP = 2e-3  # MuJoCo's own time step [s]
-
-_PHASE = 0.2
-"""Largest ω·dt [rad], with ω the highest natural frequency: frequencies are right within 0.2 %.
-MuJoCo integrates the springs explicitly, which diverges from ω·dt = 2 on."""
-
-_JOINTS = {"revolute": "hinge", "prismatic": "slide"}
-_SITE = 1e-3  # radius [m] of a drawn hole
 _CABLE = 5e-4  # radius [m] of a drawn cable
+_MOST = RANGES["tension"].high  # tension of a motor [N]; MuJoCo's ranges have two ends
+
+_CONTROLS = {
+    "length": "a locked motor per cable; its ctrl is the wire it pays out [m], 0 at the posture",
+    "tension": "a motor per cable pulls with ctrl [N] and adds no stiffness; the keyframe has the "
+    "tensions of the posture",
+    "none": "each cable is a spring with its tension at the posture",
+}
+
+
+@dataclass(frozen=True)
+class MuJoCoModel:
+    """MJCF text with what was chosen for it."""
+
+    text: str
+    motion: Motion
+    actuators: str
+    unstable: str | None  # the warning for an unstable arm
+    remarks: tuple[str, ...]  # lines for people on what was chosen
 
 
 def to_mjcf(
@@ -55,63 +60,67 @@ def to_mjcf(
     pose: Posture | None = None,
     tension: Tension | ArrayLike | None = None,
     *,
-    damping: float = 0.0,
+    actuators: Actuators | None = None,
+    damping_ratio: float | None = None,
+    damping: float | None = None,
 ) -> str:
     """Write the arm as MJCF text, which MuJoCo loads unchanged.
 
-    Bodies, joints and tendons have the names of links, joints and cables. The sites of a cable are
-    ``name/1``, ``name/2``, …; the site at the tip is ``tool0``. The keyframe ``pose`` holds the
-    posture. A lead (the straight cable between its actuator and the first site) has a constant
-    length and is left out. Force-controlled cables are actuators of constant force. Springs softer
-    than F/L would need a negative rest length; they are actuators of force and stiffness. The model
-    does not contain the wrench: give it to MuJoCo at run time, as ``xfrc_applied``.
+    Bodies, joints, tendons and actuators have the names of links, joints and cables. The sites of a
+    cable are ``name/1``, ``name/2``, …; the site at the tip is ``tool0``. A lead (the straight
+    cable between its actuator and the first site) has a constant length and is left out. So is
+    friction of the cables in their holes. Links without a drawable visual are drawn as sticks. The
+    model does not contain the wrench: give it to MuJoCo at run time, as ``xfrc_applied``.
 
-    The time step dt is 1, 2 or 5 times a power of ten [s], at most 0.2/ω and at most MuJoCo's 2 ms.
-    ω is the highest natural frequency, K_θ φ = ω² M φ. M belongs to the exported bodies. Moving
-    bodies without mass in the URDF get 1e-6 kg and 1e-9 kg m², so an arm of massless links needs
-    steps of microseconds. If K_θ is not positive definite, the model leaves the posture by itself.
-    Then a comment at the top says UNSTABLE, and :attr:`Stiffness.is_stable
-    <cdsm.Stiffness.is_stable>` is false.
+    The model starts at the posture: ``mjData`` has it when it is made, and so has the keyframe
+    ``pose``. The joint coordinates are those of cdsm. What pulls the cables is one of
+
+    - ``length``: one motor per cable holds its original length, as in :func:`~cdsm.equilibrium`.
+      Its force is k (u + L_rest − L), never a push. Its ``ctrl`` u is the length of wire that it
+      pays out [m]; u = 0 holds the posture. A force-controlled cable keeps F; there u is tension
+      added to F [N].
+    - ``tension``: one motor per cable pulls with the tension ``ctrl`` [N]. The keyframe has F, and
+      ``mjData`` begins with none. The cables add no stiffness: most arms are unstable then, and
+      need a controller.
+    - ``none``: each cable is a spring of stiffness k and rest length L_rest. Springs softer than
+      F/L would need a negative rest length; they are motors without ``ctrl``, and so are
+      force-controlled cables.
+
+    Time step: 1, 2 or 5 times a power of ten [s], at most 0.2/ω and at most MuJoCo's 2 ms. ω is the
+    highest natural frequency, K_θ φ = ω² M φ. M belongs to the exported bodies. Moving bodies
+    without mass in the URDF get 1e-6 kg and 1e-9 kg m², so an arm of massless links needs steps of
+    microseconds.
+
+    Damping: the cables damp with c = β k [N s/m], β = 2 ζ/ω. ω is the lowest frequency, and ζ its
+    ``damping_ratio``. So a mode of frequency ω_r has the ratio ζ ω_r/ω, and all of them settle as
+    fast as the lowest or faster. What cables do not resist is damped less; the comment in the file
+    says from which ratio to which.
+
+    A comment at the top states time step, damping and actuators. If K_θ is not positive definite,
+    the model leaves the posture by itself. Then the comment says UNSTABLE, a warning is issued, and
+    :attr:`Stiffness.is_stable <cdsm.Stiffness.is_stable>` is false.
 
     Args:
         arm: The arm.
         pose: Posture of the tensions. If not given, the arm is straight and has no tensions.
         tension: F at this posture: a result of :func:`~cdsm.distribute_tension`, or (C,) [N].
-        damping: Damping of every joint [N m s/rad], so that a simulation settles. MuJoCo integrates
-            it implicitly, so it does not need a smaller time step.
+        actuators: ``length``, ``tension`` or ``none``. Default: ``length``; without tensions
+            ``none``.
+        damping_ratio: ζ of the lowest mode [-]; 0.05 by default. It needs tensions.
+        damping: Damping of every joint instead [N m s/rad], [N s/m] where it slides. MuJoCo
+            integrates damping implicitly, so none needs a smaller time step.
 
     Raises:
         InvalidInput: Only one of ``pose`` and ``tension`` is given, the posture is of another arm,
-            or an argument is invalid.
+            both dampings are given, or an argument is invalid.
+        UnknownName: ``actuators`` is unknown.
         ElasticityRangeError: A tension is outside the domain of its cable's elasticity.
         SingularMass: A motion of the arm moves no link with mass.
     """
-    instance("arm", arm, Manipulator)
-    if (pose is None) != (tension is None):
-        raise InvalidInput("tension", "give pose and tension, or neither; one says nothing alone.")
-    damping = scalar("damping", damping)
-    if damping < 0.0:
-        raise InvalidInput("damping", f"{damping:g} given; it cannot be negative.")
-    if pose is not None and instance("pose", pose, Posture).arm != arm:
-        raise InvalidInput("pose", "is of another arm; take arm.at(q).")
-    K = None if pose is None or tension is None else stiffness(pose, tension)
-    root = etree.Element("mujoco", model=arm.name)
-    root.append(etree.Comment(" Generated by cdsm. Units: m, rad, kg, N. "))
-    if K is not None and not K.is_stable:
-        root.append(etree.Comment(f" {instability(K)} "))
-    etree.SubElement(root, "compiler", angle="radian", autolimits="true", inertiafromgeom="false")
-    # implicit in velocities only: integrators implicit in positions take energy from springs
-    option = etree.SubElement(root, "option", gravity=_row(arm.gravity), integrator="implicitfast")
-    order, masses = _bodies(root, arm, damping)
-    option.set("timestep", repr(_DEFAULT_STEP if K is None else _time_step(K, masses)))
-    if arm.cables:
-        _cables(root, arm, K)
-    if pose is not None:
-        q = pose.q[[arm.joint_names.index(name) for name in order]]
-        etree.SubElement(etree.SubElement(root, "keyframe"), "key", name="pose", qpos=_row(q))
-    etree.indent(root, space="  ")
-    text: str = etree.tostring(root, encoding="unicode") + "\n"
-    return text
+    model = mujoco_model(arm, pose, tension, actuators, damping_ratio, damping)
+    if model.unstable is not None:
+        warnings.warn(model.unstable, stacklevel=2)
+    return model.text
 
 
 def write_mjcf(
@@ -120,7 +129,9 @@ def write_mjcf(
     pose: Posture | None = None,
     tension: Tension | ArrayLike | None = None,
     *,
-    damping: float = 0.0,
+    actuators: Actuators | None = None,
+    damping_ratio: float | None = None,
+    damping: float | None = None,
 ) -> Path:
     """Write the text of :func:`to_mjcf` to a file, completely or not at all. Return its path.
 
@@ -129,16 +140,82 @@ def write_mjcf(
         path: The file. An existing file is replaced.
         pose: As for :func:`to_mjcf`.
         tension: As for :func:`to_mjcf` [N].
+        actuators: As for :func:`to_mjcf`.
+        damping_ratio: As for :func:`to_mjcf` [-].
         damping: As for :func:`to_mjcf` [N m s/rad].
 
     Raises:
         FileError: The file cannot be written.
         CdsmError: As for :func:`to_mjcf`.
     """
-    return write_text(path, to_mjcf(arm, pose, tension, damping=damping))
+    model = mujoco_model(arm, pose, tension, actuators, damping_ratio, damping)
+    if model.unstable is not None:
+        warnings.warn(model.unstable, stacklevel=2)
+    return write_text(path, model.text)
 
 
-def instability(K: Stiffness) -> str:
+def mujoco_model(
+    arm: Manipulator,
+    pose: Posture | None = None,
+    tension: Tension | ArrayLike | None = None,
+    actuators: str | None = None,
+    damping_ratio: float | None = None,
+    damping: float | None = None,
+) -> MuJoCoModel:
+    """Build the model of :func:`to_mjcf`, with what was chosen for it."""
+    instance("arm", arm, Manipulator)
+    if (pose is None) != (tension is None):
+        raise InvalidInput("tension", "give pose and tension, or neither; one says nothing alone.")
+    if pose is not None and instance("pose", pose, Posture).arm != arm:
+        raise InvalidInput("pose", "is of another arm; take arm.at(q).")
+    K = None if pose is None or tension is None else stiffness(pose, tension)
+    actuators = actuators or ("none" if K is None else "length")
+    one_of("kind of actuators", actuators, _CONTROLS)
+    if K is None and (actuators == "length" or damping_ratio is not None):
+        name = "actuators" if damping_ratio is None else "damping_ratio"
+        raise InvalidInput(name, "follows from the stiffness; give pose and tension too.")
+    if damping is not None and damping_ratio is not None:
+        raise InvalidInput("damping", "give it or damping_ratio, not both.")
+    for name, value in (("damping_ratio", damping_ratio), ("damping", damping)):
+        if value is not None and scalar(name, value) < 0.0:
+            raise InvalidInput(name, f"{value:g} given; it cannot be negative.")
+
+    root = etree.Element("mujoco", model=arm.name)
+    compiler = etree.SubElement(root, "compiler", angle="radian", autolimits="true")
+    compiler.set("inertiafromgeom", "false")
+    # implicit in velocities only: integrators implicit in positions take energy from springs
+    option = etree.SubElement(root, "option", gravity=row(arm.gravity), integrator="implicitfast")
+    start = {} if pose is None else dict(zip(arm.joint_names, pose.q.tolist(), strict=True))
+    masses = add_bodies(root, arm, start)
+    motion = choose_motion(arm, K, masses, damping_ratio, damping)
+    option.set("timestep", repr(motion.time_step))
+    joints = list(root.iter("joint"))  # in MuJoCo's order, depth first
+    if motion.joints:
+        for joint in joints:
+            joint.set("damping", repr(motion.joints))
+    pulled = _cables(root, arm, K, actuators, motion.wires) if arm.cables else []
+    if K is not None:
+        frame = etree.SubElement(etree.SubElement(root, "keyframe"), "key", name="pose")
+        frame.set("qpos", row([start[joint.get("name")] for joint in joints]))
+        if pulled:
+            frame.set("ctrl", row(pulled))
+
+    held = K if K is None or actuators != "tension" else _without_motors(K)
+    unstable = None if held is None or held.is_stable else _instability(held)
+    remarks = (
+        *motion.said,
+        f"actuators  {actuators}: {_CONTROLS[actuators]}",
+        "friction   of the cables in their holes is left out",
+    )
+    said = [unstable] if unstable is not None else []
+    for line in reversed(["Generated by cdsm. Units: m, rad, kg, N.", *said, *remarks]):
+        root.insert(0, etree.Comment(f" {line} "))
+    etree.indent(root, space="  ")
+    text: str = etree.tostring(root, encoding="unicode") + "\n"
+    return MuJoCoModel(text, motion, actuators, unstable, remarks)
+
+
+def _instability(K: Stiffness) -> str:
     """Write the warning for an unstable arm."""
     unit = K.posture.arm.stiffness_unit()
     return (
@@ -147,154 +224,53 @@ def instability(K: Stiffness) -> str:
     )
 
 
-def _time_step(K: Stiffness, masses: list[Carried]) -> float:
-    """Choose a time step [s] for the fastest motion: 1, 2 or 5 times a power of ten."""
-    omega = fastest(K, mass_matrix(K.posture, masses))
-    if omega * _DEFAULT_STEP <= _PHASE:
-        return _DEFAULT_STEP
-    power = math.floor(math.log10(_PHASE / omega))
-    steps = [float(f"{digit}e{exponent}") for exponent in (power - 1, power) for digit in (1, 2, 5)]
-    return max(step for step in steps if step * omega <= _PHASE)
-
-
-# --- bodies ---------------------------------------------------------------------------------
-
-
-def _bodies(
-    root: etree._Element, arm: Manipulator, damping: float
-) -> tuple[list[str], list[Carried]]:
-    """Add the tree of links. Return the joints in MuJoCo's order, and the link masses."""
-    robot = parse_xml(arm.urdf, "robot")
-    links = {str(link.get("name")): link for link in robot.findall("link")}
-    joints = robot.findall("joint")
-    below: dict[str, list[etree._Element]] = {name: [] for name in links}
-    for joint in joints:
-        below[joint.find("parent").get("link")].append(joint)
-    carried = {joint.find("child").get("link") for joint in joints}
-    (base,) = links.keys() - carried
-    sites: dict[str, list[tuple[str, tuple[float, ...]]]] = {name: [] for name in links}
-    for cable in arm.cables:
-        for i, site in enumerate(cable.sites, start=1):
-            sites[site.link].append((f"{cable.name}/{i}", site.position))
-    sites[arm.tip_link].append(("tool0", (0.0, 0.0, 0.0)))
-
-    world = etree.SubElement(root, "worldbody")
-    # MuJoCo reserves the name world for its root
-    bodies = {base: world if base == "world" else etree.SubElement(world, "body", name=base)}
-    moving, queue = {base: False}, [base]
-    masses: list[Carried] = []
-    for name in queue:
-        if bodies[name] is not world:
-            masses += _inertial(bodies[name], links[name], moving[name])
-        for visual in links[name].findall("visual"):
-            _shape(bodies[name], visual)
-        for hole, position in sites[name]:
-            etree.SubElement(bodies[name], "site", name=hole, pos=_row(position), size=repr(_SITE))
-        for joint in below[name]:
-            child, kind = joint.find("child").get("link"), _JOINTS.get(joint.get("type"))
-            bodies[child] = etree.SubElement(bodies[name], "body", name=child, **_placed(joint))
-            moving[child] = moving[name] or kind is not None
-            if kind is not None:
-                bodies[child].append(_joint(joint, kind, damping))
-            queue.append(child)
-    # MuJoCo numbers joints as they come in the document, depth first
-    return [joint.get("name") for joint in world.iter("joint")], masses
-
-
-def _joint(joint: etree._Element, kind: str, damping: float) -> etree._Element:
-    axis, limit = joint.find("axis"), joint.find("limit")
-    made = {"name": joint.get("name"), "type": kind}
-    made["axis"] = "1 0 0" if axis is None else axis.get("xyz")
-    made["range"] = f"{limit.get('lower', '0')} {limit.get('upper', '0')}"
-    return etree.Element("joint", made | ({"damping": repr(damping)} if damping else {}))
-
-
-def _inertial(body: etree._Element, link: etree._Element, moves: bool) -> list[Carried]:
-    """Give a body the mass of its link, or a tiny mass if it moves and has none."""
-    inertial = link.find("inertial")
-    mass = 0.0 if inertial is None else float(inertial.find("mass").get("value"))
-    if inertial is not None and mass > _SMALLEST:
-        place, turn = _origin(inertial)
-        tensor = _inertia(inertial.find("inertia"), turn.as_matrix())
-    elif moves:
-        # tiny mass, its weight compensated
-        body.set("gravcomp", "1")
-        mass, place, tensor = _MASS, np.zeros(3), _INERTIA * np.eye(3)
-    else:
-        return []
-    full = [tensor[0, 0], tensor[1, 1], tensor[2, 2], tensor[0, 1], tensor[0, 2], tensor[1, 2]]
-    etree.SubElement(body, "inertial", pos=_row(place), mass=repr(mass), fullinertia=_row(full))
-    return [Carried(str(link.get("name")), mass, place, tensor)]
-
-
-def _inertia(inertia: etree._Element, R: Array) -> Array:
-    """Compute I (3, 3) in the link frame, adjusted for MuJoCo. Statics does not use I."""
-    xx, yy, zz, xy, xz, yz = (
-        float(inertia.get(key)) for key in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
-    )
-    tensor: Array = R @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ R.T
-    moments, axes = np.linalg.eigh(tensor)
-    taken = np.maximum(moments, _INERTIA) if moments[0] < _SMALLEST else moments.copy()
-    # first correct a needle: the largest moment must not fall below the second
-    taken[0] = max(taken[0], 2.0 * _ROUNDING * taken[1])
-    taken[2] = min(taken[2], (1.0 - _ROUNDING) * (taken[0] + taken[1]))
-    if (taken == moments).all():
-        return tensor
-    return np.asarray(axes @ np.diag(taken) @ axes.T)
-
-
-def _shape(body: etree._Element, visual: etree._Element) -> None:
-    """Draw cylinders, boxes and spheres. Meshes are separate files and are left out."""
-    shape = visual.find("geometry/*")
-    if shape is None or shape.tag not in ("cylinder", "box", "sphere"):
-        return
-    if shape.tag == "cylinder":
-        size = [float(shape.get("radius")), float(shape.get("length")) / 2.0]
-    elif shape.tag == "box":
-        size = [float(x) / 2.0 for x in shape.get("size").split()]
-    else:
-        size = [float(shape.get("radius"))]
-    geom = etree.SubElement(body, "geom", type=shape.tag, size=_row(size), **_placed(visual))
-    geom.attrib.update({"contype": "0", "conaffinity": "0"})
-
-
-def _placed(element: etree._Element) -> dict[str, str]:
-    place, turn = _origin(element)
-    return {"pos": _row(place), "quat": _row(np.roll(turn.as_quat(), 1))}
-
-
-def _origin(element: etree._Element) -> tuple[Array, Rotation]:
-    origin = element.find("origin")
-    given = {} if origin is None else origin.attrib
-    xyz, rpy = (
-        np.array(given.get(key, "0 0 0").split(), dtype=np.float64) for key in ("xyz", "rpy")
-    )
-    return xyz, Rotation.from_euler("xyz", rpy)
+def _without_motors(K: Stiffness) -> Stiffness:
+    """Return K_θ of the same tensions held by force: no cable adds passive stiffness."""
+    arm = K.posture.arm
+    free = arm.with_cables([replace(cable, control="force") for cable in arm.cables])
+    return stiffness(free.at(K.posture.q, check_limits=False), K.tension, wrench=K.wrench)
 
 
 # --- cables ---------------------------------------------------------------------------------
 
 
-def _cables(root: etree._Element, arm: Manipulator, K: Stiffness | None) -> None:
-    tendon, actuator = etree.SubElement(root, "tendon"), etree.Element("actuator")
+def _cables(
+    root: etree._Element, arm: Manipulator, K: Stiffness | None, actuators: str, damping: Array
+) -> list[float]:
+    """Add the tendons and what pulls them. Return the ``ctrl`` of the motors at the posture."""
+    tendon, motors = etree.SubElement(root, "tendon"), etree.Element("actuator")
+    at_start = []
     for c, cable in enumerate(arm.cables):
         spatial = etree.SubElement(tendon, "spatial", name=cable.name, width=repr(_CABLE))
         for i in range(1, len(cable.sites) + 1):
             etree.SubElement(spatial, "site", site=f"{cable.name}/{i}")
-        if K is None:
+        if damping[c]:
+            spatial.set("damping", repr(float(damping[c])))
+        F, k, length = 0.0, 0.0, 0.0
+        if K is not None:
+            F, k = float(K.tension[c]), float(K.cable_stiffness[c])
+            length = float(K.posture.cable_lengths[c]) - cable.lead
+        rest = length - F / k if k > 0.0 else -1.0
+        if actuators == "none" and (K is None or rest >= 0.0):
+            if K is not None:
+                spatial.set("stiffness", repr(k))
+                spatial.set("springlength", f"0 {rest!r}")
             continue
-        F, k = float(K.tension[c]), float(K.cable_stiffness[c])
-        length = float(K.posture.cable_lengths[c]) - cable.lead
-        if k > 0.0 and length - F / k >= 0.0:
-            spatial.set("stiffness", repr(k))
-            spatial.set("springlength", f"0 {length - F / k!r}")
-        else:
-            bias = _row([k * length - F, -k, 0.0])
-            general = etree.SubElement(actuator, "general", name=cable.name, tendon=cable.name)
-            general.attrib.update({"biastype": "affine", "gainprm": "0", "biasprm": bias})
-    if len(actuator):
-        root.append(actuator)
-
-
-def _row(values: ArrayLike) -> str:
-    return " ".join(repr(float(x)) for x in np.ravel(values))
+        # force along the tendon, which pulls where it is negative: gain ctrl + bias
+        gain, bias, control = k, [k * length - F, -k, 0.0], 0.0
+        motor = etree.SubElement(motors, "general", name=cable.name, tendon=cable.name)
+        if actuators == "tension":
+            gain, bias, control = -1.0, [0.0, 0.0, 0.0], F
+            motor.set("ctrlrange", f"0 {_MOST!r}")
+        elif actuators == "none":
+            gain = 0.0
+        elif k == 0.0:
+            gain = -1.0
+            motor.set("ctrlrange", f"{-F!r} {_MOST!r}")
+        motor.attrib.update({"biastype": "affine", "gainprm": repr(gain), "biasprm": row(bias)})
+        if actuators == "length":
+            motor.set("forcerange", f"{-_MOST!r} 0")
+        at_start.append(control)
+    if len(motors):
+        root.append(motors)
+    return at_start

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import NamedTuple, final
 
 import numpy as np
-from scipy.linalg import eigh, eigvalsh
+from scipy.linalg import eigh
 
 from cdsm.arm_model import joints_to
 from cdsm.errors import InvalidInput, SingularMass
@@ -154,15 +154,20 @@ def _stand_in_mass(pose: Posture) -> Array:
     return mass_matrix(pose, stand_ins)
 
 
-def fastest(stiffness: Stiffness, M: Array) -> float:
-    """Return the largest √|ω²| [1/s] of K_θ φ = ω² M φ; raise SingularMass if M is singular."""
+def motions(stiffness: Stiffness, M: Array) -> tuple[Array, Array]:
+    """Solve K_θ φ = ω² M φ. Return ω² (nv,) [1/s²], rising, and φ (nv, nv) with φᵀMφ = 1.
+
+    Raises:
+        SingularMass: M is singular.
+    """
     # scaled by joint: the mass of the last link may be rounding beside that of the arm
     unit = 1.0 / np.sqrt(M.diagonal())
     K, M = (matrix * unit * unit[:, None] for matrix in (stiffness.joint, M))
     try:
-        return math.sqrt(abs(eigvalsh((K + K.T) / 2.0, M)).max())
+        squares, shapes = eigh((K + K.T) / 2.0, M)
     except np.linalg.LinAlgError:  # M is not positive definite
         raise _massless(stiffness.posture, unit * np.linalg.eigh(M)[1][:, 0]) from None
+    return squares, unit[:, None] * shapes
 
 
 def _massless(pose: Posture, motion: Array) -> SingularMass:

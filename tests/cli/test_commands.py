@@ -309,7 +309,7 @@ def test_export_of_an_unstable_arm_says_so_first(geometry: Path, tmp_path: Path)
     soft = ("--rigidity", 1e9, "--spring", 0.2)
     told = call(*asked, 60, *soft)
     assert told.exit_code == 3
-    first, arm, written = told.stdout.splitlines()
+    first, arm, *_, written = told.stdout.splitlines()
     assert first.startswith("UNSTABLE: the smallest eigenvalue of K_θ is -")
     assert (arm.split(":")[0], written) == ("probe", f"written: {model}")
     assert f"<!-- {first} -->" in model.read_text(encoding="utf-8")
@@ -320,6 +320,26 @@ def test_export_of_an_unstable_arm_says_so_first(geometry: Path, tmp_path: Path)
     assert held.exit_code == 0
     assert json.loads(held.stdout)["stable"] is True
     assert "UNSTABLE" not in model.read_text(encoding="utf-8")
+
+
+def test_export_states_time_step_damping_and_actuators(geometry: Path, tmp_path: Path) -> None:
+    model = tmp_path / "arm.xml"
+    asked = ("export", geometry, "--mjcf", model, "--angles", 5, "--rigidity", 48e3)
+    told = call(*asked, "--min-tension", 5, "--damping-ratio", 0.1)
+    assert told.exit_code == 0
+    chosen = told.stdout.splitlines()[1:5]
+    assert [line.split()[0] for line in chosen] == ["time", "damping", "actuators", "friction"]
+    assert "ratio 0.1 to " in chosen[1]
+    text = model.read_text(encoding="utf-8")
+    assert all(f"<!-- {line} -->" in text for line in chosen)
+    numbers = json.loads(call(*asked, "--damping", 0.1, "--actuators", "none", "--json").stdout)
+    assert f'timestep="{numbers["time_step_s"]!r}"' in model.read_text(encoding="utf-8")
+    assert numbers["joint_damping_Nm_s_per_rad"] == 0.1
+    assert set(numbers["cable_damping_N_s_per_m"].values()) == {0.0}
+    assert numbers["actuators"] == "none"
+    loose = call(*asked, "--actuators", "tension")
+    assert loose.exit_code == 3
+    assert loose.stdout.startswith("UNSTABLE")
 
 
 def test_wire_file_is_the_elasticity_of_the_cables(geometry: Path, tmp_path: Path) -> None:

@@ -1,0 +1,75 @@
+"""Time step and damping of an arm in MuJoCo, from its natural frequencies."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from cdsm.manipulator import Manipulator
+from cdsm.statics.natural_modes import Carried, mass_matrix, motions
+from cdsm.stiffness_matrix import Stiffness
+from cdsm.support.format import JointUnits
+from cdsm.support.values import Array
+
+DAMPING_RATIO = 0.05
+"""Default damping of the lowest mode, as a part of critical damping."""
+
+_DEFAULT_STEP = 2e-3  # MuJoCo's own time step [s]
+
+_PHASE = 0.2
+"""Largest ω·dt [rad], with ω the highest natural frequency: frequencies are right within 0.2 %.
+MuJoCo integrates the springs explicitly, which diverges from ω·dt = 2 on."""
+
+
+class Motion(NamedTuple):
+    """Time step and damping of a model."""
+
+    time_step: float  # [s]
+    wires: Array  # damping of the cables (C,) [N s/m]
+    joints: float  # damping of every joint [N m s/rad], [N s/m] where it slides
+    said: tuple[str, str]  # lines for people
+
+
+def choose_motion(
+    arm: Manipulator,
+    K: Stiffness | None,
+    masses: list[Carried],
+    ratio: float | None,
+    damping: float | None,
+) -> Motion:
+    """Choose the time step for the fastest motion, and the damping.
+
+    Without a ``damping`` of the joints, the wires damp: c = β k, β = 2 ζ/ω with ω of the lowest
+    mode. Joint dampers as strong would hold the arm's slow motions back tenfold.
+    """
+    wires, joints = np.zeros(len(arm.cables)), damping or 0.0
+    step, reason = _DEFAULT_STEP, "MuJoCo's own"
+    unit = JointUnits(arm.slides).joined("N m s/rad", "N s/m")
+    damped = f"{joints:.4g} {unit} at every joint"
+    if K is not None:
+        squares, shapes = motions(K, mass_matrix(K.posture, masses))
+        fastest = math.sqrt(abs(squares).max())
+        step, reason = _time_step(fastest), f"for frequencies up to {fastest / math.tau:.4g} Hz"
+        swings = squares > 0.0
+        if damping is None and swings.any():
+            omega = np.sqrt(squares[swings])
+            wires = 2.0 * (DAMPING_RATIO if ratio is None else ratio) / omega[0] * K.cable_stiffness
+            stretch = K.posture.length_jacobian @ shapes[:, swings]
+            ratios = wires @ stretch**2 / (2.0 * omega)
+            damped = (
+                f"ratio {ratios.min():.2g} to {ratios.max():.2g} of the modes, by the cables: "
+                f"{wires.min():.4g} to {wires.max():.4g} N s/m"
+            )
+    said = f"time step  {1e3 * step:g} ms, {reason}", f"damping    {damped}"
+    return Motion(step, wires, joints, said)
+
+
+def _time_step(omega: float) -> float:
+    """Choose a time step [s] for the fastest motion [1/s]: 1, 2 or 5 times a power of ten."""
+    if omega * _DEFAULT_STEP <= _PHASE:
+        return _DEFAULT_STEP
+    power = math.floor(math.log10(_PHASE / omega))
+    steps = [float(f"{digit}e{exponent}") for exponent in (power - 1, power) for digit in (1, 2, 5)]
+    return max(step for step in steps if step * omega <= _PHASE)
