@@ -41,6 +41,7 @@ if TYPE_CHECKING:
         UnreachableStiffness,
         UrdfError,
     )
+    from cdsm.friction.stuck import sliding_stiffness, stuck_stiffness
     from cdsm.geometry import CableRoute, Geometry, Joint, Link
     from cdsm.identification import Identification, Measurement, identify
     from cdsm.instability import Remedy
@@ -165,10 +166,12 @@ __all__ = [
     "read_tensile_csv",
     "saturation",
     "serpentine_cables",
+    "sliding_stiffness",
     "solve_joint_angles",
     "stiffness",
     "stiffness_gradient",
     "stiffness_range",
+    "stuck_stiffness",
     "sweep",
     "to_mjcf",
     "to_urdf",
@@ -191,6 +194,7 @@ _NAMES = {
         "SingularMass SingularStiffness SolverError StoreError TensileTestError UnknownName "
         "UnreachableStiffness UrdfError"
     ),
+    "friction.stuck": "sliding_stiffness stuck_stiffness",
     "geometry": "CableRoute Geometry Joint Link",
     "instability": "Remedy",
     "identification": "Identification Measurement identify",

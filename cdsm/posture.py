@@ -14,7 +14,7 @@ from cdsm.cable_chains import Chains
 from cdsm.kernels import chains as chain_kernels
 from cdsm.kernels import segments as segment_kernels
 from cdsm.kernels import stiffness as stiffness_kernels
-from cdsm.kernels.tree import Frames
+from cdsm.kernels.tree import Frames, Routing
 from cdsm.support.format import coordinates
 from cdsm.support.values import Array, ReadOnlyState, frozen
 
@@ -40,7 +40,17 @@ class Segments(ReadOnlyState):
     length_jacobian: Array
     wrap: Array
     wrap_jacobian: Array
+    _routing: Routing
     _frames: Frames
+
+    def tension_stiffness(self, tension: Array) -> Array:
+        """Compute Σ T_j ∂²l_j/∂θ² of each cable (C, nv, nv) [N m/rad], from checked T (S,) [N]."""
+        cable, (_, _, segment, joint, _) = self.chains.cable, self._routing
+        return frozen(
+            chain_kernels.single_tension_stiffness(
+                segment, joint, *self._frames, tension, cable, int(cable[-1]) + 1
+            )
+        )
 
 
 @final
@@ -141,6 +151,7 @@ class Posture(ReadOnlyState):
             length_jacobian=frozen(jacobian),
             wrap=frozen(wrap),
             wrap_jacobian=frozen(gradient),
+            _routing=Routing(*model.chain_arrays[:5]),
             _frames=Frames(*map(frozen, frames)),
         )
 

@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from cdsm.report import Report
 
 Term = Literal["active", "passive", "gravity", "load", "joint"]
+Friction = Literal["frictionless", "stuck", "sliding"]
 
 _NO_WRENCH = frozen(np.zeros(6))
 _NO_DIRECTIONS = frozen(np.zeros((0, 3)))
@@ -86,9 +87,11 @@ class Stiffness(ReadOnlyState):
         posture: The posture.
         tension: F (C,) [N].
         wrench: W (6,): force [N], then moment [N m].
-        cable_stiffness: Diagonal of K_L (C,) [N/m]; 0 for force-controlled cables.
+        cable_stiffness: Diagonal of K_L (C,) [N/m]; 0 for force-controlled cables. It is that of
+            the whole cable, without friction.
         active: H_L·F (nv, nv) [N m/rad]; also called geometric.
-        passive: J_Lᵀ K_L J_L (nv, nv) [N m/rad]; also called material or elastic.
+        passive: J_Lᵀ K_L J_L (nv, nv) [N m/rad]; also called material or elastic. With friction it
+            is Σ g_j ∂T_j/∂θ over the segments; it is not symmetric if cables slide.
         gravity: ∂g/∂θ (nv, nv) [N m/rad].
         load: −∂(J_Xᵀ W)/∂θ (nv, nv) [N m/rad]; not symmetric if W has a moment.
         joint: K_θ, sum of the four terms (nv, nv) [N m/rad]: row torque, column angle.
@@ -96,6 +99,11 @@ class Stiffness(ReadOnlyState):
             reference posture; None if the motors are locked at this posture.
         distribution: The :class:`~cdsm.Tension` that gave the tensions; None for tensions as an
             array.
+        friction: ``"frictionless"``; ``"stuck"``, if the holes with friction hold their cables; or
+            ``"sliding"``, if cables slide in some of them.
+        segment_tension: T (S,) [N] of the segments of :attr:`Posture.segments`; None if
+            frictionless.
+        tension_gradient: ∂T/∂θ (S, nv) [N/rad] of these segments; None if frictionless.
     """
 
     posture: Posture
@@ -109,6 +117,9 @@ class Stiffness(ReadOnlyState):
     joint: Array
     free_length: Array | None = None
     distribution: Tension | None = None
+    friction: Friction = "frictionless"
+    segment_tension: Array | None = None
+    tension_gradient: Array | None = None
 
     @property
     def free_lengths(self) -> Array:
@@ -126,9 +137,11 @@ class Stiffness(ReadOnlyState):
     def residual(self) -> Array:
         """J_Lᵀ F − (J_Xᵀ W − g) (nv,) [N m]; zero if the tensions balance the arm (Eq. 13)."""
         pose = self.posture
-        return frozen(
-            self.tension @ pose.length_jacobian - self.wrench @ pose.jacobian + pose.gravity_torque
-        )
+        if self.segment_tension is None:
+            cables = self.tension @ pose.length_jacobian
+        else:
+            cables = self.segment_tension @ pose.segments.length_jacobian
+        return frozen(cables - self.wrench @ pose.jacobian + pose.gravity_torque)
 
     @cached_property
     def margin(self) -> float:
@@ -234,10 +247,18 @@ class Stiffness(ReadOnlyState):
         stiffness, motion = self._along(u)
         motion = motion * stiffness
         pose = self.posture
+        if self.segment_tension is None or self.tension_gradient is None:
+            passive = self.cable_stiffness * (pose.length_jacobian @ motion) ** 2
+            active = self.tension * (pose.length_hessian @ motion @ motion)
+        else:
+            segments = pose.segments
+            each = (segments.length_jacobian @ motion) * (self.tension_gradient @ motion)
+            passive = np.asarray(np.bincount(segments.chains.cable, each), dtype=np.float64)
+            active = segments.tension_stiffness(self.segment_tension) @ motion @ motion
         return Shares(
             direction=u,
-            passive=frozen(self.cable_stiffness * (pose.length_jacobian @ motion) ** 2),
-            active=frozen(self.tension * (pose.length_hessian @ motion @ motion)),
+            passive=frozen(passive),
+            active=frozen(active),
             gravity=float(motion @ self.gravity @ motion),
             load=float(motion @ self.load @ motion),
         )
@@ -268,10 +289,21 @@ class Stiffness(ReadOnlyState):
         The second derivation uses central differences of the potential and the torque at this
         posture. It takes some tenths of a second. Problems are not raised as errors; the report
         lists them.
+
+        Raises:
+            InvalidInput: The stiffness is not frictionless.
         """
         from cdsm.report import report_on  # here, since a stiffness does not need it
 
-        return report_on(self)
+        return report_on(self.require_frictionless())
+
+    def require_frictionless(self) -> Stiffness:
+        """Return this stiffness, or raise InvalidInput if it is one with friction."""
+        if self.friction != "frictionless":
+            raise InvalidInput(
+                "stiffness", f"the cables are {self.friction}; give a frictionless K of stiffness."
+            )
+        return self
 
     def __repr__(self) -> str:
         state = "stable" if self.is_stable else "UNSTABLE"
@@ -317,7 +349,17 @@ class Stiffness(ReadOnlyState):
     def _verdict(self) -> str:
         state = "stable" if self.is_stable else "UNSTABLE"
         unit = self.posture.arm.stiffness_unit()
-        return f"{state}, smallest joint stiffness {self.margin:.4g} {unit} ({MODEL})"
+        return f"{state}, smallest joint stiffness {self.margin:.4g} {unit} ({self._model})"
+
+    @property
+    def _model(self) -> str:
+        """Assumptions of this stiffness, in words."""
+        if self.friction == "frictionless":
+            return MODEL
+        values = self.posture.segments.chains.friction
+        low, high = values.min(initial=math.inf), values.max(initial=0.0)
+        mu = f"{low:g}" if low == high else f"{low:g} to {high:g}"
+        return MODEL.replace("frictionless", f"cables {self.friction}, μ = {mu}")
 
     def _require_mobile(self, u: Array) -> None:
         """Raise SingularStiffness if a force along a unit direction u (3,) moves no joint."""
@@ -399,6 +441,15 @@ def stiffness(
             tensions are of another posture, or a wrench is given with a ``Tension``.
         ElasticityRangeError: A tension is outside the domain of its cable's elasticity.
     """
+    F, W = checked_tension(pose, tension, wrench)
+    k = pose.arm._model.laws.stiffness(pose.cable_lengths, F)
+    return assemble(pose, F, W, k, tension if isinstance(tension, Tension) else None)
+
+
+def checked_tension(
+    pose: Posture, tension: Tension | ArrayLike, wrench: ArrayLike | None
+) -> tuple[Array, Array]:
+    """Check the arguments of :func:`stiffness`; return F (C,) [N] and W (6,)."""
     arm = instance("pose", pose, Posture).arm
     if isinstance(tension, Tension):
         if not tension.posture._equals(pose):
@@ -416,8 +467,7 @@ def stiffness(
             raise InvalidInput(
                 "tension", f"{F[c]:g} N given for {arm.cables[c].name}; cables only pull."
             )
-    k = arm._model.laws.stiffness(pose.cable_lengths, F)
-    return assemble(pose, F, W, k, tension if isinstance(tension, Tension) else None)
+    return F, W
 
 
 def assemble(

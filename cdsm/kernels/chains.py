@@ -22,6 +22,9 @@ import numpy as np
 from cdsm.kernels.compiling import Width, compiled, inner, lanes, upwards
 from cdsm.kernels.segments import (
     Segments,
+    add_length_hessian,
+    mirror,
+    one_frames,
     segment_scratch,
     set_derivative,
     set_direction,
@@ -151,3 +154,25 @@ def single_chains(
         frames.slide.reshape(joint_slide.shape[0], 3),
         frames.site.reshape(row.shape[0], 3),
     )
+
+
+@compiled
+def single_tension_stiffness(
+    segment: Indices,
+    joint: Indices,
+    origin: Array,
+    axis: Array,
+    slide: Array,
+    site: Array,
+    tension: Array,
+    slot: Indices,
+    slots: int,
+) -> Array:
+    """Compute Σ T_j ∂²l_j/∂θ² over the segments of each slot, (slots, nv, nv), of one posture."""
+    nv = origin.shape[0] - 1
+    total, weight = np.zeros((slots, nv, nv, 1)), tension.reshape(tension.shape[0], 1)
+    frames = one_frames(origin, axis, slide, site)
+    add_length_hessian(segment, joint, frames, weight, slot, segment_scratch(nv, 1), total, None)
+    for s in range(slots):
+        mirror(total[s], None)
+    return total.reshape(slots, nv, nv)

@@ -102,10 +102,10 @@ def stiffness_gradient(stiffness: Stiffness) -> StiffnessGradient:
         stiffness: K, the result of :func:`~cdsm.stiffness`.
 
     Raises:
-        InvalidInput: ``stiffness`` is not a ``Stiffness``, or the slope of a user-defined law is
-            not finite.
+        InvalidInput: ``stiffness`` is not a frictionless ``Stiffness``, or the slope of a
+            user-defined law is not finite.
         ElasticityRangeError: A tension is outside the domain of its elasticity.
     """
-    K = instance("stiffness", stiffness, Stiffness)
+    K = instance("stiffness", stiffness, Stiffness).require_frictionless()
     slope, _ = K.posture.arm._model.laws.slopes(K.tension, K.cable_stiffness)
     return StiffnessGradient(stiffness=K, cable_stiffness=slope)

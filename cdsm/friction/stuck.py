@@ -1,0 +1,116 @@
+"""Stiffness of an arm whose cables stick in their holes, or slide in some of them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cdsm.errors import InvalidInput
+from cdsm.friction.tangent import Signs, tension_gradient
+from cdsm.kernels.stiffness import single_load_stiffness
+from cdsm.posture import Posture
+from cdsm.stiffness_matrix import Friction, Stiffness, checked_tension
+from cdsm.support.validation import instance, number_array, vector, wrench_vector
+from cdsm.support.values import Array, frozen
+from cdsm.tension import Tension
+
+
+def stuck_stiffness(
+    pose: Posture, tension: Tension | ArrayLike, wrench: ArrayLike | None = None
+) -> Stiffness:
+    """Compute the stiffness while all cables stick: what a load below :func:`breakaway` measures.
+
+    Each segment between two holes is a spring k_j = EA(F)/a_j of its own, with the natural length
+    a_j of its wire: K_θ = Σ_j (F H_j + k_j g_j g_jᵀ) + gravity + load, with g_j = ∂l_j/∂θ and H_j
+    = ∂²l_j/∂θ². Lead, springs in series and motors of force behind a hole that holds do not count.
+    A hole without friction, or through which the cable goes straight, does not hold: its segments
+    are one spring. An arm without friction has the stiffness of :func:`~cdsm.stiffness`. With the
+    same tensions, the result minus this stiffness is positive semidefinite.
+
+    Arguments and errors are those of :func:`~cdsm.stiffness`. All segments of a cable have its
+    tension, as after some shaking of the arm.
+    """
+    F, W = checked_tension(pose, tension, wrench)
+    T = F[pose.segments.chains.cable]
+    none = np.zeros(len(pose.segments.wrap), dtype=np.int8)
+    given = tension if isinstance(tension, Tension) else None
+    return assemble_segments(pose, T, none, W, "stuck", given)
+
+
+def sliding_stiffness(
+    pose: Posture, tension: ArrayLike, sliding: ArrayLike, wrench: ArrayLike | None = None
+) -> Stiffness:
+    """Compute the stiffness while cables slide in some holes, in the given directions.
+
+    Segments that sliding holes join share their wire, and their tensions keep the ratio
+    exp(±μ φ). K_θ = Σ_j (T_j H_j + g_j ∂T_j/∂θ) + gravity + load is not symmetric, and may be
+    softer than the frictionless stiffness in some joint motions. It holds as long as the same holes
+    slide in the same directions.
+
+    Args:
+        pose: The posture.
+        tension: T (S,) [N] of the segments of :attr:`Posture.segments`, not negative; or F (C,) [N]
+            at the actuators: the tensions beyond each sliding hole then follow from it.
+        sliding: One sign per hole of :attr:`Posture.segments`, (P,): 0 where the hole holds, 1
+            where the tension after it is the larger one by exp(μ φ), −1 where it is the smaller.
+        wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m]; default zero.
+
+    Raises:
+        InvalidInput: An argument has the wrong shape or is not numbers, or a tension is negative.
+        ElasticityRangeError: A tension is outside the domain of its cable's elasticity.
+    """
+    chains = instance("pose", pose, Posture).segments.chains
+    signs = vector("sliding", sliding, len(chains.hole), "one sign per hole")
+    wrong = np.flatnonzero(~np.isin(signs, (-1.0, 0.0, 1.0)))
+    if wrong.size:
+        hole = int(wrong[0])
+        raise InvalidInput(
+            "sliding", f"{signs[hole]:g} given for hole {hole + 1}; a sign is -1, 0 or 1."
+        )
+    T = number_array("tension", tension, "tension")
+    if T.shape == (len(pose.arm.cables),) and len(T) != len(chains.segments):
+        step = np.zeros(len(chains.segments))
+        step[chains.hole + 1] = signs * chains.friction * pose.segments.wrap
+        first = np.flatnonzero(np.diff(chains.cable, prepend=-1))
+        total = np.cumsum(step)
+        T = T[chains.cable] * np.exp(total - total[first][chains.cable])
+    T = vector("tension", T, len(chains.segments), "one tension [N] per segment, or per cable")
+    if T.min() < 0.0:
+        raise InvalidInput("tension", f"{T.min():g} N given; cables only pull.")
+    W = frozen(np.zeros(6)) if wrench is None else wrench_vector("wrench", wrench)
+    return assemble_segments(pose, T, signs.astype(np.int8), W, "sliding")
+
+
+def assemble_segments(
+    pose: Posture,
+    tension: Array,
+    sliding: Signs,
+    wrench: Array,
+    friction: Friction,
+    distribution: Tension | None = None,
+) -> Stiffness:
+    """Compute K_θ from checked tensions of the segments T (S,) and signs σ (P,) of the holes."""
+    model, segments = pose.arm._model, pose.segments
+    gradient = tension_gradient(pose, tension, sliding)
+    active = segments.tension_stiffness(tension).sum(axis=0)
+    passive = segments.length_jacobian.T @ gradient
+    if friction == "stuck":
+        passive = (passive + passive.T) / 2.0  # symmetric but for rounding
+    load = single_load_stiffness(pose.jacobian, wrench, model.masses.tip_joints)
+    first = np.flatnonzero(np.diff(segments.chains.cable, prepend=-1))
+    F = tension[first]
+    return Stiffness(
+        posture=pose,
+        tension=frozen(F),
+        wrench=wrench,
+        cable_stiffness=model.laws.stiffness(pose.cable_lengths, F),
+        active=frozen(active),
+        passive=frozen(passive),
+        gravity=pose.gravity_stiffness,
+        load=frozen(load),
+        joint=frozen(active + passive + pose.gravity_stiffness + load),
+        distribution=distribution,
+        friction=friction,
+        segment_tension=frozen(tension),
+        tension_gradient=gradient,
+    )
