@@ -1,0 +1,179 @@
+"""Cables of an arm as chains of segments: their tensions, slips and energies at a fixed posture."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cdsm.cable import Cable
+from cdsm.elasticity import Elasticity, LinearElasticity
+from cdsm.kernels.chain_problem import chain_tangent, solve_chains
+from cdsm.kernels.tree import Indices
+from cdsm.support.values import Array
+
+_ITERATIONS = 60
+"""Newton steps on a law of rigidity. Linear laws need one, strands 3 to 6."""
+
+_UNDAMPED = 20
+"""Newton steps that are not halved; a law with kinks may make full steps cycle."""
+
+_CONVERGED = 1e-13
+"""Relative change of the tensions that ends the iteration: the error left is its square."""
+
+
+class Chain(NamedTuple):
+    """State of all cables at a posture, after the slips; arrays are over the segments (S,)."""
+
+    tension: Array  # T [N]
+    natural: Array  # a: natural length of the wire in the segment [m]
+    slip: Array  # natural length [m] that moved to the next segment
+    slides: NDArray[np.bool_]  # whether the hole to the next segment slides
+    stretch: Array  # 1 + ε [-]
+    compliance: Array  # −∂a/∂T at constant length [m/N]
+
+
+class ChainProblem:
+    """Laws, series springs and motors of all cables, divided into segments.
+
+    A force-controlled motor holds the tension of the first segment, a position-controlled motor its
+    wire. The series spring belongs to the first segment. Beyond the ends of its law a segment keeps
+    the rigidity of the end; a cable whose tension is zero is slack.
+
+    Args:
+        cables: Cables of the arm.
+        start: First segment of each cable; the last entry is the number of segments (C+1,).
+        tension: F (C,) [N] at which the natural lengths are defined.
+        unstrained: Whether natural lengths are unstretched, or those under ``tension``.
+    """
+
+    def __init__(
+        self, cables: tuple[Cable, ...], start: Indices, tension: Array, unstrained: bool
+    ) -> None:
+        self._start = start
+        self._cable = np.repeat(np.arange(len(cables)), np.diff(start))
+        size, first = self._cable.size, start[:-1]
+        self._spring, self._rest = np.zeros(size), np.zeros(size)
+        self._spring[first] = [1.0 / cable.series_stiffness for cable in cables]
+        self._rest[first] = [cable.elasticity.domain.low for cable in cables]
+        self._base, self._softness = np.ones(size), np.zeros(size)
+        self._laws: list[tuple[Elasticity, Indices]] = []  # not linear
+        groups: list[tuple[Elasticity, list[int]]] = []
+        for c, cable in enumerate(cables):
+            same = next((of for law, of in groups if law is cable.elasticity), None)
+            if same is None:
+                groups.append((cable.elasticity, same := []))
+            same.append(c)
+        for law, of in groups:
+            segments = np.flatnonzero(np.isin(self._cable, of))
+            if isinstance(law, LinearElasticity):
+                self._softness[segments] = 1.0 / law.rigidity(0.0)
+            else:
+                self._laws.append((law, segments))
+        self._offset = np.zeros(size)
+        if not unstrained:
+            F = tension[self._cable]
+            base, softness = self._strain(F)
+            self._offset = base + softness * F - 1.0
+            self._base = self._base - self._offset
+
+    def settle(
+        self, length: Array, natural: Array, ratio: Array, forced: Array, near: Array
+    ) -> Chain:
+        """Solve the chain problem of lengths l, old natural lengths a and ρ = exp(μ φ), all (S,).
+
+        ``forced`` (C,) [N] is the tension that a motor holds, or NaN. Roots are searched from the
+        tensions ``near`` (S,) [N].
+        """
+        T = near
+        for attempt in range(_ITERATIONS):
+            base, softness = self._strain(T)
+            new, slip, slides = solve_chains(
+                self._start,
+                forced,
+                length,
+                natural,
+                base,
+                softness,
+                self._spring,
+                self._rest,
+                ratio,
+                T,
+            )
+            if not self._laws or (abs(new - T) <= _CONVERGED * np.maximum(new, 1.0)).all():
+                break
+            T = new if attempt < _UNDAMPED else (T + new) / 2.0
+        stretch = base + softness * new
+        wire = (length - self._spring * (new - self._rest)) / stretch
+        compliance = (self._spring + wire * softness) / stretch
+        after = natural - slip
+        after[1:] += slip[:-1]
+        first = self._start[:-1]
+        supplied = ~np.isnan(forced)
+        after[first[supplied]] = wire[first[supplied]]
+        slack = (new == 0.0) & ~supplied[self._cable]
+        if slack.any():  # a slack cable remembers nothing: its surplus spreads evenly
+            surplus = np.add.reduceat(after, first) / np.add.reduceat(wire, first)
+            after = np.where(slack, wire * surplus[self._cable], after)
+        return Chain(new, after, slip, slides, stretch, compliance)
+
+    def natural(self, length: Array, tension: Array) -> Array:
+        """Compute the natural lengths a (S,) [m] of segments of length l under T (S,) [N]."""
+        base, softness = self._strain(tension)
+        wire = length - self._spring * (tension - self._rest)
+        return np.asarray(wire / (base + softness * tension))
+
+    def tangent(
+        self, chain: Chain, forced: Array, gradient: Array, friction_gradient: Array
+    ) -> Array:
+        """Compute ∂T/∂θ (S, nv) [N/rad]; see :func:`~cdsm.kernels.chain_problem.chain_tangent`."""
+        return chain_tangent(
+            self._start,
+            forced,
+            chain.stretch,
+            chain.compliance,
+            chain.tension,
+            chain.slides,
+            gradient,
+            friction_gradient,
+        )
+
+    def stored(self, natural: Array, tension: Array) -> float:
+        """Compute the energy [J] in all segments and series springs, from the low ends of laws."""
+        spring = self._spring @ (tension**2 - self._rest**2) / 2.0
+        return float(natural @ self._energy(tension) + spring)
+
+    def potential(self, tension: Array) -> Array:
+        """Compute T (1 + ε) − ∫ T dε (S,) [N]: the work that brings wire under tension, per length.
+
+        Wire that moves from one segment to another dissipates the difference. To first order in the
+        strain this is the difference of the tensions.
+        """
+        base, softness = self._strain(tension)
+        return np.asarray(tension * (base + softness * tension) - self._energy(tension))
+
+    def _strain(self, tension: Array) -> tuple[Array, Array]:
+        """Return base and softness (S,) of the tangents 1 + ε ≈ base + softness · T at T (S,)."""
+        if not self._laws:
+            return self._base, self._softness
+        base, softness = self._base.copy(), self._softness.copy()
+        for law, of in self._laws:
+            inside, rigidity = _within(law, tension[of])
+            softness[of] = 1.0 / rigidity
+            base[of] += law.strain(inside) - inside / rigidity
+        return base, softness
+
+    def _energy(self, tension: Array) -> Array:
+        """Compute ∫ T dε (S,) [N] from the low ends of the laws."""
+        energy = self._softness * tension**2 / 2.0
+        for law, of in self._laws:
+            T, (inside, rigidity) = tension[of], _within(law, tension[of])
+            energy[of] = law.energy(inside) + (T**2 - inside**2) / (2.0 * rigidity)
+        return energy
+
+
+def _within(law: Elasticity, tension: Array) -> tuple[Array, Array]:
+    """Return the tensions moved into the domain of a law, and its rigidities there [N]."""
+    inside = np.clip(tension, law.domain.first, law.domain.high)
+    return inside, np.asarray(law.rigidity(inside))

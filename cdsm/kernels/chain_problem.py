@@ -1,0 +1,217 @@
+"""Numba kernel of the chain problem: tensions along a cable that sticks and slips in its holes.
+
+Segment j of a cable lies between two holes. At a fixed posture it has the length l_j. From one
+posture to the next it keeps its natural length a_j, except for wire that slips through its holes.
+Coulomb friction (capstan) with ρ_j = exp(μ φ_j) at the hole between segments j and j + 1 demands
+
+    T_j/ρ_j ≤ T_{j+1} ≤ ρ_j T_j.
+
+Wire s_j > 0 moves from j to j + 1 only if T_{j+1} = ρ_j T_j, and back (s_j < 0) only if
+T_j = ρ_j T_{j+1}. Under T a segment has the natural length
+
+    A_j(T) = (l_j − c_j (T − T⁰_j))/(1 + ε(T)).
+
+A series spring of compliance c_j, at rest at T⁰_j, exists only in the first segment. A_j falls with
+T. Wire is conserved: A_j(T_j) = a_j − s_j + s_{j−1}. With y = ln T all this is the optimality (KKT)
+conditions of
+
+    minimize Σ_j D_j(y_j),   D_j′ = a_j − A_j(e^y),   subject to |y_{j+1} − y_j| ≤ μ φ_j,
+
+and the slips are the multipliers. D_j′ rises, so the problem is strictly convex: there is one
+answer. No segment of a tense cable is slack.
+
+Dynamic programming on the chain solves it exactly ("taut string"). Let V_j(y) be the least sum over
+the segments from j to the end of the cable if segment j has y. Let y*_j be its minimizer. The
+choice of y_{j+1} is the point z nearest to y*_{j+1} within y ± μφ_j. Therefore
+
+    V_j′(y) = D_j′(y) + V_{j+1}′(z) if y*_{j+1} is beyond y ± μφ_j,   and D_j′(y) if not.
+
+From the end of the cable to the motor, the root y*_j of the rising V_j′ is found by Newton's method
+inside a bracket. A locked motor gives y_1 = y*_1, a motor that holds the tension gives y_1. From
+there y_{j+1} = z. A hole slides if z is not y*_{j+1}; then s_j = −V_{j+1}′(z). All this runs in T
+instead of y, so that T = 0 is an ordinary number: there the cable is slack.
+
+One value of V_j′ takes as long as its block of sliding holes. So N segments take O(N) where few
+holes slide, and O(N²) where all do.
+
+In this kernel 1 + ε(T) = base + softness · T. For other laws :mod:`cdsm.friction.chain_problem`
+repeats it with the tangent of the law, which is Newton's method.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cdsm.kernels.compiling import compiled, inner
+from cdsm.kernels.tree import Indices
+from cdsm.support.values import Array
+
+_ROUNDING = 2.0**-52
+"""Rounding of V_j′ over the natural lengths in its sum; of a tension over itself."""
+
+_ITERATIONS = 200
+"""Steps that find a root. Newton's method needs 3 to 6; bisection from a bracket would need 60."""
+
+
+class Wire(NamedTuple):
+    """Segments of all cables (S,), one cable after the other, each from its motor to its end."""
+
+    length: Array  # l [m]
+    natural: Array  # a before the slips [m]
+    base: Array  # 1 + ε, extrapolated to no tension [-]
+    softness: Array  # dε/dT [1/N]
+    spring: Array  # compliance of the series spring [m/N]
+    rest: Array  # tension at which the spring is at rest [N]
+    ratio: Array  # ρ of the hole to the next segment; not used at the end of a cable [-]
+
+
+@inner
+def _surplus(wire: Wire, j: int, T: float) -> tuple[float, float]:
+    """Compute D_j′ = a_j − A_j(T) [m] and its derivative by T [m/N]."""
+    stretch = wire.base[j] + wire.softness[j] * T
+    natural = (wire.length[j] - wire.spring[j] * (T - wire.rest[j])) / stretch
+    return wire.natural[j] - natural, (wire.spring[j] + natural * wire.softness[j]) / stretch
+
+
+@inner
+def _next(T: float, ratio: float, best: float) -> float:
+    """Return the tension nearest to ``best`` that friction allows beside T."""
+    return min(max(best, T / ratio), T * ratio)
+
+
+@inner
+def _slope(
+    wire: Wire, best: Array, j: int, last: int, tension: float
+) -> tuple[float, float, float]:
+    """Compute V_j′ [m], its derivative by T [m/N], and the natural length in its sum [m]."""
+    total, rise = _surplus(wire, j, tension)
+    T, size = tension, abs(wire.natural[j])
+    for i in range(j + 1, last + 1):
+        T = _next(T, wire.ratio[i - 1], best[i])
+        if best[i] == T > 0.0:  # V_i is flat; at T = 0 this is the limit T → 0
+            break
+        value, slope = _surplus(wire, i, T)
+        total += value
+        rise += slope * (T / tension if tension > 0.0 else 1.0)
+        size += abs(wire.natural[i])
+    return total, rise, size
+
+
+@inner
+def _root(wire: Wire, best: Array, j: int, last: int, near: float) -> float:
+    """Find y*_j as a tension; zero if V_j′ > 0 for all tensions."""
+    if _slope(wire, best, j, last, 0.0)[0] >= 0.0:
+        return 0.0
+    low, high, T = 0.0, math.inf, near if near > 0.0 else 1.0
+    for _ in range(_ITERATIONS):
+        value, rise, size = _slope(wire, best, j, last, T)
+        if value < 0.0:
+            low = T
+        else:
+            high = T
+        new = T - value / rise
+        if abs(new - T) <= _ROUNDING * T or abs(value) <= _ROUNDING * size:
+            return max(new, 0.0)
+        if not low < new < high:
+            new = (low + high) / 2.0 if math.isfinite(high) else 2.0 * T
+        T = new
+    return T
+
+
+@compiled
+def solve_chains(
+    start: Indices,
+    forced: Array,
+    length: Array,
+    natural: Array,
+    base: Array,
+    softness: Array,
+    spring: Array,
+    rest: Array,
+    ratio: Array,
+    near: Array,
+) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Solve the chain problem of all cables; see :class:`Wire` for the arrays (S,).
+
+    ``start`` (C+1,) is the first segment of each cable, and the number of segments at the end.
+    ``forced`` (C,) [N] is the tension that a motor holds in the first segment; NaN: it holds the
+    wire. The roots are searched from the tensions ``near`` (S,) [N].
+
+    Returns:
+        T (S,) [N]; the slip (S,) [m] of natural length from each segment to the next one; whether
+        the hole between the two slides (S,). A hole without friction always slides.
+    """
+    wire = Wire(length, natural, base, softness, spring, rest, ratio)
+    size = length.shape[0]
+    best, T, slip, slides = np.empty(size), np.empty(size), np.zeros(size), np.zeros(size, np.bool_)
+    for c in range(start.shape[0] - 1):
+        first, last = start[c], start[c + 1] - 1
+        held = math.isnan(forced[c])
+        for j in range(last, first, -1):
+            best[j] = _root(wire, best, j, last, near[j])
+        best[first] = _root(wire, best, first, last, near[first]) if held else forced[c]
+        T[first] = best[first]
+        for j in range(first + 1, last + 1):
+            T[j] = _next(T[j - 1], ratio[j - 1], best[j])
+            slides[j - 1] = T[j] != best[j] or ratio[j - 1] == 1.0
+        moved = 0.0
+        for j in range(last, first, -1):
+            moved = moved - _surplus(wire, j, T[j])[0] if slides[j - 1] else 0.0
+            slip[j - 1] = moved if T[first] > 0.0 else 0.0
+    return T, slip, slides
+
+
+@compiled
+def chain_tangent(
+    start: Indices,
+    forced: Array,
+    stretch: Array,
+    compliance: Array,
+    tension: Array,
+    slides: NDArray[np.bool_],
+    gradient: Array,
+    friction_gradient: Array,
+) -> Array:
+    """Compute ∂T/∂θ (S, nv) [N/rad] of the answer of :func:`solve_chains`.
+
+    A block is a run of segments joined by sliding holes. In it T_j = T_a exp(Σ ± μ φ) and its wire
+    is conserved. With g = ∂l/∂θ, the sum ψ_j = Σ ± μ ∂φ/∂θ from the first segment of the block to
+    segment j, and the compliance −∂A/∂T of the segments,
+
+        ∂ln T_a/∂θ = Σ_j (g_j/(1 + ε_j) − compliance_j T_j ψ_j) / Σ_j compliance_j T_j,
+        ∂T_j/∂θ = T_j (∂ln T_a/∂θ + ψ_j).
+
+    A motor that holds the tension holds T_a of its block. A slack cable stays slack. ``stretch`` is
+    1 + ε (S,), ``gradient`` g (S, nv) [m/rad], and ``friction_gradient`` μ ∂φ/∂θ (S, nv) [1/rad] of
+    the hole to the next segment.
+    """
+    size, nv = gradient.shape
+    result = np.zeros((size, nv))
+    for c in range(start.shape[0] - 1):
+        a = start[c]
+        while a < start[c + 1]:
+            end = a + 1
+            while end < start[c + 1] and slides[end - 1]:
+                end += 1
+            if tension[a] > 0.0:
+                held = a == start[c] and not math.isnan(forced[c])
+                weight = 0.0
+                for j in range(a, end):
+                    weight += compliance[j] * tension[j]
+                for v in range(nv):
+                    turned, pull = 0.0, 0.0
+                    for j in range(a, end):
+                        if j > a:
+                            up = tension[j] > tension[j - 1]
+                            turned += friction_gradient[j - 1, v] * (1.0 if up else -1.0)
+                        result[j, v] = tension[j] * turned
+                        pull += gradient[j, v] / stretch[j] - compliance[j] * result[j, v]
+                    common = 0.0 if held else pull / weight
+                    for j in range(a, end):
+                        result[j, v] += tension[j] * common
+            a = end
+    return result

@@ -1,0 +1,357 @@
+"""The chain problem: tensions and slips of a cable in its holes, against KKT and other solvers."""
+
+import itertools
+import math
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.optimize import brentq, minimize
+
+import cdsm
+from cdsm.friction.chain_problem import ChainProblem
+from cdsm.kernels.chain_problem import Wire, chain_tangent, solve_chains
+from cdsm.support.values import Array
+
+ROUNDING = 8.0 * np.finfo(float).eps
+
+
+class Chains(NamedTuple):
+    """Chain problems side by side, as the kernel takes them."""
+
+    start: NDArray[np.intp]
+    forced: Array
+    wire: Wire
+    near: Array
+
+    def solve(self) -> tuple[Array, Array, NDArray[np.bool_]]:
+        return solve_chains(self.start, self.forced, *self.wire, self.near)
+
+    def part(self, c: int) -> "Chains":
+        """One of the chains."""
+        own = slice(self.start[c], self.start[c + 1])
+        wire = Wire(*(each[own] for each in self.wire))
+        return Chains(np.array([0, wire.length.size]), self.forced[c : c + 1], wire, self.near[own])
+
+    def lengths_left(self, T: Array) -> tuple[Array, Array]:
+        """D' = a − A(T) [m] and its derivative by T [m/N]."""
+        w = self.wire
+        stretch = w.base + w.softness * T
+        natural = (w.length - w.spring * (T - w.rest)) / stretch
+        return w.natural - natural, (w.spring + natural * w.softness) / stretch
+
+
+def random_chains(seed: int, count: int, most: int = 16) -> Chains:
+    """Chains near a state that friction allows: also without friction, slack, springs, forces."""
+    rng = np.random.default_rng(seed)
+    sizes = rng.integers(1, most + 1, count)
+    start = np.concatenate([[0], np.cumsum(sizes)])
+    of, total = np.repeat(np.arange(count), sizes), int(sizes.sum())
+    length = rng.uniform(0.005, 0.1, total)
+    softness = 10.0 ** -rng.uniform(3.0, 5.5, count)[of]
+    first = start[:-1]
+    spring, rest = np.zeros(total), np.zeros(total)
+    spring[first] = np.where(rng.random(count) < 0.3, 10.0 ** rng.uniform(-6.0, -3.0, count), 0.0)
+    length[first] += np.where(rng.random(count) < 0.5, rng.uniform(0.0, 0.5, count), 0.0)
+    rest[first] = np.where(rng.random(count) < 0.3, 2.2, 0.0)
+    mu = rng.choice([0.0, 0.02, 0.1, 0.3, 2.0], count)[of]
+    grip = mu * rng.uniform(0.0, 0.4, total) * (rng.random(total) < 0.8)  # some without wrap
+    T = 10.0 ** rng.uniform(-6.0, 3.0, count)[of]
+    for c in range(count):
+        for j in range(start[c] + 1, start[c + 1]):
+            T[j] = T[j - 1] * math.exp(grip[j - 1] * rng.uniform(-1.0, 1.0))
+    base = 1.0 - rng.choice([0.0, 1e-3], count)[of]
+    natural = (length - spring * (T - rest)) / (base + softness * T)
+    length *= 1.0 + 10.0 ** rng.uniform(-7.0, -2.0, count)[of] * rng.normal(size=total)
+    forced = np.where(rng.random(count) < 0.3, T[first] * rng.uniform(0.0, 2.0, count), np.nan)
+    wire = Wire(length, natural, base, softness, spring, rest, np.exp(grip))
+    return Chains(start, forced, wire, T)
+
+
+def check_optimality(chains: Chains) -> tuple[int, int]:
+    """Check the KKT conditions, which make the answer the only one; count slack and sliding."""
+    T, slip, slides = chains.solve()
+    assert np.isfinite(T).all()
+    assert np.isfinite(slip).all()
+    left, rise = chains.lengths_left(T)
+    slack = 0
+    for c, forced in enumerate(chains.forced):
+        a, b = chains.start[c], chains.start[c + 1]
+        if not np.isnan(forced):
+            assert T[a] == forced
+        if T[a] == 0.0:
+            assert not T[a:b].any()
+            assert not slip[a:b].any()
+            if np.isnan(forced):
+                slack += 1
+                assert left[a:b].sum() >= -ROUNDING * abs(chains.wire.natural[a:b]).sum()
+            continue
+        assert (T[a:b] > 0.0).all()
+        step, grip = np.diff(np.log(T[a:b])), np.log(chains.wire.ratio[a : b - 1])
+        own = slip[a : b - 1]
+        assert slip[b - 1] == 0.0
+        assert (abs(step) <= grip + 1e-14).all()
+        np.testing.assert_allclose(step[own > 0.0], grip[own > 0.0], atol=1e-14)
+        np.testing.assert_allclose(step[own < 0.0], -grip[own < 0.0], atol=1e-14)
+        assert ((own == 0.0) | slides[a : b - 1]).all()
+        # wire is conserved: what a block of sliding holes lacks, over its compliance, is tension
+        lacking = left[a:b] - np.diff(np.concatenate([[0.0], own, [0.0]]))
+        edges = [0, *(np.flatnonzero(~slides[a : b - 1]) + 1), b - a]
+        for i, k in itertools.pairwise(edges):
+            if i == 0 and not np.isnan(forced):
+                lacking[0] = 0.0  # the motor supplies the wire of its segment
+            share = T[a + i : a + k] / T[a + i : a + k].max()
+            compliance = (share * rise[a + i : a + k]).sum()
+            noise = abs(chains.wire.natural[a + i : a + k]).sum() * ROUNDING
+            error = abs(lacking[i:k].sum()) - noise
+            assert error <= 1e-9 * compliance * T[a + i : a + k].max()
+    return slack, int(slides.sum())
+
+
+def test_random_chains_meet_the_optimality_conditions() -> None:
+    slack, sliding = check_optimality(random_chains(0, 3000))
+    assert slack > 100
+    assert sliding > 3000
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", range(1, 26))
+def test_a_hundred_thousand_chains_meet_the_optimality_conditions(seed: int) -> None:
+    check_optimality(random_chains(seed, 4000, most=24))
+
+
+def test_every_pattern_of_sliding_holes_was_tried_and_one_fits() -> None:
+    # independent: for each pattern of stuck, forward and backward holes, roots of the blocks
+    chains, found = random_chains(77, 150, most=5), 0
+    for c in range(150):
+        one = chains.part(c)
+        T = one.solve()[0]
+        if not np.isnan(one.forced[0]) or T[0] < 1e-3:
+            continue
+        grip, size = np.log(one.wire.ratio[:-1]), T.size
+        fits = []
+        for pattern in itertools.product((0, 1, -1), repeat=size - 1):
+            trial = np.empty(size)
+            edges = [0, *(i + 1 for i, s in enumerate(pattern) if not s), size]
+            for i, k in itertools.pairwise(edges):
+                rise = np.concatenate([[0.0], np.cumsum((pattern * grip)[i : k - 1])])
+
+                def lacking(
+                    y: float, i: int = i, k: int = k, rise: Array = rise, one: Chains = one
+                ) -> float:
+                    full = np.zeros(one.near.size)
+                    full[i:k] = np.exp(y + rise)
+                    return float(one.lengths_left(full)[0][i:k].sum())
+
+                if lacking(-40.0) > 0.0 or lacking(25.0) < 0.0:
+                    break
+                trial[i:k] = np.exp(brentq(lacking, -40.0, 25.0, xtol=1e-15, rtol=1e-15) + rise)
+            else:
+                slip = np.cumsum(one.lengths_left(trial)[0])[:-1]
+                step = np.diff(np.log(trial))
+                noise = 1e-15
+                if (abs(step) <= grip + 1e-9).all() and (np.array(pattern) * slip >= -noise).all():
+                    fits.append(trial)
+        assert fits
+        # noise of the lengths, as a tension: rounding times EA
+        tolerance = 1e-9 * T.max() + 32.0 * ROUNDING / one.wire.softness[0]
+        for fit in fits:
+            np.testing.assert_allclose(fit, T, rtol=0.0, atol=tolerance)
+        found += 1
+    assert found > 60
+
+
+def test_general_convex_solver_comes_to_the_same_tensions() -> None:
+    rng = np.random.default_rng(5)
+    for _ in range(40):
+        size = int(rng.integers(2, 9))
+        length, grip = rng.uniform(0.01, 0.05, size), 0.3 * rng.uniform(0.0, 0.5, size - 1)
+        T0 = np.full(size, 50.0)
+        softness = np.full(size, 1.0 / 2e3)
+        natural = length / (1.0 + softness * T0)
+        moved = length * (1.0 + 3e-3 * rng.normal(size=size))
+        zero, ratio = np.zeros(size), np.exp(np.append(grip, 0.0))
+        wire = Wire(moved, natural, np.ones(size), softness, zero, zero, ratio)
+        chains = Chains(np.array([0, size]), np.array([np.nan]), wire, T0)
+
+        def objective(y: Array, wire: Wire = wire) -> tuple[float, Array]:
+            # ∫ (a − l/(1 + κ eʸ)) dy = (a − l) y + l ln(1 + κ eʸ)
+            T = 50.0 * np.exp(y)
+            value = (wire.natural - wire.length) @ y + wire.length @ np.log1p(wire.softness * T)
+            rate = wire.natural - wire.length / (1.0 + wire.softness * T)
+            return 1e4 * float(value), 1e4 * rate
+
+        D = np.diff(np.eye(size), axis=0)
+        limits = [
+            {"type": "ineq", "fun": lambda y, D=D, g=grip, s=s: g - s * (D @ y)} for s in (1, -1)
+        ]
+        answer = minimize(
+            objective,
+            np.zeros(size),
+            jac=True,
+            method="SLSQP",
+            constraints=limits,
+            options={"ftol": 1e-16, "maxiter": 500},
+        )
+        np.testing.assert_allclose(50.0 * np.exp(answer.x), chains.solve()[0], rtol=2e-6)
+
+
+# --- one hole in closed form ----------------------------------------------------------------
+
+
+def capstan(
+    pulled: float, mu: float = 0.1, angle: float = 0.5
+) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Two equal segments of EA = 1 kN at 50 N; the second is pulled longer."""
+    ones, zero = np.ones(2), np.zeros(2)
+    length, softness = 0.1 * ones, ones / 1000.0
+    natural = length / (1.0 + 50.0 * softness)
+    wire = Wire(
+        np.array([0.1, 0.1 + pulled]),
+        natural,
+        ones,
+        softness,
+        zero,
+        zero,
+        np.exp(mu * angle * ones),
+    )
+    return Chains(np.array([0, 2]), np.array([np.nan]), wire, 50.0 * ones).solve()
+
+
+def test_one_hole_in_closed_form() -> None:
+    a = 0.1 / 1.05
+    grip, stiff = math.exp(0.05), 1000.0 / a
+    breakaway = 50.0 * (grip - 1.0) / stiff  # how far the second segment can be pulled
+    T, slip, slides = capstan(0.999 * breakaway)
+    np.testing.assert_allclose(T, [50.0, 50.0 + 0.999 * breakaway * stiff], rtol=1e-13)
+    assert not slides.any()
+    assert not slip.any()
+    # sliding: T₂ = ρ T₁, and 0.1/(1 + T₁/EA) + (0.1 + x)/(1 + ρ T₁/EA) = 2 a, a quadratic
+    x = 3.0 * breakaway
+    T, slip, slides = capstan(x)
+    b, c = 0.1, 0.1 + x
+    p = np.polynomial.Polynomial([b + c - 2 * a, b * grip + c - 2 * a * (1 + grip), -2 * a * grip])
+    root = 1000.0 * p.roots().max()
+    np.testing.assert_allclose(T, [root, grip * root], rtol=1e-12)
+    assert slides.tolist() == [True, False]
+    assert slip[0] == pytest.approx(a - 0.1 / (1.0 + root / 1000.0), rel=1e-9)
+    assert slip[0] > 0.0
+
+
+def test_without_friction_the_tension_is_one_and_does_not_depend_on_the_holes() -> None:
+    T, _, slides = capstan(1e-3, mu=0.0)
+    assert T[0] == T[1]
+    assert slides[0]
+    assert T[0] == pytest.approx(1000.0 * (0.201 / (2 * 0.1 / 1.05) - 1.0), rel=1e-12)
+
+
+# --- derivatives ----------------------------------------------------------------------------
+
+
+def test_tangent_is_the_derivative_of_the_tensions() -> None:
+    rng, tried = np.random.default_rng(3), 0
+    for seed in range(120):
+        chains = random_chains(100 + seed, 1, most=9)
+        T, _, slides = chains.solve()
+        if T[0] < 1.0:
+            continue
+        w, size = chains.wire, T.size
+        g, gripped = rng.normal(size=(size, 1)), 0.1 * rng.normal(size=(size, 1))
+        gripped[w.ratio == 1.0] = 0.0
+        stretch = w.base + w.softness * T
+        slope = chain_tangent(
+            chains.start,
+            chains.forced,
+            stretch,
+            chains.lengths_left(T)[1],
+            T,
+            slides,
+            g,
+            gripped,
+        )[:, 0]
+        step, moved = 1e-6 * T.max() * w.softness[0] * w.length.min(), []
+        for sign in (1.0, -1.0):
+            turned = w._replace(
+                length=w.length + sign * step * g[:, 0],
+                ratio=w.ratio * np.exp(sign * step * gripped[:, 0]),
+            )
+            moved.append(chains._replace(wire=turned).solve())
+        if any((each[2] != slides).any() or each[0][0] == 0.0 for each in moved):
+            continue  # a hole begins to slide within the step
+        numerical = (moved[0][0] - moved[1][0]) / (2.0 * step)
+        noise = 4e-16 / w.softness[0] / step
+        np.testing.assert_allclose(slope, numerical, rtol=1e-5, atol=8.0 * noise + 1e-6)
+        tried += 1
+    assert tried > 50
+
+
+# --- laws -----------------------------------------------------------------------------------
+
+LAWS = (
+    cdsm.LinearElasticity(48e3),
+    cdsm.StrandElasticity.eq19_repaired(),
+    cdsm.TabulatedElasticity((0.0, 10.0, 60.0, 400.0), (0.0, 1e-3, 3e-3, 1e-2)),
+)
+
+
+@pytest.mark.parametrize("law", LAWS, ids=["linear", "strand", "table"])
+@pytest.mark.parametrize("unstrained", [True, False])
+def test_laws_keep_their_tension_where_nothing_moves(
+    law: cdsm.Elasticity, unstrained: bool
+) -> None:
+    problem, lengths, F = one_cable(law, unstrained)
+    T = np.full(6, F)
+    natural, ratio = problem.natural(lengths, T), np.full(6, 1.05)
+    chain = problem.settle(lengths, natural, ratio, np.array([np.nan]), np.full(6, 3.0))
+    np.testing.assert_allclose(chain.tension, F, rtol=1e-9)
+    if not unstrained:
+        np.testing.assert_allclose(natural[1:], lengths[1:], rtol=1e-15)
+
+
+@pytest.mark.parametrize("law", LAWS, ids=["linear", "strand", "table"])
+def test_any_law_conserves_wire_and_balances_its_energy(law: cdsm.Elasticity) -> None:
+    # lengths change slowly: work of the lengths = stored + dissipated, to second order of the step
+    errors = []
+    for steps in (50, 100, 200):
+        problem, lengths, F = one_cable(law, True)
+        T, ratio = np.full(6, F), np.full(6, math.exp(0.03))
+        natural = problem.natural(lengths, T)
+        total, begin = natural.sum(), problem.stored(natural, T)
+        way, worked, lost = np.array([0, 1, -1, 2, 0, 1]) * 1e-4, 0.0, 0.0
+        for s in range(1, steps + 1):
+            at = lengths + way * math.sin(3.0 * s / steps)
+            before, P = T, problem.potential(T)
+            chain = problem.settle(at, natural, ratio, np.array([np.nan]), T)
+            T, natural = chain.tension, chain.natural
+            assert natural.sum() == pytest.approx(total, rel=1e-15)
+            change = way * (math.sin(3.0 * s / steps) - math.sin(3.0 * (s - 1) / steps))
+            worked += float((before + T) @ change) / 2.0
+            P = (P + problem.potential(T)) / 2.0
+            lost += float(chain.slip[:-1] @ np.diff(problem.potential(T)))
+            assert (chain.slip[:-1] * np.diff(problem.potential(T)) >= 0.0).all()
+        errors.append(worked - (problem.stored(natural, T) - begin) - lost)
+        assert lost > 1e-5
+    assert abs(errors[-1]) < 0.02 * lost
+    assert abs(errors[-1]) < 0.6 * abs(errors[0])
+
+
+def test_slack_cable_forgets_and_is_tightened_again() -> None:
+    problem, lengths, F = one_cable(LAWS[0], True, math.inf)
+    natural, held = problem.natural(lengths, np.full(6, F)), np.array([np.nan])
+    ratio = np.full(6, 1.05)
+    slack = problem.settle(lengths * 0.99, natural, ratio, held, np.full(6, F))
+    assert not slack.tension.any()
+    assert slack.natural.sum() == pytest.approx(natural.sum(), rel=1e-15)
+    back = problem.settle(lengths, slack.natural, ratio, held, slack.tension)
+    np.testing.assert_allclose(back.tension, F, rtol=1e-9)
+
+
+def one_cable(
+    law: cdsm.Elasticity, unstrained: bool, spring: float = 2e5
+) -> tuple[ChainProblem, Array, float]:
+    """A cable of six segments at 50 N, with a spring at its motor."""
+    sites = tuple(cdsm.Site("link", (0.01 * i, 0.0, 0.0)) for i in range(7))
+    cable = cdsm.Cable("cable", sites, law, series_stiffness=spring)
+    lengths = np.array([0.2, 0.02, 0.03, 0.05, 0.02, 0.04])
+    return ChainProblem((cable,), np.array([0, 6]), np.array([50.0]), unstrained), lengths, 50.0
