@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from cdsm import plots as plots
     from cdsm import presets
     from cdsm import view as view
+    from cdsm.arm_file.cables import read_cables, write_cables
     from cdsm.batch import Batch, Tensions, distribute_tensions, evaluate
     from cdsm.cable import Cable, Site, in_series, serpentine_cables
     from cdsm.elasticity import Domain, Elasticity, LinearElasticity
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
         InvalidInput,
         JointLimitError,
         MissingExtra,
+        MissingWire,
         SingularMass,
         SingularStiffness,
         SolverError,
@@ -45,7 +47,6 @@ if TYPE_CHECKING:
     from cdsm.geometry import CableRoute, Geometry, Joint, Link
     from cdsm.identification import Identification, Measurement, identify
     from cdsm.instability import Remedy
-    from cdsm.interchange.cable_file import read_cables, write_cables
     from cdsm.interchange.caspr import read_caspr
     from cdsm.interchange.mjcf import to_mjcf, write_mjcf
     from cdsm.kinematics.maps import inverse_kinematics, solve_joint_angles
@@ -112,6 +113,7 @@ __all__ = [
     "Manipulator",
     "Measurement",
     "MissingExtra",
+    "MissingWire",
     "Modes",
     "PathPlan",
     "PathPoses",
@@ -185,20 +187,20 @@ __all__ = [
 
 
 _NAMES = {
+    "arm_file.cables": "read_cables write_cables",
     "batch": "Batch Tensions distribute_tensions evaluate",
     "cable": "Cable Site in_series serpentine_cables",
     "elasticity": "Domain Elasticity LinearElasticity",
     "errors": (
         "CableError CdsmError ClusterError ElasticityRangeError EquilibriumError FileError "
         "GeometryError InfeasibleTension InvalidInput JointLimitError MissingExtra "
-        "SingularMass SingularStiffness SolverError StoreError TensileTestError UnknownName "
-        "UnreachableStiffness UrdfError"
+        "MissingWire SingularMass SingularStiffness SolverError StoreError TensileTestError "
+        "UnknownName UnreachableStiffness UrdfError"
     ),
     "friction.stuck": "sliding_stiffness stuck_stiffness",
     "geometry": "CableRoute Geometry Joint Link",
     "instability": "Remedy",
     "identification": "Identification Measurement identify",
-    "interchange.cable_file": "read_cables write_cables",
     "interchange.caspr": "read_caspr",
     "interchange.mjcf": "to_mjcf write_mjcf",
     "kinematics.maps": "inverse_kinematics solve_joint_angles",

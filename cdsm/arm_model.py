@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,7 @@ from cdsm.cable import Cable
 from cdsm.cable_chains import Chains
 from cdsm.cable_laws import CableLaws, OriginalLength
 from cdsm.errors import CableError, UnknownName
+from cdsm.geometry import Geometry
 from cdsm.kernels import segments
 from cdsm.kernels.serpentine_guess import find_blocks
 from cdsm.kernels.tree import Routing, Tree
@@ -26,6 +27,22 @@ from cdsm.support.values import Array, frozen
 
 _LIMIT_SLACK = 1e-9
 """Angle [rad] beyond a limit that is accepted as rounding, e.g. of a conversion from degrees."""
+
+
+GRAVITY = (0.0, 0.0, -9.81)
+"""Default gravity in base axes [m/s²]."""
+
+
+class ArmParts(NamedTuple):
+    """What an arm is built from; equal arms have equal parts."""
+
+    geometry: Geometry | None
+    urdf: str
+    cables: tuple[Cable, ...]
+    tip: str
+    gravity: tuple[float, ...]
+    original_length: OriginalLength
+    joint_names: tuple[str, ...] | None
 
 
 class ArmModel:

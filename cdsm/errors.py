@@ -146,6 +146,25 @@ class ClusterError(CdsmError):
     """A dask cluster that does not work."""
 
 
+class MissingWire(CdsmError, LookupError):
+    """Cables whose file names no wire, so that their stiffness is unknown.
+
+    Attributes:
+        path: Path of the file.
+        cables: Names of the cables without a wire; empty: all.
+    """
+
+    def __init__(self, path: object, cables: Sequence[str] = ()) -> None:
+        self.path = str(path)
+        self.cables = tuple(cables)
+        whose = f"the cables {_first(self.cables)}" if self.cables else "its cables"
+        super().__init__(
+            f"{self.path}: has no wire for {whose}, and the stiffness depends on it. Give wire= "
+            "(--wire on the command line), or write it at the top of an ARM.toml, such as "
+            'wire = "1x19-1.2mm", or wire = 48e3 for a constant EA in N.'
+        )
+
+
 class GeometryError(CdsmError, ValueError):
     """A geometry that cannot be built.
 

@@ -27,6 +27,7 @@ from cdsm.support.records import (
     Name,
     Number,
     checked_keywords,
+    did_you_mean,
     parse,
     read_toml,
     record,
@@ -39,6 +40,12 @@ MAXIMUM_JOINTS = 100
 """Largest number of joints, since many more would overflow the stack of the URDF parsers."""
 
 UNIVERSAL_AXES = ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+ARM_KEYS = (
+    *("gravity", "original_length", "wire", "wires", "urdf"),
+    *("series_stiffness", "control", "minimum", "maximum"),
+)
+"""Keys of an ARM.toml that do not describe its geometry; ``cables`` may."""
 
 JointCount = Annotated[Integer, Field(ge=1, le=MAXIMUM_JOINTS)]
 CablesPerJoint = Annotated[Integer, Field(ge=1, le=64)]
@@ -338,15 +345,19 @@ class Geometry(Printed):
             "# axes: in the axes of the link before; angle: of the hole about x, from y towards z;",
             "# joint (of a cable): the joint it drives, from 1; it ends on the disk after it.",
         ]
-        lines += toml_lines(self, ("name", "base_length", "hole_radius"))
+        return "\n".join([*lines, *self.toml_lines()]) + "\n"
+
+    def toml_lines(self, prefix: str = "") -> list[str]:
+        """Return the lines of :meth:`to_toml`, with a prefix before the names of tables."""
+        lines = toml_lines(self, ("name", "base_length", "hole_radius"))
         for joint in self.joints:
-            lines += ["", "[[joints]]", *toml_lines(joint)]
+            lines += ["", f"[[{prefix}joints]]", *toml_lines(joint)]
         for link in self.links:
-            lines += ["", "[[links]]", *toml_lines(link)]
+            lines += ["", f"[[{prefix}links]]", *toml_lines(link)]
         for cable in self.cables:
             keys = ("joint", "angle", "lead", *(["friction"] if cable.friction else []))
-            lines += ["", "[[cables]]", *toml_lines(cable, keys)]
-        return "\n".join(lines) + "\n"
+            lines += ["", f"[[{prefix}cables]]", *toml_lines(cable, keys)]
+        return lines
 
     def write(self, path: str | os.PathLike[str]) -> Path:
         """Write :meth:`to_toml` to a file and return its path; a failure leaves no partial file.
@@ -369,32 +380,38 @@ class Geometry(Printed):
         """
         instance("text", text, str)
         try:
-            return cls._of_tables(read_toml(text))
+            return cls.of_tables(split_geometry(read_toml(text))[0])
         except GeometryError as error:
             raise GeometryError(error.faults, source) from None
 
     @classmethod
-    def _of_tables(cls, data: dict[str, Any]) -> Geometry:
+    def of_tables(cls, data: dict[str, Any]) -> Geometry:
+        """Build a geometry from parsed TOML: see :meth:`read`; raise GeometryError."""
         builders: dict[str, Callable[..., Geometry]] = {
             "universal": cls.universal,
             "hinged": cls.hinged,
+            "geometry": lambda **full: parse(cls, full),
         }
         kind = next((key for key in data if key in builders), None)
         if kind is None and data.keys() & {"joints", "links"}:
             return parse(cls, data)
         if kind is None and "cables" in data:
-            fault = "holds cables but no joints: give a file of cables beside the arm it is for"
+            faults = ["holds cables but no joints: give a file of cables beside the arm it is for"]
         elif kind is None:
             found = ", ".join(data) or "nothing"
-            fault = f"holds {found}; give a table [universal] or [hinged], or the full form"
+            faults = [f"holds {found}; give a table [universal] or [hinged], or the full form"]
         elif len(data) > 1:
-            others = ", ".join(key for key in data if key != kind)
-            fault = f"{others}: stands outside [{kind}], which says it all; move it in, or away"
+            faults = [
+                f"{key}: stands outside [{kind}], which says all of the geometry; move it in, or "
+                f"away{did_you_mean(key, ARM_KEYS)}"
+                for key in data
+                if key != kind
+            ]
         elif not isinstance(data[kind], dict):
-            fault = f"{kind}: is {data[kind]!r}; give a table [{kind}]"
+            faults = [f"{kind}: is {data[kind]!r}; give a table [{kind}]"]
         else:
             return builders[kind](**data[kind])
-        raise GeometryError([fault])
+        raise GeometryError(faults)
 
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> Geometry:
@@ -409,3 +426,15 @@ class Geometry(Printed):
                 keys.
         """
         return cls.from_toml(read_text(path), source=os.fspath(path))
+
+
+def split_geometry(data: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Split the parsed TOML of an arm: what describes its geometry, and what does not.
+
+    Cables belong to the geometry if its joints or links stand beside them.
+    """
+    kept = set(ARM_KEYS)
+    if data.keys() - {"cables"} and not data.keys() & {"joints", "links"}:
+        kept.add("cables")
+    geometry = {key: value for key, value in data.items() if key not in kept}
+    return geometry, {key: value for key, value in data.items() if key in kept}

@@ -10,12 +10,13 @@ import os
 from collections import Counter
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Any, NamedTuple, final, get_args
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, final, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cdsm.arm_model import ArmModel
+from cdsm.arm_model import GRAVITY, ArmModel, ArmParts
 from cdsm.cable import Cable, serpentine_cables
 from cdsm.cable_laws import OriginalLength
 from cdsm.elasticity import Elasticity
@@ -26,26 +27,18 @@ from cdsm.kernels.segments import SHORTEST_SEGMENT
 from cdsm.kernels.tree import Frames
 from cdsm.posture import Posture, site_paths
 from cdsm.rigid_body import RigidBody
+from cdsm.support.files import write_text
 from cdsm.support.format import JointUnits
 from cdsm.support.validation import flag, instance, one_of, sequence_of, vector
 from cdsm.support.values import Array, Printed, frozen
 from cdsm.urdf import TIP, to_urdf
 from cdsm.urdf_reader import read_urdf
 
-GRAVITY = (0.0, 0.0, -9.81)
-"""Default gravity in base axes [m/s²]."""
+if TYPE_CHECKING:
+    from cdsm.wires.catalogue import Wire
 
-
-class _Parts(NamedTuple):
-    """What an arm is built from; equal arms have equal parts."""
-
-    geometry: Geometry | None
-    urdf: str
-    cables: tuple[Cable, ...]
-    tip: str
-    gravity: tuple[float, ...]
-    original_length: OriginalLength
-    joint_names: tuple[str, ...]
+CablesOrFile = Sequence[Cable] | str | os.PathLike[str]
+"""Cables, or the path of their file."""
 
 
 @final
@@ -57,6 +50,7 @@ class Manipulator(Printed):
         elasticity: One law for all cables, or one law per cable. The cables are then those of
             :func:`~cdsm.serpentine_cables`.
         cables: The cables, if ``elasticity`` is not given: any sites on any links of :attr:`urdf`.
+            Or the path of their file.
         gravity: Gravity in base axes (3,) [m/s²]; (0, 0, 0) for none.
         original_length: Length l_0 of a locked wire that its stiffness EA/l_0 uses.
             ``"unstrained"``: the length that the motor holds, ℓ/(1 + ε(F)) for a wire of length ℓ
@@ -75,7 +69,7 @@ class Manipulator(Printed):
         geometry: Geometry,
         elasticity: Elasticity | Sequence[Elasticity] | None = None,
         *,
-        cables: Sequence[Cable] | None = None,
+        cables: CablesOrFile | None = None,
         gravity: ArrayLike = GRAVITY,
         original_length: OriginalLength = "unstrained",
     ) -> None:
@@ -94,7 +88,7 @@ class Manipulator(Printed):
     def from_urdf(
         cls,
         urdf: str | os.PathLike[str],
-        cables: Sequence[Cable],
+        cables: CablesOrFile,
         *,
         tip: str,
         joint_names: Sequence[str] | None = None,
@@ -109,7 +103,7 @@ class Manipulator(Printed):
 
         Args:
             urdf: Path of the URDF file, or its text.
-            cables: Cables of the arm; :func:`~cdsm.read_cables` reads them from a file.
+            cables: Cables of the arm, or the path of their file: see :func:`~cdsm.read_cables`.
             tip: Link whose frame is the tip; other docstrings call it ``tool0``.
             joint_names: The moving joints in the order of q. None: Pinocchio's order, from the base
                 along each branch to its end, branches in the order of their joints' names.
@@ -131,11 +125,59 @@ class Manipulator(Printed):
         arm._build(None, text, cables, tip, gravity, original_length, joint_names)
         return arm
 
+    @classmethod
+    def read(cls, path: str | os.PathLike[str], wire: Wire | None = None) -> Manipulator:
+        """Read an arm from an ARM.toml: robot, cables, wires, gravity.
+
+        The file holds a geometry in a form of :meth:`Geometry.read`, or a table ``[urdf]`` with
+        ``tip``, and ``file`` (a path, from the folder of this file) or ``text``; optional are
+        ``joint_names`` and ``check_inertia`` (see :meth:`from_urdf`). All other keys are optional:
+
+        - ``wire``: of all cables: a name such as ``"1x19-1.2mm"``, a constant EA [N], a table in
+          the form of :func:`~cdsm.read_elasticity`, or the NAME of a table ``[wires.NAME]``.
+        - ``series_stiffness`` [N/m], ``control``, ``minimum``, ``maximum`` [N]: of all cables, as
+          in :class:`Cable`.
+        - ``[cables.NAME]``: the same keys for one cable of the geometry; or ``[[cables]]``: all
+          cables through any points, as in :func:`~cdsm.read_cables`.
+        - ``gravity`` [m/s²], ``original_length``: as for :class:`Manipulator`.
+
+        Args:
+            path: The file; :meth:`write` writes one, ``cdsm new`` another with comments.
+            wire: Wire of all cables, in the place of the file's: a law, a name, EA [N], or the path
+                of a file of :func:`~cdsm.write_elasticity`.
+
+        Raises:
+            FileError: The file cannot be read or does not describe an arm. Every fault is listed.
+            MissingWire: The file has no wire for some cables, and ``wire`` is not given.
+            UrdfError: The URDF is not a supported robot; lists every fault.
+            CableError: A cable is on an unknown link.
+            UnknownName: No link is called ``tip``, or no wire like ``wire``.
+            InvalidInput: ``joint_names`` does not name each moving joint once.
+        """
+        from cdsm.arm_file.arm import read_arm  # pydantic: slow to import
+
+        arm = cls.__new__(cls)
+        arm._build(*read_arm(path, wire))
+        return arm
+
+    def write(self, path: str | os.PathLike[str]) -> Path:
+        """Write an ARM.toml from which :meth:`read` builds an equal arm; return its path.
+
+        A URDF is written into the file.
+
+        Raises:
+            InvalidInput: A file cannot hold an elasticity of this kind.
+            FileError: The file cannot be written; an existing file stays unchanged.
+        """
+        from cdsm.arm_file.arm import arm_text
+
+        return write_text(path, arm_text(self._parts))
+
     def _build(
         self,
         geometry: Geometry | None,
         urdf: str,
-        cables: Sequence[Cable],
+        cables: CablesOrFile,
         tip: str,
         gravity: ArrayLike,
         original_length: OriginalLength,
@@ -148,7 +190,7 @@ class Manipulator(Printed):
         body = RigidBody(urdf, tip, self._gravity, joint_names)
         self._model = ArmModel(body, cables, original_length)
         g = tuple(self._gravity.tolist())
-        self._parts = _Parts(geometry, urdf, cables, tip, g, original_length, body.joint_names)
+        self._parts = ArmParts(geometry, urdf, cables, tip, g, original_length, body.joint_names)
 
     @property
     def geometry(self) -> Geometry:
@@ -268,25 +310,36 @@ class Manipulator(Printed):
     def __hash__(self) -> int:
         return hash(self.urdf)  # a user-defined elasticity may not be hashable
 
-    def __getstate__(self) -> _Parts:
+    def __getstate__(self) -> ArmParts:
         return self._parts
 
-    def __setstate__(self, parts: _Parts) -> None:
+    def __setstate__(self, parts: ArmParts) -> None:
         self._build(*parts)
 
-    def with_cables(self, cables: Sequence[Cable]) -> Manipulator:
+    def with_cables(self, cables: CablesOrFile) -> Manipulator:
         """Return an arm with the same robot and other cables.
 
         Args:
-            cables: One or more cables.
+            cables: One or more cables, or the path of their file.
 
         Raises:
             InvalidInput: ``cables`` is not a list or tuple of cables, or the rigidity of a law
                 jumps.
             CableError: Two cables have the same name, or a cable is on an unknown link.
         """
+        return self._replace(cables=_checked_cables(cables))
+
+    def with_gravity(self, gravity: ArrayLike) -> Manipulator:
+        """Return the same arm under another gravity (3,) [m/s²], in base axes.
+
+        Raises:
+            InvalidInput: Gravity is not three numbers.
+        """
+        return self._replace(gravity=gravity)
+
+    def _replace(self, **changes: Any) -> Manipulator:
         arm = type(self).__new__(type(self))
-        arm._build(*self._parts._replace(cables=_checked_cables(cables)))
+        arm._build(*self._parts._replace(**changes))
         return arm
 
     def at(self, q: ArrayLike, *, check_limits: bool = True) -> Posture:
@@ -358,7 +411,11 @@ class Manipulator(Printed):
         return tuple(pose)
 
 
-def _checked_cables(cables: Sequence[Cable]) -> tuple[Cable, ...]:
+def _checked_cables(cables: CablesOrFile) -> tuple[Cable, ...]:
+    if isinstance(cables, (str, os.PathLike)):
+        from cdsm.arm_file.cables import read_cables
+
+        return read_cables(cables)
     cables = sequence_of("cables", cables, Cable)
     if not cables:
         raise InvalidInput("cables", "none given; an arm needs at least one.")

@@ -17,15 +17,15 @@ from cdsm.cable_laws import OriginalLength
 from cdsm.elasticity import Elasticity, LinearElasticity
 from cdsm.geometry import Geometry, Link
 from cdsm.manipulator import Manipulator
-from cdsm.wires.laws import StrandElasticity
+from cdsm.wires.catalogue import SOLID, STRAND
 
-STRAND_1X19: Final = StrandElasticity.eq19_repaired()
+STRAND_1X19: Final = STRAND
 """The 1×19 steel strand of 1.2 mm of Section IV-C: Eq. 19, repaired and continuous."""
 
 STRAND_DIAMETER: Final = 1.2e-3
 """Diameter of the 1×19 strand [m]."""
 
-STEEL_WIRE_200GPA: Final = LinearElasticity.of_wire(200e9, STRAND_DIAMETER)
+STEEL_WIRE_200GPA: Final = SOLID
 """Solid wire with the strand's diameter and the 200 GPa of Section IV-B: EA = 226 kN."""
 
 ELASTIC_STAGE: Final = LinearElasticity(48e3)

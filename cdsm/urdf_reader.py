@@ -48,7 +48,7 @@ def read_urdf(source: str | os.PathLike[str], *, check_inertia: bool = True) -> 
     """
     flag("check_inertia", check_inertia)
     inline = isinstance(source, str) and source.lstrip("\ufeff \t\r\n").startswith("<")
-    text = str(source).lstrip("\ufeff \t\r\n") if inline else read_text(source)
+    text = (str(source) if inline else read_text(source)).lstrip("\ufeff \t\r\n")
     name = "the URDF" if inline else os.fspath(source)
     try:
         robot = parse_xml(text, "robot")

@@ -412,6 +412,7 @@ ERRORS: tuple[cdsm.CdsmError, ...] = (
     cdsm.FileError("/nowhere/arm.toml", "does not exist."),
     cdsm.StoreError("/nowhere/s.zarr", "holds another sweep.", ["minimum: 1.0, 2.0"]),
     cdsm.MissingExtra("zarr", "sweep"),
+    cdsm.MissingWire("arm.toml", ["cable1_1"]),
     cdsm.ClusterError("a worker failed."),
     cdsm.GeometryError(["a: is missing", "b: is odd"], "arm.toml"),
     cdsm.UrdfError("is no robot."),

@@ -35,7 +35,7 @@ def stiffness(
     pose = arm.at(angles)
     tension = tensions.distribute(pose)
     K = cdsm.stiffness(pose, tension)
-    answer(as_json, lambda: _numbers(tension, K), pose.arm, tension, K)
+    answer(as_json, lambda: _numbers(tension, K), tensions.conditions(pose.arm), tension, K)
 
 
 def _numbers(tension: cdsm.Tension, K: cdsm.Stiffness) -> Json:
@@ -85,7 +85,7 @@ def check(
         from cdsm.support.files import write_text
 
         typer.echo(f"written: {write_text(html, report.to_html())}", err=True)
-    answer(as_json, report.to_dict, pose.arm, report)
+    answer(as_json, report.to_dict, tensions.conditions(pose.arm), report)
     if not report.trustworthy:
         raise typer.Exit(UNMET)
 
@@ -122,7 +122,8 @@ def export(
         raise typer.BadParameter("give --mjcf, --cables-out or both.", param_hint="--mjcf")
     pose = arm.at(angles)
     numbers: Json = {"name": pose.arm.name}
-    lines, written = [str(pose.arm)], []
+    conditions = tensions.conditions(pose.arm)
+    lines, written = [str(conditions)], []
     if mjcf is not None:
         from cdsm.interchange.mjcf import mujoco_model
         from cdsm.support.files import write_text
@@ -143,6 +144,7 @@ def export(
     if cables_out is not None:
         written.append(str(cdsm.write_cables(pose.arm.cables, cables_out)))
     lines += [f"written: {path}" for path in written]
-    answer(as_json, lambda: numbers | {"written": written}, "\n".join(lines))
+    numbers |= conditions.to_dict() | {"written": written}
+    answer(as_json, lambda: numbers, "\n".join(lines))
     if numbers.get("stable") is False:
         raise typer.Exit(UNMET)

@@ -9,6 +9,7 @@ import typer
 
 import cdsm
 from cdsm.cli import options
+from cdsm.cli.conditions import Conditions
 from cdsm.cli.options import Angles, ArmOptions, AsJson, Picture, TensionOptions, numbers
 from cdsm.cli.output import Json, answer, joints, write_picture
 
@@ -30,7 +31,8 @@ def weigh(
     test = cdsm.weight_test(pose, tension, numbers("--force", force, 3), steps=steps)
     write_picture(figure, "plot_weight_test", test)
     loaded = f"at the full load:\n{test.loaded[-1]}"
-    answer(as_json, lambda: _weight_numbers(test), pose.arm, test, loaded)
+    conditions = tensions.conditions(pose.arm)
+    answer(as_json, lambda: _weight_numbers(test), conditions, test, loaded)
 
 
 def _weight_numbers(test: cdsm.WeightTest) -> Json:
@@ -85,7 +87,7 @@ def buckle(
     pose = arm.at(angles)
     carried = numbers("--wrench", wrench, 6)
     tension = cdsm.critical_tension(pose, carried, solver)
-    most = None
+    most, low = None, None
     if load is not None:
         low = 10.0 if min_tension is None else min_tension
         high = math.inf if max_tension is None else max_tension
@@ -93,7 +95,8 @@ def buckle(
         most = cdsm.critical_load(pose, weight, low, high, solver, carried=carried)
     write_picture(figure, "plot_critical_tension", tension)
     found = (tension,) if most is None else (tension, most)
-    answer(as_json, lambda: _buckling_numbers(tension, most), pose.arm, *found)
+    conditions = Conditions(pose.arm, () if low is None else (low,))
+    answer(as_json, lambda: _buckling_numbers(tension, most), conditions, *found)
 
 
 def _buckling_numbers(tension: cdsm.CriticalTension, load: cdsm.CriticalLoad | None) -> Json:

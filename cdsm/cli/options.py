@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import inspect
 import math
 from collections.abc import Callable
@@ -13,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 import typer
 
 import cdsm
+from cdsm.cli.conditions import Conditions
 from cdsm.cli.output import reported
 
 if TYPE_CHECKING:
@@ -51,51 +53,75 @@ class ArmOptions:
         Path,
         typer.Argument(
             metavar="ARM",
-            help="Geometry (.toml); or a robot (.urdf), with --cables and --tip; or the folder of "
-            "a CASPR model.",
+            help="An ARM.toml, as `cdsm new` writes it; or a robot (.urdf), with --cables and "
+            "--tip; or the folder of a CASPR model.",
         ),
     ]
     cables: Annotated[
-        Path | None, _arm_option(metavar="CABLES.toml", help="Its cables, and their wires.")
+        Path | None,
+        _arm_option(metavar="CABLES.toml", help="Its cables, in the place of its own."),
     ] = None
     tip: Annotated[str | None, _arm_option(help="The link of a .urdf that is its tip.")] = None
-    rigidity: Annotated[
-        float | None,
-        _arm_option(help="Constant EA of all cables [N]; default: the 1x19 strand of Eq. 19."),
-    ] = None
     wire: Annotated[
-        Path | None,
-        _arm_option(metavar="WIRE.toml", help="Elasticity of all cables, as `cdsm fit` writes it."),
+        str | None,
+        _arm_option(
+            metavar="NAME|EA|WIRE.toml",
+            help="Wire of all cables: a name such as 1x19-1.2mm, a constant rigidity in N, or a "
+            "file that `cdsm fit` writes; default: what the files say.",
+        ),
     ] = None
+    rigidity: Annotated[float | None, _arm_option(help="Older name of --wire EA.", hidden=True)] = (
+        None
+    )
     spring: Annotated[
-        float, _arm_option(help="Stiffness of a spring in series with every cable [N/mm].")
-    ] = math.inf
+        float | None,
+        _arm_option(help="Stiffness of a spring in series with every cable [N/mm]."),
+    ] = None
     gravity: Annotated[
-        str, _arm_option(help="In m/s², base axes: GX,GY,GZ.", metavar="GX,GY,GZ")
-    ] = "0,0,-9.81"
+        str | None,
+        _arm_option(
+            help="In m/s², base axes; default: what the file says, or 0,0,-9.81.",
+            metavar="GX,GY,GZ",
+        ),
+    ] = None
 
     def read(self) -> cdsm.Manipulator:
         """Build the arm from its files and options."""
-        gravity = numbers("--gravity", self.gravity, 3)
-        if self.arm.suffix.lower() == ".urdf":
-            if self.cables is None or self.tip is None:
-                missing = "--cables" if self.cables is None else "--tip"
-                raise typer.BadParameter("a robot in a .urdf needs it.", param_hint=missing)
-            self._refuse("the file of --cables has the wires", "rigidity", "wire", "spring")
-            cables = cdsm.read_cables(self.cables)
-            return cdsm.Manipulator.from_urdf(self.arm, cables, tip=self.tip, gravity=gravity)
-        self._refuse("the tip of a .urdf is free, that of others is not", "tip")
+        try:
+            arm = self._arm()
+        except cdsm.MissingWire as error:
+            raise typer.BadParameter(str(error), param_hint="--wire") from None
+        if self.spring is not None:
+            springs = [
+                dataclasses.replace(cable, series_stiffness=1000.0 * self.spring)
+                for cable in arm.cables
+            ]
+            arm = arm.with_cables(springs)
+        if self.gravity is not None:
+            arm = arm.with_gravity(numbers("--gravity", self.gravity, 3))
+        return arm
+
+    def _arm(self) -> cdsm.Manipulator:
+        """Read the arm, its wire included, from its files."""
+        wire = self._wire()
+        robot = self.arm.suffix.lower() == ".urdf"
+        if robot and (self.cables is None or self.tip is None):
+            missing = "--cables" if self.cables is None else "--tip"
+            raise typer.BadParameter("a robot in a .urdf needs it.", param_hint=missing)
+        if not robot:
+            self._refuse("the tip of a .urdf is free, that of others is not", "tip")
         if self.arm.is_dir():
-            self._refuse("a CASPR model has its own cables", "cables", "spring")
-            return cdsm.read_caspr(self.arm, elasticity=self._elasticity(), gravity=gravity)
-        geometry = cdsm.Geometry.read(self.arm)
-        if self.cables is not None:
-            self._refuse("the file of --cables has the wires", "rigidity", "wire", "spring")
-            return cdsm.Manipulator(geometry, cables=cdsm.read_cables(self.cables), gravity=gravity)
-        routed = cdsm.serpentine_cables(
-            geometry, self._elasticity(), series_stiffness=1000.0 * self.spring
-        )
-        return cdsm.Manipulator(geometry, cables=routed, gravity=gravity)
+            self._refuse("a CASPR model has its own cables", "cables")
+            if wire is None:
+                raise cdsm.MissingWire(self.arm)
+            return cdsm.read_caspr(self.arm, elasticity=wire)
+        if self.cables is None:
+            return cdsm.Manipulator.read(self.arm, wire)
+        cables = cdsm.read_cables(self.cables, wire)
+        if robot:
+            return cdsm.Manipulator.from_urdf(self.arm, cables, tip=str(self.tip))
+        # the cables of the arm are not asked for a wire
+        return cdsm.Manipulator.read(self.arm, cables[0].elasticity).with_cables(cables)
 
     def at(self, angles: str) -> cdsm.Posture:
         """Return the posture at joint coordinates [degrees, or mm if a joint slides]."""
@@ -115,14 +141,19 @@ class ArmOptions:
             if field.name in names and getattr(self, field.name) != field.default:
                 raise typer.BadParameter(f"{why}; leave it out.", param_hint=f"--{field.name}")
 
-    def _elasticity(self) -> cdsm.Elasticity:
-        if self.rigidity is not None and self.wire is not None:
-            raise typer.BadParameter("give it or --wire, not both.", param_hint="--rigidity")
-        if self.wire is not None:
-            return cdsm.read_elasticity(self.wire)
+    def _wire(self) -> cdsm.Elasticity | None:
+        """Return the wire of --wire, or of --rigidity, if one is given."""
+        from cdsm.wires.catalogue import as_wire
+
+        if self.wire is None:
+            return None if self.rigidity is None else cdsm.LinearElasticity(self.rigidity)
         if self.rigidity is not None:
-            return cdsm.LinearElasticity(self.rigidity)
-        return cdsm.presets.STRAND_1X19
+            raise typer.BadParameter("give it or --wire, not both.", param_hint="--rigidity")
+        try:
+            rigidity = float(self.wire)
+        except ValueError:
+            return as_wire(self.wire)
+        return as_wire(rigidity)
 
 
 @dataclass(frozen=True)
@@ -133,6 +164,10 @@ class TensionOptions:
     max_tension: MaxTension = math.inf
     wrench: Wrench = NO_WRENCH
     solver: Solver = DEFAULT_SOLVER
+
+    def conditions(self, arm: cdsm.Manipulator) -> Conditions:
+        """Return what an answer with these options is computed with."""
+        return Conditions(arm, (self.min_tension,))
 
     def distribute(self, pose: cdsm.Posture) -> cdsm.Tension:
         """Compute the tensions at a posture."""

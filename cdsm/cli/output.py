@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import typer
 
 import cdsm
+from cdsm.cli.conditions import Conditions
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -41,7 +42,11 @@ def console() -> Console:
 def answer(as_json: bool, as_dict: Callable[[], Json], *parts: object) -> None:
     """Print an answer: its parts as text, or its numbers as strict JSON."""
     if as_json:
-        typer.echo(json.dumps(_plain(as_dict()), indent=1, allow_nan=False))
+        told = as_dict()
+        for part in parts:
+            if isinstance(part, Conditions):
+                told = part.to_dict() | told
+        typer.echo(json.dumps(_plain(told), indent=1, allow_nan=False))
     else:
         typer.echo("\n\n".join(map(str, parts)))
 

@@ -10,6 +10,7 @@ import typer
 
 import cdsm
 from cdsm.cli import options
+from cdsm.cli.conditions import Conditions
 from cdsm.cli.options import ArmOptions, AsJson, MaxTension, MinTension, Picture, numbers
 from cdsm.cli.output import UNMET, Json, answer, by_cable, joints, write_picture
 
@@ -70,7 +71,8 @@ def plan(
         plan = cdsm.plan_path(
             robot, u, targets, *bounds, angles=file.angles, tips=file.tips, rate=rate
         )
-        answer(as_json, lambda: _path_numbers(plan), robot, plan)
+        conditions = Conditions(robot, (min_tension,))
+        answer(as_json, lambda: _path_numbers(plan), conditions, plan)
         draw, drawn = "plot_path_plan", (plan,)
     elif wanted is None:
         raise typer.BadParameter("give it, or --path.", param_hint="--target")
@@ -80,7 +82,8 @@ def plan(
         pose = arm.at("0" if angles is None else angles)
         attainable = cdsm.stiffness_range(pose, u, *bounds)
         best = cdsm.plan_stiffness(pose, u, wanted, *bounds)
-        answer(as_json, lambda: _numbers(best, attainable), pose.arm, attainable, best)
+        conditions = Conditions(pose.arm, (min_tension,))
+        answer(as_json, lambda: _numbers(best, attainable), conditions, attainable, best)
         draw, drawn = "plot_stiffness_plan", (best, attainable)
         if out is not None:  # repeats the search as a path of one sample
             plan = cdsm.plan_path(pose.arm, u, wanted, *bounds, angles=[pose.q])

@@ -11,6 +11,7 @@ import typer
 
 import cdsm
 from cdsm.cli import options
+from cdsm.cli.conditions import Conditions
 from cdsm.cli.options import ArmOptions, AsJson, joint_scales, numbers
 from cdsm.cli.output import Json, answer
 from cdsm.sweeps.quantities import DEFAULT, QUANTITIES
@@ -110,7 +111,8 @@ def sweep(
         outputs=[name.strip() for name in quantities.split(",")],
         store=resume,
     )
-    _answer(as_json, dataset, cdsm.write_sweep(dataset, out), summary=True)
+    conditions = Conditions(robot, tuple(low))
+    _answer(as_json, dataset, cdsm.write_sweep(dataset, out), conditions)
 
 
 def map_sweep(
@@ -143,7 +145,7 @@ def map_sweep(
         place, half = numbers("--section", rest.replace(":", " "), 2)
         slab = (axis.strip(), place / 1000.0, half / 1000.0)
     figure = cdsm.plots.plot_map(dataset, quantity, section=slab)
-    _answer(as_json, dataset, write_file(out, figure.savefig), summary=False)
+    _answer(as_json, dataset, write_file(out, figure.savefig))
 
 
 def _grid(text: str, arm: cdsm.Manipulator) -> cdsm.GridPoses:
@@ -171,15 +173,19 @@ def _grid(text: str, arm: cdsm.Manipulator) -> cdsm.GridPoses:
     return cdsm.GridPoses(angles, rest)
 
 
-def _answer(as_json: bool, dataset: xarray.Dataset, written: Path, *, summary: bool) -> None:
+def _answer(
+    as_json: bool, dataset: xarray.Dataset, written: Path, conditions: Conditions | None = None
+) -> None:
+    """Tell what was written; a new sweep also tells its conditions and how its entries went."""
     from cdsm.support.datasets import status_names
 
     status = dataset["status"].values
     words = status_names(dataset)
     counts = {word: int((status == value).sum()) for value, word in words.items()}
     lines = [f"written: {written}"]
-    if summary:
+    if conditions is not None:
         listed = ", ".join(f"{count} {word}" for word, count in counts.items() if count)
         lines.insert(0, f"{dataset.attrs['title']}, {dataset.attrs['poses']}: {listed}")
     numbers: Json = {"entries": counts, "written": [str(written)]}
-    answer(as_json, lambda: numbers, "\n".join(lines))
+    first = () if conditions is None else (conditions,)
+    answer(as_json, lambda: numbers, *first, "\n".join(lines))

@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 import cdsm
+from cdsm.cli.conditions import Conditions
 from cdsm.cli.options import (
     DEFAULT_SOLVER,
     Angles,
@@ -20,7 +21,7 @@ from cdsm.cli.options import (
     Solver,
     numbers,
 )
-from cdsm.cli.output import answer
+from cdsm.cli.output import Json, answer
 
 
 def view(
@@ -67,7 +68,9 @@ def view(
             largest_force=largest_force,
         ) as page:
             text = f"shown at {page.url}; Ctrl-C ends it"
-            answer(as_json, lambda: {"name": pose.arm.name, "url": page.url}, pose.arm, text)
+            conditions = Conditions(pose.arm, (min_tension,))
+            told: Json = {"name": pose.arm.name, "url": page.url}
+            answer(as_json, lambda: told, conditions, text)
             if browser:
                 webbrowser.open(page.url)
             page.wait()

@@ -134,14 +134,17 @@ def toml_lines(record: object, keys: Iterable[str] | None = None) -> list[str]:
     """Return one TOML line for each field that is not None."""
     names = keys or [field.name for field in fields(record)]  # type: ignore[arg-type]
     values = ((name, getattr(record, name)) for name in names)
-    return [f"{name} = {_toml(value)}" for name, value in values if value is not None]
+    return [f"{name} = {toml_value(value)}" for name, value in values if value is not None]
 
 
-def _toml(value: object) -> str:
+def toml_value(value: object) -> str:
+    """Return a text, a number, or a tuple of these, as a TOML value."""
     if isinstance(value, tuple):
-        return f"[{', '.join(map(_toml, value))}]"
-    # JSON and TOML escape all characters of a name in the same manner
-    return json.dumps(value) if isinstance(value, str) else repr(value)
+        return f"[{', '.join(map(toml_value, value))}]"
+    if isinstance(value, str):
+        # JSON and TOML escape alike, except for DEL and the pairs of \\u that JSON writes for emoji
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    return repr(value)
 
 
 def _keys(kind: Callable[..., Any]) -> list[str]:
@@ -158,6 +161,12 @@ def _keys(kind: Callable[..., Any]) -> list[str]:
             for key in _keys(entry)
         ),
     ]
+
+
+def did_you_mean(key: str, known: Iterable[str]) -> str:
+    """Return ``; did you mean …?`` with the known key most like this one, or an empty text."""
+    near = difflib.get_close_matches(key[:100], list(known), n=1)
+    return f"; did you mean {near[0]}?" if near else ""
 
 
 def _faults(error: ValidationError, kind: Callable[..., Any]) -> list[str]:
@@ -185,8 +194,7 @@ def _faults(error: ValidationError, kind: Callable[..., Any]) -> list[str]:
         elif fault["type"] == "unexpected_keyword_argument":
             key = str(fault["loc"][-1])
             hinted += 1
-            near = difflib.get_close_matches(key[:100], known, n=1) if hinted <= _HINTED else []
-            hint = f"; did you mean {near[0]}?" if near else ""
+            hint = did_you_mean(key, known) if hinted <= _HINTED else ""
             listed.append(f"{where}: is not a key that is known here{hint}")
         else:
             value = repr(fault["input"])

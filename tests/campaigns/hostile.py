@@ -92,6 +92,8 @@ def _path(path: Path) -> None:
 READERS: dict[str, Reader] = {
     "geometry": Reader("full.toml", _geometry),
     "short geometry": Reader("short.toml", _geometry),
+    "arm": Reader("arm.toml", lambda path: _arm(cdsm.Manipulator.read(path))),
+    "arm of a urdf": Reader("finger.toml", lambda path: _arm(cdsm.Manipulator.read(path))),
     "cables": Reader("cables.toml", lambda path: _arm(crab().with_cables(cdsm.read_cables(path)))),
     "linear wire": Reader("linear.toml", _elasticity),
     "strand": Reader("strand.toml", _elasticity),
@@ -123,6 +125,8 @@ def whole_files(path: Path) -> Path:
         "disk_offset = 0.01\nhole_radius = 0.03\nlink_mass = 0.5\n",
         encoding="utf-8",
     )
+    mixed_arm().write(path / "arm.toml")
+    crab().write(path / "finger.toml")
     cdsm.write_cables(crab().cables, path / "cables.toml")
     cdsm.write_elasticity(LAW, path / "linear.toml")
     cdsm.write_elasticity(cdsm.presets.STRAND_1X19, path / "strand.toml")

@@ -19,6 +19,8 @@ from tests.interchange.test_caspr import cable, folder, link
 from tests.support.patience import HANGS
 
 SHORT = """
+wire = "1x19-1.2mm"
+
 [universal]
 name = "probe"
 joints = 3
@@ -93,6 +95,13 @@ def test_check_tells_the_report_of_the_api_and_writes_it_as_a_page(
     arm = cdsm.Manipulator(cdsm.Geometry.read(geometry), cdsm.presets.STRAND_1X19)
     pose = arm.at(np.full(6, np.deg2rad(8.0)))
     report = cdsm.stiffness(pose, cdsm.distribute_tension(pose, 40.0)).report()
+    assert told.pop("computed_with") == {
+        "wire": "1x19-1.2mm",
+        "gravity_m_per_s2": [0.0, 0.0, -9.81],
+        "least_tension_N": [40.0],
+        "original_length": "unstrained",
+        "friction": "none",
+    }
     assert told == report.to_dict()
     assert page.read_text(encoding="utf-8") == report.to_html()
     assert [path.name for path in tmp_path.iterdir() if "report" in path.name] == ["report.html"]
@@ -309,7 +318,8 @@ def test_export_of_an_unstable_arm_says_so_first(geometry: Path, tmp_path: Path)
     soft = ("--rigidity", 1e9, "--spring", 0.2)
     told = call(*asked, 60, *soft)
     assert told.exit_code == 3
-    first, arm, *_, written = told.stdout.splitlines()
+    first, conditions, arm, *_, written = told.stdout.splitlines()
+    assert conditions.startswith("with wire EA 1e+09 N on a spring of 0.2 N/mm; ")
     assert first.startswith("UNSTABLE: the smallest eigenvalue of K_θ is -")
     assert (arm.split(":")[0], written) == ("probe", f"written: {model}")
     assert f"<!-- {first} -->" in model.read_text(encoding="utf-8")
@@ -327,7 +337,7 @@ def test_export_states_time_step_damping_and_actuators(geometry: Path, tmp_path:
     asked = ("export", geometry, "--mjcf", model, "--angles", 5, "--rigidity", 48e3)
     told = call(*asked, "--min-tension", 5, "--damping-ratio", 0.1)
     assert told.exit_code == 0
-    chosen = told.stdout.splitlines()[1:5]
+    chosen = told.stdout.splitlines()[2:6]
     assert [line.split()[0] for line in chosen] == ["time", "damping", "actuators", "friction"]
     assert "ratio 0.1 to " in chosen[1]
     text = model.read_text(encoding="utf-8")
@@ -564,13 +574,7 @@ def test_default_solver_of_the_commands_is_that_of_the_library() -> None:
         (("rail.urdf",), "--cables", "a robot in a .urdf needs it"),
         (("rail.urdf", "--cables", "rail.toml"), "--tip", "a robot in a .urdf needs it"),
         (("probe.toml", "--tip", "car"), "--tip", "leave it out"),
-        (("probe.toml", "--cables", "rail.toml", "--spring", "2"), "--spring", "leave it out"),
         ((".", "--cables", "rail.toml"), "--cables", "a CASPR model has its own cables"),
-        (
-            ("rail.urdf", "--cables", "rail.toml", "--tip", "car", "--rigidity", "9"),
-            "--rigidity",
-            "the file of --cables has the wires",
-        ),
     ],
 )
 def test_options_that_this_kind_of_arm_does_not_heed_are_refused(
@@ -593,3 +597,62 @@ def test_warm_compiles_all_kernels_and_says_how_long_it_took() -> None:
     result = call("warm")
     assert result.exit_code == 0, result.output
     assert "kernels are compiled" in result.output
+
+
+def test_first_line_says_what_was_computed_with(geometry: Path, tmp_path: Path) -> None:
+    def first(*arguments: object) -> str:
+        result = call(*arguments)
+        assert result.exit_code in (0, 3), result.output
+        return result.stdout.splitlines()[0]
+
+    usual = "with wire 1x19-1.2mm; gravity 0, 0, -9.81 m/s²; least tension 10 N; frictionless"
+    for command in (
+        ("stiffness", geometry),
+        ("check", geometry),
+        ("weigh", geometry, "--force", "0,0,-1", "--steps", 1),
+        ("plan", geometry, "--direction", "0,0,1", "--target", 9, "--angles", 3),
+        ("export", geometry, "--mjcf", tmp_path / "arm.xml"),
+        ("sweep", geometry, "--random", 1, "--out", tmp_path / "sweep.nc"),
+    ):
+        assert first(*command) == usual
+    given = ("--gravity", "0,1,0", "--spring", 2, "--wire", 48e3, "--min-tension", 20)
+    assert first("stiffness", geometry, *given) == (
+        "with wire EA 48000 N on a spring of 2 N/mm; gravity 0, 1, 0 m/s²; least tension 20 N; "
+        "frictionless"
+    )
+    geometry.write_text(
+        'original_length = "stretched"\ngravity = [0, -2.0, 0.5]\nminimum = 12.5\n'
+        + SHORT.replace("link_mass = 0.1", "link_mass = 0.1\nlead = 0.1\nfriction = 0.1")
+        + '\n[cables.cable1_1]\nwire = {kind = "tabulated", tensions = [0.0, 400.0], '
+        "strains = [0.0, 0.01]}\n",
+        encoding="utf-8",
+    )
+    assert first("stiffness", geometry) == (
+        "with wire table, 0 to 400 N (1 of 9), 1x19-1.2mm (8 of 9); gravity 0, -2, 0.5 m/s²; least "
+        "tension 10 N (cables of their own up to 12.5 N); stretched lengths; friction of its holes "
+        "left out"
+    )
+
+
+@pytest.mark.parametrize("command", ["stiffness", "check", "buckle"])
+def test_an_arm_without_a_wire_asks_for_one(command: str, geometry: Path, tmp_path: Path) -> None:
+    geometry.write_text(SHORT.replace('wire = "1x19-1.2mm"', ""), encoding="utf-8")
+    (tmp_path / "model").mkdir()
+    model = folder(tmp_path / "model", link(1, "R_Z"), cable())
+    for arm in (geometry, model):
+        told = call(command, arm)
+        assert told.exit_code == 2
+        assert "--wire" in told.stderr
+        assert "1x19-1.2mm" in told.stderr
+    assert call(command, geometry, "--wire", "1x19-1.2mm").exit_code in (0, 3)
+    wrong = call(command, geometry, "--wire", "1x9-1.2mm")
+    assert wrong.exit_code == 1
+    assert "did you mean '1x19-1.2mm'" in wrong.stderr
+    assert call("urdf", geometry, "-o", tmp_path / "arm.urdf").exit_code == 0
+
+
+def test_a_finger_of_two_files_is_one(rail: tuple[object, ...], tmp_path: Path) -> None:
+    urdf, _, cables, *_ = rail
+    arm = cdsm.Manipulator.from_urdf(str(urdf), str(cables), tip="car")
+    file = arm.write(tmp_path / "one.toml")
+    assert call("stiffness", file).stdout == call("stiffness", *rail).stdout

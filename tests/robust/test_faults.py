@@ -185,7 +185,20 @@ def test_an_interrupted_command_says_so_in_one_line_and_goes_on(tmp_path: Path) 
     arm, path, out = tmp_path / "arm.toml", tmp_path / "s.zarr", tmp_path / "s.csv"
     short_arm().geometry.write(arm)
     out.write_text("old", encoding="utf-8")
-    command = ("-m", "cdsm", "sweep", arm, "--random", 100_000, "--out", out, "--resume", path)
+    command = (
+        "-m",
+        "cdsm",
+        "sweep",
+        arm,
+        "--wire",
+        "1x19-1.2mm",
+        "--random",
+        100_000,
+        "--out",
+        out,
+        "--resume",
+        path,
+    )
     with running(*command) as process:
         wait_for(lambda: blocks_done(path) >= 1, process)
         process.send_signal(signal.SIGINT)

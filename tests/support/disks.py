@@ -58,7 +58,7 @@ def write(path: Path) -> dict[str, Callable[[], object]]:
 def commands(folder: Path, path: Path) -> dict[str, list[object]]:
     """What writes files as a user calls it; the inputs lie elsewhere."""
     arm, test, swept = folder / "arm.toml", folder / "test.csv", folder / "swept.nc"
-    ARM.geometry.write(arm)
+    ARM.write(arm)
     force = np.linspace(0.0, 300.0, 60)
     rows = "\n".join(f"{f / 50.0:.6f},{f}" for f in force)
     test.write_text(f"displacement [mm],force [N]\n{rows}\n", encoding="utf-8")

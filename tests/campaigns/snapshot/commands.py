@@ -64,7 +64,9 @@ def helps() -> Named:
     yield "nothing", command()
 
 
-PROBE = """[universal]
+PROBE = """wire = "1x19-1.2mm"
+
+[universal]
 name = "probe"
 joints = 3
 cables_per_joint = 3

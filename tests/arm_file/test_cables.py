@@ -12,13 +12,13 @@ from cdsm import presets
 TABLE = cdsm.TabulatedElasticity((0.0, 10.0, 30.0), (0.0, 1e-3, 2e-3))
 
 ONE = """
-[elasticities.wire]
+[wires.rope]
 kind = "linear"
 rigidity = 48e3
 
 [[cables]]
 name = "left"
-elasticity = "wire"
+wire = "rope"
 sites = [{link = "a", xyz = [0, 0.01, 0.0]}, {link = "b", xyz = [0.1, 0.01, 0.0]}]
 """
 
@@ -30,8 +30,8 @@ def test_what_is_written_is_read_back(tmp_path: Path) -> None:
     cables[3] = replace(cables[3], minimum=2.5, maximum=310.0, name='odd "name"\\ü')
     path = cdsm.write_cables(cables, tmp_path / "cables.toml")
     assert cdsm.read_cables(path) == tuple(cables)
-    # one table per wire, not one per cable
-    assert path.read_text(encoding="utf-8").count("[elasticities.") == 3
+    # one table per wire that has neither a name nor a constant rigidity
+    assert path.read_text(encoding="utf-8").count("\n[wires.") == 1
 
 
 def test_what_is_left_out_is_nothing(tmp_path: Path) -> None:
@@ -50,10 +50,17 @@ def test_what_is_left_out_is_nothing(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("before", "after", "said"),
     [
-        ('elasticity = "wire"', 'elasticity = "rope"', "no [elasticities.rope]; there is wire"),
-        ('elasticity = "wire"', 'elastcity = "wire"', "did you mean elasticity?"),
-        ("48e3", "-1.0", "elasticities.wire.rigidity"),
-        ('kind = "linear"', 'kind = "rubber"', "elasticities.wire.kind: must be one of linear"),
+        (
+            'wire = "rope"',
+            'wire = "rape"',
+            "wire: no wire is called 'rape'; did you",
+        ),
+        ('wire = "rope"', "wire = -3.0", "cables[1].wire: -3 N given"),
+        ('wire = "rope"', "wire = true", "cables[1].wire: True given; give a name, EA in N"),
+        ('wire = "rope"', 'wier = "rope"', "cables[1].wier: is not a key that is known here; did"),
+        ("48e3", "-1.0", "wires.rope.rigidity"),
+        ('kind = "linear"', 'kind = "rubber"', "wires.rope.kind: must be one of linear"),
+        ("[wires.rope]", '[wires."1x19-1.2mm"]', "cdsm knows a wire of this name"),
         ("[0, 0.01, 0.0]", "[0, 0.01]", "sites[1].xyz"),
         ("[0, 0.01, 0.0]", "[0, nan, 0.0]", "sites[1].xyz[2]"),
         (', {link = "b", xyz = [0.1, 0.01, 0.0]}', "", "sites"),
@@ -64,8 +71,9 @@ def test_what_is_left_out_is_nothing(tmp_path: Path) -> None:
         ('name = "left"', 'name = "left"\nfriction = 2.5', "cables[1].friction: 2.5 given"),
         ("{link", "{friction = 0.1, link", "site 1 has friction or wrap"),
         ("{link", "{wrap = 20.0, link", "wrap: 20 rad given"),
-        ("[[cables]]", "[[cable]]", "cables: is missing"),
-        ("[elasticities.wire]", "elasticities = 3\n[other]", "elasticities: must be tables"),
+        ("[[cables]]", "[[cable]]", "cable: is not a key that is known here; did you mean cables?"),
+        ("[[cables]]", "[cables]", "cables: "),
+        ("[wires.rope]", "wires = 3\n[wire]", "wires: is 3; give tables [wires.NAME]"),
         ("[[cables]]", "[[cables]", "is not TOML"),
     ],
 )
@@ -91,7 +99,7 @@ def test_friction_of_a_cable_is_that_of_its_holes_without_one_of_their_own(tmp_p
         f'    {{link = "link{i}", xyz = [0.0, 0.02, 0.0]{more}}},' for i, more in enumerate(given)
     ]
     text = ONE[: ONE.index("[[cables]]")]
-    text += '[[cables]]\nname = "a"\nelasticity = "wire"\nfriction = 0.1\n'
+    text += '[[cables]]\nname = "a"\nwire = "rope"\nfriction = 0.1\n'
     path = tmp_path / "cables.toml"
     path.write_text(text + "lead = 0.2\nsites = [\n" + "\n".join(lines) + "\n]\n")
     (cable,) = cdsm.read_cables(path)
@@ -122,3 +130,32 @@ def test_bounds_of_a_cable_that_cannot_be_are_refused(low: float, high: float) -
     cable = presets.virtual_prototype().cables[0]
     with pytest.raises(cdsm.CableError, match="cable1_1"):
         replace(cable, minimum=low, maximum=high)
+
+
+def test_keys_of_older_files_are_read(tmp_path: Path) -> None:
+    path = tmp_path / "cables.toml"
+    path.write_text(ONE, encoding="utf-8")
+    today = cdsm.read_cables(path)
+    older = ONE.replace("[wires.", "[elasticities.").replace("wire =", "elasticity =")
+    path.write_text(older, encoding="utf-8")
+    assert cdsm.read_cables(path) == today
+
+
+def test_wire_of_all_cables_stands_at_the_top_or_is_given(tmp_path: Path) -> None:
+    path = tmp_path / "cables.toml"
+    without = ONE.replace('wire = "rope"\n', "")
+    path.write_text(without, encoding="utf-8")
+    with pytest.raises(cdsm.MissingWire) as caught:
+        cdsm.read_cables(path)
+    assert caught.value.path == str(path)
+    assert cdsm.read_cables(path, "1x19-1.2mm")[0].elasticity == presets.STRAND_1X19
+    assert cdsm.read_cables(path, 48e3)[0].elasticity == cdsm.LinearElasticity(48e3)
+    path.write_text('wire = "solid-1.2mm"\nminimum = 3.0\n' + without, encoding="utf-8")
+    (cable,) = cdsm.read_cables(path)
+    assert (cable.elasticity, cable.minimum) == (presets.STEEL_WIRE_200GPA, 3.0)
+
+
+@pytest.mark.parametrize("name", ["a\x7fb", "😀", "ü\u2028'''", 'q"\\\n'])
+def test_any_name_is_written_and_read(name: str, tmp_path: Path) -> None:
+    cable = replace(presets.virtual_prototype().cables[0], name=name)
+    assert cdsm.read_cables(cdsm.write_cables([cable], tmp_path / "c.toml")) == (cable,)

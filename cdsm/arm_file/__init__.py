@@ -1,0 +1,1 @@
+"""An arm as one TOML file: its robot, its cables and their wires, gravity."""

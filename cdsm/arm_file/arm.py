@@ -1,0 +1,186 @@
+"""ARM.toml: a robot, its cables and their wires, and gravity in one file."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Any, Self, TypeVar
+
+from pydantic import Field, model_validator
+
+from cdsm.arm_file.cables import (
+    CableKeys,
+    CableSettings,
+    Routed,
+    build_cables,
+    cable_lines,
+    read_routed,
+    read_wires,
+    setting_lines,
+    today,
+    wire_entries,
+)
+from cdsm.arm_model import GRAVITY, ArmParts
+from cdsm.cable import Cable, serpentine_cables
+from cdsm.cable_laws import OriginalLength
+from cdsm.elasticity import LinearElasticity
+from cdsm.errors import FileError, GeometryError, UnknownName, UrdfError, counted
+from cdsm.geometry import Geometry, split_geometry
+from cdsm.support.files import read_text
+from cdsm.support.records import CrossFaults, Number, parse, read_toml, record, toml_value
+from cdsm.support.validation import RANGES, one_of
+from cdsm.urdf import TIP, to_urdf
+from cdsm.urdf_reader import read_urdf
+from cdsm.wires.catalogue import Wire, as_wire
+
+_HEAD = """\
+# An arm of cdsm. Units: m, rad, kg, N, N/m, m/s2. Base axes: x along the straight arm.
+"""
+
+
+_ESCAPED = re.compile(r"'''|'$|[^\t\n -~\x80-\U0010ffff]")
+"""What a literal text of TOML cannot hold."""
+
+_Read = TypeVar("_Read")
+
+_G = Annotated[Number, Field(ge=-RANGES["gravity"].high, le=RANGES["gravity"].high)]
+
+
+@record
+class _Urdf:
+    tip: str
+    file: str | None = None
+    text: str | None = None
+    joint_names: Annotated[tuple[str, ...], Field(strict=False)] | None = None
+    check_inertia: bool = True
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if (self.file is None) == (self.text is None):
+            raise CrossFaults(["file: give file (a path, from the folder of this one) or text"])
+        return self
+
+
+@record
+class _Keys(CableKeys):
+    """All keys at the top of a file; the value of Any is checked by its own reader."""
+
+    gravity: Annotated[tuple[_G, _G, _G], Field(strict=False)] = GRAVITY
+    original_length: OriginalLength = "unstrained"
+    urdf: _Urdf | None = None
+
+
+def read_arm(path: str | os.PathLike[str], wire: Wire | None) -> ArmParts:
+    """Read an ARM.toml. Arguments and errors are those of :meth:`cdsm.Manipulator.read`."""
+    text = read_text(path)
+    forced = None if wire is None else as_wire(wire)
+    faults: list[str] = []
+
+    def attempt(read: Callable[..., _Read], *given: Any) -> _Read | None:
+        try:
+            return read(*given)
+        except GeometryError as error:
+            faults.extend(error.faults)
+            return None
+
+    data = attempt(read_toml, text)
+    if data is None:
+        raise FileError(path, faults[0])
+    described, rest = split_geometry(today(data))
+    keys = attempt(parse, _Keys, rest)
+    geometry = robot = routed = wires = cables = None
+    if "urdf" not in rest:
+        geometry = attempt(Geometry.of_tables, described)
+    elif described:
+        faults.append(f"urdf: stands beside {next(iter(described))}; an arm has one of them")
+    if keys is not None:
+        robot, wires = keys.urdf, attempt(read_wires, keys, forced)
+        if robot is not None or geometry is not None:
+            routed = attempt(_routed, keys.cables, geometry)
+    if not faults:
+        cables = attempt(build_cables, routed, keys, wires, path)
+    if faults or keys is None or cables is None:
+        raise FileError(path, f"cannot be read as an arm, {counted(faults)}")
+    g, length = keys.gravity, keys.original_length
+    if robot is None:
+        assert geometry is not None
+        return ArmParts(geometry, to_urdf(geometry), cables, TIP, g, length, None)
+    source = robot.text if robot.file is None else Path(path).parent / robot.file
+    assert source is not None
+    urdf = read_urdf(source, check_inertia=robot.check_inertia)
+    return ArmParts(None, urdf, cables, robot.tip, g, length, robot.joint_names)
+
+
+def _routed(cables: object, geometry: Geometry | None) -> list[Routed]:
+    """Return the paths of the cables: of ``[[cables]]``, or of the geometry with settings."""
+    if geometry is None or isinstance(cables, list):
+        return read_routed(cables)
+    tables = {} if cables is None else cables
+    if not isinstance(tables, dict):
+        raise GeometryError([f"cables: is {cables!r}; give tables [cables.NAME] or [[cables]]"])
+    routed = serpentine_cables(geometry, LinearElasticity(1.0))
+    own, faults = {}, []
+    for name, table in tables.items():
+        try:
+            one_of("cable", name, [cable.name for cable in routed])
+            own[name] = parse(CableSettings, table)
+        except UnknownName as error:
+            faults.append(f"cables.{name}: {error}")
+        except GeometryError as error:
+            faults += [f"cables.{name}.{fault}" for fault in error.faults]
+    if faults:
+        raise GeometryError(faults)
+    return [
+        Routed(f"cables.{c.name}", c.name, c.sites, c.lead, own.get(c.name, CableSettings()))
+        for c in routed
+    ]
+
+
+def arm_text(parts: ArmParts) -> str:
+    """Return the text of a file from which :func:`read_arm` reads equal parts.
+
+    Raises:
+        InvalidInput: A file cannot hold an elasticity of this kind.
+    """
+    geometry, cables = parts.geometry, parts.cables
+    wires, tables = wire_entries(cables)
+    settings = [setting_lines(cable) for cable in cables]
+    lines = [_HEAD, f"gravity = {toml_value(parts.gravity)}"]
+    lines.append(f"original_length = {toml_value(parts.original_length)}")
+    if len(set(wires)) == 1:
+        lines.append(f"wire = {wires[0]}")
+        wires = [""] * len(cables)
+    shared = [line for line in settings[0] if all(line in own for own in settings)]
+    settings = [[line for line in own if line not in shared] for own in settings]
+    lines += [*shared, "", *tables]
+    lines += _urdf_lines(parts) if geometry is None else _geometry_lines(geometry)
+    plain = () if geometry is None else serpentine_cables(geometry, LinearElasticity(1.0))
+    if [_path(cable) for cable in plain] != [_path(cable) for cable in cables]:
+        return "\n".join([*lines, *cable_lines(cables, wires, settings)])
+    for cable, wire, own in zip(cables, wires, settings, strict=True):
+        own = [*([f"wire = {wire}"] if wire else []), *own]
+        if own:
+            lines += [f"[cables.{cable.name}]", *own, ""]
+    return "\n".join(lines)
+
+
+def _path(cable: Cable) -> tuple[object, ...]:
+    return cable.name, cable.sites, cable.lead
+
+
+def _geometry_lines(geometry: Geometry) -> list[str]:
+    return ["[geometry]", *geometry.toml_lines("geometry."), ""]
+
+
+def _urdf_lines(parts: ArmParts) -> list[str]:
+    """Return the lines of a table [urdf] with the text inside, readable if TOML can hold it so."""
+    urdf, lines = parts.urdf, ["[urdf]", f"tip = {toml_value(parts.tip)}"]
+    lines.append(f"joint_names = {toml_value(parts.joint_names)}")
+    try:
+        read_urdf(urdf)
+    except UrdfError:  # the arm was built without this check
+        lines.append("check_inertia = false")
+    text = toml_value(urdf) if _ESCAPED.search(urdf) else f"'''\n{urdf}'''"
+    return [*lines, f"text = {text}", ""]

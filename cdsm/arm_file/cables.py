@@ -1,0 +1,342 @@
+"""Cables in TOML: sites, wire, lead, spring, control and tension bounds."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any, NamedTuple
+
+from pydantic import Field
+
+from cdsm.cable import Cable, Control, Site
+from cdsm.elasticity import Elasticity, LinearElasticity
+from cdsm.errors import (
+    CableError,
+    FileError,
+    GeometryError,
+    InvalidInput,
+    MissingWire,
+    UnknownName,
+    counted,
+)
+from cdsm.support.files import read_text, write_text
+from cdsm.support.records import (
+    Friction,
+    LengthOrZero,
+    Point,
+    SpringStiffness,
+    Tension,
+    Wrap,
+    parse,
+    read_toml,
+    record,
+    toml_lines,
+    toml_value,
+)
+from cdsm.support.validation import one_of, sequence_of
+from cdsm.wires.catalogue import WIRES, Wire, as_wire, name_of
+from cdsm.wires.files import from_table, table_of
+
+_HEAD = """\
+# cdsm cables. Units: m, N, N/m.
+# wire: a name, a constant rigidity EA in N, or the law of a table [wires.NAME].
+# sites: links of the robot with a point in each one's frame, from the actuator's side to the end.
+# lead: straight cable from the actuator to the first site. series_stiffness: of a spring in series;
+# none if left out. control: what the motor holds, "position" or "force". minimum, maximum: tensions
+# that the cable may carry; 0 and none if left out. friction, wrap (of a site): coefficient, and an
+# angle [rad] that adds to the angle by which the cable turns there; 0 if left out.
+"""
+
+_Label = Annotated[str, Field(min_length=1, max_length=200)]
+
+
+@record
+class CableSettings:
+    """What a file may say of all cables or of one cable; None: nothing."""
+
+    wire: Any = None
+    series_stiffness: SpringStiffness | None = None
+    control: Control | None = None
+    minimum: Tension | None = None
+    maximum: Tension | None = None
+
+
+@record
+class CableKeys(CableSettings):
+    """What stands at the top of a file; the values of Any are checked where they are read."""
+
+    wires: Any = Field(default_factory=dict)
+    cables: Any = None
+
+
+SETTINGS = ("series_stiffness", "control", "minimum", "maximum")
+"""Settings that are attributes of a :class:`Cable` with the same name."""
+
+
+@record
+class _Site:
+    link: _Label
+    xyz: Point
+    friction: Friction | None = None
+    wrap: Wrap | None = None
+
+
+@record
+class _Entry(CableSettings):
+    name: _Label
+    lead: LengthOrZero = 0.0
+    friction: Friction = 0.0
+    sites: Annotated[tuple[_Site, ...], Field(strict=False, min_length=2)]
+
+
+@record
+class _Entries:
+    cables: Annotated[tuple[_Entry, ...], Field(strict=False, min_length=1)]
+
+
+def write_cables(cables: Sequence[Cable], path: str | os.PathLike[str]) -> Path:
+    """Write cables to a TOML file. :func:`read_cables` returns equal cables.
+
+    Args:
+        cables: One or more cables.
+        path: The file. An existing file is replaced.
+
+    Raises:
+        InvalidInput: No cables are given, or a file cannot hold an elasticity of this kind.
+        FileError: The file cannot be written.
+    """
+    cables = sequence_of("cables", cables, Cable)
+    if not cables:
+        raise InvalidInput("cables", "none given; there is nothing to write.")
+    wires, tables = wire_entries(cables)
+    settings = [setting_lines(cable) for cable in cables]
+    return write_text(path, "\n".join([_HEAD, *tables, *cable_lines(cables, wires, settings)]))
+
+
+def read_cables(path: str | os.PathLike[str], wire: Wire | None = None) -> tuple[Cable, ...]:
+    """Read the cables of an arm from a TOML file.
+
+    The file has one table ``[[cables]]`` per cable with ``name`` and ``sites`` (two or more
+    ``{link = "…", xyz = [x, y, z]}``, [m]). Its ``wire`` is a name such as ``"1x19-1.2mm"``, a
+    constant rigidity [N], or the NAME of a table ``[wires.NAME]`` in the form of
+    :func:`~cdsm.read_elasticity`. Optional are ``lead`` [m] (the straight cable between its
+    actuator and the first site), ``series_stiffness`` [N/m], ``control`` (``"position"`` or
+    ``"force"``), ``minimum`` and ``maximum`` [N]. ``wire`` and the optional keys except ``lead``
+    may also stand once at the top, for all cables. ``friction`` of a cable is the coefficient in
+    all holes that it passes. A site may have ``friction`` and ``wrap`` [rad] of its own, as in
+    :class:`~cdsm.Site`.
+
+    Args:
+        path: The file.
+        wire: Wire of all cables, in the place of the file's: a law, a name, EA [N], or a WIRE.toml.
+
+    Raises:
+        FileError: The file cannot be read or does not describe cables. Every fault is listed.
+        MissingWire: The file names no wire for some cables, and ``wire`` is not given.
+    """
+    text = read_text(path)
+    forced = None if wire is None else as_wire(wire)
+    try:
+        keys = parse(CableKeys, today(read_toml(text)))
+        wires = read_wires(keys, forced)
+        return build_cables(read_routed(keys.cables), keys, wires, path)
+    except GeometryError as error:
+        faults = error.faults
+    raise FileError(path, f"cannot be read as cables, {counted(faults)}")
+
+
+def today(data: dict[str, Any]) -> dict[str, Any]:
+    """Return the data of a file with the keys of today in the place of older ones."""
+    if "elasticities" in data:
+        data["wires"] = data.pop("elasticities")
+    cables = data.get("cables")
+    for entry in cables if isinstance(cables, list) else ():
+        if isinstance(entry, dict) and "wire" not in entry and "elasticity" in entry:
+            entry["wire"] = entry.pop("elasticity")
+    return data
+
+
+class Wires(NamedTuple):
+    """The wires of a file: laws by name, of all cables, and the law that replaces any other."""
+
+    named: dict[str, Elasticity]
+    usual: Elasticity | None
+    forced: Elasticity | None
+
+    def of(self, given: object) -> Elasticity | None:
+        """Return the law of a cable whose key ``wire`` is given, or None if it has no wire."""
+        own = None if given is None else read_wire(given, self.named)
+        return self.forced or own or self.usual
+
+
+def read_wires(keys: CableKeys, forced: Elasticity | None) -> Wires:
+    """Read the tables ``[wires.NAME]`` and the wire of all cables; raise GeometryError."""
+    if not isinstance(keys.wires, dict):
+        raise GeometryError([f"wires: is {keys.wires!r}; give tables [wires.NAME]"])
+    named, usual, faults = {}, None, []
+    for name, table in keys.wires.items():
+        if name in WIRES:
+            faults.append(f"wires.{name}: cdsm knows a wire of this name; choose another")
+        try:
+            named[name] = read_wire(table, {}, f"wires.{name}")
+        except GeometryError as error:
+            faults += error.faults
+    try:
+        usual = None if keys.wire is None else read_wire(keys.wire, named)
+    except GeometryError as error:
+        faults += error.faults
+    if faults:
+        raise GeometryError(faults)
+    return Wires(named, usual, forced)
+
+
+def read_wire(given: object, named: Mapping[str, Elasticity], key: str = "wire") -> Elasticity:
+    """Read a name, EA [N] or the table of a law; raise GeometryError with faults at ``key``."""
+    try:
+        if isinstance(given, dict):
+            return from_table(given)
+        if isinstance(given, str):
+            known = {**WIRES, **named}
+            return known[one_of("wire", given, known)]
+        if isinstance(given, bool) or not isinstance(given, (int, float)):
+            raise InvalidInput(key, f"{given!r} given; give a name, EA in N, or a table.")
+        return LinearElasticity(given)
+    except GeometryError as error:
+        faults = [f"{key}.{fault}" for fault in error.faults]
+    except UnknownName as error:
+        faults = [f"{key}: {error} Or give EA in N, or a table [wires.NAME]."]
+    except InvalidInput as error:
+        faults = [f"{key}: {str(error).removeprefix(f'{error.name}: ')}"]
+    raise GeometryError(faults)
+
+
+_ANY = LinearElasticity(1.0)
+"""Stands for a wire that is missing, until all other faults of the file are known."""
+
+
+class Routed(NamedTuple):
+    """A cable before its wire is known: where it stands in the file, its path and its settings."""
+
+    where: str
+    name: str
+    sites: tuple[Site, ...]
+    lead: float
+    own: CableSettings
+
+
+def read_routed(cables: object) -> list[Routed]:
+    """Read the tables ``[[cables]]``; raise GeometryError with every fault."""
+    entries = parse(_Entries, {"cables": cables} if cables is not None else {}).cables
+    names = [entry.name for entry in entries]
+    faults = [
+        f"cables[{i}].name: {name!r} is used twice"
+        for i, name in enumerate(names, start=1)
+        if name in names[: i - 1]
+    ]
+    routed = []
+    for i, entry in enumerate(entries, start=1):
+        try:
+            routed.append(Routed(f"cables[{i}]", entry.name, _sites(entry), entry.lead, entry))
+        except InvalidInput as error:
+            faults.append(f"cables[{i}]: {error}")
+    if faults:
+        raise GeometryError(faults)
+    return routed
+
+
+def _sites(entry: _Entry) -> tuple[Site, ...]:
+    """Build the sites of a cable; holes without a friction of their own have that of the cable."""
+    passed = range(0 if entry.lead > 0.0 else 1, len(entry.sites) - 1)
+    sites = []
+    for i, site in enumerate(entry.sites):
+        usual = entry.friction if i in passed else 0.0
+        friction = usual if site.friction is None else site.friction
+        sites.append(Site(site.link, site.xyz, friction, site.wrap or 0.0))
+    return tuple(sites)
+
+
+def build_cables(
+    routed: Iterable[Routed],
+    settings: CableSettings,
+    wires: Wires,
+    path: str | os.PathLike[str],
+) -> tuple[Cable, ...]:
+    """Build cables with their own settings, and with those of all cables where they have none.
+
+    Raises:
+        GeometryError: Some settings are faulty; lists every fault.
+        MissingWire: All settings are right, but some cables have no wire.
+    """
+    cables: list[Cable] = []
+    faults: list[str] = []
+    without: list[str] = []
+    for where, name, sites, lead, own in routed:
+        given = {
+            key: getattr(each, key)
+            for each in (settings, own)
+            for key in SETTINGS
+            if getattr(each, key) is not None
+        }
+        try:
+            wire = wires.of(own.wire)
+            if wire is None:
+                without.append(name)
+            cables.append(Cable(name, sites, wire or _ANY, lead, **given))
+        except GeometryError as error:
+            faults += [f"{where}.{fault}" for fault in error.faults]
+        except (CableError, InvalidInput) as error:
+            faults.append(f"{where}: {error}")
+    if faults:
+        raise GeometryError(faults)
+    if without:
+        raise MissingWire(path, without if len(without) < len(cables) else ())
+    return tuple(cables)
+
+
+def wire_entries(cables: Sequence[Cable]) -> tuple[list[str], list[str]]:
+    """Return the value of the key ``wire`` of each cable, and the lines of the tables of wires."""
+    values: dict[str, str] = {}
+    lines: list[str] = []
+    keys = []
+    for cable in cables:
+        law = cable.elasticity
+        table = "\n".join(table_of(law))
+        if table not in values:
+            known = name_of(law)
+            if known is None and isinstance(law, LinearElasticity):
+                values[table] = toml_value(float(law.rigidity(0.0)))
+            elif known is None:
+                known = f"wire{1 + len(lines) // 3}"
+                lines += [f"[wires.{known}]", table, ""]
+            if known is not None:
+                values[table] = toml_value(known)
+        keys.append(values[table])
+    return keys, lines
+
+
+def setting_lines(cable: Cable) -> list[str]:
+    """Return one line for each setting of a cable that is not the default."""
+    defaults = {"series_stiffness": math.inf, "control": "position", "minimum": 0.0}
+    defaults["maximum"] = math.inf
+    given = {key: getattr(cable, key) for key in SETTINGS if getattr(cable, key) != defaults[key]}
+    return [f"{key} = {toml_value(value)}" for key, value in given.items()]
+
+
+def cable_lines(
+    cables: Sequence[Cable], wires: Sequence[str], settings: Sequence[Sequence[str]]
+) -> list[str]:
+    """Return the lines of the tables ``[[cables]]``; an empty wire is left out."""
+    lines = []
+    for cable, wire, given in zip(cables, wires, settings, strict=True):
+        lines += ["[[cables]]", f"name = {toml_value(cable.name)}"]
+        lines += [f"wire = {wire}"] if wire else []
+        lines += [f"lead = {toml_value(cable.lead)}"] if cable.lead else []
+        lines += [*given, "sites = ["]
+        for site in cable.sites:
+            own = {"friction": site.friction or None, "wrap": site.wrap or None}
+            entry = toml_lines(_Site(link=site.link, xyz=site.position, **own))
+            lines.append(f"    {{{', '.join(entry)}}},")
+        lines += ["]", ""]
+    return lines

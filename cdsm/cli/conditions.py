@@ -1,0 +1,72 @@
+"""What an answer was computed with: wire, gravity, least tension, friction."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import cdsm
+    from cdsm.cli.output import Json
+
+_NAMED = 3
+"""Number of different wires that the line names."""
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """First lines of an answer: what it was computed with, and the arm.
+
+    Attributes:
+        arm: The arm.
+        minimum: Lower bounds of all tensions that were asked for [N].
+    """
+
+    arm: cdsm.Manipulator
+    minimum: tuple[float, ...] = ()
+
+    def __str__(self) -> str:
+        x, y, z = self.arm.gravity.tolist()
+        words = [f"wire {self.wire}", f"gravity {x:g}, {y:g}, {z:g} m/s²"]
+        if self.minimum:
+            words.append(f"least tension {', '.join(f'{each:g}' for each in self.minimum)} N")
+            own = max(cable.minimum for cable in self.arm.cables)
+            if own > min(self.minimum):
+                words[-1] += f" (cables of their own up to {own:g} N)"
+        if self.arm.original_length != "unstrained":
+            words.append("stretched lengths")
+        words.append("friction of its holes left out" if self.arm.has_friction else "frictionless")
+        return f"with {'; '.join(words)}\n{self.arm}"
+
+    @property
+    def wire(self) -> str:
+        """The wires of the cables and their springs, as text."""
+        from cdsm.wires.catalogue import label
+
+        counts = Counter(
+            label(cable.elasticity)
+            + (
+                f" on a spring of {cable.series_stiffness / 1000.0:.4g} N/mm"
+                if cable.series_stiffness < float("inf")
+                else ""
+            )
+            for cable in self.arm.cables
+        )
+        if len(counts) == 1:
+            return next(iter(counts))
+        if len(counts) > _NAMED:
+            return f"of {len(counts)} kinds"
+        return ", ".join(f"{name} ({count} of {counts.total()})" for name, count in counts.items())
+
+    def to_dict(self) -> Json:
+        """Return them for JSON, in SI units."""
+        return {
+            "computed_with": {
+                "wire": self.wire,
+                "gravity_m_per_s2": self.arm.gravity,
+                "least_tension_N": list(self.minimum),
+                "original_length": self.arm.original_length,
+                "friction": "left out" if self.arm.has_friction else "none",
+            }
+        }

@@ -1,0 +1,68 @@
+"""Wires by name, and what else may stand for a wire: a rigidity or a file."""
+
+from __future__ import annotations
+
+import math
+import os
+from typing import Final
+
+from cdsm.elasticity import Elasticity, LinearElasticity
+from cdsm.errors import InvalidInput, UnknownName
+from cdsm.wires.files import read_elasticity
+from cdsm.wires.laws import StrandElasticity, TabulatedElasticity
+
+STRAND: Final = StrandElasticity.eq19_repaired()
+"""The 1×19 steel strand of 1.2 mm of Section IV-C: Eq. 19, repaired and continuous."""
+
+SOLID: Final = LinearElasticity.of_wire(200e9, 1.2e-3)
+"""Solid wire with the strand's diameter and the 200 GPa of Section IV-B."""
+
+WIRES: Final[dict[str, Elasticity]] = {"1x19-1.2mm": STRAND, "solid-1.2mm": SOLID}
+"""Laws by the name of their wire."""
+
+Wire = Elasticity | str | float | os.PathLike[str]
+"""What stands for a wire: a law, a name of :data:`WIRES`, EA [N], or the path of a WIRE.toml."""
+
+
+def as_wire(wire: Wire) -> Elasticity:
+    """Return the law of a wire.
+
+    Args:
+        wire: A law, a name of :data:`WIRES`, a constant rigidity EA [N], or the path of a TOML file
+            that :func:`~cdsm.write_elasticity` writes.
+
+    Raises:
+        UnknownName: No wire has this name.
+        InvalidInput: The rigidity is not a positive number of :data:`RANGES`.
+        FileError: The file cannot be read or does not describe an elasticity.
+    """
+    if isinstance(wire, Elasticity):
+        return wire
+    if isinstance(wire, str) and wire in WIRES:
+        return WIRES[wire]
+    if isinstance(wire, os.PathLike) or (isinstance(wire, str) and wire.endswith(".toml")):
+        return read_elasticity(wire)
+    if isinstance(wire, str):
+        raise UnknownName("wire", wire, WIRES, "Or give a rigidity EA in N, or a file WIRE.toml.")
+    if isinstance(wire, bool) or not isinstance(wire, (int, float)):
+        raise InvalidInput("wire", f"{wire!r} given; give a name, a rigidity EA in N, or a file.")
+    return LinearElasticity(wire)
+
+
+def name_of(law: Elasticity) -> str | None:
+    """Return the name of a law in :data:`WIRES`, or None."""
+    return next((name for name, known in WIRES.items() if known == law), None)
+
+
+def label(law: Elasticity) -> str:
+    """Return a short text for a wire: its name, its EA, or its kind with its domain."""
+    known = name_of(law)
+    if known is not None:
+        return known
+    if isinstance(law, LinearElasticity):
+        return f"EA {float(law.rigidity(0.0)):.6g} N"
+    kind = {StrandElasticity: "strand", TabulatedElasticity: "table"}.get(
+        type(law), type(law).__name__
+    )
+    low, high = law.domain
+    return f"{kind}, {low:.4g} to {high:.4g} N" if math.isfinite(high) else kind

@@ -1,0 +1,248 @@
+"""An arm as one file: there and back with all bits, wires, and every fault by name."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import cdsm
+from cdsm import presets
+from tests.support import strategies
+
+SHORT = """
+gravity = [0.0, -9.81, 0.0]
+wire = "1x19-1.2mm"
+minimum = 5.0
+
+[universal]
+joints = 2
+cables_per_joint = 3
+link_length = 0.05
+base_length = 0.02
+disk_offset = 0.01
+hole_radius = 0.02
+link_mass = 0.1
+
+[cables.cable2_3]
+wire = 48e3
+control = "force"
+maximum = 300.0
+"""
+
+ARMS = st.one_of(
+    strategies.serpentine_arms(strategies.geometries(most_joints=5)),
+    strategies.routed_arms(strategies.geometries(most_joints=4)),
+    strategies.trees(),
+)
+
+FINGER = """
+<robot name="finger">
+  <link name="base"/>
+  <link name="tip"><inertial><mass value="0.1"/><inertia ixx="1e-4" iyy="1e-4" izz="1e-4"
+    ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="knuckle" type="revolute"><parent link="base"/><child link="tip"/>
+    <axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
+</robot>
+"""
+
+CABLES = """
+[[cables]]
+name = "flexor"
+sites = [{link = "base", xyz = [-0.1, 0, -0.01]}, {link = "tip", xyz = [0.03, 0, -0.01]}]
+"""
+
+
+def read(tmp_path: Path, text: str, wire: Any = None) -> cdsm.Manipulator:
+    path = tmp_path / "arm.toml"
+    path.write_text(text, encoding="utf-8")
+    return cdsm.Manipulator.read(path, wire)
+
+
+def test_file_by_hand_is_the_arm_it_describes(tmp_path: Path) -> None:
+    geometry = cdsm.Geometry.universal(
+        joints=2,
+        cables_per_joint=3,
+        link_length=0.05,
+        base_length=0.02,
+        disk_offset=0.01,
+        hole_radius=0.02,
+        link_mass=0.1,
+    )
+    cables = [
+        replace(cable, minimum=5.0)
+        for cable in cdsm.serpentine_cables(geometry, presets.STRAND_1X19)
+    ]
+    cables[5] = replace(
+        cables[5], elasticity=cdsm.LinearElasticity(48e3), control="force", maximum=300.0
+    )
+    arm = read(tmp_path, SHORT)
+    assert arm == cdsm.Manipulator(geometry, cables=cables, gravity=(0.0, -9.81, 0.0))
+    assert cdsm.Geometry.read(tmp_path / "arm.toml") == geometry
+
+
+@settings(max_examples=30, deadline=None)
+@given(arm=ARMS, gravity=strategies.gravities, stretched=st.booleans())
+def test_written_arm_is_read_back_with_all_bits(
+    tmp_path_factory: pytest.TempPathFactory,
+    arm: cdsm.Manipulator,
+    gravity: tuple[float, float, float],
+    stretched: bool,
+) -> None:
+    path = tmp_path_factory.mktemp("arm") / "arm.toml"
+    arm = arm.with_gravity(gravity)
+    assert cdsm.Manipulator.read(arm.write(path)) == arm
+    by_urdf = cdsm.Manipulator.from_urdf(
+        arm.urdf,
+        arm.cables,
+        tip=arm.tip_link,
+        joint_names=arm.joint_names[::-1],
+        gravity=gravity,
+        original_length="stretched" if stretched else "unstrained",
+    )
+    again = cdsm.Manipulator.read(by_urdf.write(path))
+    assert again == by_urdf
+    assert again.joint_names == arm.joint_names[::-1]
+    if arm.is_serpentine:
+        assert cdsm.Geometry.read(arm.write(path)) == arm.geometry
+
+
+@pytest.mark.parametrize("text", [FINGER, FINGER.strip(), FINGER.replace("\n", "\r\n")])
+def test_urdf_is_a_file_beside_it_or_text_inside(tmp_path: Path, text: str) -> None:
+    (tmp_path / "robots").mkdir()
+    (tmp_path / "robots" / "finger.urdf").write_bytes(text.encode())
+    head = 'wire = 48e3\n[urdf]\ntip = "tip"\nfile = "robots/finger.urdf"\n'
+    arm = read(tmp_path, head + CABLES)
+    cables = arm.cables
+    expected = cdsm.Manipulator.from_urdf(tmp_path / "robots" / "finger.urdf", cables, tip="tip")
+    assert arm == expected
+    moved = tmp_path / "robots" / "copy.toml"  # holds the text, so it may stand anywhere
+    assert cdsm.Manipulator.read(arm.write(moved)) == arm
+
+
+def test_urdf_that_needs_no_check_of_its_inertias_says_so(tmp_path: Path) -> None:
+    odd = FINGER.replace('ixx="1e-4"', 'ixx="9.0"').replace("-->", "'''")
+    cables = read(tmp_path, f"wire = 48e3\n[urdf]\ntip = 'tip'\ntext = '''{FINGER}'''\n{CABLES}")
+    with pytest.raises(cdsm.UrdfError):
+        cdsm.Manipulator.from_urdf(odd, cables.cables, tip="tip")
+    arm = cdsm.Manipulator.from_urdf(odd, cables.cables, tip="tip", check_inertia=False)
+    assert cdsm.Manipulator.read(arm.write(tmp_path / "odd.toml")) == arm
+
+
+def test_arm_without_a_wire_asks_for_one(tmp_path: Path) -> None:
+    text = SHORT.replace('wire = "1x19-1.2mm"\n', "")
+    with pytest.raises(
+        cdsm.MissingWire, match=r"has no wire for the cables cable1_1, .*--wire"
+    ) as e:
+        read(tmp_path, text)
+    assert e.value.cables == ("cable1_1", "cable1_2", "cable1_3", "cable2_1", "cable2_2")
+    assert cdsm.Geometry.read(tmp_path / "arm.toml").joints
+    with pytest.raises(cdsm.MissingWire, match="has no wire for its cables"):
+        read(tmp_path, text.replace("wire = 48e3\n", ""))
+    law = cdsm.TabulatedElasticity((0.0, 50.0, 400.0), (0.0, 2e-3, 8e-3))
+    file = cdsm.write_elasticity(law, tmp_path / "wire.toml")
+    for wire, expected in (
+        ("1x19-1.2mm", presets.STRAND_1X19),
+        (48e3, cdsm.LinearElasticity(48e3)),
+        (law, law),
+        (file, law),
+        (str(file), law),
+    ):
+        arm = read(tmp_path, text, wire)
+        assert {cable.elasticity for cable in arm.cables} == {expected}  # also of cable2_3
+    with pytest.raises(cdsm.UnknownName, match=r"did you mean '1x19-1\.2mm'"):
+        read(tmp_path, text, "1x9-1.2mm")
+    for wrong in (-1.0, np.nan, True, None):
+        with pytest.raises((cdsm.InvalidInput, cdsm.MissingWire)):
+            read(tmp_path, text, wrong)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "said"),
+    [
+        ("gravity = [", "gravty = [", "did you mean gravity?"),
+        ("gravity = [0.0, ", "gravity = [", "gravity"),
+        ("-9.81", "-9.81e9", "gravity"),
+        ("minimum = 5.0", "minimum = -5.0", "minimum: -5 N given; cables only pull"),
+        (
+            "minimum = 5.0",
+            "minimum = 400.0",
+            "cable 'cable2_3': tensions from 400 to",
+        ),
+        ("minimum = 5.0", 'original_length = "long"', "original_length"),
+        ("minimum = 5.0", "lead = 5.0", "lead: stands outside [universal]"),
+        (
+            'wire = "1x19-1.2mm"',
+            'wire = "1x19"',
+            "wire: no wire is called '1x19'. Known: 1x19-1.2mm, ",
+        ),
+        ('wire = "1x19-1.2mm"', "wire = {kind = 'linear'}", "wire.rigidity: is missing"),
+        ('wire = "1x19-1.2mm"', "wires = {a = {kind = 'liner'}}", "wires.a.kind: must be one of"),
+        ("[cables.cable2_3]", "[cables.cable2_4]", "no cable is called 'cable2_4'; did you mean"),
+        ("[cables.cable2_3]", "[cables]", "cables.wire"),
+        ("control =", "contrl =", "cables.cable2_3.contrl: is not a key that is known here; did"),
+        ("[universal]", "[univresal]", "univresal"),
+        ("joints = 2", "joints = 0", "joints"),
+        ("joints = 2", "jonits = 2", "jonits: is not a key that is known here; did you mean joi"),
+        ("[universal]", "[hinged]\n[universal]", "stands outside"),
+        ("[universal]", "[urdf]\ntip = 'a'\n[universal]", "urdf: stands beside universal"),
+        ("[universal]", "[universal", "is not TOML"),
+    ],
+)
+def test_faults_are_named(before: str, after: str, said: str, tmp_path: Path) -> None:
+    assert before in SHORT
+    with pytest.raises(cdsm.FileError) as caught:
+        read(tmp_path, SHORT.replace(before, after, 1))
+    assert said in str(caught.value)
+    assert "arm.toml: " in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("urdf", "said"),
+    [
+        ("tip = 'tip'", "give file (a path, from the folder of this one) or text"),
+        ("file = 'a.urdf'", "urdf.tip: is missing"),
+        ("tip = 'tip'\nfile = 'absent.urdf'", "absent.urdf: does not exist"),
+        ("tip = 'tip'\nfle = 'absent.urdf'", "urdf.fle: is not a key that is known here; did you"),
+        ("tip = 'top'\ntext = '''" + FINGER + "'''", "no link is called 'top'"),
+    ],
+)
+def test_faults_of_a_urdf_are_named(urdf: str, said: str, tmp_path: Path) -> None:
+    with pytest.raises(cdsm.CdsmError) as caught:
+        read(tmp_path, f"wire = 48e3\n[urdf]\n{urdf}\n{CABLES}")
+    assert said in str(caught.value)
+
+
+def test_all_faults_are_listed_at_once(tmp_path: Path) -> None:
+    text = SHORT.replace("joints = 2", "joints = 0").replace("0.0]", "true]")
+    with pytest.raises(cdsm.FileError, match="2 faults") as caught:
+        read(tmp_path, text)
+    for part in ("gravity[3]", "joints"):
+        assert part in str(caught.value)
+
+
+def test_user_defined_wires_cannot_be_written(tmp_path: Path) -> None:
+    class Rubber(cdsm.Elasticity):
+        domain = cdsm.Domain(0.0, 100.0)
+
+        def rigidity(self, tension: Any) -> Any:
+            return np.full_like(self.domain.check(tension), 1e3)
+
+        strain = energy = rigidity
+
+    arm = cdsm.Manipulator(presets.virtual_prototype_geometry(), Rubber())
+    with pytest.raises(cdsm.InvalidInput, match="Tabulate its strain"):
+        arm.write(tmp_path / "arm.toml")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_cables_may_be_given_by_their_file(tmp_path: Path) -> None:
+    arm = presets.virtual_prototype()
+    path = cdsm.write_cables(arm.cables[:2], tmp_path / "cables.toml")
+    assert cdsm.Manipulator(arm.geometry, cables=path).cables == arm.cables[:2]
+    assert cdsm.Manipulator.from_urdf(arm.urdf, str(path), tip="tool0").cables == arm.cables[:2]
+    assert arm.with_cables(path).cables == arm.cables[:2]
+    assert arm.with_gravity((0, 0, 1)).gravity.tolist() == [0.0, 0.0, 1.0]
