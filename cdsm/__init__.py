@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from cdsm import view as view
     from cdsm.arm_file.cables import read_cables, write_cables
     from cdsm.batch import Batch, Tensions, distribute_tensions, evaluate
-    from cdsm.cable import Cable, Site, in_series, serpentine_cables
+    from cdsm.cable import Cable, Cables, Site, in_series, serpentine_cables
     from cdsm.elasticity import Domain, Elasticity, LinearElasticity
     from cdsm.errors import (
         CableError,
@@ -59,15 +59,17 @@ if TYPE_CHECKING:
     from cdsm.planning.plan import StiffnessPlan, plan_stiffness
     from cdsm.planning.range import StiffnessRange, stiffness_range
     from cdsm.planning.tension_growth import Saturation, saturation
-    from cdsm.posture import Posture
+    from cdsm.posture import MomentArms, Posture
     from cdsm.report import Report, SelfCheck
+    from cdsm.shares import Shares
+    from cdsm.statics.bifurcation import Bifurcation, bifurcation
     from cdsm.statics.buckling import CriticalLoad, CriticalTension, critical_load, critical_tension
     from cdsm.statics.equilibrium import Equilibrium, equilibrium
     from cdsm.statics.natural_modes import Modes, modes
     from cdsm.statics.weight_test import LinearPrediction, WeightTest, weight_test
-    from cdsm.stiffness_matrix import Shares, Stiffness, stiffness
+    from cdsm.stiffness_matrix import Stiffness, stiffness
     from cdsm.support.status import Status
-    from cdsm.sweeps.export import read_sweep, write_sweep
+    from cdsm.sweeps.export import read_sweep, sweep_to_pandas, write_sweep
     from cdsm.sweeps.poses import GridPoses, PathPoses, PoseSet, RandomPoses
     from cdsm.sweeps.run import sweep
     from cdsm.sweeps.status import SweepStatus
@@ -82,9 +84,11 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Batch",
+    "Bifurcation",
     "Cable",
     "CableError",
     "CableRoute",
+    "Cables",
     "CdsmError",
     "ClusterError",
     "CriticalLoad",
@@ -115,6 +119,7 @@ __all__ = [
     "MissingExtra",
     "MissingWire",
     "Modes",
+    "MomentArms",
     "PathPlan",
     "PathPoses",
     "PoseSet",
@@ -147,6 +152,7 @@ __all__ = [
     "UnreachableStiffness",
     "UrdfError",
     "WeightTest",
+    "bifurcation",
     "critical_load",
     "critical_tension",
     "distribute_tension",
@@ -175,6 +181,7 @@ __all__ = [
     "stiffness_range",
     "stuck_stiffness",
     "sweep",
+    "sweep_to_pandas",
     "to_mjcf",
     "to_urdf",
     "weight_test",
@@ -189,7 +196,7 @@ __all__ = [
 _NAMES = {
     "arm_file.cables": "read_cables write_cables",
     "batch": "Batch Tensions distribute_tensions evaluate",
-    "cable": "Cable Site in_series serpentine_cables",
+    "cable": "Cable Cables Site in_series serpentine_cables",
     "elasticity": "Domain Elasticity LinearElasticity",
     "errors": (
         "CableError CdsmError ClusterError ElasticityRangeError EquilibriumError FileError "
@@ -213,15 +220,17 @@ _NAMES = {
     "planning.plan": "StiffnessPlan plan_stiffness",
     "planning.range": "StiffnessRange stiffness_range",
     "planning.tension_growth": "Saturation saturation",
-    "posture": "Posture",
+    "posture": "MomentArms Posture",
     "report": "Report SelfCheck",
+    "statics.bifurcation": "Bifurcation bifurcation",
     "statics.buckling": "CriticalLoad CriticalTension critical_load critical_tension",
     "statics.equilibrium": "Equilibrium equilibrium",
     "statics.natural_modes": "Modes modes",
     "statics.weight_test": "LinearPrediction WeightTest weight_test",
-    "stiffness_matrix": "Shares Stiffness stiffness",
+    "shares": "Shares",
+    "stiffness_matrix": "Stiffness stiffness",
     "support.status": "Status",
-    "sweeps.export": "read_sweep write_sweep",
+    "sweeps.export": "read_sweep sweep_to_pandas write_sweep",
     "sweeps.poses": "GridPoses PathPoses PoseSet RandomPoses",
     "sweeps.run": "sweep",
     "sweeps.status": "SweepStatus",

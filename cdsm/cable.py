@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, final, get_args
+from typing import Literal, SupportsIndex, final, get_args, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -197,6 +197,30 @@ class Cable:
             lambda F: 1.0 / self.tangent_stiffness(F, free_length),
             "elongation",
         )
+
+
+class Cables(tuple[Cable, ...]):
+    """Cables of an arm, in the order of every (C,) array: ``cables[0]`` or ``cables["cable1_1"]``.
+
+    Raises:
+        UnknownName: No cable has the name that is asked for.
+    """
+
+    __slots__ = ()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the cables, in their order."""
+        return tuple(cable.name for cable in self)
+
+    @overload
+    def __getitem__(self, which: SupportsIndex | str, /) -> Cable: ...
+    @overload
+    def __getitem__(self, which: slice, /) -> tuple[Cable, ...]: ...
+    def __getitem__(self, which: SupportsIndex | slice | str, /) -> Cable | tuple[Cable, ...]:
+        if isinstance(which, str):
+            return super().__getitem__(self.names.index(one_of("cable", which, self.names)))
+        return super().__getitem__(which)
 
 
 def _length(value: float) -> float:

@@ -10,7 +10,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import final
+from typing import TYPE_CHECKING, final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,6 +19,9 @@ from cdsm.errors import ElasticityRangeError, InvalidInput
 from cdsm.support.roots import rising_root
 from cdsm.support.validation import RANGES, flag, number_array, quantity, scalar
 from cdsm.support.values import Array
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _STEP = 6e-6
 """Relative step of central differences: the cube root of the rounding of float64."""
@@ -102,6 +105,12 @@ class Elasticity(ABC):
     @abstractmethod
     def domain(self) -> Domain:
         """Tensions [N] for which the elasticity is defined."""
+
+    def plot(self) -> Figure:
+        """Plot tangent and secant rigidity [kN] over the tension [N]."""
+        from cdsm.plots import plot_elasticity  # matplotlib imports slowly
+
+        return plot_elasticity(self)
 
     @abstractmethod
     def rigidity(self, tension: ArrayLike) -> Array:

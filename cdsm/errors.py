@@ -135,8 +135,8 @@ class MissingExtra(CdsmError, ImportError):
 
     def __init__(self, package: str, extra: str) -> None:
         super().__init__(
-            f"{package} is not installed, which this needs; run "
-            f"pip install 'cdsm-stiffness[{extra}]'."
+            f"{package} is not installed, which this needs; run pip install -e '.[{extra}]' in "
+            "the folder of cdsm, its clone."
         )
         self.package = package
         self.extra = extra
@@ -310,7 +310,7 @@ class InfeasibleTension(CdsmError):
         elif relaxation == float("inf"):
             message += (
                 "No bounds would help: the cables cannot exert this torque at all. Change the "
-                "posture, the load, or the routing."
+                "posture, the load, or the routing (in Python, print(pose.moment_arms))."
             )
         else:
             message += (

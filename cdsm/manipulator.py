@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cdsm.arm_model import GRAVITY, ArmModel, ArmParts
-from cdsm.cable import Cable, serpentine_cables
+from cdsm.cable import Cable, Cables, serpentine_cables
 from cdsm.cable_laws import OriginalLength
 from cdsm.elasticity import Elasticity
 from cdsm.errors import CableError, InvalidInput, JointLimitError
@@ -35,6 +35,8 @@ from cdsm.urdf import TIP, to_urdf
 from cdsm.urdf_reader import read_urdf
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from cdsm.wires.catalogue import Wire
 
 CablesOrFile = Sequence[Cable] | str | os.PathLike[str]
@@ -184,7 +186,7 @@ class Manipulator(Printed):
         joint_names: Sequence[str] | None = None,
     ) -> None:
         """Set all attributes from checked URDF text and, if given, its geometry."""
-        cables = _checked_cables(cables)
+        self._cables = cables = _checked_cables(cables)
         self._gravity = vector("gravity", gravity, 3, "gravity in base axes [m/s²]", "gravity")
         one_of("original_length", original_length, get_args(OriginalLength))
         body = RigidBody(urdf, tip, self._gravity, joint_names)
@@ -238,9 +240,9 @@ class Manipulator(Printed):
         return self._parts.urdf
 
     @property
-    def cables(self) -> tuple[Cable, ...]:
-        """Cables of the arm, in the order of every (C,) array."""
-        return self._parts.cables
+    def cables(self) -> Cables:
+        """Cables of the arm, in the order of every (C,) array: ``cables[0]``, or by name."""
+        return self._cables
 
     @property
     def gravity(self) -> Array:
@@ -342,6 +344,15 @@ class Manipulator(Printed):
         arm._build(*self._parts._replace(**changes))
         return arm
 
+    def plot(self, q: ArrayLike | None = None) -> Figure:
+        """Plot the arm in mm at joint angles q (nv,) [rad]; by default as straight as it can be.
+
+        Raises:
+            InvalidInput: q is not (nv,) finite real numbers.
+            JointLimitError: An angle is beyond its limit.
+        """
+        return self.at(np.clip(0.0, self.lower, self.upper) if q is None else q).plot()
+
     def at(self, q: ArrayLike, *, check_limits: bool = True) -> Posture:
         """Evaluate the arm at joint angles q: kinematics, cable lengths and gravity.
 
@@ -411,12 +422,12 @@ class Manipulator(Printed):
         return tuple(pose)
 
 
-def _checked_cables(cables: CablesOrFile) -> tuple[Cable, ...]:
+def _checked_cables(cables: CablesOrFile) -> Cables:
     if isinstance(cables, (str, os.PathLike)):
         from cdsm.arm_file.cables import read_cables
 
-        return read_cables(cables)
-    cables = sequence_of("cables", cables, Cable)
+        return Cables(read_cables(cables))
+    cables = Cables(sequence_of("cables", cables, Cable))
     if not cables:
         raise InvalidInput("cables", "none given; an arm needs at least one.")
     counts = Counter(cable.name for cable in cables)

@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cdsm.cable import Cable
 from cdsm.cable_chains import Chains
@@ -15,11 +16,18 @@ from cdsm.kernels import chains as chain_kernels
 from cdsm.kernels import segments as segment_kernels
 from cdsm.kernels import stiffness as stiffness_kernels
 from cdsm.kernels.tree import Frames, Routing
-from cdsm.support.format import coordinates
+from cdsm.support.format import JointUnits, aligned, coordinates, plain
+from cdsm.support.tidy import data_frame
+from cdsm.support.validation import one_of
 from cdsm.support.values import Array, ReadOnlyState, frozen
 
 if TYPE_CHECKING:
+    import pandas
+    from matplotlib.figure import Figure
+
     from cdsm.manipulator import Manipulator
+    from cdsm.stiffness_matrix import Stiffness
+    from cdsm.tension import Tension
 
 
 @final
@@ -83,7 +91,40 @@ class Posture(ReadOnlyState):
     _frames: Frames
 
     def __repr__(self) -> str:
-        return f"<Posture of {self.arm.name}, tip at {coordinates(self.tip[:3, 3])} m>"
+        return f"<Posture of {self.arm.name}, tip at {coordinates(1e3 * self.tip[:3, 3])} mm>"
+
+    def plot(self, tension: Tension | None = None, stiffness: Stiffness | None = None) -> Figure:
+        """Plot the arm in mm, with tensions as colours and the compliance at the tip if given.
+
+        Arguments and errors are those of :func:`cdsm.plots.plot_arm`.
+        """
+        from cdsm.plots import plot_arm  # matplotlib imports slowly
+
+        return plot_arm(self, tension, stiffness)
+
+    def to_dict(self) -> dict[str, object]:
+        """Return angles, tip, cable lengths and moment arms in SI for JSON, units in the keys."""
+        lengths = dict(zip(self.arm.cables.names, self.cable_lengths, strict=True))
+        numbers = {
+            **self._coordinates,
+            "tip_position_m": self.tip[:3, 3],
+            "tip_rotation": self.tip[:3, :3],
+            "cable_length_m": lengths,
+            **self.moment_arms.to_dict(),
+        }
+        return dict(plain(numbers))
+
+    @property
+    def _coordinates(self) -> dict[str, object]:
+        return JointUnits(self.arm.slides).to_dict(self.arm.joint_names, self.q)
+
+    @cached_property
+    def moment_arms(self) -> MomentArms:
+        """Moment arm of each cable about each joint, as a table by name."""
+        arm, values = self.arm, frozen(0.0 - self.length_jacobian)  # no zero is negative
+        return MomentArms(
+            values=values, cables=arm.cables.names, joints=arm.joint_names, slides=arm.slides
+        )
 
     @cached_property
     def length_hessian(self) -> Array:
@@ -176,6 +217,71 @@ class Posture(ReadOnlyState):
             model.masses.tip_joints,
         )
         return frozen(active), frozen(passive), frozen(load), frozen(joint)
+
+
+@final
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class MomentArms(ReadOnlyState):
+    """Moment arm of each cable about each joint, −J_L: torque per tension, τ = −J_Lᵀ F (Eq. 13).
+
+    A positive arm turns the joint to positive angles. ``arms["cable1_1", "joint1_1"]`` is one arm.
+
+    Attributes:
+        values: The arms (C, nv) [m]; the force per tension [-] where a joint slides.
+        cables: Names of the cables.
+        joints: Names of the joints.
+        slides: Whether each joint slides (nv,).
+    """
+
+    values: Array
+    cables: tuple[str, ...]
+    joints: tuple[str, ...]
+    slides: NDArray[np.bool_]
+
+    def __getitem__(self, names: tuple[str, str]) -> float:
+        """Return the arm of a cable about a joint [m]; [-] where the joint slides.
+
+        Raises:
+            UnknownName: No cable, or no joint, has this name.
+        """
+        cable, joint = names
+        row = self.cables.index(one_of("cable", cable, self.cables))
+        return float(self.values[row, self.joints.index(one_of("joint", joint, self.joints))])
+
+    def to_dict(self) -> dict[str, object]:
+        """Return the arms by cable and joint for JSON, with the units in the keys."""
+        found: dict[str, object] = {}
+        for name, chosen in (("moment_arm_m", ~self.slides), ("force_per_tension", self.slides)):
+            columns = np.flatnonzero(chosen).tolist()
+            if columns:
+                found[name] = {
+                    cable: {self.joints[i]: float(row[i]) for i in columns}
+                    for cable, row in zip(self.cables, self.values, strict=True)
+                }
+        return found
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """Return a table with a row for each cable and a column for each joint, in SI.
+
+        Raises:
+            MissingExtra: pandas is not installed.
+        """
+        units = np.where(self.slides, "-", "m").tolist()
+        names = [f"{joint} [{unit}]" for joint, unit in zip(self.joints, units, strict=True)]
+        return data_frame(dict(zip(names, self.values.T, strict=True)), "cable", self.cables)
+
+    def __repr__(self) -> str:
+        return f"<MomentArms of {len(self.cables)} cables about {len(self.joints)} joints>"
+
+    def __str__(self) -> str:
+        scale = np.where(self.slides, 1.0, 1e3)
+        rows = [
+            [cable, *(f"{arm:z.2f}" for arm in scale * row)]
+            for cable, row in zip(self.cables, self.values, strict=True)
+        ]
+        slide = " [-] where the joint slides;" if self.slides.any() else ""
+        note = f"moment arms [mm],{slide} positive: the cable turns the joint to positive angles"
+        return "\n".join([*aligned([["", *self.joints], *rows]), note])
 
 
 def site_paths(cables: Sequence[Cable], sites: Array) -> list[Array]:

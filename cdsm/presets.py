@@ -19,6 +19,24 @@ from cdsm.geometry import Geometry, Link
 from cdsm.manipulator import Manipulator
 from cdsm.wires.catalogue import SOLID, STRAND
 
+__all__ = [
+    "ELASTIC_STAGE",
+    "STEEL_WIRE_200GPA",
+    "STRAND_1X19",
+    "STRAND_DIAMETER",
+    "TEN_DEGREES",
+    "experimental_prototype",
+    "experimental_prototype_geometry",
+    "virtual_prototype",
+    "virtual_prototype_geometry",
+]
+
+
+def __dir__() -> list[str]:
+    """List the public names."""
+    return __all__
+
+
 STRAND_1X19: Final = STRAND
 """The 1×19 steel strand of 1.2 mm of Section IV-C: Eq. 19, repaired and continuous."""
 

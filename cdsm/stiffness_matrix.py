@@ -11,9 +11,9 @@ stiffness in x" then has three different meanings. Each meaning has a name here:
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 from typing import TYPE_CHECKING, Literal, final, get_args
 
 import numpy as np
@@ -22,13 +22,16 @@ from numpy.typing import ArrayLike
 from cdsm.errors import InvalidInput, SingularStiffness
 from cdsm.kernels import readings
 from cdsm.posture import Posture
-from cdsm.support.format import MODEL, coordinates
+from cdsm.shares import Shares
+from cdsm.support.format import MODEL, coordinates, key, plain
 from cdsm.support.markup import element, row
+from cdsm.support.tidy import dataset
 from cdsm.support.validation import (
     Direction,
     instance,
     one_of,
     unit_direction,
+    unit_directions,
     vector,
     wrench_vector,
 )
@@ -36,44 +39,20 @@ from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension
 
 if TYPE_CHECKING:
+    import xarray
+    from matplotlib.figure import Figure
+
     from cdsm.instability import Remedy
     from cdsm.report import Report
 
 Term = Literal["active", "passive", "gravity", "load", "joint"]
 Friction = Literal["frictionless", "stuck", "sliding"]
 
+_ORTHOGONAL = 1e-9
+"""Largest product of two unit directions that are orthogonal."""
+
 _NO_WRENCH = frozen(np.zeros(6))
 _NO_DIRECTIONS = frozen(np.zeros((0, 3)))
-
-
-@final
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Shares(ReadOnlyState):
-    """Contributions to the stiffness in one direction; their sum is :attr:`total`.
-
-    Attributes:
-        direction: The unit direction (3,), base axes.
-        passive: Contribution of each cable's elasticity, (C,) [N/m].
-        active: Contribution of each cable's tension, (C,) [N/m]; mostly negative.
-        gravity: Contribution of the weight of the links [N/m].
-        load: Contribution of the wrench at the tip [N/m].
-    """
-
-    direction: Array
-    passive: Array
-    active: Array
-    gravity: float
-    load: float
-
-    @property
-    def cables(self) -> Array:
-        """Sum of the passive and active contributions of each cable, (C,) [N/m]."""
-        return frozen(self.passive + self.active)
-
-    @property
-    def total(self) -> float:
-        """Sum of all contributions [N/m]: the stiffness along the direction."""
-        return float(self.passive.sum() + self.active.sum() + self.gravity + self.load)
 
 
 @final
@@ -191,6 +170,29 @@ class Stiffness(ReadOnlyState):
         self._refuse(status, "the Cartesian stiffness matrix")
         return frozen(cartesian)
 
+    def cartesian_in(self, directions: Iterable[Direction]) -> Array:
+        """Compute (U C_vv Uᵀ)⁻¹ (n, n) [N/m]: force per tip displacement in a plane or along lines.
+
+        For planar arms, whose tip moves in the plane of U only: their stiffness in this plane.
+
+        Args:
+            directions: U, n orthogonal directions in base axes: names as ``("x", "z")``, or (n, 3).
+
+        Raises:
+            InvalidInput: The directions are not finite numbers, not orthogonal, or one is zero.
+            SingularStiffness: K_θ is singular, or the tip hardly moves in one of the directions.
+        """
+        U = unit_directions("directions", directions).reshape(-1, 3)
+        if abs(U @ U.T - np.eye(len(U))).max() > _ORTHOGONAL:
+            raise InvalidInput("directions", "are not orthogonal; give axes of a plane.")
+        rows = self.posture.jacobian[:3]
+        vectors, moved, _ = np.linalg.svd(U @ rows)
+        if moved[-1] <= readings.FLAT * np.linalg.norm(rows, 2):
+            u: Array = np.asarray(vectors[:, len(moved) - 1] @ U, dtype=np.float64)
+            raise SingularStiffness(f"the tip cannot move along {_line(u)}.", frozen(u))
+        inverse = np.linalg.inv(U @ self.compliance[:3, :3] @ U.T)
+        return frozen(np.asarray(inverse, dtype=np.float64))
+
     def along(self, direction: Direction) -> float:
         """Compute 1/(uᵀ C_vv u) [N/m], the tangent stiffness that a tip weight measures (Eq. 20).
 
@@ -256,6 +258,7 @@ class Stiffness(ReadOnlyState):
             passive = np.asarray(np.bincount(segments.chains.cable, each), dtype=np.float64)
             active = segments.tension_stiffness(self.segment_tension) @ motion @ motion
         return Shares(
+            stiffness=self,
             direction=u,
             passive=frozen(passive),
             active=frozen(active),
@@ -305,19 +308,75 @@ class Stiffness(ReadOnlyState):
             )
         return self
 
+    def plot(self) -> Figure:
+        """Plot the arm in mm, cables coloured by tension, with the compliance at its tip.
+
+        Raises:
+            SingularStiffness: K_θ is singular.
+        """
+        return self.posture.plot(self.distribution, self)
+
+    def to_dict(self) -> dict[str, object]:
+        """Return the stiffness in SI for JSON, with units in the keys; None if it does not exist.
+
+        Three numbers are x, y, z.
+        """
+
+        def read(reading: Callable[[], object]) -> object:
+            try:
+                return reading()
+            except SingularStiffness:
+                return None
+
+        pose, unit = self.posture, self.posture.arm.stiffness_unit()
+        numbers = {
+            **pose._coordinates,
+            "tip_position_m": pose.tip[:3, 3],
+            "tension_N": dict(zip(pose.arm.cables.names, self.tension, strict=True)),
+            "cable_length_m": pose.cable_lengths,
+            key("static_residual", pose.arm.torque_unit()): self.residual,
+            "model": self._model,
+            "along_N_per_m": [read(partial(self.along, axis)) for axis in np.eye(3)],
+            "cartesian_N_per_m": read(lambda: self.cartesian),
+            "pseudoinverse_N_per_m": read(self.pseudoinverse),
+            "compliance": read(lambda: self.compliance),
+            key("joint_stiffness", unit): self.joint,
+            key("margin", unit): self.margin,
+            "stable": self.is_stable,
+        }
+        return dict(plain(numbers))
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Return the terms of K_θ, tensions and cable stiffnesses as a Dataset in SI, labelled.
+
+        Raises:
+            MissingExtra: xarray is not installed.
+        """
+        arm, square = self.posture.arm, ("joint", "joint_column")
+        unit = arm.stiffness_unit()
+        terms = {name: (square, getattr(self, name), unit) for name in get_args(Term)}
+        # a variable must not have the name of a dimension
+        terms["joint_stiffness"] = terms.pop("joint")
+        of_cables = {
+            "tension": (("cable",), self.tension, "N"),
+            "cable_stiffness": (("cable",), self.cable_stiffness, "N/m"),
+        }
+        labels = {"cable": arm.cables.names, **dict.fromkeys(square, arm.joint_names)}
+        return dataset({**terms, **of_cables}, labels, title=f"stiffness of {arm.name}")
+
     def __repr__(self) -> str:
         state = "stable" if self.is_stable else "UNSTABLE"
         return f"<Stiffness of {self.posture.arm.name}, {state}>"
 
     def __str__(self) -> str:
         lines = [f"{name:<24}{''.join(f'{cell:>12}' for cell in row)}" for name, *row in self._rows]
-        return "\n".join([*self.warnings, *lines, self._verdict])
+        return "\n".join([*self.warnings, *lines, *self._notes])
 
     def _repr_html_(self) -> str:
         head, *rows = self._rows
         table = element("table", row("th", head), *(row("td", cells) for cells in rows))
         warning = element("pre", "\n".join(self.warnings)) if self.warnings else ""
-        return warning + table + element("p", self._verdict)
+        return warning + table + "".join(element("p", note) for note in self._notes)
 
     @property
     def _rows(self) -> list[tuple[str, ...]]:
@@ -330,7 +389,7 @@ class Stiffness(ReadOnlyState):
             "  of it active": lambda i: shares(i).active.sum(),
             "  of it gravity": lambda i: shares(i).gravity,
             "  of it load": lambda i: shares(i).load,
-            "cartesian, diagonal": lambda i: self.cartesian[i, i],
+            "cartesian, diagonal": self._cartesian_entry,
             "pseudoinverse, diagonal": lambda i: self.pseudoinverse()[i, i],
         }
 
@@ -345,11 +404,34 @@ class Stiffness(ReadOnlyState):
             *((name, *(cell(read, i) for i in range(3))) for name, read in lines.items()),
         ]
 
+    def _cartesian_entry(self, i: int) -> float:
+        """Return a diagonal entry of ``cartesian``, or of that of the axes that can move [N/m]."""
+        try:
+            return float(self.cartesian[i, i])
+        except SingularStiffness:
+            mobile = [axis for axis in range(3) if math.isfinite(self.along(np.eye(3)[axis]))]
+            if i not in mobile:
+                raise
+            matrix = self.cartesian_in(np.eye(3)[mobile])
+            return float(matrix[mobile.index(i), mobile.index(i)])
+
     @property
-    def _verdict(self) -> str:
+    def _notes(self) -> tuple[str, ...]:
+        """Lines below the printed table: why entries are missing; whether the arm is stable."""
+        try:
+            _ = self.cartesian
+            missing = []
+        except SingularStiffness as error:
+            u = _line(error.direction)
+            missing = [
+                f"inf, -: the tip cannot move along {u}; cartesian: in the plane of other axes"
+                if error.direction.size == 3
+                else "-: K_θ is singular, the arm is about to buckle"
+            ]
         state = "stable" if self.is_stable else "UNSTABLE"
         unit = self.posture.arm.stiffness_unit()
-        return f"{state}, smallest joint stiffness {self.margin:.4g} {unit} ({self._model})"
+        least = f"smallest joint stiffness {self.margin:.4g} {unit} ({self._model})"
+        return (*missing, f"{state}, {least}")
 
     @property
     def _model(self) -> str:
@@ -468,6 +550,11 @@ def checked_tension(
                 "tension", f"{F[c]:g} N given for {arm.cables[c].name}; cables only pull."
             )
     return F, W
+
+
+def _line(u: Array) -> str:
+    """Format a direction (3,) whose sign does not matter: its largest entry is positive."""
+    return coordinates(np.round(u * np.sign(u[abs(u).argmax()]), 9), "z.3g")
 
 
 def assemble(

@@ -13,12 +13,12 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Final, final
+from typing import TYPE_CHECKING, Any, Final, final
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, DTypeLike
 
 from cdsm.cable import Cable
 from cdsm.errors import InvalidInput, SolverError
@@ -27,8 +27,14 @@ from cdsm.kernels import tension as tension_kernels
 from cdsm.kernels.tension import DISTANCE, OPTIMALITY
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
+from cdsm.support.format import aligned, key, plain
+from cdsm.support.tidy import data_frame
 from cdsm.support.validation import bound, instance, one_of, quantity, wrench_vector
 from cdsm.support.values import Array, ReadOnlyState, frozen
+
+if TYPE_CHECKING:
+    import pandas
+    from matplotlib.figure import Figure
 
 DEFAULT_SOLVER: Final = "daqp"
 """Default solver of all tension distributions: exact, and the fastest in measurements."""
@@ -55,6 +61,9 @@ _SETTINGS: dict[str, dict[str, Any]] = {
 class Tension(ReadOnlyState):
     """Cable tensions that balance an arm, with the data of their problem.
 
+    A mapping from the name of a cable to its tension [N]: ``tension["cable1_1"]``,
+    ``dict(tension)``, ``len(tension)``. :attr:`values` is the array, as in ``np.array(tension)``.
+
     Attributes:
         posture: The posture.
         values: F (C,) [N], in the order of ``posture.arm.cables``.
@@ -75,6 +84,34 @@ class Tension(ReadOnlyState):
     residual: Array
     least: bool = True
 
+    def keys(self) -> tuple[str, ...]:
+        """Return the names of the cables, in the order of :attr:`values`."""
+        return self.posture.arm.cables.names
+
+    def items(self) -> tuple[tuple[str, float], ...]:
+        """Return name and tension [N] of each cable."""
+        return tuple(zip(self.keys(), self.values.tolist(), strict=True))
+
+    def __getitem__(self, cable: str) -> float:
+        """Return the tension of a cable [N].
+
+        Raises:
+            UnknownName: No cable has this name.
+        """
+        return dict(self.items())[one_of("cable", cable, self.keys())]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.keys())
+
+    def __contains__(self, cable: object) -> bool:
+        return cable in self.keys()
+
+    def __len__(self) -> int:
+        return self.values.size
+
+    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> Array:
+        return np.array(self.values, dtype) if copy else np.asarray(self.values, dtype)
+
     @property
     def at_minimum(self) -> tuple[str, ...]:
         """Names of the cables at their lower bound."""
@@ -89,6 +126,38 @@ class Tension(ReadOnlyState):
         tight = distance <= OPTIMALITY * self.values.max(initial=0.0)
         return tuple(self.posture.arm.cables[c].name for c in np.flatnonzero(tight))
 
+    def plot(self) -> Figure:
+        """Plot the arm in mm, its cables coloured by their tension [N]."""
+        return self.posture.plot(self)
+
+    def to_dict(self) -> dict[str, object]:
+        """Return tensions, bounds and load in SI for JSON, with units in the keys; inf as None."""
+        arm = self.posture.arm
+        numbers = {
+            **self.posture._coordinates,
+            "tension_N": dict(self),
+            "minimum_N": dict(zip(self, self.minimum, strict=True)),
+            "maximum_N": dict(zip(self, self.maximum, strict=True)),
+            "force_N": self.wrench[:3],
+            "moment_Nm": self.wrench[3:],
+            key("static_residual", arm.torque_unit()): self.residual,
+            "solver": self.solver,
+        }
+        return dict(plain(numbers))
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """Return a table of tension and bounds [N], a row for each cable.
+
+        Raises:
+            MissingExtra: pandas is not installed.
+        """
+        columns = {
+            "tension [N]": self.values,
+            "minimum [N]": self.minimum,
+            "maximum [N]": self.maximum,
+        }
+        return data_frame(columns, "cable", self.keys())
+
     def __repr__(self) -> str:
         return (
             f"<Tension {self.values.min():.4g} to {self.values.max():.4g} N in "
@@ -96,11 +165,7 @@ class Tension(ReadOnlyState):
         )
 
     def __str__(self) -> str:
-        rows = [f"{'cable':<12}{'tension [N]':>14}"]
-        rows += [
-            f"{cable.name:<12}{value:>14.3f}"
-            for cable, value in zip(self.posture.arm.cables, self.values, strict=True)
-        ]
+        rows = aligned([("cable", "tension [N]"), *((c, f"{F:.3f}") for c, F in self.items())])
         unit = self.posture.arm.torque_unit()
         return "\n".join([*rows, f"static residual: {abs(self.residual).max():.1e} {unit}"])
 

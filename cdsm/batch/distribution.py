@@ -4,19 +4,25 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import final
+from typing import TYPE_CHECKING, final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm.batch.evaluator import Evaluator
 from cdsm.batch.inputs import given_wrench, postures
+from cdsm.batch.labels import to_dataset
 from cdsm.batch.layout import OK, Codes, Flags
 from cdsm.manipulator import Manipulator
 from cdsm.support.status import summary
+from cdsm.support.tidy import tidy
 from cdsm.support.validation import instance
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import checked_bounds
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
 
 
 @final
@@ -46,6 +52,22 @@ class Tensions(ReadOnlyState):
     def ok(self) -> Flags:
         """Return for each posture whether tensions were found, (B,)."""
         return frozen(self.status == OK)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Return tensions and status as a Dataset in SI, labelled by posture, joint and cable.
+
+        Raises:
+            MissingExtra: xarray is not installed.
+        """
+        return to_dataset(self.arm, self.q, self.status, {"tension": self.values})
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """Return a tidy table in SI: a row for each posture, a column for each joint and cable.
+
+        Raises:
+            MissingExtra: xarray is not installed.
+        """
+        return tidy(self.to_xarray())
 
     def __len__(self) -> int:
         return len(self.q)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import final
+from typing import TYPE_CHECKING, final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,13 +15,19 @@ from cdsm.batch import layout
 from cdsm.batch.distribution import Tensions
 from cdsm.batch.evaluator import Evaluator
 from cdsm.batch.inputs import given_tension, given_wrench, postures
+from cdsm.batch.labels import to_dataset
 from cdsm.batch.layout import QUANTITIES, Codes, Flags
 from cdsm.errors import InvalidInput, UnknownName
 from cdsm.manipulator import Manipulator
 from cdsm.support.status import summary
+from cdsm.support.tidy import tidy
 from cdsm.support.validation import Direction, instance, one_of, unit_directions
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import checked_bounds
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
 
 OUTPUTS = (*(name for name in QUANTITIES if name != "tension"), "tension")
 """Names of the quantities that :func:`evaluate` computes."""
@@ -76,6 +82,23 @@ class Batch(ReadOnlyState):
     def ok(self) -> Flags:
         """Return for each posture whether all requested quantities exist, (B,)."""
         return frozen(self.status == layout.OK)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Return the quantities as a Dataset in SI, labelled by posture, joint, cable and axis.
+
+        Raises:
+            MissingExtra: xarray is not installed.
+        """
+        values = dict(zip(self.outputs, self.values, strict=True))
+        return to_dataset(self.arm, self.q, self.status, values, self.direction)
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """Return a tidy table in SI: a row for each posture, a column for each component.
+
+        Raises:
+            MissingExtra: xarray is not installed.
+        """
+        return tidy(self.to_xarray())
 
     def __len__(self) -> int:
         return len(self.q)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -42,24 +41,15 @@ def console() -> Console:
 def answer(as_json: bool, as_dict: Callable[[], Json], *parts: object) -> None:
     """Print an answer: its parts as text, or its numbers as strict JSON."""
     if as_json:
+        from cdsm.support.format import plain
+
         told = as_dict()
         for part in parts:
             if isinstance(part, Conditions):
                 told = part.to_dict() | told
-        typer.echo(json.dumps(_plain(told), indent=1, allow_nan=False))
+        typer.echo(json.dumps(plain(told), indent=1, allow_nan=False))
     else:
         typer.echo("\n\n".join(map(str, parts)))
-
-
-def _plain(value: object) -> object:
-    """Turn arrays and tuples into lists, and infinite numbers into null."""
-    if isinstance(value, dict):
-        return {name: _plain(each) for name, each in value.items()}
-    if hasattr(value, "tolist"):  # an array
-        return _plain(value.tolist())
-    if isinstance(value, (list, tuple)):
-        return [_plain(each) for each in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def joints(arm: cdsm.Manipulator, q: Array) -> Json:

@@ -6,10 +6,11 @@ cable has no direction. Solutions then stay away from the limit by 1e-5 of it.
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
-from typing import final
+from typing import TYPE_CHECKING, final
 
 import numpy as np
 
@@ -17,7 +18,11 @@ from cdsm.kinematics.residuals import LIMIT_MARGIN
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.rigid_body import rotation_vector
+from cdsm.support.format import JointUnits, aligned, plain
 from cdsm.support.values import Array, ReadOnlyState, frozen
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -55,15 +60,21 @@ class _Solution(ReadOnlyState, ABC):
         return "reachable" if self.reachable else "NOT REACHABLE"
 
     def _angle_rows(self) -> list[str]:
-        at_limit = self.at_limit
-        return [
-            f"{'joint':<12}{'angle [rad]':>14}",
-            *(
-                f"{joint:<12}{angle:>z14.6f}{'  at limit' if joint in at_limit else ''}"
-                for joint, angle in zip(self.arm.joint_names, self.angles, strict=True)
-            ),
-            "",
+        names, at_limit = self.arm.joint_names, self.at_limit
+        shown = JointUnits(self.arm.slides).shown
+        rows = [
+            (joint, f"{value / size:z.4f} {unit}", "at limit" if joint in at_limit else "")
+            for joint, value, (unit, size) in zip(names, self.angles, shown, strict=True)
         ]
+        return [*aligned([("joint", "angle", ""), *rows]), ""]
+
+    def plot(self) -> Figure:
+        """Plot the arm in mm at the angles found.
+
+        Raises:
+            CableError: Two neighbouring sites of a cable coincide there.
+        """
+        return self.posture.plot()
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} of {self.arm.name}, {self._verdict}>"
@@ -99,6 +110,22 @@ class JointSolution(_Solution):
     def _misfit(self) -> float:
         return float(np.linalg.norm(self.residual)) / self.arm.length
 
+    def to_dict(self) -> dict[str, object]:
+        """Return angles and cable lengths in SI for JSON, with units in the keys."""
+        numbers = {
+            "reachable": self.reachable,
+            **JointUnits(self.arm.slides).to_dict(self.arm.joint_names, self.angles),
+            "wanted_length_m": dict(zip(self._cables, self.cable_lengths, strict=True)),
+            "cable_length_m": dict(zip(self._cables, self.lengths, strict=True)),
+            "at_limit": self.at_limit,
+            "iterations": self.iterations,
+        }
+        return dict(plain(numbers))
+
+    @property
+    def _cables(self) -> tuple[str, ...]:
+        return self.arm.cables.names
+
     @property
     def redundancy(self) -> int:
         """Number of joint motions that change no cable length: nv − rank J_L.
@@ -108,17 +135,18 @@ class JointSolution(_Solution):
         return self.arm.nv - int(np.linalg.matrix_rank(self.posture.length_jacobian))
 
     def __str__(self) -> str:
-        rows = [f"{'cable':<12}{'wanted [m]':>14}{'length [m]':>14}{'off [m]':>12}"]
-        rows += [
-            f"{cable.name:<12}{wanted:>14.6f}{length:>14.6f}{off:>12.1e}"
-            for cable, wanted, length, off in zip(
-                self.arm.cables, self.cable_lengths, self.lengths, self.residual, strict=True
-            )
-        ]
+        numbers = 1e3 * np.column_stack([self.cable_lengths, self.lengths, self.residual])
+        rows = aligned(
+            [("cable", "wanted [mm]", "length [mm]", "off [mm]")]
+            + [
+                (name, f"{wanted:.3f}", f"{length:.3f}", f"{off:.1e}")
+                for name, (wanted, length, off) in zip(self._cables, numbers, strict=True)
+            ]
+        )
         worst = int(abs(self.residual).argmax())
         verdict = (
-            f"{self._verdict}: {self.arm.cables[worst].name} is off most, "
-            f"by {self.residual[worst]:+.2g} m"
+            f"{self._verdict}: {self._cables[worst]} is off most, "
+            f"by {1e3 * self.residual[worst]:+.2g} mm"
         )
         return "\n".join([*rows, "", *self._angle_rows(), verdict])
 
@@ -144,6 +172,20 @@ class KinematicSolution(_Solution):
     target: Array
     tip: Array
 
+    def to_dict(self) -> dict[str, object]:
+        """Return angles, tip and errors in SI for JSON, with units in the keys."""
+        numbers = {
+            "reachable": self.reachable,
+            **JointUnits(self.arm.slides).to_dict(self.arm.joint_names, self.angles),
+            "tip_position_m": self.tip[:3, 3],
+            "tip_rotation": self.tip[:3, :3],
+            "position_error_m": self.position_error,
+            "orientation_error_rad": self.orientation_error,
+            "at_limit": self.at_limit,
+            "iterations": self.iterations,
+        }
+        return dict(plain(numbers))
+
     @property
     def position_error(self) -> float:
         """Distance from the tip to the target [m]."""
@@ -162,7 +204,7 @@ class KinematicSolution(_Solution):
         return float(np.hypot(self.position_error / self.arm.length, self.orientation_error))
 
     def __str__(self) -> str:
-        verdict = f"{self._verdict}: the tip is {self.position_error:.2g} m"
+        verdict = f"{self._verdict}: the tip is {1e3 * self.position_error:.2g} mm"
         if self.target.ndim == 2:
-            verdict += f" and {self.orientation_error:.2g} rad"
+            verdict += f" and {math.degrees(self.orientation_error):.2g}°"
         return "\n".join([*self._angle_rows(), f"{verdict} from its target"])

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import groupby
 from pathlib import Path
-from typing import Any, Literal, final
+from typing import TYPE_CHECKING, Any, Literal, final
 
 import numpy as np
 
@@ -19,8 +19,14 @@ from cdsm.manipulator import Manipulator
 from cdsm.planning.half_way import HalfWay, half_way
 from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.files import write_text
+from cdsm.support.format import JointUnits, plain
 from cdsm.support.progress import track
+from cdsm.support.tidy import data_frame
 from cdsm.support.values import Array, ReadOnlyState, frozen
+
+if TYPE_CHECKING:
+    import pandas
+    from matplotlib.figure import Figure
 
 Status = Literal["posture", "balance", "elasticity", "singular", "stiffness", "rate"]
 
@@ -138,12 +144,74 @@ class PathPlan(ReadOnlyState):
         """Indices of the position-controlled cables."""
         return [c for c, each in enumerate(self.arm.cables) if each.control == "position"]
 
-    def write_csv(self, path: str | os.PathLike[str]) -> Path:
-        """Write one line per sample in SI units; return the path.
+    @property
+    def tips(self) -> Array:
+        """Tip positions (P, 3) [m]."""
+        return frozen(np.array([K.posture.tip[:3, 3] for K in self.stiffness]).reshape(-1, 3))
+
+    def plot(self, animate: str | os.PathLike[str] | None = None) -> Figure:
+        """Plot wanted and reached stiffness [N/mm] and the tensions [N] over the samples.
+
+        Args:
+            animate: A ``.gif`` to write too, in which the arm follows the path.
+
+        Raises:
+            InvalidInput: The plan is one of ``cartesian``, or nothing to animate is planned.
+            FileError: The animation cannot be written.
+        """
+        from cdsm.plots import plot_path, plot_path_plan  # matplotlib imports slowly
+
+        if animate is not None:
+            plot_path(self, animate=animate)
+        return plot_path_plan(self)
+
+    def to_dict(self) -> dict[str, object]:
+        """Return the plan in SI for JSON, with units in the keys: a row per planned sample."""
+        numbers = {
+            "cables": self.arm.cables.names,
+            "target_N_per_m": self.target,
+            "planned": self.planned,
+            "achieved_N_per_m": self.achieved,
+            **JointUnits(self.arm.slides).to_dict(self.arm.joint_names, self.angles),
+            "tip_position_m": self.tips,
+            "tensions_N": self.tensions,
+            "cable_lengths_m": self.cable_lengths,
+            "half_way": [
+                {
+                    "after": between.index,
+                    "target_N_per_m": between.target,
+                    "achieved_N_per_m": between.achieved,
+                    "misfit": between.misfit,
+                    "reason": between.reason,
+                }
+                for between in self.between
+            ],
+            "infeasible": [
+                {"index": sample.index, "status": sample.status, "reason": sample.reason}
+                for sample in self.infeasible
+            ],
+            "iterations": self.iterations,
+        }
+        return dict(plain(numbers))
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """Return the table of :meth:`write` in SI, a row for each sample; NaN where none exists.
+
+        Raises:
+            MissingExtra: pandas is not installed.
+        """
+        header, rows = self._table
+        columns = [[None if x == "" else x for x in column] for column in zip(*rows, strict=True)]
+        table = dict(zip(header, columns, strict=True))
+        return data_frame(table, "sample", table.pop("sample"))
+
+    def write(self, path: str | os.PathLike[str]) -> Path:
+        """Write one line per sample in SI units as CSV; return the path.
 
         The columns are ``sample``, ``status``, joint angles [rad] ([m] where a joint slides),
-        tensions [N], cable lengths [m], unstrained lengths [m] of position-controlled cables, and
-        ``reason``. An infeasible sample has only its number, status and reason.
+        tensions [N], cable lengths [m], unstrained lengths [m] of position-controlled cables, tip
+        [m], target and reached stiffness [N/m], and ``reason``. An infeasible sample has only its
+        number, status, target and reason.
 
         Args:
             path: The file. It is written completely or not at all.
@@ -151,28 +219,58 @@ class PathPlan(ReadOnlyState):
         Raises:
             FileError: The file cannot be written.
         """
-        names = [cable.name for cable in self.arm.cables]
+        header, rows = self._table
+        text = io.StringIO()
+        writer = csv.writer(text, lineterminator="\n")
+        writer.writerow(header)
+        writer.writerows(rows)
+        return write_text(path, text.getvalue())
+
+    def write_csv(self, path: str | os.PathLike[str]) -> Path:
+        """Write the plan with :meth:`write`; this old name is kept for one release.
+
+        Raises:
+            FileError: The file cannot be written.
+        """
+        return self.write(path)
+
+    @property
+    def _table(self) -> tuple[list[str], list[list[Any]]]:
+        """Header and rows of the written table; cells without a value are empty."""
+        names = self.arm.cables.names
         joints = zip(self.arm.joint_names, self.arm.joint_units, strict=True)
+        size = len(self.target)
+        targets = self.target.reshape(size, -1)
+        numbered = self._readings(targets.shape[1])
         columns = [
             *(f"{name} [{unit}]" for name, unit in joints),
             *(f"{name} tension [N]" for name in names),
             *(f"{name} length [m]" for name in names),
             *(f"{names[c]} unstrained length [m]" for c in self._held),
+            *("tip x [m]", "tip y [m]", "tip z [m]"),
+            *(f"stiffness{number} [N/m]" for number in numbered),
         ]
+        achieved = self.achieved.reshape(len(self.planned), -1)
         blocks = self.angles, self.tensions, self.cable_lengths, self.unstrained_lengths
+        numbers = np.hstack([*blocks, self.tips, achieved]).tolist()
         rows: list[list[Any]] = [
-            [i, "planned", *numbers, ""]
-            for i, numbers in zip(self.planned, np.hstack(blocks).tolist(), strict=True)
+            [i, "planned", *row, *targets[i].tolist(), ""]
+            for i, row in zip(self.planned, numbers, strict=True)
         ]
         rows += [
-            [each.index, each.status, *[""] * len(columns), each.reason] for each in self.infeasible
+            [i, each.status, *[""] * len(columns), *targets[i].tolist(), each.reason]
+            for each in self.infeasible
+            for i in [each.index]
         ]
         rows.sort(key=lambda row: int(row[0]))
-        text = io.StringIO()
-        writer = csv.writer(text, lineterminator="\n")
-        writer.writerow(["sample", "status", *columns, "reason"])
-        writer.writerows(rows)
-        return write_text(path, text.getvalue())
+        wanted = (f"target{number} [N/m]" for number in numbered)
+        return ["sample", "status", *columns, *wanted, "reason"], rows
+
+    def _readings(self, count: int) -> list[str]:
+        """Return what follows the name of each wanted stiffness: nothing if there is one."""
+        if self.direction is None:
+            return [f" {a}{b}" for a in "xyz" for b in "xyz"]
+        return [""] if count == 1 else [f" {k}" for k in range(1, count + 1)]
 
     def __repr__(self) -> str:
         return f"<PathPlan of {len(self.planned)} of {len(self.target)} samples>"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import final
+from typing import TYPE_CHECKING, final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,11 +21,16 @@ from cdsm.planning.range import MARGIN
 from cdsm.planning.stiffness_model import StiffnessModel
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness, stiffness
-from cdsm.support.format import MODEL, coordinates
+from cdsm.support.format import MODEL, coordinates, key, plain
 from cdsm.support.progress import progress_allowed
 from cdsm.support.validation import Direction, flag, unit_directions
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from cdsm.planning.range import StiffnessRange
 
 
 @final
@@ -73,6 +78,36 @@ class StiffnessPlan(ReadOnlyState):
     def spread(self) -> float:
         """Relative excess of the largest effort found over the least [-]."""
         return float(self.efforts[-1] / self.efforts[0] - 1.0) if self.efforts.size else 0.0
+
+    def plot(self, attainable: StiffnessRange | None = None) -> Figure:
+        """Plot the planned tensions [N], between those of the softest and the stiffest arm.
+
+        Args:
+            attainable: Range of stiffness to show beside the plan of one direction, if given.
+
+        Raises:
+            InvalidInput: The range is of another posture or direction.
+        """
+        from cdsm.plots import plot_stiffness_plan  # matplotlib imports slowly
+
+        return plot_stiffness_plan(self, attainable)
+
+    def to_dict(self) -> dict[str, object]:
+        """Return target, stiffness and tensions in SI for JSON, with units in the keys."""
+        pose = self.tension.posture
+        numbers = {
+            "direction": self.direction,
+            "target_N_per_m": self.target,
+            "achieved_N_per_m": self.achieved,
+            "reached": self.reached,
+            "tension_N": dict(self.tension),
+            "cable_length_m": dict(zip(self.tension, pose.cable_lengths, strict=True)),
+            **pose._coordinates,
+            key("margin", pose.arm.stiffness_unit()): self.stiffness.margin,
+            "efforts_N": self.efforts,
+            "iterations": self.iterations,
+        }
+        return dict(plain(numbers))
 
     def __repr__(self) -> str:
         F = self.tension.values

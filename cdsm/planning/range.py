@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import NamedTuple, final
+from typing import TYPE_CHECKING, NamedTuple, final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,12 +17,15 @@ from cdsm.planning.starts import StartPoints
 from cdsm.planning.stiffness_model import Constraints, Evaluation, StiffnessModel
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import stiffness
-from cdsm.support.format import MODEL, coordinates
+from cdsm.support.format import MODEL, coordinates, plain
 from cdsm.support.progress import progress_allowed, track
 from cdsm.support.validation import Direction, flag, unit_direction
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension
 from cdsm.wires.laws import StrandElasticity, TabulatedElasticity
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 MARGIN = 1e-4
 """Default ratio of the smallest to the largest eigenvalue of K_θ: arms of 40 joints reach 3e-4."""
@@ -69,11 +72,29 @@ class StiffnessRange(ReadOnlyState):
         """The posture."""
         return self.low_tension.posture
 
+    def plot(self) -> Figure:
+        """Plot the tensions [N] of the softest and the stiffest arm."""
+        from cdsm.plots import plot_stiffness_range  # matplotlib imports slowly
+
+        return plot_stiffness_range(self)
+
+    def to_dict(self) -> dict[str, object]:
+        """Return both ends and their tensions in SI for JSON, with units in the keys."""
+        numbers = {
+            **self.posture._coordinates,
+            "direction": self.direction,
+            "low_N_per_m": self.low,
+            "high_N_per_m": self.high,
+            "low_tension_N": dict(self.low_tension),
+            "high_tension_N": dict(self.high_tension),
+        }
+        return dict(plain(numbers))
+
     def __contains__(self, target: float) -> bool:
         return self.low <= target <= self.high
 
     def __repr__(self) -> str:
-        return f"<StiffnessRange {self.low:.6g} to {self.high:.6g} N/m>"
+        return f"<StiffnessRange {self.low / 1e3:.6g} to {self.high / 1e3:.6g} N/mm>"
 
     def __str__(self) -> str:
         def ends(name: str, F: Array, found: Array) -> str:

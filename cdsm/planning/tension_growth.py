@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
-from typing import Final, Literal, final
+from typing import TYPE_CHECKING, Final, Literal, final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -29,10 +29,15 @@ from cdsm.statics.bound_scan import (
     tension_domain,
 )
 from cdsm.stiffness_matrix import Stiffness, stiffness
-from cdsm.support.format import MODEL, coordinates
+from cdsm.support.format import MODEL, coordinates, plain
+from cdsm.support.tidy import data_frame
 from cdsm.support.validation import Direction, bound, instance, scalar, unit_direction
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import DEFAULT_SOLVER, Tension, distribute_tension
+
+if TYPE_CHECKING:
+    import pandas
+    from matplotlib.figure import Figure
 
 End = Literal["buckling", "maximum", "infeasible", "elasticity", "none"]
 
@@ -85,6 +90,40 @@ class Saturation(ReadOnlyState):
     def end(self) -> float:
         """Lower bound [N] at which the curve ends; ``limit`` is the reason."""
         return float(self.curve[-1, 0])
+
+    def plot(self) -> Figure:
+        """Plot stiffness [N/mm] and its gain [N/m per N] over the lower bound of tension [N]."""
+        from cdsm.plots import plot_saturation  # matplotlib imports slowly
+
+        return plot_saturation(self)
+
+    def to_dict(self) -> dict[str, object]:
+        """Return bounds, slopes and curve in SI for JSON, with units in the keys; inf as None."""
+        numbers = {
+            **self.tension.posture._coordinates,
+            "direction": self.direction,
+            "fraction": self.fraction,
+            "saturation_tension_N": self.bound,
+            "steepest_tension_N": self.steepest,
+            "steepest_slope_per_m": self.steepest_slope,
+            "stiffest_tension_N": self.stiffest,
+            "end_tension_N": self.end,
+            "limit": self.limit,
+            "tension_N": dict(self.tension),
+            "minimum_tension_N": self.curve[:, 0],
+            "along_N_per_m": self.curve[:, 1],
+            "slope_per_m": self.curve[:, 2],
+        }
+        return dict(plain(numbers))
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """Return a table of stiffness [N/m] and slope [1/m], a row for each lower bound [N].
+
+        Raises:
+            MissingExtra: pandas is not installed.
+        """
+        columns = {"along [N/m]": self.curve[:, 1], "slope [1/m]": self.curve[:, 2]}
+        return data_frame(columns, "minimum [N]", self.curve[:, 0])
 
     def __repr__(self) -> str:
         return f"<Saturation at {self.bound:.4g} N>"

@@ -1,21 +1,45 @@
 """Figures of arms, maps, plans, loads, and of the paper. Axes show mm and N/mm.
 
-Every function returns a new :class:`matplotlib.figure.Figure`. Show it in a notebook, or save it
-with ``savefig``. No function changes the global state of matplotlib.
+Every function returns a new :class:`matplotlib.figure.Figure`, as wide as one or two columns of a
+journal. Show it in a notebook, or write it with :func:`save_figure`. No function changes the global
+state of matplotlib.
 """
 
 from cdsm.plots.arm import plot_arm
-from cdsm.plots.loads import plot_critical_tension, plot_weight_test
+from cdsm.plots.by_cable import plot_shares, plot_stiffness_plan, plot_stiffness_range
+from cdsm.plots.loads import plot_bifurcation, plot_critical_tension, plot_weight_test
 from cdsm.plots.maps import plot_map
 from cdsm.plots.paper import plot_paper
-from cdsm.plots.planning import plot_path_plan, plot_stiffness_plan
+from cdsm.plots.path import plot_modes, plot_path
+from cdsm.plots.planning import (
+    plot_path_plan,
+    plot_saturation,
+    plot_stiffness_ranges,
+)
+from cdsm.plots.style import save_figure
+from cdsm.plots.wires import plot_cables, plot_elasticity
 
 __all__ = [
     "plot_arm",
+    "plot_bifurcation",
+    "plot_cables",
     "plot_critical_tension",
+    "plot_elasticity",
     "plot_map",
+    "plot_modes",
     "plot_paper",
+    "plot_path",
     "plot_path_plan",
+    "plot_saturation",
+    "plot_shares",
     "plot_stiffness_plan",
+    "plot_stiffness_range",
+    "plot_stiffness_ranges",
     "plot_weight_test",
+    "save_figure",
 ]
+
+
+def __dir__() -> list[str]:
+    """List the public names."""
+    return __all__

@@ -10,13 +10,30 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from cdsm.errors import InvalidInput
-from cdsm.plots.style import AXES, COLORS, MM, equal_axes, expect
+from cdsm.plots.style import (
+    AXES,
+    MM,
+    ONE_COLUMN,
+    SCREEN,
+    SKY,
+    SMALL,
+    TEXT,
+    VERMILLION,
+    equal_axes,
+    expect,
+    fill_canvas,
+    heading,
+    legend,
+)
 from cdsm.support.values import Array, frozen
 
 if TYPE_CHECKING:
     from cdsm.posture import Posture
     from cdsm.stiffness_matrix import Stiffness
     from cdsm.tension import Tension
+
+BESIDE_BAR = 0.82
+"""Fraction of the width of a figure that is left of the scale of tensions."""
 
 _FLATTEST = 0.35
 """Smallest range of an axis, as a fraction of the largest."""
@@ -51,18 +68,34 @@ def plot_arm(
         taken = stiffness.posture
         if taken is not pose and not (taken.arm == pose.arm and (taken.q == pose.q).all()):
             raise InvalidInput("stiffness", "was taken at another posture; take it at this one.")
-    figure = Figure(figsize=(7.0, 5.0), layout="constrained")
-    axes: Any = figure.add_subplot(projection="3d")
+    figure, axes = arm_axes()
     unstable = stiffness is not None and not stiffness.is_stable
     if stiffness is not None and not unstable:
         _draw_ellipsoid(axes, stiffness)
-    draw_arm(axes, pose, tension)
+    draw_arm(
+        axes, pose, None if tension is None else tension_colors(tension).to_rgba(tension.values)
+    )
+    frame_arms(axes, None)
     if tension is not None:
-        figure.colorbar(
-            tension_colors(tension), ax=axes, label="cable tension [N]", shrink=0.7, pad=0.12
-        )
-    figure.suptitle(f"{pose.arm}{'; UNSTABLE' if unstable else ''}", fontsize=10)
+        tension_bar(figure, tension_colors(tension))
+    heading(figure, f"{'UNSTABLE: ' if unstable else ''}{pose.arm}")
+    fill_canvas(axes, 1.0 if tension is None else BESIDE_BAR)
     return figure
+
+
+def arm_axes() -> tuple[Figure, Any]:
+    """Build a figure of one column with 3D axes."""
+    figure = Figure(figsize=(ONE_COLUMN, ONE_COLUMN), dpi=SCREEN)
+    axes: Any = figure.add_subplot(projection="3d")
+    axes.view_init(elev=24.0, azim=-62.0)
+    return figure, axes
+
+
+def tension_bar(figure: Figure, colors: ScalarMappable) -> None:
+    """Draw the scale of the tensions at the right edge of a figure."""
+    bar = figure.colorbar(colors, cax=figure.add_axes((BESIDE_BAR + 0.01, 0.15, 0.025, 0.6)))
+    bar.set_label("cable tension [N]", fontsize=TEXT)
+    bar.ax.tick_params(labelsize=SMALL)
 
 
 ELLIPSOID_GRID = 13, 25
@@ -95,32 +128,35 @@ def _draw_ellipsoid(axes: Any, stiffness: Stiffness) -> None:
     surface = ellipsoid(stiffness)
     if surface is not None:
         longest = MM * np.linalg.norm(stiffness.compliance[:3, :3], 2)
-        label = f"where 1 N moves the tip: longest {longest:.3g} mm"
-        axes.plot_wireframe(*(MM * surface), color=COLORS[1], linewidth=0.5, label=label)
-        axes.legend(loc="upper left", fontsize=8)
+        label = f"where 1 N moves the tip; longest: {longest:.3g} mm"
+        axes.plot_wireframe(*(MM * surface), color=VERMILLION, linewidth=0.4, label=label)
+        legend(axes, loc="upper left")
 
 
-def draw_arm(axes: Any, pose: Posture, tension: Tension | None) -> None:
-    """Draw an arm on existing 3D axes."""
+def draw_arm(axes: Any, pose: Posture, colors: Array | None = None) -> None:
+    """Draw an arm on existing 3D axes; colours of its cables (C, 4) are optional."""
     if pose.arm.is_serpentine:
         _draw_disks(axes, pose)
     else:
         _draw_joints(axes, pose)
     for bone in pose.bones:
-        axes.plot(*(MM * bone.T), color="0.1", linewidth=2.5)
-    colors = [COLORS[0]] * len(pose.cable_paths)
-    if tension is not None:
-        colors = tension_colors(tension).to_rgba(tension.values).tolist()
-    for path, color in zip(pose.cable_paths, colors, strict=True):
-        axes.plot(*(MM * path.T), color=color, linewidth=1.1)
-    axes.tick_params(labelsize=7, pad=-1)
-    limits = np.array([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()])
+        axes.plot(*(MM * bone.T), color="0.1", linewidth=2.0)
+    shades = [SKY] * len(pose.cable_paths) if colors is None else colors.tolist()
+    for path, color in zip(pose.cable_paths, shades, strict=True):
+        axes.plot(*(MM * path.T), color=color, linewidth=0.9)
+
+
+def frame_arms(axes: Any, limits: Array | None) -> None:
+    """Set labels, and limits (3, 2) [mm] with equal scales; None: around all that is drawn."""
+    axes.tick_params(labelsize=SMALL, pad=-3)
+    if limits is None:
+        limits = np.array([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()])
     ranges = np.ptp(limits, axis=1)
     ranges = np.maximum(ranges, _FLATTEST * ranges.max())  # keep space around a flat arm
     for name, middle, size in zip(AXES, limits.mean(axis=1), ranges, strict=True):
-        getattr(axes, f"set_{name}label")(f"{name} [mm]", fontsize=8)
+        getattr(axes, f"set_{name}label")(f"{name} [mm]", fontsize=TEXT, labelpad=-6)
         getattr(axes, f"set_{name}lim")(middle - size / 2.0, middle + size / 2.0)
-    equal_axes(axes)
+    equal_axes(axes, 1.0)
 
 
 def _draw_joints(axes: Any, pose: Posture) -> None:
@@ -129,11 +165,11 @@ def _draw_joints(axes: Any, pose: Posture) -> None:
         axes.plot(*(MM * bracket.T), color="0.5", linewidth=0.8)
     for chosen, marker in ((~pose.arm.slides, "o"), (pose.arm.slides, "s")):
         places = MM * pose.joint_positions[chosen]
-        axes.plot(*places.T, marker, color="0.1", markerfacecolor="white", markersize=5, zorder=5)
+        axes.plot(*places.T, marker, color="0.1", markerfacecolor="white", markersize=4, zorder=5)
     if pose.arm.slides.any():
-        axes.plot([], [], [], "o", color="0.1", markerfacecolor="white", label="turns")
-        axes.plot([], [], [], "s", color="0.1", markerfacecolor="white", label="slides")
-        axes.legend(loc="upper left", fontsize=8)
+        for marker, label in (("o", "turns"), ("s", "slides")):
+            axes.plot([], [], [], marker, color="0.1", markerfacecolor="white", label=label)
+        legend(axes, loc="upper left")
 
 
 def _draw_disks(axes: Any, pose: Posture) -> None:
@@ -145,10 +181,15 @@ def _draw_disks(axes: Any, pose: Posture) -> None:
         for place in places:
             center = placement[:3, 3:] + place * placement[:3, :1]
             edge = center + placement[:3, :3] @ ring
-            axes.plot(*(MM * edge), color="0.35", linewidth=0.9)
+            axes.plot(*(MM * edge), color="0.45", linewidth=0.6)
 
 
 def tension_colors(tension: Tension) -> ScalarMappable:
     """Build the colour scale from the smallest to the largest tension."""
-    low, high = tension.values.min(), tension.values.max()
+    return color_scale(tension.values)
+
+
+def color_scale(tensions: Array) -> ScalarMappable:
+    """Build the colour scale from the smallest to the largest of some tensions."""
+    low, high = tensions.min(), tensions.max()
     return ScalarMappable(Normalize(low, max(high, low + 1e-9)), "viridis")

@@ -6,11 +6,27 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.figure import Figure
 
-from cdsm.plots.style import AXES, COLORS, MM, expect, panels
+from cdsm.plots.style import (
+    AXES,
+    BLUE,
+    COLORS,
+    MM,
+    ONE_COLUMN,
+    SMALL,
+    TWO_COLUMNS,
+    VERMILLION,
+    cable_lines,
+    expect,
+    heading,
+    legend,
+    panels,
+)
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from cdsm.statics.bifurcation import Bifurcation
     from cdsm.statics.buckling import CriticalTension
     from cdsm.statics.weight_test import WeightTest
 
@@ -21,6 +37,8 @@ _ROOM = 0.08
 def plot_weight_test(test: WeightTest) -> Figure:
     """Plot load over tip displacement, nonlinear and linear, and tensions over load.
 
+    Up to 24 cables are named.
+
     Args:
         test: Result of :func:`~cdsm.weight_test`. Several steps show a curve.
 
@@ -28,21 +46,23 @@ def plot_weight_test(test: WeightTest) -> Figure:
         InvalidInput: ``test`` is not a weight test.
     """
     expect("test", test, "WeightTest")
-    figure, ((left, right),) = panels(10.0, 4.0, 2)
+    figure, ((left, right),) = panels(TWO_COLUMNS, 3.0, 2)
     loads = np.concatenate([[0.0], test.loads])
     moved = np.vstack([np.zeros(3), test.displacements])
-    for axis, color, nonlinear, linear in zip(
-        AXES, COLORS, moved.T, test.linear.displacement, strict=True
+    for axis, color, marker, nonlinear, linear in zip(
+        AXES, COLORS, "os^", moved.T, test.linear.displacement, strict=True
     ):
-        left.plot(MM * nonlinear, loads, "o-", color=color, markersize=3, label=axis)
+        left.plot(MM * nonlinear, loads, f"{marker}-", color=color, markersize=3, label=axis)
         left.plot([0.0, MM * linear], [0.0, loads[-1]], "--", color=color, linewidth=0.9)
     left.set(xlabel="displacement of the tip [mm]", ylabel="load [N]")
-    left.legend(title="direction; dashed: linear", fontsize=8, title_fontsize=8)
-    tensions = np.vstack([test.without.tension, test.tensions])
-    right.plot(loads, tensions, color=COLORS[0], linewidth=0.9, alpha=0.7)
+    legend(left, title="direction; dashed: linear")
+    names = test.without.pose.arm.cables.names
+    cable_lines(right, loads, np.vstack([test.without.tension, test.tensions]), names)
     right.set(xlabel="load [N]", ylabel="tension of each cable [N]")
     right.set_ylim(bottom=0.0)
-    figure.suptitle(f"{test.without.pose.arm.name}: weight of {np.linalg.norm(test.force):.4g} N")
+    left_it = "; left its reference before the weight" if test.settled_first else ""
+    weight = f"weight of {np.linalg.norm(test.force):.4g} N"
+    heading(figure, f"{test.without.pose.arm.name}: {weight}{left_it}")
     return figure
 
 
@@ -56,9 +76,9 @@ def plot_critical_tension(critical: CriticalTension) -> Figure:
         InvalidInput: ``critical`` is not a critical tension.
     """
     expect("critical", critical, "CriticalTension")
-    figure, ((axes,),) = panels(7.0, 4.0, 1)
+    figure, ((axes,),) = panels(ONE_COLUMN, 2.6, 1)
     mark = "o" if critical.bounds.size == 1 else ""
-    axes.plot(critical.bounds, critical.margins, color=COLORS[0], marker=mark)
+    axes.plot(critical.bounds, critical.margins, color=BLUE, marker=mark)
     axes.axhline(0.0, color="0.2", linewidth=0.8)
     low, high = critical.examined
     shown = high if math.isinf(critical.minimum) or not critical.stable else 2.0 * critical.minimum
@@ -68,20 +88,52 @@ def plot_critical_tension(critical: CriticalTension) -> Figure:
     room = _ROOM * np.ptp(margins)
     axes.set_ylim(margins.min() - room, margins.max() + room)
     edges = [low, *np.ravel(critical.stable), high]
+    label = "unstable"
     for start, end in zip(edges[::2], edges[1::2], strict=True):
-        axes.axvspan(start, end, color=COLORS[1], alpha=0.15, linewidth=0.0)
+        if end > start:
+            axes.axvspan(start, end, color=VERMILLION, alpha=0.15, linewidth=0.0, label=label)
+            label = "_"
     if math.isfinite(critical.minimum) and critical.stable:
-        axes.plot(critical.minimum, 0.0, "o", color=COLORS[1])
+        axes.plot(critical.minimum, 0.0, "o", color=VERMILLION, markersize=4)
         axes.annotate(
             f"buckles at {critical.minimum:.4g} N",
             (critical.minimum, 0.0),
-            xytext=(8, 10),
+            xytext=(6, 8),
             textcoords="offset points",
-            fontsize=9,
+            fontsize=SMALL,
         )
-    axes.set(
-        xlabel="lower bound of tension [N]",
-        ylabel=f"smallest joint stiffness [{critical.posture.arm.stiffness_unit()}]",
-        title=f"{critical.posture.arm.name}; shaded: unstable",
+    unit = critical.posture.arm.stiffness_unit()
+    axes.set(xlabel="lower bound of tension [N]", ylabel=f"smallest joint stiffness [{unit}]")
+    axes.set_title(critical.posture.arm.name)
+    if label == "_":
+        legend(axes)
+    return figure
+
+
+def plot_bifurcation(found: Bifurcation) -> Figure:
+    """Plot how far a slight push moves the tip, over the lower bound of tension.
+
+    Args:
+        found: Result of :func:`~cdsm.bifurcation`.
+
+    Raises:
+        InvalidInput: ``found`` is not a bifurcation.
+    """
+    expect("found", found, "Bifurcation")
+    figure, ((axes,),) = panels(ONE_COLUMN, 2.4, 1)
+    push = np.linalg.norm(found.push[:3])
+    axes.plot(
+        found.bounds,
+        MM * np.linalg.norm(found.displacements, axis=1),
+        "o-",
+        color=BLUE,
+        markersize=3,
+        label=f"pushed aside by {push:.3g} N",
     )
+    critical = found.critical.minimum
+    axes.axvline(critical, color=VERMILLION, linestyle="--", label=f"buckles at {critical:.4g} N")
+    axes.set(xlabel="lower bound of tension [N]", ylabel="displacement of the tip [mm]")
+    axes.set_title(found.critical.posture.arm.name)
+    axes.set_ylim(bottom=0.0)
+    legend(axes)
     return figure

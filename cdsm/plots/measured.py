@@ -9,7 +9,18 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from cdsm.plots.style import COLORS, KN, MM, N_PER_MM, panels
+from cdsm.plots.style import (
+    BLUE,
+    KN,
+    MM,
+    N_PER_MM,
+    SMALL,
+    TWO_COLUMNS,
+    VERMILLION,
+    heading,
+    legend,
+    panels,
+)
 
 if TYPE_CHECKING:
     from cdsm.identification.result import Identification
@@ -21,23 +32,23 @@ _MOST_LABELS = 30
 
 def plot_tensile_fit(fit: TensileFit) -> Figure:
     """Plot force over displacement with the fit, and rigidity with its stages and any band."""
-    figure, ((left, right),) = panels(10.0, 4.2, 2)
+    figure, ((left, right),) = panels(TWO_COLUMNS, 3.0, 2)
     tension, band = fit.tensions, fit.band
     stretch = fit.start + fit.elasticity.strain(tension) * fit.test.gauge_length
     left.plot(MM * fit.test.displacement, fit.test.force, ".", color="0.6", ms=3, label="test")
-    left.plot(MM * stretch, tension, color=COLORS[1], label=fit.method)
+    left.plot(MM * stretch, tension, color=VERMILLION, label=fit.method)
     left.set(xlabel="displacement [mm]", ylabel="force [N]")
     if band is not None:
         right.fill_between(
             tension,
             KN * band.low,
             KN * band.high,
-            color=COLORS[0],
+            color=BLUE,
             alpha=0.3,
             linewidth=0,
             label="95 % band",
         )
-    right.plot(tension, KN * fit.elasticity.rigidity(tension), color=COLORS[1], label="EA")
+    right.plot(tension, KN * fit.elasticity.rigidity(tension), color=VERMILLION, label="EA")
     for stage, shade in zip(fit.stages, ("0.93", "0.98", "0.88"), strict=False):
         right.axvspan(stage.low, stage.high, color=shade, zorder=0)
         right.annotate(
@@ -49,38 +60,36 @@ def plot_tensile_fit(fit: TensileFit) -> Figure:
             rotation=90,
             ha="center",
             va="top",
-            fontsize=8,
+            fontsize=SMALL,
             color="0.35",
         )
     right.set(xlabel="tension [N]", ylabel="tangent rigidity EA [kN]")
     right.set_ylim(bottom=0.0)
     for axes in (left, right):
-        axes.legend(fontsize=8, loc="best")
+        legend(axes)
     return figure
 
 
 def plot_identification(fit: Identification, labels: Sequence[str], title: str) -> Figure:
     """Plot predicted over measured stiffness, and each residual in standard deviations."""
-    figure, ((left, right),) = panels(11.0, 4.5, 2)
+    figure, ((left, right),) = panels(TWO_COLUMNS, 3.2, 2)
     measured, predicted = N_PER_MM * fit.measured, N_PER_MM * fit.predicted
     sigma = [N_PER_MM * measurement.std for measurement in fit.measurements]
     ends = [min(measured.min(), predicted.min()), max(measured.max(), predicted.max())]
     left.plot(ends, ends, color="0.6", linewidth=0.9)
-    left.errorbar(
-        measured, predicted, xerr=sigma, fmt="o", color=COLORS[0], markersize=4, capsize=2
-    )
+    left.errorbar(measured, predicted, xerr=sigma, fmt="o", color=BLUE, markersize=4, capsize=2)
     left.set(xlabel="measured [N/mm], ± σ", ylabel="predicted [N/mm]")
     place = np.arange(len(sigma))
     for width, shade in ((2.0, 0.12), (1.0, 0.2)):
         right.axhspan(-width, width, color="0.5", alpha=shade, linewidth=0.0)
-    right.vlines(place, 0.0, fit.residuals, color=COLORS[0], linewidth=1.2)
-    right.plot(place, fit.residuals, "o", color=COLORS[0], markersize=4)
+    right.vlines(place, 0.0, fit.residuals, color=BLUE, linewidth=1.2)
+    right.plot(place, fit.residuals, "o", color=BLUE, markersize=4)
     right.axhline(0.0, color="0.2", linewidth=0.8)
     right.set_ylabel("(predicted − measured)/σ, bands at 1 and 2 σ")
     if len(sigma) <= _MOST_LABELS and any(measurement.label for measurement in fit.measurements):
-        right.set_xticks(place, labels, rotation=90, fontsize=8)
+        right.set_xticks(place, labels, rotation=90, fontsize=SMALL)
     else:
         right.set_xlabel("measurement")
         right.xaxis.set_major_locator(MaxNLocator(integer=True))
-    figure.suptitle(title)
+    heading(figure, title)
     return figure

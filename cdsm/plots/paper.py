@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from cdsm.errors import InvalidInput
-from cdsm.plots.arm import draw_arm
+from cdsm.plots.arm import draw_arm, frame_arms
 from cdsm.plots.style import AXES, COLORS, KN, MM, N_PER_MM, STYLES, legend_below, panels
 from cdsm.support.values import Array
 
@@ -166,7 +166,8 @@ def _plot_postures(result: paper.StiffnessFigure) -> Figure:
         zip(result.curves, result.original, result.postures, strict=True)
     ):
         picture: Any = figure.add_subplot(grid[0, column], projection="3d")
-        draw_arm(picture, pose, None)
+        draw_arm(picture, pose)
+        frame_arms(picture, None)
         picture.set_title(curve.label, fontsize=10)
         for row, (name, reading) in enumerate(_READINGS.items(), start=1):
             axes: Any = figure.add_subplot(grid[row, column])

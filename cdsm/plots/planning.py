@@ -1,8 +1,9 @@
-"""Plot the attainable stiffness of an arm, and plans of stiffness."""
+"""Plot the attainable stiffness of an arm, plans of stiffness, shares and saturation."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib import colormaps
@@ -11,61 +12,134 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from cdsm.errors import InvalidInput
-from cdsm.plots.style import COLORS, N_PER_MM, expect, panels
-from cdsm.support.format import coordinates
+from cdsm.plots.style import (
+    BLUE,
+    COLORS,
+    GREEN,
+    N_PER_MM,
+    ONE_COLUMN,
+    SCREEN,
+    SMALL,
+    STYLES,
+    TWO_COLUMNS,
+    VERMILLION,
+    cable_lines,
+    direction_name,
+    expect,
+    heading,
+    legend,
+    panels,
+    styled,
+)
 from cdsm.support.values import Array
 
 if TYPE_CHECKING:
     from cdsm.planning.path_plan import PathPlan
-    from cdsm.planning.plan import StiffnessPlan
     from cdsm.planning.range import StiffnessRange
+    from cdsm.planning.tension_growth import Saturation
 
 _SAME = 1e-9
-"""Largest difference between the entries of two equal unit directions."""
+"""Largest entry of a unit direction outside a plane in which it lies."""
 
 _JUMP = 3.0
 """The target jumps where a change exceeds the neighbouring changes of equal sign by this factor."""
 
-_NAMED = 20
-"""Above this number of cables the colours are not distinct, so cables are not named."""
+_ROOM = 1.15
+"""Highest value of an axis that begins at zero, over the largest value drawn."""
 
 
-def plot_stiffness_plan(plan: StiffnessPlan, attainable: StiffnessRange) -> Figure:
-    """Plot the tensions of all cables: for the softest, the planned and the stiffest arm.
+def plot_stiffness_ranges(ranges: Mapping[str, Sequence[StiffnessRange]]) -> Figure:
+    """Plot attainable stiffness over the direction, as a polar diagram in N/mm.
+
+    A curve for each largest stiffness, and the smallest of the last entry shaded. The other half of
+    the circle is the same, since ``along(-u)`` is ``along(u)``.
 
     Args:
-        plan: Result of :func:`~cdsm.planning.plan.plan_stiffness` for one direction.
-        attainable: Range of stiffness along the direction of the plan, at its posture.
+        ranges: Ranges by label, such as the bound of the tensions. The directions of each rise
+            from 0° to below 180° in one coordinate plane, such as that of y and z.
 
     Raises:
-        InvalidInput: The arguments are not a plan and a range, or differ in posture or direction.
+        InvalidInput: A range is missing or of the wrong type, or the directions are not in one
+            coordinate plane.
     """
-    expect("plan", plan, "StiffnessPlan")
-    expect("attainable", attainable, "StiffnessRange")
-    same = plan.tension.posture._equals(attainable.posture)
-    u = np.zeros(3) if plan.direction is None else plan.direction
-    if not same or not np.allclose(u, attainable.direction, rtol=0.0, atol=_SAME):
-        raise InvalidInput("attainable", "is not of the posture and the direction of the plan.")
-    figure, ((axes,),) = panels(8.0, 4.0, 1)
-    names = [cable.name for cable in attainable.posture.arm.cables]
-    for tension, value, name, color, marker in (
-        (attainable.low_tension, attainable.low, "softest", COLORS[2], "v"),
-        (plan.tension, float(plan.achieved), "planned", COLORS[0], "o"),
-        (attainable.high_tension, attainable.high, "stiffest", COLORS[1], "^"),
-    ):
-        label = f"{name}: {N_PER_MM * value:.4g} N/mm"
-        axes.plot(names, tension.values, marker, color=color, label=label, linestyle=":")
-    axes.set(ylabel="tension [N]", title=f"stiffness along {_named(attainable.direction)}")
-    axes.set_ylim(bottom=0.0)
-    axes.tick_params(axis="x", rotation=60)
-    axes.legend(fontsize=8)
+    every = [one for each in ranges.values() for one in each]
+    for one in every:
+        expect("ranges", one, "StiffnessRange")
+    if not every or not all(ranges.values()):
+        raise InvalidInput("ranges", "holds none; give ranges of several directions by label.")
+    u = np.array([one.direction for one in every])
+    normal = int(abs(u).max(axis=0).argmin())
+    if abs(u[:, normal]).max() > _SAME:
+        raise InvalidInput("ranges", "has directions that are in no plane of two base axes.")
+    first, second = (axis for axis in range(3) if axis != normal)
+    figure = Figure(figsize=(ONE_COLUMN, 4.2), dpi=SCREEN, layout="constrained")
+    axes: Any = styled(figure.add_subplot(projection="polar"))
+
+    def around(found: Sequence[StiffnessRange], values: Sequence[float]) -> tuple[Array, Array]:
+        v = np.array([one.direction for one in found])
+        turn = np.arctan2(v[:, second], v[:, first])
+        order = np.argsort(turn := np.mod(turn, np.pi))
+        half, radius = turn[order], N_PER_MM * np.array(values)[order]
+        return (
+            np.concatenate([half, half + np.pi, half[:1] + 2.0 * np.pi]),
+            np.concatenate([radius, radius, radius[:1]]),
+        )
+
+    shades = colormaps["cividis"](np.linspace(0.0, 0.85, len(ranges)))
+    for k, ((label, found), shade) in enumerate(zip(ranges.items(), shades, strict=True)):
+        high = around(found, [one.high for one in found])
+        axes.plot(*high, STYLES[k % len(STYLES)], color=to_hex(shade), label=f"stiffest, {label}")
+    label, found = [*ranges.items()][-1]
+    low = around(found, [one.low for one in found])
+    axes.fill(*low, color="0.85", label=f"softer than it can be, {label}")
+    axes.plot(*low, color="0.4", linewidth=0.8)
+    letters = "xyz"[first], "xyz"[second]
+    ends = [f"{sign}{letter}" for sign in "+-" for letter in letters]
+    axes.set_xticks(np.deg2rad([0.0, 90.0, 180.0, 270.0]), ends)
+    axes.set_title("attainable stiffness along u [N/mm]")
+    figure.legend(loc="outside lower center", fontsize=SMALL, handlelength=2.4)
+    return figure
+
+
+def plot_saturation(found: Saturation) -> Figure:
+    """Plot stiffness, and its gain per newton, over the lower bound of the tensions.
+
+    Args:
+        found: Result of :func:`~cdsm.saturation`.
+
+    Raises:
+        InvalidInput: ``found`` is not a saturation.
+    """
+    expect("found", found, "Saturation")
+    bound, along, slope = found.curve.T
+    figure, ((left, right),) = panels(TWO_COLUMNS, 2.6, 2)
+    left.plot(bound, N_PER_MM * along, color=BLUE)
+    left.set(ylabel=f"stiffness along {direction_name(found.direction)} [N/mm]")
+    left.set_ylim(bottom=0.0)
+    gain = N_PER_MM * slope
+    right.semilogy(bound, np.where(gain > 0.0, gain, np.nan), color=BLUE)
+    right.set(ylabel="gain [N/mm per N]")
+    if found.steepest_slope > 0.0:
+        part = f"{100.0 * found.fraction:.3g} % of the largest gain"
+        level = N_PER_MM * found.fraction * found.steepest_slope
+        right.axhline(level, color="0.4", linestyle=":", label=part)
+    for axes in (left, right):
+        axes.set_xlabel("lower bound of tension [N]")
+        if np.isfinite(found.bound):
+            label = f"pays less above {found.bound:.4g} N"
+            axes.axvline(found.bound, color=VERMILLION, linestyle="--", label=label)
+        if bound[0] < found.stiffest < bound[-1]:
+            label = f"softer above {found.stiffest:.4g} N"
+            axes.axvline(found.stiffest, color=GREEN, linestyle="-.", label=label)
+    legend(right)
+    heading(figure, found.tension.posture.arm.name)
     return figure
 
 
 def plot_path_plan(plan: PathPlan) -> Figure:
     """Plot wanted and planned stiffness, and tensions, over the samples of a path.
 
-    Infeasible samples are shaded. Target jumps are steps. Up to 20 cables have colours and names.
+    Infeasible samples are shaded. Target jumps are steps. Up to 24 cables have colours and names.
 
     Args:
         plan: Result of :func:`~cdsm.planning.path.plan_path` for one direction or several.
@@ -76,7 +150,7 @@ def plot_path_plan(plan: PathPlan) -> Figure:
     expect("plan", plan, "PathPlan")
     if plan.direction is None:
         raise InvalidInput("plan", "is one of cartesian; only stiffness along directions is drawn.")
-    figure, ((above,), (below,)) = panels(8.0, 5.5, 1, rows=2, sharex=True)
+    figure, ((above,), (below,)) = panels(TWO_COLUMNS, 4.6, 1, rows=2, sharex=True)
     size = len(plan.target)
     wanted = N_PER_MM * plan.target.reshape(size, -1)
     # NaN leaves a gap in the line at samples that are not planned
@@ -88,23 +162,20 @@ def plot_path_plan(plan: PathPlan) -> Figure:
     for k, u in enumerate(plan.direction.reshape(-1, 3)):
         color = COLORS[k % len(COLORS)]
         label = "wanted" if k == 0 else None
-        above.plot(*_stepped(wanted[:, k]), color="0.6", linewidth=3.0, label=label)
-        above.plot(achieved[:, k], ".-", color=color, linewidth=1.0, markersize=3, label=_named(u))
-    names = [cable.name for cable in plan.arm.cables]
-    named = len(names) <= _NAMED
-    for c, name in enumerate(names):
-        color = to_hex(colormaps["tab20"](c)) if named else COLORS[0]
-        below.plot(tensions[:, c], ".-", color=color, linewidth=0.9, markersize=2, label=name)
-    if named:
-        beside = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5), "frameon": False}
-        below.legend(fontsize=7, ncols=1 + (len(names) > _NAMED // 2), **beside)
+        above.plot(*_stepped(wanted[:, k]), color="0.7", linewidth=4.0, label=label)
+        label = f"reached along {direction_name(u)}"
+        above.plot(achieved[:, k], ".-", color=color, linewidth=1.0, markersize=3, label=label)
+    line = {"marker": ".", "linewidth": 0.9, "markersize": 2}
+    cable_lines(below, np.arange(0.0, size), tensions, plan.arm.cables.names, **line)
     for axes in (above, below):
         for index in (sample.index for sample in plan.infeasible):
-            axes.axvspan(index - 0.5, index + 0.5, color=COLORS[1], alpha=0.15, linewidth=0.0)
-        axes.margins(y=0.1)
-        axes.set_ylim(bottom=0.0)
-    above.set(ylabel="stiffness [N/mm]", title=f"{plan.arm.name}; shaded: infeasible")
-    above.legend(title="along", fontsize=8, title_fontsize=8)
+            axes.axvspan(index - 0.5, index + 0.5, color=VERMILLION, alpha=0.15, linewidth=0.0)
+    for axes, values in ((above, [wanted, achieved]), (below, [tensions])):
+        highest = max((np.nanmax(each, initial=0.0) for each in values), default=0.0)
+        axes.set_ylim(0.0, _ROOM * highest or 1.0)
+    shaded = "; shaded: infeasible" if plan.infeasible else ""
+    above.set(ylabel="stiffness [N/mm]", title=f"{plan.arm.name}{shaded}")
+    legend(above, loc="lower right")
     below.xaxis.set_major_locator(MaxNLocator(integer=True))
     below.set(xlabel="sample", ylabel="tension of each cable [N]")
     return figure
@@ -120,8 +191,3 @@ def _stepped(values: Array) -> tuple[Array, Array]:
     at = np.repeat(last + 1, 2)
     beside = np.stack([values[last], values[last + 1]], axis=1).ravel()
     return np.insert(np.arange(0.0, values.size), at, at - 0.5), np.insert(values, at, beside)
-
-
-def _named(u: Array) -> str:
-    """Format a direction; rounding errors become zero."""
-    return coordinates(np.round(u, 9), "z.3g")

@@ -1,23 +1,81 @@
-"""Shared by all figures: colours, units, scales of axes, and a check of the input type."""
+"""Shared by all figures: sizes, colours, units, scales of axes, and a check of the input type.
+
+A figure is as wide as one or two columns of a journal, with text of 7 and 8 points. Colours are
+those of Okabe and Ito (2008), distinct to all kinds of colour vision; lines also differ in style.
+"""
 
 from __future__ import annotations
 
+import os
+import textwrap
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+from matplotlib import rc_context
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from cdsm.errors import InvalidInput
+from cdsm.support.files import as_path, write_file
+from cdsm.support.format import coordinates
+from cdsm.support.values import Array
+
+ONE_COLUMN: Final = 3.5
+TWO_COLUMNS: Final = 7.16
+"""Widths [inch] of one and two columns of an IEEE journal."""
+
+TEXT: Final = 8.0
+SMALL: Final = 7.0
+"""Sizes of text [pt]: of labels and titles; of ticks and legends."""
+
+SCREEN: Final = 150.0
+PRINT: Final = 300.0
+"""Resolutions [dots per inch]: in a notebook, and of a written PNG."""
+
+BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILLION, PURPLE = PALETTE = (
+    *("#000000", "#e69f00", "#56b4e9", "#009e73", "#f0e442", "#0072b2", "#d55e00", "#cc79a7"),
+)
+"""The eight colours of Okabe and Ito, "Color universal design", 2008."""
 
 AXES: Final = ("x", "y", "z")
-COLORS: Final = ("#3b6fb6", "#c8553d", "#4f8f5b")
+COLORS: Final = (BLUE, VERMILLION, GREEN)
+"""Colours of the directions x, y and z."""
+
 STYLES: Final = ("-", "--", "-.", ":")
 MM: Final = 1e3
 KN: Final = 1e-3
 N_PER_MM: Final = 1e-3
 TICKS: Final = 5
 """Largest number of tick intervals on an axis of a map or a 3D picture."""
+
+NAMED: Final = 24
+"""Above this number of cables, lines are not distinct, so cables are not named."""
+
+_CABLES: Final = (BLUE, VERMILLION, GREEN, ORANGE, SKY, PURPLE, BLACK, "0.6")
+_FORMATS: Final = (".pdf", ".svg", ".png")
+
+
+def save_figure(figure: Figure, path: str | os.PathLike[str]) -> Path:
+    """Write a figure: vectors (``.pdf``, ``.svg``) or pixels (``.png``, 300 dpi); return its path.
+
+    Equal figures give equal bytes: no date is written, and names in an SVG are not random.
+
+    Args:
+        figure: Figure of a function of :mod:`cdsm.plots`, or any other.
+        path: The file. It is written completely or not at all.
+
+    Raises:
+        InvalidInput: The path ends neither in ``.pdf``, ``.svg`` nor ``.png``.
+        FileError: The file cannot be written.
+    """
+    suffix = as_path(path).suffix.lower()
+    if suffix not in _FORMATS:
+        raise InvalidInput("path", f"{str(path)!r} given; it must end in {', '.join(_FORMATS)}.")
+    dateless = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}.get(suffix)
+    with rc_context({"svg.hashsalt": "cdsm", "pdf.fonttype": 42}):
+        return write_file(path, lambda aside: figure.savefig(aside, dpi=PRINT, metadata=dateless))
 
 
 def expect(name: str, value: object, kind: str) -> None:
@@ -29,27 +87,102 @@ def expect(name: str, value: object, kind: str) -> None:
         raise InvalidInput(name, f"{value!r} given; a {kind} is needed.")
 
 
+def direction_name(u: Array) -> str:
+    """Format a direction; rounding errors become zero."""
+    return coordinates(np.round(u, 9), "z.3g")
+
+
 def panels(
     width: float, height: float, columns: int, rows: int = 1, **options: Any
 ) -> tuple[Figure, Any]:
     """Build a figure and its panels (rows, columns), each with grid lines; sizes in inches."""
-    figure = Figure(figsize=(width, height), layout="constrained")
+    figure = Figure(figsize=(width, height), dpi=SCREEN, layout="constrained")
     axes = figure.subplots(rows, columns, squeeze=False, **options)
     for panel in axes.flat:
-        panel.grid(alpha=0.3)
+        styled(panel)
     return figure, axes
 
 
+def styled(axes: Any) -> Any:
+    """Set grid lines and sizes of text of new axes; return the axes."""
+    axes.grid(alpha=0.3, linewidth=0.6)
+    axes.tick_params(labelsize=SMALL, width=0.6)
+    axes.title.set_fontsize(TEXT)
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.label.set_fontsize(TEXT)
+        axis.offsetText.set_fontsize(SMALL)
+    return axes
+
+
+def heading(figure: Figure, text: str) -> None:
+    """Write a title over a figure, broken to its width."""
+    figure.suptitle(textwrap.fill(text, round(16 * figure.get_figwidth())), fontsize=TEXT)
+
+
+def legend(axes: Any, **options: Any) -> Any:
+    """Draw the legend of a panel in small text."""
+    return axes.legend(
+        **{"fontsize": SMALL, "title_fontsize": SMALL, "handlelength": 2.2} | options
+    )
+
+
 def legend_below(figure: Figure, axes: Any, columns: int, **options: Any) -> None:
-    """Draw one legend below all panels, from the lines of one panel."""
-    handles, labels = axes.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=columns, **options)
+    """Draw one legend below all panels, from the lines of one panel or of several, each once."""
+    found: dict[str, Any] = {}
+    for panel in np.ravel(axes):
+        for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
+            found.setdefault(label, handle)
+    figure.legend(
+        found.values(),
+        found.keys(),
+        loc="outside lower center",
+        ncols=columns,
+        **{"fontsize": SMALL, "title_fontsize": SMALL, "handlelength": 2.4} | options,
+    )
 
 
-def equal_axes(axes: Any) -> None:
+def cable_lines(axes: Any, x: Array, values: Array, names: Sequence[str], **line: Any) -> None:
+    """Draw values (N, C) over x (N,), a line for each cable; name up to 24 beside the panel."""
+    named = len(names) <= NAMED
+    for c, name in enumerate(names):
+        color = _CABLES[c % len(_CABLES)] if named else BLUE
+        style = STYLES[c // len(_CABLES)] if named else "-"
+        axes.plot(x, values[:, c], color=color, linestyle=style, label=name, **line)
+    if named:
+        columns = 1 + (len(names) > NAMED // 2)
+        legend(axes, loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, ncols=columns)
+
+
+def equal_axes(axes: Any, zoom: float = 0.75) -> None:
     """Give 3D axes equal scales, with space for their labels."""
     ranges = np.ptp([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()], axis=1)
-    axes.set_box_aspect(ranges, zoom=0.75)
+    axes.set_box_aspect(ranges, zoom=zoom)
     for letter, part in zip(AXES, ranges / ranges.max(), strict=True):
         ticks = MaxNLocator(max(1, round(TICKS * part)))  # fewer ticks on a short axis
         getattr(axes, f"{letter}axis").set_major_locator(ticks)
+
+
+def fill_canvas(axes: Any, right: float = 1.0) -> None:
+    """Enlarge a 3D picture until it fills its figure, up to a fraction ``right`` of the width.
+
+    The figure gets the height that the picture needs.
+    """
+    figure = axes.figure
+    for _ in range(4):  # text keeps its size, so the right scale is found step by step
+        figure.draw_without_rendering()
+        size = figure.get_size_inches() * figure.dpi
+        box = axes.get_tightbbox().transformed(figure.transFigure.inverted())
+        place = axes.get_position()
+        scale = 0.98 * right / box.width
+        height = box.height * scale * size[1]  # of the picture, in pixels
+        figure.set_figheight((height + 2.5 * TEXT * figure.dpi / 72.0) / figure.dpi)
+        shrink = size[1] / (figure.get_figheight() * figure.dpi)
+        left, bottom = box.x0 - place.x0, box.y0 - place.y0
+        axes.set_position(
+            (
+                0.01 * right - left * scale,
+                0.01 - bottom * scale * shrink,
+                place.width * scale,
+                place.height * scale * shrink,
+            )
+        )

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Final, final
+from typing import TYPE_CHECKING, Final, final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -29,9 +29,13 @@ from cdsm.statics.bound_scan import (
     tension_domain,
 )
 from cdsm.stiffness_matrix import Stiffness, stiffness
+from cdsm.support.format import key, plain
 from cdsm.support.validation import bound, instance, wrench_vector
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import DEFAULT_SOLVER, distribute_tension
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _NOWHERE: Final = 1e6
 """Largest load factor that is tried. If the arm holds it, the critical factor is infinite."""
@@ -70,16 +74,40 @@ class CriticalTension(ReadOnlyState):
     margins: Array
 
     def __repr__(self) -> str:
-        return f"<CriticalTension {self.minimum:.4g} N>"
+        return f"<CriticalTension: {self._verdict}>"
 
-    def __str__(self) -> str:
+    @property
+    def _verdict(self) -> str:
         low, high = self.examined
         if not self.stable:
-            verdict = f"unstable at every lower bound from {low:.4g} N to {high:.4g} N"
-        elif math.isinf(self.minimum):
-            verdict = f"does not buckle at any lower bound up to {high:.4g} N"
-        else:
-            verdict = f"buckles at a lower bound of {self.minimum:.6g} N"
+            return f"unstable at every lower bound from {low:.4g} N to {high:.4g} N"
+        if math.isinf(self.minimum):
+            return f"does not buckle at any lower bound up to {high:.4g} N"
+        return f"buckles at a lower bound of {self.minimum:.6g} N"
+
+    def plot(self) -> Figure:
+        """Plot the smallest joint stiffness [N m/rad] over the lower bound of tension [N]."""
+        from cdsm.plots import plot_critical_tension  # matplotlib imports slowly
+
+        return plot_critical_tension(self)
+
+    def to_dict(self) -> dict[str, object]:
+        """Return bounds, mode and margins in SI for JSON, with units in the keys; inf as None."""
+        arm = self.posture.arm
+        numbers = {
+            **self.posture._coordinates,
+            "critical_minimum_tension_N": self.minimum,
+            "stable_minimum_tension_N": self.stable,
+            "examined_minimum_tension_N": self.examined,
+            "mode": dict(zip(arm.joint_names, self.mode, strict=True)),
+            "tension_N": dict(zip(arm.cables.names, self.tension, strict=True)),
+            "minimum_tension_N": self.bounds,
+            key("margin", arm.stiffness_unit()): self.margins,
+        }
+        return dict(plain(numbers))
+
+    def __str__(self) -> str:
+        verdict = self._verdict
         spans = ", ".join(f"{a:.4g} to {b:.4g} N" for a, b in self.stable if a < b)
         names = self.posture.arm.joint_names
         lines = [verdict, f"stable from {spans}" if spans else "", _describe_mode(names, self.mode)]
@@ -109,6 +137,20 @@ class CriticalLoad(ReadOnlyState):
     limit: Limit
     mode: Array
     tension: Array
+
+    def to_dict(self) -> dict[str, object]:
+        """Return load, factor and mode in SI for JSON, with units in the keys; inf as None."""
+        arm = self.posture.arm
+        numbers = {
+            **self.posture._coordinates,
+            "load": self.wrench,
+            "carried": self.carried,
+            "critical_load_factor": self.factor,
+            "limit": self.limit,
+            "load_mode": dict(zip(arm.joint_names, self.mode, strict=True)),
+            "tension_N": dict(zip(arm.cables.names, self.tension, strict=True)),
+        }
+        return dict(plain(numbers))
 
     def __repr__(self) -> str:
         return f"<CriticalLoad factor {self.factor:.4g}, {self.limit}>"

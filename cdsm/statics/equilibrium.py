@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import final
+from typing import TYPE_CHECKING, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,10 +21,13 @@ from cdsm.posture import Posture
 from cdsm.statics.locked_motors import LoadedArm, rounding
 from cdsm.statics.trust_region import FLAT, RestSearch, find_rest
 from cdsm.stiffness_matrix import Stiffness, stiffness
-from cdsm.support.format import coordinates
+from cdsm.support.format import aligned, coordinates, plain
 from cdsm.support.validation import wrench_vector
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _SMALLEST_STEP = 2.0**-6
 """Smallest load step that is tried."""
@@ -139,17 +142,42 @@ class Equilibrium(ReadOnlyState):
         """Names of the joints that rest on a stop."""
         return tuple(self.pose.arm.joint_names[i] for i in np.flatnonzero(self.reaction))
 
+    def plot(self) -> Figure:
+        """Plot the arm in mm at the reference (grey) and at the equilibrium."""
+        from cdsm.plots import plot_path  # matplotlib imports slowly
+
+        return plot_path([self.reference, self.pose])
+
+    def to_dict(self) -> dict[str, object]:
+        """Return posture, tensions and load in SI for JSON, with units in the keys."""
+        names = self.pose.arm.cables.names
+        numbers = {
+            **self.pose._coordinates,
+            "tip_displacement_m": self.displacement,
+            "tension_N": dict(zip(names, self.tension, strict=True)),
+            "reference_tension_N": dict(zip(names, self.reference_tension, strict=True)),
+            "force_N": self.wrench[:3],
+            "moment_Nm": self.wrench[3:],
+            "slack": self.slack,
+            "at_limit": self.at_limit,
+            "stable": self.stable,
+        }
+        return dict(plain(numbers))
+
     def __repr__(self) -> str:
         moved = float(np.linalg.norm(self.displacement)) * 1000.0
         return f"<Equilibrium of {self.pose.arm.name}, tip moved by {moved:.4g} mm>"
 
     def __str__(self) -> str:
         arm = self.pose.arm
-        rows = [f"{'cable':<12}{'tension [N]':>14}{'reference':>12}"]
-        rows += [
-            f"{cable.name:<12}{F:>14.3f}{F0:>12.3f}{'  slack' if cable.name in self.slack else ''}"
-            for cable, F, F0 in zip(arm.cables, self.tension, self.reference_tension, strict=True)
-        ]
+        numbers = zip(arm.cables.names, self.tension, self.reference_tension, strict=True)
+        rows = aligned(
+            [("cable", "tension [N]", "reference", "")]
+            + [
+                (name, f"{F:.3f}", f"{F0:.3f}", "slack" if name in self.slack else "")
+                for name, F, F0 in numbers
+            ]
+        )
         rows.append(f"tip moved by {coordinates(1000.0 * self.displacement)} mm")
         rows += [
             f"{name} rests on its stop, which pushes with {self.reaction[i]:.4g} "

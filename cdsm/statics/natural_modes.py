@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import NamedTuple, final
+from typing import TYPE_CHECKING, NamedTuple, final
 
 import numpy as np
 from scipy.linalg import eigh
@@ -18,9 +18,13 @@ from cdsm.arm_model import joints_to
 from cdsm.errors import InvalidInput, SingularMass
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness
+from cdsm.support.format import aligned, plain
 from cdsm.support.validation import instance
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.urdf import CROSS_INERTIA, CROSS_MASS
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _MASSLESS = 1e-12
 """A motion has no mass if its eigenvalue of M is below this part of the largest."""
@@ -60,6 +64,25 @@ class Modes(ReadOnlyState):
         """Whether all modes vibrate."""
         return not self.growth_rates.size
 
+    def plot(self) -> Figure:
+        """Plot the arm in mm, deflected by its lowest modes, or by those that grow."""
+        from cdsm.plots import plot_modes  # matplotlib imports slowly
+
+        return plot_modes(self)
+
+    def to_dict(self) -> dict[str, object]:
+        """Return frequencies, growth rates and shapes for JSON, with units in the keys."""
+        pose = self.stiffness.posture
+        numbers = {
+            **pose._coordinates,
+            "frequencies_Hz": self.frequencies,
+            "growth_rates_per_s": self.growth_rates,
+            "joints": pose.arm.joint_names,
+            "shapes": self.shapes.T,
+            "growth_shapes": self.growth_shapes.T,
+        }
+        return dict(plain(numbers))
+
     def __repr__(self) -> str:
         name = self.stiffness.posture.arm.name
         if not self.is_stable:
@@ -67,13 +90,11 @@ class Modes(ReadOnlyState):
         return f"<Modes of {name}, {self.frequencies[0]:.4g} to {self.frequencies[-1]:.4g} Hz>"
 
     def __str__(self) -> str:
-        rows = [f"{'mode':<6}{'frequency [Hz]':>16}  {'moves most':<12}"]
-        rows += [
-            f"{number:<6}{frequency:>16.4g}  {joint:<12}".rstrip()
-            for number, (frequency, joint) in enumerate(
-                zip(self.frequencies, self._leading(self.shapes), strict=True), start=1
-            )
-        ]
+        found = zip(self.frequencies, self._leading(self.shapes), strict=True)
+        rows = aligned(
+            [("mode", "frequency [Hz]", "moves most")]
+            + [(str(k), f"{frequency:.4g}", joint) for k, (frequency, joint) in enumerate(found, 1)]
+        )
         rows += [
             f"UNSTABLE: a deflection, most of it at {joint}, grows by e in {1.0 / rate:.4g} s"
             if rate

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import final
+from typing import TYPE_CHECKING, final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,10 +14,15 @@ from cdsm.errors import InvalidInput
 from cdsm.posture import Posture
 from cdsm.statics.equilibrium import Equilibrium, equilibrium
 from cdsm.statics.following import follow_load
-from cdsm.support.format import MODEL, coordinates
+from cdsm.support.format import MODEL, coordinates, plain
+from cdsm.support.tidy import data_frame
 from cdsm.support.validation import unit_direction, vector, whole_number
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension
+
+if TYPE_CHECKING:
+    import pandas
+    from matplotlib.figure import Figure
 
 MOST_STEPS = 1000
 """Largest number of steps. A curve with more points is not smoother, but takes long."""
@@ -122,6 +127,48 @@ class WeightTest(ReadOnlyState):
     def tensions(self) -> Array:
         """Cable tensions at each step (n, C) [N]."""
         return frozen(np.array([each.tension for each in self.loaded]))
+
+    def plot(self) -> Figure:
+        """Plot load [N] over tip displacement [mm], and the tension of each cable [N]."""
+        from cdsm.plots import plot_weight_test  # matplotlib imports slowly
+
+        return plot_weight_test(self)
+
+    def to_dict(self) -> dict[str, object]:
+        """Return loads, displacements and tensions in SI for JSON, with units in the keys."""
+        last, before = self.loaded[-1], self.without
+        numbers = {
+            "before": {
+                "tip_displacement_m": before.displacement,
+                "at_limit": before.at_limit,
+                "slack": before.slack,
+                "stable": before.stable,
+            },
+            "force_N": self.force,
+            "loads_N": self.loads,
+            "tip_displacements_m": self.displacements,
+            "linear_displacement_m": self.linear.displacement,
+            "stiffness_N_per_m": self.stiffness,
+            "linear_stiffness_N_per_m": self.linear.stiffness,
+            "cables": last.pose.arm.cables.names,
+            "tensions_N": self.tensions,
+            **last.pose._coordinates,
+            "slack": last.slack,
+            "at_limit": last.at_limit,
+            "stable": last.stable,
+        }
+        return dict(plain(numbers))
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """Return a table of tip displacement [m] and tensions [N], a row for each load [N].
+
+        Raises:
+            MissingExtra: pandas is not installed.
+        """
+        names = [f"{name} tension [N]" for name in self.without.pose.arm.cables.names]
+        moved = zip(("x [m]", "y [m]", "z [m]"), self.displacements.T, strict=True)
+        columns = {**dict(moved), **dict(zip(names, self.tensions.T, strict=True))}
+        return data_frame(columns, "load [N]", self.loads)
 
     def __repr__(self) -> str:
         return (

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
-from typing import Final, NamedTuple
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,26 @@ def span(values: Array, form: Callable[[float], str] = "{:.4g}".format) -> str:
     """Return the range of some numbers as text: ``2 to 5``, or ``2`` if all are printed alike."""
     low, high = form(float(values.min())), form(float(values.max()))
     return low if low == high else f"{low} to {high}"
+
+
+def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
+    """Return lines of text: the first column to the left, the others to the right, all aligned."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return [
+        "  ".join([first.ljust(widths[0]), *map(str.rjust, others, widths[1:])]).rstrip()
+        for first, *others in rows
+    ]
+
+
+def plain(value: Any) -> Any:
+    """Turn arrays and tuples into lists, infinite numbers and NaN into None, as JSON needs them."""
+    if isinstance(value, Mapping):
+        return {name: plain(each) for name, each in value.items()}
+    if isinstance(value, (np.ndarray, np.generic)):
+        return plain(value.tolist())
+    if isinstance(value, (list, tuple)):
+        return [plain(each) for each in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def key(name: str, unit: str) -> str:

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import itertools
 import os
 import shutil
-from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING
 
 from cdsm.errors import FileError, InvalidInput
-from cdsm.support.datasets import check_sweep, status_names
+from cdsm.support.datasets import check_sweep
 from cdsm.support.extras import need
 from cdsm.support.files import as_path, write_file
+from cdsm.support.tidy import tidy
 
 if TYPE_CHECKING:
     import pandas
@@ -45,6 +41,23 @@ def write_sweep(dataset: xarray.Dataset, path: str | os.PathLike[str]) -> Path:
     check_target(path)
     write = _write_table if as_path(path).suffix.lower() == ".csv" else _write_netcdf
     return write_file(path, lambda aside: write(dataset, aside))
+
+
+def sweep_to_pandas(dataset: xarray.Dataset) -> pandas.DataFrame:
+    """Return a sweep as a tidy table: a row for each posture and case, a column for each component.
+
+    The columns are those of the CSV file of :func:`write_sweep`, with the SI unit in each name.
+    The status is a word; a value that does not exist is NaN.
+
+    Args:
+        dataset: Result of :func:`~cdsm.sweeps.run.sweep`, or a part of it.
+
+    Raises:
+        InvalidInput: ``dataset`` is not a sweep, or its status has a number without a word.
+        MissingExtra: xarray is not installed.
+    """
+    check_sweep(dataset)
+    return tidy(dataset if dataset["status"].ndim else dataset.expand_dims("entry"))
 
 
 def read_sweep(path: str | os.PathLike[str]) -> xarray.Dataset:
@@ -126,41 +139,4 @@ def _write_table(dataset: xarray.Dataset, path: Path) -> None:
     with path.open("w", encoding="utf-8", newline="") as file:
         for start in range(0, len(status), step):
             part = dataset.isel({status.dims[0]: slice(start, start + step)})
-            _table(part).to_csv(file, index=False, header=start == 0, lineterminator="\n")
-
-
-def _table(dataset: xarray.Dataset) -> pandas.DataFrame:
-    import pandas
-
-    status = dataset["status"]
-    columns: dict[str, NDArray[Any]] = {}
-    for name in (*dataset.coords, *dataset.data_vars):
-        variable = dataset[name]
-        if name == "status" or (variable.dims == (name,) and name not in status.dims):
-            continue  # coordinates of components appear in the names of the columns
-        units = f" [{variable.units}]" if variable.attrs.get("units", "1") != "1" else ""
-        for suffix, component in _components(variable, status):
-            columns[f"{name}{suffix}{units}"] = component
-    words = status_names(dataset)
-    unknown = ~np.isin(status.values, list(words))
-    if unknown.any():
-        raise InvalidInput(
-            "dataset",
-            f"its status holds {status.values[unknown][0].item()!r}, which is none of {words}; the "
-            "file it was read from may be damaged.",
-        )
-    columns["status"] = np.array([words[int(value)] for value in status.values.ravel()])
-    return pandas.DataFrame(columns)
-
-
-def _components(
-    variable: xarray.DataArray, status: xarray.DataArray
-) -> Iterator[tuple[str, NDArray[Any]]]:
-    """Yield name and column of each component of a variable; one entry per entry of the status."""
-    inner = [dim for dim in variable.dims if dim not in status.dims]
-    names = [map(str, variable[dim].values.tolist()) for dim in inner]
-    for places in itertools.product(*(enumerate(each) for each in names)):
-        one = variable.isel({dim: i for dim, (i, _) in zip(inner, places, strict=True)})
-        # along dimensions that the variable lacks, its values are repeated
-        full = one.broadcast_like(status).transpose(*status.dims)
-        yield "".join(f"_{name}" for _, name in places), full.values.ravel()
+            tidy(part).to_csv(file, index=False, header=start == 0, lineterminator="\n")

@@ -596,7 +596,7 @@ def test_bad_input_is_refused_by_name(name: str) -> None:
 def test_tables_name_cables_joints_and_what_is_not_reached() -> None:
     found = cdsm.solve_joint_angles(ARM, LENGTHS + np.eye(len(LENGTHS))[1] * 0.02)
     text = str(found)
-    for name in (*ARM.joint_names, *(cable.name for cable in ARM.cables), "[m]", "[rad]"):
+    for name in (*ARM.joint_names, *(cable.name for cable in ARM.cables), "[mm]", " deg"):
         assert name in text
     assert "NOT REACHABLE: cable1_2 is off most, by -0.0" in text
     assert "NOT REACHABLE" in repr(found)

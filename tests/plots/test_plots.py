@@ -271,7 +271,8 @@ def test_path_is_drawn_with_gaps_where_nothing_is_planned() -> None:
     np.testing.assert_allclose(_shown(held)[1], [80.0, 82.0, np.nan, 86.0, np.nan])
     assert len(below.get_lines()) == 15
     np.testing.assert_array_equal(_shown(below.get_lines()[4])[1, [0, 1, 3]], plan.tensions[:, 4])
-    assert len({line.get_color() for line in below.get_lines()}) == 15
+    looks = {(line.get_color(), line.get_linestyle()) for line in below.get_lines()}
+    assert len(looks) == 15
     legend = below.get_legend()
     assert legend is not None
     assert [text.get_text() for text in legend.get_texts()] == [each.name for each in arm.cables]
@@ -295,7 +296,7 @@ def test_steps_and_ramps_of_a_path_are_drawn_as_what_they_are() -> None:
 def test_many_cables_are_not_told_apart_by_colour() -> None:
     arm = cdsm.Manipulator(
         cdsm.Geometry.universal(
-            joints=7,
+            joints=9,
             cables_per_joint=3,
             link_length=0.03,
             base_length=0.02,

@@ -1,0 +1,81 @@
+"""Batches as labelled Datasets: dimensions and units of each quantity."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from cdsm.manipulator import Manipulator
+from cdsm.support.format import coordinates
+from cdsm.support.status import Status
+from cdsm.support.tidy import dataset
+from cdsm.support.values import Array
+
+if TYPE_CHECKING:
+    import xarray
+
+    from cdsm.batch.layout import Codes
+
+_JOINTS: Final = ("joint", "joint_column")
+_MOTIONS: Final = ("motion", "motion_column")
+_AXES: Final = ("axis", "axis_column")
+
+_DIMS: Final[dict[str, tuple[tuple[str, ...], str]]] = {
+    "tip_position": (("axis",), "m"),
+    "tip_rotation": (_AXES, "1"),
+    "jacobian": (("motion", "joint"), "1"),
+    "cable_lengths": (("cable",), "m"),
+    "length_jacobian": (("cable", "joint"), "m/rad"),
+    "gravity_torque": (("joint",), "torque"),
+    "tension": (("cable",), "N"),
+    "residual": (("joint",), "torque"),
+    **dict.fromkeys(("gravity", "active", "load", "passive", "joint"), (_JOINTS, "stiffness")),
+    "cable_stiffness": (("cable",), "N/m"),
+    "margin": ((), "stiffness"),
+    "pseudoinverse": (_AXES, "N/m"),
+    "cartesian": (_AXES, "N/m"),
+    "along": (("direction",), "N/m"),
+    "compliance": (_MOTIONS, "1"),
+}
+"""Dimensions of each quantity after that of the postures, and its unit; 1 for matrices of SI units
+that differ. The units of torque and joint stiffness are those of the arm."""
+
+
+def to_dataset(
+    arm: Manipulator,
+    q: Array,
+    status: Codes,
+    values: dict[str, Array],
+    directions: Array | None = None,
+) -> xarray.Dataset:
+    """Build a Dataset of quantities (B, …) by name; MissingExtra if xarray is not installed."""
+    units = {"torque": arm.torque_unit(), "stiffness": arm.stiffness_unit()}
+    variables: dict[str, tuple[Sequence[str], Array, str]] = {
+        "q": (("pose", "joint"), q, " or ".join(sorted(set(arm.joint_units))[::-1]))
+    }
+    if "tip" in values:
+        tip = values.pop("tip")
+        values |= {"tip_position": tip[:, :3, 3], "tip_rotation": tip[:, :3, :3]}
+    for name, value in values.items():
+        dims, unit = _DIMS[name]
+        # one direction has no axis of its own; a variable must not have the name of a dimension
+        shown = (("pose", *dims), value.reshape(len(q), -1) if name == "along" else value)
+        variables["joint_stiffness" if name == "joint" else name] = (*shown, units.get(unit, unit))
+    motions = ("x", "y", "z", "rx", "ry", "rz")
+    labels = {
+        **dict.fromkeys(_JOINTS, arm.joint_names),
+        **dict.fromkeys(_MOTIONS, motions),
+        **dict.fromkeys(_AXES, motions[:3]),
+        "cable": arm.cables.names,
+    }
+    if directions is not None:
+        labels["direction"] = tuple(map(coordinates, directions.reshape(-1, 3)))
+    found = dataset(variables, labels, title=f"postures of {arm.name}")
+    flags = {
+        "flag_values": np.array([int(each) for each in Status], dtype=np.uint8),
+        "flag_meanings": " ".join(each.name.lower() for each in Status),
+    }
+    found["status"] = ("pose", status.copy(), flags)
+    return found

@@ -1,0 +1,149 @@
+"""Plot a number for each cable: shares of a stiffness, and tensions of plans."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from cdsm.errors import InvalidInput
+from cdsm.plots.style import (
+    BLUE,
+    GREEN,
+    N_PER_MM,
+    ONE_COLUMN,
+    ORANGE,
+    TWO_COLUMNS,
+    VERMILLION,
+    direction_name,
+    expect,
+    heading,
+    legend,
+    panels,
+)
+
+if TYPE_CHECKING:
+    from cdsm.planning.plan import StiffnessPlan
+    from cdsm.planning.range import StiffnessRange
+    from cdsm.shares import Shares
+    from cdsm.tension import Tension
+
+_SAME = 1e-9
+"""Largest difference between the entries of two equal unit directions."""
+
+_ROOM = 1.15
+"""Highest value of an axis that begins at zero, over the largest value drawn."""
+
+_WIDE = 12
+"""Above this number of cables a figure that names them is two columns wide."""
+
+
+def plot_shares(shares: Shares) -> Figure:
+    """Plot the contribution of each cable, of gravity and of the load to a stiffness as bars.
+
+    Args:
+        shares: Result of :meth:`~cdsm.Stiffness.shares`.
+
+    Raises:
+        InvalidInput: ``shares`` is not the shares of a stiffness.
+    """
+    expect("shares", shares, "Shares")
+    arm = shares.stiffness.posture.arm
+    names = [*arm.cables.names, "gravity", "load"]
+    figure, ((axes,),) = panels(_width(names), 2.8, 1)
+    passive = N_PER_MM * np.append(shares.passive, [0.0, 0.0])
+    active = N_PER_MM * np.append(shares.active, [0.0, 0.0])
+    others = N_PER_MM * np.array([0.0] * len(shares.cables) + [shares.gravity, shares.load])
+    # bars of one sign stand on each other, so that none hides another
+    for values, below, color, label in (
+        (passive, 0.0 * passive, BLUE, "passive: elasticity"),
+        (active, np.where(active * passive > 0.0, passive, 0.0), ORANGE, "active: tension"),
+        (others, 0.0 * others, GREEN, "gravity, load"),
+    ):
+        axes.bar(names, values, bottom=below, color=color, label=label)
+    axes.axhline(0.0, color="0.2", linewidth=0.8)
+    _name_cables(axes)
+    axes.set_ylabel("contribution [N/mm]")
+    total = f"{N_PER_MM * shares.total:.4g} N/mm along {direction_name(shares.direction)}"
+    unstable = "" if shares.stiffness.is_stable else "UNSTABLE: "
+    heading(figure, f"{unstable}{arm.name}: what makes up the {total}")
+    legend(axes)
+    return figure
+
+
+def plot_stiffness_plan(plan: StiffnessPlan, attainable: StiffnessRange | None = None) -> Figure:
+    """Plot the planned tension of each cable, between those of the softest and the stiffest arm.
+
+    Args:
+        plan: Result of :func:`~cdsm.plan_stiffness`.
+        attainable: Range of stiffness along the single direction of the plan, at its posture, if
+            its ends shall be shown.
+
+    Raises:
+        InvalidInput: The arguments are not a plan and a range, or differ in posture or direction.
+    """
+    expect("plan", plan, "StiffnessPlan")
+    F = plan.tension
+    if attainable is None:
+        misses = "" if plan.reached else f", missed by {100.0 * plan.misfit:.2g} %"
+        return _plot_tensions([(F, f"planned{misses}", "o")], f"{F.posture.arm.name}: plan")
+    expect("attainable", attainable, "StiffnessRange")
+    same = F.posture._equals(attainable.posture)
+    u = np.zeros(3) if plan.direction is None else plan.direction
+    if not same or u.shape != (3,) or abs(u - attainable.direction).max() > _SAME:
+        raise InvalidInput("attainable", "is not of the posture and the direction of the plan.")
+    planned = F, f"planned: {N_PER_MM * float(plan.achieved):.4g} N/mm", "o"
+    softest, stiffest = _ends(attainable)
+    return _plot_tensions([softest, planned, stiffest], _along(attainable))
+
+
+def plot_stiffness_range(attainable: StiffnessRange) -> Figure:
+    """Plot the tension of each cable for the softest and for the stiffest arm.
+
+    Args:
+        attainable: Result of :func:`~cdsm.stiffness_range`.
+
+    Raises:
+        InvalidInput: ``attainable`` is not a range of stiffness.
+    """
+    expect("attainable", attainable, "StiffnessRange")
+    return _plot_tensions(_ends(attainable), _along(attainable))
+
+
+def _width(names: Sequence[str]) -> float:
+    return TWO_COLUMNS if len(names) > _WIDE else ONE_COLUMN
+
+
+def _name_cables(axes: Any) -> None:
+    axes.tick_params(axis="x", rotation=60)
+    for label in axes.get_xticklabels():
+        label.set(ha="right", rotation_mode="anchor")
+
+
+def _ends(attainable: StiffnessRange) -> tuple[tuple[Tension, str, str], ...]:
+    """Return tensions, label and marker of the softest and of the stiffest arm."""
+    return (
+        (attainable.low_tension, f"softest: {N_PER_MM * attainable.low:.4g} N/mm", "v"),
+        (attainable.high_tension, f"stiffest: {N_PER_MM * attainable.high:.4g} N/mm", "^"),
+    )
+
+
+def _along(attainable: StiffnessRange) -> str:
+    return f"{attainable.posture.arm.name}: stiffness along {direction_name(attainable.direction)}"
+
+
+def _plot_tensions(shown: Sequence[tuple[Tension, str, str]], title: str) -> Figure:
+    """Plot several tensions of the same cables, each with a label and a marker."""
+    names = shown[0][0].keys()
+    figure, ((axes,),) = panels(_width(names), 2.8, 1)
+    colors = {"v": GREEN, "o": BLUE, "^": VERMILLION}
+    for F, label, marker in shown:
+        line = {"color": colors[marker], "linestyle": ":", "linewidth": 0.8, "markersize": 4}
+        axes.plot(names, F.values, marker, label=label, **line)
+    axes.set(ylabel="tension [N]", title=title)
+    axes.set_ylim(0.0, _ROOM * max(F.values.max() for F, *_ in shown) or 1.0)
+    _name_cables(axes)
+    legend(axes)
+    return figure

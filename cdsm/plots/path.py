@@ -1,0 +1,178 @@
+"""Plot an arm that moves: pictures over each other, an animation, and natural modes."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from matplotlib.animation import PillowWriter
+from matplotlib.figure import Figure
+
+from cdsm.errors import InvalidInput
+from cdsm.plots.arm import BESIDE_BAR, arm_axes, color_scale, draw_arm, frame_arms, tension_bar
+from cdsm.plots.style import (
+    COLORS,
+    MM,
+    SCREEN,
+    VERMILLION,
+    expect,
+    fill_canvas,
+    heading,
+    legend,
+)
+from cdsm.support.files import as_path, write_file
+from cdsm.support.values import Array
+
+if TYPE_CHECKING:
+    from cdsm.planning.path_plan import PathPlan
+    from cdsm.posture import Posture
+    from cdsm.statics.natural_modes import Modes
+
+_GHOSTS: Final = 5
+"""Number of postures that are drawn over each other."""
+
+_FRAMES: Final = 150
+"""Largest number of frames of an animation; a longer path is thinned out."""
+
+_RATE: Final = 15
+"""Frames per second."""
+
+_SHAPES: Final = 3
+"""Number of modes that are drawn."""
+
+_DEFLECTED: Final = 0.15
+"""Largest displacement of the tip in the picture of a mode, over the length of the arm."""
+
+
+def plot_path(
+    path: PathPlan | Sequence[Posture], *, animate: str | os.PathLike[str] | None = None
+) -> Figure:
+    """Plot some postures of a path over each other, from pale to dark, with the way of the tip.
+
+    Args:
+        path: Postures of one arm, in order; or a plan, of which the planned samples are drawn.
+        animate: A ``.gif`` to write too: the arm follows the path, its cables coloured by the
+            tensions of a plan.
+
+    Raises:
+        InvalidInput: ``path`` is not postures of one arm or holds none, or ``animate`` does not
+            end in ``.gif``.
+        FileError: The animation cannot be written.
+    """
+    poses, tensions = _postures(path)
+    figure, axes = arm_axes()
+    shown = np.unique(np.linspace(0, len(poses) - 1, _GHOSTS).round().astype(int)).tolist()
+    limits = _limits(poses)
+    for k, shade in zip(shown, np.linspace(0.75, 0.1, len(shown)), strict=True):
+        _draw_skeleton(axes, poses[k], f"{shade:.2f}")
+    tips = MM * np.array([pose.tip[:3, 3] for pose in poses])
+    axes.plot(*tips.T, color=VERMILLION, linewidth=1.2, label="way of the tip")
+    axes.plot(*tips[-1:].T, "o", color=VERMILLION, markersize=3, label="its end")
+    legend(axes, loc="upper left")
+    frame_arms(axes, limits)
+    heading(figure, f"{poses[0].arm.name}: {len(poses)} postures, the last one is dark")
+    fill_canvas(axes)
+    if animate is not None:
+        _animate(animate, poses, tensions, limits)
+    return figure
+
+
+def plot_modes(modes: Modes) -> Figure:
+    """Plot an arm deflected by its lowest modes; of an unstable arm by those that grow fastest.
+
+    Deflections are enlarged: the tip moves by at most 15 % of the length of the arm.
+
+    Args:
+        modes: Result of :func:`~cdsm.modes`.
+
+    Raises:
+        InvalidInput: ``modes`` is not the modes of an arm.
+    """
+    expect("modes", modes, "Modes")
+    pose = modes.stiffness.posture
+    figure, axes = arm_axes()
+    _draw_skeleton(axes, pose, "0.6")
+    named = [(rate, f"grows at {rate:.3g}/s") for rate in modes.growth_rates]
+    named += [(frequency, f"{frequency:.3g} Hz") for frequency in modes.frequencies]
+    shapes = np.hstack([modes.growth_shapes, modes.shapes]).T
+    poses = [pose]
+    for shape, (_, label), color in zip(shapes, named, COLORS[:_SHAPES], strict=False):
+        moved = np.linalg.norm(pose.jacobian[:3] @ shape)
+        step = _DEFLECTED * pose.arm.length / max(moved, np.linalg.norm(shape) * pose.arm.length)
+        bent = pose.arm.at(pose.q + step * shape, check_limits=False)
+        poses.append(bent)
+        bones = np.concatenate([*bent.bones])
+        axes.plot(*(MM * bones.T), color=color, linewidth=1.5, label=label)
+    legend(axes, loc="upper left", title="lowest modes, enlarged")
+    frame_arms(axes, _limits(poses))
+    unstable = "" if modes.is_stable else "UNSTABLE: "
+    heading(figure, f"{unstable}{pose.arm.name}")
+    fill_canvas(axes)
+    return figure
+
+
+def _postures(path: PathPlan | Sequence[Posture]) -> tuple[list[Posture], Array | None]:
+    """Return the postures of a path, and the tensions (P, C) [N] if it is a plan."""
+    tensions = None
+    if isinstance(path, Sequence):
+        poses = list(path)
+    else:
+        expect("path", path, "PathPlan")
+        poses, tensions = [K.posture for K in path.stiffness], path.tensions
+    for pose in poses:
+        expect("path", pose, "Posture")
+        if pose.arm != poses[0].arm:
+            raise InvalidInput("path", "holds postures of two arms; give those of one.")
+    if not poses:
+        raise InvalidInput("path", "holds no posture to draw; plan, or give, one at least.")
+    return poses, tensions
+
+
+def _limits(poses: Sequence[Posture]) -> Array:
+    """Return the limits (3, 2) [mm] of axes that hold all postures."""
+    points = MM * np.concatenate(
+        [each for pose in poses for each in (*pose.cable_paths, *pose.bones)]
+    )
+    low, high = points.min(axis=0), points.max(axis=0)
+    return np.array([low, high]).T
+
+
+def _draw_skeleton(axes: Any, pose: Posture, shade: str) -> None:
+    for bone in pose.bones:
+        axes.plot(*(MM * bone.T), color=shade, linewidth=2.0)
+    for way in pose.cable_paths:
+        axes.plot(*(MM * way.T), color=shade, linewidth=0.4)
+
+
+def _animate(
+    path: str | os.PathLike[str], poses: Sequence[Posture], tensions: Array | None, limits: Array
+) -> None:
+    """Write a GIF; a frame for each posture, or for 150 of them."""
+    if as_path(path).suffix.lower() != ".gif":
+        raise InvalidInput("animate", f"{str(path)!r} given; it must end in .gif.")
+    figure, axes = arm_axes()
+    colors = None if tensions is None else color_scale(tensions)
+    if colors is not None:
+        tension_bar(figure, colors)
+    chosen = np.unique(np.linspace(0, len(poses) - 1, _FRAMES).round().astype(int)).tolist()
+
+    def draw(k: int) -> None:
+        axes.clear()
+        shades = None if colors is None or tensions is None else colors.to_rgba(tensions[k])
+        draw_arm(axes, poses[k], shades)
+        frame_arms(axes, limits)
+        heading(figure, f"{poses[0].arm.name}, posture {k} of {len(poses) - 1}")
+
+    def fill(aside: Path) -> None:
+        writer = PillowWriter(fps=_RATE)
+        with writer.saving(figure, aside, SCREEN):
+            for k in chosen:
+                draw(k)
+                writer.grab_frame()
+
+    draw(0)
+    fill_canvas(axes, 1.0 if colors is None else BESIDE_BAR)
+    write_file(path, fill)

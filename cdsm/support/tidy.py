@@ -1,0 +1,88 @@
+"""Labelled data: pandas tables and xarray Datasets of results."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cdsm.errors import InvalidInput
+from cdsm.support.datasets import status_names
+from cdsm.support.extras import need
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
+
+def data_frame(
+    columns: Mapping[str, NDArray[Any] | Sequence[object]],
+    index: str,
+    labels: NDArray[Any] | Sequence[object],
+) -> pandas.DataFrame:
+    """Build a table of columns by name, with an index by name and labels."""
+    need("sweep", "pandas")
+    import pandas
+
+    return pandas.DataFrame(dict(columns), index=pandas.Index(labels, name=index))
+
+
+def dataset(
+    variables: Mapping[str, tuple[Sequence[str], NDArray[Any], str]],
+    labels: Mapping[str, Sequence[object] | NDArray[Any]],
+    **attributes: str,
+) -> xarray.Dataset:
+    """Build a Dataset of variables (dimensions, values, SI unit), and labels of the dimensions."""
+    need("sweep", "xarray")
+    import xarray
+
+    used = {dim for dims, _, _ in variables.values() for dim in dims}
+    return xarray.Dataset(
+        {
+            name: (tuple(dims), values.copy(), {"units": unit})
+            for name, (dims, values, unit) in variables.items()
+        },
+        {dim: list(values) for dim, values in labels.items() if dim in used},
+        attributes,
+    )
+
+
+def tidy(dataset: xarray.Dataset) -> pandas.DataFrame:
+    """Build a table: a row for each entry of ``status``, a column for each component, with unit."""
+    import pandas
+
+    status = dataset["status"]
+    columns: dict[str, NDArray[Any]] = {}
+    for name in (*dataset.coords, *dataset.data_vars):
+        variable = dataset[name]
+        if name == "status" or (variable.dims == (name,) and name not in status.dims):
+            continue  # coordinates of components appear in the names of the columns
+        units = f" [{variable.units}]" if variable.attrs.get("units", "1") != "1" else ""
+        for suffix, component in _components(variable, status):
+            columns[f"{name}{suffix}{units}"] = component
+    words = status_names(dataset)
+    unknown = ~np.isin(status.values, list(words))
+    if unknown.any():
+        raise InvalidInput(
+            "dataset",
+            f"its status holds {status.values[unknown][0].item()!r}, which is none of {words}; the "
+            "file it was read from may be damaged.",
+        )
+    columns["status"] = np.array([words[int(value)] for value in status.values.ravel()])
+    return pandas.DataFrame(columns)
+
+
+def _components(
+    variable: xarray.DataArray, status: xarray.DataArray
+) -> Iterator[tuple[str, NDArray[Any]]]:
+    """Yield name and column of each component of a variable; one entry per entry of the status."""
+    inner = [dim for dim in variable.dims if dim not in status.dims]
+    names = [map(str, variable[dim].values.tolist()) for dim in inner]
+    for places in itertools.product(*(enumerate(each) for each in names)):
+        one = variable.isel({dim: i for dim, (i, _) in zip(inner, places, strict=True)})
+        # along dimensions that the variable lacks, its values are repeated
+        full = one.broadcast_like(status).transpose(*status.dims)
+        yield "".join(f"_{name}" for _, name in places), full.values.ravel()

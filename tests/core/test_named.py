@@ -1,0 +1,254 @@
+"""Results by name: mappings, tables of text, dictionaries for JSON, pandas and xarray."""
+
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+
+import cdsm
+from cdsm.batch.evaluation import OUTPUTS
+from tests.support.arms import mixed_arm, random_posture
+from tests.support.foreign import POSTURE, crab
+
+POSE = random_posture(mixed_arm(), 3)
+PULL = cdsm.distribute_tension(POSE, 10.0)
+K = cdsm.stiffness(POSE, PULL)
+NAMES = [cable.name for cable in POSE.arm.cables]
+
+
+def test_tension_is_a_mapping_by_cable_whose_values_are_an_array() -> None:
+    assert dict(PULL) == dict(zip(NAMES, PULL.values.tolist(), strict=True))
+    assert dict(PULL.items()) == {**PULL}
+    assert list(PULL) == NAMES
+    assert len(PULL) == len(NAMES)
+    assert PULL[NAMES[3]] == PULL.values[3]
+    assert NAMES[0] in PULL
+    assert "cable9_9" not in PULL
+    np.testing.assert_array_equal(np.asarray(PULL), PULL.values)
+    copy = np.array(PULL)
+    copy[0] = 0.0  # a copy can be written to, the tension is as it was
+    assert PULL.values[0] > 0.0
+    with pytest.raises(cdsm.UnknownName, match="did you mean"):
+        _ = PULL["cabel1_1"]
+    np.testing.assert_array_equal(cdsm.stiffness(POSE, np.array(PULL)).joint, K.joint)
+
+
+def test_cables_of_an_arm_are_found_by_number_and_by_name() -> None:
+    cables = POSE.arm.cables
+    assert cables[NAMES[2]] is cables[2]
+    assert cables.names == tuple(NAMES)
+    assert cables == tuple(cables)
+    assert cables[:2] == tuple(cables)[:2]
+    assert POSE.arm.with_cables(cables) == POSE.arm
+    with pytest.raises(cdsm.UnknownName, match="no cable is called 'cabel1_1'; did you mean"):
+        _ = cables["cabel1_1"]
+
+
+def test_moment_arms_times_tensions_are_the_torque_that_balances_gravity() -> None:
+    arms = POSE.moment_arms
+    np.testing.assert_allclose(arms.values.T @ PULL.values, POSE.gravity_torque, atol=1e-12)
+    # Eq. 13: tau = -J_L^T F; a motion that a cable pulls shortens it
+    q = POSE.q.copy()
+    q[1] += 1e-6
+    shorter = (POSE.cable_lengths - POSE.arm.at(q).cable_lengths) / 1e-6
+    np.testing.assert_allclose(arms.values[:, 1], shorter, atol=1e-6)
+    joint = POSE.arm.joint_names[1]
+    assert arms[NAMES[0], joint] == arms.values[0, 1]
+    lines = str(arms).splitlines()
+    assert lines[0].split() == list(POSE.arm.joint_names)
+    assert lines[1].split()[:3] == [NAMES[0], *(f"{1e3 * x:z.2f}" for x in arms.values[0, :2])]
+    for wrong in ((NAMES[0], "joint9"), ("cable9", joint)):
+        with pytest.raises(cdsm.UnknownName):
+            _ = arms[wrong]
+
+
+def test_moment_arms_of_sliding_joints_have_no_unit() -> None:
+    arms = crab().at(POSTURE).moment_arms
+    assert arms.slides.any()
+    assert set(arms.to_dict()) == {"moment_arm_m", "force_per_tension"}
+    assert "[-] where the joint slides" in str(arms)
+
+
+def test_shares_are_printed_by_name_and_add_up() -> None:
+    shares = K.shares("z")
+    assert shares[NAMES[4]] == shares.cables[4]
+    rows = {line.split()[0]: line.split() for line in str(shares).splitlines()[1:-1]}
+    assert rows[NAMES[4]][3] == f"{shares.cables[4] / 1e3:z.4g}"
+    assert rows["total"][1:] == [f"{shares.total / 1e3:.4g}", "100.0%"]
+    parts = [float(rows[name][4].rstrip("%")) for name in NAMES]
+    parts += [float(rows[name][-1].rstrip("%")) for name in ("gravity", "load")]
+    assert sum(parts) == pytest.approx(100.0, abs=0.05 * len(parts))
+    with pytest.raises(cdsm.UnknownName):
+        _ = shares["cable9"]
+
+
+def test_shares_of_an_unstable_arm_say_so_first() -> None:
+    soft = cdsm.serpentine_cables(
+        POSE.arm.geometry, cdsm.LinearElasticity(1e9), series_stiffness=10.0
+    )
+    loose = POSE.arm.with_cables(soft).at(POSE.q)
+    shares = cdsm.stiffness(loose, np.full(9, 300.0)).shares("z")
+    assert str(shares).startswith("UNSTABLE: the arm buckles, ")
+    assert repr(shares).endswith(", UNSTABLE>")
+    assert shares.to_dict()["stable"] is False
+
+
+def test_columns_are_aligned_whatever_the_names() -> None:
+    cables = [
+        cdsm.Cable(f"{'a_very_long_name_of_a_' * (i == 1)}cable{i}", each.sites, each.elasticity)
+        for i, each in enumerate(POSE.arm.cables)
+    ]
+    pose = POSE.arm.with_cables(cables).at(POSE.q)
+    pull = cdsm.distribute_tension(pose, 10.0)
+    rest = cdsm.equilibrium(pose, pull)
+    for text in (str(pull), str(rest)):
+        rows = text.splitlines()[: 1 + len(cables)]
+        assert len({row.rindex(".") for row in rows[1:]}) == 1
+
+
+def test_planar_arms_have_a_cartesian_stiffness_in_their_plane() -> None:
+    geometry = cdsm.Geometry.hinged(
+        joints=3,
+        twist=0.0,
+        cables_per_joint=2,
+        link_length=0.05,
+        base_length=0.03,
+        disk_offset=0.01,
+        hole_radius=0.02,
+        link_mass=0.1,
+    )
+    pose = cdsm.Manipulator(geometry, cdsm.LinearElasticity(5e4)).at([0.2, -0.3, 0.25])
+    planar = cdsm.stiffness(pose, cdsm.distribute_tension(pose, 30.0))
+    with pytest.raises(cdsm.SingularStiffness):
+        _ = planar.cartesian
+    matrix = planar.cartesian_in(("x", "z"))
+    C = planar.compliance[np.ix_([0, 2], [0, 2])]
+    np.testing.assert_allclose(matrix @ C, np.eye(2), atol=1e-12)
+    # along a line it is what a weight measures
+    assert planar.cartesian_in([[1.0, 0.0, 1.0]])[0, 0] == pytest.approx(planar.along([1, 0, 1]))
+    text = str(planar).splitlines()
+    row = next(line.split()[-3:] for line in text if line.startswith("cartesian"))
+    assert row == [f"{matrix[0, 0] / 1e3:.4g}", "-", f"{matrix[1, 1] / 1e3:.4g}"]
+    assert "inf, -: the tip cannot move along (0, 1, 0)" in text[-2]
+    with pytest.raises(cdsm.SingularStiffness, match=r"cannot move along \(0, 1, 0\)"):
+        planar.cartesian_in(("x", "y"))
+    with pytest.raises(cdsm.InvalidInput, match="not orthogonal"):
+        planar.cartesian_in([[1, 0, 0], [1, 0, 1]])
+    np.testing.assert_allclose(K.cartesian_in(["x", "y", "z"]), K.cartesian, rtol=1e-9)
+
+
+U = (0.0, 0.3, 1.0)
+PLAN = cdsm.plan_path(
+    POSE.arm, U, [K.along(U), 1e9], 10.0, 200.0, angles=[POSE.q, POSE.q], rate=50.0
+)
+RESULTS: dict[str, Any] = {
+    "Posture": POSE,
+    "MomentArms": POSE.moment_arms,
+    "Tension": PULL,
+    "Stiffness": K,
+    "Shares": K.shares(U),
+    "JointSolution": cdsm.solve_joint_angles(POSE.arm, POSE.cable_lengths),
+    "KinematicSolution": cdsm.inverse_kinematics(POSE.arm, POSE.tip),
+    "Modes": cdsm.modes(POSE, K),
+    "Equilibrium": cdsm.equilibrium(POSE, PULL),
+    "WeightTest": cdsm.weight_test(POSE, PULL, (0.0, 0.0, -1.0), steps=2),
+    "StiffnessRange": cdsm.stiffness_range(POSE, U, 10.0, 200.0, starts=2),
+    "StiffnessPlan": cdsm.plan_stiffness(POSE, U, K.along(U), 10.0, 200.0),
+    "PathPlan": PLAN,
+    "Saturation": cdsm.saturation(POSE, U, 10.0, 200.0),
+    "CriticalTension": cdsm.critical_tension(POSE),
+    "CriticalLoad": cdsm.critical_load(POSE, (0.0, 0.0, -1.0, 0.0, 0.0, 0.0), 10.0),
+    "Report": K.report(),
+}
+
+
+@pytest.mark.parametrize("name", RESULTS)
+def test_results_become_strict_json_with_units_in_the_keys(name: str) -> None:
+    found = RESULTS[name].to_dict()
+    text = json.dumps(found, allow_nan=False)
+    assert json.loads(text) == found
+    if name != "Report":
+        assert any(key.endswith(("_N", "_m", "_N_per_m", "_rad", "_Hz")) for key in found)
+
+
+@pytest.mark.parametrize(
+    ("name", "rows"),
+    [
+        ("Tension", 9),
+        ("Shares", 9),
+        ("MomentArms", 9),
+        ("WeightTest", 2),
+        ("PathPlan", 2),
+        ("Saturation", len(RESULTS["Saturation"].curve)),
+    ],
+)
+def test_tables_have_a_row_for_each_and_units_in_the_columns(name: str, rows: int) -> None:
+    table = RESULTS[name].to_pandas()
+    assert len(table) == rows
+    assert any("[N" in column or "[m" in column for column in table.columns)
+
+
+def test_tables_hold_the_numbers_of_their_results() -> None:
+    assert PULL.to_pandas()["tension [N]"].to_dict() == dict(PULL)
+    table = PLAN.to_pandas()
+    assert table["status"].to_list() == ["planned", "stiffness"]
+    assert table["stiffness [N/m]"].iloc[0] == PLAN.achieved[0]
+    assert np.isnan(table["stiffness [N/m]"].iloc[1])
+    assert table["target [N/m]"].to_list() == PLAN.target.tolist()
+    tip = table[["tip x [m]", "tip y [m]", "tip z [m]"]].iloc[0].to_numpy(dtype=float)
+    np.testing.assert_array_equal(tip, POSE.tip[:3, 3])
+
+
+def test_stiffness_is_a_labelled_dataset() -> None:
+    found = K.to_xarray()
+    one, other = POSE.arm.joint_names[:2]
+    at = found["joint_stiffness"].sel(joint=one, joint_column=other)
+    assert float(at) == K.joint[0, 1]
+    assert at.units == POSE.arm.stiffness_unit()
+    parts = found["active"] + found["passive"] + found["gravity"] + found["load"]
+    np.testing.assert_allclose(parts, K.joint)
+    assert float(found["tension"].sel(cable=NAMES[1])) == PULL.values[1]
+
+
+def test_batch_has_one_row_for_each_posture_in_pandas_and_labels_in_xarray() -> None:
+    q = np.array([POSE.q, 0.5 * POSE.q, 99.0 * POSE.q])
+    outputs = [name for name in OUTPUTS if name != "along"]
+    batch = cdsm.evaluate(
+        POSE.arm, q, minimum=10.0, outputs=[*outputs, "along"], direction=["z", "x"]
+    )
+    found, table = batch.to_xarray(), batch.to_pandas()
+    assert len(table) == 3
+    assert table["status"].to_list() == ["ok", "ok", "beyond_limits"]
+    np.testing.assert_array_equal(found["tip_position"][0], batch["tip"][0, :3, 3])
+    np.testing.assert_array_equal(found["joint_stiffness"], batch["joint"])
+    joint = POSE.arm.joint_names[2]
+    np.testing.assert_array_equal(
+        found["length_jacobian"].sel(cable=NAMES[1], joint=joint), batch["length_jacobian"][:, 1, 2]
+    )
+    np.testing.assert_array_equal(table[f"tension_{NAMES[2]} [N]"], batch["tension"][:, 2])
+    np.testing.assert_array_equal(table["along_(0, 0, 1) [N/m]"], batch["along"][:, 0])
+    pulls = cdsm.distribute_tensions(POSE.arm, q, 10.0)
+    np.testing.assert_array_equal(pulls.to_xarray()["tension"], pulls.values)
+    np.testing.assert_array_equal(pulls.to_pandas()[f"tension_{NAMES[0]} [N]"], pulls.values[:, 0])
+
+
+def test_sweeps_become_tidy_tables() -> None:
+    grid = cdsm.GridPoses({POSE.arm.joint_names[0]: [0.0, 0.1]})
+    found = cdsm.sweep(POSE.arm, grid, minimum=[10.0, 20.0], progress=False)
+    table = cdsm.sweep_to_pandas(found)
+    assert len(table) == 4
+    first = found.isel({found.status.dims[0]: 0, "minimum": 1})
+    assert table["along_z [N m-1]"].iloc[1] == float(first.along.sel(direction="z"))
+    assert set(table["status"]) == {"ok"}
+
+
+def test_extras_that_are_missing_are_installed_from_a_clone() -> None:
+    assert "run pip install -e '.[sweep]' in the folder of cdsm" in str(
+        cdsm.MissingExtra("pandas", "sweep")
+    )
+
+
+def test_presets_list_what_they_offer_only() -> None:
+    assert not {"np", "math", "replace", "annotations"} & set(dir(cdsm.presets))
+    assert "virtual_prototype" in dir(cdsm.presets)
