@@ -301,7 +301,11 @@ class Stiffness(ReadOnlyState):
         return report_on(self.require_frictionless())
 
     def require_frictionless(self) -> Stiffness:
-        """Return this stiffness, or raise InvalidInput if it is one with friction."""
+        """Return this stiffness if it is frictionless.
+
+        Raises:
+            InvalidInput: Its cables stick or slide.
+        """
         if self.friction != "frictionless":
             raise InvalidInput(
                 "stiffness", f"the cables are {self.friction}; give a frictionless K of stiffness."
