@@ -31,6 +31,7 @@ class Chains:
             series spring and the motor control. The lead is a segment that arrives along x of the
             link of the first site.
         cable: Cable of each segment (S,).
+        start: First segment of each cable, and at last the number of segments (C+1,).
         hole: Segment before each hole (P,). The segment after it is the next one.
         site: Index of each hole among the sites of its cable (P,).
         friction: μ of each hole (P,) [-].
@@ -39,6 +40,7 @@ class Chains:
 
     segments: tuple[Cable, ...]
     cable: Indices
+    start: Indices
     hole: Indices
     site: Indices
     friction: Array
@@ -48,7 +50,7 @@ class Chains:
     def of(cls, cables: Sequence[Cable]) -> Self:
         """Divide cables into segments and holes."""
         segments: list[Cable] = []
-        cable_of, hole, where = [], [], []
+        cable_of, start, hole, where = [], [0], [], []
         for c, cable in enumerate(cables):
             sites = list(cable.sites)
             if cable.lead > 0.0:
@@ -63,10 +65,12 @@ class Chains:
             where += [(c, i) for i in passed]
             segments += own
             cable_of += [c] * len(own)
+            start.append(len(segments))
         at = [cables[c].sites[i] for c, i in where]
         return cls(
             segments=tuple(segments),
             cable=frozen(np.array(cable_of, dtype=np.intp)),
+            start=frozen(np.array(start, dtype=np.intp)),
             hole=frozen(np.array(hole, dtype=np.intp)),
             site=frozen(np.array([i for _, i in where], dtype=np.intp)),
             friction=frozen(np.array([site.friction for site in at])),

@@ -6,13 +6,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm.errors import InvalidInput
-from cdsm.friction.tangent import Signs, tension_gradient
+from cdsm.friction.tangent import Flags, tension_gradient
 from cdsm.kernels.stiffness import single_load_stiffness
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Friction, Stiffness, checked_tension
 from cdsm.support.validation import instance, number_array, vector, wrench_vector
 from cdsm.support.values import Array, frozen
 from cdsm.tension import Tension
+
+_RATIO = 1e-9
+"""Relative deviation of a ratio of tensions that is rounding."""
+
+_NO_WRENCH = frozen(np.zeros(6))
 
 
 def stuck_stiffness(
@@ -32,7 +37,7 @@ def stuck_stiffness(
     """
     F, W = checked_tension(pose, tension, wrench)
     T = F[pose.segments.chains.cable]
-    none = np.zeros(len(pose.segments.wrap), dtype=np.int8)
+    none = np.zeros(len(pose.segments.wrap), dtype=np.bool_)
     given = tension if isinstance(tension, Tension) else None
     return assemble_segments(pose, T, none, W, "stuck", given)
 
@@ -56,7 +61,8 @@ def sliding_stiffness(
         wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m]; default zero.
 
     Raises:
-        InvalidInput: An argument has the wrong shape or is not numbers, or a tension is negative.
+        InvalidInput: An argument has the wrong shape or is not numbers, a tension is negative, or
+            the tensions beside a hole are further apart than its friction allows.
         ElasticityRangeError: A tension is outside the domain of its cable's elasticity.
     """
     chains = instance("pose", pose, Posture).segments.chains
@@ -68,23 +74,41 @@ def sliding_stiffness(
             "sliding", f"{signs[hole]:g} given for hole {hole + 1}; a sign is -1, 0 or 1."
         )
     T = number_array("tension", tension, "tension")
+    grip = signs * chains.friction * pose.segments.wrap
     if T.shape == (len(pose.arm.cables),) and len(T) != len(chains.segments):
         step = np.zeros(len(chains.segments))
-        step[chains.hole + 1] = signs * chains.friction * pose.segments.wrap
-        first = np.flatnonzero(np.diff(chains.cable, prepend=-1))
+        step[chains.hole + 1] = grip
         total = np.cumsum(step)
-        T = T[chains.cable] * np.exp(total - total[first][chains.cable])
+        T = (T * np.exp(-total[chains.start[:-1]]))[chains.cable] * np.exp(total)
     T = vector("tension", T, len(chains.segments), "one tension [N] per segment, or per cable")
     if T.min() < 0.0:
         raise InvalidInput("tension", f"{T.min():g} N given; cables only pull.")
-    W = frozen(np.zeros(6)) if wrench is None else wrench_vector("wrench", wrench)
-    return assemble_segments(pose, T, signs.astype(np.int8), W, "sliding")
+    _require_friction(pose, T, signs)
+    W = _NO_WRENCH if wrench is None else wrench_vector("wrench", wrench)
+    return assemble_segments(pose, T, signs != 0.0, W, "sliding")
+
+
+def _require_friction(pose: Posture, tension: Array, signs: Array) -> None:
+    """Check that the tensions (S,) beside each hole have the ratio that friction allows."""
+    chains = pose.segments.chains
+    before, after = tension[chains.hole], tension[chains.hole + 1]
+    grip = np.exp(chains.friction * pose.segments.wrap)
+    low, high = np.where(signs > 0.0, grip, 1.0 / grip), np.where(signs < 0.0, 1.0 / grip, grip)
+    beyond = (after < before * low * (1.0 - _RATIO)) | (after > before * high * (1.0 + _RATIO))
+    if beyond.any():
+        hole = int(beyond.argmax())
+        cable = pose.arm.cables[chains.cable[chains.hole[hole]]]
+        raise InvalidInput(
+            "tension",
+            f"{before[hole]:.6g} and {after[hole]:.6g} N beside site {chains.site[hole] + 1} of "
+            f"{cable.name}: the ratio is {low[hole]:.6g} to {high[hole]:.6g} there.",
+        )
 
 
 def assemble_segments(
     pose: Posture,
     tension: Array,
-    sliding: Signs,
+    sliding: Flags,
     wrench: Array,
     friction: Friction,
     distribution: Tension | None = None,
@@ -97,8 +121,7 @@ def assemble_segments(
     if friction == "stuck":
         passive = (passive + passive.T) / 2.0  # symmetric but for rounding
     load = single_load_stiffness(pose.jacobian, wrench, model.masses.tip_joints)
-    first = np.flatnonzero(np.diff(segments.chains.cable, prepend=-1))
-    F = tension[first]
+    F = tension[segments.chains.start[:-1]]
     return Stiffness(
         posture=pose,
         tension=frozen(F),

@@ -186,6 +186,17 @@ def test_stuck_arms_are_never_softer_a_hundred_thousand(part: int) -> None:
     stiffer_arms(range(1000 * part, 1000 * (part + 1)), postures=5)
 
 
+def test_slack_cables_are_springs_as_without_friction() -> None:
+    pose, F, _ = posed("mixed", 0.1)
+    plain, _, _ = posed("mixed", 0.0)
+    F[::2] = 0.0
+    stuck = cdsm.stuck_stiffness(pose, F)
+    assert stuck.tension_gradient is not None
+    assert (abs(stuck.tension_gradient).max(axis=1) > 0.0).sum() == 19  # all that move
+    free = cdsm.stiffness(pose, F).joint
+    np.testing.assert_allclose(cdsm.stuck_stiffness(plain, F).joint, free, rtol=1e-11)
+
+
 def test_lead_and_motor_control_do_not_count_while_cables_stick() -> None:
     q = np.full(10, np.deg2rad(10.0))
     F = np.linspace(40.0, 120.0, 15)
@@ -277,6 +288,12 @@ def test_bad_input_is_named() -> None:
         cdsm.sliding_stiffness(pose, F, none + 0.5)
     with pytest.raises(cdsm.InvalidInput, match=r"tension: .* cables only pull"):
         cdsm.sliding_stiffness(pose, -F, none)
+    T = F[pose.segments.chains.cable]
+    with pytest.raises(cdsm.InvalidInput, match=r"N beside site 1 of cable1_1: the ratio"):
+        cdsm.sliding_stiffness(pose, T, none + 1.0)
+    T[-1] *= 1.2
+    with pytest.raises(cdsm.InvalidInput, match=r"N beside site 5 of cable3_4: the ratio"):
+        cdsm.sliding_stiffness(pose, T, none)
     with pytest.raises(cdsm.InvalidInput, match="tension: shape"):
         cdsm.sliding_stiffness(pose, F[1:], none)
     for use in (cdsm.stiffness_gradient, cdsm.Stiffness.report):
