@@ -7,11 +7,10 @@ remedy.
 from __future__ import annotations
 
 import difflib
-import math
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
-from cdsm.support.format import coordinates, enough
+from cdsm.support.format import beyond, coordinates, enough, told_apart
 
 if TYPE_CHECKING:
     import numpy as np
@@ -222,8 +221,10 @@ class JointLimitError(CdsmError, ValueError):
         self.limits = tuple((float(low), float(high)) for low, high in limits)
         units = units or ["rad"] * len(joints)
         said = [
-            _beyond(*each)
-            for each in zip(self.joints, self.angles, self.limits, units, strict=True)
+            beyond(joint, angle, *limit, unit)
+            for joint, angle, limit, unit in zip(
+                self.joints, self.angles, self.limits, units, strict=True
+            )
         ]
         self.problem = first_of(said, _NAMED, "joints")
         super().__init__(
@@ -231,16 +232,6 @@ class JointLimitError(CdsmError, ValueError):
             "in a full description or a URDF), or, in Python, pass check_limits=False to compute "
             "beyond them."
         )
-
-
-def _beyond(joint: str, angle: float, limits: tuple[float, float], unit: str) -> str:
-    """Return a joint's position and limits as text; if the joint turns, add degrees."""
-    low, high = limits
-    said = f"{joint} = {angle:.6g} {unit} is outside [{low:.6g}, {high:.6g}] {unit}"
-    if unit != "rad":
-        return said
-    degrees = [f"{math.degrees(value):.4g}°" for value in (angle, low, high)]
-    return f"{said} ({degrees[0]} of {degrees[1]} to {degrees[2]})"
 
 
 class ElasticityRangeError(CdsmError, ValueError):
@@ -265,7 +256,7 @@ class ElasticityRangeError(CdsmError, ValueError):
         self.indices = tuple(int(index) for index in indices)
         self.cables = tuple(cables)
         names = f" (cable {_first(self.cables)})" if self.cables else ""
-        values = _first([f"{value:.6g}" for value in self.tension])
+        values = _first(told_apart(self.tension))
         super().__init__(f"tension {values} N{names}: {problem}")
 
 
@@ -315,8 +306,8 @@ class InfeasibleTension(CdsmError):
         else:
             message += (
                 f"Widening every bound by {enough(relaxation, up=True)} N would be enough "
-                f"(cables at a bound: {', '.join(self.binding) or 'none'}). Lower minimum, raise "
-                "maximum, or reduce the load."
+                f"(cables at a bound: {', '.join(self.binding) or 'none'}). Lower minimum=, raise "
+                "maximum=, or reduce the load."
             )
         super().__init__(message)
 
@@ -410,19 +401,21 @@ class UnreachableStiffness(CdsmError):
         self.low = low
         self.high = high
         self.nearest = tuple(float(value) for value in nearest)
+        wanted, least, most, *near = told_apart(
+            [value / 1e3 for value in (target, low, high, *self.nearest)]
+        )
         message = (
-            f"no admissible tensions give {target:.8g} N/m along {coordinates(direction)}: the "
-            f"range is {low:.8g} to {high:.8g} N/m"
+            f"no admissible tensions give {wanted} N/mm along {coordinates(direction)}: the range "
+            f"is {least} to {most} N/mm"
         )
         if low <= target <= high:
-            sides = " and ".join(f"{value:.8g}" for value in self.nearest)
             message += (
-                f", but the nearest found is {sides} N/m. Raise starts, ask for one of these, or "
-                "change the bounds or the posture."
+                f", but the nearest found is {' and '.join(near)} N/mm. Raise starts=, ask for one "
+                "of these, or change the bounds or the posture."
             )
         else:
             message += (
-                ". Ask for a stiffness within it, or widen it: change minimum, maximum, margin, "
+                ". Ask for a stiffness within it, or widen it: change minimum=, maximum=, "
                 "the load or the posture, or take other cables."
             )
         super().__init__(message)

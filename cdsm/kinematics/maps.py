@@ -16,6 +16,7 @@ from cdsm.kinematics.nearest import nearest
 from cdsm.kinematics.residuals import LengthResidual, Residual, TipResidual
 from cdsm.kinematics.solutions import JointSolution, KinematicSolution
 from cdsm.manipulator import Manipulator
+from cdsm.support.format import beyond as outside
 from cdsm.support.validation import instance, number_array, scalar, vector
 from cdsm.support.values import Array, frozen
 
@@ -133,10 +134,11 @@ def _checked_guess(arm: Manipulator, guess: ArrayLike | None) -> Array:
     beyond = arm._model.beyond_limits(angles)
     if beyond.any():
         i = int(beyond.argmax())
+        limits = arm.lower[i], arm.upper[i], arm.joint_units[i]
         raise InvalidInput(
             "guess",
-            f"{arm.joint_names[i]} = {angles[i]:.6g} rad is outside [{arm.lower[i]:.6g}, "
-            f"{arm.upper[i]:.6g}] rad; guess angles within the joint limits.",
+            f"{outside(arm.joint_names[i], angles[i], *limits)}; guess angles within the joint "
+            "limits.",
         )
     return angles
 

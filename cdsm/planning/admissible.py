@@ -128,7 +128,7 @@ def admissible(
     outside = np.flatnonzero(low > high)
     if outside.size:
         raise ElasticityRangeError(
-            f"nothing between minimum and maximum is in the domain "
+            f"nothing between minimum= and maximum= is in the domain "
             f"{cables[outside[0]].elasticity.domain} of the elasticity. Change minimum= or "
             "maximum=, or use an elasticity that covers them.",
             np.where(maximum < first, maximum, minimum)[outside].tolist(),

@@ -135,9 +135,9 @@ def plan_path(
                 solved = inverse_kinematics(arm, path[i], near)
                 if not solved.reachable:
                     reason = (
-                        f"the tip comes no nearer to {coordinates(solved.target, '.6g')} m than "
-                        f"{solved.position_error:.3g} m. Ask for a place within reach, or start "
-                        "from a guess= nearer to it."
+                        f"the tip comes no nearer to {coordinates(1e3 * solved.target)} mm than "
+                        f"{1e3 * solved.position_error:.3g} mm. Ask for a place within reach, or "
+                        "start from a guess= nearer to it."
                     )
                     infeasible.append(InfeasibleSample(i, "posture", reason))
                     continue

@@ -121,7 +121,7 @@ class StiffnessPlan(ReadOnlyState):
         else:
             pairs = np.reshape([self.achieved, self.target], (2, -1)).T / 1000.0
             rows += [
-                f"along {coordinates(u)}: {value:.6g} N/mm ({wanted:.6g} N/mm wanted)"
+                f"along {coordinates(u)}: {value:.4g} N/mm ({wanted:.4g} N/mm wanted)"
                 for u, (value, wanted) in zip(self.direction.reshape(-1, 3), pairs, strict=True)
             ]
         return "\n".join([*rows, f"({MODEL})"])

@@ -17,7 +17,7 @@ from cdsm.planning.starts import StartPoints
 from cdsm.planning.stiffness_model import Constraints, Evaluation, StiffnessModel
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import stiffness
-from cdsm.support.format import MODEL, coordinates, plain
+from cdsm.support.format import MODEL, coordinates, plain, span
 from cdsm.support.progress import progress_allowed, track
 from cdsm.support.validation import Direction, flag, unit_direction
 from cdsm.support.values import Array, ReadOnlyState, frozen
@@ -94,19 +94,14 @@ class StiffnessRange(ReadOnlyState):
         return self.low <= target <= self.high
 
     def __repr__(self) -> str:
-        return f"<StiffnessRange {self.low / 1e3:.6g} to {self.high / 1e3:.6g} N/mm>"
+        return f"<StiffnessRange {self.low / 1e3:.4g} to {self.high / 1e3:.4g} N/mm>"
 
     def __str__(self) -> str:
-        def ends(name: str, F: Array, found: Array) -> str:
-            same = int((abs(found - found[0]) <= 1e-6 * found[0]).sum())
-            told = f"{name} with {F.min():.4g} to {F.max():.4g} N, "
-            return told + f"found from {same} of {found.size} starts"
-
         return (
             f"along {coordinates(self.direction)} the stiffness can be "
             f"{self.low / 1000.0:.4g} to {self.high / 1000.0:.4g} N/mm\n"
-            f"{ends('softest', self.low_tension.values, self.low_found)}\n"
-            f"{ends('stiffest', self.high_tension.values, self.high_found)}\n({MODEL})"
+            f"softest with {span(self.low_tension.values)} N, "
+            f"stiffest with {span(self.high_tension.values)} N\n({MODEL})"
         )
 
 

@@ -138,11 +138,11 @@ class Saturation(ReadOnlyState):
                 f"N/mm per N, at a lower bound of {self.steepest:.4g} N",
                 f"it never pays less than {part} of that"
                 if math.isinf(self.bound)
-                else f"above {self.bound:.6g} N it pays less than {part}",
+                else f"above {self.bound:.4g} N it pays less than {part}",
             ]
         if self.curve[0, 0] < self.stiffest < self.end:
-            lines.append(f"above {self.stiffest:.6g} N tension makes the arm softer")
-        lines.append(f"looked at up to {self.end:.6g} N, {_ENDS[self.limit]} ({MODEL})")
+            lines.append(f"above {self.stiffest:.4g} N tension makes the arm softer")
+        lines.append(f"looked at up to {self.end:.4g} N, {_ENDS[self.limit]} ({MODEL})")
         return "\n".join(lines)
 
 

@@ -83,7 +83,7 @@ class CriticalTension(ReadOnlyState):
             return f"unstable at every lower bound from {low:.4g} N to {high:.4g} N"
         if math.isinf(self.minimum):
             return f"does not buckle at any lower bound up to {high:.4g} N"
-        return f"buckles at a lower bound of {self.minimum:.6g} N"
+        return f"buckles at a lower bound of {self.minimum:.4g} N"
 
     def plot(self) -> Figure:
         """Plot the smallest joint stiffness [N m/rad] over the lower bound of tension [N]."""
@@ -165,7 +165,7 @@ class CriticalLoad(ReadOnlyState):
             "none": "nothing happens that far",
         }[self.limit]
         mode = _describe_mode(self.posture.arm.joint_names, self.mode)
-        held = f"the load up to a factor of {self.factor:.6g}"
+        held = f"the load up to a factor of {self.factor:.4g}"
         return f"holds {held if self.factor else 'no part of the load'}; {reason}\n{mode}"
 
 

@@ -21,7 +21,7 @@ from cdsm.posture import Posture
 from cdsm.statics.locked_motors import LoadedArm, rounding
 from cdsm.statics.trust_region import FLAT, RestSearch, find_rest
 from cdsm.stiffness_matrix import Stiffness, stiffness
-from cdsm.support.format import aligned, coordinates, plain
+from cdsm.support.format import aligned, coordinates, place, plain
 from cdsm.support.validation import wrench_vector
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension
@@ -250,11 +250,13 @@ def _require_between_stops(pose: Posture) -> None:
     beyond = arm._model.beyond_limits(q)
     if np.count_nonzero(beyond):
         i = int(beyond.argmax())
+        unit = arm.joint_units[i]
         stop = arm.lower[i] if q[i] < arm._model.lowest[i] else arm.upper[i]
         raise InvalidInput(
             "pose",
-            f"{arm.joint_names[i]} = {q[i]:.6g} rad is beyond its stop at {stop:.6g} rad, where no "
-            "motor can be locked; start within the joint limits, or widen joint_limit.",
+            f"{arm.joint_names[i]} = {place(q[i], unit)} is beyond its stop at "
+            f"{place(stop, unit)}, where no motor can be locked; start within the joint limits, or "
+            "widen joint_limit.",
         )
 
 

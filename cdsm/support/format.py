@@ -52,6 +52,26 @@ def plain(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
+def place(value: float, unit: str) -> str:
+    """Return a joint coordinate [rad or m] as people read it: ``12.5°`` or ``30 mm``."""
+    return f"{math.degrees(value):.4g}°" if unit == "rad" else f"{1e3 * value:.4g} mm"
+
+
+def beyond(joint: str, value: float, low: float, high: float, unit: str) -> str:
+    """Return as text that a joint coordinate [rad or m] is beyond its limits."""
+    said = f"{joint} = {place(value, unit)} is outside {place(low, unit)} to {place(high, unit)}"
+    return f"{said} ({value:.4g} {unit} of {low:.4g} to {high:.4g} {unit})"
+
+
+def told_apart(values: Sequence[float]) -> list[str]:
+    """Return numbers with four digits, or more where different ones would read alike."""
+    for digits in (4, 6, 8, 12):
+        texts = [f"{value:.{digits}g}" for value in values]
+        if len(set(texts)) == len(set(values)):
+            break
+    return texts
+
+
 def key(name: str, unit: str) -> str:
     """Return a JSON key with unit: ``margin`` in ``N m/rad`` becomes ``margin_Nm_per_rad``."""
     words = unit.replace("N m", "Nm").replace("/", " per ").split()

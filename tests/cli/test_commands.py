@@ -185,7 +185,7 @@ def test_buckle_finds_tension_and_load_of_the_api(geometry: Path, tmp_path: Path
     carried = call(
         "buckle", geometry, *options, "--load", "-1,0,0,0,0,0", "--wrench", "-1,0,0,0,0,0"
     )
-    assert f"{load.factor - 1.0:.6g}" in carried.output
+    assert f"{load.factor - 1.0:.4g}" in carried.output
     without = call("buckle", geometry, "--min-tension", "20")
     assert without.exit_code == 2
     assert "under --load only" in without.stderr
@@ -366,7 +366,10 @@ def test_wire_file_is_the_elasticity_of_the_cables(geometry: Path, tmp_path: Pat
     ("arguments", "said"),
     [
         (("stiffness", "absent.toml"), "absent.toml: does not exist"),
-        (("stiffness", "{geometry}", "--angles", "80"), "joint1_1 = 1.39626 rad"),
+        (
+            ("stiffness", "{geometry}", "--angles", "80"),
+            "joint1_1 = 80° is outside -53.13°",
+        ),
         (("stiffness", "{geometry}", "--min-tension", "1"), "domain (2.2 N, 810 N]"),
         (("stiffness", "{geometry}", "--solver", "dapq"), "did you mean 'daqp'"),
         (

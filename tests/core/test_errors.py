@@ -14,8 +14,10 @@ def test_joints_beyond_their_limits_are_named_in_their_units() -> None:
     error = cdsm.JointLimitError(
         names, [2.0] * 6, [(-1.0, 1.0)] * 6, ["rad", "m", "rad", "rad", "rad", "rad"]
     )
-    turned = "j0 = 2 rad is outside [-1, 1] rad (114.6° of -57.3° to 57.3°)"
-    assert error.problem.startswith(f"{turned}; j1 = 2 m is outside [-1, 1] m; j2 = ")
+    turned = "j0 = 114.6° is outside -57.3° to 57.3° (2 rad of -1 to 1 rad)"
+    assert error.problem.startswith(
+        f"{turned}; j1 = 2000 mm is outside -1000 mm to 1000 mm (2 m of -1 to 1 m); j2 = "
+    )
     assert error.problem.endswith("; and 2 joints more")
     assert str(error).startswith(f"{error.problem}. Stay inside the limits")
     assert error.joints == tuple(names)
@@ -50,14 +52,16 @@ def test_infeasible_tension_says_what_would_help(
 @pytest.mark.parametrize(
     ("target", "words"),
     [
-        (50.0, "but the nearest found is 40 and 60 N/m. Raise starts"),
+        (50.0, "but the nearest found is 0.04 and 0.06 N/mm. Raise starts="),
         (500.0, ". Ask for a stiffness within it, or widen it"),
     ],
 )
 def test_unreachable_stiffness_names_the_range_or_the_nearest(target: float, words: str) -> None:
     u = np.array([0.0, 0.6, -0.8])
     error = cdsm.UnreachableStiffness(u, target, 10.0, 100.0, [40, 60])
-    assert f"give {target:g} N/m along (0, 0.6, -0.8): the range is 10 to 100 N/m" in str(error)
+    assert f"give {target / 1e3:g} N/mm along (0, 0.6, -0.8): the range is 0.01 to 0.1 N/mm" in str(
+        error
+    )
     assert words in str(error)
     assert error.nearest == (40.0, 60.0)
 

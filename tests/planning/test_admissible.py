@@ -19,7 +19,7 @@ def test_bounds_are_those_of_the_domains_and_the_least_tensions_are_within() -> 
     assert ((REGION.low <= F) & (REGION.high >= F)).all()
     np.testing.assert_allclose(F @ POSE.length_jacobian, -POSE.gravity_torque, atol=1e-10)
     assert abs(REGION.null.T @ POSE.length_jacobian).max() < 1e-12
-    with pytest.raises(cdsm.ElasticityRangeError, match="nothing between minimum and maximum"):
+    with pytest.raises(cdsm.ElasticityRangeError, match="nothing between minimum= and maximum="):
         admissible(POSE, 900.0, np.inf, np.zeros(6))
 
 

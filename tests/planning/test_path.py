@@ -176,7 +176,7 @@ def test_tip_out_of_reach_is_named_with_how_near_it_comes() -> None:
     assert plan.planned == (0, 2)
     assert plan.infeasible[0].status == "posture"
     assert "no nearer" in plan.infeasible[0].reason
-    assert "than 0.25 m" in plan.infeasible[0].reason
+    assert "than 250 mm" in plan.infeasible[0].reason
 
 
 def test_samples_that_no_tension_holds_are_named() -> None:

@@ -272,7 +272,11 @@ BAD: list[tuple[dict[str, Any], type[cdsm.CdsmError], str]] = [
     ({"wrench": (1.0, 2.0)}, cdsm.InvalidInput, "wrench"),
     ({"wrench": (0.0, 0.0, 1e5, 0.0, 0.0, 0.0)}, cdsm.InfeasibleTension, "balances the arm"),
     ({"minimum": 50.0, "maximum": 50.1}, cdsm.InfeasibleTension, "balances the arm"),
-    ({"minimum": 1000.0, "maximum": 2e3}, cdsm.ElasticityRangeError, "between minimum and maximum"),
+    (
+        {"minimum": 1000.0, "maximum": 2e3},
+        cdsm.ElasticityRangeError,
+        "between minimum= and maximum=",
+    ),
     ({"maximum": 2.0}, cdsm.CdsmError, "minimum|balances"),
     ({"margin": 0.0}, cdsm.InvalidInput, "margin"),
     ({"margin": 1.0}, cdsm.InvalidInput, "margin"),
@@ -308,7 +312,7 @@ def test_direction_in_which_the_tip_cannot_move_has_no_range() -> None:
 
 def test_what_is_printed_says_what_was_found() -> None:
     found = cdsm.stiffness_range(soft_hinge().at([0.0]), DOWN, 10.0, 70.0)
-    for part in ("along (0, 0, 1)", "N/mm", "softest with 70 to 70 N", "starts"):
+    for part in ("along (0, 0, 1)", "N/mm", "softest with 70 N"):
         assert part in str(found)
     assert "StiffnessRange" in repr(found)
     assert found.posture.arm.nv == 1
