@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import re
 from pathlib import Path
 from typing import Annotated
 
@@ -18,6 +20,22 @@ def fit(
         float | None,
         typer.Option(help="Length of the tested wire in mm; default: what the file says."),
     ] = None,
+    columns: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME,NAME",
+            help="Columns of displacement (or strain) and force, by name or by number from 1 on; "
+            "default: by the names in the header.",
+        ),
+    ] = None,
+    skip: Annotated[int, typer.Option(help="Lines at the top that are not read.")] = 0,
+    units: Annotated[
+        str | None,
+        typer.Option(
+            metavar="UNIT,UNIT",
+            help="Units of displacement and force if the file has none, such as mm,N.",
+        ),
+    ] = None,
     method: Annotated[str, typer.Option(help="monotone, or polynomial as in the paper.")] = (
         "monotone"
     ),
@@ -27,20 +45,56 @@ def fit(
     figure: Picture = None,
     as_json: AsJson = False,
 ) -> None:
-    """Fit the rigidity of a wire to its tensile test: report, and if wanted figure and TOML."""
+    """Fit the rigidity of a wire to its tensile test: report, and if wanted figure and TOML.
+
+    It reads the text files of testing machines: titles before the header, other languages, decimal
+    commas, units in a line of their own.
+    """
     from cdsm.support.progress import progress_bar
 
     length = None if gauge_length is None else gauge_length / 1000.0
-    data = cdsm.read_tensile_csv(test, gauge_length=length)
-    with progress_bar("fitting"):
-        fitted = cdsm.fit_tensile_test(data.displacement, data.force, data.gauge_length, method)
+    pairs = _pair("--columns", columns), _pair("--units", units)
+    try:
+        data = cdsm.read_tensile_csv(
+            test, columns=pairs[0], skip=skip, units=pairs[1], gauge_length=length
+        )
+        with progress_bar("fitting"):
+            fitted = cdsm.fit_tensile_test(data.displacement, data.force, data.gauge_length, method)
+    except cdsm.TensileTestError as error:
+        raise cdsm.TensileTestError(_as_options(str(error))) from None
     if out is not None:
         typer.echo(f"written: {cdsm.write_elasticity(fitted.elasticity, out)}", err=True)
     if figure is not None:
         from cdsm.support.files import write_file
 
         typer.echo(f"written: {write_file(figure, fitted.plot().savefig)}", err=True)
-    answer(as_json, lambda: _numbers(fitted), fitted)
+    read = f"{test}: {data.source}"
+    answer(as_json, lambda: {"read": data.source, **_numbers(fitted)}, f"{read}\n{fitted}")
+
+
+def _pair(option: str, text: str | None) -> list[str] | None:
+    """Read two entries separated by a comma; a name with a comma stands in quotes."""
+    if text is None:
+        return None
+    entries = [entry.strip() for entry in next(csv.reader([text], skipinitialspace=True), [])]
+    if len(entries) != 2:
+        raise typer.BadParameter(
+            f"{text!r} given; give two, of displacement and force.", param_hint=option
+        )
+    return entries
+
+
+def _as_options(message: str) -> str:
+    """Write the keywords of a message as options: ``units=('mm', 'N')`` as ``--units mm,N``."""
+    message = message.replace("gauge_length= [m]", "--gauge-length [mm]")
+    message = re.sub(r"(displacement|force)_unit= or ", "", message)
+    message = re.sub(r"as (displacement|force)_unit=", "by --units", message)
+    message = re.sub(r"(displacement|force)_unit=", "--units has ", message)
+
+    def option(found: re.Match[str]) -> str:
+        return f"--{found[1]} {','.join(entry.strip(chr(39)) for entry in found[2].split(', '))}"
+
+    return re.sub(r"(columns|units)=\(([^)]*)\)", option, message)
 
 
 def _numbers(fit: cdsm.TensileFit) -> Json:

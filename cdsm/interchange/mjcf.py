@@ -21,6 +21,7 @@ from lxml import etree
 from numpy.typing import ArrayLike
 
 from cdsm.errors import InvalidInput
+from cdsm.instability import verdict
 from cdsm.interchange.mjcf_bodies import add_bodies, row
 from cdsm.interchange.mjcf_motion import Motion, choose_motion
 from cdsm.manipulator import Manipulator
@@ -201,7 +202,7 @@ def mujoco_model(
             frame.set("ctrl", row(pulled))
 
     held = K if K is None or actuators != "tension" else _without_motors(K)
-    unstable = None if held is None or held.is_stable else _instability(held)
+    unstable = None if held is None or held.is_stable else verdict(held)
     remarks = (
         *motion.said,
         f"actuators  {actuators}: {_CONTROLS[actuators]}",
@@ -213,15 +214,6 @@ def mujoco_model(
     etree.indent(root, space="  ")
     text: str = etree.tostring(root, encoding="unicode") + "\n"
     return MuJoCoModel(text, motion, actuators, unstable, remarks)
-
-
-def _instability(K: Stiffness) -> str:
-    """Write the warning for an unstable arm."""
-    unit = K.posture.arm.stiffness_unit()
-    return (
-        f"UNSTABLE: the smallest eigenvalue of K_θ is {K.margin:.4g} {unit}; the arm leaves this "
-        "posture by itself."
-    )
 
 
 def _without_motors(K: Stiffness) -> Stiffness:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import contextlib
 import os
 import secrets
@@ -15,12 +16,12 @@ MAXIMUM_BYTES = 10_000_000
 """Largest size of a file that is read; a larger file is a mistake or an attack."""
 
 
-def read_text(path: str | os.PathLike[str]) -> str:
-    """Return the UTF-8 text of a file.
+def read_text(path: str | os.PathLike[str], *, any_encoding: bool = False) -> str:
+    """Return the text of a file: UTF-8, or with ``any_encoding`` also UTF-16 or Windows-1252.
 
     Raises:
         FileError: The file is missing, not readable, not a regular file, larger than
-            :data:`MAXIMUM_BYTES`, or not UTF-8.
+            :data:`MAXIMUM_BYTES`, or of another encoding.
     """
     path = as_path(path)
     try:
@@ -31,7 +32,7 @@ def read_text(path: str | os.PathLike[str]) -> str:
             data = file.read(MAXIMUM_BYTES + 1)
         if len(data) > MAXIMUM_BYTES:
             raise FileError(path, f"is larger than the {MAXIMUM_BYTES} bytes that are read.")
-        return data.decode("utf-8-sig")  # some editors write a byte order mark
+        return _decoded(data) if any_encoding else data.decode("utf-8-sig")  # may have a mark
     except CdsmError:
         raise
     except FileNotFoundError:
@@ -42,6 +43,18 @@ def read_text(path: str | os.PathLike[str]) -> str:
         ) from None
     except (OSError, ValueError) as error:
         raise FileError(path, f"cannot be read: {_reason(error)}.") from None
+
+
+def _decoded(data: bytes) -> str:
+    """Decode what laboratory machines write. UTF-16 has a mark, or zeros beside its letters."""
+    if data[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE):
+        return data.decode("utf-16")
+    if b"\0" in data[:2]:
+        return data.decode("utf-16-be" if data[0] == 0 else "utf-16-le")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return data.decode("cp1252")
 
 
 def write_text(path: str | os.PathLike[str], text: str) -> Path:

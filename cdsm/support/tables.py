@@ -18,6 +18,8 @@ from cdsm.support.values import Array
 _LONGEST_CELL = 1000
 """Maximum number of characters of a cell; numbers and names are shorter."""
 
+_TRIED = 500  # lines that tell the delimiter; titles are fewer
+
 
 class Table(NamedTuple):
     """Cells of a table, without white space around them.
@@ -56,19 +58,41 @@ class Table(NamedTuple):
             return math.nan
 
 
-def read_table(path: str | os.PathLike[str], delimiters: str = ",") -> Table:
-    """Read a table. The first delimiter that the header holds is used, else the last.
+def read_table(
+    path: str | os.PathLike[str],
+    delimiters: str = ",",
+    *,
+    skip: int = 0,
+    any_encoding: bool = False,
+) -> Table:
+    """Read a table. Its delimiter is the one that leaves numbers in most lines.
+
+    Args:
+        path: The file.
+        delimiters: Delimiters to try; if lines cannot tell them apart, the first one that the
+            first line holds.
+        skip: Number of lines at the top that are not read.
+        any_encoding: Read other encodings than UTF-8, see :func:`~cdsm.support.files.read_text`.
 
     Raises:
         FileError: The file cannot be read, or a line cannot be split into cells; the line is named.
     """
-    lines = [(k, line) for k, line in enumerate(read_text(path).splitlines(), 1) if line.strip()]
+    text = read_text(path, any_encoding=any_encoding)
+    lines = [(k, line) for k, line in enumerate(text.splitlines(), 1) if line.strip() and k > skip]
     comments = [line for _, line in lines if line.lstrip().startswith("#")]
     lines = [(k, line) for k, line in lines if not line.lstrip().startswith("#")]
     header = lines[0][1] if lines else ""
-    delimiter = next((each for each in delimiters if each in header), delimiters[-1])
+    order = sorted(delimiters, key=lambda each: each not in header)
+    delimiter = max(order, key=lambda each: _rows_of_numbers(lines[:_TRIED], each))
     rows = [(k, _cells(path, k, line, delimiter)) for k, line in lines]
     return Table(rows, comments, delimiter)
+
+
+def _rows_of_numbers(lines: list[tuple[int, str]], delimiter: str) -> int:
+    """Count the lines with two numbers or more, if this is the delimiter."""
+    table = Table([], [], delimiter)
+    cells = ([cell.strip(' "') for cell in line.split(delimiter)] for _, line in lines)
+    return sum(sum(not math.isnan(table.number(cell)) for cell in row) > 1 for row in cells)
 
 
 def name_and_unit(cell: str) -> tuple[str, str]:

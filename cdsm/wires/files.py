@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from dataclasses import fields
 from pathlib import Path
 from typing import Annotated, Literal
@@ -14,6 +15,9 @@ from cdsm.errors import FileError, GeometryError, InvalidInput, listed
 from cdsm.support.files import read_text, write_text
 from cdsm.support.records import Number, Rigidity, parse, read_toml, record, toml_lines
 from cdsm.wires.laws import StrandElasticity, TabulatedElasticity
+
+_MEASURED = re.compile(r'^"?[-+]?\d[\d.,eE+-]*"?\s*[;,\t]\s*"?[-+]?\d', re.MULTILINE)
+"""A line that begins with two numbers, as in a CSV and never in TOML outside of arrays."""
 
 _Row = Annotated[tuple[Number, ...], Field(strict=False)]
 
@@ -97,7 +101,13 @@ def read_elasticity(path: str | os.PathLike[str]) -> Elasticity:
     Raises:
         FileError: The file cannot be read or does not describe an elasticity (all faults listed).
     """
-    text = read_text(path)
+    text = read_text(path, any_encoding=True)  # to know a table of a testing machine
+    if _MEASURED.search(text):
+        raise FileError(
+            path,
+            "looks like a table of measured points, not like the law of a wire. Fit it first: "
+            "`cdsm fit`, or cdsm.read_tensile_csv and cdsm.fit_tensile_test.",
+        )
     try:
         return from_table(read_toml(text))
     except GeometryError as error:

@@ -350,9 +350,9 @@ def test_unstable_arm_is_named_on_top_and_leaves() -> None:
     pull = cdsm.distribute_tension(pose, 5.0)
     K = cdsm.stiffness(pose, pull)
     assert not K.is_stable
-    with pytest.warns(UserWarning, match="UNSTABLE: the smallest eigenvalue"):
+    with pytest.warns(UserWarning, match="UNSTABLE: the arm buckles"):
         text = cdsm.to_mjcf(arm, pose, pull, damping=0.0)
-    assert f"<!-- UNSTABLE: the smallest eigenvalue of K_θ is {K.margin:.4g} N m/rad" in text
+    assert f"eigenvalue of K_θ is {K.margin:.4g} N m/rad" in text
     assert text.index("UNSTABLE") < text.index("<option")
     model = mujoco.MjModel.from_xml_string(text)
     data = mujoco.MjData(model)

@@ -20,13 +20,15 @@ _OUTLYING = 5e-3
 _AROUND = 25  # neighbouring points over which the noise is assumed constant
 _SURE = 3.0  # standard deviations beyond which a rise of the force is certain
 _MAD = 1.4826  # standard deviation of normal noise over its median magnitude
-_MISTAKEN = (  # mistake, then factors that correct force and strain
-    ("the displacement is in mm", 1.0, 1e-3),
-    ("the displacement is in µm", 1.0, 1e-6),
-    ("the gauge length is in mm", 1.0, 1e3),
-    ("the force is in mN", 1e-3, 1.0),
-    ("the force is in kN", 1e3, 1.0),
-    ("the force is in MN", 1e6, 1.0),
+_GAUGES = 5e-3, 50.0  # gauge lengths of tests [m]; outside, the gauge length is the mistake
+_MISTAKEN = (  # mistake, then factors that correct force, displacement and gauge length
+    ("the displacement is in mm", 1.0, 1e-3, 1.0),
+    ("the displacement is in µm", 1.0, 1e-6, 1.0),
+    ("the gauge length is {given:g} mm and should be {meant:g} mm", 1.0, 1.0, 1e-3),
+    ("the gauge length is {given:g} mm and should be {meant:g} mm", 1.0, 1.0, 1e3),
+    ("the force is in mN", 1e-3, 1.0, 1.0),
+    ("the force is in kN", 1e3, 1.0, 1.0),
+    ("the force is in MN", 1e6, 1.0, 1.0),
 )
 
 
@@ -64,7 +66,7 @@ def loading(test: TensileTest) -> tuple[Points, float, tuple[str, ...]]:
         notes.append(f"far from their neighbours and left out: {', '.join(listed[:3])}{more}")
     force, strain = test.force[~outlier], test.displacement[~outlier] / test.gauge_length
     _require(len(force), "points are left that lie near their neighbours")
-    _check_span(strain, force)
+    _check_span(strain, force, test.gauge_length)
     kept = _is_loading(strain)
     if not kept.all():
         notes.append(f"points of unloading and reloading left out: {np.count_nonzero(~kept)}")
@@ -106,7 +108,7 @@ def loading(test: TensileTest) -> tuple[Points, float, tuple[str, ...]]:
         )
         points = points.part(slice(count, None))
     _require(len(points.force), "points are left after the slack")
-    _check_rigidity(points)
+    _check_rigidity(points, test.gauge_length)
     if len(points.force) > _MOST:
         points = points.means(np.arange(len(points.force)) * _MOST // len(points.force))
     return points, noise, tuple(notes)
@@ -184,18 +186,19 @@ def _require(count: int, what: str) -> None:
         raise TensileTestError(f"only {count} {what}; a fit needs at least {FEWEST}.")
 
 
-def _check_span(strain: Array, force: Array) -> None:
+def _check_span(strain: Array, force: Array, gauge_length: float) -> None:
     reach = float(np.ptp(strain))
     if reach == 0.0 or np.ptp(force) == 0.0:
         raise TensileTestError("displacement or force never changes; give a test that loads.")
     if reach > 1.0:
         raise TensileTestError(
-            f"the displacements span {reach:.4g} times the gauge length, and no wire stretches so "
-            f"far. {_likely(float(np.ptp(force)) / reach, reach)}"
+            f"the displacements span {1e3 * reach * gauge_length:.4g} mm, {reach:.4g} times the "
+            f"gauge length of {1e3 * gauge_length:.4g} mm, and no wire stretches so far. "
+            f"{_likely(float(np.ptp(force)) / reach, reach, gauge_length)}"
         )
 
 
-def _check_rigidity(points: Points) -> None:
+def _check_rigidity(points: Points, gauge_length: float) -> None:
     """Raise if no wire has such a rigidity over the upper half of the rise."""
     upper = points.force >= (points.force[0] + points.force[-1]) / 2.0
     rise, reach = np.ptp(points.force[upper]), np.ptp(points.strain[upper])
@@ -203,19 +206,24 @@ def _check_rigidity(points: Points) -> None:
     if not 1.0 <= rigidity <= 1e9:
         raise TensileTestError(
             f"the rigidity would be about {rigidity:.3g} N, which no wire has (1 N to 1e9 N). "
-            f"{_likely(rigidity, float(np.ptp(points.strain)))}"
+            f"{_likely(rigidity, float(np.ptp(points.strain)), gauge_length)}"
         )
 
 
-def _likely(rigidity: float, reach: float) -> str:
-    """Suggest the wrong unit that explains a rigidity [N] and a largest strain."""
-    found = [
-        unit
-        for unit, by_force, by_strain in _MISTAKEN
-        if 1e2 <= rigidity * by_force / by_strain <= 1e7 and 1e-4 <= reach * by_strain <= 1.0
-    ]
-    hint = f"It looks as if {' or '.join(found)}." if found else "Check all three."
-    return f"Displacement and gauge length are in m, force in N. {hint}"
+def _likely(rigidity: float, reach: float, gauge_length: float) -> str:
+    """Suggest the mistake that explains a rigidity [N] and a largest strain."""
+    found = []
+    low, high = _GAUGES
+    for mistake, force, displacement, gauge in _MISTAKEN:
+        strain = displacement / gauge
+        possible = 1e2 <= rigidity * force / strain <= 1e7 and 1e-4 <= reach * strain <= 1.0
+        # a gauge length that tests have is taken for right
+        if possible and (gauge == 1.0) is (low <= gauge_length <= high):
+            meant = 1e3 * gauge_length * gauge
+            found.append(mistake.format(given=1e3 * gauge_length, meant=meant))
+    if not found:
+        return "Check the units of displacement, force and gauge length."
+    return f"It looks as if {' or '.join(found)}."
 
 
 def _is_loading(strain: Array) -> NDArray[np.bool_]:

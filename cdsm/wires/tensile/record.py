@@ -5,25 +5,23 @@ from __future__ import annotations
 import math
 import os
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final, NoReturn, final
+from typing import NoReturn, final
 
-from cdsm.errors import TensileTestError
+from cdsm.errors import InvalidInput, TensileTestError
 from cdsm.support.tables import Table, read_table
-from cdsm.support.validation import number_array, scalar
+from cdsm.support.validation import number_array, scalar, whole_number
 from cdsm.support.values import Array, ReadOnlyState, frozen
+from cdsm.wires.tensile.columns import UNITS, USUAL, Column, Header, find_header
 
-_UNITS: Final = {
-    "displacement": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "μm": 1e-6},
-    "force": {"mN": 1e-3, "N": 1.0, "kN": 1e3, "MN": 1e6},
-}
-_USUAL: Final = {"displacement": "mm", "force": "N"}
-_WORDS: Final = {
-    "displacement": ("displacement", "extension", "elongation", "stroke"),
-    "force": ("force", "load", "tension"),
-}
 _GAUGE = re.compile(
     r"gauge[ _-]?length\s*+[=:]?\s*+([-+\d.,eE]+)\s*[\[(]?([^\W\d]*)", re.IGNORECASE
+)
+_TITLE = re.compile(  # Einspannlänge: from grip to grip; Messlänge: of an extensometer
+    r"(?:gau?ge[ _-]?length|einspannlänge|messlänge)(?: L_?0)?(\D{0,60}?)([\d.,]+)"
+    r"[ \t]*[\[(]?([^\W\d]*)",
+    re.IGNORECASE,
 )
 
 
@@ -36,6 +34,7 @@ class TensileTest(ReadOnlyState):
         displacement: Displacement of the crosshead or extensometer, shape (n,) [m].
         force: Force, shape (n,) [N], tension positive.
         gauge_length: Free length of the wire between the grips or the clips [m].
+        source: What was read from a file: its columns and their units. Empty for arrays.
 
     Raises:
         InvalidInput: A field is not finite numbers.
@@ -45,6 +44,7 @@ class TensileTest(ReadOnlyState):
     displacement: Array
     force: Array
     gauge_length: float
+    source: str = ""
 
     def __post_init__(self) -> None:
         for name in ("displacement", "force"):
@@ -69,87 +69,87 @@ class TensileTest(ReadOnlyState):
 def read_tensile_csv(
     path: str | os.PathLike[str],
     *,
+    columns: Sequence[str | int] | None = None,
+    skip: int = 0,
+    units: Sequence[str] | None = None,
     displacement_unit: str | None = None,
     force_unit: str | None = None,
     gauge_length: float | None = None,
 ) -> TensileTest:
-    """Read a tensile test from CSV. If the header lacks a unit, give the unit as an argument.
+    """Read a tensile test from the text file of a testing machine, or from any CSV.
 
-    The first line that is not a comment is the header. It names one column displacement, extension,
-    elongation or stroke, and one column force, load or tension. Each name has a unit:
-    ``displacement [mm]``, ``Load (kN)``, ``force_N``. The units may also form the next line. Other
-    columns are ignored. Commas, semicolons or tabs separate the columns. Decimal commas are allowed
-    with semicolons and tabs. A comment may give the gauge length: ``# gauge_length = 500 mm``.
+    The header is the line among the first 50 that names both columns and that most rows of numbers
+    follow; titles and tables of results may stand before it. It names a displacement, extension,
+    elongation or stroke, and a force or load, in English or another language (Standardweg,
+    Standardkraft, Déplacement, Fuerza, 位移, …). Each name has a unit: ``displacement [mm]``,
+    ``Load (kN)``, ``force_N``, ``Kraft/N``. The units may also form the next line. A strain in % or
+    mm/mm is read where there is no displacement. Other columns are ignored.
+
+    Commas, semicolons or tabs separate the columns. Decimal commas are allowed with semicolons and
+    tabs. The text is UTF-8, UTF-16 or Windows-1252. A comment may give the gauge length:
+    ``# gauge_length = 500 mm``; so may a title line: ``Gauge length``, ``Einspannlänge``,
+    ``Messlänge``.
 
     Args:
         path: The file.
-        displacement_unit: ``m``, ``cm``, ``mm`` or ``um``, if the header has no unit.
-        force_unit: ``mN``, ``N``, ``kN`` or ``MN``, if the header has no unit.
-        gauge_length: l_0 [m], if no comment gives it.
+        columns: Displacement or strain, and force: the names of their columns, or their numbers
+            from 1 on. Default: by the names in the header.
+        skip: Number of lines at the top that are not read.
+        units: Units of displacement and force, if the header has none.
+        displacement_unit: ``m``, ``cm``, ``mm``, ``um`` or ``in``; of a strain ``%`` or ``mm/mm``.
+            The first of ``units``.
+        force_unit: ``mN``, ``N``, ``kN``, ``MN``, ``lbf`` or ``kgf``. The second of ``units``.
+        gauge_length: l_0 [m], if the file does not give it.
 
     Raises:
         FileError: The file cannot be read.
+        InvalidInput: ``columns`` or ``units`` are not two entries, or ``skip`` is negative.
         TensileTestError: There is no header; a column, a unit or the gauge length is missing, given
             twice or not understood; or an entry is not a finite number (the line is named).
     """
-    table = read_table(path, "\t;,")
+    for name, pair in (("columns", columns), ("units", units)):
+        if pair is not None and (not isinstance(pair, (list, tuple)) or len(pair) != 2):
+            raise InvalidInput(name, f"{pair!r} given; give two, of displacement and force.")
+    skip = whole_number("skip", skip, 0, 1_000_000)
+    given = units or (displacement_unit, force_unit)
+    table = read_table(path, "\t;,", skip=skip, any_encoding=True)
     try:
-        header, first = _header(table)
-        displacement = _column(table, header, first, "displacement", displacement_unit)
-        force = _column(table, header, first, "force", force_unit)
-        length = _gauge_length(table, gauge_length)
+        header, *read = find_header(table, columns)
+        scales = [_scale(each, unit) for each, unit in zip(read, given, strict=True)]
+        displacement, force = (table.column(each.at, _bad_cell, header.first) for each in read)
+        length = _gauge_length(table, header, gauge_length)
     except TensileTestError as error:
         raise TensileTestError(f"{path}: {error}") from None
-    return TensileTest(displacement, force, length)
+    if read[0].kind == "strain":
+        scales[0] *= length
+    places = [each.at for each in read]
+    others = [each for each in header.columns if each.kind and each.at not in places]
+    unread = f"; not read: {', '.join(map(str, others))}" if others else ""
+    source = f"{' and '.join(map(str, read))} of line {header.line}{unread}"
+    return TensileTest(scales[0] * displacement, scales[1] * force, length, source)
 
 
-def _header(table: Table) -> tuple[list[str], int]:
-    """Return column names with units, and the first row of numbers. Row 1 may hold units."""
-    if not table.rows:
-        raise TensileTestError("holds no data; a header and one line per point are needed.")
-    header = table.header
-    if not any(math.isnan(table.number(cell)) for cell in header):
-        raise TensileTestError(
-            f"line {table.rows[0][0]}: there is no header. Begin with a line that names the "
-            "columns and their units, such as: displacement [mm], force [N]"
-        )
-    units = table.rows[1][1] if len(table.rows) > 1 else ["1"]
-    if not all(re.fullmatch(r"[\[(]?\s*[^\W\d]*\s*[\])]?", cell) for cell in units):
-        return header, 1
-    units = [unit.strip("[]() ") for unit in (*units, *[""] * len(header))]
-    return [f"{a} [{b}]" if b else a for a, b in zip(header, units, strict=False)], 2
-
-
-def _column(table: Table, header: list[str], first: int, kind: str, given: str | None) -> Array:
-    """Return the displacement or the force from row ``first`` on, in SI units."""
-    names = [re.split(r"[\s\[(_/,]", cell.lower(), maxsplit=1)[0] for cell in header]
-    at = [k for k, name in enumerate(names) if name in _WORDS[kind]]
-    if len(at) != 1:
-        raise TensileTestError(
-            f"{len(at) or 'no'} columns of {kind} in the header {header}; exactly one must be "
-            f"called {' or '.join(_WORDS[kind])}, with its unit, such as: {kind} [{_USUAL[kind]}]"
-        )
-    # the unit stands in brackets, or after the last underscore, blank or slash
-    cell, known, keyword = header[at[0]], _UNITS[kind], f"{kind}_unit"
-    unit = re.search(r"[\[(]([^\])]*)[\])]", cell) or re.search(r"[_/\s]([^\s_/]+)$", cell)
-    found = unit[1].strip() if unit else None
-    for each in (found, given):
-        if each is not None and each not in known:
+def _scale(column: Column, given: str | None) -> float:
+    """Return the unit of a column in SI."""
+    kind = column.kind or ""
+    known, keyword = UNITS[kind], "force_unit" if kind == "force" else "displacement_unit"
+    for each in (column.unit, given):
+        if each and each not in known:
             raise TensileTestError(
-                f"the unit {each!r} of the {kind} is not known; use {', '.join(known)}, in the "
-                f"header or as {keyword}=."
+                f"the unit {each!r} of the {kind} {column.name!r} is not known; use "
+                f"{', '.join(known)}, in the header or as {keyword}=."
             )
-    if found is not None and given is not None and found != given:
+    if column.unit and given and column.unit != given:
         raise TensileTestError(
-            f"the header has the {kind} in {found}, but {keyword}={given!r}; drop one."
+            f"the header has the {kind} in {column.unit}, but {keyword}={given!r}; drop one."
         )
-    chosen = found or given
-    if chosen is None:
+    unit = column.unit or given
+    if not unit:
         raise TensileTestError(
-            f"the {kind} has no unit. Put it into the header, such as {kind} [{_USUAL[kind]}], or "
-            f"pass {keyword}=."
+            f"the {kind} {column.name!r} has no unit. Put it into the header, such as "
+            f"{column.name} [{USUAL[kind]}], or pass {keyword}= or units=('mm', 'N')."
         )
-    return known[chosen] * table.column(at[0], _bad_cell, first)
+    return known[unit]
 
 
 def _bad_cell(problem: str) -> NoReturn:
@@ -159,21 +159,30 @@ def _bad_cell(problem: str) -> NoReturn:
     )
 
 
-def _gauge_length(table: Table, given: float | None) -> float:
+def _gauge_length(table: Table, header: Header, given: float | None) -> float:
+    known = UNITS["displacement"]
     lengths = [] if given is None else [scalar("gauge_length", given)]
     decimal_comma = table._replace(delimiter=";")
     for number, unit in _GAUGE.findall("\n".join(table.comments)):
         value = decimal_comma.number(number)
-        if math.isnan(value) or unit not in _UNITS["displacement"]:
+        if math.isnan(value) or unit not in known:
             raise TensileTestError(
                 f"the gauge length {number!r} {unit!r} is not understood; write it with its unit: "
                 "# gauge_length = 500 mm"
             )
-        lengths.append(value * _UNITS["displacement"][unit])
+        lengths.append(value * known[unit])
+    if not lengths:
+        titles = (" ".join(cells) for line, cells in table.rows if line < header.line)
+        for between, number, unit in _TITLE.findall("\n".join(titles)):
+            before = re.findall(r"[\[(]\s*([^\W\d]+)\s*[\])]", between)
+            unit = unit if unit in known else next(iter(before), "")
+            if unit in known and math.isfinite(value := decimal_comma.number(number)):
+                lengths.append(value * known[unit])
     if not lengths:
         raise TensileTestError(
             "has no gauge length. Pass gauge_length= [m], or add a line: # gauge_length = 500 mm"
         )
     if max(lengths) - min(lengths) > 1e-9 * abs(max(lengths)):
-        raise TensileTestError(f"gauge lengths of {lengths} m are given; give one.")
+        listed = " and ".join(f"{1e3 * length:g} mm" for length in dict.fromkeys(lengths))
+        raise TensileTestError(f"the gauge length is {listed}; give one, as gauge_length= [m].")
     return lengths[0]
