@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, final
@@ -160,6 +160,15 @@ class Posture(ReadOnlyState):
             nearest = min(feet, key=lambda each: float(np.linalg.norm(each - site)))
             lines.append(frozen(np.array([site, nearest])))
         return tuple(lines)
+
+    def _stick_figure(self, without: Collection[int]) -> tuple[list[Array], list[Array]]:
+        """Return bones and brackets of links, without those of some rows of joints; 0: the base."""
+        rows = self.arm._model.routing.row.tolist()
+        brackets = zip(rows, self.brackets, strict=True)
+        return (
+            [bone for row, each in enumerate(self._bones) if row not in without for bone in each],
+            [bracket for row, bracket in brackets if row not in without],
+        )
 
     @cached_property
     def _bones(self) -> tuple[tuple[Array, ...], ...]:

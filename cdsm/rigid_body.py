@@ -30,6 +30,18 @@ class BodyState(NamedTuple):
     gravity_stiffness: Array
 
 
+class Shapes(NamedTuple):
+    """Drawn shapes of a URDF.
+
+    Attributes:
+        place: Move the shapes to joint angles (nv,) [rad].
+        rows: Rows of the joints whose links have shapes.
+    """
+
+    place: Callable[[Array], None]
+    rows: frozenset[int]
+
+
 class RigidBody:
     """A Pinocchio model of a tree of revolute and prismatic joints, with one tip frame.
 
@@ -177,10 +189,9 @@ class RigidBody:
         whole: Array = (upper + np.triu(upper, 1).T)[np.ix_(self._theirs, self._theirs)]
         return whole
 
-    def visualizer(self, urdf: str, server: object, node: str) -> Callable[[Array], None] | None:
-        """Draw the shapes of the URDF below a node of a viser server.
+    def visualizer(self, urdf: str, server: object, node: str) -> Shapes | None:
+        """Draw the shapes of the URDF below a node of a viser server; None without shapes.
 
-        Return a function that moves the shapes to joint angles (nv,) [rad], or None without shapes.
         If a shape, e.g. a mesh, cannot be read, nothing is drawn and UrdfError is raised.
         """
         from pinocchio.visualize import ViserVisualizer
@@ -199,7 +210,8 @@ class RigidBody:
                 f"the shapes of the URDF cannot be drawn: {str(error).strip().rstrip('.')}. Meshes "
                 "of a package:// are looked for in the folders of ROS_PACKAGE_PATH."
             ) from None
-        return lambda q: drawn.display(q[self._ours])
+        rows = frozenset(self._row(shape.parentJoint) for shape in shapes.geometryObjects)
+        return Shapes(lambda q: drawn.display(q[self._ours]), rows)
 
     def _path(self, joint: int) -> list[int]:
         """Return the Pinocchio joints from the base to a joint."""

@@ -5,6 +5,8 @@ from __future__ import annotations
 import contextlib
 import math
 import webbrowser
+from dataclasses import fields
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -12,8 +14,8 @@ import typer
 import cdsm
 from cdsm.cli.conditions import Conditions
 from cdsm.cli.options import (
+    ANGLES,
     DEFAULT_SOLVER,
-    Angles,
     ArmOptions,
     AsJson,
     MaxTension,
@@ -26,12 +28,23 @@ from cdsm.cli.output import Json, answer
 
 def view(
     arm: ArmOptions,
-    angles: Angles = "0",
+    angles: Annotated[str | None, ANGLES] = None,
+    path: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="PATH.csv",
+            help="A path to play, a line per sample. Columns, with the unit in brackets: the "
+            "joints in deg (mm where they slide), or x, y, z of the tip in mm.",
+        ),
+    ] = None,
     min_tension: MinTension = 10.0,
     max_tension: MaxTension = math.inf,
     force: Annotated[
         str, typer.Option(help="At the tip, to begin with: FX,FY,FZ [N].", metavar="FX,FY,FZ")
     ] = "0,0,0",
+    sag: Annotated[
+        bool, typer.Option("--sag", help="To begin with, let the force move the arm.")
+    ] = False,
     solver: Solver = DEFAULT_SOLVER,
     largest_tension: Annotated[
         float, typer.Option(help="Right end of the slider of the least tension [N].")
@@ -52,25 +65,43 @@ def view(
     ] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Show an arm in the browser, live: move joints, tension and load; see how stiff it is."""
+    """Show an arm in the browser, live: move joints, tip, tension and load; see how stiff it is."""
+    from cdsm.cli.path_file import PathFile, read_path
+
     with contextlib.suppress(KeyboardInterrupt):  # Ctrl-C ends the view, also while it starts
-        pose = arm.at(angles)
+        pose = None if angles is None else arm.at(angles)
+        robot = arm.read() if pose is None else pose.arm
+        motion = PathFile(None, None, None) if path is None else read_path(path, robot)
         with cdsm.view.serve(
-            pose.arm,
+            robot,
             host=host,
             port=port,
-            q=pose.q,
+            q=None if pose is None else pose.q,
             minimum=min_tension,
             maximum=max_tension,
             force=numbers("--force", force, 3),
+            sag=sag,
+            angles=motion.angles,
+            tips=motion.tips,
             solver=solver,
             largest_tension=largest_tension,
             largest_force=largest_force,
+            arm_arguments=_arguments(arm),
         ) as page:
             text = f"shown at {page.url}; Ctrl-C ends it"
-            conditions = Conditions(pose.arm, (min_tension,))
-            told: Json = {"name": pose.arm.name, "url": page.url}
+            conditions = Conditions(robot, (min_tension,))
+            told: Json = {"name": robot.name, "url": page.url}
             answer(as_json, lambda: told, conditions, text)
             if browser:
                 webbrowser.open(page.url)
             page.wait()
+
+
+def _arguments(arm: ArmOptions) -> list[str]:
+    """Return the arguments of the shell that describe an arm."""
+    given = [str(arm.arm)]
+    for field in fields(arm)[1:]:
+        value, option = getattr(arm, field.name), f"--{field.name.replace('_', '-')}"
+        if value != field.default:
+            given.append(option if value is True else f"{option}={value}")
+    return given

@@ -108,7 +108,7 @@ def plan_path(
             or another argument is invalid.
     """
     instance("arm", arm, Manipulator)
-    path = _checked_path(arm, angles, tips)
+    path = checked_path(arm, angles, tips)
     if tips is None and guess is not None:
         raise InvalidInput("guess", "given with angles=, which need none; drop it, or give tips=.")
     size = len(path)
@@ -169,7 +169,7 @@ def plan_path(
     )
 
 
-def _checked_path(arm: Manipulator, angles: ArrayLike | None, tips: ArrayLike | None) -> Array:
+def checked_path(arm: Manipulator, angles: ArrayLike | None, tips: ArrayLike | None) -> Array:
     """Check the path: joint angles (S, nv) [rad] or tip positions (S, 3) [m]."""
     if (angles is None) == (tips is None):
         raise InvalidInput(

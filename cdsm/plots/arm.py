@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+import math
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from matplotlib.cm import ScalarMappable
@@ -51,8 +52,8 @@ def plot_arm(
         pose: Posture to draw.
         tension: Tensions that colour the cables, if given.
         stiffness: If given and stable, the ellipsoid C_vv f, |f| = 1, is drawn at the tip. It
-            shows the displacement under a force of any direction. Its longest half axis is a
-            fifth of the arm's length. The title says if the arm is unstable.
+            shows the displacement under a force of any direction, to the scale in the legend. The
+            title says if the arm is unstable.
 
     Raises:
         InvalidInput: An argument has the wrong type, or belongs to another arm or posture.
@@ -101,17 +102,36 @@ def tension_bar(figure: Figure, colors: ScalarMappable) -> None:
 ELLIPSOID_GRID = 13, 25
 """Number of points of an ellipsoid from pole to pole, and around."""
 
+_LARGEST = 0.3
+"""Largest half axis of a drawn ellipsoid, as a fraction of the arm's length."""
 
-def ellipsoid(stiffness: Stiffness) -> Array | None:
-    """Compute the surface (3, 13, 25) [m] of the ellipsoid C_vv f, |f| = 1, drawn at the tip.
 
-    Its longest half axis is a fifth of the arm's length. None if no force moves the tip.
+class Ellipsoid(NamedTuple):
+    """Surface of the tip displacements C_vv f, |f| = 1 N, drawn at the tip to a scale.
 
-    Raises:
-        SingularStiffness: K_θ is singular, so the ellipsoid does not exist.
+    Attributes:
+        surface: Points of the drawn surface (3, 13, 25) [m].
+        scale: Drawn over true displacement [-], a power of ten.
+        longest: Largest true displacement per force [m/N].
     """
-    C = stiffness.compliance[:3, :3]
-    longest = np.linalg.norm(C, 2)
+
+    surface: Array
+    scale: float
+    longest: float
+
+    def __str__(self) -> str:
+        """Return what the ellipsoid is, and its scale."""
+        large, small = max(self.scale, 1.0), max(1.0 / self.scale, 1.0)
+        return f"where 1 N moves the tip, scale {large:g}:{small:g}"
+
+
+def ellipsoid(compliance: Array, tip: Array, length: float) -> Ellipsoid | None:
+    """Compute the ellipsoid of C_vv (3, 3) [m/N] at a tip (3,) of an arm of a length [m].
+
+    The scale is the power of ten with a half axis of 3 to 30 % of the length, so the size shows the
+    magnitude. None if no force moves the tip.
+    """
+    longest = float(np.linalg.norm(compliance, 2))
     if longest == 0.0:
         return None
     rows, columns = ELLIPSOID_GRID
@@ -119,17 +139,17 @@ def ellipsoid(stiffness: Stiffness) -> Array | None:
         np.linspace(0.0, 2.0 * np.pi, columns), np.linspace(0.0, np.pi, rows)
     )
     force = np.stack([np.sin(down) * np.cos(around), np.sin(down) * np.sin(around), np.cos(down)])
-    size = 0.2 * stiffness.posture.arm.length / longest
-    moved: Array = size * np.einsum("ij,j...->i...", C, force)
-    return frozen(moved + stiffness.posture.tip[:3, 3, None, None])
+    scale = 10.0 ** math.floor(math.log10(_LARGEST * length / longest))
+    moved = scale * np.einsum("ij,j...->i...", compliance, force)
+    return Ellipsoid(frozen(moved + tip[:, None, None]), scale, longest)
 
 
 def _draw_ellipsoid(axes: Any, stiffness: Stiffness) -> None:
-    surface = ellipsoid(stiffness)
-    if surface is not None:
-        longest = MM * np.linalg.norm(stiffness.compliance[:3, :3], 2)
-        label = f"where 1 N moves the tip; longest: {longest:.3g} mm"
-        axes.plot_wireframe(*(MM * surface), color=VERMILLION, linewidth=0.4, label=label)
+    pose = stiffness.posture
+    drawn = ellipsoid(stiffness.compliance[:3, :3], pose.tip[:3, 3], pose.arm.length)
+    if drawn is not None:
+        label = f"{drawn}; longest: {MM * drawn.longest:.3g} mm"
+        axes.plot_wireframe(*(MM * drawn.surface), color=VERMILLION, linewidth=0.4, label=label)
         legend(axes, loc="upper left")
 
 

@@ -9,6 +9,7 @@ nonlinear elasticity and series springs included.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, final
@@ -22,7 +23,7 @@ from cdsm.statics.locked_motors import LoadedArm, rounding
 from cdsm.statics.trust_region import FLAT, RestSearch, find_rest
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.format import aligned, coordinates, place, plain
-from cdsm.support.validation import wrench_vector
+from cdsm.support.validation import unit_direction, wrench_vector
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension
 
@@ -34,6 +35,9 @@ _SMALLEST_STEP = 2.0**-6
 
 _CLOSE = 1e-3
 """Two sites meet if their distance falls below this part of their distance at the reference."""
+
+_IMMOBILE = 1e-14
+"""A compliance along a direction below this part of the largest is rounding."""
 
 
 @final
@@ -121,6 +125,26 @@ class Equilibrium(ReadOnlyState):
                 frozen(mode),
             )
         return frozen(J @ np.linalg.solve(K, J.T))
+
+    def along(self, direction: ArrayLike) -> float:
+        """Compute 1/(uᵀ C_vv u) [N/m] with C of :attr:`compliance`: joints at stops are fixed.
+
+        Args:
+            direction: u (3,) in base axes, any length.
+
+        Returns:
+            The stiffness; inf if the tip cannot move in this direction.
+
+        Raises:
+            InvalidInput: ``direction`` is not three finite numbers, or is zero.
+            SingularStiffness: K_θ of the joints off their stops is singular.
+        """
+        if not self.at_limit:
+            return self.stiffness.along(direction)
+        u, C = unit_direction("direction", direction), self.compliance[:3, :3]
+        compliance = float(u @ C @ u)
+        mobile = abs(compliance) > _IMMOBILE * np.linalg.norm(C)
+        return 1.0 / compliance if mobile else math.inf
 
     @property
     def _off_stops(self) -> NDArray[np.intp]:

@@ -33,9 +33,6 @@ _MEASURED = 1e-12
 _DISPLACED = 1e-9
 """Tip displacement, over the length of the arm, that is more than rounding of the balance."""
 
-_IMMOBILE = 1e-14
-"""A compliance along the force below this part of the largest is rounding."""
-
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -92,13 +89,7 @@ class WeightTest(ReadOnlyState):
             SingularStiffness: The arm without the weight is about to buckle.
         """
         C = self.without.compliance[:3, :3]
-        u = unit_direction("force", self.force)
-        if self.without.at_limit:
-            compliance = float(u @ C @ u)
-            mobile = abs(compliance) > _IMMOBILE * np.linalg.norm(C)
-            stiff = 1.0 / compliance if mobile else math.inf
-        else:
-            stiff = self.without.stiffness.along(u)
+        stiff = self.without.along(self.force)
         return LinearPrediction(displacement=frozen(C @ self.force), stiffness=stiff)
 
     @property

@@ -4,7 +4,8 @@
 :func:`serve` serves a page with these results and updates it.
 """
 
-from cdsm.view.server import View, serve
+from cdsm.view.live_view import View
+from cdsm.view.server import serve
 from cdsm.view.state import Condition, Setting, Shown, show
 
 __all__ = ["Condition", "Setting", "Shown", "View", "serve", "show"]

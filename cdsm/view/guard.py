@@ -9,9 +9,10 @@ refuses:
   header shows that name.
 - **A connection of our page to another server**, by ``?websocket=`` in a link. That server could
   run scripts in our page. A header of the page allows connections to its own server only.
-- **Messages that the page does not send.** A client may report its camera, move a slider within
-  its range, and press a button. The guard drops all other messages: requests to share the view on
-  a public server, and changes of any property that is not a value.
+- **Messages that the page does not send.** A client may report its camera and a click in the
+  scene, drag the handle at the tip, move a slider within its range, and use a switch or a button.
+  The guard drops all other messages: requests to share the view on a public server, and changes
+  of any property that is not a value.
 - **Other machines** that do not know the token in the URL, if the address is not loopback.
 
 At a loopback address any program on this machine, of any user, can connect. The network traffic
@@ -41,6 +42,7 @@ from websockets.asyncio.server import ServerConnection
 from websockets.http11 import Request, Response
 
 from cdsm.errors import CdsmError
+from cdsm.view.messages import scene_message
 
 _LOG = logging.getLogger(__name__)
 
@@ -54,7 +56,12 @@ _STARTING: Final = threading.Lock()
 
 _Reply = Callable[[ServerConnection, Request], Response | None]
 
-Control = viser.GuiSliderHandle[float] | viser.GuiButtonHandle
+Control = (
+    viser.GuiSliderHandle[float]
+    | viser.GuiButtonHandle
+    | viser.GuiButtonGroupHandle
+    | viser.GuiCheckboxHandle
+)
 """Controls that a client may use."""
 
 
@@ -121,7 +128,7 @@ class Guard:
         return server
 
     def admit(self, control: Control) -> None:
-        """Allow clients to move this slider or press this button."""
+        """Allow clients to use this control."""
         self._controls[control._impl.uuid] = control
 
     def _answer(
@@ -163,9 +170,10 @@ class Guard:
         try:
             # packed again: of two fields with one name, viser may read the one not checked here
             message = msgspec.msgpack.decode(raw)
+            seen = scene_message(message)
+            if seen is not None:
+                return msgspec.msgpack.encode(seen)
             match message:
-                case {"type": "ViewerCameraMessage"}:  # viser keeps a camera for each client
-                    return msgspec.msgpack.encode(message)
                 case {"type": "GuiUpdateMessage", "uuid": uuid, "updates": {"value": value}}:
                     value = self._allowed(uuid, value)
                     if value is not None and (len(message), len(message["updates"])) == (3, 1):
@@ -176,11 +184,15 @@ class Guard:
             self._refuse(f"a message, {str(error)[:80]!a}")
         return None
 
-    def _allowed(self, uuid: str, value: object) -> bool | float | None:
+    def _allowed(self, uuid: str, value: object) -> bool | float | str | None:
         """Return the value that a control may take, or None if control or value is not allowed."""
         control = self._controls.get(uuid)
         if isinstance(control, viser.GuiButtonHandle):
             return True if value is True else None
+        if isinstance(control, viser.GuiCheckboxHandle):
+            return value if isinstance(value, bool) else None
+        if isinstance(control, viser.GuiButtonGroupHandle):
+            return value if value in control.options else None
         if control is None or isinstance(value, bool) or not isinstance(value, (int, float)):
             return None
         if not math.isfinite(value):

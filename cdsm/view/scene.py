@@ -12,7 +12,12 @@ from numpy.typing import NDArray
 from cdsm.errors import CableError, UrdfError
 from cdsm.manipulator import Manipulator
 from cdsm.plots.arm import ELLIPSOID_GRID
-from cdsm.view.state import GREY, Condition, Shown
+from cdsm.posture import Posture
+from cdsm.support.values import Array
+from cdsm.view.cable_names import CableNames
+from cdsm.view.camera import Ball, Cameras
+from cdsm.view.state import ELLIPSOID, FORCE, GREY, Condition, Shown
+from cdsm.view.surroundings import draw_surroundings
 
 if TYPE_CHECKING:
     import viser
@@ -21,8 +26,6 @@ _LOG = logging.getLogger(__name__)
 
 _BODY = "/arm"
 _STICK: Final = (40, 40, 45)
-_ELLIPSOID: Final = (200, 85, 61)
-_FORCE: Final = (59, 111, 182)
 _NOTHING: Final = np.zeros((1, 2, 3))
 _ABOVE = 0.1
 """Height of the label above the tip, as a fraction of the arm's length."""
@@ -31,31 +34,32 @@ _ABOVE = 0.1
 class Scene:
     """An arm in a viser server.
 
-    Pinocchio's visualiser draws the links from the shapes in the URDF. If the URDF has no shapes,
-    or a mesh cannot be read, straight sticks join the joints. The arrow of ``largest_force`` [N]
-    is half as long as the arm.
+    Pinocchio's visualiser draws the links from the shapes in the URDF. Sticks join the joints of
+    links without shapes, or of all links if a mesh cannot be read. ``force_scale`` [m/N] is the
+    length of the arrow of the force.
     """
 
-    def __init__(self, server: viser.ViserServer, arm: Manipulator, largest_force: float) -> None:
+    def __init__(self, server: viser.ViserServer, arm: Manipulator, force_scale: float) -> None:
         length, scene = arm.length, server.scene
-        self._server, self._reach = server, 0.5 * length / largest_force
+        self._server, self._force_scale, self._length = server, force_scale, length
+        self._path = np.empty((0, 3))
         self._up = np.array([0.0, 0.0, _ABOVE * length])
         body = scene.add_frame(_BODY, show_axes=False)
         cables = scene.add_frame("/cables", show_axes=False)
         try:
-            self._place = arm._model.body.visualizer(arm.urdf, server, _BODY)
+            self._shapes = arm._model.body.visualizer(arm.urdf, server, _BODY)
         except UrdfError as error:
             _LOG.warning("%s Sticks are drawn instead.", error)
-            self._place = None
-        # an environment map and shadows take seconds without a GPU
-        scene.configure_environment_map(hdri=None)
-        scene.configure_default_lights(cast_shadow=False)
-        scene.add_light_ambient("/light", intensity=2.0)
-        scene.add_frame("/base", axes_length=0.15 * length, axes_radius=0.004 * length)
-        for axis, name in zip(0.17 * length * np.eye(3), "xyz", strict=True):
-            scene.add_label(f"/base/{name}", name, position=axis)
+            self._shapes = None
+        draw_surroundings(server, length)
         self._sticks = scene.add_line_segments(
             "/sticks", _NOTHING, _STICK, thickness=0.012 * length, visible=False
+        )
+        self._brackets = scene.add_line_segments(
+            "/brackets", _NOTHING, GREY, thickness=1.5, thickness_units="screen", visible=False
+        )
+        self._reference = scene.add_line_segments(
+            "/reference", _NOTHING, GREY, thickness=2.5, thickness_units="screen", visible=False
         )
         # one node per cable: viser treats colours of single points as linear light, so they
         # would differ from the colours of the bar
@@ -66,12 +70,12 @@ class Scene:
             for i in range(len(arm.cables))
         ]
         # hidden if there is no posture
-        self._parts = (body if self._place is not None else self._sticks, cables)
+        self._parts = (cables,) if self._shapes is None else (body, cables)
         self._ellipsoid = scene.add_mesh_simple(
             "/ellipsoid",
             np.zeros((math.prod(ELLIPSOID_GRID), 3)),
             _faces(*ELLIPSOID_GRID),
-            color=_ELLIPSOID,
+            color=ELLIPSOID,
             opacity=0.65,
             side="front",  # the two sides of a flat ellipsoid would flicker
             cast_shadow=False,
@@ -81,17 +85,21 @@ class Scene:
         self._force = scene.add_arrows(
             "/force",
             _NOTHING,
-            _FORCE,
+            FORCE,
             shaft_radius=0.006 * length,
             head_radius=0.016 * length,
             head_length=0.04 * length,
             visible=False,
         )
         self._label = scene.add_label("/condition", "", anchor="bottom-center", visible=False)
-        self._look(arm)
+        self.names = CableNames(server)
+        self.cameras = Cameras(server, self._ball(_straight(arm)))
 
-    def update(self, shown: Shown) -> None:
-        """Show these results, and hide everything that they do not have."""
+    def update(self, shown: Shown, follow: bool) -> None:
+        """Show these results, and hide everything that they do not have.
+
+        With ``follow`` the cameras may be fitted anew.
+        """
         pose, force, ellipsoid = shown.posture, shown.setting.force, shown.ellipsoid
         for part in self._parts:
             part.visible = pose is not None
@@ -101,37 +109,63 @@ class Scene:
         self._force.visible = pushed and bool(force.any())
         self._label.visible = pose is not None and shown.condition is not Condition.STABLE
         self._label.text = shown.condition.value
+        self.names.update(shown)
+        self._draw_lines(shown)
         if pose is None or shown.cable_colors is None:
             return
         tip = pose.tip[:3, 3]
-        if self._place is not None:
-            self._place(pose.q)
-        else:
-            self._sticks.points = np.array(pose.bones, dtype=np.float32)
+        if self._shapes is not None:
+            self._shapes.place(pose.q)
         for cable, path, color in zip(
             self._cables, pose.cable_paths, shown.cable_colors, strict=True
         ):
             cable.points = np.stack([path[:-1], path[1:]], axis=1).astype(np.float32)
             cable.colors = color
         if ellipsoid is not None:
-            self._ellipsoid.vertices = ellipsoid.reshape(3, -1).T.astype(np.float32)
+            self._ellipsoid.vertices = ellipsoid.surface.reshape(3, -1).T.astype(np.float32)
         if self._force.visible:
-            self._force.points = np.array([[tip, tip + self._reach * force]], dtype=np.float32)
+            end = tip + self._force_scale * force
+            self._force.points = np.array([[tip, end]], dtype=np.float32)
         self._label.position = tip + self._up
+        if follow:
+            self.cameras.follow(self._ball(pose))
 
-    def _look(self, arm: Manipulator) -> None:
-        """Set the first camera: at the side of the arm, a little above it."""
-        try:
-            straight = arm.at(np.clip(np.zeros(arm.nv), arm.lower, arm.upper))
-            points = np.concatenate([*straight.bones, *straight.cable_paths])
-        except CableError:  # two sites of a cable coincide at this posture
-            points = np.array([[0.0, 0.0, 0.0], [arm.length, 0.0, 0.0]])
-        middle = (points.min(axis=0) + points.max(axis=0)) / 2.0
-        size = max(float(np.ptp(points, axis=0).max()), arm.length)
-        camera = self._server.initial_camera
-        camera.look_at, camera.position = middle, middle + size * np.array([0.2, -1.6, 0.6])
-        camera.fov = math.radians(45.0)
-        camera.near, camera.far = size / 100.0, 100.0 * size
+    def draw_path(self, tips: Array) -> None:
+        """Draw a path of the tip (S, 3) [m], and fit the cameras to it and the arm."""
+        self._path = tips
+        lines = np.stack([tips[:-1], tips[1:]], axis=1).astype(np.float32)
+        self._server.scene.add_line_segments(
+            "/path", lines, FORCE, thickness=1.5, thickness_units="screen"
+        )
+
+    def _draw_lines(self, shown: Shown) -> None:
+        """Draw links without shapes as sticks, and the reference of an arm that sags."""
+        pose, reference = shown.posture, shown.reference
+        shaped = frozenset() if self._shapes is None else self._shapes.rows
+        bones, brackets = ([], []) if pose is None else pose._stick_figure(shaped)
+        before = list(reference.bones) if shown.rest and reference else []
+        for node, lines in (
+            (self._sticks, bones),
+            (self._brackets, brackets),
+            (self._reference, before),
+        ):
+            node.visible = len(lines) > 0
+            if node.visible:
+                node.points = np.array(lines, dtype=np.float32)
+
+    def _ball(self, pose: Posture | None) -> Ball:
+        points = np.array([[0.0, 0.0, 0.0], [self._length, 0.0, 0.0]])
+        if pose is not None:
+            points = np.concatenate([*pose.bones, *pose.cable_paths, self._path])
+        return Ball.around(points, least=0.5 * self._length)
+
+
+def _straight(arm: Manipulator) -> Posture | None:
+    """Return the arm as straight as it goes; None if two sites of a cable coincide there."""
+    try:
+        return arm.at(np.clip(np.zeros(arm.nv), arm.lower, arm.upper))
+    except CableError:
+        return None
 
 
 def _faces(rows: int, columns: int) -> NDArray[np.uint32]:

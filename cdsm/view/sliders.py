@@ -1,25 +1,19 @@
-"""Build the panel of the page: sliders that set the arm, and text about the arm."""
+"""Compute the sliders of the page: round ends and steps, in degrees, mm and N."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, final
 
 import numpy as np
 
 from cdsm.manipulator import Manipulator
-from cdsm.plots.style import AXES
 from cdsm.support.format import JointUnits
 from cdsm.support.values import Array
-from cdsm.view.panel import page_text
-from cdsm.view.state import Setting, Shown
 
 if TYPE_CHECKING:
     import viser
-
-    from cdsm.view.guard import Control
 
 _STEPS = 500
 """Smallest number of steps of a slider. A slider is some hundred pixels long."""
@@ -28,8 +22,8 @@ _TURN: Final = 2.0 * math.pi
 _LENGTHS = 10.0
 """Range of a sliding joint without limits, in lengths of the arm; others turn once each way."""
 
-_IN_FOLDER: Final = 10
-"""Number of joints in one folder. Only the first folder is open."""
+_DECIMALS: Final = 9
+"""Decimals of a position that is not a step, in degrees, mm or N: further ones are noise."""
 
 _ROUND = 1e-9
 """Largest difference of an end from a round number, as a fraction of a step."""
@@ -38,7 +32,10 @@ _ROUND = 1e-9
 @final
 @dataclass(frozen=True, kw_only=True)
 class Range:
-    """Ends, step and first position of a slider, in a unit of the SI value ``unit`` (° = π/180)."""
+    """Ends, step and first position of a slider, in a unit of the SI value ``unit`` (° = π/180).
+
+    The page shows ``digits`` digits after the point.
+    """
 
     label: str
     low: float
@@ -46,6 +43,7 @@ class Range:
     step: float
     initial: float
     unit: float = 1.0
+    digits: int = 0
 
 
 def slider_range(label: str, low: float, high: float, initial: float, unit: float = 1.0) -> Range:
@@ -63,7 +61,9 @@ def slider_range(label: str, low: float, high: float, initial: float, unit: floa
     high = round(math.floor(high / step + _ROUND) * step, digits)
     step = round(step, digits)
     low, high = min(low, initial), max(high, initial)
-    return Range(label=label, low=low, high=high, step=step, initial=initial, unit=unit)
+    return Range(
+        label=label, low=low, high=high, step=step, initial=initial, unit=unit, digits=digits
+    )
 
 
 def joint_ranges(arm: Manipulator, q: Array) -> tuple[Range, ...]:
@@ -90,78 +90,15 @@ class Slider:
         """Current value in SI."""
         return float(self.handle.value) * self.range.unit
 
-    def move(self, position: float) -> None:
-        """Move the slider to a position in its own unit, or to the nearest end."""
-        ends = self.range
-        self.handle.value = min(max(position, ends.low), ends.high)  # type: ignore[misc]
+    def move(self, value: float) -> None:
+        """Move the slider to a value in SI, also between two steps."""
+        position = round(value / self.range.unit, _DECIMALS) + 0.0  # no -0
+        self.handle.value = position  # type: ignore[misc]
 
+    def straighten(self) -> None:
+        """Move the slider to zero, or to the nearest end."""
+        self.handle.value = min(max(0.0, self.range.low), self.range.high)  # type: ignore[misc]
 
-class Controls:
-    """Controls and text of an arm in the empty panel of a viser server.
-
-    ``limits`` [N] are the largest lower bound of tension and the largest force of the sliders.
-    A moved slider calls ``changed`` from any thread. ``admit`` receives every control that
-    browsers may use.
-    """
-
-    def __init__(
-        self,
-        server: viser.ViserServer,
-        arm: Manipulator,
-        start: Setting,
-        limits: tuple[float, float],
-        changed: Callable[[], None],
-        admit: Callable[[Control], None],
-    ) -> None:
-        self._gui, self._start, self._changed, self._admit = server.gui, start, changed, admit
-        self._text = server.gui.add_html("")
-        with server.gui.add_folder("Load"):
-            tension, force = limits
-            high = max(tension, start.minimum)
-            self._minimum = self._add(slider_range("least tension [N]", 0.0, high, start.minimum))
-            self._force = [
-                self._add(slider_range(f"force {axis} [N]", -force, force, f))
-                for axis, f in zip(AXES, start.force.tolist(), strict=True)
-            ]
-        ranges = joint_ranges(arm, start.q)
-        self._joints: list[Slider] = []
-        for first in range(0, len(ranges), _IN_FOLDER):
-            group = ranges[first : first + _IN_FOLDER]
-            name = f"Joints {first + 1} to {first + len(group)}" if len(ranges) > 1 else "Joint"
-            with server.gui.add_folder(name, expand_by_default=first == 0):
-                self._joints += [self._add(joint) for joint in group]
-        for label, hint, act in (
-            ("Straight", "All joints as near zero as they go.", self._straighten),
-            ("Reset", "All sliders as they were at the beginning.", self._reset),
-        ):
-            button = server.gui.add_button(label, hint=hint)
-            button.on_click(act)
-            admit(button)
-
-    @property
-    def setting(self) -> Setting:
-        """Current values of all sliders."""
-        return replace(
-            self._start,
-            q=np.array([joint.value for joint in self._joints]),
-            minimum=self._minimum.value,
-            force=np.array([component.value for component in self._force]),
-        )
-
-    def update(self, shown: Shown) -> None:
-        """Write the text about these results."""
-        self._text.content = page_text(shown)
-
-    def _add(self, ends: Range) -> Slider:
-        handle = self._gui.add_slider(ends.label, ends.low, ends.high, ends.step, ends.initial)
-        handle.on_update(lambda _: self._changed())
-        self._admit(handle)
-        return Slider(handle, ends)
-
-    def _straighten(self, _: object) -> None:
-        for joint in self._joints:
-            joint.move(0.0)
-
-    def _reset(self, _: object) -> None:
-        for slider in (*self._joints, *self._force, self._minimum):
-            slider.move(slider.range.initial)
+    def reset(self) -> None:
+        """Move the slider to its first position."""
+        self.handle.value = self.range.initial  # type: ignore[misc]

@@ -1,4 +1,4 @@
-"""Compute the results for a setting of the sliders, or the reason why they do not exist."""
+"""Compute the results for a setting of the controls, or the reason why they do not exist."""
 
 from __future__ import annotations
 
@@ -11,11 +11,12 @@ from typing import Final, final
 import numpy as np
 from numpy.typing import NDArray
 
-from cdsm.errors import CdsmError, InvalidInput
+from cdsm.errors import CdsmError, EquilibriumError, InvalidInput
 from cdsm.kernels.principal import principal_stiffness
 from cdsm.manipulator import Manipulator
-from cdsm.plots.arm import ellipsoid, tension_colors
+from cdsm.plots.arm import Ellipsoid, color_scale, ellipsoid
 from cdsm.posture import Posture
+from cdsm.statics.equilibrium import Equilibrium, equilibrium
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.status import Status
 from cdsm.support.values import Array, ReadOnlyState, frozen
@@ -24,6 +25,9 @@ from cdsm.tension import DEFAULT_SOLVER, Tension, distribute_tension
 GREY: Final = (150, 150, 150)
 """Colour of cables with unknown tension."""
 
+ELLIPSOID: Final = (200, 85, 61)
+FORCE: Final = (59, 111, 182)
+
 
 class Condition(Enum):
     """State of the arm at a setting; the value is the text on the page."""
@@ -31,6 +35,9 @@ class Condition(Enum):
     STABLE = "STABLE"
     UNSTABLE = "UNSTABLE"
     SINGULAR = "ABOUT TO BUCKLE"
+    LEFT_REFERENCE = "LEFT ITS REFERENCE"
+    NEUTRAL = "NEUTRAL"
+    NO_EQUILIBRIUM = "NO EQUILIBRIUM FOUND"
     INFEASIBLE = "INFEASIBLE"
     OUTSIDE_ELASTICITY = "OUTSIDE THE ELASTICITY"
     NO_POSTURE = "NO POSTURE"
@@ -46,17 +53,26 @@ _CONDITIONS: Final[dict[Status | None, Condition]] = {
     Status.COINCIDENT_SITES: Condition.NO_POSTURE,
 }
 
+_PROBLEMS: Final = {
+    Condition.UNSTABLE: "K_θ is not positive definite: the arm buckles under these tensions.",
+    Condition.LEFT_REFERENCE: "The arm is unstable where its motors are locked. It left this "
+    "posture without any force, and rests where it is shown.",
+    Condition.NEUTRAL: "No cable brings back every joint: the arm rests here, but not firmly.",
+}
+
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Setting(ReadOnlyState):
-    """Values of the sliders in SI units.
+    """Values of the controls in SI units.
 
     Attributes:
         q: Joint angles (nv,) [rad]; [m] where a joint slides.
         minimum: Lower bound of all tensions [N].
         maximum: Upper bound of all tensions [N].
         force: Force at the tip, in base axes (3,) [N].
+        sag: Whether the force moves the arm. The cables are then tensioned at ``q`` without the
+            force, and the motors are locked. Otherwise the tensions hold ``q`` under the force.
         solver: Solver of the tension distribution.
     """
 
@@ -64,6 +80,7 @@ class Setting(ReadOnlyState):
     minimum: float
     maximum: float = math.inf
     force: Array
+    sag: bool = False
     solver: str = DEFAULT_SOLVER
 
     def __post_init__(self) -> None:
@@ -78,75 +95,110 @@ class Shown(ReadOnlyState):
     """Results on the page at one setting. A result that does not exist is None, never outdated.
 
     Attributes:
-        setting: Values of the sliders.
+        setting: Values of the controls.
         condition: State of the arm.
-        problem: Error message, or why the arm is unstable; empty for a stable arm.
-        posture: None if the angles are invalid or beyond a limit, or sites of a cable coincide.
-        tension: None if no tensions balance the arm.
-        stiffness: None if the tensions are missing or outside the domain of the law.
+        problem: Error message, or why the arm is not stable; empty for a stable arm.
+        reference: Posture of the setting. None if its angles are invalid or beyond a limit, or
+            sites of a cable coincide.
+        tension: Tensions at the reference; None if none balance the arm.
+        stiffness: Stiffness at the posture that is shown; None if the tensions are missing or
+            outside the domain of the law.
+        rest: Equilibrium under the force; None if the arm does not sag, or none was found.
     """
 
     setting: Setting
     condition: Condition
     problem: str = ""
-    posture: Posture | None = None
+    reference: Posture | None = None
     tension: Tension | None = None
     stiffness: Stiffness | None = None
+    rest: Equilibrium | None = None
 
     @property
-    def _stable(self) -> Stiffness | None:
-        return self.stiffness if self.condition is Condition.STABLE else None
+    def posture(self) -> Posture | None:
+        """Posture that is shown: at rest under the force, or the reference."""
+        return self.reference if self.rest is None else self.rest.pose
+
+    @property
+    def tensions(self) -> Array | None:
+        """Tensions (C,) [N] at the posture that is shown; None if unknown."""
+        if self.setting.sag:
+            return None if self.rest is None else self.rest.tension
+        return None if self.tension is None else self.tension.values
+
+    @cached_property
+    def compliance(self) -> Array | None:
+        """Compliance (3, 3) [m/N] of the tip; None if the arm is not stable."""
+        if self.condition not in (Condition.STABLE, Condition.LEFT_REFERENCE):
+            return None
+        source = self.rest or self.stiffness
+        return None if source is None else source.compliance[:3, :3]
 
     @cached_property
     def along(self) -> Array | None:
         """Stiffness along x, y, z (3,) [N/m], inf if the tip cannot move; None if not stable."""
-        K = self._stable
-        return None if K is None else frozen(np.array([K.along(axis) for axis in np.eye(3)]))
+        source = self.rest or self.stiffness
+        if self.compliance is None or source is None:
+            return None
+        return frozen(np.array([source.along(axis) for axis in np.eye(3)]))
 
     @cached_property
     def principal(self) -> dict[str, Array] | None:
         """Softest and stiffest direction and their stiffness [N/m]; None if not stable."""
-        K = self._stable
-        return None if K is None else principal_stiffness(K.compliance[:3, :3])
+        return None if self.compliance is None else principal_stiffness(self.compliance)
 
     @cached_property
     def cable_colors(self) -> NDArray[np.uint8] | None:
         """Red, green and blue of each cable (C, 3), by tension; grey if it is unknown."""
         if self.posture is None:
             return None
-        if self.tension is None:
+        if self.tensions is None:
             return frozen(np.full((len(self.posture.arm.cables), 3), GREY, dtype=np.uint8))
-        colors = tension_colors(self.tension).to_rgba(self.tension.values, bytes=True)
+        colors = color_scale(self.tensions).to_rgba(self.tensions, bytes=True)
         return frozen(np.asarray(colors, dtype=np.uint8)[:, :3].copy())
 
     @cached_property
-    def ellipsoid(self) -> Array | None:
-        """Ellipsoid of :func:`cdsm.plots.plot_arm` (3, rows, columns) [m]; None if not stable."""
-        return None if self._stable is None else ellipsoid(self._stable)
+    def ellipsoid(self) -> Ellipsoid | None:
+        """Ellipsoid of :func:`cdsm.plots.plot_arm`; None if the arm is not stable."""
+        pose = self.posture
+        if self.compliance is None or pose is None:
+            return None
+        return ellipsoid(self.compliance, pose.tip[:3, 3], pose.arm.length)
 
 
 def show(arm: Manipulator, setting: Setting) -> Shown:
     """Compute the results for an arm at a setting; every error becomes a condition."""
-    pose = tension = K = None
+    pose = tension = K = rest = None
     condition, problem = Condition.STABLE, ""
     try:
         pose = arm.at(setting.q)
-        wrench = np.concatenate([setting.force, np.zeros(3)])
-        tension = distribute_tension(pose, setting.minimum, setting.maximum, wrench, setting.solver)
+        force, none = np.concatenate([setting.force, np.zeros(3)]), np.zeros(6)
+        held = none if setting.sag else force
+        tension = distribute_tension(pose, setting.minimum, setting.maximum, held, setting.solver)
         K = stiffness(pose, tension)
-        _ = K.compliance  # raises if K_θ is singular: its margin is only rounding error
-        if not K.is_stable:
-            condition = Condition.UNSTABLE
-            problem = "K_θ is not positive definite: the arm buckles under these tensions."
+        if setting.sag:
+            stable, K = K.is_stable, None
+            rest = equilibrium(pose, tension, force)
+            K = rest.stiffness
+            _ = rest.compliance
+            condition = Condition.STABLE if stable else Condition.LEFT_REFERENCE
+            condition = condition if rest.stable else Condition.NEUTRAL
+        else:
+            _ = K.compliance  # raises if K_θ is singular: its margin is only rounding error
+            condition = Condition.STABLE if K.is_stable else Condition.UNSTABLE
+        problem = _PROBLEMS.get(condition, "")
     except InvalidInput as error:
         condition, problem = Condition.INVALID, str(error)
+    except EquilibriumError as error:
+        condition, problem = Condition.NO_EQUILIBRIUM, str(error)
     except CdsmError as error:
         condition, problem = _CONDITIONS.get(Status.of(error), Condition.FAILED), str(error)
     return Shown(
         setting=setting,
         condition=condition,
         problem=problem,
-        posture=pose,
+        reference=pose,
         tension=tension,
         stiffness=K,
+        rest=rest,
     )

@@ -1,5 +1,6 @@
 """Figures draw what they are given; how they look was looked at."""
 
+import re
 from collections.abc import Callable
 
 import numpy as np
@@ -9,6 +10,7 @@ from mpl_toolkits.mplot3d.art3d import Line3D, Line3DCollection  # type: ignore[
 
 import cdsm
 from cdsm import paper, plots
+from cdsm.plots.arm import ellipsoid
 from cdsm.support.values import Array
 from tests.conftest import Results
 from tests.support.arms import mixed_arm, random_posture
@@ -83,9 +85,15 @@ def test_ellipsoid_shows_where_forces_move_the_tip() -> None:
     (wires,) = [each for each in axes.collections if isinstance(each, Line3DCollection)]
     points = np.concatenate(wires._segments3d) / 1e3 - pose.tip[:3, 3]
     C = K.compliance[:3, :3]
-    size = 0.2 * pose.arm.length / np.linalg.norm(C, 2)
-    # all are moved there by forces of one size
-    np.testing.assert_allclose(np.linalg.norm(np.linalg.solve(size * C, points.T), axis=0), 1.0)
+    legend = axes.get_legend()
+    assert legend is not None
+    [told] = [text.get_text() for text in legend.get_texts()]
+    found = re.fullmatch(r"where 1 N moves the tip, scale (\d+):(\d+); longest: (\S+) mm", told)
+    assert found is not None, told
+    scale = float(found[1]) / float(found[2])
+    # all are moved there by 1 N, to the scale in the legend
+    np.testing.assert_allclose(np.linalg.norm(np.linalg.solve(scale * C, points.T), axis=0), 1.0)
+    assert float(found[3]) == pytest.approx(1e3 * np.linalg.norm(C, 2), rel=5e-3)
     with pytest.raises(cdsm.InvalidInput, match="another posture"):
         plots.plot_arm(random_posture(mixed_arm(), 4), stiffness=K)
     soft = cdsm.serpentine_cables(
@@ -95,6 +103,19 @@ def test_ellipsoid_shows_where_forces_move_the_tip() -> None:
     unstable = plots.plot_arm(loose, stiffness=cdsm.stiffness(loose, np.full(9, 300.0)))
     assert "UNSTABLE" in unstable.get_suptitle()
     assert not list(unstable.axes[0].collections)
+
+
+@pytest.mark.parametrize("softer", [1e-4, 1e-2, 0.5, 1.0, 2.9, 31.0, 1e5])
+def test_a_scale_is_a_power_of_ten_and_keeps_the_ellipsoid_in_sight(softer: float) -> None:
+    C = 1e-4 * softer * np.diag([1.0, 0.3, 0.1])
+    drawn = ellipsoid(C, np.zeros(3), 0.2)
+    assert drawn is not None
+    assert drawn.scale == 10.0 ** round(np.log10(drawn.scale))
+    size = float(np.linalg.norm(drawn.surface, axis=0).max())
+    assert 0.03 * 0.2 * (1.0 - 1e-9) <= size <= 0.3 * 0.2 * (1.0 + 1e-9)
+    # on a grid of 13 points from pole to pole the longest half axis, x, is met
+    assert size == pytest.approx(drawn.scale * 1e-4 * softer, rel=1e-12)
+    assert ellipsoid(0.0 * C, np.zeros(3), 0.2) is None
 
 
 def test_paper_figures_show_both_readings_in_newton_per_millimetre(

@@ -277,23 +277,89 @@ def test_a_slider_stays_within_its_range_and_its_sender_is_told(
     assert view._guard.refused == 0
 
 
-def test_only_sliders_and_buttons_take_values(view: View) -> None:
-    text = view._controls._text
+def test_only_controls_take_values_and_only_their_own(view: View) -> None:
+    text, switch = view._controls._text, view._controls._sag
     with Client(view) as enemy:
-        reset = enemy.control("Reset")
+        buttons = enemy.control("all")
         for control, value in (
             (text._impl.uuid, 1.0),
             ("no such", 1.0),
-            (reset, False),
-            (reset, 1.0),
-            (reset, [True] * 9),
+            (buttons, True),
+            (buttons, 1.0),
+            (buttons, "no such"),
+            (buttons, ["Reset"]),
+            (switch._impl.uuid, 1),
+            (switch._impl.uuid, "true"),
+            (switch._impl.uuid, None),
         ):
             enemy.change(control, {"value": value})
         settle(view, enemy)
-        assert view._guard.refused == 5
+        assert view._guard.refused == 9
         assert view._controls._force[0].handle.value == 0.5
-        enemy.change(reset, {"value": True})  # which everybody may press
+        assert switch.value is False
+        enemy.change(switch._impl.uuid, {"value": True})  # what everybody may do
+        wait_for(lambda: view.shown.setting.sag)
+        enemy.change(buttons, {"value": "Reset"})
         wait_for(lambda: view._controls._force[0].handle.value == 0.0)
+        wait_for(lambda: not view.shown.setting.sag)
+
+
+HERE = [0.2, 0.01, -0.03]
+DRAG = {"type": "TransformControlsUpdateMessage", "name": "/target", "owner": ""}
+CLICK = {"type": "ScenePointerMessage", "event_type": "click", "modifier": None}
+
+
+def test_a_client_drags_the_tip_and_nothing_else(view: View) -> None:
+    with Client(view) as friend:
+        friend.send({"type": "TransformControlsDragStartMessage", "name": "/target", "owner": ""})
+        friend.send(DRAG | {"wxyz": [1.0, 0.0, 0.0, 0.0], "position": HERE})
+        friend.send({"type": "TransformControlsDragEndMessage", "name": "/target", "owner": ""})
+        wait_for(lambda: tip_at(view, HERE))
+        assert view._guard.refused == 0
+        before = node(view, "/cables/0").points.copy()
+        turned = [math.nan, "x", None, 1e300]
+        # of a turned handle the place alone is taken
+        friend.send(DRAG | {"wxyz": turned, "position": [0.2, 0.0, 0.0]})
+        wait_for(lambda: tip_at(view, [0.2, 0.0, 0.0]))
+        assert node(view, "/target").wxyz.tolist() == [1.0, 0.0, 0.0, 0.0]
+        assert (node(view, "/cables/0").points != before).any()
+    places: list[Any] = [[math.nan, 0.0, 0.0], [1e300, 0.0, 0.0], HERE[:2], "abc", [True] * 3, {}]
+    hostile: list[dict[str, Any]] = [
+        DRAG | {"name": "/arm", "wxyz": [1.0, 0.0, 0.0, 0.0], "position": HERE},
+        {"type": "TransformControlsDragStartMessage", "name": "/arm", "owner": ""},
+        *(DRAG | {"wxyz": [1.0, 0.0, 0.0, 0.0], "position": place} for place in places),
+    ]
+    with Client(view) as enemy:
+        for message in hostile:
+            enemy.send(message)
+        settle(view, enemy)
+    assert view._guard.refused == len(hostile)
+    assert tip_at(view, [0.2, 0.0, 0.0])
+
+
+def test_a_click_names_the_cable_that_it_hits(view: View) -> None:
+    end = view.shown.posture.cable_paths[4][-1]  # type: ignore[union-attr]
+    ray = {"ray_origin": [0.1, -1.0, 0.3], "screen_pos": [[0.5, 0.5]]}
+    with Client(view) as friend:
+        way = [float(x) for x in end - np.array(ray["ray_origin"])]
+        friend.send(CLICK | ray | {"ray_direction": way})
+        wait_for(lambda: view._server.scene.get_handle_by_name("/names/4") is not None)
+        assert node(view, "/names/4").text.startswith("cable2_2: ")
+        friend.send(CLICK | ray | {"ray_direction": [0.0, 0.0, 1.0]})  # past the arm
+        wait_for(lambda: not node(view, "/names/4").visible)
+        assert view._guard.refused == 0
+        nowhere: list[Any] = [[math.inf, 0.0, 0.0], [0.0, 0.0, 0.0], None]
+        for place in nowhere:
+            friend.send(CLICK | ray | {"ray_direction": place})
+        friend.send(CLICK | ray | {"event_type": "rect-select"})
+        settle(view, friend)
+        assert view._guard.refused == 4
+
+
+def tip_at(view: View, place: list[float]) -> bool:
+    posture = view.shown.posture
+    assert posture is not None
+    return bool(np.allclose(posture.tip[:3, 3], place, atol=1e-9))  # sliders have 1e-9 degrees
 
 
 def test_every_other_message_of_viser_is_dropped(view: View) -> None:

@@ -1,0 +1,72 @@
+"""Name cables in the picture: all of them, or one that was clicked."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from cdsm.support.values import Array
+from cdsm.view.state import Shown
+
+if TYPE_CHECKING:
+    import viser
+
+_NEAR: Final = 0.012
+"""Angle [rad] between a clicked ray and a cable that it hits: some 12 pixels."""
+
+
+def clicked_cable(paths: Sequence[Array], origin: Array, direction: Array) -> int | None:
+    """Return the cable that is nearest to a ray from a camera, or None if none is near.
+
+    ``paths`` are as ``cable_paths`` of a posture; origin (3,) and direction (3,) are of the ray.
+    """
+    u = direction / np.linalg.norm(direction)
+    angles = [
+        min(_angle(start - origin, end - start, u) for start, end in pairwise(path))
+        for path in paths
+    ]
+    nearest = int(np.argmin(angles))
+    return nearest if angles[nearest] < _NEAR else None
+
+
+def _angle(start: Array, way: Array, u: Array) -> float:
+    """Return the smallest angle [rad] between a ray u from 0 and a short line from ``start``."""
+    across, off = way - (way @ u) * u, start - (start @ u) * u
+    part = float(np.clip(-(off @ across) / max(float(across @ across), 1e-300), 0.0, 1.0))
+    point = start + part * way
+    return float(np.arctan2(np.linalg.norm(np.cross(u, point)), u @ point))
+
+
+class CableNames:
+    """Labels at the ends of cables, with name and tension."""
+
+    def __init__(self, server: viser.ViserServer) -> None:
+        self._scene = server.scene
+        self._labels: dict[int, viser.LabelHandle] = {}
+        self.all = False
+        self.chosen: int | None = None
+
+    def choose(self, shown: Shown, origin: Array, direction: Array) -> None:
+        """Name the clicked cable alone; without one, no cable."""
+        if shown.posture is not None:
+            self.chosen = clicked_cable(shown.posture.cable_paths, origin, direction)
+
+    def update(self, shown: Shown) -> None:
+        """Write and move the labels that are wanted, and hide the others."""
+        pose, tensions = shown.posture, shown.tensions
+        wanted: set[int] = set()
+        if pose is not None:
+            chosen = set() if self.chosen is None else {self.chosen}
+            wanted = set(range(len(pose.cable_paths))) if self.all else chosen
+            for c in wanted:
+                if c not in self._labels:
+                    self._labels[c] = self._scene.add_label(f"/names/{c}", "")
+                name = pose.arm.cables[c].name
+                label = self._labels[c]
+                label.text = name if tensions is None else f"{name}: {tensions[c]:.4g} N"
+                label.position = pose.cable_paths[c][-1]
+        for c, label in self._labels.items():
+            label.visible = c in wanted

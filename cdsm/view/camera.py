@@ -1,0 +1,116 @@
+"""Fit the cameras of all browsers to the arm."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final, Self, final
+
+import numpy as np
+
+from cdsm.support.values import Array
+
+if TYPE_CHECKING:
+    import viser
+
+_FOV: Final = math.radians(45.0)
+"""Vertical field of view."""
+
+_FIRST: Final = np.array([0.2, -1.5, 0.75])
+"""First direction from the arm to the camera: at its side, a little above it."""
+
+_MARGIN = 1.3
+"""Radius of what the camera sees, over the radius of the arm."""
+
+_OUTSIDE, _SMALL = 1.3, 0.5
+"""Extent of the arm, over the fitted radius, beyond and below which the cameras are fitted anew."""
+
+_USUAL: Final = 1200, 900
+"""Width and height in pixels of the page for which the first camera is placed."""
+
+_PHONE = 576
+"""Width in pixels up to which viser shows the panel as a sheet over the lower part of the page."""
+
+_FREE = 0.4
+"""Part of the height of a phone that this sheet leaves free."""
+
+
+@final
+@dataclass(frozen=True)
+class Ball:
+    """Ball around points: middle (3,) [m] and radius [m]."""
+
+    middle: Array
+    radius: float
+
+    @classmethod
+    def around(cls, points: Array, least: float) -> Self:
+        """Build a ball around points (P, 3), with at least some radius."""
+        middle = (points.min(axis=0) + points.max(axis=0)) / 2.0
+        return cls(middle, max(float(np.linalg.norm(points - middle, axis=1).max()), least))
+
+    def fits(self, other: Ball) -> bool:
+        """Whether a camera that is fitted to this ball shows the other ball well."""
+        reach = float(np.linalg.norm(other.middle - self.middle)) + other.radius
+        return _SMALL * self.radius < reach < _OUTSIDE * self.radius
+
+
+def placed(ball: Ball, direction: Array, width: int, height: int) -> tuple[Array, Array]:
+    """Compute position and look-at point [m] of a camera that looks at a ball.
+
+    Args:
+        ball: What the camera shows.
+        direction: From the ball to the camera (3,), of any length.
+        width: Width of the page in pixels.
+        height: Height of the page in pixels.
+    """
+    free = _FREE if width <= _PHONE else 1.0
+    high = math.tan(_FOV / 2.0)
+    distance = _MARGIN * ball.radius / min(high * free, high * width / height)
+    back = direction / np.linalg.norm(direction)
+    up = np.array([0.0, 0.0, 1.0]) - back[2] * back
+    size = float(np.linalg.norm(up))
+    # the middle of the free part is above the middle of the page
+    shift = (1.0 - free) * distance * high * (up / size if size > 0.0 else up)
+    look_at = ball.middle - shift
+    return look_at + distance * back, look_at
+
+
+class Cameras:
+    """Cameras of all browsers of a viser server, fitted to a ball."""
+
+    def __init__(self, server: viser.ViserServer, ball: Ball) -> None:
+        self._server, self._ball = server, ball
+        self._set_first()
+        camera = server.initial_camera
+        camera.fov, camera.near, camera.far = _FOV, ball.radius / 50.0, 200.0 * ball.radius
+        server.on_client_connect(self._on_connect)
+
+    def follow(self, ball: Ball) -> None:
+        """Fit all cameras if the arm has left the picture or has become small in it."""
+        if not self._ball.fits(ball):
+            self._ball = ball
+            self._set_first()
+            for client in self._server.get_clients().values():
+                self.fit(client)
+
+    def fit(self, client: viser.ClientHandle) -> None:
+        """Fit one camera to the ball; its direction stays."""
+        camera = client.camera
+        self._place(client, camera.position - camera.look_at)
+
+    def _set_first(self) -> None:
+        camera = self._server.initial_camera
+        camera.position, camera.look_at = placed(self._ball, _FIRST, *_USUAL)
+
+    def _on_connect(self, client: viser.ClientHandle) -> None:
+        if client.camera.image_width <= _PHONE:
+            self._place(client, _FIRST)
+
+    def _place(self, client: viser.ClientHandle, direction: Array) -> None:
+        camera = client.camera
+        with client.atomic():
+            camera.position, look_at = placed(
+                self._ball, direction, camera.image_width, camera.image_height
+            )
+            camera.look_at = look_at

@@ -1,0 +1,100 @@
+"""Write what is shown as a command of the shell, or as lines of Python."""
+
+from __future__ import annotations
+
+import math
+import shlex
+from collections.abc import Iterable, Sequence
+from typing import Final
+
+from cdsm.manipulator import Manipulator
+from cdsm.support.format import JointUnits
+from cdsm.support.markup import element
+from cdsm.tension import DEFAULT_SOLVER
+from cdsm.view.state import Setting
+
+_COPY: Final = (
+    "getSelection().selectAllChildren(this.parentNode.querySelector('code'));"
+    "document.execCommand('copy')"
+)
+"""Copy the command. ``navigator.clipboard`` would need https on other machines."""
+
+_SAVE: Final = (
+    "const size=one=>one.width*one.height;"
+    "const picture=[...document.querySelectorAll('canvas')].sort((a,b)=>size(b)-size(a))[0];"
+    "picture.toBlob(blob=>{const link=document.createElement('a');"
+    "link.href=URL.createObjectURL(blob);link.download=document.title.split(':')[0]+'.png';"
+    "link.click();URL.revokeObjectURL(link.href)})"
+)
+"""Save the largest canvas, which is the scene."""
+
+_BUTTON: Final = "padding:0.3em 0.8em;margin-right:0.6em;cursor:pointer"
+_CODE: Final = "display:block;white-space:pre-wrap;overflow-wrap:anywhere;margin-bottom:0.6em"
+
+
+def command_line(arm: Manipulator, setting: Setting, arm_arguments: Sequence[str]) -> str:
+    """Write the command of the shell that prints what is shown at a setting.
+
+    ``arm_arguments`` describe the arm: its file, and options such as ``--rigidity``.
+    """
+    weighs = setting.sag and bool(setting.force.any())
+    options = {
+        "angles": _joined(_degrees(arm, setting)),
+        "min-tension": f"{setting.minimum:.12g}",
+        "max-tension": f"{setting.maximum:.12g}" if math.isfinite(setting.maximum) else "",
+        "force": _joined(setting.force.tolist()) if weighs else "",
+        "wrench": "" if weighs or not setting.force.any() else _joined(_wrench(setting)),
+        "solver": "" if setting.solver == DEFAULT_SOLVER else setting.solver,
+    }
+    given = [f"--{name}={value}" for name, value in options.items() if value]
+    return shlex.join(["cdsm", "weigh" if weighs else "stiffness", *arm_arguments, *given])
+
+
+def python_lines(setting: Setting) -> str:
+    """Write the lines of Python that compute what is shown at a setting of an arm ``arm``."""
+    wrench = f"[{_joined(_wrench(setting), ', ')}]"
+    bounds = [f"{setting.minimum:.12g}"]
+    bounds += [f"{setting.maximum:.12g}"] if math.isfinite(setting.maximum) else []
+    held = [] if setting.sag or not setting.force.any() else [f"wrench={wrench}"]
+    solver = [] if setting.solver == DEFAULT_SOLVER else [f"solver={setting.solver!r}"]
+    return "\n".join(
+        [
+            f"pose = arm.at([{_joined(setting.q.tolist(), ', ')}])",
+            f"tension = cdsm.distribute_tension({', '.join(['pose', *bounds, *held, *solver])})",
+            f"rest = cdsm.equilibrium(pose, tension, {wrench})"
+            if setting.sag
+            else "K = cdsm.stiffness(pose, tension)",
+        ]
+    )
+
+
+def command_text(arm: Manipulator, setting: Setting, arm_arguments: Sequence[str] | None) -> str:
+    """Write the end of the page: the command and buttons; Python without arguments of an arm."""
+    if arm_arguments is None:
+        where, command = "in Python", python_lines(setting)
+    else:
+        where, command = "in a shell", command_line(arm, setting, arm_arguments)
+    return str(
+        element(
+            "div",
+            element("div", f"The same {where}:", style="color:gray"),
+            element("code", command, style=_CODE, data_cdsm="command"),
+            element("button", "Copy", style=_BUTTON, onclick=_COPY),
+            element("button", "Save picture", style=_BUTTON, onclick=_SAVE),
+            style="padding:0 0.8em 0.8em;font-size:0.85em",
+        )
+    )
+
+
+def _degrees(arm: Manipulator, setting: Setting) -> list[float]:
+    """Return the joint coordinates in degrees, or mm where a joint slides."""
+    units = JointUnits(arm.slides).shown
+    return [x / unit for x, (_, unit) in zip(setting.q.tolist(), units, strict=True)]
+
+
+def _wrench(setting: Setting) -> list[float]:
+    return [*setting.force.tolist(), 0.0, 0.0, 0.0]
+
+
+def _joined(values: Iterable[float], separator: str = ",") -> str:
+    return separator.join(f"{value:z.12g}" for value in values)

@@ -1,0 +1,134 @@
+"""Build the panel of the page: controls that set the arm, and text about the arm."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from cdsm.manipulator import Manipulator
+from cdsm.plots.style import AXES
+from cdsm.support.values import Array
+from cdsm.view.command import command_text
+from cdsm.view.panel import page_text, tensions_text
+from cdsm.view.sliders import Range, Slider, joint_ranges, slider_range
+from cdsm.view.state import Setting, Shown
+
+if TYPE_CHECKING:
+    import viser
+
+    from cdsm.view.guard import Control
+
+_IN_FOLDER: Final = 10
+"""Number of joints in one folder. Only the first folder is open."""
+
+_STRAIGHT, _RESET, _FIT = "Straight", "Reset", "Fit camera"
+_HINT: Final = (
+    "All joints as near zero as they go; all controls as they were at the beginning; the whole arm "
+    "into the picture."
+)
+_SAG: Final = (
+    "Tension the cables without the force, lock the motors, then apply the force: the arm moves to "
+    "its equilibrium. Otherwise the tensions hold the posture under the force."
+)
+
+
+class Controls:
+    """Controls and text of an arm in the empty panel of a viser server.
+
+    ``arm_arguments`` describe the arm in a shell, see :func:`command_text`. ``limits`` [N] are the
+    largest lower bound of tension and the largest force of the sliders. ``force_scale`` [m/N] is
+    the length of the arrow of the force. A moved control calls ``changed`` from any thread.
+    ``fit`` fits the camera of a browser. ``admit`` receives every control that browsers may use.
+    """
+
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        arm: Manipulator,
+        start: Setting,
+        arm_arguments: Sequence[str] | None,
+        limits: tuple[float, float],
+        force_scale: float,
+        changed: Callable[[], None],
+        fit: Callable[[viser.ClientHandle], None],
+        admit: Callable[[Control], None],
+    ) -> None:
+        self._gui, self._start = server.gui, start
+        self._changed, self._fit, self._admit = changed, fit, admit
+        self._arm, self._arm_arguments, self._force_scale = arm, arm_arguments, force_scale
+        self._text = self._gui.add_html("", order=-1.0)  # above the path, which has 0
+        with self._gui.add_folder("Load"):
+            tension, force = limits
+            high = max(tension, start.minimum)
+            self._minimum = self._add(slider_range("least tension [N]", 0.0, high, start.minimum))
+            self._force = [
+                self._add(slider_range(f"force {axis} [N]", -force, force, f))
+                for axis, f in zip(AXES, start.force.tolist(), strict=True)
+            ]
+            self._sag = self.add_switch("let it sag", _SAG, start.sag)
+        ranges = joint_ranges(arm, start.q)
+        self._joints: list[Slider] = []
+        for first in range(0, len(ranges), _IN_FOLDER):
+            group = ranges[first : first + _IN_FOLDER]
+            name = f"Joints {first + 1} to {first + len(group)}" if len(ranges) > 1 else "Joint"
+            with self._gui.add_folder(name, expand_by_default=first == 0):
+                self._joints += [self._add(joint) for joint in group]
+        buttons = self._gui.add_button_group("all", (_STRAIGHT, _RESET, _FIT), hint=_HINT)
+        buttons.on_click(self._press)
+        admit(buttons)
+        with self._gui.add_folder("Cable tensions"):
+            self.names = self.add_switch(
+                "show names", "A click on a cable in the picture names this cable alone.", False
+            )
+            self._tensions = self._gui.add_html("")
+        self._command = self._gui.add_html("")
+
+    @property
+    def setting(self) -> Setting:
+        """Current values of all controls."""
+        return replace(
+            self._start,
+            q=np.array([joint.value for joint in self._joints]),
+            minimum=self._minimum.value,
+            force=np.array([component.value for component in self._force]),
+            sag=self._sag.value,
+        )
+
+    def update(self, shown: Shown, remark: str) -> None:
+        """Write the text about these results, and a remark."""
+        self._text.content = page_text(shown, self._force_scale, remark)
+        self._tensions.content = tensions_text(shown)
+        self._command.content = command_text(self._arm, shown.setting, self._arm_arguments)
+
+    def move(self, q: Array) -> None:
+        """Move the sliders of the joints to angles (nv,) [rad]."""
+        for joint, angle in zip(self._joints, q.tolist(), strict=True):
+            joint.move(angle)
+
+    def add_switch(self, label: str, hint: str, on: bool) -> viser.GuiCheckboxHandle:
+        """Add a switch."""
+        switch = self._gui.add_checkbox(label, on, hint=hint)
+        switch.on_update(lambda _: self._changed())
+        self._admit(switch)
+        return switch
+
+    def _add(self, ends: Range) -> Slider:
+        handle = self._gui.add_slider(ends.label, ends.low, ends.high, ends.step, ends.initial)
+        handle.precision = ends.digits  # the box beside the slider has room for no more
+        handle.on_update(lambda _: self._changed())
+        self._admit(handle)
+        return Slider(handle, ends)
+
+    def _press(self, event: viser.GuiEvent[viser.GuiButtonGroupHandle]) -> None:
+        if event.target.value == _STRAIGHT:
+            for joint in self._joints:
+                joint.straighten()
+        elif event.target.value == _RESET:
+            for slider in (*self._joints, *self._force, self._minimum):
+                slider.reset()
+            self._sag.value = self._start.sag  # type: ignore[misc]
+        elif event.client is not None:
+            self._fit(event.client)

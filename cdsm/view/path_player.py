@@ -1,0 +1,80 @@
+"""Play a path: joint angles or tip positions, sample by sample."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from cdsm.support.values import Array
+
+if TYPE_CHECKING:
+    import viser
+
+    from cdsm.view.guard import Control
+
+_FASTEST, _SPEED = 30.0, 10.0
+"""Largest and first speed [samples/s]."""
+
+_PLAY, _PAUSE = "Play", "Pause"
+
+
+class PathPlayer:
+    """Controls that play a path.
+
+    Args:
+        server: Where to add the controls.
+        path: One row per sample (S, …).
+        go: Moves the arm to a row, and returns when this is shown.
+        admit: Receives every control that browsers may use.
+    """
+
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        path: Array,
+        go: Callable[[Array], None],
+        admit: Callable[[Control], None],
+    ) -> None:
+        self._path, self._go = path, go
+        self._playing, self._closed = threading.Event(), threading.Event()
+        with server.gui.add_folder("Path", order=0.0):
+            last = float(len(path))
+            self._sample = server.gui.add_slider(f"sample of {len(path)}", 1.0, last, 1.0, 1.0)
+            self._speed = server.gui.add_slider("samples per s", 1.0, _FASTEST, 1.0, _SPEED)
+            self._button = server.gui.add_button(
+                _PLAY, hint="From here; from the start at the end."
+            )
+        self._sample.on_update(self._on_sample)
+        self._button.on_click(self._on_click)
+        for control in (self._sample, self._speed, self._button):
+            admit(control)
+        self._thread = threading.Thread(target=self._run, name="cdsm path", daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Stop playing, for ever."""
+        self._closed.set()
+        self._playing.set()
+        self._thread.join()
+
+    def _on_sample(self, _: object) -> None:
+        self._go(self._path[round(self._sample.value) - 1])
+
+    def _on_click(self, _: object) -> None:
+        self._play(not self._playing.is_set())
+
+    def _play(self, on: bool) -> None:
+        if on and round(self._sample.value) == len(self._path):
+            self._sample.value = 1.0  # type: ignore[misc]
+        self._button.label = _PAUSE if on else _PLAY
+        (self._playing.set if on else self._playing.clear)()
+
+    def _run(self) -> None:
+        while self._playing.wait() and not self._closed.wait(1.0 / self._speed.value):
+            if not self._playing.is_set():
+                continue
+            if round(self._sample.value) >= len(self._path):
+                self._play(False)
+            else:
+                self._sample.value += 1.0  # type: ignore[misc]

@@ -1,0 +1,35 @@
+"""Run a job in a thread on request, and only once for many requests."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+from collections.abc import Callable
+from concurrent import futures
+
+
+class Worker:
+    """A thread that runs a job on request. All requests during a run cause one further run.
+
+    Many threads request runs, faster than the job ends. It reads the newest state when it starts.
+    """
+
+    def __init__(self, job: Callable[[], None]) -> None:
+        self._job = job
+        self._thread = futures.ThreadPoolExecutor(1, "cdsm view")
+        self._lock = threading.Lock()
+        self._last: futures.Future[None] | None = None
+
+    def request(self) -> None:
+        """Request a run of the job. Any thread may call this; after the end nothing happens."""
+        with self._lock, contextlib.suppress(RuntimeError):  # the thread has ended
+            if self._last is None or self._last.running() or self._last.done():
+                self._last = self._thread.submit(self._job)
+
+    def wait(self) -> None:
+        """Wait until all requests made before are done."""
+        futures.wait([self._last] if self._last else [])
+
+    def close(self) -> None:
+        """Wait until all requests made before are done, and refuse further ones."""
+        self._thread.shutdown()
