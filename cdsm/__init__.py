@@ -74,6 +74,9 @@ if TYPE_CHECKING:
     from cdsm.sweeps.run import sweep
     from cdsm.sweeps.status import SweepStatus
     from cdsm.tension import Tension, distribute_tension
+    from cdsm.tolerances.budget import Uncertainty, uncertainty
+    from cdsm.tolerances.monte_carlo import MonteCarlo, monte_carlo
+    from cdsm.tolerances.tolerance import Tolerance, Tolerances
     from cdsm.urdf import to_urdf, write_urdf
     from cdsm.wires.files import read_elasticity, write_elasticity
     from cdsm.wires.laws import StrandElasticity, TabulatedElasticity
@@ -120,6 +123,7 @@ __all__ = [
     "MissingWire",
     "Modes",
     "MomentArms",
+    "MonteCarlo",
     "PathPlan",
     "PathPoses",
     "PoseSet",
@@ -148,6 +152,9 @@ __all__ = [
     "TensileTestError",
     "Tension",
     "Tensions",
+    "Tolerance",
+    "Tolerances",
+    "Uncertainty",
     "UnknownName",
     "UnreachableStiffness",
     "UrdfError",
@@ -164,6 +171,7 @@ __all__ = [
     "in_series",
     "inverse_kinematics",
     "modes",
+    "monte_carlo",
     "plan_path",
     "plan_stiffness",
     "presets",
@@ -184,6 +192,7 @@ __all__ = [
     "sweep_to_pandas",
     "to_mjcf",
     "to_urdf",
+    "uncertainty",
     "weight_test",
     "write_cables",
     "write_elasticity",
@@ -235,6 +244,9 @@ _NAMES = {
     "sweeps.run": "sweep",
     "sweeps.status": "SweepStatus",
     "tension": "Tension distribute_tension",
+    "tolerances.budget": "Uncertainty uncertainty",
+    "tolerances.monte_carlo": "MonteCarlo monte_carlo",
+    "tolerances.tolerance": "Tolerance Tolerances",
     "urdf": "to_urdf write_urdf",
     "wires.files": "read_elasticity write_elasticity",
     "wires.laws": "StrandElasticity TabulatedElasticity",

@@ -224,6 +224,7 @@ K = cdsm.stiffness(POSE, PULL)
 SHARES = K.shares((0.0, 0.3, 1.0))
 WEIGHT = cdsm.weight_test(POSE, PULL, (0.0, 0.0, -1.0), steps=2)
 PULLS = cdsm.distribute_tensions(POSE.arm, [POSE.q, POSE.q / 2.0], minimum=10.0)
+TOLERANCES = cdsm.Tolerances(rigidity=0.05, hole_radius=1e-4)
 RESULTS: dict[str, Any] = {
     "Posture": POSE,
     "Tension": PULL,
@@ -252,6 +253,10 @@ RESULTS: dict[str, Any] = {
         POSE.arm, (0.0, 0.3, 1.0), K.along((0.0, 0.3, 1.0)), 10.0, 200.0, angles=[POSE.q] * 2
     ).between[0],
     "Saturation": cdsm.saturation(POSE, (0.0, 0.3, 1.0), 10.0, 200.0),
+    "Uncertainty": cdsm.uncertainty(POSE, PULL, TOLERANCES, direction=(0.0, 0.3, 1.0)),
+    "MonteCarlo": cdsm.monte_carlo(
+        POSE, PULL, TOLERANCES, direction=(0.0, 0.3, 1.0), draws=100, progress=False
+    ),
     "CriticalTension": cdsm.critical_tension(POSE),
     "Tensions": PULLS,
     "Batch": cdsm.evaluate(
@@ -291,10 +296,11 @@ def attributes(result: Any) -> list[str]:
 
 
 def arrays(result: Any) -> Iterator[tuple[str, Array]]:
-    """Every array a result gives out, those inside tuples included."""
+    """Every array a result gives out, those inside tuples and dictionaries included."""
     for name in attributes(result):
         value = getattr(result, name)
-        for part in value if isinstance(value, tuple) else (value,):
+        many = value.values() if isinstance(value, dict) else value
+        for part in many if isinstance(value, (tuple, dict)) else (value,):
             if isinstance(part, np.ndarray):
                 yield name, part
 

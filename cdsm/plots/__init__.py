@@ -6,6 +6,7 @@ state of matplotlib.
 """
 
 from cdsm.plots.arm import plot_arm
+from cdsm.plots.budget import plot_monte_carlo, plot_uncertainty
 from cdsm.plots.by_cable import plot_shares, plot_stiffness_plan, plot_stiffness_range
 from cdsm.plots.loads import plot_bifurcation, plot_critical_tension, plot_weight_test
 from cdsm.plots.maps import plot_map
@@ -27,6 +28,7 @@ __all__ = [
     "plot_elasticity",
     "plot_map",
     "plot_modes",
+    "plot_monte_carlo",
     "plot_paper",
     "plot_path",
     "plot_path_plan",
@@ -35,6 +37,7 @@ __all__ = [
     "plot_stiffness_plan",
     "plot_stiffness_range",
     "plot_stiffness_ranges",
+    "plot_uncertainty",
     "plot_weight_test",
     "save_figure",
 ]

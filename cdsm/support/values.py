@@ -37,7 +37,8 @@ class ReadOnlyState(Printed):
 
     def __setstate__(self, state: dict[str, object]) -> None:
         for value in state.values():
-            for array in value if isinstance(value, tuple) else (value,):
+            parts = tuple(value.values()) if isinstance(value, dict) else value
+            for array in parts if isinstance(parts, tuple) else (parts,):
                 if isinstance(array, np.ndarray):
                     frozen(array)
         self.__dict__.update(state)

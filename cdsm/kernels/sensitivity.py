@@ -1,0 +1,384 @@
+"""Numba kernel of the derivatives of a stiffness by everything that an arm is built from.
+
+Every reading of a stiffness has one quantity in common: with a fixed joint motion z,
+
+    Φ = zᵀ K_θ z = Σ_c (F_c L̈_c + k_c L̇_c²) − Σ_b m_b γ·ẍ_b − f·ẍ_tip − m·ω̇_tip,
+
+where a dot is the derivative along q̇ = z, q̈ = 0. The smallest eigenvalue of K_θ has the gradient
+of Φ with z its eigenvector. For the compliance c = uᵀ J_v K_θ⁻¹ J_vᵀ u, z = K_θ⁻¹ J_vᵀ u gives
+
+    dc = −dΨ,    Ψ = Φ − 2 u·ẋ_tip.
+
+Ψ depends only on places x, velocities ẋ and accelerations ẍ of points that links carry: cable
+sites, centres of mass and the tip. The kernel finds its derivatives X, V, A by these three, point
+by point, and then turns them into derivatives by what moves the points:
+
+- by the position of a point in its link. A displacement δ changes x by δ, ẋ by ω × δ and ẍ by ω̇ × δ
+  + ω × (ω × δ).
+- by the origin of a joint in its parent link: the sum of the same over all points beyond it.
+- by a joint angle: the points beyond the joint turn, and their motion relative to the parent link
+  turns with them.
+
+One pass over the cables and one over the points of each joint give all derivatives together, where
+differences would take two evaluations of K_θ for each.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from cdsm.kernels.compiling import Index, compiled, inner
+from cdsm.kernels.tree import Indices, Routing, Tree, empty_frames, forward_kinematics
+from cdsm.support.values import Array
+
+
+class _Motion(NamedTuple):
+    """Motion of all joint frames along q̇ = z: ω, ω̇, and ȯ and ö of the origins, (nv+1, 3) each."""
+
+    turning: Array
+    turning_rate: Array
+    velocity: Array
+    acceleration: Array
+
+
+@inner
+def _cross(a: Array, b: Array, product: Array) -> None:
+    """Fill a × b (3,)."""
+    product[0] = a[1] * b[2] - a[2] * b[1]
+    product[1] = a[2] * b[0] - a[0] * b[2]
+    product[2] = a[0] * b[1] - a[1] * b[0]
+
+
+@inner
+def _dot(a: Array, b: Array) -> float:
+    return float(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
+
+
+@inner
+def _move(
+    turning: Array, turning_rate: Array, arm: Array, velocity: Array, acceleration: Array
+) -> None:
+    """Fill ω × r and ω̇ × r + ω × (ω × r) (3,) of a point at r from the origin of a moving frame."""
+    _cross(turning, arm, velocity)
+    w, e, v, r = turning, turning_rate, velocity, arm
+    acceleration[0] = e[1] * r[2] - e[2] * r[1] + w[1] * v[2] - w[2] * v[1]
+    acceleration[1] = e[2] * r[0] - e[0] * r[2] + w[2] * v[0] - w[0] * v[2]
+    acceleration[2] = e[0] * r[1] - e[1] * r[0] + w[0] * v[1] - w[1] * v[0]
+
+
+@inner
+def _set_motion(
+    tree: Tree, origin: Array, axis: Array, slide: Array, z: Array, motion: _Motion
+) -> None:
+    """Fill the motion of the joint frames (nv+1, 3), base first."""
+    turning, rate, velocity, acceleration = motion
+    arm, v, a, way = np.empty(3), np.empty(3), np.empty(3), np.zeros(3)
+    for k in range(tree.order.shape[0]):
+        i = tree.order[k]
+        before, speed = tree.parent[i], z[i - 1]
+        for r in range(3):
+            arm[r] = origin[i, r] - origin[before, r]
+            if slide.shape[0]:
+                way[r] = slide[i, r] * speed
+        _move(turning[before], rate[before], arm, v, a)
+        for r in range(3):
+            velocity[i, r] = velocity[before, r] + v[r] + way[r]
+            acceleration[i, r] = acceleration[before, r] + a[r]
+            turning[i, r] = turning[before, r] + axis[i, r] * speed
+        _cross(turning[before], way, v)
+        for r in range(3):
+            acceleration[i, r] += 2.0 * v[r]
+        _cross(turning[before], axis[i], v)
+        for r in range(3):
+            rate[i, r] = rate[before, r] + v[r] * speed
+
+
+@inner
+def _add_cable(
+    begin: Index,
+    end: Index,
+    tension: float,
+    stiffness: float,
+    slope: float,
+    pull: float,
+    point: Array,
+    weight: Array,
+) -> tuple[float, float]:
+    """Add the derivatives of F L̈ + k L̇² + p L̇ of one cable; return L̈ and L̇.
+
+    ``point`` and ``weight`` (N, 3, 3) hold x, ẋ, ẍ and the derivatives by them. ``slope`` is ∂k/∂L.
+    """
+    rate = bend = 0.0
+    u, v, w = np.empty(3), np.empty(3), np.empty(3)
+    for turn in range(2):  # first L̇, which the derivatives need
+        by_rate, by_length = 2.0 * stiffness * rate + pull, slope * rate * rate
+        for a in range(begin, end - 1):
+            b = a + 1
+            for r in range(3):
+                u[r] = point[b, 0, r] - point[a, 0, r]
+                v[r] = point[b, 1, r] - point[a, 1, r]
+                w[r] = point[b, 2, r] - point[a, 2, r]
+            length = math.sqrt(_dot(u, u))
+            for r in range(3):
+                u[r] /= length
+            along, square, drift = _dot(u, v), _dot(v, v), _dot(u, w)
+            if turn == 0:
+                rate += along
+                bend += (square - along * along) / length + drift
+                continue
+            for r in range(3):
+                across = (v[r] - along * u[r]) / length  # ∂ℓ̇/∂x
+                by_x = (
+                    -2.0 * along * across / length
+                    - (square - along * along) / (length * length) * u[r]
+                    + (w[r] - drift * u[r]) / length
+                )
+                x = tension * by_x + by_rate * across + by_length * u[r]
+                xdot = 2.0 * tension * across + by_rate * u[r]
+                weight[b, 0, r] += x
+                weight[a, 0, r] -= x
+                weight[b, 1, r] += xdot
+                weight[a, 1, r] -= xdot
+                weight[b, 2, r] += tension * u[r]
+                weight[a, 2, r] -= tension * u[r]
+    return bend, rate
+
+
+@inner
+def _pull_back(turning: Array, rate: Array, weight: Array, scratch: Array, pulled: Array) -> None:
+    """Fill X + V × ω + A × ω̇ + (A × ω) × ω (3,): the derivative by a displacement in a frame."""
+    X, V, A = weight[0], weight[1], weight[2]
+    _cross(A, turning, scratch)
+    w, e, s = turning, rate, scratch
+    for r in range(3):
+        p, q = (r + 1) % 3, (r + 2) % 3
+        pulled[r] = X[r] + (V[p] + s[p]) * w[q] - (V[q] + s[q]) * w[p] + A[p] * e[q] - A[q] * e[p]
+
+
+@inner
+def _by_joint(
+    i: Index,
+    before: Index,
+    frames: tuple[Array, Array, Array],
+    motion: _Motion,
+    row: Indices,
+    beyond: Array,
+    point: Array,
+    weight: Array,
+    spin: Array,
+    spin_rate: Array,
+    tip: Index,
+    placement: Array,
+) -> float:
+    """Fill the derivative by the origin of joint i (3,) in base axes; return that by its angle.
+
+    ``beyond`` (nv+1,) marks the rows that joint i moves. ``spin`` and ``spin_rate`` (3,) are the
+    derivatives by ω and ω̇ of the tip.
+    """
+    origin, axis, slide = frames
+    turning, rate, velocity, acceleration = motion
+    w, e = turning[before], rate[before]
+    arm, v, a, back, scratch = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    total, moment = np.zeros(3), np.zeros(3)
+    # the joint's own slide moves its origin beyond the point fixed to the parent
+    for n in range(row.shape[0]):
+        if beyond[row[n]] == 0.0:
+            continue
+        _pull_back(w, e, weight[n], scratch, back)  # leaves A × ω in scratch
+        for r in range(3):
+            total[r] += back[r]
+            arm[r] = point[n, 0, r] - origin[before, r]
+        _move(w, e, arm, v, a)
+        for r in range(3):  # motion relative to the parent link, then Coriolis
+            v[r] = point[n, 1, r] - velocity[before, r] - v[r]
+        for r in range(3):
+            p, q = (r + 1) % 3, (r + 2) % 3
+            a[r] = (
+                point[n, 2, r] - acceleration[before, r] - a[r] - 2.0 * (w[p] * v[q] - w[q] * v[p])
+            )
+            arm[r] = point[n, 0, r] - origin[i, r]
+            scratch[r] = weight[n, 1, r] + 2.0 * scratch[r]
+        A = weight[n, 2]
+        for r in range(3):
+            p, q = (r + 1) % 3, (r + 2) % 3
+            moment[r] += (
+                arm[p] * back[q]
+                - arm[q] * back[p]
+                + v[p] * scratch[q]
+                - v[q] * scratch[p]
+                + a[p] * A[q]
+                - a[q] * A[p]
+            )
+    if beyond[tip] != 0.0:  # ω and ω̇ of the tip
+        _cross(spin_rate, w, scratch)
+        for r in range(3):
+            v[r] = turning[tip, r] - w[r]
+            scratch[r] += spin[r]
+        for r in range(3):
+            p, q = (r + 1) % 3, (r + 2) % 3
+            a[r] = rate[tip, r] - e[r] - (w[p] * v[q] - w[q] * v[p])
+        for r in range(3):
+            p, q = (r + 1) % 3, (r + 2) % 3
+            moment[r] += v[p] * scratch[q] - v[q] * scratch[p]
+            moment[r] += a[p] * spin_rate[q] - a[q] * spin_rate[p]
+    for r in range(3):
+        placement[r] = total[r]
+    derivative = _dot(axis[i], moment)
+    return derivative + _dot(slide[i], total) if slide.shape[0] else derivative
+
+
+@inner
+def _to_frame(rotation: Array, vector: Array, turned: Array) -> None:
+    """Fill Rᵀ v (3,): a vector in base axes, in the axes of a joint frame."""
+    for r in range(3):
+        turned[r] = (
+            rotation[0, r, 0] * vector[0]
+            + rotation[1, r, 0] * vector[1]
+            + rotation[2, r, 0] * vector[2]
+        )
+
+
+@compiled
+def single_gradient(
+    parent: Indices,
+    order: Indices,
+    turn: Array,
+    translation: Array,
+    joint_axis: Array,
+    joint_slide: Array,
+    row: Indices,
+    point: Array,
+    segment: Indices,
+    joint: Indices,
+    fixed: Array,
+    mass: Array,
+    centre: Array,
+    gravity: Array,
+    tip: int,
+    tip_joints: Indices,
+    tip_rotation: Array,
+    tip_point: Array,
+    q: Array,
+    first: Indices,
+    z: Array,
+    velocity: Array,
+    tension: Array,
+    stiffness: Array,
+    slope: Array,
+    pull: Array,
+    wrench: Array,
+    bent: float,
+    turned: float,
+) -> tuple[float, Array, Array, Array, Array, Array, Array, Array, Array]:
+    """Compute Ψ of one posture, and its derivatives while z, v, p and W are constant.
+
+        Ψ = Σ_c (F_c L̈_c + k_c L̇_c² + p_c L̇_c) + v·ẋ_tip
+            − a (Σ_b m_b γ·ẍ_b + f·ẍ_tip + m·ω̇_tip) − b (Σ_b m_b γ·ẋ_b + f·ẋ_tip + m·ω_tip)
+
+    With a = 1 and p = b = 0 it is zᵀ K_θ z + v·ẋ_tip. With F = k = v = a = 0, b = 1 and p the
+    tensions, it is the work of the torque out of balance (Eq. 13) on the motion z.
+
+    The first arguments are those of :func:`~cdsm.kernels.posture.single_pose`. ``first`` (C+1,) is
+    the first site of each cable, ``z`` (nv,) the joint motion, ``velocity`` v (3,), ``stiffness``
+    k (C,), ``slope`` ∂k/∂L (C,), ``pull`` p (C,), ``bent`` a and ``turned`` b.
+
+    Returns:
+        Ψ, and its derivatives by q (nv,), by the site positions in the frames of their joints (P,
+        3), by the origins of the joints in their parents (nv+1, 3), by the centres of mass (nv+1,
+        3), by the tip's position (3,), by the masses (nv+1,), by tension at constant k (C,), and by
+        k (C,). The derivative by the length of a straight lead is ``slope`` times the last one.
+    """
+    tree = Tree(parent, order, turn, translation, joint_axis, joint_slide)
+    routing = Routing(row, point, segment, joint, fixed)
+    frames = empty_frames(tree, routing, 1)
+    rows, sites, nv = parent.shape[0], row.shape[0], q.shape[0]
+    rotation = np.empty((rows, 3, 3, 1))
+    forward_kinematics(tree, routing, q.reshape(nv, 1), np.empty((2, 1)), rotation, frames, None)
+    origin, axis = frames.origin.reshape(rows, 3), frames.axis.reshape(rows, 3)
+    slide = frames.slide.reshape(joint_slide.shape[0], 3)
+    motion = _Motion(
+        np.zeros((rows, 3)), np.zeros((rows, 3)), np.zeros((rows, 3)), np.zeros((rows, 3))
+    )
+    _set_motion(tree, origin, axis, slide, z, motion)
+    turning, rate, moving, acceleration = motion
+    # all points that matter: sites, centres of mass, tip
+    count = sites + rows + 1
+    at = np.empty(count, dtype=np.intp)
+    x, weight = np.empty((count, 3, 3)), np.zeros((count, 3, 3))
+    arm, v, a = np.empty(3), np.empty(3), np.empty(3)
+    for n in range(count):
+        at[n] = row[n] if n < sites else n - sites if n < sites + rows else tip
+        i = at[n]
+        for r in range(3):
+            if n < sites:
+                arm[r] = frames.site[n, r, 0] - origin[i, r]
+            else:
+                local = centre[i] if n < sites + rows else tip_point
+                arm[r] = (
+                    rotation[i, r, 0, 0] * local[0]
+                    + rotation[i, r, 1, 0] * local[1]
+                    + rotation[i, r, 2, 0] * local[2]
+                )
+        _move(turning[i], rate[i], arm, v, a)
+        for r in range(3):
+            x[n, 0, r] = origin[i, r] + arm[r]
+            x[n, 1, r] = moving[i, r] + v[r]
+            x[n, 2, r] = acceleration[i, r] + a[r]
+    value = 0.0
+    by_tension, by_stiffness = np.empty(tension.shape[0]), np.empty(tension.shape[0])
+    for c in range(tension.shape[0]):
+        bend, speed = _add_cable(
+            first[c], first[c + 1], tension[c], stiffness[c], slope[c], pull[c], x, weight
+        )
+        by_tension[c], by_stiffness[c] = bend, speed * speed
+        value += tension[c] * bend + stiffness[c] * speed * speed + pull[c] * speed
+    by_mass = np.empty(rows)
+    for i in range(rows):
+        n = sites + i
+        by_mass[i] = -bent * _dot(gravity, x[n, 2]) - turned * _dot(gravity, x[n, 1])
+        value += mass[i] * by_mass[i]
+        for r in range(3):
+            weight[n, 1, r] = -turned * mass[i] * gravity[r]
+            weight[n, 2, r] = -bent * mass[i] * gravity[r]
+    last, spin, spin_rate = count - 1, np.empty(3), np.empty(3)
+    for r in range(3):
+        weight[last, 1, r] = velocity[r] - turned * wrench[r]
+        weight[last, 2, r] = -bent * wrench[r]
+        spin[r] = -turned * wrench[3 + r]
+        spin_rate[r] = -bent * wrench[3 + r]
+        value += weight[last, 1, r] * x[last, 1, r] + weight[last, 2, r] * x[last, 2, r]
+    value += _dot(spin, turning[tip]) + _dot(spin_rate, rate[tip])
+    by_q, by_site, by_centre = np.empty(nv), np.empty((sites, 3)), np.empty((rows, 3))
+    by_origin, by_tip, back, scratch = np.zeros((rows, 3)), np.empty(3), np.empty(3), np.empty(3)
+    for n in range(count):
+        i = at[n]
+        _pull_back(turning[i], rate[i], weight[n], scratch, back)
+        into = by_site[n] if n < sites else by_centre[i] if n < sites + rows else by_tip
+        _to_frame(rotation[i], back, into)
+    beyond = np.empty(rows)
+    for k in range(rows - 1):
+        i = order[k]
+        for other in range(rows):
+            beyond[other] = 0.0
+        beyond[i] = 1.0
+        for other in range(k + 1, rows - 1):
+            beyond[order[other]] = beyond[parent[order[other]]]
+        by_q[i - 1] = _by_joint(
+            i,
+            parent[i],
+            (origin, axis, slide),
+            motion,
+            at,
+            beyond,
+            x,
+            weight,
+            spin,
+            spin_rate,
+            tip,
+            back,
+        )
+        _to_frame(rotation[parent[i]], back, by_origin[i])
+    return value, by_q, by_site, by_origin, by_centre, by_tip, by_mass, by_tension, by_stiffness

@@ -1,0 +1,71 @@
+"""Plot budgets of uncertainty and Monte Carlo runs."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from cdsm.plots.style import COLORS, expect, panels
+
+if TYPE_CHECKING:
+    from cdsm.tolerances.budget import Uncertainty
+    from cdsm.tolerances.monte_carlo import MonteCarlo
+
+
+def plot_uncertainty(budget: Uncertainty) -> Figure:
+    """Plot the contribution of each source to the standard uncertainty, and their root sum square.
+
+    Args:
+        budget: Result of :func:`~cdsm.uncertainty`.
+
+    Raises:
+        InvalidInput: ``budget`` is not a budget.
+    """
+    expect("budget", budget, "Uncertainty")
+    unit, size = budget.question.unit
+    named = {source.replace("_", " "): u / size for source, u in budget.contributions.items() if u}
+    bars = named | {"all together": budget.standard_uncertainty / size}
+    figure, ((axes,),) = panels(7.0, 1.2 + 0.34 * len(bars), 1)
+    colors = [COLORS[0]] * len(named) + [COLORS[1]]
+    drawn = axes.barh(list(bars), list(bars.values()), color=colors, height=0.65)
+    axes.bar_label(drawn, fmt="%.3g", padding=4)
+    axes.invert_yaxis()
+    axes.margins(x=0.12)
+    axes.set_axisbelow(True)
+    axes.grid(visible=False, axis="y")
+    axes.set(xlabel=f"standard uncertainty [{unit}]")
+    axes.set_title(f"{budget.question.name}: {budget.value / size:.4g} {unit}", fontsize=11)
+    return figure
+
+
+def plot_monte_carlo(run: MonteCarlo) -> Figure:
+    """Plot the distribution of the drawn values, and the normal distribution of first order.
+
+    Args:
+        run: Result of :func:`~cdsm.monte_carlo`.
+
+    Raises:
+        InvalidInput: ``run`` is not a Monte Carlo run.
+    """
+    expect("run", run, "MonteCarlo")
+    (unit, size), first = run.budget.question.unit, run.budget
+    figure, ((axes,),) = panels(7.0, 4.0, 1)
+    values, u = run.values / size, first.standard_uncertainty / size
+    low, high = np.quantile(values, [0.0005, 0.9995])
+    shown = values[(values >= low) & (values <= high)]
+    axes.hist(shown, 80, density=True, color=COLORS[0], alpha=0.45, label="Monte Carlo")
+    if u > 0.0:
+        x = np.linspace(low, high, 300)
+        z = (x - first.value / size) / u
+        density = np.exp(-z * z / 2.0) / (u * np.sqrt(2.0 * np.pi))
+        axes.plot(x, density, color=COLORS[1], label="first order")
+    for interval, color in ((run.interval(), COLORS[0]), (first.interval(), COLORS[1])):
+        for end in interval:
+            axes.axvline(end / size, color=color, linestyle="--", linewidth=1.0)
+    axes.set(xlabel=f"{first.question.name} [{unit}]", ylabel=f"probability density [1/({unit})]")
+    axes.set_yticks([])
+    axes.set_ylim(top=1.25 * axes.get_ylim()[1])
+    axes.legend(title="dashed: 95 % intervals", loc="upper right")
+    return figure

@@ -1,0 +1,116 @@
+"""Gradients of tensions that are distributed anew: of one cable, and at which the arm buckles.
+
+The tensions of free cables are F_f = Bᵀ λ with B F_f = τ − B_b F_b (Eqs. 13, 17), B = J_Lᵀ of the
+free cables, b the cables at a bound. For weights y of the tensions, μ = (B Bᵀ)⁻¹ B y_f and
+r = y_f − Bᵀ μ,
+
+    Σ y_c dF_c = r·dBᵀ λ + μ·(dτ − dJ_Lᵀ F).
+
+Both terms are derivatives of work at constant tensions: of Σ r_c L̇_c on the motion λ, and of the
+torque out of balance on the motion −μ. So the kernel of the stiffness gives them too. The formula
+holds while the same cables stay at their bounds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cdsm.errors import InvalidInput
+from cdsm.kernels.sensitivity import single_gradient
+from cdsm.kernels.tension import OPTIMALITY
+from cdsm.support.values import Array
+from cdsm.tension import Tension
+from cdsm.tolerances.inputs import Inputs
+
+_NO_VELOCITY = np.zeros(3)
+
+_DETERMINED = 1e-12
+"""Smaller singular values of B Bᵀ, over the largest: the free cables do not balance the arm."""
+
+
+class Balance(NamedTuple):
+    """Free cables of a tension distribution, and (B Bᵀ)⁻¹ of their B."""
+
+    tension: Tension
+    free: NDArray[np.bool_]
+    inverse: Array
+
+    @classmethod
+    def of(cls, tension: Tension) -> Balance:
+        """Find the free cables; raise InvalidInput if they alone do not determine the balance."""
+        F = tension.values
+        near = OPTIMALITY * F.max(initial=0.0)
+        free = (F - tension.minimum > near) & (tension.maximum - F > near)
+        B = tension.posture.length_jacobian[free].T
+        singular = np.linalg.svd(B @ B.T, compute_uv=False)
+        if not tension.least or singular[-1] <= _DETERMINED * singular[0]:
+            raise InvalidInput(
+                "tension",
+                "has no gradient: so many cables are at a bound that the others do not determine "
+                "it, or it was not distributed as the least. Lower the minimum.",
+            )
+        return cls(tension, free, np.linalg.inv(B @ B.T))
+
+    def multipliers(self, weights: Array) -> Array:
+        """Compute μ (nv,) of weights y (C,)."""
+        B = self.tension.posture.length_jacobian[self.free].T
+        return np.asarray(self.inverse @ (B @ weights[self.free]))
+
+    def by_bound(self, weights: Array) -> float:
+        """Compute Σ y_c dF_c/dF_min if one lower bound of all cables rises."""
+        low = self.tension.values - self.tension.minimum
+        held = ~self.free & (low <= OPTIMALITY * self.tension.values.max(initial=0.0))
+        J = self.tension.posture.length_jacobian
+        return float(weights[held].sum() - self.multipliers(weights) @ J[held].sum(axis=0))
+
+    def gradient(self, inputs: Inputs, weights: Array) -> dict[str, Array]:
+        """Compute the derivatives of Σ y_c F_c by source; 0 by tension, rigidity and lead."""
+        F, free = self.tension.values, self.free
+        B = self.tension.posture.length_jacobian[free].T
+        mu = self.multipliers(weights)
+        rest = np.zeros_like(F)
+        rest[free] = weights[free] - B.T @ mu
+        motion = self.inverse @ (B @ F[free])
+        found = self._work(inputs, motion, rest, 0.0)
+        balance = self._work(inputs, -mu, F, 1.0)
+        return {name: found[name] + balance[name] for name in found}
+
+    def _work(self, inputs: Inputs, motion: Array, pull: Array, loaded: float) -> dict[str, Array]:
+        """Compute the derivatives of Σ p_c L̇_c, plus gravity and load if wanted, by source."""
+        pose, none = self.tension.posture, np.zeros_like(pull)
+        arguments: tuple[Any, ...] = (
+            *pose.arm._model.arrays,
+            *(pose.q, inputs.first, motion, _NO_VELOCITY),
+            *(none, none, none, pull, self.tension.wrench, 0.0, loaded),
+        )
+        _, by_q, *by_places, by_mass, _, _ = single_gradient(*arguments)
+        along = np.concatenate([place.ravel() for place in by_places])
+        return {
+            "rigidity": none,
+            "joint_angle": by_q,
+            "tension": none,
+            "lead": none,
+            "link_mass": by_mass[inputs.link_rows],
+            **inputs.by_source(along),
+        }
+
+
+def buckling_gradient(
+    balance: Balance, inputs: Inputs, margin: Mapping[str, Array]
+) -> dict[str, Array]:
+    """Compute the derivatives of the lower bound at which the smallest eigenvalue is zero.
+
+    ``margin`` holds the derivatives of the eigenvalue at constant tensions. With y its derivatives
+    by the tensions, dF_min = −(∂λ + Σ y_c dF_c)/(Σ y_c dF_c/dF_min). The tensions are those of the
+    distribution, so a measured tension does not matter.
+    """
+    weights = margin["tension"]
+    moved, slope = balance.gradient(inputs, weights), balance.by_bound(weights)
+    return {
+        name: np.zeros_like(g) if name == "tension" else -(g + moved[name]) / slope
+        for name, g in margin.items()
+    }

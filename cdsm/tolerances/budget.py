@@ -1,0 +1,291 @@
+"""Budget of uncertainty of a reading: its standard uncertainty, and what contributes how much."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, final, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cdsm.errors import InvalidInput, SingularStiffness
+from cdsm.posture import Posture
+from cdsm.statics.buckling import critical_tension
+from cdsm.stiffness_matrix import stiffness
+from cdsm.support.validation import instance, one_of, scalar, unit_direction
+from cdsm.support.values import Array, ReadOnlyState, frozen
+from cdsm.tension import Tension, distribute_tension
+from cdsm.tolerances.inputs import inputs_of
+from cdsm.tolerances.readings import DRAWN, Question, Reading
+from cdsm.tolerances.tolerance import Tolerances
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+LINEAR = 0.05
+"""Largest second-order change, over the uncertainty, of a budget that calls itself linear."""
+
+
+@final
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Uncertainty(ReadOnlyState):
+    """A reading with its standard uncertainty, and the contributions to it (JCGM 100).
+
+    Attributes:
+        question: The reading: which one, of which stiffness, in which direction.
+        tolerances: The tolerances.
+        value: The reading of the arm as described [N/m], [N m/rad], [m] or [N].
+        standard_uncertainty: u_c = √Σ u_i² over the sources, as the value [N/m], [N m/rad], [m] or
+            [N].
+        contributions: u_i of each source that has a tolerance, largest first, as the value [N/m],
+            [N m/rad], [m] or [N].
+        sensitivities: Partial derivatives (n,) of the value by the n inputs of each source, in the
+            unit of the value per [-], [rad], [m], [N] or [kg].
+    """
+
+    question: Question
+    tolerances: Tolerances
+    value: float
+    standard_uncertainty: float
+    contributions: Mapping[str, float]
+    sensitivities: Mapping[str, Array]
+
+    @property
+    def relative(self) -> float:
+        """Standard uncertainty over the magnitude of the value [-]."""
+        return self.standard_uncertainty / abs(self.value) if self.value else math.inf
+
+    @cached_property
+    def curvature(self) -> float:
+        """Second-order part of the change of the value by one u_c, over u_c [-].
+
+        (f(x + d) + f(x − d) − 2 f(x))/(2 u_c) with the displacement d = Σ g/u_c of all inputs. Of
+        all displacements of the same probability, d changes f most: by u_c to first order.
+        """
+        if self.standard_uncertainty == 0.0 or self.question.of not in DRAWN:
+            return 0.0
+        moves = {}
+        for source, tolerance in self.tolerances.given.items():
+            by = tolerance.spread(self.sensitivities[source]) / self.standard_uncertainty
+            moves[source] = np.stack([by, -by])
+        above, below = self.question.at(moves)
+        return float((above + below - 2.0 * self.value) / (2.0 * self.standard_uncertainty))
+
+    @property
+    def is_linear(self) -> bool:
+        """Whether first order is enough: the curvature is at most 5 % of the uncertainty.
+
+        If not, see :func:`~cdsm.monte_carlo`.
+        """
+        return abs(self.curvature) <= LINEAR
+
+    def interval(self, probability: float = 0.95) -> tuple[float, float]:
+        """Return the coverage interval value ± k u_c, with k of the normal distribution.
+
+        Args:
+            probability: Between 0 and 1.
+
+        Raises:
+            InvalidInput: ``probability`` is not between 0 and 1.
+        """
+        half = coverage_factor(probability) * self.standard_uncertainty
+        return self.value - half, self.value + half
+
+    def largest_inputs(self, count: int = 5) -> tuple[tuple[str, str, float], ...]:
+        """Return source, name and |∂f/∂x| u(x) of the inputs that contribute most one by one.
+
+        Args:
+            count: How many.
+        """
+        labels = inputs_of(self.question.stiffness.posture.arm).labels
+        each = [
+            (source, name, abs(float(g)) * tolerance.standard)
+            for source, tolerance in self.tolerances.given.items()
+            for name, g in zip(labels[source], self.sensitivities[source], strict=True)
+        ]
+        return tuple(sorted(each, key=lambda entry: -entry[2])[:count])
+
+    def to_dict(self) -> dict[str, object]:
+        """Return all numbers in SI, with the unit of the value beside them."""
+        low, high = self.interval()
+        return {
+            "quantity": self.question.name,
+            "unit": self.question.si_unit,
+            "value": self.value,
+            "standard_uncertainty": self.standard_uncertainty,
+            "interval_95": [low, high],
+            "linear": self.is_linear,
+            "contributions": dict(self.contributions),
+        }
+
+    def plot(self) -> Figure:
+        """Draw the contributions, one bar per source."""
+        from cdsm.plots import plot_uncertainty
+
+        return plot_uncertainty(self)
+
+    def __repr__(self) -> str:
+        return f"<Uncertainty {self._headline}>"
+
+    def __str__(self) -> str:
+        unit, size = self.question.unit
+        low, high = self.interval()
+        lines = [
+            f"{self._headline} (one standard uncertainty, {100.0 * self.relative:.2g} %)",
+            f"95 % of such arms: {low / size:.4g} to {high / size:.4g} {unit}",
+            f"{'source':<14}{'tolerance':>16}{f'contribution [{unit}]':>24}{'of variance':>14}",
+        ]
+        for source, u in self.contributions.items():
+            if u == 0.0:
+                continue
+            tolerance = self.tolerances.given[source]
+            share = (u / self.standard_uncertainty) ** 2
+            lines.append(
+                f"{source:<14}{shown(source, tolerance.standard):>16}{u / size:>24.3g}"
+                f"{100.0 * share:>12.3g} %"
+            )
+        if not self.is_linear:
+            lines.append(
+                f"first order is not enough here: curvature {100.0 * self.curvature:.2g} % of the "
+                "uncertainty; use Monte Carlo (cdsm.monte_carlo)"
+            )
+        return "\n".join(lines)
+
+    @property
+    def _headline(self) -> str:
+        unit, size = self.question.unit
+        u = self.standard_uncertainty / size
+        places = decimals(u)
+        return f"{self.question.name}: {self.value / size:.{places}f} ± {u:.{places}f} {unit}"
+
+
+def uncertainty(
+    pose: Posture,
+    tension: Tension | ArrayLike,
+    tolerances: Tolerances,
+    *,
+    direction: ArrayLike | None = None,
+    of: Reading = "along",
+    cable: str | None = None,
+    wrench: ArrayLike | None = None,
+) -> Uncertainty:
+    """Compute how sure a reading of a stiffness is, to first order (JCGM 100, Eq. 13).
+
+        u_c² = Σ_s σ_s² g_sᵀ R_s g_s
+
+    Each source s has the standard uncertainty σ, the correlations R of its inputs, and the exact
+    partial derivatives g of the reading by them. For ``"along"``, ``"margin"`` and ``"tip"`` the
+    tensions are measured, so they are inputs like all others. For ``"tension"`` and
+    ``"critical_tension"`` they are distributed anew for every arm; cables at a bound stay there.
+
+    Args:
+        pose: The posture.
+        tension: As for :func:`~cdsm.stiffness`; a :class:`Tension` for the last two readings.
+        tolerances: Tolerances of the arm, the angles and the tensions.
+        direction: u (3,) in base axes, any length: for ``"along"`` and ``"tip"`` only.
+        of: ``"along"``: the stiffness along u [N/m]. ``"margin"``: the smallest eigenvalue of K_θ
+            [N m/rad]. ``"tip"``: the tip's coordinate along u [m]. ``"tension"``: the distributed
+            tension of a cable [N]. ``"critical_tension"``: the lower bound of tension at which the
+            arm buckles [N]; see :func:`~cdsm.critical_tension`.
+        cable: Name of the cable, for ``"tension"`` only.
+        wrench: As for :func:`~cdsm.stiffness`.
+
+    Raises:
+        InvalidInput: An argument has the wrong type or shape; ``direction`` or ``cable`` is missing
+            or not wanted; the arm does not have one of the sources; the tensions have no gradient;
+            the arm does not buckle.
+        UnknownName: ``of`` or ``cable`` is unknown.
+        ElasticityRangeError: A tension is outside the domain of its cable's law.
+        SingularStiffness: The reading does not exist.
+    """
+    question = asked(pose, tension, tolerances, direction, of, cable, wrench)
+    value = question.value()
+    if not math.isfinite(value):  # the stiffness along a direction
+        assert question.direction is not None
+        raise SingularStiffness(
+            "the tip cannot move in this direction: its stiffness is infinite, and has no "
+            "uncertainty. Choose another direction, or bend the arm.",
+            question.direction,
+        )
+    gradient = question.gradient()
+    variances = {
+        source: max(float(gradient[source] @ tolerance.spread(gradient[source])), 0.0)
+        for source, tolerance in tolerances.given.items()
+    }
+    ranked = sorted(variances, key=lambda source: -variances[source])
+    return Uncertainty(
+        question=question,
+        tolerances=tolerances,
+        value=value,
+        standard_uncertainty=math.sqrt(sum(variances.values())),
+        contributions={source: math.sqrt(variances[source]) for source in ranked},
+        sensitivities={source: frozen(g) for source, g in gradient.items()},
+    )
+
+
+def asked(
+    pose: Posture,
+    tension: Tension | ArrayLike,
+    tolerances: Tolerances,
+    direction: ArrayLike | None,
+    of: Reading,
+    cable: str | None,
+    wrench: ArrayLike | None,
+) -> Question:
+    """Check the arguments of :func:`uncertainty` and return the reading that they ask for."""
+    instance("tolerances", tolerances, Tolerances)
+    one_of("reading", of, get_args(Reading))
+    K = stiffness(pose, tension, wrench)
+    inputs_of(pose.arm).require(tolerances, pose.arm)
+    for name, value, wanted in (
+        ("direction", direction, of in ("along", "tip")),
+        ("cable", cable, of == "tension"),
+    ):
+        if (value is not None) != wanted:
+            raise InvalidInput(
+                name, f"is needed for {of}." if wanted else f"has no meaning for {of}."
+            )
+    if of in ("tension", "critical_tension"):
+        instance("tension", tension, Tension)
+    if of == "critical_tension":
+        critical = critical_tension(pose, K.wrench).minimum
+        if not math.isfinite(critical):
+            raise InvalidInput("of", "the arm does not buckle, so no tension is critical.")
+        K = stiffness(pose, distribute_tension(pose, critical, wrench=K.wrench))
+    u = None if direction is None else unit_direction("direction", direction)
+    names = [each.name for each in pose.arm.cables]
+    index = None if cable is None else names.index(one_of("cable", cable, names))
+    return Question(of, K, u, index)
+
+
+def coverage_factor(probability: float) -> float:
+    """Return k with which value ± k u covers a normal distribution with this probability."""
+    from scipy.special import ndtri
+
+    p = scalar("probability", probability)
+    if not 0.0 < p < 1.0:
+        raise InvalidInput("probability", f"{p:g} given; a number between 0 and 1 is needed.")
+    return float(ndtri((1.0 + p) / 2.0))
+
+
+def decimals(uncertainty: float) -> int:
+    """Return the decimals with which an uncertainty has two significant digits, 0 to 12."""
+    if not 0.0 < uncertainty < math.inf:
+        return 4
+    return min(max(1 - math.floor(math.log10(uncertainty)), 0), 12)
+
+
+def shown(source: str, standard: float) -> str:
+    """Return a standard uncertainty in people's units: %, deg, N, mm or g."""
+    for names, size, unit in (
+        (("rigidity",), 1e-2, "%"),
+        (("joint_angle", "hole_angle"), math.pi / 180.0, "deg"),
+        (("tension",), 1.0, "N"),
+        (("link_mass",), 1e-3, "g"),
+    ):
+        if source in names:
+            return f"{standard / size:.3g} {unit}"
+    return f"{standard * 1e3:.3g} mm"

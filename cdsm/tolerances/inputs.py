@@ -1,0 +1,183 @@
+"""Inputs of a stiffness that have tolerances, and how each of them changes the arrays of an arm.
+
+Site positions, joint origins, centres of mass and the tip depend linearly on hole radii, disk
+offsets and link lengths. One sparse matrix therefore serves both ways: its transpose turns the
+derivatives by all places into derivatives by the inputs, and the matrix itself turns drawn errors
+into displaced places.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from scipy.sparse import csr_matrix, hstack
+
+from cdsm.errors import InvalidInput
+from cdsm.manipulator import Manipulator
+from cdsm.support.values import Array, frozen
+from cdsm.tolerances.tolerance import Tolerances
+from cdsm.urdf import CROSS_MASS
+
+_NEAR = 1e-9
+"""A site this near to a disk [m] is on the disk."""
+
+_ON_DISKS = ("hole_radius", "hole_angle", "disk_offset", "link_length")
+"""Sources that only an arm with disks has."""
+
+
+class Places(NamedTuple):
+    """All places that an arm is built from, in the frames of its joints [m].
+
+    Attributes:
+        site: Cable sites (…, P, 3).
+        origin: Origin of each joint in its parent (…, nv+1, 3).
+        centre: Centres of mass (…, nv+1, 3).
+        tip: The tip (…, 3).
+    """
+
+    site: Array
+    origin: Array
+    centre: Array
+    tip: Array
+
+    def stacked(self) -> Array:
+        """Return all coordinates in one vector (n,)."""
+        return np.concatenate([place.ravel() for place in self])
+
+    def moved(self, by: Array) -> Places:
+        """Return the places with displacements (N, n) added: arrays with one more axis."""
+        ends = np.cumsum([place.size for place in self])[:-1]
+        parts = np.split(by, ends, axis=1)
+        return Places(
+            *(x + part.reshape(-1, *x.shape) for x, part in zip(self, parts, strict=True))
+        )
+
+
+@lru_cache(maxsize=8)
+def inputs_of(arm: Manipulator) -> Inputs:
+    """Return the inputs of an arm; kept, since finding them takes longer than a stiffness."""
+    return Inputs(arm)
+
+
+class Inputs:
+    """Inputs of an arm, source by source.
+
+    Attributes:
+        places: The places of the arm as described.
+        first: First site of each cable, and the number of sites, (C+1,).
+        link_rows: Row of the joint that moves each link with a mass, (links,).
+        labels: Names of the inputs of each source.
+        columns: Their columns in :attr:`map`.
+        map: Displacement of all coordinates of :attr:`places` per input (n, inputs), sparse.
+    """
+
+    def __init__(self, arm: Manipulator) -> None:
+        model = arm._model
+        cables = [cable.name for cable in arm.cables]
+        self.places = Places(
+            model.routing.point, model.tree.translation, model.masses.centre, model.masses.point
+        )
+        self.first = frozen(np.cumsum([0, *(len(cable.sites) for cable in arm.cables)]))
+        moving = (
+            model.masses.mass > CROSS_MASS
+        )  # the crosses of universal joints weigh next to nothing
+        self.link_rows = frozen(np.flatnonzero(moving))
+        rows = ("base", *arm.joint_names)
+        sites = [
+            f"{cable.name} on {site.link}, site {i}"
+            for cable in arm.cables
+            for i, site in enumerate(cable.sites, start=1)
+        ]
+        self.labels: dict[str, tuple[str, ...]] = {
+            "rigidity": tuple(cables),
+            "joint_angle": arm.joint_names,
+            "tension": tuple(cables),
+            "lead": tuple(cables),
+            "link_mass": tuple(f"link moved by {rows[i]}" for i in self.link_rows),
+            "site": tuple(f"{site}, {axis}" for site in sites for axis in "xyz"),
+        }
+        total, count = self.places.stacked().size, 3 * len(sites)
+        maps = {"site": csr_matrix(np.eye(total, count))}
+        if arm.is_serpentine:
+            maps |= self._disks(arm, sites)
+        self.map = csr_matrix(hstack(list(maps.values())))
+        ends = np.cumsum([0, *(each.shape[1] for each in maps.values())]).tolist()
+        self.columns = {source: slice(*ends[i : i + 2]) for i, source in enumerate(maps)}
+        self._transposed = csr_matrix(self.map.T)
+
+    def by_source(self, by_place: Array) -> dict[str, Array]:
+        """Turn derivatives by all coordinates of :attr:`places` (n,) into those by the inputs."""
+        by_input = self._transposed @ by_place
+        return {source: by_input[columns] for source, columns in self.columns.items()}
+
+    def displaced(self, errors: Mapping[str, Array]) -> Array:
+        """Return the displacements (N, n) of all places by errors (N, inputs) of some sources."""
+        count = len(next(iter(errors.values())))
+        every = np.zeros((count, self.map.shape[1]))
+        for source, columns in self.columns.items():
+            if source in errors:
+                every[:, columns] = errors[source]
+        return np.asarray((self.map @ every.T).T)
+
+    def require(self, tolerances: Tolerances, arm: Manipulator) -> None:
+        """Raise InvalidInput for a source that the arm does not have."""
+        for name in tolerances.given:
+            if name not in self.labels:
+                raise InvalidInput(
+                    name,
+                    f"{arm.name} was made from a URDF and has no holes on disks; give site, the "
+                    "tolerance [m] of each coordinate of its cable sites.",
+                )
+
+    def _disks(self, arm: Manipulator, sites: list[str]) -> dict[str, csr_matrix]:
+        """Label the inputs of holes, disks and links, and return what they move."""
+        body, (P, rows) = arm._model.body, (len(sites), arm.nv + 1)
+        end, origin, centre = 3 * P + 6 * rows, 3 * P, 3 * P + 3 * rows
+        found: dict[str, dict[str, list[tuple[int, float]]]] = {name: {} for name in _ON_DISKS}
+
+        def add(source: str, label: str, at: int, way: Iterable[float]) -> None:
+            entries = found[source].setdefault(label, [])
+            entries += [(at + r, x) for r, x in enumerate(way) if x]
+
+        links = {name: body.locate(name) for name, _ in arm.geometry.disks}
+        names = list(links)
+        everywhere = [site for cable in arm.cables for site in cable.sites]
+        offsets = dict(arm.geometry.disks)
+        for p, site in enumerate(everywhere):
+            if site.link not in links:
+                continue
+            _, rotation, _ = links[site.link]
+            x, y, z = site.position
+            radius = float(np.hypot(y, z))
+            if radius > 0.0:
+                add("hole_radius", sites[p], 3 * p, rotation @ [0.0, y / radius, z / radius])
+                add("hole_angle", sites[p], 3 * p, rotation @ [0.0, -z, y])
+            for d, place in enumerate(offsets[site.link]):
+                if abs(x - place) > _NEAR:
+                    continue
+                before_joint = d > 0 or site.link == names[0]
+                along = rotation @ [-1.0 if before_joint else 1.0, 0.0, 0.0]
+                add("disk_offset", f"disk {d + 1} of {site.link}", 3 * p, along)
+                if before_joint and site.link != names[0]:
+                    add("link_length", site.link, 3 * p, -along)
+        for k, link in enumerate(names[1:], start=1):
+            row, rotation, _ = links[link]
+            along = rotation @ [1.0, 0.0, 0.0]
+            add("link_length", link, centre + 3 * row, along / 2.0)
+            if k == len(names) - 1:
+                add("link_length", link, end, along)
+            else:
+                following = int(np.flatnonzero(arm._model.tree.parent[1:] == row)[0]) + 1
+                add("link_length", link, origin + 3 * following, along)
+        maps = {}
+        for source, inputs in found.items():
+            self.labels[source] = tuple(inputs)
+            at = [(i, n, x) for n, entries in enumerate(inputs.values()) for i, x in entries]
+            matrix = np.zeros((end + 3, len(inputs)))
+            for place, n, way in at:
+                matrix[place, n] = way
+            maps[source] = csr_matrix(matrix)
+        return maps

@@ -1,0 +1,299 @@
+"""Monte Carlo runs: a reading of many arms, each drawn within the tolerances (JCGM 101)."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import os
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import cached_property, partial
+from pathlib import Path
+from typing import TYPE_CHECKING, final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cdsm.errors import FileError, InvalidInput
+from cdsm.posture import Posture
+from cdsm.support.extras import need
+from cdsm.support.files import make_folder, write_file
+from cdsm.support.progress import progress_bar
+from cdsm.support.validation import flag, one_of, scalar, whole_number
+from cdsm.support.values import Array, ReadOnlyState, frozen
+from cdsm.tension import Tension
+from cdsm.tolerances.budget import Uncertainty, decimals, uncertainty
+from cdsm.tolerances.inputs import inputs_of
+from cdsm.tolerances.readings import DRAWN, Question, Reading
+from cdsm.tolerances.tolerance import WIDTH, Tolerance, Tolerances
+
+if TYPE_CHECKING:
+    import xarray
+    from matplotlib.figure import Figure
+
+_BLOCK = 1000
+"""Draws that one thread computes at a time; each block has random numbers of its own."""
+
+
+AGREES = 0.1
+"""Largest distance of the ends of both 95 % intervals, over the uncertainty, if they agree."""
+
+
+@final
+@dataclass(frozen=True, eq=False, kw_only=True)
+class MonteCarlo(ReadOnlyState):
+    """Values of a reading for drawn arms; made by :func:`monte_carlo`.
+
+    Attributes:
+        budget: The same reading to first order.
+        values: The reading of each drawn arm (n,) [N/m], [N m/rad] or [m].
+        seed: Seed of the random numbers.
+    """
+
+    budget: Uncertainty
+    values: Array
+    seed: int
+
+    @cached_property
+    def mean(self) -> float:
+        """Mean of the values."""
+        return float(self.values.mean())
+
+    @cached_property
+    def standard_uncertainty(self) -> float:
+        """Standard deviation of the values (JCGM 101, Eq. 17)."""
+        return float(self.values.std(ddof=1))
+
+    def interval(self, probability: float = 0.95) -> tuple[float, float]:
+        """Return the probabilistically symmetric coverage interval (JCGM 101, 7.7).
+
+        Args:
+            probability: Between 0 and 1.
+
+        Raises:
+            InvalidInput: ``probability`` is not between 0 and 1.
+        """
+        p = scalar("probability", probability)
+        if not 0.0 < p < 1.0:
+            raise InvalidInput("probability", f"{p:g} given; a number between 0 and 1 is needed.")
+        low, high = np.quantile(self.values, [(1.0 - p) / 2.0, (1.0 + p) / 2.0])
+        return float(low), float(high)
+
+    @property
+    def agrees(self) -> bool:
+        """Whether first order is validated: see :data:`AGREES` (JCGM 101, clause 8)."""
+        both = zip(self.interval(), self.budget.interval(), strict=True)
+        return all(abs(a - b) <= AGREES * self.standard_uncertainty for a, b in both)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Return the values and the errors of all inputs as a Dataset with dimension ``draw``.
+
+        The errors are drawn again from the seed: one variable per source, with the names of its
+        inputs. Tools for sensitivity analysis take such samples.
+
+        Raises:
+            MissingExtra: xarray is not installed (extra ``sweep``).
+        """
+        need("sweep", "xarray")
+        import xarray
+
+        question, tolerances = self.budget.question, self.budget.tolerances
+        labels = inputs_of(question.stiffness.posture.arm).labels
+        drawn = [
+            _errors(question, tolerances, self.seed, i, count)
+            for i, count in _blocks(self.values.size)
+        ]
+        reading = xarray.Variable(
+            "draw", self.values, {"long_name": question.name, "units": question.si_unit}
+        )
+        variables: dict[str, object] = {question.of: reading}
+        for source in tolerances.given:
+            size = f"{source}_input"
+            variables[f"{source}_error"] = (
+                (("draw", size)),
+                np.concatenate([e[source] for e in drawn]),
+            )
+            variables[size] = ((size,), list(labels[source]))
+        return xarray.Dataset(variables, attrs={"seed": self.seed})
+
+    def plot(self) -> Figure:
+        """Draw the histogram of the values beside the normal distribution of first order."""
+        from cdsm.plots import plot_monte_carlo
+
+        return plot_monte_carlo(self)
+
+    def __repr__(self) -> str:
+        return f"<MonteCarlo {self.values.size} draws, {self._headline}>"
+
+    def __str__(self) -> str:
+        unit, size = self.budget.question.unit
+        low, high = (end / size for end in self.interval())
+        word = "agrees with" if self.agrees else "differs from"
+        first = ", ".join(f"{end / size:.4g}" for end in self.budget.interval())
+        return "\n".join(
+            [
+                f"{self.budget.question.name}: {self._headline}, {self.values.size} draws",
+                f"95 % of the draws: {low:.4g} to {high:.4g} {unit}, which {word} first order "
+                f"({first})",
+            ]
+        )
+
+    @property
+    def _headline(self) -> str:
+        unit, size = self.budget.question.unit
+        u = self.standard_uncertainty / size
+        places = decimals(u)
+        return f"{self.mean / size:.{places}f} ± {u:.{places}f} {unit}"
+
+
+def monte_carlo(
+    pose: Posture,
+    tension: Tension | ArrayLike,
+    tolerances: Tolerances,
+    *,
+    direction: ArrayLike | None = None,
+    of: Reading = "along",
+    wrench: ArrayLike | None = None,
+    draws: int = 100_000,
+    seed: int = 0,
+    store: str | os.PathLike[str] | None = None,
+    progress: bool = True,
+) -> MonteCarlo:
+    """Compute a reading for many arms, drawn within the tolerances (JCGM 101).
+
+    Each draw has its own angles, tensions, rigidities, leads, holes, disks, links and masses. The
+    same seed gives the same bits on any number of threads, also after an interruption.
+
+    Args:
+        pose: The posture.
+        tension: As for :func:`~cdsm.stiffness`.
+        tolerances: As for :func:`~cdsm.uncertainty`.
+        direction: As for :func:`~cdsm.uncertainty`.
+        of: ``"along"``, ``"margin"`` or ``"tip"``.
+        wrench: As for :func:`~cdsm.stiffness`.
+        draws: Number of arms, 100 to 10⁸.
+        seed: Seed of the random numbers, from 0.
+        store: Folder that keeps the values of finished blocks, so that an interrupted run resumes.
+        progress: Show a progress bar on a terminal.
+
+    Raises:
+        InvalidInput: As for :func:`~cdsm.uncertainty`, or ``draws`` or ``seed`` is out of range.
+        UnknownName: ``of`` is not one of the three readings.
+        ElasticityRangeError: A drawn tension is outside the domain of its cable's law.
+        SingularStiffness: The reading does not exist.
+        FileError: The folder cannot be used, or holds another run.
+    """
+    if of not in DRAWN:
+        one_of("reading of Monte Carlo", of, DRAWN)
+    count = whole_number("draws", draws, 100, 10**8)
+    start = whole_number("seed", seed, 0)
+    wanted = flag("progress", progress)
+    if isinstance(tolerances, Tolerances) and not tolerances.given:
+        raise InvalidInput("tolerances", "are all zero, so all draws are the same; give one.")
+    budget = uncertainty(pose, tension, tolerances, direction=direction, of=of, wrench=wrench)
+    folder = None if store is None else _opened(store, budget, start)
+    values = np.empty(count)
+    compute = partial(_block, budget.question, tolerances, start, folder)
+    blocks = list(_blocks(count))
+    with (
+        progress_bar("Monte Carlo", count, wanted=wanted, rate=True) as advance,
+        ThreadPoolExecutor(os.cpu_count()) as pool,
+    ):
+        for (i, size), part in zip(
+            blocks, pool.map(compute, *zip(*blocks, strict=True)), strict=True
+        ):
+            values[i * _BLOCK : i * _BLOCK + size] = part
+            advance(size)
+    return MonteCarlo(budget=budget, values=frozen(values), seed=start)
+
+
+def _blocks(count: int) -> Iterator[tuple[int, int]]:
+    """Yield the number and the size of each block of draws."""
+    for i in range(math.ceil(count / _BLOCK)):
+        yield i, min(_BLOCK, count - i * _BLOCK)
+
+
+def _errors(
+    question: Question, tolerances: Tolerances, seed: int, block: int, count: int
+) -> dict[str, Array]:
+    """Draw the errors of one block by source."""
+    rng = np.random.default_rng([seed, block])
+    labels = inputs_of(question.stiffness.posture.arm).labels
+    return {
+        source: draw(tolerance, rng, _BLOCK, len(labels[source]))[:count]
+        for source, tolerance in tolerances.given.items()
+    }
+
+
+def draw(tolerance: Tolerance, rng: np.random.Generator, draws: int, count: int) -> Array:
+    """Draw errors (draws, count) with the distribution and correlation of a tolerance.
+
+    Correlated errors that are not normal are sums of independent ones: each input keeps its
+    standard uncertainty and correlations, but for 0 < ρ < 1 not quite its distribution.
+    """
+    rho = tolerance.correlation
+    if not isinstance(rho, float):
+        values, vectors = np.linalg.eigh(tolerance.matrix(count))
+        root = vectors * np.sqrt(values.clip(0.0))
+        errors = _standardised(tolerance, rng, (draws, count)) @ root.T
+    elif rho in (0.0, 1.0):
+        errors = _standardised(tolerance, rng, (draws, 1 if rho else count))
+        errors = np.repeat(errors, count, axis=1) if rho else errors
+    else:
+        own = _standardised(tolerance, rng, (draws, count))
+        common = _standardised(tolerance, rng, (draws, 1))
+        errors = math.sqrt(1.0 - rho) * own + math.sqrt(rho) * common
+    return np.asarray(tolerance.standard * errors)
+
+
+def _standardised(tolerance: Tolerance, rng: np.random.Generator, shape: tuple[int, int]) -> Array:
+    """Draw errors of standard deviation one."""
+    if tolerance.distribution == "normal":
+        return rng.standard_normal(shape)
+    width = WIDTH[tolerance.distribution]
+    if tolerance.distribution == "uniform":
+        return rng.uniform(-width, width, shape)
+    return rng.triangular(-width, 0.0, width, shape)
+
+
+def _block(
+    question: Question,
+    tolerances: Tolerances,
+    seed: int,
+    folder: Path | None,
+    block: int,
+    count: int,
+) -> Array:
+    """Compute the values of one block, or read them if the folder has them."""
+    path = None if folder is None else folder / f"{block:06d}.npy"
+    if path is not None and path.exists():
+        kept = np.load(path)
+        if kept.size >= count:
+            return np.asarray(kept[:count])
+    values = question.at(_errors(question, tolerances, seed, block, count))
+    if path is not None:
+        write_file(path, lambda aside: aside.write_bytes(_bytes(values)))
+    return values
+
+
+def _bytes(values: Array) -> bytes:
+    import io
+
+    buffer = io.BytesIO()
+    np.save(buffer, values)
+    return buffer.getvalue()
+
+
+def _opened(store: str | os.PathLike[str], budget: Uncertainty, seed: int) -> Path:
+    """Create the folder of a run, or check that it holds this run."""
+    folder = make_folder(store)
+    parts = [budget.question.of, repr(budget.value), repr(budget.standard_uncertainty), str(seed)]
+    parts += [
+        f"{name} {t.standard!r} {t.distribution}" for name, t in budget.tolerances.given.items()
+    ]
+    mark, path = hashlib.sha256("\n".join(parts).encode()).hexdigest(), folder / "run.txt"
+    if path.exists() and path.read_text() != mark:
+        raise FileError(folder, "holds another Monte Carlo run; give an empty folder.")
+    write_file(path, lambda aside: aside.write_text(mark))
+    return folder

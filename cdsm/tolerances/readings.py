@@ -1,0 +1,256 @@
+"""Readings with a budget: their values, gradients, and values at displaced inputs.
+
+Each reading has two sides that never meet but in the tests: the gradient by all inputs of one
+posture, for the budget, and the values of many drawn arms, for Monte Carlo.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Final, Literal
+
+import numpy as np
+
+from cdsm.errors import ElasticityRangeError
+from cdsm.kernels.draws import stiffness_of_draws
+from cdsm.kernels.sensitivity import single_gradient
+from cdsm.stiffness_matrix import Stiffness
+from cdsm.support.format import coordinates
+from cdsm.support.values import Array, ReadOnlyState
+from cdsm.tolerances.balanced import Balance, buckling_gradient
+from cdsm.tolerances.inputs import Inputs, inputs_of
+
+Reading = Literal["along", "margin", "tip", "tension", "critical_tension"]
+
+DRAWN: Final = ("along", "margin", "tip")
+"""Readings that can be computed for many drawn arms."""
+
+_NOWHERE = np.zeros(3)
+
+
+@dataclass(frozen=True, eq=False)
+class Question(ReadOnlyState):
+    """A reading of one stiffness, in SI.
+
+    Attributes:
+        of: ``"along"``, ``"margin"``, ``"tip"``, ``"tension"`` or ``"critical_tension"``.
+        stiffness: The stiffness; for ``critical_tension`` that at the critical tension.
+        direction: The unit direction (3,) of ``along`` and ``tip``; else None.
+        cable: Index of the cable of ``tension``; else None.
+    """
+
+    of: Reading
+    stiffness: Stiffness
+    direction: Array | None = None
+    cable: int | None = None
+
+    @property
+    def unit(self) -> tuple[str, float]:
+        """Unit in which people read the value, and its size in SI."""
+        if self.of == "margin":
+            return self.stiffness.posture.arm.stiffness_unit(), 1.0
+        return {"along": ("N/mm", 1e3), "tip": ("mm", 1e-3)}.get(self.of, ("N", 1.0))
+
+    @property
+    def si_unit(self) -> str:
+        """Unit of the value."""
+        return {"along": "N/m", "tip": "m"}.get(self.of, self.unit[0])
+
+    @property
+    def name(self) -> str:
+        """Name of the reading, with its direction or cable."""
+        if self.direction is not None:
+            what = "stiffness" if self.of == "along" else "tip"
+            return f"{what} along {coordinates(self.direction)}"
+        if self.cable is not None:
+            return f"tension of {self.stiffness.posture.arm.cables[self.cable].name}"
+        return "smallest joint stiffness" if self.of == "margin" else "critical lower bound"
+
+    def value(self) -> float:
+        """Return the reading itself."""
+        K = self.stiffness
+        if self.of == "tension":
+            return float(K.tension[self.cable])
+        if self.of == "critical_tension":
+            assert K.distribution is not None
+            return float(K.distribution.minimum.max())
+        if self.direction is None:
+            return K.margin
+        if self.of == "along":
+            return K.along(self.direction)
+        return float(self.direction @ K.posture.tip[:3, 3])
+
+    def gradient(self) -> dict[str, Array]:
+        """Compute the partial derivative of the reading by every input, by source (inputs,)."""
+        K, inputs = self.stiffness, inputs_of(self.stiffness.posture.arm)
+        if self.of == "along":
+            assert self.direction is not None
+            return _along_gradient(K, inputs, self.direction)
+        if self.of == "tip":
+            assert self.direction is not None
+            return _tip_gradient(K, inputs, self.direction)
+        margin = _gradient(K, inputs, K.critical_direction, _NOWHERE)
+        if self.of == "margin":
+            return margin
+        assert K.distribution is not None
+        balance = Balance.of(K.distribution)
+        if self.of == "critical_tension":
+            return buckling_gradient(balance, inputs, margin)
+        return balance.gradient(inputs, np.eye(len(K.tension))[self.cable])
+
+    def at(self, errors: Mapping[str, Array]) -> Array:
+        """Compute a reading of :data:`DRAWN` for N arms (N,), with errors (N, inputs) by source."""
+        joint, tip_rows, tips = evaluate(self.stiffness, errors)
+        if self.of == "margin":
+            return np.asarray(np.linalg.eigvalsh((joint + joint.transpose(0, 2, 1)) / 2.0)[:, 0])
+        assert self.direction is not None
+        if self.of == "tip":
+            return np.asarray(tips @ self.direction)
+        force = self.direction @ tip_rows
+        motion = np.linalg.solve(joint, force[:, :, None])[:, :, 0]
+        return np.asarray(1.0 / np.einsum("ni,ni->n", force, motion))
+
+
+def _along_gradient(K: Stiffness, inputs: Inputs, u: Array) -> dict[str, Array]:
+    """Compute the derivatives of 1/(uᵀ C_vv u), by source."""
+    force = u @ K.posture.jacobian[:3]
+    right = np.asarray(np.linalg.solve(K.joint, force), np.float64)
+    square = 1.0 / float(force @ right) ** 2
+    if not K.wrench[3:].any():
+        partials = _gradient(K, inputs, right, u)
+    else:
+        # K_θ is not symmetric: a bilinear form of two motions, by the forms of sum and difference
+        left = np.asarray(np.linalg.solve(K.joint.T, force), np.float64)
+        plus = _gradient(K, inputs, (left + right) / 2.0, u)
+        minus = _gradient(K, inputs, (left - right) / 2.0, _NOWHERE)
+        partials = {name: plus[name] - minus[name] for name in plus}
+        partials["joint_angle"] += _skew_gradient(K, left, right)
+    return {name: square * g for name, g in partials.items()}
+
+
+def _gradient(K: Stiffness, inputs: Inputs, motion: Array, direction: Array) -> dict[str, Array]:
+    """Compute the derivatives of zᵀ K_θ z − 2 u·J_v z with z and u fixed, by source."""
+    pose, F, k = K.posture, K.tension, K.cable_stiffness
+    laws = pose.arm._model.laws
+    rigidity, strain = _laws(K, F)
+    stretched = rigidity * (1.0 + strain)
+    wire = pose.cable_lengths - laws.series * (F - laws.rest)
+    by_stretched = k**2 * wire / stretched**2  # zero where the motor holds the force
+    slope = -(k**2) / stretched
+    by_force = k**2 * laws.series / stretched + by_stretched * _stretched_slope(K, strain)
+    arguments: tuple[Any, ...] = (
+        *pose.arm._model.arrays,
+        *(pose.q, inputs.first, motion, -2.0 * direction),
+        *(F, k, slope, np.zeros_like(F), K.wrench, 1.0, 0.0),
+    )
+    _, by_q, *by_places, by_mass, by_tension, by_stiffness = single_gradient(*arguments)
+    along = np.concatenate([place.ravel() for place in by_places])
+    return {
+        "rigidity": by_stiffness * by_stretched * rigidity,
+        "joint_angle": by_q,
+        "tension": by_tension + by_stiffness * by_force,
+        "lead": by_stiffness * slope,
+        "link_mass": by_mass[inputs.link_rows],
+        **inputs.by_source(along),
+    }
+
+
+def _skew_gradient(K: Stiffness, left: Array, right: Array) -> Array:
+    """Compute ∂/∂q of −m·(ω_r × ω_l)/2 (nv,), the skew part of the load term between two motions.
+
+    ω = J_ω z of the tip. Joint i turns the part of ω that is due to the joints from i on.
+    """
+    turns, chain = K.posture.jacobian[3:], K.posture.arm._model.masses.tip_joints
+    moment, found = K.wrench[3:], np.zeros(left.size)
+    for n, i in enumerate(chain):
+        beyond = chain[n:]
+        both = [
+            np.cross(turns[:, i], turns[:, beyond] @ motion[beyond]) for motion in (right, left)
+        ]
+        turned = np.cross(both[0], turns @ left) + np.cross(turns @ right, both[1])
+        found[i] = -moment @ turned / 2.0
+    return found
+
+
+def _tip_gradient(K: Stiffness, inputs: Inputs, direction: Array) -> dict[str, Array]:
+    """Compute the derivatives of the tip's coordinate along u, by source."""
+    pose, tree, masses = K.posture, K.posture.arm._model.tree, K.posture.arm._model.masses
+    none = {name: np.zeros(len(labels)) for name, labels in inputs.labels.items()}
+    origin, rotation = np.zeros_like(tree.translation), np.eye(3)
+    for i in masses.tip_joints:  # base first; a place in a frame moves the tip by R δ
+        origin[i + 1] = direction @ rotation
+        start, cosine, sine = tree.turn[i + 1]
+        rotation = rotation @ (start + np.cos(pose.q[i]) * cosine + np.sin(pose.q[i]) * sine)
+    tip = direction @ rotation
+    places = inputs.places
+    along = np.concatenate(
+        [np.zeros(places.site.size), origin.ravel(), np.zeros(places.centre.size), tip]
+    )
+    return none | inputs.by_source(along) | {"joint_angle": direction @ pose.jacobian[:3]}
+
+
+def _laws(K: Stiffness, tension: Array) -> tuple[Array, Array]:
+    """Compute EA [N] and ε at tensions (…, C); ε is 0 if l_0 is the stretched length."""
+    arm = K.posture.arm
+    laws = arm._model.laws
+    rigidity, strain = np.ones_like(tension), np.zeros_like(tension)
+    for law, held in laws.held:
+        F = tension[..., held]
+        try:
+            rigidity[..., held] = law.rigidity(F)
+            if arm.original_length == "unstrained":
+                strain[..., held] = law.strain(F)
+        except ElasticityRangeError as error:
+            low, high = float(F.min()), float(F.max())
+            raise ElasticityRangeError(
+                f"at tensions from {low:.4g} to {high:.4g} N, which the tolerance of the tensions "
+                f"reaches; the elasticity is defined on {law.domain}. Raise the tensions, or lower "
+                "their tolerance.",
+                error.tension,
+            ) from None
+    return rigidity, strain
+
+
+def _stretched_slope(K: Stiffness, strain: Array) -> Array:
+    """Compute the derivative of EA (1 + ε) by F (C,) [-]: EA′ (1 + ε) + 1, or EA′."""
+    arm = K.posture.arm
+    slope = np.zeros_like(strain)
+    for law, held in arm._model.laws.held:
+        slope[held] = law.rigidity_slope(K.tension[held])
+    return slope * (1.0 + strain) + float(arm.original_length == "unstrained")
+
+
+def evaluate(K: Stiffness, errors: Mapping[str, Array]) -> tuple[Array, Array, Array]:
+    """Compute K_θ (N, nv, nv), J_v (N, 3, nv) and the tip (N, 3) of arms with errors."""
+    pose, model, inputs = K.posture, K.posture.arm._model, inputs_of(K.posture.arm)
+    count = len(next(iter(errors.values())))
+
+    def drawn(source: str, nominal: Array) -> Array:
+        values = np.repeat(nominal[None], count, axis=0)
+        return values + errors[source] if source in errors else values
+
+    q, tension = drawn("joint_angle", pose.q), drawn("tension", K.tension)
+    lead = drawn("lead", np.array([cable.lead for cable in pose.arm.cables]))
+    mass = np.repeat(model.masses.mass[None], count, axis=0)
+    if "link_mass" in errors:
+        mass[:, inputs.link_rows] += errors["link_mass"]
+    places: tuple[Any, ...] = inputs.places.moved(inputs.displaced(errors))
+    rigidity, strain = _laws(K, tension)
+    scale = 1.0 + errors.get("rigidity", np.zeros((count, 1)))  # of EA; ε falls with it
+    held = K.cable_stiffness > 0.0
+    stretched = np.where(held, rigidity * (scale + strain), 0.0)
+    nv, tree, routing, masses = pose.arm.nv, model.tree, model.routing, model.masses
+    joint, tip_rows = np.empty((count, nv, nv)), np.empty((count, 3, nv))
+    tips = np.empty((count, 3))
+    arguments: tuple[Any, ...] = (
+        *(tree.parent, tree.order, tree.turn, tree.axis, tree.slide),
+        *(routing.row, routing.segment, routing.joint),
+        *(masses.gravity, masses.tip, masses.tip_joints, masses.rotation),
+        *(inputs.first, model.laws.series, model.laws.rest, K.wrench),
+        *(q, tension, stretched, lead, mass),
+        *(np.ascontiguousarray(place) for place in places),
+        *(joint, tip_rows, tips),
+    )
+    stiffness_of_draws(*arguments)
+    return joint, tip_rows, tips
