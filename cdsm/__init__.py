@@ -43,6 +43,7 @@ if TYPE_CHECKING:
         UnreachableStiffness,
         UrdfError,
     )
+    from cdsm.friction.breakaway import Breakaway, breakaway
     from cdsm.friction.stuck import sliding_stiffness, stuck_stiffness
     from cdsm.geometry import CableRoute, Geometry, Joint, Link
     from cdsm.identification import Identification, Measurement, identify
@@ -88,6 +89,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Batch",
     "Bifurcation",
+    "Breakaway",
     "Cable",
     "CableError",
     "CableRoute",
@@ -160,6 +162,7 @@ __all__ = [
     "UrdfError",
     "WeightTest",
     "bifurcation",
+    "breakaway",
     "critical_load",
     "critical_tension",
     "distribute_tension",
@@ -213,6 +216,7 @@ _NAMES = {
         "MissingWire SingularMass SingularStiffness SolverError StoreError TensileTestError "
         "UnknownName UnreachableStiffness UrdfError"
     ),
+    "friction.breakaway": "Breakaway breakaway",
     "friction.stuck": "sliding_stiffness stuck_stiffness",
     "geometry": "CableRoute Geometry Joint Link",
     "instability": "Remedy",

@@ -1,0 +1,197 @@
+"""Breakaway: the load at which the first cable of a stuck arm begins to slide in a hole.
+
+While all cables stick, a force W u at the tip moves the joints by dθ/dW = K_θ⁻¹ J_vᵀ u, and hole i
+between the segments j and j + 1 begins to slide when |ln T_{j+1} − ln T_j| = μ φ_i. To first order
+the load of hole i is therefore
+
+    W_i = μ φ_i / (|x_i| − y_i),   x_i = d(ln T_{j+1} − ln T_j)/dW,   y_i = μ dφ_i/dW,
+
+or none, where |x_i| ≤ y_i. Starting from the smallest of them, Newton's method finds the load at
+which the loaded arm itself, with clamped segments, reaches the bound.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cdsm.errors import EquilibriumError, InvalidInput
+from cdsm.friction.chain_problem import ChainProblem
+from cdsm.friction.stuck import assemble_segments, stuck_stiffness
+from cdsm.friction.tangent import holding
+from cdsm.posture import Posture
+from cdsm.stiffness_matrix import Stiffness
+from cdsm.support.format import coordinates
+from cdsm.support.validation import Direction, unit_direction
+from cdsm.support.values import Array, ReadOnlyState, frozen
+from cdsm.tension import Tension
+
+_HELD = 1e300
+"""Ratio of tensions that a hole holds while it cannot slide."""
+
+_ROUNDING = 1e-12
+"""Pull of a hole, over the largest, that is rounding."""
+
+_REACHED = 1e-9
+"""Relative excess over the bound of another hole that is rounding."""
+
+_ITERATIONS = 50
+"""Newton steps; 3 to 5 are usual, and some more where another hole goes first."""
+
+_CONVERGED = 1e-10
+"""Relative change of the load that ends the search: the error left is its square."""
+
+
+@final
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Breakaway(ReadOnlyState):
+    """Load at which the first cable of a stuck arm begins to slide, and the hole where it does.
+
+    Attributes:
+        stiffness: K of :func:`stuck_stiffness`, which smaller loads measure.
+        direction: Unit direction u (3,) of the force, base axes.
+        load: The breakaway load [N], more than the wrench of ``stiffness``; inf if no cable ever
+            slides, as the force moves no joint; 0 without friction.
+        first_order: The same in closed form [N], to first order in the load.
+        hole_loads: Closed form of each hole (P,) [N]; inf where the cable never begins to slide,
+            also because it always does.
+        cable: Name of the cable that slides first; None if the load is 0 or inf.
+        site: Number of the hole among the sites of this cable, from 1; None likewise.
+        link: Name of the link of this hole; None likewise.
+    """
+
+    stiffness: Stiffness
+    direction: Array
+    load: float
+    first_order: float
+    hole_loads: Array
+    cable: str | None
+    site: int | None
+    link: str | None
+
+    def __str__(self) -> str:
+        said = f"breakaway along {coordinates(self.direction)}: {self.load:.4g} N"
+        if self.cable is None:
+            return said
+        return f"{said}, first at site {self.site} of {self.cable} ({self.link})"
+
+
+def breakaway(
+    pose: Posture,
+    tension: Tension | ArrayLike,
+    direction: Direction,
+    wrench: ArrayLike | None = None,
+) -> Breakaway:
+    """Compute the force along a direction at which the first cable begins to slide in a hole.
+
+    All segments of a cable start with its tension, as after some shaking of the arm, and motors are
+    locked. A weight below this load measures :func:`stuck_stiffness`.
+
+    Args:
+        pose: The posture.
+        tension: As for :func:`~cdsm.stiffness`. Tensions out of balance are held there.
+        direction: u (3,) of the force in base axes, any length, or an axis such as ``"-z"``.
+        wrench: As for :func:`~cdsm.stiffness`.
+
+    Raises:
+        InvalidInput: As for :func:`~cdsm.stiffness`, or ``direction`` is no direction.
+        ElasticityRangeError: A tension leaves the domain of its cable's elasticity.
+        SingularStiffness: The stuck arm is about to buckle.
+        EquilibriumError: The arm does not stick up to the load found: it buckles before.
+    """
+    u = unit_direction("direction", direction)
+    K = stuck_stiffness(pose, tension, wrench)
+    loads, motion = hole_loads(K, u)
+    first = float(loads.min()) if holding(pose).any() else 0.0
+    load = first
+    where: tuple[str | None, int | None, str | None] = (None, None, None)
+    if 0.0 < first < math.inf:
+        hole = int(loads.argmin())
+        load, hole = _reached(K, u, motion * first, first, hole)
+        chains = pose.segments.chains
+        cable, site = pose.arm.cables[chains.cable[chains.hole[hole]]], int(chains.site[hole])
+        where = cable.name, site + 1, cable.sites[site].link
+    return Breakaway(
+        stiffness=K,
+        direction=u,
+        load=load,
+        first_order=first,
+        hole_loads=frozen(loads),
+        cable=where[0],
+        site=where[1],
+        link=where[2],
+    )
+
+
+def hole_loads(K: Stiffness, u: Array) -> tuple[Array, Array]:
+    """Compute the first-order loads W_i (P,) [N] of all holes, and dθ/dW (nv,) [rad/N]."""
+    segments, (T, gradient) = K.posture.segments, segment_state(K)
+    chains, motion = segments.chains, K._along(u)[1]
+    slack = T == 0.0  # a slack cable holds nothing: any pull moves it
+    relative = (gradient @ motion) / np.where(slack, 1.0, T)
+    pull = abs(relative[chains.hole + 1] - relative[chains.hole])
+    rate = pull - chains.friction * (segments.wrap_jacobian @ motion)
+    grip = np.where(slack[chains.hole], 0.0, chains.friction * segments.wrap)
+    least = _ROUNDING * float(pull.max(initial=0.0))
+    loads = np.divide(grip, rate, out=np.full(rate.size, math.inf), where=rate > least)
+    return np.where(holding(K.posture), loads, math.inf), motion
+
+
+def _reached(K: Stiffness, u: Array, motion: Array, load: float, hole: int) -> tuple[float, int]:
+    """Find the load [N] at which the first hole of the stuck, loaded arm reaches its bound.
+
+    Newton's method for joints and load, from the first-order answer of the given hole; another hole
+    that is beyond its bound there takes its place.
+    """
+    pose, arm = K.posture, K.posture.arm
+    chains, held = pose.segments.chains, holding(pose)
+    problem = ChainProblem(arm.cables, chains.start, K.tension, arm.original_length == "unstrained")
+    T, gradient = segment_state(K)
+    natural = problem.natural(pose.segments.lengths, T)
+    forced = [cable.control == "force" for cable in arm.cables]
+    ratio, none = np.ones(T.size), np.zeros(held.size, dtype=np.bool_)
+    ratio[chains.hole[held]] = _HELD
+    torque = u @ pose.jacobian[:3]
+    q, T = pose.q + motion, T + gradient @ motion
+    for _ in range(_ITERATIONS):
+        moved = arm.at(q, check_limits=False)
+        lengths, wrap = moved.segments.lengths, moved.segments.wrap
+        T = problem.settle(lengths, natural, ratio, np.where(forced, K.tension, np.nan), T).tension
+        wrench = K.wrench.copy()
+        wrench[:3] += load * u
+        now = assemble_segments(moved, frozen(T), none, frozen(wrench), "stuck")
+        pull = np.log(T[chains.hole + 1] / T[chains.hole])
+        beyond = np.where(held, abs(pull) - chains.friction * wrap, -1.0)
+        _, gradient = segment_state(now)
+        relative = gradient / T[:, None]
+        slope = (
+            np.sign(pull[hole]) * (relative[chains.hole[hole] + 1] - relative[chains.hole[hole]])
+            - chains.friction[hole] * moved.segments.wrap_jacobian[hole]
+        )
+        torque = u @ moved.jacobian[:3]
+        bordered = np.block([[now.joint, -torque[:, None]], [slope[None], np.zeros((1, 1))]])
+        residual = now.residual - K.residual
+        step = np.linalg.solve(bordered, -np.append(residual, beyond[hole]))
+        q, T, load = q + step[:-1], T + gradient @ step[:-1], load + float(step[-1])
+        if abs(step[-1]) <= _CONVERGED * load:
+            worst = int(beyond.argmax())
+            if beyond[worst] <= _REACHED * chains.friction[worst] * wrap[worst]:
+                return load, hole
+            hole = worst
+    raise EquilibriumError(
+        f"the stuck arm has no equilibrium up to a load of {load:.4g} N",
+        residual,
+        0.0,
+        arm.joint_names[int(abs(residual).argmax())],
+    )
+
+
+def segment_state(K: Stiffness) -> tuple[Array, Array]:
+    """Return T (S,) [N] and ∂T/∂θ (S, nv) [N/rad] of a stiffness with friction."""
+    if K.segment_tension is None or K.tension_gradient is None:
+        raise InvalidInput("stiffness", "is frictionless; give one of stuck_stiffness.")
+    return K.segment_tension, K.tension_gradient
