@@ -234,8 +234,8 @@ def singular_values(rows: Array, left: Array, values: Array, scratch: Array, wid
     zero. ``scratch`` is (5, W).
     """
     aa, bb, ab, cosine, sine = scratch[0], scratch[1], scratch[2], scratch[3], scratch[4]
-    for i in range(3):
-        for j in range(3):
+    for i in upwards(0, left.shape[0]):
+        for j in upwards(0, left.shape[0]):
             for w in lanes(width):
                 left[i, j, w] = 1.0 if i == j else 0.0
     for _ in range(_SWEEPS):
@@ -259,14 +259,14 @@ def singular_values(rows: Array, left: Array, values: Array, scratch: Array, wid
                     p, r = rows[a, k, w], rows[b, k, w]
                     rows[a, k, w] = cosine[w] * p - sine[w] * r
                     rows[b, k, w] = sine[w] * p + cosine[w] * r
-            for j in range(3):
+            for j in upwards(0, left.shape[0]):
                 for w in lanes(width):
                     p, r = left[j, a, w], left[j, b, w]
                     left[j, a, w] = cosine[w] * p - sine[w] * r
                     left[j, b, w] = sine[w] * p + cosine[w] * r
         if turned == 0.0:
             break
-    for a in range(3):
+    for a in range(left.shape[0]):
         _set_product(rows, a, a, aa, width)
         for w in lanes(width):
             values[a, w] = math.sqrt(aa[w])

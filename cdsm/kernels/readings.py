@@ -221,8 +221,8 @@ def read_stiffness(
         _project(JX, system, nv + 1 + count, readings.compliance, width)
     if wanted.cartesian:
         _project(right, system, system.shape[1] - 3, inner, width)
-        for a in range(3):
-            for c in range(3):
+        for a in upwards(0, inner.shape[0]):
+            for c in upwards(0, inner.shape[0]):
                 for w in lanes(width):
                     inner[a, 3 + c, w] = 1.0 if a == c else 0.0
         eliminate(inner, rows, width)
@@ -246,7 +246,7 @@ def _decompose(
     JX: Array, left: Array, S: Array, right: Array, rows: Array, status: Indices, width: Width
 ) -> None:
     """Fill O, S and V of J_v; set the status where the tip cannot move in all directions."""
-    for a in range(3):
+    for a in upwards(0, right.shape[0]):
         for i in upwards(0, JX.shape[1]):
             for w in lanes(width):
                 right[a, i, w] = JX[a, i, w]
@@ -255,8 +255,8 @@ def _decompose(
         smallest = min(S[0, w], S[1, w], S[2, w])
         if status[w] == READ and not smallest > FLAT * max(S[0, w], S[1, w], S[2, w]):
             status[w] = IMMOBILE
-    for i in range(3):
-        for a in range(3):
+    for i in upwards(0, left.shape[0]):
+        for a in upwards(0, left.shape[0]):
             for w in lanes(width):
                 left[i, a, w] /= S[a, w]
 
@@ -265,7 +265,7 @@ def _decompose(
 def _set_product(K: Array, right: Array, image: Array, width: Width) -> None:
     """Fill image (nv, 3, W) with K Vᵀ."""
     for i in upwards(0, K.shape[0]):
-        for c in range(3):
+        for c in upwards(0, right.shape[0]):
             for w in lanes(width):
                 image[i, c, w] = 0.0
             for j in upwards(0, K.shape[0]):
@@ -301,17 +301,17 @@ def _set_right_sides(
         probe = 1.0 + (0.6180339887498949 * np.intp(i)) % 1.0
         for w in lanes(width):
             system[i, nv, w] = probe
-        for a in range(3):
+        for a in upwards(0, 3):
             for w in lanes(width):
                 linear[w] = max(linear[w], abs(JX[a, i, w]))
         if wanted.compliance:
-            for c in range(6):
+            for c in upwards(0, JX.shape[0]):
                 for w in lanes(width):
-                    system[i, first + count + np.uint64(c), w] = JX[c, i, w]
+                    system[i, first + count + c, w] = JX[c, i, w]
         if wanted.cartesian:
-            for c in range(3):
+            for c in upwards(0, right.shape[0]):
                 for w in lanes(width):
-                    system[i, columns - np.uint64(3 - c), w] = right[c, i, w]
+                    system[i, columns - np.uint64(right.shape[0]) + c, w] = right[c, i, w]
     for u in upwards(0, count):
         x, y, z = directions[u, 0], directions[u, 1], directions[u, 2]
         for w in lanes(width):
@@ -438,11 +438,13 @@ def _congruence(
 
     X is three columns of inner, and O is the factor.
     """
-    for i in range(3):
-        for j in range(3):
+    for i in upwards(0, factor.shape[0]):
+        for j in upwards(0, factor.shape[0]):
             for w in lanes(width):
                 out[i, j, w] = math.nan if status[w] == IMMOBILE else 0.0
-            for k in range(3):
-                for m in range(3):
+            for k in upwards(0, factor.shape[0]):
+                for m in upwards(0, factor.shape[0]):
                     for w in lanes(width):
-                        out[i, j, w] += factor[i, k, w] * inner[k, first + m, w] * factor[j, m, w]
+                        out[i, j, w] += (
+                            factor[i, k, w] * inner[k, np.uint64(first) + m, w] * factor[j, m, w]
+                        )
