@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from cdsm.errors import (
         CableError,
         CdsmError,
+        CdsmWarning,
         ClusterError,
         ElasticityRangeError,
         EquilibriumError,
@@ -95,6 +96,7 @@ __all__ = [
     "CableRoute",
     "Cables",
     "CdsmError",
+    "CdsmWarning",
     "ClusterError",
     "CriticalLoad",
     "CriticalTension",
@@ -211,8 +213,8 @@ _NAMES = {
     "cable": "Cable Cables Site in_series serpentine_cables",
     "elasticity": "Domain Elasticity LinearElasticity",
     "errors": (
-        "CableError CdsmError ClusterError ElasticityRangeError EquilibriumError FileError "
-        "GeometryError InfeasibleTension InvalidInput JointLimitError MissingExtra "
+        "CableError CdsmError CdsmWarning ClusterError ElasticityRangeError EquilibriumError "
+        "FileError GeometryError InfeasibleTension InvalidInput JointLimitError MissingExtra "
         "MissingWire SingularMass SingularStiffness SolverError StoreError TensileTestError "
         "UnknownName UnreachableStiffness UrdfError"
     ),

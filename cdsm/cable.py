@@ -256,8 +256,8 @@ def serpentine_cables(
     """Route the cables of a serpentine arm through the holes of its disks.
 
     A cable of joint k passes the base disk and every disk of links 1…k−1. It ends on the first disk
-    of link k. Its hole is always (x, R cos φ, R sin φ). The i-th cable of joint k has the name
-    ``cable{k}_{i}``.
+    of link k. Its holes are at (x, R cos φ, R sin φ) with the R of each disk, or its own. The i-th
+    cable of joint k has the name ``cable{k}_{i}``.
 
     Args:
         geometry: The arm.
@@ -275,21 +275,18 @@ def serpentine_cables(
         raise InvalidInput(
             "elasticity", f"{elasticity!r} given; give one Elasticity, or one for each of {count}."
         )
-    cables = []
-    of_joint = [0] * len(geometry.joints)
-    for route, material in zip(geometry.cables, elasticities, strict=True):
-        of_joint[route.joint - 1] += 1
-        y = geometry.hole_radius * math.cos(route.angle)
-        z = geometry.hole_radius * math.sin(route.angle)
-        passed = geometry.disks[: route.joint]
-        last, (end, *_) = geometry.disks[route.joint]
-        sites = [Site(link, (x, y, z), route.friction) for link, places in passed for x in places]
+    cables, disks = [], geometry.disks
+    for name, route, material in zip(
+        geometry.cable_names, geometry.cables, elasticities, strict=True
+    ):
+        *passed, end = disks[: 2 * route.joint]
+        sites = [Site(disk.link, disk.hole(route), route.friction) for disk in passed]
         if route.lead == 0.0:
             sites[0] = replace(sites[0], friction=0.0)
         cables.append(
             Cable(
-                name=f"cable{route.joint}_{of_joint[route.joint - 1]}",
-                sites=(*sites, Site(last, (end, y, z))),
+                name=name,
+                sites=(*sites, Site(end.link, end.hole(route))),
                 elasticity=material,
                 lead=route.lead,
                 series_stiffness=series_stiffness,

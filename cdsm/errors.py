@@ -64,6 +64,10 @@ def _restore(kind: type[CdsmError], args: tuple[object, ...], data: dict[str, ob
     return error
 
 
+class CdsmWarning(UserWarning):
+    """Base class of all warnings of cdsm: an input that is possible, but rarely meant."""
+
+
 class InvalidInput(CdsmError, ValueError):
     """An argument with a wrong type, shape or value.
 

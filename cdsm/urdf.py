@@ -18,7 +18,7 @@ from lxml import etree
 from lxml.builder import ElementMaker
 
 from cdsm.errors import UrdfError
-from cdsm.geometry import Geometry
+from cdsm.geometry import Disk, Geometry
 from cdsm.rigid_body import RigidBody
 from cdsm.support.files import write_file
 from cdsm.support.validation import instance
@@ -48,7 +48,8 @@ _COLORS = {"backbone": (0.35, 0.38, 0.42, 1.0), "disk": (0.85, 0.65, 0.25, 1.0)}
 def to_urdf(geometry: Geometry) -> str:
     """Return the URDF text of an arm; equal geometries give identical text.
 
-    Each link has the mass of a solid cylinder with the hole radius, centred at mid-link. A cross,
+    Each link has the mass of a solid cylinder, centred at mid-link, with the hole radius of its
+    first disk. A cross,
     or a link of mass zero, has :data:`CROSS_MASS` and :data:`CROSS_INERTIA`. Disks and backbone are
     visual shapes. Collision shapes are left out, since neighbouring disks touch at the joint
     limits.
@@ -60,7 +61,8 @@ def to_urdf(geometry: Geometry) -> str:
         InvalidInput: ``geometry`` is not a Geometry.
     """
     instance("geometry", geometry, Geometry)
-    links = [E.link(name="base_link"), _link(geometry, 0)]
+    disks = geometry.disks
+    links = [E.link(name="base_link"), _link(geometry, 0, disks[:1])]
     joints = [joint("fixed", "base_joint", "base_link", "base_disk")]
     parent, start = "base_disk", geometry.base_length
     for k, (each, limit) in enumerate(
@@ -69,12 +71,12 @@ def to_urdf(geometry: Geometry) -> str:
         child = f"link{k}"
         if len(each.axes) == 2:
             cross = f"cross{k}"
-            links.append(_cross(cross, geometry.hole_radius))
+            links.append(_cross(cross, geometry.hole_radii[k - 1]))
             joints.append(_revolute(f"joint{k}_1", parent, cross, start, each.axes[0], limit))
             joints.append(_revolute(f"joint{k}_2", cross, child, 0.0, each.axes[1], limit))
         else:
             joints.append(_revolute(f"joint{k}", parent, child, start, each.axes[0], limit))
-        links.append(_link(geometry, k))
+        links.append(_link(geometry, k, disks[2 * k - 1 : 2 * k + 1]))
         parent, start = child, geometry.links[k - 1].length
     links.append(E.link(name=TIP))
     joints.append(joint("fixed", "tool0_joint", parent, TIP, *_at(start)))
@@ -155,13 +157,12 @@ def _read_back(path: Path, length: float) -> None:
             )
 
 
-def _link(geometry: Geometry, index: int) -> etree._Element:
-    """Build body ``index`` of the arm: 0 is the base with its disk, k is link k."""
-    name, disks = geometry.disks[index]
-    radius = geometry.hole_radius
+def _link(geometry: Geometry, index: int, disks: tuple[Disk, ...]) -> etree._Element:
+    """Build body ``index`` of the arm with its disks: 0 is the base, k is link k."""
+    radius = disks[0].hole_radius
     thickness = 0.2 * geometry.joints[max(index - 1, 0)].disk_offset
     length = geometry.links[index - 1].length if index else geometry.base_length
-    parts = [_cylinder("disk", x, 1.1 * radius, thickness) for x in disks]
+    parts = [_cylinder("disk", disk.x, disk.radius, thickness) for disk in disks]
     if length > 0.0:
         parts.insert(0, _cylinder("backbone", length / 2, 0.2 * radius, length))
     if index:
@@ -169,7 +170,7 @@ def _link(geometry: Geometry, index: int) -> etree._Element:
         lateral = mass * (3.0 * radius**2 + length**2) / 12.0
         moments = [mass * radius**2 / 2.0, lateral, lateral] if mass else [CROSS_INERTIA] * 3
         parts.insert(0, inertial(mass or CROSS_MASS, np.diag(moments), *_at(length / 2)))
-    return E.link(*parts, name=name)
+    return E.link(*parts, name=disks[0].link)
 
 
 def _cross(name: str, radius: float) -> etree._Element:

@@ -28,6 +28,7 @@ from cdsm.cable_laws import OriginalLength
 from cdsm.elasticity import LinearElasticity
 from cdsm.errors import FileError, GeometryError, UnknownName, UrdfError, counted
 from cdsm.geometry import Geometry, split_geometry
+from cdsm.geometry.tables import build, lines_of
 from cdsm.support.files import read_text
 from cdsm.support.records import CrossFaults, Number, parse, read_toml, record, toml_value
 from cdsm.support.validation import RANGES, one_of
@@ -92,7 +93,7 @@ def read_arm(path: str | os.PathLike[str], wire: Wire | None) -> ArmParts:
     keys = attempt(parse, _Keys, rest)
     geometry = robot = routed = wires = cables = None
     if "urdf" not in rest:
-        geometry = attempt(Geometry.of_tables, described)
+        geometry = attempt(build, Geometry, described)
     elif described:
         faults.append(f"urdf: stands beside {next(iter(described))}; an arm has one of them")
     if keys is not None:
@@ -171,7 +172,7 @@ def _path(cable: Cable) -> tuple[object, ...]:
 
 
 def _geometry_lines(geometry: Geometry) -> list[str]:
-    return ["[geometry]", *geometry.toml_lines("geometry."), ""]
+    return ["[geometry]", *lines_of(geometry, "geometry."), ""]
 
 
 def _urdf_lines(parts: ArmParts) -> list[str]:

@@ -193,15 +193,12 @@ def _draw_joints(axes: Any, pose: Posture) -> None:
 
 
 def _draw_disks(axes: Any, pose: Posture) -> None:
-    geometry = pose.arm.geometry
     circle = np.linspace(0.0, 2.0 * np.pi, 49)
-    ring = geometry.hole_radius * np.array([0.0 * circle, np.cos(circle), np.sin(circle)])
-    for link, places in geometry.disks:
-        placement = pose.link_pose(link)
-        for place in places:
-            center = placement[:3, 3:] + place * placement[:3, :1]
-            edge = center + placement[:3, :3] @ ring
-            axes.plot(*(MM * edge), color="0.45", linewidth=0.6)
+    for disk in pose.arm.geometry.disks:
+        placement = pose.link_pose(disk.link)
+        ring = [0.0 * circle + disk.x, disk.radius * np.cos(circle), disk.radius * np.sin(circle)]
+        edge = placement[:3, 3:] + placement[:3, :3] @ np.array(ring)
+        axes.plot(*(MM * edge), color="0.45", linewidth=0.6)
 
 
 def tension_colors(tension: Tension) -> ScalarMappable:

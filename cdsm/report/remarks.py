@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cdsm.geometry import LONGEST
+
 if TYPE_CHECKING:
     from cdsm.report.report import Report
 
@@ -24,9 +26,6 @@ _SINGULAR = 1e-12
 
 _DIGITS = 1e10
 """Condition number of K_θ above which K_θ⁻¹ has less than six digits."""
-
-_LONGEST = 30.0
-"""The lengths of an arm longer than this [m] are probably in millimetres."""
 
 _NAMED = 4
 
@@ -78,7 +77,7 @@ def faults(report: Report) -> Iterator[str]:
 def notes(report: Report) -> Iterator[str]:
     """Yield notes for a user of the stiffness; they do not mean that it is wrong."""
     length = report.stiffness.posture.arm.length
-    if length > _LONGEST:
+    if length > LONGEST:
         yield f"the arm is {length:.4g} m long: it looks as if its lengths are in mm; give metres."
     yield from _of_tensions(report)
     yield from _of_ranks(report)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import difflib
+import inspect
 import json
 import re
 import tomllib
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import fields, is_dataclass
 from functools import wraps
 from typing import Annotated, Any, TypeVar, cast, dataclass_transform, get_args, get_type_hints
@@ -16,7 +17,9 @@ from pydantic import (
     AfterValidator,
     BeforeValidator,
     ConfigDict,
+    Discriminator,
     Field,
+    Tag,
     TypeAdapter,
     ValidationError,
     validate_call,
@@ -66,6 +69,23 @@ Point = Annotated[
 ]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$", max_length=64)]
 
+ONE, EACH = "(one)", "(each)"
+"""Tags of one value for all joints and of one for each; no part of a name in a fault."""
+
+
+def one_or_each(value: object) -> str:
+    """Return the tag of a value for all joints, or of a list with one for each."""
+    return EACH if isinstance(value, (list, tuple)) or getattr(value, "ndim", False) else ONE
+
+
+_Each = TypeVar("_Each")
+
+PerJoint = Annotated[
+    Annotated[_Each, Tag(ONE)] | Annotated[Sequence[_Each], BeforeValidator(_plain), Tag(EACH)],
+    Discriminator(one_or_each),
+]
+"""A value for all joints, or one for each joint, base to tip."""
+
 
 _DEEPEST = 64
 """Maximum number of parts of a dotted key; a description of an arm needs two."""
@@ -103,6 +123,10 @@ def _reporting(validated: _Function, kind: Callable[..., Any]) -> _Function:
 
     @wraps(validated)
     def call(*args: object, **values: object) -> object:
+        if len(args) > 1:  # the first one is the class or the object itself
+            names = [each for each in inspect.signature(kind).parameters if each != "cls"]
+            pairs = [f"{name}={value!r}" for name, value in zip(names, args[1:], strict=False)]
+            raise GeometryError([f"takes keywords only: write {', '.join(pairs)}"])
         try:
             return validated(*args, **values)
         except ValidationError as error:
@@ -177,7 +201,9 @@ def _faults(error: ValidationError, kind: Callable[..., Any]) -> list[str]:
     for fault in faults:
         # joints[2].limit counts from 1 like the names of joints and cables
         where = "".join(
-            f"[{part + 1}]" if isinstance(part, int) else f".{part}" for part in fault["loc"]
+            f"[{part + 1}]" if isinstance(part, int) else f".{part}"
+            for part in fault["loc"]
+            if part not in (ONE, EACH)
         ).lstrip(".")
         cause = fault.get("ctx", {}).get("error")
         if isinstance(cause, CrossFaults):

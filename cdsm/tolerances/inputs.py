@@ -142,10 +142,11 @@ class Inputs:
             entries = found[source].setdefault(label, [])
             entries += [(at + r, x) for r, x in enumerate(way) if x]
 
-        links = {name: body.locate(name) for name, _ in arm.geometry.disks}
+        disks = arm.geometry.disks
+        offsets = {name: [disk.x for disk in disks if disk.link == name] for name, *_ in disks}
+        links = {name: body.locate(name) for name in offsets}
         names = list(links)
         everywhere = [site for cable in arm.cables for site in cable.sites]
-        offsets = dict(arm.geometry.disks)
         for p, site in enumerate(everywhere):
             if site.link not in links:
                 continue

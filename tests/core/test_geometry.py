@@ -105,11 +105,12 @@ def test_default_limit_is_never_above_80_degrees() -> None:
 
 
 def test_every_link_has_a_disk_beside_each_of_its_joints() -> None:
-    disks = dict(general().disks)
-    assert list(disks) == ["base_disk", "link1", "link2"]
-    assert disks["base_disk"] == pytest.approx([0.02 - 0.01])
-    assert disks["link1"] == pytest.approx([0.01, 0.04 - 0.005])
-    assert disks["link2"] == pytest.approx([0.005])
+    disks = general().disks
+    assert [(disk.link, disk.joint) for disk in disks] == [
+        *(("base_disk", 1), ("link1", 1)),
+        *(("link1", 2), ("link2", 2)),
+    ]
+    assert [disk.x for disk in disks] == pytest.approx([0.02 - 0.01, 0.01, 0.04 - 0.005, 0.005])
 
 
 def test_general_constructor_takes_joints_links_and_cables_that_differ() -> None:
@@ -216,13 +217,13 @@ FAULTS: dict[str, tuple[dict[str, Any], list[str]]] = {
     "friction negative": ({"friction": -0.1}, ["friction", "-0.1 given", "0, or 1e-06 to 2 is"]),
     "friction above 2": ({"friction": 2.5}, ["friction", "2.5 given", "0, or 1e-06 to 2 is"]),
     "friction NaN": ({"friction": math.nan}, ["friction", "finite", "nan"]),
-    "friction per joint": ({"friction": [0.1, 0.2]}, ["friction", "valid number"]),
+    "friction per joint": ({"friction": [0.1, 0.2]}, ["friction: 2 values given for 5"]),
     "NaN": ({"link_length": math.nan}, ["link_length", "finite", "nan"]),
     "infinite": ({"link_mass": math.inf}, ["link_mass", "finite", "inf"]),
     "text for a number": ({"link_length": "0.04"}, ["link_length", "valid number", "'0.04'"]),
     "bool for a number": ({"link_mass": True}, ["link_mass", "valid number", "True"]),
     "fraction for a count": ({"joints": 2.5}, ["joints", "valid integer", "2.5"]),
-    "list for a number": ({"lead": [1.0]}, ["lead", "valid number", "[1.0]"]),
+    "list for a number": ({"base_length": [1.0]}, ["base_length", "valid number", "[1.0]"]),
     "no number": ({"base_length": None}, ["base_length", "valid number", "None"]),
     "limit zero": ({"joint_limit": 0.0}, ["joint_limit", "greater than 0", "0.0"]),
     "limit above pi": ({"joint_limit": 4.0}, ["joint_limit", "less than or equal to 3.14", "4.0"]),
@@ -230,12 +231,15 @@ FAULTS: dict[str, tuple[dict[str, Any], list[str]]] = {
     "number for a name": ({"name": 3}, ["name", "valid string", "3"]),
     "overlapping disks": (
         {"link_length": 0.019},
-        ["links[1].length", "0.019 m", "overlap", "more than 0.02 m", "lower disk_offset"],
+        ["disk_offset: too large", "0.019 m", "0.02 m; and 3 links more; lower disk_offset"],
     ),
-    "touching disks": ({"link_length": 0.02}, ["links[1].length", "more than 0.02 m"]),
+    "touching disks": (
+        {"link_length": 0.02},
+        ["disk_offset: too large: link 1", "more than 0.02 m"],
+    ),
     "last disk beyond the tip": (
         {"joints": 1, "link_length": 0.01},
-        ["links[1].length", "its disk need", "more than 0.01 m"],
+        ["disk_offset: too large: link 1", "its disk needs more than 0.01 m"],
     ),
 }
 
@@ -269,7 +273,7 @@ GENERAL_FAULTS: dict[str, tuple[dict[str, Any], list[str]]] = {
     "unknown key": ({"hole_radious": 0.1}, ["hole_radious", "did you mean hole_radius?"]),
     "second link too short": (
         {"links": (cdsm.Link(length=0.04, mass=0.5), cdsm.Link(length=0.005, mass=0.0))},
-        ["links[2].length: 0.005 m"],
+        ["link 2 is 0.005 m long, its disk needs more than 0.005 m"],
     ),
 }
 
@@ -316,7 +320,7 @@ def test_faults_between_fields_are_listed_together() -> None:
             cables=(cdsm.CableRoute(joint=1, angle=0.0), cdsm.CableRoute(joint=9, angle=0.0)),
         )
     starts = [fault.split(":")[0] for fault in caught.value.faults]
-    assert starts == ["links[1].length", "links[2].length", "cables[2].joint"]
+    assert starts == ["disk_offset", "cables[2].joint"]
 
 
 # what is replaced in a TOML text, and what the message must say
@@ -466,7 +470,7 @@ def test_faults_of_a_file_name_the_file(tmp_path: Path) -> None:
         cdsm.Geometry.read(path)
     assert caught.value.source == str(path)
     assert str(path) in str(caught.value)
-    assert len(caught.value.faults) == 7
+    assert len(caught.value.faults) == 6
 
 
 def test_writing_into_a_missing_folder_says_so(tmp_path: Path) -> None:

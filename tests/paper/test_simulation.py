@@ -160,7 +160,7 @@ def test_virtual_prototype_is_that_of_section_iv() -> None:
     arm = presets.virtual_prototype()
     assert (arm.nv, len(arm.cables)) == (10, 15)
     assert arm.geometry.hole_radius == 0.03
-    places = [x for _, disks in arm.geometry.disks for x in disks]
+    places = [disk.x for disk in arm.geometry.disks]
     assert places == [0.01, *[0.01, 0.03] * 4, 0.01]  # every 20 mm along the straight arm
     np.testing.assert_array_equal(arm.gravity, (0.0, -9.81, 0.0))
 

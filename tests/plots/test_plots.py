@@ -22,7 +22,7 @@ def test_arm_is_drawn_with_disks_cables_and_equal_axes() -> None:
     pull = cdsm.distribute_tension(pose, 10.0)
     axes = plots.plot_arm(pose, pull).axes[0]
     lines = [line for line in axes.get_lines() if isinstance(line, Line3D)]
-    disks = sum(len(places) for _, places in pose.arm.geometry.disks)
+    disks = len(pose.arm.geometry.disks)
     before = disks + len(pose.bones)
     assert len(lines) == before + len(pose.arm.cables)
     first = np.array(lines[before].get_data_3d())

@@ -266,7 +266,7 @@ def _unless_sites_coincide(
 @st.composite
 def _routed_arms(draw: st.DrawFn, shapes: Strategy[cdsm.Geometry]) -> cdsm.Manipulator | None:
     geometry = draw(shapes)
-    links = ("base_link", "tool0", *(name for name, _ in geometry.disks))
+    links = ("base_link", "tool0", *dict.fromkeys(disk.link for disk in geometry.disks))
     routed = draw(cables(links, size=geometry.hole_radius))
     if draw(st.sampled_from([True, True, True, False])):  # most can be balanced then
         routed += cdsm.serpentine_cables(geometry, draw(elasticities()))

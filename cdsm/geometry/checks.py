@@ -1,0 +1,115 @@
+"""Disks of a geometry, and what makes it impossible or doubtful."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from cdsm.errors import first_of
+from cdsm.geometry.holes import sharing
+from cdsm.geometry.parts import Disk
+
+if TYPE_CHECKING:
+    from cdsm.geometry.description import Geometry
+
+LONGEST = 30.0
+"""The lengths of an arm longer than this [m] are probably in millimetres."""
+
+_WIDEST = 1.0
+"""A hole radius or disk offset larger than this [m] is probably in millimetres."""
+
+
+def disks_of(geometry: Geometry) -> tuple[Disk, ...]:
+    """Return all disks, base to tip: see :attr:`Geometry.disks`."""
+    joints, farthest = geometry.joints, farthest_holes(geometry)
+    links = ["base_disk", *(f"link{k + 1}" for k in range(len(joints)))]
+    ends = [geometry.base_length, *(link.length for link in geometry.links)]
+    disks = []
+    for k, (joint, R, end) in enumerate(zip(joints, geometry.hole_radii, ends, strict=False)):
+        for d, link, x in (
+            (2 * k, links[k], end - joint.disk_offset),
+            (2 * k + 1, links[k + 1], joint.disk_offset),
+        ):
+            radius = 1.1 * farthest[d] if joint.disk_radius is None else joint.disk_radius
+            disks.append(Disk(link, x, k + 1, R, radius))
+    return tuple(disks)
+
+
+def farthest_holes(geometry: Geometry) -> list[float]:
+    """Return the distance of the farthest hole of each disk from the axis [m]."""
+    farthest = [R for R in geometry.hole_radii for _ in range(2)]
+    for cable in geometry.cables:
+        if cable.radius is not None:
+            for d in range(2 * cable.joint):
+                farthest[d] = max(farthest[d], cable.radius)
+    return farthest
+
+
+def faults_of(geometry: Geometry) -> list[str]:
+    """Return the faults that concern several parts of a geometry."""
+    count = len(geometry.joints)
+    faults = []
+    if len(geometry.links) != count:
+        faults.append(
+            f"links: {len(geometry.links)} given for {count} joints; every joint has one link "
+            "after it"
+        )
+    faults += _short_links(geometry)
+    faults += [
+        f"cables[{c}].joint: {cable.joint} is past the last joint, {count}; give 1 to {count}"
+        for c, cable in enumerate(geometry.cables, start=1)
+        if cable.joint > count
+    ]
+    if faults:
+        return faults
+    small = [
+        f"at joint {k} it is {joint.disk_radius:g} m, and the farthest hole is at {farthest:g} m"
+        for k, (joint, farthest) in enumerate(
+            zip(geometry.joints, farthest_holes(geometry)[::2], strict=True), start=1
+        )
+        if joint.disk_radius is not None and joint.disk_radius <= farthest
+    ]
+    if small:
+        faults.append(
+            f"disk_radius: too small: {first_of(small, 1, 'joints')}; give more, or leave it out"
+        )
+    return faults
+
+
+def _short_links(geometry: Geometry) -> list[str]:
+    """Return one fault for all links that are too short for their disks."""
+    offsets = [joint.disk_offset for joint in geometry.joints]
+    short = [
+        f"link {k} is {link.length:g} m long, its {'disks need' if after else 'disk needs'} "
+        f"more than {before + after:g} m"
+        for k, (link, before, after) in enumerate(
+            zip(geometry.links, offsets, [*offsets[1:], 0.0], strict=False), start=1
+        )
+        if link.length <= before + after
+    ]
+    if not short:
+        return []
+    told = first_of(short, 1, "links")
+    return [f"disk_offset: too large: {told}; lower disk_offset, or lengthen the links"]
+
+
+def doubts_about(geometry: Geometry) -> list[str]:
+    """Return what is possible, but rarely meant: lengths in mm, cables that share holes."""
+    doubts = []
+    sizes = [
+        ("the arm", geometry.length, LONGEST),
+        ("hole_radius", max(geometry.hole_radii), _WIDEST),
+        ("disk_offset", max(joint.disk_offset for joint in geometry.joints), _WIDEST),
+    ]
+    large = [f"{what} is {size:.4g} m" for what, size, most in sizes if size > most]
+    if large:
+        doubts.append(f"{', '.join(large)}: it looks as if lengths are in mm; give them in metres.")
+    names = geometry.cable_names
+    groups = [
+        " and ".join(names[c] for c in each) for each in sharing(geometry.cables, geometry.disks)
+    ]
+    if groups:
+        doubts.append(
+            f"cables share holes: {first_of(groups, 4, 'holes')}. Two cables in one hole rub, and "
+            "few disks are built so. Set them apart by spread=, phase= or hole_angles=."
+        )
+    return doubts

@@ -1,0 +1,110 @@
+"""TOML of a geometry: which tables there are, and what they build."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Annotated, Any
+
+from pydantic import Field
+
+from cdsm.errors import GeometryError
+from cdsm.support.records import Name, Number, did_you_mean, parse, record, toml_lines
+
+if TYPE_CHECKING:
+    from cdsm.geometry.description import Geometry
+
+ARM_KEYS = (
+    *("gravity", "original_length", "wire", "wires", "urdf"),
+    *("series_stiffness", "control", "minimum", "maximum"),
+)
+"""Keys of an ARM.toml that do not describe its geometry; ``cables`` may."""
+
+
+def build(cls: type[Geometry], data: dict[str, Any]) -> Geometry:
+    """Build a geometry from parsed TOML: see :meth:`read`; raise GeometryError."""
+    builders: dict[str, Callable[..., Geometry]] = {
+        "universal": cls.universal,
+        "hinged": cls.hinged,
+        "geometry": lambda **full: parse(cls, full),
+    }
+    if "sections" in data:
+        return _joined(cls, data)
+    kind = next((key for key in data if key in builders), None)
+    if kind is None and data.keys() & {"joints", "links"}:
+        return parse(cls, data)
+    if kind is None and "cables" in data:
+        faults = ["holds cables but no joints: give a file of cables beside the arm it is for"]
+    elif kind is None:
+        found = ", ".join(data) or "nothing"
+        faults = [
+            f"holds {found}; give a table [universal] or [hinged], [[sections]] of them, "
+            "or the full form"
+        ]
+    elif len(data) > 1:
+        faults = [
+            f"{key}: stands outside [{kind}], which says all of the geometry; move it in, or "
+            f"away{did_you_mean(key, ARM_KEYS)}"
+            for key in data
+            if key != kind
+        ]
+    elif not isinstance(data[kind], dict):
+        faults = [f"{kind}: is {data[kind]!r}; give a table [{kind}]"]
+    else:
+        return builders[kind](**data[kind])
+    raise GeometryError(faults)
+
+
+@record
+class _Sections:
+    sections: Annotated[tuple[dict[str, Any], ...], Field(strict=False, min_length=1)]
+    spread: Number = 0.0
+    name: Name = "arm"
+
+
+def _joined(cls: type[Geometry], data: dict[str, Any]) -> Geometry:
+    """Build an arm of the tables ``[[sections]]``; raise GeometryError with every fault."""
+    given = parse(_Sections, data)
+    parts, faults = [], []
+    for i, section in enumerate(given.sections, start=1):
+        try:
+            parts.append(build(cls, section))
+        except GeometryError as error:
+            faults += [f"sections[{i}].{fault}" for fault in error.faults]
+    if faults:
+        raise GeometryError(faults)
+    return cls.sections(parts, spread=given.spread, name=given.name)
+
+
+def split_geometry(data: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Split the parsed TOML of an arm: what describes its geometry, and what does not.
+
+    Cables belong to the geometry if its joints or links stand beside them.
+    """
+    kept = set(ARM_KEYS)
+    if data.keys() - {"cables"} and not data.keys() & {"joints", "links"}:
+        kept.add("cables")
+    geometry = {key: value for key, value in data.items() if key not in kept}
+    return geometry, {key: value for key, value in data.items() if key in kept}
+
+
+def text_of(geometry: Geometry) -> str:
+    """Return the TOML text of a geometry in its full form."""
+    lines = [
+        "# cdsm geometry. Units: m, rad, kg.",
+        "# axes: in the axes of the link before; angle: of the hole about x, from y towards z;",
+        "# joint (of a cable): the joint it drives, from 1; it ends on the disk after it.",
+    ]
+    return "\n".join([*lines, *lines_of(geometry)]) + "\n"
+
+
+def lines_of(geometry: Geometry, prefix: str = "") -> list[str]:
+    """Return the lines of the full form, with a prefix before the names of tables."""
+    lines = toml_lines(geometry, ("name", "base_length", "hole_radius"))
+    for joint in geometry.joints:
+        lines += ["", f"[[{prefix}joints]]", *toml_lines(joint)]
+    for link in geometry.links:
+        lines += ["", f"[[{prefix}links]]", *toml_lines(link)]
+    for cable in geometry.cables:
+        keys = ("joint", "angle", "lead", *(["friction"] if cable.friction else []), "radius")
+        lines += ["", f"[[{prefix}cables]]", *toml_lines(cable, keys)]
+    return lines

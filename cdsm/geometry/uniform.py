@@ -1,0 +1,110 @@
+"""Parts of arms whose joints are alike: one number for all joints, or one for each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Annotated, Any
+
+from pydantic import Discriminator, Field, Tag
+
+from cdsm.errors import GeometryError
+from cdsm.geometry.holes import spread_out
+from cdsm.geometry.parts import MAXIMUM_JOINTS, CableRoute, Joint, Link
+from cdsm.support.records import EACH, ONE, Integer, Number, PerJoint, one_or_each
+
+JointCount = Annotated[Integer, Field(ge=1, le=MAXIMUM_JOINTS)]
+
+_MOST_CABLES = 64
+
+CablesPerJoint = Annotated[Integer, Field(ge=1, le=_MOST_CABLES)]
+
+_Angles = Annotated[Sequence[Number], Field(min_length=1, max_length=_MOST_CABLES)]
+
+
+def _of_all_or_each(value: object) -> str:
+    first = next(iter(value), None) if isinstance(value, (list, tuple)) else value
+    return one_or_each(first)
+
+
+HoleAngles = Annotated[
+    Annotated[_Angles, Tag(ONE)] | Annotated[Sequence[_Angles], Tag(EACH)],
+    Discriminator(_of_all_or_each),
+]
+"""Angles of the holes of all joints, or of each joint [rad]."""
+
+
+def uniform(
+    axes: Sequence[tuple[tuple[float, float, float], ...]],
+    usual_angles: Callable[[int], list[list[float]]],
+    cables_per_joint: int | None,
+    hole_angles: Any,
+    sizes: Mapping[str, PerJoint[float] | None],
+    spread: float,
+) -> dict[str, Any]:
+    """Return joints, links, cables and hole radius of a Geometry; raise GeometryError.
+
+    ``axes`` has the axes of each joint. ``usual_angles`` returns the hole angles of each joint for
+    a number of cables per joint, if ``hole_angles`` are not given. ``sizes`` has the keywords that
+    are one number or one per joint.
+    """
+    n = len(axes)
+    faults = [
+        f"{key}: {len(value)} values given for {n} joints; give one, or one for each joint"
+        for key, value in sizes.items()
+        if isinstance(value, Sequence) and len(value) != n
+    ]
+    if (cables_per_joint is None) == (hole_angles is None):
+        given = "is missing" if hole_angles is None else "stands beside hole_angles"
+        faults.append(f"cables_per_joint: {given}; give cables_per_joint or hole_angles")
+    elif hole_angles is not None and isinstance(hole_angles[0], Sequence) and len(hole_angles) != n:
+        faults.append(
+            f"hole_angles: {len(hole_angles)} lists given for {n} joints; give one list of angles, "
+            "or one for each joint"
+        )
+    if faults:
+        raise GeometryError(faults)
+    each: dict[str, tuple[Any, ...]] = {
+        key: tuple(value) if isinstance(value, Sequence) else (value,) * n
+        for key, value in sizes.items()
+    }
+    if hole_angles is None:
+        angles: Sequence[Sequence[float]] = usual_angles(cables_per_joint or 0)
+    else:
+        angles = hole_angles if isinstance(hole_angles[0], Sequence) else (hole_angles,) * n
+    hole_radius = each["hole_radius"][0]
+    cables = [
+        CableRoute(
+            joint=k + 1,
+            angle=angle + phase if phase else angle,
+            lead=each["lead"][k],
+            friction=each["friction"][k],
+            radius=each["cable_radius"][k],
+        )
+        for k, phase in enumerate(each["phase"])
+        for angle in angles[k]
+    ]
+    return {
+        "hole_radius": hole_radius,
+        "joints": tuple(
+            Joint(
+                axes=axis,
+                disk_offset=h,
+                limit=limit,
+                hole_radius=None if hole_radius == R else R,
+                disk_radius=disk,
+            )
+            for axis, h, limit, R, disk in zip(
+                axes,
+                each["disk_offset"],
+                each["joint_limit"],
+                each["hole_radius"],
+                each["disk_radius"],
+                strict=True,
+            )
+        ),
+        "links": tuple(
+            Link(length=length, mass=mass)
+            for length, mass in zip(each["link_length"], each["link_mass"], strict=True)
+        ),
+        "cables": spread_out(cables, spread),
+    }

@@ -1,0 +1,20 @@
+"""Warnings of cdsm, shown at the line of the user's program."""
+
+from __future__ import annotations
+
+import sys
+import warnings
+
+from cdsm.errors import CdsmWarning
+
+_OURS = {"cdsm", "pydantic", "dataclasses", "contextlib"}
+
+
+def warn(message: str) -> None:
+    """Warn with a :class:`CdsmWarning` at the first caller outside cdsm."""
+    level, frame = 1, sys._getframe(1)
+    while frame.f_back is not None:
+        if str(frame.f_globals.get("__name__")).partition(".")[0] not in _OURS:
+            break
+        level, frame = level + 1, frame.f_back
+    warnings.warn(message, CdsmWarning, stacklevel=level + 1)
