@@ -160,7 +160,7 @@ class Cable:
         values = self.elasticity.domain.check(tension)
         length = _length(free_length)
         wire = length * self.elasticity.strain(values)
-        return np.asarray(wire + (values - self.elasticity.domain.low) / self.series_stiffness)
+        return np.asarray(wire + (values - self.elasticity.rest) / self.series_stiffness)
 
     def tangent_stiffness(self, tension: ArrayLike, free_length: float) -> Array:
         """Compute dF/dΔl = 1/(l_0/EA(F) + 1/k_series) [N/m] for any type of motor control.
@@ -176,7 +176,7 @@ class Cable:
         Arguments, shapes and errors are those of :meth:`elongation`.
         """
         values = self.elasticity.domain.check(tension)
-        spring = (values**2 - self.elasticity.domain.low**2) / (2.0 * self.series_stiffness)
+        spring = (values**2 - self.elasticity.rest**2) / (2.0 * self.series_stiffness)
         return np.asarray(_length(free_length) * self.elasticity.energy(values) + spring)
 
     def tension(self, elongation: ArrayLike, free_length: float) -> Array:

@@ -15,6 +15,7 @@ from cdsm.support.validation import LARGEST, RANGES
 from cdsm.support.values import Array, frozen
 from cdsm.wires.continuity import find_jump
 from cdsm.wires.laws import StrandElasticity
+from cdsm.wires.slack import SlackBelow
 
 OriginalLength = Literal["unstrained", "stretched"]
 
@@ -36,8 +37,7 @@ class CableLaws:
     Attributes:
         held: Each different law of the position-controlled cables, with the indices of its cables.
         series: 1/k_series of all cables (C,) [m/N].
-        rest: Tension at which each series spring is at rest (C,) [N]: the low end of the law's
-            domain.
+        rest: Tension at which each series spring is at rest (C,) [N]: that of zero strain.
     """
 
     def __init__(self, cables: tuple[Cable, ...], original_length: OriginalLength) -> None:
@@ -60,7 +60,7 @@ class CableLaws:
         self._bounded = bool(self._least.any() or np.isfinite(self._most).any())
         series = np.array([cable.series_stiffness for cable in self._cables])
         self.series = frozen(1.0 / series)
-        self.rest = frozen(np.array([cable.elasticity.domain.low for cable in self._cables]))
+        self.rest = frozen(np.array([cable.elasticity.rest for cable in self._cables]))
         # constant EA of linear laws; all other laws are evaluated at each tension
         constant, linear, self.asked = np.zeros(len(self._cables)), np.zeros(len(self._cables)), []
         for law, of in self.held:
@@ -186,6 +186,8 @@ def kinks(law: Elasticity) -> tuple[float, ...]:
     The slope at a kink is the slope of the range below it. A table has weak kinks at its points;
     they are not returned.
     """
+    if isinstance(law, SlackBelow):
+        return law.rest, *kinks(law.law)
     return law.joins if isinstance(law, StrandElasticity) else ()
 
 

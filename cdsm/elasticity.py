@@ -112,6 +112,29 @@ class Elasticity(ABC):
 
         return plot_elasticity(self)
 
+    @property
+    def rest(self) -> float:
+        """Tension [N] at which the strain is zero: the low end of :attr:`domain`."""
+        return self.domain.low
+
+    def slack_below(self) -> Elasticity:
+        """Return this law with a slack branch: it is continued down to zero tension.
+
+        Below the low end F_0 of this law, EA keeps its value EA(F_0), so it stays continuous and
+        positive. Strains count from F_0 as before, so answers within the law stay the same. Below
+        it ε = (F − F_0)/EA(F_0) is negative. The cable is slack at ε = −F_0/EA(F_0), and below.
+
+        The branch is an assumption; no tensile test has measured it. The strand of Eq. 19 has
+        EA = 16.4 N from 2.2 N down and is slack after shortening by 13 %: it is that soft where
+        its polynomial begins. A law that begins at zero is returned as it is.
+
+        Raises:
+            InvalidInput: The wire would be shorter than half its length when it is slack.
+        """
+        from cdsm.wires.slack import SlackBelow
+
+        return self if 0.0 in self.domain else SlackBelow(self)
+
     @abstractmethod
     def rigidity(self, tension: ArrayLike) -> Array:
         """Compute the tangent rigidity EA(F) = l_0 dF/dΔl [N]; K_L uses it (caption of Fig. 5).
@@ -144,7 +167,7 @@ class Elasticity(ABC):
 
     @abstractmethod
     def strain(self, tension: ArrayLike) -> Array:
-        """Compute the strain Δl/l_0 = ∫ dF/EA(F) [-] from the low end of the domain.
+        """Compute the strain Δl/l_0 = ∫ dF/EA(F) [-] from :attr:`rest`, the domain's low end.
 
         Args:
             tension: F [N], any shape.
@@ -157,7 +180,7 @@ class Elasticity(ABC):
     def energy(self, tension: ArrayLike) -> Array:
         """Compute the elastic energy ∫ F dε = ∫ F dF/EA(F) [N] = [J/m] per unstretched metre.
 
-        It starts at the low end of the domain, like :meth:`strain`.
+        It starts at :attr:`rest`, like :meth:`strain`.
 
         Args:
             tension: F [N], any shape.
@@ -170,7 +193,7 @@ class Elasticity(ABC):
         """Compute the tension F [N] at a strain: the inverse of :meth:`strain`.
 
         Args:
-            strain: Δl/l_0 [-] from the low end of the domain, any shape.
+            strain: Δl/l_0 [-] from :attr:`rest`, any shape.
 
         Raises:
             InvalidInput: ``strain`` is not numbers.
@@ -182,15 +205,15 @@ class Elasticity(ABC):
         )
 
     def secant_rigidity(self, tension: ArrayLike) -> Array:
-        """Compute the secant rigidity ΔF/(Δl/l_0) [N] of Eq. 18 from the low end of the domain.
+        """Compute the secant rigidity ΔF/(Δl/l_0) [N] of Eq. 18 from :attr:`rest`.
 
-        It equals :meth:`rigidity` at the low end, and everywhere if EA is constant. Argument and
+        It equals :meth:`rigidity` there, and everywhere if EA is constant. Argument and
         errors are those of :meth:`rigidity`.
         """
         values = self.domain.check(tension)
         strain = self.strain(values)
         secant = np.array(self.rigidity(values))
-        np.divide(values - self.domain.low, strain, out=secant, where=strain > 0.0)
+        np.divide(values - self.rest, strain, out=secant, where=strain != 0.0)
         return secant
 
 
@@ -274,8 +297,8 @@ def tension_at(
     """Find the tensions F [N] at which a rising function stretch(F) has the wanted values.
 
     ``wanted`` is a strain [-] or an elongation [m] of any shape; the error calls it ``name``.
-    ``stretch`` is zero at the low end of ``domain``, and ``slope`` is its derivative. If no tension
-    of the domain gives one of the values, ElasticityRangeError is raised.
+    ``stretch`` is zero or less at the low end of ``domain``, and ``slope`` is its derivative. If no
+    tension of the domain gives one of the values, ElasticityRangeError is raised.
     """
     low, high, most = *domain, RANGES["tension"].high
     if math.isinf(high):  # an unbounded law: search only as far as needed
@@ -286,7 +309,7 @@ def tension_at(
     grid[-1] = high  # low + (high - low) may differ from high by rounding
     reached = stretch(grid)
     # a law's last digit may depend on the array size, and ``high`` belongs to the domain
-    outside = (wanted < 0.0) | (wanted > reached[-1] * (1.0 + _ROUNDING))
+    outside = (wanted < min(reached[0], 0.0)) | (wanted > reached[-1] * (1.0 + _ROUNDING))
     if outside.any():
         first = np.atleast_1d(wanted)[np.atleast_1d(outside)][0]
         raise ElasticityRangeError(

@@ -77,6 +77,13 @@ class ArmOptions:
         float | None,
         _arm_option(help="Stiffness of a spring in series with every cable [N/mm]."),
     ] = None
+    slack_below: Annotated[
+        bool,
+        _arm_option(
+            "--slack-below",
+            help="Continue the wires below their laws: constant rigidity down to 0 N, then slack.",
+        ),
+    ] = False
     gravity: Annotated[
         str | None,
         _arm_option(
@@ -97,6 +104,12 @@ class ArmOptions:
                 for cable in arm.cables
             ]
             arm = arm.with_cables(springs)
+        if self.slack_below:
+            continued = [
+                dataclasses.replace(cable, elasticity=cable.elasticity.slack_below())
+                for cable in arm.cables
+            ]
+            arm = arm.with_cables(continued)
         if self.gravity is not None:
             arm = arm.with_gravity(numbers("--gravity", self.gravity, 3))
         return arm

@@ -56,7 +56,7 @@ class ChainProblem:
         size, first = self._cable.size, start[:-1]
         self._spring, self._rest = np.zeros(size), np.zeros(size)
         self._spring[first] = [1.0 / cable.series_stiffness for cable in cables]
-        self._rest[first] = [cable.elasticity.domain.low for cable in cables]
+        self._rest[first] = [cable.elasticity.rest for cable in cables]
         self._base, self._softness = np.ones(size), np.zeros(size)
         self._laws: list[tuple[Elasticity, Indices]] = []  # not linear
         groups: list[tuple[Elasticity, list[int]]] = []

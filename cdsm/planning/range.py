@@ -23,6 +23,7 @@ from cdsm.support.validation import Direction, flag, unit_direction
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension
 from cdsm.wires.laws import StrandElasticity, TabulatedElasticity
+from cdsm.wires.slack import SlackBelow
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -246,7 +247,7 @@ def _rigidities_rise(region: Admissible) -> bool:
         law = cable.elasticity
         if cable.control == "force" or isinstance(law, LinearElasticity):
             continue
-        if not isinstance(law, (StrandElasticity, TabulatedElasticity)):
+        if not isinstance(law, (StrandElasticity, TabulatedElasticity, SlackBelow)):
             return False  # a user-defined law may do anything between samples
         rigidity = law.rigidity(np.linspace(low, high, _LAW_SAMPLES))
         if (np.diff(rigidity) < -_LAW_ROUNDING * rigidity[1:]).any():

@@ -22,6 +22,7 @@ from cdsm.manipulator import Manipulator
 from cdsm.support.format import JointUnits
 from cdsm.support.values import Array
 from cdsm.wires.laws import TabulatedElasticity
+from cdsm.wires.slack import SlackBelow
 
 if TYPE_CHECKING:
     from cdsm.stiffness_matrix import Stiffness
@@ -64,6 +65,7 @@ class LockedCable(NamedTuple):
         """Return the distance [N] from the tension to the nearest end or kink of the law."""
         F, law = self.tension, self.cable.elasticity
         edges = [law.domain.low, law.domain.high, *kinks(law)]
+        law = law.law if isinstance(law, SlackBelow) else law
         if isinstance(law, TabulatedElasticity):
             # the rigidity has kinks at the points of a table. A point too near leaves no room for
             # a step and is ignored: the kink is then in the middle, and differences still converge

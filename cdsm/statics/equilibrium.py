@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from cdsm.cable import Cable
 from cdsm.errors import EquilibriumError, InvalidInput, SingularStiffness
 from cdsm.posture import Posture
 from cdsm.statics.locked_motors import LoadedArm, rounding
@@ -188,18 +189,24 @@ class Equilibrium(ReadOnlyState):
         }
         return dict(plain(numbers))
 
+    def _state(self, cable: Cable, tension: float) -> str:
+        if cable.name in self.slack:
+            return "slack"
+        below = cable.control == "position" and tension < cable.elasticity.rest
+        return "on the slack branch of its wire" if below else ""
+
     def __repr__(self) -> str:
         moved = float(np.linalg.norm(self.displacement)) * 1000.0
         return f"<Equilibrium of {self.pose.arm.name}, tip moved by {moved:.4g} mm>"
 
     def __str__(self) -> str:
         arm = self.pose.arm
-        numbers = zip(arm.cables.names, self.tension, self.reference_tension, strict=True)
+        numbers = zip(arm.cables, self.tension, self.reference_tension, strict=True)
         rows = aligned(
             [("cable", "tension [N]", "reference", "")]
             + [
-                (name, f"{F:.3f}", f"{F0:.3f}", "slack" if name in self.slack else "")
-                for name, F, F0 in numbers
+                (cable.name, f"{F:.3f}", f"{F0:.3f}", self._state(cable, F))
+                for cable, F, F0 in numbers
             ]
         )
         rows.append(f"tip moved by {coordinates(1000.0 * self.displacement)} mm")

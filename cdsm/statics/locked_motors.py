@@ -125,7 +125,8 @@ class LoadedArm:
                 raise ElasticityRangeError(
                     f"at the equilibrium; the elasticity is defined on {domain}, and says neither "
                     "how a cable goes slack below it nor how it yields above. Change the tensions "
-                    "or the load, or use an elasticity that covers them.",
+                    "or the load, use an elasticity that covers them, or continue it below by its "
+                    "slack_below().",
                     F[outside].tolist(),
                     where,
                     [names[c] for c in where],
@@ -183,6 +184,8 @@ class _LockedLaw:
         self._free_length, self._series = free_length, series
         domain, size = law.domain, tension.shape
         self._low, self._high = np.full(size, domain.first), np.full(size, domain.high)
+        # a slack branch has negative strains
+        self._least_strain = np.minimum(law.strain(domain.first), 0.0)
         softest = self._compliance(self._low)
         if (softest <= 0.0).any():
             which = np.flatnonzero(softest <= 0.0).tolist()
@@ -208,7 +211,7 @@ class _LockedLaw:
 
     def _elongation(self, F: Array) -> Array:
         """Compute Δl = l_0 ε(F) + ΔF/k_series [m] from the low end of the law."""
-        wire = self._free_length * self.law.strain(F)
+        wire = self._free_length * (self.law.strain(F) - self._least_strain)
         return np.asarray(wire + (F - self.law.domain.low) * self._series)
 
     def _compliance(self, F: Array) -> Array:

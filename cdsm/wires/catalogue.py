@@ -10,6 +10,7 @@ from cdsm.elasticity import Elasticity, LinearElasticity
 from cdsm.errors import InvalidInput, UnknownName
 from cdsm.wires.files import read_elasticity
 from cdsm.wires.laws import StrandElasticity, TabulatedElasticity
+from cdsm.wires.slack import SlackBelow
 
 STRAND: Final = StrandElasticity.eq19_repaired()
 """The 1×19 steel strand of 1.2 mm of Section IV-C: Eq. 19, repaired and continuous."""
@@ -59,6 +60,9 @@ def label(law: Elasticity) -> str:
     known = name_of(law)
     if known is not None:
         return known
+    if isinstance(law, SlackBelow):
+        EA = float(law.rigidity(0.0))
+        return f"{label(law.law)}, with a slack branch of EA {EA:.4g} N below {law.rest:.4g} N"
     if isinstance(law, LinearElasticity):
         return f"EA {float(law.rigidity(0.0)):.6g} N"
     kind = {StrandElasticity: "strand", TabulatedElasticity: "table"}.get(

@@ -9,6 +9,7 @@ import numpy as np
 
 from cdsm.elasticity import Elasticity, LinearElasticity
 from cdsm.wires.laws import StrandElasticity, TabulatedElasticity
+from cdsm.wires.slack import SlackBelow
 
 _SAMPLES = np.linspace(0.0, 1.0, 257) ** 3  # shares of the domain, more at low tension
 _LARGEST_TENSION = 1e5  # [N], end of an infinite domain: more than any cable carries
@@ -34,6 +35,8 @@ def find_jump(law: Elasticity) -> Jump | None:
     Laws of this library are continuous by construction and are not sampled. If a user-defined law
     raises an error, return None, because the first use of the law reports the error.
     """
+    if isinstance(law, SlackBelow):
+        law = law.law
     if isinstance(law, (LinearElasticity, StrandElasticity, TabulatedElasticity)):
         return None
     try:

@@ -15,6 +15,7 @@ from cdsm.errors import FileError, GeometryError, InvalidInput, listed
 from cdsm.support.files import read_text, write_text
 from cdsm.support.records import Number, Rigidity, parse, read_toml, record, toml_lines
 from cdsm.wires.laws import StrandElasticity, TabulatedElasticity
+from cdsm.wires.slack import SlackBelow
 
 _MEASURED = re.compile(r'^"?[-+]?\d[\d.,eE+-]*"?\s*[;,\t]\s*"?[-+]?\d', re.MULTILINE)
 """A line that begins with two numbers, as in a CSV and never in TOML outside of arrays."""
@@ -35,6 +36,7 @@ class _Strand:
     high: Number
     joins: _Row
     coefficients: Annotated[tuple[_Row, ...], Field(strict=False)]
+    slack_below: bool | None = None
 
 
 @record
@@ -42,6 +44,7 @@ class _Tabulated:
     kind: Literal["tabulated"] = "tabulated"
     tensions: _Row
     strains: _Row
+    slack_below: bool | None = None
 
 
 _KINDS: dict[str, tuple[type[Elasticity], type[_Linear | _Strand | _Tabulated]]] = {
@@ -53,6 +56,8 @@ _KINDS: dict[str, tuple[type[Elasticity], type[_Linear | _Strand | _Tabulated]]]
 
 def table_of(elasticity: Elasticity) -> list[str]:
     """Return the lines of the TOML table of an elasticity. Raise if no file can hold its kind."""
+    if isinstance(elasticity, SlackBelow):
+        return [*table_of(elasticity.law), "slack_below = true"]
     for law, entry in _KINDS.values():
         if isinstance(elasticity, law):
             names = (field.name for field in fields(elasticity))  # type: ignore[arg-type]
@@ -71,8 +76,10 @@ def from_table(data: object) -> Elasticity:
     if not isinstance(kind, str) or kind not in _KINDS:
         raise GeometryError([f"kind: must be one of {', '.join(_KINDS)}, but is {kind!r}"])
     law, entry = _KINDS[kind]
-    values = vars(parse(entry, data))
-    return law(**{name: value for name, value in values.items() if name != "kind"})
+    values = dict(vars(parse(entry, data)))
+    slack = values.pop("slack_below", None)
+    made = law(**{name: value for name, value in values.items() if name != "kind"})
+    return made.slack_below() if slack else made
 
 
 def write_elasticity(elasticity: Elasticity, path: str | os.PathLike[str]) -> Path:
@@ -96,7 +103,8 @@ def read_elasticity(path: str | os.PathLike[str]) -> Elasticity:
     Args:
         path: The TOML file. Its ``kind`` is ``linear`` (with ``rigidity`` [N]), ``strand`` (with
             ``coefficients`` [N, 1, 1/N, …], ``joins``, ``low``, ``high`` [N]) or ``tabulated``
-            (with ``tensions`` [N], ``strains`` [-]).
+            (with ``tensions`` [N], ``strains`` [-]). With ``slack_below = true`` a strand or a
+            table is continued to zero tension, see :meth:`Elasticity.slack_below`.
 
     Raises:
         FileError: The file cannot be read or does not describe an elasticity (all faults listed).

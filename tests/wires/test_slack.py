@@ -1,0 +1,175 @@
+"""Slack branch of a law: continued to zero tension, and the same within the law."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from typer.testing import CliRunner
+
+import cdsm
+from cdsm.cli import app
+from cdsm.support.values import Array
+
+STRAND = cdsm.presets.STRAND_1X19
+TABLE = cdsm.TabulatedElasticity((4.0, 10.0, 40.0, 300.0), (0.0, 1e-3, 3e-3, 1e-2))
+LAWS: dict[str, cdsm.Elasticity] = {"strand": STRAND, "table": TABLE}
+
+GEOMETRY = cdsm.Geometry.universal(
+    joints=4,
+    cables_per_joint=3,
+    link_length=0.06,
+    base_length=0.03,
+    disk_offset=0.012,
+    hole_radius=0.025,
+    link_mass=0.12,
+    lead=0.3,
+)
+BENT = np.deg2rad([10.0, 5.0, 10.0, 5.0, -8.0, 0.0, -8.0, 0.0])
+
+
+def pulled(law: cdsm.Elasticity, least: float) -> tuple[cdsm.Posture, cdsm.Tension]:
+    pose = cdsm.Manipulator(GEOMETRY, law).at(BENT)
+    return pose, cdsm.distribute_tension(pose, least)
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_rigidity_is_continuous_and_positive_and_the_strain_its_integral(name: str) -> None:
+    law, low = LAWS[name].slack_below(), LAWS[name].domain.low
+    assert tuple(law.domain) == (0.0, LAWS[name].domain.high)
+    around = law.rigidity([0.0, low * (1.0 - 1e-12), low, low * (1.0 + 1e-9)])
+    assert (around > 0.0).all()
+    np.testing.assert_allclose(around, around[0], rtol=1e-6)
+    for power, of in enumerate((law.strain, law.energy)):
+
+        def slope(F: float, power: int = power) -> float:
+            return F**power / float(law.rigidity(F))
+
+        for a, b in ((0.0, 0.6 * low), (0.3 * low, low), (0.0, 3.0 * low)):
+            area = quad(slope, a, b, points=[low], limit=200)[0]
+            assert float(of(b) - of(a)) == pytest.approx(area, rel=1e-8)
+    assert float(law.strain(low)) == pytest.approx(0.0, abs=1e-15)
+    F = np.linspace(0.0, 5.0 * low, 41)
+    np.testing.assert_allclose(law.tension(law.strain(F)), F, atol=1e-9)
+    assert (law.rigidity_slope([0.0, 0.5 * low]) == 0.0).all()
+    secant = (F - low) * law.rigidity(0.0) - law.strain(F) * law.rigidity(
+        0.0
+    ) * law.secant_rigidity(F)
+    np.testing.assert_allclose(secant, 0.0, atol=1e-9 * float(law.rigidity(5.0 * low)))
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_within_the_law_all_is_the_same_to_the_bit(name: str) -> None:
+    law, slack = LAWS[name], LAWS[name].slack_below()
+    F = np.linspace(law.domain.first, law.domain.high, 300)
+    for ask in ("rigidity", "rigidity_slope", "strain", "energy"):
+        np.testing.assert_array_equal(getattr(slack, ask)(F), getattr(law, ask)(F))
+    (pose, pull), (pose_slack, pull_slack) = pulled(law, 8.0), pulled(slack, 8.0)
+    np.testing.assert_array_equal(pull_slack.values, pull.values)
+    K, K_slack = cdsm.stiffness(pose, pull), cdsm.stiffness(pose_slack, pull_slack)
+    np.testing.assert_array_equal(K_slack.joint, K.joint)
+    np.testing.assert_array_equal(K_slack.cable_stiffness, K.cable_stiffness)
+    # elongations count from zero tension here, from the low end there: equal to rounding
+    rest = cdsm.equilibrium(pose, pull, (0, 0, -1.0, 0, 0, 0))
+    rest_slack = cdsm.equilibrium(pose_slack, pull_slack, (0, 0, -1.0, 0, 0, 0))
+    np.testing.assert_allclose(rest_slack.tension, rest.tension, atol=1e-10)
+    np.testing.assert_allclose(rest_slack.pose.q, rest.pose.q, atol=1e-12)
+
+
+def test_a_load_test_that_ended_at_the_low_end_runs_on() -> None:
+    pose, pull = pulled(STRAND, 3.0)
+    force = np.array([0.0, 0.0, -4.0])
+    with pytest.raises(cdsm.ElasticityRangeError, match=r"slack_below"):
+        cdsm.weight_test(pose, pull, force, steps=20)
+    pose, pull = pulled(STRAND.slack_below(), 3.0)
+    test = cdsm.weight_test(pose, pull, force, steps=20)
+    least = np.array([each.tension.min() for each in test.loaded])
+    assert least[0] > 2.2 > least[-1] > 0.0
+    assert abs(np.diff(least)).max() < 0.3  # no jump where the law begins
+    assert all(each.converged and each.stable for each in test.loaded)
+    assert "on the slack branch of its wire" in str(test.loaded[-1])
+    assert "on the slack branch" not in str(test.loaded[0])
+
+
+def test_slack_branch_of_a_constant_rigidity_is_the_linear_law() -> None:
+    """l_0 at 5 N is l_0 (1 + 5/EA) at rest, so EA + 5 N from 5 N on is EA from 0 N on.
+
+    At zero tension both cables are slack, in the same equilibrium.
+    """
+    linear = cdsm.LinearElasticity(2e3)
+    from_five = cdsm.StrandElasticity(((2005.0,),), (), 5.0, 500.0).slack_below()
+    slack: list[str] = []
+    for least, force in ((8.0, -0.5), (8.0, -3.0), (3.0, -6.0)):
+        rests = []
+        for law in (linear, from_five):
+            pose, pull = pulled(law, least)
+            K = cdsm.stiffness(pose, pull)
+            rests.append((K, cdsm.equilibrium(pose, pull, (0, 0, force, 0, 0, 0))))
+        (K, rest), (K_five, rest_five) = rests
+        np.testing.assert_allclose(K_five.joint, K.joint, atol=1e-12 * abs(K.joint).max())
+        np.testing.assert_allclose(rest_five.pose.q, rest.pose.q, atol=1e-9)
+        np.testing.assert_allclose(rest_five.tension, rest.tension, atol=1e-7)
+        assert rest_five.slack == rest.slack
+        slack += rest.slack
+    assert slack
+
+
+@pytest.mark.parametrize("least", [0.5, 1.5])
+@pytest.mark.parametrize("spring", [np.inf, 2e3])
+def test_stiffness_on_the_branch_is_that_of_the_potential(least: float, spring: float) -> None:
+    cables = cdsm.serpentine_cables(GEOMETRY, TABLE.slack_below(), series_stiffness=spring)
+    pose = cdsm.Manipulator(GEOMETRY, cables=cables).at(BENT)
+    pull = cdsm.distribute_tension(pose, least)
+    assert pull.values.min() < TABLE.domain.low < pull.values.max()
+    report = cdsm.stiffness(pose, pull).report()
+    assert report.trustworthy, report.faults
+    assert report.self_check.passed
+
+
+def test_a_law_from_zero_on_is_itself() -> None:
+    for law in (cdsm.LinearElasticity(1e4), cdsm.TabulatedElasticity((0.0, 9.0), (0.0, 1e-3))):
+        assert law.slack_below() is law
+    assert STRAND.slack_below().slack_below() == STRAND.slack_below()
+
+
+def test_wire_that_would_vanish_is_refused() -> None:
+    soft = cdsm.StrandElasticity(((0.0, 1.5),), (), 10.0, 100.0)
+    with pytest.raises(cdsm.InvalidInput, match=r"shortening by 66\.7 %"):
+        soft.slack_below()
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_files_hold_the_branch(name: str, tmp_path: Path) -> None:
+    law = LAWS[name].slack_below()
+    path = cdsm.write_elasticity(law, tmp_path / "wire.toml")
+    assert "slack_below = true" in path.read_text(encoding="utf-8")
+    assert cdsm.read_elasticity(path) == law
+    path.write_text(path.read_text(encoding="utf-8").replace("= true", "= false"))
+    assert cdsm.read_elasticity(path) == LAWS[name]
+    path.write_text(path.read_text(encoding="utf-8").replace("= false", "= 1"))
+    with pytest.raises(cdsm.FileError, match="slack_below"):
+        cdsm.read_elasticity(path)
+    arm = cdsm.Manipulator(GEOMETRY, law)
+    assert cdsm.Manipulator.read(arm.write(tmp_path / "arm.toml")) == arm
+
+
+def test_command_line_says_that_the_branch_is_there(tmp_path: Path) -> None:
+    arm = cdsm.Manipulator(GEOMETRY, STRAND).write(tmp_path / "arm.toml")
+    asked = ["stiffness", str(arm), "--min-tension", "1"]
+    ended = CliRunner().invoke(app, asked)
+    assert ended.exit_code == 1
+    assert "2.2 N" in ended.stderr
+    found = CliRunner().invoke(app, [*asked, "--slack-below"])
+    assert "1x19-1.2mm, with a slack branch of EA 16.37 N below 2.2 N" in found.stdout
+    numbers = json.loads(CliRunner().invoke(app, [*asked, "--slack-below", "--json"]).stdout)
+    assert min(numbers["tension_N"].values()) == pytest.approx(1.0)
+
+
+def test_batches_know_the_branch() -> None:
+    pose, pull = pulled(TABLE.slack_below(), 1.5)
+    q: Array = np.stack([pose.q, 0.5 * pose.q])
+    K = cdsm.evaluate(pose.arm, q, minimum=1.5, outputs=("joint",))
+    np.testing.assert_allclose(
+        K["joint"][0], cdsm.stiffness(pose, pull).joint, rtol=1e-9, atol=1e-12
+    )
