@@ -67,6 +67,8 @@ if TYPE_CHECKING:
     from cdsm.statics.bifurcation import Bifurcation, bifurcation
     from cdsm.statics.buckling import CriticalLoad, CriticalTension, critical_load, critical_tension
     from cdsm.statics.equilibrium import Equilibrium, equilibrium
+    from cdsm.statics.load_cycle import load_cycle
+    from cdsm.statics.load_history import LoadHistory
     from cdsm.statics.natural_modes import Modes, modes
     from cdsm.statics.weight_test import LinearPrediction, WeightTest, weight_test
     from cdsm.stiffness_matrix import Stiffness, stiffness
@@ -121,6 +123,7 @@ __all__ = [
     "LinearElasticity",
     "LinearPrediction",
     "Link",
+    "LoadHistory",
     "Manipulator",
     "Measurement",
     "MissingExtra",
@@ -175,6 +178,7 @@ __all__ = [
     "identify",
     "in_series",
     "inverse_kinematics",
+    "load_cycle",
     "modes",
     "monte_carlo",
     "plan_path",
@@ -240,6 +244,8 @@ _NAMES = {
     "statics.bifurcation": "Bifurcation bifurcation",
     "statics.buckling": "CriticalLoad CriticalTension critical_load critical_tension",
     "statics.equilibrium": "Equilibrium equilibrium",
+    "statics.load_cycle": "load_cycle",
+    "statics.load_history": "LoadHistory",
     "statics.natural_modes": "Modes modes",
     "statics.weight_test": "LinearPrediction WeightTest weight_test",
     "shares": "Shares",

@@ -71,7 +71,7 @@ FUNCTIONS = {name: thing for name, thing in PUBLIC.items() if inspect.isfunction
 CLASSES = {name: thing for name, thing in PUBLIC.items() if inspect.isclass(thing)}
 
 UNIT = re.compile(
-    r"\[(?:N|m|rad|kg|Pa|s|Hz|-|1)\b[^\]]*\]|\[-\]|\b(?:N|m|rad|kg)\b"
+    r"\[(?:N|m|J|rad|kg|Pa|s|Hz|-|1)\b[^\]]*\]|\[-\]|\b(?:N|m|rad|kg)\b"
     r"|[Uu]nit (?:vector|joint motion)"
 )
 SHAPE = re.compile(r"\((?:nv|B|C|D|S|P|n|\d|sites)(?:\s*[,+]\s*[\w…]*)*\)|any shape|same shape")
@@ -235,6 +235,7 @@ RESULTS: dict[str, Any] = {
     "KinematicSolution": cdsm.inverse_kinematics(POSE.arm, POSE.tip),
     "Modes": cdsm.modes(POSE, K),
     "Equilibrium": cdsm.equilibrium(POSE, PULL, random_wrench(3)),
+    "LoadHistory": cdsm.load_cycle(POSE, PULL, [random_wrench(3)]),
     "WeightTest": WEIGHT,
     "LinearPrediction": WEIGHT.linear,
     "StiffnessGradient": cdsm.stiffness_gradient(K),

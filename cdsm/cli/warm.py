@@ -25,5 +25,7 @@ def warm(as_json: AsJson = False) -> None:
         up = (0.0, 0.0, 1.0)
         cdsm.plan_stiffness(pose, up, 1.01 * K.along(up), minimum=40.0)
         cdsm.evaluate(arm, pose.q[None], minimum=40.0, direction=up, outputs=("along",))
+        rough = cdsm.presets.virtual_prototype(friction=0.1).at(pose.q)
+        cdsm.load_cycle(rough, tension.values, np.zeros((1, 6)))
     seconds = time.perf_counter() - start
     answer(as_json, lambda: {"seconds": seconds}, f"kernels are compiled: {seconds:.0f} s")

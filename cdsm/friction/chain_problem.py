@@ -46,6 +46,9 @@ class ChainProblem:
         start: First segment of each cable; the last entry is the number of segments (C+1,).
         tension: F (C,) [N] at which the natural lengths are defined.
         unstrained: Whether natural lengths are unstretched, or those under ``tension``.
+
+    Attributes:
+        laws: Each law with its cables.
     """
 
     def __init__(
@@ -58,25 +61,23 @@ class ChainProblem:
         self._spring[first] = [1.0 / cable.series_stiffness for cable in cables]
         self._rest[first] = [cable.elasticity.rest for cable in cables]
         self._base, self._softness = np.ones(size), np.zeros(size)
-        self._laws: list[tuple[Elasticity, Indices]] = []  # not linear
-        groups: list[tuple[Elasticity, list[int]]] = []
+        self._curved: list[tuple[Elasticity, Indices]] = []
+        self.laws: list[tuple[Elasticity, list[int]]] = []
         for c, cable in enumerate(cables):
-            same = next((of for law, of in groups if law is cable.elasticity), None)
+            same = next((of for law, of in self.laws if law is cable.elasticity), None)
             if same is None:
-                groups.append((cable.elasticity, same := []))
+                self.laws.append((cable.elasticity, same := []))
             same.append(c)
-        for law, of in groups:
+        for law, of in self.laws:
             segments = np.flatnonzero(np.isin(self._cable, of))
             if isinstance(law, LinearElasticity):
                 self._softness[segments] = 1.0 / law.rigidity(0.0)
             else:
-                self._laws.append((law, segments))
-        self._offset = np.zeros(size)
+                self._curved.append((law, segments))
         if not unstrained:
             F = tension[self._cable]
             base, softness = self._strain(F)
-            self._offset = base + softness * F - 1.0
-            self._base = self._base - self._offset
+            self._base = self._base - (base + softness * F - 1.0)
 
     def settle(
         self, length: Array, natural: Array, ratio: Array, forced: Array, near: Array
@@ -101,7 +102,7 @@ class ChainProblem:
                 ratio,
                 T,
             )
-            if not self._laws or (abs(new - T) <= _CONVERGED * np.maximum(new, 1.0)).all():
+            if not self._curved or (abs(new - T) <= _CONVERGED * np.maximum(new, 1.0)).all():
                 break
             T = new if attempt < _UNDAMPED else (T + new) / 2.0
         stretch = base + softness * new
@@ -155,10 +156,10 @@ class ChainProblem:
 
     def _strain(self, tension: Array) -> tuple[Array, Array]:
         """Return base and softness (S,) of the tangents 1 + ε ≈ base + softness · T at T (S,)."""
-        if not self._laws:
+        if not self._curved:
             return self._base, self._softness
         base, softness = self._base.copy(), self._softness.copy()
-        for law, of in self._laws:
+        for law, of in self._curved:
             inside, rigidity = _within(law, tension[of])
             softness[of] = 1.0 / rigidity
             base[of] += law.strain(inside) - inside / rigidity
@@ -167,7 +168,7 @@ class ChainProblem:
     def _energy(self, tension: Array) -> Array:
         """Compute ∫ T dε (S,) [N] from the low ends of the laws."""
         energy = self._softness * tension**2 / 2.0
-        for law, of in self._laws:
+        for law, of in self._curved:
             T, (inside, rigidity) = tension[of], _within(law, tension[of])
             energy[of] = law.energy(inside) + (T**2 - inside**2) / (2.0 * rigidity)
         return energy

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from cdsm.cable import Cable
 from cdsm.errors import EquilibriumError, InvalidInput, SingularStiffness
 from cdsm.posture import Posture
-from cdsm.statics.locked_motors import LoadedArm, rounding
+from cdsm.statics.locked_motors import Iterate, LoadedArm, rounding
 from cdsm.statics.trust_region import FLAT, RestSearch, find_rest
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.format import aligned, coordinates, place, plain
@@ -251,7 +251,7 @@ def equilibrium(
     """
     reference = stiffness(pose, tension, None if isinstance(tension, Tension) else wrench)
     W = reference.wrench if wrench is None else wrench_vector("wrench", wrench)
-    _require_between_stops(pose)
+    require_between_stops(pose)
     loaded = LoadedArm(pose, reference.tension, W)
     start = loaded.at(pose, reference.tension)
     # try the whole load first; in a smaller step a torque holds part of the load back
@@ -267,7 +267,8 @@ def equilibrium(
         elif step > _SMALLEST_STEP:
             step /= 2.0
         else:
-            raise _no_rest(loaded, search, reached)
+            residual = np.where(search.at_stop, 0.0, search.state.torque)
+            raise no_rest(pose, search.state.K.posture, residual, reached)
 
 
 def eigenvalues(K: Array, free: NDArray[np.intp]) -> Array:
@@ -276,7 +277,8 @@ def eigenvalues(K: Array, free: NDArray[np.intp]) -> Array:
     return np.asarray(np.linalg.eigvalsh((K + K.T) / 2.0), dtype=np.float64)
 
 
-def _require_between_stops(pose: Posture) -> None:
+def require_between_stops(pose: Posture) -> None:
+    """Raise InvalidInput if a joint is beyond its stop."""
     arm, q = pose.arm, pose.q
     beyond = arm._model.beyond_limits(q)
     if np.count_nonzero(beyond):
@@ -291,7 +293,7 @@ def _require_between_stops(pose: Posture) -> None:
         )
 
 
-def settled(loaded: LoadedArm, search: RestSearch, iterations: int) -> Equilibrium:
+def settled(loaded: LoadedArm, search: RestSearch[Iterate], iterations: int) -> Equilibrium:
     """Return the equilibrium that a search has found; check that all laws are defined there."""
     K = search.state.K
     loaded.require_domains(K.tension)
@@ -308,17 +310,19 @@ def settled(loaded: LoadedArm, search: RestSearch, iterations: int) -> Equilibri
     )
 
 
-def _no_rest(loaded: LoadedArm, search: RestSearch, reached: float) -> EquilibriumError:
-    pose = search.state.K.posture
-    residual = frozen(np.where(search.at_stop, 0.0, search.state.torque))
+def no_rest(
+    reference: Posture, pose: Posture, residual: Array, reached: float, load: str = "the load"
+) -> EquilibriumError:
+    """Return the error of a search that ends with an imbalance (nv,), at a part of the load."""
+    frozen(residual)
     worst = int(abs(residual).argmax())
     joint = pose.arm.joint_names[worst]
     problem = (
-        f"the arm finds no stable place to rest beyond {100.0 * reached:.3g} % of the load; at the "
+        f"the arm finds no stable place to rest beyond {100.0 * reached:.3g} % of {load}; at the "
         f"last iterate {abs(residual[worst]):.4g} {pose.arm.torque_unit(worst)} are out of balance "
         f"at {joint}"
     )
-    before, after = loaded.reference.cable_paths, pose.cable_paths
+    before, after = reference.cable_paths, pose.cable_paths
     for cable, *paths in zip(pose.arm.cables, before, after, strict=True):
         apart, left = (np.linalg.norm(np.diff(path, axis=0), axis=1) for path in paths)
         if (left < _CLOSE * apart).any():

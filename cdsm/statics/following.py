@@ -70,7 +70,7 @@ def follow(before: Equilibrium, wrench: Array, start: Array | None = None) -> Eq
     return settled(loaded, search, search.iterations)
 
 
-def _is_stable_between(loaded: LoadedArm, start: Iterate, search: RestSearch) -> bool:
+def _is_stable_between(loaded: LoadedArm, start: Iterate, search: RestSearch[Iterate]) -> bool:
     """Check that the straight path to the equilibrium is short, and K_θ positive definite on it.
 
     An arm that snaps through has an unstable posture on this path. The search may have jumped it.

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cdsm.cable import Cable
 from cdsm.elasticity import Elasticity
 from cdsm.errors import ElasticityRangeError, InvalidInput
 from cdsm.posture import Posture
@@ -15,7 +17,7 @@ from cdsm.stiffness_matrix import Stiffness, assemble
 from cdsm.support.roots import rising_root
 from cdsm.support.values import Array, frozen
 
-_ROUNDING = 16.0 * float(np.finfo(np.float64).eps)
+ROUNDING = 16.0 * float(np.finfo(np.float64).eps)
 """Relative rounding of a torque, from the angles, lengths and tensions in its sum."""
 
 _APART = 1e-6
@@ -102,35 +104,49 @@ class LoadedArm:
 
     def stops(self) -> tuple[Array, Array]:
         """Return the lowest and highest angles (nv,) [rad], at which joints rest on stops."""
-        arm, q = self.reference.arm, self.reference.q
-        touching = np.zeros(arm.nv, dtype=np.bool_)  # joints that their disks stop
-        if arm.is_serpentine:
-            joints = arm.geometry.joints
-            touching[:] = [joint.limit is None for joint in joints for _ in joint.axes]
-        apart = np.where(touching, _APART, 0.0)
-        # the reference may be nearer to the stop
-        return np.minimum(arm.lower + apart, q), np.maximum(arm.upper - apart, q)
+        return stops(self.reference)
 
     def require_domains(self, tension: Array) -> None:
         """Raise ElasticityRangeError if tensions (C,) [N] are outside the domains of their laws.
 
         Zero is allowed if the law begins at zero: the cable is slack.
         """
-        names = [cable.name for cable in self.reference.arm.cables]
-        for each in self._laws:
-            domain, F = each.law.domain, tension[each.held]
-            outside = (domain.low * (1.0 - _BEYOND) > F) | (domain.high * (1.0 + _BEYOND) < F)
-            if np.count_nonzero(outside):
-                where = np.arange(tension.size)[each.held][outside].tolist()
-                raise ElasticityRangeError(
-                    f"at the equilibrium; the elasticity is defined on {domain}, and says neither "
-                    "how a cable goes slack below it nor how it yields above. Change the tensions "
-                    "or the load, use an elasticity that covers them, or continue it below by its "
-                    "slack_below().",
-                    F[outside].tolist(),
-                    where,
-                    [names[c] for c in where],
-                )
+        groups = [(each.law, each.held) for each in self._laws]
+        require_domains(self.reference.arm.cables, groups, tension)
+
+
+def require_domains(
+    cables: Sequence[Cable],
+    groups: Iterable[tuple[Elasticity, slice | NDArray[np.intp]]],
+    tension: Array,
+    where: str = "at the equilibrium",
+) -> None:
+    """Raise ElasticityRangeError if tensions (C,) [N] are outside the law of their group."""
+    for law, of in groups:
+        F = tension[of]
+        outside = (law.domain.low * (1.0 - _BEYOND) > F) | (law.domain.high * (1.0 + _BEYOND) < F)
+        if np.count_nonzero(outside):
+            at = np.arange(tension.size)[of][outside].tolist()
+            raise ElasticityRangeError(
+                f"{where}; the elasticity is defined on {law.domain}, and says neither how a cable "
+                "goes slack below it nor how it yields above. Change the tensions or the load, use "
+                "an elasticity that covers them, or continue it below by its slack_below().",
+                F[outside].tolist(),
+                at,
+                [cables[c].name for c in at],
+            )
+
+
+def stops(reference: Posture) -> tuple[Array, Array]:
+    """Return the angles (nv,) [rad] at which joints rest on stops; the reference is between."""
+    arm, q = reference.arm, reference.q
+    touching = np.zeros(arm.nv, dtype=np.bool_)  # joints that their disks stop
+    if arm.is_serpentine:
+        joints = arm.geometry.joints
+        touching[:] = [joint.limit is None for joint in joints for _ in joint.axes]
+    apart = np.where(touching, _APART, 0.0)
+    # the reference may be nearer to the stop
+    return np.minimum(arm.lower + apart, q), np.maximum(arm.upper - apart, q)
 
 
 def rounding(K: Stiffness) -> Array:
@@ -139,24 +155,26 @@ def rounding(K: Stiffness) -> Array:
     force = K.tension + K.cable_stiffness * pose.cable_lengths
     terms = force @ abs(pose.length_jacobian) + abs(K.wrench) @ abs(pose.jacobian)
     turned = abs(K.joint) @ abs(pose.q)
-    terms += abs(pose.gravity_torque) + turned + _tilt_torque(pose, K.tension)
-    return np.asarray(_ROUNDING * terms)
+    terms += abs(pose.gravity_torque) + turned
+    terms += tilt_torque(pose, K.tension[pose.arm._model.routing.segment[:-1, 0]])
+    return np.asarray(ROUNDING * terms)
 
 
-def _tilt_torque(pose: Posture, tension: Array) -> Array:
+def tilt_torque(pose: Posture, tension: Array) -> Array:
     """Compute the torque (nv,) [N m] per relative rounding of the sites, which tilts the segments.
 
-    Short segments tilt most. Between disks that nearly touch this is most of the rounding.
+    ``tension`` [N] is that of each segment that joints can change. Short segments tilt most.
+    Between disks that nearly touch this is most of the rounding.
     """
     routing = pose.arm._model.routing
     segment, joint = routing.segment, routing.joint
     site, origin = pose._frames.site, pose._frames.origin
-    cable, start, end = segment[:-1, :3].T
+    start, end = segment[:-1, 1:3].T
     apart = np.linalg.norm(site[end] - site[start], axis=1)
     far = np.linalg.norm(site[end], axis=1)
-    over = np.repeat(np.arange(cable.size), np.diff(segment[:, 3]))
+    over = np.repeat(np.arange(start.size), np.diff(segment[:, 3]))
     arm = np.linalg.norm(site[end][over] - origin[joint], axis=1)
-    force = (tension[cable] * far / apart)[over] * arm
+    force = (tension * far / apart)[over] * arm
     torque = np.bincount(joint, force, minlength=len(origin))[1:]
     return np.asarray(torque, dtype=np.float64)
 

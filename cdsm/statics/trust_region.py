@@ -16,13 +16,12 @@ no potential.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Generic, NamedTuple, Protocol, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cdsm.errors import CdsmError
-from cdsm.statics.locked_motors import Iterate, LoadedArm
 from cdsm.support.values import Array
 
 _ATTEMPTS = 200
@@ -39,10 +38,46 @@ _POOR, _GOOD, _ACCEPTED = 0.25, 0.75, 0.05
 a step is accepted above the third (Nocedal and Wright, Numerical Optimization, 2006, alg. 4.1)."""
 
 
-class RestSearch(NamedTuple):
+class Iterate(Protocol):
+    """Arm at one posture, balanced or not: a state of the search."""
+
+    @property
+    def q(self) -> Array:
+        """Joint angles (nv,) [rad]."""
+
+    @property
+    def torque(self) -> Array:
+        """Imbalance r minus the torque held back (nv,) [N m]."""
+
+    @property
+    def rounding(self) -> Array:
+        """Rounding of the imbalance (nv,) [N m]."""
+
+    @property
+    def stiffness(self) -> Array:
+        """∂r/∂q (nv, nv) [N m/rad]."""
+
+    def holding_back(self, torque: Array | float) -> Self:
+        """Return this posture with a torque (nv,) [N m] that holds part of the load back."""
+
+
+State = TypeVar("State", bound=Iterate)
+
+
+class Loaded(Protocol[State]):
+    """Arm under a load."""
+
+    def moved(self, q: Array, near: State) -> State:
+        """Compute the arm at joint angles (nv,) [rad]; raise CableError if two sites coincide."""
+
+    def stops(self) -> tuple[Array, Array]:
+        """Return the lowest and highest angles (nv,) [rad]."""
+
+
+class RestSearch(NamedTuple, Generic[State]):
     """Result of an equilibrium search."""
 
-    state: Iterate  # the last iterate
+    state: State  # the last iterate
     at_stop: NDArray[np.bool_]  # which joints rest on a stop that pushes (nv,)
     history: tuple[float, ...]  # largest |r| of the free joints at every accepted iterate
     iterations: int  # number of steps tried
@@ -80,7 +115,9 @@ class _Free(NamedTuple):
         )
 
 
-def find_rest(loaded: LoadedArm, start: Iterate, held_back: Array | float = 0.0) -> RestSearch:
+def find_rest(
+    loaded: Loaded[State], start: State, held_back: Array | float = 0.0
+) -> RestSearch[State]:
     """Find the equilibrium from an iterate while a torque (nv,) holds part of the load back."""
     stops = loaded.stops()
     state, radius = start.holding_back(held_back), _FIRST

@@ -1,0 +1,94 @@
+"""Loaded arm whose cables stick and slip in their holes: tensions of segments, imbalance, tangent.
+
+    r(q) = Σ_j T_j g_j + g − J_Xᵀ W,    ∂r/∂q = Σ_j (T_j H_j + g_jᵀ ∂T_j/∂q) + ∂g/∂q − ∂(J_Xᵀ W)/∂q
+
+g_j and H_j are the gradient and the Hessian of the length of segment j. At a posture the tensions
+follow from the natural lengths before the move (:mod:`cdsm.friction.chain_problem`). ∂r/∂q is not
+symmetric where holes slide: friction has no potential. Without friction this is
+:class:`~cdsm.statics.locked_motors.LoadedArm`.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from cdsm.friction.chain_problem import Chain, ChainProblem
+from cdsm.kernels import stiffness as stiffness_kernels
+from cdsm.posture import Posture
+from cdsm.statics.locked_motors import ROUNDING, tilt_torque
+from cdsm.support.values import Array
+
+
+class Settled(NamedTuple):
+    """Arm at one posture, balanced or not, with its cables slipped as far as friction lets them."""
+
+    pose: Posture
+    chain: Chain
+    residual: Array  # r (nv,) [N m]
+    torque: Array  # r minus the torque held back (nv,) [N m]
+    rounding: Array  # rounding of r (nv,) [N m]
+    stiffness: Array  # ∂r/∂q (nv, nv) [N m/rad]
+    slope: Array  # ∂T/∂q (S, nv) [N/rad]
+
+    @property
+    def q(self) -> Array:
+        """Joint angles (nv,) [rad]."""
+        return self.pose.q
+
+    def holding_back(self, torque: Array | float) -> Settled:
+        """Return this posture with a torque (nv,) [N m] that holds part of the load back."""
+        return self._replace(torque=self.residual - torque)
+
+
+class FrictionalArm(NamedTuple):
+    """Arm under a wrench, its cables with the natural lengths that they had before the move."""
+
+    problem: ChainProblem
+    limits: tuple[Array, Array]  # lowest and highest angles (nv,) [rad]
+    natural: Array  # natural length of each segment before the move (S,) [m]
+    wrench: Array  # W (6,): force [N], then moment [N m]
+    forced: Array  # tension at which a motor holds the first segment (C,) [N]; NaN: its wire
+
+    def stops(self) -> tuple[Array, Array]:
+        """Return the lowest and highest angles (nv,) [rad], at which joints rest on stops."""
+        return self.limits
+
+    def moved(self, q: Array, near: Settled) -> Settled:
+        """Compute the arm at joint angles (nv,) [rad]; raise CableError if two sites coincide."""
+        pose = near.pose.arm.at(q, check_limits=False)
+        return self.at(pose, np.maximum(near.chain.tension + near.slope @ (q - near.q), 0.0))
+
+    def at(self, pose: Posture, near: Array) -> Settled:
+        """Compute the arm at a posture. The search for its tensions starts at ``near`` (S,) [N]."""
+        segments = pose.segments
+        holes, nv = segments.chains, pose.q.size
+        lengths, J = segments.lengths, segments.length_jacobian
+        ratio, grip = np.ones(lengths.size), np.zeros((lengths.size, nv + 1))
+        ratio[holes.hole] = np.exp(holes.friction * segments.wrap)
+        grip[holes.hole, :nv] = holes.friction[:, None] * segments.wrap_jacobian
+        chain = self.problem.settle(lengths, self.natural, ratio, self.forced, near)
+        # the last column is the rounding of the tensions, from that of all lengths
+        slopes = self.problem.tangent(chain, self.forced, np.c_[J, lengths], grip)
+        slope, rounded = slopes[:, :nv].copy(), abs(slopes[:, nv])
+        model, T = pose.arm._model, chain.tension
+        segment, joint = model.chain_arrays[2:4]
+        *_, K = stiffness_kernels.single_stiffness(
+            segment,
+            joint,
+            *segments._frames,
+            pose.jacobian,
+            J,
+            pose.gravity_stiffness,
+            T,
+            np.zeros(T.size),
+            self.wrench,
+            model.masses.tip_joints,
+        )
+        K = K + J.T @ slope
+        residual = T @ J + pose.gravity_torque - self.wrench @ pose.jacobian
+        terms = (T + rounded) @ abs(J) + abs(self.wrench) @ abs(pose.jacobian)
+        terms += abs(pose.gravity_torque) + abs(K) @ abs(pose.q)
+        terms += tilt_torque(pose, T[segment[:-1, 0]])
+        return Settled(pose, chain, residual, residual, ROUNDING * terms, K, slope)

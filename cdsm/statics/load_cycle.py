@@ -1,0 +1,166 @@
+"""Load an arm with friction in its holes slowly, from load to load and command to command."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from cdsm.errors import InvalidInput
+from cdsm.friction.chain_problem import ChainProblem
+from cdsm.posture import Posture
+from cdsm.statics.equilibrium import require_between_stops
+from cdsm.statics.load_history import LoadHistory
+from cdsm.statics.locked_motors import LoadedArm, require_domains, stops
+from cdsm.statics.slow_loading import Load, Passage, SlowLoading, State
+from cdsm.stiffness_matrix import checked_tension
+from cdsm.support.progress import track
+from cdsm.support.validation import WRENCH, number_array, scalar
+from cdsm.support.values import Array, frozen
+from cdsm.tension import Tension
+
+MOST_LOADS = 100_000
+"""Largest number of loads of a history."""
+
+_LEAST, _MOST = 1e-12, 0.1
+"""Range of the accuracy: work that rounding leaves unaccounted for, and a tenth of the work."""
+
+
+def load_cycle(
+    pose: Posture,
+    tension: Tension | ArrayLike,
+    wrenches: ArrayLike,
+    *,
+    motors: ArrayLike | None = None,
+    accuracy: float = 1e-3,
+) -> LoadHistory:
+    """Load an arm with friction slowly, load by load, and keep what its holes remember.
+
+    Under a load the arm is in equilibrium, r(q) = Σ T_j g_j + g − J_Xᵀ W = 0 (Eq. 13 by segments).
+    Friction holds |ln T_{j+1} − ln T_j| ≤ μ φ_j at each hole, and wire moves through a hole only at
+    this bound, towards the larger tension. So the answer depends on all loads before: it starts at
+    the reference, with one tension in all segments of a cable, as after shaking the arm. From load
+    to load everything changes in proportion and slowly, without inertia. Joint limits are stops.
+    Without friction each load gives the :func:`~cdsm.equilibrium`.
+
+    The equations determine the answer at each posture, but in rare cases several postures are in
+    equilibrium. Then the arm goes to the one that the search from the last posture finds.
+
+    Args:
+        pose: The reference posture, at which the motors are locked.
+        tension: F at the reference: the result of :func:`~cdsm.distribute_tension`, or other
+            tensions (C,) [N]. If they do not balance the arm, it settles on the way to the first
+            load.
+        wrenches: W of each load (n, 6) at ``tool0`` in base axes: force [N], then moment [N m]. The
+            way to the first one starts at the wrench of the ``Tension``, or at zero.
+        motors: Commands of the motors at each load (n, C): for a position-controlled cable the
+            natural length of wire taken in since the reference [m], positive if it pulls; for a
+            force-controlled cable its tension [N]. Default: nothing, and F.
+        accuracy: Largest part of the work of each step that may stay unaccounted for by stored
+            energy and dissipation, from 1e-12 to 0.1. Steps are divided until it is met. Tips and
+            tensions are far more accurate: they depend on sub-steps only if a hole stops sliding
+            within one.
+
+    Raises:
+        InvalidInput: As for :func:`~cdsm.stiffness`; or the posture is beyond a joint limit; or
+            ``wrenches``, ``motors`` or ``accuracy`` are not as above.
+        ElasticityRangeError: A tension at the reference or at a load is outside the domain of its
+            law.
+        EquilibriumError: The arm finds no place to rest on the way to a load, which is named.
+    """
+    F, W = checked_tension(pose, tension, None)
+    pose.arm._model.laws.stiffness(pose.cable_lengths, F)  # in the domains of the laws
+    loads = number_array("wrenches", wrenches, "wrench")
+    if loads.ndim != 2 or loads.shape[1] != 6 or not 0 < len(loads) <= MOST_LOADS:
+        raise InvalidInput(
+            "wrenches",
+            f"shape {loads.shape} given, (n, 6) with n from 1 to {MOST_LOADS} needed: one wrench "
+            f"per load ({WRENCH}).",
+        )
+    share = scalar("accuracy", accuracy)
+    if not _LEAST <= share <= _MOST:
+        raise InvalidInput("accuracy", f"{share:g} given; {_LEAST:g} to {_MOST:g} is needed.")
+    require_between_stops(pose)
+    LoadedArm(pose, F, W)  # refuses a spring that leaves no wire
+    arm, chains = pose.arm, pose.segments.chains
+    start = np.searchsorted(chains.cable, np.arange(len(arm.cables) + 1))
+    forced = np.array([cable.control == "force" for cable in arm.cables])
+    resting = np.where(forced, F, 0.0)
+    commands = np.tile(resting, (len(loads), 1)) if motors is None else _commands(motors, forced)
+    if commands.shape != (len(loads), F.size):
+        raise InvalidInput(
+            "motors",
+            f"shape {commands.shape} given, ({len(loads)}, {F.size}) needed: for each load one "
+            "command per cable.",
+        )
+    problem = ChainProblem(arm.cables, start, F, arm.original_length == "unstrained")
+    loading = SlowLoading(problem, start, stops(pose), forced, pose, share)
+    state, none = loading.begin(F, W), frozen(np.zeros(pose.q.size))
+    history = []
+    for k, (wrench, command) in enumerate(track(tuple(zip(loads, commands, strict=True)), "loads")):
+        state, passage = loading.carry(
+            state, Load(wrench, none, command), f"the way to load {k + 1}"
+        )
+        _require_domains(loading, state, k)
+        history.append((state, passage))
+    return _labelled(pose, F, loads, commands, history)
+
+
+def _commands(motors: ArrayLike, forced: NDArray[np.bool_]) -> Array:
+    """Check commands of the motors, except their shape."""
+    commands = number_array("motors", motors)
+    if commands.ndim == 2 and commands.shape[1] == forced.size:
+        pulled = commands[:, forced]
+        if pulled.size and pulled.min() < 0.0:
+            raise InvalidInput("motors", f"{pulled.min():g} N given; cables only pull.")
+        number_array("motors", commands[:, ~forced], "length")
+        number_array("motors", pulled, "tension")
+    return commands
+
+
+def _require_domains(loading: SlowLoading, state: State, load: int) -> None:
+    """Raise ElasticityRangeError if a tension is outside the domain of its law."""
+    cables, T = loading.reference.arm.cables, state.settled.chain.tension
+    first = loading.start[:-1]
+    # a motor that holds the tension of a cable without friction needs no law
+    groups = [
+        (law, np.array([c for c in of if not loading.forced[c] or any(cables[c].friction)]))
+        for law, of in loading.problem.laws
+    ]
+    known = [(law, of) for law, of in groups if of.size]
+    for extreme in (np.minimum, np.maximum):
+        require_domains(cables, known, extreme.reduceat(T, first), f"at load {load + 1}")
+
+
+def _labelled(
+    pose: Posture,
+    tension: Array,
+    wrenches: Array,
+    commands: Array,
+    history: Sequence[tuple[State, Passage]],
+) -> LoadHistory:
+    chains = pose.segments.chains
+    states, ways = zip(*history, strict=True)
+    hole = chains.hole
+    slips = np.array([way.slip[hole] for way in ways])
+    last = np.array([state.settled.chain.slip[hole] for state in states])
+    holds = chains.friction > 0.0
+    energies = np.array([way[:4] for way in ways]).T
+    load_work, motor_work, stored, dissipated = (frozen(each.copy()) for each in energies)
+    return LoadHistory(
+        reference=pose,
+        reference_tension=tension,
+        wrenches=frozen(wrenches),
+        motors=frozen(commands),
+        angles=frozen(np.array([state.pose.q for state in states])),
+        tip=frozen(np.array([state.pose.tip[:3, 3] for state in states])),
+        segment_tensions=frozen(np.array([state.settled.chain.tension for state in states])),
+        slip=frozen(slips),
+        sliding=frozen(np.where(holds, np.sign(last), 0.0).astype(np.int8)),
+        reaction=frozen(np.array([state.reaction for state in states])),
+        load_work=load_work,
+        motor_work=motor_work,
+        stored=stored,
+        dissipated=dissipated,
+    )

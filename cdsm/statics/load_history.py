@@ -1,0 +1,198 @@
+"""What a series of loads and motor commands does to an arm with friction: the result."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cdsm.friction.stuck import assemble_segments
+from cdsm.posture import Posture
+from cdsm.stiffness_matrix import Friction, Stiffness
+from cdsm.support.tidy import dataset
+from cdsm.support.validation import whole_number
+from cdsm.support.values import Array, ReadOnlyState, frozen
+
+if TYPE_CHECKING:
+    import xarray
+    from matplotlib.figure import Figure
+
+_SHOWN = 24
+"""Most loads that print shows; of longer histories, the first and the last ones."""
+
+
+@final
+@dataclass(frozen=True, eq=False, kw_only=True)
+class LoadHistory(ReadOnlyState):
+    """States of an arm with friction, load by load; made by :func:`~cdsm.load_cycle`.
+
+    n loads, S segments and P holes, in the order of :attr:`Posture.segments`. All arrays are
+    read-only.
+
+    Attributes:
+        reference: Posture at which the motors were locked.
+        reference_tension: F (C,) [N] there, the same in all segments of a cable.
+        wrenches: W at each load (n, 6): force [N], then moment [N m].
+        motors: Commands at each load (n, C): natural length [m] that a position-controlled motor
+            has taken in since the reference, or the tension [N] of a force-controlled one.
+        angles: Joint coordinates at each load (n, nv) [rad].
+        tip: Position of the tip at each load (n, 3) [m].
+        segment_tensions: T of each segment at each load (n, S) [N].
+        slip: Natural length of wire that moved through each hole on the way to each load (n, P)
+            [m]; positive towards the end of the cable.
+        sliding: Holes that slide as the load is reached (n, P): 1 towards the end of the cable, −1
+            towards its motor, 0 where the hole holds; also 0 where it has no friction.
+        reaction: Torque of the stops on the joints at each load (n, nv) [N m].
+        load_work: Work of the load on the way to each load (n,) [J].
+        motor_work: Work of the motors, likewise (n,) [J].
+        stored: Change of the energy of cables, springs and weights, likewise (n,) [J].
+        dissipated: Work lost in the holes, likewise (n,) [J]; never negative.
+    """
+
+    reference: Posture
+    reference_tension: Array
+    wrenches: Array
+    motors: Array
+    angles: Array
+    tip: Array
+    segment_tensions: Array
+    slip: Array
+    sliding: NDArray[np.int8]
+    reaction: Array
+    load_work: Array
+    motor_work: Array
+    stored: Array
+    dissipated: Array
+
+    @cached_property
+    def displacement(self) -> Array:
+        """Tip position minus its position at the reference, (n, 3) [m]."""
+        return frozen(self.tip - self.reference.tip[:3, 3])
+
+    @cached_property
+    def unaccounted(self) -> Array:
+        """Work minus stored and dissipated energy (n,) [J].
+
+        It is the error of the integration, and the kinetic energy where the arm snaps through.
+        """
+        work = self.load_work + self.motor_work
+        return frozen(work - self.stored - self.dissipated)
+
+    @cached_property
+    def tensions(self) -> tuple[Array, ...]:
+        """Tensions T (n, segments) [N] of each cable, from its motor to its end."""
+        cable = self.reference.segments.chains.cable
+        parts = np.split(self.segment_tensions, np.flatnonzero(np.diff(cable)) + 1, axis=1)
+        return tuple(frozen(part.copy()) for part in parts)
+
+    @property
+    def holes(self) -> tuple[str, ...]:
+        """Name of each hole (P,): its cable, and the number of the site from the actuator."""
+        chains, cables = self.reference.segments.chains, self.reference.arm.cables
+        pairs = zip(chains.cable[chains.hole], chains.site, strict=True)
+        return tuple(f"{cables[c].name} site {site + 1}" for c, site in pairs)
+
+    def pose(self, load: int) -> Posture:
+        """Return the posture at a load, counted from 0; negative numbers count from the last.
+
+        Raises:
+            InvalidInput: There is no such load.
+        """
+        return self.reference.arm.at(self.angles[self._index(load)], check_limits=False)
+
+    def stiffness(self, load: int) -> Stiffness:
+        """Compute the tangent stiffness at a load, while the holes that slide there slide on.
+
+        Raises:
+            InvalidInput: There is no such load.
+        """
+        k = self._index(load)
+        signs = self.sliding[k]
+        friction: Friction = "sliding" if signs.any() else "stuck"
+        T, W = self.segment_tensions[k].copy(), self.wrenches[k].copy()
+        return assemble_segments(self.pose(k), T, signs, frozen(W), friction)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Return a labelled Dataset over load, axis, joint, cable, segment and hole, in SI units.
+
+        Raises:
+            MissingExtra: xarray is not installed.
+        """
+        arm, chains = self.reference.arm, self.reference.segments.chains
+        names = np.array(arm.cables.names)
+        first = np.flatnonzero(np.diff(chains.cable, prepend=-1))
+        of = chains.cable[chains.hole]
+        axes = list("xyz")
+        labels: dict[str, Sequence[object] | NDArray[Any]] = {
+            "load": np.arange(1, len(self.tip) + 1),
+            "axis": axes,
+            "component": [f"{kind}{axis}" for kind in "fm" for axis in axes],
+            "joint": arm.joint_names,
+            "cable": arm.cables.names,
+            "hole": self.holes,
+        }
+        of_holes = {
+            "hole_cable": ("hole", names[of]),
+            "hole_site": ("hole", chains.site + 1),
+            "segment_cable": ("segment", names[chains.cable]),
+            "segment_number": ("segment", np.arange(len(chains.cable)) - first[chains.cable] + 1),
+        }
+        variables: dict[str, tuple[tuple[str, ...], NDArray[Any], str]] = {
+            "wrench": (("load", "component"), self.wrenches, "N, N m"),
+            "motor": (("load", "cable"), self.motors, "m, or N of a force-controlled cable"),
+            "joint_position": (("load", "joint"), self.angles, "rad, or m where a joint slides"),
+            "tip": (("load", "axis"), self.tip, "m"),
+            "tip_displacement": (("load", "axis"), self.displacement, "m"),
+            "segment_tension": (("load", "segment"), self.segment_tensions, "N"),
+            "slip": (("load", "hole"), self.slip, "m"),
+            "sliding": (("load", "hole"), self.sliding, "1"),
+            "stop_torque": (("load", "joint"), self.reaction, "N m, or N where a joint slides"),
+            "load_work": (("load",), self.load_work, "J"),
+            "motor_work": (("load",), self.motor_work, "J"),
+            "stored": (("load",), self.stored, "J"),
+            "dissipated": (("load",), self.dissipated, "J"),
+        }
+        title = f"slow loading of {arm.name}, with friction in the holes"
+        return dataset(variables, labels, title=title).assign_coords(of_holes)
+
+    def plot(self) -> Figure:
+        """Plot force over displacement, and the tensions along the cable that changes most."""
+        from cdsm.plots import plot_load_history  # matplotlib imports slowly
+
+        return plot_load_history(self)
+
+    def __repr__(self) -> str:
+        return f"<LoadHistory of {self.reference.arm.name}, {len(self.tip)} loads>"
+
+    def __str__(self) -> str:
+        count = len(self.tip)
+        rows = [
+            f"{'load':>5}{'force [N]':>26}{'tip moved by [mm]':>30}"
+            f"{'sliding':>9}{'work [mJ]':>12}{'lost [mJ]':>12}"
+        ]
+        work = self.load_work + self.motor_work
+        for k in range(count):
+            if count > _SHOWN and _SHOWN // 2 <= k < count - _SHOWN // 2:
+                if k == _SHOWN // 2:
+                    rows.append(f"{'…':>5}")
+                continue
+            force = "".join(f"{f:>8.4g}" for f in self.wrenches[k, :3])
+            moved = "".join(f"{1000.0 * x:>10.4f}" for x in self.displacement[k])
+            rows.append(
+                f"{k + 1:>5}  {force}{moved}{np.count_nonzero(self.sliding[k]):>9}"
+                f"{1000.0 * work[k]:>12.4g}{1000.0 * self.dissipated[k]:>12.4g}"
+            )
+        rows.append(
+            f"{self.sliding.shape[1]} holes; in all {1000.0 * work.sum():.4g} mJ of work, "
+            f"{1000.0 * self.dissipated.sum():.4g} mJ of it lost in the holes"
+        )
+        return "\n".join(rows)
+
+    def _index(self, load: int) -> int:
+        count = len(self.tip)
+        k = whole_number("load", load, -count, count - 1)
+        return k % count

@@ -1,0 +1,211 @@
+"""Carry an arm with friction in its holes from load to load: sub-steps, work and dissipation.
+
+A sub-step solves r(q) = 0 with the natural lengths that its start left. It is exact if no hole
+stops sliding within it: then only its ends matter. The energy tells whether that was so, and
+whether the energies themselves are accurate. Over a sub-step,
+
+    work of load and motors = change of stored energy + dissipation.
+
+The stored energy is a function of the state. The work is ∫ Q·dq with the torque Q = J_Xᵀ W of the
+load, and ∫ P du of a motor that takes in the natural length u, with P = T (1 + ε) − ∫ T dε. The
+dissipation is Σ_j ∫ (P_{j+1} − P_j) ds_j with the slips s_j of the holes. To first order in the
+strain P is T. The integrals follow from both halves of a sub-step by Simpson's rule. A sub-step is
+halved until both sides agree.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cdsm.errors import CdsmError
+from cdsm.friction.chain_problem import ChainProblem
+from cdsm.kernels.tree import Indices
+from cdsm.posture import Posture
+from cdsm.statics.equilibrium import no_rest
+from cdsm.statics.frictional_arm import FrictionalArm, Settled
+from cdsm.statics.trust_region import RestSearch, find_rest
+from cdsm.support.values import Array
+
+_FINEST, _SHORTEST = 2.0**-12, 2.0**-6
+"""Smallest sub-steps, as a part of the step between two loads: for the energy, where a snap is not
+resolved further; and where no rest is found."""
+
+_ROUNDING = 16.0 * float(np.finfo(np.float64).eps)
+"""Relative rounding of the stored energy."""
+
+
+class Load(NamedTuple):
+    """What acts on an arm from outside."""
+
+    wrench: Array  # W (6,): force [N], then moment [N m]
+    held: Array  # torque that holds an unbalanced arm at its reference (nv,) [N m]
+    motors: Array  # per cable (C,): natural length taken in [m]; or tension [N] of a force motor
+
+    def towards(self, other: Load, part: float) -> Load:
+        """Return the load at a part of the way to another one, which is exact at its end."""
+        if part == 1.0:
+            return other
+        return Load(*(a + part * (b - a) for a, b in zip(self, other, strict=True)))
+
+
+class State(NamedTuple):
+    """An arm at rest under a load. The natural lengths of its segments are its memory."""
+
+    load: Load
+    settled: Settled
+    reaction: Array  # torque of the stops (nv,) [N m]
+    motion: Array  # motion of the joints that led here (nv,) [rad]
+
+    @property
+    def pose(self) -> Posture:
+        """The posture."""
+        return self.settled.pose
+
+
+class Passage(NamedTuple):
+    """Energies [J] and slips on the way from one load to another."""
+
+    load_work: float
+    motor_work: float
+    stored: float  # change
+    dissipated: float
+    slip: Array  # natural length that moved from each segment to the next (S,) [m]
+
+    @property
+    def unaccounted(self) -> float:
+        """Work that is neither stored nor dissipated [J]."""
+        return self.load_work + self.motor_work - self.stored - self.dissipated
+
+    def joined(self, other: Passage) -> Passage:
+        """Return this passage and the next one as one."""
+        return Passage(
+            self.load_work + other.load_work,
+            self.motor_work + other.motor_work,
+            self.stored + other.stored,
+            self.dissipated + other.dissipated,
+            self.slip + other.slip,
+        )
+
+
+class SlowLoading(NamedTuple):
+    """An arm with friction that is loaded slowly."""
+
+    problem: ChainProblem
+    start: Indices  # first segment of each cable, and the number of segments (C+1,)
+    limits: tuple[Array, Array]  # lowest and highest angles (nv,) [rad]
+    forced: NDArray[np.bool_]  # whether the motor of each cable holds the tension (C,)
+    reference: Posture
+    accuracy: float  # largest part of the work of a step that may stay unaccounted for
+
+    def begin(self, tension: Array, wrench: Array) -> State:
+        """Return the arm at its reference; all segments of a cable have its tension (C,) [N]."""
+        pose = self.reference
+        T = tension[pose.segments.chains.cable]
+        natural = self.problem.natural(pose.segments.lengths, T)
+        motors = np.where(self.forced, tension, 0.0)
+        settled = self._arm(natural, wrench, motors).at(pose, T)
+        none = np.zeros(pose.q.size)
+        return State(Load(wrench, settled.residual, motors), settled, none, none)
+
+    def carry(self, before: State, load: Load, what: str) -> tuple[State, Passage]:
+        """Carry an arm at rest to another load; ``what`` names it if it finds no rest there."""
+        first, state = before.load, before
+        total = Passage(0.0, 0.0, 0.0, 0.0, np.zeros(before.settled.chain.slip.size))
+        reached, part, turnover = 0.0, 1.0, 0.0
+        while reached < 1.0:
+            goal = min(1.0, reached + part)
+            middle, search = self._rest(state, first.towards(load, (reached + goal) / 2.0))
+            end = None
+            if middle is not None:
+                end, search = self._rest(middle, first.towards(load, goal))
+            if middle is not None and end is not None:
+                passage, noise = self._energies(state, middle, end)
+                work = abs(passage.load_work) + abs(passage.motor_work)
+                turnover = max(turnover, work / (goal - reached))
+                allowed = self.accuracy * turnover * (goal - reached) + noise
+                if abs(passage.unaccounted) <= allowed or part <= _FINEST:
+                    total, state = total.joined(passage), end
+                    reached, part = goal, 2.0 * part
+                    continue
+            elif part <= _SHORTEST:
+                residual = np.where(search.at_stop, 0.0, search.state.torque)
+                raise no_rest(self.reference, search.state.pose, residual, reached, what)
+            part = (goal - reached) / 2.0
+        return state, total
+
+    def _arm(self, natural: Array, wrench: Array, motors: Array) -> FrictionalArm:
+        forced = np.where(self.forced, motors, np.nan)
+        return FrictionalArm(self.problem, self.limits, natural, wrench, forced)
+
+    def _rest(self, before: State, load: Load) -> tuple[State | None, RestSearch[Settled]]:
+        """Find the rest of an arm under a new load; None if there is none near."""
+        old, natural = before.settled, before.settled.chain.natural.copy()
+        taken = np.where(self.forced, 0.0, load.motors - before.load.motors)
+        natural[self.start[:-1]] -= taken
+        arm = self._arm(natural, load.wrench, load.motors)
+        start = arm.at(old.pose, old.chain.tension).holding_back(load.held)
+        if before.motion @ start.torque < 0.0:  # it moves on the same way: what slid slides on
+            start = _ahead(arm, old, start, load.held)
+        search = find_rest(arm, start, load.held)
+        if not search.converged:
+            return None, search
+        reaction = np.where(search.at_stop, search.state.torque, 0.0)
+        return State(load, search.state, reaction, search.state.q - old.q), search
+
+    def _energies(self, start: State, middle: State, end: State) -> tuple[Passage, float]:
+        """Compute the energies of a sub-step from its middle, and their rounding [J]."""
+        states = (start, middle, end)
+        torque = [s.load.wrench @ s.pose.jacobian + s.load.held for s in states]
+        P = [self.problem.potential(s.settled.chain.tension) for s in states]
+        first = self.start[:-1]
+        wire = [-np.add.reduceat(s.settled.chain.natural, first) for s in states]
+        half, other = middle.settled.chain.slip, end.settled.chain.slip
+        before, after = self._stored(start), self._stored(end)
+        passage = Passage(
+            load_work=_work(torque, [s.settled.q for s in states]),
+            motor_work=_work([p[first] for p in P], wire),
+            stored=after - before,
+            dissipated=_dissipated([np.append(np.diff(p), 0.0) for p in P], half, other),
+            slip=half + other,
+        )
+        settled = end.settled
+        uncertain = np.linalg.lstsq(settled.stiffness, settled.rounding, rcond=None)[0]
+        noise = abs(torque[2]) @ abs(uncertain) + _ROUNDING * (abs(before) + abs(after))
+        return passage, float(noise)
+
+    def _stored(self, state: State) -> float:
+        pose, chain = state.pose, state.settled.chain
+        weight = pose.arm._model.body.potential_energy(pose.q)
+        return weight + self.problem.stored(chain.natural, chain.tension)
+
+
+def _ahead(arm: FrictionalArm, old: Settled, start: Settled, held: Array) -> Settled:
+    """Return the arm moved on with the tangent of the last step, if that leaves less imbalance."""
+    try:
+        step = np.linalg.solve(old.stiffness, -start.torque)
+        near = start._replace(slope=old.slope)
+        guess = arm.moved(np.clip(old.q + step, *arm.limits), near).holding_back(held)
+    except (CdsmError, np.linalg.LinAlgError):  # sites meet, or about to buckle
+        return start
+    return guess if np.linalg.norm(guess.torque) < np.linalg.norm(start.torque) else start
+
+
+def _work(force: list[Array], way: list[Array]) -> float:
+    """Integrate force over way from start, middle and end; exact for parabolas over time."""
+    half, whole = way[1] - way[0], way[2] - way[0]
+    ends = force[0] @ (4.0 * half - whole) + force[2] @ (3.0 * whole - 4.0 * half)
+    return float(ends + 4.0 * (force[1] @ whole)) / 6.0
+
+
+def _dissipated(jump: list[Array], half: Array, other: Array) -> float:
+    """Integrate the jumps of P at holes over the slips of both halves; no term is negative."""
+    start, middle, end = jump
+    whole, again = half + other, half * other > 0.0
+    simpson = start * (4.0 * half - whole) + 4.0 * middle * whole + end * (3.0 * whole - 4.0 * half)
+    even = again & (half * start > 0.0) & (abs(other - half) < abs(half) / 2.0)
+    # a hole that begins to slide in a half slides with the jump at the end of this half
+    late = half * middle + other * np.where(again, (middle + end) / 2.0, end)
+    return float(np.where(even, simpson / 6.0, late).sum())
