@@ -12,7 +12,6 @@ everywhere. Otherwise the elasticity would change away from the posture.
 from __future__ import annotations
 
 import os
-import warnings
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -30,6 +29,7 @@ from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.files import write_text
 from cdsm.support.validation import RANGES, instance, one_of, scalar
 from cdsm.support.values import Array
+from cdsm.support.warning import warn
 from cdsm.tension import Tension
 
 Actuators = Literal["length", "tension", "none"]
@@ -120,7 +120,7 @@ def to_mjcf(
     """
     model = mujoco_model(arm, pose, tension, actuators, damping_ratio, damping)
     if model.unstable is not None:
-        warnings.warn(model.unstable, stacklevel=2)
+        warn(model.unstable)
     return model.text
 
 
@@ -151,7 +151,7 @@ def write_mjcf(
     """
     model = mujoco_model(arm, pose, tension, actuators, damping_ratio, damping)
     if model.unstable is not None:
-        warnings.warn(model.unstable, stacklevel=2)
+        warn(model.unstable)
     return write_text(path, model.text)
 
 

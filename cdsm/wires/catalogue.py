@@ -21,6 +21,8 @@ SOLID: Final = LinearElasticity.of_wire(200e9, 1.2e-3)
 WIRES: Final[dict[str, Elasticity]] = {"1x19-1.2mm": STRAND, "solid-1.2mm": SOLID}
 """Laws by the name of their wire."""
 
+_FILES = (".toml", ".csv", ".txt", ".tsv")  # of tables too: their reader says to fit them first
+
 Wire = Elasticity | str | float | os.PathLike[str]
 """What stands for a wire: a law, a name of :data:`WIRES`, EA [N], or the path of a WIRE.toml."""
 
@@ -41,7 +43,7 @@ def as_wire(wire: Wire) -> Elasticity:
         return wire
     if isinstance(wire, str) and wire in WIRES:
         return WIRES[wire]
-    if isinstance(wire, os.PathLike) or (isinstance(wire, str) and wire.endswith(".toml")):
+    if isinstance(wire, os.PathLike) or (isinstance(wire, str) and wire.endswith(_FILES)):
         return read_elasticity(wire)
     if isinstance(wire, str):
         raise UnknownName("wire", wire, WIRES, "Or give a rigidity EA in N, or a file WIRE.toml.")

@@ -15,6 +15,7 @@ from typer.testing import CliRunner
 import cdsm
 from cdsm.cli import app
 from cdsm.support.values import Array
+from cdsm.wires.catalogue import as_wire
 
 DATA = Path(__file__).parents[1] / "data"
 INSTRON, ZWICK = DATA / "instron_strand.csv", DATA / "zwick_seil.csv"
@@ -218,3 +219,5 @@ def test_command_line_speaks_of_its_options(tmp_path: Path) -> None:
 def test_measured_points_are_no_law_of_a_wire(path: Path) -> None:
     with pytest.raises(cdsm.FileError, match="Fit it first: `cdsm fit`"):
         cdsm.read_elasticity(path)
+    with pytest.raises(cdsm.FileError, match="Fit it first: `cdsm fit`"):
+        as_wire(str(path))  # as --wire does

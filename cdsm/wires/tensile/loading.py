@@ -61,7 +61,7 @@ def loading(test: TensileTest) -> tuple[Points, float, tuple[str, ...]]:
     outlier[1:-1] |= _outliers(test.displacement)[1:-1]  # a soft wire moves far at its first load
     if outlier.any():
         places = zip(test.force[outlier], test.displacement[outlier], strict=True)
-        listed = [f"{force:.4g} N at {place:.4g} m" for force, place in places]
+        listed = [f"{force:.4g} N at {1e3 * place:.4g} mm" for force, place in places]
         more = f" and {len(listed) - 3} more" if len(listed) > 3 else ""
         notes.append(f"far from their neighbours and left out: {', '.join(listed[:3])}{more}")
     force, strain = test.force[~outlier], test.displacement[~outlier] / test.gauge_length
@@ -101,10 +101,10 @@ def loading(test: TensileTest) -> tuple[Points, float, tuple[str, ...]]:
         )
     notes += _slips(points, test.gauge_length, max(8.0 * noise, _OUTLYING * span))
     if count := _slack(points, noise, 1e-6 * span):
-        until = points.strain[count] * test.gauge_length
+        until = 1e3 * points.strain[count] * test.gauge_length
         notes.append(
-            f"points before the first load left out: {count}, up to {until:.4g} m, where the force "
-            "does not rise beyond its noise"
+            f"points before the first load left out: {count}, up to {until:.4g} mm, where the "
+            "force does not rise beyond its noise"
         )
         points = points.part(slice(count, None))
     _require(len(points.force), "points are left after the slack")
@@ -144,10 +144,10 @@ def _slips(points: Points, gauge_length: float, least: float) -> list[str]:
     for peak in np.unique(highest[fall > least]):
         below = np.flatnonzero((highest == peak) & (fall > least))
         if len(below) > 1:
+            place = 1e3 * points.strain[below[0]] * gauge_length
             notes.append(
-                f"the force falls by {fall[below].max():.4g} N at "
-                f"{points.strain[below[0]] * gauge_length:.4g} m while the displacement grows, as "
-                f"when a grip slips: EA near {peak:.4g} N comes out too low"
+                f"the force falls by {fall[below].max():.4g} N at {place:.4g} mm while the "
+                f"displacement grows, as when a grip slips: EA near {peak:.4g} N comes out too low"
             )
     return notes
 

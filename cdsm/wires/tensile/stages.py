@@ -74,8 +74,9 @@ def doubts(points: Points, spread: Spread, gauge_length: float) -> tuple[str, ..
     times = abs(errors) / np.maximum(local_noise(errors), _SEEN * reach)
     worst = int(times.argmax())
     if times[worst] > _FAR:
+        place = 1e3 * points.strain[worst] * gauge_length
         notes.append(
-            f"{points.force[worst]:.4g} N at {points.strain[worst] * gauge_length:.4g} m lies "
+            f"{points.force[worst]:.4g} N at {place:.4g} mm lies "
             f"{times[worst]:.0f} times the scatter around it off the curve: check this point"
         )
     # without noise, all errors may be zero
