@@ -14,6 +14,7 @@ import typer
 import cdsm
 from cdsm.cli.arm import check, export, stiffness, urdf
 from cdsm.cli.loads import buckle, weigh
+from cdsm.cli.new import new
 from cdsm.cli.options import as_command
 from cdsm.cli.output import debug_wanted
 from cdsm.cli.paper import reproduce
@@ -55,7 +56,7 @@ def main(
 
 
 _ALL = (
-    *(urdf, stiffness, check, weigh, buckle, plan, sweep, map_sweep),
+    *(new, urdf, stiffness, check, weigh, buckle, plan, sweep, map_sweep),
     *(view, fit, export, reproduce, warm),
 )
 for command in _ALL:

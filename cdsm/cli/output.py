@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
+import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -73,11 +74,26 @@ def write_picture(path: Path | None, draw: str, *results: object, err: bool = Tr
         typer.echo(f"written: {write_file(path, figure.savefig)}", err=err)
 
 
+def _show(
+    usual: Callable[..., None], message: Warning, category: type[Warning], *where: Any
+) -> None:
+    """Show a warning of cdsm in one line, and any other in the usual manner."""
+    if not issubclass(category, cdsm.CdsmWarning):
+        return usual(message, category, *where)
+    text = f"warning: {message}"
+    return console().print(text, style="yellow", markup=False, highlight=False, soft_wrap=True)
+
+
 @contextmanager
 def reported() -> Iterator[None]:
-    """Turn an error into a message and exit code 1, Ctrl-C into 130; --debug changes nothing."""
+    """Turn an error into a message and exit code 1, Ctrl-C into 130; --debug changes nothing.
+
+    A warning of cdsm becomes one line, too.
+    """
     try:
-        yield
+        with warnings.catch_warnings():
+            warnings.showwarning = partial(_show, warnings.showwarning)
+            yield
     # OSError: of the terminal or pipe
     except (KeyboardInterrupt, cdsm.CdsmError, OSError) as error:
         if debug_wanted.get():

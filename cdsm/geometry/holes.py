@@ -68,4 +68,4 @@ def sharing(cables: Sequence[CableRoute], disks: Sequence[Disk]) -> list[list[in
             for members in holes.values():
                 if len(members) > 1 and not any(set(members) <= set(each) for each in found):
                     found[tuple(members)] = None
-    return [list(each) for each in found]
+    return [list(each) for each in sorted(found)]

@@ -1,0 +1,114 @@
+"""``cdsm new``: write an ARM.toml to begin with."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+import cdsm
+from cdsm.cli.options import AsJson, numbers
+from cdsm.cli.output import Json, answer
+
+_kind = {"rich_help_panel": "The kind of arm: one of them"}
+_size = {"rich_help_panel": "Its sizes"}
+
+
+def new(
+    arm: Annotated[Path, typer.Argument(metavar="ARM.toml", help="File to write.")],
+    universal: Annotated[
+        int | None, typer.Option(metavar="N", help="N universal joints.", **_kind)
+    ] = None,
+    hinged: Annotated[
+        int | None, typer.Option(metavar="N", help="N hinges, each turned by --twist.", **_kind)
+    ] = None,
+    sections: Annotated[
+        str | None,
+        typer.Option(
+            metavar="N,N,...",
+            help="Sections of N universal joints each, base to tip; each one is narrower by a "
+            "quarter.",
+            **_kind,
+        ),
+    ] = None,
+    twist: Annotated[
+        float | None,
+        typer.Option(help="Of --hinged: from each axis to the next, in degrees; 90.", **_size),
+    ] = None,
+    cables_per_joint: Annotated[
+        int | None, typer.Option(help="3; of hinges 2, the antagonistic pair.", **_size)
+    ] = None,
+    link_length: Annotated[float, typer.Option(help="Of every link, in mm.", **_size)] = 60.0,
+    base_length: Annotated[
+        float, typer.Option(help="From the base frame to joint 1, in mm.", **_size)
+    ] = 30.0,
+    disk_offset: Annotated[
+        float, typer.Option(help="From each joint to its two disks, in mm.", **_size)
+    ] = 5.0,
+    hole_radius: Annotated[
+        float, typer.Option(help="Of the holes from the axis, in mm.", **_size)
+    ] = 20.0,
+    link_mass: Annotated[float, typer.Option(help="Of every link, in kg.", **_size)] = 0.05,
+    lead: Annotated[
+        float, typer.Option(help="Straight cable from actuator to base disk, in mm.", **_size)
+    ] = 100.0,
+    wire: Annotated[
+        str, typer.Option(metavar="NAME|EA", help="Wire of all cables: a name, or EA in N.")
+    ] = "1x19-1.2mm",
+    gravity: Annotated[str, typer.Option(metavar="GX,GY,GZ", help="In m/s², base axes.")] = (
+        "0,0,-9.81"
+    ),
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a file.")] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Write an ARM.toml, complete and with a comment on every key; any command takes it at once."""
+    from cdsm.arm_file.template import template
+    from cdsm.support.files import write_text
+    from cdsm.support.validation import one_of
+    from cdsm.wires.catalogue import WIRES, as_wire
+
+    if sum(kind is not None for kind in (universal, hinged, sections)) != 1:
+        raise typer.BadParameter(
+            "give one of --universal, --hinged and --sections.", param_hint="--universal"
+        )
+    if twist is not None and hinged is None:
+        raise typer.BadParameter("goes with --hinged only.", param_hint="--twist")
+    if arm.exists() and not overwrite:
+        raise typer.BadParameter(f"{arm} exists; add --overwrite.", param_hint="ARM.toml")
+    try:
+        law: str | float = float(wire)
+    except ValueError:
+        law = one_of("wire", wire, WIRES)
+    counts = [universal or hinged or 0]
+    if sections is not None:
+        counts = [round(count) for count in numbers("--sections", sections)]
+    kind = "universal" if hinged is None else "hinged"
+    usual: dict[str, float] = {"twist": math.radians(90.0 if twist is None else twist)}
+    each = cables_per_joint or (3 if hinged is None else 2)
+    parts = []
+    for i, count in enumerate(counts):
+        sizes = {
+            "joints": count,
+            **(usual if hinged is not None else {}),
+            "cables_per_joint": each,
+            "link_length": link_length / 1000.0,
+            "base_length": 0.0 if i else base_length / 1000.0,
+            "disk_offset": disk_offset / 1000.0,
+            "hole_radius": 0.75**i * hole_radius / 1000.0,
+            "link_mass": link_mass,
+            "lead": lead / 1000.0,
+        }
+        if hinged is not None:
+            sizes["spread"] = math.radians(10.0)
+        if i:  # between the holes of all sections, wherever those are
+            sizes["phase"] = math.tau / max(math.lcm(*counts), 1) / each * i / len(counts)
+        parts.append((kind, sizes))
+    built = [getattr(cdsm.Geometry, kind)(**sizes) for kind, sizes in parts]
+    geometry = cdsm.Geometry.sections(built)
+    whole = cdsm.Manipulator(geometry, as_wire(law), gravity=numbers("--gravity", gravity, 3))
+    text = template(arm.name, law, tuple(whole.gravity.tolist()), parts)
+    written = write_text(arm, text)
+    told: Json = {"name": geometry.name, "length_m": geometry.length, "written": [str(written)]}
+    answer(as_json, lambda: told, whole, f"written: {written}; try cdsm check {written}")
