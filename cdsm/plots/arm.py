@@ -24,7 +24,6 @@ from cdsm.plots.style import (
     expect,
     fill_canvas,
     heading,
-    legend,
 )
 from cdsm.support.values import Array, frozen
 
@@ -79,7 +78,8 @@ def plot_arm(
     frame_arms(axes, None)
     if tension is not None:
         tension_bar(figure, tension_colors(tension))
-    heading(figure, f"{'UNSTABLE: ' if unstable else ''}{pose.arm}")
+    heading(figure, f"{'UNSTABLE: ' if unstable else ''}{pose.arm.name}")
+    picture_legend(figure, axes)
     fill_canvas(axes, 1.0 if tension is None else BESIDE_BAR)
     return figure
 
@@ -90,6 +90,13 @@ def arm_axes() -> tuple[Figure, Any]:
     axes: Any = figure.add_subplot(projection="3d")
     axes.view_init(elev=24.0, azim=-62.0)
     return figure, axes
+
+
+def picture_legend(figure: Figure, axes: Any) -> None:
+    """Draw the legend of a 3D picture at the bottom of its figure, if it names anything."""
+    handles, labels = axes.get_legend_handles_labels()
+    if handles:
+        figure.legend(handles, labels, loc="lower center", ncols=3, fontsize=SMALL, frameon=False)
 
 
 def tension_bar(figure: Figure, colors: ScalarMappable) -> None:
@@ -150,7 +157,6 @@ def _draw_ellipsoid(axes: Any, stiffness: Stiffness) -> None:
     if drawn is not None:
         label = f"{drawn}; longest: {MM * drawn.longest:.3g} mm"
         axes.plot_wireframe(*(MM * drawn.surface), color=VERMILLION, linewidth=0.4, label=label)
-        legend(axes, loc="upper left")
 
 
 def draw_arm(axes: Any, pose: Posture, colors: Array | None = None) -> None:
@@ -174,7 +180,7 @@ def frame_arms(axes: Any, limits: Array | None) -> None:
     ranges = np.ptp(limits, axis=1)
     ranges = np.maximum(ranges, _FLATTEST * ranges.max())  # keep space around a flat arm
     for name, middle, size in zip(AXES, limits.mean(axis=1), ranges, strict=True):
-        getattr(axes, f"set_{name}label")(f"{name} [mm]", fontsize=TEXT, labelpad=-6)
+        getattr(axes, f"set_{name}label")(f"{name} [mm]", fontsize=TEXT, labelpad=-3)
         getattr(axes, f"set_{name}lim")(middle - size / 2.0, middle + size / 2.0)
     equal_axes(axes, 1.0)
 
@@ -188,8 +194,8 @@ def _draw_joints(axes: Any, pose: Posture) -> None:
         axes.plot(*places.T, marker, color="0.1", markerfacecolor="white", markersize=4, zorder=5)
     if pose.arm.slides.any():
         for marker, label in (("o", "turns"), ("s", "slides")):
-            axes.plot([], [], [], marker, color="0.1", markerfacecolor="white", label=label)
-        legend(axes, loc="upper left")
+            line = {"color": "0.1", "markerfacecolor": "white", "linestyle": ""}
+            axes.plot([], [], [], marker, label=label, **line)
 
 
 def _draw_disks(axes: Any, pose: Posture) -> None:

@@ -17,6 +17,7 @@ from cdsm.plots.style import (
     ORANGE,
     TWO_COLUMNS,
     VERMILLION,
+    caption,
     direction_name,
     expect,
     heading,
@@ -142,7 +143,8 @@ def _plot_tensions(shown: Sequence[tuple[Tension, str, str]], title: str) -> Fig
     for F, label, marker in shown:
         line = {"color": colors[marker], "linestyle": ":", "linewidth": 0.8, "markersize": 4}
         axes.plot(names, F.values, marker, label=label, **line)
-    axes.set(ylabel="tension [N]", title=title)
+    axes.set_ylabel("tension [N]")
+    caption(axes, title)
     axes.set_ylim(0.0, _ROOM * max(F.values.max() for F, *_ in shown) or 1.0)
     _name_cables(axes)
     legend(axes)

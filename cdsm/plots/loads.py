@@ -17,6 +17,7 @@ from cdsm.plots.style import (
     TWO_COLUMNS,
     VERMILLION,
     cable_lines,
+    caption,
     expect,
     heading,
     legend,
@@ -104,7 +105,7 @@ def plot_critical_tension(critical: CriticalTension) -> Figure:
         )
     unit = critical.posture.arm.stiffness_unit()
     axes.set(xlabel="lower bound of tension [N]", ylabel=f"smallest joint stiffness [{unit}]")
-    axes.set_title(critical.posture.arm.name)
+    caption(axes, critical.posture.arm.name)
     if label == "_":
         legend(axes)
     return figure
@@ -133,7 +134,7 @@ def plot_bifurcation(found: Bifurcation) -> Figure:
     critical = found.critical.minimum
     axes.axvline(critical, color=VERMILLION, linestyle="--", label=f"buckles at {critical:.4g} N")
     axes.set(xlabel="lower bound of tension [N]", ylabel="displacement of the tip [mm]")
-    axes.set_title(found.critical.posture.arm.name)
+    caption(axes, found.critical.posture.arm.name)
     axes.set_ylim(bottom=0.0)
     legend(axes)
     return figure

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from itertools import cycle
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -49,25 +50,27 @@ def plot_tensile_fit(fit: TensileFit) -> Figure:
             label="95 % band",
         )
     right.plot(tension, KN * fit.elasticity.rigidity(tension), color=VERMILLION, label="EA")
-    for stage, shade in zip(fit.stages, ("0.93", "0.98", "0.88"), strict=False):
-        right.axvspan(stage.low, stage.high, color=shade, zorder=0)
-        right.annotate(
-            stage.name,
-            ((stage.low + stage.high) / 2.0, 1.0),
-            xycoords=("data", "axes fraction"),
-            xytext=(0, -4),
-            textcoords="offset points",
-            rotation=90,
-            ha="center",
-            va="top",
-            fontsize=SMALL,
-            color="0.35",
-        )
+    shade_stages(right, [(stage.name, stage.low, stage.high) for stage in fit.stages])
     right.set(xlabel="tension [N]", ylabel="tangent rigidity EA [kN]")
     right.set_ylim(bottom=0.0)
     for axes in (left, right):
         legend(axes)
     return figure
+
+
+def shade_stages(axes: Any, stages: Sequence[tuple[str, float, float]], along: str = "x") -> None:
+    """Shade stages (name, low, high) of the tension [N], which the axis ``along`` shows."""
+    for (name, low, high), shade in zip(stages, cycle(("0.93", "0.98", "0.88")), strict=False):
+        middle = (low + high) / 2.0
+        if along == "x":
+            axes.axvspan(low, high, color=shade, zorder=0, linewidth=0)
+            place, turn = {"xy": (middle, 0.98), "xycoords": ("data", "axes fraction")}, 90.0
+            aligned = {"ha": "center", "va": "top"}
+        else:
+            axes.axhspan(low, high, color=shade, zorder=0, linewidth=0)
+            place, turn = {"xy": (0.02, middle), "xycoords": ("axes fraction", "data")}, 0.0
+            aligned = {"ha": "left", "va": "center"}
+        axes.annotate(name, **place, **aligned, rotation=turn, fontsize=SMALL, color="0.3")
 
 
 def plot_identification(fit: Identification, labels: Sequence[str], title: str) -> Figure:

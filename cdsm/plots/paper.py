@@ -1,8 +1,11 @@
-"""Plot the recomputed figures of the paper."""
+"""Plot the recomputed figures of the paper: stiffness over Young's modulus, tension and lead.
+
+Columns are the directions x, y and z, or postures. Rows are the two readings of "the stiffness":
+the paper's K_R, and what a hung weight measures.
+"""
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Final
 
@@ -11,22 +14,47 @@ from matplotlib.figure import Figure
 
 from cdsm.errors import InvalidInput
 from cdsm.plots.arm import draw_arm, frame_arms
-from cdsm.plots.style import AXES, COLORS, KN, MM, N_PER_MM, STYLES, legend_below, panels
+from cdsm.plots.paper_experiments import plot_experiment, plot_prototype, plot_strand
+from cdsm.plots.style import (
+    AXES,
+    BLUE,
+    COLORS,
+    MM,
+    N_PER_MM,
+    ORANGE,
+    SCREEN,
+    TWO_COLUMNS,
+    VERMILLION,
+    caption,
+    heading,
+    legend_below,
+    panels,
+    styled,
+)
 from cdsm.support.values import Array
 
 if TYPE_CHECKING:
     from cdsm import paper
 
-_LENGTHS: Final = {"stretched": "$l_0 = L$ (paper)", "unstrained": "original $l_0$"}
-_READINGS: Final = {"pseudoinverse": "paper's reading", "along": "hung weight"}
+_LENGTHS: Final = {"stretched": "$l_0 = L$, as in the paper", "unstrained": "original $l_0$"}
+_READINGS: Final = {"pseudoinverse": "paper's reading, $K_R$", "along": "hung weight, $1/C$"}
+_NOTE: Final = (
+    "paper's reading: diagonal of $K_R = J^{+T} K_\\theta J^+$; "
+    "hung weight: $1/(u^T C\\,u)$, what a small weight at the tip measures"
+)
 _SWEPT: Final = {
     "young_modulus": "Young's modulus [GPa]",
-    "tension": "cable tension, mean and range [N]",
+    "tension": "cable tension, mean [N]",
 }
+_BARS: Final = 5
+"""Number of bars on a curve that show the range of tension over the cables."""
+
+_WIDE: Final = {"linewidth": 4.0, "alpha": 0.4}
+"""A line under another one, both visible."""
 
 
 def plot_paper(result: paper.Figure) -> Figure:
-    """Plot one recomputed figure of the paper.
+    """Plot one recomputed figure of the paper, with the numbers that the paper prints.
 
     A stiffness has two readings: the paper's K_R above, a hung weight below. Each is shown with
     the stretched length in EA/l_0, as in the paper, and with the original length. The cable
@@ -42,77 +70,102 @@ def plot_paper(result: paper.Figure) -> Figure:
     if draw is None:
         raise InvalidInput("result", f"{result!r} given; a figure of cdsm.paper is needed.")
     figure = draw(result)
-    figure.suptitle(result.title)
+    heading(figure, result.title)
     return figure
 
 
-def _plot_strand(result: paper.StrandFigure) -> Figure:
-    """Plot (a) force over displacement, (b) rigidity over tension."""
-    figure, ((left, right),) = panels(10.0, 4.0, 2)
-    left.plot(MM * result.displacement, result.tension, color=COLORS[0])
-    left.set(
-        xlabel=f"stretch of a {MM * result.gauge_length:g} mm wire [mm]",
-        ylabel="force [N]",
-        title="(a)",
+def _grid(
+    result: paper.StiffnessFigure, height: float, rows: int, **options: Any
+) -> tuple[Figure, Any]:
+    """Build a figure of two columns with a panel for each direction in each row."""
+    figure, grid = panels(TWO_COLUMNS, height, 3, rows, sharex=True, **options)
+    for axes, axis in zip(grid[0], AXES, strict=True):
+        caption(axes, axis)
+    for axes in grid[-1]:
+        axes.set_xlabel(_SWEPT[result.swept])
+    return figure, grid
+
+
+def _plot_moduli(result: paper.StiffnessFigure) -> Figure:
+    """Plot both readings over Young's modulus, and how far the passive part is from the total."""
+    figure, grid = _grid(result, 5.4, 3)
+    ratio, limit = (result.claims[k].paper or () for k in (0, 1))
+    looks: tuple[dict[str, Any], ...] = (
+        {"color": BLUE, "linewidth": 1.2, "zorder": 3},
+        {"color": ORANGE, **_WIDE},
     )
-    right.fill_between(
-        result.tension,
-        KN * result.low,
-        KN * result.high,
-        color=COLORS[0],
-        alpha=0.15,
-        linewidth=0.0,
-        label="tangent, all laws of the printed digits",
-    )
-    right.plot(result.tension, KN * result.tangent, color=COLORS[0], label="tangent, repaired")
-    right.plot(result.tension, KN * result.secant, "--", color=COLORS[2], label="secant (Eq. 18)")
-    lower = result.tension <= result.join  # above, the printed and the repaired law share digits
-    right.plot(
-        result.tension[lower],
-        KN * result.printed[lower],
-        ":",
-        color=COLORS[1],
-        label="as printed, below 31 N",
-    )
-    right.set_ylim(-5.0, 1.05 * KN * result.high.max())  # the printed law falls to -788 kN
-    right.set(xlabel="tension [N]", ylabel="rigidity EA [kN]", title="(b)")
-    right.legend(fontsize=8, loc="upper left")
+    for row, (name, reading) in zip(grid, _READINGS.items(), strict=False):
+        row[0].set_ylabel(f"{reading} [N/mm]")
+        for i, axes in enumerate(row):
+            for curve, look in zip(result.curves, looks, strict=True):
+                values = N_PER_MM * getattr(curve, name)[:, i]
+                axes.plot(_swept(result, curve), values, label=curve.label, **look)
+                passive = N_PER_MM * getattr(curve, f"{name}_part")[:, i]
+            axes.plot(
+                _swept(result, curve)[::4], passive[::4], "k.", ms=4, label="passive part alone"
+            )
+            axes.set_ylim(bottom=0.0)
+    first = result.curves[0]
+    x, stated = _swept(result, first), "paper: proportional, twice at 320 GPa"
+    for i, axes in enumerate(grid[0]):
+        doubled = N_PER_MM * ratio[i] * first.pseudoinverse[0, i]
+        axes.plot(x[-1], doubled, "kD", markerfacecolor="none", markersize=6, label=stated)
+    grid[2, 0].set_ylabel("passive part less total [%]")
+    for i, axes in enumerate(grid[2]):
+        axes.axhspan(-limit[0], limit[0], color="0.9", linewidth=0, label="paper: within 1.5 %")
+        for curve, look in zip(result.curves, looks, strict=True):
+            for (name, reading), style in zip(_READINGS.items(), ("-", "--"), strict=True):
+                whole, part = getattr(curve, name)[:, i], getattr(curve, f"{name}_part")[:, i]
+                label = f"difference, {reading.split(',')[0]}"
+                axes.plot(x, 100.0 * (part / whole - 1.0), style, **look)
+                axes.plot([], [], style, color="0.2", label=label)
+        axes.set_ylim(-1.2 * limit[0], 1.2 * limit[0])
+    legend_below(figure, grid[:, 0], 3, title=_NOTE)
     return figure
 
 
 def _plot_directions(result: paper.StiffnessFigure) -> Figure:
-    """Plot a row for each reading, a column for each direction, a curve for each case."""
-    over_tension = result.swept == "tension"
-    curves = result.curves + (result.original if over_tension else ())
-    figure, grid = panels(11.0, 6.0, 3, 2, sharex=True)
+    """Plot both readings over the tension, and the paper's increment."""
+    figure, grid = _grid(result, 4.4, 2)
+    increments = result.claims[0].paper or ()
     for row, (name, reading) in zip(grid, _READINGS.items(), strict=True):
+        row[0].set_ylabel(f"{reading} [N/mm]")
         for i, axes in enumerate(row):
-            for curve, style in zip(curves, STYLES, strict=False):
-                label = _LENGTHS[curve.original_length] if over_tension else curve.label
-                line = {"color": COLORS[i], "linestyle": style, "label": label}
-                _draw_curve(axes, result, curve, getattr(curve, name)[:, i], **line)
-                if result.part == "passive" and name == "pseudoinverse":
-                    passive = N_PER_MM * curve.pseudoinverse_part[:, i]
-                    axes.plot(_swept(result, curve), passive, "k.", markersize=3)
-            axes.set_ylabel(f"$K_{AXES[i]}$, {reading} [N/mm]")
-    note = "dots: passive part alone" if result.part == "passive" else None
-    grid[0, 0].legend(fontsize=8, title=note, title_fontsize=8)
-    for axes in grid[-1]:
-        axes.set_xlabel(_SWEPT[result.swept])
+            for curves, look in (
+                (result.curves, {"color": BLUE}),
+                (result.original, {"color": VERMILLION, "linestyle": "--"}),
+            ):
+                (curve,) = curves
+                values = getattr(curve, name)[:, i]
+                _draw_curve(axes, curve, values, label=_LENGTHS[curve.original_length], **look)
+            axes.set_ylim(bottom=0.0)
+    (curve,) = result.curves
+    for i, axes in enumerate(grid[0]):
+        end = N_PER_MM * (1.0 + increments[i]) * curve.pseudoinverse[0, i]
+        label = "paper: stated increment, from the first computed value"
+        axes.plot(curve.tension[-1, 1], end, "ko", markersize=4, label=label)
+        axes.annotate(
+            f"+{increments[i]:g} times",
+            (curve.tension[-1, 1], end),
+            xytext=(-6, 2),
+            textcoords="offset points",
+            ha="right",
+            fontsize=7,
+        )
+    legend_below(figure, grid[0, 0], 3, title=_NOTE)
     return figure
 
 
 def _plot_changes(result: paper.StiffnessFigure) -> Figure:
     """Plot a column for each axis: active part, and change of stiffness since the first tension."""
-    figure, grid = panels(11.0, 9.0, 3, 3, sharex=True, sharey="row")
+    figure, grid = _grid(result, 5.6, 3, sharey="row")
     first, stated = result.curves[0], result.claims[0].paper or ()
-    for i, color in enumerate(COLORS):
+    for i in range(3):
         active, *changes = grid[:, i]
-        _draw_curve(active, result, first, first.pseudoinverse_part[:, i], color=color)
-        active.set(title=AXES[i])
+        _draw_curve(active, first, first.pseudoinverse_part[:, i], color=BLUE)
         for axes, name in zip(changes, _READINGS, strict=True):
             for pair, shade in zip(
-                zip(result.curves, result.original, strict=True), (color, "0.45"), strict=False
+                zip(result.curves, result.original, strict=True), (BLUE, ORANGE), strict=False
             ):
                 for curve, style in zip(pair, ("-", "--"), strict=True):
                     values = getattr(curve, name)[:, i]
@@ -126,19 +179,18 @@ def _plot_changes(result: paper.StiffnessFigure) -> Figure:
                     )
             axes.axhline(0.0, color="0.2", linewidth=0.6)
         end = first.tension[-1, 1]
-        changes[0].plot([end], [stated[i]], "ko", markersize=5, label="paper, at the end")
-        changes[1].set_xlabel("cable tension, mean [N]")
-    grid[0, 0].set_ylabel("active part, EA = 48 kN [N/mm]")
-    grid[1, 0].set_ylabel("change, paper's reading of $K_R$ [%]")
-    grid[2, 0].set_ylabel("change, hung weight [%]")
-    legend_below(figure, grid[1, 0], 3, fontsize=9)
+        changes[0].plot([end], [stated[i]], "ko", markersize=4, label="paper, at the end")
+    grid[0, 0].set_ylabel("active part of $K_R$ [N/mm]")
+    for axes, reading in zip(grid[1:, 0], _READINGS.values(), strict=True):
+        axes.set_ylabel(f"change,\n{reading} [%]")
+    legend_below(figure, grid[:2, 0], 2, title=_NOTE)
     return figure
 
 
 def _plot_lead(result: paper.LeadFigure) -> Figure:
     """Plot a panel for each reading, a colour for each direction."""
-    figure, (pair,) = panels(10.0, 4.6, 2, sharey=True)
-    for axes, name in zip(pair, _READINGS, strict=True):
+    figure, (pair,) = panels(TWO_COLUMNS, 3.4, 2, sharey=True)
+    for axes, (name, reading) in zip(pair, _READINGS.items(), strict=True):
         for i, (axis, color) in enumerate(zip(AXES, COLORS, strict=True)):
             for changes, length, style in (
                 (getattr(result, f"stretched_{name}"), "stretched", "-"),
@@ -149,103 +201,59 @@ def _plot_lead(result: paper.LeadFigure) -> Figure:
         axes.axhline(0.0, color="0.2", linewidth=0.8)
         axes.set_xscale("symlog", linthresh=10.0, linscale=0.6)
         axes.set_xlim(0.0, MM * result.leads[-1])
-        axes.set_xticks([0.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 300.0])
+        axes.set_xticks([0.0, 5.0, 10.0, 20.0, 50.0, 100.0, 300.0])
         axes.xaxis.set_major_formatter(lambda x, _: f"{x:g}")
         axes.set_xlabel("lead of all cables [mm]")
-    pair[0].set(title="paper's reading of $K_R$", ylabel="change of stiffness [%]")
-    pair[1].set(title="hung weight")
-    legend_below(figure, pair[0], 3, fontsize=9)
+        caption(axes, reading)
+    pair[0].set_ylabel("change of stiffness [%]")
+    legend_below(figure, pair[0], 3, title=_NOTE)
     return figure
 
 
 def _plot_postures(result: paper.StiffnessFigure) -> Figure:
     """Plot a column for each posture: a picture of the arm, and a curve for each direction."""
-    figure = Figure(figsize=(11.0, 9.0), layout="constrained")
-    grid = figure.add_gridspec(3, 3, height_ratios=(1.15, 1.0, 1.0))
+    figure = Figure(figsize=(TWO_COLUMNS, 6.4), dpi=SCREEN, layout="constrained")
+    grid = figure.add_gridspec(3, 3, height_ratios=(1.1, 1.0, 1.0))
     for column, (curve, original, pose) in enumerate(
         zip(result.curves, result.original, result.postures, strict=True)
     ):
         picture: Any = figure.add_subplot(grid[0, column], projection="3d")
         draw_arm(picture, pose)
         frame_arms(picture, None)
-        picture.set_title(curve.label, fontsize=10)
+        picture.set_axis_off()
+        picture.set_box_aspect(picture._box_aspect, zoom=1.5)
+        caption(picture, curve.label)
         for row, (name, reading) in enumerate(_READINGS.items(), start=1):
-            axes: Any = figure.add_subplot(grid[row, column])
+            axes: Any = styled(figure.add_subplot(grid[row, column]))
             for i, (axis, color) in enumerate(zip(AXES, COLORS, strict=True)):
-                values = getattr(curve, name)[:, i]
-                _draw_curve(axes, result, curve, values, color=color, label=axis)
-                unstrained = N_PER_MM * getattr(original, name)[:, i]
-                axes.plot(_swept(result, curve), unstrained, "k:", linewidth=0.8)
-            axes.set_ylabel(f"stiffness, {reading} [N/mm]")
-            axes.grid(alpha=0.3)
+                for each, look in ((original, _WIDE), (curve, {"linewidth": 1.0})):
+                    values = N_PER_MM * getattr(each, name)[:, i]
+                    label = f"{axis}, {_LENGTHS[each.original_length]}"
+                    axes.plot(_swept(result, each), values, color=color, label=label, **look)
+            axes.set_yscale("log")
+            if column == 0:
+                axes.set_ylabel(f"{reading} [N/mm]")
         axes.set_xlabel(_SWEPT[result.swept])
-    title = "direction; solid: l_0 = L (paper), dotted: original length"
-    legend_below(figure, axes, 3, title=title)  # the last panel: all have the same three lines
+    note = f"{_NOTE}\nthe paper prints no numbers here: a steep rise, then a slight decrease"
+    legend_below(figure, axes, 3, title=note)  # the last panel: all have the same lines
     return figure
 
 
-def _plot_experiment(result: paper.ExperimentFigure) -> Figure:
-    """Plot a panel for each trace: a line of computed values, dots for the paper's values."""
-    scale = 1.0 if result.relative else N_PER_MM
-    unit = "stiffness in y over the first [-]" if result.relative else "stiffness [N/mm]"
-    tension = result.swept == "tension"
-    rows, columns = -(-len(result.traces) // 3), min(len(result.traces), 3)
-    size = 3.7 * columns + 1.0, 3.3 * rows + 0.5
-    figure, grid = panels(*size, columns, rows, sharex="col", sharey="col")
-    for axes, trace, color in zip(grid.ravel(), result.traces, COLORS * rows, strict=False):
-        across = 1.0 if tension else N_PER_MM
-        axes.plot(across * trace.swept, scale * trace.computed, color=color, label="computed")
-        axes.plot(across * trace.paper_at, scale * trace.paper, "ko", markersize=4, label="paper")
-        axes.set(
-            xlabel="tension as reported [N]" if tension else "cable stiffness [N/mm]", ylabel=unit
-        )
-        axes.set_title(textwrap.fill(trace.label, 44), fontsize=9)
-        axes.set_ylim(bottom=0.0)
-        axes.legend(fontsize=8)
-    return figure
-
-
-def _plot_prototype(result: paper.PrototypeFigure) -> Figure:
-    """Plot the residual of each number of Section V, for each reading of Table II."""
-    names = result.fits[0].step.numbers
-    figure, ((axes,),) = panels(8.5, 7.0, 1)
-    places = np.arange(len(names))
-    for fit, marker, color in zip(result.fits, "os^D", (*COLORS, "0.3"), strict=True):
-        axes.plot(
-            100.0 * fit.residuals,
-            places[: fit.residuals.size],
-            marker,
-            color=color,
-            markersize=5,
-            alpha=0.8,
-            label=f"{fit.step.label}: {fit.step.count}",
-        )
-    axes.axvline(0.0, color="0.2", linewidth=0.8)
-    axes.set_yticks(places, names, fontsize=8)
-    axes.invert_yaxis()
-    axes.set_xlabel("100 ln(model/paper); Figs. 12, 13: (model − paper)/paper [%]")
-    figure.legend(loc="outside lower center", ncols=1, fontsize=8)
-    return figure
-
-
-def _draw_curve(
-    axes: Any, result: paper.StiffnessFigure, curve: paper.Curve, values: Array, **line: Any
-) -> None:
-    """Draw a stiffness [N/m] over the swept quantity; bars show the range of tension."""
-    x, y = _swept(result, curve), N_PER_MM * values
-    axes.plot(x, y, **line)
-    if result.swept == "tension":
-        low, mean, high = curve.tension.T
-        every = slice(None, None, max(1, len(x) // 8))
-        axes.errorbar(
-            x[every],
-            y[every],
-            xerr=np.array([mean - low, high - mean])[:, every],
-            fmt="none",
-            ecolor=line["color"],
-            elinewidth=0.7,
-            alpha=0.5,
-        )
+def _draw_curve(axes: Any, curve: paper.Curve, values: Array, **line: Any) -> None:
+    """Draw a stiffness [N/m] over the mean tension; bars show the range over the cables."""
+    low, mean, high = curve.tension.T
+    axes.plot(mean, N_PER_MM * values, **line)
+    some = np.linspace(0, len(mean) - 1, _BARS).round().astype(int)
+    axes.errorbar(
+        mean[some],
+        N_PER_MM * values[some],
+        xerr=np.array([mean - low, high - mean])[:, some],
+        fmt="none",
+        ecolor="0.4",
+        elinewidth=0.8,
+        capsize=2.0,
+        label="bars: range over the cables",
+    )
 
 
 def _swept(result: paper.StiffnessFigure, curve: paper.Curve) -> Array:
@@ -253,16 +261,16 @@ def _swept(result: paper.StiffnessFigure, curve: paper.Curve) -> Array:
 
 
 _DRAWN: Final[dict[str, Callable[[Any], Figure]]] = {
-    "fig3": _plot_directions,
+    "fig3": _plot_moduli,
     "fig4": _plot_changes,
-    "fig5": _plot_strand,
+    "fig5": plot_strand,
     "fig6": _plot_directions,
     "fig7": _plot_changes,
     "fig8": _plot_postures,
-    "fig10": _plot_experiment,
-    "fig12": _plot_experiment,
-    "fig13": _plot_experiment,
+    "fig10": plot_experiment,
+    "fig12": plot_experiment,
+    "fig13": plot_experiment,
     "lead": _plot_lead,
-    "prototype": _plot_prototype,
+    "prototype": plot_prototype,
 }
 """Function that draws each figure of :data:`cdsm.paper.FIGURES`, by name."""

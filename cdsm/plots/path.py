@@ -12,7 +12,15 @@ from matplotlib.animation import PillowWriter
 from matplotlib.figure import Figure
 
 from cdsm.errors import InvalidInput
-from cdsm.plots.arm import BESIDE_BAR, arm_axes, color_scale, draw_arm, frame_arms, tension_bar
+from cdsm.plots.arm import (
+    BESIDE_BAR,
+    arm_axes,
+    color_scale,
+    draw_arm,
+    frame_arms,
+    picture_legend,
+    tension_bar,
+)
 from cdsm.plots.style import (
     COLORS,
     MM,
@@ -21,7 +29,6 @@ from cdsm.plots.style import (
     expect,
     fill_canvas,
     heading,
-    legend,
 )
 from cdsm.support.files import as_path, write_file
 from cdsm.support.values import Array
@@ -43,7 +50,7 @@ _RATE: Final = 15
 _SHAPES: Final = 3
 """Number of modes that are drawn."""
 
-_DEFLECTED: Final = 0.15
+_DEFLECTED: Final = 0.25
 """Largest displacement of the tip in the picture of a mode, over the length of the arm."""
 
 
@@ -66,14 +73,15 @@ def plot_path(
     figure, axes = arm_axes()
     shown = np.unique(np.linspace(0, len(poses) - 1, _GHOSTS).round().astype(int)).tolist()
     limits = _limits(poses)
-    for k, shade in zip(shown, np.linspace(0.75, 0.1, len(shown)), strict=True):
+    for k, shade in zip(shown[:-1], np.linspace(0.8, 0.5, len(shown) - 1), strict=True):
         _draw_skeleton(axes, poses[k], f"{shade:.2f}")
+    draw_arm(axes, poses[-1])
     tips = MM * np.array([pose.tip[:3, 3] for pose in poses])
     axes.plot(*tips.T, color=VERMILLION, linewidth=1.2, label="way of the tip")
     axes.plot(*tips[-1:].T, "o", color=VERMILLION, markersize=3, label="its end")
-    legend(axes, loc="upper left")
     frame_arms(axes, limits)
-    heading(figure, f"{poses[0].arm.name}: {len(poses)} postures, the last one is dark")
+    heading(figure, f"{poses[0].arm.name}: the last of {len(poses)} postures, others pale")
+    picture_legend(figure, axes)
     fill_canvas(axes)
     if animate is not None:
         _animate(animate, poses, tensions, limits)
@@ -83,7 +91,7 @@ def plot_path(
 def plot_modes(modes: Modes) -> Figure:
     """Plot an arm deflected by its lowest modes; of an unstable arm by those that grow fastest.
 
-    Deflections are enlarged: the tip moves by at most 15 % of the length of the arm.
+    Deflections are enlarged: the tip moves by at most 25 % of the length of the arm.
 
     Args:
         modes: Result of :func:`~cdsm.modes`.
@@ -106,10 +114,10 @@ def plot_modes(modes: Modes) -> Figure:
         poses.append(bent)
         bones = np.concatenate([*bent.bones])
         axes.plot(*(MM * bones.T), color=color, linewidth=1.5, label=label)
-    legend(axes, loc="upper left", title="lowest modes, enlarged")
     frame_arms(axes, _limits(poses))
     unstable = "" if modes.is_stable else "UNSTABLE: "
-    heading(figure, f"{unstable}{pose.arm.name}")
+    heading(figure, f"{unstable}{pose.arm.name}, enlarged modes")
+    picture_legend(figure, axes)
     fill_canvas(axes)
     return figure
 
@@ -143,8 +151,6 @@ def _limits(poses: Sequence[Posture]) -> Array:
 def _draw_skeleton(axes: Any, pose: Posture, shade: str) -> None:
     for bone in pose.bones:
         axes.plot(*(MM * bone.T), color=shade, linewidth=2.0)
-    for way in pose.cable_paths:
-        axes.plot(*(MM * way.T), color=shade, linewidth=0.4)
 
 
 def _animate(

@@ -24,6 +24,7 @@ from cdsm.plots.style import (
     TWO_COLUMNS,
     VERMILLION,
     cable_lines,
+    caption,
     direction_name,
     expect,
     heading,
@@ -96,7 +97,9 @@ def plot_stiffness_ranges(ranges: Mapping[str, Sequence[StiffnessRange]]) -> Fig
     letters = "xyz"[first], "xyz"[second]
     ends = [f"{sign}{letter}" for sign in "+-" for letter in letters]
     axes.set_xticks(np.deg2rad([0.0, 90.0, 180.0, 270.0]), ends)
-    axes.set_title("attainable stiffness along u [N/mm]")
+    heading(figure, "attainable stiffness along u [N/mm]")
+    axes.set_rlabel_position(60.0)
+    axes.yaxis.set_major_locator(MaxNLocator(4))
     figure.legend(loc="outside lower center", fontsize=SMALL, handlelength=2.4)
     return figure
 
@@ -131,7 +134,7 @@ def plot_saturation(found: Saturation) -> Figure:
         if bound[0] < found.stiffest < bound[-1]:
             label = f"softer above {found.stiffest:.4g} N"
             axes.axvline(found.stiffest, color=GREEN, linestyle="-.", label=label)
-    legend(right)
+    legend(right, loc="lower left")
     heading(figure, found.tension.posture.arm.name)
     return figure
 
@@ -174,7 +177,8 @@ def plot_path_plan(plan: PathPlan) -> Figure:
         highest = max((np.nanmax(each, initial=0.0) for each in values), default=0.0)
         axes.set_ylim(0.0, _ROOM * highest or 1.0)
     shaded = "; shaded: infeasible" if plan.infeasible else ""
-    above.set(ylabel="stiffness [N/mm]", title=f"{plan.arm.name}{shaded}")
+    above.set_ylabel("stiffness [N/mm]")
+    caption(above, f"{plan.arm.name}{shaded}")
     legend(above, loc="lower right")
     below.xaxis.set_major_locator(MaxNLocator(integer=True))
     below.set(xlabel="sample", ylabel="tension of each cable [N]")

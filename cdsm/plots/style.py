@@ -16,6 +16,7 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
+from matplotlib.transforms import Bbox
 
 from cdsm.errors import InvalidInput
 from cdsm.support.files import as_path, write_file
@@ -52,6 +53,9 @@ TICKS: Final = 5
 
 NAMED: Final = 24
 """Above this number of cables, lines are not distinct, so cables are not named."""
+
+_GAP: Final = 0.06
+"""Free space around a picture [inch]."""
 
 _CABLES: Final = (BLUE, VERMILLION, GREEN, ORANGE, SKY, PURPLE, BLACK, "0.6")
 _FORMATS: Final = (".pdf", ".svg", ".png")
@@ -107,7 +111,6 @@ def styled(axes: Any) -> Any:
     """Set grid lines and sizes of text of new axes; return the axes."""
     axes.grid(alpha=0.3, linewidth=0.6)
     axes.tick_params(labelsize=SMALL, width=0.6)
-    axes.title.set_fontsize(TEXT)
     for axis in (axes.xaxis, axes.yaxis):
         axis.label.set_fontsize(TEXT)
         axis.offsetText.set_fontsize(SMALL)
@@ -117,6 +120,11 @@ def styled(axes: Any) -> Any:
 def heading(figure: Figure, text: str) -> None:
     """Write a title over a figure, broken to its width."""
     figure.suptitle(textwrap.fill(text, round(16 * figure.get_figwidth())), fontsize=TEXT)
+
+
+def caption(axes: Any, text: str) -> None:
+    """Write a title over a panel."""
+    axes.set_title(text, fontsize=TEXT)
 
 
 def legend(axes: Any, **options: Any) -> Any:
@@ -165,24 +173,30 @@ def equal_axes(axes: Any, zoom: float = 0.75) -> None:
 def fill_canvas(axes: Any, right: float = 1.0) -> None:
     """Enlarge a 3D picture until it fills its figure, up to a fraction ``right`` of the width.
 
-    The figure gets the height that the picture needs.
+    The figure gets the height that the picture, its title and its legend need.
     """
     figure = axes.figure
+    legends, titles = figure.legends, [figure._suptitle] if figure._suptitle else []
     for _ in range(4):  # text keeps its size, so the right scale is found step by step
         figure.draw_without_rendering()
-        size = figure.get_size_inches() * figure.dpi
-        box = axes.get_tightbbox().transformed(figure.transFigure.inverted())
-        place = axes.get_position()
-        scale = 0.98 * right / box.width
-        height = box.height * scale * size[1]  # of the picture, in pixels
-        figure.set_figheight((height + 2.5 * TEXT * figure.dpi / 72.0) / figure.dpi)
-        shrink = size[1] / (figure.get_figheight() * figure.dpi)
-        left, bottom = box.x0 - place.x0, box.y0 - place.y0
+        width = figure.get_figwidth() * figure.dpi
+        below, above = (
+            _GAP * figure.dpi + sum(each.get_window_extent().height for each in parts)
+            for parts in (legends, titles)
+        )
+        place = axes.get_window_extent()
+        parts = [
+            axis.get_tightbbox(figure.canvas.get_renderer()) for axis in axes._axis_map.values()
+        ]
+        box = Bbox.union(parts)
+        scale = (right - 2.0 * _GAP / figure.get_figwidth()) * width / box.width
+        height = below + scale * box.height + above
+        figure.set_figheight(height / figure.dpi)
+        corner = (
+            _GAP * figure.dpi - scale * (box.x0 - place.x0),
+            below - scale * (box.y0 - place.y0),
+        )
+        size = scale * place.width, scale * place.height
         axes.set_position(
-            (
-                0.01 * right - left * scale,
-                0.01 - bottom * scale * shrink,
-                place.width * scale,
-                place.height * scale * shrink,
-            )
+            (corner[0] / width, corner[1] / height, size[0] / width, size[1] / height)
         )

@@ -18,6 +18,7 @@ from cdsm.plots.style import (
     PALETTE,
     STYLES,
     VERMILLION,
+    caption,
     expect,
     legend,
     panels,
@@ -75,7 +76,7 @@ def plot_cables(cables: Mapping[str, Cable] | Sequence[Cable], free_length: floa
         color = PALETTE[-3:][k % 3]
         axes.semilogy(tension, values, STYLES[k % len(STYLES)], color=color, label=name)
     axes.set(xlabel="tension [N]", ylabel="cable stiffness [N/mm]")
-    axes.set_title(f"original length {1e3 * free_length:g} mm")
+    caption(axes, f"original length {1e3 * free_length:g} mm")
     legend(axes)
     return figure
 
