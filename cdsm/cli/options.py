@@ -39,7 +39,10 @@ Wrench = Annotated[
     str, _tension_option(help="At the tip: FX,FY,FZ,MX,MY,MZ [N, N m].", metavar="FX,...,MZ")
 ]
 Solver = Annotated[str, _tension_option(help="Quadratic-programming solver.")]
-Picture = Annotated[Path | None, typer.Option(metavar="FILE.png", help="Picture to write.")]
+Picture = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE.pdf|svg|png", help="Figure to write; pdf and svg are vectors."),
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print SI numbers as JSON.")]
 
 NO_WRENCH = "0,0,0,0,0,0"

@@ -68,10 +68,8 @@ def by_cable(arm: cdsm.Manipulator, values: Array) -> Json:
 def write_picture(path: Path | None, draw: str, *results: object, err: bool = True) -> None:
     """Draw results with the function ``draw`` of :mod:`cdsm.plots`, if a path is given."""
     if path is not None:
-        from cdsm.support.files import write_file
-
         figure = getattr(cdsm.plots, draw)(*results)
-        typer.echo(f"written: {write_file(path, figure.savefig)}", err=err)
+        typer.echo(f"written: {cdsm.plots.save_figure(figure, path)}", err=err)
 
 
 def _show(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -20,10 +20,17 @@ def reproduce(
     out: Annotated[Path, typer.Option(help="Folder for the figures and tables.")] = Path(
         "reproduction"
     ),
+    kind: Annotated[
+        Literal["pdf", "svg", "png"],
+        typer.Option("--format", help="Kind of the figures; pdf and svg are vectors."),
+    ] = "png",
     as_json: AsJson = False,
 ) -> None:
-    """Recompute Figs. 3 to 13 of the paper: pictures, table and numbers."""
-    from cdsm.support.files import make_folder, write_file, write_text
+    """Recompute Figs. 3 to 8, 10, 12 and 13 of the paper: figures, table and numbers.
+
+    The table is complete, with assumptions and other readings, in reproduction.md.
+    """
+    from cdsm.support.files import make_folder, write_text
     from cdsm.support.progress import track
 
     paper = cdsm.paper
@@ -33,7 +40,7 @@ def reproduce(
         result = compute()
         results.append(result)
         figure = cdsm.plots.plot_paper(result)
-        written.append(write_file(out / f"{result.name}.png", figure.savefig))
+        written.append(cdsm.plots.save_figure(figure, out / f"{result.name}.{kind}"))
     written.append(write_text(out / "reproduction.md", paper.to_markdown(results)))
     numbers = json.dumps(paper.to_dict(results), indent=1, allow_nan=False)
     written.append(write_text(out / "reproduction.json", numbers + "\n"))

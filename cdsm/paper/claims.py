@@ -18,7 +18,8 @@ EXPLANATION = (
     "same with the unstrained length, which locked motors hold; hung weight: with that, the "
     "stiffness that a small weight at the tip measures. searched: what was chosen to meet the "
     "paper's number. Section V was measured with weights: there computed is that, on one prototype "
-    "identified from the same data within stated bounds. All of it is frictionless, links rigid."
+    "identified from the same data within stated bounds. All of it is frictionless, links rigid. "
+    "Left out: Fig. 9, a photograph, and Fig. 11, measured springs without printed numbers."
 )
 
 

@@ -1,23 +1,40 @@
-"""Plot workspace maps: reachable tip positions, coloured by stiffness."""
+"""Plot workspace maps: reachable tip positions, coloured by stiffness, as dots or as cells."""
 
 from __future__ import annotations
 
 import itertools
 import textwrap
-from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 
 import numpy as np
+from matplotlib import colormaps
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from numpy.typing import NDArray
+from matplotlib.ticker import LogLocator
 
 from cdsm.errors import InvalidInput
-from cdsm.plots.style import AXES, COLORS, MM, N_PER_MM, TICKS, equal_axes, panels
+from cdsm.plots.map_panels import Case, Map, cases_of, slices_of
+from cdsm.plots.style import (
+    AXES,
+    BLACK,
+    MM,
+    N_PER_MM,
+    ORANGE,
+    PURPLE,
+    SMALL,
+    TEXT,
+    TICKS,
+    TWO_COLUMNS,
+    VERMILLION,
+    caption,
+    heading,
+    panels,
+)
 from cdsm.support.datasets import check_sweep, status_names
-from cdsm.support.validation import one_of, scalar
+from cdsm.support.validation import one_of, whole_number
 from cdsm.support.values import Array
 
 if TYPE_CHECKING:
@@ -31,19 +48,30 @@ _UNITS: Final = {
 }
 """Factor and label of the colour bar for each unit of a Dataset."""
 
-_MOST_PANELS = 9
 _WIDE = 30.0
 """The colours are logarithmic if the ratio of largest to smallest value exceeds this."""
 
-_FLAT = 1e-9
-"""The tips are in a plane if their extent along an axis is below this fraction of the largest."""
+_MIDDLE = (0.05, 0.95)
+"""Values further from these quantiles than these are from each other are outliers."""
+
+_TALLEST = 4.0
+"""Largest height of a panel [inch]."""
+
+Statistic = Literal["median", "min", "max"]
 
 _MARKS: Final[dict[str, tuple[str, str, float]]] = {
-    "unstable": ("x", COLORS[1], 18.0),
+    "unstable": ("x", VERMILLION, 14.0),
     "infeasible": (".", "0.75", 8.0),
-    "outside_elasticity": ("+", "0.55", 18.0),
+    "outside_elasticity": ("+", PURPLE, 18.0),
+    "solver_failed": ("^", ORANGE, 14.0),
+    "singular": ("d", VERMILLION, 14.0),
+    "immobile": ("s", "0.5", 10.0),
+    "beyond_limits": ("v", "0.6", 10.0),
+    "coincident_sites": ("*", BLACK, 18.0),
+    "worker_lost": ("1", BLACK, 20.0),
+    "pending": ("2", "0.5", 20.0),
 }
-"""Marker, colour and size of entries without the quantity; any other status uses the last one."""
+"""Marker, colour and size of entries without the quantity, by status."""
 
 
 def plot_map(
@@ -51,13 +79,17 @@ def plot_map(
     quantity: str = "softest",
     *,
     section: tuple[str, float, float] | None = None,
+    statistic: Statistic | None = None,
+    bins: int = 40,
 ) -> Figure:
     """Plot the tips of a sweep in mm, coloured by a quantity, with a panel for each case.
 
-    Axes are equal. Tips in a plane and sections are shown in 2D, other tips in 3D. Entries without
-    the quantity are marked by their status. Unstable entries are marked too, because their
-    stiffness has no meaning, except in a map of the margin. If some values are infinite, the
-    colours end at the 99th percentile of the finite ones, and the colour bar ends in an arrow.
+    Tips in a plane and sections are dots, or cells if a statistic is given. A cloud of tips is
+    shown in three slices through its middle, as cells. Many postures may put the tip into one cell;
+    the statistic tells which value it shows. Entries without the quantity are marked by their
+    status, in cells only where nothing else is. Unstable entries are marked too, because their
+    stiffness has no meaning, except in a map of the margin. Outliers, far from the middle 90 % of
+    the values, and infinite values have a colour of their own, at the ends of the colour bar.
 
     Args:
         dataset: Result of :func:`~cdsm.sweeps.run.sweep` with the output ``tip_position``. Use
@@ -65,194 +97,160 @@ def plot_map(
         quantity: Quantity with one number per entry: ``"softest"``, ``"stiffest"``,
             ``"anisotropy"``, ``"margin"``, ``"along"`` (a panel for each direction).
         section: Axis, position and half thickness [m] of a slab. Only tips inside it are shown.
+        statistic: ``"median"``, ``"min"`` or ``"max"`` of the postures in a cell; None: dots where
+            the tips are in a plane or a section, else the median.
+        bins: Number of cells along the longest side of a map.
 
     Raises:
         InvalidInput: ``dataset`` is not a sweep or has too many panels, ``quantity`` has more than
-            one number per entry, or ``section`` is invalid or holds no tip.
-        UnknownName: The sweep has no such quantity or no tip positions, or the axis is unknown.
+            one number per entry, ``section`` is invalid or holds no tip, or ``bins`` is not a whole
+            number from 2 to 500.
+        UnknownName: The sweep has no such quantity or no tip positions, or the axis or the
+            statistic is unknown.
         MissingExtra: xarray is not installed.
     """
     check_sweep(dataset)
     one_of("quantity", quantity, [str(name) for name in dataset.data_vars])
     one_of("quantity", "tip_position", [str(name) for name in dataset.data_vars])
+    if statistic is not None:
+        one_of("statistic", statistic, get_args(Statistic))
+    whole_number("bins", bins, 2, 500)
     tips = MM * dataset["tip_position"].transpose(..., "axis")
     poses = [str(dim) for dim in tips.dims[:-1]]
     words = status_names(dataset)
-    maps = list(_panels(dataset, quantity, poses, words))
+    cases = list(cases_of(dataset, quantity, poses, words))
     points = tips.values.reshape(-1, 3)
-    shown = np.isfinite(points).all(axis=1)
-    title = [dataset.attrs["title"], dataset.attrs["poses"]]
-    if section is not None:
-        inside, slab = _slab(points, section)
-        shown &= inside
-        title.append(slab)
-    if not shown.any():
+    known = np.isfinite(points).all(axis=1)
+    slices, cloud = slices_of(points[known], section)
+    factor, unit = _UNITS.get(dataset[quantity].units, (1.0, dataset[quantity].units))
+    maps = [
+        Map(
+            ", ".join(filter(None, [case.title, part.title])),
+            points[inside][:, part.plane],
+            factor * case.values[inside],
+            case.status[inside],
+            part.plane,
+        )
+        for case in cases
+        for part in slices
+        for inside in [known & part.holds(points)]
+    ]
+    if not any(len(each.points) for each in maps):
         raise InvalidInput(
             "section" if section is not None else "dataset",
             "has no tip to show; widen the section, or sweep over other postures.",
         )
-    points = points[shown]
-    plane = _plane(points, section)
-    factor, unit = _UNITS.get(dataset[quantity].units, (1.0, dataset[quantity].units))
-    maps = [_Panel(title, factor * values[shown], code[shown]) for title, values, code in maps]
-    every = np.concatenate([panel.values for panel in maps])
-    colors = _colors(every)
-
-    columns = 2 if len(maps) == 4 else min(len(maps), 3)
+    every = np.concatenate([each.values for each in maps])
+    colors, extend = _colors(every)
+    shown = statistic or ("median" if cloud else None)
+    columns = len(slices) if cloud else 2 if len(maps) == 4 else min(len(maps), 3)
     rows = -(-len(maps) // columns)
-    size = 1.5 + 3.6 * columns, 0.9 + 3.2 * rows
-    projection: dict[str, Any] = {} if plane else {"subplot_kw": {"projection": "3d"}}
-    figure, grid = panels(*size, columns, rows, **projection)
-    for axes, panel in itertools.zip_longest(grid.flat, maps):
-        if panel is None:
+    width = (TWO_COLUMNS - 1.3) / columns
+    ratio = max(np.ptp(each.limits[1]) / np.ptp(each.limits[0]) for each in maps)
+    width = min(width, _TALLEST / ratio)
+    size = 1.3 + width * columns + 0.5, 0.9 + (0.45 + width * ratio) * rows
+    figure, grid = panels(*size, columns, rows)
+    for axes, each in itertools.zip_longest(grid.flat, maps):
+        if each is None:
             axes.set_axis_off()
             continue
-        _draw(axes, points, panel, plane, colors, words)
-        axes.set_title(panel.title, fontsize=9)
+        _draw(axes, each, colors, words, shown, bins)
+        caption(axes, each.title)
     name = dataset[quantity].long_name.split(",")[0]
-    extend = "max" if np.isposinf(every).any() else "neither"
-    bar = figure.colorbar(colors, ax=grid, shrink=0.8, extend=extend)
+    bar = figure.colorbar(colors, ax=grid, extend=extend)
     sign = "; below 0: unstable" if quantity == "margin" else ""
-    bar.set_label(f"{name} [{unit}]{sign}", fontsize=9)
-    bar.ax.tick_params(labelsize=8)
-    _legend(figure, maps, words)
-    figure.suptitle(textwrap.fill(", ".join(title), 30 + 45 * columns), fontsize=9)
+    of = f"{shown} of a cell: " if shown else ""
+    bar.set_label(textwrap.fill(f"{of}{name} [{unit}]{sign}", 45), fontsize=TEXT)
+    if isinstance(colors.norm, LogNorm):
+        bar.ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        bar.minorticks_off()
+    bar.ax.yaxis.set_major_formatter(lambda x, _: f"{x:.4g}")
+    bar.ax.tick_params(which="both", labelsize=SMALL)
+    # of a cloud, the slices show a part of the entries
+    _legend(figure, cases if cloud else maps, maps, words)
+    heading(figure, f"{dataset.attrs['title']}, {dataset.attrs['poses']}")
     return figure
 
 
-class _Panel(NamedTuple):
-    """One map: values of all tips (NaN if missing) and their status."""
-
-    title: str
-    values: Array
-    status: NDArray[np.int8]
-
-
-def _panels(
-    dataset: xarray.Dataset, quantity: str, poses: list[str], words: Mapping[int, str]
-) -> Iterator[_Panel]:
-    """Build a panel for each combination of the dimensions that do not belong to the postures."""
-    status = dataset["status"]
-    allowed = {*map(str, status.dims), "direction"}
-    dims = [str(dim) for dim in dataset[quantity].dims]
-    if not set(dims) <= allowed or set(poses) - set(dims):
-        raise InvalidInput(
-            "quantity",
-            f"{quantity} has the dimensions {', '.join(dims)}; a map shows one number per entry, "
-            "such as softest, stiffest, anisotropy, margin or along.",
-        )
-    cases = [dim for dim in dims if dim not in poses]
-    sizes = [dataset.sizes[dim] for dim in cases]
-    if (count := int(np.prod(sizes))) > _MOST_PANELS:
-        listed = ", ".join(f"{dim} ({dataset.sizes[dim]})" for dim in cases)
-        raise InvalidInput(
-            "dataset",
-            f"makes {count} panels, of {listed}; choose up to {_MOST_PANELS}, as in "
-            f"dataset.isel({cases[0]}=[0]).",
-        )
-    # a dimension that the quantity does not have cannot change its status: take index 0
-    status = status.isel({dim: 0 for dim in status.dims if dim not in dims}, drop=True)
-    codes = status.broadcast_like(dataset[quantity])
-    hidden = [] if quantity == "margin" else [v for v, word in words.items() if word == "unstable"]
-    for place in np.ndindex(*sizes):
-        at = dict(zip(cases, place, strict=True))
-        title = ", ".join(_title(dataset, dim, i) for dim, i in at.items())
-        values, code = (
-            each.isel(at).transpose(*poses).values.ravel() for each in (dataset[quantity], codes)
-        )
-        yield _Panel(title, np.where(np.isin(code, hidden), np.nan, values), code)
-
-
-def _title(dataset: xarray.Dataset, dim: str, place: int) -> str:
-    value = dataset[dim].values[place]
-    if isinstance(value, str):
-        return f"{dim} {value}"
-    units = dataset[dim].attrs.get("units", "1")
-    return f"{dim} {value:g}" + (f" {units}" if units != "1" else "")
-
-
-def _slab(points: Array, section: tuple[str, float, float]) -> tuple[NDArray[np.bool_], str]:
-    """Find the tips inside a section; return their mask and a text about the section."""
-    if not isinstance(section, (tuple, list)) or len(section) != 3:
-        raise InvalidInput(
-            "section", f"{section!r} given; an axis, its place and the half thickness [m] needed."
-        )
-    axis = AXES.index(one_of("axis", section[0], AXES))
-    place, half = scalar("section", section[1]), scalar("section", section[2])
-    inside = abs(points[:, axis] - MM * place) <= MM * half
-    words = f"{section[0]} = {MM * place:g} ± {MM * half:g} mm"
-    return inside, words.replace(" ", "\xa0")  # no line break inside
-
-
-def _plane(points: Array, section: tuple[str, float, float] | None) -> tuple[int, int] | None:
-    """Find the two axes of the section, or of the plane of all tips; None if there is no plane."""
-    if section is not None:
-        normal = AXES.index(section[0])
-    else:
-        extent = np.ptp(np.vstack([points, np.zeros(3)]), axis=0)  # the base is at the origin
-        normal = int(extent.argmin())
-        if extent[normal] > _FLAT * extent.max():
-            return None
-    first, second = (axis for axis in range(3) if axis != normal)
-    return first, second
-
-
-def _colors(values: Array) -> ScalarMappable:
-    """Build the scale of the finite values, up to their 99th percentile if some are infinite."""
+def _colors(values: Array) -> tuple[ScalarMappable, str]:
+    """Build the scale of the finite values without outliers; say at which ends it is exceeded."""
     finite = values[np.isfinite(values)] if np.isfinite(values).any() else np.array([0.0, 1.0])
-    low = float(finite.min())
-    high = float(np.quantile(finite, 0.99 if np.isposinf(values).any() else 1.0))
-    scale = Normalize
-    if low > 0.0 and high > _WIDE * low:
-        scale = LogNorm
-    elif low < 0.0 < high:  # a margin: the colour shows its sign first
-        low, high = -max(-low, high), max(-low, high)
-    name = "coolwarm_r" if low < 0.0 < high else "viridis"
-    return ScalarMappable(scale(low, max(high, low + 1e-12 * abs(low))), name)
+    low, high = float(finite.min()), float(finite.max())
+    wide = low > 0.0 and high > _WIDE * low
+    measure = np.log(finite) if low > 0.0 else finite
+    near, far = np.quantile(measure, _MIDDLE)
+    inner = finite[(measure >= 2.0 * near - far) & (measure <= 2.0 * far - near)]
+    low, high = float(inner.min()), float(inner.max())
+    below, above = bool((finite < low).any()), bool((values > high).any())
+    scale, name = (LogNorm, "viridis") if wide and high > _WIDE * low else (Normalize, "viridis")
+    if low < 0.0 < high:  # a margin: the colour shows its sign first
+        low, high, name = -max(-low, high), max(-low, high), "PuOr"
+    cmap = colormaps[name].with_extremes(under=BLACK, over=VERMILLION)
+    extend = {(0, 0): "neither", (1, 0): "min", (0, 1): "max", (1, 1): "both"}[below, above]
+    return ScalarMappable(scale(low, max(high, low + 1e-12 * abs(low))), cmap), extend
 
 
 def _draw(
     axes: Any,
-    points: Array,
-    panel: _Panel,
-    plane: tuple[int, int] | None,
+    shown: Map,
     colors: ScalarMappable,
     words: Mapping[int, str],
+    statistic: Statistic | None,
+    bins: int,
 ) -> None:
-    shown = plane or (0, 1, 2)
-    known = ~np.isnan(panel.values)
+    known = ~np.isnan(shown.values)
+    limits, marked = shown.limits, ~known
     highest: Any = colors.norm.vmax
-    for code in np.unique(panel.status[~known]).tolist():
-        mark, color, size = _MARKS.get(words[code], _MARKS["outside_elasticity"])
-        marked = points[~known & (panel.status == code)][:, shown]
-        axes.scatter(*marked.T, marker=mark, c=color, s=size, linewidths=0.7)
-    axes.scatter(
-        *points[known][:, shown].T,
-        c=np.minimum(panel.values[known], highest + abs(highest)),  # infinities are not drawn
-        norm=colors.norm,
-        cmap=colors.cmap,
-        s=14.0,
-        linewidths=0.0,
-    )
-    axes.scatter(*np.zeros((len(shown), 1)), marker="s", c="0.1", s=28.0)
-    for letter, axis in zip(AXES, shown, strict=False):
-        getattr(axes, f"set_{letter}label")(f"{AXES[axis]} [mm]", fontsize=8)
-    axes.tick_params(labelsize=7)
-    if plane:
-        axes.locator_params(nbins=TICKS)
-        axes.set_aspect("equal", adjustable="datalim")
-    else:
-        equal_axes(axes)
+    finite = np.minimum(shown.values, 2.0 * abs(highest))  # infinities are not drawn
+    if statistic is not None and known.any():
+        from scipy.stats import binned_statistic_2d  # here, because it imports slowly
+
+        size = np.ptp(limits, axis=1).max() / bins
+        edges = [np.arange(low, high + size, size) for low, high in limits]
+        cells, *_, cell = binned_statistic_2d(
+            *shown.points[known].T, finite[known], statistic, edges, expand_binnumbers=True
+        )
+        axes.pcolormesh(*edges, np.ma.masked_invalid(cells.T), norm=colors.norm, cmap=colors.cmap)
+        taken = {tuple(each) for each in cell.T.tolist()}
+        places = np.stack([np.digitize(x, e) for x, e in zip(shown.points.T, edges, strict=True)])
+        marked &= [tuple(each) not in taken for each in places.T.tolist()]
+    for code in np.unique(shown.status[marked]).tolist():
+        mark, color, area = _MARKS[words[code]]
+        chosen = shown.points[marked & (shown.status == code)]
+        axes.scatter(*chosen.T, marker=mark, c=color, s=area, linewidths=0.7)
+    if statistic is None:
+        axes.scatter(
+            *shown.points[known].T,
+            c=finite[known],
+            norm=colors.norm,
+            cmap=colors.cmap,
+            s=8.0,
+            linewidths=0.0,
+        )
+    axes.set(xlim=limits[0], ylim=limits[1])
+    axes.plot(0.0, 0.0, "s", color="0.1", markersize=4)
+    for letter, axis in zip("xy", shown.plane, strict=True):
+        getattr(axes, f"set_{letter}label")(f"{AXES[axis]} [mm]")
+    axes.locator_params(nbins=TICKS)
+    axes.set_aspect("equal")
 
 
-def _legend(figure: Figure, panels: list[_Panel], words: Mapping[int, str]) -> None:
-    """Draw the legend: each marker, and its share of all entries."""
-    status = np.concatenate([panel.status[np.isnan(panel.values)] for panel in panels])
-    total = sum(panel.status.size for panel in panels)
-    handles = [Line2D([], [], marker="s", color="0.1", linestyle="", label="base")]
+def _legend(
+    figure: Figure,
+    counted: Sequence[Case | Map],
+    maps: Sequence[Map],
+    words: Mapping[int, str],
+) -> None:
+    """Draw the legend: each marker, and its share of the entries that count."""
+    status = np.concatenate([each.status[np.isnan(each.values)] for each in counted])
+    total = sum(each.status.size for each in counted)
+    handles = []
+    if any((each.limits[:, 0] <= 0.0).all() and (each.limits[:, 1] >= 0.0).all() for each in maps):
+        handles.append(Line2D([], [], marker="s", color="0.1", linestyle="", label="base"))
     for value, count in zip(*np.unique(status, return_counts=True), strict=True):
         word = words[int(value)]
-        mark, color, _ = _MARKS.get(word, _MARKS["outside_elasticity"])
+        mark, color, _ = _MARKS[word]
         label = f"{word.replace('_', ' ')}: {100.0 * count / total:.3g} %"
         handles.append(Line2D([], [], marker=mark, color=color, linestyle="", label=label))
-    figure.legend(handles=handles, loc="outside lower center", ncols=5, fontsize=8)
+    if handles:
+        figure.legend(handles=handles, loc="outside lower center", ncols=4, fontsize=SMALL)

@@ -27,6 +27,9 @@ if TYPE_CHECKING:
     from cdsm.identification.result import Identification
     from cdsm.wires.tensile.fit import TensileFit
 
+_BROAD = 0.25
+"""Stages wider than this part of all have their name in level lines."""
+
 _MOST_LABELS = 30
 """Above this number of measurements the axis shows numbers, not names."""
 
@@ -60,17 +63,18 @@ def plot_tensile_fit(fit: TensileFit) -> Figure:
 
 def shade_stages(axes: Any, stages: Sequence[tuple[str, float, float]], along: str = "x") -> None:
     """Shade stages (name, low, high) of the tension [N], which the axis ``along`` shows."""
+    whole = stages[-1][2] - stages[0][1]
     for (name, low, high), shade in zip(stages, cycle(("0.93", "0.98", "0.88")), strict=False):
-        middle = (low + high) / 2.0
+        middle, shown = (low + high) / 2.0, {"fontsize": SMALL, "color": "0.3"}
         if along == "x":
             axes.axvspan(low, high, color=shade, zorder=0, linewidth=0)
-            place, turn = {"xy": (middle, 0.98), "xycoords": ("data", "axes fraction")}, 90.0
-            aligned = {"ha": "center", "va": "top"}
+            turn = 90.0 if high - low < _BROAD * whole else 0.0
+            where = {"transform": axes.get_xaxis_transform(), "ha": "center", "va": "top"}
+            axes.text(middle, 0.98, name, rotation=turn, **where, **shown)
         else:
             axes.axhspan(low, high, color=shade, zorder=0, linewidth=0)
-            place, turn = {"xy": (0.02, middle), "xycoords": ("axes fraction", "data")}, 0.0
-            aligned = {"ha": "left", "va": "center"}
-        axes.annotate(name, **place, **aligned, rotation=turn, fontsize=SMALL, color="0.3")
+            where = {"transform": axes.get_yaxis_transform(), "va": "center"}
+            axes.text(0.02, middle, name.replace("\n", " "), **where, **shown)
 
 
 def plot_identification(fit: Identification, labels: Sequence[str], title: str) -> Figure:

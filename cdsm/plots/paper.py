@@ -23,6 +23,8 @@ from cdsm.plots.style import (
     N_PER_MM,
     ORANGE,
     SCREEN,
+    SMALL,
+    STYLES,
     TWO_COLUMNS,
     VERMILLION,
     caption,
@@ -37,7 +39,7 @@ if TYPE_CHECKING:
     from cdsm import paper
 
 _LENGTHS: Final = {"stretched": "$l_0 = L$, as in the paper", "unstrained": "original $l_0$"}
-_READINGS: Final = {"pseudoinverse": "paper's reading, $K_R$", "along": "hung weight, $1/C$"}
+_READINGS: Final = {"pseudoinverse": "paper's reading\n$K_R$", "along": "hung weight\n$1/C$"}
 _NOTE: Final = (
     "paper's reading: diagonal of $K_R = J^{+T} K_\\theta J^+$; "
     "hung weight: $1/(u^T C\\,u)$, what a small weight at the tip measures"
@@ -104,19 +106,19 @@ def _plot_moduli(result: paper.StiffnessFigure) -> Figure:
             axes.plot(
                 _swept(result, curve)[::4], passive[::4], "k.", ms=4, label="passive part alone"
             )
-            axes.set_ylim(bottom=0.0)
+            axes.set_ylim(0.0, 1.12 * values.max())
     first = result.curves[0]
     x, stated = _swept(result, first), "paper: proportional, twice at 320 GPa"
     for i, axes in enumerate(grid[0]):
         doubled = N_PER_MM * ratio[i] * first.pseudoinverse[0, i]
         axes.plot(x[-1], doubled, "kD", markerfacecolor="none", markersize=6, label=stated)
-    grid[2, 0].set_ylabel("passive part less total [%]")
+    grid[2, 0].set_ylabel("passive less\ntotal [%]")
     for i, axes in enumerate(grid[2]):
         axes.axhspan(-limit[0], limit[0], color="0.9", linewidth=0, label="paper: within 1.5 %")
         for curve, look in zip(result.curves, looks, strict=True):
             for (name, reading), style in zip(_READINGS.items(), ("-", "--"), strict=True):
                 whole, part = getattr(curve, name)[:, i], getattr(curve, f"{name}_part")[:, i]
-                label = f"difference, {reading.split(',')[0]}"
+                label = f"difference, {reading.splitlines()[0]}"
                 axes.plot(x, 100.0 * (part / whole - 1.0), style, **look)
                 axes.plot([], [], style, color="0.2", label=label)
         axes.set_ylim(-1.2 * limit[0], 1.2 * limit[0])
@@ -131,27 +133,20 @@ def _plot_directions(result: paper.StiffnessFigure) -> Figure:
     for row, (name, reading) in zip(grid, _READINGS.items(), strict=True):
         row[0].set_ylabel(f"{reading} [N/mm]")
         for i, axes in enumerate(row):
-            for curves, look in (
-                (result.curves, {"color": BLUE}),
-                (result.original, {"color": VERMILLION, "linestyle": "--"}),
-            ):
-                (curve,) = curves
-                values = getattr(curve, name)[:, i]
-                _draw_curve(axes, curve, values, label=_LENGTHS[curve.original_length], **look)
-            axes.set_ylim(bottom=0.0)
-    (curve,) = result.curves
+            (curve,), (original,) = result.curves, result.original
+            _draw_curve(
+                axes, curve, getattr(curve, name)[:, i], color=BLUE, label=_LENGTHS["stretched"]
+            )
+            values = N_PER_MM * getattr(original, name)[:, i]
+            line = {"color": VERMILLION, "label": _LENGTHS["unstrained"]}
+            axes.plot(original.tension[:, 1], values, "--", **line)
+            axes.set_ylim(0.0, 1.12 * values.max())
     for i, axes in enumerate(grid[0]):
         end = N_PER_MM * (1.0 + increments[i]) * curve.pseudoinverse[0, i]
         label = "paper: stated increment, from the first computed value"
         axes.plot(curve.tension[-1, 1], end, "ko", markersize=4, label=label)
-        axes.annotate(
-            f"+{increments[i]:g} times",
-            (curve.tension[-1, 1], end),
-            xytext=(-6, 2),
-            textcoords="offset points",
-            ha="right",
-            fontsize=7,
-        )
+        words = {"transform": axes.transAxes, "ha": "right", "fontsize": SMALL}
+        axes.text(0.97, 0.05, f"paper: +{increments[i]:g} times", **words)
     legend_below(figure, grid[0, 0], 3, title=_NOTE)
     return figure
 
@@ -182,7 +177,7 @@ def _plot_changes(result: paper.StiffnessFigure) -> Figure:
         changes[0].plot([end], [stated[i]], "ko", markersize=4, label="paper, at the end")
     grid[0, 0].set_ylabel("active part of $K_R$ [N/mm]")
     for axes, reading in zip(grid[1:, 0], _READINGS.values(), strict=True):
-        axes.set_ylabel(f"change,\n{reading} [%]")
+        axes.set_ylabel(f"change, {reading} [%]")
     legend_below(figure, grid[:2, 0], 2, title=_NOTE)
     return figure
 
@@ -204,7 +199,7 @@ def _plot_lead(result: paper.LeadFigure) -> Figure:
         axes.set_xticks([0.0, 5.0, 10.0, 20.0, 50.0, 100.0, 300.0])
         axes.xaxis.set_major_formatter(lambda x, _: f"{x:g}")
         axes.set_xlabel("lead of all cables [mm]")
-        caption(axes, reading)
+        caption(axes, reading.replace("\n", ", "))
     pair[0].set_ylabel("change of stiffness [%]")
     legend_below(figure, pair[0], 3, title=_NOTE)
     return figure
@@ -221,12 +216,12 @@ def _plot_postures(result: paper.StiffnessFigure) -> Figure:
         draw_arm(picture, pose)
         frame_arms(picture, None)
         picture.set_axis_off()
-        picture.set_box_aspect(picture._box_aspect, zoom=1.5)
+        picture.set_box_aspect(picture._box_aspect, zoom=1.2)
         caption(picture, curve.label)
         for row, (name, reading) in enumerate(_READINGS.items(), start=1):
             axes: Any = styled(figure.add_subplot(grid[row, column]))
             for i, (axis, color) in enumerate(zip(AXES, COLORS, strict=True)):
-                for each, look in ((original, _WIDE), (curve, {"linewidth": 1.0})):
+                for each, look in ((original, _WIDE), (curve, {"linestyle": STYLES[i]})):
                     values = N_PER_MM * getattr(each, name)[:, i]
                     label = f"{axis}, {_LENGTHS[each.original_length]}"
                     axes.plot(_swept(result, each), values, color=color, label=label, **look)

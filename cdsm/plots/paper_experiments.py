@@ -30,8 +30,8 @@ if TYPE_CHECKING:
 
 _STAGES: Final = (
     ("pre-tensioning", 0.0, 120.0),
-    ("elastic, rising slowly", 120.0, 400.0),
-    ("elastic, near-constant", 400.0, 810.0),
+    ("elastic,\nrising slowly", 120.0, 400.0),
+    ("elastic,\nnear-constant", 400.0, 810.0),
     ("plastic: no law", 810.0, 900.0),
 )
 """Stages of the strand and their tensions [N] in Section IV-C; the end of the last is not given."""
@@ -44,14 +44,8 @@ def plot_strand(result: paper.StrandFigure) -> Figure:
     shade_stages(left, _STAGES, "y")
     left.set(xlabel=f"stretch of a {MM * result.gauge_length:g} mm wire [mm]", ylabel="force [N]")
     left.set_ylim(0.0, _STAGES[-1][-1])
-    left.annotate(
-        "below 2.2 N Eq. 19 is not positive:\nthe stretch counts from there",
-        (MM * result.displacement[0], result.tension[0]),
-        xytext=(0.4, 0.07),
-        textcoords="axes fraction",
-        fontsize=SMALL,
-        arrowprops={"arrowstyle": "-", "linewidth": 0.6},
-    )
+    words = "stretch from 2.2 N on: below,\nEq. 19 is not positive"
+    left.text(0.02, 0.15, words, transform=left.transAxes, fontsize=SMALL)
     caption(left, "(a)")
     right.fill_between(
         result.tension,
@@ -77,7 +71,7 @@ def plot_strand(result: paper.StrandFigure) -> Figure:
         arrowprops={"arrowstyle": "<-", "color": VERMILLION, "linewidth": 0.8},
     )
     shade_stages(right, _STAGES)
-    right.set_ylim(-5.0, 1.4 * KN * result.high.max())  # the printed law falls far below
+    right.set_ylim(-5.0, 1.2 * KN * result.high.max())  # the printed law falls far below
     right.set_xlim(0.0, _STAGES[-1][-1])
     right.set(xlabel="tension [N]", ylabel="rigidity EA [kN]")
     caption(right, "(b)")
@@ -100,7 +94,7 @@ def plot_experiment(result: paper.ExperimentFigure) -> Figure:
         color = colors[k % len(colors)]
         axes.plot(across * trace.swept, scale * trace.computed, color=color, label="computed")
         axes.plot(across * trace.paper_at, scale * trace.paper, "ko", markersize=4, label="paper")
-        caption(axes, textwrap.fill(trace.label, 100 // columns))
+        caption(axes, textwrap.fill(trace.label, 110 // columns))
         axes.set_ylim(bottom=0.0)
         if k % columns == 0:
             axes.set_ylabel(unit)
@@ -116,13 +110,15 @@ def plot_prototype(result: paper.PrototypeFigure) -> Figure:
     names = result.fits[0].step.numbers
     figure, ((axes,),) = panels(TWO_COLUMNS, 5.0, 1)
     places = np.arange(len(names))
-    for fit, marker, color in zip(result.fits, "os^D", (*COLORS, PURPLE), strict=True):
+    looks = zip(result.fits, "os^D", (8, 5, 5, 5), (*COLORS, PURPLE), strict=True)
+    for fit, marker, size, color in looks:  # the first two hold the same values: a ring around
         axes.plot(
             100.0 * fit.residuals,
             places[: fit.residuals.size],
             marker,
             color=color,
-            markersize=5,
+            markersize=size,
+            markerfacecolor="none" if marker == "o" else color,
             alpha=0.8,
             label=f"{fit.step.label}: {fit.step.count}",
         )

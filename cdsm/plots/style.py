@@ -14,6 +14,7 @@ from typing import Any, Final
 
 import numpy as np
 from matplotlib import rc_context
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import Bbox
@@ -110,7 +111,7 @@ def panels(
 def styled(axes: Any) -> Any:
     """Set grid lines and sizes of text of new axes; return the axes."""
     axes.grid(alpha=0.3, linewidth=0.6)
-    axes.tick_params(labelsize=SMALL, width=0.6)
+    axes.tick_params(which="both", labelsize=SMALL, width=0.6)
     for axis in (axes.xaxis, axes.yaxis):
         axis.label.set_fontsize(TEXT)
         axis.offsetText.set_fontsize(SMALL)
@@ -184,10 +185,9 @@ def fill_canvas(axes: Any, right: float = 1.0) -> None:
             _GAP * figure.dpi + sum(each.get_window_extent().height for each in parts)
             for parts in (legends, titles)
         )
+        renderer: Any = FigureCanvasAgg(figure).get_renderer()  # type: ignore[no-untyped-call]
         place = axes.get_window_extent()
-        parts = [
-            axis.get_tightbbox(figure.canvas.get_renderer()) for axis in axes._axis_map.values()
-        ]
+        parts = [axis.get_tightbbox(renderer) for axis in axes._axis_map.values()]
         box = Bbox.union(parts)
         scale = (right - 2.0 * _GAP / figure.get_figwidth()) * width / box.width
         height = below + scale * box.height + above

@@ -2,11 +2,15 @@
 
 import re
 from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.lines import Line2D
 from mpl_toolkits.mplot3d.art3d import Line3D, Line3DCollection  # type: ignore[import-untyped]
+from PIL import Image
 
 import cdsm
 from cdsm import paper, plots
@@ -73,16 +77,16 @@ def test_foreign_robot_shows_its_joints_and_what_guides_its_cables() -> None:
     )
     np.testing.assert_allclose(shown[0], turning)
     np.testing.assert_allclose(shown[1], sliding)
-    legend = axes.get_legend()
-    assert legend is not None
-    assert [text.get_text() for text in legend.get_texts()] == ["turns", "slides"]
+    (below,) = plots.plot_arm(pose).legends
+    assert [text.get_text() for text in below.get_texts()] == ["turns", "slides"]
 
 
 def test_ellipsoid_shows_where_forces_move_the_tip() -> None:
     pose = random_posture(mixed_arm(), 3)
     K = cdsm.stiffness(pose, cdsm.distribute_tension(pose, 10.0))
     axes = plots.plot_arm(pose, stiffness=K).axes[0]
-    (wires,) = [each for each in axes.collections if isinstance(each, Line3DCollection)]
+    wires = axes.collections[0]
+    assert isinstance(wires, Line3DCollection)
     points = np.concatenate(wires._segments3d) / 1e3 - pose.tip[:3, 3]
     C = K.compliance[:3, :3]
     legend = axes.get_legend()
@@ -126,11 +130,12 @@ def test_paper_figures_show_both_readings_in_newton_per_millimetre(
             continue
         figure = plots.plot_paper(result)
         labels = [axes.get_ylabel() for axes in figure.axes]
+        # one label serves a row; of changes it says so
+        unit = "[%]" if result.name in ("fig4", "fig7") else "[N/mm]"
         for reading in ("paper's reading", "hung weight"):
-            # of changes in per cent one label serves a row
-            changes = result.name in ("fig4", "fig7")
-            unit, count = ("[%]", 1) if changes else ("[N/mm]", 3)
-            assert sum(reading in label and unit in label for label in labels) == count
+            assert sum(reading in label and unit in label for label in labels) == 1
+        (below,) = figure.legends
+        assert "what a small weight at the tip measures" in below.get_title().get_text()
         figure.draw_without_rendering()
 
 
@@ -157,7 +162,40 @@ def test_experiments_show_the_papers_numbers_beside_the_computed(results: Result
             computed, printed = axes.get_lines()
             np.testing.assert_allclose(_shown(computed)[1], unit * trace.computed)
             np.testing.assert_allclose(_shown(printed)[1], unit * trace.paper)
-            assert "[N" in axes.get_xlabel()
+        assert "[N" in figure.axes[-1].get_xlabel()
+        assert "parameters were chosen" in figure.legends[0].get_title().get_text()
+
+
+@pytest.mark.parametrize("name", ["fig3", "fig4", "fig6", "fig7"])
+def test_numbers_that_the_paper_prints_are_drawn_in_its_figures(
+    results: Results, name: str
+) -> None:
+    result = results[name]
+    assert isinstance(result, paper.StiffnessFigure)
+    stated = result.claims[0].paper
+    assert stated is not None
+    first = 1e-3 * result.curves[0].pseudoinverse[0]
+    row = {"fig3": 0, "fig6": 0}.get(name, 1)
+    for i, axes in enumerate(plots.plot_paper(result).axes[3 * row : 3 * row + 3]):
+        (mark,) = (line for line in axes.get_lines() if str(line.get_label()).startswith("paper"))
+        expected = {"fig3": first[i] * stated[i], "fig6": first[i] * (1.0 + stated[i])}
+        assert _shown(mark)[1, 0] == pytest.approx(expected.get(name, stated[i]))
+
+
+def test_nothing_is_hidden_under_another_line(results: Results) -> None:
+    result = results["fig3"]
+    assert isinstance(result, paper.StiffnessFigure)
+    thin, wide = plots.plot_paper(result).axes[0].get_lines()[:2]
+    assert wide.get_linewidth() > 3.0 * thin.get_linewidth()
+    assert thin.get_zorder() > wide.get_zorder()
+
+
+def test_stages_of_the_strand_are_shaded_and_named(results: Results) -> None:
+    for axes in plots.plot_paper(results["fig5"]).axes:
+        words = " ".join(text.get_text().replace("\n", " ") for text in axes.texts)
+        for stage in ("pre-tensioning", "elastic, near-constant", "plastic"):
+            assert stage in words
+        assert len(axes.patches) == 4
 
 
 def test_prototype_figure_shows_a_dot_for_every_number_that_counted(results: Results) -> None:
@@ -180,7 +218,7 @@ def test_changes_are_shown_in_both_readings_beside_the_papers_number(results: Re
     figure.draw_without_rendering()
     assert len(figure.axes) == 9
     for i, axes in enumerate(figure.axes[3:6]):
-        strand, original, wire, wire_original, zero, stated = axes.get_lines()
+        strand, original, wire, wire_original, zero, stated = axes.get_lines()[:6]
         strand_claim, wire_claim = result.claims
         assert _shown(strand)[1, -1] == pytest.approx(strand_claim.computed[i])
         assert _shown(original)[1, -1] == pytest.approx(strand_claim.original[i])
@@ -339,3 +377,120 @@ def test_many_cables_are_not_told_apart_by_colour() -> None:
 def _shown(line: Line2D) -> Array:
     """x and y of a line (2, N)."""
     return np.asarray(line.get_xydata(), dtype=np.float64).T
+
+
+@pytest.mark.parametrize("suffix", [".pdf", ".svg", ".png"])
+def test_figures_have_the_same_bytes_each_time(tmp_path: Path, suffix: str) -> None:
+    pose = random_posture(mixed_arm(), 3)
+    pull = cdsm.distribute_tension(pose, 10.0)
+    once, twice = (
+        plots.save_figure(pull.plot(), tmp_path / f"{k}{suffix}").read_bytes() for k in "ab"
+    )
+    assert once == twice
+    assert b"CreationDate" not in once
+    assert b"<dc:date>" not in once
+
+
+def test_figures_are_one_or_two_columns_wide_and_printed_at_300_dpi(tmp_path: Path) -> None:
+    pose = random_posture(mixed_arm(), 3)
+    K = cdsm.stiffness(pose, cdsm.distribute_tension(pose, 10.0))
+    for figure in (K.plot(), K.shares("z").plot(), cdsm.saturation(pose, "z", 10.0).plot()):
+        width = figure.get_figwidth()
+        assert width in (3.5, 7.16)
+        with Image.open(plots.save_figure(figure, tmp_path / "a.png")) as image:
+            assert image.width == pytest.approx(300.0 * width, abs=1.0)
+    with pytest.raises(cdsm.InvalidInput, match=r"must end in \.pdf, \.svg, \.png"):
+        plots.save_figure(figure, tmp_path / "a.jpg")
+
+
+def test_arm_fills_its_canvas() -> None:
+    figure = cdsm.presets.virtual_prototype().plot()
+    figure.draw_without_rendering()
+    axes: Any = figure.axes[0]
+    renderer = FigureCanvasAgg(figure).get_renderer()  # type: ignore[no-untyped-call]
+    boxes = [axis.get_tightbbox(renderer) for axis in axes._axis_map.values()]
+    low = np.min([box.min for box in boxes], axis=0)
+    high = np.max([box.max for box in boxes], axis=0)
+    size = figure.get_size_inches() * figure.dpi
+    assert (high - low > np.array([0.9, 0.75]) * size).all()
+    assert (low >= 0.0).all()
+    assert (high <= size).all()
+
+
+def test_every_result_that_people_look_at_has_a_picture(tmp_path: Path) -> None:
+    pose = random_posture(mixed_arm(), 3)
+    pull = cdsm.distribute_tension(pose, 10.0)
+    K = cdsm.stiffness(pose, pull)
+    attainable = cdsm.stiffness_range(pose, "z", 10.0, 200.0, starts=2)
+    target = attainable.low + 0.2 * (attainable.high - attainable.low)
+    plan = cdsm.plan_stiffness(pose, "z", target, 10.0, 200.0)
+    path = cdsm.plan_path(
+        pose.arm, "z", target, 10.0, 200.0, angles=np.linspace(1.0, 0.999, 3)[:, None] * pose.q
+    )
+    for result in (
+        *(pose.arm, pose, pull, K, K.shares("z"), cdsm.modes(pose, K)),
+        *(attainable, plan, path, cdsm.saturation(pose, "z", 10.0, 200.0)),
+        *(cdsm.equilibrium(pose, pull), cdsm.weight_test(pose, pull, (0.0, 0.0, -1.0))),
+        cdsm.critical_tension(pose),
+        *(cdsm.solve_joint_angles(pose.arm, pose.cable_lengths), cdsm.presets.STRAND_1X19),
+        cdsm.inverse_kinematics(pose.arm, pose.tip),
+    ):
+        result.plot().draw_without_rendering()
+    plan.plot(attainable).draw_without_rendering()
+    above, below = path.plot(animate=tmp_path / "arm.gif").axes
+    # a constant target is inside the panel, not on its frame
+    assert above.get_ylim()[1] > 1.1e-3 * target
+    assert below.get_ylim()[1] > 1.1 * path.tensions.max()
+    with Image.open(tmp_path / "arm.gif") as film:
+        assert film.n_frames == len(path.planned) == 3  # type: ignore[attr-defined]
+    with pytest.raises(cdsm.InvalidInput, match=r"must end in \.gif"):
+        plots.plot_path([pose], animate=tmp_path / "arm.mp4")
+    with pytest.raises(cdsm.InvalidInput, match="postures of two arms"):
+        plots.plot_path([pose, cdsm.presets.virtual_prototype().at(np.zeros(10))])
+
+
+def test_shares_are_bars_that_add_up() -> None:
+    pose = random_posture(mixed_arm(), 3)
+    shares = cdsm.stiffness(pose, cdsm.distribute_tension(pose, 10.0)).shares("y")
+    (axes,) = shares.plot().axes
+    heights = sum(patch.get_height() for patch in axes.patches)  # type: ignore[attr-defined]
+    assert 1e3 * heights == pytest.approx(shares.total)
+    names = [label.get_text() for label in axes.get_xticklabels()]
+    assert names == [*pose.arm.cables.names, "gravity", "load"]
+
+
+def test_ranges_of_many_directions_are_a_polar_diagram() -> None:
+    pose = random_posture(mixed_arm(), 3)
+    turns = np.deg2rad([0.0, 60.0, 120.0])
+    ranges = [
+        cdsm.stiffness_range(pose, [0.0, np.cos(a), np.sin(a)], 10.0, 100.0, starts=2)
+        for a in turns
+    ]
+    (axes,) = plots.plot_stiffness_ranges({"up to 100 N": ranges}).axes
+    angle, radius = _shown(axes.get_lines()[0])
+    np.testing.assert_allclose(angle[:3], turns)
+    np.testing.assert_allclose(radius[[0, 3, 6]], 1e-3 * ranges[0].high)
+    tilted = cdsm.stiffness_range(pose, [0.5, 0.5, 0.5], 10.0, 100.0, starts=2)
+    with pytest.raises(cdsm.InvalidInput, match="no plane of two base axes"):
+        plots.plot_stiffness_ranges({"a": [tilted]})
+
+
+def test_bifurcation_is_where_buckling_was_found() -> None:
+    geometry = cdsm.presets.experimental_prototype_geometry()
+    cables = cdsm.serpentine_cables(geometry, cdsm.LinearElasticity(1e9), series_stiffness=1890.0)
+    pose = cdsm.Manipulator(geometry, cables=cables, gravity=(0, 0, 0)).at(np.zeros(3))
+    critical = cdsm.critical_tension(pose)
+    found = cdsm.bifurcation(critical, bounds=critical.minimum * np.array([0.9, 1.0 - 1e-3, 1.2]))
+    moved = np.linalg.norm(found.displacements, axis=1)
+    # linear below: 1 mN over the stiffness along the push
+    pull = cdsm.distribute_tension(pose, 0.9 * critical.minimum)
+    along = cdsm.stiffness(pose, pull).along(found.push[:3])
+    assert moved[0] == pytest.approx(1e-3 / along, rel=0.05)
+    assert moved[2] > 0.01 > 20.0 * moved[0]
+    assert len(found.to_pandas()) == 3
+    assert found.to_dict()["critical_minimum_tension_N"] == critical.minimum
+    (axes,) = found.plot().axes
+    np.testing.assert_allclose(_shown(axes.get_lines()[0])[1], 1e3 * moved)
+    stiff = cdsm.presets.virtual_prototype().at(np.full(10, 0.1))
+    with pytest.raises(cdsm.InvalidInput, match="an arm that buckles is needed"):
+        cdsm.bifurcation(cdsm.critical_tension(stiff))

@@ -5,11 +5,12 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
-from matplotlib.collections import PathCollection
+from matplotlib.collections import PathCollection, QuadMesh
 from matplotlib.figure import Figure
 
 import cdsm
 from cdsm import plots
+from cdsm.plots import maps
 from cdsm.support.values import Array
 from tests.support.sweeps import short_arm
 
@@ -19,7 +20,7 @@ PLANAR = cdsm.GridPoses(
 
 
 def drawn(figure: Figure, panel: int = 0) -> list[PathCollection]:
-    """The scatters of a panel: each status that is missing, then colours, then the base."""
+    """The scatters of a panel: each status that is missing, then colours."""
     figure.draw_without_rendering()
     return [each for each in figure.axes[panel].collections if isinstance(each, PathCollection)]
 
@@ -37,7 +38,7 @@ def planar() -> xr.Dataset:
 
 def test_tips_in_a_plane_are_shown_in_it_in_mm_with_equal_axes(planar: xr.Dataset) -> None:
     figure = plots.plot_map(planar, "softest")
-    colors, _ = drawn(figure)
+    (colors,) = drawn(figure)
     tips = 1e3 * planar.tip_position.values.reshape(-1, 3)
     assert abs(tips[:, 1]).max() < 1e-9
     np.testing.assert_allclose(places(colors), tips[:, [0, 2]], rtol=1e-12)
@@ -58,16 +59,16 @@ def test_unstable_entries_are_marked_and_counted(planar: xr.Dataset) -> None:
     for quantity in ("softest", "along"):
         data = planar.isel(direction=[2]) if quantity == "along" else planar
         figure = plots.plot_map(data, quantity)
-        marked, colors, _ = drawn(figure, 2)
+        marked, colors = drawn(figure, 2)
         np.testing.assert_allclose(places(marked), tips)
         assert not len(places(colors))
         told = [text.get_text() for text in figure.legends[0].get_texts()]
-        assert told == ["base", f"unstable: {100 * unstable.mean():.3g} %"]
+        assert told == [f"unstable: {100 * unstable.mean():.3g} %"]  # no base: it is far away
 
 
 def test_the_margin_is_shown_with_its_sign_also_where_it_is_negative(planar: xr.Dataset) -> None:
     figure = plots.plot_map(planar, "margin")
-    colors, _ = drawn(figure, 2)
+    (colors,) = drawn(figure, 2)
     np.testing.assert_allclose(
         np.asarray(colors.get_array()), planar.margin[..., 2].values.ravel(), rtol=1e-12
     )
@@ -83,7 +84,7 @@ def test_infinite_values_are_at_the_end_of_the_bar() -> None:
             np.isposinf(found.anisotropy).values.tolist()
             == ([True] + [False] * 20)[: len(postures)]
         )
-        *_, colors, _ = drawn(plots.plot_map(found, "anisotropy"))
+        *_, colors = drawn(plots.plot_map(found, "anisotropy", section=("y", 0.0, 1.0)))
         values = np.asarray(colors.get_array())
         assert np.isfinite(values).all()
         assert values[0] > float(colors.norm.vmax)  # type: ignore[arg-type]
@@ -94,23 +95,68 @@ def test_three_dimensions_sections_and_statuses() -> None:
     found = cdsm.sweep(arm, cdsm.RandomPoses(256), minimum=20.0, maximum=400.0)
     figure = plots.plot_map(found, "along")
     figure.draw_without_rendering()
-    axes: Any = figure.axes[0]
-    assert [axes.get_title() for axes in figure.axes[:3]] == [f"direction {u}" for u in "xyz"]
-    limits = np.ptp([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()], axis=1)
-    np.testing.assert_allclose(limits / axes._box_aspect, (limits / axes._box_aspect)[0])
+    titles = [axes.get_title() for axes in figure.axes[:9]]
+    assert [each.split(",")[0] for each in titles[::3]] == [f"direction {u}" for u in "xyz"]
+    assert [each.split(", ")[1][0] for each in titles[:3]] == ["y", "z", "x"]  # slices of a cloud
     infeasible = float((found.status == cdsm.SweepStatus.INFEASIBLE).mean())
     assert 0.0 < infeasible < 1.0
     told = [text.get_text() for text in figure.legends[0].get_texts()]
     assert f"infeasible: {100 * infeasible:.3g} %" in told
 
     section = plots.plot_map(found, "softest", section=("y", 0.01, 0.02))
-    shown = np.vstack([places(each) for each in drawn(section)[:-1]])
+    shown = np.vstack([places(each) for each in drawn(section)])
     tips = 1e3 * found.tip_position.values
     inside = tips[abs(tips[:, 1] - 10.0) <= 20.0]
     assert 0 < len(inside) < len(tips)
     order = [np.lexsort(each.T) for each in (shown, inside[:, [0, 2]])]
     np.testing.assert_allclose(shown[order[0]], inside[:, [0, 2]][order[1]], rtol=1e-12)
-    assert "y\xa0=\xa010\xa0±\xa020\xa0mm" in section.get_suptitle()
+    assert section.axes[0].get_title() == "y\xa0=\xa010\xa0±\xa020\xa0mm"
+
+
+@pytest.mark.parametrize("statistic", ["median", "min", "max"])
+def test_cells_show_the_statistic_of_their_tips(planar: xr.Dataset, statistic: str) -> None:
+    one = planar.isel(minimum=0)
+    figure = plots.plot_map(one, "softest", statistic=statistic, bins=4)  # type: ignore[arg-type]
+    (mesh,) = (each for each in figure.axes[0].collections if isinstance(each, QuadMesh))
+    shown: Any = np.ma.asarray(mesh.get_array())
+    corners: Any = mesh.get_coordinates()
+    tips = 1e3 * one.tip_position.values.reshape(-1, 3)[:, [0, 2]]
+    values = 1e-3 * one.softest.values.ravel()
+    assert 1 < shown.count() < len(values)
+    for row, column in np.argwhere(~np.ma.getmaskarray(shown)):
+        low, high = corners[row, column], corners[row + 1, column + 1]
+        inside = ((tips >= low) & (tips < high)).all(axis=1)
+        expected = getattr(np, statistic)(values[inside])
+        assert shown[row, column] == pytest.approx(expected)
+    assert figure.axes[-1].get_ylabel().startswith(f"{statistic} of a cell: stiffness in the")
+
+
+def test_outliers_do_not_set_the_scale_and_have_a_colour_of_their_own(planar: xr.Dataset) -> None:
+    data = planar.isel(minimum=0).copy(deep=True)
+    first = data.softest.values.ravel()[1:].max()
+    data.softest[dict.fromkeys(data.softest.dims, 0)] = 1e-3 * first
+    figure = plots.plot_map(data, "softest")
+    (colors,) = drawn(figure)
+    assert colors.norm.vmin > 1e-5 * first
+    below = colors.to_rgba(1e-6 * first)
+    assert below not in [colors.to_rgba(x) for x in np.linspace(*colors.get_clim(), 50)]
+
+
+def test_every_status_has_a_marker_of_its_own() -> None:
+    marks = {each.name.lower(): maps._MARKS.get(each.name.lower()) for each in cdsm.SweepStatus}
+    del marks["ok"]
+    assert None not in marks.values()
+    assert len({mark[0] for mark in marks.values() if mark}) == len(marks)
+
+
+def test_maps_are_as_high_as_what_they_show(planar: xr.Dataset) -> None:
+    """A crescent of tips is no white page: the panel is as wide and high as the tips are."""
+    figure = plots.plot_map(planar.isel(minimum=0), "softest")
+    figure.draw_without_rendering()
+    axes = figure.axes[0]
+    tips = 1e3 * planar.tip_position.values.reshape(-1, 3)[:, [0, 2]]
+    for limits, way in zip((axes.get_xlim(), axes.get_ylim()), np.ptp(tips, axis=0), strict=True):
+        assert np.ptp(limits) < max(way, 0.15 * np.ptp(tips, axis=0).max()) + 25.0
 
 
 @pytest.mark.parametrize(
@@ -120,6 +166,8 @@ def test_three_dimensions_sections_and_statuses() -> None:
         ({"quantity": "tip_position"}, "tip_position has the dimensions"),
         ({"section": ("w", 0.0, 0.1)}, "no axis is called 'w'"),
         ({"section": 3.0}, "section: 3.0 given"),
+        ({"statistic": "mean"}, "no statistic is called 'mean'"),
+        ({"bins": 1}, "bins"),
         ({"section": ("y", 5.0, 0.1)}, "section: has no tip to show"),
         ({"quantity": "along"}, "makes 9 panels|"),
     ],

@@ -1,0 +1,148 @@
+"""Panels of workspace maps: which tips, values and statuses each one shows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cdsm.errors import InvalidInput
+from cdsm.plots.style import AXES, MM
+from cdsm.support.validation import one_of, scalar
+from cdsm.support.values import Array
+
+if TYPE_CHECKING:
+    import xarray
+
+_MOST_PANELS = 9
+
+_FLAT = 1e-9
+"""The tips are in a plane if their extent along an axis is below this fraction of the largest."""
+
+_SLICE = 0.04
+"""Half thickness of the slices of a cloud of tips, over its extent."""
+
+_THIN = 0.15
+"""Least ratio of the sides of a map."""
+
+_ROOM = 0.05
+"""Margin around the tips, over their largest extent."""
+
+
+class Slice(NamedTuple):
+    """A slab of tips, and the two axes in which it is seen."""
+
+    title: str
+    normal: int
+    place: float
+    half: float
+    plane: tuple[int, int]
+
+    def holds(self, points: Array) -> NDArray[np.bool_]:
+        return np.asarray(abs(points[:, self.normal] - self.place) <= self.half)
+
+
+class Map(NamedTuple):
+    """Tips (N, 2) [mm] of one panel, their values (NaN if missing), their status, and the axes."""
+
+    title: str
+    points: Array
+    values: Array
+    status: NDArray[np.int8]
+    plane: tuple[int, int]
+
+    @property
+    def limits(self) -> Array:
+        """Limits (2, 2) [mm] of the panel."""
+        if not len(self.points):
+            return np.array([[-1.0, 1.0], [-1.0, 1.0]])
+        low, high = self.points.min(axis=0), self.points.max(axis=0)
+        room = _ROOM * max(float((high - low).max()), 1.0)
+        wide = np.maximum(high - low, _THIN * (high - low).max())  # a line of tips needs some room
+        middle = (low + high) / 2.0
+        return np.array([middle - wide / 2.0 - room, middle + wide / 2.0 + room]).T
+
+
+class Case(NamedTuple):
+    """One map: values of all tips (NaN if missing) and their status."""
+
+    title: str
+    values: Array
+    status: NDArray[np.int8]
+
+
+def cases_of(
+    dataset: xarray.Dataset, quantity: str, poses: list[str], words: Mapping[int, str]
+) -> Iterator[Case]:
+    """Build a panel for each combination of the dimensions that do not belong to the postures."""
+    status = dataset["status"]
+    allowed = {*map(str, status.dims), "direction"}
+    dims = [str(dim) for dim in dataset[quantity].dims]
+    if not set(dims) <= allowed or set(poses) - set(dims):
+        raise InvalidInput(
+            "quantity",
+            f"{quantity} has the dimensions {', '.join(dims)}; a map shows one number per entry, "
+            "such as softest, stiffest, anisotropy, margin or along.",
+        )
+    cases = [dim for dim in dims if dim not in poses]
+    sizes = [dataset.sizes[dim] for dim in cases]
+    if (count := int(np.prod(sizes))) > _MOST_PANELS:
+        listed = ", ".join(f"{dim} ({dataset.sizes[dim]})" for dim in cases)
+        raise InvalidInput(
+            "dataset",
+            f"makes {count} panels, of {listed}; choose up to {_MOST_PANELS}, as in "
+            f"dataset.isel({cases[0]}=[0]).",
+        )
+    # a dimension that the quantity does not have cannot change its status: take index 0
+    status = status.isel({dim: 0 for dim in status.dims if dim not in dims}, drop=True)
+    codes = status.broadcast_like(dataset[quantity])
+    hidden = [] if quantity == "margin" else [v for v, word in words.items() if word == "unstable"]
+    for place in np.ndindex(*sizes):
+        at = dict(zip(cases, place, strict=True))
+        title = ", ".join(_title(dataset, dim, i) for dim, i in at.items())
+        values, code = (
+            each.isel(at).transpose(*poses).values.ravel() for each in (dataset[quantity], codes)
+        )
+        yield Case(title, np.where(np.isin(code, hidden), np.nan, values), code)
+
+
+def _title(dataset: xarray.Dataset, dim: str, place: int) -> str:
+    value = dataset[dim].values[place]
+    if isinstance(value, str):
+        return f"{dim} {value}"
+    units = dataset[dim].attrs.get("units", "1")
+    return f"{dim} {value:g}" + (f" {units}" if units != "1" else "")
+
+
+def slices_of(points: Array, section: tuple[str, float, float] | None) -> tuple[list[Slice], bool]:
+    """Find the slabs to show, and whether they are slices of a cloud."""
+    if section is not None:
+        return [_slab(section)], False
+    if not len(points):
+        return [Slice("", 0, 0.0, np.inf, _others(0))], False
+    extent = np.ptp(np.vstack([points, np.zeros(3)]), axis=0)  # the base is at the origin
+    normal = int(extent.argmin())
+    if extent[normal] <= _FLAT * extent.max():
+        return [Slice("", normal, 0.0, np.inf, _others(normal))], False
+    middle = np.median(points, axis=0)
+    half = _SLICE * np.ptp(points, axis=0)
+    slices = [_slab((AXES[axis], middle[axis] / MM, half[axis] / MM)) for axis in (1, 2, 0)]
+    return slices, True
+
+
+def _slab(section: tuple[str, float, float]) -> Slice:
+    if not isinstance(section, (tuple, list)) or len(section) != 3:
+        raise InvalidInput(
+            "section", f"{section!r} given; an axis, its place and the half thickness [m] needed."
+        )
+    axis = AXES.index(one_of("axis", section[0], AXES))
+    place, half = MM * scalar("section", section[1]), MM * scalar("section", section[2])
+    title = f"{section[0]} = {place:.3g} ± {half:.2g} mm".replace(" ", "\xa0")  # no line break
+    return Slice(title, axis, place, half, _others(axis))
+
+
+def _others(normal: int) -> tuple[int, int]:
+    first, second = (axis for axis in range(3) if axis != normal)
+    return first, second
