@@ -250,7 +250,7 @@ class PathPlan(ReadOnlyState):
             *("tip x [m]", "tip y [m]", "tip z [m]"),
             *(f"stiffness{number} [N/m]" for number in numbered),
         ]
-        achieved = self.achieved.reshape(len(self.planned), -1)
+        achieved = self.achieved.reshape(len(self.planned), targets.shape[1])
         blocks = self.angles, self.tensions, self.cable_lengths, self.unstrained_lengths
         numbers = np.hstack([*blocks, self.tips, achieved]).tolist()
         rows: list[list[Any]] = [

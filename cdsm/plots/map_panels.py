@@ -41,6 +41,7 @@ class Slice(NamedTuple):
     plane: tuple[int, int]
 
     def holds(self, points: Array) -> NDArray[np.bool_]:
+        """Check which points (N, 3) [mm] are in the slab."""
         return np.asarray(abs(points[:, self.normal] - self.place) <= self.half)
 
 

@@ -84,14 +84,13 @@ def test_foreign_robot_shows_its_joints_and_what_guides_its_cables() -> None:
 def test_ellipsoid_shows_where_forces_move_the_tip() -> None:
     pose = random_posture(mixed_arm(), 3)
     K = cdsm.stiffness(pose, cdsm.distribute_tension(pose, 10.0))
-    axes = plots.plot_arm(pose, stiffness=K).axes[0]
+    figure = plots.plot_arm(pose, stiffness=K)
+    axes = figure.axes[0]
     wires = axes.collections[0]
     assert isinstance(wires, Line3DCollection)
     points = np.concatenate(wires._segments3d) / 1e3 - pose.tip[:3, 3]
     C = K.compliance[:3, :3]
-    legend = axes.get_legend()
-    assert legend is not None
-    [told] = [text.get_text() for text in legend.get_texts()]
+    [told] = [text.get_text() for text in figure.legends[0].get_texts()]
     found = re.fullmatch(r"where 1 N moves the tip, scale (\d+):(\d+); longest: (\S+) mm", told)
     assert found is not None, told
     scale = float(found[1]) / float(found[2])
