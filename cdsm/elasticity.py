@@ -85,8 +85,8 @@ class Domain:
         if np.count_nonzero(outside):
             raise ElasticityRangeError(
                 f"outside the domain {self} of the elasticity. Keep the tension inside it "
-                "(minimum=, maximum=), or use an elasticity that covers it; slack_below() continues "
-                "one to 0 N.",
+                "(minimum=, maximum=), or use an elasticity that covers it; slack_below() continues"
+                " one to 0 N.",
                 np.atleast_1d(values)[np.atleast_1d(outside)].tolist(),
                 np.flatnonzero(outside).tolist(),
             )
