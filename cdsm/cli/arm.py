@@ -105,7 +105,8 @@ def export(
         typer.Option(help="Of the MuJoCo model: length (locked motors), tension, or none."),
     ] = "length",
     damping_ratio: Annotated[
-        float | None, typer.Option(help="Of its lowest mode, by its cables; 0.05 if left out.")
+        float | None,
+        typer.Option(help="Of its least damped mode, by its cables; 0.05 if left out."),
     ] = None,
     damping: Annotated[
         float | None, typer.Option(help="Of each of its joints instead [N m s/rad].")

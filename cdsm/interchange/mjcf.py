@@ -92,10 +92,10 @@ def to_mjcf(
     without mass in the URDF get 1e-6 kg and 1e-9 kg m², so an arm of massless links needs steps of
     microseconds.
 
-    Damping: the cables damp with c = β k [N s/m], β = 2 ζ/ω. ω is the lowest frequency, and ζ its
-    ``damping_ratio``. So a mode of frequency ω_r has the ratio ζ ω_r/ω, and all of them settle as
-    fast as the lowest or faster. What cables do not resist is damped less; the comment in the file
-    says from which ratio to which.
+    Damping: the cables damp with c = β k [N s/m]. A mode has the ratio ζ = β (J_L φ)ᵀ k (J_L φ)/2ω,
+    about β ω/2. β gives the least damped mode the ``damping_ratio``, mostly the lowest one; all
+    others settle as fast or faster. Modes with less than half of their ω² from the cables do not
+    count and are damped less. The comment in the file says from which ratio to which.
 
     A comment at the top states time step, damping and actuators. If K_θ is not positive definite,
     the model leaves the posture by itself. Then the comment says UNSTABLE, a warning is issued, and
@@ -107,7 +107,7 @@ def to_mjcf(
         tension: F at this posture: a result of :func:`~cdsm.distribute_tension`, or (C,) [N].
         actuators: ``length``, ``tension`` or ``none``. Default: ``length``; without tensions
             ``none``.
-        damping_ratio: ζ of the lowest mode [-]; 0.05 by default. It needs tensions.
+        damping_ratio: ζ of the least damped mode [-]; 0.05 by default. It needs tensions.
         damping: Damping of every joint instead [N m s/rad], [N s/m] where it slides. MuJoCo
             integrates damping implicitly, so none needs a smaller time step.
 
@@ -177,9 +177,7 @@ def mujoco_model(
         raise InvalidInput(name, "follows from the stiffness; give pose and tension too.")
     if damping is not None and damping_ratio is not None:
         raise InvalidInput("damping", "give it or damping_ratio, not both.")
-    for name, value in (("damping_ratio", damping_ratio), ("damping", damping)):
-        if value is not None and scalar(name, value) < 0.0:
-            raise InvalidInput(name, f"{value:g} given; it cannot be negative.")
+    ratio, damping = _checked("damping_ratio", damping_ratio), _checked("damping", damping)
 
     root = etree.Element("mujoco", model=arm.name)
     compiler = etree.SubElement(root, "compiler", angle="radian", autolimits="true")
@@ -188,7 +186,7 @@ def mujoco_model(
     option = etree.SubElement(root, "option", gravity=row(arm.gravity), integrator="implicitfast")
     start = {} if pose is None else dict(zip(arm.joint_names, pose.q.tolist(), strict=True))
     masses = add_bodies(root, arm, start)
-    motion = choose_motion(arm, K, masses, damping_ratio, damping)
+    motion = choose_motion(arm, K, masses, ratio, damping)
     option.set("timestep", repr(motion.time_step))
     joints = list(root.iter("joint"))  # in MuJoCo's order, depth first
     if motion.joints:
@@ -214,6 +212,15 @@ def mujoco_model(
     etree.indent(root, space="  ")
     text: str = etree.tostring(root, encoding="unicode") + "\n"
     return MuJoCoModel(text, motion, actuators, unstable, remarks)
+
+
+def _checked(name: str, value: float | None) -> float | None:
+    """Return a damping as a float; it must not be negative."""
+    if value is None:
+        return None
+    if (number := scalar(name, value)) < 0.0:
+        raise InvalidInput(name, f"{number:g} given; it cannot be negative.")
+    return number
 
 
 def _without_motors(K: Stiffness) -> Stiffness:

@@ -14,7 +14,10 @@ from cdsm.support.format import JointUnits
 from cdsm.support.values import Array
 
 DAMPING_RATIO = 0.05
-"""Default damping of the lowest mode, as a part of critical damping."""
+"""Default damping of the least damped mode, as a part of critical damping."""
+
+_SHARE = 0.5
+"""Least part of ω² from the wires, for a mode that they are to damp."""
 
 _DEFAULT_STEP = 2e-3  # MuJoCo's own time step [s]
 
@@ -41,8 +44,8 @@ def choose_motion(
 ) -> Motion:
     """Choose the time step for the fastest motion, and the damping.
 
-    Without a ``damping`` of the joints, the wires damp: c = β k, β = 2 ζ/ω with ω of the lowest
-    mode. Joint dampers as strong would hold the arm's slow motions back tenfold.
+    Without a ``damping`` of the joints, the wires damp: c = β k. β gives the least damped mode its
+    ``ratio``. Joint dampers as strong would hold the slow motions of a long arm back tenfold.
     """
     wires, joints = np.zeros(len(arm.cables)), damping or 0.0
     step, reason = _DEFAULT_STEP, "MuJoCo's own"
@@ -53,14 +56,16 @@ def choose_motion(
         fastest = math.sqrt(abs(squares).max())
         step, reason = _time_step(fastest), f"for frequencies up to {fastest / math.tau:.4g} Hz"
         swings = squares > 0.0
-        if damping is None and swings.any():
-            omega = np.sqrt(squares[swings])
-            wires = 2.0 * (DAMPING_RATIO if ratio is None else ratio) / omega[0] * K.cable_stiffness
-            stretch = K.posture.length_jacobian @ shapes[:, swings]
-            ratios = wires @ stretch**2 / (2.0 * omega)
+        omega = np.sqrt(squares[swings])
+        stretch = K.posture.length_jacobian @ shapes[:, swings]
+        ratios = K.cable_stiffness @ stretch**2 / (2.0 * omega)  # for β = 1 s
+        resisted = 2.0 * ratios >= _SHARE * omega
+        if damping is None and resisted.any():
+            beta = (DAMPING_RATIO if ratio is None else ratio) / ratios[resisted].min()
+            wires = beta * K.cable_stiffness
             damped = (
-                f"ratio {ratios.min():.2g} to {ratios.max():.2g} of the modes, by the cables: "
-                f"{wires.min():.4g} to {wires.max():.4g} N s/m"
+                f"ratio {beta * ratios.min():.2g} to {beta * ratios.max():.2g} of the modes, by "
+                f"the cables: {wires.min():.4g} to {wires.max():.4g} N s/m"
             )
     said = f"time step  {1e3 * step:g} ms, {reason}", f"damping    {damped}"
     return Motion(step, wires, joints, said)
