@@ -302,6 +302,21 @@ def test_file_states_what_was_chosen() -> None:
             assert each in comments
 
 
+def test_file_says_what_is_missing_for_balance() -> None:
+    pose, pull = finger()
+    assert "balance " not in cdsm.to_mjcf(pose.arm, pose, pull)
+    loaded = cdsm.distribute_tension(pose, 5.0, wrench=(0, 0, -1.5, 0, 0, 0))
+    text = cdsm.to_mjcf(pose.arm, pose, loaded)
+    assert (
+        "load       (0, 0, -1.5) N, (0, 0, 0) N m is not in the model: apply it to finger" in text
+    )
+    assert "balance " not in text
+    wrong = pull.values + 3.0 * np.eye(6)[0]
+    left = 3.0 * abs(pose.length_jacobian[0, 0])
+    text = cdsm.to_mjcf(pose.arm, pose, wrong)
+    assert f"balance    {left:.4g} N m are missing, most at proximal_joint" in text
+
+
 def test_bad_choices_are_named() -> None:
     pose, pull = finger()
     for options, said in (
