@@ -44,6 +44,7 @@ if TYPE_CHECKING:
         UnreachableStiffness,
         UrdfError,
     )
+    from cdsm.friction.band import RestBand, rest_band
     from cdsm.friction.breakaway import Breakaway, breakaway
     from cdsm.friction.stuck import sliding_stiffness, stuck_stiffness
     from cdsm.geometry import CableRoute, Geometry, Joint, Link
@@ -138,6 +139,7 @@ __all__ = [
     "RandomPoses",
     "Remedy",
     "Report",
+    "RestBand",
     "Saturation",
     "SelfCheck",
     "Shares",
@@ -189,6 +191,7 @@ __all__ = [
     "read_elasticity",
     "read_sweep",
     "read_tensile_csv",
+    "rest_band",
     "saturation",
     "serpentine_cables",
     "sliding_stiffness",
@@ -222,6 +225,7 @@ _NAMES = {
         "MissingWire SingularMass SingularStiffness SolverError StoreError TensileTestError "
         "UnknownName UnreachableStiffness UrdfError"
     ),
+    "friction.band": "RestBand rest_band",
     "friction.breakaway": "Breakaway breakaway",
     "friction.stuck": "sliding_stiffness stuck_stiffness",
     "geometry": "CableRoute Geometry Joint Link",

@@ -230,6 +230,7 @@ RESULTS: dict[str, Any] = {
     "Tension": PULL,
     "Stiffness": K,
     "Shares": SHARES,
+    "RestBand": cdsm.rest_band(POSE, PULL, "z"),
     "Breakaway": cdsm.breakaway(POSE, PULL, "z"),
     "JointSolution": cdsm.solve_joint_angles(POSE.arm, POSE.cable_lengths),
     "KinematicSolution": cdsm.inverse_kinematics(POSE.arm, POSE.tip),

@@ -21,14 +21,13 @@ from cdsm.cli.options import (
     MaxTension,
     MinTension,
     Solver,
-    WeightOptions,
+    numbers,
 )
 from cdsm.cli.output import Json, answer
 
 
 def view(
     arm: ArmOptions,
-    weight: WeightOptions,
     angles: Annotated[str | None, ANGLES] = None,
     path: Annotated[
         Path | None,
@@ -40,6 +39,9 @@ def view(
     ] = None,
     min_tension: MinTension = 10.0,
     max_tension: MaxTension = math.inf,
+    force: Annotated[
+        str, typer.Option(help="At the tip, to begin with: FX,FY,FZ [N].", metavar="FX,FY,FZ")
+    ] = "0,0,0",
     sag: Annotated[
         bool, typer.Option("--sag", help="To begin with, let the force move the arm.")
     ] = False,
@@ -77,7 +79,7 @@ def view(
             q=None if pose is None else pose.q,
             minimum=min_tension,
             maximum=max_tension,
-            force=weight.vector(robot),
+            force=numbers("--force", force, 3),
             sag=sag,
             angles=motion.angles,
             tips=motion.tips,

@@ -1,0 +1,142 @@
+"""Bands that hold whatever the history: where an arm with friction may rest, and its tensions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cdsm.errors import SolverError
+from cdsm.friction.rest_states import Neighbourhood, RestStates
+from cdsm.friction.tangent import holding
+from cdsm.posture import Posture
+from cdsm.stiffness_matrix import Stiffness, stiffness
+from cdsm.support.format import coordinates
+from cdsm.support.validation import Direction, unit_direction
+from cdsm.support.values import Array, ReadOnlyState, frozen
+from cdsm.tension import Tension
+
+_ROOM = 1.25
+"""The neighbourhood over the first-order band, and its growth where it does not hold the band."""
+
+_WIDENINGS = 8
+"""Number of neighbourhoods before there is no band."""
+
+_INSIDE = 0.98
+"""A band that needs more than this part of its neighbourhood is computed again in a larger one."""
+
+
+@final
+@dataclass(frozen=True, eq=False, kw_only=True)
+class RestBand(ReadOnlyState):
+    """Where the tip of an arm with locked motors may rest, whatever loads came and went before.
+
+    ``low``, ``high``, ``tensions``, ``end_tensions`` and ``loads`` are proved for all states of
+    rest in a neighbourhood of the reference: ``room`` times the set of all states that are at rest
+    to first order. A simulation may come near to them, but not beyond.
+
+    Attributes:
+        stiffness: Frictionless K of the reference, with its posture, tensions and wrench.
+        direction: Unit direction u (3,) of the displacement, base axes.
+        low: Least displacement of the tip from the reference along u [m], not positive.
+        high: Largest displacement of the tip from the reference along u [m], not negative.
+        first_order: Largest displacement either way to first order [m], in closed form.
+        room: Size of the neighbourhood over that of all states at rest to first order [-]; 0 if
+            no hole holds at the reference: it is then the one state at rest.
+    """
+
+    stiffness: Stiffness
+    direction: Array
+    low: float
+    high: float
+    first_order: float
+    room: float
+
+    def __str__(self) -> str:
+        return (
+            f"at rest from {1e3 * self.low:.4g} to {1e3 * self.high:.4g} mm along "
+            f"{coordinates(self.direction)}, whatever came before"
+        )
+
+    @cached_property
+    def tensions(self) -> Array:
+        """Least and largest tension (S, 2) [N] of each segment at rest; some milliseconds each."""
+        return self._tensions(range(len(self.stiffness.posture.segments.lengths)))
+
+    @cached_property
+    def end_tensions(self) -> Array:
+        """Least and largest tension (C, 2) [N] of each cable at rest where it ends."""
+        start = self.stiffness.posture.segments.chains.start
+        return self._tensions((start[1:] - 1).tolist())
+
+    @cached_property
+    def loads(self) -> Array:
+        """Least and largest force along u (2,) [N] under which the reference may stay at rest.
+
+        They come on top of the wrench of the reference. Each load between them has an admissible
+        state of tensions that balances it at the very angles of the reference.
+        """
+        if self.room == 0.0:
+            return frozen(np.zeros(2))
+        near = Neighbourhood(self.stiffness, self.room)
+        held = RestStates(self.stiffness, near.still(self.stiffness))
+        return frozen(np.array([-held.load(-self.direction), held.load(self.direction)]))
+
+    def _tensions(self, segments: Sequence[int]) -> Array:
+        K = self.stiffness
+        if self.room == 0.0:
+            cable = K.posture.segments.chains.cable
+            return frozen(np.repeat(K.tension[cable[list(segments)]][:, None], 2, axis=1))
+        return RestStates(K, Neighbourhood(K, self.room)).tensions(segments)
+
+
+def rest_band(
+    pose: Posture,
+    tension: Tension | ArrayLike,
+    direction: Direction,
+    wrench: ArrayLike | None = None,
+) -> RestBand:
+    """Compute where the tip may rest along a direction, whatever loads came and went before.
+
+    The reference is the posture with the given tension in all segments of each cable. The motors
+    are locked there, or hold their force. Loads beyond ``wrench`` have come and gone. The band is
+    proved by linear programs with an outer correction for finite displacements and nonlinear laws.
+
+    Args:
+        pose: The posture of the reference.
+        tension: As for :func:`~cdsm.stiffness`. Torque out of balance is held there.
+        direction: u (3,) in base axes, any length, or an axis such as ``"-z"``.
+        wrench: W (6,), which still acts, as for :func:`~cdsm.stiffness`.
+
+    Raises:
+        InvalidInput: As for :func:`~cdsm.stiffness`, or ``direction`` is no direction.
+        ElasticityRangeError: A tension of the band is outside the domain of an elasticity.
+        SingularStiffness: K_θ is singular.
+        SolverError: The band is wider than the arm, as where it is unstable.
+    """
+    K = stiffness(pose, tension, wrench)
+    u = unit_direction("direction", direction)
+    if not holding(pose).any():  # one state of rest
+        return RestBand(stiffness=K, direction=u, low=0.0, high=0.0, first_order=0.0, room=0.0)
+    room = _ROOM
+    for _ in range(_WIDENINGS):
+        near = Neighbourhood(K, room)
+        states = RestStates(K, near)
+        ends = [states.displacement(sign * u) for sign in (-1.0, 1.0)]
+        if max(end.reach for end in ends) <= _INSIDE:
+            break
+        room *= _ROOM
+    else:
+        raise SolverError("highs", "finds no end of the band: friction holds an unstable arm")
+    return RestBand(
+        stiffness=K,
+        direction=u,
+        low=-ends[0].bound,
+        high=ends[1].bound,
+        first_order=float(near.largest(u @ pose.jacobian[:3])) / room,
+        room=room,
+    )

@@ -1,0 +1,91 @@
+"""Bounds of what a linear model of an arm leaves out in a neighbourhood of a posture.
+
+Sites turn with levers of at most r about the joints of their segment, across it by at most p, and
+a segment is nowhere shorter than m. Along a way that turns by σ in all, its length then has
+|l′′′| ≤ (3 r p²/m² + 3 r p/m + r) σ³. Its direction turns by p σ/m, with a second derivative of at
+most (2 p r/m² + p²/m² + r/m) σ².
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cdsm.errors import SolverError
+from cdsm.stiffness_matrix import Stiffness
+from cdsm.support.values import Array
+
+_ITERATIONS = 30
+"""Steps of a fixed point that converges by a factor of ten or more."""
+
+
+class Remainders:
+    """Bounds of what the linear parts leave out in the neighbourhood |δ| ≤ ρ.
+
+    Joints that slide count as turns of ρ/r on the lever r, which moves points as far.
+
+    Attributes:
+        length: of each segment, from its second-order expansion (S,) [m].
+        gradient: of each ∂l/∂θ (S, nv) [m/rad].
+        turn: of each wrap angle, from a constant (P,) [rad].
+        wrap: of each wrap angle, from its tangent (P,) [rad]; inf where it may vanish.
+        tip: of the displacement of the tip, from its second-order expansion [m].
+        body: of the torques of weight and wrench (nv,) [N m].
+    """
+
+    def __init__(self, K: Stiffness, within: Array) -> None:
+        pose = K.posture
+        segments, slides = pose.segments, pose.arm.slides
+        count, nv = segments.lengths.size, within.size
+        self.length, self.gradient = np.zeros(count), np.zeros((count, nv))
+        tilt, bend = np.zeros(count), np.zeros(count)  # of the direction of each segment
+        routing, (origin, axis, slide, site) = segments._routing, segments._frames
+        table, joint = routing.segment, routing.joint
+        for row in range(len(table) - 1):
+            s, a, b = table[row, :3]
+            rows = joint[table[row, 3] : table[row + 1, 3]]
+            ends = site[[a, b], None, :] - origin[rows]
+            lever = float(np.linalg.norm(ends, axis=2).max())
+            per = np.where(slides[rows - 1], 1.0 / lever, 1.0)
+            turn = float(per @ within[rows - 1])
+            r = lever * math.exp(turn)
+            m = segments.lengths[s] - r * turn
+            if m <= 0.0:  # sites may meet
+                raise SolverError("highs", "finds no band: friction may hold the arm too far away")
+            moved = np.cross(axis[rows], ends)  # of either end: a hole sees the far one turn
+            if slide.size:
+                moved = moved + slide[rows]
+            u = (site[b] - site[a]) / segments.lengths[s]
+            across = np.linalg.norm(moved - (moved @ u)[..., None] * u, axis=2) / per
+            p = p_0 = float(across.max())
+            for _ in range(_ITERATIONS):  # p grows with the turn at most at this rate
+                p = min(p_0 + turn * (p * r / m + p**2 / m + r), r)
+            tilt[s] = p * turn / m
+            bend[s] = (2.0 * p * r / m**2 + (p / m) ** 2 + r / m) * turn**2
+            third = 3.0 * r * (p / m) ** 2 + 3.0 * r * p / m + r
+            self.length[s] = third * turn**3 / 6.0
+            self.gradient[s, rows - 1] = third * per * turn**2 / 2.0
+        first, second = segments.chains.hole, segments.chains.hole + 1
+        self.turn = tilt[first] + tilt[second]
+        angle = segments.wrap - segments.chains.wrap
+        sine = np.sin(angle) - self.turn  # sin is 1-Lipschitz
+        rate = bend[first] + bend[second] + 2.0 * tilt[first] * tilt[second] + self.turn**2
+        self.wrap = np.divide(rate, 2.0 * sine, out=np.full(angle.size, math.inf), where=sine > 0.0)
+        self.tip, self.body = _body_remainders(K, within, slides)
+
+
+def _body_remainders(K: Stiffness, within: Array, slides: NDArray[np.bool_]) -> tuple[float, Array]:
+    """Bound what the linear parts leave out of the tip's way [m] and of body torques (nv,)."""
+    model, pose = K.posture.arm._model, K.posture
+    masses, tree = model.masses, model.tree
+    reach = float(np.linalg.norm(tree.translation, axis=1).sum()) + float(abs(pose.q) @ slides)
+    reach += float(np.linalg.norm(np.vstack([masses.centre, masses.point]), axis=1).max())
+    per = np.where(slides, 1.0 / reach, 1.0)
+    turn = float(per @ within)
+    reach *= math.exp(turn)
+    weight = float(masses.mass.sum() * np.linalg.norm(masses.gravity))
+    force, moment = np.linalg.norm(K.wrench[:3]), np.linalg.norm(K.wrench[3:])
+    torque = ((weight + float(force)) * reach + float(moment)) * turn**2 / 2.0
+    return reach * turn**3 / 6.0, torque * per

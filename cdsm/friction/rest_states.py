@@ -1,0 +1,313 @@
+"""All states of rest of an arm with friction near a reference, as a polyhedron that holds them.
+
+A state of rest near a reference has joint angles θ_0 + δ and segment tensions T with
+
+    Σ_j T_j g_j(θ) + g(θ) − J_X(θ)ᵀ W = the same at the reference    (equilibrium)
+    Σ_j l_j(θ)/(1 + ε(T_j)) = the same at the reference               (wire of a locked motor)
+    exp(−μ φ_i(θ)) ≤ T_{j+1}/T_j ≤ exp(μ φ_i(θ))                      (friction at each hole)
+
+To first order in δ and ΔT this is a polyhedron, and the largest and smallest displacement of the
+tip in it are two linear programs. All that is left out, nonlinear laws included, is bounded in a
+neighbourhood |δ_i| ≤ ρ_i, |ΔT_j| ≤ ρ_T and added to the right-hand sides. The polyhedron then
+contains all states of rest in the neighbourhood (outer correction):
+
+- Sites turn with levers of at most r about the joints of their segment, across it by at most p,
+  and a segment is nowhere shorter than m. Then |l′′′| ≤ c = 3 r p²/m² + 3 r p/m + r per turn. With
+  σ = Σ ρ_i over its joints, l departs from its second-order expansion by at most c σ³/6, and
+  ∂l/∂θ_i from its tangent by c σ²/2.
+- The wrap angles are tangent to their gradients, or constant, up to likewise bounds.
+- Over a range |ΔT| ≤ ρ_T of tensions, 1/(1 + ε) falls, and lies between two parallel lines.
+- Products of δ and ΔT are at most those of ρ and ρ_T.
+
+The answer of a linear program is not trusted: its multipliers give a bound by weak duality.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from copy import copy
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+
+from cdsm.cable import Cable
+from cdsm.errors import ElasticityRangeError, SolverError
+from cdsm.friction.remainders import Remainders
+from cdsm.kernels.chains import single_tension_stiffness
+from cdsm.kernels.stiffness import single_load_stiffness
+from cdsm.stiffness_matrix import Stiffness
+from cdsm.support.values import Array, frozen
+
+_NEAR = 1e-9
+"""Least neighbourhood [rad], [m] or [N]: that of an arm without friction is rounding."""
+
+_CELLS = 2048
+"""Intervals of tension in each of which a strain is only known to rise."""
+
+
+class Neighbourhood:
+    """States near a reference: ``room`` times those that are at rest to first order.
+
+    With the relative changes y_j = ΔT_j/F − ȳ of a cable about their mean over its wire, the wire
+    gives F ȳ = k Σ_j g_j·δ, with k the stiffness of the whole cable. Equilibrium becomes
+    K_θ δ = −Σ_j F y_j g_j with the frictionless K_θ. Each step of y at a hole is free within ±μ φ,
+    so any sum over y is largest where each step has its sign: a closed form.
+
+    Attributes:
+        joints: Largest |δ| (nv,) [rad].
+        tensions: Largest |ΔT| (S,) [N].
+    """
+
+    def __init__(self, K: Stiffness, room: float) -> None:
+        segments = K.posture.segments
+        chains, laws = segments.chains, K.posture.arm._model.segment_laws
+        cable, start, F = chains.cable, chains.start, K.tension
+        with np.errstate(divide="ignore"):
+            soft = 1.0 / laws.stiffness(segments.lengths, F[cable])
+        steps = np.zeros((cable.size, chains.hole.size))
+        for i, hole in enumerate(chains.hole):
+            of = slice(start[cable[hole]], start[cable[hole] + 1])
+            after = np.arange(of.start, of.stop) > hole
+            forced = not np.isfinite(soft[of.start])  # the motor holds the tension at the start
+            mean = 0.0 if forced else soft[of][after].sum() / soft[of].sum()
+            steps[of, i] = (after - mean) * F[cable[hole]]
+        joints = -np.linalg.solve(K.joint, segments.length_jacobian.T @ steps)
+        common = K.cable_stiffness[:, None] * (K.posture.length_jacobian @ joints)
+        grip = room * chains.friction * segments.wrap
+        self._steps = joints * grip
+        self.joints = np.maximum(self.largest(np.eye(len(joints))), _NEAR)
+        self.tensions = np.maximum(abs((steps + common[cable]) * grip).sum(axis=1), _NEAR)
+
+    def still(self, K: Stiffness) -> Self:
+        """Return the states with the very angles of the reference: |ln T/F| is at most Σ μ φ."""
+        segments = K.posture.segments
+        chains, grip = segments.chains, np.zeros(len(segments.lengths))
+        grip[chains.hole] = chains.friction * segments.wrap
+        most = np.expm1(np.add.reduceat(grip, chains.start[:-1])) * K.tension
+        same = copy(self)
+        same.joints, same._steps = np.zeros_like(self.joints), np.zeros_like(self._steps)
+        same.tensions = np.maximum(most[chains.cable], _NEAR)
+        return same
+
+    def largest(self, rows: Array) -> Array:
+        """Compute the largest |a·δ| of rows a (…, nv)."""
+        return np.asarray(abs(rows @ self._steps).sum(axis=-1))
+
+
+class End(NamedTuple):
+    """Largest value over the polyhedron: as solved, as proved, and how near to its ρ it is."""
+
+    value: float
+    bound: float
+    reach: float
+
+
+class RestStates:
+    """The polyhedron of states of rest with |δ| ≤ ρ and |ΔT| ≤ ρ_T; ``near`` holds both.
+
+    The variables are δ/ρ, ΔT/ρ_T, and one slack per equation, whose bounds are the outer
+    correction.
+    """
+
+    def __init__(self, K: Stiffness, near: Neighbourhood) -> None:
+        from scipy.sparse import csc_array
+
+        pose, cables = K.posture, K.posture.arm.cables
+        within, apart, nv = near.joints, near.tensions, near.joints.size
+        segments = pose.segments
+        chains, g, length = segments.chains, segments.length_jacobian, segments.lengths
+        cable, start = chains.cable, chains.start
+        F, far = K.tension[cable], Remainders(K, within)
+        routing, frames, count = segments._routing, segments._frames, np.arange(length.size)
+        H = single_tension_stiffness(
+            routing.segment, routing.joint, *frames, np.ones(length.size), count, length.size
+        )
+        turned, straight = near.largest(H), near.largest(g)
+        low = np.maximum(-F / apart, -1.0)  # no tension is negative
+        high = np.ones(length.size)
+        for c, each in enumerate(cables):
+            if each.control == "force":
+                low[start[c]] = high[start[c]] = 0.0
+
+        # Σ ΔT g + (Σ F H + ∂g/∂θ − ∂(J_Xᵀ W)/∂θ) δ + slack = 0
+        balance = np.hstack([(K.active + K.gravity + K.load) * within, (g * apart[:, None]).T])
+        off = apart @ turned + (F + apart) @ far.gradient + far.body
+        self._torque = abs(balance).max(axis=1)
+        self._torque = np.where(self._torque > 0.0, self._torque, 1.0)
+        rows, slack = [balance / self._torque[:, None]], [np.c_[-off, off] / self._torque[:, None]]
+        # b(F) Σ g δ + Σ l b′ ΔT + slack = 0 for each locked motor
+        unstrained = pose.arm.original_length == "unstrained"
+        for c, each in enumerate(cables):
+            if each.control == "position":
+                of = slice(start[c], start[c + 1])
+                wire = _Wire.of(each, float(K.tension[c]), float(apart[of].max()), unstrained)
+                spring = 1.0 / each.series_stiffness
+                row = np.zeros((1, nv + length.size))
+                row[0, :nv] = wire.share * g[of].sum(axis=0) * within
+                row[0, nv + start[c] : nv + start[c + 1]] = length[of] * wire.slope * apart[of]
+                row[0, nv + start[c]] -= spring * wire.share * apart[start[c]]
+                # l departs from its tangent by δᵀHδ/2 and a third-order part
+                longer = within @ near.largest(H[of].sum(axis=0)) / 2.0 + far.length[of].sum()
+                whole, lost = float(length[of].sum()), wire.share * float(longer)
+                each_longer = straight[of] + turned[of] @ within / 2.0 + far.length[of]
+                lost += float(each_longer.sum()) * wire.change
+                lost += spring * (wire.most - each.elasticity.domain.low) * wire.change
+                # a slack cable has more wire than its segments are long
+                spare = whole * wire.change + lost if wire.least == 0.0 else 0.0
+                ends = whole * wire.below - lost, whole * wire.above + lost + spare
+                scale = abs(row).max()
+                rows.append(row / scale)
+                slack.append(np.array([ends]) / scale)
+        equations, width = np.vstack(rows), np.vstack(slack)
+        self._equations = csc_array(np.hstack([equations, np.eye(len(equations))]))
+        self._low = np.concatenate([-np.ones(nv), low, width[:, 0]])
+        self._high = np.concatenate([np.ones(nv), high, width[:, 1]])
+        self._cone, self._cone_high = _cone(K, near, far, self._low.size)
+        self._pose, self._near, self._tip, self._tension = pose, near, far.tip, F
+
+    def displacement(self, u: Array) -> End:
+        """Compute the largest displacement of the tip along a unit direction (3,) [m]."""
+        cost, near = np.zeros(self._low.size), self._near
+        cost[: near.joints.size] = (u @ self._pose.jacobian[:3]) * near.joints
+        found = self._largest(cost)
+        tip_joints = self._pose.arm._model.masses.tip_joints
+        curved = single_load_stiffness(self._pose.jacobian, np.append(u, np.zeros(3)), tip_joints)
+        return found._replace(
+            bound=found.bound + float(near.joints @ near.largest(curved)) / 2.0 + self._tip
+        )
+
+    def tensions(self, chosen: Iterable[int]) -> Array:
+        """Compute the least and the largest tensions (n, 2) [N] of some segments."""
+        bounds = []
+        for j in chosen:
+            cost = np.zeros(self._low.size)
+            cost[self._near.joints.size + j] = 1.0
+            ends = np.array([-self._largest(-cost).bound, self._largest(cost).bound])
+            bounds.append(self._tension[j] + self._near.tensions[j] * ends)
+        return frozen(np.maximum(np.array(bounds), 0.0))
+
+    def load(self, u: Array) -> float:
+        """Compute the largest force [N] along u (3,) that some tensions balance; use ρ = 0."""
+        from scipy.sparse import csc_array, hstack
+
+        nv = self._near.joints.size
+        torque = (u @ self._pose.jacobian[:3]) / self._torque
+        most = int(abs(torque).argmax())
+        if torque[most] == 0.0:
+            return math.inf
+        column = np.zeros(self._equations.shape[0])
+        column[:nv] = -torque
+        equations, cone = self._equations, self._cone
+        pull = abs(equations[[most], :]) @ np.maximum(-self._low, self._high)
+        bound = 1.01 * float(pull[0]) / abs(torque[most])
+        widened = object.__new__(RestStates)
+        widened.__dict__.update(
+            self.__dict__,
+            _equations=csc_array(hstack([equations, csc_array(column[:, None])])),
+            _cone=csc_array(hstack([cone, csc_array((cone.shape[0], 1))])),
+            _low=np.append(self._low, -bound),
+            _high=np.append(self._high, bound),
+        )
+        return widened._largest(np.append(np.zeros(self._low.size), 1.0)).bound
+
+    def _largest(self, cost: Array) -> End:
+        """Maximize cost · x; the bound is that of the multipliers, by weak duality."""
+        from scipy.optimize import linprog
+
+        scale = float(abs(cost).max())
+        if scale == 0.0:
+            return End(0.0, 0.0, 0.0)
+        found = linprog(
+            -cost / scale,
+            A_ub=self._cone,
+            b_ub=self._cone_high,
+            A_eq=self._equations,
+            b_eq=np.zeros(self._equations.shape[0]),
+            bounds=np.c_[self._low, self._high],
+            method="highs-ds",
+        )
+        if found.status != 0:
+            raise SolverError("highs", f"finds no state of rest: {found.message}")
+        dual, pull = -found.eqlin.marginals, np.maximum(-found.ineqlin.marginals, 0.0)
+        left = cost / scale - self._equations.T @ dual - self._cone.T @ pull
+        bound = pull @ self._cone_high + np.maximum(left * self._low, left * self._high).sum()
+        states = self._near.joints.size + self._near.tensions.size
+        reach = float(abs(found.x[:states]).max())
+        return End(-scale * found.fun, scale * float(bound), reach)
+
+
+def _cone(K: Stiffness, near: Neighbourhood, far: Remainders, size: int) -> tuple[Any, Array]:
+    """Return the friction cone, A x ≤ b, of variables x (size,): T_{j+1} ≤ e^{μφ} T_j, and back.
+
+    With ψ = μ (φ(θ) − φ_0), e^ψ ≤ 1 + ψ + ψ²/2 e^|ψ|. The linear part of ψ stands in A, where φ has
+    a tangent.
+    """
+    from scipy.sparse import csc_array
+
+    segments = K.posture.segments
+    chains, hole, nv = segments.chains, segments.chains.hole, near.joints.size
+    F, apart = K.tension[chains.cable], near.tensions
+    ratio, mu = np.exp(chains.friction * segments.wrap), chains.friction
+    smooth = np.isfinite(far.wrap)
+    slope = np.where(smooth[:, None], mu[:, None] * segments.wrap_jacobian, 0.0)
+    linear = near.largest(slope)
+    rest = mu * np.where(smooth, far.wrap, far.turn)
+    most = linear + rest
+    curved = rest + most**2 / 2.0 * np.exp(most)
+    blocks, bounds = [], []
+    for here, there in ((hole, hole + 1), (hole + 1, hole)):
+        rows = np.zeros((hole.size, size))
+        index, scale = np.arange(hole.size), np.maximum(F[here], apart[here])
+        rows[:, :nv] = -(ratio * F[here] / scale)[:, None] * slope * near.joints
+        rows[index, nv + there] = apart[there] / scale
+        rows[index, nv + here] = -ratio * apart[here] / scale
+        free = apart[here] * linear + (F[here] + apart[here]) * curved
+        blocks.append(rows)
+        bounds.append(((ratio - 1.0) * F[here] + ratio * free) / scale)
+    return csc_array(np.vstack(blocks)), np.concatenate(bounds)
+
+
+class _Wire(NamedTuple):
+    """b = 1/(1 + ε) of a cable over its range of tensions, between two parallel lines.
+
+    b_F + slope ΔT + below ≤ b ≤ b_F + slope ΔT + above, with b_F = ``share``; |b − b_F| ≤ change.
+    """
+
+    least: float
+    most: float
+    share: float
+    slope: float
+    below: float
+    above: float
+    change: float
+
+    @classmethod
+    def of(cls, cable: Cable, F: float, apart: float, unstrained: bool) -> _Wire:
+        """Bound b for tensions of a locked cable at most ``apart`` [N] from F [N]."""
+        law = cable.elasticity
+        strain = float(law.strain(F))
+        offset = 0.0 if unstrained else strain
+        least, most = max(F - apart, 0.0), F + apart
+        at = np.linspace(least, most, _CELLS + 1)
+        outside = [F for F in (least, most) if not law.domain.first <= F <= law.domain.high]
+        if outside:
+            raise ElasticityRangeError(
+                f"of a band; the elasticity is defined on {law.domain} only. Raise the tensions, "
+                "or use an elasticity that covers them",
+                outside,
+                cables=[cable.name],
+            )
+        b = 1.0 / (1.0 + law.strain(at) - offset)
+        share = 1.0 / (1.0 + strain - offset)
+        slope = float((b[-1] - b[0]) / (most - least)) if most > least else 0.0
+        line = share + slope * (at - F)
+        return cls(
+            least=least,
+            most=most,
+            share=share,
+            slope=slope,
+            below=float((b[1:] - line[:-1]).min(initial=0.0)),
+            above=float((b[:-1] - line[1:]).max(initial=0.0)),
+            change=float(max(b[0] - share, share - b[-1])),
+        )
