@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Final, final
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import stdtrit
 
 from cdsm.elasticity import Elasticity
 from cdsm.errors import TensileTestError
@@ -51,23 +50,23 @@ class Stage:
 @final
 @dataclass(frozen=True, eq=False)
 class Band(ReadOnlyState):
-    """Confidence band of EA (95 %), for the scatter of the points and the bias of the smoothing.
+    """Confidence band of EA: it covers EA at each tension with 95 %, for the scatter of the points.
 
-    The band is EA·exp(±t s), with t of Student and s the standard deviation of ln EA. s follows
-    from the residuals around each tension and from the mean squared bias of the smoothing (Nychka,
-    J. Am. Stat. Assoc. 83, 1988). The smoothing is the least that its likelihood allows.
+    The band is that of a rougher curve than the fitted one, exp(m ± t s). m is the ln EA of this
+    curve, s its standard deviation from the residuals around each tension, and t that of Student
+    for as many degrees of freedom. Its bias is far below its scatter, where the fitted curve rounds
+    off bends of EA. So the band is wider than the scatter of the law, which may touch its edge.
 
-    The band covers 95 % of the tensions, not each tension with 95 %. It is calibrated for smooth
-    wires: in 20 tests of each kind (15 N to 800 N, noise constant or growing with the force), it
-    covers 98 % and more of the tensions. Where EA jumps (a kink of force over strain), the curve
-    rounds EA off by 10 % and more. Then the band covers 84 to 95 % of the tensions, and none next
-    to the kink. Mostly no note reports this.
+    Measured, in 100 tests of 400 points each: of Eq. 19, a linear wire and a wire with a toe, with
+    0.5 N and 2 N of noise, it covers 95.3 % of all cases, and at each of 16 tensions from 10 N to
+    790 N between 89 and 100 %, as 100 tests scatter. Where EA jumps (a kink of force over strain),
+    no curve follows: the band misses EA within some newtons of the kink.
 
     The band leaves out errors of calibration and gauge length, and errors that neighbouring points
     share (drift, ripple, slip). ``TensileFit.notes`` names shared errors if the residuals show
     them; a drift as slow as the test stays hidden. Neighbours also share steps of a load cell
-    coarser than the noise. With steps of 0.5 N, the band covers 50 to 93 % of the tensions without
-    noise, and 93 to 98 % for smooth wires with 0.1 N of noise.
+    coarser than the noise. With steps of 0.5 N and Eq. 19, the band covers 34 % of the tensions
+    without noise, 83 % with 0.1 N, and 95 % with 0.5 N.
 
     Attributes:
         tensions: Tensions F, shape (n,) [N].
@@ -216,7 +215,7 @@ def fit_tensile_test(
         stages=_stages(tensions, elastic_from, onset, most),
         rms=float(np.sqrt(np.mean((points.force - fitted)[inside] ** 2))),
         tensions=tensions,
-        band=_band(elasticity, tensions, curve, points) if method == "monotone" else None,
+        band=_band(tensions, curve, points) if method == "monotone" else None,
         test=test,
         method=method,
         start=float(start) * test.gauge_length,
@@ -248,13 +247,13 @@ def _as_law(curve: Curve, points: Points) -> TabulatedElasticity:
     return TabulatedElasticity(tuple(tensions.tolist()), tuple((strain - strain[0]).tolist()))
 
 
-def _band(law: Elasticity, tensions: Array, curve: Curve, points: Points) -> Band:
-    spread = curve.loosest(points).spread(points)
-    reach = float(stdtrit(spread.freedom, (1.0 + _CONFIDENCE) / 2.0))
-    deviation = reach * np.interp(tensions, curve.basis.tensions, spread.deviation)
-    factor = np.exp(np.minimum(deviation, np.log(_UNKNOWN)))
-    rigidity = law.rigidity(tensions)
-    return Band(tensions, frozen(rigidity / factor), frozen(rigidity * factor))
+def _band(tensions: Array, curve: Curve, points: Points) -> Band:
+    middle, half = (
+        np.interp(tensions, curve.basis.tensions, each)
+        for each in curve.interval(points, _CONFIDENCE)
+    )
+    half = np.minimum(half, np.log(_UNKNOWN))
+    return Band(tensions, frozen(np.exp(middle - half)), frozen(np.exp(middle + half)))
 
 
 def _grid(low: float, high: float, grid: Array) -> Array:

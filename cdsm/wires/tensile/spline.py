@@ -16,12 +16,14 @@ import numpy as np
 from scipy.interpolate import BSpline
 from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import least_squares
+from scipy.special import stdtrit
 
 from cdsm.support.values import Array
 from cdsm.wires.tensile.loading import Points
 
 _INTERVALS = 48  # of the spline, at most; more do not change the curve of a wire
 _NEAR = 41  # neighbouring points over which the noise is assumed constant
+_ROUGHER = 1000.0  # less smoothing of the band's curve: its bias is then far below its scatter
 _GRID = 1200  # tensions: strain error below 1e-4 where EA varies thousandfold
 
 
@@ -30,6 +32,13 @@ def _running_integral(values: Array, tensions: Array, axis: int = -1) -> Array:
 
     integral: Array = cumulative_trapezoid(values, tensions, axis=axis, initial=0.0)
     return integral
+
+
+def _neighbours(values: Array) -> Array:
+    """Sum the values (n,) of the points around each point, reflected at the ends."""
+    near = min(_NEAR, len(values))
+    padded = np.pad(values, (near // 2, near - 1 - near // 2), mode="reflect")
+    return np.convolve(padded, np.ones(near), mode="valid")
 
 
 def _least_variance(points: Points) -> float:
@@ -172,22 +181,45 @@ class Curve:
     def spread(self, points: Points) -> Spread:
         """Compute the uncertainty of the curve from the noise of the points."""
         rows, error = self._linearised(points)
-        factor, scale = self._factored(rows)
-        inverse = cho_solve(factor, np.eye(len(scale))) / np.outer(scale, scale)
-        leverage = np.clip(((rows @ inverse) * rows).sum(axis=1), 0.0, 1.0)
+        inverse, leverage = self._inverse(rows)
         freedom = float(max(len(error) - leverage.sum(), 1.0))
         variance = float((error**2).sum() / freedom)
         # enlarge the residuals by the part of the noise that the curve follows
         error = error / np.sqrt(np.maximum(1.0 - leverage, 0.1))
-        near = min(_NEAR, len(error))
-        padded = np.pad(error**2, (near // 2, near - 1 - near // 2), mode="reflect")
-        local = np.convolve(padded, np.full(near, 1.0 / near), mode="valid")
+        local = _neighbours(error**2) / min(_NEAR, len(error))
         # scatter from the local noise, and bias from the prior of the smoothing
         moved = (inverse @ rows.T) * np.sqrt(local)
         covariance = moved @ moved.T + variance * inverse @ self._penalty @ inverse
         splines = self.basis.splines
         deviation = np.sqrt(((splines @ covariance[:-1, :-1]) * splines).sum(axis=1))
         return Spread(inverse, float(np.sqrt(variance)), freedom, error, deviation)
+
+    def interval(self, points: Points, probability: float) -> tuple[Array, Array]:
+        """Compute a confidence interval of log EA at each tension of the grid: middle, half-width.
+
+        The most likely curve is smooth, so it is biased where EA bends, and its own scatter covers
+        the truth too seldom there. The interval is that of a rougher curve: :data:`_ROUGHER` times
+        less smoothing than its likelihood allows leaves a bias far below the scatter. The scatter
+        is that of the neighbouring points, with their own degrees of freedom.
+        """
+        loosest = self.loosest(points)
+        rough = replace(loosest, smoothing=loosest.smoothing / _ROUGHER).refitted(points)
+        rows, error = rough._linearised(points)
+        inverse, leverage = rough._inverse(rows)
+        freedom = np.maximum(_neighbours(1.0 - leverage), 1.0)
+        moved = (inverse @ rows.T) * np.sqrt(_neighbours(error**2) / freedom)
+        splines = self.basis.splines
+        covariance = (moved @ moved.T)[:-1, :-1]
+        deviation = np.sqrt(((splines @ covariance) * splines).sum(axis=1))
+        degrees = np.interp(rough.strain, points.strain, freedom)
+        half = stdtrit(degrees, (1.0 + probability) / 2.0) * deviation
+        return np.asarray(splines @ rough.coefficients), np.asarray(half)
+
+    def _inverse(self, rows: Array) -> tuple[Array, Array]:
+        """Return the inverse of the penalised normal matrix, and the leverage of each point."""
+        factor, scale = self._factored(rows)
+        inverse = cho_solve(factor, np.eye(len(scale))) / np.outer(scale, scale)
+        return inverse, np.clip(((rows @ inverse) * rows).sum(axis=1), 0.0, 1.0)
 
     def loosest(self, points: Points) -> Curve:
         """Find the curve with the least smoothing that its restricted likelihood allows.
