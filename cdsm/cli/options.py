@@ -128,9 +128,10 @@ class ArmOptions:
             self._refuse("the tip of a .urdf is free, that of others is not", "tip")
         if self.arm.is_dir():
             self._refuse("a CASPR model has its own cables", "cables")
-            if wire is None:
+            arm = cdsm.read_caspr(self.arm, elasticity=wire or cdsm.LinearElasticity(1.0))
+            if wire is None:  # only now, since the folder may hold no model
                 raise cdsm.MissingWire(self.arm)
-            return cdsm.read_caspr(self.arm, elasticity=wire)
+            return arm
         if self.cables is None:
             return cdsm.Manipulator.read(self.arm, wire)
         cables = cdsm.read_cables(self.cables, wire)

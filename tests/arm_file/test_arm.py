@@ -35,6 +35,7 @@ maximum = 300.0
 
 ARMS = st.one_of(
     strategies.serpentine_arms(strategies.geometries(most_joints=5)),
+    strategies.serpentine_arms(strategies.sectioned_geometries()),
     strategies.routed_arms(strategies.geometries(most_joints=4)),
     strategies.trees(),
 )
@@ -84,7 +85,7 @@ def test_file_by_hand_is_the_arm_it_describes(tmp_path: Path) -> None:
     assert cdsm.Geometry.read(tmp_path / "arm.toml") == geometry
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(arm=ARMS, gravity=strategies.gravities, stretched=st.booleans())
 def test_written_arm_is_read_back_with_all_bits(
     tmp_path_factory: pytest.TempPathFactory,
@@ -108,6 +109,7 @@ def test_written_arm_is_read_back_with_all_bits(
     assert again.joint_names == arm.joint_names[::-1]
     if arm.is_serpentine:
         assert cdsm.Geometry.read(arm.write(path)) == arm.geometry
+        assert cdsm.Geometry.from_toml(arm.geometry.to_toml()) == arm.geometry
 
 
 @pytest.mark.parametrize("text", [FINGER, FINGER.strip(), FINGER.replace("\n", "\r\n")])

@@ -641,7 +641,7 @@ def test_first_line_says_what_was_computed_with(geometry: Path, tmp_path: Path) 
 def test_an_arm_without_a_wire_asks_for_one(command: str, geometry: Path, tmp_path: Path) -> None:
     geometry.write_text(SHORT.replace('wire = "1x19-1.2mm"', ""), encoding="utf-8")
     (tmp_path / "model").mkdir()
-    model = folder(tmp_path / "model", link(1, "R_Z"), cable())
+    model = folder(tmp_path / "model", link(1, "R_Z") + link(2, "U_XY"), cable())
     for arm in (geometry, model):
         told = call(command, arm)
         assert told.exit_code == 2

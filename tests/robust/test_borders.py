@@ -110,10 +110,12 @@ def test_a_lone_surrogate_is_no_name(what: str) -> None:
     assert repr(SURROGATE) in str(caught.value)
 
 
-@pytest.mark.parametrize("given", [5, None, "cable1_1", {}, [3.0], iter(ARM.cables)])
+@pytest.mark.parametrize("given", [5, None, {}, [3.0], iter(ARM.cables)])
 def test_cables_are_a_list_of_cables(given: Any) -> None:
     with pytest.raises(cdsm.InvalidInput, match=r"cables: .*a list or tuple of Cable is needed"):
         ARM.with_cables(given)
+    with pytest.raises(cdsm.FileError, match="cable1_1: does not exist"):
+        ARM.with_cables("cable1_1")  # a text is the path of a file
 
 
 # --- flags ----------------------------------------------------------------------------------

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import cache
 from typing import Any, NamedTuple, TypeVar, cast
 
@@ -125,6 +126,31 @@ def mixed_geometries(
         cables=tuple(draw(st.lists(route, min_size=1, max_size=4 * count)))
         + draw(st.sampled_from([(), spread, spread, spread])),
     )
+
+
+@st.composite
+def sectioned_geometries(draw: st.DrawFn) -> cdsm.Geometry:
+    """Arms of one to three sections: radii per joint, rings of their own, friction, spread."""
+    sections = []
+    for part in draw(st.lists(mixed_geometries(PLAUSIBLE, 3), min_size=1, max_size=3)):
+        radius = PLAUSIBLE.hole_radius
+        radii = [draw(st.none() | radius) for _ in part.joints]
+        rings = [draw(st.none() | st.none() | radius) for _ in part.cables]
+        sections.append(
+            part.replace(
+                joints=[replace(j, hole_radius=R) for j, R in zip(part.joints, radii, strict=True)],
+                links=[replace(link, length=link.length + 0.02) for link in part.links],
+                cables=[
+                    replace(route, radius=R, friction=draw(st.sampled_from([0.0, 0.1, 1e-3])))
+                    for route, R in zip(part.cables, rings, strict=True)
+                ],
+            )
+        )
+    joined = cdsm.Geometry.sections(
+        sections, spread=draw(st.just(0.0) | st.floats(0.0, 0.5)), name=draw(names)
+    )
+    outer = draw(st.none() | st.floats(0.07, 0.1))  # beyond all holes
+    return joined.replace(joints=[replace(joint, disk_radius=outer) for joint in joined.joints])
 
 
 def geometries(most_joints: int = 12) -> Strategy[cdsm.Geometry]:
