@@ -1,0 +1,175 @@
+"""The numbers that notebooks 01 to 05 show: they are run here, cell by cell, and then looked at."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+import xarray as xr
+
+import cdsm
+
+FOLDER = Path(__file__).parents[2] / "notebooks"
+Shown = SimpleNamespace
+"""Names of a notebook after its last cell."""
+
+
+def first_arm(nb: Shown) -> None:
+    assert nb.text == cdsm.to_urdf(nb.geometry)  # the same geometry always gives the same bytes
+    np.testing.assert_allclose(nb.pose.tip[:3, 3], [0.3026, 0.0503, -0.0983], atol=1e-4)
+    assert abs(nb.pull.residual).max() < 1e-12
+    assert len(nb.pull.at_minimum) == 6
+    np.testing.assert_allclose(nb.pull.values.max(), 91.06, atol=0.01)
+    with pytest.raises(cdsm.InfeasibleTension) as caught:
+        cdsm.distribute_tension(nb.pose, minimum=40.0, maximum=150.0, wrench=[0, 0, -25, 0, 0, 0])
+    assert caught.value.joint == "joint3_1"
+    K = nb.K
+    assert K.is_stable
+    np.testing.assert_allclose(K.joint, K.active + K.passive + K.gravity + K.load)
+    np.testing.assert_allclose(nb.along / 1e3, [9.336, 1.691, 1.643], rtol=1e-3)
+    assert np.all(nb.ratio[0] > 1)
+    assert np.all(nb.ratio[1] > nb.ratio[0])
+    assert np.isclose(nb.shares.total, K.along("z"), rtol=1e-12)
+    assert nb.arm.cables[int(nb.shares.cables.argmax())].name == "cable6_1"
+    assert nb.report.trustworthy
+    assert 170 < nb.minima[nb.best] < 190
+    assert 210 < nb.edge < 225
+    assert not nb.stable["strand (Eq. 19)"][0]
+    assert np.all(np.diff(nb.constant) < 0)
+    changes = nb.changes
+    for reading in ("K_R", "hung weight"):
+        assert max(changes["stretched (paper)", reading]) < 0.0 < min(changes["original", reading])
+    weights = changes["original", "hung weight"]
+    np.testing.assert_allclose(weights, [9.3e-3, 7.5e-3, 7.4e-3], atol=5e-5)
+    np.testing.assert_allclose(nb.falls.original, [1.9, 6.5, 7.4], atol=0.1)
+    np.testing.assert_allclose(nb.falls.along, [277.0, 92.0, 93.0], atol=1.0)
+
+
+def cables_and_experiments(nb: Shown) -> None:
+    assert nb.rms < 0.02
+    assert nb.naive > 0.3
+    fit = cdsm.fit_tensile_test(nb.displacement, nb.force, nb.test.gauge_length)
+    stages = {stage.name: stage for stage in fit.stages}
+    assert abs(stages["pre-tensioning"].high - 120.0) < 20.0  # the paper says 120 N
+    assert nb.ends[1] / nb.ends[0] < 2.0
+    assert np.all(np.diff(nb.y) > 0)  # the pre-tensioning stage
+    for name, value in nb.actual.items():
+        low, high = nb.found.confidence(0.999)[name]
+        assert low < value < high
+    fits = nb.summary.fits
+    expected = [(0.391, 0.139, 0.331), (0.211, 0.154, 0.331), (0.187, 0.116, 0.245)]
+    expected += [(0.108, 0.035, 0.152)]
+    np.testing.assert_allclose([fit.misfit for fit in fits], expected, atol=0.01)
+    last = fits[-1].prototype
+    np.testing.assert_allclose(last.levels[1:4], (11.0, 18.0, 48.0), atol=1.0)
+    np.testing.assert_allclose(abs(np.diag(last.weights)), (8.0, 10.0, 7.0), atol=1.0)
+    assert [len(fit.step.free) for fit in fits] == [13, 13, 17, 14]
+    assert [len(fit.at_bound) for fit in fits] == [8, 8, 8, 4]
+    assert np.ptp(nb.ratio) < 0.01
+    predicted = nb.predicted
+    np.testing.assert_allclose(predicted.table, nb.printed.predicted.table, rtol=2e-3)
+    np.testing.assert_allclose(predicted.drops, (0.165, 0.406), atol=0.003)
+    np.testing.assert_allclose(predicted.rises, (8.65, 10.9), atol=0.05)
+    assert abs(predicted.check - 110.3) < 0.5
+
+
+def weights_and_buckling(nb: Shown) -> None:
+    K = nb.K
+    assert abs(nb.small.stiffness / K.along("z") - 1) < 1e-4
+    assert nb.paper > 1.5 * nb.small.stiffness  # it overestimates what a weight measures
+    assert abs(nb.tangent / 1e3 - 0.1214) < 1e-4
+    assert abs(nb.secants["down"] - 0.1949) < 1e-4
+    assert abs(nb.secants["up"] - 0.1054) < 1e-4
+    # a secant compliance is the mean of the tangents on the way
+    tangents = [each.compliance[2, 2] for each in (nb.hung.without, *nb.hung.loaded)]
+    mean = (sum(tangents) - (tangents[0] + tangents[-1]) / 2.0) / len(nb.hung.loaded)
+    assert abs(mean * nb.hung.stiffness - 1.0) < 1e-3
+    assert nb.stiffens_from == {0.1: 9.25, 0.25: 22.75, 0.33: 29.75}
+    assert all(rest.stable for rest in nb.buckled.rests)
+    moved = np.linalg.norm(nb.buckled.displacements, axis=1)
+    assert moved[nb.buckled.bounds < nb.critical.minimum].max() < 0.01 < moved[-1]
+    # at the end ω² falls in proportion to what is left: four times as near, half as fast
+    lowest = [nb.lowest_frequency((1 - part) * nb.critical.minimum) for part in (4e-3, 1e-3)]
+    assert abs(lowest[0] / lowest[1] - 2.0) < 0.02
+
+
+def stiffness_control(nb: Shown) -> None:
+    assert all(nb.gains[1:] < nb.gains[:-1])  # every newton pays less than those before
+    assert abs(nb.ends.low / 20.29e3 - 1) < 1e-3
+    assert abs(nb.ends.high / 128.6e3 - 1) < 1e-3
+    assert len(nb.sampled) > 100
+    assert nb.ends.low < min(nb.sampled) < max(nb.sampled) < nb.ends.high
+    saturated = nb.saturated
+    along = saturated.curve[:, 1]
+    assert abs(saturated.bound - 159.245) < 0.01
+    assert abs(saturated.steepest_slope / 1e3 - 2.187) < 1e-3
+    assert abs(saturated.stiffest - 557.6) < 0.1
+    assert 0.99 < along[-1] / along.max() < 1.0
+    assert saturated.limit == "elasticity"
+    measured = nb.held_measured
+    assert abs(nb.plan_measured / 90e3 - 1) < 1e-4
+    with pytest.raises(cdsm.UnreachableStiffness) as caught:
+        cdsm.plan_stiffness(nb.pose, "z", 150e3, minimum=20.0, maximum=800.0)
+    assert abs(caught.value.high / nb.ends.high - 1) < 1e-9
+    held, target = nb.held, nb.target
+    assert held.complete
+    assert held.steps.max() <= 4.0 * (1 + 1e-12)
+    assert abs(held.achieved / target - 1).max() < 1e-9
+    assert max(each.misfit for each in held.between) < 1e-3
+    for k, value in measured.items():
+        assert abs(value / target[k] - 1) < 1e-4
+    # what is paid out, and its elongation, make the length
+    for c, cable in enumerate(nb.arm.cables):
+        elongation = cable.elongation(held.tensions[62, c], held.unstrained_lengths[62, c])
+        assert abs(nb.stretch[62, c] - elongation) < 1e-15
+
+
+def workspace_maps(nb: Shown) -> None:
+    pose = nb.arm.at(nb.q[nb.row])
+    single = cdsm.stiffness(pose, cdsm.distribute_tension(pose, minimum=50.0)).compliance
+    assert abs(nb.batch["compliance"][nb.row] - single).max() < 1e-12 * abs(single).max()
+    value = float(nb.straight.along.sel(minimum=50.0, direction="z"))
+    assert abs(value / nb.expected - 1) < 1e-9
+    assert np.allclose(nb.softest, [11.65, 33.48, 53.03], atol=5e-3)
+    assert np.allclose(nb.buckled, [0.0192, 0.1620], atol=1e-3)
+    assert np.allclose([nb.q10, nb.q50, nb.q90], [4.23, 9.09, 19.89], rtol=2e-3)
+    holds, buckles, never = nb.holds, nb.buckles, nb.never
+    assert all(np.diff(buckles / (holds + buckles)) > 0.0)
+    # what the cables can balance by themselves they can at any bound: one posture needs the weight
+    assert np.isclose(never[-1] - never[0], 2.0**-11)
+    assert np.allclose(holds[[0, -1]], [0.513, 0.028], atol=1e-3)
+    assert nb.pending == 3 * nb.left.status.size // 4
+    xr.testing.assert_identical(nb.resumed, nb.space)
+    xr.testing.assert_identical(nb.again, nb.space)
+    assert cdsm.Geometry.from_toml(nb.again.attrs["geometry"]) == nb.soft.geometry
+
+
+CHECKS: dict[str, Callable[[Shown], None]] = {
+    "01_from_geometry_to_stiffness": first_arm,
+    "02_cables_tensile_tests_and_experiments": cables_and_experiments,
+    "03_hanging_weights_and_buckling": weights_and_buckling,
+    "04_stiffness_control": stiffness_control,
+    "05_workspace_stiffness_maps": workspace_maps,
+}
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("default")
+@pytest.mark.parametrize("name", CHECKS)
+def test_notebook_shows_the_numbers_that_its_text_tells(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    mpl.use("agg")
+    monkeypatch.chdir(FOLDER)
+    cells = json.loads((FOLDER / f"{name}.ipynb").read_text(encoding="utf-8"))["cells"]
+    names: dict[str, Any] = {}
+    for cell in cells:
+        if cell["cell_type"] == "code":
+            source = "".join(cell["source"]).replace("%matplotlib inline\n", "")
+            assert "assert" not in source  # numbers are pinned here
+            exec(compile(source, name, "exec"), names)
+    CHECKS[name](SimpleNamespace(**names))
