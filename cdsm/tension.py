@@ -280,11 +280,16 @@ def _with_fixed(
     return frozen(low), frozen(high)
 
 
-def installed_solver(solver: str) -> str:
-    """Return the name of a solver; UnknownName if it is not installed."""
+def installed_solvers() -> list[str]:
+    """Return the names of the solvers that are installed."""
     import qpsolvers  # slow to import
 
-    return one_of("installed solver", solver, qpsolvers.available_solvers)
+    return sorted(qpsolvers.available_solvers)
+
+
+def installed_solver(solver: str) -> str:
+    """Return the name of a solver; UnknownName if it is not installed."""
+    return one_of("installed solver", solver, installed_solvers())
 
 
 def _solve(problem: tension_kernels.Scaled, solver: str) -> Array | str:

@@ -6,6 +6,7 @@ A command imports what it runs when it runs, so that help pages are there at onc
 from __future__ import annotations
 
 import io
+import logging
 import sys
 from typing import Annotated
 
@@ -13,9 +14,9 @@ import typer
 
 import cdsm
 from cdsm.cli.arm import check, export, stiffness, urdf
+from cdsm.cli.command import Command, as_command
 from cdsm.cli.loads import buckle, weigh
 from cdsm.cli.new import new
-from cdsm.cli.options import as_command
 from cdsm.cli.output import debug_wanted
 from cdsm.cli.paper import reproduce
 from cdsm.cli.plan import plan
@@ -47,9 +48,16 @@ def main(
     debug: Annotated[
         bool, typer.Option("--debug", help="Show where an error comes from; before the command.")
     ] = False,
+    verbose: Annotated[
+        bool,
+        typer.Option("--verbose", "-v", help="Show the log of long runs; before the command."),
+    ] = False,
 ) -> None:
     """Stiffness of cable-driven serpentine manipulators."""
     debug_wanted.set(debug)
+    if verbose:
+        logging.basicConfig(format="%(message)s")
+        logging.getLogger("cdsm").setLevel(logging.INFO)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # a terminal without Greek letters shows "?"
             stream.reconfigure(errors="replace")
@@ -60,4 +68,5 @@ _ALL = (
     *(view, fit, export, reproduce, warm),
 )
 for command in _ALL:
-    app.command("map" if command is map_sweep else command.__name__)(as_command(command))
+    name = "map" if command is map_sweep else command.__name__
+    app.command(name, cls=Command)(as_command(command))

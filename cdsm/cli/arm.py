@@ -2,75 +2,56 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated, Literal
 
 import typer
 
 import cdsm
-from cdsm.cli.options import Angles, ArmOptions, AsJson, TensionOptions
-from cdsm.cli.output import UNMET, Json, answer, by_cable, joints
-
-if TYPE_CHECKING:
-    from cdsm.support.values import Array
+from cdsm.cli.options import Angles, ArmOptions, AsJson, LoadOptions, TensionOptions
+from cdsm.cli.output import Json, answer, by_cable, written
 
 
 def urdf(
     geometry: Annotated[Path, typer.Argument(metavar="ARM.toml", help="Geometry to read.")],
-    output: Annotated[Path, typer.Option("--output", "-o", help="URDF file to write.")],
+    out: Annotated[
+        Path, typer.Option("--out", "-o", metavar="FILE.urdf", help="URDF file to write.")
+    ],
     as_json: AsJson = False,
 ) -> None:
     """Write the URDF of an arm, checked by reading it back with two parsers."""
     arm = cdsm.Geometry.read(geometry)
-    path = cdsm.write_urdf(arm, output)
+    path = cdsm.write_urdf(arm, out)
     numbers: Json = {"name": arm.name, "length_m": arm.length, "written": [str(path)]}
     answer(as_json, lambda: numbers, f"{arm}\nwritten: {path}")
 
 
 def stiffness(
-    arm: ArmOptions, tensions: TensionOptions, angles: Angles = "0", as_json: AsJson = False
+    arm: ArmOptions,
+    tensions: TensionOptions,
+    load: LoadOptions,
+    angles: Angles = "0",
+    as_json: AsJson = False,
 ) -> None:
-    """Distribute the tensions at a posture, and print them and the stiffness."""
+    """Distribute the tensions at a posture, and print them and the stiffness.
+
+    Exit code 0; 3 if the arm is unstable.
+    """
     pose = arm.at(angles)
-    tension = tensions.distribute(pose)
+    tension = tensions.distribute(pose, load.at_tip(pose.arm))
     K = cdsm.stiffness(pose, tension)
-    answer(as_json, lambda: _numbers(tension, K), tensions.conditions(pose.arm), tension, K)
-
-
-def _numbers(tension: cdsm.Tension, K: cdsm.Stiffness) -> Json:
-    from cdsm.support.format import MODEL, key
-
-    def matrix(read: Callable[[], Array]) -> Array | None:
-        try:
-            return read()
-        except cdsm.SingularStiffness:
-            return None
-
-    pose, arm = tension.posture, tension.posture.arm
-    return {
-        **joints(arm, pose.q),
-        "tip_position_m": pose.tip[:3, 3],
-        "tension_N": by_cable(arm, tension.values),
-        "cable_length_m": pose.cable_lengths,
-        key("static_residual", arm.torque_unit()): K.residual,
-        "model": MODEL,
-        "along_N_per_m": [K.along(axis) for axis in ((1, 0, 0), (0, 1, 0), (0, 0, 1))],
-        "cartesian_N_per_m": matrix(lambda: K.cartesian),
-        "pseudoinverse_N_per_m": matrix(K.pseudoinverse),
-        "compliance": matrix(lambda: K.compliance),
-        key("joint_stiffness", arm.stiffness_unit()): K.joint,
-        key("margin", arm.stiffness_unit()): K.margin,
-        "stable": K.is_stable,
-    }
+    conditions = tensions.conditions(pose.arm)
+    answer(as_json, K.to_dict, conditions, tension, K, warnings=K.warnings[:1])
 
 
 def check(
     arm: ArmOptions,
     tensions: TensionOptions,
+    load: LoadOptions,
     angles: Angles = "0",
-    html: Annotated[
-        Path | None, typer.Option("--html", metavar="FILE.html", help="Write it as a page too.")
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", "-o", metavar="FILE.html", help="Write it as a page too."),
     ] = None,
     as_json: AsJson = False,
 ) -> None:
@@ -80,29 +61,33 @@ def check(
     Exit code 0: it can be trusted; 3: it cannot, and the report says why.
     """
     pose = arm.at(angles)
-    report = cdsm.stiffness(pose, tensions.distribute(pose)).report()
-    if html is not None:
+    tension = tensions.distribute(pose, load.at_tip(pose.arm))
+    report = cdsm.stiffness(pose, tension).report()
+    if out is not None:
         from cdsm.support.files import write_text
 
-        typer.echo(f"written: {write_text(html, report.to_html())}", err=True)
-    answer(as_json, report.to_dict, tensions.conditions(pose.arm), report)
-    if not report.trustworthy:
-        raise typer.Exit(UNMET)
+        written(write_text(out, report.to_html()))
+    warnings = () if report.trustworthy else ("NOT to be trusted: the report says why.",)
+    answer(as_json, report.to_dict, tensions.conditions(pose.arm), report, warnings=warnings)
 
 
 def export(
     arm: ArmOptions,
     tensions: TensionOptions,
-    mjcf: Annotated[
-        Path | None, typer.Option(metavar="FILE.xml", help="MuJoCo model, its cables pulled.")
+    load: LoadOptions,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", "-o", metavar="FILE.xml", help="MuJoCo model to write, its cables pulled."
+        ),
     ] = None,
     cables_out: Annotated[
         Path | None, typer.Option(metavar="FILE.toml", help="File of its cables to write.")
     ] = None,
     angles: Angles = "0",
     actuators: Annotated[
-        str,
-        typer.Option(help="Of the MuJoCo model: length (locked motors), tension, or none."),
+        Literal["length", "tension", "none"],
+        typer.Option(help="Of the MuJoCo model; length: locked motors."),
     ] = "length",
     damping_ratio: Annotated[
         float | None,
@@ -119,18 +104,19 @@ def export(
 
     Exit code 0; 3 if the arm of the MuJoCo model is unstable: it is written all the same.
     """
-    if mjcf is None and cables_out is None:
-        raise typer.BadParameter("give --mjcf, --cables-out or both.", param_hint="--mjcf")
+    if out is None and cables_out is None:
+        raise typer.BadParameter("give --out, --cables-out or both.", param_hint="--out")
     pose = arm.at(angles)
     numbers: Json = {"name": pose.arm.name}
     conditions = tensions.conditions(pose.arm)
-    lines, written = [str(conditions)], []
-    if mjcf is not None:
+    lines, files = [str(conditions)], []
+    warnings: list[str] = []
+    if out is not None:
         from cdsm.interchange.mjcf import mujoco_model
         from cdsm.support.files import write_text
         from cdsm.support.format import JointUnits, key
 
-        tension = tensions.distribute(pose)
+        tension = tensions.distribute(pose, load.at_tip(pose.arm))
         model = mujoco_model(pose.arm, pose, tension, actuators, damping_ratio, damping)
         motion, unit = model.motion, JointUnits(pose.arm.slides).joined("N m s/rad", "N s/m")
         numbers |= {
@@ -140,12 +126,11 @@ def export(
             key("joint_damping", unit): motion.joints,
             "actuators": model.actuators,
         }
-        lines = [*filter(None, [model.unstable]), *lines, *model.remarks]
-        written.append(str(write_text(mjcf, model.text)))
+        warnings += filter(None, [model.unstable])
+        lines += model.remarks
+        files.append(str(write_text(out, model.text)))
     if cables_out is not None:
-        written.append(str(cdsm.write_cables(pose.arm.cables, cables_out)))
-    lines += [f"written: {path}" for path in written]
-    numbers |= conditions.to_dict() | {"written": written}
-    answer(as_json, lambda: numbers, "\n".join(lines))
-    if numbers.get("stable") is False:
-        raise typer.Exit(UNMET)
+        files.append(str(cdsm.write_cables(pose.arm.cables, cables_out)))
+    lines += [f"written: {path}" for path in files]
+    numbers |= conditions.to_dict() | {"written": files}
+    answer(as_json, lambda: numbers, "\n".join(lines), warnings=warnings)

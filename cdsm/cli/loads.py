@@ -10,63 +10,54 @@ import typer
 import cdsm
 from cdsm.cli import options
 from cdsm.cli.conditions import Conditions
-from cdsm.cli.options import Angles, ArmOptions, AsJson, Picture, TensionOptions, numbers
-from cdsm.cli.output import Json, answer, joints, write_picture
+from cdsm.cli.options import (
+    Angles,
+    ArmOptions,
+    AsJson,
+    Picture,
+    TensionOptions,
+    WeightOptions,
+    wrench_of,
+)
+from cdsm.cli.output import answer, write_picture
+from cdsm.cli.values import numbers
 
 
 def weigh(
     arm: ArmOptions,
     tensions: TensionOptions,
-    force: Annotated[
-        str, typer.Option(help="The weight: FX,FY,FZ at the tip [N].", metavar="FX,FY,FZ")
-    ],
+    weight: WeightOptions,
+    wrench: options.Wrench = None,
     angles: Angles = "0",
     steps: Annotated[int, typer.Option(help="Equal steps to hang it in.")] = 5,
     figure: Picture = None,
     as_json: AsJson = False,
 ) -> None:
-    """Hang a weight at the tip with the motors locked, and see how far it goes (Eq. 20)."""
+    """Hang a weight at the tip with the motors locked, and see how far it goes (Eq. 20).
+
+    --force or --mass is the weight; --wrench is what the arm carries before. Exit code 0; 3 if the
+    arm does not stay at its posture without the weight, or buckles under it.
+    """
+    if not weight.given:
+        raise typer.BadParameter("give it or --mass: the weight.", param_hint="--force")
     pose = arm.at(angles)
-    tension = tensions.distribute(pose)
-    test = cdsm.weight_test(pose, tension, numbers("--force", force, 3), steps=steps)
-    write_picture(figure, "plot_weight_test", test)
+    tension = tensions.distribute(pose, wrench_of(wrench))
+    test = cdsm.weight_test(pose, tension, weight.vector(pose.arm), steps=steps)
+    write_picture(figure, test.plot)
     loaded = f"at the full load:\n{test.loaded[-1]}"
     conditions = tensions.conditions(pose.arm)
-    answer(as_json, lambda: _weight_numbers(test), conditions, test, loaded)
-
-
-def _weight_numbers(test: cdsm.WeightTest) -> Json:
-    last, before = test.loaded[-1], test.without
-    return {
-        "before": {
-            "tip_displacement_m": before.displacement,
-            "at_limit": before.at_limit,
-            "slack": before.slack,
-            "stable": before.stable,
-        },
-        "force_N": test.force,
-        "loads_N": test.loads,
-        "tip_displacements_m": test.displacements,
-        "linear_displacement_m": test.linear.displacement,
-        "stiffness_N_per_m": test.stiffness,
-        "linear_stiffness_N_per_m": test.linear.stiffness,
-        "cables": [cable.name for cable in last.pose.arm.cables],
-        "tensions_N": test.tensions,
-        **joints(last.pose.arm, last.pose.q),
-        "slack": last.slack,
-        "at_limit": last.at_limit,
-        "stable": last.stable,
-    }
+    warnings = (*cdsm.stiffness(pose, tension).warnings, *test.warnings)
+    answer(as_json, test.to_dict, conditions, test, loaded, warnings=warnings)
 
 
 def buckle(
     arm: ArmOptions,
+    weight: WeightOptions,
     angles: Angles = "0",
     load: Annotated[
         str | None,
         typer.Option(
-            help="Also find the multiple of this load that the arm stands at --min-tension.",
-            metavar="FX,...,MZ",
+            help="Older name of --force, with a moment.", metavar="FX,...,MZ", hidden=True
         ),
     ] = None,
     min_tension: Annotated[
@@ -75,44 +66,39 @@ def buckle(
     max_tension: Annotated[
         float | None, typer.Option(help="Upper bound of all tensions under the load [N].")
     ] = None,
-    wrench: options.Wrench = options.NO_WRENCH,
+    wrench: options.Wrench = None,
     solver: options.Solver = options.DEFAULT_SOLVER,
     figure: Picture = None,
     as_json: AsJson = False,
 ) -> None:
-    """Find the tension, and the load, at which the arm buckles."""
+    """Find the tension at which the arm buckles, and the multiple of a load that it holds.
+
+    --force or --mass is the load that is multiplied; --wrench is what the arm always carries. Exit
+    code 0; 3 if the arm is unstable at every tension, or without the load already.
+    """
+    loaded = weight.given or load is not None
     for option, value in (("--min-tension", min_tension), ("--max-tension", max_tension)):
-        if value is not None and load is None:
-            raise typer.BadParameter("bounds the tensions under --load only.", param_hint=option)
+        if value is not None and not loaded:
+            raise typer.BadParameter(
+                "bounds the tensions under --force or --mass only.", param_hint=option
+            )
     pose = arm.at(angles)
-    carried = numbers("--wrench", wrench, 6)
+    carried = wrench_of(wrench)
     tension = cdsm.critical_tension(pose, carried, solver)
-    most, low = None, None
-    if load is not None:
-        low = 10.0 if min_tension is None else min_tension
-        high = math.inf if max_tension is None else max_tension
-        weight = numbers("--load", load, 6)
-        most = cdsm.critical_load(pose, weight, low, high, solver, carried=carried)
-    write_picture(figure, "plot_critical_tension", tension)
-    found = (tension,) if most is None else (tension, most)
-    conditions = Conditions(pose.arm, () if low is None else (low,))
-    answer(as_json, lambda: _buckling_numbers(tension, most), conditions, *found)
-
-
-def _buckling_numbers(tension: cdsm.CriticalTension, load: cdsm.CriticalLoad | None) -> Json:
-    names = tension.posture.arm.joint_names
-    found: Json = {
-        "critical_minimum_tension_N": tension.minimum,
-        "stable_minimum_tension_N": tension.stable,
-        "examined_minimum_tension_N": tension.examined,
-        "mode": dict(zip(names, tension.mode, strict=True)),
-        "tension_N": tension.tension,
-    }
-    if load is not None:
-        found |= {
-            "load": load.wrench,
-            "critical_load_factor": load.factor,
-            "limit": load.limit,
-            "load_mode": dict(zip(names, load.mode, strict=True)),
-        }
-    return found
+    found: list[cdsm.CriticalTension | cdsm.CriticalLoad] = [tension]
+    low: tuple[float, ...] = ()
+    if loaded:
+        multiplied = [0.0] * 6 if load is None else numbers("--load", load, 6, "FX,...,MZ")
+        multiplied[:3] += weight.vector(pose.arm)
+        least = 10.0 if min_tension is None else min_tension
+        most = math.inf if max_tension is None else max_tension
+        low = (least,)
+        found.append(cdsm.critical_load(pose, multiplied, least, most, solver, carried=carried))
+    write_picture(figure, tension.plot)
+    answer(
+        as_json,
+        lambda: {name: value for each in reversed(found) for name, value in each.to_dict().items()},
+        Conditions(pose.arm, low),
+        *found,
+        warnings=[warning for each in found for warning in each.warnings],
+    )

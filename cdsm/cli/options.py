@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import dataclasses
-import inspect
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, fields, is_dataclass
-from functools import partial, wraps
+from dataclasses import dataclass, fields
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
 import cdsm
 from cdsm.cli.conditions import Conditions
-from cdsm.cli.output import reported
+from cdsm.cli.values import coordinates, gravity_vector, joint_scales, numbers
 
 if TYPE_CHECKING:
     from cdsm.support.values import Array
@@ -26,26 +24,52 @@ DEFAULT_SOLVER: Final = "daqp"
 _arm_option = partial(typer.Option, rich_help_panel="The arm")
 _tension_option = partial(typer.Option, rich_help_panel="Tensions and load")
 
+
+def _solvers() -> list[str]:
+    from cdsm.tension import installed_solvers
+
+    return installed_solvers()
+
+
+def _wires() -> list[str]:
+    from cdsm.wires.catalogue import WIRES
+
+    return list(WIRES)
+
+
+def directions() -> list[str]:
+    """Return the names of directions."""
+    from cdsm.support.validation import AXES
+
+    return list(AXES)
+
+
 ANGLES = typer.Option(
-    help="Joint angles in degrees (mm where a joint slides), separated by commas, or one for all "
-    "joints; 0 if left out.",
-    metavar="DEG,DEG,...",
+    help="Joint angles in degrees (mm where a joint slides): by name, the others are 0; in order; "
+    "or one for all joints. 0 if left out.",
+    metavar="JOINT=DEG,...|DEG,DEG,...|DEG",
     show_default=False,
 )
 Angles = Annotated[str, ANGLES]
-MinTension = Annotated[float, _tension_option(help="Lower bound of all tensions [N].")]
+MinTension = Annotated[
+    float, _tension_option(help="Lower bound of all tensions [N] (in Python: minimum, 0).")
+]
 MaxTension = Annotated[float, _tension_option(help="Upper bound of all tensions [N].")]
 Wrench = Annotated[
-    str, _tension_option(help="At the tip: FX,FY,FZ,MX,MY,MZ [N, N m].", metavar="FX,...,MZ")
+    str | None,
+    _tension_option(
+        help="Force and moment at the tip, base axes: FX,FY,FZ,MX,MY,MZ [N, N m].",
+        metavar="FX,...,MZ",
+    ),
 ]
-Solver = Annotated[str, _tension_option(help="Quadratic-programming solver.")]
+Solver = Annotated[
+    str, _tension_option(help="Quadratic-programming solver.", autocompletion=_solvers)
+]
 Picture = Annotated[
     Path | None,
-    typer.Option(metavar="FILE.pdf|svg|png", help="Figure to write; pdf and svg are vectors."),
+    typer.Option(metavar="FILE.pdf|svg|png", help="Picture to write, vectors or 300 dpi."),
 ]
-AsJson = Annotated[bool, typer.Option("--json", help="Print SI numbers as JSON.")]
-
-NO_WRENCH = "0,0,0,0,0,0"
+AsJson = Annotated[bool, typer.Option("--json", help="Print SI numbers as JSON, errors too.")]
 
 
 @dataclass(frozen=True)
@@ -69,6 +93,7 @@ class ArmOptions:
         str | None,
         _arm_option(
             metavar="NAME|EA|WIRE.toml",
+            autocompletion=_wires,
             help="Wire of all cables: a name such as 1x19-1.2mm, a constant rigidity in N, or a "
             "file that `cdsm fit` writes; default: what the files say.",
         ),
@@ -90,8 +115,10 @@ class ArmOptions:
     gravity: Annotated[
         str | None,
         _arm_option(
-            help="In m/s², base axes; default: what the file says, or 0,0,-9.81.",
-            metavar="GX,GY,GZ",
+            help="In m/s², base axes, or an axis for 9.81 along it, such as -y; default: what the "
+            "file says, or -z.",
+            metavar="GX,GY,GZ|AXIS",
+            autocompletion=directions,
         ),
     ] = None
 
@@ -114,7 +141,7 @@ class ArmOptions:
             ]
             arm = arm.with_cables(continued)
         if self.gravity is not None:
-            arm = arm.with_gravity(numbers("--gravity", self.gravity, 3))
+            arm = arm.with_gravity(gravity_vector(self.gravity))
         return arm
 
     def _arm(self) -> cdsm.Manipulator:
@@ -142,15 +169,8 @@ class ArmOptions:
 
     def at(self, angles: str) -> cdsm.Posture:
         """Return the posture at joint coordinates [degrees, or mm if a joint slides]."""
-        arm, given = self.read(), numbers("--angles", angles)
-        given = given * arm.nv if len(given) == 1 else given
-        if len(given) != arm.nv:
-            names = ", ".join(arm.joint_names)
-            raise typer.BadParameter(
-                f"{len(given)} given; give one angle, or one for each of {names}.",
-                param_hint="--angles",
-            )
-        return arm.at(given * joint_scales(arm))
+        arm = self.read()
+        return arm.at(coordinates(angles, arm) * joint_scales(arm))
 
     def _refuse(self, why: str, *names: str) -> None:
         """Raise BadParameter for options that this kind of arm would ignore."""
@@ -179,64 +199,65 @@ class TensionOptions:
 
     min_tension: MinTension = 10.0
     max_tension: MaxTension = math.inf
-    wrench: Wrench = NO_WRENCH
     solver: Solver = DEFAULT_SOLVER
 
     def conditions(self, arm: cdsm.Manipulator) -> Conditions:
         """Return what an answer with these options is computed with."""
         return Conditions(arm, (self.min_tension,))
 
-    def distribute(self, pose: cdsm.Posture) -> cdsm.Tension:
-        """Compute the tensions at a posture."""
-        load = numbers("--wrench", self.wrench, 6)
-        return cdsm.distribute_tension(pose, self.min_tension, self.max_tension, load, self.solver)
+    def distribute(self, pose: cdsm.Posture, wrench: Array) -> cdsm.Tension:
+        """Compute the tensions at a posture under a wrench (6,)."""
+        return cdsm.distribute_tension(
+            pose, self.min_tension, self.max_tension, wrench, self.solver
+        )
 
 
-def as_command(function: Callable[..., None]) -> Callable[..., None]:
-    """Return a function as typer needs it: one parameter per option, and errors as messages.
+@dataclass(frozen=True)
+class WeightOptions:
+    """Options of a force at the tip."""
 
-    typer reads options only from the signature. Shared options are declared once, as fields of a
-    dataclass; here they replace the parameter of the function that is annotated with it.
-    """
-    groups: dict[str, Any] = {}
-    options: list[inspect.Parameter] = []
-    for each in inspect.signature(function, eval_str=True).parameters.values():
-        if is_dataclass(each.annotation):
-            groups[each.name] = each.annotation
-            options += inspect.signature(groups[each.name], eval_str=True).parameters.values()
-        else:
-            options.append(each)
+    force: Annotated[
+        str | None,
+        _tension_option(help="Force at the tip, base axes: FX,FY,FZ [N].", metavar="FX,FY,FZ"),
+    ] = None
+    mass: Annotated[
+        float | None, _tension_option(help="Mass [kg] that hangs at the tip, along gravity.")
+    ] = None
 
-    @wraps(function)
-    def command(**given: Any) -> None:
-        for name, group in groups.items():
-            given[name] = group(**{field.name: given.pop(field.name) for field in fields(group)})
-        with reported():
-            function(**given)
+    @property
+    def given(self) -> bool:
+        """Whether a force or a mass is given."""
+        return self.force is not None or self.mass is not None
 
-    command.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
-        [option.replace(kind=inspect.Parameter.KEYWORD_ONLY) for option in options]
-    )
-    return command
+    def vector(self, arm: cdsm.Manipulator) -> Array:
+        """Return the force of both (3,) [N]."""
+        import numpy as np
+
+        force = np.zeros(3)
+        if self.force is not None:
+            force += numbers("--force", self.force, 3, "FX,FY,FZ")
+        if self.mass is not None:
+            if not arm.gravity.any():
+                raise typer.BadParameter("has no weight without gravity.", param_hint="--mass")
+            force += self.mass * arm.gravity
+        return force
 
 
-def joint_scales(arm: cdsm.Manipulator) -> Array:
-    """Return the command-line unit of each joint (nv,) in SI: one degree [rad] or one mm [m]."""
+@dataclass(frozen=True)
+class LoadOptions(WeightOptions):
+    """Options of a load at the tip; force, mass and wrench add up."""
+
+    wrench: Wrench = None
+
+    def at_tip(self, arm: cdsm.Manipulator) -> Array:
+        """Return the load (6,): force [N], then moment [N m]."""
+        carried = wrench_of(self.wrench)
+        carried[:3] += self.vector(arm)
+        return carried
+
+
+def wrench_of(text: str | None) -> Array:
+    """Return the wrench (6,) of --wrench; zero if it is not given."""
     import numpy as np
 
-    from cdsm.support.format import JointUnits
-
-    return np.array([scale for _, scale in JointUnits(arm.slides).shown])
-
-
-def numbers(option: str, text: str, count: int | None = None) -> list[float]:
-    """Read numbers separated by commas or spaces, and check their count."""
-    try:
-        values = [float(word) for word in text.replace(",", " ").split()]
-    except ValueError as error:
-        raise typer.BadParameter(
-            f"{error}; separate numbers by commas.", param_hint=option
-        ) from None
-    if count is not None and len(values) != count:
-        raise typer.BadParameter(f"{len(values)} given; give {count}.", param_hint=option)
-    return values
+    return np.array([0.0] * 6 if text is None else numbers("--wrench", text, 6, "FX,...,MZ"))

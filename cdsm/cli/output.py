@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import json
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import cache, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import typer
 
 import cdsm
 from cdsm.cli.conditions import Conditions
+from cdsm.cli.words import in_options
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
     from rich.console import Console
 
     from cdsm.support.values import Array
@@ -27,8 +29,15 @@ Json = dict[str, object]
 debug_wanted: ContextVar[bool] = ContextVar("debug_wanted", default=False)
 """Whether the running command shows tracebacks."""
 
-UNMET = 3
-"""Exit code of a negative answer (unstable, untrusted, infeasible); 1: error, 2: wrong option."""
+FAILED, MISUSED, UNMET, INTERRUPTED = 1, 2, 3, 130
+"""Exit codes: an error; a wrong option; the arm does not do what was asked; Ctrl-C.
+
+3 is that of every answer with a warning (the arm is unstable, has left its reference, some samples
+cannot be planned, the report is not trustworthy), and of errors that say what the arm cannot do.
+"""
+
+_UsageError = cast(type[typer.BadParameter], typer.BadParameter.__mro__[1])
+"""Base class of errors of usage, of which typer has no public name."""
 
 
 @cache
@@ -39,25 +48,33 @@ def console() -> Console:
     return Console(stderr=True)
 
 
-def answer(as_json: bool, as_dict: Callable[[], Json], *parts: object) -> None:
-    """Print an answer: its parts as text, or its numbers as strict JSON."""
-    if as_json:
-        from cdsm.support.format import plain
+def answer(
+    as_json: bool, as_dict: Callable[[], Json], *parts: object, warnings: Sequence[str] = ()
+) -> None:
+    """Print an answer, its warnings first: its parts as text, or its numbers as strict JSON.
 
-        told = as_dict()
+    Warnings end the command with exit code 3. So everything is written before it is told.
+    """
+    if as_json:
+        told: Json = {"warnings": warnings}
         for part in parts:
             if isinstance(part, Conditions):
-                told = part.to_dict() | told
-        typer.echo(json.dumps(plain(told), indent=1, allow_nan=False))
+                told |= part.to_dict()
+        _print_json(told | as_dict())
     else:
-        typer.echo("\n\n".join(map(str, parts)))
+        texts = (
+            "\n".join(line for line in str(part).splitlines() if line not in warnings)
+            for part in parts
+        )
+        typer.echo("\n".join([*warnings, "\n\n".join(texts)]))
+    if warnings:
+        raise typer.Exit(UNMET)
 
 
-def joints(arm: cdsm.Manipulator, q: Array) -> Json:
-    """Return joint coordinates q (..., nv) by joint name, for JSON."""
-    from cdsm.support.format import JointUnits
+def _print_json(told: Json) -> None:
+    from cdsm.support.format import plain
 
-    return JointUnits(arm.slides).to_dict(arm.joint_names, q)
+    typer.echo(json.dumps(plain(told), indent=1, allow_nan=False, default=str))
 
 
 def by_cable(arm: cdsm.Manipulator, values: Array) -> Json:
@@ -65,11 +82,15 @@ def by_cable(arm: cdsm.Manipulator, values: Array) -> Json:
     return dict(zip((cable.name for cable in arm.cables), values.tolist(), strict=True))
 
 
-def write_picture(path: Path | None, draw: str, *results: object, err: bool = True) -> None:
-    """Draw results with the function ``draw`` of :mod:`cdsm.plots`, if a path is given."""
+def write_picture(path: Path | None, draw: Callable[[], Figure]) -> None:
+    """Draw a figure and write it, if a path is given."""
     if path is not None:
-        figure = getattr(cdsm.plots, draw)(*results)
-        typer.echo(f"written: {cdsm.plots.save_figure(figure, path)}", err=err)
+        written(cdsm.plots.save_figure(draw(), path))
+
+
+def written(path: Path) -> None:
+    """Tell on the standard error that a file is written."""
+    typer.echo(f"written: {path}", err=True)
 
 
 def _show(
@@ -83,23 +104,43 @@ def _show(
 
 
 @contextmanager
-def reported() -> Iterator[None]:
-    """Turn an error into a message and exit code 1, Ctrl-C into 130; --debug changes nothing.
+def misuse_reported(as_json: bool) -> Iterator[None]:
+    """Turn an error of usage into JSON, if wanted, and exit code 2; else it is left to typer."""
+    try:
+        yield
+    except _UsageError as error:
+        if debug_wanted.get() or not as_json:
+            raise
+        _print_json({"error": "UsageError", "message": error.format_message(), "data": {}})
+        raise typer.Exit(MISUSED) from None
+
+
+@contextmanager
+def reported(as_json: bool) -> Iterator[None]:
+    """Turn an error into a message, or into JSON, and an exit code; --debug shows where it is.
 
     A warning of cdsm becomes one line, too.
     """
     try:
-        with warnings.catch_warnings():
+        with misuse_reported(as_json), warnings.catch_warnings():
             warnings.showwarning = partial(_show, warnings.showwarning)
             yield
-    # OSError: of the terminal or pipe
-    except (KeyboardInterrupt, cdsm.CdsmError, OSError) as error:
+    except KeyboardInterrupt:
         if debug_wanted.get():
             raise
-        if isinstance(error, KeyboardInterrupt):
-            console().print("interrupted: no file is half-written, and what --resume keeps stays")
-            raise typer.Exit(130) from None
-        console().print(
-            f"error: {error}", style="red", markup=False, highlight=False, soft_wrap=True
-        )
-        raise typer.Exit(1) from None
+        console().print("interrupted: no file is half-written, and what --resume keeps stays")
+        raise typer.Exit(INTERRUPTED) from None
+    # OSError: of the terminal or pipe
+    except (cdsm.CdsmError, OSError) as error:
+        if debug_wanted.get():
+            raise
+        message = in_options(str(error))
+        if as_json:
+            kind = type(error).__name__
+            _print_json({"error": kind, "message": message, "data": vars(error)})
+        else:
+            console().print(
+                f"error: {message}", style="red", markup=False, highlight=False, soft_wrap=True
+            )
+        cannot = cdsm.InfeasibleTension, cdsm.EquilibriumError, cdsm.UnreachableStiffness
+        raise typer.Exit(UNMET if isinstance(error, cannot) else FAILED) from None

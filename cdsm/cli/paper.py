@@ -17,9 +17,9 @@ _WIDE = 110
 
 
 def reproduce(
-    out: Annotated[Path, typer.Option(help="Folder for the figures and tables.")] = Path(
-        "reproduction"
-    ),
+    out: Annotated[
+        Path, typer.Option("--out", "-o", help="Folder for the figures and tables.")
+    ] = Path("reproduction"),
     kind: Annotated[
         Literal["pdf", "svg", "png"],
         typer.Option("--format", help="Kind of the figures; pdf and svg are vectors."),

@@ -36,7 +36,8 @@ def read_path(path: Path, arm: Manipulator) -> PathFile:
     """Read a path from a CSV file: a header, then one line per sample.
 
     The header names the columns and their units. Joint columns have the names of the joints of
-    the arm. Other columns are ignored. Lines that begin with # are comments.
+    the arm; joints without a column stay at 0. Other columns are ignored. Lines that begin with #
+    are comments.
     """
 
     def refuse(problem: str) -> NoReturn:
@@ -52,13 +53,19 @@ def read_path(path: Path, arm: Manipulator) -> PathFile:
             refuse(f"has two columns called {name}; give each once")
         found[name] = at, unit
 
-    def columns(wanted: dict[str, dict[str, float]]) -> Array | None:
-        """Read the columns of these names in SI; None if the file has none of them."""
+    def columns(wanted: dict[str, dict[str, float]], *, some: bool = False) -> Array | None:
+        """Read the columns of these names in SI; None if the file has none of them.
+
+        With ``some`` a missing column is zero.
+        """
         if not wanted.keys() & found.keys():
             return None
         values = []
         for name, known in wanted.items():
             at, unit = found.get(name, (-1, ""))
+            if some and at < 0:
+                values.append(np.zeros(len(table.rows) - 1))
+                continue
             if unit not in known:
                 fault = f"the column {name} has no unit that is known"
                 names = " or ".join(f"{name} [{unit}]" for unit in known)
@@ -67,7 +74,7 @@ def read_path(path: Path, arm: Manipulator) -> PathFile:
         return np.array(values).T
 
     kinds = [_LENGTH if slides else _ANGLE for slides in arm.slides]
-    angles = columns(dict(zip(arm.joint_names, kinds, strict=True)))
+    angles = columns(dict(zip(arm.joint_names, kinds, strict=True)), some=True)
     tips, target = columns(dict.fromkeys("xyz", _LENGTH)), columns({"target": _STIFFNESS})
     if (angles is None) == (tips is None):
         first = f"{arm.joint_names[0]} [{'mm' if arm.slides[0] else 'deg'}]"

@@ -11,8 +11,9 @@ import typer
 import cdsm
 from cdsm.cli import options
 from cdsm.cli.conditions import Conditions
-from cdsm.cli.options import ArmOptions, AsJson, MaxTension, MinTension, Picture, numbers
-from cdsm.cli.output import UNMET, Json, answer, by_cable, joints, write_picture
+from cdsm.cli.options import ArmOptions, AsJson, LoadOptions, MaxTension, MinTension, Picture
+from cdsm.cli.output import answer, write_picture, written
+from cdsm.cli.values import axis, numbers
 
 if TYPE_CHECKING:
     from cdsm.support.values import Array
@@ -20,8 +21,14 @@ if TYPE_CHECKING:
 
 def plan(
     arm: ArmOptions,
+    load: LoadOptions,
     direction: Annotated[
-        str, typer.Option(help="Along which the arm is to be so stiff.", metavar="X,Y,Z")
+        str,
+        typer.Option(
+            help="Along which the arm is to be so stiff: an axis such as z or -y, or a vector.",
+            metavar="AXIS|X,Y,Z",
+            autocompletion=options.directions,
+        ),
     ],
     target: Annotated[
         float | None,
@@ -32,9 +39,9 @@ def plan(
         Path | None,
         typer.Option(
             metavar="PATH.csv",
-            help="Instead of --angles, a line per sample. Columns, with the unit in brackets: the "
-            "joints in deg (mm where they slide), or x, y, z of the tip in mm; and, if wanted, "
-            "target in N/mm.",
+            help="Instead of --angles, a line per sample. Columns, with the unit in brackets: "
+            "joints in deg (mm where they slide; 0 if left out), or x, y, z of the tip in mm; and, "
+            "if wanted, target in N/mm.",
         ),
     ] = None,
     rate: Annotated[
@@ -42,11 +49,13 @@ def plan(
     ] = math.inf,
     min_tension: MinTension = 10.0,
     max_tension: MaxTension = math.inf,
-    wrench: options.Wrench = options.NO_WRENCH,
     out: Annotated[
         Path | None,
         typer.Option(
-            "--out", "-o", metavar="FILE.csv", help="Tensions and cable lengths to write, in SI."
+            "--out",
+            "-o",
+            metavar="FILE.csv",
+            help="Angles, tensions, lengths, stiffness to write.",
         ),
     ] = None,
     figure: Picture = None,
@@ -54,44 +63,45 @@ def plan(
 ) -> None:
     """Find the least tensions that make an arm as stiff as wanted, at a posture or along a path.
 
-    Exit code 3: some samples of the path cannot be planned; all that can is written all the same.
+    Exit code 0; 3 if no tensions reach the target, at a posture or at some samples of the path. The
+    other samples are written all the same.
     """
-    u = numbers("--direction", direction, 3)
-    bounds = min_tension, max_tension, numbers("--wrench", wrench, 6)
+    u = axis(direction) or numbers("--direction", direction, 3, "an axis, or X,Y,Z")
     if path is not None and angles is not None:
         raise typer.BadParameter("is of one posture; --path has its own.", param_hint="--angles")
     wanted = None if target is None else 1000.0 * target
-    drawn: tuple[object, ...]
     if path is not None:
         from cdsm.cli.path_file import read_path
 
         robot = arm.read()
         file = read_path(path, robot)
         targets = _one_target(wanted, file.target)
+        bounds = min_tension, max_tension, load.at_tip(robot)
         plan = cdsm.plan_path(
             robot, u, targets, *bounds, angles=file.angles, tips=file.tips, rate=rate
         )
+        if out is not None:
+            written(plan.write(out))
+        write_picture(figure, plan.plot)
+        missed = len(plan.target) - len(plan.planned)
+        warnings = [f"NOT REACHED at {missed} of {len(plan.target)} samples"] if missed else []
         conditions = Conditions(robot, (min_tension,))
-        answer(as_json, lambda: _path_numbers(plan), conditions, plan)
-        draw, drawn = "plot_path_plan", (plan,)
+        answer(as_json, plan.to_dict, conditions, plan, warnings=warnings)
     elif wanted is None:
         raise typer.BadParameter("give it, or --path.", param_hint="--target")
     elif math.isfinite(rate):
         raise typer.BadParameter("is of a path; give --path, too.", param_hint="--rate")
     else:
         pose = arm.at("0" if angles is None else angles)
+        bounds = min_tension, max_tension, load.at_tip(pose.arm)
         attainable = cdsm.stiffness_range(pose, u, *bounds)
         best = cdsm.plan_stiffness(pose, u, wanted, *bounds)
-        conditions = Conditions(pose.arm, (min_tension,))
-        answer(as_json, lambda: _numbers(best, attainable), conditions, attainable, best)
-        draw, drawn = "plot_stiffness_plan", (best, attainable)
         if out is not None:  # repeats the search as a path of one sample
-            plan = cdsm.plan_path(pose.arm, u, wanted, *bounds, angles=[pose.q])
-    if out is not None:
-        typer.echo(f"written: {plan.write_csv(out)}", err=as_json)
-    write_picture(figure, draw, *drawn, err=as_json)
-    if path is not None and plan.infeasible:
-        raise typer.Exit(UNMET)
+            written(cdsm.plan_path(pose.arm, u, wanted, *bounds, angles=[pose.q]).write(out))
+        write_picture(figure, lambda: best.plot(attainable))
+        conditions = Conditions(pose.arm, (min_tension,))
+        told = [attainable, best]
+        answer(as_json, lambda: attainable.to_dict() | best.to_dict(), conditions, *told)
 
 
 def _one_target(given: float | None, of_file: Array | None) -> float | Array:
@@ -105,49 +115,3 @@ def _one_target(given: float | None, of_file: Array | None) -> float | Array:
         f"{'neither was' if given is None else 'both were'} given.",
         param_hint="--target",
     )
-
-
-def _numbers(plan: cdsm.StiffnessPlan, attainable: cdsm.StiffnessRange) -> Json:
-    from cdsm.support.format import key
-
-    pose, arm = plan.tension.posture, plan.tension.posture.arm
-    return {
-        "direction": attainable.direction,
-        "low_N_per_m": attainable.low,
-        "high_N_per_m": attainable.high,
-        "target_N_per_m": plan.target,
-        "achieved_N_per_m": plan.achieved,
-        "tension_N": by_cable(arm, plan.tension.values),
-        "cable_length_m": by_cable(arm, pose.cable_lengths),
-        **joints(arm, pose.q),
-        key("margin", arm.stiffness_unit()): plan.stiffness.margin,
-        "efforts_N": plan.efforts,
-        "iterations": plan.iterations,
-    }
-
-
-def _path_numbers(plan: cdsm.PathPlan) -> Json:
-    return {
-        "cables": [cable.name for cable in plan.arm.cables],
-        "target_N_per_m": plan.target,
-        "planned": plan.planned,
-        "achieved_N_per_m": plan.achieved,
-        **joints(plan.arm, plan.angles),
-        "tensions_N": plan.tensions,
-        "cable_lengths_m": plan.cable_lengths,
-        "half_way": [
-            {
-                "after": between.index,
-                "target_N_per_m": between.target,
-                "achieved_N_per_m": between.achieved,
-                "misfit": between.misfit,
-                "reason": between.reason,
-            }
-            for between in plan.between
-        ],
-        "infeasible": [
-            {"index": sample.index, "status": sample.status, "reason": sample.reason}
-            for sample in plan.infeasible
-        ],
-        "iterations": plan.iterations,
-    }

@@ -12,14 +12,22 @@ import typer
 import cdsm
 from cdsm.cli import options
 from cdsm.cli.conditions import Conditions
-from cdsm.cli.options import ArmOptions, AsJson, joint_scales, numbers
+from cdsm.cli.options import ArmOptions, AsJson, LoadOptions
 from cdsm.cli.output import Json, answer
+from cdsm.cli.values import joint_scales, numbers
 from cdsm.sweeps.quantities import DEFAULT, QUANTITIES
 
 if TYPE_CHECKING:
     import xarray
 
     from cdsm.support.values import Array
+
+
+_POSES = "--grid, --path, --random"
+
+
+def _quantities() -> list[str]:
+    return list(QUANTITIES)
 
 
 @dataclass(frozen=True)
@@ -31,29 +39,31 @@ class PoseOptions:
         typer.Option(
             help="Joints with first and last angle and their number, or one angle, in degrees (mm "
             "where they slide); joints that are not named stay at 0.",
-            metavar="JOINT=LOW:HIGH:COUNT,JOINT=ANGLE,...",
+            metavar="JOINT=LOW:HIGH:N,...",
         ),
     ] = None
     path: Annotated[
         Path | None,
         typer.Option(
             help="Straight lines in joint space between these waypoints: a column for each joint, "
-            "headed by its name and unit, as in joint1_1 [deg].",
+            "headed by its name and unit, as in joint1_1 [deg]; joints without one stay at 0.",
             metavar="WAYPOINTS.csv",
         ),
     ] = None
-    count: Annotated[int | None, typer.Option(help="Postures along --path; default: its own.")] = (
-        None
-    )
+    count: Annotated[
+        int | None, typer.Option(help="Postures along --path; default: its own.", min=2)
+    ] = None
     random: Annotated[
-        int | None, typer.Option(help="So many Sobol points within the joint limits.")
+        int | None, typer.Option(help="So many Sobol points within the joint limits.", min=1)
     ] = None
     seed: Annotated[int | None, typer.Option(help="Of --random; 0.")] = None
 
     def read(self, arm: cdsm.Manipulator) -> cdsm.PoseSet:
         """Build the set of postures from its options."""
         if sum(given is not None for given in (self.grid, self.path, self.random)) != 1:
-            raise typer.BadParameter("give one of --grid, --path and --random.", param_hint="poses")
+            raise typer.BadParameter(
+                "give one of --grid, --path and --random.", param_hint="--grid, --path, --random"
+            )
         for option, value, needed, of in (
             ("--count", self.count, "--path", self.path),
             ("--seed", self.seed, "--random", self.random),
@@ -80,15 +90,20 @@ def sweep(
         Path, typer.Option("--out", "-o", help="File to write: .nc (NetCDF) or .csv, SI units.")
     ],
     poses: PoseOptions,
+    load: LoadOptions,
     min_tension: Annotated[
         str, typer.Option(help="Lower bound of all tensions [N], or several.", metavar="N,N,...")
     ] = "10",
     max_tension: options.MaxTension = math.inf,
     quantities: Annotated[
         str,
-        typer.Option(help=f"What to compute, of {', '.join(QUANTITIES)}.", metavar="NAME,NAME,..."),
+        typer.Option(
+            help=f"What to compute, of {', '.join(QUANTITIES)}; default: {', '.join(DEFAULT)}.",
+            metavar="NAME,NAME,...",
+            show_default=False,
+            autocompletion=_quantities,
+        ),
     ] = ",".join(DEFAULT),
-    wrench: options.Wrench = options.NO_WRENCH,
     resume: Annotated[
         Path | None,
         typer.Option(help="Folder to keep results in as they come; goes on from what is there."),
@@ -107,7 +122,7 @@ def sweep(
         wanted,
         minimum=low[0] if len(low) == 1 else low,
         maximum=max_tension,
-        wrench=numbers("--wrench", wrench, 6),
+        wrench=load.at_tip(robot),
         outputs=[name.strip() for name in quantities.split(",")],
         store=resume,
     )
@@ -119,33 +134,37 @@ def map_sweep(
     sweep: Annotated[
         Path, typer.Argument(metavar="SWEEP", help="Sweep to read: .nc, or a --resume folder.")
     ],
-    out: Annotated[Path, typer.Option("--out", "-o", help="Picture to write.", metavar="FILE.png")],
+    out: Annotated[
+        Path,
+        typer.Option("--out", "-o", help="Picture to write.", metavar="FILE.pdf|svg|png"),
+    ],
     quantity: Annotated[
         str,
         typer.Option(
-            help="What to show: softest, stiffest, anisotropy, margin, along, or another number."
+            help="What to show: softest, stiffest, anisotropy, margin, along, or another number.",
+            autocompletion=_quantities,
         ),
     ] = "softest",
     section: Annotated[
         str | None,
         typer.Option(
-            help="Show the tips within a slab: its normal, place and half thickness in mm.",
+            help="Show the tips within a slab: its normal (x, y or z), place and half thickness "
+            "in mm, as in y=0:20.",
             metavar="AXIS=PLACE:HALF",
         ),
     ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Colour the reachable workspace by a quantity of a sweep."""
-    from cdsm.support.files import write_file
-
     dataset = cdsm.read_sweep(sweep)
     slab = None
     if section is not None:
-        axis, _, rest = section.partition("=")
-        place, half = numbers("--section", rest.replace(":", " "), 2)
-        slab = (axis.strip(), place / 1000.0, half / 1000.0)
+        normal, _, rest = section.partition("=")
+        slab_in_mm = rest.replace(":", " ")
+        place, half = numbers("--section", slab_in_mm, 2, "AXIS=PLACE:HALF, in mm")
+        slab = (normal.strip(), place / 1000.0, half / 1000.0)
     figure = cdsm.plots.plot_map(dataset, quantity, section=slab)
-    _answer(as_json, dataset, write_file(out, figure.savefig))
+    _answer(as_json, dataset, cdsm.plots.save_figure(figure, out))
 
 
 def _grid(text: str, arm: cdsm.Manipulator) -> cdsm.GridPoses:
@@ -167,7 +186,7 @@ def _grid(text: str, arm: cdsm.Manipulator) -> cdsm.GridPoses:
             angles[name] = unit * np.linspace(given[0], given[1], int(given[2]))
         else:
             raise typer.BadParameter(
-                f"{part!r} given; a joint is JOINT=LOW:HIGH:COUNT or JOINT=ANGLE.",
+                f"{part!r} given; a joint is JOINT=LOW:HIGH:N or JOINT=ANGLE.",
                 param_hint="--grid",
             )
     return cdsm.GridPoses(angles, rest)
@@ -186,6 +205,8 @@ def _answer(
     if conditions is not None:
         listed = ", ".join(f"{count} {word}" for word, count in counts.items() if count)
         lines.insert(0, f"{dataset.attrs['title']}, {dataset.attrs['poses']}: {listed}")
-    numbers: Json = {"entries": counts, "written": [str(written)]}
+    told: Json = {"entries": counts, "written": [str(written)]}
     first = () if conditions is None else (conditions,)
-    answer(as_json, lambda: numbers, *first, "\n".join(lines))
+    unstable = counts.get("unstable", 0)
+    warnings = [f"UNSTABLE at {unstable} of {status.size} entries"] if unstable else []
+    answer(as_json, lambda: told, *first, "\n".join(lines), warnings=warnings)

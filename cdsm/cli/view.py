@@ -21,13 +21,14 @@ from cdsm.cli.options import (
     MaxTension,
     MinTension,
     Solver,
-    numbers,
+    WeightOptions,
 )
 from cdsm.cli.output import Json, answer
 
 
 def view(
     arm: ArmOptions,
+    weight: WeightOptions,
     angles: Annotated[str | None, ANGLES] = None,
     path: Annotated[
         Path | None,
@@ -39,9 +40,6 @@ def view(
     ] = None,
     min_tension: MinTension = 10.0,
     max_tension: MaxTension = math.inf,
-    force: Annotated[
-        str, typer.Option(help="At the tip, to begin with: FX,FY,FZ [N].", metavar="FX,FY,FZ")
-    ] = "0,0,0",
     sag: Annotated[
         bool, typer.Option("--sag", help="To begin with, let the force move the arm.")
     ] = False,
@@ -79,7 +77,7 @@ def view(
             q=None if pose is None else pose.q,
             minimum=min_tension,
             maximum=max_tension,
-            force=numbers("--force", force, 3),
+            force=weight.vector(robot),
             sag=sag,
             angles=motion.angles,
             tips=motion.tips,

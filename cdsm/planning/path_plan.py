@@ -28,6 +28,9 @@ if TYPE_CHECKING:
     import pandas
     from matplotlib.figure import Figure
 
+_NO_ANGLE = 1e-15
+"""A smaller joint coordinate [rad or m] of a path is rounding."""
+
 Status = Literal["posture", "balance", "elasticity", "singular", "stiffness", "rate"]
 
 
@@ -251,7 +254,9 @@ class PathPlan(ReadOnlyState):
             *(f"stiffness{number} [N/m]" for number in numbered),
         ]
         achieved = self.achieved.reshape(len(self.planned), targets.shape[1])
-        blocks = self.angles, self.tensions, self.cable_lengths, self.unstrained_lengths
+        # inverse kinematics leaves angles such as 1e-33, which are 0
+        angles = np.where(abs(self.angles) < _NO_ANGLE, 0.0, self.angles)
+        blocks = angles, self.tensions, self.cable_lengths, self.unstrained_lengths
         numbers = np.hstack([*blocks, self.tips, achieved]).tolist()
         rows: list[list[Any]] = [
             [i, "planned", *row, *targets[i].tolist(), ""]

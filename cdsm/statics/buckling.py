@@ -80,10 +80,15 @@ class CriticalTension(ReadOnlyState):
     def _verdict(self) -> str:
         low, high = self.examined
         if not self.stable:
-            return f"unstable at every lower bound from {low:.4g} N to {high:.4g} N"
+            return f"UNSTABLE at every lower bound from {low:.4g} N to {high:.4g} N"
         if math.isinf(self.minimum):
             return f"does not buckle at any lower bound up to {high:.4g} N"
         return f"buckles at a lower bound of {self.minimum:.4g} N"
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """That the arm is UNSTABLE at every lower bound; empty if it is stable at some."""
+        return () if self.stable else (self._verdict,)
 
     def plot(self) -> Figure:
         """Plot the smallest joint stiffness [N m/rad] over the lower bound of tension [N]."""
@@ -137,6 +142,11 @@ class CriticalLoad(ReadOnlyState):
     limit: Limit
     mode: Array
     tension: Array
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """That the arm is UNSTABLE without the load already; else empty."""
+        return () if self.factor else (f"UNSTABLE without the load: {self}".partition("\n")[0],)
 
     def to_dict(self) -> dict[str, object]:
         """Return load, factor and mode in SI for JSON, with units in the keys; inf as None."""

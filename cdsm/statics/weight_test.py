@@ -98,6 +98,20 @@ class WeightTest(ReadOnlyState):
         moved = float(np.linalg.norm(self.without.displacement))
         return moved > _DISPLACED * self.without.pose.arm.length
 
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """That the arm left its reference before the weight, or is neutral there; else empty."""
+        said = []
+        if self.settled_first:
+            moved = coordinates(1000.0 * self.without.displacement)
+            said.append(
+                "LEFT ITS REFERENCE: before the weight the arm did not stay there; the tip moved "
+                f"by {moved} mm, from where all this is measured"
+            )
+        if not self.without.stable:
+            said.append("NEUTRAL: before the weight, not every joint is brought back")
+        return tuple(said)
+
     @cached_property
     def loads(self) -> Array:
         """Magnitude of the force at each step (n,) [N]."""
@@ -178,17 +192,9 @@ class WeightTest(ReadOnlyState):
             f"linear {self.linear.stiffness / 1000.0:.4g} N/mm",
             f"(linear is {MODEL}; measured the secant over this weight)",
         ]
-        if self.settled_first:
-            moved = coordinates(1000.0 * self.without.displacement)
-            rows.append(
-                "before the weight the arm did not stay at its reference: the tip moved by "
-                f"{moved} mm, from where all this is measured"
-            )
         if self.without.at_limit:
             rows.append(f"before the weight at a stop: {', '.join(self.without.at_limit)}")
-        if not self.without.stable:
-            rows.append("before the weight the arm was NEUTRAL: not every joint is brought back")
-        return "\n".join(rows)
+        return "\n".join([*self.warnings, *rows])
 
 
 def weight_test(

@@ -88,7 +88,7 @@ def test_check_tells_the_report_of_the_api_and_writes_it_as_a_page(
     geometry: Path, tmp_path: Path
 ) -> None:
     page = tmp_path / "report.html"
-    options = ("check", geometry, "--angles", 8, "--min-tension", 40, "--html", page)
+    options = ("check", geometry, "--angles", 8, "--min-tension", 40, "--out", page)
     result = call(*options, "--json")
     assert result.exit_code == 0, result.output
     told = json.loads(result.stdout)
@@ -102,6 +102,7 @@ def test_check_tells_the_report_of_the_api_and_writes_it_as_a_page(
         "original_length": "unstrained",
         "friction": "none",
     }
+    assert told.pop("warnings") == []
     assert told == report.to_dict()
     assert page.read_text(encoding="utf-8") == report.to_html()
     assert [path.name for path in tmp_path.iterdir() if "report" in path.name] == ["report.html"]
@@ -188,7 +189,7 @@ def test_buckle_finds_tension_and_load_of_the_api(geometry: Path, tmp_path: Path
     assert f"{load.factor - 1.0:.4g}" in carried.output
     without = call("buckle", geometry, "--min-tension", "20")
     assert without.exit_code == 2
-    assert "under --load only" in without.stderr
+    assert "under --force or --mass" in without.stderr
 
 
 def test_plan_tells_range_and_plan_of_the_api(geometry: Path, tmp_path: Path) -> None:
@@ -297,7 +298,7 @@ def test_plan_asks_for_one_target_and_for_a_path_with_its_rate(
 def test_export_writes_what_the_api_writes(geometry: Path, tmp_path: Path) -> None:
     model, cables = tmp_path / "arm.xml", tmp_path / "cables.toml"
     result = call(
-        *("export", geometry, "--angles", 5, "--mjcf", model, "--cables-out", cables),
+        *("export", geometry, "--angles", 5, "--out", model, "--cables-out", cables),
         *("--min-tension", 20, "--rigidity", 48e3, "--damping", 0.1),
     )
     assert result.output.count("written: ") == 2
@@ -309,7 +310,7 @@ def test_export_writes_what_the_api_writes(geometry: Path, tmp_path: Path) -> No
     assert cdsm.read_cables(cables) == arm.cables
     nothing = call("export", geometry)
     assert nothing.exit_code == 2
-    assert "--mjcf, --cables-out or both" in nothing.stderr
+    assert "--out, --cables-out or both" in nothing.stderr
 
 
 def test_export_of_an_unstable_arm_says_so_first(geometry: Path, tmp_path: Path) -> None:
@@ -372,19 +373,14 @@ def test_wire_file_is_the_elasticity_of_the_cables(geometry: Path, tmp_path: Pat
         ),
         (("stiffness", "{geometry}", "--min-tension", "1"), "domain (2.2 N, 810 N]"),
         (("stiffness", "{geometry}", "--solver", "dapq"), "did you mean 'daqp'"),
-        (
-            ("stiffness", "{geometry}", "--max-tension", "10", "--wrench", "0,0,-90,0,0,0"),
-            "N m are",
-        ),
-        (("weigh", "{geometry}", "--force", "0,0,0"), "force: is zero"),
-        (("weigh", "{geometry}", "--force", "0,0,-1", "--steps", "0"), "steps"),
+        (("weigh", "{geometry}", "--force", "0,0,0"), "--force: is zero"),
+        (("weigh", "{geometry}", "--force", "0,0,-1", "--steps", "0"), "--steps: 0 given"),
         (("weigh", "{geometry}", "--force", "0,0,-900"), "810 N"),
-        (("buckle", "{geometry}", "--load", "0,0,0,0,0,0"), "wrench: is zero"),
-        (("plan", "{geometry}", "--direction", "0,0,0", "--target", "9"), "direction: is the"),
-        (("plan", "{geometry}", "--direction", "0,0,1", "--target", "9e9"), "the range is"),
+        (("buckle", "{geometry}", "--force", "0,0,0"), "wrench: is zero"),
+        (("plan", "{geometry}", "--direction", "0,0,0", "--target", "9"), "--direction: is the"),
         (("plan", "{geometry}", "--direction", "0,0,1", "--path", "no.csv"), "does not exist"),
         (("urdf", "{geometry}", "-o", "absent/arm.urdf"), "folder absent does not exist"),
-        (("check", "{geometry}", "--html", "absent/r.html"), "folder absent does not exist"),
+        (("check", "{geometry}", "--out", "absent/r.html"), "folder absent does not exist"),
         (("check", "{geometry}", "--min-tension", "1"), "domain (2.2 N, 810 N]"),
         (("reproduce", "--out", "{geometry}"), "cannot be made a folder"),
     ],
@@ -606,7 +602,8 @@ def test_first_line_says_what_was_computed_with(geometry: Path, tmp_path: Path) 
     def first(*arguments: object) -> str:
         result = call(*arguments)
         assert result.exit_code in (0, 3), result.output
-        return result.stdout.splitlines()[0]
+        lines = result.stdout.splitlines()
+        return next(line for line in lines[:2] if not line.startswith("UNSTABLE"))
 
     usual = "with wire 1x19-1.2mm; gravity 0, 0, -9.81 m/s²; least tension 10 N; frictionless"
     for command in (

@@ -66,6 +66,11 @@ def test_csv_holds_every_sample_with_its_units_bit_by_bit(tmp_path: Path) -> Non
         free = [float(row[f"{name} unstrained length [m]"]) for name in held]
         np.testing.assert_array_equal(free, plan.unstrained_lengths[k])
     assert not any("cable2_1 unstrained" in column for column in rows[0])
+    reached = [float(row["stiffness [N/m]"]) for row in (rows[0], rows[2])]
+    np.testing.assert_array_equal(reached, plan.achieved)
+    noisy = replace(plan, angles=np.full_like(plan.angles, 1.2e-33))
+    with noisy.write(path).open(encoding="utf-8", newline="") as file:
+        assert next(csv.DictReader(file))["joint1_1 [rad]"] == "0.0"
     with pytest.raises(cdsm.FileError, match="does not exist"):
         plan.write_csv(tmp_path / "absent" / "motors.csv")
 

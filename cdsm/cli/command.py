@@ -1,0 +1,61 @@
+"""How typer runs our commands: shared options, older names, errors as messages or JSON, help."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Callable
+from dataclasses import fields, is_dataclass
+from functools import wraps
+from typing import Any
+
+import typer.core
+
+from cdsm.cli.output import misuse_reported, reported
+from cdsm.cli.words import newer
+
+
+class Command(typer.core.TyperCommand):
+    """Command whose options may have older names, and whose errors of usage are JSON if asked."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Parse the arguments of the command."""
+        known = [newer(str(self.name), word) for word in args]
+        with misuse_reported("--json" in known):
+            return super().parse_args(ctx, known)
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """Write the help page; a unit such as [deg] is not taken for markup."""
+        for option in self.params:
+            text = getattr(option, "help", None)
+            if text:
+                option.help = re.sub(r"(?<!\\)\[(?=[a-z])", r"\\[", text)  # type: ignore[attr-defined]
+        super().format_help(ctx, formatter)
+
+
+def as_command(function: Callable[..., None]) -> Callable[..., None]:
+    """Return a function as typer needs it: one parameter per option, and errors as messages.
+
+    typer reads options only from the signature. Shared options are declared once, as fields of a
+    dataclass; here they replace the parameter of the function that is annotated with it.
+    """
+    groups: dict[str, Any] = {}
+    options: list[inspect.Parameter] = []
+    for each in inspect.signature(function, eval_str=True).parameters.values():
+        if is_dataclass(each.annotation):
+            groups[each.name] = each.annotation
+            options += inspect.signature(groups[each.name], eval_str=True).parameters.values()
+        else:
+            options.append(each)
+
+    @wraps(function)
+    def command(**given: Any) -> None:
+        for name, group in groups.items():
+            given[name] = group(**{field.name: given.pop(field.name) for field in fields(group)})
+        with reported(given["as_json"]):
+            function(**given)
+
+    command.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
+        [option.replace(kind=inspect.Parameter.KEYWORD_ONLY) for option in options]
+    )
+    return command

@@ -1,0 +1,74 @@
+"""Values of options: numbers, axes, joint coordinates."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import typer
+
+import cdsm
+
+if TYPE_CHECKING:
+    from cdsm.support.values import Array
+
+
+def joint_scales(arm: cdsm.Manipulator) -> Array:
+    """Return the command-line unit of each joint (nv,) in SI: one degree [rad] or one mm [m]."""
+    import numpy as np
+
+    from cdsm.support.format import JointUnits
+
+    return np.array([scale for _, scale in JointUnits(arm.slides).shown])
+
+
+def coordinates(text: str, arm: cdsm.Manipulator) -> list[float]:
+    """Return the joint coordinates of --angles (nv,) [degrees, or mm where a joint slides]."""
+    from cdsm.support.validation import one_of
+
+    if "=" in text:
+        named: dict[str, float] = {}
+        for part in text.replace(",", " ").split():
+            name, _, value = part.partition("=")
+            if one_of("joint", name, arm.joint_names) in named:
+                raise typer.BadParameter(f"{name} is given twice.", param_hint="--angles")
+            named[name] = numbers("--angles", value, 1, "JOINT=DEG")[0]
+        return [named.get(name, 0.0) for name in arm.joint_names]
+    given = numbers("--angles", text)
+    given = given * arm.nv if len(given) == 1 else given
+    if len(given) != arm.nv:
+        names = ", ".join(arm.joint_names)
+        raise typer.BadParameter(
+            f"{len(given)} given; give one angle, one for each of {names}, or some by name, such "
+            f"as {arm.joint_names[-1]}=10.",
+            param_hint="--angles",
+        )
+    return given
+
+
+def axis(text: str) -> tuple[float, float, float] | None:
+    """Return the unit vector of an axis such as ``-z``; None if the text is not an axis."""
+    from cdsm.support.validation import AXES
+
+    return AXES.get(text.strip())
+
+
+def gravity_vector(text: str) -> list[float]:
+    """Return gravity (3,) [m/s²]: a vector, or 9.81 along an axis."""
+    along = axis(text)
+    if along is not None:
+        return [9.81 * x for x in along]
+    return numbers("--gravity", text, 3, "an axis, or GX,GY,GZ")
+
+
+def numbers(option: str, text: str, count: int | None = None, form: str = "numbers") -> list[float]:
+    """Read numbers separated by commas or spaces, and check their count."""
+    try:
+        values = [float(word) for word in text.replace(",", " ").split()]
+    except ValueError as error:
+        raise typer.BadParameter(
+            f"{error}; separate numbers by commas.", param_hint=option
+        ) from None
+    if count is not None and len(values) != count:
+        counted = f"{len(values)} number{'s' * (len(values) != 1)} given; give {count}: {form}."
+        raise typer.BadParameter(counted, param_hint=option)
+    return values

@@ -1,0 +1,64 @@
+"""Words of the command line: options in messages of the library, older names of options."""
+
+from __future__ import annotations
+
+import re
+from typing import Final
+
+_OPTIONS: Final = {
+    "count": "--count",
+    "damping": "--damping",
+    "damping_ratio": "--damping-ratio",
+    "direction": "--direction",
+    "force": "--force",
+    "gauge_length": "--gauge-length",
+    "gravity": "--gravity",
+    "host": "--host",
+    "largest_force": "--largest-force",
+    "largest_tension": "--largest-tension",
+    "maximum": "--max-tension",
+    "minimum": "--min-tension",
+    "outputs": "--quantities",
+    "port": "--port",
+    "rate": "--rate",
+    "section": "--section",
+    "seed": "--seed",
+    "solver": "--solver",
+    "steps": "--steps",
+    "store": "--resume",
+    "target": "--target",
+    "wire": "--wire",
+    "wrench": "--wrench",
+}
+"""Option for each argument of the library that a message may name."""
+
+_PYTHON: Final = (
+    (", or, in Python, pass check_limits=False to compute beyond them.", "."),
+    ("Raise starts=, ask", "Ask"),
+    (", or start from a guess= nearer to it.", "."),
+)
+"""Remedies that the command line does not have, and what is left without them."""
+
+_NAMES: Final = "|".join(_OPTIONS)
+_ARGUMENT: Final = re.compile(rf"^({_NAMES})(?=: )|\b({_NAMES})=(?!\w)")
+"""An argument as messages name it: ``minimum=``, or at the beginning, ``minimum: ``."""
+
+OLDER: Final[dict[str, dict[str, str]]] = {
+    "urdf": {"--output": "--out"},
+    "check": {"--html": "--out"},
+    "export": {"--mjcf": "--out"},
+}
+"""Older names of the options of a command, which go with the next release."""
+
+
+def in_options(message: str) -> str:
+    """Return a message of the library in words of the command line: ``--min-tension``."""
+    for remedy, left in _PYTHON:
+        message = message.replace(remedy, left)
+    return _ARGUMENT.sub(lambda found: _OPTIONS[found[1] or found[2]], message)
+
+
+def newer(command: str, word: str) -> str:
+    """Return an argument of a command with an older name of an option replaced."""
+    name, equals, value = word.partition("=")
+    return OLDER.get(command, {}).get(name, name) + equals + value

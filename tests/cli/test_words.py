@@ -1,0 +1,302 @@
+"""The command line speaks its own words: options, units, warnings first, errors as JSON."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import cdsm
+from cdsm.cli import app
+from cdsm.cli.words import OLDER, in_options
+from tests.cli.test_commands import call, geometry
+
+__all__ = ["geometry"]  # a fixture
+
+STEEL = ("--wire", 48e3)
+SOFT = ("--wire", 1e9, "--spring", 0.2, "--min-tension", 60, "--angles", 5)
+
+
+def said(text: str) -> str:
+    """Return the words of a message that may be wrapped and framed."""
+    return " ".join(text.replace("│", " ").split())
+
+
+# --- warnings first -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("arguments", "first"),
+    [
+        (("stiffness", *SOFT), "UNSTABLE: the arm buckles"),
+        (("check", *SOFT), "NOT to be trusted"),
+        (("export", *SOFT, "--out", "{folder}/arm.xml"), "UNSTABLE: "),
+        (("weigh", *SOFT, "--mass", 0.1), "UNSTABLE: the arm buckles"),
+        (
+            ("sweep", *SOFT[:-2], "--grid", "joint1_1=5:6:2", "--out", "{folder}/s.csv"),
+            "UNSTABLE at 2 of 2 entries",
+        ),
+        (
+            ("buckle", *SOFT, "--force", "0,0,-1"),
+            "UNSTABLE at every lower bound",
+        ),
+        (
+            ("plan", *STEEL, "--direction", "z", "--path", "{folder}/path.csv", "--target", 1e6),
+            "NOT REACHED at 1 of 1 samples",
+        ),
+    ],
+)
+def test_danger_is_the_first_line_and_exit_code_3(
+    arguments: tuple[object, ...], first: str, geometry: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "path.csv").write_text("joint1_1 [deg]\n5\n", encoding="utf-8")
+    command, *rest = (str(each).format(folder=tmp_path) for each in arguments)
+    told = call(command, geometry, *rest, *(("--max-tension", 300) if command == "plan" else ()))
+    assert told.exit_code == 3, told.output
+    assert told.stdout.startswith(first)
+    as_json = call(command, geometry, *rest, "--json")
+    assert as_json.exit_code == 3
+    assert json.loads(as_json.stdout)["warnings"][0].startswith(first)
+
+
+def test_an_arm_that_leaves_its_reference_says_so_first(geometry: Path) -> None:
+    told = call("weigh", geometry, *SOFT, "--mass", 0.1).stdout
+    assert told.index("UNSTABLE") < told.index("it would hold") < told.index("LEFT ITS REFERENCE")
+    assert told.index("LEFT ITS REFERENCE") < told.index("with wire") < told.index("load [N]")
+    assert told.count("LEFT ITS REFERENCE") == told.count("UNSTABLE: the arm buckles") == 1
+
+
+def test_nothing_is_wrong_with_a_stable_arm(geometry: Path) -> None:
+    told = call("stiffness", geometry, *STEEL, "--json")
+    assert told.exit_code == 0
+    assert json.loads(told.stdout)["warnings"] == []
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error"),
+    [
+        (("stiffness", "--max-tension", 10, "--wrench", "0,0,-90,0,0,0"), "InfeasibleTension"),
+        (("plan", "--direction", "z", "--target", "9e9", "--max-tension", 99), "UnreachableStiff"),
+    ],
+)
+def test_what_the_arm_cannot_do_is_exit_code_3_too(
+    arguments: tuple[object, ...], error: str, geometry: Path
+) -> None:
+    command, *rest = arguments
+    told = call(command, geometry, *STEEL, *rest)
+    assert told.exit_code == 3
+    assert told.stderr.startswith("error: ")
+    as_json = call(command, geometry, *STEEL, *rest, "--json")
+    assert as_json.exit_code == 3
+    assert json.loads(as_json.stdout)["error"].startswith(error)
+
+
+# --- errors as JSON -------------------------------------------------------------------------
+
+
+def test_an_error_is_an_object_if_json_is_asked_for(geometry: Path) -> None:
+    told = call("stiffness", geometry, *STEEL, "--angles", "joint2_1=80", "--json")
+    assert told.exit_code == 1
+    assert told.stderr == ""
+    error = json.loads(told.stdout)
+    assert error["error"] == "JointLimitError"
+    assert error["message"].startswith("joint2_1 = 80° is outside -53.13° to 53.13°")
+    assert "Python" not in error["message"]
+    assert error["data"]["joints"] == ["joint2_1"]
+    np.testing.assert_allclose(error["data"]["angles"], [np.deg2rad(80.0)])
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [("--angles", "1,2"), ("--nothing",), ("--min-tension", "much"), ("--gravity", "up")],
+)
+def test_an_error_of_usage_is_an_object_too(wrong: tuple[str, ...], geometry: Path) -> None:
+    told = call("stiffness", geometry, *STEEL, *wrong, "--json")
+    assert told.exit_code == 2
+    error = json.loads(told.stdout)
+    assert error["error"] == "UsageError"
+    assert wrong[0] in error["message"]
+    plain = call("stiffness", geometry, *STEEL, *wrong)
+    assert plain.exit_code == 2
+    assert plain.stdout == ""
+    assert wrong[0] in plain.stderr
+
+
+# --- words and units ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("message", "translated"),
+    [
+        ("minimum: -1 N given", "--min-tension: -1 N given"),
+        ("Keep it inside (minimum=, maximum=).", "Keep it inside (--min-tension, --max-tension)."),
+        ("change minimum=, or", "change --min-tension, or"),
+        ("the minimum of count=3 stays", "the minimum of count=3 stays"),
+        ("A. Raise starts=, ask for one.", "A. Ask for one."),
+    ],
+)
+def test_messages_name_options(message: str, translated: str) -> None:
+    assert in_options(message) == translated
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (
+            ("stiffness", "--wire", "1x19-1.2mm", "--min-tension", 1),
+            "(--min-tension, --max-tension)",
+        ),
+        (("stiffness", *STEEL, "--min-tension", -1), "--min-tension: -1 N given"),
+        (("weigh", *STEEL, "--force", "0,0,-1", "--steps", 0), "--steps: 0 given"),
+        (("plan", *STEEL, "--direction", "z", "--target", 1e7, "--max-tension", 99), "1e+07 N/mm"),
+    ],
+)
+def test_messages_are_in_options_and_units_of_the_command_line(
+    arguments: tuple[object, ...], words: str, geometry: Path
+) -> None:
+    command, *rest = arguments
+    told = call(command, geometry, *rest)
+    assert words in said(told.stderr)
+    assert "minimum=" not in told.stderr
+
+
+@pytest.mark.parametrize(
+    ("command", "older"), [(command, name) for command in OLDER for name in OLDER[command]]
+)
+def test_older_names_of_options_still_work_and_are_not_shown(
+    command: str, older: str, geometry: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / {"urdf": "a.urdf", "check": "a.html", "export": "a.xml"}[command]
+    arm = (geometry, *(STEEL if command != "urdf" else ()))
+    assert call(command, *arm, f"{older}={out}").exit_code == 0
+    assert out.exists()
+    help_page = call(command, "--help").output
+    assert older not in help_page
+    assert "--out" in help_page
+
+
+def test_help_shows_units_and_whole_lists() -> None:
+    text = said(call("sweep", "--help").output)
+    assert "joint1_1 [deg]" in text
+    assert "tip_position, along" in text
+    assert "…" not in text
+    for command in app.registered_commands:
+        assert "\\[" not in call(command.name, "--help").output
+
+
+# --- values ---------------------------------------------------------------------------------
+
+
+def numbers(*arguments: object) -> dict[str, object]:
+    told = call("stiffness", *arguments, "--json")
+    assert told.exit_code == 0, told.output
+    found: dict[str, object] = json.loads(told.stdout)
+    found.pop("computed_with")
+    return found
+
+
+def test_angles_by_name_are_those_in_order(geometry: Path) -> None:
+    by_name = numbers(geometry, *STEEL, "--angles", "joint3_1=10, joint1_2=-5")
+    in_order = numbers(geometry, *STEEL, "--angles", "0,-5,0,0,10,0")
+    assert by_name == in_order
+    for wrong, words in (
+        ("joint1_1=1,joint1_1=2", "given twice"),
+        ("joint1_1=", "1: JOINT=DEG"),
+        ("joint1_1=1,2", "2"),
+    ):
+        assert words in said(call("stiffness", geometry, *STEEL, "--angles", wrong).stderr)
+    unknown = call("stiffness", geometry, *STEEL, "--angles", "joint9=1")
+    assert "no joint is called 'joint9'" in unknown.stderr
+
+
+def test_force_mass_and_wrench_add_up(geometry: Path) -> None:
+    one = numbers(geometry, *STEEL, "--angles", 5, "--force", "1,0,0", "--mass", 0.2)
+    other = numbers(geometry, *STEEL, "--angles", 5, "--wrench", f"1,0,{0.2 * -9.81!r},0,0,0")
+    assert one == other
+    both = numbers(
+        *(geometry, *STEEL, "--angles", 5, "--force", "1,0,0"),
+        *("--wrench", f"0,0,{0.2 * -9.81!r},0,0,0"),
+    )
+    assert both == other
+    afloat = call("weigh", geometry, *STEEL, "--mass", 0.2, "--gravity", "0,0,0")
+    assert afloat.exit_code == 2
+    assert "has no weight without gravity" in said(afloat.stderr)
+
+
+def test_a_weight_is_a_force_or_a_mass(geometry: Path) -> None:
+    mass = call("weigh", geometry, *STEEL, "--angles", 5, "--mass", 0.2, "--json")
+    force = call(
+        "weigh", geometry, *STEEL, "--angles", 5, "--force", f"0,0,{0.2 * -9.81!r}", "--json"
+    )
+    assert mass.stdout == force.stdout
+    neither = call("weigh", geometry, *STEEL)
+    assert neither.exit_code == 2
+    assert "give it or --mass" in said(neither.stderr)
+
+
+def test_axes_are_directions_and_gravity(geometry: Path) -> None:
+    for axis, vector in (("-y", "0,-9.81,0"), ("z", "0,0,9.81")):
+        along = numbers(geometry, *STEEL, "--angles", 5, "--gravity", axis)
+        assert along == numbers(geometry, *STEEL, "--angles", 5, "--gravity", vector)
+    asked = ("plan", geometry, *STEEL, "--angles", 8, "--max-tension", 400, "--json")
+    K = json.loads(call("stiffness", geometry, *STEEL, "--angles", 8, "--json").stdout)
+    target = K["along_N_per_m"][2] / 1000.0
+    by_name = call(*asked, "--direction", "-z", "--target", target)
+    assert by_name.exit_code == 0, by_name.output
+    by_vector = call(*asked, "--direction", "0,0,-1", "--target", target)
+    assert json.loads(by_name.stdout) == json.loads(by_vector.stdout)
+    wrong = call(*asked[:-1], "--direction", "up", "--target", 9)
+    assert wrong.exit_code == 2
+
+
+def test_joints_without_a_column_stay_at_zero(geometry: Path, tmp_path: Path) -> None:
+    path, out = tmp_path / "path.csv", tmp_path / "s.nc"
+    path.write_text("joint3_1 [deg]\n0\n10\n", encoding="utf-8")
+    told = call("sweep", geometry, *STEEL, "--path", path, "--out", out)
+    assert told.exit_code == 0, told.output
+    q = cdsm.read_sweep(out).q
+    np.testing.assert_allclose(np.rad2deg(q.sel(joint="joint3_1").values), [0.0, 10.0])
+    assert not q.drop_sel(joint="joint3_1").values.any()
+
+
+def test_section_says_what_is_missing(geometry: Path, tmp_path: Path) -> None:
+    out = tmp_path / "s.nc"
+    call("sweep", geometry, *STEEL, "--random", 4, "--out", out)
+    told = call("map", out, "--out", tmp_path / "m.png", "--section", "y=3")
+    assert told.exit_code == 2
+    assert "1 number given; give 2: AXIS=PLACE:HALF, in mm" in said(told.stderr)
+
+
+def test_figures_may_be_vectors(geometry: Path, tmp_path: Path) -> None:
+    for suffix, magic in (("pdf", b"%PDF"), ("svg", b"<?xml"), ("png", b"\x89PNG")):
+        figure = tmp_path / f"w.{suffix}"
+        weighed = call("weigh", geometry, *STEEL, "--angles", 5, "--mass", 0.2, "--figure", figure)
+        assert weighed.exit_code == 0, weighed.output
+        assert figure.read_bytes().startswith(magic)
+
+
+@pytest.mark.parametrize(
+    ("line", "offered"),
+    [
+        ("stiffness a.toml --solver d", "daqp"),
+        ("stiffness a.toml --wire 1", "1x19-1.2mm"),
+        ("plan a.toml --direction z", "z"),
+        ("map s.nc --quantity soft", "softest"),
+        ("export a.toml --actuators t", "tension"),
+    ],
+)
+def test_values_are_completed_where_there_are_few(line: str, offered: str) -> None:
+    from typer.testing import CliRunner
+
+    environment = {"_CDSM_COMPLETE": "complete_bash", "COMP_WORDS": f"cdsm {line}"}
+    environment["COMP_CWORD"] = str(len(line.split()))
+    told = CliRunner().invoke(app, [], env=environment, prog_name="cdsm")
+    assert offered in told.stdout.split()
+
+
+def test_verbose_shows_the_log(
+    geometry: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    asked = ("sweep", geometry, *STEEL, "--random", 4, "--out", tmp_path / "s.csv")
+    assert call("--verbose", *asked).exit_code == 0
+    assert "sweep of probe: 4 of 4 entries to compute" in caplog.text
