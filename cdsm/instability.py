@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 from cdsm.cable import Cable, serpentine_cables
 from cdsm.elasticity import Domain, Elasticity
 from cdsm.errors import CdsmError, GeometryError
-from cdsm.kernels.readings import single_margin
+from cdsm.kernels.read import read_margin
 from cdsm.posture import Posture
 from cdsm.support.format import enough, span
 from cdsm.support.values import Array, ReadOnlyState, frozen
@@ -114,7 +114,7 @@ def _remedies(K: Stiffness) -> Iterator[Remedy]:
     def margin(changed: Posture, tension: Array) -> float:
         """Smallest eigenvalue of K_θ of an arm at a posture under tensions (C,) [N]."""
         k = changed.arm._model.laws.stiffness(changed.cable_lengths, tension)
-        return single_margin(changed._joint_stiffness(tension, k, K.wrench)[-1])
+        return read_margin(changed._joint_stiffness(tension, k, K.wrench)[-1])
 
     def changed(cables: tuple[Cable, ...]) -> Posture:
         return arm.with_cables(cables).at(pose.q, check_limits=False)

@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike
 
 from cdsm.errors import InvalidInput, SingularStiffness
 from cdsm.kernels import readings
+from cdsm.kernels.read import read, read_margin
 from cdsm.posture import Posture
 from cdsm.shares import Shares
 from cdsm.support.format import MODEL, coordinates, key, plain
@@ -129,7 +130,7 @@ class Stiffness(ReadOnlyState):
         If an arm has sliding and turning joints, only its sign is independent of the unit of
         length.
         """
-        return readings.single_margin(self.joint)
+        return read_margin(self.joint)
 
     @cached_property
     def critical_direction(self) -> Array:
@@ -151,9 +152,9 @@ class Stiffness(ReadOnlyState):
         Raises:
             SingularStiffness: K_θ is singular: the arm is about to buckle.
         """
-        status, *_, compliance, _ = self._readings(self.joint, compliance=True)
+        status, found = self._read(self.joint, "compliance")
         self._refuse(status)
-        return frozen(compliance)
+        return frozen(found["compliance"].reshape(6, 6))
 
     @cached_property
     def cartesian(self) -> Array:
@@ -166,9 +167,9 @@ class Stiffness(ReadOnlyState):
             SingularStiffness: K_θ is singular, or the tip hardly moves in one direction. In the
                 second case the error names the direction; use :meth:`along` for other directions.
         """
-        status, *_, cartesian = self._readings(self.joint, cartesian=True)
+        status, found = self._read(self.joint, "cartesian")
         self._refuse(status, "the Cartesian stiffness matrix")
-        return frozen(cartesian)
+        return frozen(found["cartesian"].reshape(3, 3))
 
     def cartesian_in(self, directions: Iterable[Direction]) -> Array:
         """Compute (U C_vv Uᵀ)⁻¹ (n, n) [N/m]: force per tip displacement in a plane or along lines.
@@ -227,9 +228,9 @@ class Stiffness(ReadOnlyState):
             SingularStiffness: The tip hardly moves in one direction, so J⁺ omits this direction.
         """
         matrix: Array = getattr(self, one_of("stiffness term", term, get_args(Term)))
-        status, result, *_ = self._readings(matrix, pseudoinverse=True)
+        status, found = self._read(matrix, "pseudoinverse")
         self._refuse(status, "the pseudo-inverse reading")
-        return frozen(result)
+        return frozen(found["pseudoinverse"].reshape(3, 3))
 
     def shares(self, direction: Direction) -> Shares:
         """Compute the contribution of each cable's elasticity and tension to :meth:`along`.
@@ -459,10 +460,11 @@ class Stiffness(ReadOnlyState):
 
     def _along(self, u: Array) -> tuple[float, Array]:
         """Return stiffness along a unit direction [N/m] and joint motion per unit force (nv,)."""
-        status, _, along, motion, *_ = self._readings(self.joint, u[None])
-        if math.isnan(along[0]):
+        status, found = self._read(self.joint, "along", u[None])
+        stiffness = float(found["along"][0, 0, 0])
+        if math.isnan(stiffness):
             self._refuse(status)
-        return float(along[0]), motion[:, self.joint.shape[0] + 1]
+        return stiffness, found["motion"][0, :, 0, 0]
 
     @cached_property
     def _parts(self) -> Array:
@@ -470,24 +472,22 @@ class Stiffness(ReadOnlyState):
         parts = abs(self.active) + abs(self.passive) + abs(self.gravity) + abs(self.load)
         return frozen(parts)
 
-    def _readings(
-        self,
-        matrix: Array,
-        directions: Array = _NO_DIRECTIONS,
-        pseudoinverse: bool = False,
-        compliance: bool = False,
-        cartesian: bool = False,
-    ) -> tuple[int, Array, Array, Array, Array, Array]:
-        jacobian = self.posture.jacobian
-        return readings.single_readings(
-            matrix, self._parts, jacobian, directions, pseudoinverse, compliance, cartesian
+    def _read(
+        self, matrix: Array, name: str, directions: Array = _NO_DIRECTIONS
+    ) -> tuple[int, dict[str, Array]]:
+        """Return the status and a reading of K_θ, or of one of its terms."""
+        status = np.full((1, 1), readings.READ)
+        K, parts, JX = (
+            each[None, :, :, None] for each in (matrix, self._parts, self.posture.jacobian)
         )
+        found = read(K, parts, JX, directions, (name,), status, None)
+        return int(status[0, 0]), found
 
     def _refuse(self, status: int, what: str = "") -> None:
         """Raise an error if a reading does not exist; a named reading also needs a mobile tip."""
         if status == readings.READ:
             return
-        if what and self._readings(self.joint, pseudoinverse=True)[0] == readings.IMMOBILE:
+        if what and self._read(self.joint, "pseudoinverse")[0] == readings.IMMOBILE:
             u = frozen(np.linalg.svd(self.posture.jacobian[:3])[0][:, 2].copy())
             raise SingularStiffness(
                 f"{what} does not exist: the tip cannot move along {coordinates(u)}, where the "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from itertools import pairwise
 from typing import Any
 
@@ -14,6 +15,10 @@ from cdsm.batch.layout import OK, QUANTITIES, UNDECIDED, Codes, Flags
 from cdsm.cable_laws import CableLaws
 from cdsm.elasticity import Elasticity
 from cdsm.errors import ElasticityRangeError, InfeasibleTension, SolverError
+from cdsm.kernels.distribution import search_tensions
+from cdsm.kernels.read import read
+from cdsm.kernels.readings import IMMOBILE, READ, SINGULAR, UNREAD
+from cdsm.kernels.tension import NO_ARM
 from cdsm.kernels.tree import Indices
 from cdsm.manipulator import Manipulator
 from cdsm.support.status import Status
@@ -25,6 +30,12 @@ _WIDTH = 32
 
 _LONG = 2**15
 """Numbers for one posture from which a block has half the width."""
+
+_CACHE, _FEWEST = 2**16, 8
+"""Numbers of K_θ and P that are kept for the readings, and the least number of their blocks."""
+
+_CODES = np.array([OK, Status.INFEASIBLE, UNDECIDED], dtype=np.uint8)
+"""Status of each outcome of a search: OPTIMAL, INFEASIBLE, UNDECIDED."""
 
 
 class Evaluator:
@@ -107,6 +118,9 @@ class Evaluator:
         """Find the tensions of some postures, and then fill their status and output."""
         tension = np.empty((rows.size, len(self._arm.cables)))
         self._evaluate(rows, None, np.array([layout.TENSION]), found, tension)
+        left = np.flatnonzero(found == UNDECIDED)
+        if left.size:
+            tension[left], found[left] = self._search(rows[left])
         for r in np.flatnonzero(found == UNDECIDED):
             row = rows[r : r + 1]
             low, high, wrench = (
@@ -120,17 +134,59 @@ class Evaluator:
                 found[r] = Status.of(error) or Status.SOLVER_FAILED
         self._evaluate(rows, frozen(tension), self._wanted, found, out)
 
+    def _search(self, rows: Indices) -> tuple[Array, Codes]:
+        """Search the tensions of postures whose guess is not the optimum; return their codes."""
+        nv, cables = self._arm.nv, len(self._arm.cables)
+        needed = np.array([layout.JACOBIAN, layout.LENGTH_JACOBIAN, layout.GRAVITY_TORQUE])
+        out, found = np.empty((rows.size, (7 + cables) * nv)), np.zeros(rows.size, dtype=np.uint8)
+        self._evaluate(rows, self._nothing, needed, found, out)
+        JX, arms, g = np.split(out, [6 * nv, (6 + cables) * nv], axis=1)
+        torque, wrench = -g, self._of(self._wrench, rows)
+        for a in range(6):  # in the order of the kernel, for the same bits
+            torque += wrench[:, a : a + 1] * JX[:, a * nv : (a + 1) * nv]
+        J = np.where(abs(arms) >= NO_ARM * self._arm.length, arms, 0.0).reshape(-1, cables, nv)
+        low, high = (self._of(each, rows).copy() for each in self._bounds or ())
+        tension, outcome = np.empty((rows.size, cables)), np.empty(rows.size, dtype=np.intp)
+        search_tensions(self._arm._model.blocks, J, torque, low, high, tension, outcome)
+        return tension, _CODES[outcome]
+
     def _evaluate(
         self, rows: Indices, tension: Array | None, wanted: Indices, found: Codes, out: Array
     ) -> None:
         """Fill status and output of some postures; without tensions (b, C), distribute them."""
+        read = wanted[wanted > layout.JOINT]
+        if not read.size:
+            self._evaluate_blocks(rows, tension, wanted, found, out, 0)
+            return
+        # readings keep K_θ of several blocks: few enough for the cache, enough for few calls
+        size = self._block * max(_FEWEST, _CACHE // (2 * self._block * self._arm.nv**2))
+        for first in range(0, rows.size, size):
+            part = slice(first, min(first + size, rows.size))
+            given = None if tension is None else tension[part]
+            blocks = -(-(part.stop - first) // self._block)
+            kept = self._evaluate_blocks(rows[part], given, wanted, found[part], out[part], blocks)
+            self._read(*kept, read, found[part], out[part])
+
+    def _evaluate_blocks(
+        self,
+        rows: Indices,
+        tension: Array | None,
+        wanted: Indices,
+        found: Codes,
+        out: Array,
+        blocks: int,
+    ) -> tuple[Array, Array, Array]:
+        """Fill what is not a reading; return K_θ, P and J_X of so many blocks for the readings."""
         given = low = high = rigidity = self._nothing
         if tension is not None:
             given = tension
-            if self._asks:
+            if self._asks and tension.size:
                 rigidity = _rigidities(self._arm, tension, found == OK)
         elif self._bounds is not None:
             low, high = (self._of(each, rows) for each in self._bounds)
+        nv, width = self._arm.nv, self._block
+        K, parts = np.empty((2, blocks, nv, nv, width))
+        JX = np.empty((blocks, 6, nv, width))
         arguments: tuple[Any, ...] = (
             *self._arrays,
             self._of(self._q, rows),
@@ -139,14 +195,37 @@ class Evaluator:
             high,
             rigidity,
             self._of(self._wrench, rows),
-            self._directions,
             self._start,
-            wanted,
-            self._block,
+            wanted[wanted <= layout.JOINT],
+            wanted[-1] if wanted.size else 0,
+            width,
+            K,
+            parts,
+            JX,
             out,
             found,
         )
         evaluate_rows(*arguments)
+        return K, parts, JX
+
+    def _read(
+        self, K: Array, parts: Array, JX: Array, wanted: Indices, found: Codes, out: Array
+    ) -> None:
+        """Fill the wanted readings, and the status of postures that lack one."""
+        status = np.full(K.shape[0] * K.shape[-1], UNREAD)
+        status[: found.size][found == OK] = READ
+        blocks = status.reshape(K.shape[0], -1)
+        names = [QUANTITIES[number] for number in wanted]
+        values = read(K, parts, JX, self._directions, names, blocks, self._block)
+        state = status[: found.size]
+        for number, name in zip(wanted, names, strict=True):
+            value = values[name].reshape(K.shape[0], -1, self._block).swapaxes(1, 2)
+            place = self._place[name]
+            out[:, place] = value.reshape(status.size, -1)[: found.size]
+            singular = (state == SINGULAR) & (number > layout.PSEUDOINVERSE)
+            out[(state == UNREAD) | singular, place] = math.nan
+        found[state == SINGULAR] = Status.SINGULAR
+        found[state == IMMOBILE] = Status.IMMOBILE
 
     def _of(self, values: Array, rows: Indices) -> Array:
         """Return the values (b, n) of some postures; one row (n,) for all is repeated."""

@@ -1,4 +1,4 @@
-"""Fused kernel: it computes all requested quantities of many postures, block by block.
+"""Fused kernel: it computes all requested quantities of many postures up to K_θ, block by block.
 
 The physics is in :mod:`cdsm.kernels`. This kernel calls it without allocating memory per block.
 """
@@ -11,38 +11,28 @@ import numpy as np
 
 from cdsm.batch.layout import (
     ACTIVE,
-    ALONG,
     BEYOND_LIMITS,
     CABLE_LENGTHS,
     CABLE_STIFFNESS,
-    CARTESIAN,
     COINCIDENT_SITES,
-    COMPLIANCE,
     GRAVITY,
     GRAVITY_TORQUE,
-    IMMOBILE,
-    INFEASIBLE,
     JACOBIAN,
     JOINT,
     LENGTH_JACOBIAN,
     LOAD,
-    MARGIN,
     OK,
     OUTSIDE_ELASTICITY,
     PASSIVE,
-    PSEUDOINVERSE,
     RESIDUAL,
-    SINGULAR,
     TENSION,
     TIP,
     UNDECIDED,
     Codes,
 )
-from cdsm.kernels import distribution, readings
 from cdsm.kernels.bodies import Masses, gravity_torque, set_gravity_stiffness, tip_jacobian
 from cdsm.kernels.compiling import Index, Width, inlined, inner, lanes, threaded, upwards
 from cdsm.kernels.distribution import distribute, set_torque
-from cdsm.kernels.readings import Readings, Wanted, read_stiffness, workspace
 from cdsm.kernels.segments import (
     SHORTEST_SEGMENT,
     add_length_hessian,
@@ -81,14 +71,17 @@ def evaluate_rows(
     high: Array,
     rigidity: Array,
     wrench: Array,
-    directions: Array,
     start: Indices,
     wanted: Indices,
+    last: int,
     width: int,
+    joint: Array,
+    parts: Array,
+    jacobian: Array,
     out: Array,
     status: Codes,
 ) -> None:
-    """Fill the status (b,) and the requested quantities (b, …) of every posture.
+    """Fill the status (b,) and the requested quantities (b, …) of every posture, up to K_θ.
 
     Args:
         tree: The joints.
@@ -109,21 +102,18 @@ def evaluate_rows(
         rigidity: EA (1 + ε) (b, C) [N]; 0 under force control, negative outside the domain. (0, C)
             if it follows from ``constant`` and ``linear``.
         wrench: W (b, 6).
-        directions: Unit vectors (D, 3) of ``along``.
         start: Index in the record at which each quantity begins.
         wanted: Numbers of the requested quantities, rising.
+        last: Largest number of a quantity that must be computed.
         width: Number of postures in a block.
+        joint: K_θ of B blocks (B, nv, nv, W), for the readings; (0, nv, nv, W) if there are none.
+        parts: Sum of the magnitudes of the four terms, as ``joint``.
+        jacobian: J_X (B, 6, nv, W), as ``joint``.
         out: The requested quantities in one row per posture; NaN where they do not exist.
         status: On entry OK, or why no tensions were found; on return the status of the posture.
-            UNDECIDED: neither tensions nor a proof that there are none were found.
+            UNDECIDED: the guess of its tensions is not the optimum.
     """
     rows, nv, cables, bodies = q.shape[0], q.shape[1], series.shape[0], lowest.shape[0] + 1
-    last, is_wanted = 0, np.zeros(start.shape[0] - 1, dtype=np.bool_)
-    for number in wanted:
-        last, is_wanted[number] = number, True
-    read = Wanted(
-        is_wanted[MARGIN], is_wanted[PSEUDOINVERSE], is_wanted[COMPLIANCE], is_wanted[CARTESIAN]
-    )
 
     # the quantities: views of a record, one after the other; the posture is the last axis of all
     record = np.zeros((start[start.shape[0] - 1], width))
@@ -140,13 +130,6 @@ def evaluate_rows(
     k = _vector(record, start, CABLE_STIFFNESS)
     passive = _matrix(record, start, PASSIVE, nv, width)
     K = _matrix(record, start, JOINT, nv, width)
-    read_out = Readings(
-        _vector(record, start, MARGIN),
-        _matrix(record, start, PSEUDOINVERSE, 3, width),
-        _vector(record, start, ALONG),
-        _matrix(record, start, COMPLIANCE, 6, width),
-        _matrix(record, start, CARTESIAN, 3, width),
-    )
 
     # scratch, used again for every block
     angles, loads, stretched = (
@@ -159,11 +142,9 @@ def evaluate_rows(
     rotation, carried = np.empty((bodies, 3, 3, width)), np.empty((bodies, 7, width))
     guess, check = empty_guess(blocks, nv, cables, width), certificate(nv, cables, width)
     arms, torque = np.empty((cables, nv, width)), np.empty((nv, width))
-    work, six = workspace(nv, directions.shape[0], read, width), np.empty((6, width))
-    shortest = np.empty(width)
-    code, outcome = np.empty(width, dtype=np.intp), np.empty(width, dtype=np.intp)
-    known, slot = np.empty(width, dtype=np.intp), np.zeros(cables, dtype=np.intp)
-    parts = np.empty((nv, nv, width))
+    six, shortest = np.empty((6, width)), np.empty(width)
+    code, known = np.empty(width, dtype=np.intp), np.empty(width, dtype=np.intp)
+    slot, magnitudes = np.zeros(cables, dtype=np.intp), np.empty((nv, nv, width))
 
     for first in range(0, rows, width):
         _load(q, first, angles, width)
@@ -194,13 +175,9 @@ def evaluate_rows(
             set_torque(JX, g, loads, torque, width)
             if low.shape[0]:
                 _set_arms(J, smallest_arm, arms, width)
+                distribute(blocks, arms, torque, least, most, guess, check, F, width)
                 for w in lanes(width):
-                    outcome[w] = distribution.OPTIMAL if code[w] == OK else distribution.PASSED
-                distribute(blocks, arms, torque, least, most, guess, check, F, outcome, width)
-                for w in lanes(width):
-                    if outcome[w] == distribution.INFEASIBLE:
-                        code[w] = INFEASIBLE
-                    elif outcome[w] == distribution.UNDECIDED:
+                    if code[w] == OK and not (check.optimal[w] == 1.0 and guess.failed[w] < 0.0):
                         code[w] = UNDECIDED
             _note(code, LOAD, known, width)
         if last > TENSION:
@@ -224,21 +201,14 @@ def evaluate_rows(
             _clear(passive, width)
             add_passive_stiffness(J, k, passive, six, width)
             mirror(passive, width)
-            sum_terms(active, passive, gravity, load, K, parts, width)
+            sizes = parts[first // width] if parts.shape[0] else magnitudes
+            sum_terms(active, passive, gravity, load, K, sizes, width)
             _note(code, JOINT, known, width)
 
-        # readings of K_θ
-        if last > JOINT:
-            for w in lanes(width):
-                outcome[w] = readings.READ if code[w] == OK else readings.UNREAD
-            read_stiffness(K, parts, JX, directions, read, work, read_out, outcome, width)
-            for w in lanes(width):
-                if outcome[w] == readings.SINGULAR:
-                    code[w], known[w] = SINGULAR, PSEUDOINVERSE + 1
-                elif outcome[w] != readings.UNREAD:
-                    known[w] = CARTESIAN + 1
-                    if outcome[w] == readings.IMMOBILE:
-                        code[w] = IMMOBILE
+        # what the readings of K_θ are computed from
+        if joint.shape[0]:
+            _copy(K, joint[first // width], width)
+            _copy(JX, jacobian[first // width], width)
         _store(record, start, wanted, code, known, first, out, status)
 
 
@@ -303,6 +273,14 @@ def _is_beyond(q: Array, lowest: Array, highest: Array, w: Index) -> bool:
     for i in range(q.shape[0]):
         beyond = beyond or q[i, w] < lowest[i] or q[i, w] > highest[i]
     return beyond
+
+
+@inner
+def _copy(matrix: Array, block: Array, width: Width) -> None:
+    for i in upwards(0, matrix.shape[0]):
+        for j in upwards(0, matrix.shape[1]):
+            for w in lanes(width):
+                block[i, j, w] = matrix[i, j, w]
 
 
 @inner

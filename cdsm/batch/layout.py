@@ -22,7 +22,7 @@ OUTSIDE_ELASTICITY = int(Status.OUTSIDE_ELASTICITY)
 SINGULAR = int(Status.SINGULAR)
 IMMOBILE = int(Status.IMMOBILE)
 UNDECIDED = 255
-"""The kernel certified neither tensions nor infeasibility; ``distribute_tension`` decides."""
+"""The guess of the tensions is not the optimum: a search, or ``distribute_tension``, decides."""
 
 QUANTITIES = (
     "tip",

@@ -2,7 +2,8 @@
 
 min ½‖F‖²   so that   J_Lᵀ F = J_Xᵀ W − g   and   low ≤ F ≤ high.
 
-Most guesses of a block of postures are optimal. The others are searched one by one.
+Most guesses of a block of postures are optimal. The others are searched one by one, by a kernel
+that is compiled when it is first needed.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ import numpy as np
 
 from cdsm.kernels import active_set
 from cdsm.kernels.active_set import FOUND, IMPOSSIBLE, empty_state
-from cdsm.kernels.compiling import Index, Width, inlined, inner, lanes, upwards
+from cdsm.kernels.compiling import Width, inlined, inner, lanes, threaded, upwards
 from cdsm.kernels.serpentine_guess import (
     Blocks,
     Guess,
@@ -24,8 +25,8 @@ from cdsm.kernels.tension import Certificate, certificate, is_infeasible, set_op
 from cdsm.kernels.tree import Indices
 from cdsm.support.values import Array
 
-OPTIMAL, INFEASIBLE, UNDECIDED, PASSED = range(4)
-"""Outcome: certified tensions; a proof that there are none; neither; not asked."""
+OPTIMAL, INFEASIBLE, UNDECIDED = range(3)
+"""Outcome: certified tensions; a proof that there are none; neither."""
 
 
 @inner
@@ -51,24 +52,17 @@ def distribute(
     guess: Guess,
     certificate: Certificate,
     tension: Array,
-    outcome: Indices,
     width: Width,
 ) -> None:
-    """Fill the least tensions (C, W) and the outcome (W,); postures PASSED on entry are not asked.
+    """Guess the least tensions (C, W); they are if ``certificate`` is optimal, and none failed.
 
     J is J_L (C, nv, W), with moment arms of rounding set to zero; b is the torque to balance (nv,
-    W); ``low`` and ``high`` are the bounds (C, W). Without an outcome OPTIMAL, the tensions are
-    meaningless.
+    W); ``low`` and ``high`` are the bounds (C, W).
     """
     guess_tensions(blocks, J, b, low, high, guess, width)
     set_multipliers(blocks, J, guess.F, guess, np.intp(0), width)
     set_optimal(J, b, low, high, guess.F, guess.y, certificate, width)
     set_within(guess.F, low, high, tension, width)
-    for w in lanes(width):
-        if outcome[w] != PASSED:
-            outcome[w] = OPTIMAL
-            if not (certificate.optimal[w] == 1.0 and guess.failed[w] < 0.0):
-                outcome[w] = _search_one(blocks, J, b, low, high, tension, w)
 
 
 @inner
@@ -79,38 +73,49 @@ def set_within(F: Array, low: Array, high: Array, tension: Array, width: Width) 
             tension[c, w] = min(max(F[c, w], low[c, w]), high[c, w])
 
 
+@threaded
+def search_tensions(
+    blocks: Blocks,
+    J: Array,
+    b: Array,
+    low: Array,
+    high: Array,
+    tension: Array,
+    outcome: Indices,
+) -> None:
+    """Fill the tensions (r, C) and the outcome (r,) of postures whose guess is not the optimum.
+
+    J is (r, C, nv) and b (r, nv); ``low`` and ``high`` are (r, C): as in :func:`distribute`.
+    Without an outcome OPTIMAL, the tensions are meaningless.
+    """
+    for r in range(J.shape[0]):
+        outcome[r] = _search_one(blocks, J[r], b[r], low[r], high[r], tension[r])
+
+
 @inner
 def _search_one(
-    blocks: Blocks, J: Array, b: Array, low: Array, high: Array, tension: Array, w: Index
+    blocks: Blocks, rows: Array, torque: Array, lowest: Array, highest: Array, tension: Array
 ) -> int:
-    """Fill the tensions of posture w and return the outcome."""
-    count, nv = J.shape[0], J.shape[1]
-    rows, torque = np.empty((count, nv)), np.empty(nv)
-    lowest, highest = np.empty(count), np.empty(count)
-    for i in range(nv):
-        torque[i] = b[i, w]
-    for c in range(count):
-        lowest[c], highest[c] = low[c, w], high[c, w]
-        for i in range(nv):
-            rows[c, i] = J[c, i, w]
-    J_1, b_1 = rows.reshape(count, nv, 1), torque.reshape(nv, 1)
-    low_1, high_1 = lowest.reshape(count, 1), highest.reshape(count, 1)
-    one = J_1.shape[2]  # numba would compile kernels once more for a literal 1
+    """Fill the tensions (C,) of one posture and return the outcome."""
+    count, nv = rows.shape
+    J, b = rows.reshape(count, nv, 1), torque.reshape(nv, 1)
+    low, high = lowest.reshape(count, 1), highest.reshape(count, 1)
+    one = J.shape[2]  # numba would compile kernels once more for a literal 1
     guess, state = empty_guess(blocks, nv, count, one), empty_state(nv, count)
-    guess_tensions(blocks, J_1, b_1, low_1, high_1, guess, one)
+    guess_tensions(blocks, J, b, low, high, guess, one)
     if (
         blocks.row.shape[0]
         and guess.failed[0] >= 0.0
-        and is_provably_infeasible(blocks, J_1, b_1, low_1, high_1, guess, np.zeros((count, 1)))
+        and is_provably_infeasible(blocks, J, b, low, high, guess, np.zeros((count, 1)))
     ):
         return INFEASIBLE
     found = active_set.search(rows, torque, lowest, highest, state)
     if found == FOUND:
         F, y, check = state.F.reshape(count, 1), state.y.reshape(nv, 1), certificate(nv, count, one)
-        set_optimal(J_1, b_1, low_1, high_1, F, y, check, one)
+        set_optimal(J, b, low, high, F, y, check, one)
         if check.optimal[0] == 1.0:
             for c in range(count):
-                tension[c, w] = min(max(state.F[c], lowest[c]), highest[c])
+                tension[c] = min(max(state.F[c], lowest[c]), highest[c])
             return OPTIMAL
     if found == IMPOSSIBLE and is_infeasible(rows, torque, lowest, highest, state.y):
         return INFEASIBLE

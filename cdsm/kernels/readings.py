@@ -1,6 +1,8 @@
 """Kernels that compute readings of K_θ: stability margin, compliance and Cartesian stiffness.
 
-All arrays are those of a block of postures: the last axis is the posture.
+The arrays hold blocks of postures: the first axis is the block, the last one the posture in it. One
+posture is one block of one, with the width None. :mod:`cdsm.kernels.read` calls these kernels. Each
+is compiled when it is first asked for.
 
 With the linear rows J_v of J_X, and C = J_X K_θ⁻¹ J_Xᵀ with its linear part C_vv,
 
@@ -20,11 +22,10 @@ below REGULAR times the largest entry of D^-½ P D^-½.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
-from cdsm.kernels.compiling import Index, Width, compiled, inlined, inner, lanes, upwards
+from cdsm.kernels.compiling import Index, Width, inner, lanes, threaded, upwards
 from cdsm.kernels.linear_algebra import eliminate, singular_values, smallest_eigenvalue
 from cdsm.kernels.tree import Indices
 from cdsm.support.values import Array
@@ -52,188 +53,18 @@ READ, SINGULAR, IMMOBILE, UNREAD = range(4)
 """Status of the readings: all exist; K_θ⁻¹ does not exist; J_v⁺ does not exist; K_θ is unknown."""
 
 
-class Wanted(NamedTuple):
-    """Flags of the wanted readings; ``along`` is computed for every given direction."""
-
-    margin: bool
-    pseudoinverse: bool
-    compliance: bool
-    cartesian: bool
-
-
-class Readings(NamedTuple):
-    """Arrays for the readings of a block of W postures, filled by :func:`read_stiffness`.
-
-    Shapes: margin (1, W), pseudoinverse (3, 3, W), along (D, W), compliance (6, 6, W), cartesian
-    (3, 3, W).
-    """
-
-    margin: Array
-    pseudoinverse: Array
-    along: Array
-    compliance: Array
-    cartesian: Array
-
-
-class Workspace(NamedTuple):
-    """Scratch arrays for a block of W postures.
-
-    Attributes:
-        symmetric: The symmetric part of K_θ (nv, nv, W).
-        rows: Scratch of the eigenvalues and of short loops (4 nv + 10, W).
-        scale: D^-½ (nv, W).
-        largest: Largest entry of D^-½ P D^-½ (W,).
-        system: K_θ, a probing torque, and, if wanted, J_vᵀu of each direction, J_Xᵀ and Vᵀ.
-        left: U, then O (3, 3, W).
-        values: The singular values S (3, W).
-        right: V (3, nv, W).
-        image: K_θ Vᵀ (nv, 3, W).
-        inner: A matrix (3, 3, W), and right of it the unit matrix.
-    """
-
-    symmetric: Array
-    rows: Array
-    scale: Array
-    largest: Array
-    system: Array
-    left: Array
-    values: Array
-    right: Array
-    image: Array
-    inner: Array
-
-
-@inlined
-def workspace(nv: int, directions: int, wanted: Wanted, width: int) -> Workspace:
-    """Allocate scratch for the wanted readings."""
-    columns = directions + (6 if wanted.compliance else 0) + (3 if wanted.cartesian else 0)
-    return Workspace(
-        np.empty((nv, nv, width)),
-        np.empty((4 * nv + 10, width)),
-        np.empty((nv, width)),
-        np.empty(width),
-        np.empty((nv, nv + columns + (1 if columns > 0 else 0), width)),
-        np.empty((3, 3, width)),
-        np.empty((3, width)),
-        np.empty((3, nv, width)),
-        np.empty((nv, 3, width)),
-        np.empty((3, 6, width)),
-    )
-
-
-# --- one posture ----------------------------------------------------------------------------
-
-
-@compiled
-def single_readings(
-    K: Array,
-    parts: Array,
-    JX: Array,
-    directions: Array,
-    pseudoinverse: bool,
-    compliance: bool,
-    cartesian: bool,
-) -> tuple[int, Array, Array, Array, Array, Array]:
-    """Return the status and the wanted readings of one posture.
-
-    K is K_θ or, for the pseudoinverse, any of its terms (nv, nv). P is ``parts`` (nv, nv).
-
-    Returns:
-        Status, pseudoinverse (3, 3), along (D,), a matrix with the joint motions K_θ⁻¹ J_vᵀu in its
-        columns from nv + 1 on, compliance (6, 6) and cartesian (3, 3).
-    """
-    nv, count = K.shape[0], directions.shape[0]
-    wanted = Wanted(False, pseudoinverse, compliance, cartesian)
-    work, status = workspace(nv, count, wanted, 1), np.full(1, READ)
-    readings = Readings(
-        np.empty((1, 1)),
-        np.empty((3, 3, 1)),
-        np.empty((count, 1)),
-        np.empty((6, 6, 1)),
-        np.empty((3, 3, 1)),
-    )
-    block, magnitudes = K.reshape(nv, nv, 1), parts.reshape(nv, nv, 1)
-    jacobian = JX.reshape(6, nv, 1)
-    read_stiffness(block, magnitudes, jacobian, directions, wanted, work, readings, status, None)
-    return (
-        status[0],
-        readings.pseudoinverse.reshape(3, 3),
-        readings.along.reshape(count),
-        work.system.reshape(nv, work.system.shape[1]),
-        readings.compliance.reshape(6, 6),
-        readings.cartesian.reshape(3, 3),
-    )
-
-
-@compiled
-def single_margin(K: Array) -> float:
-    """Compute the smallest eigenvalue of the symmetric part of K (nv, nv)."""
-    nv, least = K.shape[0], np.empty(1)
-    symmetric = np.empty((nv, nv, 1))
-    set_symmetric(K.reshape(nv, nv, 1), symmetric, None)
-    smallest_eigenvalue(symmetric, np.empty((4 * nv + 10, 1)), least, None)
-    margin: float = least[0]
-    return margin
-
-
-# --- blocks of postures ---------------------------------------------------------------------
-
-
-@inlined
-def read_stiffness(
-    K: Array,
-    parts: Array,
-    JX: Array,
-    directions: Array,
-    wanted: Wanted,
-    work: Workspace,
-    readings: Readings,
-    status: Indices,
-    width: Width,
-) -> None:
-    """Fill the readings that are wanted and exist, and the status: READ, SINGULAR or IMMOBILE.
-
-    Postures that are UNREAD on entry stay so; their readings are meaningless.
-
-    If the tip is immobile, pseudoinverse and cartesian are NaN. If K_θ is singular, ``along`` is
-    NaN, or infinite in directions in which the tip cannot move; compliance and cartesian are
-    meaningless. K is K_θ (nv, nv, W), JX is J_X (6, nv, W), and directions are unit vectors u (D,
-    3). P is ``parts`` (nv, nv, W).
-    """
-    symmetric, rows, scale, largest, system, left, values, right, image, inner = work
-    nv, count = K.shape[0], directions.shape[0]
-    if wanted.margin:
-        set_symmetric(K, symmetric, width)
-        smallest_eigenvalue(symmetric, rows, readings.margin[0], width)
-    if wanted.cartesian or wanted.pseudoinverse:
-        _decompose(JX, left, values, right, rows, status, width)
-    if wanted.pseudoinverse:
-        _set_product(K, right, image, width)
-        _project(right, image, np.intp(0), inner, width)
-        _congruence(left, inner, np.intp(0), status, readings.pseudoinverse, width)
-    if system.shape[1] > nv:
-        _set_right_sides(JX, directions, right, wanted, system, rows, readings.along, width)
-        _equilibrate(K, parts, scale, largest, system, width)
-        eliminate(system, rows, width)
-        _rescale(K, scale, largest, system, rows, status, width)
-        _set_along(JX, directions, system, rows, status, readings.along, width)
-    if wanted.compliance:
-        _project(JX, system, nv + 1 + count, readings.compliance, width)
-    if wanted.cartesian:
-        _project(right, system, system.shape[1] - 3, inner, width)
-        for a in upwards(0, inner.shape[0]):
-            for c in upwards(0, inner.shape[0]):
-                for w in lanes(width):
-                    inner[a, 3 + c, w] = 1.0 if a == c else 0.0
-        eliminate(inner, rows, width)
-        for w in lanes(width):
-            if rows[0, w] == 0.0 and status[w] == READ:
-                status[w] = SINGULAR
-        _congruence(left, inner, np.intp(3), status, readings.cartesian, width)
+@threaded
+def set_margins(K: Array, margin: Array, width: Width) -> None:
+    """Fill the smallest eigenvalues (B, W) of the symmetric parts of K (B, nv, nv, W)."""
+    nv, side = K.shape[1], K.shape[3]
+    symmetric, scratch = np.empty((nv, nv, side)), np.empty((4 * nv + 10, side))
+    for b in range(K.shape[0]):
+        _set_symmetric(K[b], symmetric, width)
+        smallest_eigenvalue(symmetric, scratch, margin[b], width)
 
 
 @inner
-def set_symmetric(K: Array, symmetric: Array, width: Width) -> None:
+def _set_symmetric(K: Array, symmetric: Array, width: Width) -> None:
     """Fill the symmetric part (nv, nv, W) of K."""
     for i in upwards(0, K.shape[0]):
         for j in upwards(0, K.shape[0]):
@@ -241,24 +72,49 @@ def set_symmetric(K: Array, symmetric: Array, width: Width) -> None:
                 symmetric[i, j, w] = (K[i, j, w] + K[j, i, w]) / 2.0
 
 
+# --- the tip's mobility ---------------------------------------------------------------------
+
+
+@threaded
+def decompose(JX: Array, left: Array, right: Array, status: Indices, width: Width) -> None:
+    """Fill O (B, 3, 3, W) and V (B, 3, nv, W) of J_v; set the status where the tip is immobile.
+
+    JX is J_X (B, 6, nv, W). The status (B, W) changes only where it is READ.
+    """
+    scratch, S = np.empty((5, JX.shape[3])), np.empty((3, JX.shape[3]))
+    for b in range(JX.shape[0]):
+        _copy(JX[b], right[b], width)
+        singular_values(right[b], left[b], S, scratch, width)
+        factor, state = left[b], status[b]
+        for w in lanes(width):
+            smallest = min(S[0, w], S[1, w], S[2, w])
+            if state[w] == READ and not smallest > FLAT * max(S[0, w], S[1, w], S[2, w]):
+                state[w] = IMMOBILE
+        for i in upwards(0, factor.shape[0]):
+            for a in upwards(0, factor.shape[0]):
+                for w in lanes(width):
+                    factor[i, a, w] /= S[a, w]
+
+
 @inner
-def _decompose(
-    JX: Array, left: Array, S: Array, right: Array, rows: Array, status: Indices, width: Width
-) -> None:
-    """Fill O, S and V of J_v; set the status where the tip cannot move in all directions."""
+def _copy(JX: Array, right: Array, width: Width) -> None:
+    """Copy J_v (3, nv, W), the first rows of J_X."""
     for a in upwards(0, right.shape[0]):
         for i in upwards(0, JX.shape[1]):
             for w in lanes(width):
                 right[a, i, w] = JX[a, i, w]
-    singular_values(right, left, S, rows, width)
-    for w in lanes(width):
-        smallest = min(S[0, w], S[1, w], S[2, w])
-        if status[w] == READ and not smallest > FLAT * max(S[0, w], S[1, w], S[2, w]):
-            status[w] = IMMOBILE
-    for i in upwards(0, left.shape[0]):
-        for a in upwards(0, left.shape[0]):
-            for w in lanes(width):
-                left[i, a, w] /= S[a, w]
+
+
+@threaded
+def set_pseudoinverses(
+    K: Array, left: Array, right: Array, status: Indices, out: Array, width: Width
+) -> None:
+    """Fill O (V K Vᵀ) Oᵀ (B, 3, 3, W), or NaN where the tip is immobile."""
+    image, middle = np.empty((K.shape[1], 3, K.shape[3])), np.empty((3, 3, K.shape[3]))
+    for b in range(K.shape[0]):
+        _set_product(K[b], right[b], image, width)
+        _project(right[b], image, np.intp(0), middle, width)
+        _congruence(left[b], middle, np.intp(0), status[b], out[b], width)
 
 
 @inner
@@ -276,53 +132,37 @@ def _set_product(K: Array, right: Array, image: Array, width: Width) -> None:
 # --- K_θ⁻¹ ----------------------------------------------------------------------------------
 
 
-@inner
-def _set_right_sides(
-    JX: Array,
-    directions: Array,
-    right: Array,
-    wanted: Wanted,
-    system: Array,
-    rows: Array,
-    along: Array,
-    width: Width,
-) -> None:
-    """Fill the probing torque and the wanted columns of J_vᵀu, J_Xᵀ and Vᵀ, right of K_θ.
+@threaded
+def solve(
+    K: Array, parts: Array, system: Array, status: Indices, scale: Array, peak: Array, width: Width
+) -> int:
+    """Replace the columns B behind the first nv + 1 of the system by K_θ⁻¹ B; count the doubtful.
 
-    ``along`` (D, W) becomes inf where u moves no joint, else NaN.
+    K is K_θ and ``parts`` is P, (B, nv, nv, W). ``scale`` becomes D^-½ (B, nv, W). ``peak`` (B, W)
+    becomes the largest entry of D^-½ P D^-½ where K_θ may be singular, else 0.
     """
-    nv, torque, linear = np.uint64(JX.shape[1]), rows[0], rows[1]
-    first = nv + np.uint64(1)
-    columns, count = np.uint64(system.shape[1]), np.uint64(directions.shape[0])
-    for w in lanes(width):
-        linear[w] = 0.0
+    rows, largest, doubtful = np.empty((4, K.shape[3])), np.empty(K.shape[3]), 0
+    moved = np.empty(K.shape[3])
+    for b in range(K.shape[0]):
+        _set_probe(system[b], width)
+        _equilibrate(K[b], parts[b], scale[b], largest, system[b], width)
+        eliminate(system[b], rows, width)
+        _rescale(scale[b], system[b], moved, width)
+        for w in lanes(width):
+            certain = moved[w] * largest[w] < _DOUBT and rows[0, w] > 0.0
+            peak[b, w] = 0.0 if certain or status[b, w] == UNREAD else largest[w]
+            doubtful += 1 if peak[b, w] > 0.0 else 0
+    return doubtful
+
+
+@inner
+def _set_probe(system: Array, width: Width) -> None:
+    """Fill column nv with an irregular torque from 1 to 2 that excites almost every motion."""
+    nv = np.uint64(system.shape[0])
     for i in upwards(0, nv):
-        # an irregular torque from 1 to 2 that excites almost every motion
         probe = 1.0 + (0.6180339887498949 * np.intp(i)) % 1.0
         for w in lanes(width):
             system[i, nv, w] = probe
-        for a in upwards(0, 3):
-            for w in lanes(width):
-                linear[w] = max(linear[w], abs(JX[a, i, w]))
-        if wanted.compliance:
-            for c in upwards(0, JX.shape[0]):
-                for w in lanes(width):
-                    system[i, first + count + c, w] = JX[c, i, w]
-        if wanted.cartesian:
-            for c in upwards(0, right.shape[0]):
-                for w in lanes(width):
-                    system[i, columns - np.uint64(right.shape[0]) + c, w] = right[c, i, w]
-    for u in upwards(0, count):
-        x, y, z = directions[u, 0], directions[u, 1], directions[u, 2]
-        for w in lanes(width):
-            torque[w] = 0.0
-        for i in upwards(0, nv):
-            for w in lanes(width):
-                system[i, first + u, w] = x * JX[0, i, w] + y * JX[1, i, w] + z * JX[2, i, w]
-            for w in lanes(width):
-                torque[w] = max(torque[w], abs(system[i, first + u, w]))
-        for w in lanes(width):
-            along[u, w] = math.nan if torque[w] > UNMOVED * linear[w] else math.inf
 
 
 @inner
@@ -350,17 +190,9 @@ def _equilibrate(
 
 
 @inner
-def _rescale(
-    K: Array,
-    scale: Array,
-    largest: Array,
-    system: Array,
-    rows: Array,
-    status: Indices,
-    width: Width,
-) -> None:
-    """Scale the solutions back to K_θ⁻¹ B; set the status where K_θ is singular."""
-    nv, moved = np.uint64(K.shape[0]), rows[4]
+def _rescale(scale: Array, system: Array, moved: Array, width: Width) -> None:
+    """Scale the solutions back to K_θ⁻¹ B; fill the largest motion (W,) under the probe."""
+    nv = np.uint64(system.shape[0])
     for w in lanes(width):
         moved[w] = 0.0
     for i in upwards(0, nv):
@@ -369,51 +201,108 @@ def _rescale(
         for c in upwards(nv + np.uint64(1), system.shape[1]):
             for w in lanes(width):
                 system[i, c, w] *= scale[i, w]
-    for w in lanes(width):
-        # LAPACK's singular values take ten times as long as all the rest, and are rarely needed
-        certain = moved[w] * largest[w] < _DOUBT and rows[0, w] > 0.0
-        if status[w] != UNREAD and not certain and not _is_regular(K, scale, largest[w], w):
-            status[w] = SINGULAR
+
+
+@threaded
+def set_torques(JX: Array, directions: Array, system: Array, along: Array, width: Width) -> None:
+    """Fill the columns of J_vᵀu from nv + 1 on; ``along`` (B, D, W) is inf if u moves no joint.
+
+    Elsewhere it is NaN. ``directions`` are unit vectors u (D, 3).
+    """
+    scratch = np.empty((2, JX.shape[3]))
+    for b in range(JX.shape[0]):
+        _set_torques(JX[b], directions, system[b], scratch, along[b], width)
 
 
 @inner
-def _is_regular(K: Array, scale: Array, largest: float, w: Index) -> bool:
-    """Check whether the smallest singular value of one scaled K_θ is large enough."""
-    nv = K.shape[0]
-    if not largest < math.inf:  # a joint has zero stiffness in all terms
-        return False
-    scaled = np.empty((nv, nv))
-    for i in range(nv):
-        for j in range(nv):
-            scaled[i, j] = K[i, j, w] * scale[i, w] * scale[j, w]
-    regular: bool = np.linalg.svd(scaled)[1][-1] > REGULAR * largest
-    return regular
-
-
-@inner
-def _set_along(
-    JX: Array,
-    directions: Array,
-    system: Array,
-    rows: Array,
-    status: Indices,
-    along: Array,
-    width: Width,
+def _set_torques(
+    JX: Array, directions: Array, system: Array, scratch: Array, along: Array, width: Width
 ) -> None:
-    """Fill the stiffness along each direction, where the tip can move and K_θ is regular."""
-    compliance, first = rows[0], np.uint64(JX.shape[1] + 1)
+    torque, linear, nv = scratch[0], scratch[1], np.uint64(JX.shape[1])
+    first = nv + np.uint64(1)
+    for w in lanes(width):
+        linear[w] = 0.0
+    for i in upwards(0, nv):
+        for a in upwards(0, directions.shape[1]):
+            for w in lanes(width):
+                linear[w] = max(linear[w], abs(JX[a, i, w]))
     for u in upwards(0, directions.shape[0]):
         x, y, z = directions[u, 0], directions[u, 1], directions[u, 2]
         for w in lanes(width):
-            compliance[w] = 0.0
-        for i in upwards(0, JX.shape[1]):
+            torque[w] = 0.0
+        for i in upwards(0, nv):
             for w in lanes(width):
-                torque = x * JX[0, i, w] + y * JX[1, i, w] + z * JX[2, i, w]
-                compliance[w] += torque * system[i, first + u, w]
+                system[i, first + u, w] = x * JX[0, i, w] + y * JX[1, i, w] + z * JX[2, i, w]
+            for w in lanes(width):
+                torque[w] = max(torque[w], abs(system[i, first + u, w]))
         for w in lanes(width):
-            stiffness = 1.0 / compliance[w] if compliance[w] != 0.0 else math.inf
-            exists = math.isnan(along[u, w]) and status[w] != SINGULAR
-            along[u, w] = stiffness if exists else along[u, w]
+            along[u, w] = math.nan if torque[w] > UNMOVED * linear[w] else math.inf
+
+
+@threaded
+def set_along(
+    JX: Array, directions: Array, system: Array, status: Indices, along: Array, width: Width
+) -> None:
+    """Fill the stiffness along each direction where it is NaN and K_θ is not singular."""
+    compliance, first = np.empty(JX.shape[3]), np.uint64(JX.shape[2] + 1)
+    for b in range(JX.shape[0]):
+        for u in upwards(0, directions.shape[0]):
+            _set_compliance(JX[b], directions[u], system[b], first + u, compliance, width)
+            for w in lanes(width):
+                stiffness = 1.0 / compliance[w] if compliance[w] != 0.0 else math.inf
+                exists = math.isnan(along[b, u, w]) and status[b, w] != SINGULAR
+                along[b, u, w] = stiffness if exists else along[b, u, w]
+
+
+@inner
+def _set_compliance(
+    JX: Array, u: Array, system: Array, column: Index, compliance: Array, width: Width
+) -> None:
+    """Fill uᵀ C_vv u (W,) from a column of K_θ⁻¹ J_vᵀu."""
+    x, y, z = u[0], u[1], u[2]
+    for w in lanes(width):
+        compliance[w] = 0.0
+    for i in upwards(0, JX.shape[1]):
+        for w in lanes(width):
+            torque = x * JX[0, i, w] + y * JX[1, i, w] + z * JX[2, i, w]
+            compliance[w] += torque * system[i, column, w]
+
+
+@threaded
+def set_compliances(JX: Array, system: Array, first: int, out: Array, width: Width) -> None:
+    """Fill J_X K_θ⁻¹ J_Xᵀ (B, 6, 6, W); K_θ⁻¹ J_Xᵀ are six columns of the system."""
+    for b in range(JX.shape[0]):
+        _project(JX[b], system[b], first, out[b], width)
+
+
+@threaded
+def set_cartesians(
+    left: Array, right: Array, system: Array, status: Indices, out: Array, width: Width
+) -> None:
+    """Fill O (V K_θ⁻¹ Vᵀ)⁻¹ Oᵀ (B, 3, 3, W), or NaN where the tip is immobile.
+
+    K_θ⁻¹ Vᵀ are the last three columns of the system. Where V K_θ⁻¹ Vᵀ is singular, K_θ counts as
+    singular.
+    """
+    both, pivots = np.empty((3, 6, right.shape[3])), np.empty((4, right.shape[3]))
+    for b in range(right.shape[0]):
+        _project(right[b], system[b], system.shape[2] - 3, both, width)
+        _set_unit(both, width)
+        eliminate(both, pivots, width)
+        for w in lanes(width):
+            if pivots[0, w] == 0.0 and status[b, w] == READ:
+                status[b, w] = SINGULAR
+        _congruence(left[b], both, np.intp(3), status[b], out[b], width)
+
+
+@inner
+def _set_unit(both: Array, width: Width) -> None:
+    """Fill the unit matrix right of a matrix (n, 2 n, W)."""
+    n = np.uint64(both.shape[0])
+    for a in upwards(0, n):
+        for c in upwards(0, n):
+            for w in lanes(width):
+                both[a, n + c, w] = 1.0 if a == c else 0.0
 
 
 @inner
@@ -432,11 +321,11 @@ def _project(A: Array, B: Array, first: Index, out: Array, width: Width) -> None
 
 @inner
 def _congruence(
-    factor: Array, inner: Array, first: Index, status: Indices, out: Array, width: Width
+    factor: Array, middle: Array, first: Index, status: Indices, out: Array, width: Width
 ) -> None:
     """Fill out (3, 3, W) with O X Oᵀ, or NaN where the tip is immobile.
 
-    X is three columns of inner, and O is the factor.
+    X is three columns of the middle, and O is the factor.
     """
     for i in upwards(0, factor.shape[0]):
         for j in upwards(0, factor.shape[0]):
@@ -446,5 +335,5 @@ def _congruence(
                 for m in upwards(0, factor.shape[0]):
                     for w in lanes(width):
                         out[i, j, w] += (
-                            factor[i, k, w] * inner[k, np.uint64(first) + m, w] * factor[j, m, w]
+                            factor[i, k, w] * middle[k, np.uint64(first) + m, w] * factor[j, m, w]
                         )

@@ -11,6 +11,7 @@ import cdsm
 from cdsm.batch import evaluator
 from cdsm.batch.fused_kernel import evaluate_rows
 from cdsm.kernels import active_set, serpentine_guess, tension
+from cdsm.kernels.distribution import UNDECIDED, search_tensions
 from cdsm.support.values import Array
 from tests.batch.test_evaluation import custom_arm, one_hinge
 from tests.support.arms import STEEL, mixed_arm, random_arm
@@ -208,15 +209,20 @@ def test_rows_that_nothing_can_be_shown_of_go_to_the_single_posture(
     expected = cdsm.distribute_tensions(arm, q, 5.0, wrench=wrench)
     assert 5 < np.count_nonzero(expected.ok) < 55
 
-    decided = evaluate_rows
+    decided, searched = evaluate_rows, search_tensions
 
     def undecided(*arguments: Any) -> None:
-        *_, out, status = arguments
         decided(*arguments)
-        if len(arguments[12]) == 0:  # no tensions were given
-            status[:], out[:] = 255, np.nan
+        if len(arguments[12]) == 0 and len(arguments[13]):  # tensions were distributed
+            arguments[-1][:] = 255
+
+    def lost(*arguments: Any) -> None:
+        searched(*arguments)
+        *_, tension, outcome = arguments
+        tension[:], outcome[:] = np.nan, UNDECIDED
 
     monkeypatch.setattr(evaluator, "evaluate_rows", undecided)
+    monkeypatch.setattr(evaluator, "search_tensions", lost)
     found = cdsm.distribute_tensions(arm, q, 5.0, wrench=wrench)
     np.testing.assert_array_equal(found.status, expected.status)
     np.testing.assert_allclose(

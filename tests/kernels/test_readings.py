@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from cdsm.kernels import readings
+from cdsm.kernels.read import read, read_margin
 from cdsm.support.values import Array, frozen
 
 Matrices = tuple[Array, Array, Array, Array, Array]
@@ -21,18 +22,28 @@ def terms(seed: int, nv: int) -> Matrices:
     return frozen(a + p + g + w), a, p, g, w
 
 
-def read(matrices: Matrices, JX: Array, u: Array) -> tuple[int, Array, Array, Array]:
-    parts = np.sum([abs(term) for term in matrices[1:]], axis=0)
-    status, _, along, _, compliance, cartesian = readings.single_readings(
-        matrices[0], frozen(parts), frozen(JX), frozen(u), False, True, True
+def read_one(
+    K: Array, parts: Array, JX: Array, u: Array, *names: str
+) -> tuple[int, dict[str, Array]]:
+    """The status and some readings of one posture, without the axes of blocks."""
+    status = np.full((1, 1), readings.READ)
+    matrix, held, jacobian = (
+        np.ascontiguousarray(each)[None, :, :, None] for each in (K, parts, JX)
     )
-    return status, along, compliance, cartesian
+    found = read(matrix, held, jacobian, np.ascontiguousarray(u), names, status, None)
+    return int(status[0, 0]), {name: value[0, ..., 0] for name, value in found.items()}
+
+
+def all_of(matrices: Matrices, JX: Array, u: Array) -> tuple[int, Array, Array, Array]:
+    parts = np.sum([abs(term) for term in matrices[1:]], axis=0)
+    names = ("along", "compliance", "cartesian")
+    status, found = read_one(matrices[0], parts, JX, u, *names)
+    return status, found["along"], found["compliance"], found["cartesian"]
 
 
 def pseudoinverse_of(K: Array, JX: Array) -> tuple[int, Array]:
-    return readings.single_readings(K, K, frozen(JX), frozen(np.zeros((0, 3))), True, False, False)[
-        :2
-    ]
+    status, found = read_one(K, K, JX, np.zeros((0, 3)), "pseudoinverse")
+    return status, found["pseudoinverse"]
 
 
 @pytest.mark.parametrize("nv", [3, 4, 10, 25])
@@ -41,7 +52,7 @@ def test_readings_are_their_formulas(nv: int) -> None:
     K = matrices[0]
     rng = np.random.default_rng(nv)
     JX, u = rng.normal(size=(6, nv)), np.linalg.qr(rng.normal(size=(3, 3)))[0]
-    status, along, compliance, cartesian = read(matrices, JX, u)
+    status, along, compliance, cartesian = all_of(matrices, JX, u)
     C = JX @ np.linalg.inv(K) @ JX.T
     assert status == readings.READ
     np.testing.assert_allclose(compliance, C, rtol=0.0, atol=1e-11 * abs(C).max())
@@ -52,14 +63,14 @@ def test_readings_are_their_formulas(nv: int) -> None:
     status, pseudoinverse = pseudoinverse_of(K, JX)
     np.testing.assert_allclose(pseudoinverse, pinv.T @ K @ pinv, rtol=1e-9)
     margin = np.linalg.eigvalsh((K + K.T) / 2.0)[0]
-    assert readings.single_margin(K) == pytest.approx(margin, rel=1e-12)
+    assert read_margin(K) == pytest.approx(margin, rel=1e-12)
 
 
 def test_a_tip_that_cannot_move_has_no_matrix_and_is_infinitely_stiff_there() -> None:
     matrices = terms(0, 5)
     JX = np.random.default_rng(0).normal(size=(6, 5))
     JX[0] = 0.0
-    status, along, compliance, cartesian = read(matrices, JX, np.eye(3))
+    status, along, compliance, cartesian = all_of(matrices, JX, np.eye(3))
     assert status == readings.IMMOBILE
     assert along[0] == math.inf
     assert np.isfinite(along[1:]).all()
@@ -84,7 +95,7 @@ def test_what_is_singular_does_not_depend_on_the_units_of_a_joint(units: float) 
         plus, minus = (parts + scaled) / 2.0, (scaled - parts) / 2.0
         K, active, passive = (frozen(D @ each @ D) for each in (scaled, plus, minus))
         zero = frozen(np.zeros((4, 4)))
-        status, along, *_ = read((K, active, passive, zero, zero), JX, np.eye(3))
+        status, along, *_ = all_of((K, active, passive, zero, zero), JX, np.eye(3))
         assert (status == readings.SINGULAR) == singular
         assert np.isnan(along).all() == singular
 
@@ -92,5 +103,5 @@ def test_what_is_singular_does_not_depend_on_the_units_of_a_joint(units: float) 
 def test_a_joint_that_nothing_holds_is_singular() -> None:
     K = frozen(np.diag([1.0, 0.0, 2.0]))
     zero = frozen(np.zeros((3, 3)))
-    status, *_ = read((K, K, zero, zero, zero), np.ones((6, 3)), np.eye(3))
+    status, *_ = all_of((K, K, zero, zero, zero), np.ones((6, 3)), np.eye(3))
     assert status == readings.SINGULAR

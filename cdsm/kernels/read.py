@@ -1,0 +1,101 @@
+"""Readings of K_θ by name, of one posture or of blocks of postures."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection
+
+import numpy as np
+
+from cdsm.kernels import readings as kernels
+from cdsm.kernels.compiling import Width
+from cdsm.kernels.readings import REGULAR, SINGULAR
+from cdsm.kernels.tree import Indices
+from cdsm.support.values import Array
+
+
+def read(
+    K: Array,
+    parts: Array,
+    JX: Array,
+    directions: Array,
+    wanted: Collection[str],
+    status: Indices,
+    width: Width,
+) -> dict[str, Array]:
+    """Compute the wanted readings of blocks of postures; set their status.
+
+    Postures that are UNREAD stay so; their readings are meaningless. If the tip is immobile,
+    pseudoinverse and cartesian are NaN. If K_θ is singular, ``along`` is NaN, or infinite in
+    directions in which the tip cannot move; compliance and cartesian are meaningless.
+
+    Args:
+        K: K_θ or, for the pseudoinverse, any of its terms, (B, nv, nv, W).
+        parts: P (B, nv, nv, W), the sum of the magnitudes of the four terms.
+        JX: J_X (B, 6, nv, W).
+        directions: Unit vectors u (D, 3) of ``along``.
+        wanted: Of ``margin``, ``pseudoinverse``, ``along``, ``compliance``, ``cartesian``.
+        status: READ or UNREAD (B, W); on return also SINGULAR or IMMOBILE.
+        width: W, or None for one posture.
+
+    Returns:
+        margin (B, W), pseudoinverse (B, 3, 3, W), along (B, D, W), compliance (B, 6, 6, W),
+        cartesian (B, 3, 3, W); with along also ``motion`` (B, nv, D, W), K_θ⁻¹ J_vᵀu.
+    """
+    blocks, nv, _, side = K.shape
+    found: dict[str, Array] = {}
+    if "margin" in wanted:
+        found["margin"] = margin = np.empty((blocks, side))
+        kernels.set_margins(K, margin, width)
+    left, right = np.empty((blocks, 3, 3, side)), np.empty((blocks, 3, nv, side))
+    if "cartesian" in wanted or "pseudoinverse" in wanted:
+        kernels.decompose(JX, left, right, status, width)
+    if "pseudoinverse" in wanted:
+        found["pseudoinverse"] = matrix = np.empty((blocks, 3, 3, side))
+        kernels.set_pseudoinverses(K, left, right, status, matrix, width)
+    # behind K_θ and a probing torque: J_vᵀu, then J_Xᵀ, then Vᵀ
+    first = nv + 1 + ("along" in wanted) * len(directions)
+    columns = first + 6 * ("compliance" in wanted) + 3 * ("cartesian" in wanted)
+    if columns == nv + 1:
+        return found
+    system = np.empty((blocks, nv, columns, side))
+    if "along" in wanted:
+        found["along"] = along = np.empty((blocks, len(directions), side))
+        found["motion"] = system[:, :, nv + 1 : first]
+        kernels.set_torques(JX, directions, system, along, width)
+    if "compliance" in wanted:
+        system[:, :, first : first + 6] = JX.swapaxes(1, 2)
+    if "cartesian" in wanted:
+        system[:, :, -3:] = right.swapaxes(1, 2)
+    scale, peak = np.empty((blocks, nv, side)), np.empty((blocks, side))
+    if kernels.solve(K, parts, system, status, scale, peak, width):
+        _find_singular(K, scale, peak, status)
+    if "along" in wanted:
+        kernels.set_along(JX, directions, system, status, along, width)
+    if "compliance" in wanted:
+        found["compliance"] = matrix = np.empty((blocks, 6, 6, side))
+        kernels.set_compliances(JX, system, first, matrix, width)
+    if "cartesian" in wanted:
+        found["cartesian"] = matrix = np.empty((blocks, 3, 3, side))
+        kernels.set_cartesians(left, right, system, status, matrix, width)
+    return found
+
+
+def read_margin(K: Array) -> float:
+    """Compute the smallest eigenvalue of the symmetric part of one K (nv, nv)."""
+    margin = np.empty((1, 1))
+    kernels.set_margins(K[None, :, :, None], margin, None)
+    return float(margin[0, 0])
+
+
+def _find_singular(K: Array, scale: Array, peak: Array, status: Indices) -> None:
+    """Set the status of the doubtful postures whose K_θ is singular, by its singular values.
+
+    They take ten times as long as all the rest, and are rarely needed.
+    """
+    for b, w in np.argwhere(peak > 0.0):
+        if peak[b, w] < math.inf:  # else a joint has zero stiffness in all terms
+            scaled = K[b, :, :, w] * scale[b, :, None, w] * scale[b, :, w]
+            if np.linalg.svd(scaled)[1][-1] > REGULAR * peak[b, w]:
+                continue
+        status[b, w] = SINGULAR
