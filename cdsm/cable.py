@@ -143,6 +143,17 @@ class Cable:
         """Friction coefficient μ [-] of each hole that the cable passes, actuator side first."""
         return tuple(site.friction for site in self.sites[0 if self.lead > 0.0 else 1 : -1])
 
+    def with_friction(self, friction: float) -> Cable:
+        """Return the same cable with one friction coefficient μ [-] in all holes that it passes.
+
+        Raises:
+            InvalidInput: ``friction`` is negative, above 2, or not a number.
+        """
+        sites, passed = list(self.sites), range(0 if self.lead > 0.0 else 1, len(self.sites) - 1)
+        for i in passed:
+            sites[i] = replace(sites[i], friction=friction)
+        return replace(self, sites=tuple(sites))
+
     def elongation(self, tension: ArrayLike, free_length: float) -> Array:
         """Compute Δl = l_0 ε(F) + ΔF/k_series [m], from the low end of the elasticity's domain.
 

@@ -256,7 +256,7 @@ class Manipulator(Printed):
 
     @property
     def has_friction(self) -> bool:
-        """Whether a cable has friction in a hole; only ``cdsm.friction`` takes it into account."""
+        """Whether a cable has friction in a hole; most answers leave it out, and say so."""
         return any(any(cable.friction) for cable in self.cables)
 
     @property
@@ -330,6 +330,14 @@ class Manipulator(Printed):
             CableError: Two cables have the same name, or a cable is on an unknown link.
         """
         return self._replace(cables=_checked_cables(cables))
+
+    def with_friction(self, friction: float) -> Manipulator:
+        """Return the same arm with one friction coefficient μ [-] in all holes.
+
+        Raises:
+            InvalidInput: ``friction`` is negative, above 2, or not a number.
+        """
+        return self._replace(cables=tuple(cable.with_friction(friction) for cable in self.cables))
 
     def with_gravity(self, gravity: ArrayLike) -> Manipulator:
         """Return the same arm under another gravity (3,) [m/s²], in base axes.

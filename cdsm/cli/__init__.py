@@ -15,6 +15,7 @@ import typer
 import cdsm
 from cdsm.cli.arm import check, export, stiffness, urdf
 from cdsm.cli.command import Command, as_command
+from cdsm.cli.cycle import cycle
 from cdsm.cli.loads import buckle, weigh
 from cdsm.cli.new import new
 from cdsm.cli.output import debug_wanted
@@ -64,7 +65,7 @@ def main(
 
 
 _ALL = (
-    *(new, urdf, stiffness, check, weigh, buckle, plan, sweep, map_sweep),
+    *(new, urdf, stiffness, check, weigh, cycle, buckle, plan, sweep, map_sweep),
     *(view, fit, export, reproduce, warm),
 )
 for command in _ALL:

@@ -21,10 +21,12 @@ class Conditions:
     Attributes:
         arm: The arm.
         minimum: Lower bounds of all tensions that were asked for [N].
+        friction: Whether the answer takes the friction of the arm into account.
     """
 
     arm: cdsm.Manipulator
     minimum: tuple[float, ...] = ()
+    friction: bool = False
 
     def __str__(self) -> str:
         x, y, z = self.arm.gravity.tolist()
@@ -36,8 +38,18 @@ class Conditions:
                 words[-1] += f" (cables of their own up to {own:g} N)"
         if self.arm.original_length != "unstrained":
             words.append("stretched lengths")
-        words.append("friction of its holes left out" if self.arm.has_friction else "frictionless")
+        words.append(self._friction)
         return f"with {'; '.join(words)}\n{self.arm}"
+
+    @property
+    def _friction(self) -> str:
+        if not self.arm.has_friction:
+            return "frictionless"
+        if not self.friction:
+            return "friction of its holes left out"
+        found = [mu for cable in self.arm.cables for mu in cable.friction]
+        low, high = min(found), max(found)
+        return f"friction {low:g}" + (f" to {high:g}" if high > low else "")
 
     @property
     def wire(self) -> str:
@@ -67,6 +79,8 @@ class Conditions:
                 "gravity_m_per_s2": self.arm.gravity,
                 "least_tension_N": list(self.minimum),
                 "original_length": self.arm.original_length,
-                "friction": "left out" if self.arm.has_friction else "none",
+                "friction": ("included" if self.friction else "left out")
+                if self.arm.has_friction
+                else "none",
             }
         }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from typing import Annotated
 
@@ -36,7 +37,8 @@ def weigh(
     """Hang a weight at the tip with the motors locked, and see how far it goes (Eq. 20).
 
     --force or --mass is the weight; --wrench is what the arm carries before. Exit code 0; 3 if the
-    arm does not stay at its posture without the weight, or buckles under it.
+    arm does not stay at its posture without the weight, or buckles under it. With --friction, it
+    also says which weights measure which stiffness.
     """
     if not weight.given:
         raise typer.BadParameter("give it or --mass: the weight.", param_hint="--force")
@@ -44,8 +46,9 @@ def weigh(
     tension = tensions.distribute(pose, wrench_of(wrench))
     test = cdsm.weight_test(pose, tension, weight.vector(pose.arm), steps=steps)
     write_picture(figure, test.plot)
-    loaded = f"at the full load:\n{test.loaded[-1]}"
-    conditions = tensions.conditions(pose.arm)
+    without = " without friction" if pose.arm.has_friction else ""
+    loaded = f"at the full load{without}:\n{test.loaded[-1]}"
+    conditions = dataclasses.replace(tensions.conditions(pose.arm), friction=True)
     warnings = (*cdsm.stiffness(pose, tension).warnings, *test.warnings)
     answer(as_json, test.to_dict, conditions, test, loaded, warnings=warnings)
 

@@ -112,6 +112,10 @@ class ArmOptions:
             help="Continue the wires below their laws: constant rigidity down to 0 N, then slack.",
         ),
     ] = False
+    friction: Annotated[
+        float | None,
+        _arm_option(help="Friction coefficient in all holes; default: what the files say, or 0."),
+    ] = None
     gravity: Annotated[
         str | None,
         _arm_option(
@@ -140,6 +144,8 @@ class ArmOptions:
                 for cable in arm.cables
             ]
             arm = arm.with_cables(continued)
+        if self.friction is not None:
+            arm = arm.with_friction(self.friction)
         if self.gravity is not None:
             arm = arm.with_gravity(gravity_vector(self.gravity))
         return arm

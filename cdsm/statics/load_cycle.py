@@ -81,12 +81,8 @@ def load_cycle(
     share = scalar("accuracy", accuracy)
     if not _LEAST <= share <= _MOST:
         raise InvalidInput("accuracy", f"{share:g} given; {_LEAST:g} to {_MOST:g} is needed.")
-    require_between_stops(pose)
-    LoadedArm(pose, F, W)  # refuses a spring that leaves no wire
-    arm, chains = pose.arm, pose.segments.chains
-    start = np.searchsorted(chains.cable, np.arange(len(arm.cables) + 1))
-    forced = np.array([cable.control == "force" for cable in arm.cables])
-    resting = np.where(forced, F, 0.0)
+    loading = slow_loading(pose, F, W, share)
+    forced, resting = loading.forced, np.where(loading.forced, F, 0.0)
     commands = np.tile(resting, (len(loads), 1)) if motors is None else _commands(motors, forced)
     if commands.shape != (len(loads), F.size):
         raise InvalidInput(
@@ -94,8 +90,6 @@ def load_cycle(
             f"shape {commands.shape} given, ({len(loads)}, {F.size}) needed: for each load one "
             "command per cable.",
         )
-    problem = ChainProblem(arm.cables, start, F, arm.original_length == "unstrained")
-    loading = SlowLoading(problem, start, stops(pose), forced, pose, share)
     state, none = loading.begin(F, W), frozen(np.zeros(pose.q.size))
     history = []
     for k, (wrench, command) in enumerate(track(tuple(zip(loads, commands, strict=True)), "loads")):
@@ -105,6 +99,17 @@ def load_cycle(
         _require_domains(loading, state, k)
         history.append((state, passage))
     return _labelled(pose, F, loads, commands, history)
+
+
+def slow_loading(pose: Posture, tension: Array, wrench: Array, accuracy: float) -> SlowLoading:
+    """Return an arm that is ready to be loaded, from checked arguments."""
+    require_between_stops(pose)
+    LoadedArm(pose, tension, wrench)  # refuses a spring that leaves no wire
+    arm = pose.arm
+    start = np.searchsorted(pose.segments.chains.cable, np.arange(len(arm.cables) + 1))
+    forced = np.array([cable.control == "force" for cable in arm.cables])
+    problem = ChainProblem(arm.cables, start, tension, arm.original_length == "unstrained")
+    return SlowLoading(problem, start, stops(pose), forced, pose, accuracy)
 
 
 def _commands(motors: ArrayLike, forced: NDArray[np.bool_]) -> Array:

@@ -2,22 +2,29 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cdsm.errors import InvalidInput
 from cdsm.friction.stuck import assemble_segments
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Friction, Stiffness
-from cdsm.support.tidy import dataset
+from cdsm.support.extras import need
+from cdsm.support.files import as_path, write_file
+from cdsm.support.format import plain
+from cdsm.support.tidy import data_frame, dataset
 from cdsm.support.validation import whole_number
 from cdsm.support.values import Array, ReadOnlyState, frozen
 
 if TYPE_CHECKING:
+    import pandas
     import xarray
     from matplotlib.figure import Figure
 
@@ -158,6 +165,58 @@ class LoadHistory(ReadOnlyState):
         }
         title = f"slow loading of {arm.name}, with friction in the holes"
         return dataset(variables, labels, title=title).assign_coords(of_holes)
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """Return a table with a row per load: wrench, displacement, sliding holes, energies.
+
+        Raises:
+            MissingExtra: pandas is not installed.
+        """
+        loads, moved = self.wrenches.T, self.displacement.T
+        columns: dict[str, NDArray[Any]] = {
+            **{f"force {axis} [N]": force for axis, force in zip("xyz", loads[:3], strict=True)},
+            **{f"moment {axis} [N m]": part for axis, part in zip("xyz", loads[3:], strict=True)},
+            **{f"displacement {axis} [m]": way for axis, way in zip("xyz", moved, strict=True)},
+            "sliding holes": np.count_nonzero(self.sliding, axis=1),
+            "load work [J]": self.load_work,
+            "motor work [J]": self.motor_work,
+            "stored [J]": self.stored,
+            "dissipated [J]": self.dissipated,
+        }
+        for cable, T in zip(self.reference.arm.cables.names, self.tensions, strict=True):
+            columns |= {f"{cable} segment {j + 1} [N]": own for j, own in enumerate(T.T)}
+        return data_frame(columns, "load", np.arange(1, len(self.tip) + 1))
+
+    def to_dict(self) -> dict[str, object]:
+        """Return loads, displacements, sliding holes and energies in SI for JSON, with units."""
+        numbers = {
+            "wrenches_N_and_Nm": self.wrenches,
+            "tip_displacements_m": self.displacement,
+            "holes": self.holes,
+            "sliding": self.sliding,
+            "load_work_J": self.load_work,
+            "motor_work_J": self.motor_work,
+            "stored_J": self.stored,
+            "dissipated_J": self.dissipated,
+        }
+        return dict(plain(numbers))
+
+    def write(self, path: str | os.PathLike[str]) -> Path:
+        """Write :meth:`to_pandas` (``.csv``) or :meth:`to_xarray` (``.nc``); return the path.
+
+        Raises:
+            InvalidInput: The path ends neither in ``.csv`` nor in ``.nc``.
+            MissingExtra: pandas or netCDF4 is not installed.
+            FileError: The file cannot be written.
+        """
+        suffix = as_path(path).suffix.lower()
+        if suffix == ".csv":
+            return write_file(path, self.to_pandas().to_csv)
+        if suffix != ".nc":
+            raise InvalidInput("path", f"{str(path)!r} ends neither in .nc (NetCDF) nor in .csv.")
+        need("sweep", "netCDF4")
+        data = self.to_xarray()
+        return write_file(path, lambda aside: data.to_netcdf(aside, engine="netcdf4"))
 
     def plot(self) -> Figure:
         """Plot force over displacement, and the tensions along the cable that changes most."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, final
 
@@ -11,9 +11,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm.errors import InvalidInput
+from cdsm.friction.breakaway import breakaway
 from cdsm.posture import Posture
 from cdsm.statics.equilibrium import Equilibrium, equilibrium
 from cdsm.statics.following import follow_load
+from cdsm.statics.load_cycle import load_cycle
+from cdsm.statics.weight_friction import WeightFriction
 from cdsm.support.format import MODEL, coordinates, plain
 from cdsm.support.tidy import data_frame
 from cdsm.support.validation import unit_direction, vector, whole_number
@@ -51,17 +54,21 @@ class LinearPrediction(ReadOnlyState):
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class WeightTest(ReadOnlyState):
-    """Equilibria of an arm while a weight at its tip grows in equal steps.
+    """An arm while a weight at its tip grows in equal steps.
+
+    If the arm has friction in its holes, tips, displacements and stiffness are those with friction.
 
     Attributes:
         force: ΔF (3,) [N], the dead force at the full load, base axes.
-        without: Equilibrium without the weight, under ``wrench`` alone.
-        loaded: Equilibrium at each step; the last one is under the full load.
+        without: Frictionless equilibrium without the weight, under ``wrench`` alone.
+        loaded: Frictionless equilibrium at each step; the last one is under the full load.
+        friction: What friction does to the test; None for an arm without friction.
     """
 
     force: Array
     without: Equilibrium
     loaded: tuple[Equilibrium, ...]
+    friction: WeightFriction | None = None
 
     @cached_property
     def displacement(self) -> Array:
@@ -121,16 +128,22 @@ class WeightTest(ReadOnlyState):
     @cached_property
     def tips(self) -> Array:
         """Tip position at each step (n, 3) [m]."""
+        if self.friction is not None:
+            return frozen(self.friction.history.tip[1:].copy())
         return frozen(np.array([each.pose.tip[:3, 3] for each in self.loaded]))
 
     @cached_property
     def displacements(self) -> Array:
         """Tip position at each step minus tip position without the weight (n, 3) [m]."""
+        if self.friction is not None:
+            return frozen(self.tips - self.friction.history.tip[0])
         return frozen(self.tips - self.without.pose.tip[:3, 3])
 
     @cached_property
     def tensions(self) -> Array:
-        """Cable tensions at each step (n, C) [N]."""
+        """Cable tensions at each step (n, C) [N]; with friction at the motors."""
+        if self.friction is not None:
+            return frozen(np.array([T[1:, 0] for T in self.friction.history.tensions]).T)
         return frozen(np.array([each.tension for each in self.loaded]))
 
     def plot(self) -> Figure:
@@ -162,6 +175,8 @@ class WeightTest(ReadOnlyState):
             "at_limit": last.at_limit,
             "stable": last.stable,
         }
+        if self.friction is not None:
+            numbers["friction"] = self.friction.to_dict()
         return dict(plain(numbers))
 
     def to_pandas(self) -> pandas.DataFrame:
@@ -192,6 +207,8 @@ class WeightTest(ReadOnlyState):
             f"linear {self.linear.stiffness / 1000.0:.4g} N/mm",
             f"(linear is {MODEL}; measured the secant over this weight)",
         ]
+        if self.friction is not None:
+            rows.append(str(self.friction))
         if self.without.at_limit:
             rows.append(f"before the weight at a stop: {', '.join(self.without.at_limit)}")
         return "\n".join([*self.warnings, *rows])
@@ -208,7 +225,9 @@ def weight_test(
     """Hang a weight at the tip of an arm with locked motors: C = ΔX/ΔF (Eq. 20).
 
     The test is nonlinear: the tensions follow the elongations, and the posture changes. For a small
-    force the result is 1/:meth:`~cdsm.Stiffness.along`.
+    force the result is 1/:meth:`~cdsm.Stiffness.along`. With friction in the holes it depends on
+    the weight: a small one measures the stuck arm, and ``friction`` of the result says from which
+    weight on the cables slide. The weight is hung once and slowly, as in :func:`~cdsm.load_cycle`.
 
     Args:
         pose: The reference posture, at which the motors are locked.
@@ -225,6 +244,7 @@ def weight_test(
         ElasticityRangeError: As for :func:`~cdsm.equilibrium`, at any step.
         EquilibriumError: The arm buckles under a part of the load. The error names this part.
             :func:`~cdsm.equilibrium` finds the posture after buckling.
+        SingularStiffness: An arm with friction is about to buckle before the weight.
     """
     force = vector("force", force, 3, "a force in base axes [N]", "force")
     if not force.any():
@@ -243,4 +263,17 @@ def weight_test(
             f"{np.abs(force).max():.3g} N moves the tip by rounding only, and measures nothing; "
             f"hang at least {_MEASURED * pose.arm.length * test.linear.stiffness:.1g} N.",
         )
-    return test
+    return _with_friction(test, tension) if pose.arm.has_friction else test
+
+
+def _with_friction(test: WeightTest, tension: Tension | ArrayLike) -> WeightTest:
+    """Return the test with friction, hung in the same steps."""
+    before, parts = test.without, test.loads / np.linalg.norm(test.force)
+    added = np.append(test.force, np.zeros(3))
+    path = before.wrench + np.append(0.0, parts)[:, None] * added
+    friction = WeightFriction(
+        breakaway=breakaway(before.reference, before.reference_tension, test.force, before.wrench),
+        frictionless=test.linear.stiffness,
+        history=load_cycle(before.reference, tension, path),
+    )
+    return replace(test, friction=friction)

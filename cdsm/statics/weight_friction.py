@@ -1,0 +1,174 @@
+"""What friction in the holes does to a weight test: when it measures which stiffness."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import final
+
+import numpy as np
+
+from cdsm.errors import CdsmError
+from cdsm.friction.breakaway import Breakaway
+from cdsm.statics.load_cycle import load_cycle, slow_loading
+from cdsm.statics.load_history import LoadHistory
+from cdsm.statics.slow_loading import Load, State
+from cdsm.support.values import Array, ReadOnlyState
+
+SLIDING = 1.25
+"""The arm slides where its tangent stiffness is at most this times the frictionless one."""
+
+CYCLES = 4
+"""Fading cycles of the dither. With more of them the answer hardly changes."""
+
+_GROWTH, _MOST = 1.25, 100.0
+"""Growth of the load from trial to trial, and its largest value over the breakaway load."""
+
+_HALVINGS = 6
+"""Bisections of the load from which the arm slides: to 0.4 %."""
+
+
+@final
+@dataclass(frozen=True, eq=False, kw_only=True)
+class WeightFriction(ReadOnlyState):
+    """Loads and stiffnesses of a weight test on an arm with friction in its holes.
+
+    Attributes:
+        breakaway: Load along the weight below which nothing slides, and where it slides first.
+        frictionless: Tangent stiffness along the weight without friction [N/m].
+        history: The weight hung in steps: the first entry is the arm without it.
+    """
+
+    breakaway: Breakaway
+    frictionless: float
+    history: LoadHistory
+
+    @property
+    def stuck(self) -> float:
+        """Tangent stiffness along the weight while all cables stick [N/m]: of small weights."""
+        return self.breakaway.stiffness.along(self.breakaway.direction)
+
+    @property
+    def secant(self) -> float:
+        """Weight over displacement along it, with friction [N/m]; inf without motion."""
+        return self._secant(self.history.tip)
+
+    @cached_property
+    def sliding_load(self) -> float:
+        """Weight [N] from which the arm slides: its tangent is within 25 % of the frictionless one.
+
+        It is found by loading the arm further and further. 0 without friction; inf if the arm does
+        not slide up to 100 breakaway loads, or finds no rest before.
+        """
+        first, u = self.breakaway.load, self.breakaway.direction
+        if not 0.0 < first < math.inf:
+            return first
+        pose, F = self.history.reference, self.history.reference_tension
+        loading = slow_loading(pose, F, self.breakaway.stiffness.wrench, 1e-2)
+        state = loading.begin(F, self.breakaway.stiffness.wrench)
+        start, none = self.history.wrenches[0], np.zeros(pose.q.size)
+
+        def loaded(before: State, load: float) -> State:
+            wrench = start + np.append(load * u, np.zeros(3))
+            target = Load(wrench, none, before.load.motors)
+            return loading.carry(before, target, f"{load:.4g} N")[0]
+
+        def slides(state: State) -> bool:
+            J = state.pose.jacobian[:3]
+            compliance = u @ J @ np.linalg.solve(state.settled.stiffness, J.T @ u)
+            return bool(SLIDING * self.frictionless * compliance >= 1.0)
+
+        load = first
+        try:
+            before = loaded(state, load)
+            while not slides(after := loaded(before, load * _GROWTH)):
+                before, load = after, load * _GROWTH
+                if load > _MOST * first:
+                    return math.inf
+            high = load * _GROWTH
+            for _ in range(_HALVINGS):
+                middle = math.sqrt(load * high)
+                state = loaded(before, middle)
+                load, before, high = (
+                    (load, before, middle) if slides(state) else (middle, state, high)
+                )
+        except (CdsmError, np.linalg.LinAlgError):  # it buckles, or leaves the law of its wire
+            return math.inf
+        return high
+
+    @cached_property
+    def dithered(self) -> float:
+        """Weight over displacement [N/m] after shaking the load by ±:attr:`sliding_load`, fading.
+
+        Four cycles about the weight fade evenly to nothing. NaN if the arm does not slide, or finds
+        no rest on the way.
+        """
+        size = self.sliding_load
+        if not 0.0 < size < math.inf:
+            return self.secant if size == 0.0 else math.nan
+        wrenches, u = self.history.wrenches, np.append(self.breakaway.direction, np.zeros(3))
+        fading = size * (1.0 - np.arange(2 * CYCLES) / (2.0 * CYCLES))
+        fading[1::2] *= -1.0
+        path = np.vstack([wrenches, wrenches[-1] + fading[:, None] * u, wrenches[-1]])
+        history = self.history
+        try:
+            tip = load_cycle(history.reference, history.reference_tension, path, accuracy=1e-2).tip
+        except CdsmError:
+            return math.nan
+        return self._secant(tip)
+
+    @property
+    def weight(self) -> float:
+        """The weight [N]."""
+        wrenches = self.history.wrenches
+        return float(np.linalg.norm((wrenches[-1] - wrenches[0])[:3]))
+
+    def _secant(self, tip: Array) -> float:
+        moved = float((tip[-1] - tip[0]) @ self.breakaway.direction)
+        return self.weight / moved if moved else math.inf
+
+    def to_dict(self) -> dict[str, object]:
+        """Return the loads and stiffnesses in SI, with units in the keys."""
+        return {
+            "stuck_below_N": self.breakaway.load,
+            "stuck_stiffness_N_per_m": self.stuck,
+            "sliding_from_N": self.sliding_load,
+            "frictionless_stiffness_N_per_m": self.frictionless,
+            "secant_stiffness_N_per_m": self.secant,
+            "sliding_holes": self.sliding_holes,
+            "holes": self.history.sliding.shape[1],
+            "dither_N": self.sliding_load,
+            "dither_cycles": CYCLES,
+            "dithered_stiffness_N_per_m": self.dithered,
+        }
+
+    @property
+    def sliding_holes(self) -> int:
+        """Number of holes in which cables slide under the weight."""
+        return int(np.count_nonzero(self.history.sliding[-1]))
+
+    def __str__(self) -> str:
+        frictionless, first = self.frictionless / 1000.0, self.breakaway.load
+        if first == 0.0:
+            return "friction holds no cable here: the cables go straight through all holes"
+        stuck = f"{self.stuck / 1000.0:.4g} N/mm"
+        rows = [f"below {first:.4g} N all cables stick: a weight measures {stuck}"]
+        if math.isinf(self.sliding_load):
+            rows.append("no weight was found from which the arm slides")
+        else:
+            rows.append(
+                f"from {self.sliding_load:.4g} N on they slide: a weight added there measures the "
+                f"frictionless {frictionless:.4g} N/mm within {100.0 * (SLIDING - 1.0):.0f} %"
+            )
+        rows.append(
+            f"this weight, {self.weight:.4g} N, measures {self.secant / 1000.0:.4g} N/mm; "
+            f"{self.sliding_holes} of {self.history.sliding.shape[1]} holes slide"
+        )
+        if math.isfinite(self.dithered):
+            rows.append(
+                f"so take the difference of two weights above {self.sliding_load:.3g} N; or shake "
+                f"the load by ±{self.sliding_load:.3g} N, fading in {CYCLES} cycles: then this "
+                f"weight measures {self.dithered / 1000.0:.4g} N/mm"
+            )
+        return "\n".join(rows)

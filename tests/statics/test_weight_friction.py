@@ -1,0 +1,69 @@
+"""A weight test with friction in the holes: stuck below, sliding above, and dithered."""
+
+import numpy as np
+import pytest
+
+import cdsm
+from cdsm import presets
+
+
+def prototype(mu: float) -> tuple[cdsm.Posture, cdsm.Tension]:
+    arm = presets.virtual_prototype(cdsm.LinearElasticity(48e3), lead=0.3, friction=mu)
+    pose = arm.at(np.full(arm.nv, presets.TEN_DEGREES))
+    return pose, cdsm.distribute_tension(pose, 50.0)
+
+
+def test_small_weights_measure_the_stuck_arm_and_increments_of_large_ones_the_frictionless() -> (
+    None
+):
+    pose, pull = prototype(0.1)
+    frictionless = cdsm.weight_test(
+        pose.arm.with_friction(0.0).at(pose.q), pull.values, [0, 0, 2.0]
+    )
+    small = cdsm.weight_test(pose, pull, [0.0, 0.0, 0.3])
+    assert small.friction is not None
+    assert frictionless.friction is None
+    limit, slides = small.friction.breakaway.load, small.friction.sliding_load
+    # of an independent program: 0.71 N, 257.4 N/mm, 36.2 N/mm
+    assert limit == pytest.approx(0.71, rel=1e-2)
+    assert small.stiffness == pytest.approx(257.4e3, rel=2e-3)
+    assert small.stiffness == pytest.approx(small.friction.stuck, rel=1e-3)
+    assert small.friction.frictionless == pytest.approx(36.2e3, rel=2e-3)
+    assert small.friction.sliding_holes == 0
+    for factor, below in ((0.97, False), (1.03, True)):
+        W = np.zeros((1, 6))
+        W[0, 2] = factor * slides
+        tangent = cdsm.load_cycle(pose, pull, W).stiffness(0).along("z")
+        assert (tangent < 1.25 * small.friction.frictionless) == below
+    large = cdsm.weight_test(pose, pull, [0.0, 0.0, 5.0], steps=2)
+    assert large.friction is not None
+    assert large.friction.secant == large.stiffness
+    assert large.stiffness == pytest.approx(51.75e3, rel=1e-3)
+    increment = 2.5 / (large.displacements[1] - large.displacements[0])[2]
+    assert increment == pytest.approx(large.friction.frictionless, rel=0.25)
+    # shaken, the weight measures within some 10 % what no friction would give
+    assert 1.0 < large.friction.dithered / frictionless.linear.stiffness < 1.15
+    np.testing.assert_array_equal(large.tensions[-1, 0], large.friction.history.tensions[0][-1, 0])
+
+
+def test_one_line_says_how_to_measure() -> None:
+    pose, pull = prototype(0.1)
+    text = str(cdsm.weight_test(pose, pull, [0.0, 0.0, 2.0]))
+    assert "below 0.7063 N all cables stick: a weight measures 257.6 N/mm" in text
+    assert "a weight added there measures the frictionless 36.23 N/mm within 25 %" in text
+    assert "take the difference of two weights above" in text
+    told = cdsm.weight_test(pose, pull, [0.0, 0.0, 2.0]).to_dict()["friction"]
+    assert isinstance(told, dict)
+    assert told["stuck_below_N"] == pytest.approx(0.7063, rel=1e-3)
+
+
+def test_straight_arm_holds_no_cable() -> None:
+    arm = presets.virtual_prototype(
+        cdsm.LinearElasticity(48e3), lead=0.3, friction=0.2, gravity=(0.0, 0.0, 0.0)
+    )
+    pose = arm.at(np.zeros(arm.nv))
+    test = cdsm.weight_test(pose, np.full(15, 50.0), [0.0, 0.0, 0.01])
+    assert test.friction is not None
+    assert test.friction.breakaway.load == test.friction.sliding_load == 0.0
+    assert test.friction.stuck == pytest.approx(test.friction.frictionless, rel=1e-9)
+    assert "straight through all holes" in str(test)
