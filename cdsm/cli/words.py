@@ -35,6 +35,8 @@ _OPTIONS: Final = {
 _PYTHON: Final = (
     (", or, in Python, pass check_limits=False to compute beyond them.", "."),
     ("Raise starts=, ask", "Ask"),
+    ("slack_below()", "--slack-below"),
+    ("`cdsm fit`, or cdsm.read_tensile_csv and cdsm.fit_tensile_test.", "`cdsm fit`."),
     (", or start from a guess= nearer to it.", "."),
 )
 """Remedies that the command line does not have, and what is left without them."""

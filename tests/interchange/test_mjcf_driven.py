@@ -315,6 +315,9 @@ def test_file_says_what_is_missing_for_balance() -> None:
     left = 3.0 * abs(pose.length_jacobian[0, 0])
     text = cdsm.to_mjcf(pose.arm, pose, wrong)
     assert f"balance    {left:.4g} N m are missing, most at proximal_joint" in text
+    urdf = pose.arm.urdf.replace("proximal_joint", "proximal--joint")
+    arm = cdsm.Manipulator.from_urdf(urdf, pose.arm.cables, tip="fingertip")
+    assert "most at proximal- -joint" in cdsm.to_mjcf(arm, arm.at(pose.q), wrong)
 
 
 def test_bad_choices_are_named() -> None:

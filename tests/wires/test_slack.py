@@ -160,6 +160,7 @@ def test_command_line_says_that_the_branch_is_there(tmp_path: Path) -> None:
     ended = CliRunner().invoke(app, asked)
     assert ended.exit_code == 1
     assert "2.2 N" in ended.stderr
+    assert "--slack-below continues one to 0 N" in ended.stderr
     found = CliRunner().invoke(app, [*asked, "--slack-below"])
     assert "1x19-1.2mm, with a slack branch of EA 16.37 N below 2.2 N" in found.stdout
     numbers = json.loads(CliRunner().invoke(app, [*asked, "--slack-below", "--json"]).stdout)

@@ -153,6 +153,7 @@ def _column(at: int, cell: str, below: str) -> Column:
     tail = re.search(r"[\s_]+(\S+)$", name) or re.search(r"/(\S+)$", name)
     if not groups and tail and tail[1] in _KNOWN:
         known, name = [tail[1]], name[: tail.start()]
+    name = name or cell
     unit = (known or [below] * bool(below) or groups or [None])[-1]
     words = re.split(r"[\s_/.,:;-]+", name.lower())
     kinds = {kind for kind, those in _WORDS.items() if not those.isdisjoint(words)}
