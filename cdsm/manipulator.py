@@ -28,8 +28,16 @@ from cdsm.kernels.tree import Frames
 from cdsm.posture import Posture, site_paths
 from cdsm.rigid_body import RigidBody
 from cdsm.support.files import write_text
-from cdsm.support.format import JointUnits
-from cdsm.support.validation import flag, instance, one_of, sequence_of, vector
+from cdsm.support.format import JointUnits, plural
+from cdsm.support.validation import (
+    Direction,
+    flag,
+    gravity_vector,
+    instance,
+    one_of,
+    sequence_of,
+    vector,
+)
 from cdsm.support.values import Array, Printed, frozen
 from cdsm.urdf import TIP, to_urdf
 from cdsm.urdf_reader import read_urdf
@@ -53,7 +61,8 @@ class Manipulator(Printed):
             :func:`~cdsm.serpentine_cables`.
         cables: The cables, if ``elasticity`` is not given: any sites on any links of :attr:`urdf`.
             Or the path of their file.
-        gravity: Gravity in base axes (3,) [m/s²]; (0, 0, 0) for none.
+        gravity: Gravity in base axes (3,) [m/s²], or an axis such as ``"-y"`` for 9.81 m/s²
+                along it; (0, 0, 0) for none.
         original_length: Length l_0 of a locked wire that its stiffness EA/l_0 uses.
             ``"unstrained"``: the length that the motor holds, ℓ/(1 + ε(F)) for a wire of length ℓ
             under F. ``"stretched"``: ℓ, as in the paper's figures; K is then too low by the strain,
@@ -109,7 +118,8 @@ class Manipulator(Printed):
             tip: Link whose frame is the tip; other docstrings call it ``tool0``.
             joint_names: The moving joints in the order of q. None: Pinocchio's order, from the base
                 along each branch to its end, branches in the order of their joints' names.
-            gravity: Gravity in base axes (3,) [m/s²]; (0, 0, 0) for none.
+            gravity: Gravity in base axes (3,) [m/s²], or an axis such as ``"-y"`` for 9.81 m/s²
+                along it; (0, 0, 0) for none.
             check_inertia: Refuse moments of inertia that no rigid body can have. Stiffness does not
                 depend on them, but :func:`~cdsm.modes` do.
             original_length: As for :class:`Manipulator`.
@@ -187,7 +197,7 @@ class Manipulator(Printed):
     ) -> None:
         """Set all attributes from checked URDF text and, if given, its geometry."""
         self._cables = cables = _checked_cables(cables)
-        self._gravity = vector("gravity", gravity, 3, "gravity in base axes [m/s²]", "gravity")
+        self._gravity = gravity_vector("gravity", gravity)
         one_of("original_length", original_length, get_args(OriginalLength))
         body = RigidBody(urdf, tip, self._gravity, joint_names)
         self._model = ArmModel(body, cables, original_length)
@@ -301,10 +311,10 @@ class Manipulator(Printed):
         return f"<Manipulator {self}>"
 
     def __str__(self) -> str:
-        free = f"{self.nv} degrees of freedom"
+        free = plural(self.nv, "degree") + " of freedom"
         if self.is_serpentine:
-            free = f"{len(self.geometry.joints)} joints ({free})"
-        return f"{self.name}: {free}, {len(self.cables)} cables, {self.length:.6g} m long"
+            free = f"{plural(len(self.geometry.joints), 'joint')} ({free})"
+        return f"{self.name}: {free}, {plural(len(self.cables), 'cable')}, {self.length:.6g} m long"
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Manipulator) and self._parts == other._parts
@@ -339,11 +349,11 @@ class Manipulator(Printed):
         """
         return self._replace(cables=tuple(cable.with_friction(friction) for cable in self.cables))
 
-    def with_gravity(self, gravity: ArrayLike) -> Manipulator:
-        """Return the same arm under another gravity (3,) [m/s²], in base axes.
+    def with_gravity(self, gravity: Direction) -> Manipulator:
+        """Return the same arm under another gravity: (3,) [m/s²] in base axes, or ``"-y"``.
 
         Raises:
-            InvalidInput: Gravity is not three numbers.
+            InvalidInput: Gravity is neither an axis nor three numbers.
         """
         return self._replace(gravity=gravity)
 

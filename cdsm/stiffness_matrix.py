@@ -348,6 +348,10 @@ class Stiffness(ReadOnlyState):
             key("joint_stiffness", unit): self.joint,
             key("margin", unit): self.margin,
             "stable": self.is_stable,
+            "remedies": [
+                {"change": each.change, "factor": each.factor, "text": str(each)}
+                for each in self.remedies
+            ],
         }
         return dict(plain(numbers))
 

@@ -27,7 +27,7 @@ from cdsm.kernels import tension as tension_kernels
 from cdsm.kernels.tension import DISTANCE, OPTIMALITY
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
-from cdsm.support.format import aligned, key, plain
+from cdsm.support.format import aligned, key, plain, plural
 from cdsm.support.tidy import data_frame
 from cdsm.support.validation import bound, instance, one_of, quantity, wrench_vector
 from cdsm.support.values import Array, ReadOnlyState, frozen
@@ -161,7 +161,7 @@ class Tension(ReadOnlyState):
     def __repr__(self) -> str:
         return (
             f"<Tension {self.values.min():.4g} to {self.values.max():.4g} N in "
-            f"{self.values.size} cables>"
+            f"{plural(self.values.size, 'cable')}>"
         )
 
     def __str__(self) -> str:

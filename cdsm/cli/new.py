@@ -11,7 +11,7 @@ import typer
 import cdsm
 from cdsm.cli.options import AsJson
 from cdsm.cli.output import Json, answer
-from cdsm.cli.values import gravity_vector, numbers
+from cdsm.cli.values import gravity_of, numbers
 
 _kind = {"rich_help_panel": "The kind of arm: one of them"}
 _size = {"rich_help_panel": "Its sizes"}
@@ -61,7 +61,7 @@ def new(
     gravity: Annotated[
         str,
         typer.Option(metavar="GX,GY,GZ|AXIS", help="In m/s², base axes, or 9.81 along an axis."),
-    ] = ("0,0,-9.81"),
+    ] = "-z",
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a file.")] = False,
     as_json: AsJson = False,
 ) -> None:
@@ -109,7 +109,7 @@ def new(
         parts.append((kind, sizes))
     built = [getattr(cdsm.Geometry, kind)(**sizes) for kind, sizes in parts]
     geometry = cdsm.Geometry.sections(built)
-    whole = cdsm.Manipulator(geometry, as_wire(law), gravity=gravity_vector(gravity))
+    whole = cdsm.Manipulator(geometry, as_wire(law), gravity=gravity_of(gravity))
     text = template(arm.name, law, tuple(whole.gravity.tolist()), parts)
     written = write_text(arm, text)
     told: Json = {"name": geometry.name, "length_m": geometry.length, "written": [str(written)]}

@@ -13,7 +13,7 @@ import typer
 
 import cdsm
 from cdsm.cli.conditions import Conditions
-from cdsm.cli.values import coordinates, gravity_vector, joint_scales, numbers
+from cdsm.cli.values import coordinates, gravity_of, joint_scales, numbers
 
 if TYPE_CHECKING:
     from cdsm.support.values import Array
@@ -147,7 +147,7 @@ class ArmOptions:
         if self.friction is not None:
             arm = arm.with_friction(self.friction)
         if self.gravity is not None:
-            arm = arm.with_gravity(gravity_vector(self.gravity))
+            arm = arm.with_gravity(gravity_of(self.gravity))
         return arm
 
     def _arm(self) -> cdsm.Manipulator:

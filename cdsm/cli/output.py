@@ -63,7 +63,7 @@ def answer(
         _print_json(told | as_dict())
     else:
         texts = (
-            "\n".join(line for line in str(part).splitlines() if line not in warnings)
+            "\n".join(line for line in in_options(str(part)).splitlines() if line not in warnings)
             for part in parts
         )
         typer.echo("\n".join([*warnings, "\n\n".join(texts)]))

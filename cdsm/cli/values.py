@@ -52,16 +52,16 @@ def axis(text: str) -> tuple[float, float, float] | None:
     return AXES.get(text.strip())
 
 
-def gravity_vector(text: str) -> list[float]:
-    """Return gravity (3,) [m/s²]: a vector, or 9.81 along an axis."""
-    along = axis(text)
-    if along is not None:
-        return [9.81 * x for x in along]
-    return numbers("--gravity", text, 3, "an axis, or GX,GY,GZ")
+def gravity_of(text: str) -> list[float] | str:
+    """Return gravity (3,) [m/s²], or the axis along which it has 9.81 m/s²."""
+    word = text.strip()
+    return word if axis(word) else numbers("--gravity", text, 3, "an axis, or GX,GY,GZ")
 
 
 def numbers(option: str, text: str, count: int | None = None, form: str = "numbers") -> list[float]:
     """Read numbers separated by commas or spaces, and check their count."""
+    from cdsm.support.format import plural
+
     try:
         values = [float(word) for word in text.replace(",", " ").split()]
     except ValueError as error:
@@ -69,6 +69,6 @@ def numbers(option: str, text: str, count: int | None = None, form: str = "numbe
             f"{error}; separate numbers by commas.", param_hint=option
         ) from None
     if count is not None and len(values) != count:
-        counted = f"{len(values)} number{'s' * (len(values) != 1)} given; give {count}: {form}."
+        counted = f"{plural(len(values), 'number')} given; give {count}: {form}."
         raise typer.BadParameter(counted, param_hint=option)
     return values

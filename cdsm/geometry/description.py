@@ -26,6 +26,7 @@ from cdsm.geometry.parts import (
 )
 from cdsm.geometry.uniform import CablesPerJoint, HoleAngles, JointCount, uniform
 from cdsm.support.files import read_text, write_text
+from cdsm.support.format import plural
 from cdsm.support.records import (
     CrossFaults,
     Friction,
@@ -317,8 +318,9 @@ class Geometry(Printed):
     def __str__(self) -> str:
         dof = sum(len(joint.axes) for joint in self.joints)
         return (
-            f"{self.name}: {len(self.joints)} joints ({dof} degrees of freedom), "
-            f"{len(self.cables)} cables, {self.length:g} m long"
+            f"{self.name}: {plural(len(self.joints), 'joint')} "
+            f"({plural(dof, 'degree')} of freedom), "
+            f"{plural(len(self.cables), 'cable')}, {self.length:g} m long"
         )
 
     @property

@@ -52,6 +52,11 @@ def plain(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
+def plural(count: int, noun: str) -> str:
+    """Return a count with its noun: ``1 cable``, ``2 cables``."""
+    return f"{count} {noun}{'s' * (count != 1)}"
+
+
 def place(value: float, unit: str) -> str:
     """Return a joint coordinate [rad or m] as people read it: ``12.5°`` or ``30 mm``."""
     return f"{math.degrees(value):.4g}°" if unit == "rad" else f"{1e3 * value:.4g} mm"

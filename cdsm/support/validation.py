@@ -211,6 +211,13 @@ def axis_vector(name: str, axis: str) -> tuple[float, float, float]:
     return AXES[axis]
 
 
+def gravity_vector(name: str, value: Direction) -> Array:
+    """Return gravity (3,) [m/s²], read-only: a vector, or 9.81 m/s² along an axis."""
+    if isinstance(value, str):
+        return frozen(9.81 * np.array(axis_vector(name, value)))
+    return vector(name, value, 3, "gravity in base axes [m/s²]", "gravity")
+
+
 def unit_directions(name: str, value: Direction | Iterable[Direction]) -> Array:
     """Return the read-only unit vector (3,) of one direction, or (n, 3) of n directions."""
     if isinstance(value, str):

@@ -13,6 +13,7 @@ from tests.cli.test_commands import call, geometry
 
 __all__ = ["geometry"]  # a fixture
 
+LAW = cdsm.LinearElasticity(48e3)
 STEEL = ("--wire", 48e3)
 SOFT = ("--wire", 1e9, "--spring", 0.2, "--min-tension", 60, "--angles", 5)
 
@@ -247,6 +248,29 @@ def test_axes_are_directions_and_gravity(geometry: Path) -> None:
     assert json.loads(by_name.stdout) == json.loads(by_vector.stdout)
     wrong = call(*asked[:-1], "--direction", "up", "--target", 9)
     assert wrong.exit_code == 2
+
+
+def test_gravity_along_an_axis_in_python(geometry: Path) -> None:
+    arm = cdsm.Manipulator(cdsm.Geometry.read(geometry), LAW, gravity="-y")
+    np.testing.assert_array_equal(arm.gravity, [0.0, -9.81, 0.0])
+    np.testing.assert_array_equal(arm.with_gravity("x").gravity, [9.81, 0.0, 0.0])
+    with pytest.raises(cdsm.InvalidInput, match="gravity: 'down' given; give x, y, z"):
+        arm.with_gravity("down")
+
+
+def test_one_cable_is_one_cable() -> None:
+    one = cdsm.Geometry.hinged(
+        joints=1,
+        twist=0.0,
+        cables_per_joint=1,
+        link_length=0.05,
+        base_length=0.02,
+        disk_offset=0.01,
+        hole_radius=0.02,
+        link_mass=0.1,
+    )
+    for text in (str(one), str(cdsm.Manipulator(one, LAW))):
+        assert text.startswith("arm: 1 joint (1 degree of freedom), 1 cable, ")
 
 
 def test_joints_without_a_column_stay_at_zero(geometry: Path, tmp_path: Path) -> None:
