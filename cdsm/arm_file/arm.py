@@ -77,6 +77,12 @@ def read_arm(path: str | os.PathLike[str], wire: Wire | None) -> ArmParts:
     """Read an ARM.toml. Arguments and errors are those of :meth:`cdsm.Manipulator.read`."""
     text = read_text(path)
     forced = None if wire is None else as_wire(wire)
+    if text.lstrip().startswith("<"):
+        raise FileError(
+            path,
+            "is XML, no ARM.toml. A robot from a URDF needs a tip and cables, too: give them to "
+            "Manipulator.from_urdf, or write an ARM.toml with a table [urdf].",
+        )
     faults: list[str] = []
 
     def attempt(read: Callable[..., _Read], *given: Any) -> _Read | None:

@@ -392,7 +392,7 @@ class Geometry(Printed):
         """
         instance("text", text, str)
         try:
-            return tables.build(cls, tables.split_geometry(read_toml(text))[0])
+            return tables.build_only(cls, read_toml(text))
         except GeometryError as error:
             raise GeometryError(error.faults, source) from None
 

@@ -54,6 +54,16 @@ def build(cls: type[Geometry], data: dict[str, Any]) -> Geometry:
     raise GeometryError(faults)
 
 
+def build_only(cls: type[Geometry], data: dict[str, Any]) -> Geometry:
+    """Build the geometry of a file that may describe more of an arm; raise GeometryError."""
+    described, rest = split_geometry(data)
+    if "urdf" in rest and not described:
+        raise GeometryError(
+            ["urdf: the arm is a robot from a URDF and has no geometry; use Manipulator.read"]
+        )
+    return build(cls, described)
+
+
 @record
 class _Sections:
     sections: Annotated[tuple[dict[str, Any], ...], Field(strict=False, min_length=1)]

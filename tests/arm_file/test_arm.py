@@ -248,3 +248,12 @@ def test_cables_may_be_given_by_their_file(tmp_path: Path) -> None:
     assert cdsm.Manipulator.from_urdf(arm.urdf, str(path), tip="tool0").cables == arm.cables[:2]
     assert arm.with_cables(path).cables == arm.cables[:2]
     assert arm.with_gravity((0, 0, 1)).gravity.tolist() == [0.0, 0.0, 1.0]
+
+
+def test_a_urdf_is_neither_an_arm_file_nor_a_geometry(tmp_path: Path) -> None:
+    with pytest.raises(cdsm.FileError, match=r"is XML, no ARM\.toml"):
+        read(tmp_path, FINGER)
+    text = f"wire = 48e3\n[urdf]\ntip = 'tip'\ntext = '''{FINGER}'''\n{CABLES}"
+    assert read(tmp_path, text).nv == 1
+    with pytest.raises(cdsm.GeometryError, match="has no geometry; use Manip"):
+        cdsm.Geometry.read(tmp_path / "arm.toml")
