@@ -29,7 +29,7 @@ from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.support.format import aligned, key, plain, plural
 from cdsm.support.tidy import data_frame
-from cdsm.support.validation import bound, instance, one_of, quantity, wrench_vector
+from cdsm.support.validation import bound, flag, instance, one_of, quantity, wrench_vector
 from cdsm.support.values import Array, ReadOnlyState, frozen
 
 if TYPE_CHECKING:
@@ -178,6 +178,7 @@ def distribute_tension(
     solver: str = DEFAULT_SOLVER,
     *,
     fixed: Mapping[str, float] | None = None,
+    worst_friction: bool = False,
 ) -> Tension:
     """Compute the smallest tensions in balance: min ‖F‖² with J_Lᵀ F = J_Xᵀ W − g (Eqs. 13, 17).
 
@@ -190,10 +191,13 @@ def distribute_tension(
         solver: ``"daqp"`` (exact), ``"osqp"``, or another solver that qpsolvers finds installed.
         fixed: Tensions [N] by cable name, e.g. of motors that control force. The other tensions are
             computed. A fixed tension replaces the bounds of its cable and is never widened.
+        worst_friction: Keep each segment of each cable within the bounds, whatever loads came and
+            went before. At this posture friction holds all tensions of a cable within
+            exp(±Σ μ φ) of F, with the sum over its holes. The bounds narrow by these factors.
 
     Raises:
         InvalidInput: A bound, a fixed tension or the wrench has the wrong shape or is not a number,
-            or the bounds contradict each other.
+            or the bounds contradict each other, also because of the worst friction.
         InfeasibleTension: No tension within the bounds balances the arm. The error gives the
             missing torque. If wider bounds help, it says how far the bounds of cables without a
             fixed tension must widen.
@@ -202,6 +206,9 @@ def distribute_tension(
     """
     instance("pose", pose, Posture)
     low, high = checked_bounds(pose.arm, minimum, maximum)
+    if flag("worst_friction", worst_friction):
+        loss = np.exp(_grip(pose))
+        low, high = checked_bounds(pose.arm, low * loss, high / loss)
     fixed = {} if fixed is None else fixed
     if fixed:
         low, high = _with_fixed(pose, low, high, fixed)
@@ -225,6 +232,15 @@ def distribute_tension(
         solver=solver,
         residual=frozen(values @ pose.length_jacobian - torque),
     )
+
+
+def _grip(pose: Posture) -> Array:
+    """Compute Σ μ φ of the holes of each cable (C,) [-]."""
+    segments = pose.segments
+    chains = segments.chains
+    grip = chains.friction * segments.wrap
+    total = np.bincount(chains.cable[chains.hole], grip, minlength=len(pose.arm.cables))
+    return np.asarray(total, dtype=np.float64)
 
 
 def checked_bounds(

@@ -96,6 +96,11 @@ def notes(report: Report) -> Iterator[str]:
 
 def _of_tensions(report: Report) -> Iterator[str]:
     K = report.stiffness
+    if K.posture.arm.has_friction:
+        yield (
+            "the cables have friction, and this K is frictionless, as after shaking the arm: loads "
+            "below cdsm.breakaway measure cdsm.stuck_stiffness, which is larger."
+        )
     if report.optimality is None:
         came = "were given" if K.free_length is None else "follow from an equilibrium"
         yield f"the tensions {came}, not distributed: nothing says they are the least."

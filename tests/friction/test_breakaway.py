@@ -62,6 +62,48 @@ def test_load_is_that_of_the_first_slip(friction: float, direction: str) -> None
     assert found.load == pytest.approx(found.first_order, rel=0.03)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("direction", ["z", "-x"])
+def test_simulated_arm_slips_just_beyond_the_load(direction: str) -> None:
+    """The simulator of load histories sticks up to the breakaway load, to a millionth of it."""
+    pose, F = prototype(0.1)
+    found = cdsm.breakaway(pose, F, direction)
+    for part, slips in ((1.0 - 1e-6, False), (1.0 + 1e-6, True)):
+        wrench = np.zeros((1, 6))
+        wrench[0, :3] = part * found.load * found.direction
+        history = cdsm.load_cycle(pose, F, wrench)
+        assert bool(history.sliding[-1].any()) == slips
+        secant = found.load / float((history.tip[-1] - pose.tip[:3, 3]) @ found.direction)
+        assert secant == pytest.approx(found.stiffness.along(direction), rel=0.02)
+
+
+def test_worst_friction_narrows_the_bounds() -> None:
+    """The least tension of any segment in the proved band is above the bound, and not idly."""
+    pose, _ = prototype(0.1)
+    pull = cdsm.distribute_tension(pose, 50.0, 400.0, worst_friction=True)
+    grip = np.bincount(
+        pose.segments.chains.cable[pose.segments.chains.hole], 0.1 * pose.segments.wrap
+    )
+    np.testing.assert_allclose(pull.minimum, 50.0 * np.exp(grip), rtol=1e-14)
+    np.testing.assert_allclose(pull.maximum, 400.0 / np.exp(grip), rtol=1e-14)
+    assert (pull.values >= pull.minimum * (1.0 - 1e-9)).all()
+    with pytest.raises(cdsm.InvalidInput, match=r"below its minimum"):
+        cdsm.distribute_tension(pose, 50.0, 51.0, worst_friction=True)
+    with pytest.raises(cdsm.InvalidInput, match="worst_friction: 1 given"):
+        cdsm.distribute_tension(pose, 50.0, worst_friction=1)  # type: ignore[arg-type]
+    smooth, _ = prototype(0.0)
+    plain = cdsm.distribute_tension(smooth, 50.0).values
+    same = cdsm.distribute_tension(smooth, 50.0, worst_friction=True).values
+    np.testing.assert_array_equal(same, plain)
+
+
+def test_report_says_that_friction_is_left_out() -> None:
+    pose, F = prototype(0.1)
+    assert any("cdsm.breakaway" in note for note in cdsm.stiffness(pose, F).report().notes)
+    smooth, F = prototype(0.0)
+    assert not any("friction" in note for note in cdsm.stiffness(smooth, F).report().notes)
+
+
 def test_first_order_is_approached_as_friction_vanishes() -> None:
     """The closed form is off by a part that falls with the load, in proportion."""
     off = []
