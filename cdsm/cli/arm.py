@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -31,6 +32,10 @@ def stiffness(
     tensions: TensionOptions,
     load: LoadOptions,
     angles: Angles = "0",
+    tolerances: Annotated[
+        Path | None,
+        typer.Option(metavar="T.toml", help="Tolerances: how sure the stiffness is, and why."),
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Distribute the tensions at a posture, and print them and the stiffness.
@@ -40,8 +45,45 @@ def stiffness(
     pose = arm.at(angles)
     tension = tensions.distribute(pose, load.at_tip(pose.arm))
     K = cdsm.stiffness(pose, tension)
-    conditions = tensions.conditions(pose.arm)
-    answer(as_json, K.to_dict, conditions, tension, K, warnings=K.warnings[:1])
+    budgets = {} if tolerances is None else _budgets(tension, cdsm.Tolerances.read(tolerances))
+    sure = {"uncertainty": {axis: budget.to_dict() for axis, budget in budgets.items()}}
+    parts = [tensions.conditions(pose.arm), tension, K, *([_table(budgets)] if budgets else [])]
+    answer(
+        as_json,
+        lambda: K.to_dict() | (sure if budgets else {}),
+        *parts,
+        warnings=K.warnings[:1],
+    )
+
+
+def _budgets(tension: cdsm.Tension, tolerances: cdsm.Tolerances) -> dict[str, cdsm.Uncertainty]:
+    """Compute the budget of the stiffness along each axis along which the tip can move."""
+    found = {}
+    for axis in ("x", "y", "z"):
+        with contextlib.suppress(cdsm.SingularStiffness):
+            found[axis] = cdsm.uncertainty(tension.posture, tension, tolerances, direction=axis)
+    return found
+
+
+def _table(budgets: dict[str, cdsm.Uncertainty]) -> str:
+    """Write values with uncertainties, and what contributes to them [%], one column per axis."""
+
+    def percent(source: str) -> list[float]:
+        return [100.0 * b.contributions[source] / abs(b.value) for b in budgets.values()]
+
+    sources = {source for budget in budgets.values() for source in budget.contributions}
+    ranked = sorted(sources, key=lambda source: -max(percent(source)))
+    rows = [
+        ("uncertainty [N/mm]", *budgets),
+        ("along", *(budget.shown for budget in budgets.values())),
+        *(
+            (f"  of it {source.replace('_', ' ')}", *(f"{part:.2g} %" for part in percent(source)))
+            for source in ranked
+        ),
+    ]
+    return "\n".join(
+        f"{name:<24}{''.join(f'{cell:>16}' for cell in cells)}" for name, *cells in rows
+    )
 
 
 def check(

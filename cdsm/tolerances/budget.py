@@ -155,11 +155,16 @@ class Uncertainty(ReadOnlyState):
         return "\n".join(lines)
 
     @property
-    def _headline(self) -> str:
-        unit, size = self.question.unit
+    def shown(self) -> str:
+        """Value and standard uncertainty, rounded to two digits of it, in the unit of prints."""
+        _, size = self.question.unit
         u = self.standard_uncertainty / size
         places = decimals(u)
-        return f"{self.question.name}: {self.value / size:.{places}f} ± {u:.{places}f} {unit}"
+        return f"{self.value / size:.{places}f} ± {u:.{places}f}"
+
+    @property
+    def _headline(self) -> str:
+        return f"{self.question.name}: {self.shown} {self.question.unit[0]}"
 
 
 def uncertainty(

@@ -23,6 +23,22 @@ def said(text: str) -> str:
     return " ".join(text.replace("│", " ").split())
 
 
+def test_stiffness_with_tolerances_says_how_sure_it_is(geometry: Path, tmp_path: Path) -> None:
+    file = tmp_path / "T.toml"
+    file.write_text("rigidity = 0.05\njoint_angle = 0.01\n", encoding="utf-8")
+    asked = ("stiffness", geometry, *STEEL, "--angles", 5, "--tolerances", file)
+    numbers = json.loads(call(*asked, "--json").stdout)["uncertainty"]
+    arm = cdsm.Manipulator(cdsm.Geometry.read(geometry), cdsm.LinearElasticity(48e3))
+    pose = arm.at(np.full(arm.nv, np.deg2rad(5.0)))
+    budget = cdsm.uncertainty(
+        pose, cdsm.distribute_tension(pose, 10.0), cdsm.Tolerances.read(file), direction="z"
+    )
+    assert numbers["z"]["standard_uncertainty"] == pytest.approx(budget.standard_uncertainty)
+    shown = call(*asked).stdout
+    assert budget.shown in shown
+    assert "of it joint angle" in shown
+
+
 # --- warnings first -------------------------------------------------------------------------
 
 
