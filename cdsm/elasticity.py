@@ -21,6 +21,9 @@ from cdsm.support.validation import RANGES, flag, number_array, quantity, scalar
 from cdsm.support.values import Array
 
 if TYPE_CHECKING:
+    import os
+    from pathlib import Path
+
     from matplotlib.figure import Figure
 
 _STEP = 6e-6
@@ -106,6 +109,28 @@ class Elasticity(ABC):
     @abstractmethod
     def domain(self) -> Domain:
         """Tensions [N] for which the elasticity is defined."""
+
+    @staticmethod
+    def read(path: str | os.PathLike[str]) -> Elasticity:
+        """Read an elasticity from a TOML file, as :func:`~cdsm.read_elasticity`.
+
+        Raises:
+            FileError: The file cannot be read or does not describe an elasticity.
+        """
+        from cdsm.wires.files import read_elasticity  # which imports this module
+
+        return read_elasticity(path)
+
+    def write(self, path: str | os.PathLike[str]) -> Path:
+        """Write the elasticity to a TOML file, as :func:`~cdsm.write_elasticity`; return its path.
+
+        Raises:
+            InvalidInput: A file cannot hold an elasticity of this kind.
+            FileError: The file cannot be written.
+        """
+        from cdsm.wires.files import write_elasticity  # which imports this module
+
+        return write_elasticity(self, path)
 
     def plot(self) -> Figure:
         """Plot tangent and secant rigidity [kN] over the tension [N]."""

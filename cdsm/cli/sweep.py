@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -153,6 +153,11 @@ def map_sweep(
             metavar="AXIS=PLACE:HALF",
         ),
     ] = None,
+    statistic: Annotated[
+        Literal["median", "min", "max"] | None,
+        typer.Option(help="Of the postures in a cell; a cloud of tips shows the median."),
+    ] = None,
+    bins: Annotated[int, typer.Option(help="Cells along the longest side of a map.")] = 40,
     as_json: AsJson = False,
 ) -> None:
     """Colour the reachable workspace by a quantity of a sweep."""
@@ -163,7 +168,7 @@ def map_sweep(
         slab_in_mm = rest.replace(":", " ")
         place, half = numbers("--section", slab_in_mm, 2, "AXIS=PLACE:HALF, in mm")
         slab = (normal.strip(), place / 1000.0, half / 1000.0)
-    figure = cdsm.plots.plot_map(dataset, quantity, section=slab)
+    figure = cdsm.plots.plot_map(dataset, quantity, section=slab, statistic=statistic, bins=bins)
     _answer(as_json, dataset, cdsm.plots.save_figure(figure, out))
 
 

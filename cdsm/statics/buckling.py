@@ -158,7 +158,7 @@ class CriticalLoad(ReadOnlyState):
             "critical_load_factor": self.factor,
             "limit": self.limit,
             "load_mode": dict(zip(arm.joint_names, self.mode, strict=True)),
-            "tension_N": dict(zip(arm.cables.names, self.tension, strict=True)),
+            "load_tension_N": dict(zip(arm.cables.names, self.tension, strict=True)),
         }
         return dict(plain(numbers))
 

@@ -1,6 +1,7 @@
 """Results by name: mappings, tables of text, dictionaries for JSON, pandas and xarray."""
 
 import json
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -252,3 +253,17 @@ def test_extras_that_are_missing_are_installed_from_a_clone() -> None:
 def test_presets_list_what_they_offer_only() -> None:
     assert not {"np", "math", "replace", "annotations"} & set(dir(cdsm.presets))
     assert "virtual_prototype" in dir(cdsm.presets)
+
+
+def test_elasticities_are_read_and_written_by_methods(tmp_path: Path) -> None:
+    law = cdsm.presets.STRAND_1X19
+    assert cdsm.Elasticity.read(law.write(tmp_path / "wire.toml")) == law
+    assert (
+        PLAN.write_csv(tmp_path / "old.csv").read_text()
+        == PLAN.write(tmp_path / "new.csv").read_text()
+    )
+    header = (tmp_path / "new.csv").read_text().splitlines()[0].split(",")
+    assert header[-6:] == [
+        *("tip x [m]", "tip y [m]", "tip z [m]"),
+        *("stiffness [N/m]", "target [N/m]", "reason"),
+    ]

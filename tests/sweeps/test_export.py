@@ -136,7 +136,7 @@ def test_a_failure_leaves_the_old_file(
     def broken(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(export, "_table", broken)
+    monkeypatch.setattr(export, "tidy", broken)
     with pytest.raises(cdsm.FileError, match="No space left"):
         cdsm.write_sweep(everything, path)
     assert path.read_text(encoding="utf-8") == "old"

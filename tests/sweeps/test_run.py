@@ -375,5 +375,5 @@ def test_bad_pose_sets_are_named(make: Callable[[], object], said: str) -> None:
 
 def test_missing_extra_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "xarray", None)
-    with pytest.raises(cdsm.MissingExtra, match=r"pip install 'cdsm-stiffness\[sweep\]'"):
+    with pytest.raises(cdsm.MissingExtra, match=r"pip install -e '.\[sweep\]'"):
         cdsm.sweep(short_arm(), Q)
