@@ -152,6 +152,11 @@ class ArmOptions:
 
     def _arm(self) -> cdsm.Manipulator:
         """Read the arm, its wire included, from its files."""
+        if self.arm.suffix.lower() in (".nc", ".csv", ".zarr"):
+            raise typer.BadParameter(
+                f"{self.arm} is no arm; cdsm map reads sweeps, cdsm fit tensile tests.",
+                param_hint="ARM",
+            )
         wire = self._wire()
         robot = self.arm.suffix.lower() == ".urdf"
         if robot and (self.cables is None or self.tip is None):
@@ -161,6 +166,11 @@ class ArmOptions:
             self._refuse("the tip of a .urdf is free, that of others is not", "tip")
         if self.arm.is_dir():
             self._refuse("a CASPR model has its own cables", "cables")
+            if not any(self.arm.glob("*_bodies.xml")):
+                raise typer.BadParameter(
+                    f"{self.arm} is a folder without a CASPR model; give an ARM.toml.",
+                    param_hint="ARM",
+                )
             arm = cdsm.read_caspr(self.arm, elasticity=wire or cdsm.LinearElasticity(1.0))
             if wire is None:  # only now, since the folder may hold no model
                 raise cdsm.MissingWire(self.arm)

@@ -66,7 +66,7 @@ def numbers(option: str, text: str, count: int | None = None, form: str = "numbe
         values = [float(word) for word in text.replace(",", " ").split()]
     except ValueError as error:
         raise typer.BadParameter(
-            f"{error}; separate numbers by commas.", param_hint=option
+            f"{error}; give {form}, separated by commas.", param_hint=option
         ) from None
     if count is not None and len(values) != count:
         counted = f"{plural(len(values), 'number')} given; give {count}: {form}."

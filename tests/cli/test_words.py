@@ -274,6 +274,17 @@ def test_gravity_along_an_axis_in_python(geometry: Path) -> None:
         arm.with_gravity("down")
 
 
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [("s.nc", "is no arm; cdsm map reads sweeps"), (".", "is a folder without a CASPR model")],
+)
+def test_what_is_no_arm_is_told_what_reads_it(name: str, words: str, tmp_path: Path) -> None:
+    (tmp_path / "s.nc").write_bytes(b"CDF")
+    told = call("stiffness", tmp_path / name)
+    assert told.exit_code == 2
+    assert words in said(told.stderr)
+
+
 def test_one_cable_is_one_cable() -> None:
     one = cdsm.Geometry.hinged(
         joints=1,
