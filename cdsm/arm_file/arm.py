@@ -116,7 +116,10 @@ def read_arm(path: str | os.PathLike[str], wire: Wire | None) -> ArmParts:
         return ArmParts(geometry, to_urdf(geometry), cables, TIP, g, length, None)
     source = robot.text if robot.file is None else Path(path).parent / robot.file
     assert source is not None
-    urdf = read_urdf(source, check_inertia=robot.check_inertia)
+    try:
+        urdf = read_urdf(source, check_inertia=robot.check_inertia)
+    except FileError as error:
+        raise FileError(path, f"urdf.file: {error}") from None
     return ArmParts(None, urdf, cables, robot.tip, g, length, robot.joint_names)
 
 

@@ -207,7 +207,7 @@ def test_faults_are_named(before: str, after: str, said: str, tmp_path: Path) ->
     [
         ("tip = 'tip'", "give file (a path, from the folder of this one) or text"),
         ("file = 'a.urdf'", "urdf.tip: is missing"),
-        ("tip = 'tip'\nfile = 'absent.urdf'", "absent.urdf: does not exist"),
+        ("tip = 'tip'\nfile = 'absent.urdf'", "arm.toml: urdf.file: "),
         ("tip = 'tip'\nfle = 'absent.urdf'", "urdf.fle: is not a key that is known here; did you"),
         ("tip = 'top'\ntext = '''" + FINGER + "'''", "no link is called 'top'"),
     ],
