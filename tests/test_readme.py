@@ -25,7 +25,7 @@ def test_snippets_print_what_the_readme_shows() -> None:
         elif language == "text":
             assert printed == code
             compared += 1
-    assert compared == 3
+    assert compared == 5
 
 
 def test_a_result_is_shown_within_the_first_25_lines() -> None:
