@@ -227,6 +227,7 @@ PULLS = cdsm.distribute_tensions(POSE.arm, [POSE.q, POSE.q / 2.0], minimum=10.0)
 TOLERANCES = cdsm.Tolerances(rigidity=0.05, hole_radius=1e-4)
 RESULTS: dict[str, Any] = {
     "Posture": POSE,
+    "MomentArms": POSE.moment_arms,
     "Tension": PULL,
     "Stiffness": K,
     "Shares": SHARES,
