@@ -10,7 +10,7 @@ from typing import final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm.errors import SolverError
+from cdsm.errors import ElasticityRangeError, SolverError
 from cdsm.friction.rest_states import Neighbourhood, RestStates
 from cdsm.friction.tangent import holding
 from cdsm.posture import Posture
@@ -35,9 +35,10 @@ _INSIDE = 0.98
 class RestBand(ReadOnlyState):
     """Where the tip of an arm with locked motors may rest, whatever loads came and went before.
 
-    ``low``, ``high``, ``tensions``, ``end_tensions`` and ``loads`` are proved for all states of
-    rest in a neighbourhood of the reference: ``room`` times the set of all states that are at rest
-    to first order. A simulation may come near to them, but not beyond.
+    If ``proved``, ``low`` and ``high`` hold for all states of rest in a neighbourhood of the
+    reference: ``room`` times the set of all states that are at rest to first order. So do
+    ``tensions``, ``end_tensions`` and ``loads``, which raise SolverError or ElasticityRangeError if
+    they cannot be proved. A simulation may come near to these bounds, but not beyond.
 
     Attributes:
         stiffness: Frictionless K of the reference, with its posture, tensions and wrench.
@@ -47,6 +48,10 @@ class RestBand(ReadOnlyState):
         first_order: Largest displacement either way to first order [m], in closed form.
         room: Size of the neighbourhood over that of all states at rest to first order [-]; 0 if
             no hole holds at the reference: it is then the one state at rest.
+        proved: Whether ``low`` and ``high`` are proved. False if friction changes tensions or
+            angles so far that the outer correction does not end, as with much friction, low
+            tensions or a law that bends much (Eq. 19 with a long lead). Then both are to first
+            order, and histories may lead some percent beyond.
     """
 
     stiffness: Stiffness
@@ -55,12 +60,14 @@ class RestBand(ReadOnlyState):
     high: float
     first_order: float
     room: float
+    proved: bool = True
 
     def __str__(self) -> str:
-        return (
+        said = (
             f"at rest from {1e3 * self.low:.4g} to {1e3 * self.high:.4g} mm along "
             f"{coordinates(self.direction)}, whatever came before"
         )
+        return said if self.proved else f"{said} (to first order, not proved)"
 
     @cached_property
     def tensions(self) -> Array:
@@ -104,7 +111,8 @@ def rest_band(
 
     The reference is the posture with the given tension in all segments of each cable. The motors
     are locked there, or hold their force. Loads beyond ``wrench`` have come and gone. The band is
-    proved by linear programs with an outer correction for finite displacements and nonlinear laws.
+    proved by linear programs with an outer correction for finite displacements and nonlinear laws,
+    unless :attr:`RestBand.proved` is false.
 
     Args:
         pose: The posture of the reference.
@@ -114,29 +122,34 @@ def rest_band(
 
     Raises:
         InvalidInput: As for :func:`~cdsm.stiffness`, or ``direction`` is no direction.
-        ElasticityRangeError: A tension of the band is outside the domain of an elasticity.
+        ElasticityRangeError: A tension is outside the domain of its cable's elasticity.
         SingularStiffness: K_θ is singular.
-        SolverError: The band is wider than the arm, as where it is unstable.
     """
     K = stiffness(pose, tension, wrench)
     u = unit_direction("direction", direction)
     if not holding(pose).any():  # one state of rest
         return RestBand(stiffness=K, direction=u, low=0.0, high=0.0, first_order=0.0, room=0.0)
-    room = _ROOM
+    room, near = _ROOM, Neighbourhood(K, _ROOM)
+    half = float(near.largest(u @ pose.jacobian[:3])) / room
     for _ in range(_WIDENINGS):
-        near = Neighbourhood(K, room)
-        states = RestStates(K, near)
-        ends = [states.displacement(sign * u) for sign in (-1.0, 1.0)]
-        if max(end.reach for end in ends) <= _INSIDE:
+        try:
+            states = RestStates(K, near)
+            ends = [states.displacement(sign * u) for sign in (-1.0, 1.0)]
+        except (ElasticityRangeError, SolverError):  # too far for the law, or for the sites
             break
+        if max(end.reach for end in ends) <= _INSIDE:
+            low, high = -ends[0].bound, ends[1].bound
+            return RestBand(
+                stiffness=K, direction=u, low=low, high=high, first_order=half, room=room
+            )
         room *= _ROOM
-    else:
-        raise SolverError("highs", "finds no end of the band: friction holds an unstable arm")
+        near = Neighbourhood(K, room)
     return RestBand(
         stiffness=K,
         direction=u,
-        low=-ends[0].bound,
-        high=ends[1].bound,
-        first_order=float(near.largest(u @ pose.jacobian[:3])) / room,
-        room=room,
+        low=-half,
+        high=half,
+        first_order=half,
+        room=_ROOM,
+        proved=False,
     )
