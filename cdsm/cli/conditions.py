@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     import cdsm
     from cdsm.cli.output import Json
-
-_NAMED = 3
-"""Number of different wires that the line names."""
 
 
 @dataclass(frozen=True)
@@ -54,22 +50,9 @@ class Conditions:
     @property
     def wire(self) -> str:
         """The wires of the cables and their springs, as text."""
-        from cdsm.wires.catalogue import label
+        from cdsm.wires.catalogue import wires_text
 
-        counts = Counter(
-            label(cable.elasticity)
-            + (
-                f" on a spring of {cable.series_stiffness / 1000.0:.4g} N/mm"
-                if cable.series_stiffness < float("inf")
-                else ""
-            )
-            for cable in self.arm.cables
-        )
-        if len(counts) == 1:
-            return next(iter(counts))
-        if len(counts) > _NAMED:
-            return f"of {len(counts)} kinds"
-        return ", ".join(f"{name} ({count} of {counts.total()})" for name, count in counts.items())
+        return wires_text(self.arm.cables)
 
     def to_dict(self) -> Json:
         """Return them for JSON, in SI units."""

@@ -12,7 +12,7 @@ from cdsm.manipulator import Manipulator
 from cdsm.plots.style import AXES
 from cdsm.support.values import Array
 from cdsm.view.command import command_text
-from cdsm.view.panel import page_text, tensions_text
+from cdsm.view.panel import basis_text, page_text, tensions_text
 from cdsm.view.sliders import Range, Slider, joint_ranges, slider_range
 from cdsm.view.state import Setting, Shown
 
@@ -59,6 +59,7 @@ class Controls:
         self._gui, self._start = server.gui, start
         self._changed, self._fit, self._admit = changed, fit, admit
         self._arm, self._arm_arguments, self._force_scale = arm, arm_arguments, force_scale
+        self._gui.add_html(basis_text(arm), order=-2.0)
         self._text = self._gui.add_html("", order=-1.0)  # above the path, which has 0
         with self._gui.add_folder("Load"):
             tension, force = limits

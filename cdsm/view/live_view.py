@@ -6,6 +6,7 @@ import contextlib
 import logging
 import threading
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Self, final
 
 import numpy as np
@@ -15,7 +16,7 @@ from cdsm.support.values import Array
 from cdsm.view.controls import Controls
 from cdsm.view.path_player import PathPlayer
 from cdsm.view.scene import Scene
-from cdsm.view.state import Condition, Setting, Shown, show
+from cdsm.view.state import Condition, Setting, Shown, advised, show
 from cdsm.view.tip_handle import TipHandle
 from cdsm.view.worker import Worker
 
@@ -25,6 +26,9 @@ if TYPE_CHECKING:
     from cdsm.view.guard import Guard
 
 _LOG = logging.getLogger(__name__)
+
+_SETTLED = 0.3
+"""Seconds without a new setting before what takes some tenths of a second is computed."""
 
 _ARROW = 0.5
 """Length of the arrow of the largest force, as a fraction of the arm's length."""
@@ -134,7 +138,10 @@ class View:
             setting = self._controls.setting
             self._handle.moved_to(setting.q)
         try:
-            self._put(show(self.arm, setting))
+            shown = show(self.arm, setting)
+            self._put(shown)
+            if shown.condition is Condition.UNSTABLE and self._worker.is_left_alone(_SETTLED):
+                self._put(replace(shown, problem="\n".join([shown.problem, *advised(shown)])))
         except Exception as error:  # a bug must not leave outdated numbers on the page
             _LOG.exception("the view cannot show %s", setting)
             problem = f"{type(error).__name__}: {error}"

@@ -9,11 +9,13 @@ from typing import Final, NamedTuple
 import matplotlib
 import numpy as np
 
+from cdsm.manipulator import Manipulator
 from cdsm.plots.style import AXES, MM, N_PER_MM
 from cdsm.support.format import MODEL, coordinates
 from cdsm.support.markup import Markup, element
 from cdsm.support.values import Array
 from cdsm.view.state import ELLIPSOID, FORCE, Condition, Shown
+from cdsm.wires.catalogue import wires_text
 
 _GREEN, _RED, _AMBER, _GREY = "#2f855a", "#c53030", "#b7791f", "#718096"
 _COLORS: Final = {
@@ -52,7 +54,10 @@ def page_text(shown: Shown, force_scale: float, remark: str = "") -> str:
     color = _COLORS.get(shown.condition, _GREY)
     badge = f"background:{color};color:white;font-weight:bold;text-align:center;padding:0.2em"
     parts = [element("div", _named("condition", shown.condition.value), style=badge)]
-    parts += [element("p", _named(name, text)) for name, text in _remarks(shown, remark)]
+    lines = "white-space:pre-line"
+    parts += [
+        element("p", _named(name, text), style=lines) for name, text in _remarks(shown, remark)
+    ]
     rows = [_row(each) for each in _numbers(shown)]
     if rows:
         parts.append(element("table", *rows, style=_TABLE))
@@ -62,6 +67,14 @@ def page_text(shown: Shown, force_scale: float, remark: str = "") -> str:
     if shown.tensions is not None:
         parts += _color_bar(shown.tensions)
     return str(element("div", *parts, style=_BOX))  # msgspec accepts no subclass of str
+
+
+def basis_text(arm: Manipulator) -> str:
+    """Write what all numbers are computed with: arm, wires, gravity, friction."""
+    friction = "friction of its holes left out" if arm.has_friction else "frictionless"
+    words = f"with wire {wires_text(arm.cables)}; gravity {coordinates(arm.gravity)} m/s²"
+    lines = element("div", str(arm)), element("div", _named("basis", f"{words}; {friction}"))
+    return str(element("div", *lines, style=_TEXT + "color:gray"))
 
 
 def tensions_text(shown: Shown) -> str:

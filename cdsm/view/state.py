@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdsm.errors import CdsmError, EquilibriumError, InvalidInput
+from cdsm.instability import advice, verdict
 from cdsm.kernels.principal import principal_stiffness
 from cdsm.manipulator import Manipulator
 from cdsm.plots.arm import Ellipsoid, color_scale, ellipsoid
@@ -54,7 +55,6 @@ _CONDITIONS: Final[dict[Status | None, Condition]] = {
 }
 
 _PROBLEMS: Final = {
-    Condition.UNSTABLE: "K_θ is not positive definite: the arm buckles under these tensions.",
     Condition.LEFT_REFERENCE: "The arm is unstable where its motors are locked. It left this "
     "posture without any force, and rests where it is shown.",
     Condition.NEUTRAL: "No cable brings back every joint: the arm rests here, but not firmly.",
@@ -166,6 +166,11 @@ class Shown(ReadOnlyState):
         return ellipsoid(self.compliance, pose.tip[:3, 3], pose.arm.length)
 
 
+def advised(shown: Shown) -> tuple[str, ...]:
+    """Return what would hold an unstable arm; it takes some tenths of a second."""
+    return () if shown.stiffness is None else advice(shown.stiffness)
+
+
 def show(arm: Manipulator, setting: Setting) -> Shown:
     """Compute the results for an arm at a setting; every error becomes a condition."""
     pose = tension = K = rest = None
@@ -187,6 +192,8 @@ def show(arm: Manipulator, setting: Setting) -> Shown:
             _ = K.compliance  # raises if K_θ is singular: its margin is only rounding error
             condition = Condition.STABLE if K.is_stable else Condition.UNSTABLE
         problem = _PROBLEMS.get(condition, "")
+        if condition is Condition.UNSTABLE:
+            problem = verdict(K)
     except InvalidInput as error:
         condition, problem = Condition.INVALID, str(error)
     except EquilibriumError as error:

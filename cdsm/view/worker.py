@@ -18,18 +18,28 @@ class Worker:
         self._job = job
         self._thread = futures.ThreadPoolExecutor(1, "cdsm view")
         self._lock = threading.Lock()
+        self._asked = threading.Event()
         self._last: futures.Future[None] | None = None
 
     def request(self) -> None:
         """Request a run of the job. Any thread may call this; after the end nothing happens."""
+        self._asked.set()
         with self._lock, contextlib.suppress(RuntimeError):  # the thread has ended
             if self._last is None or self._last.running() or self._last.done():
-                self._last = self._thread.submit(self._job)
+                self._last = self._thread.submit(self._run)
 
     def wait(self) -> None:
         """Wait until all requests made before are done."""
         futures.wait([self._last] if self._last else [])
 
+    def is_left_alone(self, seconds: float) -> bool:
+        """Wait, within the job, whether nobody requests a run for some seconds."""
+        return not self._asked.wait(seconds)
+
     def close(self) -> None:
         """Wait until all requests made before are done, and refuse further ones."""
         self._thread.shutdown()
+
+    def _run(self) -> None:
+        self._asked.clear()
+        self._job()

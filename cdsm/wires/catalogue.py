@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import math
 import os
-from typing import Final
+from collections import Counter
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Final
 
 from cdsm.elasticity import Elasticity, LinearElasticity
 from cdsm.errors import InvalidInput, UnknownName
 from cdsm.wires.files import read_elasticity
 from cdsm.wires.laws import StrandElasticity, TabulatedElasticity
 from cdsm.wires.slack import SlackBelow
+
+if TYPE_CHECKING:
+    from cdsm.cable import Cable
 
 STRAND: Final = StrandElasticity.eq19_repaired()
 """The 1×19 steel strand of 1.2 mm of Section IV-C: Eq. 19, repaired and continuous."""
@@ -22,6 +27,9 @@ WIRES: Final[dict[str, Elasticity]] = {"1x19-1.2mm": STRAND, "solid-1.2mm": SOLI
 """Laws by the name of their wire."""
 
 _FILES = (".toml", ".csv", ".txt", ".tsv")  # of tables too: their reader says to fit them first
+
+_NAMED = 3
+"""Number of different wires that a text names."""
 
 Wire = Elasticity | str | float | os.PathLike[str]
 """What stands for a wire: a law, a name of :data:`WIRES`, EA [N], or the path of a WIRE.toml."""
@@ -72,3 +80,21 @@ def label(law: Elasticity) -> str:
     )
     low, high = law.domain
     return f"{kind}, {low:.4g} to {high:.4g} N" if math.isfinite(high) else kind
+
+
+def wires_text(cables: Iterable[Cable]) -> str:
+    """Return the wires of cables and their springs, as text."""
+    counts = Counter(
+        label(cable.elasticity)
+        + (
+            f" on a spring of {cable.series_stiffness / 1000.0:.4g} N/mm"
+            if cable.series_stiffness < math.inf
+            else ""
+        )
+        for cable in cables
+    )
+    if len(counts) == 1:
+        return next(iter(counts))
+    if len(counts) > _NAMED:
+        return f"of {len(counts)} kinds"
+    return ", ".join(f"{name} ({count} of {counts.total()})" for name, count in counts.items())
