@@ -23,10 +23,11 @@ _SAVE: Final = (
     "const size=one=>one.width*one.height;"
     "const picture=[...document.querySelectorAll('canvas')].sort((a,b)=>size(b)-size(a))[0];"
     "picture.toBlob(blob=>{const link=document.createElement('a');"
-    "link.href=URL.createObjectURL(blob);link.download=document.title.split(':')[0]+'.png';"
-    "link.click();URL.revokeObjectURL(link.href)})"
+    "link.href=window.URL.createObjectURL(blob);"
+    "link.download=document.title.split(':')[0]+'.png';"
+    "link.click();window.URL.revokeObjectURL(link.href)})"
 )
-"""Save the largest canvas, which is the scene."""
+"""Save the largest canvas, which is the scene. ``URL`` alone is that of the page here."""
 
 _BUTTON: Final = "padding:0.3em 0.8em;margin-right:0.6em;cursor:pointer"
 _CODE: Final = "display:block;white-space:pre-wrap;overflow-wrap:anywhere;margin-bottom:0.6em"
