@@ -25,8 +25,8 @@ _MARGIN = 1.3
 _OUTSIDE, _SMALL = 1.3, 0.5
 """Extent of the arm, over the fitted radius, beyond and below which the cameras are fitted anew."""
 
-_USUAL: Final = 1200, 900
-"""Width and height in pixels of the page for which the first camera is placed."""
+_USUAL = 4.0 / 3.0
+"""Width over height of the picture for which the first camera is placed."""
 
 _PHONE = 576
 """Width in pixels up to which viser shows the panel as a sheet over the lower part of the page."""
@@ -55,36 +55,49 @@ class Ball:
         return _SMALL * self.radius < reach < _OUTSIDE * self.radius
 
 
-def placed(ball: Ball, direction: Array, width: int, height: int) -> tuple[Array, Array]:
+def placed(ball: Ball, direction: Array, aspect: float, free: float) -> tuple[Array, Array]:
     """Compute position and look-at point [m] of a camera that looks at a ball.
 
     Args:
         ball: What the camera shows.
         direction: From the ball to the camera (3,), of any length.
-        width: Width of the page in pixels.
-        height: Height of the page in pixels.
+        aspect: Width over height of the picture.
+        free: Upper part of the picture that nothing covers, from 0 to 1.
     """
-    free = _FREE if width <= _PHONE else 1.0
     high = math.tan(_FOV / 2.0)
-    distance = _MARGIN * ball.radius / min(high * free, high * width / height)
+    distance = _MARGIN * ball.radius / min(high * free, high * aspect)
     back = direction / np.linalg.norm(direction)
     up = np.array([0.0, 0.0, 1.0]) - back[2] * back
     size = float(np.linalg.norm(up))
-    # the middle of the free part is above the middle of the page
+    # the middle of the free part is above the middle of the picture
     shift = (1.0 - free) * distance * high * (up / size if size > 0.0 else up)
     look_at = ball.middle - shift
     return look_at + distance * back, look_at
 
 
+@dataclass
+class _Browser:
+    """What is known of the picture of a browser: its free part, size and last camera position."""
+
+    free: float
+    size: tuple[int, int]
+    position: Array
+
+
 class Cameras:
-    """Cameras of all browsers of a viser server, fitted to a ball."""
+    """Cameras of all browsers of a viser server, fitted to a ball.
+
+    The camera of a browser is fitted anew if its size changes, unless its user has moved it.
+    """
 
     def __init__(self, server: viser.ViserServer, ball: Ball) -> None:
         self._server, self._ball = server, ball
+        self._browsers: dict[int, _Browser] = {}
         self._set_first()
         camera = server.initial_camera
         camera.fov, camera.near, camera.far = _FOV, ball.radius / 50.0, 200.0 * ball.radius
         server.on_client_connect(self._on_connect)
+        server.on_client_disconnect(self._on_disconnect)
 
     def follow(self, ball: Ball) -> None:
         """Fit all cameras if the arm has left the picture or has become small in it."""
@@ -97,20 +110,36 @@ class Cameras:
     def fit(self, client: viser.ClientHandle) -> None:
         """Fit one camera to the ball; its direction stays."""
         camera = client.camera
-        self._place(client, camera.position - camera.look_at)
+        browser = self._browsers.get(client.client_id)
+        if browser is None:  # it has just come or gone
+            return
+        position, look_at = placed(
+            self._ball, camera.position - camera.look_at, camera.aspect, browser.free
+        )
+        browser.position = position
+        with client.atomic():
+            camera.position = position
+            camera.look_at = look_at
 
     def _set_first(self) -> None:
         camera = self._server.initial_camera
-        camera.position, camera.look_at = placed(self._ball, _FIRST, *_USUAL)
+        camera.position, camera.look_at = placed(self._ball, _FIRST, _USUAL, 1.0)
 
     def _on_connect(self, client: viser.ClientHandle) -> None:
-        if client.camera.image_width <= _PHONE:
-            self._place(client, _FIRST)
-
-    def _place(self, client: viser.ClientHandle, direction: Array) -> None:
         camera = client.camera
-        with client.atomic():
-            camera.position, look_at = placed(
-                self._ball, direction, camera.image_width, camera.image_height
-            )
-            camera.look_at = look_at
+        size = camera.image_width, camera.image_height
+        phone = camera.image_width <= _PHONE  # viser docks the panel later: this is the whole page
+        self._browsers[client.client_id] = _Browser(_FREE if phone else 1.0, size, camera.position)
+        camera.on_update(self._on_camera)
+        self.fit(client)
+
+    def _on_disconnect(self, client: viser.ClientHandle) -> None:
+        self._browsers.pop(client.client_id, None)
+
+    def _on_camera(self, camera: viser.CameraHandle) -> None:
+        browser = self._browsers.get(camera.client.client_id)
+        size = camera.image_width, camera.image_height
+        if browser is not None and size != browser.size:
+            browser.size = size
+            if np.allclose(camera.position, browser.position, rtol=1e-4, atol=0.0):
+                self.fit(camera.client)

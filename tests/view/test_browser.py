@@ -103,11 +103,18 @@ class Page:
         for _ in range(times):
             knob.press(key)
 
+    def camera(self, view: View, width: float) -> Any:
+        """The camera of this page, once the server knows how wide the picture is."""
+        while True:
+            for client in view._server.get_clients().values():
+                if client.camera.image_width == round(width):
+                    return client.camera
+            self.page.wait_for_timeout(100.0)
+
     def pixel(self, view: View, point: Array) -> tuple[float, float]:
         """Where a point (3,) [m] of the scene is on the page, as the camera has it now."""
-        [*_, client] = view._server.get_clients().values()
-        camera = client.camera
         box = self.page.locator("canvas").first.bounding_box()
+        camera = self.camera(view, box["width"])
         back = camera.position - camera.look_at
         back /= np.linalg.norm(back)
         right = np.cross([0.0, 0.0, 1.0], back)
