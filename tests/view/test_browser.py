@@ -105,11 +105,13 @@ class Page:
 
     def camera(self, view: View, width: float) -> Any:
         """The camera of this page, once the server knows how wide the picture is."""
-        while True:
+        for _ in range(100):
             for client in view._server.get_clients().values():
-                if client.camera.image_width == round(width):
+                if abs(client.camera.image_width - width) < 2.0:
                     return client.camera
             self.page.wait_for_timeout(100.0)
+        sizes = [each.camera.image_width for each in view._server.get_clients().values()]
+        pytest.fail(f"no picture is {width} pixels wide: {sizes}")
 
     def pixel(self, view: View, point: Array) -> tuple[float, float]:
         """Where a point (3,) [m] of the scene is on the page, as the camera has it now."""
