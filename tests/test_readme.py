@@ -1,9 +1,15 @@
 """README is executed: every Python snippet runs, and prints the text block that follows it."""
 
 import io
+import os
 import re
+import shutil
+import subprocess
+import sys
 from contextlib import redirect_stdout
 from pathlib import Path
+
+import pytest
 
 from cdsm import paper
 from tests.conftest import Results
@@ -26,6 +32,33 @@ def test_snippets_print_what_the_readme_shows() -> None:
             assert printed == code
             compared += 1
     assert compared == 5
+
+
+@pytest.mark.slow
+def test_shell_commands_run_as_printed(tmp_path: Path) -> None:
+    """All but the first block, which makes the environment; and the view, which does not end."""
+    text = README.read_text(encoding="utf-8")
+    blocks = re.findall(r"```sh\n(.*?)```", text, re.DOTALL)
+    lines = [line for block in blocks for line in block.splitlines() if "pip install" not in line]
+    commands = [line for line in lines if line.split()[0].endswith("cdsm")]
+    assert len(commands) > 8
+    (tmp_path / ".venv").symlink_to(sys.prefix)
+    shutil.copy(ROOT / "examples" / "arm.toml", tmp_path / "ARM.toml")
+    tested = ROOT / "notebooks" / "data" / "strand_1x19_tensile_test.csv"
+    shutil.copy(tested, tmp_path / "TENSILE_TEST.csv")
+    # a shell that activated nothing has only the programs of the system; a bare `cdsm` is found
+    # here as README says that it is, once the environment is activated
+    path = os.pathsep.join([f"{sys.prefix}/bin", "/usr/bin", "/bin"])
+    environment = os.environ | {"PATH": path, "PYTHONPATH": str(ROOT)}
+    for command in commands:
+        if " view " in command:
+            continue
+        run = subprocess.run(
+            command, shell=True, cwd=tmp_path, env=environment, capture_output=True, text=True
+        )
+        assert run.returncode == 0, f"{command}\n{run.stdout}{run.stderr}"
+    for written in ("REPORT.html", "SWEEP.nc", "MAP.png", "ARM.urdf", "WIRE.toml", "WIRE.png"):
+        assert (tmp_path / written).stat().st_size > 0
 
 
 def test_a_result_is_shown_within_the_first_25_lines() -> None:
