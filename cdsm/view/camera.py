@@ -109,13 +109,14 @@ class Cameras:
 
     def fit(self, client: viser.ClientHandle) -> None:
         """Fit one camera to the ball; its direction stays."""
+        self._place(client, client.camera.position - client.camera.look_at)
+
+    def _place(self, client: viser.ClientHandle, direction: Array) -> None:
         camera = client.camera
         browser = self._browsers.get(client.client_id)
         if browser is None:  # it has just come or gone
             return
-        position, look_at = placed(
-            self._ball, camera.position - camera.look_at, camera.aspect, browser.free
-        )
+        position, look_at = placed(self._ball, direction, camera.aspect, browser.free)
         browser.position = position
         with client.atomic():
             camera.position = position
@@ -131,7 +132,7 @@ class Cameras:
         phone = camera.image_width <= _PHONE  # viser docks the panel later: this is the whole page
         self._browsers[client.client_id] = _Browser(_FREE if phone else 1.0, size, camera.position)
         camera.on_update(self._on_camera)
-        self.fit(client)
+        self._place(client, _FIRST)  # the camera may not be where it begins yet
 
     def _on_disconnect(self, client: viser.ClientHandle) -> None:
         self._browsers.pop(client.client_id, None)

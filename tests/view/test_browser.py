@@ -406,6 +406,10 @@ def test_the_arm_is_in_sight_at_every_size(
             break
     else:
         pytest.fail(f"no disks in view-{width}.png")
+    camera = own.camera(view, own.page.locator("canvas").first.bounding_box()["width"])
+    back = camera.position - camera.look_at
+    # from the side and a little above, whatever the size
+    np.testing.assert_allclose(back / np.linalg.norm(back), [0.118, -0.888, 0.444], atol=2e-3)
     columns = np.flatnonzero(brown.any(axis=0))
     assert columns[0] > 5  # none is cut off at an edge
     assert columns[-1] < free.shape[1] - 5
