@@ -45,16 +45,15 @@ def draw_surroundings(server: viser.ViserServer, length: float) -> None:
         fade_distance=100.0 * length,
     )
     labels = {f"{MM * x:.4g} mm": (x, near, floor) for x in np.arange(step, far - step / 2, step)}
-    labels |= {f"x = {MM * x:.4g} mm": (x, near, floor) for x in (0.0, far)}
+    labels |= {f"x = {MM * far:.4g} mm": (far, near, floor)}
+    labels |= {f"x = 0, z = {MM * floor:.4g} mm": (0.0, near, floor)}
     labels |= {f"y = {MM * y:.4g} mm": (far, y, floor) for y in (0.0, side)}
-    labels |= {f"z = {MM * floor:.4g} mm": (0.0, side, floor)}
     for i, (text, place) in enumerate(labels.items()):
         scene.add_label(
             f"/lengths/{i}",
             text,
             position=place,
             font_screen_scale=0.8,
-            depth_test=True,
             anchor="top-center",
         )
 
