@@ -1,4 +1,4 @@
-"""The numbers that notebooks 01 to 05 show: they are run here, cell by cell, and then looked at."""
+"""The numbers that notebooks show: they are run here, cell by cell, and then looked at."""
 
 import json
 from collections.abc import Callable
@@ -148,12 +148,40 @@ def workspace_maps(nb: Shown) -> None:
     assert cdsm.Geometry.from_toml(nb.again.attrs["geometry"]) == nb.soft.geometry
 
 
+def weights_with_friction(nb: Shown) -> None:
+    assert abs(nb.stuck / 1e3 - 257.6) < 0.1
+    assert abs(nb.frictionless / 1e3 - 36.2) < 0.1
+    for friction, secant in nb.secants.items():
+        assert np.all(np.diff(secant) < 1e-4 * nb.stuck)  # it falls with the weight
+        assert abs(secant[0] / nb.stuck - 1.0) < 1e-2
+        assert 1.0 < secant[-1] / nb.frictionless < 1.0 + friction + 0.1
+    assert abs(1e3 * nb.lost - 0.535) < 2e-3
+    assert abs(1e6 * nb.left - 29.2) < 0.2
+    assert abs(nb.test.friction.breakaway.load - 0.7063) < 1e-3
+    assert abs(nb.test.stiffness / 1e3 - 51.75) < 0.05
+    assert nb.band.low < min(nb.rests) < 0.7 * nb.band.low
+    assert 0.7 * nb.band.high < max(nb.rests) < nb.band.high
+    first = np.array(list(nb.first.values()))
+    np.testing.assert_allclose(first[:, 0], nb.stuck, rtol=1e-3)
+    assert np.all(np.diff(first[:, 1]) < 0.0)
+    assert abs(nb.ratio - 1.0) < 1e-9
+    small, rough, tense = (
+        nb.breakaway(mu, F) for mu, F in ((0.05, 50.0), (0.1, 50.0), (0.05, 100.0))
+    )
+    np.testing.assert_allclose([rough / small, tense / small], 2.0, rtol=0.01)
+    assert 1.0 < nb.shaken / nb.frictionless < 1.15
+    assert 1.05 < nb.plateau.min() < nb.plateau.max() < 1.15
+    tangents = np.array([tangent for _, tangent in nb.tangents.values()])
+    np.testing.assert_allclose(tangents, np.tile(tangents[1], (3, 1)), rtol=0.05)
+
+
 CHECKS: dict[str, Callable[[Shown], None]] = {
     "01_from_geometry_to_stiffness": first_arm,
     "02_cables_tensile_tests_and_experiments": cables_and_experiments,
     "03_hanging_weights_and_buckling": weights_and_buckling,
     "04_stiffness_control": stiffness_control,
     "05_workspace_stiffness_maps": workspace_maps,
+    "07_why_does_my_weight_test_depend_on_the_weight": weights_with_friction,
 }
 
 

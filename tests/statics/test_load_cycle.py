@@ -10,6 +10,7 @@ import pytest
 import cdsm
 from cdsm import presets
 from cdsm.support.values import Array
+from tests.campaigns import histories
 from tests.support.arms import random_arm, random_posture, random_tension
 
 WIRE = cdsm.LinearElasticity(48e3)
@@ -339,3 +340,12 @@ def test_random_arms_settle_from_tensions_that_do_not_balance_them() -> None:
         history = cdsm.load_cycle(pose, F, np.zeros((1, 6)))
         rest = cdsm.equilibrium(pose, F)
         np.testing.assert_allclose(history.tip[0], rest.pose.tip[:3, 3], atol=1e-10)
+
+
+# --- bands that hold whatever the history -----------------------------------------------------
+
+
+def test_random_histories_stay_in_the_band_of_rest_and_come_near_its_ends() -> None:
+    outside, far = histories.farthest(*histories.two_hinges(0.1), 12.0, 60)
+    assert not outside
+    assert 0.7 < far <= 1.0
