@@ -24,7 +24,9 @@ def warm(as_json: AsJson = False) -> None:
         str(K)
         up = (0.0, 0.0, 1.0)
         cdsm.plan_stiffness(pose, up, 1.01 * K.along(up), minimum=40.0)
-        cdsm.evaluate(arm, pose.q[None], minimum=40.0, direction=up, outputs=("along",))
+        readings = ("margin", "along", "compliance", "cartesian", "pseudoinverse")
+        cdsm.evaluate(arm, pose.q[None], minimum=40.0, direction=up, outputs=readings)
+        cdsm.distribute_tensions(arm, pose.q[None], 40.0, 40.0)  # no guess balances: a search
         rough = cdsm.presets.virtual_prototype(friction=0.1).at(pose.q)
         cdsm.load_cycle(rough, tension.values, np.zeros((1, 6)))
     seconds = time.perf_counter() - start

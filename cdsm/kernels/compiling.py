@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import hashlib
 import logging
+import os
+import tempfile
 from collections.abc import Callable, Iterable
-from functools import partial
+from functools import cache, partial
+from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numpy as np
-from numba import njit
+from numba import config, njit
 from numba.core import event
 from numba.core.compiler import Compiler
 
@@ -29,7 +33,7 @@ class _Disjoint(Compiler):
 
 
 def compiled(function: _Function) -> _Function:
-    """Compile a kernel; numba caches the result on disk if a folder is writable.
+    """Compile a kernel; numba caches the result on disk.
 
     fastmath is off, since it may remove NaN. Division by zero is not checked: no kernel divides by
     zero.
@@ -62,9 +66,43 @@ def inlined(function: _Function) -> _Function:
 def _compile(function: _Function, **options: Any) -> _Function:
     compiler = partial(njit, error_model="numpy", **options)
     try:
-        return cast(_Function, compiler(cache=True)(function))
+        kernel = compiler(cache=True)(function)
     except RuntimeError:  # neither the package's folder nor the user's cache is writable
-        return cast(_Function, compiler()(function))
+        chosen = config.CACHE_DIR  # type: ignore[attr-defined]
+        try:
+            config.CACHE_DIR = _own_folder()  # type: ignore[attr-defined]
+            kernel = compiler(cache=True)(function)
+        except (RuntimeError, OSError):  # nor is any folder for temporary files
+            kernel = compiler()(function)
+        finally:
+            config.CACHE_DIR = chosen  # type: ignore[attr-defined]
+    # numba compares the source of a kernel with its cache, but not that of the kernels it calls
+    stored = getattr(getattr(kernel, "_cache", None), "_cache_file", None)
+    if stored is not None:
+        stored._source_stamp = stored._source_stamp, _sources()
+    return cast(_Function, kernel)
+
+
+@cache
+def _sources() -> str:
+    """Return a digest of the sources of all kernels that others call."""
+    digest = hashlib.sha256()
+    for path in sorted(Path(__file__).parent.glob("*.py")):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()
+
+
+@cache
+def _own_folder() -> str:
+    """Return a folder for temporary files that only this user can write; say so."""
+    user = os.getuid() if hasattr(os, "getuid") else "user"
+    folder = Path(tempfile.gettempdir()) / f"cdsm-kernels-{user}"
+    folder.mkdir(mode=0o700, exist_ok=True)
+    seen = folder.lstat()
+    if hasattr(os, "getuid") and (seen.st_uid != user or seen.st_mode & 0o022):
+        folder = Path(tempfile.mkdtemp(prefix="cdsm-kernels-"))  # another user made the first
+    _log.warning("no cache folder of numba is writable, compiled kernels go to %s", folder)
+    return str(folder)
 
 
 class _Announcement(event.Listener):
