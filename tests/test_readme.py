@@ -53,6 +53,8 @@ def test_shell_commands_run_as_printed(tmp_path: Path) -> None:
     for command in commands:
         if " view " in command:
             continue
+        if " new ARM.toml" in command:
+            (tmp_path / "ARM.toml").unlink()
         run = subprocess.run(
             command, shell=True, cwd=tmp_path, env=environment, capture_output=True, text=True
         )
