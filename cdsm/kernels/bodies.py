@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cdsm.kernels.compiling import Width, inner, lanes, upwards
+from cdsm.kernels.compiling import Width, axes, inner, lanes, upwards
 from cdsm.kernels.tree import Frames, Indices, Tree, turned
 from cdsm.support.values import Array
 
@@ -58,8 +58,8 @@ def tip_jacobian(
     """
     origin, axis, slide, _ = frames
     i = np.uint64(masses.tip)
-    for r in upwards(0, origin.shape[1]):
-        for c in upwards(0, origin.shape[1]):
+    for r in axes(origin.shape[1], width):
+        for c in axes(origin.shape[1], width):
             x, y, z = masses.rotation[0, c], masses.rotation[1, c], masses.rotation[2, c]
             for w in lanes(width):
                 tip[r, c, w] = turned(rotation, i, r, x, y, z, w)
@@ -70,7 +70,7 @@ def tip_jacobian(
         tip[3, 3, w] = 1.0
     while i > 0:
         column = i - np.uint64(1)
-        for r in upwards(0, origin.shape[1]):
+        for r in axes(origin.shape[1], width):
             p, q = (r + 1) % 3, (r + 2) % 3
             for w in lanes(width):
                 jacobian[r, column, w] = axis[i, p, w] * (tip[q, 3, w] - origin[i, q, w]) - axis[
@@ -101,7 +101,7 @@ def gravity_torque(
     # first S and M of each link alone: columns 3 to 5, and column 6
     for i in upwards(0, parent.shape[0]):
         m, x, y, z = masses.mass[i], masses.centre[i, 0], masses.centre[i, 1], masses.centre[i, 2]
-        for r in upwards(0, origin.shape[1]):
+        for r in axes(origin.shape[1], width):
             for w in lanes(width):
                 carried[i, 3 + r, w] = m * (origin[i, r, w] + turned(rotation, i, r, x, y, z, w))
         for w in lanes(width):
@@ -113,10 +113,10 @@ def gravity_torque(
         for r in upwards(3, carried.shape[1]):
             for w in lanes(width):
                 carried[before, r, w] += carried[i, r, w]
-        for r in upwards(0, origin.shape[1]):  # r = S − M o, for a moment in the place of γ × z
+        for r in axes(origin.shape[1], width):  # r = S − M o, for a moment in the place of γ × z
             for w in lanes(width):
                 carried[i, r, w] = carried[i, 3 + r, w] - carried[i, 6, w] * origin[i, r, w]
-        for r in upwards(0, origin.shape[1]):
+        for r in axes(origin.shape[1], width):
             p, q = (r + 1) % 3, (r + 2) % 3
             for w in lanes(width):
                 carried[i, 3 + r, w] = (
@@ -125,7 +125,7 @@ def gravity_torque(
             if slide.shape[0]:
                 for w in lanes(width):
                     carried[i, 3 + r, w] += carried[i, 6, w] * slide[i, r, w]
-        for r in upwards(0, origin.shape[1]):
+        for r in axes(origin.shape[1], width):
             p, q = (r + 1) % 3, (r + 2) % 3
             for w in lanes(width):
                 carried[i, r, w] = gravity[p] * axis[i, q, w] - gravity[q] * axis[i, p, w]

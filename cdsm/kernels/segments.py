@@ -25,7 +25,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cdsm.kernels.compiling import Index, Width, compiled, inlined, inner, lanes, upwards
+from cdsm.kernels.compiling import Index, Width, axes, compiled, inlined, inner, lanes, upwards
 from cdsm.kernels.tree import Frames, Indices, Routing
 from cdsm.support.values import Array
 
@@ -66,7 +66,7 @@ def set_direction(site: Array, a: Index, b: Index, scratch: Segments, width: Wid
         length[w] = math.sqrt(square + (site[b, 2, w] - site[a, 2, w]) ** 2)
     for w in lanes(width):
         inverse[w] = 1.0 / length[w]
-    for r in upwards(0, site.shape[1]):
+    for r in axes(site.shape[1], width):
         for w in lanes(width):
             u[r, w] = (site[b, r, w] - site[a, r, w]) / length[w]
 
@@ -77,7 +77,7 @@ def set_derivative(
 ) -> None:
     """Fill d_j (3, W) = ±z × (x − o), or ± the slide, at the end x of a segment."""
     origin, axis, x = frames.origin, frames.axis, frames.site
-    for r in upwards(0, d.shape[0]):
+    for r in axes(d.shape[0], width):
         p, q = (r + 1) % 3, (r + 2) % 3
         for w in lanes(width):
             y, z = x[site, p, w] - origin[j, p, w], x[site, q, w] - origin[j, q, w]
@@ -161,7 +161,7 @@ def add_length_hessian(
             if t == split:  # the joints before it are on the other side: no u × z_i
                 for k in upwards(0, split - first):
                     i = np.uint64(joint[first + np.intp(k)])
-                    for r in upwards(0, u.shape[0]):
+                    for r in axes(u.shape[0], width):
                         p, q = (r + 1) % 3, (r + 2) % 3
                         for w in lanes(width):
                             left[k, r, w] -= weight[cable, w] * (
@@ -171,7 +171,7 @@ def add_length_hessian(
             set_derivative(frames, sign, site, j, d, width)
             for w in lanes(width):
                 along[w] = u[0, w] * d[0, w] + u[1, w] * d[1, w] + u[2, w] * d[2, w]
-            for r in upwards(0, u.shape[0]):
+            for r in axes(u.shape[0], width):
                 p, q = (r + 1) % 3, (r + 2) % 3
                 for w in lanes(width):
                     left[own, r, w] = weight[cable, w] * (

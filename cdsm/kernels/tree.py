@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cdsm.kernels.compiling import Index, Width, inlined, inner, lanes, upwards
+from cdsm.kernels.compiling import Index, Width, axes, inlined, inner, lanes, upwards
 from cdsm.support.values import Array, frozen
 
 Indices = NDArray[np.intp]
@@ -137,8 +137,8 @@ def forward_kinematics(
     parent, order, turn, translation, local_axis, local_slide = tree
     origin, axis, slide, site = frames
     cosine, sine = trigonometry[0], trigonometry[1]
-    for r in upwards(0, origin.shape[1]):
-        for c in upwards(0, origin.shape[1]):
+    for r in axes(origin.shape[1], width):
+        for c in axes(origin.shape[1], width):
             for w in lanes(width):
                 rotation[0, r, c, w] = 1.0 if r == c else 0.0
     for k in range(order.shape[0]):
@@ -146,7 +146,7 @@ def forward_kinematics(
         before, joint = np.uint64(parent[i]), i - np.uint64(1)
         for w in lanes(width):
             cosine[w], sine[w] = math.cos(q[joint, w]), math.sin(q[joint, w])
-        for r in upwards(0, origin.shape[1]):
+        for r in axes(origin.shape[1], width):
             x, y, z = translation[i, 0], translation[i, 1], translation[i, 2]
             for w in lanes(width):
                 origin[i, r, w] = origin[before, r, w] + turned(rotation, before, r, x, y, z, w)
@@ -158,7 +158,7 @@ def forward_kinematics(
             x, y, z = local_axis[i, 0], local_axis[i, 1], local_axis[i, 2]
             for w in lanes(width):
                 axis[i, r, w] = turned(rotation, before, r, x, y, z, w)
-            for c in upwards(0, origin.shape[1]):
+            for c in axes(origin.shape[1], width):
                 ax, ay, az = turn[i, 0, 0, c], turn[i, 0, 1, c], turn[i, 0, 2, c]
                 bx, by, bz = turn[i, 1, 0, c], turn[i, 1, 1, c], turn[i, 1, 2, c]
                 cx, cy, cz = turn[i, 2, 0, c], turn[i, 2, 1, c], turn[i, 2, 2, c]
@@ -170,6 +170,6 @@ def forward_kinematics(
     for p in upwards(0, routing.row.shape[0]):
         i = np.uint64(routing.row[p])
         x, y, z = routing.point[p, 0], routing.point[p, 1], routing.point[p, 2]
-        for r in upwards(0, origin.shape[1]):
+        for r in axes(origin.shape[1], width):
             for w in lanes(width):
                 site[p, r, w] = origin[i, r, w] + turned(rotation, i, r, x, y, z, w)
