@@ -9,8 +9,8 @@ into displaced places.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from functools import lru_cache
 from typing import NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from scipy.sparse import csr_matrix, hstack
@@ -56,10 +56,15 @@ class Places(NamedTuple):
         )
 
 
-@lru_cache(maxsize=8)
+_found: WeakKeyDictionary[Manipulator, Inputs] = WeakKeyDictionary()
+
+
 def inputs_of(arm: Manipulator) -> Inputs:
-    """Return the inputs of an arm; kept, since finding them takes longer than a stiffness."""
-    return Inputs(arm)
+    """Return the inputs of an arm; kept with it, since finding them takes milliseconds."""
+    inputs = _found.get(arm)
+    if inputs is None:
+        inputs = _found[arm] = Inputs(arm)
+    return inputs
 
 
 class Inputs:

@@ -98,7 +98,7 @@ def test_bounds_too_tight_say_what_is_missing_and_how_far_to_widen(seed: int) ->
     check_missing(error, pose, low, high, wrench)
     assert 0.0 < error.relaxation < INF
     assert set(error.binding) <= {cable.name for cable in pose.arm.cables}
-    assert "Lower minimum, raise maximum" in str(error)
+    assert "Lower minimum=, raise maximum=" in str(error)
 
     enough = error.relaxation * (1.0 + 1e-6)
     pull = cdsm.distribute_tension(pose, np.maximum(low - enough, 0.0), high + enough, wrench)

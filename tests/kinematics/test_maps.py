@@ -598,14 +598,14 @@ def test_tables_name_cables_joints_and_what_is_not_reached() -> None:
     text = str(found)
     for name in (*ARM.joint_names, *(cable.name for cable in ARM.cables), "[mm]", " deg"):
         assert name in text
-    assert "NOT REACHABLE: cable1_2 is off most, by -0.0" in text
+    assert "NOT REACHABLE: cable1_2 is off most, by -9.4 mm" in text
     assert "NOT REACHABLE" in repr(found)
     reached = cdsm.inverse_kinematics(ARM, TIP)
-    assert str(reached).endswith("rad from its target")
+    assert str(reached).endswith("° from its target")
     assert "\n\nreachable: the tip is " in str(reached)
     far = cdsm.inverse_kinematics(planar_arm(1), [0.04, 0.0, 0.1])
-    assert "joint1           -0.900000  at limit" in str(far)
-    assert "NOT REACHABLE: the tip is 0.066 m from its target" in str(far)
+    assert "joint1  -51.5662 deg  at limit" in str(far)
+    assert "NOT REACHABLE: the tip is 66 mm from its target" in str(far)
 
 
 def test_absurd_targets_still_have_an_answer() -> None:

@@ -562,7 +562,8 @@ def test_what_is_printed_is_each_reading_in_its_own_row() -> None:
         assert rows[name] == [f"{value / 1000.0:.4g}" for value in values]
     flat = str(cdsm.stiffness(pose.arm.at(np.zeros(5)), K.tension)).splitlines()
     absent = {line[:24].strip(): line[24:].split() for line in flat}
-    assert absent["cartesian, diagonal"] == absent["pseudoinverse, diagonal"] == ["-"] * 3
+    assert absent["pseudoinverse, diagonal"] == ["-"] * 3
+    assert absent["cartesian, diagonal"][0] == "-"  # the other two are those of a plane
 
 
 @pytest.mark.parametrize("units", [1.0, 1e-7, 1e9])

@@ -161,6 +161,8 @@ MEASURED = [
     )
     for u in np.eye(3)[1:]
 ]
+SOFT = random_arm(3, 2, elasticity=cdsm.LinearElasticity(100.0)).at([0.1, -0.1, 0.2, 0.1])
+UNSTABLE = cdsm.stiffness(SOFT, cdsm.distribute_tension(SOFT, 300.0))
 FIT = cdsm.fit_tensile_test(np.linspace(0.0, 2e-3, 40), np.linspace(0.0, 200.0, 40), 0.5)
 VALUES: dict[str, Any] = {
     **RESULTS,
@@ -170,6 +172,11 @@ VALUES: dict[str, Any] = {
     "GridPoses": cdsm.GridPoses({"joint1_1": np.linspace(-0.1, 0.1, 3)}, {"joint1_2": 0.1}),
     "PathPoses": cdsm.PathPoses(np.array([np.zeros(6), np.ones(6)]), 5),
     "RandomPoses": cdsm.RandomPoses(9, 1),
+    "Tolerance": cdsm.Tolerance(0.05, correlation=0.5),
+    "Tolerances": cdsm.Tolerances(rigidity=0.05, lead=cdsm.Tolerance(1e-3, correlation=np.eye(9))),
+    "Cables": POSE.arm.cables,
+    "Remedy": UNSTABLE.remedies[0],
+    "Bifurcation": cdsm.bifurcation(cdsm.critical_tension(SOFT), bounds=[10.0, 11.0]),
     "TensileFit": FIT,
     "TensileTest": FIT.test,
     "Measurement": MEASURED[0],

@@ -197,7 +197,7 @@ def test_arm_that_never_stands_is_said_to_be_unstable_throughout() -> None:
     found = cdsm.critical_tension(arm.at([0.0]))
     assert found.stable == ()
     assert found.minimum == found.examined[0] == 0.0
-    assert "unstable at every lower bound" in str(found)
+    assert "UNSTABLE at every lower bound" in str(found)
     load = cdsm.critical_load(arm.at([0.0]), [-1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     assert (load.factor, load.limit) == (0.0, "buckling")
     assert "buckles without the load already" in str(load)

@@ -105,11 +105,14 @@ class Page:
 
     def camera(self, view: View, width: float) -> Any:
         """The camera of this page, once the server knows how wide the picture is."""
-        for _ in range(100):
+        for i in range(100):
             for client in view._server.get_clients().values():
                 if abs(client.camera.image_width - width) < 2.0:
                     return client.camera
             self.page.wait_for_timeout(100.0)
+            if i % 10 == 9:  # a page tells its size when its camera moves: zoom a little
+                self.page.mouse.move(150.0, 300.0)
+                self.page.mouse.wheel(0.0, 1.0)
         sizes = [each.camera.image_width for each in view._server.get_clients().values()]
         pytest.fail(f"no picture is {width} pixels wide: {sizes}")
 
