@@ -15,7 +15,7 @@ from cdsm.errors import CdsmError, FileError, InvalidInput
 from cdsm.support.files import read_text
 from cdsm.support.records import read_toml
 from cdsm.support.validation import number_array, one_of, scalar
-from cdsm.support.values import Array, frozen
+from cdsm.support.values import Array, ReadOnlyState, frozen
 
 Distribution = Literal["normal", "uniform", "triangular"]
 
@@ -28,7 +28,7 @@ WIDTH = {"uniform": math.sqrt(3.0), "triangular": math.sqrt(6.0)}
 
 @final
 @dataclass(frozen=True, eq=False)
-class Tolerance:
+class Tolerance(ReadOnlyState):
     """Standard uncertainty of all inputs of one kind, e.g. of the radius of every hole.
 
     Attributes:
@@ -121,7 +121,8 @@ class Tolerance:
             and np.array_equal(self.correlation, other.correlation)
         )
 
-    __hash__ = None  # type: ignore[assignment]
+    def __hash__(self) -> int:
+        return hash((self.standard, self.distribution))
 
 
 @final

@@ -103,23 +103,26 @@ class Page:
         for _ in range(times):
             knob.press(key)
 
-    def camera(self, view: View, width: float) -> Any:
-        """The camera of this page, once the server knows how wide the picture is."""
-        for i in range(100):
-            for client in view._server.get_clients().values():
-                if abs(client.camera.image_width - width) < 2.0:
-                    return client.camera
+    def camera(self, view: View) -> Any:
+        """The camera of this page, once the server knows the shape of the picture.
+
+        A page that draws slowly draws fewer pixels, so only their ratio is that of the page.
+        """
+        box = self.page.locator("canvas").first.bounding_box()
+        wanted = box["width"] / box["height"]
+        for _ in range(100):
+            cameras = [client.camera for client in view._server.get_clients().values()]
+            for camera in cameras:
+                if abs(camera.image_width / camera.image_height / wanted - 1.0) < 0.01:
+                    return camera
             self.page.wait_for_timeout(100.0)
-            if i % 10 == 9:  # a page tells its size when its camera moves: zoom a little
-                self.page.mouse.move(150.0, 300.0)
-                self.page.mouse.wheel(0.0, 1.0)
-        sizes = [each.camera.image_width for each in view._server.get_clients().values()]
-        pytest.fail(f"no picture is {width} pixels wide: {sizes}")
+        sizes = [(camera.image_width, camera.image_height) for camera in cameras]
+        pytest.fail(f"no picture has the shape of {box}: {sizes}")
 
     def pixel(self, view: View, point: Array) -> tuple[float, float]:
         """Where a point (3,) [m] of the scene is on the page, as the camera has it now."""
         box = self.page.locator("canvas").first.bounding_box()
-        camera = self.camera(view, box["width"])
+        camera = self.camera(view)
         back = camera.position - camera.look_at
         back /= np.linalg.norm(back)
         right = np.cross([0.0, 0.0, 1.0], back)
@@ -409,7 +412,7 @@ def test_the_arm_is_in_sight_at_every_size(
             break
     else:
         pytest.fail(f"no disks in view-{width}.png")
-    camera = own.camera(view, own.page.locator("canvas").first.bounding_box()["width"])
+    camera = own.camera(view)
     back = camera.position - camera.look_at
     # from the side and a little above, whatever the size
     np.testing.assert_allclose(back / np.linalg.norm(back), [0.118, -0.888, 0.444], atol=2e-3)
