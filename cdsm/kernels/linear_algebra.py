@@ -27,6 +27,9 @@ _STEPS = 200
 
 _ROUNDING = 2.0**-52
 
+_LEAST = 1e-90
+"""Smaller entries of a tridiagonal matrix are zero."""
+
 _NOTHING = 1e-30
 """Off-diagonal entries below this part of the largest entry do not change any eigenvalue."""
 
@@ -104,6 +107,11 @@ def smallest_eigenvalue(A: Array, scratch: Array, x: Array, width: Width) -> Non
     n = A.shape[0]
     d, e, rest = scratch[:n], scratch[n : 2 * n], scratch[2 * n :]
     _tridiagonalise(A, d, e, rest, width)
+    for i in upwards(0, n):  # the squares of smaller inverses would overflow
+        for w in lanes(width):
+            d[i, w] = d[i, w] if abs(d[i, w]) > _LEAST else 0.0
+        for w in lanes(width):
+            e[i, w] = e[i, w] if abs(e[i, w]) > _LEAST else 0.0
     scale, least, G, H, going = rest[0], rest[1], rest[2], rest[3], rest[4]
     for w in lanes(width):
         scale[w], x[w], going[w] = 0.0, math.inf, 1.0

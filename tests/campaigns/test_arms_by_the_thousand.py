@@ -20,7 +20,6 @@ SHORT = 24
 """Arms of each kind."""
 
 
-@pytest.mark.filterwarnings("ignore::cdsm.CdsmWarning")  # cables may share holes
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", strategies.ARMS)
 def test_arms_give_verified_numbers_or_an_error_of_ours(kind: str) -> None:

@@ -113,6 +113,8 @@ def drawn(data: st.DataObject, kind: str) -> str:
     faulthandler.dump_traceback_later(HANGS, exit=True)
     try:
         with warnings.catch_warnings(action="error"):
+            # cables may share a hole, lengths may be extreme
+            warnings.simplefilter("ignore", cdsm.CdsmWarning)
             question = data.draw(strategies.questions(strategies.ARMS[kind]))
             tension = data.draw(strategies.tensions(question.arm))
             return outcome(question, tension, data.draw(chances))

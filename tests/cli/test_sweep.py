@@ -79,7 +79,7 @@ def test_map_draws_a_sweep(tmp_path: Path) -> None:
     [
         (("--random", "8", "--out", "{folder}/s.txt"), 1, "ends neither in .nc"),
         (("--random", "8", "--out", "{folder}/absent/s.nc"), 1, "does not exist; create it"),
-        (("--random", "0"), 2, "equal to 1"),
+        (("--random", "0"), 2, "--random"),
         (("--grid", "joint9=0:1:2"), 1, "no joint is called 'joint9'"),
         (("--grid", "joint1_1=0:1"), 2, "a joint is JOINT=LOW:HIGH:N or JOINT=ANGLE"),
         (("--grid", "joint1_1=0:1:2.5"), 2, "a joint is JOINT=LOW:HIGH:N"),
