@@ -24,7 +24,7 @@ from cdsm.kernels.sensitivity import single_gradient
 from cdsm.kernels.tension import OPTIMALITY
 from cdsm.support.values import Array
 from cdsm.tension import Tension
-from cdsm.tolerances.inputs import Inputs
+from cdsm.tolerances.inputs import Inputs, Places
 
 _NO_VELOCITY = np.zeros(3)
 
@@ -88,14 +88,13 @@ class Balance(NamedTuple):
             *(none, none, none, pull, self.tension.wrench, 0.0, loaded),
         )
         _, by_q, *by_places, by_mass, _, _ = single_gradient(*arguments)
-        along = np.concatenate([place.ravel() for place in by_places])
         return {
             "rigidity": none,
             "joint_angle": by_q,
             "tension": none,
             "lead": none,
             "link_mass": by_mass[inputs.link_rows],
-            **inputs.by_source(along),
+            **inputs.by_source(Places(*by_places)),
         }
 
 

@@ -86,10 +86,8 @@ class Inputs:
             model.routing.point, model.tree.translation, model.masses.centre, model.masses.point
         )
         self.first = frozen(np.cumsum([0, *(len(cable.sites) for cable in arm.cables)]))
-        moving = (
-            model.masses.mass > CROSS_MASS
-        )  # the crosses of universal joints weigh next to nothing
-        self.link_rows = frozen(np.flatnonzero(moving))
+        # the crosses of universal joints weigh next to nothing
+        self.link_rows = frozen(np.flatnonzero(model.masses.mass > CROSS_MASS))
         rows = ("base", *arm.joint_names)
         sites = [
             f"{cable.name} on {site.link}, site {i}"
@@ -113,9 +111,9 @@ class Inputs:
         self.columns = {source: slice(*ends[i : i + 2]) for i, source in enumerate(maps)}
         self._transposed = csr_matrix(self.map.T)
 
-    def by_source(self, by_place: Array) -> dict[str, Array]:
-        """Turn derivatives by all coordinates of :attr:`places` (n,) into those by the inputs."""
-        by_input = self._transposed @ by_place
+    def by_source(self, by_place: Places) -> dict[str, Array]:
+        """Turn derivatives by all places into those by the inputs that move them (inputs,)."""
+        by_input = self._transposed @ by_place.stacked()
         return {source: by_input[columns] for source, columns in self.columns.items()}
 
     def displaced(self, errors: Mapping[str, Array]) -> Array:

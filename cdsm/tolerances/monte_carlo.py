@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from cdsm.errors import FileError, InvalidInput
 from cdsm.posture import Posture
 from cdsm.support.extras import need
-from cdsm.support.files import make_folder, write_file
+from cdsm.support.files import make_folder, read_text, write_file, write_text
 from cdsm.support.progress import progress_bar
 from cdsm.support.validation import flag, one_of, scalar, whole_number
 from cdsm.support.values import Array, ReadOnlyState, frozen
@@ -184,8 +184,7 @@ def monte_carlo(
         SingularStiffness: The reading does not exist.
         FileError: The folder cannot be used, or holds another run.
     """
-    if of not in DRAWN:
-        one_of("reading of Monte Carlo", of, DRAWN)
+    one_of("reading of Monte Carlo", of, DRAWN)
     count = whole_number("draws", draws, 100, 10**8)
     start = whole_number("seed", seed, 0)
     wanted = flag("progress", progress)
@@ -273,16 +272,8 @@ def _block(
             return np.asarray(kept[:count])
     values = question.at(_errors(question, tolerances, seed, block, count))
     if path is not None:
-        write_file(path, lambda aside: aside.write_bytes(_bytes(values)))
+        write_file(path, lambda aside: np.save(aside, values))
     return values
-
-
-def _bytes(values: Array) -> bytes:
-    import io
-
-    buffer = io.BytesIO()
-    np.save(buffer, values)
-    return buffer.getvalue()
 
 
 def _opened(store: str | os.PathLike[str], budget: Uncertainty, seed: int) -> Path:
@@ -293,7 +284,7 @@ def _opened(store: str | os.PathLike[str], budget: Uncertainty, seed: int) -> Pa
         f"{name} {t.standard!r} {t.distribution}" for name, t in budget.tolerances.given.items()
     ]
     mark, path = hashlib.sha256("\n".join(parts).encode()).hexdigest(), folder / "run.txt"
-    if path.exists() and path.read_text() != mark:
+    if path.exists() and read_text(path) != mark:
         raise FileError(folder, "holds another Monte Carlo run; give an empty folder.")
-    write_file(path, lambda aside: aside.write_text(mark))
+    write_text(path, mark)
     return folder

@@ -19,7 +19,7 @@ from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.format import coordinates
 from cdsm.support.values import Array, ReadOnlyState
 from cdsm.tolerances.balanced import Balance, buckling_gradient
-from cdsm.tolerances.inputs import Inputs, inputs_of
+from cdsm.tolerances.inputs import Inputs, Places, inputs_of
 
 Reading = Literal["along", "margin", "tip", "tension", "critical_tension"]
 
@@ -145,14 +145,13 @@ def _gradient(K: Stiffness, inputs: Inputs, motion: Array, direction: Array) -> 
         *(F, k, slope, np.zeros_like(F), K.wrench, 1.0, 0.0),
     )
     _, by_q, *by_places, by_mass, by_tension, by_stiffness = single_gradient(*arguments)
-    along = np.concatenate([place.ravel() for place in by_places])
     return {
         "rigidity": by_stiffness * by_stretched * rigidity,
         "joint_angle": by_q,
         "tension": by_tension + by_stiffness * by_force,
         "lead": by_stiffness * slope,
         "link_mass": by_mass[inputs.link_rows],
-        **inputs.by_source(along),
+        **inputs.by_source(Places(*by_places)),
     }
 
 
@@ -182,12 +181,11 @@ def _tip_gradient(K: Stiffness, inputs: Inputs, direction: Array) -> dict[str, A
         origin[i + 1] = direction @ rotation
         start, cosine, sine = tree.turn[i + 1]
         rotation = rotation @ (start + np.cos(pose.q[i]) * cosine + np.sin(pose.q[i]) * sine)
-    tip = direction @ rotation
-    places = inputs.places
-    along = np.concatenate(
-        [np.zeros(places.site.size), origin.ravel(), np.zeros(places.centre.size), tip]
+    still = inputs.places
+    moved = Places(
+        np.zeros_like(still.site), origin, np.zeros_like(still.centre), direction @ rotation
     )
-    return none | inputs.by_source(along) | {"joint_angle": direction @ pose.jacobian[:3]}
+    return none | inputs.by_source(moved) | {"joint_angle": direction @ pose.jacobian[:3]}
 
 
 def _laws(K: Stiffness, tension: Array) -> tuple[Array, Array]:
