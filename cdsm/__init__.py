@@ -64,7 +64,6 @@ if TYPE_CHECKING:
     from cdsm.planning.tension_growth import Saturation, saturation
     from cdsm.posture import MomentArms, Posture
     from cdsm.report import Report, SelfCheck
-    from cdsm.shares import Shares
     from cdsm.statics.bifurcation import Bifurcation, bifurcation
     from cdsm.statics.buckling import CriticalLoad, CriticalTension, critical_load, critical_tension
     from cdsm.statics.equilibrium import Equilibrium, equilibrium
@@ -72,7 +71,7 @@ if TYPE_CHECKING:
     from cdsm.statics.load_history import LoadHistory
     from cdsm.statics.natural_modes import Modes, modes
     from cdsm.statics.weight_test import LinearPrediction, WeightTest, weight_test
-    from cdsm.stiffness_matrix import Stiffness, stiffness
+    from cdsm.stiffness_matrix import Shares, Stiffness, stiffness
     from cdsm.support.status import Status
     from cdsm.sweeps.export import read_sweep, sweep_to_pandas, write_sweep
     from cdsm.sweeps.poses import GridPoses, PathPoses, PoseSet, RandomPoses
@@ -252,8 +251,7 @@ _NAMES = {
     "statics.load_history": "LoadHistory",
     "statics.natural_modes": "Modes modes",
     "statics.weight_test": "LinearPrediction WeightTest weight_test",
-    "shares": "Shares",
-    "stiffness_matrix": "Stiffness stiffness",
+    "stiffness_matrix": "Shares Stiffness stiffness",
     "support.status": "Status",
     "sweeps.export": "read_sweep sweep_to_pandas write_sweep",
     "sweeps.poses": "GridPoses PathPoses PoseSet RandomPoses",

@@ -53,7 +53,7 @@ def public() -> Iterator[tuple[str, Any]]:
         yield name, thing
         if not inspect.isclass(thing):
             continue
-        for inner, part in vars(thing).items():
+        for inner, part in own(thing).items():
             if inner.startswith("_"):
                 continue
             if isinstance(part, (staticmethod, classmethod)):
@@ -64,6 +64,13 @@ def public() -> Iterator[tuple[str, Any]]:
                 yield f"{name}.{inner}", part.fget
             elif isinstance(part, cached_property):
                 yield f"{name}.{inner}", part.func
+
+
+def own(kind: type) -> dict[str, Any]:
+    """What a class defines, or takes from a base that is not public."""
+    bases = [base for base in reversed(kind.__mro__) if base.__module__.startswith("cdsm.")]
+    hidden = [base for base in bases if base is kind or base.__name__ not in cdsm.__all__]
+    return {name: part for base in hidden for name, part in vars(base).items()}
 
 
 PUBLIC = dict(public())

@@ -28,7 +28,7 @@ from cdsm.plots.style import (
 if TYPE_CHECKING:
     from cdsm.planning.plan import StiffnessPlan
     from cdsm.planning.range import StiffnessRange
-    from cdsm.shares import Shares
+    from cdsm.stiffness_matrix import Shares
     from cdsm.tension import Tension
 
 _SAME = 1e-9

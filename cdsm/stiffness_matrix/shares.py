@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, final
 
 from cdsm.instability import verdict
+from cdsm.stiffness_matrix.prints import model_of
 from cdsm.support.format import aligned, coordinates, plain
 from cdsm.support.tidy import data_frame
 from cdsm.support.validation import one_of
@@ -103,4 +104,4 @@ class Shares(ReadOnlyState):
         along = f"stiffness along {coordinates(self.direction)}"
         K = self.stiffness
         first = [] if K.is_stable else [f"{verdict(K)}; its shares mean nothing"]
-        return "\n".join([*first, along, *aligned(rows), f"({K._model})"])
+        return "\n".join([*first, along, *aligned(rows), f"({model_of(K)})"])

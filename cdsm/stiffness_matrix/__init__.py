@@ -1,0 +1,15 @@
+"""Stiffness of an arm at a posture under given cable tensions.
+
+    K_θ = H_L·F + J_Lᵀ K_L J_L + ∂g/∂θ − ∂(J_Xᵀ W)/∂θ                          (Eq. 16)
+          active   passive       gravity   load
+
+``assembly`` computes it, ``value`` holds it, ``cartesian`` has what is read off it at the
+tip, ``shares`` what each cable contributes, and ``prints`` its table and its numbers for JSON.
+"""
+
+from cdsm.stiffness_matrix.assembly import assemble as assemble
+from cdsm.stiffness_matrix.assembly import checked_tension as checked_tension
+from cdsm.stiffness_matrix.assembly import stiffness as stiffness
+from cdsm.stiffness_matrix.shares import Shares as Shares
+from cdsm.stiffness_matrix.value import Friction as Friction
+from cdsm.stiffness_matrix.value import Stiffness as Stiffness

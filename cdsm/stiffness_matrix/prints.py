@@ -1,0 +1,115 @@
+"""A stiffness for people and for JSON: its printed table, the notes below it, its numbers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import cache, partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cdsm.errors import SingularStiffness
+from cdsm.stiffness_matrix.cartesian import axis_of
+from cdsm.support.format import MODEL, key, plain
+
+if TYPE_CHECKING:
+    from cdsm.stiffness_matrix.shares import Shares
+    from cdsm.stiffness_matrix.value import Stiffness
+
+
+def table(K: Stiffness) -> list[tuple[str, ...]]:
+    """Return the rows of the printed table: a header, then a name and three numbers per row."""
+    axes = np.eye(3)
+    shares: Callable[[int], Shares] = cache(lambda i: K.shares(axes[i]))
+    lines: dict[str, Callable[[int], float]] = {
+        "along": lambda i: K.along(axes[i]),
+        "  of it passive": lambda i: shares(i).passive.sum(),
+        "  of it active": lambda i: shares(i).active.sum(),
+        "  of it gravity": lambda i: shares(i).gravity,
+        "  of it load": lambda i: shares(i).load,
+        "cartesian, diagonal": partial(_cartesian_entry, K),
+        "pseudoinverse, diagonal": lambda i: K.pseudoinverse()[i, i],
+    }
+
+    def cell(read: Callable[[int], float], i: int) -> str:
+        try:
+            return f"{read(i) / 1000.0:.4g}"
+        except SingularStiffness:
+            return "-"
+
+    return [
+        ("stiffness [N/mm]", "x", "y", "z"),
+        *((name, *(cell(read, i) for i in range(3))) for name, read in lines.items()),
+    ]
+
+
+def _cartesian_entry(K: Stiffness, i: int) -> float:
+    """Return a diagonal entry of ``cartesian``, or of that of the axes that can move [N/m]."""
+    try:
+        return float(K.cartesian[i, i])
+    except SingularStiffness:
+        mobile = [axis for axis in range(3) if math.isfinite(K.along(np.eye(3)[axis]))]
+        if i not in mobile:
+            raise
+        matrix = K.cartesian_in(np.eye(3)[mobile])
+        return float(matrix[mobile.index(i), mobile.index(i)])
+
+
+def notes(K: Stiffness) -> tuple[str, ...]:
+    """Return the lines below the table: why entries are missing; whether the arm is stable."""
+    try:
+        _ = K.cartesian
+        missing = []
+    except SingularStiffness as error:
+        u = axis_of(error.direction)
+        missing = [
+            f"inf, -: the tip cannot move along {u}; cartesian: in the plane of other axes"
+            if error.direction.size == 3
+            else "-: K_θ is singular, the arm is about to buckle"
+        ]
+    state = "stable" if K.is_stable else "UNSTABLE"
+    unit = K.posture.arm.stiffness_unit()
+    least = f"smallest joint stiffness {K.margin:.4g} {unit} ({model_of(K)})"
+    return (*missing, f"{state}, {least}")
+
+
+def model_of(K: Stiffness) -> str:
+    """Return the assumptions of a stiffness in words."""
+    if K.friction == "frictionless":
+        return MODEL
+    values = K.posture.segments.chains.friction
+    low, high = values.min(initial=math.inf), values.max(initial=0.0)
+    mu = f"{low:g}" if low == high else f"{low:g} to {high:g}"
+    return MODEL.replace("frictionless", f"cables {K.friction}, μ = {mu}")
+
+
+def numbers(K: Stiffness) -> dict[str, object]:
+    """Return :meth:`Stiffness.to_dict`."""
+
+    def read(reading: Callable[[], object]) -> object:
+        try:
+            return reading()
+        except SingularStiffness:
+            return None
+
+    pose, unit = K.posture, K.posture.arm.stiffness_unit()
+    found = {
+        **pose._coordinates,
+        "tip_position_m": pose.tip[:3, 3],
+        "tension_N": dict(zip(pose.arm.cables.names, K.tension, strict=True)),
+        "cable_length_m": pose.cable_lengths,
+        key("static_residual", pose.arm.torque_unit()): K.residual,
+        "model": model_of(K),
+        "along_N_per_m": [read(partial(K.along, axis)) for axis in np.eye(3)],
+        "cartesian_N_per_m": read(lambda: K.cartesian),
+        "pseudoinverse_N_per_m": read(K.pseudoinverse),
+        "compliance": read(lambda: K.compliance),
+        key("joint_stiffness", unit): K.joint,
+        key("margin", unit): K.margin,
+        "stable": K.is_stable,
+        "remedies": [
+            {"change": each.change, "factor": each.factor, "text": str(each)} for each in K.remedies
+        ],
+    }
+    return dict(plain(found))
