@@ -78,9 +78,9 @@ if TYPE_CHECKING:
     from cdsm.sweeps.run import sweep
     from cdsm.sweeps.status import SweepStatus
     from cdsm.tension import Tension, distribute_tension
+    from cdsm.tolerance import Tolerance, Tolerances
     from cdsm.tolerances.budget import Uncertainty, uncertainty
     from cdsm.tolerances.monte_carlo import MonteCarlo, monte_carlo
-    from cdsm.tolerances.tolerance import Tolerance, Tolerances
     from cdsm.urdf import to_urdf, write_urdf
     from cdsm.wires.files import read_elasticity, write_elasticity
     from cdsm.wires.laws import StrandElasticity, TabulatedElasticity
@@ -260,7 +260,7 @@ _NAMES = {
     "tension": "Tension distribute_tension",
     "tolerances.budget": "Uncertainty uncertainty",
     "tolerances.monte_carlo": "MonteCarlo monte_carlo",
-    "tolerances.tolerance": "Tolerance Tolerances",
+    "tolerance": "Tolerance Tolerances",
     "urdf": "to_urdf write_urdf",
     "wires.files": "read_elasticity write_elasticity",
     "wires.laws": "StrandElasticity TabulatedElasticity",

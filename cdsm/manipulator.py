@@ -39,6 +39,7 @@ from cdsm.support.validation import (
     vector,
 )
 from cdsm.support.values import Array, Printed, frozen
+from cdsm.tolerance import Tolerances
 from cdsm.urdf import TIP, to_urdf
 from cdsm.urdf_reader import read_urdf
 
@@ -152,6 +153,7 @@ class Manipulator(Printed):
         - ``[cables.NAME]``: the same keys for one cable of the geometry; or ``[[cables]]``: all
           cables through any points, as in :func:`~cdsm.read_cables`.
         - ``gravity`` [m/s²], ``original_length``: as for :class:`Manipulator`.
+        - ``[tolerances]``: the sources of :class:`Tolerances`; see :meth:`Tolerances.read`.
 
         Args:
             path: The file; :meth:`write` writes one, ``cdsm new`` another with comments.
@@ -194,6 +196,7 @@ class Manipulator(Printed):
         gravity: ArrayLike,
         original_length: OriginalLength,
         joint_names: Sequence[str] | None = None,
+        tolerances: Tolerances = Tolerances(),  # noqa: B008  # frozen
     ) -> None:
         """Set all attributes from checked URDF text and, if given, its geometry."""
         self._cables = cables = _checked_cables(cables)
@@ -202,7 +205,9 @@ class Manipulator(Printed):
         body = RigidBody(urdf, tip, self._gravity, joint_names)
         self._model = ArmModel(body, cables, original_length)
         g = tuple(self._gravity.tolist())
-        self._parts = ArmParts(geometry, urdf, cables, tip, g, original_length, body.joint_names)
+        self._parts = ArmParts(
+            geometry, urdf, cables, tip, g, original_length, body.joint_names, tolerances
+        )
 
     @property
     def geometry(self) -> Geometry:
@@ -268,6 +273,11 @@ class Manipulator(Printed):
     def has_friction(self) -> bool:
         """Whether a cable has friction in a hole; most answers leave it out, and say so."""
         return any(any(cable.friction) for cable in self.cables)
+
+    @property
+    def tolerances(self) -> Tolerances:
+        """How far the arm may be from its description; all zero if nothing was said."""
+        return self._parts.tolerances
 
     @property
     def nv(self) -> int:
@@ -348,6 +358,14 @@ class Manipulator(Printed):
             InvalidInput: ``friction`` is negative, above 2, or not a number.
         """
         return self._replace(cables=tuple(cable.with_friction(friction) for cable in self.cables))
+
+    def with_tolerances(self, tolerances: Tolerances) -> Manipulator:
+        """Return the same arm with other tolerances.
+
+        Raises:
+            InvalidInput: ``tolerances`` are not :class:`Tolerances`.
+        """
+        return self._replace(tolerances=instance("tolerances", tolerances, Tolerances))
 
     def with_gravity(self, gravity: Direction) -> Manipulator:
         """Return the same arm under another gravity: (3,) [m/s²] in base axes, or ``"-y"``.

@@ -1,4 +1,4 @@
-"""ARM.toml: a robot, its cables and their wires, and gravity in one file."""
+"""ARM.toml: a robot, its cables and their wires, gravity and tolerances in one file."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ from cdsm.arm_file.cables import (
     today,
     wire_entries,
 )
+from cdsm.arm_file.tolerances import from_table, tolerance_lines
 from cdsm.arm_model import GRAVITY, ArmParts
 from cdsm.cable import Cable, serpentine_cables
 from cdsm.cable_laws import OriginalLength
@@ -32,6 +33,7 @@ from cdsm.geometry.tables import build, lines_of
 from cdsm.support.files import read_text
 from cdsm.support.records import CrossFaults, Number, parse, read_toml, record, toml_value
 from cdsm.support.validation import RANGES, one_of
+from cdsm.tolerance import Tolerances
 from cdsm.urdf import TIP, to_urdf
 from cdsm.urdf_reader import read_urdf
 from cdsm.wires.catalogue import Wire, as_wire
@@ -71,6 +73,7 @@ class _Keys(CableKeys):
     gravity: Annotated[tuple[_G, _G, _G], Field(strict=False)] = GRAVITY
     original_length: OriginalLength = "unstrained"
     urdf: _Urdf | None = None
+    tolerances: Any = Field(default_factory=dict)
 
 
 def read_arm(path: str | os.PathLike[str], wire: Wire | None) -> ArmParts:
@@ -97,30 +100,41 @@ def read_arm(path: str | os.PathLike[str], wire: Wire | None) -> ArmParts:
         raise FileError(path, faults[0])
     described, rest = split_geometry(today(data))
     keys = attempt(parse, _Keys, rest)
-    geometry = robot = routed = wires = cables = None
+    geometry = robot = routed = wires = cables = tolerances = None
     if "urdf" not in rest:
         geometry = attempt(build, Geometry, described)
     elif described:
         faults.append(f"urdf: stands beside {next(iter(described))}; an arm has one of them")
     if keys is not None:
         robot, wires = keys.urdf, attempt(read_wires, keys, forced)
+        tolerances = attempt(_tolerances, keys.tolerances)
         if robot is not None or geometry is not None:
             routed = attempt(_routed, keys.cables, geometry)
     if not faults:
         cables = attempt(build_cables, routed, keys, wires, path)
-    if faults or keys is None or cables is None:
+    if faults or keys is None or cables is None or tolerances is None:
         raise FileError(path, f"cannot be read as an arm, {counted(faults)}")
     g, length = keys.gravity, keys.original_length
     if robot is None:
         assert geometry is not None
-        return ArmParts(geometry, to_urdf(geometry), cables, TIP, g, length, None)
+        return ArmParts(geometry, to_urdf(geometry), cables, TIP, g, length, None, tolerances)
     source = robot.text if robot.file is None else Path(path).parent / robot.file
     assert source is not None
     try:
         urdf = read_urdf(source, check_inertia=robot.check_inertia)
     except FileError as error:
         raise FileError(path, f"urdf.file: {error}") from None
-    return ArmParts(None, urdf, cables, robot.tip, g, length, robot.joint_names)
+    return ArmParts(None, urdf, cables, robot.tip, g, length, robot.joint_names, tolerances)
+
+
+def _tolerances(given: object) -> Tolerances:
+    """Read the table [tolerances]; raise GeometryError with every fault."""
+    if not isinstance(given, dict):
+        raise GeometryError([f"tolerances: is {given!r}; give a table [tolerances]"])
+    try:
+        return from_table(given)
+    except GeometryError as error:
+        raise GeometryError([f"tolerances.{fault}" for fault in error.faults]) from None
 
 
 def _routed(cables: object, geometry: Geometry | None) -> list[Routed]:
@@ -165,6 +179,8 @@ def arm_text(parts: ArmParts) -> str:
     shared = [line for line in settings[0] if all(line in own for own in settings)]
     settings = [[line for line in own if line not in shared] for own in settings]
     lines += [*shared, "", *tables]
+    tolerances = tolerance_lines(parts.tolerances)
+    lines += ["[tolerances]", *tolerances, ""] if tolerances else []
     lines += _urdf_lines(parts) if geometry is None else _geometry_lines(geometry)
     plain = () if geometry is None else serpentine_cables(geometry, LinearElasticity(1.0))
     if [_path(cable) for cable in plain] != [_path(cable) for cable in cables]:

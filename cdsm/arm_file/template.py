@@ -26,6 +26,19 @@ wire = {wire}
 #maximum = 400.0
 """
 
+_TOLERANCES = """
+# How far the arm may be from what stands here, one sigma; `cdsm stiffness` then says how sure K is.
+#[tolerances]
+#rigidity = 0.05  # of EA, relative; common to all cables, as of one spool
+#joint_angle = 0.0087  # [rad] 0.5 degrees
+#tension = 2.0  # as measured [N]
+#lead = 5e-3  # [m]
+#hole_radius = {{within = 2e-4}}  # [m] surely within +-0.2 mm
+#disk_offset = 1e-4  # [m]
+#link_length = 1e-4  # [m]
+#link_mass = {mass}  # [kg]
+"""
+
 _COMMENTS = {
     "joints": "base to tip",
     "twist": "about x, from each hinge axis to the next",
@@ -97,7 +110,8 @@ def template(
         examples = zip(_MORE.items(), more, strict=True)
         lines += [f"#{_line(key, value, comment)}" for (key, comment), value in examples]
         lines.append("")
-    return "\n".join(lines).rstrip("\n") + "\n" + _ONE_CABLE
+    tolerances = _TOLERANCES.format(mass=f"{0.05 * sections[0][1]['link_mass']:.3g}")
+    return "\n".join(lines).rstrip("\n") + "\n" + _ONE_CABLE + tolerances
 
 
 def _line(key: str, value: object, comment: str) -> str:

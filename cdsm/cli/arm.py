@@ -34,7 +34,10 @@ def stiffness(
     angles: Angles = "0",
     tolerances: Annotated[
         Path | None,
-        typer.Option(metavar="T.toml", help="Tolerances: how sure the stiffness is, and why."),
+        typer.Option(
+            metavar="T.toml",
+            help="Tolerances: how sure the stiffness is, and why. Default: those in ARM.toml.",
+        ),
     ] = None,
     as_json: AsJson = False,
 ) -> None:
@@ -45,7 +48,8 @@ def stiffness(
     pose = arm.at(angles)
     tension = tensions.distribute(pose, load.at_tip(pose.arm))
     K = cdsm.stiffness(pose, tension)
-    budgets = {} if tolerances is None else _budgets(tension, cdsm.Tolerances.read(tolerances))
+    given = pose.arm.tolerances if tolerances is None else cdsm.Tolerances.read(tolerances)
+    budgets = _budgets(tension, given) if given.given else {}
     sure = {"uncertainty": {axis: budget.to_dict() for axis, budget in budgets.items()}}
     parts = [tensions.conditions(pose.arm), tension, K, *([_table(budgets)] if budgets else [])]
     answer(

@@ -42,6 +42,10 @@ def fit(
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="Elasticity to write, as TOML.")
     ] = None,
+    tolerances: Annotated[
+        Path | None,
+        typer.Option(metavar="T.toml", help="Tolerances to write: the 95 % band of the rigidity."),
+    ] = None,
     figure: Picture = None,
     as_json: AsJson = False,
 ) -> None:
@@ -64,6 +68,9 @@ def fit(
         raise cdsm.TensileTestError(_as_options(str(error))) from None
     if out is not None:
         typer.echo(f"written: {cdsm.write_elasticity(fitted.elasticity, out)}", err=True)
+    if tolerances is not None:
+        band = cdsm.Tolerances(rigidity=fitted.tolerance())
+        typer.echo(f"written: {band.write(tolerances)}", err=True)
     if figure is not None:
         from cdsm.support.files import write_file
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 ARM_KEYS = (
     *("gravity", "original_length", "wire", "wires", "urdf"),
-    *("series_stiffness", "control", "minimum", "maximum"),
+    *("series_stiffness", "control", "minimum", "maximum", "tolerances"),
 )
 """Keys of an ARM.toml that do not describe its geometry; ``cables`` may."""
 

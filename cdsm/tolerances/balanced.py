@@ -93,6 +93,7 @@ class Balance(NamedTuple):
             "joint_angle": by_q,
             "tension": none,
             "lead": none,
+            "friction": np.zeros(len(inputs.labels["friction"])),
             "link_mass": by_mass[inputs.link_rows],
             **inputs.by_source(Places(*by_places)),
         }

@@ -18,9 +18,10 @@ from cdsm.stiffness_matrix import stiffness
 from cdsm.support.validation import instance, one_of, scalar, unit_direction
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension, distribute_tension
+from cdsm.tolerance import Tolerances
 from cdsm.tolerances.inputs import inputs_of
+from cdsm.tolerances.parts import Part, spread, standards
 from cdsm.tolerances.readings import DRAWN, Question, Reading
-from cdsm.tolerances.tolerance import Tolerances
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -53,6 +54,11 @@ class Uncertainty(ReadOnlyState):
     contributions: Mapping[str, float]
     sensitivities: Mapping[str, Array]
 
+    @cached_property
+    def parts(self) -> Mapping[str, tuple[Part, ...]]:
+        """Inputs of each source, grouped by their tolerances."""
+        return self.question.parts(self.tolerances)
+
     @property
     def relative(self) -> float:
         """Standard uncertainty over the magnitude of the value [-]."""
@@ -68,8 +74,8 @@ class Uncertainty(ReadOnlyState):
         if self.standard_uncertainty == 0.0 or self.question.of not in DRAWN:
             return 0.0
         moves = {}
-        for source, tolerance in self.tolerances.given.items():
-            by = tolerance.spread(self.sensitivities[source]) / self.standard_uncertainty
+        for source, parts in self.parts.items():
+            by = spread(parts, self.sensitivities[source]) / self.standard_uncertainty
             moves[source] = np.stack([by, -by])
         above, below = self.question.at(moves)
         return float((above + below - 2.0 * self.value) / (2.0 * self.standard_uncertainty))
@@ -102,9 +108,14 @@ class Uncertainty(ReadOnlyState):
         """
         labels = inputs_of(self.question.stiffness.posture.arm).labels
         each = [
-            (source, name, abs(float(g)) * tolerance.standard)
-            for source, tolerance in self.tolerances.given.items()
-            for name, g in zip(labels[source], self.sensitivities[source], strict=True)
+            (source, name, abs(float(g)) * float(u))
+            for source, parts in self.parts.items()
+            for name, g, u in zip(
+                labels[source],
+                self.sensitivities[source],
+                standards(parts, len(labels[source])),
+                strict=True,
+            )
         ]
         return tuple(sorted(each, key=lambda entry: -entry[2])[:count])
 
@@ -141,12 +152,15 @@ class Uncertainty(ReadOnlyState):
         for source, u in self.contributions.items():
             if u == 0.0:
                 continue
-            tolerance = self.tolerances.given[source]
+            size_of_inputs = standards(self.parts[source], self.sensitivities[source].size)
             share = (u / self.standard_uncertainty) ** 2
             lines.append(
-                f"{source:<14}{shown(source, tolerance.standard):>16}{u / size:>24.3g}"
+                f"{source:<14}{shown(source, size_of_inputs):>16}{u / size:>24.3g}"
                 f"{100.0 * share:>12.3g} %"
             )
+        without = [source for source, u in self.contributions.items() if u == 0.0]
+        if without:
+            lines.append(f"without influence on it: {', '.join(without)}")
         if not self.is_linear:
             lines.append(
                 f"first order is not enough here: curvature {100.0 * self.curvature:.2g} % of the "
@@ -170,7 +184,7 @@ class Uncertainty(ReadOnlyState):
 def uncertainty(
     pose: Posture,
     tension: Tension | ArrayLike,
-    tolerances: Tolerances,
+    tolerances: Tolerances | None = None,
     *,
     direction: ArrayLike | None = None,
     of: Reading = "along",
@@ -189,7 +203,8 @@ def uncertainty(
     Args:
         pose: The posture.
         tension: As for :func:`~cdsm.stiffness`; a :class:`Tension` for the last two readings.
-        tolerances: Tolerances of the arm, the angles and the tensions.
+        tolerances: Tolerances of the arm, the angles and the tensions. None: those of the arm, as
+            in the table ``[tolerances]`` of its file.
         direction: u (3,) in base axes, any length: for ``"along"`` and ``"tip"`` only.
         of: ``"along"``: the stiffness along u [N/m]. ``"margin"``: the smallest eigenvalue of K_θ
             [N m/rad]. ``"tip"``: the tip's coordinate along u [m]. ``"tension"``: the distributed
@@ -206,6 +221,7 @@ def uncertainty(
         ElasticityRangeError: A tension is outside the domain of its cable's law.
         SingularStiffness: The reading does not exist.
     """
+    tolerances = chosen(pose, tolerances)
     question = asked(pose, tension, tolerances, direction, of, cable, wrench)
     value = question.value()
     if not math.isfinite(value):  # the stiffness along a direction
@@ -217,8 +233,8 @@ def uncertainty(
         )
     gradient = question.gradient()
     variances = {
-        source: max(float(gradient[source] @ tolerance.spread(gradient[source])), 0.0)
-        for source, tolerance in tolerances.given.items()
+        source: max(float(gradient[source] @ spread(parts, gradient[source])), 0.0)
+        for source, parts in question.parts(tolerances).items()
     }
     ranked = sorted(variances, key=lambda source: -variances[source])
     return Uncertainty(
@@ -231,6 +247,20 @@ def uncertainty(
     )
 
 
+def chosen(pose: Posture, tolerances: Tolerances | None) -> Tolerances:
+    """Return the tolerances, or those of the arm; raise InvalidInput if there are none."""
+    if tolerances is not None:
+        return instance("tolerances", tolerances, Tolerances)
+    own = instance("pose", pose, Posture).arm.tolerances
+    if not own.given:
+        raise InvalidInput(
+            "tolerances",
+            "none given, and the arm has none; give Tolerances(rigidity=0.05, …), or a table "
+            "[tolerances] in its file.",
+        )
+    return own
+
+
 def asked(
     pose: Posture,
     tension: Tension | ArrayLike,
@@ -241,7 +271,6 @@ def asked(
     wrench: ArrayLike | None,
 ) -> Question:
     """Check the arguments of :func:`uncertainty` and return the reading that they ask for."""
-    instance("tolerances", tolerances, Tolerances)
     one_of("reading", of, get_args(Reading))
     K = stiffness(pose, tension, wrench)
     inputs_of(pose.arm).require(tolerances, pose.arm)
@@ -283,14 +312,19 @@ def decimals(uncertainty: float) -> int:
     return min(max(1 - math.floor(math.log10(uncertainty)), 0), 12)
 
 
-def shown(source: str, standard: float) -> str:
-    """Return a standard uncertainty in people's units: %, deg, N, mm or g."""
-    for names, size, unit in (
-        (("rigidity",), 1e-2, "%"),
-        (("joint_angle", "hole_angle"), math.pi / 180.0, "deg"),
-        (("tension",), 1.0, "N"),
-        (("link_mass",), 1e-3, "g"),
-    ):
-        if source in names:
-            return f"{standard / size:.3g} {unit}"
-    return f"{standard * 1e3:.3g} mm"
+_SHOWN = {
+    "rigidity": (1e-2, " %"),
+    "joint_angle": (math.pi / 180.0, " deg"),
+    "hole_angle": (math.pi / 180.0, " deg"),
+    "tension": (1.0, " N"),
+    "link_mass": (1e-3, " g"),
+    "friction": (1.0, ""),
+}
+"""Size and name of the unit in which people read the inputs of a source; all others in mm."""
+
+
+def shown(source: str, standards: Array) -> str:
+    """Return the standard uncertainties of a source in people's units."""
+    size, unit = _SHOWN.get(source, (1e-3, " mm"))
+    low, high = (f"{each / size:.3g}" for each in (standards.min(), standards.max()))
+    return f"{low}{unit}" if low == high else f"{low} to {high}{unit}"

@@ -18,7 +18,7 @@ from scipy.sparse import csr_matrix, hstack
 from cdsm.errors import InvalidInput
 from cdsm.manipulator import Manipulator
 from cdsm.support.values import Array, frozen
-from cdsm.tolerances.tolerance import Tolerances
+from cdsm.tolerance import Tolerances
 from cdsm.urdf import CROSS_MASS
 
 _NEAR = 1e-9
@@ -102,6 +102,9 @@ class Inputs:
             "link_mass": tuple(f"link moved by {rows[i]}" for i in self.link_rows),
             "site": tuple(f"{site}, {axis}" for site in sites for axis in "xyz"),
         }
+        each = (site for cable in arm.cables for site in cable.sites)
+        holes = zip(sites, each, strict=True)
+        self.labels["friction"] = tuple(name for name, site in holes if site.friction)
         total, count = self.places.stacked().size, 3 * len(sites)
         maps = {"site": csr_matrix(np.eye(total, count))}
         if arm.is_serpentine:
@@ -128,11 +131,13 @@ class Inputs:
     def require(self, tolerances: Tolerances, arm: Manipulator) -> None:
         """Raise InvalidInput for a source that the arm does not have."""
         for name in tolerances.given:
-            if name not in self.labels:
+            if not self.labels.get(name):
                 raise InvalidInput(
                     name,
-                    f"{arm.name} was made from a URDF and has no holes on disks; give site, the "
-                    "tolerance [m] of each coordinate of its cable sites.",
+                    f"{arm.name} has no friction in its holes; see Manipulator.with_friction."
+                    if name == "friction"
+                    else f"{arm.name} was made from a URDF and has no holes on disks; give site, "
+                    "the tolerance [m] of each coordinate of its cable sites.",
                 )
 
     def _disks(self, arm: Manipulator, sites: list[str]) -> dict[str, csr_matrix]:

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, final
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cdsm.arm_file.tolerances import tolerance_lines
 from cdsm.errors import FileError, InvalidInput
 from cdsm.posture import Posture
 from cdsm.support.extras import need
@@ -23,10 +24,11 @@ from cdsm.support.progress import progress_bar
 from cdsm.support.validation import flag, one_of, scalar, whole_number
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension
-from cdsm.tolerances.budget import Uncertainty, decimals, uncertainty
+from cdsm.tolerance import Tolerances
+from cdsm.tolerances.budget import Uncertainty, chosen, decimals, uncertainty
 from cdsm.tolerances.inputs import inputs_of
+from cdsm.tolerances.parts import draw
 from cdsm.tolerances.readings import DRAWN, Question, Reading
-from cdsm.tolerances.tolerance import WIDTH, Tolerance, Tolerances
 
 if TYPE_CHECKING:
     import xarray
@@ -150,7 +152,7 @@ class MonteCarlo(ReadOnlyState):
 def monte_carlo(
     pose: Posture,
     tension: Tension | ArrayLike,
-    tolerances: Tolerances,
+    tolerances: Tolerances | None = None,
     *,
     direction: ArrayLike | None = None,
     of: Reading = "along",
@@ -188,7 +190,8 @@ def monte_carlo(
     count = whole_number("draws", draws, 100, 10**8)
     start = whole_number("seed", seed, 0)
     wanted = flag("progress", progress)
-    if isinstance(tolerances, Tolerances) and not tolerances.given:
+    tolerances = chosen(pose, tolerances)
+    if not tolerances.given:
         raise InvalidInput("tolerances", "are all zero, so all draws are the same; give one.")
     budget = uncertainty(pose, tension, tolerances, direction=direction, of=of, wrench=wrench)
     folder = None if store is None else _opened(store, budget, start)
@@ -220,40 +223,9 @@ def _errors(
     rng = np.random.default_rng([seed, block])
     labels = inputs_of(question.stiffness.posture.arm).labels
     return {
-        source: draw(tolerance, rng, _BLOCK, len(labels[source]))[:count]
-        for source, tolerance in tolerances.given.items()
+        source: draw(parts, rng, _BLOCK, len(labels[source]))[:count]
+        for source, parts in question.parts(tolerances).items()
     }
-
-
-def draw(tolerance: Tolerance, rng: np.random.Generator, draws: int, count: int) -> Array:
-    """Draw errors (draws, count) with the distribution and correlation of a tolerance.
-
-    Correlated errors that are not normal are sums of independent ones: each input keeps its
-    standard uncertainty and correlations, but for 0 < ρ < 1 not quite its distribution.
-    """
-    rho = tolerance.correlation
-    if not isinstance(rho, float):
-        values, vectors = np.linalg.eigh(tolerance.matrix(count))
-        root = vectors * np.sqrt(values.clip(0.0))
-        errors = _standardised(tolerance, rng, (draws, count)) @ root.T
-    elif rho in (0.0, 1.0):
-        errors = _standardised(tolerance, rng, (draws, 1 if rho else count))
-        errors = np.repeat(errors, count, axis=1) if rho else errors
-    else:
-        own = _standardised(tolerance, rng, (draws, count))
-        common = _standardised(tolerance, rng, (draws, 1))
-        errors = math.sqrt(1.0 - rho) * own + math.sqrt(rho) * common
-    return np.asarray(tolerance.standard * errors)
-
-
-def _standardised(tolerance: Tolerance, rng: np.random.Generator, shape: tuple[int, int]) -> Array:
-    """Draw errors of standard deviation one."""
-    if tolerance.distribution == "normal":
-        return rng.standard_normal(shape)
-    width = WIDTH[tolerance.distribution]
-    if tolerance.distribution == "uniform":
-        return rng.uniform(-width, width, shape)
-    return rng.triangular(-width, 0.0, width, shape)
 
 
 def _block(
@@ -280,9 +252,7 @@ def _opened(store: str | os.PathLike[str], budget: Uncertainty, seed: int) -> Pa
     """Create the folder of a run, or check that it holds this run."""
     folder = make_folder(store)
     parts = [budget.question.of, repr(budget.value), repr(budget.standard_uncertainty), str(seed)]
-    parts += [
-        f"{name} {t.standard!r} {t.distribution}" for name, t in budget.tolerances.given.items()
-    ]
+    parts += tolerance_lines(budget.tolerances)
     mark, path = hashlib.sha256("\n".join(parts).encode()).hexdigest(), folder / "run.txt"
     if path.exists() and read_text(path) != mark:
         raise FileError(folder, "holds another Monte Carlo run; give an empty folder.")

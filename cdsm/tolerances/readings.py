@@ -18,8 +18,10 @@ from cdsm.kernels.sensitivity import single_gradient
 from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.format import coordinates
 from cdsm.support.values import Array, ReadOnlyState
+from cdsm.tolerance import Tolerances
 from cdsm.tolerances.balanced import Balance, buckling_gradient
 from cdsm.tolerances.inputs import Inputs, Places, inputs_of
+from cdsm.tolerances.parts import Part, parts_of
 
 Reading = Literal["along", "margin", "tip", "tension", "critical_tension"]
 
@@ -66,6 +68,11 @@ class Question(ReadOnlyState):
         if self.cable is not None:
             return f"tension of {self.stiffness.posture.arm.cables[self.cable].name}"
         return "smallest joint stiffness" if self.of == "margin" else "critical lower bound"
+
+    def parts(self, tolerances: Tolerances) -> dict[str, tuple[Part, ...]]:
+        """Find the inputs of each tolerance; see :func:`~cdsm.tolerances.parts.parts_of`."""
+        K = self.stiffness
+        return parts_of(tolerances, inputs_of(K.posture.arm).labels, K.tension)
 
     def value(self) -> float:
         """Return the reading itself."""
@@ -150,6 +157,7 @@ def _gradient(K: Stiffness, inputs: Inputs, motion: Array, direction: Array) -> 
         "joint_angle": by_q,
         "tension": by_tension + by_stiffness * by_force,
         "lead": by_stiffness * slope,
+        "friction": np.zeros(len(inputs.labels["friction"])),
         "link_mass": by_mass[inputs.link_rows],
         **inputs.by_source(Places(*by_places)),
     }

@@ -50,8 +50,10 @@ def test_every_key_behind_a_hash_may_be_used(name: str, tmp_path: Path) -> None:
         same = key.startswith(("#original_length", "#control"))  # they show the default
         assert (cdsm.Manipulator.read(path) == usual) == same, key
     rest = text[text.index("#[cables") :]
-    path.write_text(text.replace(rest, re.sub("(?m)^#", "", rest)), encoding="utf-8")
-    assert cdsm.Manipulator.read(path).cables[0].minimum == 20.0
+    path.write_text(text.replace(rest, re.sub(r"(?m)^#(?=[a-z\[])", "", rest)), encoding="utf-8")
+    used = cdsm.Manipulator.read(path)
+    assert used.cables[0].minimum == 20.0
+    assert len(used.tolerances.given) == 8
 
 
 def test_new_takes_sizes_in_mm_and_degrees(tmp_path: Path) -> None:

@@ -1,12 +1,14 @@
 """Budgets: what correlations do, what first order is worth, what is refused."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import cdsm
-from cdsm.tolerances.monte_carlo import draw
+from cdsm.tolerances.inputs import inputs_of
+from cdsm.tolerances.parts import draw, parts_of
 from tests.support import arms
 
 LAW = cdsm.LinearElasticity(48e3)
@@ -48,7 +50,7 @@ def test_the_budget_of_a_workshop() -> None:
     pose, tension = posture()
     common = {
         name: cdsm.Tolerance(tolerance.standard, correlation=1.0)
-        for name, tolerance in WORKSHOP.given.items()
+        for name, (tolerance,) in WORKSHOP.given.items()
         if name not in ("joint_angle", "tension")
     }
     tolerances = cdsm.Tolerances(
@@ -171,33 +173,94 @@ def test_distributions_keep_their_standard_uncertainty() -> None:
     for distribution in ("normal", "uniform", "triangular"):
         for correlation in (0.0, 0.6, 1.0):
             tolerance = cdsm.Tolerance(2.0, distribution, correlation)
-            drawn = draw(tolerance, rng, 100_000, 2)
+            parts = parts_of(cdsm.Tolerances(lead=tolerance), {"lead": ("a", "b")}, np.zeros(2))
+            drawn = draw(parts["lead"], rng, 100_000, 2)
             np.testing.assert_allclose(drawn.std(axis=0), 2.0, rtol=0.01)
             found = np.mean(drawn[:, 0] * drawn[:, 1]) / 4.0
             assert found == pytest.approx(correlation, abs=0.02)
     assert cdsm.Tolerance.within(0.3).standard == pytest.approx(0.3 / math.sqrt(3.0))
 
 
-def test_a_file_of_tolerances(tmp_path: object) -> None:
-    path = f"{tmp_path}/tolerances.toml"
-    with open(path, "w") as file:
-        file.write("rigidity = 0.05\nhole_radius = {within = 1e-4, correlation = 0.5}\n")
-    found = cdsm.Tolerances.read(path)
-    assert found.given == {
-        "rigidity": cdsm.Tolerance(0.05, correlation=1.0),
-        "hole_radius": cdsm.Tolerance.within(1e-4, correlation=0.5),
-    }
-    for text, match in (
-        ("rigidty = 0.05", "rigidity"),
-        ("lead = -1.0", "lead"),
-        ("lead = {within = 1.0, standard = 2.0}", "one of standard and within"),
-        ("lead = {width = 1.0}", "width"),
-        ("lead =", "TOML"),
-    ):
-        with open(path, "w") as file:
-            file.write(text)
-        with pytest.raises(cdsm.FileError, match=match):
-            cdsm.Tolerances.read(path)
+def test_two_spools_and_disks_drilled_together() -> None:
+    """Errors common to a group add up within it, and as squares between groups."""
+    pose, tension = posture()
+    spools = [
+        cdsm.Tolerance(0.05, correlation=1.0, of="cable[12]_*"),
+        cdsm.Tolerance(0.02, correlation=1.0, of="cable[34]_*"),
+    ]
+    drilled = cdsm.Tolerance(1e-4, correlation=1.0, of="* on link1, *")
+    tolerances = cdsm.Tolerances(rigidity=spools, hole_radius=drilled)
+    budget = cdsm.uncertainty(pose, tension, tolerances, direction="y")
+    g = budget.sensitivities["rigidity"]
+    expected = math.hypot(0.05 * g[:6].sum(), 0.02 * g[6:].sum())
+    assert budget.contributions["rigidity"] == pytest.approx(expected, rel=1e-14)
+    labels = inputs_of(pose.arm).labels["hole_radius"]
+    on_link = ["on link1" in label for label in labels]
+    assert sum(on_link) == 12 + 9
+    common = abs(budget.sensitivities["hole_radius"][on_link].sum())
+    assert budget.contributions["hole_radius"] == pytest.approx(1e-4 * common, rel=1e-14)
+    assert "2 to 5 %" in str(budget)
+    run = cdsm.monte_carlo(pose, tension, tolerances, direction="y", draws=20_000, progress=False)
+    assert run.standard_uncertainty == pytest.approx(budget.standard_uncertainty, rel=0.03)
+    errors = run.to_xarray()["rigidity_error"].values
+    assert np.ptp(errors[:, :6], axis=1).max() == np.ptp(errors[:, 6:], axis=1).max() == 0.0
+    assert abs(np.corrcoef(errors[:, 0], errors[:, 6])[0, 1]) < 0.03
+
+
+def test_the_band_of_a_fit_is_the_tolerance_of_its_cables() -> None:
+    """Each cable has the half-width of the band at its own tension, and all share one error."""
+    rng = np.random.default_rng(4)
+    force = np.linspace(0.0, 200.0, 300)
+    fit = cdsm.fit_tensile_test(
+        cdsm.LinearElasticity(48e3).strain(force) * 0.5, force + rng.normal(0.0, 0.5, 300), 0.5
+    )
+    assert fit.band is not None
+    arm = readme_arm()
+    arm = arm.with_cables(
+        [replace(cable, elasticity=fit.elasticity) for cable in arm.cables]
+    ).with_tolerances(cdsm.Tolerances(rigidity=fit.tolerance()))
+    pose = arm.at(np.deg2rad([10, 5, 10, 5, -8, 0, -8, 0]))
+    tension = cdsm.distribute_tension(pose, minimum=50.0)
+    budget = cdsm.uncertainty(pose, tension, direction="y")
+    F = tension.values
+    half = [np.interp(F, fit.tensions, np.log(end)) for end in (fit.band.low, fit.band.high)]
+    standard = (half[1] - half[0]) / 2.0 / 1.959963984540054
+    g = budget.sensitivities["rigidity"]
+    assert budget.standard_uncertainty == pytest.approx(abs(g @ standard), rel=1e-3)
+    assert 0.0005 < budget.relative < 0.05
+    short = cdsm.Tolerances(
+        rigidity=cdsm.Tolerance(np.full(2, 0.1), tensions=np.array([1.0, 40.0]))
+    )
+    with pytest.raises(cdsm.InvalidInput, match=r"known from 1 to 40 N, but a cable has \d"):
+        cdsm.uncertainty(pose, tension, short, direction="y")
+    vague = cdsm.Tolerances(
+        rigidity=cdsm.Tolerance(np.array([1.0, 0.1]), tensions=np.array([1.0, 500.0]))
+    )
+    with pytest.raises(cdsm.InvalidInput, match=r"rigidity: its standard .* Raise the tensions"):
+        cdsm.uncertainty(pose, tension, vague, direction="y")
+
+
+def test_the_tolerances_of_an_arm_are_those_of_its_budgets() -> None:
+    pose, tension = posture()
+    with pytest.raises(cdsm.InvalidInput, match=r"tolerances: none given, and the arm has none"):
+        cdsm.uncertainty(pose, tension, direction="z")
+    own = pose.arm.with_tolerances(WORKSHOP).at(pose.q)
+    mine = cdsm.uncertainty(own, tension.values, direction="z")
+    theirs = cdsm.uncertainty(pose, tension, WORKSHOP, direction="z")
+    assert mine.contributions == theirs.contributions
+    assert own.arm != pose.arm
+    assert own.arm.with_tolerances(cdsm.Tolerances()) == pose.arm
+
+
+def test_friction_does_not_enter_the_frictionless_stiffness() -> None:
+    pose, tension = posture()
+    rough = pose.arm.with_friction(0.1).at(pose.q)
+    tolerances = cdsm.Tolerances(friction=0.02, rigidity=0.05)
+    budget = cdsm.uncertainty(rough, tension.values, tolerances, direction="z")
+    assert budget.contributions["friction"] == 0.0
+    assert "without influence on it: friction" in str(budget)
+    with pytest.raises(cdsm.InvalidInput, match="friction: arm has no friction in its holes"):
+        cdsm.uncertainty(pose, tension, tolerances, direction="z")
 
 
 def test_bad_input_is_named() -> None:
@@ -206,7 +269,7 @@ def test_bad_input_is_named() -> None:
         cdsm.Tolerances(lead=-1e-3)
     with pytest.raises(cdsm.InvalidInput, match=r"rigidity: .*relative"):
         cdsm.Tolerances(rigidity=5.0)
-    with pytest.raises(cdsm.InvalidInput, match="eigenvalue"):
+    with pytest.raises(cdsm.InvalidInput, match="not positive semidefinite"):
         cdsm.Tolerance(1.0, correlation=[[1, 0.9, -0.9], [0.9, 1, 0.9], [-0.9, 0.9, 1]])  # type: ignore[arg-type]
     matrix = cdsm.Tolerance(1e-3, correlation=np.eye(3))
     with pytest.raises(cdsm.InvalidInput, match="12"):
@@ -224,6 +287,22 @@ def test_bad_input_is_named() -> None:
     straight = pose.arm.at(np.zeros(8))
     with pytest.raises(cdsm.SingularStiffness, match="infinite"):
         cdsm.uncertainty(straight, np.full(12, 50.0), WORKSHOP, direction=[1, 0, 0])
+    for spool, said in (
+        ("cabel*", "no input is called 'cabel\\*'; the first of 12 is 'cable1_1'"),
+        ("cable1_1", "cable1_1 has two tolerances"),
+    ):
+        twice = cdsm.Tolerances(
+            rigidity=[cdsm.Tolerance(0.05, of="cable1*"), cdsm.Tolerance(0.02, of=spool)]
+        )
+        with pytest.raises(cdsm.InvalidInput, match=said):
+            cdsm.uncertainty(pose, tension, twice, direction=[0, 0, 1])
+    with pytest.raises(cdsm.InvalidInput, match=r"rigidity: .*a list or tuple of Tolerance"):
+        cdsm.Tolerances(rigidity=[0.05])  # type: ignore[list-item]
+    with pytest.raises(cdsm.InvalidInput, match="lead: does not depend on tensions"):
+        cdsm.Tolerances(lead=cdsm.Tolerance(np.full(2, 0.1), tensions=np.array([1.0, 40.0])))
+    for tensions in ([1.0], [40.0, 1.0], [[1.0, 2.0]], [1.0, 2.0, 3.0]):
+        with pytest.raises(cdsm.InvalidInput, match="tensions"):
+            cdsm.Tolerance(np.full(2, 0.1), tensions=np.array(tensions))
     with pytest.raises(cdsm.InvalidInput, match="all zero"):
         cdsm.monte_carlo(pose, tension, cdsm.Tolerances(), direction=[0, 0, 1])
 

@@ -5,11 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from cdsm.tolerances.tolerance import SOURCES
 
 import cdsm
 from cdsm.support.values import Array
 from cdsm.tolerances.readings import Question
-from cdsm.tolerances.tolerance import SOURCES
 from tests.support import arms
 from tests.support.differences import assert_second_order
 

@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING, Final, final
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.special import ndtri
 
 from cdsm.elasticity import Elasticity
-from cdsm.errors import TensileTestError
+from cdsm.errors import InvalidInput, TensileTestError
 from cdsm.support.validation import RANGES, one_of, scalar
 from cdsm.support.values import Array, ReadOnlyState, frozen
+from cdsm.tolerance import EVERY, Tolerance
 from cdsm.wires.laws import TabulatedElasticity
 from cdsm.wires.tensile.loading import FEWEST, Points, loading
 from cdsm.wires.tensile.polynomials import polynomials
@@ -121,6 +123,24 @@ class TensileFit(ReadOnlyState):
                 *(f"  note      {note}" for note in self.notes),
             ]
         )
+
+    def tolerance(self, of: str = EVERY) -> Tolerance:
+        """Return the band as the tolerance of the rigidity of cables of this wire.
+
+        The standard uncertainty of EA(F) is half the width of ln EA over 1.96; all cables are of
+        one spool, so they share one error.
+
+        Args:
+            of: Names of these cables, as for :class:`~cdsm.Tolerance`.
+
+        Raises:
+            InvalidInput: A fit by polynomials has no band.
+        """
+        if self.band is None:
+            raise InvalidInput("method", "a fit by polynomials has no band; fit by 'monotone'.")
+        half = np.log(self.band.high / self.band.low) / 2.0
+        standard = half / float(ndtri((1.0 + _CONFIDENCE) / 2.0))
+        return Tolerance(standard, correlation=1.0, of=of, tensions=self.band.tensions)
 
     def plot(self) -> Figure:
         """Plot force over displacement with the fit, and rigidity with its band and stages.

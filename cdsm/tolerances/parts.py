@@ -1,0 +1,140 @@
+"""Tolerances of an arm's inputs: what variance they cause, and errors drawn from them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from fnmatch import fnmatchcase
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cdsm.errors import InvalidInput
+from cdsm.kernels.tree import Indices
+from cdsm.support.values import Array
+from cdsm.tolerance import EVERY, LARGEST, WIDTH, Tolerance, Tolerances
+
+_ALL = slice(None)
+
+
+class Part(NamedTuple):
+    """Inputs of one source that share a tolerance, and their standard uncertainties.
+
+    Attributes:
+        inputs: Their indices; a slice if they are all.
+        standard: Standard uncertainty of all, or of each (k,).
+        tolerance: The tolerance.
+    """
+
+    inputs: slice | Indices
+    standard: float | Array
+    tolerance: Tolerance
+
+    def spread(self, sensitivity: Array, spread: Array) -> None:
+        """Add σ R σ g (n,) of partial derivatives g (n,) and correlations R (JCGM 100, Eq. 13)."""
+        weighted = self.standard * sensitivity[self.inputs]
+        spread[self.inputs] += self.standard * self.tolerance.correlated(weighted)
+
+    def draw(self, rng: np.random.Generator, errors: Array) -> None:
+        """Draw the errors (draws, n) of the inputs.
+
+        Correlated errors that are not normal are sums of independent ones: each input keeps its
+        standard uncertainty and correlations, but for 0 < ρ < 1 not quite its distribution.
+        """
+        tolerance, rho = self.tolerance, self.tolerance.correlation
+        draws, count = errors[:, self.inputs].shape
+        if not isinstance(rho, float):
+            values, vectors = np.linalg.eigh(tolerance.matrix(count))
+            root = vectors * np.sqrt(values.clip(0.0))
+            drawn = _standardised(tolerance, rng, (draws, count)) @ root.T
+        elif rho in (0.0, 1.0):
+            drawn = _standardised(tolerance, rng, (draws, 1 if rho else count))
+        else:
+            own = _standardised(tolerance, rng, (draws, count))
+            common = _standardised(tolerance, rng, (draws, 1))
+            drawn = math.sqrt(1.0 - rho) * own + math.sqrt(rho) * common
+        errors[:, self.inputs] = self.standard * drawn
+
+
+def parts_of(
+    tolerances: Tolerances, labels: Mapping[str, Sequence[str]], tension: Array
+) -> dict[str, tuple[Part, ...]]:
+    """Find the inputs of each tolerance by their names, and their standards at tensions (C,).
+
+    Raises:
+        InvalidInput: No input has such a name, two tolerances are of one input, or a tension is
+            outside those of a tolerance, or so near to slack that its rigidity is not known.
+    """
+    found = {}
+    for source, given in tolerances.given.items():
+        names, parts = labels[source], []
+        taken = np.zeros(len(names), dtype=np.bool_)
+        for each in given:
+            inputs = _ALL if each.of == EVERY else _matching(source, each.of, names)
+            if taken[inputs].any():
+                twice = names[int(np.flatnonzero(taken & _mask(inputs, len(names)))[0])]
+                raise InvalidInput(
+                    source, f"{twice} has two tolerances; {each.of!r} is the second."
+                )
+            taken[inputs] = True
+            standard = each.at(tension[inputs]) if each.tensions is not None else each.standard
+            if each.tensions is not None and np.max(standard) > LARGEST[source]:
+                raise InvalidInput(
+                    source,
+                    f"its standard uncertainty reaches {np.max(standard):.3g} at these tensions; "
+                    f"up to {LARGEST[source]:g} is a tolerance. Raise the tensions.",
+                )
+            parts.append(Part(inputs, standard, each))
+        found[source] = tuple(parts)
+    return found
+
+
+def spread(parts: Sequence[Part], sensitivity: Array) -> Array:
+    """Compute σ R σ g (n,) of all inputs of a source."""
+    total = np.zeros_like(sensitivity)
+    for part in parts:
+        part.spread(sensitivity, total)
+    return total
+
+
+def standards(parts: Sequence[Part], count: int) -> Array:
+    """Return the standard uncertainty (n,) of each input of a source."""
+    found = np.zeros(count)
+    for part in parts:
+        found[part.inputs] = part.standard
+    return found
+
+
+def draw(parts: Sequence[Part], rng: np.random.Generator, draws: int, count: int) -> Array:
+    """Draw errors (draws, n) of all inputs of a source."""
+    errors = np.zeros((draws, count))
+    for part in parts:
+        part.draw(rng, errors)
+    return errors
+
+
+def _matching(source: str, pattern: str, names: Sequence[str]) -> Indices:
+    """Return the indices of the names that match a pattern."""
+    found = np.flatnonzero([fnmatchcase(name, pattern) for name in names])
+    if not found.size:
+        raise InvalidInput(
+            source, f"no input is called {pattern!r}; the first of {len(names)} is {names[0]!r}."
+        )
+    return found
+
+
+def _mask(inputs: slice | Indices, count: int) -> NDArray[np.bool_]:
+    mask = np.zeros(count, dtype=np.bool_)
+    mask[inputs] = True
+    return mask
+
+
+def _standardised(tolerance: Tolerance, rng: np.random.Generator, shape: tuple[int, int]) -> Array:
+    """Draw errors of standard deviation one."""
+    if tolerance.distribution == "normal":
+        return rng.standard_normal(shape)
+    width = WIDTH[tolerance.distribution]
+    if tolerance.distribution == "uniform":
+        return rng.uniform(-width, width, shape)
+    return rng.triangular(-width, 0.0, width, shape)

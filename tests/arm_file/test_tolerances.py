@@ -1,0 +1,114 @@
+"""Tolerances in TOML: their own file, and the table of an arm's file."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import cdsm
+from tests.cli.test_commands import call
+
+EXAMPLE = Path(__file__).parents[2] / "examples" / "arm.toml"
+
+ALL_KINDS = cdsm.Tolerances(
+    rigidity=[
+        cdsm.Tolerance(1.0 / 30.0, correlation=1.0, of="cable1_*"),
+        cdsm.Tolerance(
+            np.array([0.1, 1.0 / 3.0]),
+            correlation=1.0,
+            of="cable[23]_*",
+            tensions=np.array([1.0, 1e2 / 3.0]),
+        ),
+    ],
+    hole_radius=cdsm.Tolerance.within(1e-4, "triangular", correlation=0.3),
+    tension=2.0,
+    lead=cdsm.Tolerance(1e-3, correlation=np.eye(12) / 2.0 + 0.5),
+    friction=0.02,
+    link_mass=cdsm.Tolerance(0.0, "uniform"),
+)
+
+
+def test_a_file_of_tolerances(tmp_path: Path) -> None:
+    path = tmp_path / "tolerances.toml"
+    path.write_text("rigidity = 0.05\nhole_radius = {within = 1e-4, correlation = 0.5}\n")
+    assert cdsm.Tolerances.read(path).given == {
+        "rigidity": (cdsm.Tolerance(0.05, correlation=1.0),),
+        "hole_radius": (cdsm.Tolerance.within(1e-4, correlation=0.5),),
+    }
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("rigidty = 0.05", "rigidty: .*did you mean 'rigidity'"),
+        ("lead = -1.0", "lead: .*-1 given; a tolerance is not negative"),
+        ("lead = true", "lead: "),
+        ("lead = {within = 1.0, standard = 2.0}", "one of standard and within"),
+        ("lead = {width = 1.0}", "no key of lead is called 'width'"),
+        ("lead = {standard = 1.0, of = 3}", "of: 3 given"),
+        ("lead = {standard = 1e-3, distribution = 'gauss'}", "'gauss'"),
+        ("lead = {standard = 1e-3, correlation = [[1, 2], [2, 1]]}", "not positive semidefinite"),
+        ("rigidity = 5", "up to 0.5 is a tolerance"),
+        ("rigidity = {within = 0.1, tensions = [1, 2]}", "tensions go with standard"),
+        ("lead =", "TOML"),
+    ],
+)
+@pytest.mark.parametrize("whole", [False, True])
+def test_faults_are_named(text: str, said: str, whole: bool, tmp_path: Path) -> None:
+    path = tmp_path / "t.toml"
+    if whole:
+        path.write_text(EXAMPLE.read_text(encoding="utf-8") + f"\n[tolerances]\n{text}\n")
+    else:
+        path.write_text(text + "\n")
+    with pytest.raises(cdsm.FileError, match=said):
+        (cdsm.Manipulator if whole else cdsm.Tolerances).read(path)
+
+
+def test_all_faults_are_told_at_once(tmp_path: Path) -> None:
+    path = tmp_path / "t.toml"
+    path.write_text("lead = -1\nrigidty = 1\n")
+    with pytest.raises(cdsm.FileError, match="2 faults"):
+        cdsm.Tolerances.read(path)
+    path.write_text("tolerances = 3\n" + EXAMPLE.read_text(encoding="utf-8"))
+    with pytest.raises(cdsm.FileError, match=r"give a table \[tolerances\]"):
+        cdsm.Manipulator.read(path)
+
+
+def test_every_kind_comes_back_to_the_last_bit(tmp_path: Path) -> None:
+    assert cdsm.Tolerances.read(ALL_KINDS.write(tmp_path / "t.toml")) == ALL_KINDS
+    arm = cdsm.Manipulator.read(EXAMPLE).with_tolerances(ALL_KINDS)
+    again = cdsm.Manipulator.read(arm.write(tmp_path / "arm.toml"))
+    assert again == arm
+    assert again.tolerances == ALL_KINDS
+    assert again.with_gravity("-y").with_friction(0.1).tolerances == ALL_KINDS
+
+
+def test_stiffness_uses_the_table_of_the_arm(tmp_path: Path) -> None:
+    arm, mine = tmp_path / "arm.toml", tmp_path / "mine.toml"
+    text = EXAMPLE.read_text(encoding="utf-8")
+    assert "±" not in call("stiffness", EXAMPLE, "--angles", 5).stdout
+    table = text[text.index("#[tolerances]") :]
+    arm.write_text(text.replace(table, table.replace("\n#", "\n")[1:]), encoding="utf-8")
+    own = call("stiffness", arm, "--angles", 5).stdout
+    assert own.count("±") == 3
+    assert "of it hole radius" in own
+    mine.write_text("rigidity = 0.1\n")
+    given = call("stiffness", arm, "--angles", 5, "--tolerances", mine).stdout
+    assert "of it rigidity" in given
+    assert "of it hole radius" not in given
+
+
+def test_fit_writes_its_band(tmp_path: Path) -> None:
+    force = np.linspace(0.0, 200.0, 200)
+    noisy = force + np.random.default_rng(1).normal(0.0, 0.5, 200)
+    test, band = tmp_path / "test.csv", tmp_path / "band.toml"
+    rows = "\n".join(f"{1e3 * 0.5 * f / 48e3},{g}" for f, g in zip(force, noisy, strict=True))
+    test.write_text(f"displacement [mm],force [N]\n{rows}\n")
+    told = call("fit", test, "--gauge-length", 500, "--tolerances", band)
+    assert told.exit_code == 0, told.output
+    (tolerance,) = cdsm.Tolerances.read(band).given["rigidity"]
+    data = cdsm.read_tensile_csv(test, gauge_length=0.5)
+    fit = cdsm.fit_tensile_test(data.displacement, data.force, 0.5)
+    assert tolerance == fit.tolerance()
+    with pytest.raises(cdsm.InvalidInput, match="has no band"):
+        cdsm.fit_tensile_test(data.displacement, data.force, 0.5, "polynomial").tolerance()
