@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from cdsm.tolerances.tolerance import SOURCES
+from cdsm.tolerance import SOURCES
 
 import cdsm
 from cdsm.support.values import Array
