@@ -61,15 +61,17 @@ if TYPE_CHECKING:
     from cdsm.planning.path_plan import InfeasibleSample, PathPlan
     from cdsm.planning.plan import StiffnessPlan, plan_stiffness
     from cdsm.planning.range import StiffnessRange, stiffness_range
-    from cdsm.planning.tension_growth import Saturation, saturation
+    from cdsm.planning.saturation_curve import Saturation
+    from cdsm.planning.tension_growth import saturation
     from cdsm.posture import MomentArms, Posture
     from cdsm.report import Report, SelfCheck
     from cdsm.statics.bifurcation import Bifurcation, bifurcation
     from cdsm.statics.buckling import CriticalLoad, CriticalTension, critical_load, critical_tension
-    from cdsm.statics.equilibrium import Equilibrium, equilibrium
+    from cdsm.statics.equilibrium import Equilibrium
     from cdsm.statics.load_cycle import load_cycle
     from cdsm.statics.load_history import LoadHistory
     from cdsm.statics.natural_modes import Modes, modes
+    from cdsm.statics.rest_search import equilibrium
     from cdsm.statics.weight_test import LinearPrediction, WeightTest, weight_test
     from cdsm.stiffness_matrix import Shares, Stiffness, stiffness
     from cdsm.support.status import Status
@@ -241,15 +243,17 @@ _NAMES = {
     "planning.path_plan": "InfeasibleSample PathPlan",
     "planning.plan": "StiffnessPlan plan_stiffness",
     "planning.range": "StiffnessRange stiffness_range",
-    "planning.tension_growth": "Saturation saturation",
+    "planning.saturation_curve": "Saturation",
+    "planning.tension_growth": "saturation",
     "posture": "MomentArms Posture",
     "report": "Report SelfCheck",
     "statics.bifurcation": "Bifurcation bifurcation",
     "statics.buckling": "CriticalLoad CriticalTension critical_load critical_tension",
-    "statics.equilibrium": "Equilibrium equilibrium",
+    "statics.equilibrium": "Equilibrium",
     "statics.load_cycle": "load_cycle",
     "statics.load_history": "LoadHistory",
     "statics.natural_modes": "Modes modes",
+    "statics.rest_search": "equilibrium",
     "statics.weight_test": "LinearPrediction WeightTest weight_test",
     "stiffness_matrix": "Shares Stiffness stiffness",
     "support.status": "Status",

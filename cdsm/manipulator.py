@@ -14,8 +14,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, final, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from cdsm.arm_facts import ArmFacts
 from cdsm.arm_model import GRAVITY, ArmModel, ArmParts
 from cdsm.cable import Cable, Cables, serpentine_cables
 from cdsm.cable_laws import OriginalLength
@@ -28,7 +29,6 @@ from cdsm.kernels.tree import Frames
 from cdsm.posture import Posture, site_paths
 from cdsm.rigid_body import RigidBody
 from cdsm.support.files import write_text
-from cdsm.support.format import JointUnits, plural
 from cdsm.support.validation import (
     Direction,
     flag,
@@ -38,7 +38,7 @@ from cdsm.support.validation import (
     sequence_of,
     vector,
 )
-from cdsm.support.values import Array, Printed, frozen
+from cdsm.support.values import Array, frozen
 from cdsm.tolerance import Tolerances
 from cdsm.urdf import TIP, to_urdf
 from cdsm.urdf_reader import read_urdf
@@ -53,7 +53,7 @@ CablesOrFile = Sequence[Cable] | str | os.PathLike[str]
 
 
 @final
-class Manipulator(Printed):
+class Manipulator(ArmFacts):
     """A cable-driven arm: rigid links, revolute joints, cables.
 
     Args:
@@ -208,123 +208,6 @@ class Manipulator(Printed):
         self._parts = ArmParts(
             geometry, urdf, cables, tip, g, original_length, body.joint_names, tolerances
         )
-
-    @property
-    def geometry(self) -> Geometry:
-        """Geometry from which the arm was built.
-
-        Raises:
-            InvalidInput: The arm was built from a URDF.
-        """
-        if self._parts.geometry is None:
-            raise InvalidInput(
-                "geometry", f"{self.name} was made from a URDF and has none; see arm.urdf."
-            )
-        return self._parts.geometry
-
-    @property
-    def is_serpentine(self) -> bool:
-        """Whether the arm was built from a :class:`~cdsm.Geometry`."""
-        return self._parts.geometry is not None
-
-    @property
-    def name(self) -> str:
-        """Name of the robot."""
-        return self._model.body.name
-
-    @cached_property
-    def length(self) -> float:
-        """Length of the path from the base through the joints to the tip, all joints at zero [m].
-
-        For a robot from a URDF, it is at least the largest distance of a cable site from its joint.
-        The length is a scale for errors, so it must not be zero if the tip is on a joint.
-        """
-        if self.is_serpentine:
-            return self.geometry.length
-        reach = float(np.linalg.norm(self._model.routing.point, axis=1).max())
-        return max(self._model.body.length, reach)
-
-    @property
-    def tip_link(self) -> str:
-        """Name of the link whose frame is the tip."""
-        return self._parts.tip
-
-    @property
-    def urdf(self) -> str:
-        """URDF text of the arm."""
-        return self._parts.urdf
-
-    @property
-    def cables(self) -> Cables:
-        """Cables of the arm, in the order of every (C,) array: ``cables[0]``, or by name."""
-        return self._cables
-
-    @property
-    def gravity(self) -> Array:
-        """Gravity in base axes (3,) [m/s²]."""
-        return self._gravity
-
-    @property
-    def original_length(self) -> OriginalLength:
-        """Definition of the length l_0 of a wire in EA/l_0; see :class:`Manipulator`."""
-        return self._parts.original_length
-
-    @property
-    def has_friction(self) -> bool:
-        """Whether a cable has friction in a hole; most answers leave it out, and say so."""
-        return any(any(cable.friction) for cable in self.cables)
-
-    @property
-    def tolerances(self) -> Tolerances:
-        """How far the arm may be from its description; all zero if nothing was said."""
-        return self._parts.tolerances
-
-    @property
-    def nv(self) -> int:
-        """Number of degrees of freedom."""
-        return self._model.body.nv
-
-    @property
-    def joint_names(self) -> tuple[str, ...]:
-        """Names of the joints, in the order of every (nv,) array."""
-        return self._model.body.joint_names
-
-    @property
-    def slides(self) -> NDArray[np.bool_]:
-        """Whether each joint slides (nv,); its coordinate is then a length [m], not an angle."""
-        return self._model.body.slides
-
-    @property
-    def joint_units(self) -> tuple[str, ...]:
-        """Unit of each joint's coordinate (nv,): rad, or m where the joint slides."""
-        return JointUnits(self.slides).coordinates
-
-    def torque_unit(self, joint: int | None = None) -> str:
-        """Return the torque unit of one joint (N where it slides), or of all joints together."""
-        return JointUnits(self.slides).torque(joint)
-
-    def stiffness_unit(self) -> str:
-        """Return the unit of the diagonal of K_θ and its eigenvalues; N/m where joints slide."""
-        return JointUnits(self.slides).stiffness()
-
-    @property
-    def lower(self) -> Array:
-        """Lower joint limits (nv,) [rad]; [m] where a joint slides."""
-        return self._model.body.lower
-
-    @property
-    def upper(self) -> Array:
-        """Upper joint limits (nv,) [rad]; [m] where a joint slides."""
-        return self._model.body.upper
-
-    def __repr__(self) -> str:
-        return f"<Manipulator {self}>"
-
-    def __str__(self) -> str:
-        free = plural(self.nv, "degree") + " of freedom"
-        if self.is_serpentine:
-            free = f"{plural(len(self.geometry.joints), 'joint')} ({free})"
-        return f"{self.name}: {free}, {plural(len(self.cables), 'cable')}, {self.length:.6g} m long"
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Manipulator) and self._parts == other._parts

@@ -11,18 +11,15 @@ from typing import Annotated, Any, Self, TypeVar
 from pydantic import Field, model_validator
 
 from cdsm.arm_file.cables import (
-    CableKeys,
-    CableSettings,
     Routed,
     build_cables,
     cable_lines,
     read_routed,
-    read_wires,
     setting_lines,
     today,
-    wire_entries,
 )
 from cdsm.arm_file.tolerances import from_table, tolerance_lines
+from cdsm.arm_file.wires import CableKeys, CableSettings, read_wires, wire_entries
 from cdsm.arm_model import GRAVITY, ArmParts
 from cdsm.cable import Cable, serpentine_cables
 from cdsm.cable_laws import OriginalLength

@@ -9,7 +9,7 @@ from cdsm.geometry.holes import sharing
 from cdsm.geometry.parts import Disk
 
 if TYPE_CHECKING:
-    from cdsm.geometry.description import Geometry
+    from cdsm.geometry.description import Description
 
 LONGEST = 30.0
 """The lengths of an arm longer than this [m] are probably in millimetres."""
@@ -18,7 +18,7 @@ _WIDEST = 1.0
 """A hole radius or disk offset larger than this [m] is probably in millimetres."""
 
 
-def disks_of(geometry: Geometry) -> tuple[Disk, ...]:
+def disks_of(geometry: Description) -> tuple[Disk, ...]:
     """Return all disks, base to tip: see :attr:`Geometry.disks`."""
     joints, farthest = geometry.joints, farthest_holes(geometry)
     links = ["base_disk", *(f"link{k + 1}" for k in range(len(joints)))]
@@ -34,7 +34,7 @@ def disks_of(geometry: Geometry) -> tuple[Disk, ...]:
     return tuple(disks)
 
 
-def farthest_holes(geometry: Geometry) -> list[float]:
+def farthest_holes(geometry: Description) -> list[float]:
     """Return the distance of the farthest hole of each disk from the axis [m]."""
     farthest = [R for R in geometry.hole_radii for _ in range(2)]
     for cable in geometry.cables:
@@ -44,7 +44,7 @@ def farthest_holes(geometry: Geometry) -> list[float]:
     return farthest
 
 
-def faults_of(geometry: Geometry) -> list[str]:
+def faults_of(geometry: Description) -> list[str]:
     """Return the faults that concern several parts of a geometry."""
     count = len(geometry.joints)
     faults = []
@@ -75,7 +75,7 @@ def faults_of(geometry: Geometry) -> list[str]:
     return faults
 
 
-def _short_links(geometry: Geometry) -> list[str]:
+def _short_links(geometry: Description) -> list[str]:
     """Return one fault for all links that are too short for their disks."""
     offsets = [joint.disk_offset for joint in geometry.joints]
     short = [
@@ -92,7 +92,7 @@ def _short_links(geometry: Geometry) -> list[str]:
     return [f"disk_offset: too large: {told}; lower disk_offset, or lengthen the links"]
 
 
-def doubts_about(geometry: Geometry) -> list[str]:
+def doubts_about(geometry: Description) -> list[str]:
     """Return what is possible, but rarely meant: lengths in mm, cables that share holes."""
     doubts = []
     sizes = [

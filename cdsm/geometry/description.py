@@ -1,77 +1,35 @@
-"""Description of an arm as a frozen value: uniform arms, sections, TOML."""
+"""The fields of an arm's geometry, their checks, and what follows from them."""
 
 from __future__ import annotations
 
 import math
-import os
-from collections.abc import Sequence
-from dataclasses import replace
-from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
-from cdsm.errors import GeometryError
-from cdsm.geometry import tables
 from cdsm.geometry.checks import disks_of, doubts_about, faults_of
-from cdsm.geometry.holes import beside_the_hinges, evenly_spaced, spread_out
 from cdsm.geometry.parts import (
     MAXIMUM_JOINTS,
-    UNIVERSAL_AXES,
     CableRoute,
     Disk,
     Joint,
-    Limit,
     Link,
 )
-from cdsm.geometry.uniform import CablesPerJoint, HoleAngles, JointCount, uniform
-from cdsm.support.files import read_text, write_text
 from cdsm.support.format import plural
 from cdsm.support.records import (
     CrossFaults,
-    Friction,
     Length,
     LengthOrZero,
-    Mass,
     Name,
-    Number,
-    PerJoint,
-    checked_keywords,
-    read_toml,
     record,
 )
-from cdsm.support.validation import instance, scalar, sequence_of
 from cdsm.support.values import Printed
 from cdsm.support.warning import warn
 
 
 @record
-class Geometry(Printed):
-    """A serpentine arm, joint by joint; frozen, checked, all in SI units.
-
-    This general constructor allows different joints, links and cables. :meth:`universal` and
-    :meth:`hinged` build arms of equal or similar joints, :meth:`sections` joins several arms to
-    one, and :meth:`replace` changes some attributes. Joint 1 is at x = ``base_length``, joint k+1
-    at the end of link k, and the tip at the end of the last link. Every joint has one disk
-    ``disk_offset`` before it and one after it. The holes of its disks are at its ``hole_radius``.
-
-    Attributes:
-        name: Name of the robot: letters, digits and underscores.
-        base_length: L_0: distance from the base frame to joint 1 [m].
-        hole_radius: R: distance of the holes from the arm's axis [m], at joints without one of
-            their own.
-        joints: All joints, base to tip.
-        links: One :class:`Link` per joint.
-        cables: One :class:`CableRoute` per cable.
-
-    Raises:
-        GeometryError: The geometry is invalid; lists every fault: unknown or missing keys, wrong
-            types, lengths that are not positive, overlapping disks, holes outside their disk,
-            cables that end past the last joint, > 100 joints.
-
-    Warns:
-        CdsmWarning: Cables share a hole, or lengths look like millimetres.
-    """
+class Description(Printed):
+    """Fields of a :class:`~cdsm.Geometry`, which documents and builds them."""
 
     joints: Annotated[
         tuple[Joint, ...], Field(strict=False, min_length=1, max_length=MAXIMUM_JOINTS)
@@ -81,230 +39,6 @@ class Geometry(Printed):
     base_length: LengthOrZero
     hole_radius: Length
     name: Name = "arm"
-
-    @classmethod
-    @checked_keywords
-    def universal(
-        cls,
-        *,
-        joints: JointCount,
-        cables_per_joint: CablesPerJoint | None = None,
-        link_length: PerJoint[Length],
-        base_length: LengthOrZero,
-        disk_offset: PerJoint[Length],
-        hole_radius: PerJoint[Length],
-        link_mass: PerJoint[Mass],
-        lead: PerJoint[LengthOrZero] = 0.0,
-        friction: PerJoint[Friction] = 0.0,
-        joint_limit: PerJoint[Limit] | None = None,
-        disk_radius: PerJoint[Length] | None = None,
-        cable_radius: PerJoint[Length] | None = None,
-        hole_angles: HoleAngles | None = None,
-        phase: PerJoint[Number] = 0.0,
-        spread: Number = 0.0,
-        name: Name = "arm",
-    ) -> Self:
-        """Build an arm of n universal joints with m cables each.
-
-        Cable j = 0…m−1 of joint k = 1…n has its holes at φ = 2π((k−1) + n j)/(n m) + phase_k, or
-        at φ = hole_angles[k][j] + phase_k. Without these keywords all holes of the base disk are
-        evenly spaced. Sizes are one number for all joints, or one for each joint, base to tip.
-
-        Args:
-            joints: n, 1 to 100.
-            cables_per_joint: m; not needed with ``hole_angles``.
-            link_length: Length of every link [m], more than two ``disk_offset``.
-            base_length: L_0: distance from the base frame to joint 1 [m].
-            disk_offset: h: distance from each joint centre to the disk on each side [m].
-            hole_radius: R: distance of the holes from the axis, on both disks of a joint [m].
-            link_mass: Mass of every link [kg].
-            lead: Straight cable between each actuator and the base disk [m]; of the cables of each
-                joint.
-            friction: μ of all cables, or of the cables of each joint, as in :class:`CableRoute`.
-            joint_limit: Largest angle about each axis in both directions [rad]. None: until the
-                disks touch, 2 atan(h/R), at most 80°; R is ``disk_radius`` if given.
-            disk_radius: Outer radius of the disks [m]; None: 1.1 times that of the farthest hole.
-            cable_radius: Distance of the holes from the axis on all disks [m], for the cables of
-                each joint, e.g. on an inner ring; None: the ``hole_radius`` of each disk.
-            hole_angles: φ of the cables of a joint [rad]: one list for all joints, or a list of
-                lists, one for each joint.
-            phase: Added to φ of the cables of each joint [rad].
-            spread: Angle [rad] between neighbours where g cables would share one hole: cable
-                i = 0…g−1, base to tip, is turned by (i − (g−1)/2)·spread. 0: they share it.
-            name: Name of the robot.
-
-        Raises:
-            GeometryError: Some arguments are invalid; lists every fault.
-
-        Warns:
-            CdsmWarning: As for :class:`Geometry`.
-        """
-        return cls(
-            **uniform(
-                [UNIVERSAL_AXES] * joints,
-                lambda m: evenly_spaced(joints, m),
-                cables_per_joint,
-                hole_angles,
-                {
-                    "link_length": link_length,
-                    "disk_offset": disk_offset,
-                    "hole_radius": hole_radius,
-                    "link_mass": link_mass,
-                    "lead": lead,
-                    "friction": friction,
-                    "joint_limit": joint_limit,
-                    "disk_radius": disk_radius,
-                    "cable_radius": cable_radius,
-                    "phase": phase,
-                },
-                spread,
-            ),
-            base_length=base_length,
-            name=name,
-        )
-
-    @classmethod
-    @checked_keywords
-    def hinged(
-        cls,
-        *,
-        joints: JointCount,
-        twist: Number,
-        cables_per_joint: CablesPerJoint | None = None,
-        link_length: PerJoint[Length],
-        base_length: LengthOrZero,
-        disk_offset: PerJoint[Length],
-        hole_radius: PerJoint[Length],
-        link_mass: PerJoint[Mass],
-        lead: PerJoint[LengthOrZero] = 0.0,
-        friction: PerJoint[Friction] = 0.0,
-        joint_limit: PerJoint[Limit] | None = None,
-        disk_radius: PerJoint[Length] | None = None,
-        cable_radius: PerJoint[Length] | None = None,
-        hole_angles: HoleAngles | None = None,
-        phase: PerJoint[Number] = 0.0,
-        spread: Number = 0.0,
-        name: Name = "arm",
-    ) -> Self:
-        """Build an arm of n hinges; ``twist`` turns each axis about x from the previous one.
-
-        Hinge k has the axis cos ψ_k y + sin ψ_k z with ψ_k = (k−1)·twist. The link frames are not
-        twisted. Cable j = 0…m−1 of hinge k has its holes at φ = ψ_k + 90° + 2πj/m + phase_k: a
-        pair is at ψ_k ± 90°. With ``hole_angles``, φ = hole_angles[k][j] + phase_k, from y as well.
-
-        Where the twist brings hinges back into one plane, e.g. every second one with 90°, their
-        cables share holes; ``spread`` sets them apart, near their plane.
-
-        Args:
-            joints: n, 1 to 100.
-            twist: Angle between neighbouring hinge axes about x [rad].
-            cables_per_joint: m; default 2, the antagonistic pair.
-            link_length: As for :meth:`universal`, like all following arguments [m].
-            base_length: L_0 [m].
-            disk_offset: h [m].
-            hole_radius: R [m].
-            link_mass: Mass of every link [kg].
-            lead: Straight cable between each actuator and the base disk [m].
-            friction: μ of all cables, as in :class:`CableRoute`.
-            joint_limit: Largest angle in both directions [rad].
-            disk_radius: Outer radius of the disks [m].
-            cable_radius: Distance of the holes of each joint's cables from the axis [m].
-            hole_angles: φ of the cables of a hinge [rad].
-            phase: Added to φ of the cables of each hinge [rad].
-            spread: Angle between neighbours that would share a hole [rad].
-            name: Name of the robot.
-
-        Raises:
-            GeometryError: Some arguments are invalid; lists every fault.
-
-        Warns:
-            CdsmWarning: As for :class:`Geometry`.
-        """
-        rolls = [k * twist for k in range(joints)]
-        return cls(
-            **uniform(
-                [((0.0, math.cos(roll), math.sin(roll)),) for roll in rolls],
-                lambda m: beside_the_hinges(rolls, m),
-                2 if cables_per_joint is None and hole_angles is None else cables_per_joint,
-                hole_angles,
-                {
-                    "link_length": link_length,
-                    "disk_offset": disk_offset,
-                    "hole_radius": hole_radius,
-                    "link_mass": link_mass,
-                    "lead": lead,
-                    "friction": friction,
-                    "joint_limit": joint_limit,
-                    "disk_radius": disk_radius,
-                    "cable_radius": cable_radius,
-                    "phase": phase,
-                },
-                spread,
-            ),
-            base_length=base_length,
-            name=name,
-        )
-
-    @classmethod
-    def sections(
-        cls, sections: Sequence[Geometry], *, spread: float = 0.0, name: str = "arm"
-    ) -> Geometry:
-        """Join arms end to end to one arm of two or more sections.
-
-        Each section keeps its joints, links, radii and cables. Its base frame is the tip of the
-        section before, so its ``base_length`` lengthens the last link of that. Its cables run
-        through all disks before it: at the angle of their own holes, and at the hole radius of each
-        disk, or at their own radius (``cable_radius``) if they have one.
-
-        Args:
-            sections: The sections, base to tip.
-            spread: As for :meth:`universal`, for cables of all sections. Or give the sections
-                another ``phase``.
-            name: Name of the robot.
-
-        Raises:
-            InvalidInput: ``sections`` is not a list or tuple of geometries.
-            GeometryError: The arm is invalid: no section, > 100 joints, overlapping disks.
-
-        Warns:
-            CdsmWarning: As for :class:`Geometry`.
-        """
-        parts = sequence_of("sections", sections, Geometry)
-        if not parts:
-            raise GeometryError(["sections: none given; give one or more"])
-        first = parts[0]
-        joints: list[Joint] = []
-        links: list[Link] = []
-        cables: list[CableRoute] = []
-        for part in parts:
-            if links:
-                length = links[-1].length + part.base_length
-                links[-1] = replace(links[-1], length=length)
-            cables += [replace(each, joint=each.joint + len(joints)) for each in part.cables]
-            joints += [
-                replace(joint, hole_radius=None if first.hole_radius == R else R)
-                for joint, R in zip(part.joints, part.hole_radii, strict=True)
-            ]
-            links += part.links
-        return cls(
-            name=name,
-            base_length=first.base_length,
-            hole_radius=first.hole_radius,
-            joints=tuple(joints),
-            links=tuple(links),
-            cables=spread_out(cables, scalar("spread", spread)),
-        )
-
-    def replace(self, **changes: Any) -> Geometry:
-        """Return this geometry with other attributes, checked as in the constructor.
-
-        Args:
-            changes: Attributes of :class:`Geometry`, such as ``hole_radius=0.02``.
-
-        Raises:
-            GeometryError: The changed geometry is invalid; lists every fault.
-        """
-        return replace(self, **changes)
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -366,49 +100,3 @@ class Geometry(Printed):
             count[cable.joint] += 1
             names.append(f"cable{cable.joint}_{count[cable.joint]}")
         return tuple(names)
-
-    def to_toml(self) -> str:
-        """Return the TOML text from which :meth:`read` builds an equal geometry."""
-        return tables.text_of(self)
-
-    def write(self, path: str | os.PathLike[str]) -> Path:
-        """Write :meth:`to_toml` to a file and return its path; a failure leaves no partial file.
-
-        Raises:
-            FileError: The file cannot be written.
-        """
-        return write_text(path, self.to_toml())
-
-    @classmethod
-    def from_toml(cls, text: str, source: str | None = None) -> Geometry:
-        """Build a geometry from TOML text: see :meth:`read`.
-
-        Args:
-            text: The TOML text.
-            source: Name of its file, for the error.
-
-        Raises:
-            GeometryError: ``text`` is not TOML or not a geometry; lists every fault.
-        """
-        instance("text", text, str)
-        try:
-            return tables.build_only(cls, read_toml(text))
-        except GeometryError as error:
-            raise GeometryError(error.faults, source) from None
-
-    @classmethod
-    def read(cls, path: str | os.PathLike[str]) -> Geometry:
-        """Read a geometry from a TOML file.
-
-        The file has the full form that :meth:`write` writes, or one table ``[universal]`` or
-        ``[hinged]``. The keys of the table are the keywords of the constructor with this name. An
-        arm of sections has such a table in each ``[[sections]]`` (``[sections.universal]``), and
-        ``name`` and ``spread`` at the top. Of an ARM.toml (see :meth:`cdsm.Manipulator.read`) this
-        reads the geometry.
-
-        Raises:
-            FileError: The file cannot be read.
-            GeometryError: The file is not TOML or not a geometry; lists every fault, also unknown
-                keys.
-        """
-        return cls.from_toml(read_text(path), source=os.fspath(path))

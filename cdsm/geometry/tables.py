@@ -11,7 +11,7 @@ from cdsm.errors import GeometryError
 from cdsm.support.records import Name, Number, did_you_mean, parse, record, toml_lines
 
 if TYPE_CHECKING:
-    from cdsm.geometry.description import Geometry
+    from cdsm.geometry.geometry import Geometry
 
 ARM_KEYS = (
     *("gravity", "original_length", "wire", "wires", "urdf"),

@@ -10,7 +10,7 @@ from pydantic import Discriminator, Field, Tag
 from cdsm.errors import GeometryError
 from cdsm.geometry.holes import spread_out
 from cdsm.geometry.parts import MAXIMUM_JOINTS, CableRoute, Joint, Link
-from cdsm.support.records import EACH, ONE, Integer, Number, PerJoint, one_or_each
+from cdsm.support.records import EACH, ONE, Integer, Number, one_or_each
 
 JointCount = Annotated[Integer, Field(ge=1, le=MAXIMUM_JOINTS)]
 
@@ -33,20 +33,26 @@ HoleAngles = Annotated[
 """Angles of the holes of all joints, or of each joint [rad]."""
 
 
+_SIZES = (
+    *("link_length", "disk_offset", "hole_radius", "link_mass", "lead", "friction"),
+    *("joint_limit", "disk_radius", "cable_radius", "phase"),
+)
+"""Keywords that are one value for all joints, or one for each."""
+
+
 def uniform(
     axes: Sequence[tuple[tuple[float, float, float], ...]],
     usual_angles: Callable[[int], list[list[float]]],
-    cables_per_joint: int | None,
-    hole_angles: Any,
-    sizes: Mapping[str, PerJoint[float] | None],
-    spread: float,
+    keywords: Mapping[str, Any],
 ) -> dict[str, Any]:
     """Return joints, links, cables and hole radius of a Geometry; raise GeometryError.
 
     ``axes`` has the axes of each joint. ``usual_angles`` returns the hole angles of each joint for
-    a number of cables per joint, if ``hole_angles`` are not given. ``sizes`` has the keywords that
-    are one number or one per joint.
+    a number of cables per joint, if no ``hole_angles`` are given. ``keywords`` are those of
+    :meth:`Geometry.universal`.
     """
+    cables_per_joint, hole_angles = keywords["cables_per_joint"], keywords["hole_angles"]
+    sizes = {key: keywords[key] for key in _SIZES}
     n = len(axes)
     faults = [
         f"{key}: {len(value)} values given for {n} joints; give one, or one for each joint"
@@ -106,5 +112,5 @@ def uniform(
             Link(length=length, mass=mass)
             for length, mass in zip(each["link_length"], each["link_mass"], strict=True)
         ),
-        "cables": spread_out(cables, spread),
+        "cables": spread_out(cables, keywords["spread"]),
     }

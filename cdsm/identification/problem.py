@@ -13,8 +13,8 @@ from cdsm.errors import CdsmError, InvalidInput, SingularStiffness
 from cdsm.identification.least_squares import NoModelError
 from cdsm.identification.measurement import Measurement, label
 from cdsm.manipulator import Manipulator
-from cdsm.statics.equilibrium import equilibrium
 from cdsm.statics.following import follow
+from cdsm.statics.rest_search import equilibrium
 from cdsm.statics.weight_test import WeightTest, weight_test
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.validation import SMALLEST, unit_direction

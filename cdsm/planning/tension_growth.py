@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
-from typing import TYPE_CHECKING, Final, Literal, final
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,6 +17,7 @@ from cdsm.errors import InvalidInput
 from cdsm.kernels.tension import OPTIMALITY
 from cdsm.planning.gradient import stiffness_gradient
 from cdsm.planning.objectives import unstable
+from cdsm.planning.saturation_curve import End, Saturation
 from cdsm.posture import Posture
 from cdsm.statics.bound_scan import (
     StiffnessAt,
@@ -29,121 +29,16 @@ from cdsm.statics.bound_scan import (
     tension_domain,
 )
 from cdsm.stiffness_matrix import Stiffness, stiffness
-from cdsm.support.format import MODEL, coordinates, plain
-from cdsm.support.tidy import data_frame
 from cdsm.support.validation import Direction, bound, instance, scalar, unit_direction
-from cdsm.support.values import Array, ReadOnlyState, frozen
+from cdsm.support.values import Array, frozen
 from cdsm.tension import DEFAULT_SOLVER, Tension, distribute_tension
 
 if TYPE_CHECKING:
-    import pandas
-    from matplotlib.figure import Figure
+    pass
 
-End = Literal["buckling", "maximum", "infeasible", "elasticity", "none"]
 
 _JUST = 1e-9  # relative distance from a bound to a point just beside it
 _INSET = 1e-6  # distance of the curve from an end without a slope, over the length of the curve
-
-_ENDS: Final[dict[End, str]] = {
-    "buckling": "where the arm buckles",
-    "maximum": "where the maximum leaves no tensions that balance the arm",
-    "infeasible": "beyond which no tensions balance the arm",
-    "elasticity": "where a tension reaches the end of its cable's elasticity",
-    "none": "and goes on",
-}
-
-
-@final
-@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class Saturation(ReadOnlyState):
-    """Stiffness over the lower bound of the least tensions; made by :func:`saturation`.
-
-    Attributes:
-        direction: u (3,), a unit direction in base axes.
-        fraction: Part of the largest slope [-] below which tension does not pay.
-        bound: The lower bound [N] at which the slope has fallen to this part of the largest slope.
-            It is inf if the slope stays above it, and the start if the stiffness never rises.
-        tension: The least tensions with this bound, or with the bound of the end.
-        stiffness: K_θ under these tensions.
-        steepest: The lower bound [N] with the largest slope.
-        steepest_slope: d along/d bound there [1/m].
-        stiffest: The lower bound [N] with the largest stiffness: an end of the curve, or a maximum
-            between, above which tension softens the arm.
-        limit: Why the curve ends: ``"buckling"``, ``"maximum"`` (the bound ``maximum``),
-            ``"elasticity"`` (a tension leaves the domain of its cable), ``"infeasible"`` (no
-            tensions balance the arm) or ``"none"`` (the curve goes on).
-        curve: Lower bound [N], stiffness along u [N/m] and its slope [1/m], (n, 3).
-    """
-
-    direction: Array
-    fraction: float
-    bound: float
-    tension: Tension
-    stiffness: Stiffness
-    steepest: float
-    steepest_slope: float
-    stiffest: float
-    limit: End
-    curve: Array
-
-    @property
-    def end(self) -> float:
-        """Lower bound [N] at which the curve ends; ``limit`` is the reason."""
-        return float(self.curve[-1, 0])
-
-    def plot(self) -> Figure:
-        """Plot stiffness [N/mm] and its gain [N/m per N] over the lower bound of tension [N]."""
-        from cdsm.plots import plot_saturation  # matplotlib imports slowly
-
-        return plot_saturation(self)
-
-    def to_dict(self) -> dict[str, object]:
-        """Return bounds, slopes and curve in SI for JSON, with units in the keys; inf as None."""
-        numbers = {
-            **self.tension.posture._coordinates,
-            "direction": self.direction,
-            "fraction": self.fraction,
-            "saturation_tension_N": self.bound,
-            "steepest_tension_N": self.steepest,
-            "steepest_slope_per_m": self.steepest_slope,
-            "stiffest_tension_N": self.stiffest,
-            "end_tension_N": self.end,
-            "limit": self.limit,
-            "tension_N": dict(self.tension),
-            "minimum_tension_N": self.curve[:, 0],
-            "along_N_per_m": self.curve[:, 1],
-            "slope_per_m": self.curve[:, 2],
-        }
-        return dict(plain(numbers))
-
-    def to_pandas(self) -> pandas.DataFrame:
-        """Return a table of stiffness [N/m] and slope [1/m], a row for each lower bound [N].
-
-        Raises:
-            MissingExtra: pandas is not installed.
-        """
-        columns = {"along [N/m]": self.curve[:, 1], "slope [1/m]": self.curve[:, 2]}
-        return data_frame(columns, "minimum [N]", self.curve[:, 0])
-
-    def __repr__(self) -> str:
-        return f"<Saturation at {self.bound:.4g} N>"
-
-    def __str__(self) -> str:
-        along, part = coordinates(self.direction), f"{100.0 * self.fraction:.3g} %"
-        if self.steepest_slope <= 0.0:
-            lines = [f"tension nowhere raises the stiffness along {along}"]
-        else:
-            lines = [
-                f"the stiffness along {along} rises most, by {self.steepest_slope / 1000.0:.4g} "
-                f"N/mm per N, at a lower bound of {self.steepest:.4g} N",
-                f"it never pays less than {part} of that"
-                if math.isinf(self.bound)
-                else f"above {self.bound:.4g} N it pays less than {part}",
-            ]
-        if self.curve[0, 0] < self.stiffest < self.end:
-            lines.append(f"above {self.stiffest:.4g} N tension makes the arm softer")
-        lines.append(f"looked at up to {self.end:.4g} N, {_ENDS[self.limit]} ({MODEL})")
-        return "\n".join(lines)
 
 
 def saturation(

@@ -37,7 +37,7 @@ from cdsm.support.values import Array
 if TYPE_CHECKING:
     from cdsm.planning.path_plan import PathPlan
     from cdsm.planning.range import StiffnessRange
-    from cdsm.planning.tension_growth import Saturation
+    from cdsm.planning.saturation_curve import Saturation
 
 _SAME = 1e-9
 """Largest entry of a unit direction outside a plane in which it lies."""

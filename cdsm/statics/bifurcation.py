@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike
 
 from cdsm.errors import InvalidInput
 from cdsm.statics.buckling import CriticalTension
-from cdsm.statics.equilibrium import Equilibrium, equilibrium
+from cdsm.statics.equilibrium import Equilibrium
+from cdsm.statics.rest_search import equilibrium
 from cdsm.support.format import plain
 from cdsm.support.tidy import data_frame
 from cdsm.support.validation import instance, number_array, quantity

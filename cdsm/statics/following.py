@@ -7,8 +7,9 @@ import math
 import numpy as np
 
 from cdsm.errors import CableError, EquilibriumError
-from cdsm.statics.equilibrium import Equilibrium, eigenvalues, settled
+from cdsm.statics.equilibrium import Equilibrium, eigenvalues
 from cdsm.statics.locked_motors import Iterate, LoadedArm
+from cdsm.statics.rest_search import settled
 from cdsm.statics.trust_region import RestSearch, find_rest
 from cdsm.support.values import Array, frozen
 

@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 from cdsm.errors import InvalidInput
 from cdsm.friction.chain_problem import ChainProblem
 from cdsm.posture import Posture
-from cdsm.statics.equilibrium import require_between_stops
 from cdsm.statics.load_history import LoadHistory
 from cdsm.statics.locked_motors import LoadedArm, require_domains, stops
+from cdsm.statics.rest_search import require_between_stops
 from cdsm.statics.slow_loading import Load, Passage, SlowLoading, State
 from cdsm.stiffness_matrix import checked_tension
 from cdsm.support.progress import track

@@ -24,8 +24,8 @@ from cdsm.errors import CdsmError
 from cdsm.friction.chain_problem import ChainProblem
 from cdsm.kernels.tree import Indices
 from cdsm.posture import Posture
-from cdsm.statics.equilibrium import no_rest
 from cdsm.statics.frictional_arm import FrictionalArm, Settled
+from cdsm.statics.rest_search import no_rest
 from cdsm.statics.trust_region import RestSearch, find_rest
 from cdsm.support.values import Array
 

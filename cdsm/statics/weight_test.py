@@ -13,9 +13,10 @@ from numpy.typing import ArrayLike
 from cdsm.errors import InvalidInput
 from cdsm.friction.breakaway import breakaway
 from cdsm.posture import Posture
-from cdsm.statics.equilibrium import Equilibrium, equilibrium
+from cdsm.statics.equilibrium import Equilibrium
 from cdsm.statics.following import follow_load
 from cdsm.statics.load_cycle import load_cycle
+from cdsm.statics.rest_search import equilibrium
 from cdsm.statics.weight_friction import WeightFriction
 from cdsm.support.format import MODEL, coordinates, plain
 from cdsm.support.tidy import data_frame

@@ -17,7 +17,8 @@ from cdsm.kernels.principal import principal_stiffness
 from cdsm.manipulator import Manipulator
 from cdsm.plots.arm import Ellipsoid, color_scale, ellipsoid
 from cdsm.posture import Posture
-from cdsm.statics.equilibrium import Equilibrium, equilibrium
+from cdsm.statics.equilibrium import Equilibrium
+from cdsm.statics.rest_search import equilibrium
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.status import Status
 from cdsm.support.values import Array, ReadOnlyState, frozen

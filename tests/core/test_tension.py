@@ -14,7 +14,7 @@ import cdsm
 from cdsm.kernels import tension as tension_kernels
 from cdsm.kernels.tension import DISTANCE, OPTIMALITY
 from cdsm.support.values import Array
-from cdsm.tension import _polished, _shortfall
+from cdsm.tension.solvers import _polished, _shortfall
 from tests.support.arms import (
     STEEL,
     random_arm,

@@ -1,0 +1,114 @@
+"""Wires in TOML: names, rigidities and tables of laws, and the settings that cables share."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+from pydantic import Field
+
+from cdsm.cable import Cable, Control
+from cdsm.elasticity import Elasticity, LinearElasticity
+from cdsm.errors import GeometryError, InvalidInput, UnknownName
+from cdsm.support.records import SpringStiffness, Tension, record, toml_value
+from cdsm.support.validation import one_of
+from cdsm.wires.catalogue import WIRES, name_of
+from cdsm.wires.files import from_table, table_of
+
+
+@record
+class CableSettings:
+    """What a file may say of all cables or of one cable; None: nothing."""
+
+    wire: Any = None
+    series_stiffness: SpringStiffness | None = None
+    control: Control | None = None
+    minimum: Tension | None = None
+    maximum: Tension | None = None
+
+
+@record
+class CableKeys(CableSettings):
+    """What stands at the top of a file; the values of Any are checked where they are read."""
+
+    wires: Any = Field(default_factory=dict)
+    cables: Any = None
+
+
+SETTINGS = ("series_stiffness", "control", "minimum", "maximum")
+"""Settings that are attributes of a :class:`Cable` with the same name."""
+
+
+class Wires(NamedTuple):
+    """The wires of a file: laws by name, of all cables, and the law that replaces any other."""
+
+    named: dict[str, Elasticity]
+    usual: Elasticity | None
+    forced: Elasticity | None
+
+    def of(self, given: object) -> Elasticity | None:
+        """Return the law of a cable whose key ``wire`` is given, or None if it has no wire."""
+        own = None if given is None else read_wire(given, self.named)
+        return self.forced or own or self.usual
+
+
+def read_wires(keys: CableKeys, forced: Elasticity | None) -> Wires:
+    """Read the tables ``[wires.NAME]`` and the wire of all cables; raise GeometryError."""
+    if not isinstance(keys.wires, dict):
+        raise GeometryError([f"wires: is {keys.wires!r}; give tables [wires.NAME]"])
+    named, usual, faults = {}, None, []
+    for name, table in keys.wires.items():
+        if name in WIRES:
+            faults.append(f"wires.{name}: cdsm knows a wire of this name; choose another")
+        try:
+            named[name] = read_wire(table, {}, f"wires.{name}")
+        except GeometryError as error:
+            faults += error.faults
+    try:
+        usual = None if keys.wire is None else read_wire(keys.wire, named)
+    except GeometryError as error:
+        faults += error.faults
+    if faults:
+        raise GeometryError(faults)
+    return Wires(named, usual, forced)
+
+
+def read_wire(given: object, named: Mapping[str, Elasticity], key: str = "wire") -> Elasticity:
+    """Read a name, EA [N] or the table of a law; raise GeometryError with faults at ``key``."""
+    try:
+        if isinstance(given, dict):
+            return from_table(given)
+        if isinstance(given, str):
+            known = {**WIRES, **named}
+            return known[one_of("wire", given, known)]
+        if isinstance(given, bool) or not isinstance(given, (int, float)):
+            raise InvalidInput(key, f"{given!r} given; give a name, EA in N, or a table.")
+        return LinearElasticity(given)
+    except GeometryError as error:
+        faults = [f"{key}.{fault}" for fault in error.faults]
+    except UnknownName as error:
+        faults = [f"{key}: {error} Or give EA in N, or a table [wires.NAME]."]
+    except InvalidInput as error:
+        faults = [f"{key}: {str(error).removeprefix(f'{error.name}: ')}"]
+    raise GeometryError(faults)
+
+
+def wire_entries(cables: Sequence[Cable]) -> tuple[list[str], list[str]]:
+    """Return the value of the key ``wire`` of each cable, and the lines of the tables of wires."""
+    values: dict[str, str] = {}
+    lines: list[str] = []
+    keys = []
+    for cable in cables:
+        law = cable.elasticity
+        table = "\n".join(table_of(law))
+        if table not in values:
+            known = name_of(law)
+            if known is None and isinstance(law, LinearElasticity):
+                values[table] = toml_value(float(law.rigidity(0.0)))
+            elif known is None:
+                known = f"wire{1 + len(lines) // 3}"
+                lines += [f"[wires.{known}]", table, ""]
+            if known is not None:
+                values[table] = toml_value(known)
+        keys.append(values[table])
+    return keys, lines

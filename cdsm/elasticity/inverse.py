@@ -1,0 +1,57 @@
+"""Tensions at which a rising function, such as the strain of a law, has wanted values."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from cdsm.elasticity.domain import Domain
+from cdsm.errors import ElasticityRangeError
+from cdsm.support.roots import rising_root
+from cdsm.support.validation import RANGES
+from cdsm.support.values import Array
+
+_ROUNDING = 1e-15
+"""Relative rounding of a strain: a few units in the last place."""
+
+
+# denser at the low end, where most laws are soft; the first and last points are exactly 0 and 1
+_GRID = np.linspace(0.0, 1.0, 25) ** 3
+
+
+def tension_at(
+    wanted: Array,
+    domain: Domain,
+    stretch: Callable[[Array], Array],
+    slope: Callable[[Array], Array],
+    name: str,
+) -> Array:
+    """Find the tensions F [N] at which a rising function stretch(F) has the wanted values.
+
+    ``wanted`` is a strain [-] or an elongation [m] of any shape; the error calls it ``name``.
+    ``stretch`` is zero or less at the low end of ``domain``, and ``slope`` is its derivative. If no
+    tension of the domain gives one of the values, ElasticityRangeError is raised.
+    """
+    low, high, most = *domain, RANGES["tension"].high
+    if math.isinf(high):  # an unbounded law: search only as far as needed
+        high = max(1.0, 2.0 * low)
+        while float(stretch(np.array(high))) < wanted.max(initial=0.0) and high < most:
+            high = min(2.0 * high, most)
+    grid = np.maximum(low + (high - low) * _GRID, domain.first)
+    grid[-1] = high  # low + (high - low) may differ from high by rounding
+    reached = stretch(grid)
+    # a law's last digit may depend on the array size, and ``high`` belongs to the domain
+    outside = (wanted < min(reached[0], 0.0)) | (wanted > reached[-1] * (1.0 + _ROUNDING))
+    if outside.any():
+        first = np.atleast_1d(wanted)[np.atleast_1d(outside)][0]
+        raise ElasticityRangeError(
+            f"no tension of the domain {domain} gives the {name} {first:.6g}; it reaches "
+            f"{reached[-1]:.6g}.",
+            [high],
+            np.flatnonzero(outside).tolist(),
+        )
+    above = np.searchsorted(reached[1:-1], wanted) + 1
+    guess = np.interp(wanted, reached, grid)
+    return rising_root(wanted, guess, grid[above - 1], grid[above], stretch, slope)[0]

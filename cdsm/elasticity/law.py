@@ -1,0 +1,170 @@
+"""The abstract law: rigidity, strain and energy of a cable as functions of its tension."""
+
+from __future__ import annotations
+
+import os
+from abc import ABC, abstractmethod
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cdsm.elasticity.domain import Domain
+from cdsm.elasticity.inverse import tension_at
+from cdsm.support.validation import number_array
+from cdsm.support.values import Array
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+_STEP = 6e-6
+"""Relative step of central differences: the cube root of the rounding of float64."""
+
+
+class Elasticity(ABC):
+    """Axial elasticity of a cable. All methods take any shape and return the same shape.
+
+    A user-defined law must define :attr:`domain`, :meth:`rigidity`, :meth:`strain` and
+    :meth:`energy`. The rigidity must be positive and continuous; its slope may jump.
+    :class:`~cdsm.Manipulator` samples the rigidity and refuses a law if it finds a jump of more
+    than 0.01 %.
+    """
+
+    @property
+    @abstractmethod
+    def domain(self) -> Domain:
+        """Tensions [N] for which the elasticity is defined."""
+
+    @staticmethod
+    def read(path: str | os.PathLike[str]) -> Elasticity:
+        """Read an elasticity from a TOML file, as :func:`~cdsm.read_elasticity`.
+
+        Raises:
+            FileError: The file cannot be read or does not describe an elasticity.
+        """
+        from cdsm.wires.files import read_elasticity  # which imports this module
+
+        return read_elasticity(path)
+
+    def write(self, path: str | os.PathLike[str]) -> Path:
+        """Write the elasticity to a TOML file, as :func:`~cdsm.write_elasticity`; return its path.
+
+        Raises:
+            InvalidInput: A file cannot hold an elasticity of this kind.
+            FileError: The file cannot be written.
+        """
+        from cdsm.wires.files import write_elasticity  # which imports this module
+
+        return write_elasticity(self, path)
+
+    def plot(self) -> Figure:
+        """Plot tangent and secant rigidity [kN] over the tension [N]."""
+        from cdsm.plots import plot_elasticity  # matplotlib imports slowly
+
+        return plot_elasticity(self)
+
+    @property
+    def rest(self) -> float:
+        """Tension [N] at which the strain is zero: the low end of :attr:`domain`."""
+        return self.domain.low
+
+    def slack_below(self) -> Elasticity:
+        """Return this law with a slack branch: it is continued down to zero tension.
+
+        Below the low end F_0 of this law, EA keeps its value EA(F_0), so it stays continuous and
+        positive. Strains count from F_0 as before, so answers within the law stay the same. Below
+        it ε = (F − F_0)/EA(F_0) is negative. The cable is slack at ε = −F_0/EA(F_0), and below.
+
+        The branch is an assumption; no tensile test has measured it. The strand of Eq. 19 has
+        EA = 16.4 N from 2.2 N down and is slack after shortening by 13 %: it is that soft where
+        its polynomial begins. A law that begins at zero is returned as it is.
+
+        Raises:
+            InvalidInput: The wire would be shorter than half its length when it is slack.
+        """
+        from cdsm.wires.slack import SlackBelow
+
+        return self if 0.0 in self.domain else SlackBelow(self)
+
+    @abstractmethod
+    def rigidity(self, tension: ArrayLike) -> Array:
+        """Compute the tangent rigidity EA(F) = l_0 dF/dΔl [N]; K_L uses it (caption of Fig. 5).
+
+        Args:
+            tension: F [N], any shape.
+
+        Raises:
+            ElasticityRangeError: A tension is outside :attr:`domain`, or the law has no positive
+                rigidity there.
+        """
+
+    def rigidity_slope(self, tension: ArrayLike) -> Array:
+        """Compute dEA/dF [-], the slope of the tangent rigidity.
+
+        By default it is the central difference over F ± 6e-6 max(F, 1 N), with about ten correct
+        digits. Near an end of :attr:`domain` the difference is one-sided. A law may override it.
+
+        Args:
+            tension: F [N], any shape.
+
+        Raises:
+            ElasticityRangeError: A tension is outside :attr:`domain`.
+        """
+        values = self.domain.check(tension)
+        step = _STEP * np.maximum(values, 1.0)
+        before = np.maximum(values - step, self.domain.first)
+        after = np.minimum(values + step, self.domain.high)
+        return np.asarray((self.rigidity(after) - self.rigidity(before)) / (after - before))
+
+    @abstractmethod
+    def strain(self, tension: ArrayLike) -> Array:
+        """Compute the strain Δl/l_0 = ∫ dF/EA(F) [-] from :attr:`rest`, the domain's low end.
+
+        Args:
+            tension: F [N], any shape.
+
+        Raises:
+            ElasticityRangeError: As for :meth:`rigidity`.
+        """
+
+    @abstractmethod
+    def energy(self, tension: ArrayLike) -> Array:
+        """Compute the elastic energy ∫ F dε = ∫ F dF/EA(F) [N] = [J/m] per unstretched metre.
+
+        It starts at :attr:`rest`, like :meth:`strain`.
+
+        Args:
+            tension: F [N], any shape.
+
+        Raises:
+            ElasticityRangeError: As for :meth:`rigidity`.
+        """
+
+    def tension(self, strain: ArrayLike) -> Array:
+        """Compute the tension F [N] at a strain: the inverse of :meth:`strain`.
+
+        Args:
+            strain: Δl/l_0 [-] from :attr:`rest`, any shape.
+
+        Raises:
+            InvalidInput: ``strain`` is not numbers.
+            ElasticityRangeError: No tension of the domain gives one of the strains.
+        """
+        wanted = number_array("strain", strain)
+        return tension_at(
+            wanted, self.domain, self.strain, lambda F: 1.0 / self.rigidity(F), "strain"
+        )
+
+    def secant_rigidity(self, tension: ArrayLike) -> Array:
+        """Compute the secant rigidity ΔF/(Δl/l_0) [N] of Eq. 18 from :attr:`rest`.
+
+        It equals :meth:`rigidity` there, and everywhere if EA is constant. Argument and
+        errors are those of :meth:`rigidity`.
+        """
+        values = self.domain.check(tension)
+        strain = self.strain(values)
+        secant = np.array(self.rigidity(values))
+        np.divide(values - self.rest, strain, out=secant, where=strain != 0.0)
+        return secant

@@ -1,0 +1,62 @@
+"""The class of all errors and that of all warnings; how messages list many faults."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+
+def listed(faults: Sequence[str], most: int | None = None) -> str:
+    """Return the faults as one line each; ``most`` limits their number."""
+    more = "" if most is None or len(faults) <= most else f"\n  and {len(faults) - most} more"
+    return "".join(f"\n  - {fault}" for fault in faults[:most]) + more
+
+
+def counted(faults: Sequence[str], most: int | None = None) -> str:
+    """Return the number of faults, with :func:`listed` below it."""
+    count = "1 fault" if len(faults) == 1 else f"{len(faults)} faults"
+    return f"{count}:{listed(faults, most)}"
+
+
+def first_of(said: Sequence[str], most: int, what: str) -> str:
+    """Return the first ``most`` sentences and the number of others: ``…; and 3 joints more``."""
+    more = len(said) - most
+    return "; ".join(said[:most]) + (f"; and {more} {what} more" if more > 0 else "")
+
+
+NAMED = 4
+"""Number of joints or cables that a message names; the attributes of the error hold all of them."""
+
+
+def named(words: Sequence[str]) -> str:
+    """Return the first :data:`NAMED` words with commas, and ``…`` if there are more."""
+    return ", ".join(words[:NAMED]) + (", …" if len(words) > NAMED else "")
+
+
+LONGEST = 8000
+"""Largest number of characters of a message, since a name in a file can be very long."""
+
+
+class CdsmError(Exception):
+    """Base class of all errors raised by cdsm."""
+
+    def __init__(self, message: str = "") -> None:
+        more = len(message) - LONGEST
+        super().__init__(message if more <= 0 else f"{message[:LONGEST]}… ({more} characters more)")
+
+    def __reduce__(self) -> tuple[object, ...]:
+        # subclasses have attributes, which Exception's own pickling would lose
+        return (_restore, (type(self), self.args, self.__dict__))
+
+
+def _restore(kind: type[CdsmError], args: tuple[object, ...], data: dict[str, object]) -> CdsmError:
+    error = kind.__new__(kind, *args)
+    error.args = args
+    error.__dict__.update(data)
+    for value in data.values():
+        if hasattr(value, "setflags"):
+            value.setflags(write=False)
+    return error
+
+
+class CdsmWarning(UserWarning):
+    """Base class of all warnings of cdsm: an input that is possible, but rarely meant."""

@@ -1,0 +1,155 @@
+"""Tension distribution: the smallest cable tensions that balance the arm.
+
+The balance (Eq. 17) does not determine the tensions of a redundant arm. As usual, the smallest are
+chosen:
+
+    min ½‖F‖²   so that   J_Lᵀ F = J_Xᵀ W − g   and   minimum ≤ F ≤ maximum.
+
+The problem is made dimensionless before a solver gets it. If it has no solution,
+:mod:`cdsm.tension.infeasibility` says why.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cdsm.cable import Cable
+from cdsm.errors import InvalidInput
+from cdsm.kernels import tension as tension_kernels
+from cdsm.manipulator import Manipulator
+from cdsm.posture import Posture
+from cdsm.support.validation import bound, flag, instance, one_of, quantity, wrench_vector
+from cdsm.support.values import Array, frozen
+from cdsm.tension.infeasibility import explain
+from cdsm.tension.solvers import DEFAULT_SOLVER, solve
+from cdsm.tension.value import Tension
+
+
+def distribute_tension(
+    pose: Posture,
+    minimum: ArrayLike = 0.0,
+    maximum: ArrayLike = math.inf,
+    wrench: ArrayLike = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+    solver: str = DEFAULT_SOLVER,
+    *,
+    fixed: Mapping[str, float] | None = None,
+    worst_friction: bool = False,
+) -> Tension:
+    """Compute the smallest tensions in balance: min ‖F‖² with J_Lᵀ F = J_Xᵀ W − g (Eqs. 13, 17).
+
+    Args:
+        pose: The posture.
+        minimum: Lower bound [N], for all cables or (C,); not negative, since cables only pull.
+        maximum: Upper bound [N], for all cables or (C,); inf: no bound. Bounds that a cable defines
+            also apply.
+        wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m].
+        solver: ``"daqp"`` (exact), ``"osqp"``, or another solver that qpsolvers finds installed.
+        fixed: Tensions [N] by cable name, e.g. of motors that control force. The other tensions are
+            computed. A fixed tension replaces the bounds of its cable and is never widened.
+        worst_friction: Keep each segment of each cable within the bounds, whatever loads came and
+            went before. At this posture friction holds all tensions of a cable within
+            exp(±Σ μ φ) of F, with the sum over its holes. The bounds narrow by these factors.
+
+    Raises:
+        InvalidInput: A bound, a fixed tension or the wrench has the wrong shape or is not a number,
+            or the bounds contradict each other, also because of the worst friction.
+        InfeasibleTension: No tension within the bounds balances the arm. The error gives the
+            missing torque. If wider bounds help, it says how far the bounds of cables without a
+            fixed tension must widen.
+        UnknownName: The solver is not installed, or a fixed cable does not exist.
+        SolverError: The solver's solution does not meet the optimality conditions.
+    """
+    instance("pose", pose, Posture)
+    low, high = checked_bounds(pose.arm, minimum, maximum)
+    if flag("worst_friction", worst_friction):
+        loss = np.exp(_grip(pose))
+        low, high = checked_bounds(pose.arm, low * loss, high / loss)
+    fixed = {} if fixed is None else fixed
+    if fixed:
+        low, high = _with_fixed(pose, low, high, fixed)
+    wrench = wrench_vector("wrench", wrench)
+    torque = pose.jacobian.T @ wrench - pose.gravity_torque
+
+    length = pose.arm.length
+    scaled = tension_kernels.scaled_balance(pose.length_jacobian, torque, low, high, length)
+    problem = tension_kernels.Scaled(*scaled)
+    solution = solve(problem, solver)
+    if isinstance(solution, str):
+        free = np.array([cable.name not in fixed for cable in pose.arm.cables])
+        explain(pose, problem, solver, solution, free)
+    values = solution * problem.force
+    return Tension(
+        posture=pose,
+        values=frozen(values),
+        wrench=wrench,
+        minimum=low,
+        maximum=high,
+        solver=solver,
+        residual=frozen(values @ pose.length_jacobian - torque),
+    )
+
+
+def _grip(pose: Posture) -> Array:
+    """Compute Σ μ φ of the holes of each cable (C,) [-]."""
+    segments = pose.segments
+    chains = segments.chains
+    grip = chains.friction * segments.wrap
+    total = np.bincount(chains.cable[chains.hole], grip, minlength=len(pose.arm.cables))
+    return np.asarray(total, dtype=np.float64)
+
+
+def checked_bounds(
+    arm: Manipulator, minimum: ArrayLike, maximum: ArrayLike, rows: int | None = None
+) -> tuple[Array, Array]:
+    """Return valid bounds (C,) [N] of the tensions, including those that the cables define.
+
+    With ``rows`` a bound may also have the shape (rows, C): one row per posture. Invalid bounds
+    raise InvalidInput.
+    """
+    cables = arm.cables
+    low = bound("minimum", minimum, len(cables), rows)
+    high = bound("maximum", maximum, len(cables), rows)
+    allowed = (low >= 0.0) & (low < math.inf)
+    if np.count_nonzero(allowed) < low.size:
+        *row, c = np.argwhere(~allowed)[0].tolist()
+        raise InvalidInput(
+            "minimum",
+            f"{low[(*row, c)]:g} N given for {_named(cables[c], row)}; cables only pull, so it "
+            "must be finite and not negative.",
+        )
+    least, most = arm._model.laws.narrowed(low, high)
+    ordered = least <= most
+    if np.count_nonzero(ordered) < ordered.size:
+        at = tuple(np.argwhere(~ordered)[0].tolist())
+        l0, l1, h0, h1 = (
+            np.broadcast_to(each, ordered.shape)[at] for each in (low, least, high, most)
+        )
+        given, own = "given" if h1 == h0 else "of its own", l1 > l0
+        raise InvalidInput(
+            "maximum",
+            f"{h1:g} N {given} for {_named(cables[at[-1]], at[:-1])}, below "
+            f"{'its own' if own else 'its'} minimum of {l1:g} N; raise maximum or lower minimum.",
+        )
+    return least, most
+
+
+def _named(cable: Cable, row: Sequence[int]) -> str:
+    return f"{cable.name} in row {row[0]}" if row else cable.name
+
+
+def _with_fixed(
+    pose: Posture, low: Array, high: Array, fixed: Mapping[str, float]
+) -> tuple[Array, Array]:
+    """Return the bounds; for each fixed cable, minimum and maximum equal its fixed tension."""
+    if not isinstance(fixed, Mapping):
+        raise InvalidInput("fixed", f"{fixed!r} given; give a dict of tensions [N] by cable.")
+    names = [cable.name for cable in pose.arm.cables]
+    low, high = low.copy(), high.copy()
+    for name, value in fixed.items():
+        c = names.index(one_of("cable", name, names))
+        low[c] = high[c] = quantity(f"fixed[{name!r}]", value, "tension", zero=True)
+    return frozen(low), frozen(high)

@@ -1,0 +1,118 @@
+"""Quadratic-programming solvers, their settings, and the check of what they return.
+
+A solution is accepted only if it meets the optimality conditions.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from typing import Any, Final
+
+import numpy as np
+
+from cdsm.errors import SolverError
+from cdsm.kernels import tension as tension_kernels
+from cdsm.kernels.tension import DISTANCE, OPTIMALITY
+from cdsm.support.validation import one_of
+from cdsm.support.values import Array
+from cdsm.tension.infeasibility import instead
+
+DEFAULT_SOLVER: Final = "daqp"
+"""Default solver of all tension distributions: exact, and the fastest in measurements."""
+
+
+# with qpsolvers' defaults, these solvers miss OPTIMALITY by orders of magnitude; OSQP's polishing
+# step can spoil a solution and still report success
+_SETTINGS: dict[str, dict[str, Any]] = {
+    "clarabel": {"tol_gap_abs": 1e-11, "tol_gap_rel": 1e-11, "tol_feas": 1e-11},
+    "daqp": {"primal_tol": 1e-10},
+    "osqp": {
+        "eps_abs": 1e-10,
+        "eps_rel": 1e-10,
+        "max_iter": 100_000,
+        "polish": False,
+        "raise_error": False,
+    },
+    "piqp": {"eps_abs": 1e-11, "eps_rel": 1e-11},
+    "proxqp": {"eps_abs": 1e-11, "eps_rel": 0.0},
+}
+
+
+def installed_solvers() -> list[str]:
+    """Return the names of the solvers that are installed."""
+    import qpsolvers  # slow to import
+
+    return sorted(qpsolvers.available_solvers)
+
+
+def installed_solver(solver: str) -> str:
+    """Return the name of a solver; UnknownName if it is not installed."""
+    return one_of("installed solver", solver, installed_solvers())
+
+
+def solve(problem: tension_kernels.Scaled, solver: str) -> Array | str:
+    """Return the verified optimum, or the fault as text: no solution, or not the optimum."""
+    import qpsolvers
+    from scipy.sparse import csc_matrix
+
+    installed_solver(solver)
+    A, b, low, high, *_ = problem
+    sparse = csc_matrix if solver in qpsolvers.sparse_solvers else np.asarray
+    identity, nothing = np.eye(low.size), np.zeros(low.size)
+    qp = qpsolvers.Problem(sparse(identity), nothing, A=sparse(A), b=b, lb=low, ub=high)
+    settings = _SETTINGS.get(solver, {})
+    try:
+        if solver == "daqp":
+            solution = qpsolvers.solve_problem(qp, solver, **settings)
+        else:  # other solvers also report failure as warnings
+            with warnings.catch_warnings(action="ignore"):
+                solution = qpsolvers.solve_problem(qp, solver, **settings)
+    except Exception as error:  # each solver has its own error types
+        raise SolverError(solver, f"failed: {error}. {instead(solver)}") from error
+    x = solution.x
+    if not solution.found or x is None:
+        return "found no solution"
+    if solution.y is None or solution.z_box is None:
+        raise SolverError(solver, f"returns no multipliers to verify it by. {instead(solver)}")
+    point = tuple(np.asarray(each, dtype=np.float64) for each in (x, solution.y, solution.z_box))
+    if not np.isfinite(point[0]).all():
+        raise SolverError(solver, f"calls {x.tolist()} optimal. {instead(solver)}")
+    if _shortfall(problem, point):
+        # first-order and interior-point solvers end near the optimum, with known active bounds
+        point = _polished(problem, point)
+        shortfall = _shortfall(problem, point)
+        if shortfall:
+            return f"calls a point optimal that is not: {shortfall}"
+    # after the check: near infeasibility, large multipliers make the last bit of x matter
+    x, _, z = point
+    return tension_kernels.onto_bounds(x, z, low, high, OPTIMALITY * max(1.0, float(abs(x).max())))
+
+
+def _shortfall(problem: tension_kernels.Scaled, point: tuple[Array, ...]) -> str:
+    """Return as text why a point and its multipliers are not the optimum; empty if they are."""
+    # equal to qpsolvers' primal_residual, dual_residual and duality_gap, ten times faster
+    primal, dual, gap = tension_kernels.single_optimality(*problem[:4], *point)
+    size = max(1.0, float(abs(point[0]).max()))
+    distance = math.sqrt(2.0 * gap)  # ½‖x − x*‖² is at most the gap
+    if max(primal, dual) <= OPTIMALITY * size and distance <= DISTANCE * size:
+        return ""
+    return (
+        f"balance and bounds are missed by {primal / size:.1e}, stationarity by {dual / size:.1e} "
+        f"({OPTIMALITY:g} is allowed), and the optimum may be {distance / size:.1e} away "
+        f"({DISTANCE:g} is allowed; all dimensionless)"
+    )
+
+
+def _polished(problem: tension_kernels.Scaled, point: tuple[Array, ...]) -> tuple[Array, ...]:
+    """Solve the optimality conditions exactly for the bounds that a near-optimum makes active."""
+    A, b, low, high, *_ = problem
+    x, _, z = point
+    at_low, at_high = x - low < -z, high - x < z
+    free = ~(at_low | at_high)
+    x = np.where(at_low, low, np.where(at_high, high, 0.0))
+    x[free] = np.linalg.lstsq(A[:, free], b - A @ x, rcond=None)[0]
+    y = np.asarray(np.linalg.lstsq(A[:, free].T, -x[free], rcond=None)[0], dtype=np.float64)
+    z = -x - y @ A
+    z[free] = 0.0
+    return x, y, z

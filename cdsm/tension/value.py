@@ -1,0 +1,135 @@
+"""Cable tensions that balance an arm, as a frozen value."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, final
+
+import numpy as np
+from numpy.typing import DTypeLike
+
+from cdsm.kernels.tension import OPTIMALITY
+from cdsm.posture import Posture
+from cdsm.support.format import aligned, key, plain, plural
+from cdsm.support.tidy import data_frame
+from cdsm.support.validation import one_of
+from cdsm.support.values import Array, ReadOnlyState
+
+if TYPE_CHECKING:
+    import pandas
+    from matplotlib.figure import Figure
+
+
+@final
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Tension(ReadOnlyState):
+    """Cable tensions that balance an arm, with the data of their problem.
+
+    A mapping from the name of a cable to its tension [N]: ``tension["cable1_1"]``,
+    ``dict(tension)``, ``len(tension)``. :attr:`values` is the array, as in ``np.array(tension)``.
+
+    Attributes:
+        posture: The posture.
+        values: F (C,) [N], in the order of ``posture.arm.cables``.
+        wrench: W (6,) at ``tool0``, base axes: force [N], then moment [N m].
+        minimum: Lower bounds (C,) [N].
+        maximum: Upper bounds (C,) [N].
+        solver: Name of the solver that found the tensions.
+        residual: Residual J_Lᵀ F − (J_Xᵀ W − g) of Eq. 13, (nv,) [N m].
+        least: Whether the tensions are the smallest; False if they were chosen for a stiffness.
+    """
+
+    posture: Posture
+    values: Array
+    wrench: Array
+    minimum: Array
+    maximum: Array
+    solver: str
+    residual: Array
+    least: bool = True
+
+    def keys(self) -> tuple[str, ...]:
+        """Return the names of the cables, in the order of :attr:`values`."""
+        return self.posture.arm.cables.names
+
+    def items(self) -> tuple[tuple[str, float], ...]:
+        """Return name and tension [N] of each cable."""
+        return tuple(zip(self.keys(), self.values.tolist(), strict=True))
+
+    def __getitem__(self, cable: str) -> float:
+        """Return the tension of a cable [N].
+
+        Raises:
+            UnknownName: No cable has this name.
+        """
+        return dict(self.items())[one_of("cable", cable, self.keys())]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.keys())
+
+    def __contains__(self, cable: object) -> bool:
+        return cable in self.keys()
+
+    def __len__(self) -> int:
+        return self.values.size
+
+    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> Array:
+        return np.array(self.values, dtype) if copy else np.asarray(self.values, dtype)
+
+    @property
+    def at_minimum(self) -> tuple[str, ...]:
+        """Names of the cables at their lower bound."""
+        return self._names(self.values - self.minimum)
+
+    @property
+    def at_maximum(self) -> tuple[str, ...]:
+        """Names of the cables at their upper bound."""
+        return self._names(self.maximum - self.values)
+
+    def _names(self, distance: Array) -> tuple[str, ...]:
+        tight = distance <= OPTIMALITY * self.values.max(initial=0.0)
+        return tuple(self.posture.arm.cables[c].name for c in np.flatnonzero(tight))
+
+    def plot(self) -> Figure:
+        """Plot the arm in mm, its cables coloured by their tension [N]."""
+        return self.posture.plot(self)
+
+    def to_dict(self) -> dict[str, object]:
+        """Return tensions, bounds and load in SI for JSON, with units in the keys; inf as None."""
+        arm = self.posture.arm
+        numbers = {
+            **self.posture._coordinates,
+            "tension_N": dict(self),
+            "minimum_N": dict(zip(self, self.minimum, strict=True)),
+            "maximum_N": dict(zip(self, self.maximum, strict=True)),
+            "force_N": self.wrench[:3],
+            "moment_Nm": self.wrench[3:],
+            key("static_residual", arm.torque_unit()): self.residual,
+            "solver": self.solver,
+        }
+        return dict(plain(numbers))
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """Return a table of tension and bounds [N], a row for each cable.
+
+        Raises:
+            MissingExtra: pandas is not installed.
+        """
+        columns = {
+            "tension [N]": self.values,
+            "minimum [N]": self.minimum,
+            "maximum [N]": self.maximum,
+        }
+        return data_frame(columns, "cable", self.keys())
+
+    def __repr__(self) -> str:
+        return (
+            f"<Tension {self.values.min():.4g} to {self.values.max():.4g} N in "
+            f"{plural(self.values.size, 'cable')}>"
+        )
+
+    def __str__(self) -> str:
+        rows = aligned([("cable", "tension [N]"), *((c, f"{F:.3f}") for c, F in self.items())])
+        unit = self.posture.arm.torque_unit()
+        return "\n".join([*rows, f"static residual: {abs(self.residual).max():.1e} {unit}"])
