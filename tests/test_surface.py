@@ -388,7 +388,7 @@ def test_results_are_made_by_name_and_equal_to_nothing_but_themselves(name: str)
 
 
 def test_properties_of_an_arm_cannot_be_assigned() -> None:
-    names = [name for name, part in vars(cdsm.Manipulator).items() if isinstance(part, property)]
+    names = [name for name, part in own(cdsm.Manipulator).items() if isinstance(part, property)]
     assert "geometry" in names
     for name in names:
         with pytest.raises(AttributeError):

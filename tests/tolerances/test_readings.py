@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from cdsm.tolerance import SOURCES
 
 import cdsm
 from cdsm.support.values import Array
+from cdsm.tolerance import SOURCES
 from cdsm.tolerances.readings import Question
 from tests.support import arms
 from tests.support.differences import assert_second_order
