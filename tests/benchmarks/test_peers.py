@@ -1,6 +1,6 @@
 """The batch on one core, against other packages on the same core; each compares the numbers first.
 
-pip install 'cdsm-stiffness[bench]'     the other packages: who is absent is skipped by name
+pip install -e '.[bench]'     the other packages: who is absent is skipped by name
 pytest -m speed -s                      prints what was measured
 """
 
