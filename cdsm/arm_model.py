@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -21,6 +22,7 @@ from cdsm.errors import CableError, UnknownName
 from cdsm.geometry import Geometry
 from cdsm.kernels import segments
 from cdsm.kernels.serpentine_guess import find_blocks
+from cdsm.kernels.stuck import Holes
 from cdsm.kernels.tree import Routing, Tree
 from cdsm.rigid_body import RigidBody
 from cdsm.support.values import Array, frozen
@@ -93,6 +95,38 @@ class ArmModel:
         moving = routing.segment[:-1, 0]
         span[moving, :2], span[moving, 2] = routing.segment[:-1, 3:], routing.segment[1:, 3]
         return *routing, frozen(span), chains.hole, chains.wrap
+
+    @cached_property
+    def wire_laws(self) -> CableLaws:
+        """Elasticities of the wires that can stick, also of those whose motor holds the force."""
+        forced = {c for c, cable in enumerate(self._cables) if cable.control == "force"}
+        if not any(any(self._cables[c].friction) for c in forced):
+            return self.laws
+        cables = [
+            replace(cable, control="position") if any(cable.friction) else cable
+            for cable in self._cables
+        ]
+        return CableLaws(tuple(cables), self._original_length)
+
+    @cached_property
+    def holes(self) -> Holes:
+        """Holes and wires of the cables, for the kernels of batches."""
+        chains, cables, wires = self.chains, self._cables, self.wire_laws
+        first = np.cumsum([0, *(len(cable.sites) for cable in cables)])
+        friction, wrap = np.zeros((2, first[-1]))
+        site = first[chains.cable[chains.hole]] + chains.site
+        friction[site], wrap[site] = chains.friction, chains.wrap
+        links = [cable.sites[0].link for cable in cables]
+        return Holes(
+            first=frozen(first.astype(np.intp)),
+            friction=frozen(friction),
+            wrap=frozen(wrap),
+            lead=frozen(np.array([cable.lead for cable in cables])),
+            axis=frozen(np.array([self.body.locate(link)[1][:, 0] for link in links])),
+            locked=frozen(np.array([float(cable.control == "position") for cable in cables])),
+            constant=wires.constant,
+            linear=wires.linear,
+        )
 
     def beyond_limits(self, q: Array) -> NDArray[np.bool_]:
         """Check which joint angles (nv,) [rad] are beyond their limits."""

@@ -16,7 +16,7 @@ from cdsm.batch.distribution import Tensions
 from cdsm.batch.evaluator import Evaluator
 from cdsm.batch.inputs import given_tension, given_wrench, postures
 from cdsm.batch.labels import to_dataset
-from cdsm.batch.layout import QUANTITIES, Codes, Flags
+from cdsm.batch.layout import DIRECTIONAL, QUANTITIES, Codes, Flags
 from cdsm.errors import InvalidInput, UnknownName
 from cdsm.manipulator import Manipulator
 from cdsm.support.status import summary
@@ -51,7 +51,7 @@ class Batch(ReadOnlyState):
         wrench: W (6,) for all postures, or (B, 6): force [N], then moment [N m].
         minimum: Lower bounds (C,) for all postures or (B, C) [N]; None if F was not distributed.
         maximum: Upper bounds (C,) for all postures or (B, C) [N], or None.
-        direction: Unit direction (3,) of ``along``, or several (D, 3); or None.
+        direction: Unit direction (3,) of ``along`` and its like, or several (D, 3); or None.
         status: :class:`Status` of each posture (B,).
         outputs: Names of the requested quantities.
         values: The requested quantities, (B, …) each, in SI units: [m], [N], [rad].
@@ -145,9 +145,12 @@ def evaluate(
             ``"cable_lengths"``, ``"length_jacobian"``, ``"gravity_torque"``. Of a stiffness:
             ``"active"``, ``"passive"``, ``"gravity"``, ``"load"``, ``"joint"``,
             ``"cable_stiffness"``, ``"residual"``, ``"margin"``, ``"compliance"``, ``"cartesian"``,
-            ``"along"``, ``"pseudoinverse"``. And ``"tension"``.
-        direction: u of ``"along"``: an axis such as ``"z"``, or (3,), any length; or several
-            (D, 3), then ``along`` is (B, D).
+            ``"along"``, ``"pseudoinverse"``. While cables stick in their holes, see
+            :func:`~cdsm.stuck_stiffness`: ``"stuck_joint"``, ``"stuck_along"``,
+            ``"stuck_compliance"``, and ``"breakaway"`` [N], the load that ends it to first order
+            (:attr:`Breakaway.first_order`). And ``"tension"``.
+        direction: u of ``"along"``, ``"stuck_along"`` and ``"breakaway"``: an axis such as ``"z"``,
+            or (3,), any length; or several (D, 3), then these outputs are (B, D).
         minimum: Lower bounds [N] for :func:`distribute_tensions`, which then finds the tensions.
         maximum: Upper bounds [N] of distributed tensions; no bounds if not given.
         check_limits: Pass over postures beyond the joint limits.
@@ -164,8 +167,10 @@ def evaluate(
     names = _checked_outputs(outputs)
     angles = postures(arm, q)
     rows = len(angles)
-    if (direction is None) == ("along" in names):
-        raise InvalidInput("direction", "belongs to the output 'along': give both, or neither.")
+    if (direction is None) != set(DIRECTIONAL).isdisjoint(names):
+        raise InvalidInput(
+            "direction", f"belongs to the outputs {', '.join(DIRECTIONAL)}: give both, or neither."
+        )
     given, loads, status = _checked_load(arm, angles, tension, wrench)
     bounds = None
     if minimum is not None:

@@ -12,6 +12,7 @@ from cdsm.batch import layout
 from cdsm.batch.fused_kernel import evaluate_rows
 from cdsm.batch.inputs import checked_threads, kernel_arm, run_slices
 from cdsm.batch.layout import OK, QUANTITIES, UNDECIDED, Codes, Flags
+from cdsm.batch.stuck_readings import STUCK, WITHOUT_FRICTION, Kept, read_stuck
 from cdsm.cable_laws import CableLaws
 from cdsm.elasticity import Elasticity
 from cdsm.errors import ElasticityRangeError, InfeasibleTension, SolverError
@@ -70,7 +71,12 @@ class Evaluator:
         self._arrays = kernel_arm(arm, check_limits)
         count = len(self._directions)
         self._start = layout.starts(nv, cables, count)
-        self._wanted = np.array(sorted(map(QUANTITIES.index, names)), dtype=np.intp)
+        same = {} if arm.has_friction else WITHOUT_FRICTION
+        numbers = {QUANTITIES.index(same.get(name, name)) for name in names}
+        self._sticks = arm.has_friction and not numbers.isdisjoint(STUCK)
+        if layout.BREAKAWAY in numbers:
+            numbers.add(layout.TENSION)
+        self._wanted = np.array(sorted(numbers), dtype=np.intp)
         ends = [0, *np.cumsum(np.diff(self._start)[self._wanted]).tolist()]
         self._place = {
             QUANTITIES[number]: slice(*place)
@@ -78,17 +84,19 @@ class Evaluator:
         }
         # whether the kernel needs rigidities that only Python computes
         needs_springs = bool(self._wanted.size) and self._wanted[-1] > layout.LOAD
-        self._asks = needs_springs and bool(arm._model.laws.asked)
+        laws = arm._model.wire_laws if self._sticks else arm._model.laws
+        self._asks = needs_springs and bool(laws.asked)
         widest = _WIDTH if self._start[-1] < _LONG else _WIDTH // 2
         self._block = max(1, min(widest, len(q)))
 
         shapes = dict(zip(QUANTITIES, layout.shapes(nv, cables, count), strict=True))
         if direction is not None and direction.ndim == 1:
-            shapes["along"] = ()
+            shapes |= dict.fromkeys(layout.DIRECTIONAL, ())
         # one row for each posture, which the kernel fills; the outputs are views of it
         self._out = np.empty((len(q), ends[-1]))
         self.values = [
-            self._out[:, self._place[name]].reshape(len(q), *shapes[name]) for name in names
+            self._out[:, self._place[same.get(name, name)]].reshape(len(q), *shapes[name])
+            for name in names
         ]
 
     def run(self, status: Codes, threads: int | None) -> None:
@@ -154,7 +162,7 @@ class Evaluator:
         self, rows: Indices, tension: Array | None, wanted: Indices, found: Codes, out: Array
     ) -> None:
         """Fill status and output of some postures; without tensions (b, C), distribute them."""
-        read = wanted[wanted > layout.JOINT]
+        read = wanted[wanted > layout.STUCK_JOINT]
         if not read.size:
             self._evaluate_blocks(rows, tension, wanted, found, out, 0)
             return
@@ -165,7 +173,7 @@ class Evaluator:
             given = None if tension is None else tension[part]
             blocks = -(-(part.stop - first) // self._block)
             kept = self._evaluate_blocks(rows[part], given, wanted, found[part], out[part], blocks)
-            self._read(*kept, read, found[part], out[part])
+            self._read(kept, rows[part], read, found[part], out[part])
 
     def _evaluate_blocks(
         self,
@@ -175,17 +183,23 @@ class Evaluator:
         found: Codes,
         out: Array,
         blocks: int,
-    ) -> tuple[Array, Array, Array]:
-        """Fill what is not a reading; return K_θ, P and J_X of so many blocks for the readings."""
-        given = low = high = rigidity = self._nothing
+    ) -> Kept:
+        """Fill what is not a reading; return what the readings of so many blocks need."""
+        given = low = high = rigidity = wire = self._nothing
+        model = self._arm._model
         if tension is not None:
             given = tension
             if self._asks and tension.size:
-                rigidity = _rigidities(self._arm, tension, found == OK)
+                rigidity = wire = _rigidities(model.laws, tension, found == OK)
+                if self._sticks and model.wire_laws is not model.laws:
+                    wire = _rigidities(model.wire_laws, tension, found == OK)
         elif self._bounds is not None:
             low, high = (self._of(each, rows) for each in self._bounds)
         nv, width = self._arm.nv, self._block
-        K, parts = np.empty((2, blocks, nv, nv, width))
+        stuck, read = np.isin(wanted, STUCK), wanted > layout.STUCK_JOINT
+        free, held = blocks * bool((read & ~stuck).any()), blocks * bool((read & stuck).any())
+        K, parts = np.empty((2, free, nv, nv, width))
+        stuck_K, stuck_parts = np.empty((2, held, nv, nv, width))
         JX = np.empty((blocks, 6, nv, width))
         arguments: tuple[Any, ...] = (
             *self._arrays,
@@ -194,38 +208,48 @@ class Evaluator:
             low,
             high,
             rigidity,
+            wire,
             self._of(self._wrench, rows),
             self._start,
-            wanted[wanted <= layout.JOINT],
+            wanted[wanted <= layout.STUCK_JOINT],
             wanted[-1] if wanted.size else 0,
+            bool((~stuck & (wanted > layout.LOAD)).any()),
+            self._sticks,
             width,
             K,
             parts,
             JX,
+            stuck_K,
+            stuck_parts,
             out,
             found,
         )
         evaluate_rows(*arguments)
-        return K, parts, JX
+        return Kept(K, parts, JX, stuck_K, stuck_parts, wire)
 
-    def _read(
-        self, K: Array, parts: Array, JX: Array, wanted: Indices, found: Codes, out: Array
-    ) -> None:
+    def _read(self, kept: Kept, rows: Indices, wanted: Indices, found: Codes, out: Array) -> None:
         """Fill the wanted readings, and the status of postures that lack one."""
-        status = np.full(K.shape[0] * K.shape[-1], UNREAD)
+        status = np.full(kept.jacobian.shape[0] * self._block, UNREAD)
         status[: found.size][found == OK] = READ
-        blocks = status.reshape(K.shape[0], -1)
-        names = [QUANTITIES[number] for number in wanted]
-        values = read(K, parts, JX, self._directions, names, blocks, self._block)
-        state = status[: found.size]
-        for number, name in zip(wanted, names, strict=True):
-            value = values[name].reshape(K.shape[0], -1, self._block).swapaxes(1, 2)
-            place = self._place[name]
-            out[:, place] = value.reshape(status.size, -1)[: found.size]
-            singular = (state == SINGULAR) & (number > layout.PSEUDOINVERSE)
-            out[(state == UNREAD) | singular, place] = math.nan
-        found[state == SINGULAR] = Status.SINGULAR
-        found[state == IMMOBILE] = Status.IMMOBILE
+        stuck = np.isin(wanted, STUCK)
+        for numbers in (wanted[~stuck], wanted[stuck]):
+            own, names = status.copy(), [QUANTITIES[number] for number in numbers]
+            blocks = own.reshape(-1, self._block)
+            if not names:
+                continue
+            if numbers[0] in STUCK:
+                angles, F = self._of(self._q, rows), out[:, self._place.get("tension", slice(0))]
+                values = read_stuck(self._arm, angles, F, kept, self._directions, names, blocks)
+            else:
+                values = read(*kept[:3], self._directions, names, blocks, self._block)
+            state = own[: found.size]
+            for number, name in zip(numbers, names, strict=True):
+                value = np.moveaxis(values[name], -1, 1)
+                out[:, self._place[name]] = value.reshape(own.size, -1)[: found.size]
+                singular = (state == SINGULAR) & (number > layout.PSEUDOINVERSE)
+                out[(state == UNREAD) | singular, self._place[name]] = math.nan
+            found[state == SINGULAR] = Status.SINGULAR
+            found[state == IMMOBILE] = Status.IMMOBILE
 
     def _of(self, values: Array, rows: Indices) -> Array:
         """Return the values (b, n) of some postures; one row (n,) for all is repeated."""
@@ -233,7 +257,7 @@ class Evaluator:
         return frozen(np.ascontiguousarray(whole[rows]))
 
 
-def _rigidities(arm: Manipulator, tension: Array, usable: Flags) -> Array:
+def _rigidities(laws: CableLaws, tension: Array, usable: Flags) -> Array:
     """Return EA (1 + ε) (b, C) [N] at tensions F (b, C) [N] of usable postures (b,).
 
     It is 0 under force control and in postures that are not usable, and −1 outside the domain.
@@ -242,8 +266,8 @@ def _rigidities(arm: Manipulator, tension: Array, usable: Flags) -> Array:
         return frozen(np.zeros_like(tension))
     given = tension if usable.all() else tension[usable]
     rigidity = np.zeros_like(given)
-    for law, held in arm._model.laws.held:
-        rigidity[:, held] = _where_defined(arm._model.laws, law, given[:, held])
+    for law, held in laws.held:
+        rigidity[:, held] = _where_defined(laws, law, given[:, held])
     if given is tension:
         return frozen(rigidity)
     result = np.zeros_like(tension)

@@ -25,6 +25,7 @@ from cdsm.batch.layout import (
     OUTSIDE_ELASTICITY,
     PASSIVE,
     RESIDUAL,
+    STUCK_JOINT,
     TENSION,
     TIP,
     UNDECIDED,
@@ -47,6 +48,7 @@ from cdsm.kernels.stiffness import (
     set_load_stiffness,
     sum_terms,
 )
+from cdsm.kernels.stuck import Holes, add_stuck_stiffness, sticking_scratch
 from cdsm.kernels.tension import certificate
 from cdsm.kernels.tree import Indices, Routing, Tree, empty_frames, forward_kinematics
 from cdsm.support.values import Array
@@ -65,19 +67,25 @@ def evaluate_rows(
     rest: Array,
     constant: Array,
     linear: Array,
+    holes: Holes,
     q: Array,
     tension: Array,
     low: Array,
     high: Array,
     rigidity: Array,
+    wire: Array,
     wrench: Array,
     start: Indices,
     wanted: Indices,
     last: int,
+    slides: bool,
+    sticks: bool,
     width: int,
     joint: Array,
     parts: Array,
     jacobian: Array,
+    stuck: Array,
+    stuck_parts: Array,
     out: Array,
     status: Codes,
 ) -> None:
@@ -95,20 +103,26 @@ def evaluate_rows(
         rest: Tension at which the series springs are at rest (C,) [N].
         constant: Constant part of EA (1 + ε) (C,) [N]; 0 for motors that hold force.
         linear: Factor (C,) of the tension in EA (1 + ε): 1 for linear laws, else 0.
+        holes: Holes and wires of the cables.
         q: Joint angles (b, nv) [rad].
         tension: F (b, C) [N]; (0, C) if tensions are distributed or not needed.
         low: Lower bounds (b, C) [N] of distributed tensions; (0, C) if none are distributed.
         high: Upper bounds, as ``low``.
         rigidity: EA (1 + ε) (b, C) [N]; 0 under force control, negative outside the domain. (0, C)
             if it follows from ``constant`` and ``linear``.
+        wire: As ``rigidity`` for cables that stick: also of those under force control.
         wrench: W (b, 6).
         start: Index in the record at which each quantity begins.
         wanted: Numbers of the requested quantities, rising.
         last: Largest number of a quantity that must be computed.
+        slides: Whether the passive stiffness of cables that slide freely is needed.
+        sticks: Whether that of cables that stick is needed.
         width: Number of postures in a block.
         joint: K_θ of B blocks (B, nv, nv, W), for the readings; (0, nv, nv, W) if there are none.
         parts: Sum of the magnitudes of the four terms, as ``joint``.
         jacobian: J_X (B, 6, nv, W), as ``joint``.
+        stuck: K_θ while the cables stick as ``joint``.
+        stuck_parts: Sum of the magnitudes of its four terms, as ``stuck``.
         out: The requested quantities in one row per posture; NaN where they do not exist.
         status: On entry OK, or why no tensions were found; on return the status of the posture.
             UNDECIDED: the guess of its tensions is not the optimum.
@@ -130,6 +144,7 @@ def evaluate_rows(
     k = _vector(record, start, CABLE_STIFFNESS)
     passive = _matrix(record, start, PASSIVE, nv, width)
     K = _matrix(record, start, JOINT, nv, width)
+    stuck_K = _matrix(record, start, STUCK_JOINT, nv, width)
 
     # scratch, used again for every block
     angles, loads, stretched = (
@@ -144,6 +159,7 @@ def evaluate_rows(
     arms, torque = np.empty((cables, nv, width)), np.empty((nv, width))
     six, shortest = np.empty((6, width)), np.empty(width)
     code, known = np.empty(width, dtype=np.intp), np.empty(width, dtype=np.intp)
+    sticking, springs = sticking_scratch(nv, width), np.empty((nv, nv, width))
     slot, magnitudes = np.zeros(cables, dtype=np.intp), np.empty((nv, nv, width))
 
     for first in range(0, rows, width):
@@ -198,16 +214,36 @@ def evaluate_rows(
                 if code[w] == OK and _is_negative(stretched, w):
                     code[w] = OUTSIDE_ELASTICITY
             set_cable_stiffness(L, F, stretched, series, rest, k, width)
-            _clear(passive, width)
-            add_passive_stiffness(J, k, passive, six, width)
-            mirror(passive, width)
-            sizes = parts[first // width] if parts.shape[0] else magnitudes
-            sum_terms(active, passive, gravity, load, K, sizes, width)
+            if slides:
+                _clear(passive, width)
+                add_passive_stiffness(J, k, passive, six, width)
+                mirror(passive, width)
+                sizes = parts[first // width] if parts.shape[0] else magnitudes
+                sum_terms(active, passive, gravity, load, K, sizes, width)
             _note(code, JOINT, known, width)
+            if sticks:
+                _load(wire, first, stretched, width)
+                if not wire.shape[0]:
+                    _set_rigidity(holes.constant, holes.linear, F, stretched, width)
+                for w in lanes(width):
+                    if code[w] == OK and _is_negative(stretched, w):
+                        code[w] = OUTSIDE_ELASTICITY
+                _clear(springs, width)
+                add_stuck_stiffness(
+                    routing, holes, frames, rotation, F, stretched, series, rest, segments,
+                    sticking, springs, width,
+                )  # fmt: skip
+                mirror(springs, width)
+                sizes = stuck_parts[first // width] if stuck_parts.shape[0] else magnitudes
+                sum_terms(active, springs, gravity, load, stuck_K, sizes, width)
+                _note(code, STUCK_JOINT, known, width)
 
         # what the readings of K_θ are computed from
         if joint.shape[0]:
             _copy(K, joint[first // width], width)
+        if stuck.shape[0]:
+            _copy(stuck_K, stuck[first // width], width)
+        if jacobian.shape[0]:
             _copy(JX, jacobian[first // width], width)
         _store(record, start, wanted, code, known, first, out, status)
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from cdsm.batch.layout import DIRECTIONAL
 from cdsm.manipulator import Manipulator
 from cdsm.support.format import coordinates
 from cdsm.support.status import Status
@@ -31,13 +32,18 @@ _DIMS: Final[dict[str, tuple[tuple[str, ...], str]]] = {
     "gravity_torque": (("joint",), "torque"),
     "tension": (("cable",), "N"),
     "residual": (("joint",), "torque"),
-    **dict.fromkeys(("gravity", "active", "load", "passive", "joint"), (_JOINTS, "stiffness")),
+    **dict.fromkeys(
+        ("gravity", "active", "load", "passive", "joint", "stuck_joint"), (_JOINTS, "stiffness")
+    ),
     "cable_stiffness": (("cable",), "N/m"),
     "margin": ((), "stiffness"),
     "pseudoinverse": (_AXES, "N/m"),
     "cartesian": (_AXES, "N/m"),
     "along": (("direction",), "N/m"),
     "compliance": (_MOTIONS, "1"),
+    "stuck_along": (("direction",), "N/m"),
+    "stuck_compliance": (_MOTIONS, "1"),
+    "breakaway": (("direction",), "N"),
 }
 """Dimensions of each quantity after that of the postures, and its unit; 1 for matrices of SI units
 that differ. The units of torque and joint stiffness are those of the arm."""
@@ -61,7 +67,7 @@ def to_dataset(
     for name, value in values.items():
         dims, unit = _DIMS[name]
         # one direction has no axis of its own; a variable must not have the name of a dimension
-        shown = (("pose", *dims), value.reshape(len(q), -1) if name == "along" else value)
+        shown = (("pose", *dims), value.reshape(len(q), -1) if name in DIRECTIONAL else value)
         variables["joint_stiffness" if name == "joint" else name] = (*shown, units.get(unit, unit))
     motions = ("x", "y", "z", "rx", "ry", "rz")
     labels = {

@@ -38,14 +38,18 @@ QUANTITIES = (
     "cable_stiffness",
     "passive",
     "joint",
+    "stuck_joint",
     "margin",
     "pseudoinverse",
     "along",
     "compliance",
     "cartesian",
+    "stuck_along",
+    "stuck_compliance",
+    "breakaway",
 )
 """Quantities in the order of the record: of the joint angles alone; with tensions; with the
-rigidity of the cables; with a regular K_θ."""
+rigidity of the cables; with a regular K_θ; with a regular K_θ of the arm whose cables stick."""
 
 (
     TIP,
@@ -61,12 +65,19 @@ rigidity of the cables; with a regular K_θ."""
     CABLE_STIFFNESS,
     PASSIVE,
     JOINT,
+    STUCK_JOINT,
     MARGIN,
     PSEUDOINVERSE,
     ALONG,
     COMPLIANCE,
     CARTESIAN,
+    STUCK_ALONG,
+    STUCK_COMPLIANCE,
+    BREAKAWAY,
 ) = range(len(QUANTITIES))
+
+DIRECTIONAL = ("along", "stuck_along", "breakaway")
+"""Quantities that belong to the directions."""
 
 
 def shapes(nv: int, cables: int, directions: int) -> tuple[tuple[int, ...], ...]:
@@ -86,11 +97,15 @@ def shapes(nv: int, cables: int, directions: int) -> tuple[tuple[int, ...], ...]
         (cables,),
         matrix,
         matrix,
+        matrix,
         (),
         (3, 3),
         (directions,),
         (6, 6),
         (3, 3),
+        (directions,),
+        (6, 6),
+        (directions,),
     )
 
 

@@ -28,6 +28,7 @@ def warm(as_json: AsJson = False) -> None:
         cdsm.evaluate(arm, pose.q[None], minimum=40.0, direction=up, outputs=readings)
         cdsm.distribute_tensions(arm, pose.q[None], 40.0, 40.0)  # no guess balances: a search
         rough = cdsm.presets.virtual_prototype(friction=0.1).at(pose.q)
+        cdsm.evaluate(rough.arm, pose.q[None], tension.values, direction=up, outputs=("breakaway",))
         cdsm.load_cycle(rough, tension.values, np.zeros((1, 6)))
     seconds = time.perf_counter() - start
     answer(as_json, lambda: {"seconds": seconds}, f"kernels are compiled: {seconds:.0f} s")

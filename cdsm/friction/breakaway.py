@@ -23,6 +23,7 @@ from cdsm.errors import EquilibriumError, InvalidInput
 from cdsm.friction.chain_problem import ChainProblem
 from cdsm.friction.stuck import assemble_segments, stuck_stiffness
 from cdsm.friction.tangent import holding
+from cdsm.kernels.breakaway import ROUNDING
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.format import coordinates
@@ -32,9 +33,6 @@ from cdsm.tension import Tension
 
 _HELD = 1e300
 """Ratio of tensions that a hole holds while it cannot slide."""
-
-_ROUNDING = 1e-12
-"""Pull of a hole, over the largest, that is rounding."""
 
 _REACHED = 1e-9
 """Relative excess over the bound of another hole that is rounding."""
@@ -136,7 +134,7 @@ def hole_loads(K: Stiffness, u: Array) -> tuple[Array, Array]:
     pull = abs(relative[chains.hole + 1] - relative[chains.hole])
     rate = pull - chains.friction * (segments.wrap_jacobian @ motion)
     grip = np.where(slack[chains.hole], 0.0, chains.friction * segments.wrap)
-    least = _ROUNDING * float(pull.max(initial=0.0))
+    least = ROUNDING * float(pull.max(initial=0.0))
     loads = np.divide(grip, rate, out=np.full(rate.size, math.inf), where=rate > least)
     return np.where(holding(K.posture), loads, math.inf), motion
 

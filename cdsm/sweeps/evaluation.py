@@ -14,7 +14,7 @@ from cdsm.elasticity import Elasticity
 from cdsm.kernels.principal import principal_stiffness
 from cdsm.manipulator import Manipulator
 from cdsm.support.values import Array, ReadOnlyState
-from cdsm.sweeps.quantities import QUANTITIES
+from cdsm.sweeps.quantities import DIRECTIONAL, QUANTITIES
 from cdsm.sweeps.status import LOST, SweepStatus
 
 BlockResult = dict[str, NDArray[Any]]
@@ -31,6 +31,7 @@ _BATCH_NAMES = {
     "load_stiffness": "load",
     "joint_stiffness": "joint",
     "translational_compliance": "compliance",
+    "stuck_joint_stiffness": "stuck_joint",
 }
 """Names of quantities in a batch, where the name in a sweep is different."""
 
@@ -135,7 +136,7 @@ def _stiffnesses(
         q,
         tension,
         wrench,
-        direction=task.directions if "along" in names else None,
+        direction=None if DIRECTIONAL.isdisjoint(names) else task.directions,
         threads=threads,
     )
     if extreme:

@@ -10,6 +10,8 @@ import pytest
 import xarray as xr
 
 import cdsm
+from cdsm.friction.breakaway import hole_loads
+from cdsm.friction.tangent import holding
 from cdsm.kernels.principal import principal_stiffness
 from cdsm.support.values import Array
 from cdsm.sweeps.blocks import blocks, extents, postures
@@ -55,6 +57,12 @@ def single(
     found |= {"joint_stiffness": K.joint, "cable_stiffness": K.cable_stiffness, "margin": K.margin}
     found["translational_compliance"] = K.compliance[:3, :3]
     found["along"] = np.array([K.along(u) for u in np.eye(3)])
+    stuck = cdsm.stuck_stiffness(pose, pull)
+    found["stuck_joint_stiffness"] = stuck.joint
+    found["stuck_along"] = np.array([stuck.along(u) for u in np.eye(3)])
+    held = holding(pose).any()
+    loads = [hole_loads(stuck, u)[0].min() if held else 0.0 for u in np.eye(3)]
+    found["breakaway"] = np.array(loads)
     status = {Status.OK if K.margin > 0.0 else Status.UNSTABLE}
     try:
         found["cartesian"], found["pseudoinverse"] = K.cartesian, K.pseudoinverse()
@@ -68,7 +76,7 @@ def single(
 @pytest.mark.slow
 def test_every_entry_is_what_the_single_functions_say(everything: xr.Dataset) -> None:
     seen: set[int] = set()
-    springy = short_arm(spring=1500.0)
+    springy = short_arm(spring=1500.0).with_friction(0.1)
     soft = cdsm.sweep(springy, GRID, minimum=[40.0, 100.0], outputs=EVERYTHING)
     flat = cdsm.sweep(short_arm(), np.zeros((1, 6)), minimum=20.0, outputs=EVERYTHING)
     for arm, dataset, maximum in (

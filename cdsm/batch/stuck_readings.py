@@ -1,0 +1,79 @@
+"""Readings of blocks of postures while cables stick: stiffness, and the load that ends it."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from cdsm.batch.layout import BREAKAWAY, STUCK_ALONG, STUCK_COMPLIANCE, STUCK_JOINT
+from cdsm.kernels.breakaway import set_breakaway
+from cdsm.kernels.read import read
+from cdsm.kernels.tree import Indices
+from cdsm.manipulator import Manipulator
+from cdsm.support.values import Array, frozen
+
+STUCK = (STUCK_JOINT, STUCK_ALONG, STUCK_COMPLIANCE, BREAKAWAY)
+"""Numbers of the quantities of the stuck arm."""
+
+WITHOUT_FRICTION = {
+    "stuck_joint": "joint",
+    "stuck_along": "along",
+    "stuck_compliance": "compliance",
+}
+"""What they are in an arm without friction."""
+
+
+class Kept(NamedTuple):
+    """What readings are computed from: B blocks of W postures, the posture last.
+
+    No block is kept of what is not read.
+    """
+
+    joint: Array  # K_θ (B, nv, nv, W)
+    parts: Array  # sum of the magnitudes of its terms (B, nv, nv, W)
+    jacobian: Array  # J_X (B, 6, nv, W)
+    stuck: Array  # K_θ while the cables stick (B, nv, nv, W)
+    stuck_parts: Array  # sum of the magnitudes of its terms (B, nv, nv, W)
+    wire: Array  # EA (1 + ε) of the wires (b, C) [N]; (0, C) if all laws are linear
+
+
+def read_stuck(
+    arm: Manipulator,
+    q: Array,
+    tension: Array,
+    kept: Kept,
+    directions: Array,
+    names: Collection[str],
+    status: Indices,
+) -> dict[str, Array]:
+    """Compute readings of the stuck arm at postures q (b, nv) under tensions F (b, C) [N].
+
+    ``directions`` (D, 3) are unit vectors, and ``status`` (B, W) is as for
+    :func:`~cdsm.kernels.read.read`. The posture is the last axis of all results.
+    """
+    blocks, width = status.shape
+    load, model = np.zeros((status.size, len(directions))), arm._model
+    found = {"breakaway": np.moveaxis(load.reshape(blocks, width, -1), 1, 2)}
+    if not arm.has_friction:
+        return found
+    wanted = {WITHOUT_FRICTION.get(name, "along") for name in names}
+    values = read(kept.stuck, kept.stuck_parts, kept.jacobian, directions, wanted, status, width)
+    if "breakaway" in names:
+        holes = model.holes
+        wire = kept.wire if len(kept.wire) else holes.constant + holes.linear * tension
+        arguments: tuple[Any, ...] = (
+            model.tree,
+            model.routing,
+            holes,
+            model.laws.series,
+            model.laws.rest,
+            q,
+            frozen(np.ascontiguousarray(tension)),
+            frozen(wire),
+            np.ascontiguousarray(values["motion"]),
+            load[: len(q)],
+        )
+        set_breakaway(*arguments)
+    return found | {name: values[free] for name, free in WITHOUT_FRICTION.items() if free in values}

@@ -1,0 +1,292 @@
+"""Numba kernel of breakaway, for blocks of postures: the load at which the first hole slides.
+
+A force W u at the tip of a stuck arm moves the joints by θ̇ = K_θ⁻¹ J_vᵀu per newton. The block of
+segments after a hole pulls with Ṫ′ = k′ l̇′, the one before it with Ṫ = k l̇. The hole begins to
+slide, to first order in the load, at
+
+    W = μ φ/(|Ṫ′ − Ṫ|/F − μ φ̇),   φ̇ = −(u̇·v + u·v̇)/sin φ,
+
+with the directions u and v of the cable before and after it. Breakaway is the least W of all holes.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from cdsm.kernels.chains import STRAIGHT
+from cdsm.kernels.compiling import Index, Width, inlined, inner, lanes, threaded, upwards
+from cdsm.kernels.segments import Segments, segment_scratch, set_direction
+from cdsm.kernels.stuck import (
+    Holes,
+    Sticking,
+    open_blocks,
+    open_next,
+    set_holding,
+    set_lead,
+    set_stiffness,
+    sticking_scratch,
+)
+from cdsm.kernels.tree import Frames, Routing, Tree, empty_frames, forward_kinematics
+from cdsm.support.values import Array
+
+ROUNDING = 1e-12
+"""Pull of a hole, over the largest, that is rounding."""
+
+
+class Velocities(NamedTuple):
+    """Velocities per newton: of the joints and the sites, and of what a cable does at a hole.
+
+    Turning and origin of each joint (nv+1, 3, W), sites (P, 3, W), the directions before and after
+    a hole (3, W) each, and l̇ of the open block (W,).
+    """
+
+    turn: Array
+    origin: Array
+    site: Array
+    before: Array
+    after: Array
+    longer: Array
+
+
+class Pulls(NamedTuple):
+    """Pulls |Ṫ′ − Ṫ|/F, μ φ̇ and μ φ of the holes, each kept where its second block ends (P, W).
+
+    μ φ is negative where no block ends. ``last`` (3, W) are Ṫ/F, μ φ̇ and μ φ of the hole at which
+    the open block began.
+    """
+
+    pull: Array
+    turning: Array
+    grip: Array
+    last: Array
+
+
+@threaded
+def set_breakaway(
+    tree: Tree,
+    routing: Routing,
+    holes: Holes,
+    series: Array,
+    rest: Array,
+    q: Array,
+    tension: Array,
+    wire: Array,
+    motion: Array,
+    out: Array,
+) -> None:
+    """Fill the breakaway load (b, D) [N] of b postures; inf where no hole ever slides.
+
+    Args:
+        tree: The joints.
+        routing: The cables.
+        holes: Their holes and wires.
+        series: 1/k_series of the cables (C,) [m/N].
+        rest: Tension at which the series springs are at rest (C,) [N].
+        q: Joint angles (b, nv) [rad].
+        tension: F (b, C) [N].
+        wire: EA (1 + ε) of the wires at F (b, C) [N].
+        motion: θ̇ of the stuck arm in B blocks of W postures (B, nv, D, W) [rad/N].
+        out: The loads; 0 where no hole holds.
+    """
+    nv, width, cables = motion.shape[1], motion.shape[3], series.shape[0]
+    rows, sites = tree.parent.shape[0], routing.row.shape[0]
+    angles, F, EA = np.empty((nv, width)), np.empty((cables, width)), np.empty((cables, width))
+    frames, scratch = empty_frames(tree, routing, width), segment_scratch(nv, width)
+    rotation, block = np.empty((rows, 3, 3, width)), sticking_scratch(nv, width)
+    rates = Velocities(
+        np.zeros((rows, 3, width)),
+        np.zeros((rows, 3, width)),
+        np.empty((sites, 3, width)),
+        np.empty((3, width)),
+        np.empty((3, width)),
+        np.empty(width),
+    )
+    pulls = Pulls(
+        np.empty((sites, width)),
+        np.empty((sites, width)),
+        np.empty((sites, width)),
+        np.empty((3, width)),
+    )
+    load = np.empty(width)
+    for b in range(motion.shape[0]):
+        first = b * width
+        for w in range(width):
+            row = min(first + w, q.shape[0] - 1)
+            for i in range(nv):
+                angles[i, w] = q[row, i]
+            for c in range(cables):
+                F[c, w], EA[c, w] = tension[row, c], wire[row, c]
+        forward_kinematics(tree, routing, angles, np.empty((2, width)), rotation, frames, width)
+        for d in range(motion.shape[2]):
+            _set_velocities(tree, routing, frames, motion[b], d, rates, width)
+            _set_pulls(
+                routing, holes, frames, rotation, F, EA, series, rest, scratch, block, rates, pulls,
+                width,
+            )  # fmt: skip
+            _set_loads(pulls, load, width)
+            for w in range(min(width, q.shape[0] - first)):
+                out[first + w, d] = load[w]
+
+
+@inner
+def _set_velocities(
+    tree: Tree,
+    routing: Routing,
+    frames: Frames,
+    motion: Array,
+    direction: int,
+    rates: Velocities,
+    width: Width,
+) -> None:
+    """Fill the velocities of joints and sites under the joint velocities of one direction."""
+    turn, moved, d = rates.turn, rates.origin, np.uint64(direction)
+    for k in range(tree.order.shape[0]):
+        i = np.uint64(tree.order[k])
+        before, joint = np.uint64(tree.parent[i]), i - np.uint64(1)
+        for r in upwards(0, turn.shape[1]):
+            for w in lanes(width):
+                turn[i, r, w] = turn[before, r, w] + frames.axis[i, r, w] * motion[joint, d, w]
+        for r in range(3):
+            m, n = (r + 1) % 3, (r + 2) % 3
+            for w in lanes(width):
+                y = frames.origin[i, m, w] - frames.origin[before, m, w]
+                z = frames.origin[i, n, w] - frames.origin[before, n, w]
+                moved[i, r, w] = (
+                    moved[before, r, w] + turn[before, m, w] * z - turn[before, n, w] * y
+                )
+            if frames.slide.shape[0]:
+                for w in lanes(width):
+                    moved[i, r, w] += frames.slide[i, r, w] * motion[joint, d, w]
+    for p in upwards(0, routing.row.shape[0]):
+        i = np.uint64(routing.row[p])
+        for r in range(3):
+            m, n = (r + 1) % 3, (r + 2) % 3
+            for w in lanes(width):
+                y = frames.site[p, m, w] - frames.origin[i, m, w]
+                z = frames.site[p, n, w] - frames.origin[i, n, w]
+                rates.site[p, r, w] = moved[i, r, w] + turn[i, m, w] * z - turn[i, n, w] * y
+
+
+@inner
+def _set_pulls(
+    routing: Routing,
+    holes: Holes,
+    frames: Frames,
+    rotation: Array,
+    tension: Array,
+    wire: Array,
+    series: Array,
+    rest: Array,
+    scratch: Segments,
+    block: Sticking,
+    rates: Velocities,
+    pulls: Pulls,
+    width: Width,
+) -> None:
+    """Fill the pulls of all holes."""
+    u, length, _, _, along, _ = scratch
+    for p in upwards(0, pulls.grip.shape[0]):
+        for w in lanes(width):
+            pulls.pull[p, w] = 0.0
+        for w in lanes(width):
+            pulls.grip[p, w] = -1.0
+    for c in upwards(0, holes.lead.shape[0]):
+        open_blocks(holes, c, tension, series, rest, block, width)
+        set_lead(routing, holes, c, rotation, block.before, width)
+        i = np.uint64(routing.row[holes.first[c]])
+        for a in range(3):
+            m, n = (a + 1) % 3, (a + 2) % 3
+            for w in lanes(width):
+                rates.before[a, w] = (
+                    rates.turn[i, m, w] * block.before[n, w]
+                    - rates.turn[i, n, w] * block.before[m, w]
+                )
+        for w in lanes(width):
+            rates.longer[w], pulls.last[2, w] = 0.0, -1.0
+        end = np.uint64(holes.first[c + np.uint64(1)]) - np.uint64(1)
+        for p in upwards(np.uint64(holes.first[c]), end):
+            far = p + np.uint64(1)
+            set_direction(frames.site, p, far, scratch, width)
+            for w in lanes(width):
+                along[w] = 0.0
+            for r in upwards(0, u.shape[0]):
+                for w in lanes(width):
+                    along[w] += u[r, w] * (rates.site[far, r, w] - rates.site[p, r, w])
+            for r in upwards(0, u.shape[0]):
+                for w in lanes(width):
+                    apart = rates.site[far, r, w] - rates.site[p, r, w]
+                    rates.after[r, w] = (apart - along[w] * u[r, w]) / length[w]
+            if holes.friction[p] > 0.0:
+                set_holding(holes.wrap[p], block.before, u, block.holds, width)
+                _note_hole(holes, p, tension, wire, c, u, block, rates, pulls, width)
+            for r in upwards(0, u.shape[0]):
+                for w in lanes(width):
+                    block.before[r, w] = u[r, w]
+                for w in lanes(width):
+                    rates.before[r, w] = rates.after[r, w]
+            for w in lanes(width):
+                block.length[w] += length[w]
+            for w in lanes(width):
+                rates.longer[w] += along[w]
+        for w in lanes(width):
+            block.holds[w] = 1.0
+        _note_hole(holes, end, tension, wire, c, u, block, rates, pulls, width)
+
+
+@inner
+def _note_hole(
+    holes: Holes,
+    p: Index,
+    tension: Array,
+    wire: Array,
+    c: Index,
+    v: Array,
+    block: Sticking,
+    rates: Velocities,
+    pulls: Pulls,
+    width: Width,
+) -> None:
+    """Note the pull of the hole before the block that ends at site p, and begin with this hole."""
+    set_stiffness(wire, c, block, width)
+    u, mu, own = block.before, holes.friction[p], holes.wrap[p]
+    for w in lanes(width):
+        if block.holds[w] == 0.0:
+            continue
+        F = tension[c, w]
+        rate = block.stiffness[w] * rates.longer[w] / (F if F > 0.0 else 1.0)
+        if pulls.last[2, w] >= 0.0:
+            pulls.pull[p, w] = abs(rate - pulls.last[0, w])
+            pulls.turning[p, w] = pulls.last[1, w]
+            pulls.grip[p, w] = pulls.last[2, w]
+        x = u[1, w] * v[2, w] - u[2, w] * v[1, w]
+        y = u[2, w] * v[0, w] - u[0, w] * v[2, w]
+        z = u[0, w] * v[1, w] - u[1, w] * v[0, w]
+        sine, cosine, change = math.sqrt(x * x + y * y + z * z), 0.0, 0.0
+        for r in range(3):
+            cosine += u[r, w] * v[r, w]
+            change -= rates.before[r, w] * v[r, w] + u[r, w] * rates.after[r, w]
+        # a slack cable holds nothing: any pull moves it
+        grip = mu * (math.atan2(sine, cosine) + own) if F > 0.0 else 0.0
+        pulls.last[0, w], pulls.last[2, w] = rate, grip
+        pulls.last[1, w] = mu * change / sine if sine > STRAIGHT else 0.0
+        rates.longer[w] = 0.0
+    open_next(block, width)
+
+
+@inlined
+def _set_loads(pulls: Pulls, load: Array, width: Width) -> None:
+    """Fill the least load (W,) of all holes; inf if none ever slides, 0 if none holds."""
+    for w in lanes(width):
+        most, found, held = 0.0, math.inf, False
+        for p in range(pulls.grip.shape[0]):
+            most = max(most, pulls.pull[p, w])
+        for p in range(pulls.grip.shape[0]):
+            grip, rate = pulls.grip[p, w], pulls.pull[p, w] - pulls.turning[p, w]
+            if grip >= 0.0:
+                held = True
+                if rate > ROUNDING * most:
+                    found = min(found, grip / rate)
+        load[w] = found if held else 0.0

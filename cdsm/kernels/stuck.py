@@ -1,0 +1,253 @@
+"""Numba kernels of stuck cables, for blocks of postures: their passive stiffness.
+
+While a cable sticks, the segments between two holes that hold are one spring (a block) with
+
+    k = 1/(l/EA + 1/k_series),   passive stiffness Σ_blocks k g gᵀ,   g = ∂l/∂θ.
+
+l is the natural length of the block; only the first block of a cable has the series spring, and
+its stiffness is zero if the motor holds the force. A hole holds if it has friction and the cable
+turns there. Which holes hold depends on the posture: each posture of a block closes its blocks at
+its own holes.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from cdsm.kernels.chains import STRAIGHT
+from cdsm.kernels.compiling import Index, Width, inlined, inner, lanes, upwards
+from cdsm.kernels.segments import Segments, set_derivative
+from cdsm.kernels.tree import Frames, Indices, Routing, turned
+from cdsm.support.values import Array
+
+
+class Holes(NamedTuple):
+    """Holes and wires of all cables; sites P are counted through all cables, as in Routing.
+
+    Attributes:
+        first: Number of the first site of each cable, and at last the number of sites (C+1,).
+        friction: μ of each site (P,) [-]; 0 where no hole is.
+        wrap: Wrap angle of its own of each site (P,) [rad].
+        lead: Length of each lead (C,) [m].
+        axis: Direction of each lead in the frame of the joint of its first site (C, 3).
+        locked: 1 for each cable with a locked motor, 0 where the motor holds the force (C,).
+        constant: Constant part of EA (1 + ε) of each wire (C,) [N].
+        linear: Factor (C,) of the tension in EA (1 + ε): 1 for linear laws, else 0.
+    """
+
+    first: Indices
+    friction: Array
+    wrap: Array
+    lead: Array
+    axis: Array
+    locked: Array
+    constant: Array
+    linear: Array
+
+
+class Sticking(NamedTuple):
+    """Scratch: the open block of a cable, in W postures.
+
+    Its natural length under tension l and the compliance of its spring (W,), whether its motor is
+    locked (W,), ∂l/∂θ (nv, W); whether a hole holds (W,), the stiffness (W,), a product (W,), and
+    the direction of the cable before the hole (3, W).
+    """
+
+    length: Array
+    soft: Array
+    locked: Array
+    gradient: Array
+    holds: Array
+    stiffness: Array
+    product: Array
+    before: Array
+
+
+@inlined
+def sticking_scratch(nv: int, width: int) -> Sticking:
+    """Allocate the scratch for a block of postures."""
+    return Sticking(
+        np.empty(width),
+        np.empty(width),
+        np.empty(width),
+        np.zeros((nv, width)),
+        np.empty(width),
+        np.empty(width),
+        np.empty(width),
+        np.empty((3, width)),
+    )
+
+
+@inner
+def add_stuck_stiffness(
+    routing: Routing,
+    holes: Holes,
+    frames: Frames,
+    rotation: Array,
+    tension: Array,
+    wire: Array,
+    series: Array,
+    rest: Array,
+    scratch: Segments,
+    block: Sticking,
+    passive: Array,
+    width: Width,
+) -> None:
+    """Add Σ k g gᵀ over the blocks of all cables to a matrix (nv, nv, W), for i ≤ j only.
+
+    ``wire`` is EA (1 + ε) (C, W) [N], also of cables whose motor holds the force.
+    """
+    segment, joint, across = routing.segment, routing.joint, scratch.direction
+    d, along, inverse = scratch.derivative, scratch.along, scratch.inverse
+    nv = np.uint64(passive.shape[0])
+    s = 0
+    for c in upwards(0, holes.lead.shape[0]):
+        low, high = nv, np.uint64(0)  # joints that move the open block
+        open_blocks(holes, c, tension, series, rest, block, width)
+        set_lead(routing, holes, c, rotation, block.before, width)
+        end = np.uint64(holes.first[c + np.uint64(1)]) - np.uint64(1)
+        for p in upwards(np.uint64(holes.first[c]), end):
+            set_way(frames.site, p, scratch, width)
+            if holes.friction[p] > 0.0:
+                set_holding(holes.wrap[p], block.before, across, block.holds, width)
+                if low < high:
+                    _add_square(wire, c, block, low, high, passive, width)
+                    if _all_hold(block.holds, width):
+                        low, high = nv, np.uint64(0)
+                open_next(block, width)
+            for r in upwards(0, across.shape[0]):
+                for w in lanes(width):
+                    block.before[r, w] = across[r, w]
+            for w in lanes(width):
+                block.length[w] += scratch.length[w]
+            if s < segment.shape[0] - 1 and np.uint64(segment[s, 1]) == p:
+                for w in lanes(width):
+                    inverse[w] = 1.0 / scratch.length[w]
+                for t in range(segment[s, 3], segment[s + 1, 3]):
+                    j = np.uint64(joint[t])
+                    sign, at = (1.0, p + np.uint64(1)) if t >= segment[s, 4] else (-1.0, p)
+                    set_derivative(frames, sign, at, j, d, width)
+                    for w in lanes(width):
+                        along[w] = (
+                            across[0, w] * d[0, w] + across[1, w] * d[1, w] + across[2, w] * d[2, w]
+                        )
+                    i = j - np.uint64(1)
+                    for w in lanes(width):
+                        block.gradient[i, w] += along[w] * inverse[w]
+                    low, high = min(low, i), max(high, j)
+                s += 1
+        if low < high:
+            for w in lanes(width):
+                block.holds[w] = 1.0
+            _add_square(wire, c, block, low, high, passive, width)
+
+
+@inner
+def open_blocks(
+    holes: Holes,
+    c: Index,
+    tension: Array,
+    series: Array,
+    rest: Array,
+    block: Sticking,
+    width: Width,
+) -> None:
+    """Open the first block of cable c: its lead and its series spring."""
+    for w in lanes(width):
+        block.length[w] = holes.lead[c] - series[c] * (tension[c, w] - rest[c])
+    for w in lanes(width):
+        block.soft[w] = series[c]
+    for w in lanes(width):
+        block.locked[w] = holes.locked[c]
+
+
+@inner
+def set_lead(
+    routing: Routing, holes: Holes, c: Index, rotation: Array, out: Array, width: Width
+) -> None:
+    """Fill the direction (3, W) of the lead of cable c."""
+    i = np.uint64(routing.row[holes.first[c]])
+    x, y, z = holes.axis[c, 0], holes.axis[c, 1], holes.axis[c, 2]
+    for r in upwards(0, out.shape[0]):
+        for w in lanes(width):
+            out[r, w] = turned(rotation, i, r, x, y, z, w)
+
+
+@inner
+def set_way(site: Array, p: Index, scratch: Segments, width: Width) -> None:
+    """Fill the way (3, W) from site p to the next one in place of u, and its length (W,)."""
+    across, length = scratch.direction, scratch.length
+    far = p + np.uint64(1)
+    for r in upwards(0, across.shape[0]):
+        for w in lanes(width):
+            across[r, w] = site[far, r, w] - site[p, r, w]
+    for w in lanes(width):
+        square = across[0, w] ** 2 + across[1, w] ** 2 + across[2, w] ** 2
+        length[w] = math.sqrt(square)
+
+
+@inner
+def set_holding(own: float, a: Array, b: Array, holds: Array, width: Width) -> None:
+    """Fill 1 where a hole with friction holds (W,): the cable turns from a to b (3, W), else 0."""
+    more = own - STRAIGHT
+    for w in lanes(width):
+        x = a[1, w] * b[2, w] - a[2, w] * b[1, w]
+        y = a[2, w] * b[0, w] - a[0, w] * b[2, w]
+        z = a[0, w] * b[1, w] - a[1, w] * b[0, w]
+        sizes = (a[0, w] ** 2 + a[1, w] ** 2 + a[2, w] ** 2) * (
+            b[0, w] ** 2 + b[1, w] ** 2 + b[2, w] ** 2
+        )
+        turns = x * x + y * y + z * z - STRAIGHT * STRAIGHT * sizes
+        back = -(a[0, w] * b[0, w] + a[1, w] * b[1, w] + a[2, w] * b[2, w])
+        most = turns if turns > back else back
+        most = most if most > more else more
+        holds[w] = 1.0 if most > 0.0 else 0.0
+
+
+@inner
+def set_stiffness(wire: Array, c: Index, block: Sticking, width: Width) -> None:
+    """Fill the stiffness (W,) of blocks that end at a hole that holds, 0 else."""
+    length, soft, locked, holds = block.length, block.soft, block.locked, block.holds
+    for w in lanes(width):
+        block.stiffness[w] = holds[w] * locked[w] / (length[w] / wire[c, w] + soft[w])
+
+
+@inner
+def open_next(block: Sticking, width: Width) -> None:
+    """Open the next block where a hole holds: no spring in series, no motor."""
+    length, soft, locked, holds = block.length, block.soft, block.locked, block.holds
+    for w in lanes(width):
+        length[w] = 0.0 if holds[w] > 0.0 else length[w]
+    for w in lanes(width):
+        soft[w] = 0.0 if holds[w] > 0.0 else soft[w]
+    for w in lanes(width):
+        locked[w] = 1.0 if holds[w] > 0.0 else locked[w]
+
+
+@inner
+def _add_square(
+    wire: Array, c: Index, block: Sticking, low: Index, high: Index, passive: Array, width: Width
+) -> None:
+    """Add k g gᵀ of the blocks that end at a hole that holds, and clear their g."""
+    g, k, product, holds = block.gradient, block.stiffness, block.product, block.holds
+    set_stiffness(wire, c, block, width)
+    for i in upwards(low, high):
+        for w in lanes(width):
+            product[w] = k[w] * g[i, w]
+        for j in upwards(i, high):
+            for w in lanes(width):
+                passive[i, j, w] += product[w] * g[j, w]
+    for i in upwards(low, high):
+        for w in lanes(width):
+            g[i, w] = 0.0 if holds[w] > 0.0 else g[i, w]
+
+
+@inner
+def _all_hold(holds: Array, width: Width) -> bool:
+    passing = 0
+    for w in lanes(width):
+        passing += 1 if holds[w] == 0.0 else 0
+    return passing == 0
