@@ -731,7 +731,7 @@ BAD: dict[str, tuple[Callable[[], object], tuple[str, ...]]] = {
     ),
     "direction without along": (
         lambda: cdsm.evaluate(ARM, Q, F, direction=(1, 0, 0)),
-        ("direction: belongs to the output 'along'",),
+        ("direction: belongs to the outputs along, ",),
     ),
     "direction zero": (
         lambda: cdsm.evaluate(ARM, Q, F, outputs=("along",), direction=(0, 0, 0)),
