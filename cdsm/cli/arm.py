@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -51,13 +52,45 @@ def stiffness(
     given = pose.arm.tolerances if tolerances is None else cdsm.Tolerances.read(tolerances)
     budgets = _budgets(tension, given) if given.given else {}
     sure = {"uncertainty": {axis: budget.to_dict() for axis, budget in budgets.items()}}
-    parts = [tensions.conditions(pose.arm), tension, K, *([_table(budgets)] if budgets else [])]
+    held = _breakaways(tension)
+    stuck = {
+        axis: {"stuck_N_per_m": each.stiffness.along(axis), "breakaway_N": each.load}
+        for axis, each in held.items()
+    }
+    parts = [tensions.conditions(pose.arm), tension, K]
+    parts += [_sticking(held)] if held else []
+    parts += [_table(budgets)] if budgets else []
+    more = (sure if budgets else {}) | ({"sticking": stuck} if held else {})
     answer(
         as_json,
-        lambda: K.to_dict() | (sure if budgets else {}),
+        lambda: K.to_dict() | more,
         *parts,
         warnings=K.warnings[:1],
     )
+
+
+def _breakaways(tension: cdsm.Tension) -> dict[str, cdsm.Breakaway]:
+    """Compute the breakaway load along each axis along which some load makes a cable slide."""
+    found = {}
+    if tension.posture.arm.has_friction:
+        for axis in ("x", "y", "z"):
+            with contextlib.suppress(cdsm.CdsmError):  # it buckles before, or leaves the law
+                held = cdsm.breakaway(tension.posture, tension, axis)
+                if 0.0 < held.load < math.inf:
+                    found[axis] = held
+    return found
+
+
+def _sticking(held: dict[str, cdsm.Breakaway]) -> str:
+    """Write what small loads measure, a line per axis."""
+    from cdsm.stiffness_matrix.prints import model_of
+
+    K = next(iter(held.values())).stiffness
+    lines = [
+        f"along {axis} {each.stiffness.along(axis) / 1000.0:.4g} N/mm below {each.load:.4g} N"
+        for axis, each in held.items()
+    ]
+    return "\n".join([f"small loads measure ({model_of(K)}):", *lines])
 
 
 def _budgets(tension: cdsm.Tension, tolerances: cdsm.Tolerances) -> dict[str, cdsm.Uncertainty]:

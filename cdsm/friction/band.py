@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike
 
 from cdsm.errors import ElasticityRangeError, SolverError
 from cdsm.friction.rest_states import Neighbourhood, RestStates
-from cdsm.friction.tangent import holding
 from cdsm.posture import Posture
+from cdsm.sticking import holding
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.format import coordinates
 from cdsm.support.validation import Direction, unit_direction

@@ -22,9 +22,8 @@ from numpy.typing import ArrayLike
 from cdsm.errors import EquilibriumError, InvalidInput
 from cdsm.friction.chain_problem import ChainProblem
 from cdsm.friction.stuck import assemble_segments, stuck_stiffness
-from cdsm.friction.tangent import holding
-from cdsm.kernels.breakaway import ROUNDING
 from cdsm.posture import Posture
+from cdsm.sticking import first_order_loads, holding
 from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.format import coordinates
 from cdsm.support.validation import Direction, unit_direction
@@ -127,16 +126,9 @@ def breakaway(
 
 def hole_loads(K: Stiffness, u: Array) -> tuple[Array, Array]:
     """Compute the first-order loads W_i (P,) [N] of all holes, and dθ/dW (nv,) [rad/N]."""
-    segments, (T, gradient) = K.posture.segments, segment_state(K)
-    chains, motion = segments.chains, K._along(u)[1]
-    slack = T == 0.0  # a slack cable holds nothing: any pull moves it
-    relative = (gradient @ motion) / np.where(slack, 1.0, T)
-    pull = abs(relative[chains.hole + 1] - relative[chains.hole])
-    rate = pull - chains.friction * (segments.wrap_jacobian @ motion)
-    grip = np.where(slack[chains.hole], 0.0, chains.friction * segments.wrap)
-    least = ROUNDING * float(pull.max(initial=0.0))
-    loads = np.divide(grip, rate, out=np.full(rate.size, math.inf), where=rate > least)
-    return np.where(holding(K.posture), loads, math.inf), motion
+    T, gradient = segment_state(K)
+    motion = K._along(u)[1]
+    return first_order_loads(K.posture, T, gradient, motion), motion
 
 
 def _reached(K: Stiffness, u: Array, motion: Array, load: float, hole: int) -> tuple[float, int]:

@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm.errors import InvalidInput
-from cdsm.friction.tangent import Flags, tension_gradient
 from cdsm.kernels.stiffness import single_load_stiffness
 from cdsm.posture import Posture
+from cdsm.sticking import Flags, tension_gradient
 from cdsm.stiffness_matrix import Friction, Stiffness, checked_tension
 from cdsm.support.validation import instance, number_array, vector, wrench_vector
 from cdsm.support.values import Array, frozen

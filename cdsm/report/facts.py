@@ -13,10 +13,11 @@ from scipy.linalg import null_space
 from scipy.optimize import linprog, lsq_linear
 
 from cdsm.cable import Cable, Control
-from cdsm.errors import CdsmError, SingularStiffness
+from cdsm.errors import CdsmError, ElasticityRangeError, SingularStiffness
 from cdsm.kernels import tension as tension_kernels
 from cdsm.kernels.tension import DISTANCE
 from cdsm.report.potential import evaluate_law, joint_unit
+from cdsm.sticking import first_order_loads, holding, tension_gradient
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension
 
@@ -199,6 +200,39 @@ def _number(cable: Cable, answer: Callable[[], Array]) -> float | None:
         return float(evaluate_law(cable, answer))
     except CdsmError:
         return None
+
+
+@final
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Sticking(ReadOnlyState):
+    """What small loads measure on an arm whose cables have friction in their holes.
+
+    Attributes:
+        along: Stiffness along x, y, z while all cables stick (3,) [N/m].
+        below: Loads along x, y, z (3,) [N] up to which they stick, to first order.
+    """
+
+    along: Array
+    below: Array
+
+
+def sticking(K: Stiffness, readings: Readings | None) -> Sticking | None:
+    """Compute what sticks at the tensions of a stiffness; None if no cable does, or if unknown."""
+    pose, held = K.posture, holding(K.posture)
+    T, J = K.tension[pose.segments.chains.cable], pose.jacobian[:3]
+    if readings is None or not held.any():
+        return None
+    try:
+        gradient = tension_gradient(pose, T, np.zeros_like(held))
+    except ElasticityRangeError:  # a motor holds a force outside the domain
+        return None
+    stuck = K.joint - K.passive + pose.segments.length_jacobian.T @ gradient
+    motion = np.linalg.solve(stuck, J.T)
+    compliance = np.einsum("ri,ir->r", J, motion)
+    moves = np.isfinite(readings.along)
+    along = np.divide(1.0, compliance, out=np.full(3, np.inf), where=moves)
+    loads = [first_order_loads(pose, T, gradient, each).min() for each in motion.T]
+    return Sticking(along=frozen(along), below=frozen(np.where(moves, loads, np.inf)))
 
 
 def readings(K: Stiffness) -> Readings | None:

@@ -11,6 +11,7 @@ from cdsm.geometry import LONGEST
 
 if TYPE_CHECKING:
     from cdsm.report.report import Report
+    from cdsm.support.values import Array
 
 BALANCED = 1e-6
 """Tensions balance an arm if the residual is at most this part of the torque size."""
@@ -97,10 +98,18 @@ def notes(report: Report) -> Iterator[str]:
 def _of_tensions(report: Report) -> Iterator[str]:
     K = report.stiffness
     if K.posture.arm.has_friction:
-        yield (
-            "the cables have friction, and this K is frictionless, as after shaking the arm: loads "
-            "below cdsm.breakaway measure cdsm.stuck_stiffness, which is larger."
-        )
+        said = "the cables have friction, and this K is frictionless, as after shaking the arm"
+        if report.sticking is None or report.readings is None:
+            yield f"{said}. Here no cable is known to stick."
+        else:
+            below = _numbers(report.sticking.below)
+            stuck, free = (
+                _numbers(each / 1000.0) for each in (report.sticking.along, report.readings.along)
+            )
+            yield (
+                f"{said}. Below {below} N along x, y, z (cdsm.breakaway) the cables stick, and a "
+                f"load measures {stuck} N/mm, not {free} N/mm: hang more, or shake the arm."
+            )
     if report.optimality is None:
         came = "were given" if K.free_length is None else "follow from an equilibrium"
         yield f"the tensions {came}, not distributed: nothing says they are the least."
@@ -149,6 +158,10 @@ def _of_ranks(report: Report) -> Iterator[str]:
         yield f"J_X has rank {jacobian.rank} here, not {jacobian.full}."
     if report.condition > _DIGITS:
         yield f"K_θ has the condition {report.condition:.1g}: the compliance loses digits."
+
+
+def _numbers(values: Array) -> str:
+    return ", ".join(f"{value:.4g}" for value in values)
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, final
 import numpy as np
 
 from cdsm.report import facts, remarks
-from cdsm.report.facts import CableState, Optimality, Rank, Readings
+from cdsm.report.facts import CableState, Optimality, Rank, Readings, Sticking
 from cdsm.report.page import to_document, to_fragment, to_text
 from cdsm.report.potential import joint_unit
 from cdsm.report.self_check import SelfCheck, self_check
@@ -41,6 +41,8 @@ class Report(ReadOnlyState):
         closure: Best ratio of least to largest tension among tensions without torque [-]; zero if
             the arm cannot be pretensioned by all cables.
         readings: The three tip stiffnesses along the base axes; None if K_θ is singular.
+        sticking: What loads measure that are too small to make a cable slide; None if no cable
+            sticks, or if K_θ is singular.
     """
 
     stiffness: Stiffness
@@ -55,6 +57,7 @@ class Report(ReadOnlyState):
     cable_rank: Rank
     closure: float
     readings: Readings | None
+    sticking: Sticking | None
 
     @cached_property
     def faults(self) -> tuple[str, ...]:
@@ -140,6 +143,9 @@ class Report(ReadOnlyState):
             },
             "closure": self.closure,
             "readings_N_per_m": None if self.readings is None else asdict(self.readings),
+            "sticking": None
+            if self.sticking is None
+            else {"along_N_per_m": self.sticking.along, "below_N": self.sticking.below},
         }
         return {name: _plain(value) for name, value in values.items()}
 
@@ -162,7 +168,7 @@ def report_on(K: Stiffness) -> Report:
     """Compute the report on a stiffness."""
     residual, joint, imbalance = facts.imbalance(K)
     tip, translation, cables = facts.ranks(K)
-    pull = K.distribution
+    pull, readings = K.distribution, facts.readings(K)
     return Report(
         stiffness=K,
         self_check=self_check(K),
@@ -175,7 +181,8 @@ def report_on(K: Stiffness) -> Report:
         translation_rank=translation,
         cable_rank=cables,
         closure=facts.closure(K),
-        readings=facts.readings(K),
+        readings=readings,
+        sticking=facts.sticking(K, readings),
     )
 
 

@@ -80,3 +80,29 @@ def test_friction_beyond_reason_is_refused(arm: Path) -> None:
     result = call("weigh", arm, "--friction", -0.1, "--force", "0,0,3")
     assert result.exit_code == 1
     assert "friction: -0.1 given" in result.output
+
+
+def test_stiffness_says_below_which_load_the_stuck_arm_is_measured(arm: Path) -> None:
+    result = call("stiffness", arm, *OPTIONS, "--json")
+    assert result.exit_code == 0, result.output
+    told = json.loads(result.stdout)["sticking"]
+    law = cdsm.LinearElasticity(48e3)
+    pose = (
+        cdsm.Manipulator(cdsm.Geometry.read(arm), law)
+        .with_friction(0.15)
+        .at(np.full(6, np.deg2rad(12.0)))
+    )
+    pull = cdsm.distribute_tension(pose, 60.0)
+    text = call("stiffness", arm, *OPTIONS).output
+    assert "small loads measure (cables stuck, μ = 0.15, rigid links, tangent):" in text
+    for axis in "xyz":
+        found = cdsm.breakaway(pose, pull, axis)
+        stuck = found.stiffness.along(axis)
+        assert told[axis] == {
+            "stuck_N_per_m": pytest.approx(stuck, rel=1e-9),
+            "breakaway_N": pytest.approx(found.load, rel=1e-9),
+        }
+        assert f"along {axis} {stuck / 1000.0:.4g} N/mm below {found.load:.4g} N" in text
+    assert "stuck" not in call("stiffness", arm, *OPTIONS[:-2]).output
+    straight = ("--angles", 0, *OPTIONS[2:])
+    assert "sticking" not in json.loads(call("stiffness", arm, *straight, "--json").stdout)

@@ -11,8 +11,8 @@ import xarray as xr
 
 import cdsm
 from cdsm.friction.breakaway import hole_loads
-from cdsm.friction.tangent import holding
 from cdsm.kernels.principal import principal_stiffness
+from cdsm.sticking import holding
 from cdsm.support.values import Array
 from cdsm.sweeps.blocks import blocks, extents, postures
 from cdsm.sweeps.description import law_text

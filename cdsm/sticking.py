@@ -10,13 +10,21 @@ A hole that holds lets nothing through. Segments that sliding holes join are a b
 the cables changes by Σ_j T_j H_j δθ + Σ_j g_j δT_j. If each hole holds, δT_j = k_j g_j·δθ: each
 segment is a spring of its own. If no hole has friction, each cable is one block: the frictionless
 stiffness.
+
+A force of 1 N at the tip of a stuck arm moves the joints by θ̇, and pulls at hole i, between the
+segments j and j + 1. To first order it begins to slide under the load
+
+    W_i = μ φ_i/(|x_i| − y_i),   x_i = (∂ln T_{j+1}/∂θ − ∂ln T_j/∂θ)·θ̇,   y_i = μ ∂φ_i/∂θ·θ̇.
 """
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
+from cdsm.kernels.breakaway import ROUNDING
 from cdsm.kernels.chain_problem import chain_tangent
 from cdsm.kernels.chains import STRAIGHT
 from cdsm.posture import Posture
@@ -63,3 +71,24 @@ def tension_gradient(pose: Posture, tension: Array, sliding: Flags) -> Array:
     T = np.where(tension > 0.0, tension, _SLACK)
     gradient = segments.length_jacobian
     return frozen(chain_tangent(start, forced, stretch, compliance, T, slides, gradient, friction))
+
+
+def first_order_loads(pose: Posture, tension: Array, gradient: Array, motion: Array) -> Array:
+    """Compute the loads W_i (P,) [N] at which the holes of a stuck arm begin to slide; inf: never.
+
+    Args:
+        pose: The posture.
+        tension: T (S,) [N].
+        gradient: ∂T/∂θ (S, nv) [N/rad] of the stuck arm.
+        motion: θ̇ (nv,) [rad/N].
+    """
+    segments = pose.segments
+    chains, slack = segments.chains, tension == 0.0
+    relative = (gradient @ motion) / np.where(slack, 1.0, tension)
+    pull = abs(relative[chains.hole + 1] - relative[chains.hole])
+    rate = pull - chains.friction * (segments.wrap_jacobian @ motion)
+    # a slack cable holds nothing: any pull moves it
+    grip = np.where(slack[chains.hole], 0.0, chains.friction * segments.wrap)
+    least = ROUNDING * float(pull.max(initial=0.0))
+    loads = np.divide(grip, rate, out=np.full(rate.size, math.inf), where=rate > least)
+    return np.where(holding(pose), loads, math.inf)
