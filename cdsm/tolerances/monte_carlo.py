@@ -21,14 +21,14 @@ from cdsm.posture import Posture
 from cdsm.support.extras import need
 from cdsm.support.files import make_folder, read_text, write_file, write_text
 from cdsm.support.progress import progress_bar
-from cdsm.support.validation import flag, one_of, scalar, whole_number
+from cdsm.support.validation import flag, scalar, whole_number
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension
 from cdsm.tolerance import Tolerances
 from cdsm.tolerances.budget import Uncertainty, chosen, decimals, uncertainty
 from cdsm.tolerances.inputs import inputs_of
-from cdsm.tolerances.parts import draw
-from cdsm.tolerances.readings import DRAWN, Question, Reading
+from cdsm.tolerances.parts import draw_errors
+from cdsm.tolerances.readings import Question, Reading
 
 if TYPE_CHECKING:
     import xarray
@@ -49,7 +49,7 @@ class MonteCarlo(ReadOnlyState):
 
     Attributes:
         budget: The same reading to first order.
-        values: The reading of each drawn arm (n,) [N/m], [N m/rad] or [m].
+        values: The reading of each drawn arm (n,) [N/m], [N m/rad], [m] or [N].
         seed: Seed of the random numbers.
     """
 
@@ -156,6 +156,7 @@ def monte_carlo(
     *,
     direction: ArrayLike | None = None,
     of: Reading = "along",
+    cable: str | None = None,
     wrench: ArrayLike | None = None,
     draws: int = 100_000,
     seed: int = 0,
@@ -172,7 +173,8 @@ def monte_carlo(
         tension: As for :func:`~cdsm.stiffness`.
         tolerances: As for :func:`~cdsm.uncertainty`.
         direction: As for :func:`~cdsm.uncertainty`.
-        of: ``"along"``, ``"margin"`` or ``"tip"``.
+        of: As for :func:`~cdsm.uncertainty`.
+        cable: As for :func:`~cdsm.uncertainty`.
         wrench: As for :func:`~cdsm.stiffness`.
         draws: Number of arms, 100 to 10⁸.
         seed: Seed of the random numbers, from 0.
@@ -180,20 +182,22 @@ def monte_carlo(
         progress: Show a progress bar on a terminal.
 
     Raises:
-        InvalidInput: As for :func:`~cdsm.uncertainty`, or ``draws`` or ``seed`` is out of range.
-        UnknownName: ``of`` is not one of the three readings.
+        InvalidInput: As for :func:`~cdsm.uncertainty`, or ``draws`` or ``seed`` is out of range, or
+            no tensions balance a drawn arm, or it does not buckle, where that is asked.
+        UnknownName: As for :func:`~cdsm.uncertainty`.
         ElasticityRangeError: A drawn tension is outside the domain of its cable's law.
         SingularStiffness: The reading does not exist.
         FileError: The folder cannot be used, or holds another run.
     """
-    one_of("reading of Monte Carlo", of, DRAWN)
     count = whole_number("draws", draws, 100, 10**8)
     start = whole_number("seed", seed, 0)
     wanted = flag("progress", progress)
     tolerances = chosen(pose, tolerances)
     if not tolerances.given:
         raise InvalidInput("tolerances", "are all zero, so all draws are the same; give one.")
-    budget = uncertainty(pose, tension, tolerances, direction=direction, of=of, wrench=wrench)
+    budget = uncertainty(
+        pose, tension, tolerances, direction=direction, of=of, cable=cable, wrench=wrench
+    )
     folder = None if store is None else _opened(store, budget, start)
     values = np.empty(count)
     compute = partial(_block, budget.question, tolerances, start, folder)
@@ -222,10 +226,8 @@ def _errors(
     """Draw the errors of one block by source."""
     rng = np.random.default_rng([seed, block])
     labels = inputs_of(question.stiffness.posture.arm).labels
-    return {
-        source: draw(parts, rng, _BLOCK, len(labels[source]))[:count]
-        for source, parts in question.parts(tolerances).items()
-    }
+    errors = draw_errors(question.parts(tolerances), labels, rng, _BLOCK)
+    return {source: drawn[:count] for source, drawn in errors.items()}
 
 
 def _block(

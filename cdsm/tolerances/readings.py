@@ -8,25 +8,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Final, Literal
+from typing import Any, Literal
 
 import numpy as np
 
-from cdsm.errors import ElasticityRangeError
-from cdsm.kernels.draws import stiffness_of_draws
 from cdsm.kernels.sensitivity import single_gradient
 from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.format import coordinates
 from cdsm.support.values import Array, ReadOnlyState
 from cdsm.tolerance import Tolerances
 from cdsm.tolerances.balanced import Balance, buckling_gradient
+from cdsm.tolerances.drawn import DrawnArms, laws_at, margins
 from cdsm.tolerances.inputs import Inputs, Places, inputs_of
 from cdsm.tolerances.parts import Part, parts_of
 
 Reading = Literal["along", "margin", "tip", "tension", "critical_tension"]
-
-DRAWN: Final = ("along", "margin", "tip")
-"""Readings that can be computed for many drawn arms."""
 
 _NOWHERE = np.zeros(3)
 
@@ -107,15 +103,25 @@ class Question(ReadOnlyState):
         return balance.gradient(inputs, np.eye(len(K.tension))[self.cable])
 
     def at(self, errors: Mapping[str, Array]) -> Array:
-        """Compute a reading of :data:`DRAWN` for N arms (N,), with errors (N, inputs) by source."""
-        joint, tip_rows, tips = evaluate(self.stiffness, errors)
+        """Compute the reading for N arms (N,), with errors (N, inputs) by source.
+
+        Raises:
+            ElasticityRangeError: A tension leaves the domain of its cable's law.
+            InvalidInput: No tensions balance an arm, or it does not buckle, where that is asked.
+        """
+        arms = DrawnArms(self.stiffness, errors)
+        if self.of == "tension":
+            return np.asarray(arms.distributed()[:, self.cable])
+        if self.of == "critical_tension":
+            return arms.critical(self.value())
+        drawn = arms.evaluate()
         if self.of == "margin":
-            return np.asarray(np.linalg.eigvalsh((joint + joint.transpose(0, 2, 1)) / 2.0)[:, 0])
+            return margins(drawn.joint)
         assert self.direction is not None
         if self.of == "tip":
-            return np.asarray(tips @ self.direction)
-        force = self.direction @ tip_rows
-        motion = np.linalg.solve(joint, force[:, :, None])[:, :, 0]
+            return np.asarray(drawn.tip @ self.direction)
+        force = self.direction @ drawn.tip_rows
+        motion = np.linalg.solve(drawn.joint, force[:, :, None])[:, :, 0]
         return np.asarray(1.0 / np.einsum("ni,ni->n", force, motion))
 
 
@@ -140,7 +146,7 @@ def _gradient(K: Stiffness, inputs: Inputs, motion: Array, direction: Array) -> 
     """Compute the derivatives of zᵀ K_θ z − 2 u·J_v z with z and u fixed, by source."""
     pose, F, k = K.posture, K.tension, K.cable_stiffness
     laws = pose.arm._model.laws
-    rigidity, strain = _laws(K, F)
+    rigidity, strain = laws_at(K, F)
     stretched = rigidity * (1.0 + strain)
     wire = pose.cable_lengths - laws.series * (F - laws.rest)
     by_stretched = k**2 * wire / stretched**2  # zero where the motor holds the force
@@ -196,28 +202,6 @@ def _tip_gradient(K: Stiffness, inputs: Inputs, direction: Array) -> dict[str, A
     return none | inputs.by_source(moved) | {"joint_angle": direction @ pose.jacobian[:3]}
 
 
-def _laws(K: Stiffness, tension: Array) -> tuple[Array, Array]:
-    """Compute EA [N] and ε at tensions (…, C); ε is 0 if l_0 is the stretched length."""
-    arm = K.posture.arm
-    laws = arm._model.laws
-    rigidity, strain = np.ones_like(tension), np.zeros_like(tension)
-    for law, held in laws.held:
-        F = tension[..., held]
-        try:
-            rigidity[..., held] = law.rigidity(F)
-            if arm.original_length == "unstrained":
-                strain[..., held] = law.strain(F)
-        except ElasticityRangeError as error:
-            low, high = float(F.min()), float(F.max())
-            raise ElasticityRangeError(
-                f"at tensions from {low:.4g} to {high:.4g} N, which the tolerance of the tensions "
-                f"reaches; the elasticity is defined on {law.domain}. Raise the tensions, or lower "
-                "their tolerance.",
-                error.tension,
-            ) from None
-    return rigidity, strain
-
-
 def _stretched_slope(K: Stiffness, strain: Array) -> Array:
     """Compute the derivative of EA (1 + ε) by F (C,) [-]: EA′ (1 + ε) + 1, or EA′."""
     arm = K.posture.arm
@@ -225,38 +209,3 @@ def _stretched_slope(K: Stiffness, strain: Array) -> Array:
     for law, held in arm._model.laws.held:
         slope[held] = law.rigidity_slope(K.tension[held])
     return slope * (1.0 + strain) + float(arm.original_length == "unstrained")
-
-
-def evaluate(K: Stiffness, errors: Mapping[str, Array]) -> tuple[Array, Array, Array]:
-    """Compute K_θ (N, nv, nv), J_v (N, 3, nv) and the tip (N, 3) of arms with errors."""
-    pose, model, inputs = K.posture, K.posture.arm._model, inputs_of(K.posture.arm)
-    count = len(next(iter(errors.values())))
-
-    def drawn(source: str, nominal: Array) -> Array:
-        values = np.repeat(nominal[None], count, axis=0)
-        return values + errors[source] if source in errors else values
-
-    q, tension = drawn("joint_angle", pose.q), drawn("tension", K.tension)
-    lead = drawn("lead", np.array([cable.lead for cable in pose.arm.cables]))
-    mass = np.repeat(model.masses.mass[None], count, axis=0)
-    if "link_mass" in errors:
-        mass[:, inputs.link_rows] += errors["link_mass"]
-    places: tuple[Any, ...] = inputs.places.moved(inputs.displaced(errors))
-    rigidity, strain = _laws(K, tension)
-    scale = 1.0 + errors.get("rigidity", np.zeros((count, 1)))  # of EA; ε falls with it
-    held = K.cable_stiffness > 0.0
-    stretched = np.where(held, rigidity * (scale + strain), 0.0)
-    nv, tree, routing, masses = pose.arm.nv, model.tree, model.routing, model.masses
-    joint, tip_rows = np.empty((count, nv, nv)), np.empty((count, 3, nv))
-    tips = np.empty((count, 3))
-    arguments: tuple[Any, ...] = (
-        *(tree.parent, tree.order, tree.turn, tree.axis, tree.slide),
-        *(routing.row, routing.segment, routing.joint),
-        *(masses.gravity, masses.tip, masses.tip_joints, masses.rotation),
-        *(inputs.first, model.laws.series, model.laws.rest, K.wrench),
-        *(q, tension, stretched, lead, mass),
-        *(np.ascontiguousarray(place) for place in places),
-        *(joint, tip_rows, tips),
-    )
-    stiffness_of_draws(*arguments)
-    return joint, tip_rows, tips

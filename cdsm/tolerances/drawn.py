@@ -1,0 +1,166 @@
+"""Many arms drawn within the tolerances: their stiffnesses, and tensions that balance them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from cdsm.errors import ElasticityRangeError, InvalidInput
+from cdsm.kernels.distribution import OPTIMAL, search_tensions
+from cdsm.kernels.draws import stiffness_of_draws
+from cdsm.kernels.tension import NO_ARM
+from cdsm.stiffness_matrix import Stiffness
+from cdsm.support.values import Array
+from cdsm.tolerances.inputs import inputs_of
+
+_CONVERGED = 1e-10
+"""Relative step that ends the search of a critical tension: the error left is its square."""
+
+_STEPS = 40
+"""Secant steps; 5 are usual."""
+
+_LONGEST = 0.2
+"""Longest step over the tension."""
+
+
+class Drawn(NamedTuple):
+    """K_θ (N, nv, nv), J_v (N, 3, nv), tip (N, 3), J_L (N, C, nv) and J_Xᵀ W − g (N, nv)."""
+
+    joint: Array
+    tip_rows: Array
+    tip: Array
+    length_jacobian: Array
+    torque: Array
+
+
+class DrawnArms:
+    """N arms that differ from the arm of a stiffness by errors (N, inputs) of each source."""
+
+    def __init__(self, K: Stiffness, errors: Mapping[str, Array]) -> None:
+        pose, model, inputs = K.posture, K.posture.arm._model, inputs_of(K.posture.arm)
+        self._K, self._count = K, len(next(iter(errors.values())))
+
+        def drawn(source: str, nominal: Array) -> Array:
+            values = np.repeat(nominal[None], self._count, axis=0)
+            return values + errors[source] if source in errors else values
+
+        self._tension = drawn("tension", K.tension)
+        self._scale = 1.0 + errors.get("rigidity", np.zeros((self._count, 1)))
+        q, lead = drawn("joint_angle", pose.q), np.array([cable.lead for cable in pose.arm.cables])
+        mass = np.repeat(model.masses.mass[None], self._count, axis=0)
+        if "link_mass" in errors:
+            mass[:, inputs.link_rows] += errors["link_mass"]
+        places: tuple[Any, ...] = inputs.places.moved(inputs.displaced(errors))
+        tree, routing, masses = model.tree, model.routing, model.masses
+        self._same: tuple[Any, ...] = (
+            *(tree.parent, tree.order, tree.turn, tree.axis, tree.slide),
+            *(routing.row, routing.segment, routing.joint),
+            *(masses.gravity, masses.tip, masses.tip_joints, masses.rotation),
+            *(inputs.first, model.laws.series, model.laws.rest, K.wrench, q),
+        )
+        self._own: tuple[Any, ...] = (
+            *(drawn("lead", lead), mass),
+            *(np.ascontiguousarray(place) for place in places),
+        )
+
+    def evaluate(self, tension: Array | None = None) -> Drawn:
+        """Compute all arms at tensions (N, C), by default those measured."""
+        F = self._tension if tension is None else tension
+        rigidity, strain = laws_at(self._K, F)
+        held = self._K.cable_stiffness > 0.0
+        stretched = np.where(held, rigidity * (self._scale + strain), 0.0)  # ε falls as EA rises
+        count, (cables, nv) = self._count, self._K.posture.length_jacobian.shape
+        found = Drawn(
+            joint=np.empty((count, nv, nv)),
+            tip_rows=np.empty((count, 3, nv)),
+            tip=np.empty((count, 3)),
+            length_jacobian=np.empty((count, cables, nv)),
+            torque=np.empty((count, nv)),
+        )
+        arguments: tuple[Any, ...] = (*self._same, F, stretched, *self._own, *found)
+        stiffness_of_draws(*arguments)
+        return found
+
+    def distributed(self, minimum: Array | None = None, drawn: Drawn | None = None) -> Array:
+        """Distribute the tensions (N, C) of all arms anew, for lower bounds (N,) or those given.
+
+        Raises:
+            InvalidInput: No tensions balance one of the arms.
+        """
+        arms, given = drawn or self.evaluate(), self._K.distribution
+        assert given is not None
+        low = np.broadcast_to(given.minimum, self._tension.shape).copy()
+        if minimum is not None:
+            low[:] = minimum[:, None]
+        high = np.broadcast_to(given.maximum, low.shape).copy()
+        none = abs(arms.length_jacobian) < NO_ARM * self._K.posture.arm.length
+        J, tension = np.where(none, 0.0, arms.length_jacobian), np.empty_like(low)
+        outcome = np.empty(len(low), dtype=np.intp)
+        model = self._K.posture.arm._model
+        search_tensions(model.blocks, J, arms.torque, low, high, tension, outcome)
+        if (outcome != OPTIMAL).any():
+            raise InvalidInput(
+                "tolerances",
+                f"no tensions within the bounds balance {np.count_nonzero(outcome != OPTIMAL)} of "
+                f"{len(outcome)} drawn arms. Lower the minimum, raise the maximum, or lower the "
+                "tolerances.",
+            )
+        return tension
+
+    def critical(self, start: float) -> Array:
+        """Find the lower bounds (N,) [N] at which the arms buckle, near that of the arm itself.
+
+        Raises:
+            InvalidInput: An arm does not buckle near there.
+        """
+        arms, root = self.evaluate(), np.full(self._count, start)
+
+        def margin(bound: Array) -> Array:
+            return margins(self.evaluate(self.distributed(bound, arms)).joint)
+
+        before, fell = root * (1.0 - 1e-3), margin(root * (1.0 - 1e-3))
+        found = np.zeros(self._count, dtype=np.bool_)
+        for _ in range(_STEPS):
+            now = margin(root)
+            slope = np.divide(now - fell, root - before, out=np.ones_like(now), where=~found)
+            steepest = abs(now) / (_LONGEST * root)  # at kinks of the tensions, secants may be flat
+            slope = np.copysign(np.maximum(abs(slope), steepest), slope)
+            step = np.divide(-now, slope, out=np.zeros_like(now), where=~found & (now != 0.0))
+            found |= abs(step) <= _CONVERGED * root
+            before, fell, root = root, now, root + step
+            if found.all():
+                return np.asarray(root)
+        raise InvalidInput(
+            "tolerances",
+            f"{np.count_nonzero(~found)} of {self._count} drawn arms do not buckle near the "
+            "critical tension; lower the tolerances.",
+        )
+
+
+def margins(joint: Array) -> Array:
+    """Compute the smallest eigenvalue (N,) of the symmetric parts of K_θ (N, nv, nv)."""
+    return np.asarray(np.linalg.eigvalsh((joint + joint.transpose(0, 2, 1)) / 2.0)[:, 0])
+
+
+def laws_at(K: Stiffness, tension: Array) -> tuple[Array, Array]:
+    """Compute EA [N] and ε at tensions (…, C); ε is 0 if l_0 is the stretched length."""
+    arm = K.posture.arm
+    laws = arm._model.laws
+    rigidity, strain = np.ones_like(tension), np.zeros_like(tension)
+    for law, held in laws.held:
+        F = tension[..., held]
+        try:
+            rigidity[..., held] = law.rigidity(F)
+            if arm.original_length == "unstrained":
+                strain[..., held] = law.strain(F)
+        except ElasticityRangeError as error:
+            low, high = float(F.min()), float(F.max())
+            raise ElasticityRangeError(
+                f"at tensions from {low:.4g} to {high:.4g} N, which the tolerances reach; the "
+                f"elasticity is defined on {law.domain}. Raise the tensions, or lower the "
+                "tolerances.",
+                error.tension,
+            ) from None
+    return rigidity, strain
