@@ -55,6 +55,11 @@ if TYPE_CHECKING:
     from cdsm.kinematics.maps import inverse_kinematics, solve_joint_angles
     from cdsm.kinematics.solutions import JointSolution, KinematicSolution
     from cdsm.manipulator import Manipulator
+    from cdsm.measures.clearance import Clearance, clearance
+    from cdsm.measures.closure import has_wrench_closure, isotropy, tension_factor
+    from cdsm.measures.forces import ForcePolytope, force_polytope
+    from cdsm.measures.payload import Payload, payload
+    from cdsm.measures.wire_use import WireUse, wire_use
     from cdsm.planning.gradient import StiffnessGradient, stiffness_gradient
     from cdsm.planning.half_way import HalfWay
     from cdsm.planning.path import plan_path
@@ -101,6 +106,7 @@ __all__ = [
     "Cables",
     "CdsmError",
     "CdsmWarning",
+    "Clearance",
     "ClusterError",
     "CriticalLoad",
     "CriticalTension",
@@ -110,6 +116,7 @@ __all__ = [
     "Equilibrium",
     "EquilibriumError",
     "FileError",
+    "ForcePolytope",
     "Geometry",
     "GeometryError",
     "GridPoses",
@@ -135,6 +142,7 @@ __all__ = [
     "MonteCarlo",
     "PathPlan",
     "PathPoses",
+    "Payload",
     "PoseSet",
     "Posture",
     "RandomPoses",
@@ -169,8 +177,10 @@ __all__ = [
     "UnreachableStiffness",
     "UrdfError",
     "WeightTest",
+    "WireUse",
     "bifurcation",
     "breakaway",
+    "clearance",
     "critical_load",
     "critical_tension",
     "distribute_tension",
@@ -178,12 +188,16 @@ __all__ = [
     "equilibrium",
     "evaluate",
     "fit_tensile_test",
+    "force_polytope",
+    "has_wrench_closure",
     "identify",
     "in_series",
     "inverse_kinematics",
+    "isotropy",
     "load_cycle",
     "modes",
     "monte_carlo",
+    "payload",
     "plan_path",
     "plan_stiffness",
     "presets",
@@ -203,10 +217,12 @@ __all__ = [
     "stuck_stiffness",
     "sweep",
     "sweep_to_pandas",
+    "tension_factor",
     "to_mjcf",
     "to_urdf",
     "uncertainty",
     "weight_test",
+    "wire_use",
     "write_cables",
     "write_elasticity",
     "write_mjcf",
@@ -237,6 +253,11 @@ _NAMES = {
     "kinematics.maps": "inverse_kinematics solve_joint_angles",
     "kinematics.solutions": "JointSolution KinematicSolution",
     "manipulator": "Manipulator",
+    "measures.clearance": "Clearance clearance",
+    "measures.closure": "has_wrench_closure isotropy tension_factor",
+    "measures.forces": "ForcePolytope force_polytope",
+    "measures.payload": "Payload payload",
+    "measures.wire_use": "WireUse wire_use",
     "planning.gradient": "StiffnessGradient stiffness_gradient",
     "planning.half_way": "HalfWay",
     "planning.path": "plan_path",

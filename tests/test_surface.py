@@ -275,6 +275,9 @@ RESULTS: dict[str, Any] = {
     ),
     "CriticalLoad": cdsm.critical_load(POSE, random_wrench(4), 10.0),
     "Report": K.report(),
+    "ForcePolytope": cdsm.force_polytope(POSE, 1.0, 200.0),
+    "Payload": cdsm.payload(POSE, "z", 1.0, 200.0, deflection=1e-3),
+    "WireUse": cdsm.wire_use(PULL, diameter=1e-3, breaking_load=1e3, bend_diameter=5e-3),
 }
 
 PLAIN: dict[str, Any] = {

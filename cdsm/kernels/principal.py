@@ -31,6 +31,7 @@ def principal_stiffness(compliance: Array) -> dict[str, Array]:
         "softest": softest,
         "stiffest": stiffest,
         "anisotropy": anisotropy,
+        "isotropy": 1.0 / anisotropy,
         "softest_direction": _positive(vectors[..., 2]),
         "stiffest_direction": _positive(vectors[..., 0]),
     }

@@ -8,6 +8,7 @@ state of matplotlib.
 from cdsm.plots.arm import plot_arm
 from cdsm.plots.budget import plot_monte_carlo, plot_uncertainty
 from cdsm.plots.by_cable import plot_shares, plot_stiffness_plan, plot_stiffness_range
+from cdsm.plots.forces import plot_force_polytope
 from cdsm.plots.friction import plot_load_history
 from cdsm.plots.loads import plot_bifurcation, plot_critical_tension, plot_weight_test
 from cdsm.plots.maps import plot_map
@@ -27,6 +28,7 @@ __all__ = [
     "plot_cables",
     "plot_critical_tension",
     "plot_elasticity",
+    "plot_force_polytope",
     "plot_load_history",
     "plot_map",
     "plot_modes",

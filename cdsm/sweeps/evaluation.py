@@ -13,6 +13,7 @@ from cdsm import batch
 from cdsm.elasticity import Elasticity
 from cdsm.kernels.principal import principal_stiffness
 from cdsm.manipulator import Manipulator
+from cdsm.measures.rows import MEASURED, measured, payloads
 from cdsm.support.values import Array, ReadOnlyState
 from cdsm.sweeps.quantities import DIRECTIONAL, QUANTITIES
 from cdsm.sweeps.status import LOST, SweepStatus
@@ -89,7 +90,12 @@ def evaluate(task: SweepTask, q: Array, threads: int | None = None) -> BlockResu
     of_pose = [name for name, stage in stages.items() if stage == "pose"]
     of_law = [name for name, stage in stages.items() if stage not in ("pose", "tension")]
 
-    rows, status_of_pose = _rows(of_pose, task.arm, q, threads=threads)
+    computed = [name for name in of_pose if name not in MEASURED]
+    rows, status_of_pose = _rows(computed, task.arm, q, threads=threads)
+    exist = status_of_pose == SweepStatus.OK
+    wanted = [name for name in of_pose if name in MEASURED]
+    for name, values in measured(task.arm, q[exist], wanted, threads).items():
+        rows[name] = _spread(values, (exist,), exist.shape)
     answer: BlockResult = {**rows}
     status = np.tile(status_of_pose[:, None, None], (1, *shape[1:]))
     if len(stages) > len(of_pose):
@@ -102,6 +108,12 @@ def evaluate(task: SweepTask, q: Array, threads: int | None = None) -> BlockResu
         tension = _spread(pull.values, place, shape)
         if "tension" in stages:
             answer["tension"] = tension
+        if "payload" in stages:
+            held = p, w, m = np.nonzero(status == SweepStatus.OK)
+            force = payloads(
+                task.arm, q[p], task.wrenches[w], task.minima[m], task.maximum, task.directions
+            )
+            answer["payload"] = _spread(force, held, shape)
     if not of_law:
         return answer | {"status": np.stack([status] * len(task.laws), axis=1)}
 

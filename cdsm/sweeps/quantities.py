@@ -43,7 +43,21 @@ QUANTITIES: Final[dict[str, Quantity]] = {
     "cable_lengths": Quantity("cable lengths L, lead included (Eq. 8)", "m", "pose", ("cable",)),
     "gravity_torque": Quantity("gravity torque g = dV/dq", "N m", "pose", ("joint",)),
     "gravity_stiffness": Quantity("gravity part of K, dg/dq", "N m rad-1", "pose", _JOINTS),
+    "tension_factor": Quantity(
+        "tension factor, largest min F / max F with J_L^T F = 0; 0: no wrench closure", "1", "pose"
+    ),
+    "cable_clearance": Quantity("least distance of the axes of two cables", "m", "pose"),
+    "link_clearance": Quantity("least distance of a cable's axis from a backbone", "m", "pose"),
+    "disk_clearance": Quantity(
+        "least distance of a cable's axis from a disk, or of its hole from the edge", "m", "pose"
+    ),
     "tension": Quantity("least cable tensions F in balance (Eq. 17)", "N", "tension", ("cable",)),
+    "payload": Quantity(
+        "largest force in a direction within the limits of the tensions",
+        "N",
+        "tension",
+        ("direction",),
+    ),
     "cable_stiffness": Quantity("cable stiffness, diagonal of K_L", "N m-1", "joint", ("cable",)),
     "active_stiffness": Quantity("active part of K, H_L F (Eq. 16)", "N m rad-1", "joint", _JOINTS),
     "passive_stiffness": Quantity(
@@ -79,6 +93,7 @@ QUANTITIES: Final[dict[str, Quantity]] = {
     "softest": Quantity("stiffness in the softest direction", "N m-1", "principal"),
     "stiffest": Quantity("stiffness in the stiffest direction", "N m-1", "principal"),
     "anisotropy": Quantity("stiffest over softest", "1", "principal"),
+    "isotropy": Quantity("softest over stiffest", "1", "principal"),
     "softest_direction": Quantity("softest direction, unit length", "1", "principal", ("axis",)),
     "stiffest_direction": Quantity("stiffest direction, unit length", "1", "principal", ("axis",)),
 }

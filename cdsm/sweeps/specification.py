@@ -20,7 +20,7 @@ from cdsm.sweeps.blocks import Block
 from cdsm.sweeps.description import attributes_of, law_text
 from cdsm.sweeps.evaluation import SweepTask
 from cdsm.sweeps.poses import Poses, PoseSet, poses_of
-from cdsm.sweeps.quantities import DIRECTIONAL, QUANTITIES, Quantity
+from cdsm.sweeps.quantities import QUANTITIES, Quantity
 from cdsm.sweeps.status import LOST, SweepStatus
 
 if TYPE_CHECKING:
@@ -142,7 +142,7 @@ def specify(
         "maximum": label((), maximum, "upper bound of all tensions", "N"),
     }
     names = _outputs(outputs)
-    if not DIRECTIONAL.isdisjoint(names):
+    if any("direction" in QUANTITIES[name].dims for name in names):
         u = directions.values
         labels |= directions.labels
         labels["direction_vector"] = directions.label(

@@ -64,10 +64,7 @@ def distribute_tension(
         SolverError: The solver's solution does not meet the optimality conditions.
     """
     instance("pose", pose, Posture)
-    low, high = checked_bounds(pose.arm, minimum, maximum)
-    if flag("worst_friction", worst_friction):
-        loss = np.exp(_grip(pose))
-        low, high = checked_bounds(pose.arm, low * loss, high / loss)
+    low, high = bounds_at(pose, minimum, maximum, worst_friction)
     fixed = {} if fixed is None else fixed
     if fixed:
         low, high = _with_fixed(pose, low, high, fixed)
@@ -93,12 +90,23 @@ def distribute_tension(
     )
 
 
-def _grip(pose: Posture) -> Array:
+def bounds_at(
+    pose: Posture, minimum: ArrayLike, maximum: ArrayLike, worst_friction: bool
+) -> tuple[Array, Array]:
+    """Return valid bounds (C,) [N] at a posture; the worst friction narrows them."""
+    low, high = checked_bounds(pose.arm, minimum, maximum)
+    if flag("worst_friction", worst_friction):
+        loss = np.exp(grip(pose))
+        low, high = checked_bounds(pose.arm, low * loss, high / loss)
+    return low, high
+
+
+def grip(pose: Posture) -> Array:
     """Compute Σ μ φ of the holes of each cable (C,) [-]."""
     segments = pose.segments
     chains = segments.chains
-    grip = chains.friction * segments.wrap
-    total = np.bincount(chains.cable[chains.hole], grip, minlength=len(pose.arm.cables))
+    of_holes = chains.friction * segments.wrap
+    total = np.bincount(chains.cable[chains.hole], of_holes, minlength=len(pose.arm.cables))
     return np.asarray(total, dtype=np.float64)
 
 

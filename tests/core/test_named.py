@@ -161,6 +161,10 @@ RESULTS: dict[str, Any] = {
     "CriticalTension": cdsm.critical_tension(POSE),
     "CriticalLoad": cdsm.critical_load(POSE, (0.0, 0.0, -1.0, 0.0, 0.0, 0.0), 10.0),
     "Report": K.report(),
+    "ForcePolytope": cdsm.force_polytope(POSE, 1.0, 200.0),
+    "Payload": cdsm.payload(POSE, "z", 1.0, 200.0, deflection=1e-3),
+    "Clearance": cdsm.clearance(POSE, 1e-3),
+    "WireUse": cdsm.wire_use(PULL, diameter=1e-3, breaking_load=1e3, bend_diameter=5e-3),
 }
 
 

@@ -12,6 +12,8 @@ import xarray as xr
 import cdsm
 from cdsm.friction.breakaway import hole_loads
 from cdsm.kernels.principal import principal_stiffness
+from cdsm.measures.payload import largest_force
+from cdsm.measures.program import Loads
 from cdsm.sticking import holding
 from cdsm.support.values import Array
 from cdsm.sweeps.blocks import blocks, extents, postures
@@ -19,6 +21,7 @@ from cdsm.sweeps.description import law_text
 from cdsm.sweeps.evaluation import _BATCH_NAMES
 from cdsm.sweeps.quantities import QUANTITIES
 from cdsm.sweeps.status import LOST
+from cdsm.tension import checked_bounds
 from tests.support.sweeps import CASES, EVERYTHING, GRID, LAWS, STEEL, WRENCHES, short_arm
 
 Status = cdsm.SweepStatus
@@ -44,11 +47,18 @@ def single(
     found["tip_position"] = pose.tip[:3, 3]
     found["cable_lengths"], found["gravity_torque"] = pose.cable_lengths, pose.gravity_torque
     found["gravity_stiffness"] = pose.gravity_stiffness
+    found["tension_factor"] = cdsm.tension_factor(pose)
+    clear = cdsm.clearance(pose)
+    for kind in ("cable", "link", "disk"):
+        found[f"{kind}_clearance"] = getattr(clear, f"{kind}s")
     try:
         pull = cdsm.distribute_tension(pose, minimum, maximum, wrench)
     except cdsm.InfeasibleTension:
         return {Status.INFEASIBLE}, found
     found["tension"] = pull.values
+    low, high = checked_bounds(arm, minimum, maximum)
+    loads = [Loads.of(pose, low, high, wrench, u[:, None]) for u in np.eye(3)]
+    found["payload"] = np.array([largest_force(each) for each in loads])
     try:
         K = cdsm.stiffness(pose, pull)
     except cdsm.ElasticityRangeError:

@@ -1,0 +1,229 @@
+"""Clearance of the cables: from each other, from the links, from the edges of the disks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, NamedTuple, final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cdsm.batch.inputs import checked_threads, postures, run_slices
+from cdsm.kernels.clearance import clearance_rows
+from cdsm.kernels.tree import Indices, Routing
+from cdsm.manipulator import Manipulator
+from cdsm.posture import Posture
+from cdsm.support.format import plain
+from cdsm.support.validation import instance, quantity
+from cdsm.support.values import Array, ReadOnlyState, frozen
+
+KINDS = ("cable_clearance", "link_clearance", "disk_clearance")
+"""Clearances in the order of the kernel."""
+
+_BACKBONE = 0.2
+"""Radius of a link's backbone over that of the holes of its first disk, as the URDF draws it."""
+
+_ON = 1e-9
+"""A site this near to a disk [m] is on the disk."""
+
+
+@final
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class Clearance(ReadOnlyState):
+    """Smallest signed distances of the cables of an arm; made by :func:`clearance`.
+
+    A negative distance is the depth of an overlap. It is inf if there is no such pair.
+
+    Attributes:
+        posture: The posture.
+        diameter: Diameter of all cables [m].
+        cables: Between the surfaces of two cables [m].
+        links: Between a cable and the backbone of a link [m].
+        disks: Between a cable and a disk through which it does not run, or the edge of one
+            through which it runs [m].
+        nearest: What is nearest, two names for each of the three; empty names: there is none.
+    """
+
+    posture: Posture
+    diameter: float
+    cables: float
+    links: float
+    disks: float
+    nearest: tuple[tuple[str, str], tuple[str, str], tuple[str, str]]
+
+    def to_dict(self) -> dict[str, object]:
+        """Return the distances in SI for JSON, with units in the keys; inf as None."""
+        numbers: dict[str, object] = {**self.posture._coordinates, "diameter_m": self.diameter}
+        values = (self.cables, self.links, self.disks)
+        for kind, value, names in zip(KINDS, values, self.nearest, strict=True):
+            numbers |= {f"{kind}_m": value, f"{kind}_between": names}
+        return dict(plain(numbers))
+
+    def __repr__(self) -> str:
+        return f"<Clearance {1e3 * min(self.cables, self.links, self.disks):.4g} mm>"
+
+    def __str__(self) -> str:
+        lines = []
+        values = (self.cables, self.links, self.disks)
+        for kind, value, (one, other) in zip(KINDS, values, self.nearest, strict=True):
+            what = kind.partition("_")[0]
+            said = f"{1e3 * value:.4g} mm, {one} and {other}" if one else "none near"
+            lines.append(f"cable to {what:<6} {said}")
+        return "\n".join(lines)
+
+
+def clearance(pose: Posture, diameter: float = 0.0) -> Clearance:
+    """Compute the smallest signed distances of the cables at a posture.
+
+    Cables are straight between their sites, with round sections; leads are left out. Links are
+    backbones as the URDF draws them: from joint to joint, 0.2 R thick in radius; those of an arm
+    from a URDF are lines. Disks are plates without thickness. A cable that runs through its own
+    hole has the distance of the hole from the edge of the disk; through any other part of a disk
+    the distance is negative.
+
+    Args:
+        pose: The posture.
+        diameter: Diameter of all cables [m].
+
+    Raises:
+        InvalidInput: ``diameter`` is negative or not a length.
+    """
+    arm = instance("pose", pose, Posture).arm
+    d = quantity("diameter", diameter, "length", zero=True)
+    found, nearest = _rows(arm, pose.q[None], 1)
+    shape = _shape(arm)
+    cables, links, disks = (found[0] - d * np.array([1.0, 0.5, 0.5])).tolist()
+    names = [
+        ("", "") if second < 0 else (arm.cables[shape.segment[first, 0]].name, other[second])
+        for (first, second), other in zip(
+            nearest[0].tolist(),
+            (
+                [arm.cables[c].name for c in shape.segment[:, 0]],
+                shape.bone_names,
+                shape.disk_names,
+            ),
+            strict=True,
+        )
+    ]
+    return Clearance(
+        posture=pose,
+        diameter=d,
+        cables=cables,
+        links=links,
+        disks=disks,
+        nearest=(names[0], names[1], names[2]),
+    )
+
+
+def clearances(
+    arm: Manipulator, q: ArrayLike, diameter: float = 0.0, *, threads: int | None = None
+) -> dict[str, Array]:
+    """Compute the clearances of :func:`clearance` at many postures, (B,) [m] each, by name.
+
+    Args:
+        arm: The arm.
+        q: Joint angles (B, nv) [rad].
+        diameter: Diameter of all cables [m].
+        threads: Maximum number of threads; by default one for each core.
+
+    Raises:
+        InvalidInput: ``q`` is not (B, nv) numbers, or ``diameter`` is negative.
+    """
+    angles = postures(instance("arm", arm, Manipulator), q)
+    d = quantity("diameter", diameter, "length", zero=True)
+    found, _ = _rows(arm, angles, checked_threads(threads))
+    return {kind: found[:, i] - d * (1.0 if i == 0 else 0.5) for i, kind in enumerate(KINDS)}
+
+
+class _Shape(NamedTuple):
+    """Points, segments, bones and disks of an arm, as the kernel takes them; names for people."""
+
+    routing: Routing
+    segment: Indices
+    bone: Indices
+    bone_radius: Array
+    disk: Indices
+    disk_radius: Array
+    own: Indices
+    bone_names: list[str]
+    disk_names: list[str]
+
+
+def _rows(arm: Manipulator, q: Array, threads: int) -> tuple[Array, Indices]:
+    distance, nearest = np.empty((len(q), 3)), np.empty((len(q), 3, 2), dtype=np.intp)
+    shape = _shape(arm)
+
+    def fill(part: slice) -> None:
+        arguments: tuple[Any, ...] = (
+            *(arm._model.tree, *shape[:7]),
+            *(q[part], distance[part], nearest[part]),
+        )
+        clearance_rows(*arguments)
+
+    run_slices(fill, len(q), 1, threads)
+    return distance, nearest
+
+
+@lru_cache(maxsize=8)
+def _shape(arm: Manipulator) -> _Shape:
+    """Collect what can touch; kept for the last arms, since locating it takes milliseconds."""
+    model = arm._model
+    rows = model.routing.row.tolist()
+    points = model.routing.point.tolist()
+    segment = []
+    start = 0
+    for c, cable in enumerate(arm.cables):
+        segment += [(c, start + i, start + i + 1) for i in range(len(cable.sites) - 1)]
+        start += len(cable.sites)
+
+    def add(row: int, point: Array) -> int:
+        rows.append(row)
+        points.append(point.tolist())
+        return len(rows) - 1
+
+    names = ("the base", *(f"the link after {name}" for name in arm.joint_names))
+    radii = {}
+    if arm.is_serpentine:
+        for disk in reversed(arm.geometry.disks):
+            radii[model.body.locate(disk.link)[0]] = _BACKBONE * disk.hole_radius
+    ends = [
+        *zip(model.tree.parent[1:].tolist(), model.tree.translation[1:], strict=True),
+        (int(model.masses.tip), model.masses.point),
+    ]
+    bones = [
+        (add(row, np.zeros(3)), add(row, end), radii.get(row, 0.0), names[row])
+        for row, end in ends
+        if np.any(end)
+    ]
+    disks, own = [], np.zeros((len(segment), 0), dtype=np.intp)
+    if arm.is_serpentine:
+        for number, disk in enumerate(arm.geometry.disks, start=1):
+            row, rotation, translation = model.body.locate(disk.link)
+            place = translation + rotation @ np.array([disk.x, 0.0, 0.0])
+            ahead = place + rotation @ np.array([1.0, 0.0, 0.0])
+            disks.append((add(row, place), add(row, ahead), disk.radius, f"disk {number}"))
+            at = [
+                rows[p] == row and abs((np.array(points[p]) - place) @ (ahead - place)) < _ON
+                for p in range(start)
+            ]
+            column = [1 if at[a] else 2 if at[b] else 0 for _, a, b in segment]
+            own = np.column_stack([own, column]).astype(np.intp)
+    routing = Routing(
+        frozen(np.array(rows, dtype=np.intp)),
+        frozen(np.array(points)),
+        model.routing.segment,
+        model.routing.joint,
+        model.routing.fixed,
+    )
+    return _Shape(
+        routing,
+        np.array(segment, dtype=np.intp),
+        np.array([bone[:2] for bone in bones], dtype=np.intp).reshape(-1, 2),
+        np.array([bone[2] for bone in bones]),
+        np.array([disk[:2] for disk in disks], dtype=np.intp).reshape(-1, 2),
+        np.array([disk[2] for disk in disks]),
+        np.ascontiguousarray(own),
+        [bone[3] for bone in bones],
+        [disk[3] for disk in disks],
+    )

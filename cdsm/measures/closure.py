@@ -1,0 +1,59 @@
+"""Wrench closure, tension factor, and isotropy: how evenly cables act, and stiffness is."""
+
+from __future__ import annotations
+
+from cdsm.kernels.principal import principal_stiffness
+from cdsm.measures.program import tension_ratio
+from cdsm.posture import Posture
+from cdsm.stiffness_matrix import Stiffness
+from cdsm.support.validation import instance
+
+
+def tension_factor(pose: Posture) -> float:
+    """Compute how evenly cables can pull against each other [-]: max min F / max F, J_Lᵀ F = 0.
+
+    1: all tensions alike move nothing. 0: not all cables can be taut without a load, so the arm has
+    no wrench closure (:func:`has_wrench_closure`). The ratio is the largest of all tensions, by a
+    linear program. Pham, Yeo, Yang and Chen, Robotics and Autonomous Systems 57 (2009), take that
+    of one solution, so theirs may be smaller.
+
+    Args:
+        pose: The posture.
+
+    Raises:
+        InvalidInput: ``pose`` is not a posture.
+        SolverError: The linear program fails.
+    """
+    return tension_ratio(instance("pose", pose, Posture).length_jacobian)
+
+
+def has_wrench_closure(pose: Posture) -> bool:
+    """Return whether cables that only pull can balance any joint torque, if strong enough.
+
+    This needs J_Lᵀ of full rank, and F > 0 with J_Lᵀ F = 0 (Gouttefarde and Gosselin, IEEE T-RO 22,
+    2006). With limits of the tensions, see :func:`force_polytope`.
+
+    Args:
+        pose: The posture.
+
+    Raises:
+        InvalidInput: ``pose`` is not a posture.
+        SolverError: The linear program fails.
+    """
+    return tension_factor(pose) > 0.0
+
+
+def isotropy(stiffness: Stiffness) -> float:
+    """Compute the stiffness of the tip in its softest over that in its stiffest direction [-].
+
+    Both are extremes of 1/(uᵀ C_vv u), Eq. 20. 1: equal in all directions; 0: infinite in one.
+
+    Args:
+        stiffness: The stiffness; it must be stable.
+
+    Raises:
+        InvalidInput: ``stiffness`` is not a stiffness.
+        SingularStiffness: K_θ is singular.
+    """
+    K = instance("stiffness", stiffness, Stiffness)
+    return float(principal_stiffness(K.compliance[:3, :3])["isotropy"])

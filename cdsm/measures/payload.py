@@ -1,0 +1,228 @@
+"""Payload: the largest force that an arm holds at its tip."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass
+from typing import Final, Literal, final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cdsm.batch import evaluate
+from cdsm.measures.forces import ForcePolytope, force_polytope
+from cdsm.measures.program import Loads
+from cdsm.posture import Posture
+from cdsm.statics.buckling import critical_load
+from cdsm.stiffness_matrix import Stiffness, stiffness
+from cdsm.support.format import coordinates, plain
+from cdsm.support.status import Status
+from cdsm.support.validation import (
+    Direction,
+    instance,
+    quantity,
+    unit_direction,
+    wrench_vector,
+)
+from cdsm.support.values import Array, ReadOnlyState, frozen
+from cdsm.tension import bounds_at, distribute_tension
+
+PayloadLimit = Literal["tension", "deflection", "stability", "elasticity", "none"]
+
+_NO_WRENCH = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+_AROUND: Final = np.array([u for u in itertools.product((-1.0, 0.0, 1.0), repeat=3) if any(u)])
+"""Directions in which the worst payload is searched for loads that buckle the arm (26, 3)."""
+
+_STEPS: Final = np.arange(1, 17) / 16.0
+"""Parts of a load at which a direction is searched for loads that buckle the arm."""
+
+
+@final
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class Payload(ReadOnlyState):
+    """Largest force that an arm holds at its tip; made by :func:`payload`.
+
+    Attributes:
+        posture: The posture.
+        direction: Unit direction (3,) of the force, base axes.
+        worst: Whether it is the worst of all directions.
+        force: The largest force [N]: the smallest of ``limits``.
+        limit: What limits it.
+        limits: Largest force [N] for each limit alone; inf: none.
+    """
+
+    posture: Posture
+    direction: Array
+    worst: bool
+    force: float
+    limit: PayloadLimit
+    limits: dict[str, float]
+
+    def to_dict(self) -> dict[str, object]:
+        """Return force, direction and limits in SI for JSON, with units in the keys."""
+        numbers = {
+            **self.posture._coordinates,
+            "direction": self.direction,
+            "worst": self.worst,
+            "force_N": self.force,
+            "limit": self.limit,
+            "limits_N": self.limits,
+        }
+        return dict(plain(numbers))
+
+    def __repr__(self) -> str:
+        return f"<Payload {self}>"
+
+    def __str__(self) -> str:
+        along = coordinates(np.round(self.direction, 3) + 0.0, ".3g")
+        which = "the worst direction" if self.worst else "the direction"
+        return f"{self.force:.4g} N in {which} {along}, limit: {self.limit}"
+
+
+def payload(
+    pose: Posture,
+    direction: Direction | None = None,
+    minimum: ArrayLike = 0.0,
+    maximum: ArrayLike = math.inf,
+    wrench: ArrayLike = _NO_WRENCH,
+    *,
+    deflection: float = math.inf,
+    worst_friction: bool = False,
+) -> Payload:
+    """Compute the largest force f that the arm holds at its tip, besides W.
+
+        f = max f  so that  J_Lᵀ F = J_Xᵀ W + f J_vᵀ u − g,  minimum ≤ F ≤ maximum,
+
+    also f |C_vv u| ≤ ``deflection``, and K_θ positive definite under all loads up to f u. K_θ is
+    that of the least tensions under each load, C_vv that without the load: motors hold the cables,
+    then the force moves the tip, to first order. The worst direction has the smallest f: along the
+    normal of the nearest facet of the :func:`force_polytope`, or in the softest direction of C_vv.
+    Loads that buckle the arm are then searched for in 26 directions, 16 loads in each.
+
+    Args:
+        pose: The posture, which stays fixed.
+        direction: u: an axis such as ``"-z"``, or (3,), any length; None: the worst direction.
+        minimum: Lower bound of the tensions [N], for all cables or (C,).
+        maximum: Upper bound of the tensions [N], for all cables or (C,); for the worst direction
+            finite.
+        wrench: W (6,) at ``tool0`` in base axes that always acts: force [N], then moment [N m].
+        deflection: Largest displacement of the tip [m] that is allowed; inf: any.
+        worst_friction: As for :func:`~cdsm.distribute_tension`, in the limit of the tensions.
+
+    Raises:
+        InvalidInput: An argument has the wrong shape or range; or a cable has no upper bound.
+        InfeasibleTension: No tensions balance the arm without the force.
+        ElasticityRangeError: A tension without the force is outside the domain of its law.
+        SingularStiffness: K_θ without the force is singular.
+        SolverError: A linear program fails.
+    """
+    instance("pose", pose, Posture)
+    allowed = quantity("deflection", deflection, "length", infinite=True)
+    W = wrench_vector("wrench", wrench)
+    bare = distribute_tension(pose, minimum, maximum, W, worst_friction=worst_friction)
+    K = stiffness(pose, bare)
+    compliance = K.compliance[:3, :3] if K.is_stable else np.zeros((3, 3))
+    if direction is None:
+        polytope = force_polytope(pose, minimum, maximum, W, worst_friction=worst_friction)
+        u, limits = _worst(polytope, compliance, allowed)
+    else:
+        u = unit_direction("direction", direction)
+        limits = _along(pose, u, W, minimum, maximum, worst_friction, compliance, allowed)
+    known = min(limits.values())
+    low, high = bounds_at(pose, minimum, maximum, worst_friction)
+    u, held, kind = _until_unstable(K, u, known, low, high, worst=direction is None)
+    limits |= {"stability": held if kind == "buckling" else math.inf}
+    limits |= {"elasticity": held if kind == "elasticity" else math.inf}
+    force = max(min(limits.values()), 0.0)
+    reason = min(limits, key=lambda name: limits[name])
+    return Payload(
+        posture=pose,
+        direction=frozen(u),
+        worst=direction is None,
+        force=force,
+        limit="none" if math.isinf(force) else reason,  # type: ignore[arg-type]
+        limits=limits,
+    )
+
+
+def _along(
+    pose: Posture,
+    u: Array,
+    W: Array,
+    minimum: ArrayLike,
+    maximum: ArrayLike,
+    worst_friction: bool,
+    compliance: Array,
+    allowed: float,
+) -> dict[str, float]:
+    """Return the largest force along u by tensions and by deflection [N]."""
+    low, high = bounds_at(pose, minimum, maximum, worst_friction)
+    return {
+        "tension": largest_force(Loads.of(pose, low, high, W, u[:, None])),
+        "deflection": _ratio(allowed, float(np.linalg.norm(compliance @ u))),
+    }
+
+
+def largest_force(loads: Loads) -> float:
+    """Return the largest force [N] of loads in one direction; 0 if the arm holds none."""
+    found = loads.largest(np.ones(1), positive=True)
+    return 0.0 if found is None else found[0]
+
+
+def _worst(
+    polytope: ForcePolytope, compliance: Array, allowed: float
+) -> tuple[Array, dict[str, float]]:
+    """Return the worst direction of tensions and deflection, and both largest forces there [N]."""
+    tension = polytope.margin()
+    values, vectors = np.linalg.eigh(compliance.T @ compliance)
+    softest = _ratio(allowed, math.sqrt(max(float(values[-1]), 0.0)))
+    if softest >= tension:
+        u = polytope.worst_direction
+        return u, {
+            "tension": tension,
+            "deflection": _ratio(allowed, float(np.linalg.norm(compliance @ u))),
+        }
+    u = vectors[:, -1]
+    slopes = polytope.normals @ u
+    facing = slopes > 0.0
+    margin = float((polytope.offsets[facing] / slopes[facing]).min(initial=math.inf))
+    return u, {"tension": margin, "deflection": softest}
+
+
+def _ratio(allowed: float, compliance: float) -> float:
+    return allowed / compliance if compliance > 0.0 and math.isfinite(allowed) else math.inf
+
+
+def _until_unstable(
+    K: Stiffness, u: Array, most: float, low: Array, high: Array, *, worst: bool
+) -> tuple[Array, float, str]:
+    """Return the direction, and the force at which K_θ fails, and why; inf if none up to ``most``.
+
+    Of the worst direction, neighbouring ones are searched too; a worse one takes its place.
+    """
+    if not K.is_stable:
+        return u, 0.0, "buckling"
+    pose, W = K.posture, K.wrench
+    if most <= 0.0:
+        return u, math.inf, "none"
+    directions = np.vstack([u, _AROUND]) if worst else u[None]
+    directions = directions / np.linalg.norm(directions, axis=1)[:, None]
+    failing = [*range(len(directions))]
+    if math.isfinite(most):  # most directions hold: look only where a load fails
+        loads = most * (directions[:, None] * _STEPS[:, None]).reshape(-1, 3)
+        wrenches = W + np.hstack([loads, np.zeros_like(loads)])
+        q = np.repeat(pose.q[None], len(loads), axis=0)
+        found = evaluate(
+            pose.arm, q, None, wrenches, ("margin",), minimum=low, maximum=high, check_limits=False
+        )
+        fails = (found["margin"] <= 0.0) | (found.status == Status.OUTSIDE_ELASTICITY)
+        failing = np.flatnonzero(fails.reshape(len(directions), -1).any(axis=1)).tolist()
+    worst_found = u, math.inf, "none"
+    for i in failing:
+        load = np.concatenate([directions[i], np.zeros(3)])
+        critical = critical_load(pose, load, low, high, carried=W)
+        if critical.limit in ("buckling", "elasticity") and critical.factor < worst_found[1]:
+            worst_found = directions[i], critical.factor, critical.limit
+    return worst_found

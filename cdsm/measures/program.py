@@ -1,0 +1,124 @@
+"""Linear programs over the cable tensions that balance an arm.
+
+Loads x (k,) act at the tip along the columns of U (3, k), besides the wrench W. Balance (Eq. 13) is
+
+    J_Lᵀ F − J_vᵀ U x = J_Xᵀ W − g,   minimum ≤ F ≤ maximum.
+
+All programs below are linear in F and x; HiGHS (Huangfu and Hall, Math. Prog. Comp. 10, 2018) of
+scipy solves them.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple, Self
+
+import numpy as np
+
+from cdsm.errors import SolverError
+from cdsm.kernels import tension as tension_kernels
+from cdsm.posture import Posture
+from cdsm.support.values import Array
+
+_TIGHT = {"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10}
+
+_OPTIMAL, _INFEASIBLE, _UNBOUNDED = 0, 2, 3
+"""Status of scipy's linprog."""
+
+
+class Loads(NamedTuple):
+    """Balance under loads, in dimensionless form; see the module.
+
+    Attributes:
+        A: [J_Lᵀ, −J_vᵀ U], scaled (nv, C+k).
+        b: Torque J_Xᵀ W − g, scaled (nv,).
+        low: Lower bounds of the tensions, scaled (C,).
+        high: Upper bounds of the tensions, scaled (C,).
+        lever: Scale of each column (C+k,).
+        force: Unit of force [N].
+    """
+
+    A: Array
+    b: Array
+    low: Array
+    high: Array
+    lever: Array
+    force: float
+
+    @classmethod
+    def of(cls, pose: Posture, low: Array, high: Array, wrench: Array, directions: Array) -> Self:
+        """Build the balance of a posture with checked arguments; U (3, k) are directions."""
+        torque = pose.jacobian.T @ wrench - pose.gravity_torque
+        motion = pose.jacobian[:3].T @ directions
+        return cls.scaled(pose.length_jacobian, motion, torque, low, high, pose.arm.length)
+
+    @classmethod
+    def scaled(
+        cls, J: Array, motion: Array, torque: Array, low: Array, high: Array, length: float
+    ) -> Self:
+        """Build the balance from J_L (C, nv), J_vᵀ U (nv, k), the torque (nv,) and the bounds."""
+        A, b, low, high, arm, force = tension_kernels.scaled_balance(J, torque, low, high, length)
+        columns = np.hstack([A, -motion / arm])
+        # HiGHS drops entries below 1e-9, so each column is scaled by its own largest entry
+        lever = abs(columns).max(axis=0)
+        lever = np.where(lever > 0.0, lever, 1.0)
+        return cls(columns / lever, b, low, high, lever, force)
+
+    def largest(self, along: Array, *, positive: bool = False) -> tuple[float, Array] | None:
+        """Compute the largest a·x over all loads that the arm holds, and an x (k,) that has it.
+
+        The value is inf if there is no largest; x is then NaN. None: the arm holds no load at all.
+
+        Args:
+            along: a (k,).
+            positive: Allow only x ≥ 0.
+
+        Raises:
+            SolverError: The solver stops for another reason.
+        """
+        from scipy.optimize import linprog  # slow to import
+
+        count = self.low.size
+        ends = [*zip(self.low * self.lever[:count], self.high * self.lever[:count], strict=True)]
+        ends += [(0.0 if positive else None, None)] * along.size
+        cost = np.concatenate([np.zeros(count), -along / self.lever[count:]])
+        size = float(abs(cost).max()) or 1.0
+        found = linprog(
+            cost / size, A_eq=self.A, b_eq=self.b, bounds=ends, method="highs", options=_TIGHT
+        )
+        if found.status == _INFEASIBLE:
+            return None
+        if found.status == _UNBOUNDED:
+            return math.inf, np.full(along.size, math.nan)
+        if found.status != _OPTIMAL:
+            raise SolverError("highs", f"cannot tell the largest load: {found.message}")
+        x = found.x[count:] / self.lever[count:] * self.force
+        return float(along @ x), x
+
+
+def tension_ratio(J: Array) -> float:
+    """Compute max min F / max F over tensions F with J_Lᵀ F = 0 [-]; 0 if there is no closure."""
+    from scipy.optimize import linprog
+
+    count, nv = J.shape
+    lever = abs(J).max()
+    if lever == 0.0 or np.linalg.matrix_rank(J) < nv:
+        return 0.0
+    found = linprog(
+        np.concatenate([np.zeros(count), [-1.0]]),
+        A_eq=np.hstack([J.T / lever, np.zeros((nv, 1))]),
+        b_eq=np.zeros(nv),
+        A_ub=np.hstack([-np.eye(count), np.ones((count, 1))]),
+        b_ub=np.zeros(count),
+        bounds=(0.0, 1.0),
+        method="highs",
+        options=_TIGHT,
+    )
+    if found.status != _OPTIMAL:
+        raise SolverError("highs", f"cannot tell the tension factor: {found.message}")
+    ratio = float(found.x[-1])
+    return ratio if ratio > CLOSED else 0.0
+
+
+CLOSED = 1e-9
+"""Smaller ratios of tensions are rounding of the linear program: no closure."""

@@ -1,0 +1,141 @@
+"""Clearances against a direct computation, and against trimesh."""
+
+from itertools import combinations
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+
+import cdsm
+from cdsm.measures.clearance import clearances
+from cdsm.support.values import Array
+from tests.support.arms import mixed_arm, random_arm, random_posture
+
+
+def between(one: Array, other: Array) -> float:
+    """Distance of two segments (2, 3) by a search of two places."""
+
+    def square(t: Array) -> float:
+        apart = one[0] + t[0] * (one[1] - one[0]) - other[0] - t[1] * (other[1] - other[0])
+        return float(1e6 * apart @ apart)
+
+    starts = [(0.0, 0.0), (0.0, 1.0), (1.0, 0.0), (1.0, 1.0), (0.5, 0.5)]
+    found = [
+        minimize(square, start, bounds=[(0.0, 1.0)] * 2, method="L-BFGS-B", options={"ftol": 1e-16})
+        for start in starts
+    ]
+    return 1e-3 * float(np.sqrt(min(each.fun for each in found)))
+
+
+def direct(pose: cdsm.Posture) -> tuple[float, float, float]:
+    """Clearances of an arm with disks, from its link poses and cable paths alone."""
+    geometry = pose.arm.geometry
+    segments = [
+        (c, path[i : i + 2], i)
+        for c, path in enumerate(pose.cable_paths)
+        for i in range(len(path) - 1)
+    ]
+    cables = min(between(a, b) for (c, a, _), (d, b, _) in combinations(segments, 2) if c != d)
+    links = disks = np.inf
+    lengths = [geometry.base_length, *(link.length for link in geometry.links)]
+    names = ["base_disk", *(f"link{k + 1}" for k in range(len(geometry.links)))]
+    for name, length in zip(names, lengths, strict=True):
+        placement = pose.link_pose(name)
+        if length == 0.0:
+            continue
+        bone = placement[:3, 3] + np.array([[0.0], [length]]) * placement[:3, 0]
+        radius = 0.2 * next(disk.hole_radius for disk in geometry.disks if disk.link == name)
+        links = min(links, *(between(path, bone) - radius for _, path, _ in segments))
+    for number, disk in enumerate(geometry.disks):
+        placement = pose.link_pose(disk.link)
+        centre = placement[:3, 3] + disk.x * placement[:3, 0]
+        for _, path, i in segments:
+            local = (path - centre) @ placement[:3, :3]
+            if number in (i, i + 1):
+                disks = min(disks, disk.radius - np.hypot(*local[number - i, 1:]))
+                continue
+            t = np.linspace(0.0, 1.0, 200_001)[:, None]
+            points = local[0] + t * (local[1] - local[0])
+            out = np.hypot(points[:, 1], points[:, 2]) - disk.radius
+            if local[0, 0] * local[1, 0] < 0.0:
+                crossing = float(np.interp(0.0, *_rising(points[:, 0], out)))
+                if crossing < 0.0:
+                    disks = min(disks, crossing)
+                    continue
+            disks = min(disks, float(np.hypot(points[:, 0], np.maximum(out, 0.0)).min()))
+    return cables, links, disks
+
+
+def _rising(x: Array, y: Array) -> tuple[Array, Array]:
+    order = np.argsort(x)
+    return x[order], y[order]
+
+
+@pytest.mark.parametrize(
+    ("arm", "reach"),
+    [(random_arm(0, 2), 0.5), (random_arm(1, 3, "hinged"), 1.0), (mixed_arm(), 0.9)],
+)
+def test_clearances_equal_a_direct_computation(arm: cdsm.Manipulator, reach: float) -> None:
+    for seed in range(3):
+        pose = random_posture(arm, seed, reach)
+        found = cdsm.clearance(pose)
+        expected = direct(pose)
+        # the search of two places stops at 1e-7 m
+        assert (found.cables, found.links, found.disks) == pytest.approx(expected, abs=2e-7)
+
+
+def test_trimesh_measures_the_same_way_to_a_disk() -> None:
+    trimesh = pytest.importorskip("trimesh")
+    arm = random_arm(4, 4)
+    pose = arm.at(np.tile([0.9, 0.0], 4) * arm.upper)
+    found = cdsm.clearance(pose)
+    ours = []
+    for number, disk in enumerate(arm.geometry.disks):
+        placement = pose.link_pose(disk.link)
+        turn = np.eye(4)
+        turn[:3, :3] = placement[:3, :3] @ np.array([[0, 0, 1], [0, 1, 0], [-1, 0, 0]])
+        turn[:3, 3] = placement[:3, 3] + disk.x * placement[:3, 0]
+        plate = trimesh.creation.cylinder(disk.radius, 1e-9, sections=512, transform=turn)
+        for path in pose.cable_paths:
+            for i in range(len(path) - 1):
+                if number in (i, i + 1):
+                    continue
+                t = np.linspace(0.0, 1.0, 201)[:, None]
+                points = path[i] + t * (path[i + 1] - path[i])
+                ours.append(float(trimesh.proximity.closest_point(plate, points)[1].min()))
+    own = 0.1 * arm.geometry.hole_radius  # holes of one circle, on disks of 1.1 times its radius
+    # samples of the segment and sides of the polygon: 1e-4 m
+    assert min(found.disks, own) == pytest.approx(min(*ours, own), abs=1e-4)
+
+
+def test_batch_is_the_single_posture_and_diameters_count() -> None:
+    arm = mixed_arm()
+    rng = np.random.default_rng(0)
+    q = rng.uniform(-0.3, 0.3, (20, arm.nv))
+    rows = clearances(arm, q, 1e-3)
+    for n in range(len(q)):
+        one, thin = cdsm.clearance(arm.at(q[n]), 1e-3), cdsm.clearance(arm.at(q[n]))
+        assert (one.cables, one.links, one.disks) == tuple(each[n] for each in rows.values())
+        assert thin.cables - one.cables == pytest.approx(1e-3)
+        assert thin.links - one.links == pytest.approx(0.5e-3)
+
+
+def test_a_cable_through_a_plate_has_a_negative_clearance() -> None:
+    arm = cdsm.presets.virtual_prototype()
+    # both angles of a joint near their limit: the disks beside it overlap
+    q = np.random.default_rng(0).uniform(-0.6, 0.6, (300, 10))
+    worst = int(clearances(arm, q)["disk_clearance"].argmin())
+    pose = arm.at(q[worst])
+    found = cdsm.clearance(pose)
+    assert found.disks < -1e-3
+    assert found.disks == pytest.approx(direct(pose)[2], abs=1e-9)
+    assert "cable to disk" in str(found)
+
+
+def test_an_arm_without_disks_has_no_edges() -> None:
+    arm = random_arm(0, 1)
+    robot = cdsm.Manipulator.from_urdf(arm.urdf, arm.cables, tip="tool0")
+    found = cdsm.clearance(robot.at([0.1, 0.0]))
+    assert found.disks == np.inf
+    assert found.nearest[2] == ("", "")
+    assert found.cables == pytest.approx(cdsm.clearance(arm.at([0.1, 0.0])).cables)

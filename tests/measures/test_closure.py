@@ -1,0 +1,77 @@
+"""Tension factor, wrench closure, isotropy and the use of wires against closed forms."""
+
+import numpy as np
+import pytest
+
+import cdsm
+from tests.support.arms import random_arm, random_posture
+
+
+def one_joint(angles: tuple[float, ...]) -> cdsm.Manipulator:
+    geometry = cdsm.Geometry.universal(
+        joints=1, hole_angles=angles, link_length=0.1, base_length=0.02, disk_offset=0.01,
+        hole_radius=0.02, link_mass=0.1, friction=0.1, lead=0.1,
+    )  # fmt: skip
+    return cdsm.Manipulator(geometry, cdsm.presets.ELASTIC_STAGE)
+
+
+def test_three_even_cables_of_a_straight_joint_pull_alike() -> None:
+    even = np.deg2rad([10.0, 130.0, 250.0])
+    assert cdsm.tension_factor(one_joint(tuple(even)).at([0.0, 0.0])) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_one_more_cable_than_joints_has_one_ratio(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    pose = one_joint(tuple(np.deg2rad([0.0, 120.0, 240.0]) + rng.uniform(-0.5, 0.5, 3))).at(
+        rng.uniform(-0.3, 0.3, 2)
+    )
+    null = np.linalg.svd(pose.length_jacobian.T)[2][-1]
+    assert (null > 0.0).all() or (null < 0.0).all()
+    # CASPR's TensionFactorMetric, and that of Pham et al., is this ratio
+    assert cdsm.tension_factor(pose) == pytest.approx(abs(null).min() / abs(null).max(), rel=1e-8)
+    assert cdsm.has_wrench_closure(pose)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_no_search_finds_more_even_tensions(seed: int) -> None:
+    pose = random_posture(random_arm(seed, 2), seed)
+    factor = cdsm.tension_factor(pose)
+    null = np.linalg.svd(pose.length_jacobian.T)[2][pose.arm.nv :]
+    tried = np.random.default_rng(seed).normal(size=(100_000, len(null))) @ null
+    ratios = tried.min(axis=1) / tried.max(axis=1)
+    best = ratios[(tried > 0.0).all(axis=1)].max(initial=0.0)
+    assert best <= factor + 1e-9
+    assert best > 0.7 * factor
+
+
+def test_cables_on_one_side_close_nothing() -> None:
+    pose = one_joint(tuple(np.deg2rad([-40.0, 0.0, 40.0]))).at([0.0, 0.0])
+    assert cdsm.tension_factor(pose) == 0.0
+    assert not cdsm.has_wrench_closure(pose)
+
+
+def test_isotropy_is_the_ratio_of_extremes() -> None:
+    pose = cdsm.presets.virtual_prototype().at(np.full(10, cdsm.presets.TEN_DEGREES))
+    K = cdsm.stiffness(pose, cdsm.distribute_tension(pose, 50.0))
+    values = 1.0 / np.linalg.eigvalsh(K.compliance[:3, :3])
+    assert cdsm.isotropy(K) == pytest.approx(values.min() / values.max(), rel=1e-10)
+
+
+def test_strain_safety_and_life_of_wires() -> None:
+    pose = one_joint(tuple(np.deg2rad([0.0, 120.0, 240.0]))).at([0.2, 0.1])
+    tension = cdsm.distribute_tension(pose, 50.0)
+    use = cdsm.wire_use(tension, diameter=1e-3, breaking_load=1000.0, bend_diameter=5e-3)
+    F = tension.values
+    assert use.strain == pytest.approx(F / 48e3)
+    assert use.safety == pytest.approx(1000.0 / F)
+    assert use.bend_ratio == pytest.approx(5.0)
+    pressure = 2.0 * F / (1e-3 * 5e-3)
+    assert use.life_margin == pytest.approx(0.001 * 1770e6 / pressure)
+    rough = cdsm.wire_use(
+        tension, diameter=1e-3, breaking_load=1000.0, bend_diameter=5e-3, worst_friction=True
+    )
+    wrap = pose.segments.wrap.reshape(3, 1)
+    assert rough.largest == pytest.approx(F * np.exp(0.1 * wrap[:, 0]))
+    with pytest.raises(cdsm.InvalidInput, match="diameter"):
+        cdsm.wire_use(tension, diameter=0.0, breaking_load=1.0, bend_diameter=1.0)

@@ -1,0 +1,186 @@
+"""Force polytope and payload against exhaustive searches and another library."""
+
+from itertools import combinations
+
+import numpy as np
+import pytest
+from scipy.spatial import ConvexHull
+
+import cdsm
+from cdsm.support.values import Array
+from tests.support.arms import mixed_arm, random_arm, random_posture
+
+LOW, HIGH = 5.0, 80.0
+
+
+def corners(pose: cdsm.Posture, low: float, high: float) -> Array:
+    """All corners of the force polytope, by trying every set of cables at their bounds."""
+    J, Jv = pose.length_jacobian, pose.jacobian[:3]
+    count, nv = J.shape
+    free = nv - 3  # tensions that the equations determine besides the force
+    found = []
+    for between in combinations(range(count), free):
+        rest = [c for c in range(count) if c not in between]
+        matrix = np.column_stack([J[list(between)].T, -Jv.T])
+        if np.linalg.cond(matrix) > 1e10:
+            continue
+        for ends in np.ndindex(*[2] * len(rest)):
+            F = np.where(np.array(ends) == 0, low, high)
+            x = np.linalg.solve(matrix, -pose.gravity_torque - J[rest].T @ F)
+            if (x[:free] >= low - 1e-9).all() and (x[:free] <= high + 1e-9).all():
+                found.append(x[free:])
+    return np.array(found)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_vertices_are_those_of_an_exhaustive_search(seed: int) -> None:
+    arm = random_arm(seed, 2)
+    pose = random_posture(arm, seed)
+    tried = corners(pose, 5.0, 200.0)
+    if not len(tried):
+        with pytest.raises(cdsm.InfeasibleTension):
+            cdsm.force_polytope(pose, 5.0, 200.0)
+        return
+    expected = ConvexHull(tried)
+    found = cdsm.force_polytope(pose, 5.0, 200.0)
+    size = np.ptp(tried, axis=0).max()
+    assert found.volume == pytest.approx(expected.volume, rel=1e-7)
+    assert (found.vertices @ found.normals.T).max(axis=0) == pytest.approx(found.offsets, rel=1e-8)
+    gaps = np.linalg.norm(found.vertices[:, None] - tried[None], axis=2).min(axis=1)
+    assert gaps.max() < 1e-7 * size
+    zero = -expected.equations[:, 3].max() if (expected.equations[:, 3] > 0).any() else None
+    distance = (-expected.equations[:, 3]).min() if zero is None else zero
+    assert found.margin() == pytest.approx(distance, rel=1e-6)
+
+
+@pytest.mark.parametrize("arm", [mixed_arm(), cdsm.presets.virtual_prototype()])
+def test_payload_is_where_tensions_end(arm: cdsm.Manipulator) -> None:
+    pose = random_posture(arm, 3, 0.3)
+    maximum = 60.0 if arm.nv < 10 else 800.0
+    minimum = 0.0 if arm.nv < 10 else 15.0
+    rng = np.random.default_rng(1)
+    for u in rng.normal(size=(3, 3)):
+        held = cdsm.payload(pose, u, minimum, maximum)
+        if held.limit != "tension":
+            continue
+        load = np.concatenate([u / np.linalg.norm(u), np.zeros(3)])
+        cdsm.distribute_tension(pose, minimum, maximum, (1.0 - 1e-6) * held.force * load)
+        with pytest.raises(cdsm.InfeasibleTension):
+            cdsm.distribute_tension(pose, minimum, maximum, (1.0 + 1e-6) * held.force * load)
+
+
+def test_no_direction_is_worse_than_the_worst() -> None:
+    pose = cdsm.presets.virtual_prototype().at(cdsm.presets.TEN_DEGREES * np.arange(1, 11) / 8.0)
+    worst = cdsm.payload(pose, None, 15.0, 800.0)
+    again = cdsm.payload(pose, worst.direction, 15.0, 800.0)
+    assert worst.worst
+    assert worst.limit == "tension"
+    assert again.force == pytest.approx(worst.force, rel=1e-7)
+    # exhaustive: a fine sphere of directions, by the support of the polytope and by programs
+    rng = np.random.default_rng(0)
+    near = worst.direction + 0.05 * rng.normal(size=(15, 3))
+    forces = [cdsm.payload(pose, u, 15.0, 800.0).force for u in [*rng.normal(size=(15, 3)), *near]]
+    assert min(forces) >= worst.force * (1.0 - 1e-9)
+    assert min(forces) < 1.05 * worst.force
+
+
+def test_deflection_limits_the_payload() -> None:
+    pose = cdsm.presets.virtual_prototype().at(np.full(10, cdsm.presets.TEN_DEGREES))
+    K = cdsm.stiffness(pose, cdsm.distribute_tension(pose, 50.0, 800.0))
+    C = K.compliance[:3, :3]
+    held = cdsm.payload(pose, "z", 50.0, 800.0, deflection=1e-3)
+    assert held.limit == "deflection"
+    assert held.force == pytest.approx(1e-3 / np.linalg.norm(C[:, 2]), rel=1e-12)
+    worst = cdsm.payload(pose, None, 50.0, 800.0, deflection=1e-3)
+    assert worst.force == pytest.approx(1e-3 / np.linalg.norm(C, 2), rel=1e-9)
+    assert np.linalg.norm(C @ worst.direction) * worst.force == pytest.approx(1e-3, rel=1e-9)
+
+
+def test_a_soft_arm_buckles_before_its_cables_are_at_their_limit() -> None:
+    geometry = cdsm.presets.virtual_prototype_geometry(link_mass=0.01)
+    cables = cdsm.serpentine_cables(geometry, cdsm.presets.ELASTIC_STAGE, series_stiffness=3000.0)
+    pose = cdsm.Manipulator(geometry, cables=cables).at(np.full(10, 0.05))
+    held = cdsm.payload(pose, "-x", 10.0, 500.0)
+    load = np.array([-1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    critical = cdsm.critical_load(pose, load, 10.0, 500.0)
+    assert critical.limit == "buckling"
+    assert held.limit == "stability"
+    assert held.force == critical.factor
+    assert cdsm.payload(pose, None, 10.0, 500.0).force <= held.force
+
+
+def test_the_worst_friction_takes_from_both_ends() -> None:
+    arm = cdsm.presets.virtual_prototype(friction=0.1)
+    pose = arm.at(np.full(10, cdsm.presets.TEN_DEGREES))
+    free = cdsm.payload(pose, "z", 15.0, 200.0)
+    rough = cdsm.payload(pose, "z", 15.0, 200.0, worst_friction=True)
+    assert 0.0 < rough.force < free.force
+    load = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+    with pytest.raises(cdsm.InfeasibleTension):
+        cdsm.distribute_tension(
+            pose, 15.0, 200.0, (1.0 + 1e-6) * rough.force * load, worst_friction=True
+        )
+    polytope = cdsm.force_polytope(pose, 15.0, 200.0, worst_friction=True)
+    along = polytope.normals[:, 2] > 0.0
+    ends = polytope.offsets[along] / polytope.normals[along, 2]
+    assert ends.min() == pytest.approx(rough.force, rel=1e-7)
+
+
+def test_pycapacity_finds_the_same_polytope() -> None:
+    pose = cdsm.presets.virtual_prototype().at(np.full(10, cdsm.presets.TEN_DEGREES))
+    found = cdsm.force_polytope(pose, 15.0, 800.0)
+    # pycapacity 2.1.9, human.force_polytope(J_v, J_Lᵀ, 15, 800, 1e-9, −g)
+    assert len(found.vertices) == 48
+    assert found.volume == pytest.approx(VOLUME, rel=1e-9)
+    assert found.margin() == pytest.approx(MARGIN, rel=1e-9)
+    human = pytest.importorskip("pycapacity.human")
+    theirs = human.force_polytope(
+        pose.jacobian[:3],
+        pose.length_jacobian.T,
+        np.full(15, 15.0),
+        np.full(15, 800.0),
+        1e-9,
+        torque_bias=-pose.gravity_torque,
+    ).vertices.T
+    gaps = np.linalg.norm(found.vertices[:, None] - theirs[None], axis=2)
+    assert gaps.min(axis=0).max() < 1e-6
+    assert gaps.min(axis=1).max() < 1e-6
+
+
+VOLUME, MARGIN = 1062976867.6507927, 471.80850355
+
+
+def test_where_the_tip_cannot_move_the_links_hold_any_force() -> None:
+    pose = cdsm.presets.virtual_prototype().at(np.zeros(10))
+    polytope = cdsm.force_polytope(pose, 15.0, 800.0)
+    assert abs(polytope.unbounded) == pytest.approx(np.array([[1.0, 0.0, 0.0]]))
+    assert np.isinf(polytope.volume)
+    assert cdsm.payload(pose, "x", 15.0, 800.0).limits["tension"] == np.inf
+    side = cdsm.payload(pose, polytope.worst_direction, 15.0, 800.0)
+    assert side.force == pytest.approx(polytope.margin(), rel=1e-7)
+
+
+def test_a_pair_holds_a_segment_of_forces() -> None:
+    geometry = cdsm.Geometry.hinged(
+        joints=1, twist=0.0, link_length=0.1, base_length=0.02, disk_offset=0.01,
+        hole_radius=0.02, link_mass=0.0,
+    )  # fmt: skip
+    law = cdsm.presets.ELASTIC_STAGE
+    pose = cdsm.Manipulator(geometry, law, gravity=(0.0, 0.0, 0.0)).at([0.0])
+    polytope = cdsm.force_polytope(pose, 10.0, 110.0)
+    # one cable 110 N, the other 10 N, on 20 mm; the tip is 100 mm away
+    assert polytope.margin() == pytest.approx(100.0 * 0.02 / 0.1, rel=1e-9)
+    assert sorted(polytope.vertices[:, 2]) == pytest.approx([-20.0, 20.0])
+    assert len(polytope.unbounded) == 2
+
+
+def test_errors_name_what_is_missing() -> None:
+    pose = cdsm.presets.virtual_prototype().at(np.zeros(10))
+    with pytest.raises(cdsm.InvalidInput, match="maximum: cable1_1 has none"):
+        cdsm.force_polytope(pose, 15.0)
+    with pytest.raises(cdsm.InfeasibleTension):
+        cdsm.force_polytope(pose, 15.0, 20.0, (0.0, 0.0, -100.0, 0.0, 0.0, 0.0))
+    with pytest.raises(cdsm.InvalidInput, match="deflection"):
+        cdsm.payload(pose, "z", 15.0, 100.0, deflection=-1.0)
+    with pytest.raises(cdsm.InvalidInput, match="force"):
+        cdsm.force_polytope(pose, 15.0, 800.0).margin([1.0, 2.0])
