@@ -13,6 +13,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from cdsm import control as control
     from cdsm import paper as paper
     from cdsm import plots as plots
     from cdsm import presets
@@ -20,6 +21,10 @@ if TYPE_CHECKING:
     from cdsm.arm_file.cables import read_cables, write_cables
     from cdsm.batch import Batch, Tensions, distribute_tensions, evaluate
     from cdsm.cable import Cable, Cables, Site, in_series, serpentine_cables
+    from cdsm.control.plant import SlowPlant
+    from cdsm.control.run import TrackingRun
+    from cdsm.control.sensors import Sensors
+    from cdsm.control.track import track
     from cdsm.elasticity import Domain, Elasticity, LinearElasticity
     from cdsm.errors import (
         CableError,
@@ -151,10 +156,12 @@ __all__ = [
     "RestBand",
     "Saturation",
     "SelfCheck",
+    "Sensors",
     "Shares",
     "SingularMass",
     "SingularStiffness",
     "Site",
+    "SlowPlant",
     "SolverError",
     "Status",
     "Stiffness",
@@ -172,6 +179,7 @@ __all__ = [
     "Tensions",
     "Tolerance",
     "Tolerances",
+    "TrackingRun",
     "Uncertainty",
     "UnknownName",
     "UnreachableStiffness",
@@ -220,6 +228,7 @@ __all__ = [
     "tension_factor",
     "to_mjcf",
     "to_urdf",
+    "track",
     "uncertainty",
     "weight_test",
     "wire_use",
@@ -235,6 +244,10 @@ _NAMES = {
     "arm_file.cables": "read_cables write_cables",
     "batch": "Batch Tensions distribute_tensions evaluate",
     "cable": "Cable Cables Site in_series serpentine_cables",
+    "control.plant": "SlowPlant",
+    "control.run": "TrackingRun",
+    "control.sensors": "Sensors",
+    "control.track": "track",
     "elasticity": "Domain Elasticity LinearElasticity",
     "errors": (
         "CableError CdsmError CdsmWarning ClusterError ElasticityRangeError EquilibriumError "
@@ -295,7 +308,7 @@ _NAMES = {
 """Public names by the module they come from, which is imported when one is first touched."""
 
 _HOME = {name: f"cdsm.{module}" for module, names in _NAMES.items() for name in names.split()}
-_MODULES = ("paper", "plots", "presets", "view")
+_MODULES = ("control", "paper", "plots", "presets", "view")
 
 if not TYPE_CHECKING:  # a type checker would take any name for one that exists
 

@@ -35,6 +35,7 @@ from tests.support.arms import (
 )
 from tests.support.patience import HANGS
 from tests.support.processes import uncompiled
+from tests.support.tracking import small_path
 
 ROOT = Path(__file__).parents[1]
 
@@ -278,6 +279,7 @@ RESULTS: dict[str, Any] = {
     "ForcePolytope": cdsm.force_polytope(POSE, 1.0, 200.0),
     "Payload": cdsm.payload(POSE, "z", 1.0, 200.0, deflection=1e-3),
     "WireUse": cdsm.wire_use(PULL, diameter=1e-3, breaking_load=1e3, bend_diameter=5e-3),
+    "TrackingRun": cdsm.track(small_path(0.1), steps=1, minimum=10.0),
 }
 
 PLAIN: dict[str, Any] = {
@@ -295,6 +297,7 @@ PLAIN: dict[str, Any] = {
     "StrandElasticity": cdsm.presets.STRAND_1X19,
     "Domain": cdsm.presets.STRAND_1X19.domain,
     "SelfCheck": K.report().self_check,
+    "Sensors": cdsm.Sensors(tension_noise=0.5),
 }
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from abc import ABC, abstractmethod
 from pathlib import Path
@@ -12,7 +13,8 @@ from numpy.typing import ArrayLike
 
 from cdsm.elasticity.domain import Domain
 from cdsm.elasticity.inverse import tension_at
-from cdsm.support.validation import number_array
+from cdsm.errors import InvalidInput
+from cdsm.support.validation import number_array, scalar
 from cdsm.support.values import Array
 
 if TYPE_CHECKING:
@@ -87,6 +89,22 @@ class Elasticity(ABC):
         from cdsm.wires.slack import SlackBelow
 
         return self if 0.0 in self.domain else SlackBelow(self)
+
+    def scaled(self, factor: float) -> Elasticity:
+        """Return this law with ``factor`` times its rigidity: a stiffer or softer spool.
+
+        Strains are divided by the factor. The laws of cdsm define it; a user-defined law must
+        define it itself.
+
+        Args:
+            factor: Rigidity of the new law over that of this one [-], positive.
+
+        Raises:
+            InvalidInput: ``factor`` is not a positive number, or this law does not define it.
+        """
+        raise InvalidInput(
+            "elasticity", f"{self!r} does not say how it scales; define its scaled(factor)."
+        )
 
     @abstractmethod
     def rigidity(self, tension: ArrayLike) -> Array:
@@ -168,3 +186,11 @@ class Elasticity(ABC):
         secant = np.array(self.rigidity(values))
         np.divide(values - self.rest, strain, out=secant, where=strain != 0.0)
         return secant
+
+
+def positive_factor(factor: float) -> float:
+    """Check the factor of :meth:`Elasticity.scaled`; raise InvalidInput if it is not positive."""
+    number = scalar("factor", factor)
+    if not 0.0 < number < math.inf:
+        raise InvalidInput("factor", f"{number:g} given; a positive number is needed.")
+    return number

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm.elasticity.domain import Domain
-from cdsm.elasticity.law import Elasticity
+from cdsm.elasticity.law import Elasticity, positive_factor
 from cdsm.errors import InvalidInput
 from cdsm.support.validation import quantity, scalar
 from cdsm.support.values import Array
@@ -58,6 +58,10 @@ class LinearElasticity(Elasticity):
     def domain(self) -> Domain:
         """All tensions: [0 N, inf N)."""
         return _ALL_TENSIONS
+
+    def scaled(self, factor: float) -> LinearElasticity:
+        """Return the law of factor × EA; see :meth:`Elasticity.scaled`."""
+        return LinearElasticity(positive_factor(factor) * self._rigidity)
 
     def rigidity(self, tension: ArrayLike) -> Array:
         """Return EA [N] for every tension; see :meth:`Elasticity.rigidity`."""

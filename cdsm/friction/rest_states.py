@@ -254,7 +254,10 @@ def _cone(K: Stiffness, near: Neighbourhood, far: Remainders, size: int) -> tupl
     linear = near.largest(slope)
     rest = mu * np.where(smooth, far.wrap, far.turn)
     most = linear + rest
-    curved = rest + most**2 / 2.0 * np.exp(most)
+    with np.errstate(over="ignore"):  # a neighbourhood as wide as that holds no band
+        curved = rest + most**2 / 2.0 * np.exp(most)
+    if not np.isfinite(curved).all():
+        raise SolverError("highs", "finds no band: friction may hold the arm too far away")
     blocks, bounds = [], []
     for here, there in ((hole, hole + 1), (hole + 1, hole)):
         rows = np.zeros((hole.size, size))

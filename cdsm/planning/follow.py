@@ -10,7 +10,7 @@ from cdsm.planning.admissible import Admissible
 from cdsm.planning.path_plan import InfeasibleSample
 from cdsm.planning.planner import Planner
 from cdsm.planning.sqp import EFFORT, Program, search
-from cdsm.planning.stiffness_model import Constraints, StiffnessModel
+from cdsm.planning.stiffness_model import Constraints, ConstraintValues, StiffnessModel
 from cdsm.support.values import Array
 
 _MISSED = (
@@ -79,18 +79,12 @@ class Follower:
         self, sample: Sample, region: Admissible | None, start: Array, centre: Array | float = 0.0
     ) -> Sample | None:
         """Search once for the least tensions, or for the nearest to a centre."""
-        F = None if region is None else region.nearest(start, region.low, region.high)
-        if region is None or F is None:
+        if region is None:
             return None
-        point = sample.model.at(F)
-        if point.reserve <= 0.0:
+        found = _search(sample.model, region, sample.constraints, start, centre)
+        if found is None or not found[0].met(found[1]):
             return None
-        unit = max(region.scale, float(point.F.max()))
-        program = Program(region, point, sample.constraints, EFFORT, unit, centre)
-        found = search(program, point)
-        if not program.met(found):
-            return None
-        return replace(sample, F=region.tension(found.evaluation.F).values)
+        return replace(sample, F=region.tension(found[1].evaluation.F).values)
 
     def _from_scratch(self, sample: Sample) -> Sample | None:
         """Find the least tensions at any rate; return None if several targets are not hit."""
@@ -132,3 +126,40 @@ class Follower:
             f"sample {last.index}, and {allowed[cable]:.4g} N are allowed. Raise rate, or change "
             "the target more slowly.",
         )
+
+
+def least_change(
+    model: StiffnessModel, constraints: Constraints, before: Array, rate: Array
+) -> Array | None:
+    """Return the tensions (C,) [N] nearest to those before that hit the targets, within a rate.
+
+    If none are found that hit them, they come as near as one search finds. None if no tensions
+    within the rate hold the arm.
+    """
+    region = model.region.within(rate, before)
+    found = None if region is None else _search(model, region, constraints, before, before)
+    if region is None or found is None:
+        return None
+    return region.tension(found[1].evaluation.F).values
+
+
+def _search(
+    model: StiffnessModel,
+    region: Admissible,
+    constraints: Constraints,
+    start: Array,
+    centre: Array | float,
+) -> tuple[Program, ConstraintValues] | None:
+    """Search once, from the tensions of a region nearest to a start, for those nearest to a centre.
+
+    Return the program and where the search ends; None if the region or the start holds no arm.
+    """
+    F = region.nearest(start, region.low, region.high)
+    if F is None:
+        return None
+    point = model.at(F)
+    if point.reserve <= 0.0:
+        return None
+    unit = max(region.scale, float(point.F.max()))
+    program = Program(region, point, constraints, EFFORT, unit, centre)
+    return program, search(program, point)

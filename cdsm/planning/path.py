@@ -117,9 +117,7 @@ def plan_path(
     targets = _per_sample("target", target, tail, size)
     check_positive(directions, targets)
     loads = _per_sample("wrench", wrench, (6,), size)
-    limit = bound("rate", rate, len(arm.cables))
-    if not (limit > 0.0).all():
-        raise InvalidInput("rate", f"{limit.min():g} N given; it must be positive, or inf for any.")
+    limit = checked_rate(arm, rate)
     checked_bounds(arm, minimum, maximum)  # check now, not at the first feasible posture
     checked_margin(margin)
     follower = Follower(limit, *checked_starts(starts, seed))
@@ -185,6 +183,14 @@ def checked_path(arm: Manipulator, angles: ArrayLike | None, tips: ArrayLike | N
             name, f"shape {path.shape} given; (S, {width}) is needed, {meaning} for each sample."
         )
     return frozen(path)
+
+
+def checked_rate(arm: Manipulator, rate: ArrayLike) -> Array:
+    """Check the largest changes of the tensions per step; return them (C,) [N]."""
+    limit = bound("rate", rate, len(arm.cables))
+    if not (limit > 0.0).all():
+        raise InvalidInput("rate", f"{limit.min():g} N given; it must be positive, or inf for any.")
+    return limit
 
 
 def _per_sample(name: str, value: ArrayLike, tail: tuple[int, ...], size: int) -> Array:

@@ -20,6 +20,7 @@ from cdsm.plots.planning import (
     plot_stiffness_ranges,
 )
 from cdsm.plots.style import save_figure
+from cdsm.plots.tracking import plot_tracking_run
 from cdsm.plots.wires import plot_cables, plot_elasticity
 
 __all__ = [
@@ -41,6 +42,7 @@ __all__ = [
     "plot_stiffness_plan",
     "plot_stiffness_range",
     "plot_stiffness_ranges",
+    "plot_tracking_run",
     "plot_uncertainty",
     "plot_weight_test",
     "save_figure",

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from matplotlib.animation import PillowWriter
 from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
 
 from cdsm.errors import InvalidInput
 from cdsm.plots.arm import (
@@ -31,6 +32,7 @@ from cdsm.plots.style import (
     heading,
 )
 from cdsm.support.files import as_path, write_file
+from cdsm.support.validation import number_array
 from cdsm.support.values import Array
 
 if TYPE_CHECKING:
@@ -55,21 +57,26 @@ _DEFLECTED: Final = 0.25
 
 
 def plot_path(
-    path: PathPlan | Sequence[Posture], *, animate: str | os.PathLike[str] | None = None
+    path: PathPlan | Sequence[Posture],
+    *,
+    animate: str | os.PathLike[str] | None = None,
+    tensions: ArrayLike | None = None,
 ) -> Figure:
     """Plot some postures of a path over each other, from pale to dark, with the way of the tip.
 
     Args:
         path: Postures of one arm, in order; or a plan, of which the planned samples are drawn.
-        animate: A ``.gif`` to write too: the arm follows the path, its cables coloured by the
-            tensions of a plan.
+        animate: A ``.gif`` to write too: the arm follows the path, its cables coloured by their
+            tensions.
+        tensions: Tensions (n, C) [N] for the colours. Default: those of a plan.
 
     Raises:
         InvalidInput: ``path`` is not postures of one arm or holds none, or ``animate`` does not
             end in ``.gif``.
         FileError: The animation cannot be written.
     """
-    poses, tensions = _postures(path)
+    poses, planned = _postures(path)
+    colored = planned if tensions is None else number_array("tensions", tensions)
     figure, axes = arm_axes()
     shown = np.unique(np.linspace(0, len(poses) - 1, _GHOSTS).round().astype(int)).tolist()
     limits = _limits(poses)
@@ -84,7 +91,7 @@ def plot_path(
     picture_legend(figure, axes)
     fill_canvas(axes)
     if animate is not None:
-        _animate(animate, poses, tensions, limits)
+        _animate(animate, poses, colored, limits)
     return figure
 
 

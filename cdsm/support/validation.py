@@ -42,6 +42,7 @@ RANGES: Final = {
     "rigidity": Range("N", 1e-6, 1e12),
     "stiffness": Range("N/m", 1e-6, 1e12),
     "tension": Range("N", 1e-9, 1e9),
+    "time": Range("s", 1e-9, 1e9),
     "wrap": Range("rad", 1e-6, 4.0 * math.pi),
     "wrench": Range("N, N m", 1e-9, 1e9),
 }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import Final, final
@@ -12,6 +12,7 @@ from numpy.polynomial.polynomial import polyder
 from numpy.typing import ArrayLike
 
 from cdsm.elasticity import Domain, Elasticity
+from cdsm.elasticity.law import positive_factor
 from cdsm.errors import ElasticityRangeError, InvalidInput
 from cdsm.support.validation import LARGEST, SMALLEST, number_array, scalar
 from cdsm.support.values import Array
@@ -121,6 +122,12 @@ class StrandElasticity(Elasticity):
         """
         values = number_array("tension", tension)
         return piecewise(self._joins, self._table, values)
+
+    def scaled(self, factor: float) -> StrandElasticity:
+        """Return the law of factor × EA(F); see :meth:`Elasticity.scaled`."""
+        times = positive_factor(factor)
+        rows = tuple(tuple(times * each for each in row) for row in self.coefficients)
+        return replace(self, coefficients=rows)
 
     def rigidity(self, tension: ArrayLike) -> Array:
         """Compute EA(F) [N]; see :meth:`Elasticity.rigidity`."""
@@ -246,6 +253,11 @@ class TabulatedElasticity(Elasticity):
     def domain(self) -> Domain:
         """Domain of the law, from the first to the last tension of the points [N]."""
         return Domain(self.tensions[0], self.tensions[-1])
+
+    def scaled(self, factor: float) -> TabulatedElasticity:
+        """Return the law with the strains divided by the factor; see :meth:`Elasticity.scaled`."""
+        times = positive_factor(factor)
+        return replace(self, strains=tuple(strain / times for strain in self.strains))
 
     def rigidity(self, tension: ArrayLike) -> Array:
         """Compute EA = 1/(dε/dF) [N]; see :meth:`Elasticity.rigidity`."""

@@ -58,6 +58,10 @@ class SlackBelow(Elasticity):
     def _least(self) -> float:
         return float(self.law.rigidity(self.law.domain.first))
 
+    def scaled(self, factor: float) -> SlackBelow:
+        """Return the scaled law, continued below; see :meth:`Elasticity.scaled`."""
+        return SlackBelow(self.law.scaled(factor))
+
     def rigidity(self, tension: ArrayLike) -> Array:
         """Compute EA(F) [N], constant below the law; see :meth:`Elasticity.rigidity`."""
         return np.asarray(self.law.rigidity(self._split(tension)[0]))

@@ -52,6 +52,13 @@ def samples(law: cdsm.Elasticity, count: int = 9) -> Any:
     return np.array([F for F in inside if all(abs(F - join) > 1.0 for join in joins)])
 
 
+SCALABLE: dict[str, cdsm.Elasticity] = {
+    **LAWS,
+    "table": cdsm.TabulatedElasticity((1.0, 10.0, 40.0, 90.0), (0.0, 4e-3, 8e-3, 1.2e-2)),
+    "slack below": STRAND.slack_below(),
+}
+
+
 # --- all laws -------------------------------------------------------------------------------
 
 
@@ -416,3 +423,24 @@ def test_a_coefficient_too_small_to_matter_does_not() -> None:
     more = cdsm.StrandElasticity(((3e5, 700.0, 2.2250738585072014e-308),), (), 0.0, 20.0)
     F = np.linspace(1.0, 20.0, 5)
     np.testing.assert_array_equal(more.strain(F), whole.strain(F))
+
+
+# --- scaled ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", SCALABLE)
+def test_scaled_law_is_as_many_times_as_rigid_and_stretches_as_many_times_less(name: str) -> None:
+    law = SCALABLE[name]
+    stiffer, F = law.scaled(1.25), np.linspace(law.domain.first, min(law.domain.high, 500.0), 40)
+    assert type(stiffer) is type(law)
+    assert stiffer.domain == law.domain
+    np.testing.assert_allclose(stiffer.rigidity(F), 1.25 * law.rigidity(F), rtol=1e-12)
+    np.testing.assert_allclose(stiffer.strain(F), law.strain(F) / 1.25, rtol=1e-10, atol=1e-16)
+    np.testing.assert_allclose(stiffer.energy(F), law.energy(F) / 1.25, rtol=1e-10, atol=1e-14)
+
+
+@pytest.mark.parametrize("factor", [0.0, -1.0, math.inf, math.nan, "x"])
+def test_factor_that_is_not_positive_is_refused(factor: Any) -> None:
+    for law in SCALABLE.values():
+        with pytest.raises(cdsm.InvalidInput, match="factor"):
+            law.scaled(factor)

@@ -10,6 +10,8 @@ import cdsm
 from cdsm import presets
 from cdsm.planning import follow
 from cdsm.planning.follow import Follower
+from cdsm.planning.objectives import along_constraints
+from cdsm.planning.stiffness_model import StiffnessModel
 from tests.support.locked import (
     LENGTH,
     soft,
@@ -114,3 +116,15 @@ def test_rate_of_each_cable_is_its_own() -> None:
     assert plan.complete
     assert_holds(plan, 50.0, math.inf)
     assert abs(np.diff(plan.tensions[:, 4])).max() == pytest.approx(rate[4], rel=1e-9)
+
+
+def test_least_change_stays_within_the_rate_and_goes_no_further_than_it_must() -> None:
+    """From even tensions of a hinge, towards the one stiffness that needs 12 N more in each."""
+    arm = soft_hinge()
+    model = StiffnessModel(arm.at(np.zeros(1)), 10.0, math.inf, np.zeros(6), 1e-4)
+    goal = along_constraints(model, np.array([DOWN]), np.array([along_hinge(32.0)]))
+    before = np.full(2, 20.0)
+    for rate, expected in ((50.0, 32.0), (12.5, 32.0), (5.0, 25.0)):
+        F = follow.least_change(model, goal, before, np.full(2, rate))
+        assert F is not None
+        np.testing.assert_allclose(F, expected, rtol=1e-6)

@@ -1,0 +1,35 @@
+"""Closed loop of position and stiffness: motor laws, sensors, plants and estimates."""
+
+from cdsm.control.laws import (
+    Command,
+    Law,
+    Moment,
+    Reading,
+    Reference,
+    feedforward,
+    limited,
+    mixed,
+    tension_control,
+)
+from cdsm.control.plant import SlowPlant
+from cdsm.control.run import TrackingRun
+from cdsm.control.sensors import Sensors
+from cdsm.control.stiffness_loop import with_rigidity
+from cdsm.control.track import track
+
+__all__ = [
+    "Command",
+    "Law",
+    "Moment",
+    "Reading",
+    "Reference",
+    "Sensors",
+    "SlowPlant",
+    "TrackingRun",
+    "feedforward",
+    "limited",
+    "mixed",
+    "tension_control",
+    "track",
+    "with_rigidity",
+]

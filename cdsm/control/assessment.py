@@ -1,0 +1,113 @@
+"""What a plant really does: its stiffness, its margin, its proved band, and a weight hung on it.
+
+Under friction one arm has many stiffnesses. Here *the* stiffness of a state is that of the arm with
+the same wire in every cable and the same load after its cables have slid until nothing holds them:
+the frictionless K_θ of that rest. A weight hung on the arm measures it if the load is shaken before
+and after (:func:`hung_weight`); without shaking, small weights measure the stuck arm, which is
+several times stiffer.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from cdsm.control.plant import PlantState, SlowPlant, SlowState
+from cdsm.errors import CdsmError
+from cdsm.friction.band import RestBand, rest_band
+from cdsm.friction.breakaway import breakaway
+from cdsm.manipulator import Manipulator
+from cdsm.statics.equilibrium import no_rest
+from cdsm.statics.locked_motors import LoadedArm
+from cdsm.statics.slow_loading import Load
+from cdsm.statics.trust_region import find_rest
+from cdsm.stiffness_matrix import Stiffness
+from cdsm.support.values import Array
+
+_CYCLES: Final = 4
+"""Fading cycles of the shaking, as in :class:`~cdsm.WeightTest`."""
+
+_SHAKEN: Final = 3.0
+"""Amplitude of the shaking over the breakaway load: from there on all cables slide."""
+
+_DISPLACED: Final = 1e-3
+"""Displacement by the weight, over the length of the arm."""
+
+
+class Assessment(NamedTuple):
+    """What is true of one state of a plant.
+
+    Attributes:
+        stiffness: Frictionless K_θ with the same wire and load; None if the arm buckles.
+        band: Where the tip may rest along a direction, about the place of ``stiffness``, or None.
+    """
+
+    stiffness: Stiffness | None
+    band: RestBand | None
+
+
+def assess(
+    arm: Manipulator, state: PlantState, wrench: Array, u: Array, *, banded: bool
+) -> Assessment:
+    """Find the frictionless rest beside a state, and the proved band about it along u (3,)."""
+    try:
+        K = slid_out(arm, state, wrench)
+    except CdsmError:
+        return Assessment(None, None)
+    if not (banded and K.is_stable):
+        return Assessment(K, None)
+    band = rest_band(K.posture, K.tension, u, K.wrench)
+    return Assessment(K, band if band.proved else None)
+
+
+def slid_out(arm: Manipulator, state: PlantState, wrench: Array) -> Stiffness:
+    """Return K_θ of the rest that a state of an arm has once no hole holds a cable.
+
+    Raises:
+        EquilibriumError: There is none: the arm buckles.
+        ElasticityRangeError: A cable leaves its law.
+    """
+    pose, (wire, F) = state.pose, state.true
+    lengths = pose.cable_lengths.copy()
+    for c, cable in enumerate(arm.cables):
+        if cable.control == "position":  # the length at which this much wire has this tension
+            lengths[c] = wire[c] + float(cable.elongation(F[c], wire[c]))
+    loaded = LoadedArm(pose, F, wrench, lengths)
+    search = find_rest(loaded, loaded.at(pose, F))
+    K = search.state.K
+    if not search.converged:
+        raise no_rest(pose, K.posture, K.residual.copy(), 0.0)
+    loaded.require_domains(K.tension)
+    return K
+
+
+def hung_weight(plant: SlowPlant, state: SlowState, u: Array) -> float:
+    """Hang a weight on a plant with its motors stopped, and shake it; return N/m along u (3,).
+
+    The load swings about its mean by three breakaway loads along u and fades in four cycles, first
+    without the weight and then with it. The weight moves the tip by about 0.1 % of the arm. NaN if
+    the arm finds no rest on the way.
+    """
+    arm, load = plant.arm, state.state.load
+    try:
+        near = slid_out(arm, state, load.wrench)
+    except CdsmError:
+        return math.nan
+    weight = near.along(u) * _DISPLACED * arm.length
+    if not math.isfinite(weight):
+        return math.inf
+    swing = _SHAKEN * breakaway(near.posture, near.tension, u, near.wrench).load
+    fading = swing * (1.0 - np.arange(2 * _CYCLES) / (2.0 * _CYCLES))
+    fading[1::2] *= -1.0
+    carried, tips = state, []
+    try:
+        for hung in (0.0, weight):
+            for force in (*(hung + fading if arm.has_friction else ()), hung):
+                wrench = load.wrench + np.append(force * u, np.zeros(3))
+                carried = plant.load(carried, Load(wrench, load.held, load.motors))
+            tips.append(carried.pose.tip[:3, 3])
+    except CdsmError:
+        return math.nan
+    return weight / float(u @ (tips[1] - tips[0]))

@@ -1,0 +1,198 @@
+"""Joint angles from what the motors measure: wire and tension, stretch and friction included.
+
+A cable with the wire l_0 and the tension F at its motor has the length
+
+    L(q) = l_0 (1 + ε̄/s) + (F − F_rest)/k_series,   ε̄ = Σ_j l_j ε(ρ_j F)/Σ_j l_j,
+
+with the tension ρ_j F of segment j, and s the rigidity of all wires over what their law says. There
+are more cables than joints. So their lengths give the angles and s: the arm calibrates its own
+wire while it moves. s adds up what all steps say (recursive least squares); the angles are those of
+one step.
+
+ρ_j is what friction leaves of the tension on the way to segment j. The estimate keeps a model of
+the wire in each segment: at each step it moves through the holes as friction lets it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
+
+from cdsm.control.laws import Reading
+from cdsm.control.sensors import Sensors
+from cdsm.friction.chain_problem import ChainProblem
+from cdsm.manipulator import Manipulator
+from cdsm.posture import Posture
+from cdsm.support.values import Array
+
+UNSURE: Final = 0.3
+"""Standard deviation of 1/s before anything is measured."""
+
+_FINEST: Final = 1e-9
+"""Error of a length [m] that even exact sensors leave."""
+
+_LEAST_SPREAD: Final = 1e-3
+"""Error of a tension [N] that even exact load cells leave."""
+
+_STEPS, _CONVERGED = 8, 1e-10
+"""Gauss–Newton steps, and the step [rad] that ends them: the next is its square."""
+
+
+class Estimate(NamedTuple):
+    """What the controller believes about the arm.
+
+    Attributes:
+        pose: The posture, within the arm of the controller.
+        tension: Mean tension over the wire of each cable (C,) [N].
+        ratio: Mean tension over that at the motor (C,) [-].
+        force: Force at the tip (3,) [N], base axes.
+        softness: 1/s: strain over what the law says [-].
+        variance: Variance of ``softness`` [-].
+        natural: Wire in each segment (S,) [m]; the memory of friction.
+        shares: Tension of each segment over that at the motor (S,) [-].
+    """
+
+    pose: Posture
+    tension: Array
+    ratio: Array
+    force: Array
+    softness: float
+    variance: float
+    natural: Array
+    shares: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Observer:
+    """Estimates of the arm of a controller from its sensors."""
+
+    arm: Manipulator
+    sensors: Sensors
+
+    def begin(self, q: Array, reading: Reading) -> Estimate:
+        """Return the estimate at known joint angles (nv,), with even tensions along the cables."""
+        pose = self.arm.at(q)
+        cable = pose.segments.chains.cable
+        F = np.maximum(reading.tension, self._least)
+        natural = self._problem.natural(pose.segments.lengths, F[cable])
+        one, shares = np.ones(F.size), np.ones(cable.size)
+        force = self._tip_force(pose, F[cable])
+        return Estimate(pose, F, one, force, 1.0, UNSURE**2, natural, shares)
+
+    def update(self, before: Estimate, reading: Reading) -> Estimate:
+        """Return the estimate after one more reading."""
+        held = self._held
+        F, wire = np.maximum(reading.tension, self._least), reading.wire
+        pose, x, variance = before.pose, before.softness, before.variance
+        strain = self._mean_strain(pose, before.shares, F)
+        spring = self._series * (F - self._rest)
+        # an error of the tension stretches the cable; the encoder rounds by half a count at most
+        slack = self._tension_spread * (self._compliance(wire, F) * x)
+        spread = np.hypot(slack, self._encoder_spread)[held]
+        q = pose.q
+        for _ in range(_STEPS):
+            pose = self.arm.at(q, check_limits=False)
+            missing = (wire * (1.0 + x * strain) + spring - pose.cable_lengths)[held] / spread
+            rows = np.c_[pose.length_jacobian[held], -(wire * strain)[held]] / spread[:, None]
+            prior = np.append(np.zeros(q.size), 1.0) / np.sqrt(before.variance)
+            step = np.linalg.lstsq(
+                np.vstack([rows, prior]),
+                np.append(missing, (before.softness - x) / np.sqrt(before.variance)),
+                rcond=None,
+            )[0]
+            q, x = q + step[:-1], x + float(step[-1])
+            if abs(step).max() < _CONVERGED:
+                break
+        information = np.vstack([rows, prior])
+        variance = float(np.linalg.inv(information.T @ information)[-1, -1])
+        pose = self.arm.at(np.clip(q, self.arm.lower, self.arm.upper))
+        return self._slid(before, pose, F, x, variance)
+
+    def _slid(
+        self, before: Estimate, pose: Posture, F: Array, softness: float, variance: float
+    ) -> Estimate:
+        """Move the wire of the model through its holes to a new posture."""
+        segments = pose.segments
+        chains = segments.chains
+        ratio = np.ones(segments.lengths.size)
+        ratio[chains.hole] = np.exp(chains.friction * segments.wrap)
+        near = before.shares * F[chains.cable]
+        chain = self._problem.settle(segments.lengths, before.natural, ratio, F, near)
+        shares = chain.tension / F[chains.cable]
+        means = np.add.reduceat(shares * segments.lengths, chains.start[:-1]) / pose.cable_lengths
+        force = self._tip_force(pose, chain.tension)
+        natural = chain.natural
+        return Estimate(pose, means * F, means, force, softness, variance, natural, shares)
+
+    def _tip_force(self, pose: Posture, tension: Array) -> Array:
+        """Compute the force (3,) [N] at the tip that balances tensions (S,) [N] best.
+
+        J_vᵀ f = Σ_j T_j g_j + g, weighted by what noise and friction leave uncertain of it.
+        """
+        segments = pose.segments
+        chains, J = segments.chains, pose.length_jacobian
+        F, holes = tension[chains.start[:-1]], chains.cable[chains.hole]
+        grip = np.bincount(holes, chains.friction * segments.wrap, minlength=F.size)
+        spread = np.hypot(max(self._tension_spread, _LEAST_SPREAD), grip * F)
+        root = np.linalg.cholesky((J.T * spread**2) @ J)
+        torque = tension @ segments.length_jacobian + pose.gravity_torque
+        rows = solve_triangular(root, pose.jacobian[:3].T, lower=True)
+        wanted = solve_triangular(root, torque, lower=True)
+        return np.asarray(np.linalg.lstsq(rows, wanted, rcond=None)[0])
+
+    def _mean_strain(self, pose: Posture, shares: Array, F: Array) -> Array:
+        """Compute ε̄ (C,) [-] of the law, over the segments of each cable."""
+        segments = pose.segments
+        chains = segments.chains
+        strain = np.zeros(segments.lengths.size)
+        T = shares * F[chains.cable]
+        for law, of in self._problem.laws:
+            mine = np.isin(chains.cable, of)
+            strain[mine] = law.strain(np.clip(T[mine], law.domain.first, law.domain.high))
+        total = np.add.reduceat(strain * segments.lengths, chains.start[:-1])
+        return np.asarray(total / pose.cable_lengths)
+
+    def _compliance(self, wire: Array, F: Array) -> Array:
+        """Compute dL/dF (C,) [m/N] at constant wire."""
+        soft = np.array(self._series)
+        for law, of in self._problem.laws:
+            soft[of] += wire[of] / law.rigidity(F[of])
+        return soft
+
+    @cached_property
+    def _problem(self) -> ChainProblem:
+        arm = self.arm
+        chains = arm.at(np.clip(0.0, arm.lower, arm.upper)).segments.chains
+        even = np.zeros(len(arm.cables))
+        return ChainProblem(arm.cables, chains.start, even, unstrained=True)
+
+    @cached_property
+    def _held(self) -> NDArray[np.bool_]:
+        return np.array([cable.control == "position" for cable in self.arm.cables])
+
+    @cached_property
+    def _least(self) -> Array:
+        return np.array([cable.elasticity.domain.first for cable in self.arm.cables])
+
+    @cached_property
+    def _rest(self) -> Array:
+        return np.array([cable.elasticity.rest for cable in self.arm.cables])
+
+    @cached_property
+    def _series(self) -> Array:
+        return np.array([1.0 / cable.series_stiffness for cable in self.arm.cables])
+
+    @property
+    def _encoder_spread(self) -> float:
+        """Standard deviation of the rounding of an encoder [m]; never zero."""
+        return max(self.sensors.encoder / math.sqrt(12.0), _FINEST)
+
+    @property
+    def _tension_spread(self) -> float:
+        return math.hypot(self.sensors.tension_noise, self.sensors.tension_bias)

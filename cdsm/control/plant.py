@@ -1,0 +1,125 @@
+"""The arm that is controlled: cdsm's own, loaded slowly, with friction and history."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol, TypeVar, final
+
+import numpy as np
+
+from cdsm.cable_laws import CableLaws
+from cdsm.control.laws import Command, Reading
+from cdsm.errors import InvalidInput
+from cdsm.manipulator import Manipulator
+from cdsm.posture import Posture
+from cdsm.statics.load_cycle import slow_loading
+from cdsm.statics.slow_loading import Load, SlowLoading, State
+from cdsm.support.values import Array, frozen
+
+
+class PlantState(Protocol):
+    """State of a plant, which does not change; a move gives another one."""
+
+    @property
+    def pose(self) -> Posture:
+        """The true posture."""
+
+    @property
+    def true(self) -> Reading:
+        """True wire and tension at each motor, both (C,)."""
+
+
+AnyState = TypeVar("AnyState", bound=PlantState)
+
+
+class Plant(Protocol[AnyState]):
+    """An arm with motors, as :func:`~cdsm.track` drives it."""
+
+    @property
+    def arm(self) -> Manipulator:
+        """The true arm."""
+
+    def begin(self, q: Array, tension: Array, wrench: Array) -> AnyState:
+        """Return the arm at rest at joint angles (nv,) with cables of a tension (C,) [N]."""
+
+    def move(self, state: AnyState, command: Command, wrench: Array) -> AnyState:
+        """Return the arm after its motors followed a command under a wrench (6,).
+
+        Raises:
+            CdsmError: The arm finds no place to rest, or a cable leaves its law.
+        """
+
+
+class SlowState(NamedTuple):
+    """State of a :class:`SlowPlant`: the wire in each segment is its memory."""
+
+    loading: SlowLoading
+    reference_wire: Array  # l_0 at the reference (C,) [m]
+    state: State
+
+    @property
+    def pose(self) -> Posture:
+        """The true posture."""
+        return self.state.pose
+
+    @property
+    def true(self) -> Reading:
+        """True wire and tension at each motor, both (C,)."""
+        wire = self.reference_wire - np.where(self.loading.forced, 0.0, self.state.load.motors)
+        tension = self.state.settled.chain.tension[self.loading.start[:-1]]
+        return Reading(frozen(wire), frozen(tension))
+
+
+@final
+@dataclass(frozen=True)
+class SlowPlant:
+    """Quasi-static arm whose cables stick and slide in their holes, as in :func:`~cdsm.load_cycle`.
+
+    Its motors follow each command exactly and slowly. Its wire, friction, sizes and load may differ
+    from those that the controller believes in.
+
+    Attributes:
+        arm: The true arm.
+        accuracy: Largest part of the work [-] of a step that may stay unaccounted for.
+
+    Raises:
+        InvalidInput: ``original_length`` of the arm is not ``"unstrained"``.
+    """
+
+    arm: Manipulator
+    accuracy: float = 0.1
+
+    def __post_init__(self) -> None:
+        require_unstrained("arm", self.arm)
+
+    def begin(self, q: Array, tension: Array, wrench: Array) -> SlowState:
+        """Return the arm at rest at joint angles (nv,) with cables of a tension (C,) [N]."""
+        pose = self.arm.at(q)
+        loading = slow_loading(pose, tension, wrench, self.accuracy)
+        wire = CableLaws(self.arm.cables, "unstrained").original_lengths(
+            pose.cable_lengths, tension
+        )
+        return SlowState(loading, wire, loading.begin(tension, wrench))
+
+    def move(self, state: SlowState, command: Command, wrench: Array) -> SlowState:
+        """Return the arm after its motors followed a command under a wrench (6,).
+
+        Raises:
+            EquilibriumError: The arm finds no place to rest on the way: it buckles.
+        """
+        loading = state.loading
+        taken_in = state.reference_wire - command.wire
+        motors = np.where(loading.forced, command.tension, taken_in)
+        return self.load(state, Load(wrench, np.zeros(self.arm.nv), motors))
+
+    def load(self, state: SlowState, load: Load) -> SlowState:
+        """Return the arm under another load and other motors."""
+        return state._replace(state=state.loading.carry(state.state, load, "the step")[0])
+
+
+def require_unstrained(name: str, arm: Manipulator) -> None:
+    """Raise InvalidInput if the arm reads stretched lengths, which no motor pays out."""
+    if arm.original_length != "unstrained":
+        raise InvalidInput(
+            name, 'has original_length = "stretched"; motors pay out unstrained lengths.'
+        )

@@ -1,0 +1,96 @@
+"""What a plan asks for at each step of control, and which motors control tension."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import qr
+
+from cdsm.control.laws import Reference
+from cdsm.errors import InvalidInput
+from cdsm.manipulator import Manipulator
+from cdsm.planning.path_plan import PathPlan
+from cdsm.support.validation import one_of
+from cdsm.support.values import Array
+
+
+class Schedule(NamedTuple):
+    """References at n steps: the motors move evenly from one sample of the plan to the next.
+
+    Attributes:
+        references: Reference of each step.
+        directions: Unit directions u (D, 3), base axes.
+        targets: Wanted stiffness (n, D) [N/m].
+        tips: Tip positions (n, 3) [m].
+        wrenches: Load that the plan knows of (n, 6).
+    """
+
+    references: tuple[Reference, ...]
+    directions: Array
+    targets: Array
+    tips: Array
+    wrenches: Array
+
+    @classmethod
+    def of(cls, plan: PathPlan, steps: int) -> Self:
+        """Divide the way from each sample of a complete plan to the next into steps."""
+        size = len(plan.planned)
+        at = np.linspace(0.0, size - 1.0, (size - 1) * steps + 1)
+        before = np.minimum(at.astype(int), max(size - 2, 0))
+        after = np.minimum(before + 1, size - 1)
+
+        def along(values: Array) -> Array:
+            part = (at - before).reshape(-1, *(1,) * (values.ndim - 1))
+            return np.asarray(values[before] + part * (values[after] - values[before]))
+
+        wire = plan.cable_lengths.copy()
+        wire[:, [cable.control == "position" for cable in plan.arm.cables]] = (
+            plan.unstrained_lengths
+        )
+        k = np.array([K.cable_stiffness for K in plan.stiffness])
+        angles = along(plan.angles)
+        parts = angles, along(plan.tensions), along(wire), along(k)
+        directions = np.asarray(plan.direction).reshape(-1, 3)
+        return cls(
+            references=tuple(Reference(*each) for each in zip(*parts, strict=True)),
+            directions=directions,
+            targets=along(plan.target).reshape(-1, len(directions)),
+            tips=np.array([plan.arm.at(q).tip[:3, 3] for q in angles]),
+            wrenches=along(np.array([K.wrench for K in plan.stiffness])),
+        )
+
+
+def checked_plan(plan: PathPlan) -> Manipulator:
+    """Check that a plan can be followed; return its arm."""
+    if plan.direction is None:
+        raise InvalidInput("plan", "is one of cartesian; plan a stiffness along directions.")
+    if not plan.complete:
+        first = plan.infeasible[0]
+        raise InvalidInput(
+            "plan",
+            f"{len(plan.infeasible)} of {len(plan.target)} samples are not planned, the first of "
+            f"them sample {first.index}: {first.reason}",
+        )
+    return plan.arm
+
+
+def tension_controlled(plan: PathPlan, names: Sequence[str] | None) -> NDArray[np.bool_]:
+    """Return which cables (C,) a mixed law controls by tension.
+
+    Lengths of as many cables as there are joints give the posture. By default these are the cables
+    that do so best at the first sample, found by a QR decomposition of J_Lᵀ with pivots.
+    """
+    cables = plan.arm.cables.names
+    forced = np.ones(len(cables), dtype=np.bool_)
+    if names is None:
+        J = plan.stiffness[0].posture.length_jacobian
+        *_, order = qr(J.T, mode="economic", pivoting=True)
+        forced[order[: J.shape[1]]] = False
+    else:
+        forced[:] = False
+        for name in names:
+            forced[cables.index(one_of("cable", name, cables))] = True
+    return forced

@@ -1,0 +1,69 @@
+"""Encoders and load cells: quantised, noisy, biased and late."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final, final
+
+import numpy as np
+
+from cdsm.control.laws import Reading
+from cdsm.support.validation import quantity, scalar, whole_number
+
+LARGEST_NOISE: Final = 4.0
+"""Noise is cut off at this many standard deviations, so that bounds can be proved."""
+
+
+@final
+@dataclass(frozen=True, kw_only=True)
+class Sensors:
+    """Sensors of all motors: an encoder for the wire and a load cell for the tension.
+
+    Encoders count from where the cable is just taut (zero strain) at a known posture, so they read
+    the unstretched length l_0 that is paid out.
+
+    Attributes:
+        encoder: Length [m] of one count of an encoder; 0: exact.
+        tension_noise: Standard deviation [N] of a load cell, Gaussian, cut off at four of them.
+        tension_bias: Constant error of all load cells [N].
+        delay: Steps of control by which all readings are late.
+
+    Raises:
+        InvalidInput: A size is negative or not a number, or the delay is no whole number.
+    """
+
+    encoder: float = 1e-5
+    tension_noise: float = 0.0
+    tension_bias: float = 0.0
+    delay: int = 0
+
+    def __post_init__(self) -> None:
+        encoder = quantity("encoder", self.encoder, "length", zero=True)
+        noise = quantity("tension_noise", self.tension_noise, "tension", zero=True)
+        # the class is frozen: plain assignment is refused
+        self.__dict__.update(
+            encoder=encoder,
+            tension_noise=noise,
+            tension_bias=scalar("tension_bias", self.tension_bias),
+            delay=whole_number("delay", self.delay, 0),
+        )
+
+    def read(self, truth: Sequence[Reading], random: np.random.Generator) -> Reading:
+        """Measure the last of some true states, or an earlier one if the sensors are late.
+
+        Args:
+            truth: Wire and tension at all steps so far.
+            random: Source of the noise; the same number of draws is taken at each call.
+        """
+        now = truth[max(len(truth) - 1 - self.delay, 0)]
+        wire = now.wire
+        if self.encoder:
+            wire = self.encoder * np.round(wire / self.encoder)
+        draws = np.clip(random.standard_normal(wire.size), -LARGEST_NOISE, LARGEST_NOISE)
+        return Reading(wire, now.tension + self.tension_bias + self.tension_noise * draws)
+
+    @property
+    def tension_error(self) -> float:
+        """Largest error of a load cell [N]."""
+        return abs(self.tension_bias) + LARGEST_NOISE * self.tension_noise

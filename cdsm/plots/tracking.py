@@ -1,0 +1,71 @@
+"""Plot a closed loop over time: tip, stiffness, tensions, and the proved band."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cdsm.plots.style import (
+    BLUE,
+    COLORS,
+    MM,
+    N_PER_MM,
+    SKY,
+    TWO_COLUMNS,
+    VERMILLION,
+    cable_lines,
+    direction_name,
+    expect,
+    heading,
+    legend,
+    panels,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from cdsm.control.run import TrackingRun
+
+
+def plot_tracking_run(run: TrackingRun) -> Figure:
+    """Plot a closed loop over time: tip error, stiffness, the proved band, and all tensions.
+
+    Args:
+        run: Result of :func:`~cdsm.track`.
+
+    Raises:
+        InvalidInput: ``run`` is not the result of a closed loop.
+    """
+    expect("run", run, "TrackingRun")
+    figure, axes = panels(TWO_COLUMNS, 6.4, 1, 4, sharex=True)
+    error, stiffness, band, tension = axes[:, 0]
+    t = run.time
+    error.plot(t, MM * run.tip_error, color=BLUE)
+    error.set(ylabel="tip error [mm]")
+    error.set_ylim(bottom=0.0)
+    for u, color, wanted, found in zip(
+        run.directions, COLORS, run.target.T, run.stiffness.T, strict=False
+    ):
+        name = direction_name(u)
+        stiffness.plot(t, N_PER_MM * wanted, "--", color=color, linewidth=0.9, label="_")
+        stiffness.plot(t, N_PER_MM * found, color=color, label=f"along {name}; dashed: wanted")
+    stiffness.set(ylabel="stiffness [N/mm]")
+    stiffness.set_ylim(bottom=0.0)
+    low, high = MM * run.band.T
+    known = np.isfinite(low)
+    band.fill_between(t[known], low[known], high[known], color=SKY, alpha=0.4, label="proved band")
+    moved = MM * run.displacement
+    band.plot(t, moved, color=VERMILLION, label="tip")
+    band.set(ylabel="held by friction [mm]")
+    for panel in (stiffness, band):
+        legend(panel, loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
+    cable_lines(tension, t, run.tension, run.plan.arm.cables.names)
+    tension.set(xlabel="time [s]", ylabel="tension [N]")
+    tension.set_ylim(bottom=0.0)
+    for panel in axes[:, 0]:
+        for at in t[1:][(np.diff(run.wrench, axis=0) != 0.0).any(axis=1)][:1]:
+            panel.axvline(at, color="0.3", linewidth=0.8, linestyle=":")
+    danger = f"{run.warnings[0].split(':')[0]}. " if run.warnings else ""
+    heading(figure, f"{danger}{run.plan.arm.name}, law {run.law}; dotted: the load changes")
+    return figure

@@ -1,0 +1,61 @@
+"""The quasi-static plant against the loads and equilibria that it is made of."""
+
+import numpy as np
+import pytest
+
+import cdsm
+from cdsm.control import Command
+from tests.support.tracking import small_path
+
+NONE = np.zeros(6)
+
+
+def paid_out(plan: cdsm.PathPlan, by: float) -> Command:
+    wire = plan.unstrained_lengths[0] + by * np.arange(6)
+    return Command(wire, plan.tensions[0], np.zeros(6, dtype=np.bool_))
+
+
+def test_plant_begins_with_the_wire_that_a_plan_pays_out() -> None:
+    plan = small_path()
+    state = cdsm.SlowPlant(plan.arm).begin(plan.angles[0], plan.tensions[0], NONE)
+    np.testing.assert_allclose(state.true.wire, plan.unstrained_lengths[0], rtol=1e-14)
+    np.testing.assert_allclose(state.true.tension, plan.tensions[0], rtol=1e-14)
+    np.testing.assert_array_equal(state.pose.q, plan.angles[0])
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.1])
+def test_move_is_a_load_and_a_command_of_load_cycle(friction: float) -> None:
+    plan = small_path(friction)
+    plant, wrench = cdsm.SlowPlant(plan.arm), np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0])
+    before = plant.begin(plan.angles[0], plan.tensions[0], NONE)
+    command = paid_out(plan, 1e-5)
+    state = plant.move(before, command, wrench)
+    pose = plan.arm.at(plan.angles[0])
+    taken_in = plan.unstrained_lengths[0] - command.wire
+    history = cdsm.load_cycle(
+        pose, plan.tensions[0], [wrench], motors=[taken_in], accuracy=plant.accuracy
+    )
+    np.testing.assert_allclose(state.pose.q, history.angles[0], atol=1e-12)
+    np.testing.assert_allclose(state.true.wire, command.wire, rtol=1e-14)
+    first = [T[0, 0] for T in history.tensions]
+    np.testing.assert_allclose(state.true.tension, first, rtol=1e-9)
+    np.testing.assert_array_equal(before.pose.q, plan.angles[0])  # a state does not change
+
+
+def test_paying_wire_out_slackens_its_cable() -> None:
+    plan = small_path()
+    plant = cdsm.SlowPlant(plan.arm)
+    state = plant.begin(plan.angles[0], plan.tensions[0], NONE)
+    wire = plan.unstrained_lengths[0].copy()
+    wire[2] += 1e-4
+    command = Command(wire, plan.tensions[0], np.zeros(6, dtype=np.bool_))
+    assert plant.move(state, command, NONE).true.tension[2] < plan.tensions[0, 2] - 1.0
+
+
+def test_stretched_lengths_are_refused() -> None:
+    arm = small_path().arm
+    stretched = cdsm.Manipulator(
+        arm.geometry, elasticity=arm.cables[0].elasticity, original_length="stretched"
+    )
+    with pytest.raises(cdsm.InvalidInput, match="stretched"):
+        cdsm.SlowPlant(stretched)

@@ -1,0 +1,202 @@
+"""The closed loop: what it holds, what it survives, and what it says when it fails."""
+
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import cdsm
+from cdsm import control
+from tests.support.tracking import WANTED, circle, small_path
+
+BOUNDS: Any = {"minimum": 10.0, "maximum": 250.0}
+
+
+def test_feedforward_on_the_arm_it_believes_in_follows_to_rounding() -> None:
+    plan = small_path()
+    run = cdsm.track(plan, "feedforward", sensors=cdsm.Sensors(encoder=0.0), **BOUNDS)
+    assert run.outcome == "completed"
+    assert not run.warnings
+    at_samples = run.tip_error[::5]
+    assert at_samples.max() < 1e-11
+    assert run.tip_error.max() < 1e-5  # in between, wires and angles move evenly
+    assert abs(run.stiffness_error[::5]).max() < 1e-6
+    np.testing.assert_allclose(run.tension[::5], plan.tensions, rtol=1e-8)
+
+
+def test_same_seed_same_bits() -> None:
+    def run(seed: int) -> cdsm.TrackingRun:
+        sensors = cdsm.Sensors(tension_noise=0.5)
+        return cdsm.track(small_path(0.1), sensors=sensors, steps=2, bands=0, seed=seed, **BOUNDS)
+
+    one, again, other = run(3), run(3), run(4)
+    for field in ("tips", "tension", "measured_tension", "commanded_wire", "stiffness"):
+        np.testing.assert_array_equal(getattr(one, field), getattr(again, field))
+    assert (one.measured_tension != other.measured_tension).any()
+
+
+def test_stiffness_loop_calibrates_its_wire_and_holds_the_stiffness() -> None:
+    """A wire a tenth softer than believed; feed-forward loses most of the stiffness."""
+    plan = small_path()
+    plant = cdsm.SlowPlant(control.with_rigidity(plan.arm, 0.9))
+    sensors = cdsm.Sensors(tension_noise=0.5)
+    runs = {
+        law: cdsm.track(plan, law, plant, sensors, steps=8, bands=0, **BOUNDS)
+        for law in ("feedforward", "stiffness")
+    }
+    held = runs["stiffness"]
+    assert held.rigidity[-1] == pytest.approx(0.9, abs=5e-3)
+    assert abs(held.stiffness_error[5:]).max() < 0.02
+    assert abs(runs["feedforward"].stiffness_error).min() > 0.3
+    assert held.tip_error[5:].max() < 0.6 * runs["feedforward"].tip_error.min()
+
+
+def test_payload_that_nobody_told_of_is_felt() -> None:
+    run = cdsm.track(small_path(), payload=0.2, payload_from=0.5, steps=10, bands=0, **BOUNDS)
+    loaded = run.wrench[:, 2] != 0.0
+    assert loaded.sum() == 11
+    assert run.wrench[-1, 2] == pytest.approx(-0.2 * 9.81)
+    np.testing.assert_allclose(run.estimated_force[-1], [0.0, 0.0, -0.2 * 9.81], atol=0.1)
+    assert abs(run.estimated_force[~loaded]).max() < 0.1
+    assert abs(run.stiffness_error[5:]).max() < 0.02
+
+
+def test_own_law_is_called_with_what_is_wanted_and_measured() -> None:
+    seen = []
+
+    def patient(moment: control.Moment) -> control.Command:
+        seen.append(moment)
+        return control.limited(moment, moment.reading.wire)
+
+    run = cdsm.track(small_path(), patient, steps=2, bands=0, **BOUNDS)
+    assert run.law == "patient"
+    assert len(seen) == 5
+    np.testing.assert_array_equal(seen[-1].reference.angles, small_path().angles[-1])
+    assert run.tip_error[-1] > 1e-3  # it never pays out any wire
+
+
+# --- loops that fail ------------------------------------------------------------------------
+
+
+def test_unstable_loop_is_an_answer_with_its_time() -> None:
+    """All motors hold tensions that are read late: nothing holds the posture, and it is lost."""
+    plan = circle(0.0)
+    run = cdsm.track(
+        plan, "tension", sensors=cdsm.Sensors(delay=4), steps=12, bands=0, payload=0.3, **BOUNDS
+    )
+    assert run.outcome == "lost"
+    assert run.tip_error[-1] > 0.1 * plan.arm.length > run.tip_error[-2]
+    assert run.time[-1] == pytest.approx(0.05 * (len(run.time) - 1))
+    assert run.warnings[0].startswith(f"UNSTABLE at {run.time[-1]:.4g} s: the tip is ")
+    assert "UNSTABLE" in str(run).splitlines()[0]
+    assert np.isfinite(run.tips).all()
+
+
+def test_payload_that_is_too_heavy_is_named() -> None:
+    run = cdsm.track(small_path(), payload=40.0, steps=4, bands=0, **BOUNDS)
+    assert run.outcome in ("lost", "no rest", "wire")
+    assert run.warnings
+    assert run.reason
+    assert len(run.time) >= 4  # what came before is kept
+
+
+def test_target_that_no_tension_gives_is_named_and_the_last_tensions_are_kept() -> None:
+    plan = small_path()
+    run = cdsm.track(plan, minimum=10.0, maximum=60.0, steps=3, bands=0)
+    assert (run.commanded_tension <= 60.0).all()
+    assert run.saturated.any()
+    assert abs(run.stiffness_error).max() > 0.05
+    assert set(run.saturated_motors) <= set(plan.arm.cables.names)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"law": "pid"}, "law"),
+        ({"payload": -1.0}, "payload"),
+        ({"payload_from": 2.0}, "payload_from"),
+        ({"steps": 0}, "steps"),
+        ({"period": 0.0}, "period"),
+        ({"rate": -1.0}, "rate"),
+        ({"tension_controlled": ["cable9"]}, "cable9"),
+        ({"seed": -1}, "seed"),
+    ],
+)
+def test_wrong_arguments_are_refused(wrong: dict[str, object], said: str) -> None:
+    with pytest.raises(cdsm.CdsmError, match=said):
+        cdsm.track(small_path(), **wrong)  # type: ignore[arg-type]
+
+
+def test_plan_with_gaps_is_refused() -> None:
+    plan = small_path()
+    broken = cdsm.plan_path(
+        plan.arm, "z", [15e3, 90e3], 10.0, 250.0, angles=plan.angles[:2], progress=False
+    )
+    with pytest.raises(cdsm.InvalidInput, match=r"1 of 2 samples are not planned.*sample 1"):
+        cdsm.track(broken)
+
+
+# --- the result -----------------------------------------------------------------------------
+
+
+def test_dataset_has_units_and_is_written_whole(tmp_path: Path) -> None:
+    import xarray as xr
+
+    run = cdsm.track(small_path(0.1), steps=2, **BOUNDS)
+    data = run.to_xarray()
+    assert all("units" in data[name].attrs for name in data.data_vars)
+    assert data["time"].attrs["units"] == "s"
+    path = run.write(tmp_path / "run.nc")
+    with xr.open_dataset(path) as again:
+        np.testing.assert_array_equal(again["tip"], run.tips)
+        assert again.attrs["outcome"] == "completed"
+    with pytest.raises(cdsm.InvalidInput, match=r"\.nc"):
+        run.write(tmp_path / "run.txt")
+    assert run.to_dict()["share_inside_band"] == 1.0
+    assert "100 % of 5 steps" in str(run)
+
+
+def test_figure_and_animation_are_drawn(tmp_path: Path) -> None:
+    run = cdsm.track(small_path(0.1), steps=2, bands=2, **BOUNDS)
+    figure = run.plot(tmp_path / "run.gif")
+    assert (tmp_path / "run.gif").read_bytes()[:3] == b"GIF"
+    assert [axes.get_ylabel() for axes in figure.axes] == [
+        "tip error [mm]",
+        "stiffness [N/mm]",
+        "held by friction [mm]",
+        "tension [N]",
+    ]
+    with pytest.raises(cdsm.InvalidInput, match="TrackingRun"):
+        cdsm.plots.plot_tracking_run(dataclasses.replace)  # type: ignore[arg-type]
+
+
+# --- what it must show ----------------------------------------------------------------------
+
+
+@pytest.mark.slow
+def test_stiffness_loop_holds_four_newtons_per_millimetre_within_five_percent() -> None:
+    """10 % wrong EA, μ = 0.1, 0.5 N of noise, and 200 g hung on it half-way.
+
+    Each reading hangs a weight on the true arm and shakes it. Feed-forward alone reads a quarter of
+    the wanted stiffness, tension control up to 13 % less.
+    """
+    plan = circle(0.1)
+    plant = cdsm.SlowPlant(control.with_rigidity(plan.arm, 0.9))
+    sensors = cdsm.Sensors(encoder=1e-5, tension_noise=0.5)
+    worst = {}
+    for law in ("feedforward", "tension", "stiffness"):
+        run = cdsm.track(plan, law, plant, sensors, payload=0.2, bands=5, **BOUNDS)
+        readings = [run.hung_weight(k) for k in range(0, len(run.time), 6)]
+        worst[law] = abs(np.array(readings) / WANTED - 1.0).max()
+        assert run.outcome == "completed"
+        assert (run.commanded_tension >= 10.0).all()
+        assert (run.commanded_tension <= 250.0).all()
+        if law == "stiffness":
+            assert len(run.inside) == 13
+            assert run.inside.all()
+            assert run.tip_error.max() < 1e-3
+    assert worst["stiffness"] < 0.05
+    assert worst["feedforward"] > 0.7
+    assert worst["tension"] > 0.1

@@ -1,0 +1,50 @@
+"""Arms and paths that are followed in closed loop."""
+
+from functools import cache
+
+import numpy as np
+
+import cdsm
+from cdsm import presets
+
+WANTED = 4000.0
+"""Stiffness along z [N/m] of :func:`circle`."""
+
+
+@cache
+def small_path(friction: float = 0.0) -> cdsm.PathPlan:
+    """Two universal joints with the strand of Eq. 19; three samples of a bend."""
+    geometry = cdsm.Geometry.universal(
+        joints=2,
+        cables_per_joint=3,
+        link_length=0.06,
+        base_length=0.03,
+        disk_offset=0.012,
+        hole_radius=0.02,
+        link_mass=0.05,
+        lead=0.1,
+    )
+    arm = cdsm.Manipulator(geometry, presets.STRAND_1X19).with_friction(friction)
+    angles = np.deg2rad([[6.0, -4.0, 5.0, 3.0], [7.0, -3.0, 6.0, 3.0], [8.0, -2.0, 7.0, 3.0]])
+    return cdsm.plan_path(arm, "z", 15e3, 10.0, 250.0, angles=angles, progress=False)
+
+
+@cache
+def circle(friction: float, samples: int = 13) -> cdsm.PathPlan:
+    """Five universal joints, whose tip draws a circle of 15 mm at 4 N/mm along z."""
+    geometry = cdsm.Geometry.universal(
+        joints=5,
+        cables_per_joint=3,
+        link_length=0.06,
+        base_length=0.03,
+        disk_offset=0.012,
+        hole_radius=0.02,
+        link_mass=0.05,
+        lead=0.1,
+    )
+    arm = cdsm.Manipulator(geometry, presets.STRAND_1X19).with_friction(friction)
+    bent = np.deg2rad(np.tile([6.0, -4.0], 5))
+    turn = np.linspace(0.0, 2.0 * np.pi, samples)
+    way = np.array([0.0 * turn, np.cos(turn), np.sin(turn)]).T
+    tips = arm.at(bent).tip[:3, 3] + [-0.006, -0.015, 0.02] + 0.015 * way
+    return cdsm.plan_path(arm, "z", WANTED, 10.0, 250.0, tips=tips, guess=bent, progress=False)
