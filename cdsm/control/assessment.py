@@ -19,8 +19,8 @@ from cdsm.errors import CdsmError
 from cdsm.friction.band import RestBand, rest_band
 from cdsm.friction.breakaway import breakaway
 from cdsm.manipulator import Manipulator
-from cdsm.statics.equilibrium import no_rest
 from cdsm.statics.locked_motors import LoadedArm
+from cdsm.statics.rest_search import no_rest
 from cdsm.statics.slow_loading import Load
 from cdsm.statics.trust_region import find_rest
 from cdsm.stiffness_matrix import Stiffness

@@ -58,8 +58,9 @@ def test_payload_that_nobody_told_of_is_felt() -> None:
     loaded = run.wrench[:, 2] != 0.0
     assert loaded.sum() == 11
     assert run.wrench[-1, 2] == pytest.approx(-0.2 * 9.81)
-    np.testing.assert_allclose(run.estimated_force[-1], [0.0, 0.0, -0.2 * 9.81], atol=0.1)
-    assert abs(run.estimated_force[~loaded]).max() < 0.1
+    np.testing.assert_allclose(run.estimated_force[-1, 1:], [0.0, -0.2 * 9.81], atol=0.05)
+    # along the arm, x, a force is hardly felt in the cables
+    assert abs(run.estimated_force[~loaded, 1:]).max() < 0.05
     assert abs(run.stiffness_error[5:]).max() < 0.02
 
 
