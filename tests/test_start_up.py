@@ -65,7 +65,7 @@ def test_names_for_type_checkers_are_those_found_at_run_time() -> None:
 
 
 def test_dir_shows_the_public_names_and_modules_only() -> None:
-    assert dir(cdsm) == sorted({*cdsm.__all__, "paper", "plots", "view"})
+    assert dir(cdsm) == sorted({*cdsm.__all__, "control", "paper", "plots", "view"})
 
 
 def test_modules_are_there_without_an_import_of_their_own() -> None:
