@@ -76,7 +76,8 @@ if TYPE_CHECKING:
     from cdsm.posture import MomentArms, Posture
     from cdsm.report import Report, SelfCheck
     from cdsm.statics.bifurcation import Bifurcation, bifurcation
-    from cdsm.statics.buckling import CriticalLoad, CriticalTension, critical_load, critical_tension
+    from cdsm.statics.buckling import critical_load, critical_tension
+    from cdsm.statics.buckling_results import CriticalLoad, CriticalTension
     from cdsm.statics.equilibrium import Equilibrium
     from cdsm.statics.load_cycle import load_cycle
     from cdsm.statics.load_history import LoadHistory
@@ -282,7 +283,8 @@ _NAMES = {
     "posture": "MomentArms Posture",
     "report": "Report SelfCheck",
     "statics.bifurcation": "Bifurcation bifurcation",
-    "statics.buckling": "CriticalLoad CriticalTension critical_load critical_tension",
+    "statics.buckling": "critical_load critical_tension",
+    "statics.buckling_results": "CriticalLoad CriticalTension",
     "statics.equilibrium": "Equilibrium",
     "statics.load_cycle": "load_cycle",
     "statics.load_history": "LoadHistory",

@@ -23,6 +23,7 @@ from cdsm.tension import checked_bounds
 if TYPE_CHECKING:
     import pandas
     import xarray
+    from matplotlib.figure import Figure
 
 
 @final
@@ -52,6 +53,16 @@ class Tensions(ReadOnlyState):
     def ok(self) -> Flags:
         """Return for each posture whether tensions were found, (B,)."""
         return frozen(self.status == OK)
+
+    def plot(self) -> Figure:
+        """Plot the median tension [N] of each cable over the postures, and its range.
+
+        Raises:
+            InvalidInput: No posture has tensions.
+        """
+        from cdsm.plots import plot_tensions  # matplotlib imports slowly
+
+        return plot_tensions(self)
 
     def to_xarray(self) -> xarray.Dataset:
         """Return tensions and status as a Dataset in SI, labelled by posture, joint and cable.

@@ -43,6 +43,8 @@ class Batch(ReadOnlyState):
 
     Names, shapes and units are those of :class:`~cdsm.Posture` and :class:`~cdsm.Stiffness`, with
     the posture as first axis. A quantity that does not exist is NaN; :attr:`status` says why.
+    A batch has no picture of its own, since its rows have no order and any outputs: plot
+    :meth:`to_pandas`, or draw a :func:`~cdsm.sweep` with :func:`cdsm.plots.plot_map`.
 
     Attributes:
         arm: The arm.

@@ -52,7 +52,8 @@ ANGLES = typer.Option(
 )
 Angles = Annotated[str, ANGLES]
 MinTension = Annotated[
-    float, _tension_option(help="Lower bound of all tensions [N] (in Python: minimum, 0).")
+    float,
+    _tension_option(help="Lower bound of all tensions [N]; in Python 0, where strands go slack."),
 ]
 MaxTension = Annotated[float, _tension_option(help="Upper bound of all tensions [N].")]
 Wrench = Annotated[

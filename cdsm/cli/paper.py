@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -11,9 +10,6 @@ import typer
 
 import cdsm
 from cdsm.cli.options import AsJson
-
-_WIDE = 110
-"""Smallest width of the terminal for the table of claims; below it, a claim is a few lines."""
 
 
 def reproduce(
@@ -28,9 +24,11 @@ def reproduce(
 ) -> None:
     """Recompute Figs. 3 to 8, 10, 12 and 13 of the paper: figures, table and numbers.
 
-    The table is complete, with assumptions and other readings, in reproduction.md.
+    Prints, for each figure, the number that deviates most from the paper. The table of all numbers,
+    with assumptions and other readings, is reproduction.md.
     """
     from cdsm.support.files import make_folder, write_text
+    from cdsm.support.format import aligned
     from cdsm.support.progress import track
 
     paper = cdsm.paper
@@ -47,24 +45,7 @@ def reproduce(
     if as_json:
         typer.echo(numbers)
         return
-    _show(paper.HEADER, paper.to_rows(results))
-    typer.echo(paper.EXPLANATION)
+    rows = [paper.SUMMARY, *paper.to_summary(results)]
+    typer.echo("\n".join(aligned(rows)))
+    typer.echo(f"\nall numbers, and what each is: {out / 'reproduction.md'}")
     typer.echo("written: " + ", ".join(map(str, written)))
-
-
-def _show(header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Print a table on a wide terminal, else a few lines for each row."""
-    from rich.console import Console
-    from rich.table import Table
-
-    screen = Console()
-    if screen.width >= _WIDE:
-        table = Table(*header)
-        for row in rows:
-            table.add_row(*row)
-        screen.print(table)
-        return
-    for figure, quantity, *cells in rows:
-        typer.echo(f"{figure}: {quantity}")
-        for name, cell in zip(header[2:], cells, strict=True):
-            typer.echo(f"    {name:<12} {cell}")

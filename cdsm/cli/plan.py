@@ -59,6 +59,10 @@ def plan(
         ),
     ] = None,
     figure: Picture = None,
+    animation: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.gif", help="Of --path: the arm as it moves, to write."),
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Find the least tensions that make an arm as stiff as wanted, at a posture or along a path.
@@ -83,14 +87,18 @@ def plan(
         if out is not None:
             written(plan.write(out))
         write_picture(figure, plan.plot)
+        if animation is not None:
+            cdsm.plots.plot_path(plan, animate=animation)
+            written(animation)
         missed = len(plan.target) - len(plan.planned)
         warnings = [f"NOT REACHED at {missed} of {len(plan.target)} samples"] if missed else []
         conditions = Conditions(robot, (min_tension,))
         answer(as_json, plan.to_dict, conditions, plan, warnings=warnings)
     elif wanted is None:
         raise typer.BadParameter("give it, or --path.", param_hint="--target")
-    elif math.isfinite(rate):
-        raise typer.BadParameter("is of a path; give --path, too.", param_hint="--rate")
+    elif math.isfinite(rate) or animation is not None:
+        option = "--rate" if math.isfinite(rate) else "--animation"
+        raise typer.BadParameter("is of a path; give --path, too.", param_hint=option)
     else:
         pose = arm.at("0" if angles is None else angles)
         bounds = min_tension, max_tension, load.at_tip(pose.arm)

@@ -3,7 +3,17 @@
 from collections.abc import Callable
 from typing import Final
 
-from cdsm.paper.claims import EXPLANATION, HEADER, Claim, Figure, to_dict, to_markdown, to_rows
+from cdsm.paper.claims import (
+    EXPLANATION,
+    HEADER,
+    SUMMARY,
+    Claim,
+    Figure,
+    to_dict,
+    to_markdown,
+    to_rows,
+    to_summary,
+)
 from cdsm.paper.curves import Curve, StiffnessFigure
 from cdsm.paper.experiments import ExperimentFigure, Trace, figure_10, figure_12, figure_13
 from cdsm.paper.lead import LeadFigure, figure_lead
@@ -41,6 +51,7 @@ __all__ = [
     "FIGURES",
     "HEADER",
     "STEPS",
+    "SUMMARY",
     "Claim",
     "Curve",
     "ExperimentFigure",
@@ -57,4 +68,5 @@ __all__ = [
     "to_dict",
     "to_markdown",
     "to_rows",
+    "to_summary",
 ]

@@ -89,6 +89,35 @@ def floats(values: Iterable[float]) -> tuple[float, ...]:
     return tuple(float(value) for value in values)
 
 
+SUMMARY = ("number that deviates most", "compared", "deviation", "paper", "computed")
+
+
+def to_summary(figures: Sequence[Figure]) -> list[tuple[str, ...]]:
+    """Return one row of text per figure: the number that deviates most; :data:`SUMMARY` has heads.
+
+    A deviation is relative to the largest of the paper's numbers of its claim.
+    """
+    rows: list[tuple[str, ...]] = []
+    for figure in figures:
+        compared = [claim for claim in figure.claims if claim.difference is not None]
+        count = f"{len(compared)} of {len(figure.claims)}"
+        if compared:
+            worst = max(compared, key=_deviation)
+            name = f"{worst.figure}: {worst.quantity} [{worst.unit}]"
+            numbers = _listed(worst.paper, ".4g"), _listed(worst.computed, ".3g")
+            rows.append((name, count, f"{100.0 * _deviation(worst):.2g} %", *numbers))
+        else:
+            rows.append((f"{figure.claims[0].figure}: no numbers in the paper", count, "", "", ""))
+    return rows
+
+
+def _deviation(claim: Claim) -> float:
+    """Return the largest difference of a claim over the largest of the paper's numbers."""
+    assert claim.difference is not None
+    assert claim.paper is not None
+    return max(map(abs, claim.difference)) / max(map(abs, claim.paper))
+
+
 def to_rows(figures: Sequence[Figure]) -> list[tuple[str, ...]]:
     """Return one row of text per claim; :data:`HEADER` names the columns."""
     return [

@@ -7,10 +7,20 @@ state of matplotlib.
 
 from cdsm.plots.arm import plot_arm
 from cdsm.plots.budget import plot_monte_carlo, plot_uncertainty
-from cdsm.plots.by_cable import plot_shares, plot_stiffness_plan, plot_stiffness_range
+from cdsm.plots.by_cable import (
+    plot_shares,
+    plot_stiffness_plan,
+    plot_stiffness_range,
+    plot_tensions,
+)
 from cdsm.plots.forces import plot_force_polytope
 from cdsm.plots.friction import plot_load_history
-from cdsm.plots.loads import plot_bifurcation, plot_critical_tension, plot_weight_test
+from cdsm.plots.loads import (
+    plot_bifurcation,
+    plot_critical_load,
+    plot_critical_tension,
+    plot_weight_test,
+)
 from cdsm.plots.maps import plot_map
 from cdsm.plots.paper import plot_paper
 from cdsm.plots.path import plot_modes, plot_path
@@ -27,6 +37,7 @@ __all__ = [
     "plot_arm",
     "plot_bifurcation",
     "plot_cables",
+    "plot_critical_load",
     "plot_critical_tension",
     "plot_elasticity",
     "plot_force_polytope",
@@ -42,6 +53,7 @@ __all__ = [
     "plot_stiffness_plan",
     "plot_stiffness_range",
     "plot_stiffness_ranges",
+    "plot_tensions",
     "plot_tracking_run",
     "plot_uncertainty",
     "plot_weight_test",

@@ -26,6 +26,7 @@ from cdsm.plots.style import (
 )
 
 if TYPE_CHECKING:
+    from cdsm.batch import Tensions
     from cdsm.planning.plan import StiffnessPlan
     from cdsm.planning.range import StiffnessRange
     from cdsm.stiffness_matrix import Shares
@@ -111,6 +112,31 @@ def plot_stiffness_range(attainable: StiffnessRange) -> Figure:
     """
     expect("attainable", attainable, "StiffnessRange")
     return _plot_tensions(_ends(attainable), _along(attainable))
+
+
+def plot_tensions(tensions: Tensions) -> Figure:
+    """Plot the median tension of each cable over many postures, with the least and the largest.
+
+    Args:
+        tensions: Result of :func:`~cdsm.distribute_tensions`.
+
+    Raises:
+        InvalidInput: ``tensions`` are not tensions of many postures, or none were found.
+    """
+    expect("tensions", tensions, "Tensions")
+    found, names = tensions.values[tensions.ok], tensions.arm.cables.names
+    if not len(found):
+        raise InvalidInput("tensions", "hold no posture with tensions; see their status.")
+    figure, ((axes,),) = panels(_width(names), 2.8, 1)
+    low, middle, high = np.quantile(found, [0.0, 0.5, 1.0], axis=0)
+    reach = [middle - low, high - middle]
+    axes.errorbar(names, middle, reach, fmt="o", color=BLUE, markersize=3, capsize=2, linewidth=0.8)
+    axes.set_ylabel("tension [N]")
+    axes.set_ylim(0.0, _ROOM * high.max() or 1.0)
+    count = f"{len(found)} of {len(tensions)} postures"
+    caption(axes, f"{tensions.arm.name}: median and range, {count}")
+    _name_cables(axes)
+    return figure
 
 
 def _width(names: Sequence[str]) -> float:

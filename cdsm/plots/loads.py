@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cdsm.statics.bifurcation import Bifurcation
-    from cdsm.statics.buckling import CriticalTension
+    from cdsm.statics.buckling_results import CriticalLoad, CriticalTension
     from cdsm.statics.weight_test import WeightTest
 
 _ROOM = 0.08
@@ -108,6 +108,39 @@ def plot_critical_tension(critical: CriticalTension) -> Figure:
     caption(axes, critical.posture.arm.name)
     if label == "_":
         legend(axes)
+    return figure
+
+
+def plot_critical_load(critical: CriticalLoad) -> Figure:
+    """Plot the stability margin over the factor of the load, as far as the arm holds it.
+
+    Args:
+        critical: Result of :func:`~cdsm.critical_load`.
+
+    Raises:
+        InvalidInput: ``critical`` is not a critical load.
+    """
+    expect("critical", critical, "CriticalLoad")
+    figure, ((axes,),) = panels(ONE_COLUMN, 2.6, 1)
+    axes.plot(critical.factors, critical.margins, color=BLUE)
+    axes.axhline(0.0, color="0.2", linewidth=0.8)
+    if math.isfinite(critical.factor):
+        end = critical.factor, critical.margins[-1]
+        axes.plot(*end, "o", color=VERMILLION, markersize=4)
+        words = {
+            "buckling": "buckles",
+            "infeasible": "no balance",
+            "elasticity": "end of a law",
+        }
+        label = f"{words[critical.limit]} at {critical.factor:.4g}"
+        place = {"xytext": (-6, -12), "textcoords": "offset points", "ha": "right"}
+        axes.annotate(label, end, fontsize=SMALL, **place)
+    room = _ROOM * np.ptp([0.0, *critical.margins])
+    axes.set_ylim(min(0.0, *critical.margins) - 2.0 * room, max(0.0, *critical.margins) + room)
+    unit = critical.posture.arm.stiffness_unit()
+    axes.set(xlabel="factor of the load", ylabel=f"smallest joint stiffness [{unit}]")
+    load = " ".join(f"{x:.3g}" for x in critical.wrench[:3])
+    caption(axes, f"{critical.posture.arm.name}: load ({load}) N")
     return figure
 
 

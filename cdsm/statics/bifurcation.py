@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm.errors import InvalidInput
-from cdsm.statics.buckling import CriticalTension
+from cdsm.statics.buckling_results import CriticalTension
 from cdsm.statics.equilibrium import Equilibrium
 from cdsm.statics.rest_search import equilibrium
 from cdsm.support.format import plain

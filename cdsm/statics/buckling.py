@@ -11,8 +11,7 @@ with locked motors moves when it buckles.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final, final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,162 +20,26 @@ from cdsm.errors import InvalidInput
 from cdsm.posture import Posture
 from cdsm.statics.bound_scan import (
     SAMPLES,
-    Limit,
     failure_at,
     last_true,
     scan_end,
     stable_ranges,
     tension_domain,
 )
+from cdsm.statics.buckling_results import CriticalLoad, CriticalTension
 from cdsm.stiffness_matrix import Stiffness, stiffness
-from cdsm.support.format import key, plain
 from cdsm.support.validation import bound, instance, wrench_vector
-from cdsm.support.values import Array, ReadOnlyState, frozen
+from cdsm.support.values import Array, frozen
 from cdsm.tension import DEFAULT_SOLVER, distribute_tension
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    pass
 
 _NOWHERE: Final = 1e6
 """Largest load factor that is tried. If the arm holds it, the critical factor is infinite."""
 
-
-@final
-@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class CriticalTension(ReadOnlyState):
-    """Tension at which an arm buckles at one posture; made by :func:`critical_tension`.
-
-    Attributes:
-        posture: The fixed posture.
-        wrench: W (6,) at ``tool0``, base axes: force [N], then moment [N m].
-        minimum: Lower bound of tension [N] at which the arm, stable below, buckles. It is inf if
-            the arm is stable up to the end of :attr:`examined`. It is the low end of
-            :attr:`examined` if the arm is stable at no bound.
-        mode: Unit joint motion (nv,) of the smallest eigenvalue of K_θ at that bound. If the arm
-            does not buckle: at the bound where the arm is softest.
-        tension: F (C,) [N] at the bound of ``mode``.
-        stable: Ranges (low, high) [N] of the lower bound in which the arm is stable.
-        examined: Range [N] of the lower bound that was scanned. It ends where no tensions balance
-            the arm within the domains of the elasticities. If tensions balance the arm at every
-            bound, it ends where the terms that grow with the tension decide the sign of K_θ.
-        bounds: Lower bounds (n,) [N] that were evaluated.
-        margins: Smallest eigenvalue of K_θ at each of these bounds (n,) [N m/rad].
-    """
-
-    posture: Posture
-    wrench: Array
-    minimum: float
-    mode: Array
-    tension: Array
-    stable: tuple[tuple[float, float], ...]
-    examined: tuple[float, float]
-    bounds: Array
-    margins: Array
-
-    def __repr__(self) -> str:
-        return f"<CriticalTension: {self._verdict}>"
-
-    @property
-    def _verdict(self) -> str:
-        low, high = self.examined
-        if not self.stable:
-            return f"UNSTABLE at every lower bound from {low:.4g} N to {high:.4g} N"
-        if math.isinf(self.minimum):
-            return f"does not buckle at any lower bound up to {high:.4g} N"
-        return f"buckles at a lower bound of {self.minimum:.4g} N"
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """That the arm is UNSTABLE at every lower bound; empty if it is stable at some."""
-        return () if self.stable else (self._verdict,)
-
-    def plot(self) -> Figure:
-        """Plot the smallest joint stiffness [N m/rad] over the lower bound of tension [N]."""
-        from cdsm.plots import plot_critical_tension  # matplotlib imports slowly
-
-        return plot_critical_tension(self)
-
-    def to_dict(self) -> dict[str, object]:
-        """Return bounds, mode and margins in SI for JSON, with units in the keys; inf as None."""
-        arm = self.posture.arm
-        numbers = {
-            **self.posture._coordinates,
-            "critical_minimum_tension_N": self.minimum,
-            "stable_minimum_tension_N": self.stable,
-            "examined_minimum_tension_N": self.examined,
-            "mode": dict(zip(arm.joint_names, self.mode, strict=True)),
-            "tension_N": dict(zip(arm.cables.names, self.tension, strict=True)),
-            "minimum_tension_N": self.bounds,
-            key("margin", arm.stiffness_unit()): self.margins,
-        }
-        return dict(plain(numbers))
-
-    def __str__(self) -> str:
-        verdict = self._verdict
-        spans = ", ".join(f"{a:.4g} to {b:.4g} N" for a, b in self.stable if a < b)
-        names = self.posture.arm.joint_names
-        lines = [verdict, f"stable from {spans}" if spans else "", _describe_mode(names, self.mode)]
-        return "\n".join(line for line in lines if line)
-
-
-@final
-@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class CriticalLoad(ReadOnlyState):
-    """Multiple of a load at which an arm fails at one posture; made by :func:`critical_load`.
-
-    Attributes:
-        posture: The fixed posture.
-        wrench: W (6,) that is multiplied by the factor: force [N], then moment [N m].
-        carried: Constant wrench (6,) that acts in addition: force [N], then moment [N m].
-        factor: Largest factor [-] up to which the arm holds; inf if it holds a million times W.
-        limit: Reason of the failure: ``"buckling"``, ``"infeasible"`` (no tensions balance the
-            load), ``"elasticity"`` (a tension leaves the domain of its cable) or ``"none"``.
-        mode: Unit joint motion (nv,) of the smallest eigenvalue of K_θ at this factor.
-        tension: F (C,) [N] at this factor.
-    """
-
-    posture: Posture
-    wrench: Array
-    carried: Array
-    factor: float
-    limit: Limit
-    mode: Array
-    tension: Array
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """That the arm is UNSTABLE without the load already; else empty."""
-        return () if self.factor else (f"UNSTABLE without the load: {self}".partition("\n")[0],)
-
-    def to_dict(self) -> dict[str, object]:
-        """Return load, factor and mode in SI for JSON, with units in the keys; inf as None."""
-        arm = self.posture.arm
-        numbers = {
-            **self.posture._coordinates,
-            "load": self.wrench,
-            "carried": self.carried,
-            "critical_load_factor": self.factor,
-            "limit": self.limit,
-            "load_mode": dict(zip(arm.joint_names, self.mode, strict=True)),
-            "load_tension_N": dict(zip(arm.cables.names, self.tension, strict=True)),
-        }
-        return dict(plain(numbers))
-
-    def __repr__(self) -> str:
-        return f"<CriticalLoad factor {self.factor:.4g}, {self.limit}>"
-
-    def __str__(self) -> str:
-        reason = {
-            "buckling": "there it buckles"
-            if self.factor
-            else "it buckles without the load already",
-            "infeasible": "beyond, no tensions balance it",
-            "elasticity": "beyond, a tension leaves the domain of its cable's elasticity",
-            "none": "nothing happens that far",
-        }[self.limit]
-        mode = _describe_mode(self.posture.arm.joint_names, self.mode)
-        held = f"the load up to a factor of {self.factor:.4g}"
-        return f"holds {held if self.factor else 'no part of the load'}; {reason}\n{mode}"
+_SHOWN: Final = 10.0
+"""Largest load factor of the curve of an arm that holds every load."""
 
 
 def critical_tension(
@@ -266,9 +129,11 @@ def critical_load(
 
     factor, limit = 0.0, failure_at(at, 0.0)
     at(factor)  # raises the reason if no tensions balance the arm
+    held = [0.0]
     if limit == "none":
         end = 1e-3
         while end < _NOWHERE and failure_at(at, end) == "none":
+            held.append(end)
             end *= 2.0
         if end < _NOWHERE:
             # the doubling may have stepped over the first failure
@@ -276,10 +141,12 @@ def critical_load(
             first = next(i for i, place in enumerate(places) if failure_at(at, place) != "none")
             holds, fails = places[first - 1], places[first]
             factor, beyond = last_true(lambda x: failure_at(at, x) == "none", holds, fails)
+            held = [*places[:first], factor]
             limit = failure_at(at, beyond)
         else:
             factor = math.inf
     K = at(min(factor, _NOWHERE / 2.0))
+    factors = [each for each in held if each < _SHOWN or math.isfinite(factor)]
     return CriticalLoad(
         posture=pose,
         wrench=W,
@@ -288,6 +155,8 @@ def critical_load(
         limit=limit,
         mode=_mode(K),
         tension=K.tension,
+        factors=frozen(np.array(factors)),
+        margins=frozen(np.array([at(each).margin for each in factors])),
     )
 
 
@@ -295,10 +164,3 @@ def _mode(K: Stiffness) -> Array:
     """Return the softest joint motion, its largest entry positive (eigenvectors have no sign)."""
     mode = K.critical_direction
     return frozen(mode * np.sign(mode[abs(mode).argmax()]))
-
-
-def _describe_mode(names: tuple[str, ...], mode: Array) -> str:
-    """Name the joints with the largest shares in a mode."""
-    order = np.argsort(-abs(mode))[:4]
-    shares = ", ".join(f"{names[i]} {mode[i]:+.2f}" for i in order)
-    return f"softest joint motion: {shares}" + (", …" if len(mode) > len(order) else "")

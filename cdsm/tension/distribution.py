@@ -44,6 +44,7 @@ def distribute_tension(
     Args:
         pose: The posture.
         minimum: Lower bound [N], for all cables or (C,); not negative, since cables only pull.
+            Commands take 10 N if none is given, since a strand has no rigidity at 0 N.
         maximum: Upper bound [N], for all cables or (C,); inf: no bound. Bounds that a cable defines
             also apply.
         wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m].

@@ -55,7 +55,8 @@ def test_reproduce_writes_figures_table_and_numbers(tmp_path: Path) -> None:
     }
     assert set(written) == figures | {"reproduction.json", "reproduction.md"}
     assert all(written[name].read_bytes().startswith(b"\x89PNG") for name in figures)
-    assert "Fig. 6" in result.output
+    assert "Fig. 6: increment of stiffness" in result.output
+    assert len(result.output.splitlines()) < 20
     assert "4.17, 2.89, 4.53" in written["reproduction.md"].read_text(encoding="utf-8")
     json.loads(written["reproduction.json"].read_text(encoding="utf-8"))
 
@@ -225,10 +226,11 @@ PATHS = {
 
 @pytest.mark.parametrize("kind", PATHS)
 def test_plan_follows_a_path_as_the_api_does(kind: str, geometry: Path, tmp_path: Path) -> None:
-    path, png, motors = (tmp_path / name for name in ("path.csv", "plan.png", "motors.csv"))
+    names = ("path.csv", "plan.png", "motors.csv", "arm.gif")
+    path, png, motors, film = (tmp_path / name for name in names)
     path.write_text(PATHS[kind], encoding="utf-8")
     options = ("plan", geometry, "--path", path, "--direction", "0,0,1", "--rate", 8)
-    result = call(*options, "--figure", png, "-o", motors, "--json")
+    result = call(*options, "--figure", png, "-o", motors, "--animation", film, "--json")
     assert result.exit_code == (3 if kind == "angles" else 0), result.output
     told = json.loads(result.stdout)
     arm = cdsm.Manipulator(cdsm.Geometry.read(geometry), cdsm.presets.STRAND_1X19)
@@ -246,6 +248,7 @@ def test_plan_follows_a_path_as_the_api_does(kind: str, geometry: Path, tmp_path
         assert between.achieved is not None
         assert each["achieved_N_per_m"] == pytest.approx(float(between.achieved), rel=1e-9)
     assert png.read_bytes().startswith(b"\x89PNG")
+    assert film.read_bytes().startswith(b"GIF8")
     assert len(motors.read_text(encoding="utf-8").splitlines()) == len(targets) + 1
     text = call(*options).output
     assert "samples planned" in text
@@ -287,6 +290,7 @@ def test_plan_asks_for_one_target_and_for_a_path_with_its_rate(
     for arguments, said in (
         ((), "--path"),
         (("--target", 20, "--rate", 3), "--path"),
+        (("--target", 20, "--animation", "arm.gif"), "--path"),
         (("--target", 20, "--path", path), "both"),
         (("--path", path, "--angles", "1,2"), "--angles"),
     ):

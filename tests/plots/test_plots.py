@@ -430,7 +430,8 @@ def test_every_result_that_people_look_at_has_a_picture(tmp_path: Path) -> None:
         *(pose.arm, pose, pull, K, K.shares("z"), cdsm.modes(pose, K)),
         *(attainable, plan, path, cdsm.saturation(pose, "z", 10.0, 200.0)),
         *(cdsm.equilibrium(pose, pull), cdsm.weight_test(pose, pull, (0.0, 0.0, -1.0))),
-        cdsm.critical_tension(pose),
+        *(cdsm.critical_tension(pose), cdsm.critical_load(pose, np.eye(6)[0], 10.0)),
+        cdsm.distribute_tensions(pose.arm, [pose.q, 0.5 * pose.q], 10.0),
         *(cdsm.solve_joint_angles(pose.arm, pose.cable_lengths), cdsm.presets.STRAND_1X19),
         cdsm.inverse_kinematics(pose.arm, pose.tip),
     ):

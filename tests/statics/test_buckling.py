@@ -62,6 +62,10 @@ def test_tip_force_along_the_link_buckles_it_at_its_closed_form(minimum: float) 
     assert 2.0 * found.factor == pytest.approx(left / LENGTH, rel=1e-9)
     pulled = cdsm.critical_load(pose, [2.0, 0.0, 0.0, 0.0, 0.0, 0.0], minimum)
     assert (pulled.factor, pulled.limit) == (math.inf, "none")
+    assert pulled.factors[-1] < 10.0
+    for load in (found, pulled):  # K falls by P · LENGTH
+        expected = LENGTH * load.wrench[0] * load.factors + left
+        np.testing.assert_allclose(load.margins, expected, rtol=1e-9, atol=1e-9 * left)
 
 
 @pytest.mark.parametrize("push", [3.0, -4.0])
