@@ -22,9 +22,9 @@ NOT_QUICK = ("slow", "long", "speed")
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark ``quick`` every test that nothing else is said of; the paper and notebooks are slow."""
+    """Mark ``quick`` every test that nothing else is said of; the paper is slow."""
     for item in items:
-        if item.path.suffix == ".ipynb" or "results" in getattr(item, "fixturenames", ()):
+        if "results" in getattr(item, "fixturenames", ()):
             item.add_marker("slow")
         if not any(item.get_closest_marker(name) for name in NOT_QUICK):
             item.add_marker("quick")

@@ -11,6 +11,7 @@ HEADER = (
     *("figure", "quantity", "paper", "computed", "difference", "original length", "hung weight"),
     *("assumption", "searched"),
 )
+"""Columns of :func:`to_rows`."""
 
 EXPLANATION = (
     "Three numbers are x, y, z. computed: K_R as the paper writes it, with the pseudo-inverse of "
@@ -21,6 +22,7 @@ EXPLANATION = (
     "identified from the same data within stated bounds. All of it is frictionless, links rigid. "
     "Left out: Fig. 9, a photograph, and Fig. 11, measured springs without printed numbers."
 )
+"""What the columns mean, and what is left out."""
 
 
 @final

@@ -1,0 +1,102 @@
+"""Settings of the site. ``docs/build.py`` builds it; nothing is fetched while it does."""
+
+import re
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+HERE = Path(__file__).parent
+sys.path.insert(0, str(HERE.parent))
+
+from sphinx.application import Sphinx
+
+from docs import directives, generate
+
+
+def _mathjax() -> str:
+    """Return the script that typesets formulas; a package ships it, so no page asks a server."""
+    spec = find_spec("sphinx-mathjax-offline")
+    assert spec is not None
+    assert spec.submodule_search_locations is not None
+    return str(Path(spec.submodule_search_locations[0], "static", "mathjax", "tex-svg.js"))
+
+
+project = "cdsm"
+author = copyright = "The cdsm developers"
+version = release = generate.version()
+
+extensions = [
+    "myst_nb",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.mathjax",
+    "sphinx.ext.napoleon",
+    "sphinx.ext.viewcode",
+    "sphinx_copybutton",
+    "sphinx_design",
+]
+exclude_patterns = ["static", "pictures", "measured"]
+nitpicky = True
+nitpick_ignore_regex = [
+    # other projects' types, whose indexes are on the network; and types of ours without a page
+    ("py:.*", r"(?!cdsm\.).*"),
+    ("py:.*", r"cdsm\.(?!paper|plots|presets|view)[a-z_]+\..*"),
+    ("py:.*", r"cdsm\.[a-z_]+\.[a-z_]+\..*"),
+]
+
+myst_enable_extensions = ["colon_fence", "deflist", "dollarmath", "fieldlist"]
+myst_heading_anchors = 3
+nb_execution_mode = "auto"
+nb_execution_excludepatterns = ["generated/tutorials/*"]  # tests.support.notebooks ran them
+nb_execution_in_temp = True
+nb_execution_raise_on_error = True
+nb_execution_timeout = 600
+nb_merge_streams = True
+
+autodoc_member_order = "bysource"
+autodoc_typehints_format = "short"
+autodoc_preserve_defaults = True
+napoleon_numpy_docstring = False
+napoleon_attr_annotations = False
+napoleon_use_ivar = True
+python_use_unqualified_type_names = True
+python_maximum_signature_line_length = 80
+
+html_theme = "furo"
+html_title = "cdsm"
+html_static_path = ["static/site.css", _mathjax()]
+html_css_files = ["site.css"]
+html_show_sourcelink = html_show_sphinx = False
+html_copy_source = False
+html_theme_options = {"source_edit_link": "", "navigation_with_keys": True}
+mathjax_path = "tex-svg.js"
+mathjax3_config = {"svg": {"mtextInheritFont": True}, "options": {"enableMenu": False}}
+copybutton_prompt_text = r"\$ |>>> "
+copybutton_prompt_is_regexp = True
+
+
+def _escape(app: Sphinx, kind: str, name: str, thing: object, options: object, lines: list[str]) -> None:
+    """Keep the bars of ``|x|`` in docstrings, which are absolute values."""
+    for i, line in enumerate(lines):
+        parts = line.split("``")
+        parts[::2] = [part.replace("|", r"\|") for part in parts[::2]]
+        lines[i] = "``".join(parts)
+
+
+def _shorten(*event: object) -> tuple[str, str] | None:
+    """Write Array for numpy's own long name of an array of float64."""
+    if event[-2] is None:
+        return None
+    long = re.compile(r"(numpy\.)?ndarray\[tuple\[(typing\.)?Any, \.\.\.\], (numpy\.)?dtype\[(.*?)\]\]")
+    signature, returned = (long.sub("Array", str(text or "")) for text in event[-2:])
+    return signature, returned
+
+
+def setup(app: Sphinx) -> None:
+    """Write the generated pages before Sphinx looks for pages."""
+    directives.setup(app)
+    app.connect("config-inited", lambda *_: generate.all_pages())
+    app.connect("autodoc-process-docstring", _escape)
+    app.connect("autodoc-process-signature", _shorten)
+    # the constants of presets are found there, not where their classes are
+    own = {"cdsm.presets": "cdsm.presets"}
+    app.connect("viewcode-follow-imported", lambda _, module, name: own.get(module))

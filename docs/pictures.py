@@ -1,0 +1,75 @@
+"""Draw the pictures of README and of the first page: ``python docs/pictures.py``.
+
+The arm is that of README. Written to ``docs/pictures``; committed, since README shows them.
+"""
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import Normalize
+from PIL import Image
+
+import cdsm
+from cdsm.plots.arm import arm_axes, draw_arm
+from cdsm.plots.style import MM, TEXT, equal_axes
+
+FOLDER = Path(__file__).parent / "pictures"
+FRAMES = 48
+COLORS = 96
+"""Number of frames and colours of the animation."""
+
+geometry = cdsm.Geometry.universal(
+    joints=4, cables_per_joint=3, link_length=0.06, base_length=0.03, disk_offset=0.012,
+    hole_radius=0.025, link_mass=0.12, lead=0.3, name="serpentine",
+)  # fmt: skip
+arm = cdsm.Manipulator(geometry, elasticity=cdsm.presets.STRAND_1X19)
+
+
+def picture() -> None:
+    """Draw README's arm at README's posture, with tensions and compliance."""
+    pose = arm.at(np.deg2rad([10, 5, 10, 5, -8, 0, -8, 0]))
+    pull = cdsm.distribute_tension(pose, minimum=50.0)
+    figure = cdsm.stiffness(pose, pull).plot()
+    figure.savefig(FOLDER / "arm.png", dpi=200)
+
+
+def animation() -> None:
+    """Draw the arm on its way round; its cables keep it equally stiff along z at each posture."""
+    turn = np.linspace(0.0, 2.0 * np.pi, FRAMES + 1)[:-1]
+    bend = np.deg2rad(14.0) * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    q = np.hstack([bend, bend, 0.6 * bend, 0.6 * bend])
+    plan = cdsm.plan_path(arm, "z", 4e3, minimum=20.0, maximum=400.0, angles=q)
+    assert plan.complete
+    poses = [arm.at(angles) for angles in plan.angles]
+    tips = MM * np.array([pose.tip[:3, 3] for pose in [*poses, poses[0]]])
+    scale = Normalize(plan.tensions.min(), plan.tensions.max())
+    figure, axes = arm_axes()
+    figure.set_size_inches(3.5, 2.7)
+    axes.set_position((-0.14, -0.26, 1.34, 1.5))
+    canvas = FigureCanvasAgg(figure)
+    frames = []
+    for pose, values, along in zip(poses, plan.tensions, plan.achieved, strict=True):
+        axes.clear()
+        axes.set_axis_off()
+        draw_arm(axes, pose, colormaps["viridis"](scale(values)))
+        axes.plot(*tips.T, color="0.7", linewidth=0.8)
+        axes.set(xlim=(0, 270), ylim=(-110, 110), zlim=(-110, 110))
+        equal_axes(axes, 0.86)
+        figure.suptitle(
+            f"{along.item() / 1e3:.2f} N/mm along z, tensions {values.min():.0f} to "
+            f"{values.max():.0f} N",
+            fontsize=TEXT,
+        )
+        canvas.draw()
+        frames.append(Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB"))
+    palette = frames[0].quantize(COLORS, Image.Quantize.MAXCOVERAGE)
+    flat = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
+    flat[0].save(FOLDER / "bend.gif", save_all=True, append_images=flat[1:], duration=80, loop=0)
+
+
+if __name__ == "__main__":
+    FOLDER.mkdir(exist_ok=True)
+    picture()
+    animation()
