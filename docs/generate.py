@@ -25,6 +25,7 @@ CHAPTERS = {
     "elasticity": "Wires",
     "wires": "Wires",
     "posture": "Posture, tension, stiffness",
+    "tolerance": "Uncertainty",
     "tension": "Posture, tension, stiffness",
     "stiffness_matrix": "Posture, tension, stiffness",
     "shares": "Posture, tension, stiffness",
@@ -123,13 +124,22 @@ def _page(title: str, module: str, names: list[str], own: bool = False) -> str:
         thing = getattr(home, name)
         if isclass(thing):
             rows += [f".. autoclass:: {module}.{name}", "   :members:"]
-            rows += ["   :show-inheritance:"] if issubclass(thing, Exception) else []
+            if issubclass(thing, Exception):
+                rows.append("   :show-inheritance:")
+            elif any(_is_part(base) for base in thing.__bases__):
+                rows.append("   :inherited-members: ReadOnlyState")
         elif callable(thing):
             rows.append(f".. autofunction:: {module}.{name}")
         else:
             rows += [f".. autodata:: {_where(module, name)}.{name}", "   :no-value:"]
         rows.append("")
     return "\n".join([*rows, "```", ""])
+
+
+def _is_part(base: type) -> bool:
+    """Check whether a class is one of cdsm that users do not know by name, but its methods."""
+    hidden = base.__module__.startswith("cdsm.") and base.__name__ not in cdsm.__all__
+    return hidden and base.__name__ not in ("Printed", "ReadOnlyState")
 
 
 def _where(module: str, name: str) -> str:
