@@ -1,0 +1,1 @@
+"""The site, and what generates its pages and pictures."""

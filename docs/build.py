@@ -21,7 +21,11 @@ def main() -> int:
     """Build the site, then check its links; return the exit code."""
     os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
     os.environ["PYTHONPATH"] = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
-    os.environ |= {"TERM": "dumb", "NO_COLOR": "1", "COLUMNS": "100"}  # for commands that pages show
+    os.environ |= {
+        "TERM": "dumb",
+        "NO_COLOR": "1",
+        "COLUMNS": "100",
+    }  # for commands that pages show
     doctrees = str(ROOT / "build" / "doctrees")
     options = ["-W", "--keep-going", "-q", "-j", "auto", "-d", doctrees]
     failed = build_main([*options, str(HERE), str(SITE)])

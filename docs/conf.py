@@ -74,7 +74,9 @@ copybutton_prompt_text = r"\$ |>>> "
 copybutton_prompt_is_regexp = True
 
 
-def _escape(app: Sphinx, kind: str, name: str, thing: object, options: object, lines: list[str]) -> None:
+def _escape(
+    app: Sphinx, kind: str, name: str, thing: object, options: object, lines: list[str]
+) -> None:
     """Keep the bars of ``|x|`` in docstrings, which are absolute values."""
     for i, line in enumerate(lines):
         parts = line.split("``")
@@ -86,7 +88,9 @@ def _shorten(*event: object) -> tuple[str, str] | None:
     """Write Array for numpy's own long name of an array of float64."""
     if event[-2] is None:
         return None
-    long = re.compile(r"(numpy\.)?ndarray\[tuple\[(typing\.)?Any, \.\.\.\], (numpy\.)?dtype\[(.*?)\]\]")
+    long = re.compile(
+        r"(numpy\.)?ndarray\[tuple\[(typing\.)?Any, \.\.\.\], (numpy\.)?dtype\[(.*?)\]\]"
+    )
     signature, returned = (long.sub("Array", str(text or "")) for text in event[-2:])
     return signature, returned
 

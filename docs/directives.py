@@ -13,12 +13,12 @@ ROOT = Path(__file__).parents[1]
 class Held(SphinxDirective):
     """Show the function that computes an equation, and the test that holds it.
 
-    Each argument is ``path.py:name``. The source is included, so a name that is gone fails the build.
+    Each argument is ``path.py:name``. The source is included: a name that is gone fails the build.
     """
 
     required_arguments = 1
     final_argument_whitespace = True
-    option_spec: ClassVar = {}
+    option_spec: ClassVar[dict[str, object]] = {}
 
     def run(self) -> list[nodes.Node]:
         """Return one closed box for each argument, with its source."""

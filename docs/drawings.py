@@ -199,6 +199,7 @@ def contributions() -> Any:
 
 def hole() -> Any:
     """Draw a cable that turns in the hole of a disk, with its two tensions and the wrap angle."""
+    axes: Any
     figure, axes = plt.subplots(figsize=(4.0, 2.2), layout="constrained", dpi=110)
     turn = np.deg2rad(28.0)
     left = np.array([-1.6, 0.0])

@@ -167,7 +167,11 @@ def _commands() -> dict[str, str]:
         for option in command.params:
             if option.hidden:
                 continue
-            kind = "" if getattr(option, "is_flag", False) else option.metavar or option.display_type(typer.Context(command))
+            kind = (
+                ""
+                if getattr(option, "is_flag", False)
+                else option.metavar or option.display_type(typer.Context(command))
+            )
             words = [] if option.param_type_name == "argument" else option.opts
             rows.append(" ".join(f"`{word}`" for word in (*words, kind) if word))
             meaning = _plain(option.help or "")
@@ -182,4 +186,3 @@ def _plain(text: str) -> str:
     parts = text.replace("\b", "").strip().split("`")
     parts[::2] = [re.sub(r"([\[\]*_<>])", r"\\\1", part) for part in parts[::2]]
     return "`".join(parts)
-

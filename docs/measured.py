@@ -23,7 +23,10 @@ POSTURES = 1_000_000
 def honesty() -> str:
     """Return the table of wrong answers without a warning, in Markdown."""
     found = _numbers()
-    rows = [[route, *(f"{count:,}".replace(",", " ") for count in row)] for route, *row in found["honesty"]]
+    rows = [
+        [route, *(f"{count:,}".replace(",", " ") for count in row)]
+        for route, *row in found["honesty"]
+    ]
     return f"{_about(found)}.\n\n{_table(found['outcomes'], rows)}"
 
 
@@ -36,8 +39,9 @@ def costs() -> str:
         f"{_about(found)}. Microseconds a posture, the best of several rounds: "
         "$K_\\theta$ under given tensions, then least tensions.\n\n"
         f"{_table(found['columns'], rows)}\n\n"
-        f"{sweep['postures']:,} random postures of the virtual prototype (tensions, tip, stiffness, margin) "
-        f"go into a store in {sweep['seconds']:.0f} s, in {sweep['megabytes']:.0f} MB on disk."
+        f"{sweep['postures']:,} random postures of the virtual prototype (tensions, tip, "
+        f"stiffness, margin) go into a store in {sweep['seconds']:.0f} s, in "
+        f"{sweep['megabytes']:.0f} MB on disk."
     )
 
 
@@ -62,13 +66,14 @@ def measure() -> dict[str, Any]:
     os.environ["PYTHONWARNINGS"] = "ignore::UserWarning"  # random arms may share holes
     warnings.simplefilter("ignore", cdsm.CdsmWarning)
     from tests.benchmarks.test_table import COLUMNS, ROWS, cost, machine, runs
+    from tests.benchmarks.verdicts import Outcome
 
     where = machine()
     microseconds = [[n, *(cost(*run) for run in runs(n, rows))] for n, rows in ROWS.items()]
     tally = asked.count(QUESTIONS, seed=0, processes=2)
     routes = list(dict.fromkeys((*asked.TENSION, *asked.STIFFNESS)))
     counts = [
-        [route, *(tally.total(route, outcome, "") for outcome in (None, *asked.Outcome))]
+        [route, *(tally.total(route, outcome, "") for outcome in (None, *Outcome))]
         for route in routes
     ]
     with tempfile.TemporaryDirectory() as folder:
@@ -86,7 +91,7 @@ def measure() -> dict[str, Any]:
         "date": str(date.today()),
         "columns": ["joints", *COLUMNS],
         "microseconds": microseconds,
-        "outcomes": ["route", "asked", *(each.value for each in asked.Outcome)],
+        "outcomes": ["route", "asked", *(each.value for each in Outcome)],
         "honesty": counts,
         "sweep": {"postures": POSTURES, "seconds": took, "megabytes": size / 1e6},
     }

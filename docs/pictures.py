@@ -4,6 +4,7 @@ The arm is that of README. Written to ``docs/pictures``; committed, since README
 """
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib import colormaps
@@ -48,7 +49,7 @@ def animation() -> None:
     figure, axes = arm_axes()
     figure.set_size_inches(3.5, 2.7)
     axes.set_position((-0.14, -0.26, 1.34, 1.5))
-    canvas = FigureCanvasAgg(figure)
+    canvas: Any = FigureCanvasAgg(figure)
     frames = []
     for pose, values, along in zip(poses, plan.tensions, plan.achieved, strict=True):
         axes.clear()
