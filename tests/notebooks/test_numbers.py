@@ -187,6 +187,26 @@ def weights_with_friction(nb: Shown) -> None:
     np.testing.assert_allclose(tangents, np.tile(tangents[1], (3, 1)), rtol=0.05)
 
 
+def is_it_true(nb: Shown) -> None:
+    known = [row for row in nb.table if not np.isnan(row.uncertainty)]
+    assert all(abs(row.difference) <= row.uncertainty for row in known)
+    at_stated = [row.difference / row.theirs for row in nb.table if "200 GPa" in row.source]
+    np.testing.assert_allclose(at_stated, -0.8, atol=0.06)  # five times too small
+    assert abs(nb.modes.frequencies[0] - 2.166) < 5e-4
+    assert abs(nb.share - 81.0) < 0.5
+    assert 0.0 < nb.snake < 1.0
+    np.testing.assert_allclose(nb.rates[1:, :2], 2.0, atol=0.02)
+    relative = {axis: 100.0 * budget.relative for axis, budget in nb.budgets.items()}
+    assert 4.5 < relative["y"] < 5.6
+    assert 4.5 < relative["z"] < 5.6
+    assert 8.0 < relative["x"] < 10.5
+    x, y = nb.budgets["x"], nb.budgets["y"]
+    assert next(iter(y.contributions)) == "rigidity"
+    assert next(iter(x.contributions)) == "joint_angle"
+    assert 0.07 < x.contributions["joint_angle"] / x.value < 0.09
+    assert not x.is_linear
+
+
 CHECKS: dict[str, Callable[[Shown], None]] = {
     "00_start_here": start,
     "01_from_geometry_to_stiffness": first_arm,
@@ -196,6 +216,7 @@ CHECKS: dict[str, Callable[[Shown], None]] = {
     "05_workspace_stiffness_maps": workspace_maps,
     "06_your_own_robot": your_own_robot,
     "07_why_does_my_weight_test_depend_on_the_weight": weights_with_friction,
+    "10_is_it_true": is_it_true,
 }
 
 
