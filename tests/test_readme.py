@@ -3,16 +3,12 @@
 import io
 import os
 import re
-import shutil
 import subprocess
 import sys
 from contextlib import redirect_stdout
 from pathlib import Path
 
 import pytest
-
-from cdsm import paper
-from tests.conftest import Results
 
 ROOT = Path(__file__).parents[1]
 README = ROOT / "README.md"
@@ -31,52 +27,42 @@ def test_snippets_print_what_the_readme_shows() -> None:
         elif language == "text":
             assert printed == code
             compared += 1
-    assert compared == 5
+    assert compared == 1
 
 
 @pytest.mark.slow
 def test_shell_commands_run_as_printed(tmp_path: Path) -> None:
-    """All but the first block, which makes the environment; and the view, which does not end."""
+    """All but those that make the environment; and the view, which does not end."""
     text = README.read_text(encoding="utf-8")
     blocks = re.findall(r"```sh\n(.*?)```", text, re.DOTALL)
     lines = [line for block in blocks for line in block.splitlines() if "pip install" not in line]
     commands = [line for line in lines if line.split()[0].endswith("cdsm")]
-    assert len(commands) > 8
+    assert len(commands) == 4
     (tmp_path / ".venv").symlink_to(sys.prefix)
-    shutil.copy(ROOT / "examples" / "arm.toml", tmp_path / "ARM.toml")
-    tested = ROOT / "notebooks" / "data" / "strand_1x19_tensile_test.csv"
-    shutil.copy(tested, tmp_path / "TENSILE_TEST.csv")
     path = os.pathsep.join(["/usr/bin", "/bin"])  # a shell that activated nothing
     environment = os.environ | {"PATH": path, "PYTHONPATH": str(ROOT)}
     for command in commands:
         if " view " in command:
             continue
-        if " new ARM.toml" in command:
-            (tmp_path / "ARM.toml").unlink()
         run = subprocess.run(
             command, shell=True, cwd=tmp_path, env=environment, capture_output=True, text=True
         )
         assert run.returncode == 0, f"{command}\n{run.stdout}{run.stderr}"
-    for written in ("REPORT.html", "SWEEP.nc", "MAP.png", "ARM.urdf", "WIRE.toml", "WIRE.png"):
-        assert (tmp_path / written).stat().st_size > 0
+    assert (tmp_path / "REPORT.html").stat().st_size > 0
+
+
+def test_readme_fits_a_page_and_links_to_what_exists() -> None:
+    text = README.read_text(encoding="utf-8")
+    assert len(text.splitlines()) <= 90
+    shown = re.findall(r'<img src="(.*?)"', text)
+    assert len(shown) == 2
+    for path in (*shown, *re.findall(r"\]\((.*?)\)", text)):
+        assert (ROOT / path).exists(), path
 
 
 def test_a_result_is_shown_within_the_first_25_lines() -> None:
     head = README.read_text(encoding="utf-8").splitlines()[:25]
     assert any(line.startswith("along ") for line in head)
-
-
-def test_table_is_what_reproduce_computes(
-    results: Results,
-) -> None:
-    rows = paper.to_rows(list(results.values()))
-    text = README.read_text(encoding="utf-8")
-    cells = " \\| (.*?)" * 5
-    shown = re.findall(rf"^\| (Fig\. \d+|Section V-B),[^|]*?{cells} \|$", text, re.M)
-    assert len(shown) == 8
-    computed = [(row[0], *row[2:7]) for row in rows]
-    for row in shown:
-        assert row in computed
 
 
 def test_files_and_constants_that_contributing_names_exist() -> None:
