@@ -1,0 +1,74 @@
+"""The programs of examples/: each runs, and says what cdsm says."""
+
+import array
+import math
+from pathlib import Path
+
+import mujoco_weight
+import numpy as np
+import pytest
+from ros2_stiffness_node import answer
+from scipy.spatial.transform import Rotation
+
+import cdsm
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
+ARM = cdsm.Manipulator.read(EXAMPLES / "arm.toml")
+RNG = np.random.default_rng(6)
+
+
+def test_the_ros_node_says_what_cdsm_says_whatever_the_order_of_the_joints() -> None:
+    q = RNG.uniform(-0.1, 0.1, ARM.nv)
+    measured = dict(zip(ARM.joint_names, q.tolist(), strict=True))
+    shuffled = {"gripper": 1.0} | dict(reversed(measured.items()))
+    said = answer(ARM, shuffled, 10.0)
+    pose = ARM.at(q)
+    tension = cdsm.distribute_tension(pose, 10.0)
+    K = cdsm.stiffness(pose, tension)
+    assert said.problem == ""
+    assert dict(said.tensions) == dict(tension)
+    assert said.margin == K.margin
+    np.testing.assert_array_equal(said.tip, pose.tip[:3, 3])
+    turn = Rotation.from_quat(said.orientation).as_matrix()
+    np.testing.assert_allclose(  # rounding of eigenvectors and of a quaternion
+        turn @ np.diag(said.axes) @ turn.T, K.compliance[:3, :3], rtol=1e-9, atol=1e-15
+    )
+
+
+def test_the_ros_node_names_what_is_wrong() -> None:
+    straight = dict.fromkeys(ARM.joint_names, 0.0)
+    first = ARM.joint_names[0]
+    assert first in answer(ARM, {k: v for k, v in straight.items() if k != first}, 10.0).problem
+    for wrong in (5.0, math.nan):
+        said = answer(ARM, straight | {first: wrong}, 10.0)
+        assert first in said.problem
+        assert not said.tensions
+    unstable = answer(ARM, straight, 1e5)
+    assert unstable.problem
+
+
+def test_mujoco_comes_to_rest_where_cdsm_says() -> None:
+    arm = mujoco_weight.posture()
+    theirs, ours = mujoco_weight.simulate(*arm), mujoco_weight.compute(*arm)
+    assert np.linalg.norm(theirs - ours) < 1e-4 * np.linalg.norm(ours)
+
+
+def test_what_matlab_hands_over_is_taken() -> None:
+    """MATLAB makes an array.array of a row, and a memoryview of a matrix."""
+    row = array.array("d", [0.05] * ARM.nv)
+    pose = ARM.at(row)
+    np.testing.assert_array_equal(pose.q, np.full(ARM.nv, 0.05))
+    rows = np.array(memoryview(array.array("d", [0.05] * 3 * ARM.nv))).reshape(3, -1)
+    batch = cdsm.evaluate(ARM, rows, minimum=10, outputs=["along"], direction="z")
+    K = cdsm.stiffness(pose, cdsm.distribute_tension(pose, 10))
+    np.testing.assert_allclose(np.ravel(batch["along"]), K.along("z"), rtol=1e-12)
+
+
+@pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.m")))
+def test_matlab_uses_names_that_exist(path: Path) -> None:
+    for line in path.read_text(encoding="utf-8").splitlines():
+        for word in line.split("%")[0].replace("(", " ").split():
+            if word.startswith("py.cdsm."):
+                thing: object = cdsm
+                for part in word.removeprefix("py.cdsm.").split("."):
+                    thing = getattr(thing, part)
