@@ -22,6 +22,7 @@ from cdsm.cli.output import debug_wanted
 from cdsm.cli.paper import reproduce
 from cdsm.cli.plan import plan
 from cdsm.cli.sweep import map_sweep, sweep
+from cdsm.cli.track import track
 from cdsm.cli.view import view
 from cdsm.cli.warm import warm
 from cdsm.cli.wire import fit
@@ -66,7 +67,7 @@ def main(
 
 _ALL = (
     *(new, urdf, stiffness, check, weigh, cycle, buckle, plan, sweep, map_sweep),
-    *(view, fit, export, reproduce, warm),
+    *(track, view, fit, export, reproduce, warm),
 )
 for command in _ALL:
     name = "map" if command is map_sweep else command.__name__

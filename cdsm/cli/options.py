@@ -51,6 +51,10 @@ ANGLES = typer.Option(
     show_default=False,
 )
 Angles = Annotated[str, ANGLES]
+PATH_COLUMNS: Final = (
+    "Columns, with the unit in brackets: joints in deg (mm where they slide; 0 if left out), or x, "
+    "y, z of the tip in mm; and, if wanted, target in N/mm."
+)
 MinTension = Annotated[
     float,
     _tension_option(help="Lower bound of all tensions [N]; in Python 0, where strands go slack."),

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Final, NamedTuple, NoReturn
 
 import numpy as np
+import typer
 
 from cdsm.errors import FileError
 from cdsm.manipulator import Manipulator
@@ -83,3 +84,16 @@ def read_path(path: Path, arm: Manipulator) -> PathFile:
             "…) and tip positions (x [mm], y [mm], z [mm]); give one of them"
         )
     return PathFile(angles, tips, None if target is None else target[:, 0])
+
+
+def one_target(given: float | None, of_file: Array | None, option: str) -> float | Array:
+    """Return the target [N/m] of an option, or the targets of the file; exactly one is given."""
+    if given is not None and of_file is None:
+        return given
+    if given is None and of_file is not None:
+        return of_file
+    raise typer.BadParameter(
+        "give it, or a column target [N/mm] in the file of the path; "
+        f"{'neither was' if given is None else 'both were'} given.",
+        param_hint=option,
+    )

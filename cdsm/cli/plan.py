@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -14,9 +14,6 @@ from cdsm.cli.conditions import Conditions
 from cdsm.cli.options import ArmOptions, AsJson, LoadOptions, MaxTension, MinTension, Picture
 from cdsm.cli.output import answer, write_picture, written
 from cdsm.cli.values import axis, numbers
-
-if TYPE_CHECKING:
-    from cdsm.support.values import Array
 
 
 def plan(
@@ -39,9 +36,7 @@ def plan(
         Path | None,
         typer.Option(
             metavar="PATH.csv",
-            help="Instead of --angles, a line per sample. Columns, with the unit in brackets: "
-            "joints in deg (mm where they slide; 0 if left out), or x, y, z of the tip in mm; and, "
-            "if wanted, target in N/mm.",
+            help=f"Instead of --angles, a line per sample. {options.PATH_COLUMNS}",
         ),
     ] = None,
     rate: Annotated[
@@ -75,11 +70,11 @@ def plan(
         raise typer.BadParameter("is of one posture; --path has its own.", param_hint="--angles")
     wanted = None if target is None else 1000.0 * target
     if path is not None:
-        from cdsm.cli.path_file import read_path
+        from cdsm.cli.path_file import one_target, read_path
 
         robot = arm.read()
         file = read_path(path, robot)
-        targets = _one_target(wanted, file.target)
+        targets = one_target(wanted, file.target, "--target")
         bounds = min_tension, max_tension, load.at_tip(robot)
         plan = cdsm.plan_path(
             robot, u, targets, *bounds, angles=file.angles, tips=file.tips, rate=rate
@@ -110,16 +105,3 @@ def plan(
         conditions = Conditions(pose.arm, (min_tension,))
         told = [attainable, best]
         answer(as_json, lambda: attainable.to_dict() | best.to_dict(), conditions, *told)
-
-
-def _one_target(given: float | None, of_file: Array | None) -> float | Array:
-    """Return the target [N/m] of the option, or the targets of the file; exactly one is given."""
-    if given is not None and of_file is None:
-        return given
-    if given is None and of_file is not None:
-        return of_file
-    raise typer.BadParameter(
-        "give it, or a column target [N/mm] in the file of --path; "
-        f"{'neither was' if given is None else 'both were'} given.",
-        param_hint="--target",
-    )

@@ -27,6 +27,9 @@ if TYPE_CHECKING:
 
     from cdsm.control.run import TrackingRun
 
+_ROOM = 1.15
+"""Height of the panel of the stiffness over its largest value."""
+
 
 def plot_tracking_run(run: TrackingRun) -> Figure:
     """Plot a closed loop over time: tip error, stiffness, the proved band, and all tensions.
@@ -51,7 +54,8 @@ def plot_tracking_run(run: TrackingRun) -> Figure:
         stiffness.plot(t, N_PER_MM * wanted, "--", color=color, linewidth=0.9, label="_")
         stiffness.plot(t, N_PER_MM * found, color=color, label=f"along {name}; dashed: wanted")
     stiffness.set(ylabel="stiffness [N/mm]")
-    stiffness.set_ylim(bottom=0.0)
+    most = np.nanmax([run.target, run.stiffness], initial=0.0)
+    stiffness.set_ylim(0.0, _ROOM * N_PER_MM * most or 1.0)
     low, high = MM * run.band.T
     known = np.isfinite(low)
     band.fill_between(t[known], low[known], high[known], color=SKY, alpha=0.4, label="proved band")

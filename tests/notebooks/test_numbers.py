@@ -205,6 +205,22 @@ def is_it_true(nb: Shown) -> None:
     assert next(iter(x.contributions)) == "joint_angle"
     assert 0.07 < x.contributions["joint_angle"] / x.value < 0.09
     assert not x.is_linear
+def closed_loop(nb: Shown) -> None:
+    assert nb.plan.complete
+    assert all(run.outcome == "completed" for run in nb.runs.values())
+    worst = {law: abs(reading / nb.wanted - 1.0).max() for law, reading in nb.readings.items()}
+    assert worst["stiffness"] < 0.05
+    assert abs(worst["feedforward"] - 0.79) < 0.02
+    assert abs(worst["tension"] - 0.10) < 0.03
+    assert worst["mixed"] > 0.3
+    assert nb.stiff.inside.all()
+    assert len(nb.stiff.inside) == 5
+    assert abs(nb.stiff.rigidity[-1] - 0.9) < 1e-3
+    assert abs(nb.force[2] + 0.2 * 9.81) < 0.2
+    assert nb.stiff.tip_error.max() < 1e-3 < nb.runs["tension"].tip_error.max()
+    for tip, stiffness in nb.worst.values():
+        assert tip < 1.0
+        assert stiffness < 4.0
 
 
 CHECKS: dict[str, Callable[[Shown], None]] = {
@@ -217,6 +233,7 @@ CHECKS: dict[str, Callable[[Shown], None]] = {
     "06_your_own_robot": your_own_robot,
     "07_why_does_my_weight_test_depend_on_the_weight": weights_with_friction,
     "10_is_it_true": is_it_true,
+    "08_hold_4_newtons_per_millimetre": closed_loop,
 }
 
 

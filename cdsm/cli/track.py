@@ -1,0 +1,141 @@
+"""``cdsm track``: follow a path in closed loop, at a wanted stiffness."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+import cdsm
+from cdsm.cli import options
+from cdsm.cli.conditions import Conditions
+from cdsm.cli.options import ArmOptions, AsJson, MaxTension, MinTension, Picture
+from cdsm.cli.output import answer, write_picture, written
+from cdsm.cli.values import axis, numbers
+
+
+def _laws() -> list[str]:
+    from cdsm.control.laws import LAWS
+
+    return list(LAWS)
+
+
+def track(
+    arm: ArmOptions,
+    path: Annotated[Path, typer.Argument(metavar="PATH.csv", help=options.PATH_COLUMNS)],
+    stiffness: Annotated[
+        str,
+        typer.Option(
+            help="Wanted stiffness [N/mm] along an axis or a vector; without a number if PATH.csv "
+            "has targets.",
+            metavar="AXIS=N/mm|X,Y,Z=N/mm",
+        ),
+    ],
+    law: Annotated[
+        str,
+        typer.Option(
+            help="What the motors do: feedforward, tension, mixed, or stiffness, which plans again "
+            "at the estimated posture.",
+            autocompletion=_laws,
+        ),
+    ] = "stiffness",
+    payload: Annotated[
+        float, typer.Option(help="Mass [kg] that the controller does not know of.")
+    ] = 0.0,
+    payload_from: Annotated[
+        float, typer.Option(help="Part of the path after which it hangs at the tip.")
+    ] = 0.5,
+    true_rigidity: Annotated[
+        float, typer.Option(help="Rigidity of the true wires over what the controller believes.")
+    ] = 1.0,
+    true_friction: Annotated[
+        float | None, typer.Option(help="Friction coefficient of the true holes; default: known.")
+    ] = None,
+    encoder: Annotated[float, typer.Option(help="One count of an encoder [mm].")] = 0.01,
+    tension_noise: Annotated[
+        float, typer.Option(help="Standard deviation of the load cells [N].")
+    ] = 0.0,
+    tension_bias: Annotated[float, typer.Option(help="Error of all load cells [N].")] = 0.0,
+    delay: Annotated[int, typer.Option(help="Steps by which the sensors are late.")] = 0,
+    steps: Annotated[int, typer.Option(help="Steps of control from sample to sample.")] = 5,
+    period: Annotated[float, typer.Option(help="Time between two steps [s].")] = 0.05,
+    rate: Annotated[
+        float, typer.Option(help="How much the stiffness loop may change a tension per step [N].")
+    ] = 10.0,
+    bands: Annotated[int, typer.Option(help="Prove a band at every so many steps; 0: never.")] = 1,
+    min_tension: MinTension = 10.0,
+    max_tension: MaxTension = math.inf,
+    seed: Annotated[int, typer.Option(help="Seed of the noise.")] = 0,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", "-o", metavar="RUN.nc", help="All numbers over time to write."),
+    ] = None,
+    animate: Annotated[
+        Path | None, typer.Option(metavar="RUN.gif", help="Animation of the true arm to write.")
+    ] = None,
+    figure: Picture = None,
+    as_json: AsJson = False,
+) -> None:
+    """Follow a path in closed loop at a wanted stiffness, against an arm that differs.
+
+    The arm of the file is what the controller believes in; --true-rigidity, --true-friction and
+    --payload say how the true one differs. Exit code 0; 3 if the loop is unstable, the arm buckles,
+    or a sample cannot be planned.
+    """
+    from cdsm.cli.path_file import one_target, read_path
+    from cdsm.control import with_rigidity
+
+    robot = arm.read()
+    file = read_path(path, robot)
+    u, wanted = _wanted(stiffness)
+    target = one_target(wanted, file.target, "--stiffness")
+    plan = cdsm.plan_path(
+        robot, u, target, min_tension, max_tension, angles=file.angles, tips=file.tips
+    )
+    conditions = Conditions(robot, (min_tension,), friction=True)
+    missed = len(plan.infeasible)
+    if missed:
+        warnings = [f"NOT REACHED at {missed} of {len(plan.target)} samples"]
+        answer(as_json, plan.to_dict, conditions, plan, warnings=warnings)
+    true = with_rigidity(robot, true_rigidity) if true_rigidity != 1.0 else robot
+    true = true if true_friction is None else true.with_friction(true_friction)
+    run = cdsm.track(
+        plan,
+        law,
+        cdsm.SlowPlant(true),
+        cdsm.Sensors(
+            encoder=1e-3 * encoder,
+            tension_noise=tension_noise,
+            tension_bias=tension_bias,
+            delay=delay,
+        ),
+        minimum=min_tension,
+        maximum=max_tension,
+        payload=payload,
+        payload_from=payload_from,
+        steps=steps,
+        period=period,
+        rate=rate,
+        bands=bands,
+        seed=seed,
+    )
+    if out is not None:
+        written(run.write(out))
+    write_picture(figure, lambda: run.plot())
+    if animate is not None:
+        run.plot(animate)
+        written(animate)
+    answer(as_json, run.to_dict, conditions, run, warnings=run.warnings)
+
+
+def _wanted(text: str) -> tuple[Sequence[float], float | None]:
+    """Return the direction of --stiffness, and the stiffness [N/m] if it is given."""
+    name, given, value = text.partition("=")
+    u = axis(name) or numbers("--stiffness", name, 3, "AXIS=N/mm, or X,Y,Z=N/mm")
+    if not given:
+        return u, None
+    (wanted,) = numbers("--stiffness", value, 1, "AXIS=N/mm")
+    return u, 1000.0 * wanted
