@@ -205,6 +205,8 @@ def is_it_true(nb: Shown) -> None:
     assert next(iter(x.contributions)) == "joint_angle"
     assert 0.07 < x.contributions["joint_angle"] / x.value < 0.09
     assert not x.is_linear
+
+
 def closed_loop(nb: Shown) -> None:
     assert nb.plan.complete
     assert all(run.outcome == "completed" for run in nb.runs.values())
@@ -232,8 +234,8 @@ CHECKS: dict[str, Callable[[Shown], None]] = {
     "05_workspace_stiffness_maps": workspace_maps,
     "06_your_own_robot": your_own_robot,
     "07_why_does_my_weight_test_depend_on_the_weight": weights_with_friction,
-    "10_is_it_true": is_it_true,
     "08_hold_4_newtons_per_millimetre": closed_loop,
+    "10_is_it_true": is_it_true,
 }
 
 
