@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 from cdsm.cable import Cable
 from cdsm.cable_chains import Chains
+from cdsm.errors import first_of
+from cdsm.geometry.contacts import overlapping
 from cdsm.kernels import chains as chain_kernels
 from cdsm.kernels import segments as segment_kernels
 from cdsm.kernels import stiffness as stiffness_kernels
@@ -188,6 +190,25 @@ class Posture(ReadOnlyState):
             UnknownName: No link has this name.
         """
         return frozen(self.arm._model.body.placement(self.q, link))
+
+    @cached_property
+    def self_contacts(self) -> tuple[tuple[str, str], ...]:
+        """Pairs of links, not neighbours, that pass through each other; they bound no posture.
+
+        A link is taken as the cylinder around its disks. Empty for a robot from a URDF.
+        """
+        if not self.arm.is_serpentine:
+            return ()
+        disks = self.arm.geometry.disks
+        return tuple(overlapping(disks, {disk.link: self.link_pose(disk.link) for disk in disks}))
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """That the arm passes through itself, if it does."""
+        pairs = [" and ".join(pair) for pair in self.self_contacts]
+        if not pairs:
+            return ()
+        return (f"the arm passes through itself: {first_of(pairs, 3, 'pairs of links')}",)
 
     @cached_property
     def segments(self) -> Segments:

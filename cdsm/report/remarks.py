@@ -80,6 +80,7 @@ def notes(report: Report) -> Iterator[str]:
     length = report.stiffness.posture.arm.length
     if length > LONGEST:
         yield f"the arm is {length:.4g} m long: it looks as if its lengths are in mm; give metres."
+    yield from report.stiffness.posture.remarks
     yield from _of_tensions(report)
     yield from _of_ranks(report)
     if report.readings is None:

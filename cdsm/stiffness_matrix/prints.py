@@ -71,7 +71,7 @@ def notes(K: Stiffness) -> tuple[str, ...]:
     state = "stable" if K.is_stable else "UNSTABLE"
     unit = K.posture.arm.stiffness_unit()
     least = f"smallest joint stiffness {K.margin:.4g} {unit} ({model_of(K)})"
-    return (*missing, f"{state}, {least}")
+    return (*missing, *K.posture.remarks, f"{state}, {least}")
 
 
 def model_of(K: Stiffness) -> str:

@@ -192,7 +192,7 @@ def show(arm: Manipulator, setting: Setting) -> Shown:
         else:
             _ = K.compliance  # raises if K_θ is singular: its margin is only rounding error
             condition = Condition.STABLE if K.is_stable else Condition.UNSTABLE
-        problem = _PROBLEMS.get(condition, "")
+        problem = _PROBLEMS.get(condition, "\n".join(K.posture.remarks))
         if condition is Condition.UNSTABLE:
             problem = verdict(K)
     except InvalidInput as error:

@@ -46,3 +46,30 @@ def test_brackets_join_each_site_to_the_nearest_point_of_its_bones() -> None:
 def test_link_that_does_not_exist_is_named() -> None:
     with pytest.raises(cdsm.UnknownName, match="link9"):
         POSE.link_pose("link9")
+
+
+def ring(degrees: float) -> cdsm.Posture:
+    """Eight links of 60 mm with disks of 22 mm, bent alike in one plane."""
+    geometry = cdsm.Geometry.universal(
+        joints=8,
+        cables_per_joint=3,
+        link_length=0.06,
+        base_length=0.05,
+        disk_offset=0.012,
+        hole_radius=0.02,
+        link_mass=0.05,
+    )
+    arm = cdsm.Manipulator(geometry, cdsm.LinearElasticity(2e4))
+    return arm.at(np.radians(degrees) * (np.arange(arm.nv) % 2 == 0))
+
+
+def test_arm_that_closes_to_a_ring_passes_through_itself() -> None:
+    assert ring(0.0).self_contacts == ring(40.0).self_contacts == ()
+    assert ring(0.0).remarks == ()
+    closed = ring(50.0)
+    assert closed.self_contacts == (("base_disk", "link8"),)
+    assert closed.remarks == ("the arm passes through itself: base_disk and link8",)
+    K = cdsm.stiffness(closed, cdsm.distribute_tension(closed, 50.0))
+    assert closed.remarks[0] in str(K)
+    assert closed.remarks[0] in str(K.report())
+    assert "and 4 pairs of links more" in ring(60.0).remarks[0]

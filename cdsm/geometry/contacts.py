@@ -1,0 +1,56 @@
+"""Links of an arm that pass through each other at a posture."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations
+
+import numpy as np
+
+from cdsm.geometry.parts import Disk
+from cdsm.support.values import Array
+
+_ROUNDS = 60
+"""Alternating projections; more change no verdict on gaps and overlaps of 1e-2 of a radius."""
+
+_TOUCHING = 1e-3
+"""A gap below this part of the radius is an overlap."""
+
+
+def overlapping(disks: Sequence[Disk], poses: dict[str, Array]) -> list[tuple[str, str]]:
+    """Return the pairs of links, not neighbours, whose bodies overlap.
+
+    The body of a link is the cylinder from its first disk to its last, as wide as the wider one.
+    ``poses`` has the pose (4, 4) of each link. Points are projected from one cylinder onto the
+    other and back: both are convex, so the points come as near as the cylinders do.
+    """
+    links = list(poses)
+    pairs = np.array([(i, j) for i, j in combinations(range(len(links)), 2) if j - i > 1])
+    if not len(pairs):
+        return []
+    ends = [[disk.x for disk in disks if disk.link == link] for link in links]
+    half = np.array([(max(x) - min(x)) / 2.0 for x in ends])
+    radius = np.array([max(disk.radius for disk in disks if disk.link == link) for link in links])
+    pose = np.array([poses[link] for link in links])
+    axis = pose[:, :3, 0]
+    centre = pose[:, :3, 3] + axis * [[(max(x) + min(x)) / 2.0] for x in ends]
+    reach = np.hypot(half, radius)
+    apart = np.linalg.norm(centre[pairs[:, 0]] - centre[pairs[:, 1]], axis=1)
+    pairs = pairs[apart < reach[pairs].sum(axis=1)]
+    one, other = pairs.T
+    there = centre[other]
+    for _ in range(_ROUNDS if len(pairs) else 0):
+        here = _projected(there, centre[one], axis[one], half[one], radius[one])
+        there = _projected(here, centre[other], axis[other], half[other], radius[other])
+    gap = np.linalg.norm(there - here, axis=1) if len(pairs) else np.zeros(0)
+    return [(links[i], links[j]) for i, j in pairs[gap <= _TOUCHING * radius[one]].tolist()]
+
+
+def _projected(points: Array, centre: Array, axis: Array, half: Array, radius: Array) -> Array:
+    """Return the nearest points (n, 3) of n cylinders, one point for each."""
+    offset = points - centre
+    along = np.einsum("ni,ni->n", offset, axis)
+    across = offset - along[:, None] * axis
+    distance = np.maximum(np.linalg.norm(across, axis=1), radius)
+    along = np.clip(along, -half, half)
+    return np.asarray(centre + along[:, None] * axis + (radius / distance)[:, None] * across)
