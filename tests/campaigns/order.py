@@ -1,0 +1,54 @@
+"""Is a stuck arm ever softer than the same arm without friction?
+
+``python -m tests.campaigns.order 100000`` draws that many different arms: hinged and universal,
+linear wires and strands, springs in series, motors that hold their force, friction in some holes.
+By Cauchy and Schwarz K_stuck − K is positive semidefinite for all of them. Prints the smallest
+eigenvalue found, over the norm of K_stuck.
+"""
+
+import sys
+import time
+
+import numpy as np
+
+import cdsm
+from cdsm import presets
+from cdsm.support.progress import track
+from tests.support import arms
+from tests.support.rough import rough
+
+WIRE = cdsm.LinearElasticity(226e3)
+
+ROUNDING = 1e-12
+"""Least eigenvalue that is rounding, over the norm of K_stuck."""
+
+
+def least(seed: int, postures: int = 1) -> float:
+    """Smallest eigenvalue of K_stuck − K over the norm of K_stuck, of one random arm."""
+    rng = np.random.default_rng([seed, 19])
+    joints, kind = int(rng.integers(1, 6)), ("universal", "hinged")[seed % 2]
+    spring = 10.0 ** rng.uniform(3.5, 6.0) if seed % 3 else np.inf
+    plain = arms.random_arm(seed, joints, kind, (WIRE, presets.STRAND_1X19)[seed % 5 == 0])
+    mu = rng.uniform(-0.2, 0.5, (len(plain.cables), 20)).round(3).clip(0.0)
+    control = "force" if seed % 7 == 0 else "position"
+    arm = rough(plain, lambda c, i: float(mu[c, i]), series_stiffness=spring, control=control)
+    q = rng.uniform(-0.9, 0.9, (postures, arm.nv)) * arm.upper
+    F = rng.uniform(5.0, 300.0, (postures, len(arm.cables)))
+    found = cdsm.evaluate(arm, q, F, outputs=("joint", "stuck_joint"), threads=1)
+    assert found.ok.all()
+    stuck = found["stuck_joint"]
+    values = np.linalg.eigvalsh(stuck - found["joint"])[:, 0]
+    return float((values / np.linalg.norm(stuck, 2, axis=(1, 2))).min())
+
+
+def main(count: int) -> None:
+    """Run the campaign."""
+    start, worst = time.perf_counter(), 0.0
+    for seed in track(range(count), "arms"):
+        worst = min(worst, least(seed))
+    below = f"{count} arms, least eigenvalue {worst:.1e} of the norm of K_stuck"
+    print(f"{below}, {time.perf_counter() - start:.0f} s")
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]) if len(sys.argv) > 1 else 100_000)
