@@ -43,6 +43,12 @@ def test_small_weights_measure_the_stuck_arm_and_increments_of_large_ones_the_fr
     assert increment == pytest.approx(large.friction.frictionless, rel=0.25)
     # shaken, the weight measures within some 10 % what no friction would give
     assert 1.0 < large.friction.dithered / frictionless.linear.stiffness < 1.15
+    cycles = large.friction.dither_cycles
+    assert cycles in (1, 2, 4, 8, 16)
+    more = large.friction._shaken(slides, 2 * cycles)
+    assert more == pytest.approx(large.friction.dithered, rel=0.01)
+    assert f"fading in {cycles} cycle" in str(large.friction)
+    assert large.friction.to_dict()["dither_cycles"] == cycles
     np.testing.assert_array_equal(large.tensions[-1, 0], large.friction.history.tensions[0][-1, 0])
 
 
@@ -66,4 +72,6 @@ def test_straight_arm_holds_no_cable() -> None:
     assert test.friction is not None
     assert test.friction.breakaway.load == test.friction.sliding_load == 0.0
     assert test.friction.stuck == pytest.approx(test.friction.frictionless, rel=1e-9)
+    assert test.friction.dither_cycles == 0
+    assert test.friction.dithered == test.friction.secant
     assert "straight through all holes" in str(test)
