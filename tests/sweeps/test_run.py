@@ -71,8 +71,8 @@ def single(
     found["stuck_joint_stiffness"] = stuck.joint
     found["stuck_along"] = np.array([stuck.along(u) for u in np.eye(3)])
     held = holding(pose).any()
-    loads = [hole_loads(stuck, u)[0].min() if held else 0.0 for u in np.eye(3)]
-    found["breakaway"] = np.array(loads)
+    slips = [hole_loads(stuck, u)[0].min() if held else 0.0 for u in np.eye(3)]
+    found["breakaway"] = np.array(slips)
     status = {Status.OK if K.margin > 0.0 else Status.UNSTABLE}
     try:
         found["cartesian"], found["pseudoinverse"] = K.cartesian, K.pseudoinverse()
