@@ -22,6 +22,7 @@ from cdsm.tolerance import Tolerances
 from cdsm.tolerances.inputs import inputs_of
 from cdsm.tolerances.parts import Part, draw_errors, spread, standards
 from cdsm.tolerances.readings import Question, Reading
+from cdsm.tolerances.stuck import blocks_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -78,7 +79,7 @@ class Uncertainty(ReadOnlyState):
         one of the arms has no such reading.
         """
         question, rng = self.question, np.random.default_rng(0)
-        labels = inputs_of(question.stiffness.posture.arm).labels
+        labels = question.labels
         errors = draw_errors(self.parts, labels, rng, _PROBED)
         if not errors:
             return 0.0
@@ -117,7 +118,7 @@ class Uncertainty(ReadOnlyState):
         Args:
             count: How many.
         """
-        labels = inputs_of(self.question.stiffness.posture.arm).labels
+        labels = self.question.labels
         each = [
             (source, name, abs(float(g)) * float(u))
             for source, parts in self.parts.items()
@@ -208,8 +209,8 @@ def uncertainty(
         u_c² = Σ_s σ_s² g_sᵀ R_s g_s
 
     Each source s has the standard uncertainty σ, the correlations R of its inputs, and the exact
-    partial derivatives g of the reading by them. For ``"along"``, ``"margin"`` and ``"tip"`` the
-    tensions are measured, so they are inputs like all others. For ``"tension"`` and
+    partial derivatives g of the reading by them. For all but the last two readings the tensions
+    are measured, so they are inputs like all others. For ``"tension"`` and
     ``"critical_tension"`` they are distributed anew for every arm; cables at a bound stay there.
 
     Args:
@@ -217,11 +218,13 @@ def uncertainty(
         tension: As for :func:`~cdsm.stiffness`; a :class:`Tension` for the last two readings.
         tolerances: Tolerances of the arm, the angles and the tensions. None: those of the arm, as
             in the table ``[tolerances]`` of its file.
-        direction: u (3,) in base axes, any length: for ``"along"`` and ``"tip"`` only.
-        of: ``"along"``: the stiffness along u [N/m]. ``"margin"``: the smallest eigenvalue of K_θ
-            [N m/rad]. ``"tip"``: the tip's coordinate along u [m]. ``"tension"``: the distributed
-            tension of a cable [N]. ``"critical_tension"``: the lower bound of tension at which the
-            arm buckles [N]; see :func:`~cdsm.critical_tension`.
+        direction: u (3,) in base axes, any length: for ``"along"``, ``"stuck"``, ``"tip"`` only.
+        of: ``"along"``: the stiffness along u [N/m], without friction. ``"stuck"``: the same while
+            all cables stick in their holes, see :func:`~cdsm.stuck_stiffness`; the coefficient of
+            friction does not enter it, only which holes can hold. ``"margin"``: the smallest
+            eigenvalue of K_θ [N m/rad]. ``"tip"``: the tip's coordinate along u [m]. ``"tension"``:
+            the distributed tension of a cable [N]. ``"critical_tension"``: the lower bound of
+            tension at which the arm buckles [N]; see :func:`~cdsm.critical_tension`.
         cable: Name of the cable, for ``"tension"`` only.
         wrench: As for :func:`~cdsm.stiffness`.
 
@@ -286,7 +289,7 @@ def asked(
     one_of("reading", of, get_args(Reading))
     K = stiffness(pose, tension, wrench)
     for name, value, wanted in (
-        ("direction", direction, of in ("along", "tip")),
+        ("direction", direction, of in ("along", "stuck", "tip")),
         ("cable", cable, of == "tension"),
     ):
         if (value is not None) != wanted:
@@ -300,10 +303,18 @@ def asked(
         if not math.isfinite(critical):
             raise InvalidInput("of", "the arm does not buckle, so no tension is critical.")
         K = stiffness(pose, distribute_tension(pose, critical, wrench=K.wrench))
+    ties = None
+    if of == "stuck":
+        if not pose.arm.has_friction:
+            raise InvalidInput(
+                "of", "the arm has no friction in its holes; see Manipulator.with_friction."
+            )
+        blocks, F, ties = blocks_of(pose, K.tension)
+        K = stiffness(blocks, F, K.wrench)
     u = None if direction is None else unit_direction("direction", direction)
     names = [each.name for each in pose.arm.cables]
     index = None if cable is None else names.index(one_of("cable", cable, names))
-    return Question(of, K, u, index)
+    return Question(of, K, u, index, ties)
 
 
 def coverage_factor(probability: float) -> float:

@@ -26,7 +26,6 @@ from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension
 from cdsm.tolerance import Tolerances
 from cdsm.tolerances.budget import Uncertainty, chosen, decimals, uncertainty
-from cdsm.tolerances.inputs import inputs_of
 from cdsm.tolerances.parts import draw_errors
 from cdsm.tolerances.readings import Question, Reading
 
@@ -101,7 +100,7 @@ class MonteCarlo(ReadOnlyState):
         import xarray
 
         question, tolerances = self.budget.question, self.budget.tolerances
-        labels = inputs_of(question.stiffness.posture.arm).labels
+        labels = question.labels
         drawn = [
             _errors(question, tolerances, self.seed, i, count)
             for i, count in _blocks(self.values.size)
@@ -225,7 +224,7 @@ def _errors(
 ) -> dict[str, Array]:
     """Draw the errors of one block by source."""
     rng = np.random.default_rng([seed, block])
-    labels = inputs_of(question.stiffness.posture.arm).labels
+    labels = question.labels
     errors = draw_errors(question.parts(tolerances), labels, rng, _BLOCK)
     return {source: drawn[:count] for source, drawn in errors.items()}
 

@@ -6,7 +6,7 @@ posture, for the budget, and the values of many drawn arms, for Monte Carlo.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -21,8 +21,9 @@ from cdsm.tolerances.balanced import Balance, buckling_gradient
 from cdsm.tolerances.drawn import DrawnArms, laws_at, margins
 from cdsm.tolerances.inputs import Inputs, Places, inputs_of
 from cdsm.tolerances.parts import Part, parts_of
+from cdsm.tolerances.stuck import Ties
 
-Reading = Literal["along", "margin", "tip", "tension", "critical_tension"]
+Reading = Literal["along", "stuck", "margin", "tip", "tension", "critical_tension"]
 
 _NOWHERE = np.zeros(3)
 
@@ -32,34 +33,44 @@ class Question(ReadOnlyState):
     """A reading of one stiffness, in SI.
 
     Attributes:
-        of: ``"along"``, ``"margin"``, ``"tip"``, ``"tension"`` or ``"critical_tension"``.
-        stiffness: The stiffness; for ``critical_tension`` that at the critical tension.
-        direction: The unit direction (3,) of ``along`` and ``tip``; else None.
+        of: The reading.
+        stiffness: The stiffness; for ``critical_tension`` that at the critical tension, for
+            ``stuck`` that of the arm of blocks.
+        direction: The unit direction (3,) of ``along``, ``stuck`` and ``tip``; else None.
         cable: Index of the cable of ``tension``; else None.
+        ties: How the inputs of the arm of blocks are tied, for ``stuck``; else None.
     """
 
     of: Reading
     stiffness: Stiffness
     direction: Array | None = None
     cable: int | None = None
+    ties: Ties | None = None
+
+    @property
+    def labels(self) -> Mapping[str, Sequence[str]]:
+        """Names of the inputs of each source."""
+        return (self.ties or inputs_of(self.stiffness.posture.arm)).labels
 
     @property
     def unit(self) -> tuple[str, float]:
         """Unit in which people read the value, and its size in SI."""
         if self.of == "margin":
             return self.stiffness.posture.arm.stiffness_unit(), 1.0
-        return {"along": ("N/mm", 1e3), "tip": ("mm", 1e-3)}.get(self.of, ("N", 1.0))
+        force = ("N/mm", 1e3)
+        units = {"along": force, "stuck": force, "tip": ("mm", 1e-3)}
+        return units.get(self.of, ("N", 1.0))
 
     @property
     def si_unit(self) -> str:
         """Unit of the value."""
-        return {"along": "N/m", "tip": "m"}.get(self.of, self.unit[0])
+        return {"along": "N/m", "stuck": "N/m", "tip": "m"}.get(self.of, self.unit[0])
 
     @property
     def name(self) -> str:
         """Name of the reading, with its direction or cable."""
         if self.direction is not None:
-            what = "stiffness" if self.of == "along" else "tip"
+            what = {"along": "stiffness", "stuck": "stuck stiffness"}.get(self.of, "tip")
             return f"{what} along {coordinates(self.direction)}"
         if self.cable is not None:
             return f"tension of {self.stiffness.posture.arm.cables[self.cable].name}"
@@ -67,8 +78,8 @@ class Question(ReadOnlyState):
 
     def parts(self, tolerances: Tolerances) -> dict[str, tuple[Part, ...]]:
         """Find the inputs of each tolerance; see :func:`~cdsm.tolerances.parts.parts_of`."""
-        K = self.stiffness
-        return parts_of(tolerances, inputs_of(K.posture.arm).labels, K.tension)
+        tension = (self.ties or self.stiffness).tension
+        return parts_of(tolerances, self.labels, tension)
 
     def value(self) -> float:
         """Return the reading itself."""
@@ -80,16 +91,17 @@ class Question(ReadOnlyState):
             return float(K.distribution.minimum.max())
         if self.direction is None:
             return K.margin
-        if self.of == "along":
+        if self.of in ("along", "stuck"):
             return K.along(self.direction)
         return float(self.direction @ K.posture.tip[:3, 3])
 
     def gradient(self) -> dict[str, Array]:
         """Compute the partial derivative of the reading by every input, by source (inputs,)."""
         K, inputs = self.stiffness, inputs_of(self.stiffness.posture.arm)
-        if self.of == "along":
+        if self.of in ("along", "stuck"):
             assert self.direction is not None
-            return _along_gradient(K, inputs, self.direction)
+            gradient = _along_gradient(K, inputs, self.direction)
+            return gradient if self.ties is None else self.ties.gather(gradient)
         if self.of == "tip":
             assert self.direction is not None
             return _tip_gradient(K, inputs, self.direction)
@@ -109,7 +121,7 @@ class Question(ReadOnlyState):
             ElasticityRangeError: A tension leaves the domain of its cable's law.
             InvalidInput: No tensions balance an arm, or it does not buckle, where that is asked.
         """
-        arms = DrawnArms(self.stiffness, errors)
+        arms = DrawnArms(self.stiffness, self.ties.scatter(errors) if self.ties else errors)
         if self.of == "tension":
             return np.asarray(arms.distributed()[:, self.cable])
         if self.of == "critical_tension":

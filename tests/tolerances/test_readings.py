@@ -59,7 +59,7 @@ def _question(kind: str, of: str, moment: bool) -> Question:
     return asked(
         pose,
         tension,
-        U if of in ("along", "tip") else None,
+        U if of in ("along", "stuck", "tip") else None,
         of,  # type: ignore[arg-type]
         arm.cables[-1].name if of == "tension" else None,
         None if given else wrench,
@@ -78,7 +78,8 @@ def test_gradients_are_the_limits_of_differences(kind: str, moment: bool, of: st
     for source, partials in gradient.items():
         # a handful of directions in the space of the inputs replaces hundreds of columns
         ways = rng.normal(size=(4, partials.size))
-        size = 0.1 if of == "critical_tension" else 1.0  # cables leave their bounds near there
+        # cables leave their bounds near there; a stuck block is a tenth as long as its cable
+        size = 0.1 if of in ("critical_tension", "stuck") else 1.0
         ways *= size * STEPS.get(source, 1e-4) / abs(ways).max(axis=1, keepdims=True)
         expected = ways @ partials
 

@@ -1,0 +1,116 @@
+"""The arm that a stuck arm is: each block between holes that hold is a cable of its own.
+
+While all cables stick, K_θ is the stiffness of that arm. Its inputs are tied: the blocks of a cable
+share its rigidity and its tension, and both blocks at a hole share the hole.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from cdsm.cable import Cable
+from cdsm.kernels.tree import Indices
+from cdsm.manipulator import Manipulator
+from cdsm.posture import Posture
+from cdsm.sticking import holding
+from cdsm.support.values import Array
+from cdsm.tolerances.inputs import inputs_of
+
+_NONE = np.zeros(0, dtype=np.intp)
+"""Inputs of a source that the arm of blocks does not have: its holes have no friction."""
+
+
+class Ties(NamedTuple):
+    """Which input of an arm is which input of the arm of its blocks.
+
+    Attributes:
+        labels: Names of the inputs of the arm, by source.
+        tension: Tensions of its cables (C,) [N].
+        inputs: For each input of the arm of blocks, that of the arm; −1 where there is none.
+    """
+
+    labels: Mapping[str, Sequence[str]]
+    tension: Array
+    inputs: Mapping[str, Indices]
+
+    def gather(self, gradient: Mapping[str, Array]) -> dict[str, Array]:
+        """Sum the derivatives by the inputs of the arm of blocks over those that are one."""
+        found = {source: np.zeros(len(names)) for source, names in self.labels.items()}
+        for source, at in self.inputs.items():
+            np.add.at(found[source], at[at >= 0], gradient[source][at >= 0])
+        return found
+
+    def scatter(self, errors: Mapping[str, Array]) -> dict[str, Array]:
+        """Return the errors (N, inputs) of the arm of blocks."""
+        found = {}
+        for source, drawn in errors.items():
+            at = self.inputs.get(source, _NONE)
+            found[source] = np.where(at >= 0, drawn[:, at], 0.0)
+        return found
+
+
+def blocks_of(pose: Posture, tension: Array) -> tuple[Posture, Array, Ties]:
+    """Return the arm of blocks at a posture, its tensions, and its ties to the arm."""
+    arm, chains = pose.arm, pose.segments.chains
+    held = holding(pose)
+    where = zip(chains.cable[chains.hole[held]].tolist(), chains.site[held].tolist(), strict=True)
+    cuts: dict[int, list[int]] = {}
+    for c, site in where:
+        cuts.setdefault(c, []).append(site)
+    blocks: list[Cable] = []
+    own: list[int] = []
+    behind: list[bool] = []
+    names: dict[str, str] = {}
+    for c, cable in enumerate(arm.cables):
+        sites = tuple(replace(site, friction=0.0, wrap=0.0) for site in cable.sites)
+        at = cuts.get(c, [])
+        ends = sorted({0, *at, len(sites) - 1})
+        for n, (i, j) in enumerate(pairwise(ends)):
+            part = sites[i : j + 1]
+            if len({site.link for site in part}) == 1:
+                continue  # within one link nothing changes its length
+            block = replace(cable, name=f"{cable.name}:{n}", sites=part)
+            behind.append(i > 0 or 0 in at)
+            if behind[-1]:  # a hole that holds keeps lead, spring and motor away
+                block = replace(block, lead=0.0, series_stiffness=math.inf, control="position")
+            for k, site in enumerate(part, start=1):
+                names[f"{block.name} on {site.link}, site {k}"] = (
+                    f"{cable.name} on {site.link}, site {i + k}"
+                )
+            blocks.append(block)
+            own.append(c)
+    stuck = arm.with_cables(blocks)
+    cable_of = np.array(own, dtype=np.intp)
+    ties = Ties(inputs_of(arm).labels, tension, _tied(arm, stuck, cable_of, names, behind))
+    return stuck.at(pose.q, check_limits=False), tension[cable_of], ties
+
+
+def _tied(
+    arm: Manipulator,
+    stuck: Manipulator,
+    cable_of: Indices,
+    names: Mapping[str, str],
+    behind: Sequence[bool],
+) -> dict[str, Indices]:
+    """Find the input of the arm for each input of the arm of blocks."""
+    theirs, found = inputs_of(arm).labels, {}
+    for source, labels in inputs_of(stuck).labels.items():
+        at = {name: i for i, name in enumerate(theirs[source])}
+        if source in ("rigidity", "tension"):
+            found[source] = cable_of
+        elif source == "lead":
+            found[source] = np.where(behind, -1, cable_of)
+        elif source == "site":
+            sites = (label.rpartition(", ") for label in labels)
+            each = [at[f"{names[site]}, {axis}"] for site, _, axis in sites]
+            found[source] = np.array(each, dtype=np.intp)
+        elif source != "friction":
+            each = [at[names.get(label, label)] for label in labels]
+            found[source] = np.array(each, dtype=np.intp)
+    return found
