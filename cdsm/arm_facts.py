@@ -1,4 +1,4 @@
-"""What an arm tells of itself at any posture: names, cables, units, limits, gravity."""
+"""Attributes of an arm that hold at every posture: names, cables, units, limits, gravity."""
 
 from __future__ import annotations
 
@@ -87,12 +87,12 @@ class ArmFacts(Printed):
 
     @property
     def has_friction(self) -> bool:
-        """Whether a cable has friction in a hole; most answers leave it out, and say so."""
+        """Whether a cable has friction in a hole. Most results leave it out, and say so."""
         return any(any(cable.friction) for cable in self.cables)
 
     @property
     def tolerances(self) -> Tolerances:
-        """How far the arm may be from its description; all zero if nothing was said."""
+        """Tolerances: how far the arm may be from its description; zero if none were given."""
         return self._parts.tolerances
 
     @property

@@ -37,7 +37,7 @@ GRAVITY = (0.0, 0.0, -9.81)
 
 
 class ArmParts(NamedTuple):
-    """What an arm is built from; equal arms have equal parts."""
+    """Parts from which an arm is built; equal arms have equal parts."""
 
     geometry: Geometry | None
     urdf: str

@@ -193,9 +193,10 @@ class Posture(ReadOnlyState):
 
     @cached_property
     def self_contacts(self) -> tuple[tuple[str, str], ...]:
-        """Pairs of links, not neighbours, that pass through each other; they bound no posture.
+        """Pairs of links that pass through each other; neighbours are left to their joint limits.
 
-        A link is taken as the cylinder around its disks. Empty for a robot from a URDF.
+        The body of a link is the cylinder around its disks. No posture is refused for a contact.
+        A robot from a URDF has none, since its bodies are unknown.
         """
         if not self.arm.is_serpentine:
             return ()
@@ -204,7 +205,7 @@ class Posture(ReadOnlyState):
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """That the arm passes through itself, if it does."""
+        """A sentence if the arm passes through itself; else empty."""
         pairs = [" and ".join(pair) for pair in self.self_contacts]
         if not pairs:
             return ()

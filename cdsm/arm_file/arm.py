@@ -65,7 +65,7 @@ class _Urdf:
 
 @record
 class _Keys(CableKeys):
-    """All keys at the top of a file; the value of Any is checked by its own reader."""
+    """All keys at the top of a file. Values of type Any are checked by their own readers."""
 
     gravity: Annotated[tuple[_G, _G, _G], Field(strict=False)] = GRAVITY
     original_length: OriginalLength = "unstrained"

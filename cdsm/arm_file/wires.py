@@ -18,7 +18,7 @@ from cdsm.wires.files import from_table, table_of
 
 @record
 class CableSettings:
-    """What a file may say of all cables or of one cable; None: nothing."""
+    """Settings of all cables or of one cable in a file; None if the file does not have one."""
 
     wire: Any = None
     series_stiffness: SpringStiffness | None = None
@@ -29,7 +29,7 @@ class CableSettings:
 
 @record
 class CableKeys(CableSettings):
-    """What stands at the top of a file; the values of Any are checked where they are read."""
+    """Keys at the top of a file. Values of type Any are checked by their own readers."""
 
     wires: Any = Field(default_factory=dict)
     cables: Any = None

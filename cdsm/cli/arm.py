@@ -104,6 +104,7 @@ def _budgets(tension: cdsm.Tension, tolerances: cdsm.Tolerances) -> dict[str, cd
 
 def _table(budgets: dict[str, cdsm.Uncertainty]) -> str:
     """Write values with uncertainties, and what contributes to them [%], one column per axis."""
+    from cdsm.support.format import aligned
 
     def percent(source: str) -> list[float]:
         return [100.0 * b.contributions[source] / abs(b.value) for b in budgets.values()]
@@ -118,9 +119,7 @@ def _table(budgets: dict[str, cdsm.Uncertainty]) -> str:
             for source in ranked
         ),
     ]
-    return "\n".join(
-        f"{name:<24}{''.join(f'{cell:>16}' for cell in cells)}" for name, *cells in rows
-    )
+    return "\n".join(aligned(rows))
 
 
 def check(

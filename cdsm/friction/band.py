@@ -33,7 +33,7 @@ _INSIDE = 0.98
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class RestBand(ReadOnlyState):
-    """Where the tip of an arm with locked motors may rest, whatever loads came and went before.
+    """Region in which the tip of an arm with locked motors may rest, after any loads.
 
     If ``proved``, ``low`` and ``high`` hold for all states of rest in a neighbourhood of the
     reference: ``room`` times the set of all states that are at rest to first order. So do

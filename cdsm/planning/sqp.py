@@ -230,7 +230,7 @@ class _LocalModel:
         self.W = kernels.convex(W, program.region.null, held)
 
     def step(self, price: float, c: Array) -> _Step:
-        """Solve the quadratic program for a value of c, at the price that it needs."""
+        """Solve the quadratic program for a value of c; raise the price until it is enough."""
         region, evaluation, size = self.program.region, self.iterate.evaluation, self.size
         count, rank, m = self.g.size, len(region.rows), c.size
         low, high = ((bound - evaluation.F) / size for bound in self.bounds)

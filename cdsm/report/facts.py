@@ -205,7 +205,7 @@ def _number(cable: Cable, answer: Callable[[], Array]) -> float | None:
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Sticking(ReadOnlyState):
-    """What small loads measure on an arm whose cables have friction in their holes.
+    """Readings of small loads on an arm whose cables have friction in their holes.
 
     Attributes:
         along: Stiffness along x, y, z while all cables stick (3,) [N/m].

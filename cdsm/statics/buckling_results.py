@@ -63,7 +63,7 @@ class CriticalTension(ReadOnlyState):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """That the arm is UNSTABLE at every lower bound; empty if it is stable at some."""
+        """A sentence if the arm is UNSTABLE at every lower bound; else empty."""
         return () if self.stable else (self._verdict,)
 
     def plot(self) -> Figure:
@@ -125,7 +125,7 @@ class CriticalLoad(ReadOnlyState):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """That the arm is UNSTABLE without the load already; else empty."""
+        """A sentence if the arm is UNSTABLE even without the load; else empty."""
         return () if self.factor else (f"UNSTABLE without the load: {self}".partition("\n")[0],)
 
     def plot(self) -> Figure:

@@ -38,7 +38,7 @@ _ROUNDING = 16.0 * float(np.finfo(np.float64).eps)
 
 
 class Load(NamedTuple):
-    """What acts on an arm from outside."""
+    """Load and motor commands that act on an arm."""
 
     wrench: Array  # W (6,): force [N], then moment [N m]
     held: Array  # torque that holds an unbalanced arm at its reference (nv,) [N m]

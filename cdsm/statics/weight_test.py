@@ -108,7 +108,7 @@ class WeightTest(ReadOnlyState):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """That the arm left its reference before the weight, or is neutral there; else empty."""
+        """A sentence if the arm left its reference before the weight, or is neutral there."""
         said = []
         if self.settled_first:
             moved = coordinates(1000.0 * self.without.displacement)

@@ -1,4 +1,4 @@
-"""The stiffness of an arm as a frozen value: K_θ with its four terms, and what it tells."""
+"""The stiffness of an arm as a frozen value: K_θ with its four terms, and its readings."""
 
 from __future__ import annotations
 
@@ -147,7 +147,7 @@ class Stiffness(CartesianReadings):
 
     @cached_property
     def remedies(self) -> tuple[Remedy, ...]:
-        """What would hold an unstable arm here, each change alone; empty for a stable arm.
+        """Changes that would each hold an unstable arm here; empty for a stable arm.
 
         Wires and series springs made stiffer, other lower bounds of the tensions, other disk
         offsets: for each the factor at which the smallest eigenvalue of K_θ is zero, found by a
@@ -160,7 +160,7 @@ class Stiffness(CartesianReadings):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """That the arm is UNSTABLE, and what would hold it; empty for a stable arm."""
+        """Sentences that the arm is UNSTABLE and what would hold it; empty for a stable arm."""
         from cdsm.instability import advice, verdict
 
         return () if self.is_stable else (verdict(self), *advice(self))

@@ -77,7 +77,7 @@ def placed(ball: Ball, direction: Array, aspect: float, free: float) -> tuple[Ar
 
 @dataclass
 class _Browser:
-    """What is known of the picture of a browser: its free part, size and last camera position."""
+    """Picture of a browser: its free part, size and last camera position."""
 
     free: float
     size: tuple[int, int]
@@ -108,7 +108,7 @@ class Cameras:
                 self.fit(client)
 
     def fit(self, client: viser.ClientHandle) -> None:
-        """Fit one camera to the ball; its direction stays."""
+        """Move one camera so that it sees the whole ball; it looks in the same direction."""
         self._place(client, client.camera.position - client.camera.look_at)
 
     def _place(self, client: viser.ClientHandle, direction: Array) -> None:

@@ -96,9 +96,9 @@ class Scene:
         self.cameras = Cameras(server, self._ball(_straight(arm)))
 
     def update(self, shown: Shown, follow: bool) -> None:
-        """Show these results, and hide everything that they do not have.
+        """Draw these results, and hide the objects that have none.
 
-        With ``follow`` the cameras may be fitted anew.
+        ``follow`` allows the cameras to be fitted again.
         """
         pose, force, ellipsoid = shown.posture, shown.setting.force, shown.ellipsoid
         for part in self._parts:
