@@ -16,11 +16,19 @@ HERE = Path(__file__).parent
 ROOT = HERE.parent
 SITE = ROOT / "build" / "site"
 
+KERNEL = """\
+c.Application.log_level = "ERROR"
+c.IPKernelApp.matplotlib = "inline"
+c.InlineBackend.figure_formats = ["retina"]
+"""
+"""Settings of the kernels that run the cells of pages: figures are shown, and sharp."""
+
 
 def main() -> int:
     """Build the site, then check its links; return the exit code."""
     os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
-    os.environ["PYTHONPATH"] = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
+    paths = [str(ROOT), str(ROOT / "examples"), os.environ.get("PYTHONPATH", "")]
+    os.environ["PYTHONPATH"] = os.pathsep.join(paths)
     os.environ |= {
         "TERM": "dumb",
         "NO_COLOR": "1",

@@ -50,6 +50,7 @@ nb_execution_excludepatterns = ["generated/tutorials/*"]  # tests.support.notebo
 nb_execution_in_temp = True
 nb_execution_raise_on_error = True
 nb_execution_timeout = 600
+nb_render_markdown_format = "myst"
 nb_merge_streams = True
 
 autodoc_member_order = "bysource"

@@ -48,6 +48,7 @@ CHAPTERS = {
 """Page of the reference that shows the public names of a chapter."""
 
 MODULES = {
+    "control": "Motor laws, sensors, plants",
     "presets": "Arms and strand of the paper",
     "plots": "Figures",
     "paper": "The paper recomputed",
@@ -93,7 +94,7 @@ def slug(title: str) -> str:
 def _interface() -> dict[str, str]:
     grouped: dict[str, list[str]] = {title: [] for title in CHAPTERS.values()}
     for name in cdsm.__all__:
-        if name not in MODULES:
+        if name not in cdsm._MODULES:
             chapter = cdsm._HOME[name].split(".")[1]
             grouped.setdefault(CHAPTERS.get(chapter, chapter.capitalize()), []).append(name)
     pages = {
@@ -101,9 +102,14 @@ def _interface() -> dict[str, str]:
         for title, names in grouped.items()
         if names
     }
-    for module, title in MODULES.items():
+    for module in cdsm._MODULES:
+        title = MODULES.get(module, module.capitalize())
         source = import_module(f"cdsm.{module}")
-        names = [name for name in source.__all__ if not ismodule(getattr(source, name))]
+        names = [
+            name
+            for name in source.__all__
+            if not ismodule(getattr(source, name)) and name not in cdsm.__all__
+        ]
         pages[f"interface/{slug(title)}.md"] = _page(title, f"cdsm.{module}", names, own=True)
     entries = [f"{Path(page).stem}" for page in pages]
     listed = "\n".join(entries)
