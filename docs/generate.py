@@ -64,7 +64,7 @@ def version() -> str:
 
 def all_pages() -> None:
     """Write all generated pages; pages whose text is the same keep their date."""
-    pages = {**_tutorials(), **_interface(), **_commands()}
+    pages = {**_tutorials(), **interface(), **commands()}
     for name, text in pages.items():
         path = GENERATED / name
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -91,7 +91,8 @@ def slug(title: str) -> str:
     return re.sub(r"\W+", "-", title.lower())
 
 
-def _interface() -> dict[str, str]:
+def interface() -> dict[str, str]:
+    """Return the pages of all public names."""
     grouped: dict[str, list[str]] = {title: [] for title in CHAPTERS.values()}
     for name in cdsm.__all__:
         if name not in cdsm._MODULES:
@@ -157,9 +158,10 @@ def _where(module: str, name: str) -> str:
     raise LookupError(f"{module}.{name} is public and has no docstring")
 
 
-def _commands() -> dict[str, str]:
+def commands() -> dict[str, str]:
+    """Return the page of all commands."""
     group = typer.main.get_command(app)
-    commands = group.commands  # type: ignore[attr-defined]
+    found = group.commands  # type: ignore[attr-defined]
     rows = [
         "# Commands",
         "",
@@ -168,7 +170,7 @@ def _commands() -> dict[str, str]:
         "where an error comes from and `--verbose` the log.",
         "",
     ]
-    for name, command in commands.items():
+    for name, command in found.items():
         rows += [f"(command-{name})=", f"## cdsm {name}", "", _plain(command.help or ""), ""]
         for option in command.params:
             if option.hidden:

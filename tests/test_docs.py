@@ -58,3 +58,15 @@ def test_public_names_that_pages_link_to_exist() -> None:
             thing: object = cdsm
             for part in name.split("."):
                 thing = getattr(thing, part)
+
+
+def test_every_public_constant_has_a_page_and_a_docstring() -> None:
+    """Where one has none, the site is not built."""
+    pytest.importorskip("sphinx")
+    from docs import generate
+
+    pages = generate.interface()
+    for name in cdsm.__all__:
+        if name not in cdsm._MODULES:
+            assert any(f":: cdsm.{name}\n" in page for page in pages.values()), name
+    assert "## cdsm stiffness" in generate.commands()["commands.md"]

@@ -92,6 +92,7 @@ def floats(values: Iterable[float]) -> tuple[float, ...]:
 
 
 SUMMARY = ("number that deviates most", "compared", "deviation", "paper", "computed")
+"""Columns of :func:`to_summary`."""
 
 
 def to_summary(figures: Sequence[Figure]) -> list[tuple[str, ...]]:
