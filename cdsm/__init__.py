@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from cdsm.arm_file.cables import read_cables, write_cables
     from cdsm.batch import Batch, Tensions, distribute_tensions, evaluate
     from cdsm.cable import Cable, Cables, Site, in_series, serpentine_cables
+    from cdsm.control.mujoco_plant import MuJoCoPlant
     from cdsm.control.plant import SlowPlant
     from cdsm.control.run import TrackingRun
     from cdsm.control.sensors import Sensors
@@ -146,6 +147,7 @@ __all__ = [
     "Modes",
     "MomentArms",
     "MonteCarlo",
+    "MuJoCoPlant",
     "PathPlan",
     "PathPoses",
     "Payload",
@@ -245,6 +247,7 @@ _NAMES = {
     "arm_file.cables": "read_cables write_cables",
     "batch": "Batch Tensions distribute_tensions evaluate",
     "cable": "Cable Cables Site in_series serpentine_cables",
+    "control.mujoco_plant": "MuJoCoPlant",
     "control.plant": "SlowPlant",
     "control.run": "TrackingRun",
     "control.sensors": "Sensors",

@@ -11,6 +11,7 @@ from cdsm.control.laws import (
     mixed,
     tension_control,
 )
+from cdsm.control.mujoco_plant import MuJoCoPlant
 from cdsm.control.plant import SlowPlant
 from cdsm.control.run import TrackingRun
 from cdsm.control.sensors import Sensors
@@ -21,6 +22,7 @@ __all__ = [
     "Command",
     "Law",
     "Moment",
+    "MuJoCoPlant",
     "Reading",
     "Reference",
     "Sensors",

@@ -18,7 +18,13 @@ from cdsm.control.schedule import Schedule, checked_plan
 from cdsm.control.schedule import tension_controlled as choose_cables
 from cdsm.control.sensors import Sensors
 from cdsm.control.stiffness_loop import StiffnessLoop
-from cdsm.errors import CdsmError, EquilibriumError, InvalidInput, SingularStiffness
+from cdsm.errors import (
+    CdsmError,
+    ElasticityRangeError,
+    EquilibriumError,
+    InvalidInput,
+    SingularStiffness,
+)
 from cdsm.planning.path import checked_rate
 from cdsm.planning.path_plan import PathPlan
 from cdsm.stiffness_matrix import Stiffness
@@ -80,7 +86,8 @@ def track(
         tension_controlled: Names of the cables whose tension a mixed law controls. Default: as many
             as there are more cables than joints, so that the lengths of the others give the posture
             best.
-        bands: A proved band is computed at every so many steps, some 20 ms each; 0: never.
+        bands: A proved band is computed at every so many steps, some 20 ms each; 0: never. An arm
+            without friction has none.
         seed: Seed of the noise: the same seed gives the same bits.
 
     Raises:
@@ -133,11 +140,10 @@ def track(
         try:
             state = plant.move(state, command, wrenches[k])
         except CdsmError as error:
-            outcome = "no rest" if isinstance(error, EquilibriumError) else "wire"
-            reason = str(error)
+            outcome, reason = _stopped(error), str(error)
             break
         truth.append(state.true)
-        banded = every > 0 and k % every == 0
+        banded = every > 0 and k % every == 0 and plant.arm.has_friction
         judged = assess(plant.arm, state, wrenches[k], schedule.directions[0], banded=banded)
         records.append(_Step(wanted, reading, estimate, command, state, judged))
         before, last, wire = wanted, reading, command.wire
@@ -156,6 +162,12 @@ def track(
         states=tuple(record.state for record in records),
         **_columns(schedule, wrenches, records),
     )
+
+
+def _stopped(error: CdsmError) -> Outcome:
+    if isinstance(error, EquilibriumError):
+        return "no rest"
+    return "wire" if isinstance(error, ElasticityRangeError) else "lost"
 
 
 def _share(name: str, value: float) -> float:

@@ -1,0 +1,131 @@
+"""The arm that is controlled, with inertia and damping: MuJoCo moves the exported model.
+
+The exported motors have constant stiffness, as MuJoCo has it. Here they get the tangent of the law
+of their wire again some ten times per step of control, so that the arm rests where cdsm's does.
+Cables slide freely in their holes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Final, NamedTuple, final
+
+import numpy as np
+
+from cdsm.cable_laws import CableLaws
+from cdsm.control.laws import Command, Reading
+from cdsm.control.plant import require_unstrained
+from cdsm.errors import InvalidInput, SolverError
+from cdsm.interchange.mjcf import to_mjcf
+from cdsm.manipulator import Manipulator
+from cdsm.posture import Posture
+from cdsm.support.extras import need
+from cdsm.support.validation import quantity
+from cdsm.support.values import Array, frozen
+
+_TANGENTS: Final = 10
+"""Number of times per step that motors and load follow the posture."""
+
+
+class MuJoCoState(NamedTuple):
+    """State of a :class:`MuJoCoPlant`."""
+
+    model: Any
+    pose: Posture
+    true: Reading
+    velocity: Array  # of the joints (nv,) [rad/s], in MuJoCo's order
+
+
+@final
+@dataclass(frozen=True)
+class MuJoCoPlant:
+    """Arm with inertia and damping, moved by MuJoCo from one step of control to the next.
+
+    It need not be at rest when the next command comes.
+
+    Attributes:
+        arm: The true arm, without friction in its holes.
+        period: Time of a step [s].
+        damping_ratio: Damping of the least damped mode [-], as for :func:`~cdsm.to_mjcf`.
+
+    Raises:
+        MissingExtra: mujoco is not installed.
+        InvalidInput: The arm has friction, ``original_length`` is not ``"unstrained"``, or a number
+            is not positive.
+    """
+
+    arm: Manipulator
+    period: float = 0.05
+    damping_ratio: float = 0.5
+
+    def __post_init__(self) -> None:
+        need("mujoco", "mujoco")
+        require_unstrained("arm", self.arm)
+        quantity("period", self.period, "time")
+        if self.arm.has_friction:
+            raise InvalidInput(
+                "arm", "has friction, which MuJoCo's cables have not; give arm.with_friction(0.0)."
+            )
+
+    def begin(self, q: Array, tension: Array, wrench: Array) -> MuJoCoState:
+        """Return the arm at rest at joint angles (nv,) with cables of a tension (C,) [N]."""
+        import mujoco
+
+        pose = self.arm.at(q)
+        text = to_mjcf(self.arm, pose, tension, damping_ratio=self.damping_ratio)
+        wire = CableLaws(self.arm.cables, "unstrained").original_lengths(
+            pose.cable_lengths, tension
+        )
+        model = mujoco.MjModel.from_xml_string(text)
+        return MuJoCoState(model, pose, Reading(wire, tension), frozen(np.zeros(q.size)))
+
+    def move(self, state: MuJoCoState, command: Command, wrench: Array) -> MuJoCoState:
+        """Return the arm a period later, under a command and a wrench (6,).
+
+        Raises:
+            SolverError: The arm moves beyond all bounds.
+            ElasticityRangeError: A cable leaves its law.
+        """
+        import mujoco
+
+        model, data = state.model, mujoco.MjData(state.model)
+        names = self.arm.joint_names
+        address = np.array([model.joint(name).qposadr[0] for name in names])
+        data.qpos[address], data.qvel[:] = state.pose.q, state.velocity
+        body = model.body(self.arm.tip_link).id
+        steps = max(round(self.period / _TANGENTS / model.opt.timestep), 1)
+        for _ in range(_TANGENTS):
+            mujoco.mj_kinematics(model, data)
+            mujoco.mj_comPos(model, data)
+            mujoco.mj_tendon(model, data)
+            self._pull(model, data.ten_length, command)
+            data.qfrc_applied[:] = 0.0
+            tip = data.site("tool0").xpos
+            mujoco.mj_applyFT(model, data, wrench[:3], wrench[3:], tip, body, data.qfrc_applied)
+            mujoco.mj_step(model, data, steps)
+        if not np.isfinite(data.qpos).all() or data.warning.number.any():
+            raise SolverError("mujoco", "loses the arm: it moves beyond all bounds")
+        pose = self.arm.at(data.qpos[address].copy(), check_limits=False)
+        F = self._tensions(pose.cable_lengths, command)
+        return MuJoCoState(model, pose, Reading(command.wire, frozen(F)), data.qvel.copy())
+
+    def _pull(self, model: Any, lengths: Array, command: Command) -> None:
+        """Give each motor the tangent F + k (L' − L) of the law of its wire; lead left out."""
+        cables = self.arm.cables
+        L = lengths + [cable.lead for cable in cables]
+        F = self._tensions(L, command)
+        for c, cable in enumerate(cables):
+            motor = model.actuator(cable.name).id
+            held = cable.control == "position" and F[c] > 0.0
+            k = float(cable.tangent_stiffness(F[c], command.wire[c])) if held else 0.0
+            model.actuator_gainprm[motor, 0] = 0.0
+            model.actuator_biasprm[motor, :3] = k * lengths[c] - F[c], -k, 0.0
+
+    def _tensions(self, lengths: Array, command: Command) -> Array:
+        """Compute F (C,) [N] of cables of some lengths (C,) [m] with the commanded wire."""
+        F = command.tension.copy()
+        for c, cable in enumerate(self.arm.cables):
+            if cable.control == "position":
+                stretch, wire = float(lengths[c] - command.wire[c]), float(command.wire[c])
+                F[c] = cable.tension(stretch, wire) if stretch > 0.0 else 0.0
+        return F
