@@ -54,7 +54,7 @@ if TYPE_CHECKING:
     from cdsm.friction.breakaway import Breakaway, breakaway
     from cdsm.friction.stuck import sliding_stiffness, stuck_stiffness
     from cdsm.geometry import CableRoute, Geometry, Joint, Link
-    from cdsm.identification import Identification, Measurement, identify
+    from cdsm.identification import Identification, Measurement, WeightLoop, identify
     from cdsm.instability import Remedy
     from cdsm.interchange.caspr import read_caspr
     from cdsm.interchange.mjcf import to_mjcf, write_mjcf
@@ -187,6 +187,7 @@ __all__ = [
     "UnknownName",
     "UnreachableStiffness",
     "UrdfError",
+    "WeightLoop",
     "WeightTest",
     "WireUse",
     "bifurcation",
@@ -264,7 +265,7 @@ _NAMES = {
     "friction.stuck": "sliding_stiffness stuck_stiffness",
     "geometry": "CableRoute Geometry Joint Link",
     "instability": "Remedy",
-    "identification": "Identification Measurement identify",
+    "identification": "Identification Measurement WeightLoop identify",
     "interchange.caspr": "read_caspr",
     "interchange.mjcf": "to_mjcf write_mjcf",
     "kinematics.maps": "inverse_kinematics solve_joint_angles",

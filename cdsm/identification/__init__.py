@@ -1,8 +1,9 @@
-"""Identification of the parameters of an arm from stiffnesses measured on the arm."""
+"""Identification of the parameters of an arm from stiffnesses and loops measured on the arm."""
 
 from cdsm.identification.intervals import Profile
+from cdsm.identification.loop import WeightLoop
 from cdsm.identification.measurement import Measurement
 from cdsm.identification.result import Identification
 from cdsm.identification.search import identify
 
-__all__ = ["Identification", "Measurement", "Profile", "identify"]
+__all__ = ["Identification", "Measurement", "Profile", "WeightLoop", "identify"]

@@ -25,7 +25,7 @@ def warnings_of(result: Identification) -> list[str]:
         f"not identifiable (rank {result.rank} of {len(result.names)}): no prediction changes with "
         f"{combination}, so their values are one choice of many. Fix one, or measure what tells "
         "them apart."
-        for combination in result._null_combinations
+        for combination in result._determination.open_combinations
     ]
     correlation, std = result.correlation, result.std
     for i, name in enumerate(result.names):

@@ -70,6 +70,8 @@ class LeastSquares:
         residuals_of: Function from parameters by name to r (n,). May raise :class:`NoModelError`.
         count: Number n of residuals.
         bounds: (low, high) of each parameter.
+        beside: Function from two sets of parameters to r (n,) at the second, if that is faster so
+            near the first; exact to first order in the distance.
     """
 
     def __init__(
@@ -77,12 +79,18 @@ class LeastSquares:
         residuals_of: Callable[[dict[str, float]], Array],
         count: int,
         bounds: Mapping[str, tuple[float, float]],
+        beside: Callable[[dict[str, float], dict[str, float]], Array] | None = None,
     ) -> None:
         self.names = tuple(bounds)
         self.box = Box(np.array(list(bounds.values()), dtype=np.float64))
         self.count = count
-        self._residuals_of = residuals_of
+        self._residuals_of, self._beside = residuals_of, beside
         self._cached = lru_cache(maxsize=_CACHED)(self._evaluate)
+
+    @property
+    def followed(self) -> bool:
+        """Whether residuals beside a point are followed to first order."""
+        return self._beside is not None
 
     def parameters(self, point: Array) -> dict[str, float]:
         """Compute the parameters by name at a point of the unit cube."""
@@ -131,9 +139,14 @@ class LeastSquares:
             """Compute the residuals k steps away, or None beyond the bounds or the model."""
             moved = point.copy()
             moved[i] += k * step
-            if not 0.0 <= moved[i] <= 1.0 or self.failure(moved) is not None:
+            if not 0.0 <= moved[i] <= 1.0:
                 return None
-            return self.residuals(moved)
+            if self._beside is not None:
+                try:
+                    return self._beside(self.parameters(point), self.parameters(moved))
+                except NoModelError:
+                    return None
+            return self.residuals(moved) if self.failure(moved) is None else None
 
         for side in (1, -1):
             near = at(side)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import final
+from typing import Protocol, final
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from cdsm.errors import InvalidInput
 from cdsm.support.validation import (
@@ -76,35 +77,65 @@ class Measurement:
                 f"{force:g} N given; it must be positive, or 0 for the tangent. Turn the direction "
                 "round instead.",
             )
-        if (self.tension is None) == (self.minimum is None):
-            raise InvalidInput(
-                "tension",
-                "give one of tension= (measured, of each cable) and minimum= (a bound to "
-                f"distribute from); {'neither' if self.tension is None else 'both'} given.",
-            )
-        if not isinstance(self.label, str):
-            raise InvalidInput("label", f"{self.label!r} given; a text is needed.")
-        given = self.direction
-        given = axis_vector("direction", given) if isinstance(given, str) else given
-        unit_direction("direction", given)
-        direction = vector("direction", given, 3, "a direction in base axes")
-        wrench = wrench_vector("wrench", self.wrench)
-        checked: dict[str, object] = {
-            "value": value,
-            "std": std,
-            "force": force,
-            "direction": tuple(direction.tolist()),
-            "wrench": tuple(wrench.tolist()),
-            "angles": _numbers("angles", self.angles, "one angle [rad] per joint"),
-        }
-        if self.tension is not None:
-            checked["tension"] = _numbers("tension", self.tension, "one tension [N] per cable")
-        elif np.ndim(self.minimum) == 0:  # type: ignore[arg-type]
-            checked["minimum"] = scalar("minimum", self.minimum)
-        else:
-            checked["minimum"] = _numbers("minimum", self.minimum, "one bound [N] per cable")
+        checked = checked_conditions(self) | {"value": value, "std": std, "force": force}
         for name, entry in checked.items():
             object.__setattr__(self, name, entry)
+
+
+class Conditions(Protocol):
+    """What every measurement states: the arm before the measuring force, and its direction."""
+
+    @property
+    def direction(self) -> tuple[float, float, float] | Axis:
+        """Direction of the force."""
+
+    @property
+    def angles(self) -> tuple[float, ...]:
+        """Joint angles (nv,) [rad]."""
+
+    @property
+    def tension(self) -> tuple[float, ...] | None:
+        """Cable tensions (C,) [N]."""
+
+    @property
+    def minimum(self) -> float | tuple[float, ...] | None:
+        """Lower bound of the tensions [N]."""
+
+    @property
+    def wrench(self) -> tuple[float, ...]:
+        """W (6,) at ``tool0``."""
+
+    @property
+    def label(self) -> str:
+        """Name in reports and figures."""
+
+
+def checked_conditions(given: Conditions) -> dict[str, object]:
+    """Check the conditions of a measurement; return the fields as tuples of numbers."""
+    if (given.tension is None) == (given.minimum is None):
+        raise InvalidInput(
+            "tension",
+            "give one of tension= (measured, of each cable) and minimum= (a bound to "
+            f"distribute from); {'neither' if given.tension is None else 'both'} given.",
+        )
+    if not isinstance(given.label, str):
+        raise InvalidInput("label", f"{given.label!r} given; a text is needed.")
+    direction: ArrayLike = given.direction
+    if isinstance(direction, str):
+        direction = axis_vector("direction", direction)
+    unit_direction("direction", direction)
+    checked: dict[str, object] = {
+        "direction": tuple(vector("direction", direction, 3, "a direction in base axes").tolist()),
+        "wrench": tuple(wrench_vector("wrench", given.wrench).tolist()),
+        "angles": _numbers("angles", given.angles, "one angle [rad] per joint"),
+    }
+    if given.tension is not None:
+        checked["tension"] = _numbers("tension", given.tension, "one tension [N] per cable")
+    elif np.ndim(given.minimum) == 0:  # type: ignore[arg-type]
+        checked["minimum"] = scalar("minimum", given.minimum)
+    else:
+        checked["minimum"] = _numbers("minimum", given.minimum, "one bound [N] per cable")
+    return checked
 
 
 def _numbers(name: str, value: object, meaning: str) -> tuple[float, ...]:
@@ -114,6 +145,6 @@ def _numbers(name: str, value: object, meaning: str) -> tuple[float, ...]:
     return tuple(array.tolist())
 
 
-def label(i: int, measurement: Measurement) -> str:
+def label(i: int, measurement: Conditions) -> str:
     """Return the name of a measurement: its label, or its index in the list."""
     return measurement.label or f"[{i}]"

@@ -5,14 +5,15 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, final
+from typing import TYPE_CHECKING, final
 
 import numpy as np
-from scipy.linalg import qr
 from scipy.special import ndtri, stdtrit
 
 from cdsm.errors import InvalidInput
-from cdsm.identification.intervals import NEGLIGIBLE, RANK_TOLERANCE, Profile
+from cdsm.identification.determination import Determination
+from cdsm.identification.intervals import NEGLIGIBLE, Profile
+from cdsm.identification.loop import WeightLoop, measured
 from cdsm.identification.measurement import Measurement, label
 from cdsm.manipulator import Manipulator
 from cdsm.support.format import MODEL
@@ -28,15 +29,17 @@ if TYPE_CHECKING:
 class Identification(ReadOnlyState):
     """Parameters of an arm that explain its measurements best; made by :func:`identify`.
 
-    There are n measurements and P parameters. Each parameter has the unit in which ``model_of``
-    takes it. All arrays are read-only.
+    There are P parameters and n measured numbers: one for each stiffness, and all readings of each
+    loop. Each parameter has the unit in which ``model_of`` takes it. All arrays are read-only.
 
     Attributes:
         names: Names of the parameters, in the order of every (P,) array.
         values: Values of the parameters (P,) [m, kg, N/m, …].
         bounds: Bounds of the parameters (P, 2), low and high [m, kg, N/m, …].
         measurements: The measurements.
-        predicted: Stiffnesses of the model (n,) [N/m].
+        predicted: Stiffnesses of the model [N/m], and its loops as they were read [m] (n,).
+        residuals: Residuals r (n,) in standard deviations [-]: (predicted − measured)/σ of a
+            stiffness; of a loop, with the errors of its forces and tensions and its zeros.
         jacobian: J = ∂r/∂p (n, P) [1/m, m/N, …], r in standard deviations.
         arm: Arm with these values.
         warnings: One sentence for each reason not to trust the result; empty if there is none.
@@ -46,8 +49,9 @@ class Identification(ReadOnlyState):
     names: tuple[str, ...]
     values: Array
     bounds: Array
-    measurements: tuple[Measurement, ...]
+    measurements: tuple[Measurement | WeightLoop, ...]
     predicted: Array
+    residuals: Array
     jacobian: Array
     arm: Manipulator
     warnings: tuple[str, ...]
@@ -60,14 +64,8 @@ class Identification(ReadOnlyState):
 
     @cached_property
     def measured(self) -> Array:
-        """Measured stiffnesses (n,) [N/m]."""
-        return frozen(np.array([each.value for each in self.measurements]))
-
-    @cached_property
-    def residuals(self) -> Array:
-        """Residuals r = (predicted − measured)/σ (n,), in standard deviations [-]."""
-        sigma = np.array([each.std for each in self.measurements])
-        return frozen((self.predicted - self.measured) / sigma)
+        """Measured stiffnesses [N/m] and readings of loops [m] (n,)."""
+        return frozen(np.concatenate([measured(each) for each in self.measurements]))
 
     @property
     def chi_square(self) -> float:
@@ -76,8 +74,9 @@ class Identification(ReadOnlyState):
 
     @property
     def freedom(self) -> int:
-        """Degrees of freedom: n less :attr:`rank`."""
-        return len(self.measurements) - self.rank
+        """Degrees of freedom: n less :attr:`rank` and one for the zero of each axis of a loop."""
+        zeros = sum(len(loop.axes) for loop in self._loops)
+        return len(self.predicted) - zeros - self.rank
 
     @property
     def reduced_chi_square(self) -> float:
@@ -87,34 +86,26 @@ class Identification(ReadOnlyState):
     @property
     def rank(self) -> int:
         """Number of combinations of parameters that the measurements determine, at most P."""
-        return int(self._determined.sum())
+        return self._determination.rank
 
-    @cached_property
+    @property
     def covariance(self) -> Array:
         """Covariance (JᵀJ)⁻¹ (P, P) [m², m kg, …] for the given σ, not scaled by χ².
 
         If only the ratios of the σ are known, multiply it by :attr:`reduced_chi_square`. The bounds
         have no influence. An undetermined parameter has infinite variance.
         """
-        values, right = self._svd
-        inner = right[self._determined].T / values[self._determined]
-        covariance = inner @ inner.T / np.outer(self._column_norms, self._column_norms)
-        null = self._null_projector
-        return frozen(np.where(null != 0.0, np.copysign(math.inf, null), covariance))
+        return self._determination.covariance
 
     @cached_property
     def std(self) -> Array:
         """Standard deviations of the parameters (P,) [m, kg, N/m, …]."""
         return frozen(np.sqrt(np.diag(self.covariance)))
 
-    @cached_property
+    @property
     def correlation(self) -> Array:
         """Correlations of the parameters (P, P) [-]. At ±1 only a combination is determined."""
-        firm = np.diag(self._null_projector) == 0.0
-        matrix = np.where(np.outer(firm, firm), self.covariance, 0.0)
-        matrix = np.where(np.outer(~firm, ~firm), self._null_projector, matrix)
-        root = np.sqrt(np.diag(matrix))
-        return frozen(np.clip(matrix / np.outer(root, root), -1.0, 1.0))
+        return self._determination.correlation
 
     def confidence(
         self, level: float = 0.95, *, scaled: bool = False
@@ -170,16 +161,64 @@ class Identification(ReadOnlyState):
         intervals = list(self.confidence().values())
         numbers = np.column_stack([self.values, self.std, intervals, self.bounds])
         lines = [_row("parameter [own unit]", *columns), *map(_row, self.names, *numbers.T), ""]
-        lines.append(_row("measurement", "measured", "predicted", "residual"))
-        lines.append(_row("", "[N/mm]", "[N/mm]", "[σ]"))
-        residuals = [f"{residual:.2f}" for residual in self.residuals]
-        lines += map(_row, self._labels, self.measured / 1e3, self.predicted / 1e3, residuals)
-        lines += [f"({MODEL}; secant where a force is given)", "", self._verdict]
+        lines += [*self._stiffness_rows(), *self._loop_rows(), "", self._verdict]
         return "\n".join([*lines, *(f"warning: {sentence}" for sentence in self.warnings)])
+
+    def _stiffness_rows(self) -> list[str]:
+        chosen = [k for k, each in enumerate(self._rows) if isinstance(each, Measurement)]
+        if not chosen:
+            return []
+        names = [self._labels[k] for k in chosen]
+        numbers = self.measured[chosen] / 1e3, self.predicted[chosen] / 1e3
+        residuals = [f"{residual:.2f}" for residual in self.residuals[chosen]]
+        return [
+            _row("measurement", "measured", "predicted", "residual"),
+            _row("", "[N/mm]", "[N/mm]", "[σ]"),
+            *map(_row, names, *numbers, residuals),
+            f"({MODEL}; secant where a force is given)",
+        ]
+
+    def _loop_rows(self) -> list[str]:
+        rows = []
+        for i, each in enumerate(self.measurements):
+            if isinstance(each, WeightLoop):
+                own = [k for k, row in enumerate(self._rows) if row is each]
+                off = 1e6 * (self.predicted - self.measured)[own]
+                spread = 1e6 * float(np.ptp(self.measured[own]))
+                worst = f"{max(self.residuals[own], key=abs):.2f}"
+                rms = float(np.sqrt(np.mean(off**2)))
+                rows.append(_row(label(i, each), len(own), spread, rms, worst))
+        if rows:
+            rows.insert(0, _row("loop", "readings", "range", "rms off", "worst"))
+            rows.insert(1, _row("", "", "[µm]", "[µm]", "[σ]"))
+        return rows
+
+    @cached_property
+    def _rows(self) -> list[Measurement | WeightLoop]:
+        """Measurement of each row (n,)."""
+        return [each for each in self.measurements for _ in measured(each)]
+
+    @property
+    def _loops(self) -> list[WeightLoop]:
+        return [each for each in self.measurements if isinstance(each, WeightLoop)]
+
+    @cached_property
+    def _determination(self) -> Determination:
+        return Determination(self.names, self.jacobian, np.ptp(self.bounds, axis=1))
 
     @property
     def _labels(self) -> list[str]:
-        return [label(i, each) for i, each in enumerate(self.measurements)]
+        """Name of each row: of a stiffness, or of a reading of a loop."""
+        names = []
+        for i, each in enumerate(self.measurements):
+            axes = len(each.axes) if isinstance(each, WeightLoop) else 0
+            own = label(i, each)
+            names += (
+                [f"{own} force {k // axes + 1}" for k in range(len(measured(each)))]
+                if axes
+                else [own]
+            )
+        return names
 
     @property
     def _verdict(self) -> str:
@@ -206,58 +245,6 @@ class Identification(ReadOnlyState):
             far = max(far, self._rise(0.99, scaled=True))
         # without noise, χ² and all it scales are rounding
         return sorted(rise for rise in exact if rise > NEGLIGIBLE), far
-
-    @cached_property
-    def _column_norms(self) -> Array:
-        """Norms of the columns of J (P,); inf for a zero column."""
-        norms = np.linalg.norm(self.jacobian, axis=0)
-        # zero column: over its range, the parameter moves no residual by a millionth of its σ
-        zero = norms * np.ptp(self.bounds, axis=1) < RANK_TOLERANCE
-        return np.where(zero, math.inf, norms)
-
-    @cached_property
-    def _svd(self) -> tuple[Array, Array]:
-        """Singular values of J and right vectors. Its columns are scaled to unit length or zero."""
-        _, values, right = np.linalg.svd(self.jacobian / self._column_norms, full_matrices=False)
-        return values, right
-
-    @cached_property
-    def _determined(self) -> Any:
-        values = self._svd[0]
-        return values > RANK_TOLERANCE * max(values[0], RANK_TOLERANCE)
-
-    @property
-    def _null(self) -> Array:
-        """Undetermined combinations of the scaled parameters, as orthonormal rows (·, P)."""
-        return np.asarray(self._svd[1][~self._determined])
-
-    @cached_property
-    def _null_projector(self) -> Array:
-        """Projector (P, P) on the undetermined combinations, with rounding set to zero."""
-        projector = self._null.T @ self._null
-        return np.where(abs(projector) > 1e-8, projector, 0.0)
-
-    @property
-    def _dependent(self) -> Any:
-        """One parameter per undetermined combination. Holding these determines the others."""
-        return qr(self._null, mode="r", pivoting=True)[1][: len(self._null)]
-
-    @property
-    def _null_combinations(self) -> list[str]:
-        """Combinations that change no prediction, as text: "a by +1 and b by -0.3"."""
-        if not len(self._null):
-            return []
-        # easiest to read: one dependent parameter per combination
-        null = np.linalg.solve(self._null[:, self._dependent], self._null)
-        scale = np.where(np.isinf(self._column_norms), 1.0, self._column_norms)
-        written = []
-        for row in null:
-            row = np.where(abs(row) > 1e-4, row, 0.0) / scale
-            # readable size: no parameter moves by more than 1 % of its range
-            row = 0.01 * row / (abs(row) / np.ptp(self.bounds, axis=1)).max()
-            terms = [(row[i], self.names[i]) for i in np.flatnonzero(row)]
-            written.append(" and ".join(f"{name} by {part:+.4g}" for part, name in terms))
-        return written
 
 
 def _row(name: str, *cells: object) -> str:

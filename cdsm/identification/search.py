@@ -1,4 +1,4 @@
-"""Identify the parameters of an arm from stiffnesses measured on it, by weighted least squares."""
+"""Identify the parameters of an arm from stiffnesses and loops measured, by least squares."""
 
 from __future__ import annotations
 
@@ -15,12 +15,13 @@ from cdsm.errors import InvalidInput, UnknownName
 from cdsm.identification.diagnosis import unfinished, warnings_of
 from cdsm.identification.intervals import LowerOptimumError, Profiler
 from cdsm.identification.least_squares import LeastSquares
-from cdsm.identification.measurement import Measurement
-from cdsm.identification.problem import StiffnessModel, UserFaultError
+from cdsm.identification.loop import WeightLoop
+from cdsm.identification.measurement import Measurement, label
+from cdsm.identification.problem import Model, UserFaultError
 from cdsm.identification.result import Identification
 from cdsm.manipulator import Manipulator
 from cdsm.support.progress import progress_allowed, track
-from cdsm.support.validation import flag, scalar, sequence_of, vector
+from cdsm.support.validation import flag, scalar, vector
 from cdsm.support.values import Array, frozen
 from cdsm.tension import Tension
 
@@ -35,12 +36,18 @@ _CANDIDATES, _STARTS = 24, 3
 _COARSE, _FINE = (1e-10,) * 3, (1e-14,) * 3
 """ftol, xtol and gtol of the searches with one-sided and with central differences."""
 
+_OF_LOOPS = (1e-6, 1e-8, 1e-8)
+"""The same of searches with loops: χ² is far more exact than it can tell."""
+
+_REWEIGHINGS = 2
+"""How often errors of forces become errors of readings with the model found so far."""
+
 _EVALUATIONS = 200  # of a search, at most, without those of the differences
 
 
 def identify(
     model_of: Callable[..., Manipulator],
-    measurements: Sequence[Measurement],
+    measurements: Sequence[Measurement | WeightLoop],
     free: Mapping[str, tuple[float, float]],
     *,
     start: Mapping[str, float] | None = None,
@@ -54,9 +61,14 @@ def identify(
     arm.at(angles), tension, force, wrench=wrench).stiffness``. The search turns back if the model
     has no stable stiffness, buckles under the force, or a tension leaves the domain of a law.
 
+    A :class:`WeightLoop` is predicted as by :func:`~cdsm.load_cycle`, friction and history
+    included, so its width tells friction. Errors of its forces and tensions count as errors of its
+    readings, with their correlations. Derivatives of loops are implicit, without a search.
+
     Most of the time goes into predictions of all measurements. The search needs about 50 P of them,
     and the profiles of :meth:`Identification.confidence` about 20 P². A measurement with a force
-    takes ten times as long as one without, and longer if the arm moves far.
+    takes ten times as long as one without, and longer if the arm moves far; a loop, a tenth of a
+    second.
 
     ::
 
@@ -72,7 +84,8 @@ def identify(
     Args:
         model_of: Function that builds the arm from the free parameters (dimensions, masses,
             springs, leads, …), given by keyword.
-        measurements: At least as many measurements as parameters.
+        measurements: Stiffnesses and loops. They have at least as many numbers as there are
+            parameters; a loop has one number less than readings, since its zero is not known.
         free: Bounds (low, high) of each parameter, in the unit in which ``model_of`` takes it. If
             they are positive and a factor of 100 or more apart, the logarithm is searched.
         start: First value of each parameter. If not given, several searches start from points
@@ -89,22 +102,29 @@ def identify(
             measurement a stable stiffness.
         UnknownName: ``model_of`` or ``tension_of`` does not take a parameter.
     """
-    measurements = sequence_of("measurements", measurements, Measurement)
+    measurements = _checked_measurements(measurements)
     bounds = _checked_bounds(free)
-    if len(measurements) < len(bounds):
+    count = sum(each.informative if isinstance(each, WeightLoop) else 1 for each in measurements)
+    if count < len(bounds):
         raise InvalidInput(
             "measurements",
-            f"{len(measurements)} given for {len(bounds)} parameters, {', '.join(bounds)}; give at "
-            "least as many, or free fewer parameters.",
+            f"{count} given for {len(bounds)} parameters, {', '.join(bounds)}; give at "
+            "least as many, or free fewer parameters. A loop counts its readings less one, which "
+            "its zero takes.",
         )
-    _check_call("model_of", model_of, 0, tuple(bounds))
+    check_call("model_of", model_of, 0, tuple(bounds))
     if tension_of is not None:
-        _check_call("tension_of", tension_of, 2, tuple(bounds))
-    model = StiffnessModel(model_of, tension_of, measurements)
-    problem = LeastSquares(model.residuals, len(measurements), bounds)
+        check_call("tension_of", tension_of, 2, tuple(bounds))
+    model = Model.of(model_of, tension_of, measurements)
+    problem = problem_of(model, bounds)
     try:
         with progress_allowed(flag("progress", progress)):
-            best = _optimum(problem, _starts(problem, start))
+            starts = _starts(problem, start)
+            for _ in range(_REWEIGHINGS if model.inexact_loads else 0):
+                model = model.weighted(problem.parameters(starts[0]))
+                problem = problem_of(model, bounds)
+                starts = [_optimum(problem, starts)]
+            best = _optimum(problem, starts)
             while True:
                 try:
                     return _result(model, problem, best)
@@ -113,6 +133,32 @@ def identify(
                     best = min(_optimum(problem, [lower.point]), lower.point, key=problem.cost)
     except UserFaultError as fault:
         raise fault.args[0] from fault.__cause__
+
+
+def problem_of(model: Model, bounds: Mapping[str, tuple[float, float]]) -> LeastSquares:
+    """Return the least-squares problem of a model; loops are followed beside a point."""
+    beside = model.residuals_beside if model.loops else None
+    return LeastSquares(model.residuals, model.count, bounds, beside)
+
+
+def _checked_measurements(
+    measurements: Sequence[Measurement | WeightLoop],
+) -> tuple[Measurement | WeightLoop, ...]:
+    kinds = Measurement | WeightLoop
+    listed = isinstance(measurements, list | tuple)
+    if not listed or not all(isinstance(each, kinds) for each in measurements):
+        raise InvalidInput(
+            "measurements",
+            f"{measurements!r} given; a list or tuple of Measurement and WeightLoop is needed.",
+        )
+    for i, each in enumerate(measurements):
+        if isinstance(each, WeightLoop) and each.displacements is None:
+            raise InvalidInput(
+                f"measurements[{i}]",
+                f"{label(i, each)} has no readings yet; give its displacements [m], as with "
+                "dataclasses.replace(loop, displacements=…).",
+            )
+    return tuple(measurements)
 
 
 def _checked_bounds(free: Mapping[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
@@ -136,7 +182,7 @@ def _checked_bounds(free: Mapping[str, tuple[float, float]]) -> dict[str, tuple[
     return bounds
 
 
-def _check_call(name: str, function: object, positional: int, names: Sequence[str]) -> None:
+def check_call(name: str, function: object, positional: int, names: Sequence[str]) -> None:
     """Raise before any search if a function cannot be called with these parameters."""
     if not callable(function):
         raise InvalidInput(name, f"{function!r} given; a function is needed.")
@@ -184,7 +230,7 @@ def _starts(problem: LeastSquares, start: Mapping[str, float] | None) -> list[Ar
     where = f"none of {len(points)} starts gives" if start is None else "does not give"
     raise InvalidInput(
         "free" if start is None else "start",
-        f"{where} every measurement a stable stiffness. At {problem.describe(points[0])}, "
+        f"{where} every measurement a stable prediction. At {problem.describe(points[0])}, "
         f"{failure} Mend that, narrow the bounds, or give another start.",
     ) from failure.__cause__
 
@@ -204,20 +250,21 @@ def _checked_start(problem: LeastSquares, start: Mapping[str, float]) -> Array:
 
 
 def _optimum(problem: LeastSquares, starts: Sequence[Array]) -> Array:
+    coarse, fine = (_OF_LOOPS, _OF_LOOPS) if problem.followed else (_COARSE, _FINE)
     found = [
-        problem.search(point, method="trf", tolerances=_COARSE, most=_EVALUATIONS)
+        problem.search(point, method="trf", tolerances=coarse, most=_EVALUATIONS)
         for point in track(starts, "searching the parameters")
     ]
     _log.info("χ² at the ends of the searches: %s", [f"{problem.cost(x):.6g}" for x in found])
     best = min(found, key=problem.cost)
-    finer = problem.search(best, method="dogbox", tolerances=_FINE, most=_EVALUATIONS, central=True)
+    finer = problem.search(best, method="dogbox", tolerances=fine, most=_EVALUATIONS, central=True)
     best = min(finer, best, key=problem.cost)
     # rounding may leave an optimum beside its bound
     on_bound = np.where(best < _ON_BOUND, 0.0, np.where(best > 1.0 - _ON_BOUND, 1.0, best))
     return on_bound if math.isfinite(problem.cost(on_bound)) else best
 
 
-def _result(model: StiffnessModel, problem: LeastSquares, best: Array) -> Identification:
+def _result(model: Model, problem: LeastSquares, best: Array) -> Identification:
     values = problem.parameters(best)
     arm, predicted = model.predict(values)
     jacobian = problem.jacobian(best, central=True)
@@ -226,13 +273,14 @@ def _result(model: StiffnessModel, problem: LeastSquares, best: Array) -> Identi
         values=frozen(np.array(list(values.values()))),
         bounds=frozen(problem.box.bounds),
         measurements=model.measurements,
-        predicted=frozen(predicted),
+        predicted=frozen(model.as_read(predicted)),
+        residuals=frozen(model.weigh(predicted)),
         jacobian=frozen(jacobian / problem.box.derivative(best)),
         arm=arm,
         warnings=(),
         profiles=(),
     )
-    follow = [j for j in range(best.size) if j not in result._dependent]
+    follow = [j for j in range(best.size) if j not in result._determination.dependent]
     profiles = tuple(
         Profiler(
             problem, best, jacobian, i, [j for j in follow if j != i], *result._goals

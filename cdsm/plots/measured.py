@@ -7,6 +7,7 @@ from itertools import cycle
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib import colormaps
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
@@ -24,6 +25,7 @@ from cdsm.plots.style import (
 )
 
 if TYPE_CHECKING:
+    from cdsm.identification.loop import WeightLoop
     from cdsm.identification.result import Identification
     from cdsm.wires.tensile.fit import TensileFit
 
@@ -78,25 +80,57 @@ def shade_stages(axes: Any, stages: Sequence[tuple[str, float, float]], along: s
 
 
 def plot_identification(fit: Identification, labels: Sequence[str], title: str) -> Figure:
-    """Plot predicted over measured stiffness, and each residual in standard deviations."""
-    figure, ((left, right),) = panels(TWO_COLUMNS, 3.2, 2)
-    measured, predicted = N_PER_MM * fit.measured, N_PER_MM * fit.predicted
-    sigma = [N_PER_MM * measurement.std for measurement in fit.measurements]
-    ends = [min(measured.min(), predicted.min()), max(measured.max(), predicted.max())]
-    left.plot(ends, ends, color="0.6", linewidth=0.9)
-    left.errorbar(measured, predicted, xerr=sigma, fmt="o", color=BLUE, markersize=4, capsize=2)
-    left.set(xlabel="measured [N/mm], ± σ", ylabel="predicted [N/mm]")
-    place = np.arange(len(sigma))
+    """Plot stiffnesses and loops, predicted and measured, and each residual in σ."""
+    rows = fit._rows
+    loops: list[Any] = [each for each in fit.measurements if hasattr(each, "forces")]
+    stiff = [k for k, each in enumerate(rows) if not hasattr(each, "forces")]
+    figure, (axes,) = panels(TWO_COLUMNS, 3.2, 1 + bool(stiff) + bool(loops))
+    *left, right = axes
+    if stiff:
+        _plot_stiffnesses(left[0], fit, stiff)
+    for shade, loop in zip(np.linspace(0.0, 0.8, len(loops)), loops, strict=True):
+        own = [k for k, each in enumerate(rows) if each is loop]
+        _plot_loop(left[-1], fit, loop, own, colormaps["viridis"](shade))
+    if loops:
+        left[-1].set(xlabel="force [N]", ylabel="displacement along force [mm]")
+        line, dot = ({"color": "0.2", **style} for style in ({}, {"marker": ".", "ls": ""}))
+        left[-1].plot([], [], label="predicted", **line)
+        left[-1].plot([], [], label="measured", **dot)
+        legend(left[-1])
+    place = np.arange(len(rows))
     for width, shade in ((2.0, 0.12), (1.0, 0.2)):
         right.axhspan(-width, width, color="0.5", alpha=shade, linewidth=0.0)
     right.vlines(place, 0.0, fit.residuals, color=BLUE, linewidth=1.2)
-    right.plot(place, fit.residuals, "o", color=BLUE, markersize=4)
+    right.plot(place, fit.residuals, "o", color=BLUE, markersize=4 if len(rows) < 100 else 2)
     right.axhline(0.0, color="0.2", linewidth=0.8)
     right.set_ylabel("(predicted − measured)/σ, bands at 1 and 2 σ")
-    if len(sigma) <= _MOST_LABELS and any(measurement.label for measurement in fit.measurements):
+    if len(rows) <= _MOST_LABELS and any(measurement.label for measurement in fit.measurements):
         right.set_xticks(place, labels, rotation=90, fontsize=SMALL)
     else:
-        right.set_xlabel("measurement")
+        right.set_xlabel("reading" if loops else "measurement")
         right.xaxis.set_major_locator(MaxNLocator(integer=True))
     heading(figure, title)
     return figure
+
+
+def _plot_stiffnesses(axes: Any, fit: Identification, rows: Sequence[int]) -> None:
+    """Plot predicted over measured stiffness."""
+    measured, predicted = N_PER_MM * fit.measured[rows], N_PER_MM * fit.predicted[rows]
+    sigma = [N_PER_MM * fit._rows[k].std for k in rows]  # type: ignore[union-attr]
+    ends = [min(measured.min(), predicted.min()), max(measured.max(), predicted.max())]
+    axes.plot(ends, ends, color="0.6", linewidth=0.9)
+    axes.errorbar(measured, predicted, xerr=sigma, fmt="o", color=BLUE, markersize=4, capsize=2)
+    axes.set(xlabel="measured [N/mm], ± σ", ylabel="predicted [N/mm]")
+
+
+def _plot_loop(
+    axes: Any, fit: Identification, loop: WeightLoop, rows: Sequence[int], colour: Any
+) -> None:
+    """Plot the displacement along the force of a loop, from its first reading."""
+    u = np.array(loop.direction) / np.linalg.norm(loop.direction)
+    along = loop.axes @ u
+    read, model = (
+        MM * x[rows].reshape(-1, along.size) @ along for x in (fit.measured, fit.predicted)
+    )
+    axes.plot(loop.forces, model - read[0], color=colour, linewidth=1.0)
+    axes.plot(loop.forces, read - read[0], ".", color=colour, markersize=5)

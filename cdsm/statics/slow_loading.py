@@ -106,7 +106,7 @@ class SlowLoading(NamedTuple):
         T = tension[pose.segments.chains.cable]
         natural = self.problem.natural(pose.segments.lengths, T)
         motors = np.where(self.forced, tension, 0.0)
-        settled = self._arm(natural, wrench, motors).at(pose, T)
+        settled = self.arm(natural, wrench, motors).at(pose, T)
         none = np.zeros(pose.q.size)
         return State(Load(wrench, settled.residual, motors), settled, none, none)
 
@@ -117,10 +117,10 @@ class SlowLoading(NamedTuple):
         reached, part, turnover = 0.0, 1.0, 0.0
         while reached < 1.0:
             goal = min(1.0, reached + part)
-            middle, search = self._rest(state, first.towards(load, (reached + goal) / 2.0))
+            middle, search = self.rest(state, first.towards(load, (reached + goal) / 2.0))
             end = None
             if middle is not None:
-                end, search = self._rest(middle, first.towards(load, goal))
+                end, search = self.rest(middle, first.towards(load, goal))
             if middle is not None and end is not None:
                 passage, noise = self._energies(state, middle, end)
                 work = abs(passage.load_work) + abs(passage.motor_work)
@@ -136,16 +136,17 @@ class SlowLoading(NamedTuple):
             part = (goal - reached) / 2.0
         return state, total
 
-    def _arm(self, natural: Array, wrench: Array, motors: Array) -> FrictionalArm:
+    def arm(self, natural: Array, wrench: Array, motors: Array) -> FrictionalArm:
+        """Return the loaded arm with the natural lengths (S,) [m] that its segments had before."""
         forced = np.where(self.forced, motors, np.nan)
         return FrictionalArm(self.problem, self.limits, natural, wrench, forced)
 
-    def _rest(self, before: State, load: Load) -> tuple[State | None, RestSearch[Settled]]:
+    def rest(self, before: State, load: Load) -> tuple[State | None, RestSearch[Settled]]:
         """Find the rest of an arm under a new load; None if there is none near."""
         old, natural = before.settled, before.settled.chain.natural.copy()
         taken = np.where(self.forced, 0.0, load.motors - before.load.motors)
         natural[self.start[:-1]] -= taken
-        arm = self._arm(natural, load.wrench, load.motors)
+        arm = self.arm(natural, load.wrench, load.motors)
         start = arm.at(old.pose, old.chain.tension).holding_back(load.held)
         if before.motion @ start.torque < 0.0:  # it moves on the same way: what slid slides on
             start = _ahead(arm, old, start, load.held)

@@ -81,7 +81,8 @@ def noisy(measurements: Sequence[Measurement], seed: int) -> list[Measurement]:
 
 
 EXACT = measured(prototype(**TRUE))
-NOISY = identify(prototype, noisy(EXACT, 1), FREE)
+READ = noisy(EXACT, 1)
+NOISY = identify(prototype, READ, FREE)
 
 # --- what is found --------------------------------------------------------------------------
 
@@ -124,7 +125,7 @@ def test_jacobian_is_the_derivative_of_the_residuals() -> None:
         return np.array(
             [
                 cdsm.stiffness(arm.at(m.angles), m.tension or ()).along(m.direction) / m.std
-                for m in NOISY.measurements
+                for m in READ
             ]
         )
 
@@ -147,7 +148,7 @@ def test_covariance_is_the_inverse_of_the_normal_matrix_and_grows_with_the_std()
     scale = np.outer(NOISY.std, NOISY.std)
     np.testing.assert_allclose(NOISY.covariance / scale, np.linalg.inv(J.T @ J) / scale, rtol=1e-6)
     np.testing.assert_allclose(NOISY.correlation, NOISY.covariance / scale, rtol=1e-12)
-    doubled = [replace(each, std=2.0 * each.std) for each in NOISY.measurements]
+    doubled = [replace(each, std=2.0 * each.std) for each in READ]
     again = identify(prototype, doubled, FREE, start=NOISY.parameters)
     np.testing.assert_allclose(again.values, NOISY.values, rtol=1e-6)
     np.testing.assert_allclose(again.std, 2.0 * NOISY.std, rtol=1e-4)

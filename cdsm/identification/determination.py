@@ -1,0 +1,110 @@
+"""What measurements determine: rank, covariance and correlation, and combinations left open."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from scipy.linalg import qr
+
+from cdsm.identification.intervals import RANK_TOLERANCE
+from cdsm.support.values import Array, frozen
+
+
+@dataclass(frozen=True, eq=False)
+class Determination:
+    """Linear analysis of measurements.
+
+    Attributes:
+        names: Names of the parameters (P,).
+        jacobian: J = ∂r/∂p (n, P), r in standard deviations.
+        ranges: Range of each parameter (P,) that is of interest.
+    """
+
+    names: tuple[str, ...]
+    jacobian: Array
+    ranges: Array
+
+    @property
+    def rank(self) -> int:
+        """Number of combinations of parameters that are determined."""
+        return int(self.determined.sum())
+
+    @cached_property
+    def covariance(self) -> Array:
+        """Covariance (JᵀJ)⁻¹ (P, P); an undetermined parameter has infinite variance."""
+        values, right = self._svd
+        inner = right[self.determined].T / values[self.determined]
+        covariance = inner @ inner.T / np.outer(self._column_norms, self._column_norms)
+        null = self._null_projector
+        return frozen(np.where(null != 0.0, np.copysign(math.inf, null), covariance))
+
+    @cached_property
+    def correlation(self) -> Array:
+        """Correlations (P, P) [-]; ±1 where only a combination is determined."""
+        firm = self.firm
+        matrix = np.where(np.outer(firm, firm), self.covariance, 0.0)
+        matrix = np.where(np.outer(~firm, ~firm), self._null_projector, matrix)
+        root = np.sqrt(np.diag(matrix))
+        return frozen(np.clip(matrix / np.outer(root, root), -1.0, 1.0))
+
+    @property
+    def firm(self) -> Any:
+        """Whether each parameter is determined (P,)."""
+        return np.diag(self._null_projector) == 0.0
+
+    @property
+    def dependent(self) -> Any:
+        """One parameter per undetermined combination. Holding these determines the others."""
+        return qr(self._null, mode="r", pivoting=True)[1][: len(self._null)]
+
+    @property
+    def open_combinations(self) -> list[str]:
+        """Combinations that change no prediction, as text: "a by +1 and b by -0.3"."""
+        if not len(self._null):
+            return []
+        # easiest to read: one dependent parameter per combination
+        null = np.linalg.solve(self._null[:, self.dependent], self._null)
+        scale = np.where(np.isinf(self._column_norms), 1.0, self._column_norms)
+        written = []
+        for row in null:
+            row = np.where(abs(row) > 1e-4, row, 0.0) / scale
+            # readable size: no parameter moves by more than 1 % of its range
+            row = 0.01 * row / (abs(row) / self.ranges).max()
+            terms = [(row[i], self.names[i]) for i in np.flatnonzero(row)]
+            written.append(" and ".join(f"{name} by {part:+.4g}" for part, name in terms))
+        return written
+
+    @cached_property
+    def _column_norms(self) -> Array:
+        """Norms of the columns of J (P,); inf for a zero column."""
+        norms = np.linalg.norm(self.jacobian, axis=0)
+        # zero column: over its range, the parameter moves no residual by a millionth of its σ
+        zero = norms * self.ranges < RANK_TOLERANCE
+        return np.where(zero, math.inf, norms)
+
+    @cached_property
+    def _svd(self) -> tuple[Array, Array]:
+        """Singular values of J and right vectors. Its columns are scaled to unit length or zero."""
+        _, values, right = np.linalg.svd(self.jacobian / self._column_norms, full_matrices=False)
+        return values, right
+
+    @cached_property
+    def determined(self) -> Any:
+        """Whether each singular value counts."""
+        values = self._svd[0]
+        return values > RANK_TOLERANCE * max(values[0], RANK_TOLERANCE)
+
+    @property
+    def _null(self) -> Array:
+        """Undetermined combinations of the scaled parameters, as orthonormal rows (·, P)."""
+        return np.asarray(self._svd[1][~self.determined])
+
+    @cached_property
+    def _null_projector(self) -> Array:
+        """Projector (P, P) on the undetermined combinations, with rounding set to zero."""
+        projector = self._null.T @ self._null
+        return np.where(abs(projector) > 1e-8, projector, 0.0)

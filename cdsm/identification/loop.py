@@ -1,0 +1,171 @@
+"""Loops of a weight test: loads hung and taken off again, and what the tip did."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import final
+
+import numpy as np
+
+from cdsm.errors import InvalidInput
+from cdsm.identification.measurement import Measurement, checked_conditions
+from cdsm.manipulator import Manipulator
+from cdsm.statics.loading_path import LoadingPath
+from cdsm.support.validation import (
+    SMALLEST,
+    Axis,
+    instance,
+    number_array,
+    scalar,
+    unit_direction,
+)
+from cdsm.support.values import Array
+from cdsm.tension import distribute_tension
+
+
+@final
+@dataclass(frozen=True, kw_only=True)
+class WeightLoop:
+    """Loop of a weight test: forces hung and taken off again, and readings of the tip.
+
+    The arm is shaken at the posture, so that one tension is left in all of a cable, and its motors
+    are locked. Then the forces act one after the other, as in :func:`~cdsm.load_cycle`. A reading
+    is the position of the tip along the direction, or in x, y and z. Its zero does not matter.
+
+    Attributes:
+        direction: Direction of the forces: an axis such as ``"-z"``, kept as its vector, or (3,) in
+            base axes, any length.
+        angles: Joint angles (nv,) [rad] before the first force.
+        forces: Forces along the direction (n,) [N], in their order; 0 where nothing hangs.
+        displacements: Readings (n,) along the direction or (n, 3) in base axes [m]. None: the test
+            is planned, and has not been made.
+        displacement_std: Standard deviation of a reading [m].
+        force_std: Standard deviation of a force [N].
+        tension: Cable tensions (C,) [N] before the first force. Give ``tension`` or ``minimum``.
+        minimum: Lower bound of the tensions [N], one number or (C,).
+            :func:`~cdsm.distribute_tension` then balances the model at these angles.
+        tension_std: Standard deviation of each tension [N], the same error over the whole loop.
+        wrench: W (6,) at ``tool0`` without the forces, base axes: force [N], moment [N m].
+        label: Name in reports and figures.
+
+    Raises:
+        InvalidInput: A field is invalid, or all forces are the same. The error names the field and
+            the fault.
+    """
+
+    direction: tuple[float, float, float] | Axis
+    angles: tuple[float, ...]
+    forces: tuple[float, ...]
+    displacements: tuple[float, ...] | tuple[tuple[float, float, float], ...] | None = None
+    displacement_std: float
+    force_std: float = 0.0
+    tension: tuple[float, ...] | None = None
+    minimum: float | tuple[float, ...] | None = None
+    tension_std: float = 0.0
+    wrench: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    label: str = ""
+
+    def __post_init__(self) -> None:
+        forces = number_array("forces", self.forces, "force")
+        if forces.ndim != 1 or forces.size < 2 or np.ptp(forces) == 0.0:
+            raise InvalidInput(
+                "forces",
+                f"{self.forces!r} given; a loop needs forces of at least two sizes, one after the "
+                "other, as 0, 2, 4, 2, 0 N: only differences of readings tell something.",
+            )
+        checked: dict[str, object] = checked_conditions(self) | {"forces": tuple(forces.tolist())}
+        if self.displacements is not None:
+            read = number_array("displacements", self.displacements, "length")
+            if read.shape not in ((forces.size,), (forces.size, 3)):
+                raise InvalidInput(
+                    "displacements",
+                    f"shape {read.shape} given; one reading [m] per force is needed, "
+                    f"({forces.size},) along the direction or ({forces.size}, 3) in base axes.",
+                )
+            rows = read.tolist()
+            checked["displacements"] = tuple(rows if read.ndim == 1 else map(tuple, rows))
+        for name in ("displacement_std", "force_std", "tension_std"):
+            least = SMALLEST if name == "displacement_std" else 0.0
+            std = checked[name] = scalar(name, getattr(self, name))
+            if std < least:
+                needed = "positive" if least else "positive, or 0"
+                raise InvalidInput(name, f"{std:g} given; a standard deviation is {needed}.")
+        for name, entry in checked.items():
+            object.__setattr__(self, name, entry)
+
+    @property
+    def axes(self) -> Array:
+        """Directions that are read (k, 3): the direction, or x, y and z."""
+        alone = self.displacements is None or np.ndim(self.displacements) == 1
+        return unit_direction("direction", self.direction)[None] if alone else np.eye(3)
+
+    @property
+    def informative(self) -> int:
+        """Number of readings, less one for the zero of each axis."""
+        return (len(self.forces) - 1) * len(self.axes)
+
+    @property
+    def applied(self) -> Array:
+        """Forces (n, 3) [N] in base axes."""
+        return np.outer(self.forces, unit_direction("direction", self.direction))
+
+    def simulated(self, arm: Manipulator, random: np.random.Generator | None = None) -> WeightLoop:
+        """Return the same loop with the readings (n,) that an arm gives, along the direction.
+
+        Args:
+            arm: The arm, with friction in its holes.
+            random: Source of the errors of readings, forces and tensions. None: without errors.
+
+        Raises:
+            CdsmError: The arm cannot hold the tensions or the forces; see :func:`~cdsm.load_cycle`.
+        """
+        instance("arm", arm, Manipulator)
+        pose, wrench = arm.at(self.angles), np.array(self.wrench)
+        if self.tension is None:
+            assert self.minimum is not None
+            tension = distribute_tension(pose, self.minimum, wrench=wrench).values.copy()
+        else:
+            tension = np.array(self.tension)
+        forces, read = np.array(self.forces), np.zeros(len(self.forces))
+        if random is not None:
+            tension += self.tension_std * random.normal(size=tension.size)
+            forces += self.force_std * random.normal(size=forces.size)
+            read += self.displacement_std * random.normal(size=forces.size)
+        u = unit_direction("direction", self.direction)
+        tips = LoadingPath.of(pose, tension, wrench, np.outer(forces, u)).tips
+        read += (tips - pose.tip[:3, 3]) @ u
+        return replace(self, displacements=tuple(read.tolist()))
+
+
+def measured(measurement: Measurement | WeightLoop) -> Array:
+    """Return what was measured: the stiffness (1,) [N/m], or the readings (m,) [m]."""
+    if isinstance(measurement, WeightLoop):
+        return np.array(measurement.displacements).ravel()
+    return np.array([measurement.value])
+
+
+class Weights:
+    """Weights of the readings of a loop, of which each axis has an unknown zero.
+
+    With the covariance V of the readings and Z, which adds a zero to each axis, χ² is the least of
+    (e + Z z)ᵀ V⁻¹ (e + Z z) over z. It is |R e|² with the symmetric root R of the matrix of that
+    quadratic form, so an entry of R e is the residual of its reading in standard deviations.
+
+    Attributes:
+        root: R (m, m) [1/m] for the m readings, axis by axis within each force.
+        zero: Matrix (k, m) that gives the zeros −z of errors e.
+    """
+
+    def __init__(self, covariance: Array, axes: int) -> None:
+        inverse = np.linalg.inv(covariance)
+        zeros = np.tile(np.eye(axes), (len(covariance) // axes, 1))
+        normal = zeros.T @ inverse
+        self.zero = np.linalg.solve(normal @ zeros, normal)
+        values, vectors = np.linalg.eigh(inverse - normal.T @ self.zero)
+        values[:axes] = 0.0  # the zeros themselves, but for rounding
+        self.root = (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
+
+
+def up_and_down(weight: float, steps: int) -> tuple[float, ...]:
+    """Return the forces [N] of a loop: from none to the weight in equal steps, and back."""
+    return tuple(weight * k / steps for k in (*range(steps + 1), *range(steps - 1, -1, -1)))

@@ -1,0 +1,155 @@
+"""First-order changes of what slow loading does to an arm with friction: by loads, and by the arm.
+
+Each posture at rest solves r(q, a) = 0 with the natural lengths a that the rest before it left. So
+a small change is followed from rest to rest: it changes r by δr, the posture by δq = −K⁻¹ δr, and
+the natural lengths that are left by δa = δA(q, T). Holes that slide go on sliding, others go on
+holding. This is the derivative wherever no hole is just about to start or to stop.
+
+A change of the loads is followed with the tangents of the rests. Any change of the arm is followed
+by an arm beside it: its natural lengths and imbalances at the recorded postures are differences,
+not searches. A change of size δ is exact but for terms in δ².
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from cdsm.posture import Posture
+from cdsm.statics.load_cycle import slow_loading
+from cdsm.statics.rest_search import no_rest
+from cdsm.statics.slow_loading import Load, SlowLoading, State
+from cdsm.support.values import Array
+
+_PARTS = 16
+"""Rests over the swing of the loads. Where holes stop, tips err by up to 0.2 % of their motion."""
+
+_SHORTEST = 2.0**-6
+"""Smallest part of a step to a rest that is tried if the arm finds none at its end."""
+
+
+class _Rest(NamedTuple):
+    state: State
+    load: int  # the load that it is on the way to
+    part: float  # of the way
+
+
+class LoadingPath(NamedTuple):
+    """Rests of an arm with friction on the way through a series of loads.
+
+    Their number does not depend on the arm, as the sub-steps of :func:`~cdsm.load_cycle` do: a
+    small change of the arm changes the tips smoothly.
+    """
+
+    loading: SlowLoading
+    tension: Array  # F (C,) [N] before the first load
+    start: State
+    rests: tuple[_Rest, ...]
+    last: tuple[int, ...]  # rest at each load (n,)
+
+    @classmethod
+    def of(
+        cls, pose: Posture, tension: Array, wrench: Array, forces: Array, parts: int = _PARTS
+    ) -> LoadingPath:
+        """Load an arm, at rest at a posture under ``wrench`` (6,), with more forces (n, 3) [N].
+
+        ``parts`` is the number of rests over the swing of the forces.
+
+        Raises:
+            CdsmError: The posture is beyond a joint limit, or the arm finds no rest on the way.
+        """
+        loading = slow_loading(pose, tension, wrench, 1.0)
+        start = state = loading.begin(tension, wrench)
+        rests, last = list[_Rest](), list[int]()
+        changes = np.linalg.norm(np.diff(forces, axis=0, prepend=0.0), axis=1)
+        swing = np.linalg.norm(np.ptp(np.vstack([forces, np.zeros(3)]), axis=0))
+        for k, (force, change) in enumerate(zip(forces, changes, strict=True)):
+            whole = wrench + np.append(force, np.zeros(3))
+            target = Load(whole, np.zeros(pose.q.size), start.load.motors)
+            before, reached = state.load, 0.0
+            part = longest = 1.0 / max(1.0, np.ceil(parts * change / swing - 0.01))
+            while reached < 1.0:
+                goal = reached + part if reached + 1.5 * part < 1.0 else 1.0
+                found, search = loading.rest(state, before.towards(target, goal))
+                if found is not None:
+                    state, reached = found, goal
+                    rests.append(_Rest(state, k, reached))
+                elif part > _SHORTEST * longest:
+                    part /= 2.0
+                else:
+                    left = np.where(search.at_stop, 0.0, search.state.torque)
+                    raise no_rest(
+                        pose, search.state.pose, left, reached, f"the way to load {k + 1}"
+                    )
+            last.append(len(rests) - 1)
+        return cls(loading, tension, start, tuple(rests), tuple(last))
+
+    @property
+    def tips(self) -> Array:
+        """Tip at each load (n, 3) [m]."""
+        return np.array([self.rests[i].state.pose.tip[:3, 3] for i in self.last])
+
+    def beside(self, pose: Posture, tension: Array, wrench: Array) -> Array:
+        """Compute the tips (n, 3) [m] of an arm that hardly differs, under the same loads.
+
+        ``pose`` is its reference posture; its cables have as many segments.
+        """
+        loading = slow_loading(pose, tension, wrench, 1.0)
+        start = loading.begin(tension, wrench)
+        natural, motors = start.settled.chain.natural, start.load.motors
+        held, tips = self.start.load.held, list[Array]()
+        for rest in self.rests:
+            state, near = rest.state, rest.state.settled
+            share = (held @ state.load.held) / (held @ held) if held.any() else 0.0
+            arm = loading.arm(natural, state.load.wrench, motors)
+            beside = arm.at(pose.arm.at(near.q, check_limits=False), near.chain.tension)
+            moved = _motion(state, (beside.residual - share * start.load.held)[:, None])[:, 0]
+            natural = beside.chain.natural + _given_way(state) @ moved
+            tips.append(beside.pose.tip[:3, 3] + beside.pose.jacobian[:3] @ moved)
+        return np.array([tips[i] for i in self.last])
+
+    def by_forces(self, direction: Array) -> Array:
+        """Compute ∂tip/∂f (n, 3, n) [m/N]: of each tip by each force along a unit vector (3,)."""
+        count, problem, first = len(self.last), self.loading.problem, self.loading.start[:-1]
+        each, none = np.eye(count), np.zeros(count)
+        natural = np.zeros((len(self.start.settled.chain.natural), count))
+        tips = list[Array]()
+        for state, k, part in self.rests:
+            chain, pose = state.settled.chain, state.pose
+            added = part * each[k] + (1.0 - part) * (each[k - 1] if k else none)
+            forced = np.where(self.loading.forced, state.load.motors, np.nan)
+            grip = np.zeros_like(natural)
+            pulled = problem.tangent(chain, forced, -chain.stretch[:, None] * natural, grip)
+            J = pose.jacobian[:3]
+            imbalance = pose.segments.length_jacobian.T @ pulled - np.outer(direction @ J, added)
+            moved = _motion(state, imbalance)
+            # a slack cable keeps its wire, spread evenly
+            wire = np.add.reduceat(chain.natural, first)
+            share = np.add.reduceat(natural, first) / wire[:, None]
+            spread = chain.natural[:, None] * share[pose.segments.chains.cable]
+            left = _given_way(state) @ moved - chain.compliance[:, None] * pulled
+            natural = np.where((chain.tension == 0.0)[:, None], spread, left)
+            tips.append(J @ moved)
+        return np.array([tips[i] for i in self.last])
+
+
+def _motion(state: State, imbalance: Array) -> Array:
+    """Compute δq (nv, m) that balances an imbalance (nv, m) while joints on stops stay there."""
+    free = np.flatnonzero(state.reaction == 0.0)
+    moved = np.zeros_like(imbalance)
+    moved[free] = -np.linalg.solve(state.settled.stiffness[np.ix_(free, free)], imbalance[free])
+    return moved
+
+
+def _given_way(state: State) -> Array:
+    """Compute ∂A/∂q (S, nv) [m/rad]: of the natural lengths that a rest leaves, by its posture."""
+    chain, settled = state.settled.chain, state.settled
+    by_length = settled.pose.segments.length_jacobian / chain.stretch[:, None]
+    left = by_length - chain.compliance[:, None] * settled.slope
+    return np.where((chain.tension == 0.0)[:, None], 0.0, left)
+
+
+def same_segments(one: Posture, other: Posture) -> bool:
+    """Return whether the cables of two arms have as many segments, each."""
+    return np.array_equal(one.segments.chains.start, other.segments.chains.start)
