@@ -54,7 +54,14 @@ if TYPE_CHECKING:
     from cdsm.friction.breakaway import Breakaway, breakaway
     from cdsm.friction.stuck import sliding_stiffness, stuck_stiffness
     from cdsm.geometry import CableRoute, Geometry, Joint, Link
-    from cdsm.identification import Identification, Measurement, WeightLoop, identify
+    from cdsm.identification import (
+        ExperimentPlan,
+        Identification,
+        Measurement,
+        WeightLoop,
+        identify,
+        plan_experiment,
+    )
     from cdsm.instability import Remedy
     from cdsm.interchange.caspr import read_caspr
     from cdsm.interchange.mjcf import to_mjcf, write_mjcf
@@ -122,6 +129,7 @@ __all__ = [
     "ElasticityRangeError",
     "Equilibrium",
     "EquilibriumError",
+    "ExperimentPlan",
     "FileError",
     "ForcePolytope",
     "Geometry",
@@ -210,6 +218,7 @@ __all__ = [
     "modes",
     "monte_carlo",
     "payload",
+    "plan_experiment",
     "plan_path",
     "plan_stiffness",
     "presets",
@@ -265,7 +274,9 @@ _NAMES = {
     "friction.stuck": "sliding_stiffness stuck_stiffness",
     "geometry": "CableRoute Geometry Joint Link",
     "instability": "Remedy",
-    "identification": "Identification Measurement WeightLoop identify",
+    "identification": "ExperimentPlan Identification Measurement WeightLoop",
+    "identification.experiment": "plan_experiment",
+    "identification.search": "identify",
     "interchange.caspr": "read_caspr",
     "interchange.mjcf": "to_mjcf write_mjcf",
     "kinematics.maps": "inverse_kinematics solve_joint_angles",

@@ -1,9 +1,19 @@
 """Identification of the parameters of an arm from stiffnesses and loops measured on the arm."""
 
+from cdsm.identification.experiment import plan_experiment
+from cdsm.identification.experiment_plan import ExperimentPlan
 from cdsm.identification.intervals import Profile
 from cdsm.identification.loop import WeightLoop
 from cdsm.identification.measurement import Measurement
 from cdsm.identification.result import Identification
 from cdsm.identification.search import identify
 
-__all__ = ["Identification", "Measurement", "Profile", "WeightLoop", "identify"]
+__all__ = [
+    "ExperimentPlan",
+    "Identification",
+    "Measurement",
+    "Profile",
+    "WeightLoop",
+    "identify",
+    "plan_experiment",
+]

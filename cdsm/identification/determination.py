@@ -62,6 +62,12 @@ class Determination:
         return qr(self._null, mode="r", pivoting=True)[1][: len(self._null)]
 
     @property
+    def coordinates(self) -> Array:
+        """Matrix (P, rank) from coordinates of all that is determined to parameters."""
+        scaled = self._svd[1][self.determined].T
+        return np.asarray(scaled / self._column_norms[:, None])
+
+    @property
     def open_combinations(self) -> list[str]:
         """Combinations that change no prediction, as text: "a by +1 and b by -0.3"."""
         if not len(self._null):

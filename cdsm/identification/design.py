@@ -1,0 +1,117 @@
+"""Optimal design of experiments: which tests determine parameters best, and how far from best.
+
+Test i has the information M_i = J_iᵀ J_i, with its derivatives J_i by the parameters in standard
+deviations. Tests made n_i times determine the parameters with the covariance C = (M_0 + Σ n_i
+M_i)⁻¹, M_0 of what is known before. For the wanted rows L of parameters, a design is judged by
+f = det(L C Lᵀ)^(−1/s) (D, s wanted) or f = 1/tr(L C Lᵀ) (A). Both are concave and homogeneous in
+the information, so no design of N tests has a larger f than
+
+    f · (tr M_0 G + N max_i tr M_i G) / tr M G,   G = C Lᵀ (L C Lᵀ)⁻¹ L C (D) or C Lᵀ L C (A):
+
+the equivalence theorem (Kiefer and Wolfowitz 1960; Pukelsheim, Optimal Design of Experiments, 1993,
+chapter 7). Shares of tests are found by the multiplicative algorithm (Silvey, Titterington and
+Torsney 1978), whole tests by exchange (Fedorov 1972).
+"""
+
+from __future__ import annotations
+
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from cdsm.support.values import Array
+
+Criterion = Literal["D", "A"]
+
+_ITERATIONS, _OPTIMAL = 2000, 0.999
+"""Steps that find shares at most, and the proved efficiency that ends them."""
+
+_GAIN = 1e-9
+"""Smallest gain of ln f that is worth an exchange."""
+
+
+class Design(NamedTuple):
+    """Candidates for tests, and what is wanted of them.
+
+    Attributes:
+        information: M_i (n, r, r) of each candidate.
+        known: M_0 (r, r) of what is known before.
+        wanted: L (s, r).
+        criterion: ``"D"`` or ``"A"``.
+        tests: Number N of tests.
+    """
+
+    information: Array
+    known: Array
+    wanted: Array
+    criterion: Criterion
+    tests: int
+
+    def value(self, M: Array) -> Array:
+        """Compute ln f (…) of information matrices (…, r, r); −inf where one is singular."""
+        regular = np.linalg.cond(M) < 1e14
+        C = np.linalg.inv(np.where(regular[..., None, None], M, np.eye(M.shape[-1])))
+        covariance = self.wanted @ C @ self.wanted.T
+        if self.criterion == "A":
+            found = -np.log(np.trace(covariance, axis1=-2, axis2=-1))
+        else:
+            found = -np.linalg.slogdet(covariance)[1] / len(self.wanted)
+        return np.where(regular, found, -np.inf)
+
+    def total(self, counts: Array) -> Array:
+        """Compute M_0 + Σ n_i M_i (r, r)."""
+        return np.asarray(self.known + np.tensordot(counts, self.information, 1))
+
+    def sensitivities(self, M: Array) -> tuple[Array, float]:
+        """Compute tr M_i G (n,) and the proved efficiency f/f_best of a design, in 0…1."""
+        C = np.linalg.inv(M)
+        right = C @ self.wanted.T
+        if self.criterion == "D":
+            G = right @ np.linalg.solve(self.wanted @ right, right.T)
+        else:
+            G = right @ right.T
+        each = np.einsum("nij,ji->n", self.information, G)
+        most = float(np.sum(self.known * G)) + self.tests * float(each.max())
+        return each, float(np.sum(M * G)) / most
+
+    def shares(self) -> Array:
+        """Compute the best numbers of tests (n,), not whole, that add up to N."""
+        counts = np.full(len(self.information), self.tests / len(self.information))
+        power = 1.0 if self.criterion == "D" else 0.5
+        for _ in range(_ITERATIONS):
+            each, efficiency = self.sensitivities(self.total(counts))
+            if efficiency > _OPTIMAL:
+                break
+            counts = counts * each**power
+            counts *= self.tests / counts.sum()
+        return np.asarray(counts)
+
+    def whole(self, shares: Array) -> Array:
+        """Round shares (n,) to whole tests and exchange tests while ln f rises."""
+        counts = np.floor(shares)
+        left = self.tests - int(counts.sum())
+        counts[np.argsort(counts - shares)[:left]] += 1.0
+        here = self.value(self.total(counts))
+        while True:
+            best, exchange = here + _GAIN, None
+            for i in np.flatnonzero(counts):
+                without = self.total(counts) - self.information[i]
+                values = self.value(without + self.information)
+                j = int(values.argmax())
+                if values[j] > best:
+                    best, exchange = values[j], (i, j)
+            if exchange is None:
+                return counts
+            counts[exchange[0]] -= 1.0
+            counts[exchange[1]] += 1.0
+            here = best
+
+    def best(self) -> tuple[Array, float]:
+        """Find whole tests (n,), and prove their efficiency f/f_best, in 0…1."""
+        shares = self.shares()
+        counts = self.whole(shares)
+        M, ideal = self.total(counts), self.total(shares)
+        if not np.isfinite(self.value(M)):
+            return counts, 0.0
+        by_shares = np.exp(self.value(M) - self.value(ideal)) * self.sensitivities(ideal)[1]
+        return counts, min(1.0, max(self.sensitivities(M)[1], float(by_shares)))

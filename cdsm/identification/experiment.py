@@ -1,0 +1,244 @@
+"""Plan weight tests that determine parameters of an arm, before anything is built or measured."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cdsm.errors import CdsmError, InvalidInput, UnknownName
+from cdsm.identification.design import Criterion, Design
+from cdsm.identification.determination import Determination
+from cdsm.identification.experiment_plan import ExperimentPlan
+from cdsm.identification.least_squares import NoModelError
+from cdsm.identification.loop import WeightLoop, up_and_down
+from cdsm.identification.problem import Model, UserFaultError
+from cdsm.identification.search import check_call
+from cdsm.manipulator import Manipulator
+from cdsm.support.progress import progress_allowed, track
+from cdsm.support.validation import (
+    Direction,
+    flag,
+    number_array,
+    one_of,
+    scalar,
+    unit_directions,
+    whole_number,
+)
+from cdsm.support.values import Array, frozen
+
+_STEP = 1e-5
+"""Relative change of a parameter for its central difference."""
+
+_MOST = 5000
+"""Largest number of candidates and of tests."""
+
+
+def plan_experiment(
+    model_of: Callable[..., Manipulator],
+    parameters: Mapping[str, float],
+    *,
+    postures: ArrayLike,
+    directions: Direction | Sequence[Direction],
+    weights: ArrayLike,
+    minimum: float | ArrayLike,
+    tests: int,
+    displacement_std: float,
+    force_std: float = 0.0,
+    tension_std: float = 0.0,
+    steps: int = 4,
+    wanted: Sequence[str] | None = None,
+    known: Mapping[str, float] | None = None,
+    criterion: Criterion = "D",
+    progress: bool = True,
+) -> ExperimentPlan:
+    """Choose the weight tests that determine parameters of an arm best; see :func:`identify`.
+
+    Each posture, direction and weight is a candidate: a :class:`WeightLoop` from no force to the
+    weight and back. The plan says how often to make which, by a D- or A-optimal design: it makes
+    det C (the volume of the confidence region) or tr C (the sum of relative variances) of the
+    wanted parameters least. A proved bound tells how much better any other plan could be.
+
+    The derivatives are those at the expected values. If the arm turns out otherwise, plan again.
+
+    Args:
+        model_of: Function that builds the arm from the parameters, as for :func:`identify`.
+        parameters: Expected value of each parameter, not 0.
+        postures: Candidate joint angles (n, nv) [rad].
+        directions: Directions of the weights: names of axes, or (n, 3) in base axes.
+        weights: Largest forces of the loops (n,) [N].
+        minimum: Lower bound of the tensions before the test [N], one number or (C,).
+        tests: Number of loops that will be made, repetitions included.
+        displacement_std: Standard deviation of a reading along the weight [m].
+        force_std: Standard deviation of a force [N].
+        tension_std: Standard deviation of each tension [N].
+        steps: Steps from no force to the largest.
+        wanted: Names of the parameters that matter; the others only have to be told apart from
+            them. Default: all.
+        known: Standard deviations of parameters that are known before [own unit].
+        criterion: ``"D"`` or ``"A"``.
+        progress: Show a bar on the standard error, if that is a terminal.
+
+    Raises:
+        InvalidInput: An argument is invalid, or no candidate works, or determines what is wanted.
+        UnknownName: ``model_of`` does not take a parameter; or ``wanted`` or ``known`` names none.
+    """
+    values = _checked_parameters(parameters)
+    check_call("model_of", model_of, 0, tuple(values))
+    one_of("criterion", criterion, ("D", "A"))
+    most = whole_number("tests", tests, 1, _MOST)
+    names = tuple(values)
+    chosen = names if wanted is None else tuple(wanted)
+    for kind, given in (("wanted", chosen), ("known", tuple(known or {}))):
+        for name in given:
+            if name not in names:
+                raise UnknownName(f"parameter in {kind}", name, names, "Name one of the arm.")
+    if not chosen:
+        raise InvalidInput("wanted", "names no parameter; leave it out for all of them.")
+    noise = (displacement_std, force_std, tension_std)
+    candidates = _candidates(postures, directions, weights, minimum, noise, steps)
+    sizes = np.array(list(values.values()))
+    prior = np.zeros((len(names), len(names)))
+    for name, std in (known or {}).items():
+        if not (sigma := scalar(f"known[{name!r}]", std)) > 0.0:
+            raise InvalidInput(f"known[{name!r}]", f"{sigma:g} given; it must be positive.")
+        prior[names.index(name), names.index(name)] = abs(values[name]) / sigma
+    rows, failures = list[Array](), dict[str, str]()
+    with progress_allowed(flag("progress", progress)):
+        for loop in track(candidates, "following the candidates"):
+            try:
+                rows.append(_rows(model_of, values, loop))
+            except (CdsmError, NoModelError) as error:
+                failures[loop.label] = str(error)
+            except UserFaultError as fault:
+                raise fault.args[0] from fault.__cause__
+    usable = tuple(loop for loop in candidates if loop.label not in failures)
+    if not usable:
+        label, reason = next(iter(failures.items()))
+        raise InvalidInput(
+            "postures",
+            f"none of {len(failures)} candidates can be tested. {label}: {reason} Choose other "
+            "postures, lighter weights or higher tensions.",
+        )
+    whole = Determination(names, np.vstack([*rows, prior]), np.ones(len(names)))
+    settled = [name for name in chosen if whole.firm[names.index(name)]]
+    if not settled:
+        raise InvalidInput(
+            "wanted",
+            f"no candidate determines {', '.join(chosen)}: no prediction changes with "
+            f"{'; nor with '.join(whole.open_combinations)} (relative). Add other postures, "
+            "directions or weights, or state what is known.",
+        )
+    basis = whole.coordinates
+    design = Design(
+        information=np.array([(J @ basis).T @ (J @ basis) for J in rows]),
+        known=(prior @ basis).T @ (prior @ basis),
+        wanted=basis[[names.index(name) for name in settled]],
+        criterion=criterion,
+        tests=most,
+    )
+    counts, efficiency = design.best()
+    even = np.bincount(
+        np.round(np.linspace(0, len(usable) - 1, most)).astype(int), minlength=len(usable)
+    )
+    M = design.total(counts)
+    sensitivities = design.sensitivities(M)[0] if efficiency else np.zeros(len(usable))
+    return ExperimentPlan(
+        names=names,
+        values=frozen(sizes),
+        wanted=chosen,
+        criterion=criterion,
+        candidates=usable,
+        counts=frozen(counts.astype(np.intp)),
+        even=frozen(even.astype(np.intp)),
+        jacobians=tuple(frozen(J) for J in rows),
+        known=frozen(prior),
+        efficiency=efficiency,
+        sensitivities=frozen(sensitivities / max(sensitivities.max(), 1e-300)),
+        open_combinations=tuple(whole.open_combinations),
+        failures=tuple(failures.items()),
+    )
+
+
+def _checked_parameters(parameters: Mapping[str, float]) -> dict[str, float]:
+    if not isinstance(parameters, Mapping) or not parameters:
+        raise InvalidInput(
+            "parameters", f"{parameters!r} given; give {{name: expected value}} for at least one."
+        )
+    values = {name: scalar(f"parameters[{name!r}]", x) for name, x in parameters.items()}
+    for name, value in values.items():
+        if value == 0.0:
+            raise InvalidInput(
+                f"parameters[{name!r}]",
+                "0 given; intervals are judged relative to the expected value. Give a small one.",
+            )
+    return values
+
+
+def _candidates(
+    postures: ArrayLike,
+    directions: Direction | Sequence[Direction],
+    weights: ArrayLike,
+    minimum: float | ArrayLike,
+    noise: tuple[float, float, float],
+    steps: int,
+) -> list[WeightLoop]:
+    """Build a loop for each posture, direction and weight."""
+    angles, forces = number_array("postures", postures), number_array("weights", weights, "force")
+    if angles.ndim != 2 or not angles.size:
+        raise InvalidInput(
+            "postures", f"shape {angles.shape} given; (n, nv) joint angles [rad] are needed."
+        )
+    if forces.ndim != 1 or not forces.size or forces.min() <= 0.0:
+        raise InvalidInput("weights", f"{weights!r} given; positive forces (n,) [N] are needed.")
+    if len(forces) * len(angles) > _MOST:
+        raise InvalidInput("postures", f"more than {_MOST} candidates; give fewer.")
+    bound = number_array("minimum", minimum)
+    first = WeightLoop(
+        direction="z",
+        angles=tuple(angles[0].tolist()),
+        forces=up_and_down(1.0, whole_number("steps", steps, 1, 100)),
+        displacement_std=noise[0],
+        force_std=noise[1],
+        tension_std=noise[2],
+        minimum=float(bound) if bound.ndim == 0 else tuple(bound.tolist()),
+    )
+    axes = np.atleast_2d(unit_directions("directions", directions))
+    return [
+        replace(
+            first,
+            label=f"posture {i + 1}, {_named(u)}, {force:g} N",
+            angles=tuple(q.tolist()),
+            direction=tuple(u.tolist()),
+            forces=up_and_down(force, steps),
+        )
+        for i, q in enumerate(angles)
+        for u in axes
+        for force in forces.tolist()
+    ]
+
+
+def _named(u: Array) -> str:
+    """Write a direction: the name of its axis, or its components."""
+    axis = int(abs(u).argmax())
+    if abs(u[axis]) == 1.0:
+        return ("" if u[axis] > 0.0 else "-") + "xyz"[axis]
+    return "(" + " ".join(f"{x:.2g}" for x in u) + ")"
+
+
+def _rows(
+    model_of: Callable[..., Manipulator], values: dict[str, float], loop: WeightLoop
+) -> Array:
+    """Compute the derivatives (m, P) of a loop by relative parameters, in standard deviations."""
+    exact = loop.simulated(model_of(**values))
+    model = Model.of(model_of, None, (exact,)).weighted(values)
+    columns = []
+    for name, value in values.items():
+        near, far = (
+            model.residuals_beside(values, values | {name: value * (1.0 + s * _STEP)})
+            for s in (1.0, -1.0)
+        )
+        columns.append((near - far) / (2.0 * _STEP))
+    return np.column_stack(columns)

@@ -1,0 +1,177 @@
+"""Plan of an experiment: which weight tests to make how often, and what they will determine."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cdsm.identification.design import Criterion
+from cdsm.identification.determination import Determination
+from cdsm.identification.loop import WeightLoop
+from cdsm.support.format import aligned, plain, plural
+from cdsm.support.values import Array, ReadOnlyState, frozen
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_WIDTH = 1.959964
+"""Half a 95 % interval in standard deviations."""
+
+
+@final
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class ExperimentPlan(ReadOnlyState):
+    """Weight tests that determine parameters of an arm best; made by :func:`plan_experiment`.
+
+    There are n candidates and P parameters. All arrays are read-only.
+
+    Attributes:
+        names: Names of the parameters, in the order of every (P,) array.
+        values: Expected values (P,) [own unit].
+        wanted: Names of the parameters that matter.
+        criterion: ``"D"`` or ``"A"``.
+        candidates: The candidates that can be tested.
+        counts: How often to make each (n,).
+        even: How often an evenly spaced choice of as many tests makes each (n,).
+        jacobians: Derivatives (m, P) of each candidate's readings by relative parameters, in σ.
+        known: Rows (P, P) of what is known before: 1/σ of relative parameters on the diagonal.
+        efficiency: Proved lower bound of f/f_best [-], 1 for the best plan; variances relative to
+            those of the best plan are at most 1/efficiency, in the mean of the criterion. 0 if the
+            tests are too few to determine what is wanted.
+        sensitivities: What one more test of a candidate would add, over the most useful one (n,).
+        open_combinations: Combinations of relative parameters that no candidate determines.
+        failures: Label and reason of each candidate that cannot be tested.
+    """
+
+    names: tuple[str, ...]
+    values: Array
+    wanted: tuple[str, ...]
+    criterion: Criterion
+    candidates: tuple[WeightLoop, ...]
+    counts: NDArray[np.intp]
+    even: NDArray[np.intp]
+    jacobians: tuple[Array, ...]
+    known: Array
+    efficiency: float
+    sensitivities: Array
+    open_combinations: tuple[str, ...]
+    failures: tuple[tuple[str, str], ...]
+
+    @property
+    def tests(self) -> tuple[WeightLoop, ...]:
+        """The loops to make, repetitions included, without readings."""
+        pairs = zip(self.candidates, self.counts.tolist(), strict=True)
+        return tuple(loop for loop, count in pairs for _ in range(count))
+
+    @property
+    def even_tests(self) -> tuple[WeightLoop, ...]:
+        """As many loops, evenly spaced over the candidates."""
+        pairs = zip(self.candidates, self.even.tolist(), strict=True)
+        return tuple(loop for loop, count in pairs for _ in range(count))
+
+    @cached_property
+    def std(self) -> Array:
+        """Standard deviation to expect of each parameter (P,) [own unit]; inf: undetermined."""
+        return self._std(self.counts)
+
+    @cached_property
+    def even_std(self) -> Array:
+        """Standard deviation to expect from the evenly spaced tests (P,) [own unit]."""
+        return self._std(self.even)
+
+    @property
+    def undetermined(self) -> tuple[str, ...]:
+        """Names of the parameters that the planned tests do not determine."""
+        return tuple(n for n, std in zip(self.names, self.std, strict=True) if math.isinf(std))
+
+    @property
+    def factors(self) -> dict[str, float]:
+        """Width of the intervals of the evenly spaced tests over that of the plan, if wanted."""
+        found = zip(self.names, self.even_std, self.std, strict=True)
+        return {
+            name: float(even / std) if math.isfinite(std) else math.nan
+            for name, even, std in found
+            if name in self.wanted
+        }
+
+    def _std(self, counts: NDArray[np.intp]) -> Array:
+        pairs = zip(self.jacobians, counts.tolist(), strict=True)
+        rows = [math.sqrt(count) * J for J, count in pairs if count]
+        determination = Determination(
+            self.names, np.vstack([*rows, self.known]), np.ones(len(self.names))
+        )
+        return frozen(np.sqrt(np.diag(determination.covariance)) * abs(self.values))
+
+    def to_dict(self) -> dict[str, object]:
+        """Return the plan as plain numbers for JSON; parameters in their own units."""
+        return dict(
+            plain(
+                {
+                    "criterion": self.criterion,
+                    "efficiency_at_least": self.efficiency,
+                    "tests": [
+                        {
+                            "label": loop.label,
+                            "times": int(count),
+                            "angles": loop.angles,
+                            "direction": loop.direction,
+                            "forces_N": loop.forces,
+                        }
+                        for loop, count in zip(self.candidates, self.counts, strict=True)
+                        if count
+                    ],
+                    "parameters": dict(zip(self.names, self.values, strict=True)),
+                    "std": dict(zip(self.names, self.std, strict=True)),
+                    "even_std": dict(zip(self.names, self.even_std, strict=True)),
+                    "undetermined": self.undetermined,
+                }
+            )
+        )
+
+    def plot(self) -> Figure:
+        """Plot the intervals to expect, and how useful each candidate is."""
+        from cdsm.plots.experiment import plot_experiment_plan  # matplotlib imports slowly
+
+        return plot_experiment_plan(self)
+
+    def __repr__(self) -> str:
+        return f"<ExperimentPlan of {plural(len(self.tests), 'test')} for {', '.join(self.wanted)}>"
+
+    def __str__(self) -> str:
+        made = [
+            (loop.label, f"{count}×")
+            for loop, count in zip(self.candidates, self.counts.tolist(), strict=True)
+            if count
+        ]
+        rows = [*aligned([("test", "times"), *made]), ""]
+        shares = 100.0 * _WIDTH / abs(self.values)
+        cells = [
+            (
+                name + ("" if name in self.wanted else " (not wanted)"),
+                f"{value:.4g}",
+                *("not determined" if math.isinf(x) else f"± {x:.3g} %" for x in (plan, even)),
+            )
+            for name, value, plan, even in zip(
+                self.names, self.values, shares * self.std, shares * self.even_std, strict=True
+            )
+        ]
+        heads = ("parameter [own unit]", "expected", "95 %, planned", "95 %, evenly spaced")
+        rows += [*aligned([heads, *cells]), ""]
+        if self.efficiency:
+            most = max(0.1, 100.0 * (self.efficiency**-0.5 - 1.0))
+            rows.append(
+                f"{self.criterion}-optimal: no {plural(len(self.tests), 'test')} of these "
+                f"candidates make intervals narrower by more than {most:.2g} % in the mean"
+            )
+        for combination in self.open_combinations:
+            rows.append(f"not determined by any candidate: {combination} (relative)")
+        if self.undetermined and not self.open_combinations:
+            rows.append(f"too few tests to determine {', '.join(self.undetermined)}")
+        for label, reason in self.failures:
+            rows.append(f"left out: {label}: {reason}")
+        return "\n".join(rows)
