@@ -274,9 +274,8 @@ _NAMES = {
     "friction.stuck": "sliding_stiffness stuck_stiffness",
     "geometry": "CableRoute Geometry Joint Link",
     "instability": "Remedy",
-    "identification": "ExperimentPlan Identification Measurement WeightLoop",
-    "identification.experiment": "plan_experiment",
-    "identification.search": "identify",
+    "identification": "ExperimentPlan Identification Measurement WeightLoop identify "
+    "plan_experiment",
     "interchange.caspr": "read_caspr",
     "interchange.mjcf": "to_mjcf write_mjcf",
     "kinematics.maps": "inverse_kinematics solve_joint_angles",

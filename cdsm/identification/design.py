@@ -23,8 +23,10 @@ from cdsm.support.values import Array
 
 Criterion = Literal["D", "A"]
 
-_ITERATIONS, _OPTIMAL = 2000, 0.999
-"""Steps that find shares at most, and the proved efficiency that ends them."""
+_ITERATIONS = 2000  # steps that find shares, at most
+
+_OPTIMAL = 0.999
+"""Proved efficiency that ends the search of shares."""
 
 _GAIN = 1e-9
 """Smallest gain of ln f that is worth an exchange."""

@@ -32,18 +32,19 @@ class ExperimentPlan(ReadOnlyState):
 
     Attributes:
         names: Names of the parameters, in the order of every (P,) array.
-        values: Expected values (P,) [own unit].
+        values: Expected values (P,) [m, kg, N/m, …].
         wanted: Names of the parameters that matter.
         criterion: ``"D"`` or ``"A"``.
         candidates: The candidates that can be tested.
         counts: How often to make each (n,).
         even: How often an evenly spaced choice of as many tests makes each (n,).
-        jacobians: Derivatives (m, P) of each candidate's readings by relative parameters, in σ.
-        known: Rows (P, P) of what is known before: 1/σ of relative parameters on the diagonal.
+        jacobians: Derivatives (n, P) [-] of the readings of each candidate by relative parameters,
+            in standard deviations.
+        known: Rows (P, P) [-] of what is known before: 1/σ of relative parameters on the diagonal.
         efficiency: Proved lower bound of f/f_best [-], 1 for the best plan; variances relative to
             those of the best plan are at most 1/efficiency, in the mean of the criterion. 0 if the
             tests are too few to determine what is wanted.
-        sensitivities: What one more test of a candidate would add, over the most useful one (n,).
+        sensitivities: What one more test of a candidate would add, over the most useful (n,) [-].
         open_combinations: Combinations of relative parameters that no candidate determines.
         failures: Label and reason of each candidate that cannot be tested.
     """
@@ -76,12 +77,12 @@ class ExperimentPlan(ReadOnlyState):
 
     @cached_property
     def std(self) -> Array:
-        """Standard deviation to expect of each parameter (P,) [own unit]; inf: undetermined."""
+        """Standard deviations to expect of the parameters (P,) [m, kg, …]; inf: undetermined."""
         return self._std(self.counts)
 
     @cached_property
     def even_std(self) -> Array:
-        """Standard deviation to expect from the evenly spaced tests (P,) [own unit]."""
+        """Standard deviation to expect from the evenly spaced tests (P,) [m, kg, N/m, …]."""
         return self._std(self.even)
 
     @property

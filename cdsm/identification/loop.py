@@ -95,9 +95,9 @@ class WeightLoop:
 
     @property
     def axes(self) -> Array:
-        """Directions that are read (k, 3): the direction, or x, y and z."""
+        """Unit vectors along which the tip is read: the direction (1, 3), or x, y and z (3, 3)."""
         alone = self.displacements is None or np.ndim(self.displacements) == 1
-        return unit_direction("direction", self.direction)[None] if alone else np.eye(3)
+        return self._unit[None] if alone else np.eye(3)
 
     @property
     def informative(self) -> int:
@@ -107,7 +107,11 @@ class WeightLoop:
     @property
     def applied(self) -> Array:
         """Forces (n, 3) [N] in base axes."""
-        return np.outer(self.forces, unit_direction("direction", self.direction))
+        return np.outer(self.forces, self._unit)
+
+    @property
+    def _unit(self) -> Array:
+        return unit_direction("direction", self.direction)
 
     def simulated(self, arm: Manipulator, random: np.random.Generator | None = None) -> WeightLoop:
         """Return the same loop with the readings (n,) that an arm gives, along the direction.
@@ -131,9 +135,8 @@ class WeightLoop:
             tension += self.tension_std * random.normal(size=tension.size)
             forces += self.force_std * random.normal(size=forces.size)
             read += self.displacement_std * random.normal(size=forces.size)
-        u = unit_direction("direction", self.direction)
-        tips = LoadingPath.of(pose, tension, wrench, np.outer(forces, u)).tips
-        read += (tips - pose.tip[:3, 3]) @ u
+        tips = LoadingPath.of(pose, tension, wrench, np.outer(forces, self._unit)).tips
+        read += (tips - pose.tip[:3, 3]) @ self._unit
         return replace(self, displacements=tuple(read.tolist()))
 
 

@@ -16,6 +16,7 @@ from cdsm.paper.claims import (
 )
 from cdsm.paper.curves import Curve, StiffnessFigure
 from cdsm.paper.experiments import ExperimentFigure, Trace, figure_10, figure_12, figure_13
+from cdsm.paper.friction_fit import RoughFit, RoughPrototype, identify_rough_prototype
 from cdsm.paper.lead import LeadFigure, figure_lead
 from cdsm.paper.prototype import Prototype
 from cdsm.paper.prototype_fit import (
@@ -60,11 +61,14 @@ __all__ = [
     "Prototype",
     "PrototypeFigure",
     "PrototypeFit",
+    "RoughFit",
+    "RoughPrototype",
     "Step",
     "StiffnessFigure",
     "StrandFigure",
     "Trace",
     "identify_prototype",
+    "identify_rough_prototype",
     "to_dict",
     "to_markdown",
     "to_rows",

@@ -169,7 +169,7 @@ class RoughPrototype:
         """Distribute the tensions (5, C) [N] of each row; both springs of a bearing balance."""
         names = pose.arm.cables.names
         springs = [c for c, name in enumerate(names) if name.startswith("bearing")]
-        fixed = {}
+        fixed = dict[str, float]()
         for pair in zip(springs[::2], springs[1::2], strict=True):
             arms = abs(pose.length_jacobian[list(pair)].sum(axis=1))
             both = self.spring * _PULLED * arms[::-1] / arms.mean()

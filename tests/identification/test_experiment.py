@@ -53,7 +53,7 @@ def test_no_design_beats_the_proved_bound(criterion: Criterion, wanted: int) -> 
     design = Design(information, 0.1 * np.eye(3), np.eye(3)[:wanted], criterion, 4)
     counts, efficiency = design.best()
     every = [
-        design.value(design.total(np.bincount(chosen, minlength=6)))
+        design.value(design.total(np.bincount(chosen, minlength=6).astype(float)))
         for chosen in combinations_with_replacement(range(6), 4)
     ]
     ratio = float(np.exp(design.value(design.total(counts)) - max(every)))
