@@ -20,7 +20,7 @@ from cdsm.support.validation import Direction, unit_direction
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension
 
-_ROOM = 1.25
+_ROOM = 1.1
 """The neighbourhood over the first-order band, and its growth where it does not hold the band."""
 
 _WIDENINGS = 8

@@ -14,8 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdsm.errors import SolverError
+from cdsm.kernels.stiffness import single_load_stiffness
 from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.values import Array
+
+_STEP = 1e-4
+"""Step of differences [rad], [m]; what they truncate is added to the bound."""
 
 _ITERATIONS = 30
 """Steps of a fixed point that converges by a factor of ten or more."""
@@ -31,8 +35,8 @@ class Remainders:
         gradient: of each ∂l/∂θ (S, nv) [m/rad].
         turn: of each wrap angle, from a constant (P,) [rad].
         wrap: of each wrap angle, from its tangent (P,) [rad]; inf where it may vanish.
-        tip: of the displacement of the tip, from its second-order expansion [m].
-        body: of the torques of weight and wrench (nv,) [N m].
+        tip: of the displacement of the tip, from its third-order expansion [m].
+        body: of the torques of weight and wrench, from their second-order expansions (nv,) [N m].
     """
 
     def __init__(self, K: Stiffness, within: Array) -> None:
@@ -76,6 +80,33 @@ class Remainders:
         self.tip, self.body = _body_remainders(K, within, slides)
 
 
+class Bends:
+    """Derivatives of stiffnesses at a posture, by differences; what they truncate is bounded.
+
+    Attributes:
+        body: ∂²τ_i/∂θ_j∂θ_k (nv, nv, nv) [N m/rad²] of the torques τ of weight and wrench.
+    """
+
+    def __init__(self, K: Stiffness) -> None:
+        pose = K.posture
+        steps = _STEP * np.eye(pose.q.size)
+        self._joints = pose.arm._model.masses.tip_joints
+        self._ends = [
+            [pose.arm.at(pose.q + sign * step, check_limits=False) for sign in (1.0, -1.0)]
+            for step in steps
+        ]
+        weight = [ahead.gravity_stiffness - back.gravity_stiffness for ahead, back in self._ends]
+        self.body = np.stack(weight, axis=-1) / (2.0 * _STEP) + self.of_wrench(K.wrench)
+
+    def of_wrench(self, wrench: Array) -> Array:
+        """Compute −∂²(J_Xᵀ W)/∂θ² (nv, nv, nv) of a wrench (6,)."""
+        loads = [
+            [single_load_stiffness(end.jacobian, wrench, self._joints) for end in pair]
+            for pair in self._ends
+        ]
+        return np.stack([ahead - back for ahead, back in loads], axis=-1) / (2.0 * _STEP)
+
+
 def _body_remainders(K: Stiffness, within: Array, slides: NDArray[np.bool_]) -> tuple[float, Array]:
     """Bound what the linear parts leave out of the tip's way [m] and of body torques (nv,)."""
     model, pose = K.posture.arm._model, K.posture
@@ -87,5 +118,7 @@ def _body_remainders(K: Stiffness, within: Array, slides: NDArray[np.bool_]) -> 
     reach *= math.exp(turn)
     weight = float(masses.mass.sum() * np.linalg.norm(masses.gravity))
     force, moment = np.linalg.norm(K.wrench[:3]), np.linalg.norm(K.wrench[3:])
-    torque = ((weight + float(force)) * reach + float(moment)) * turn**2 / 2.0
-    return reach * turn**3 / 6.0, torque * per
+    torque = (weight + float(force)) * reach + float(moment)
+    cut = _STEP**2 / 6.0  # differences truncate two derivatives on
+    torque *= turn**3 / 6.0 + cut * turn**2 / 2.0
+    return reach * (turn**4 / 24.0 + cut * turn**3 / 6.0), torque * per

@@ -15,6 +15,9 @@ contains all states of rest in the neighbourhood (outer correction):
   and a segment is nowhere shorter than m. Then |l′′′| ≤ c = 3 r p²/m² + 3 r p/m + r per turn. With
   σ = Σ ρ_i over its joints, l departs from its second-order expansion by at most c σ³/6, and
   ∂l/∂θ_i from its tangent by c σ²/2.
+- δ is a sum of one motion per hole, so quadratic and cubic forms of δ are sums over two and three
+  holes, bounded term by term: those of the lengths, of the torques of weight and wrench, and of the
+  way of the tip, whose expansions go on with the bounds of :mod:`~cdsm.friction.remainders`.
 - The wrap angles are tangent to their gradients, or constant, up to likewise bounds.
 - Over a range |ΔT| ≤ ρ_T of tensions, 1/(1 + ε) falls, and lies between two parallel lines.
 - Products of δ and ΔT are at most those of ρ and ρ_T.
@@ -33,7 +36,7 @@ import numpy as np
 
 from cdsm.cable import Cable
 from cdsm.errors import ElasticityRangeError, SolverError
-from cdsm.friction.remainders import Remainders
+from cdsm.friction.remainders import Bends, Remainders
 from cdsm.kernels.chains import single_tension_stiffness
 from cdsm.kernels.stiffness import single_load_stiffness
 from cdsm.stiffness_matrix import Stiffness
@@ -42,7 +45,7 @@ from cdsm.support.values import Array, frozen
 _NEAR = 1e-9
 """Least neighbourhood [rad], [m] or [N]: that of an arm without friction is rounding."""
 
-_CELLS = 2048
+_CELLS = 8192
 """Intervals of tension in each of which a strain is only known to rise."""
 
 
@@ -94,6 +97,19 @@ class Neighbourhood:
         """Compute the largest |a·δ| of rows a (…, nv)."""
         return np.asarray(abs(rows @ self._steps).sum(axis=-1))
 
+    def curved(self, forms: Array) -> Array:
+        """Compute a bound of |δᵀ A δ|/2 for quadratic forms A (…, nv, nv).
+
+        It is a sum over pairs of holes: joints that turn against each other cancel in each pair.
+        """
+        both = self._steps.T @ forms @ self._steps
+        return np.asarray(abs(both).sum(axis=(-2, -1)) / 2.0)
+
+    def cubed(self, form: Array) -> float:
+        """Compute a bound of |Σ A_ijk δ_i δ_j δ_k|/6 of a cubic form A (nv, nv, nv), likewise."""
+        first = np.tensordot(self._steps, form, (0, 0))
+        return float(abs(self._steps.T @ first @ self._steps).sum()) / 6.0
+
 
 class End(NamedTuple):
     """Largest value over the polyhedron: as solved, as proved, and how near to its ρ it is."""
@@ -118,7 +134,7 @@ class RestStates:
         segments = pose.segments
         chains, g, length = segments.chains, segments.length_jacobian, segments.lengths
         cable, start = chains.cable, chains.start
-        F, far = K.tension[cable], Remainders(K, within)
+        F, far, bends = K.tension[cable], Remainders(K, within), Bends(K)
         routing, frames, count = segments._routing, segments._frames, np.arange(length.size)
         H = single_tension_stiffness(
             routing.segment, routing.joint, *frames, np.ones(length.size), count, length.size
@@ -132,7 +148,7 @@ class RestStates:
 
         # Σ ΔT g + (Σ F H + ∂g/∂θ − ∂(J_Xᵀ W)/∂θ) δ + slack = 0
         balance = np.hstack([(K.active + K.gravity + K.load) * within, (g * apart[:, None]).T])
-        off = apart @ turned + (F + apart) @ far.gradient + far.body
+        off = apart @ turned + (F + apart) @ far.gradient + near.curved(bends.body) + far.body
         self._torque = abs(balance).max(axis=1)
         self._torque = np.where(self._torque > 0.0, self._torque, 1.0)
         rows, slack = [balance / self._torque[:, None]], [np.c_[-off, off] / self._torque[:, None]]
@@ -148,9 +164,9 @@ class RestStates:
                 row[0, nv + start[c] : nv + start[c + 1]] = length[of] * wire.slope * apart[of]
                 row[0, nv + start[c]] -= spring * wire.share * apart[start[c]]
                 # l departs from its tangent by δᵀHδ/2 and a third-order part
-                longer = within @ near.largest(H[of].sum(axis=0)) / 2.0 + far.length[of].sum()
+                longer = near.curved(H[of].sum(axis=0)) + far.length[of].sum()
                 whole, lost = float(length[of].sum()), wire.share * float(longer)
-                each_longer = straight[of] + turned[of] @ within / 2.0 + far.length[of]
+                each_longer = straight[of] + near.curved(H[of]) + far.length[of]
                 lost += float(each_longer.sum()) * wire.change
                 lost += spring * (wire.most - each.elasticity.domain.low) * wire.change
                 # a slack cable has more wire than its segments are long
@@ -165,6 +181,7 @@ class RestStates:
         self._high = np.concatenate([np.ones(nv), high, width[:, 1]])
         self._cone, self._cone_high = _cone(K, near, far, self._low.size)
         self._pose, self._near, self._tip, self._tension = pose, near, far.tip, F
+        self._bends = bends
 
     def displacement(self, u: Array) -> End:
         """Compute the largest displacement of the tip along a unit direction (3,) [m]."""
@@ -172,10 +189,10 @@ class RestStates:
         cost[: near.joints.size] = (u @ self._pose.jacobian[:3]) * near.joints
         found = self._largest(cost)
         tip_joints = self._pose.arm._model.masses.tip_joints
-        curved = single_load_stiffness(self._pose.jacobian, np.append(u, np.zeros(3)), tip_joints)
-        return found._replace(
-            bound=found.bound + float(near.joints @ near.largest(curved)) / 2.0 + self._tip
-        )
+        force = np.append(u, np.zeros(3))
+        curved = single_load_stiffness(self._pose.jacobian, force, tip_joints)
+        more = float(near.curved(curved)) + near.cubed(self._bends.of_wrench(force)) + self._tip
+        return found._replace(bound=found.bound + more)
 
     def tensions(self, chosen: Iterable[int]) -> Array:
         """Compute the least and the largest tensions (n, 2) [N] of some segments."""

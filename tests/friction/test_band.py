@@ -82,7 +82,7 @@ def test_numbers_of_the_virtual_prototype(friction: float, expected: Array) -> N
         found = cdsm.rest_band(pose, pull, axis)
         assert 1e3 * found.first_order == pytest.approx(half, abs=6e-4)
         for end in (-found.low, found.high):
-            assert found.first_order < end < (1.25 if friction == 0.1 else 2.1) * found.first_order
+            assert found.first_order < end < (1.08 if friction == 0.1 else 1.26) * found.first_order
 
 
 def test_outer_correction_vanishes_with_friction() -> None:
