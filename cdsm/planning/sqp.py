@@ -5,6 +5,9 @@ r"""Sequential quadratic programming over the admissible tensions of a stable ar
 c is nonlinear, the balance is linear, and the stable tensions are not known in advance. Every
 iterate balances the arm and is stable, so K_θ can be inverted there.
 
+scipy's SLSQP with differences takes more than three times as long for 5 joints
+(tests/benchmarks/test_planning_speed.py).
+
 **The quadratic program of a step.** Let d = ΔF/size, g = ∂f/∂d and G = ∂c/∂d. The Lagrangian is
 L = f + y·c − z·reserve, with the multipliers y and z of the step before. Solve
 

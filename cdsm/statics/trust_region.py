@@ -10,7 +10,8 @@ the trust-region method with the exact Hessian, which goes down and leaves saddl
 every step is a full Newton step with the complete K, not only its symmetric part.
 
 scipy's trust-exact does not fit: it has no stops, and it needs a potential. A moment at the tip has
-no potential.
+no potential. Where there is one, BFGS takes thirty times as long to minimise it
+(tests/benchmarks/test_equilibrium_speed.py).
 """
 
 from __future__ import annotations

@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 
     from cdsm.stiffness_matrix import Stiffness
 
+_ROUNDING = 1e-15
+"""Contributions below this part of the total are printed as zero."""
+
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -94,7 +97,8 @@ class Shares(ReadOnlyState):
 
     def __str__(self) -> str:
         def line(name: str, whole: float, *parts: float) -> list[str]:
-            numbers = [f"{x / 1e3:z.4g}" for x in (*parts, whole)] if parts else []
+            seen = [x * (abs(x) > _ROUNDING * abs(total)) for x in (*parts, whole)]
+            numbers = [f"{x / 1e3:z.4g}" for x in seen] if parts else []
             return [name, *(numbers or ["", "", f"{whole / 1e3:z.4g}"]), f"{whole / total:z.1%}"]
 
         total, names = self.total, self.stiffness.posture.arm.cables.names

@@ -84,6 +84,22 @@ def test_shares_are_printed_by_name_and_add_up() -> None:
         _ = shares["cable9"]
 
 
+def test_shares_that_are_rounding_are_printed_as_zero() -> None:
+    geometry = cdsm.Geometry.hinged(
+        joints=2,
+        twist=np.pi / 2.0,
+        link_length=0.05,
+        base_length=0.05,
+        disk_offset=0.008,
+        hole_radius=0.015,
+        link_mass=0.02,
+    )
+    pose = cdsm.Manipulator(geometry, cdsm.LinearElasticity(48e3)).at([0.0, 0.0])
+    shares = cdsm.stiffness(pose, np.full(4, 10.0)).shares("z")
+    assert (abs(shares.passive) < 1e-20 * shares.total).any()  # the hinge about z
+    assert "e-3" not in str(shares)
+
+
 def test_shares_of_an_unstable_arm_say_so_first() -> None:
     soft = cdsm.serpentine_cables(
         POSE.arm.geometry, cdsm.LinearElasticity(1e9), series_stiffness=10.0
