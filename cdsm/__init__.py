@@ -26,6 +26,14 @@ if TYPE_CHECKING:
     from cdsm.control.run import TrackingRun
     from cdsm.control.sensors import Sensors
     from cdsm.control.track import track
+    from cdsm.design.evaluation import Designs, evaluate_designs
+    from cdsm.design.goals import Constraint, Objective
+    from cdsm.design.problem import DesignProblem
+    from cdsm.design.problem_file import read_problem
+    from cdsm.design.refine import refine_design
+    from cdsm.design.result import DesignProgress, DesignSearch
+    from cdsm.design.search import search_designs
+    from cdsm.design.variables import Variable
     from cdsm.elasticity import Domain, Elasticity, LinearElasticity
     from cdsm.errors import (
         CableError,
@@ -36,6 +44,7 @@ if TYPE_CHECKING:
         EquilibriumError,
         FileError,
         GeometryError,
+        InfeasibleDesign,
         InfeasibleTension,
         InvalidInput,
         JointLimitError,
@@ -122,8 +131,13 @@ __all__ = [
     "CdsmWarning",
     "Clearance",
     "ClusterError",
+    "Constraint",
     "CriticalLoad",
     "CriticalTension",
+    "DesignProblem",
+    "DesignProgress",
+    "DesignSearch",
+    "Designs",
     "Domain",
     "Elasticity",
     "ElasticityRangeError",
@@ -137,6 +151,7 @@ __all__ = [
     "GridPoses",
     "HalfWay",
     "Identification",
+    "InfeasibleDesign",
     "InfeasibleSample",
     "InfeasibleTension",
     "InvalidInput",
@@ -156,6 +171,7 @@ __all__ = [
     "MomentArms",
     "MonteCarlo",
     "MuJoCoPlant",
+    "Objective",
     "PathPlan",
     "PathPoses",
     "Payload",
@@ -195,6 +211,7 @@ __all__ = [
     "UnknownName",
     "UnreachableStiffness",
     "UrdfError",
+    "Variable",
     "WeightLoop",
     "WeightTest",
     "WireUse",
@@ -207,6 +224,7 @@ __all__ = [
     "distribute_tensions",
     "equilibrium",
     "evaluate",
+    "evaluate_designs",
     "fit_tensile_test",
     "force_polytope",
     "has_wrench_closure",
@@ -225,10 +243,13 @@ __all__ = [
     "read_cables",
     "read_caspr",
     "read_elasticity",
+    "read_problem",
     "read_sweep",
     "read_tensile_csv",
+    "refine_design",
     "rest_band",
     "saturation",
+    "search_designs",
     "serpentine_cables",
     "sliding_stiffness",
     "solve_joint_angles",
@@ -262,12 +283,20 @@ _NAMES = {
     "control.run": "TrackingRun",
     "control.sensors": "Sensors",
     "control.track": "track",
+    "design.evaluation": "Designs evaluate_designs",
+    "design.goals": "Constraint Objective",
+    "design.problem": "DesignProblem",
+    "design.problem_file": "read_problem",
+    "design.refine": "refine_design",
+    "design.result": "DesignProgress DesignSearch",
+    "design.search": "search_designs",
+    "design.variables": "Variable",
     "elasticity": "Domain Elasticity LinearElasticity",
     "errors": (
         "CableError CdsmError CdsmWarning ClusterError ElasticityRangeError EquilibriumError "
-        "FileError GeometryError InfeasibleTension InvalidInput JointLimitError MissingExtra "
-        "MissingWire SingularMass SingularStiffness SolverError StoreError TensileTestError "
-        "UnknownName UnreachableStiffness UrdfError"
+        "FileError GeometryError InfeasibleDesign InfeasibleTension InvalidInput JointLimitError "
+        "MissingExtra MissingWire SingularMass SingularStiffness SolverError StoreError "
+        "TensileTestError UnknownName UnreachableStiffness UrdfError"
     ),
     "friction.band": "RestBand rest_band",
     "friction.breakaway": "Breakaway breakaway",

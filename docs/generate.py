@@ -32,6 +32,7 @@ CHAPTERS = {
     "report": "Posture, tension, stiffness",
     "instability": "Posture, tension, stiffness",
     "friction": "Friction in the holes",
+    "measures": "Measures of an arm",
     "statics": "Weights, buckling, vibration",
     "kinematics": "Kinematics",
     "batch": "Many postures",

@@ -142,5 +142,10 @@ def reported(as_json: bool) -> Iterator[None]:
             console().print(
                 f"error: {message}", style="red", markup=False, highlight=False, soft_wrap=True
             )
-        cannot = cdsm.InfeasibleTension, cdsm.EquilibriumError, cdsm.UnreachableStiffness
+        cannot = (
+            cdsm.InfeasibleDesign,
+            cdsm.InfeasibleTension,
+            cdsm.EquilibriumError,
+            cdsm.UnreachableStiffness,
+        )
         raise typer.Exit(UNMET if isinstance(error, cannot) else FAILED) from None

@@ -24,6 +24,7 @@ from cdsm.errors.inputs import UnknownName as UnknownName
 from cdsm.errors.inputs import UrdfError as UrdfError
 from cdsm.errors.mechanics import ElasticityRangeError as ElasticityRangeError
 from cdsm.errors.mechanics import EquilibriumError as EquilibriumError
+from cdsm.errors.mechanics import InfeasibleDesign as InfeasibleDesign
 from cdsm.errors.mechanics import InfeasibleTension as InfeasibleTension
 from cdsm.errors.mechanics import SingularMass as SingularMass
 from cdsm.errors.mechanics import SingularStiffness as SingularStiffness

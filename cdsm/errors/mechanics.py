@@ -194,3 +194,17 @@ class UnreachableStiffness(CdsmError):
                 "the load or the posture, or take other cables."
             )
         super().__init__(message)
+
+
+class InfeasibleDesign(CdsmError):
+    """No design that a search tried meets all constraints of its problem.
+
+    Attributes:
+        constraints: Names of what the nearest design misses; ``held``: some postures are not held.
+        design: The nearest design, one number for each variable; empty if none is an arm.
+    """
+
+    def __init__(self, message: str, constraints: Sequence[str], design: Sequence[float]) -> None:
+        self.constraints = tuple(constraints)
+        self.design = tuple(design)
+        super().__init__(message)

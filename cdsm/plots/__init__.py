@@ -13,6 +13,7 @@ from cdsm.plots.by_cable import (
     plot_stiffness_range,
     plot_tensions,
 )
+from cdsm.plots.designs import plot_designs
 from cdsm.plots.forces import plot_force_polytope
 from cdsm.plots.friction import plot_load_history
 from cdsm.plots.loads import (
@@ -39,6 +40,7 @@ __all__ = [
     "plot_cables",
     "plot_critical_load",
     "plot_critical_tension",
+    "plot_designs",
     "plot_elasticity",
     "plot_force_polytope",
     "plot_load_history",

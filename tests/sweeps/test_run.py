@@ -57,8 +57,8 @@ def single(
         return {Status.INFEASIBLE}, found
     found["tension"] = pull.values
     low, high = checked_bounds(arm, minimum, maximum)
-    loads = [Loads.of(pose, low, high, wrench, u[:, None]) for u in np.eye(3)]
-    found["payload"] = np.array([largest_force(each) for each in loads])
+    ways = [Loads.of(pose, low, high, wrench, u[:, None]) for u in np.eye(3)]
+    found["payload"] = np.array([largest_force(each) for each in ways])
     try:
         K = cdsm.stiffness(pose, pull)
     except cdsm.ElasticityRangeError:

@@ -1,0 +1,97 @@
+"""``cdsm design``: search the best designs of an arm, and write the chosen one for the workshop."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+import cdsm
+from cdsm.cli.options import AsJson
+from cdsm.cli.output import answer, console
+
+_RECORD = "designs.jsonl"
+
+
+def design(
+    problem: Annotated[
+        Path,
+        typer.Argument(
+            metavar="PROBLEM.toml", help="The problem; examples/design.toml is one with comments."
+        ),
+    ],
+    out: Annotated[Path, typer.Option("--out", "-o", help="Folder of the results; it is made.")],
+    generations: Annotated[
+        int | None, typer.Option(help="Generations; default: what the file says, or 40.", min=1)
+    ] = None,
+    population: Annotated[
+        int | None,
+        typer.Option(help="Designs in each; default: what the file says, or 40.", min=4),
+    ] = None,
+    seed: Annotated[
+        int | None, typer.Option(help="Default: what the file says, or 0.", min=0)
+    ] = None,
+    choose: Annotated[
+        int | None,
+        typer.Option(
+            help="Number of the design on the front that is written; default: the compromise, the "
+            "nearest to the best of every objective.",
+            min=0,
+        ),
+    ] = None,
+    jobs: Annotated[int | None, typer.Option(help="Processes; default: all cores.", min=1)] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Search the best designs of an arm; write front, figure, and the chosen arm with its tables.
+
+    A stopped search goes on from what --out holds.
+    """
+    from cdsm.design.problem_file import read_problem
+    from cdsm.support.files import make_folder, write_text
+
+    file = read_problem(problem)
+    folder = make_folder(out)
+    task = file.problem
+
+    def tell(step: cdsm.DesignProgress) -> None:
+        if not console().is_terminal:
+            return
+        first = task.objectives[0]
+        best = (
+            f"{first.words} {first.shown(step.best)}"
+            if step.feasible
+            else f"none feasible yet, the nearest misses by {100.0 * step.missed:.3g} %"
+        )
+        console().print(
+            f"generation {step.generation}: {step.designs} designs, {step.feasible} feasible, "
+            f"best: {best}",
+            highlight=False,
+        )
+
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    found = cdsm.search_designs(
+        task,
+        generations=generations or file.generations,
+        population=population or file.population,
+        seed=file.seed if seed is None else seed,
+        store=folder / _RECORD,
+        jobs=jobs or cores or 1,
+        report=tell,
+    )
+    number = found.compromise if choose is None else choose
+    paths = [
+        write_text(folder / "front.csv", found.to_csv()),
+        cdsm.plots.save_figure(found.plot(), folder / "front.pdf"),
+        cdsm.plots.save_figure(found.arm(number).plot(), folder / "arm.pdf"),
+        *found.write_arm(folder, number),
+    ]
+    names = ", ".join(path.name for path in paths)
+    written = {"written": [str(path) for path in paths], "chosen": number}
+    answer(
+        as_json,
+        lambda: {**found.to_dict(), **written},
+        found,
+        f"design {number} is written to {folder}: {names}",
+    )

@@ -1,0 +1,207 @@
+"""Goals of a design: quantities of an arm over its postures and loads, to make best or to bound."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final, Literal, NamedTuple, final, get_args
+
+from cdsm.errors import InvalidInput
+from cdsm.support.format import coordinates
+from cdsm.support.validation import Direction, one_of, scalar, unit_direction
+
+MeasureName = Literal[
+    "stiffness",
+    "softest",
+    "isotropy",
+    "margin",
+    "deflection",
+    "motor_force",
+    "payload",
+    "tension_factor",
+    "cable_clearance",
+    "link_clearance",
+    "disk_clearance",
+    "workspace",
+    "held",
+    "mass",
+    "length",
+    "cables",
+    "wire_length",
+]
+
+
+class Kind(NamedTuple):
+    """How a quantity is computed, compared and shown.
+
+    Attributes:
+        words: Name in words.
+        unit: SI unit.
+        shown: Unit for people, and its size in SI.
+        best: Whether the most or the least is best.
+        directed: Whether it belongs to a direction.
+    """
+
+    words: str
+    unit: str
+    shown: tuple[str, float]
+    best: Literal["most", "least"]
+    directed: bool = False
+
+
+_ONE = ("", 1.0)
+_MM = ("mm", 1e-3)
+_STIFF = ("N/mm", 1e3)
+
+KINDS: Final[dict[str, Kind]] = {
+    "stiffness": Kind("least stiffness along", "N/m", _STIFF, "most", directed=True),
+    "softest": Kind("least stiffness in any direction", "N/m", _STIFF, "most"),
+    "isotropy": Kind("least isotropy", "1", _ONE, "most"),
+    "margin": Kind("least eigenvalue of K", "N m/rad", ("N m/rad", 1.0), "most"),
+    "deflection": Kind("largest deflection under the load", "m", _MM, "least"),
+    "motor_force": Kind("largest tension", "N", ("N", 1.0), "least"),
+    "payload": Kind("least payload along", "N", ("N", 1.0), "most", directed=True),
+    "tension_factor": Kind("least tension factor", "1", _ONE, "most"),
+    "cable_clearance": Kind("least clearance between cables", "m", _MM, "most"),
+    "link_clearance": Kind("least clearance of links", "m", _MM, "most"),
+    "disk_clearance": Kind("least clearance of disks", "m", _MM, "most"),
+    "workspace": Kind("volume around the tips held", "m3", ("dm³", 1e-3), "most"),
+    "held": Kind("share of postures held", "1", ("%", 1e-2), "most"),
+    "mass": Kind("mass of the links", "kg", ("kg", 1.0), "least"),
+    "length": Kind("length", "m", _MM, "most"),
+    "cables": Kind("number of cables", "1", _ONE, "least"),
+    "wire_length": Kind("wire, leads included", "m", ("m", 1.0), "least"),
+}
+"""Quantities of a design. Over postures and loads, the worst one counts."""
+
+
+@dataclass(frozen=True)
+class Measure:
+    """A quantity of a design.
+
+    Attributes:
+        of: Name of the quantity, a key of :data:`KINDS`.
+        direction: Direction of a stiffness or a payload: an axis such as ``"-z"``, or (3,); else
+            None.
+    """
+
+    of: MeasureName
+    direction: Direction | None = None
+
+    def __post_init__(self) -> None:
+        one_of("measure", self.of, get_args(MeasureName))
+        if (self.direction is None) == KINDS[self.of].directed:
+            raise InvalidInput(
+                "direction",
+                f"is needed for {self.of}."
+                if self.direction is None
+                else f"has no meaning for {self.of}.",
+            )
+        if self.direction is not None:
+            u = unit_direction("direction", self.direction)
+            self.__dict__.update(direction=tuple(u.tolist()))
+
+    @property
+    def key(self) -> str:
+        """Name of its column: ``mass``, ``stiffness (0, 0, 1)``."""
+        if self.direction is None:
+            return self.of
+        return f"{self.of} {coordinates(self.direction, '.3g')}"  # type: ignore[arg-type]
+
+    @property
+    def words(self) -> str:
+        """The quantity in words."""
+        words = KINDS[self.of].words
+        along = "" if self.direction is None else f" {self.key.removeprefix(self.of + ' ')}"
+        return words + along
+
+    @property
+    def unit(self) -> tuple[str, float]:
+        """Unit for people, and its size in SI."""
+        return KINDS[self.of].shown
+
+    def shown(self, value: float) -> str:
+        """Return a value in people's units."""
+        unit, size = self.unit
+        return f"{value / size:.4g} {unit}".rstrip()
+
+
+@final
+@dataclass(frozen=True)
+class Objective(Measure):
+    """A quantity that a search makes best.
+
+    Attributes:
+        of: ``"stiffness"``, ``"softest"``, ``"isotropy"``, ``"margin"``, ``"deflection"``,
+            ``"motor_force"``, ``"payload"``, ``"tension_factor"``, ``"cable_clearance"``,
+            ``"link_clearance"``, ``"disk_clearance"``, ``"workspace"``, ``"held"``, ``"mass"``,
+            ``"length"``, ``"cables"`` or ``"wire_length"``. Of all postures and loads, the worst
+            counts. ``deflection`` is |C_vv f| for the force f of the load, to first order; the
+            ``workspace`` is the volume of the hull of all tips that are held.
+        direction: u of ``stiffness`` and ``payload``: an axis such as ``"-z"``, or (3,).
+        goal: ``"most"`` or ``"least"``; None: what is usual, e.g. the most stiffness.
+
+    Raises:
+        UnknownName: ``of`` or ``goal`` is unknown.
+        InvalidInput: ``direction`` is missing or has no meaning.
+    """
+
+    goal: Literal["most", "least"] | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        goal = KINDS[self.of].best if self.goal is None else self.goal
+        one_of("goal", goal, ("most", "least"))
+        self.__dict__.update(goal=goal)
+
+    @property
+    def sign(self) -> float:
+        """−1 if the most is wanted, else 1: the sign with which searches make it least."""
+        return -1.0 if self.goal == "most" else 1.0
+
+
+@final
+@dataclass(frozen=True)
+class Constraint(Measure):
+    """A quantity that must stay above or below a limit at all postures and loads.
+
+    Attributes:
+        of: As for :class:`Objective`.
+        direction: As for :class:`Objective`.
+        at_least: Smallest value allowed, in SI: [N/m], [N m/rad], [m], [N], [kg] or [-]; or None.
+        at_most: Largest value allowed, in SI, or None.
+
+    Raises:
+        UnknownName: ``of`` is unknown.
+        InvalidInput: No limit is given, or two; or ``direction`` is missing or has no meaning.
+    """
+
+    at_least: float | None = None
+    at_most: float | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if (self.at_least is None) == (self.at_most is None):
+            raise InvalidInput(self.of, "needs at_least or at_most, one of them.")
+        for name in ("at_least", "at_most"):
+            given = getattr(self, name)
+            if given is not None:
+                self.__dict__[name] = scalar(f"{self.of}.{name}", given)
+
+    @property
+    def limit(self) -> float:
+        """The limit."""
+        limit = self.at_most if self.at_least is None else self.at_least
+        assert limit is not None
+        return limit
+
+    @property
+    def asked(self) -> str:
+        """What is asked, in words."""
+        which = "at most" if self.at_least is None else "at least"
+        return f"{which} {self.shown(self.limit)}"
+
+    def violation(self, value: float) -> float:
+        """Return by how much a value misses the limit, over the limit [-]; 0 if it does not."""
+        short = self.limit - value if self.at_least is not None else value - self.limit
+        size = abs(self.limit) or KINDS[self.of].shown[1]
+        return max(short / size, 0.0) if short == short else float("inf")

@@ -1,0 +1,75 @@
+"""Why no design meets all constraints: the nearest design, and what it misses by how much."""
+
+from __future__ import annotations
+
+import warnings
+from typing import NoReturn
+
+import numpy as np
+
+from cdsm.design.evaluation import Designs
+from cdsm.design.goals import KINDS
+from cdsm.errors import CdsmError, CdsmWarning, InfeasibleDesign
+from cdsm.stiffness_matrix import stiffness
+from cdsm.support.format import plural
+from cdsm.tension import distribute_tension
+
+
+def explain(designs: Designs) -> NoReturn:
+    """Raise InfeasibleDesign for the design that misses the constraints by least in sum."""
+    problem, missed = designs.problem, designs.violations
+    total = np.where(np.isfinite(missed), missed, np.inf).sum(axis=1)
+    arms = np.array([not fault for fault in designs.faults])
+    if not arms.any():
+        raise InfeasibleDesign(
+            f"none of {plural(len(designs), 'design')} is an arm: {designs.faults[0]}", (), ()
+        )
+    total[~arms] = np.inf
+    order = np.lexsort((np.nan_to_num(missed, posinf=1e9).sum(axis=1), total))
+    best = int(next(i for i in order if arms[i]))
+    row, values = designs.designs[best], designs.values[best]
+    chosen = [
+        f"{each.name} {each.shown(value)}"
+        for each, value in zip(problem.variables, problem.values(row), strict=True)
+    ]
+    said, names = [], []
+    if missed[best, 0] > 0.0:
+        names.append("held")
+        said.append(
+            f"{100.0 * missed[best, 0]:.3g} % of its postures and loads are not held: "
+            + _first_reason(designs, best)
+        )
+    keys = [each.key for each in problem.measures]
+    for constraint, miss in zip(problem.constraints, missed[best, 1:], strict=True):
+        if miss > 0.0:
+            value = float(values[keys.index(constraint.key)])
+            names.append(constraint.key)
+            is_now = "does not exist" if np.isnan(value) else constraint.shown(value)
+            far = f", {100.0 * miss:.3g} % off" if np.isfinite(miss) else ""
+            said.append(f"{constraint.words} {is_now}, {constraint.asked} is asked{far}")
+    raise InfeasibleDesign(
+        f"none of {plural(len(designs), 'design')} meets all constraints. The nearest one "
+        f"({', '.join(chosen)}) misses: {'; '.join(said)}. Loosen what it misses, widen a "
+        "variable, or search longer.",
+        tuple(names),
+        tuple(row.tolist()),
+    )
+
+
+def _first_reason(designs: Designs, best: int) -> str:
+    """Return why the first posture that is not held is not."""
+    problem, row = designs.problem, designs.designs[best]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", CdsmWarning)
+        arm = problem.arm_of(row)
+    minimum = problem.minimum_of(row)
+    for n, q in enumerate(problem.postures_of(arm)):
+        for load in problem.loads:
+            try:
+                pose = arm.at(q)
+                K = stiffness(pose, distribute_tension(pose, minimum, problem.maximum, load))
+            except CdsmError as error:
+                return f"posture {n}: {error}"
+            if not K.is_stable:
+                return f"posture {n}: UNSTABLE, {KINDS['margin'].words} {K.margin:.3g} N m/rad"
+    return "its tensions are at the edge"

@@ -1,0 +1,261 @@
+"""A design problem as a frozen value: what may change, what is wanted, where and under what."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cdsm.cable import serpentine_cables
+from cdsm.design.goals import Constraint, Measure, Objective
+from cdsm.design.variables import WHOLE, Value, Variable, changed, check, present
+from cdsm.errors import InvalidInput
+from cdsm.manipulator import Manipulator
+from cdsm.support.format import plural
+from cdsm.support.validation import instance, number_array, scalar, sequence_of
+from cdsm.support.values import Array, ReadOnlyState, frozen
+from cdsm.sweeps.poses import PoseSet, poses_of
+from cdsm.tension import checked_bounds
+from cdsm.tolerance import Tolerances
+from cdsm.wires.catalogue import as_wire
+
+MISSED = "held"
+"""The requirement of every problem that does not ask for a share: all postures are held."""
+
+
+@final
+@dataclass(frozen=True, eq=False, kw_only=True)
+class DesignProblem(ReadOnlyState):
+    """What of an arm may change, and what is wanted of it; any search works on this value.
+
+    A posture is held if tensions within the bounds balance the arm under the load, and K_θ is then
+    positive definite. A design must hold all postures under all loads, unless an objective or a
+    constraint is on ``held`` or ``workspace``.
+
+    Attributes:
+        arm: The arm that is changed; it was made from a Geometry.
+        variables: What may change.
+        objectives: What is made best; one or more.
+        constraints: What must hold.
+        postures: Joint angles q (P, nv) [rad], or a pose set; its random postures lie within the
+            joint limits of each design.
+        loads: Wrenches W (n, 6) at ``tool0``, base axes: force [N], then moment [N m].
+        minimum: Lower bound of all tensions [N], if it is no variable.
+        maximum: Upper bound of all tensions [N].
+        diameter: Diameter of the cables [m], for clearances.
+        tolerances: Tolerances of every design; constraints on ``stiffness``, ``margin`` and
+            ``motor_force`` must then hold with a margin of ``coverage`` standard uncertainties.
+        coverage: k of that margin [-].
+
+    Raises:
+        InvalidInput: An argument is invalid; two variables change the same thing; the arm was made
+            from a URDF.
+        UnknownName: The arm does not have a cable that is named.
+    """
+
+    arm: Manipulator
+    variables: tuple[Variable, ...]
+    objectives: tuple[Objective, ...]
+    postures: PoseSet | Array
+    constraints: tuple[Constraint, ...] = ()
+    loads: Array = field(default_factory=lambda: np.zeros((1, 6)))
+    minimum: float = 10.0
+    maximum: float = math.inf
+    diameter: float = 0.0
+    tolerances: Tolerances | None = None
+    coverage: float = 2.0
+
+    def __post_init__(self) -> None:
+        geometry = instance("arm", self.arm, Manipulator).geometry  # raises without one
+        variables = sequence_of("variables", self.variables, Variable)
+        objectives = sequence_of("objectives", self.objectives, Objective)
+        constraints = sequence_of("constraints", self.constraints, Constraint)
+        if not variables or not objectives:
+            raise InvalidInput("variables", "give one variable and one objective or more.")
+        for variable in variables:
+            check(variable, geometry)
+        for name, count in Counter(variable.name for variable in variables).items():
+            if count > 1:
+                raise InvalidInput("variables", f"{name} is named twice.")
+        kinds = {variable.of for variable in variables}
+        if "cables_per_joint" in kinds and kinds & {"end", "hole_angle"}:
+            raise InvalidInput(
+                "variables", "cables_per_joint replaces the cables that end or hole_angle name."
+            )
+        loads = np.atleast_2d(number_array("loads", self.loads, "wrench"))
+        if loads.ndim != 2 or loads.shape[1] != 6 or not len(loads):
+            raise InvalidInput("loads", f"shape {loads.shape} given, (n, 6) needed.")
+        postures = self.postures
+        if not isinstance(postures, PoseSet):
+            postures = frozen(number_array("postures", postures))
+        poses_of(self.arm, postures)  # raises for a wrong shape
+        checked_bounds(self.arm, self.minimum, self.maximum)
+        if (
+            any(measure.of == "deflection" for measure in (*objectives, *constraints))
+            and not loads[:, :3].any(axis=1).all()
+        ):
+            raise InvalidInput("loads", "deflection needs a force in every load.")
+        if self.tolerances is not None:
+            instance("tolerances", self.tolerances, Tolerances)
+        self.__dict__.update(
+            variables=variables,
+            objectives=objectives,
+            constraints=constraints,
+            loads=frozen(loads),
+            postures=postures,
+            coverage=scalar("coverage", self.coverage),
+        )
+
+    @cached_property
+    def measures(self) -> tuple[Measure, ...]:
+        """All quantities that are asked for, each once, and the share of postures held."""
+        asked = {each.key: each for each in (*self.objectives, *self.constraints)}
+        asked.setdefault(MISSED, Measure("held"))
+        return tuple(Measure(each.of, each.direction) for each in asked.values())
+
+    @property
+    def needs_all(self) -> bool:
+        """Whether every posture must be held."""
+        return not any(
+            each.of in ("held", "workspace") for each in (*self.objectives, *self.constraints)
+        )
+
+    @cached_property
+    def bounds(self) -> Array:
+        """Smallest and largest number of each variable (n, 2); of choices their index."""
+        return frozen(
+            np.array(
+                [
+                    (0.0, len(each.choices) - 1.0) if each.choices else (each.low, each.high)
+                    for each in self.variables
+                ],
+                dtype=np.float64,
+            )
+        )
+
+    @property
+    def is_continuous(self) -> bool:
+        """Whether all variables take all values of a range."""
+        return all(variable.is_continuous for variable in self.variables)
+
+    def values(self, design: ArrayLike) -> tuple[Value, ...]:
+        """Return the value of each variable in a design (n,); raises InvalidInput if outside.
+
+        Args:
+            design: One number for each variable: its value in SI, or the index of its choice.
+
+        Raises:
+            InvalidInput: ``design`` is not (n,) numbers, or one is outside its range.
+        """
+        x = number_array("design", design)
+        low, high = self.bounds.T
+        if x.shape != low.shape:
+            raise InvalidInput("design", f"shape {x.shape} given, {low.shape} needed.")
+        found: list[Value] = []
+        for variable, number, a, b in zip(self.variables, x.tolist(), low, high, strict=True):
+            if not a <= number <= b:
+                raise InvalidInput(
+                    "design", f"{variable.name} = {number:g} is outside {a:g} to {b:g}."
+                )
+            if variable.choices:
+                found.append(variable.choices[round(number)])
+            else:
+                found.append(round(number) if variable.of in WHOLE else number)
+        return tuple(found)
+
+    def arm_of(self, design: ArrayLike) -> Manipulator:
+        """Build the arm of a design (n,).
+
+        Args:
+            design: As for :meth:`values`.
+
+        Raises:
+            InvalidInput: As for :meth:`values`.
+            GeometryError: The values do not make an arm; lists every fault.
+        """
+        new = changed(self.arm.geometry, self.variables, self.values(design))
+        old = self.arm.cables
+        law = None if new.wire is None else as_wire(new.wire)
+        routed = serpentine_cables(new.geometry, law or old[0].elasticity)
+        like = old if len(routed) == len(old) else (old[0],) * len(routed)
+        cables = [
+            replace(
+                kept,
+                name=cable.name,
+                sites=cable.sites,
+                lead=cable.lead,
+                elasticity=law or kept.elasticity,
+            )
+            for cable, kept in zip(routed, like, strict=True)
+        ]
+        return Manipulator(
+            new.geometry,
+            cables=cables,
+            gravity=self.arm.gravity,
+            original_length=self.arm.original_length,
+        )
+
+    def minimum_of(self, design: ArrayLike) -> float:
+        """Return the lower bound of the tensions [N] of a design (n,).
+
+        Args:
+            design: As for :meth:`values`.
+
+        Raises:
+            InvalidInput: As for :meth:`values`.
+        """
+        for variable, value in zip(self.variables, self.values(design), strict=True):
+            if variable.of == "minimum":
+                return float(value)
+        return float(self.minimum)
+
+    def postures_of(self, arm: Manipulator) -> Array:
+        """Return the postures q (P, nv) [rad] of the arm of a design.
+
+        Args:
+            arm: The arm.
+
+        Raises:
+            InvalidInput: The pose set does not belong to such an arm.
+        """
+        poses = poses_of(arm, self.postures)
+        return poses.angles({dim: slice(0, size) for dim, size in poses.sizes.items()})
+
+    @cached_property
+    def start(self) -> Array | None:
+        """The design (n,) [m, rad, N, -] of the given arm; None if it is none of this problem."""
+        found = []
+        for variable, (low, high) in zip(self.variables, self.bounds.tolist(), strict=True):
+            value: Value | None = present(variable, self.arm.geometry, self.minimum)
+            if variable.of == "wire":
+                now = self.arm.cables[0].elasticity
+                value = next((c for c in variable.choices if as_wire(c) == now), None)
+            if variable.choices and value is not None:
+                value = variable.choices.index(value) if value in variable.choices else None
+            if value is None or isinstance(value, str) or not low <= value <= high:
+                return None
+            found.append(float(value))
+        return frozen(np.array(found))
+
+    def __str__(self) -> str:
+        lines = [
+            f"{self.arm.name}: {plural(len(self.variables), 'variable')}, "
+            f"{plural(len(self.loads), 'load')}"
+        ]
+        lines += [
+            f"  {each.name}: "
+            + (
+                ", ".join(map(each.shown, each.choices))
+                if each.choices
+                else f"{each.shown(each.low or 0.0)} to {each.shown(each.high or 0.0)}"
+            )
+            for each in self.variables
+        ]
+        lines += [f"  {each.goal}: {each.words}" for each in self.objectives]
+        lines += [f"  {each.words}: {each.asked}" for each in self.constraints]
+        return "\n".join(lines)

@@ -1,0 +1,188 @@
+"""PROBLEM.toml: a design problem and its search in one file, in people's units where named so."""
+
+from __future__ import annotations
+
+import math
+import os
+from pathlib import Path
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+from pydantic import Field
+
+from cdsm.design.goals import Constraint, Objective
+from cdsm.design.problem import DesignProblem
+from cdsm.design.variables import Variable
+from cdsm.errors import CdsmError, FileError, GeometryError, counted
+from cdsm.manipulator import Manipulator
+from cdsm.support.files import read_text
+from cdsm.support.records import Integer, Number, parse, read_toml, record
+from cdsm.sweeps.poses import GridPoses, PoseSet, RandomPoses
+from cdsm.tolerance import Tolerances
+
+
+@record
+class _Variable:
+    of: str
+    low: Number | None = None
+    high: Number | None = None
+    joint: Integer | None = None
+    cable: str | None = None
+    choices: Annotated[tuple[Any, ...], Field(strict=False)] = ()
+
+
+@record
+class _Objective:
+    of: str
+    direction: Any = None
+    goal: str | None = None
+
+
+@record
+class _Constraint:
+    of: str
+    direction: Any = None
+    at_least: Number | None = None
+    at_most: Number | None = None
+
+
+@record
+class _Postures:
+    random: Integer | None = None
+    seed: Integer = 0
+    grid: dict[str, Any] | None = None
+    angles: Any = None
+
+
+@record
+class _Search:
+    generations: Integer = 40
+    population: Integer = 40
+    seed: Integer = 0
+
+
+@record
+class _File:
+    arm: str
+    postures: _Postures
+    variables: Annotated[tuple[_Variable, ...], Field(strict=False, min_length=1)]
+    objectives: Annotated[tuple[_Objective, ...], Field(strict=False, min_length=1)]
+    constraints: Annotated[tuple[_Constraint, ...], Field(strict=False)] = ()
+    loads: Any = None
+    minimum: Number = 10.0
+    maximum: Number | None = None
+    diameter: Number = 0.0
+    tolerances: str | None = None
+    coverage: Number = 2.0
+    search: _Search = Field(default_factory=lambda: _Search())
+
+
+class ProblemFile(NamedTuple):
+    """A problem and the search that its file asks for.
+
+    Attributes:
+        problem: The problem.
+        generations: Number of generations.
+        population: Number of designs in each.
+        seed: Seed.
+    """
+
+    problem: DesignProblem
+    generations: int
+    population: int
+    seed: int
+
+
+def read_problem(path: str | os.PathLike[str]) -> ProblemFile:
+    """Read a design problem from a PROBLEM.toml; all in SI: m, rad, N, N/m, kg.
+
+    ``arm`` is an ARM.toml, from the folder of the file. ``[postures]`` has ``random`` (a number,
+    and ``seed``), ``grid`` (angles [rad] by joint) or ``angles`` (a list of postures). ``loads`` is
+    a list of wrenches (6 numbers) or forces (3). ``[[variables]]``, ``[[objectives]]`` and
+    ``[[constraints]]`` have the attributes of :class:`Variable` (``joint`` or ``cable`` for
+    ``at``), :class:`Objective` and :class:`Constraint`. ``tolerances`` is a file of
+    :class:`Tolerances`; ``minimum``, ``maximum``, ``diameter`` and ``coverage`` are as for
+    :class:`DesignProblem`. ``[search]`` has ``generations``, ``population`` and ``seed``.
+
+    Args:
+        path: The file; ``examples/design.toml`` is one with comments.
+
+    Raises:
+        FileError: The file, or one that it names, cannot be read, or is no problem; lists every
+            fault.
+    """
+    text = read_text(path)
+    folder = Path(path).parent
+    faults: tuple[str, ...] | list[str]
+    try:
+        file = parse(_File, read_toml(text))
+        return ProblemFile(
+            _problem(file, folder),
+            file.search.generations,
+            file.search.population,
+            file.search.seed,
+        )
+    except GeometryError as error:
+        faults = error.faults
+    except FileError:
+        raise
+    except CdsmError as error:
+        faults = [str(error)]
+    raise FileError(path, f"is no design problem, {counted(faults)}")
+
+
+def _problem(file: _File, folder: Path) -> DesignProblem:
+    parts: dict[str, list[Any]] = {"variables": [], "objectives": [], "constraints": []}
+    faults = []
+    for name, kept in parts.items():
+        for i, entry in enumerate(getattr(file, name), start=1):
+            try:
+                kept.append(_built(entry))
+            except CdsmError as error:
+                faults.append(f"{name}[{i}]: {error}")
+    try:
+        postures = _postures(file.postures)
+    except CdsmError as error:
+        faults.append(f"postures: {error}")
+    if faults:
+        raise GeometryError(faults)
+    arm = Manipulator.read(folder / file.arm)
+    tolerances = None if file.tolerances is None else Tolerances.read(folder / file.tolerances)
+    return DesignProblem(
+        arm=arm,
+        **{name: tuple(kept) for name, kept in parts.items()},
+        postures=postures,
+        loads=_loads(file.loads),
+        minimum=file.minimum,
+        maximum=math.inf if file.maximum is None else file.maximum,
+        diameter=file.diameter,
+        tolerances=tolerances,
+        coverage=file.coverage,
+    )
+
+
+def _built(entry: Any) -> Any:
+    if isinstance(entry, _Variable):
+        at = entry.cable if entry.joint is None else entry.joint
+        return Variable(entry.of, entry.low, entry.high, at, entry.choices)  # type: ignore[arg-type]
+    if isinstance(entry, _Objective):
+        return Objective(entry.of, entry.direction, entry.goal)  # type: ignore[arg-type]
+    return Constraint(entry.of, entry.direction, entry.at_least, entry.at_most)
+
+
+def _postures(entry: _Postures) -> PoseSet | Any:
+    given = [entry.random, entry.grid, entry.angles]
+    if sum(each is not None for each in given) != 1:
+        raise GeometryError(["give one of random, grid and angles"])
+    if entry.random is not None:
+        return RandomPoses(entry.random, entry.seed)
+    return GridPoses(entry.grid) if entry.grid is not None else entry.angles
+
+
+def _loads(given: Any) -> Any:
+    if given is None:
+        return np.zeros((1, 6))
+    rows = given if isinstance(given, list) and given and isinstance(given[0], list) else [given]
+    return [
+        [*row, 0.0, 0.0, 0.0] if isinstance(row, list) and len(row) == 3 else row for row in rows
+    ]

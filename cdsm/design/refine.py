@@ -1,0 +1,198 @@
+"""Refinement of a design by SLSQP of scipy, with exact derivatives."""
+
+from __future__ import annotations
+
+import math
+from contextlib import suppress
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cdsm.design.evaluation import evaluate_designs
+from cdsm.design.goals import KINDS, Measure
+from cdsm.design.gradients import SMOOTH, rows_and_gradients
+from cdsm.design.infeasible import explain
+from cdsm.design.problem import DesignProblem
+from cdsm.design.result import DesignProgress, DesignSearch
+from cdsm.design.search import pareto
+from cdsm.errors import CdsmError, InvalidInput
+from cdsm.support.validation import instance, whole_number
+from cdsm.support.values import Array, frozen
+
+_SAFE = 1e-7
+"""Relative distance that a refined design keeps from each limit, so that rounding breaks none."""
+
+
+_ROUNDS = 2
+"""Number of times that a design is improved and then brought inside its limits."""
+
+
+class _Rows(NamedTuple):
+    """Values (R,) and derivatives (R, n) of a measure over its size."""
+
+    values: Array
+    slopes: Array
+
+
+def refine_design(
+    problem: DesignProblem, start: ArrayLike | None = None, *, iterations: int = 100
+) -> DesignSearch:
+    """Improve a design of continuous variables by SLSQP (Kraft, 1988), with exact derivatives.
+
+    The worst posture counts, so the problem solved is smooth: min t with t ≥ the objective at every
+    posture and load, and every constraint at every posture and load. The result is a minimum near
+    the start; see :func:`search_designs` for the whole range.
+
+    Args:
+        problem: The problem; its variables are continuous, it has one objective, and all quantities
+            are of ``stiffness``, ``margin``, ``deflection``, ``motor_force``, ``mass`` and
+            ``length``, the usual goals.
+        start: Design (n,) [m, rad, N] to begin with; None: the given arm.
+        iterations: Maximum number of iterations.
+
+    Raises:
+        InvalidInput: The problem is not of this kind, or ``start`` is missing or outside the
+            ranges.
+        InfeasibleDesign: No design met all constraints; see :func:`search_designs`.
+    """
+    from scipy.optimize import minimize
+
+    instance("problem", problem, DesignProblem)
+    whole_number("iterations", iterations, 1)
+    _check(problem)
+    begin = problem.start if start is None else np.asarray(start, dtype=np.float64)
+    if begin is None:
+        raise InvalidInput("start", "is needed: the given arm is outside the ranges.")
+    problem.values(begin)
+    low, high = problem.bounds.T
+    size = high - low
+    objective = problem.objectives[0]
+    first = rows_and_gradients(problem, begin, objective)[0]
+    scale = float(abs(first).max()) or 1.0
+    known: dict[bytes, dict[str, _Rows]] = {}
+    visited: list[Array] = []
+
+    def at(z: Array) -> dict[str, _Rows]:
+        key = z[:-1].tobytes()
+        if key not in known:
+            x = np.clip(low + size * z[:-1], low, high)
+            visited.append(x)
+            known[key] = _all_rows(problem, x, size)
+        return known[key]
+
+    def slack(z: Array) -> Array:
+        rows = at(z)
+        parts = [z[-1] - objective.sign * rows[objective.key].values / scale]
+        for each in problem.constraints:
+            sign = 1.0 if each.at_most is None else -1.0
+            bound = abs(each.limit) or KINDS[each.of].shown[1]
+            parts.append(sign * (rows[each.key].values - each.limit) / bound - _SAFE)
+        return np.concatenate(parts)
+
+    def slope(z: Array) -> Array:
+        rows = at(z)
+        of = rows[objective.key].slopes
+        parts = [np.column_stack([-objective.sign * of / scale, np.ones(len(of))])]
+        for each in problem.constraints:
+            sign = 1.0 if each.at_most is None else -1.0
+            bound = abs(each.limit) or KINDS[each.of].shown[1]
+            of = rows[each.key].slopes
+            parts.append(np.column_stack([sign * of / bound, np.zeros(len(of))]))
+        return np.vstack(parts)
+
+    def limits(y: Array) -> Array:
+        return slack(np.append(y, 0.0))[len(first) :]
+
+    def limit_slopes(y: Array) -> Array:
+        return slope(np.append(y, 0.0))[len(first) :, :-1]
+
+    y = (begin - low) / size
+    inside = [(0.0, 1.0)] * len(size)
+    up = np.append(np.zeros(len(size)), 1.0)
+    # a step may lead where no tensions balance; the best before counts
+    with suppress(_LeftTheArm):
+        for _ in range(_ROUNDS):
+            worst = float((objective.sign * at(np.append(y, 0.0))[objective.key].values).max())
+            found = minimize(
+                lambda z: z[-1],
+                np.append(y, worst / scale),
+                jac=lambda z: up,
+                bounds=[*inside, (None, None)],
+                constraints={"type": "ineq", "fun": slack, "jac": slope},
+                method="SLSQP",
+                options={"maxiter": iterations, "ftol": 1e-9},
+            )
+            # where the worst posture or the cables at a bound change, SLSQP may end a little
+            # outside: the nearest design inside is close
+            y = ended = found.x[:-1]
+            if problem.constraints:
+                y = minimize(
+                    lambda y, to: 0.5 * float((y - to) @ (y - to)),
+                    ended,
+                    (ended,),
+                    jac=lambda y, to: y - to,
+                    bounds=inside,
+                    constraints={"type": "ineq", "fun": limits, "jac": limit_slopes},
+                    method="SLSQP",
+                    options={"maxiter": iterations, "ftol": 1e-16},
+                ).x
+    return _finished(problem, visited)
+
+
+class _LeftTheArm(Exception):
+    """A step to a design that holds not all postures."""
+
+
+def _all_rows(problem: DesignProblem, x: Array, size: Array) -> dict[str, _Rows]:
+    """Return all quantities and their derivatives by the scaled variables."""
+    found: dict[str, _Rows] = {}
+    for each in (*problem.objectives, *problem.constraints):
+        if each.key not in found:
+            try:
+                values, slopes = rows_and_gradients(problem, x, Measure(each.of, each.direction))
+            except CdsmError as error:
+                raise _LeftTheArm from error
+            found[each.key] = _Rows(values, slopes * size)
+    return found
+
+
+def _finished(problem: DesignProblem, visited: list[Array]) -> DesignSearch:
+    """Return the best feasible design that was visited."""
+    whole = evaluate_designs(problem, np.array(visited), progress=False)
+    front = pareto(whole)
+    if not len(front):
+        explain(whole)
+    objective = problem.objectives[0]
+    goals = np.where(whole.feasible == 1.0, objective.sign * whole[objective.key], math.inf)
+    history = tuple(
+        DesignProgress(
+            i + 1,
+            i + 1,
+            int(whole.feasible[: i + 1].sum()),
+            float(objective.sign * goals[: i + 1].min()),
+            float(whole.violations[: i + 1].sum(axis=1).min()),
+        )
+        for i in range(len(whole))
+    )
+    return DesignSearch(
+        problem=problem, seed=0, evaluated=whole, front=frozen(front), history=history
+    )
+
+
+def _check(problem: DesignProblem) -> None:
+    for variable in problem.variables:
+        if not variable.is_continuous:
+            raise InvalidInput("problem", f"{variable.name} is not continuous; use search_designs.")
+    if len(problem.objectives) != 1:
+        raise InvalidInput("problem", "has several objectives; leave one, or use search_designs.")
+    if problem.tolerances is not None:
+        raise InvalidInput("problem", "has tolerances; use search_designs.")
+    objective = problem.objectives[0]
+    if objective.goal != KINDS[objective.of].best:
+        raise InvalidInput("problem", f"{objective.of} at its {objective.goal} is not smooth.")
+    for each in (*problem.objectives, *problem.constraints):
+        if each.of not in SMOOTH:
+            raise InvalidInput(
+                "problem", f"{each.of} has no exact derivatives; use search_designs."
+            )

@@ -1,0 +1,240 @@
+"""Results of a search: the front, tables and pictures of it, and files for the chosen arm."""
+
+from __future__ import annotations
+
+import csv
+import io
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cdsm.design.evaluation import Designs
+from cdsm.design.goals import KINDS
+from cdsm.design.problem import DesignProblem
+from cdsm.design.workshop import cable_table, hole_table
+from cdsm.interchange.mjcf import write_mjcf
+from cdsm.manipulator import Manipulator
+from cdsm.support.files import make_folder, write_text
+from cdsm.support.format import aligned, plain, plural
+from cdsm.support.tidy import data_frame
+from cdsm.support.validation import whole_number
+from cdsm.support.values import Array, ReadOnlyState
+from cdsm.urdf import write_urdf
+
+if TYPE_CHECKING:
+    import pandas
+    from matplotlib.figure import Figure
+
+_PRINTED = 20
+"""Number of designs that a printed table shows."""
+
+
+class DesignProgress(NamedTuple):
+    """The best of a search so far.
+
+    Attributes:
+        generation: Number of the generation, from 1.
+        designs: Number of designs that were evaluated.
+        feasible: Number of these that meet all constraints.
+        best: Best value of the first objective, in SI; while none is feasible, of the nearest one.
+        missed: Smallest sum of violations [-].
+    """
+
+    generation: int
+    designs: int
+    feasible: int
+    best: float
+    missed: float
+
+
+@final
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class DesignSearch(ReadOnlyState):
+    """Best designs of a problem; made by :func:`search_designs` and :func:`refine_design`.
+
+    Attributes:
+        problem: The problem.
+        seed: Seed of the search.
+        evaluated: All designs that were evaluated.
+        front: Those that no other beats in all objectives (n,), as indices; the best in the first
+            objective first.
+        history: The best so far after each generation.
+    """
+
+    problem: DesignProblem
+    seed: int
+    evaluated: Designs
+    front: NDArray[np.intp]
+    history: tuple[DesignProgress, ...]
+
+    @property
+    def compromise(self) -> int:
+        """Number on the front of the design nearest to the best of every objective.
+
+        Distances are over the range of each objective on the front.
+        """
+        goals = self._goals
+        size = np.ptp(goals, axis=0)
+        scaled = (goals - goals.min(axis=0)) / np.where(size > 0.0, size, 1.0)
+        return int(np.linalg.norm(scaled, axis=1).argmin())
+
+    @property
+    def _goals(self) -> Array:
+        objectives = self.problem.objectives
+        every = [each.sign * self.evaluated[each.key][self.front] for each in objectives]
+        return np.column_stack(every)
+
+    def design(self, number: int | None = None) -> Array:
+        """Return a design (n,) of the front [m, rad, N, -]; None: the compromise.
+
+        Args:
+            number: Its number on the front, from 0.
+
+        Raises:
+            InvalidInput: The front has no such number.
+        """
+        return np.asarray(self.evaluated.designs[self.front[self._number(number)]])
+
+    def arm(self, number: int | None = None) -> Manipulator:
+        """Build the arm of a design of the front; None: the compromise.
+
+        Args:
+            number: Its number on the front, from 0.
+
+        Raises:
+            InvalidInput: The front has no such number.
+        """
+        return self.problem.arm_of(self.design(number))
+
+    def values(self, number: int | None = None) -> dict[str, float]:
+        """Return all quantities of a design of the front by name, in SI; None: the compromise.
+
+        Args:
+            number: Its number on the front, from 0.
+
+        Raises:
+            InvalidInput: The front has no such number.
+        """
+        row = self.evaluated.values[self.front[self._number(number)]]
+        keys = [each.key for each in self.problem.measures]
+        return dict(zip(keys, row.tolist(), strict=True))
+
+    def _number(self, number: int | None) -> int:
+        if number is None:
+            return self.compromise
+        return whole_number("number", number, 0, len(self.front) - 1)
+
+    def write_arm(self, folder: str | os.PathLike[str], number: int | None = None) -> list[Path]:
+        """Write a design as ``arm.toml``, ``arm.urdf``, ``arm.xml`` and tables; return their paths.
+
+        ``holes.csv`` has each hole of each disk, ``cables.csv`` each cable with its lengths.
+
+        Args:
+            folder: The folder; it is made.
+            number: Its number on the front, from 0; None: the compromise.
+
+        Raises:
+            InvalidInput: The front has no such number.
+            FileError: A file cannot be written.
+            UrdfError: Two parsers disagree on the URDF.
+        """
+        row = self.design(number)
+        arm, into = self.problem.arm_of(row), make_folder(folder)
+        q = self.problem.postures_of(arm)
+        return [
+            arm.write(into / "arm.toml"),
+            write_urdf(arm.geometry, into / "arm.urdf"),
+            write_mjcf(arm, into / "arm.xml"),
+            write_text(into / "holes.csv", hole_table(arm)),
+            write_text(into / "cables.csv", cable_table(arm, q)),
+        ]
+
+    def to_csv(self) -> str:
+        """Return a table of the front as CSV: variables and all quantities in SI."""
+        out = io.StringIO()
+        table = csv.writer(out, lineterminator="\n")
+        columns = self._columns()
+        table.writerow(["design", *columns])
+        table.writerows([i, *row] for i, row in enumerate(zip(*columns.values(), strict=True)))
+        return out.getvalue()
+
+    def _columns(self) -> dict[str, list[Any]]:
+        """Return a column for each variable and quantity, headed by its unit."""
+        from cdsm.design.variables import UNITS
+
+        rows = [self.problem.values(each) for each in self.evaluated.designs[self.front]]
+        found: dict[str, list[Any]] = {}
+        for variable, column in zip(self.problem.variables, zip(*rows, strict=True), strict=True):
+            unit = UNITS.get(variable.of)
+            found[variable.name + (f" [{unit}]" if unit else "")] = [*column]
+        for each in self.problem.measures:
+            values = self.evaluated[each.key][self.front].tolist()
+            found[f"{each.key} [{KINDS[each.of].unit}]"] = values
+        return found
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """Return the table of the front in SI, a row for each design.
+
+        Raises:
+            MissingExtra: pandas is not installed.
+        """
+        names = [str(i) for i in range(len(self.front))]
+        columns: dict[str, Any] = {name: np.array(c) for name, c in self._columns().items()}
+        return data_frame(columns, "design", names)
+
+    def to_dict(self) -> dict[str, object]:
+        """Return the front and the compromise in SI for JSON, with units in the keys."""
+        numbers = {
+            "designs": len(self.evaluated),
+            "feasible": int(self.evaluated.feasible.sum()),
+            "seed": self.seed,
+            "compromise": self.compromise,
+            "front": self._columns(),
+        }
+        return dict(plain(numbers))
+
+    def plot(self) -> Figure:
+        """Plot two or three objectives of all designs, with the front and the compromise.
+
+        Raises:
+            InvalidInput: The problem has one objective: there is no front; it plots the progress.
+        """
+        from cdsm.plots import plot_designs  # matplotlib imports slowly
+
+        return plot_designs(self)
+
+    def __repr__(self) -> str:
+        return f"<DesignSearch: {plural(len(self.front), 'design')} on the front>"
+
+    def __str__(self) -> str:
+        problem = self.problem
+        keys = [each.key for each in problem.measures]
+        head = ["design", *(v.name for v in problem.variables)]
+        head += [f"{m.key}" for m in problem.measures]
+        rows = []
+        every = range(len(self.front))
+        for i in [*every][:_PRINTED]:
+            row = problem.values(self.design(i))
+            values = self.values(i)
+            rows.append(
+                [
+                    f"{i}{'*' if i == self.compromise else ''}",
+                    *(v.shown(x) for v, x in zip(problem.variables, row, strict=True)),
+                    *(m.shown(values[k]) for m, k in zip(problem.measures, keys, strict=True)),
+                ]
+            )
+        lines = aligned([head, *rows])
+        feasible = int(self.evaluated.feasible.sum())
+        counted = plural(len(self.evaluated), "design")
+        more = f", {_PRINTED} shown" if len(self.front) > _PRINTED else ""
+        return "\n".join(
+            [
+                f"{counted}, {feasible} feasible, {len(self.front)} on the front{more}; * is the "
+                "compromise",
+                *lines,
+            ]
+        )

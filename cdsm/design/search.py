@@ -1,0 +1,216 @@
+"""Search of a design problem by NSGA-II (Deb et al., IEEE T-EC 6, 2002), as pymoo implements it."""
+
+from __future__ import annotations
+
+import math
+import os
+import warnings
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cdsm.design.evaluation import Designs, Found, gathered, violations, workers
+from cdsm.design.infeasible import explain
+from cdsm.design.problem import DesignProblem
+from cdsm.design.result import DesignProgress, DesignSearch
+from cdsm.design.store import Store
+from cdsm.design.variables import WHOLE
+from cdsm.kernels.tree import Indices
+from cdsm.support.extras import need
+from cdsm.support.progress import progress_bar
+from cdsm.support.validation import instance, whole_number
+from cdsm.support.values import Array, frozen
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+_FAR = 1e3
+"""Violation that stands for a design that is no arm, and for a quantity that does not exist."""
+
+
+def search_designs(
+    problem: DesignProblem,
+    *,
+    generations: int = 40,
+    population: int = 40,
+    seed: int = 0,
+    store: str | os.PathLike[str] | None = None,
+    jobs: int = 1,
+    client: Client | None = None,
+    report: Callable[[DesignProgress], None] | None = None,
+    progress: bool = True,
+) -> DesignSearch:
+    """Search the best designs of a problem: all compromises between its objectives (Pareto front).
+
+    NSGA-II of pymoo, for continuous variables, whole numbers and choices together. The first
+    designs are random, and the given arm is one of them if it lies within the ranges. The same
+    problem and the same seed give the same bits, whatever ``jobs``, ``client`` and ``store`` are.
+
+    Args:
+        problem: The problem.
+        generations: Number of generations, the random one included.
+        population: Number of designs in each.
+        seed: Seed of all random numbers.
+        store: File that keeps each evaluated design. A new search with the same arguments goes on
+            from there; one with more generations begins with the same designs.
+        jobs: Number of processes, as for :func:`evaluate_designs`.
+        client: Client of a dask cluster, in the place of processes.
+        report: Is called after each generation with the best so far.
+        progress: Show a bar, if there is a terminal.
+
+    Raises:
+        InfeasibleDesign: No design met all constraints; the error names the nearest one, and which
+            constraint it misses by how much.
+        InvalidInput: An argument is invalid.
+        MissingExtra: pymoo is not installed.
+        FileError: The store cannot be read or written.
+        StoreError: The store belongs to another problem.
+    """
+    instance("problem", problem, DesignProblem)
+    steps = whole_number("generations", generations, 1)
+    size = whole_number("population", population, 4)
+    whole_number("seed", seed, 0)
+    need("design", "pymoo")
+    kept = Store(store, problem)
+    algorithm = _algorithm(problem, size, steps, seed)
+    rows: list[Array] = []
+    found: list[Found] = []
+    history: list[DesignProgress] = []
+    with (
+        workers(problem, jobs, client) as compute,
+        progress_bar("designs", steps * size, wanted=progress, rate=True) as advance,
+    ):
+        for step in range(steps):
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # pymoo and its parts warn of themselves
+                asked = algorithm.ask()
+            if asked is None or not len(asked):
+                break
+            designs = np.array([_numbers(problem, each) for each in asked.get("X")])
+            new = _unknown(kept, designs)
+            kept.add(new, compute(new) if len(new) else ())
+            answers = [kept.get(row) for row in designs]
+            told = [each for each in answers if each is not None]
+            advance(len(designs))
+            _tell(problem, algorithm, asked, designs, told)
+            rows += [*designs]
+            found += told
+            history.append(_best(problem, step, rows, found))
+            if report is not None:
+                report(history[-1])
+    whole = gathered(problem, np.array(rows), found)
+    front = pareto(whole)
+    if not len(front):
+        explain(whole)
+    return DesignSearch(
+        problem=problem,
+        seed=seed,
+        evaluated=whole,
+        front=frozen(front),
+        history=tuple(history),
+    )
+
+
+def pareto(designs: Designs) -> Indices:
+    """Return the feasible designs that no other beats in all objectives, as rows (m,).
+
+    They are in the order of the first objective, the best first; equal ones count once.
+    """
+    problem = designs.problem
+    goals = np.column_stack([each.sign * designs[each.key] for each in problem.objectives])
+    usable = np.flatnonzero((designs.feasible == 1.0) & np.isfinite(goals).all(axis=1))
+    kept: list[int] = []
+    for i in usable.tolist():
+        others = goals[usable]
+        beats = (others <= goals[i]).all(axis=1) & (others < goals[i]).any(axis=1)
+        same = any((goals[k] == goals[i]).all() for k in kept)
+        if not beats.any() and not same:
+            kept.append(i)
+    return np.array(sorted(kept, key=lambda i: tuple(goals[i])), dtype=np.intp)
+
+
+def _unknown(kept: Store, designs: Array) -> Array:
+    """Return the designs that are not evaluated yet, each once."""
+    new = {row.tobytes(): row for row in designs if kept.get(row) is None}
+    return np.array([*new.values()]).reshape(-1, designs.shape[1])
+
+
+def _best(
+    problem: DesignProblem, step: int, rows: list[Array], found: list[Found]
+) -> DesignProgress:
+    values = np.array([each.values for each in found])
+    missed = violations(problem, values).sum(axis=1)
+    feasible = missed == 0.0
+    first = problem.objectives[0]
+    column = [each.key for each in problem.measures].index(first.key)
+    goal = np.where(feasible, first.sign * values[:, column], math.inf)
+    best = int(goal.argmin()) if feasible.any() else int(missed.argmin())
+    value = float(values[best, column])
+    return DesignProgress(step + 1, len(rows), int(feasible.sum()), value, float(missed.min()))
+
+
+def _algorithm(problem: DesignProblem, population: int, generations: int, seed: int) -> Any:
+    """Build pymoo's algorithm, ready to be asked."""
+    from pymoo.algorithms.moo.nsga2 import NSGA2
+    from pymoo.core.mixed import (
+        MixedVariableDuplicateElimination,
+        MixedVariableMating,
+        MixedVariableSampling,
+    )
+    from pymoo.core.population import Population
+    from pymoo.core.problem import Problem
+    from pymoo.core.variable import Choice, Integer, Real
+
+    named: dict[str, Any] = {}
+    for variable, (low, high) in zip(problem.variables, problem.bounds.tolist(), strict=True):
+        if variable.choices:
+            named[variable.name] = Choice(options=[float(i) for i in range(len(variable.choices))])
+        elif variable.of in WHOLE:
+            named[variable.name] = Integer(bounds=(round(low), round(high)))
+        else:
+            named[variable.name] = Real(bounds=(low, high))
+    bare = Problem(
+        vars=named, n_obj=len(problem.objectives), n_ieq_constr=1 + len(problem.constraints)
+    )
+    random = np.random.default_rng(seed)
+    first = MixedVariableSampling()(bare, population, random_state=random)
+    if problem.start is not None:
+        names = [each.name for each in problem.variables]
+        values = [
+            round(x) if each.of in WHOLE and not each.choices else x
+            for each, x in zip(problem.variables, problem.start.tolist(), strict=True)
+        ]
+        given = dict(zip(names, values, strict=True))
+        first = Population.merge(Population.new(X=[given]), first[1:])
+    algorithm = NSGA2(
+        pop_size=population,
+        sampling=first,
+        mating=MixedVariableMating(eliminate_duplicates=MixedVariableDuplicateElimination()),
+        eliminate_duplicates=MixedVariableDuplicateElimination(),
+    )
+    algorithm.setup(bare, termination=("n_gen", generations), seed=seed, verbose=False)
+    return algorithm
+
+
+def _numbers(problem: DesignProblem, chosen: dict[str, Any]) -> Array:
+    return np.array([float(chosen[each.name]) for each in problem.variables])
+
+
+def _tell(
+    problem: DesignProblem, algorithm: Any, asked: Any, designs: Array, told: list[Found]
+) -> None:
+    """Give pymoo objectives and violations."""
+    whole = gathered(problem, designs, told)
+    goals = np.column_stack([each.sign * whole[each.key] for each in problem.objectives])
+    missed = np.nan_to_num(whole.violations, nan=_FAR, posinf=_FAR)
+    lost = ~np.isfinite(goals).all(axis=1)
+    missed[lost, 0] += 1.0
+    asked.set("F", np.where(np.isfinite(goals), goals, _FAR))
+    asked.set("G", missed)
+    asked.set("H", np.zeros((len(designs), 0)))
+    for each in asked:
+        each.evaluated.update(("F", "G", "H"))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        algorithm.tell(infills=asked)

@@ -1,0 +1,105 @@
+"""Record of the designs that a search has evaluated, so that a stopped search goes on.
+
+The file has one line for the problem and one for each design, with all bits of its numbers. A
+search with the same seed asks for the same designs again, and takes those that are there from it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cdsm.design.evaluation import Found
+from cdsm.design.problem import DesignProblem
+from cdsm.errors import FileError, StoreError
+from cdsm.support.files import as_path
+from cdsm.support.values import Array
+from cdsm.sweeps.description import attributes_of
+from cdsm.sweeps.poses import poses_of
+
+
+class Store:
+    """Designs that are evaluated, by their bits.
+
+    Args:
+        path: The file; None keeps them in memory.
+        problem: The problem.
+
+    Raises:
+        FileError: The file cannot be read or written.
+        StoreError: The file holds the designs of another problem.
+    """
+
+    def __init__(self, path: str | os.PathLike[str] | None, problem: DesignProblem) -> None:
+        self._path: Path | None = None if path is None else as_path(path)
+        self._found: dict[bytes, Found] = {}
+        if self._path is None:
+            return
+        head = json.dumps({"problem": digest(problem), "of": str(problem)})
+        try:
+            if not self._path.exists():
+                self._path.write_text(head + "\n", encoding="utf-8")
+            self._read(self._path.read_text(encoding="utf-8"), head)
+        except StoreError:
+            raise
+        except (OSError, ValueError) as error:
+            raise FileError(self._path, f"cannot be used as a record: {error}.") from None
+
+    def _read(self, text: str, head: str) -> None:
+        assert self._path is not None
+        first, *lines = text.split("\n")
+        if first != head:
+            raise StoreError(
+                self._path,
+                "holds the designs of another problem, or is no record of designs. Ask the same "
+                "again, or give another folder.",
+            )
+        for line in lines[:-1]:  # the last one is empty, or was cut off
+            entry: dict[str, Any] = json.loads(line)
+            row, values = (np.array([float.fromhex(x) for x in entry[k]]) for k in ("at", "is"))
+            self._found[row.tobytes()] = Found(values, entry.get("fault", ""))
+        if lines[-1]:
+            whole = "\n".join([first, *lines[:-1], ""])
+            self._path.write_text(whole, encoding="utf-8")
+
+    def get(self, row: Array) -> Found | None:
+        """Return what is known of a design (n,), or None."""
+        return self._found.get(row.tobytes())
+
+    def add(self, rows: Iterable[Array], found: Iterable[Found]) -> None:
+        """Keep what was found of some designs."""
+        lines = []
+        for row, each in zip(rows, found, strict=True):
+            self._found[row.tobytes()] = each
+            entry: dict[str, Any] = {
+                name: [x.hex() for x in numbers.tolist()]
+                for name, numbers in (("at", row), ("is", each.values))
+            }
+            lines.append(json.dumps(entry | ({"fault": each.fault} if each.fault else {})))
+        if self._path is not None and lines:
+            try:
+                with self._path.open("a", encoding="utf-8") as file:
+                    file.write("\n".join([*lines, ""]))
+            except OSError as error:
+                raise FileError(self._path, f"cannot be written: {error}.") from None
+
+
+def digest(problem: DesignProblem) -> str:
+    """Return a digest of everything on which the quantities of a problem depend."""
+    poses = poses_of(problem.arm, problem.postures)
+    q = poses.angles({dim: slice(0, size) for dim, size in poses.sizes.items()})
+    parts = [
+        json.dumps(attributes_of(problem.arm)),
+        repr((problem.variables, problem.objectives, problem.constraints)),
+        repr((problem.minimum, problem.maximum, problem.diameter, problem.coverage)),
+        repr(problem.tolerances),
+        poses.description,
+    ]
+    data = "\n".join(parts).encode() + q.tobytes() + problem.loads.tobytes()
+    return hashlib.sha256(data).hexdigest()

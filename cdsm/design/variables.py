@@ -1,0 +1,256 @@
+"""Design variables: what of an arm a search may choose, and how a choice changes the arm."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Final, Literal, NamedTuple, final, get_args
+
+from cdsm.errors import InvalidInput
+from cdsm.geometry import CableRoute, Geometry, Joint, Link
+from cdsm.geometry.holes import beside_the_hinges, evenly_spaced
+from cdsm.support.validation import one_of, scalar, whole_number
+from cdsm.wires.catalogue import Wire, as_wire
+
+VariableName = Literal[
+    "hole_radius",
+    "disk_offset",
+    "link_length",
+    "lead",
+    "phase",
+    "hole_angle",
+    "end",
+    "cables_per_joint",
+    "wire",
+    "minimum",
+]
+
+Value = float | int | str
+"""Value of a variable: a number in SI, or the name or the rigidity [N] of a wire."""
+
+WHOLE: Final = ("end", "cables_per_joint")
+_OF_JOINT: Final = ("hole_radius", "disk_offset", "link_length", "lead", "phase")
+_OF_CABLE: Final = ("hole_angle", "end")
+UNITS: Final = {
+    "hole_radius": "m",
+    "disk_offset": "m",
+    "link_length": "m",
+    "lead": "m",
+    "phase": "rad",
+    "hole_angle": "rad",
+    "minimum": "N",
+}
+"""SI unit of each variable that has one."""
+
+
+@final
+@dataclass(frozen=True)
+class Variable:
+    """Something of an arm that a search may choose.
+
+    Attributes:
+        of: ``"hole_radius"``, ``"disk_offset"``, ``"link_length"`` [m]: of one joint or of all.
+            A link keeps its mass per length. ``"lead"`` [m]: of the cables of one joint or of all.
+            ``"phase"`` [rad]: added to the hole angles of the cables of one joint or of all.
+            ``"hole_angle"`` [rad]: of one cable. ``"end"``: number of the joint at which a cable
+            ends: the routing. ``"cables_per_joint"``: evenly spaced. ``"wire"``: of all cables.
+            ``"minimum"`` [N]: lower bound of all tensions, the pretension.
+        low: Smallest value, in SI: [m], [rad] or [N]; None with ``choices``.
+        high: Largest value, in SI: [m], [rad] or [N]; None with ``choices``.
+        at: Number of a joint, or name of a cable of the arm that is changed; None: all.
+        choices: Values to choose from, in the place of a range; for a wire always.
+
+    Raises:
+        UnknownName: ``of`` is unknown.
+        InvalidInput: The range is empty or not of numbers; ``at`` is missing or has no meaning.
+    """
+
+    of: VariableName
+    low: float | None = None
+    high: float | None = None
+    at: int | str | None = None
+    choices: tuple[Value, ...] = ()
+
+    def __post_init__(self) -> None:
+        one_of("variable", self.of, get_args(VariableName))
+        if not isinstance(self.choices, (tuple, list)):
+            raise InvalidInput("choices", f"{self.choices!r} given; give a list.")
+        self.__dict__.update(choices=tuple(self.choices))
+        if bool(self.choices) == (self.low is not None or self.high is not None):
+            raise InvalidInput(self.of, "needs low and high, or choices.")
+        if self.of == "wire":
+            if not self.choices:
+                raise InvalidInput(self.of, "has no range; give choices: names, or EA in N.")
+            for wire in self.choices:
+                as_wire(wire)
+        elif self.choices:
+            values = [scalar(f"{self.of}.choices", each) for each in self.choices]
+            if len(set(values)) < len(values):
+                raise InvalidInput(self.of, "names a choice twice.")
+        else:
+            if self.low is None or self.high is None:
+                raise InvalidInput(self.of, "needs both low and high.")
+            low, high = (scalar(self.of, each) for each in (self.low, self.high))
+            if not low < high:
+                raise InvalidInput(self.of, f"from {low:g} to {high:g} given; give low < high.")
+            if self.of in WHOLE:
+                low, high = (_whole(self.of, each) for each in (low, high))
+            self.__dict__.update(low=low, high=high)
+        if self.of in _OF_CABLE and not isinstance(self.at, str):
+            raise InvalidInput(self.of, f"needs at= the name of a cable, not {self.at!r}.")
+        if self.of in _OF_JOINT and self.at is not None:
+            whole_number(f"{self.of}.at", self.at, 1)
+        if self.of not in (*_OF_CABLE, *_OF_JOINT) and self.at is not None:
+            raise InvalidInput(self.of, f"at={self.at!r} given; it has one value for the arm.")
+
+    @property
+    def name(self) -> str:
+        """Name of the variable: ``hole_radius``, ``hole_radius of joint 2``."""
+        if self.at is None:
+            return self.of
+        return f"{self.of} of {f'joint {self.at}' if isinstance(self.at, int) else self.at}"
+
+    @property
+    def is_continuous(self) -> bool:
+        """Whether the variable takes all values of a range."""
+        return not self.choices and self.of not in WHOLE
+
+    def shown(self, value: Value) -> str:
+        """Return a value in people's units: mm, degrees, N."""
+        unit = UNITS.get(self.of)
+        if unit is None or isinstance(value, str):
+            return f"{value}" if isinstance(value, (str, int)) else f"{value:g}"
+        if unit == "m":
+            return f"{1e3 * value:.4g} mm"
+        return f"{math.degrees(value):.4g}°" if unit == "rad" else f"{value:.4g} N"
+
+
+def _whole(name: str, value: float) -> int:
+    """Return a whole number that a file may hold as a float."""
+    return whole_number(name, round(value) if float(value).is_integer() else value, 1)
+
+
+class Changed(NamedTuple):
+    """An arm with the values of all variables."""
+
+    geometry: Geometry
+    wire: Wire | None
+    minimum: float | None
+
+
+def changed(geometry: Geometry, variables: Sequence[Variable], values: Iterable[Value]) -> Changed:
+    """Return the geometry, the wire and the lower bound with the values of all variables.
+
+    Raises:
+        GeometryError: The values do not make an arm.
+    """
+    wire: Wire | None = None
+    minimum = None
+    joints, links, cables = [*geometry.joints], [*geometry.links], [*geometry.cables]
+    # where cables end first: lead and phase belong to the cables of a joint
+    pairs = sorted(zip(variables, values, strict=True), key=lambda pair: pair[0].of not in WHOLE)
+    for variable, value in pairs:
+        of, at = variable.of, variable.at
+        if of == "wire" or isinstance(value, str):
+            wire = value
+        elif of == "minimum":
+            minimum = float(value)
+        elif of == "cables_per_joint":
+            cables = _even(geometry, int(value))
+        elif of == "end":
+            c = geometry.cable_names.index(str(at))
+            cables[c] = replace(cables[c], joint=int(value))
+        elif of == "hole_angle":
+            c = geometry.cable_names.index(str(at))
+            cables[c] = replace(cables[c], angle=value)
+        else:
+            for k in range(len(joints)) if at is None else [int(at) - 1]:
+                _change(of, value, k, joints, links, cables)
+    return Changed(
+        geometry.replace(joints=tuple(joints), links=tuple(links), cables=tuple(cables)),
+        wire,
+        minimum,
+    )
+
+
+def _change(
+    of: str,
+    value: float,
+    k: int,
+    joints: list[Joint],
+    links: list[Link],
+    cables: list[CableRoute],
+) -> None:
+    """Change a variable of joint k."""
+    if of == "hole_radius":
+        joints[k] = replace(joints[k], hole_radius=value)
+    elif of == "disk_offset":
+        joints[k] = replace(joints[k], disk_offset=value)
+    elif of == "link_length":
+        old = links[k]
+        links[k] = replace(old, length=value, mass=old.mass * value / old.length)
+    else:
+        for c, cable in enumerate(cables):
+            if cable.joint == k + 1 and of == "lead":
+                cables[c] = replace(cable, lead=value)
+            elif cable.joint == k + 1:
+                cables[c] = replace(cable, angle=cable.angle + value)
+
+
+def _even(geometry: Geometry, count: int) -> list[CableRoute]:
+    """Return evenly spaced cables, so many of each joint, like the first one of each joint now."""
+    n = len(geometry.joints)
+    if all(len(joint.axes) == 2 for joint in geometry.joints):
+        angles = evenly_spaced(n, count)
+    else:
+        rolls = [math.atan2(joint.axes[0][2], joint.axes[0][1]) for joint in geometry.joints]
+        angles = beside_the_hinges(rolls, count)
+    cables = []
+    for k in range(n):
+        like = [cable for cable in geometry.cables if cable.joint == k + 1] or [geometry.cables[0]]
+        cables += [replace(like[0], joint=k + 1, angle=angle) for angle in angles[k]]
+    return cables
+
+
+def present(variable: Variable, geometry: Geometry, minimum: float) -> float | None:
+    """Return the value that a variable has in an arm; None if joints or cables differ in it."""
+    k = variable.at - 1 if isinstance(variable.at, int) else None
+    of: dict[str, Callable[[], list[float]]] = {
+        "hole_radius": lambda: [*geometry.hole_radii],
+        "disk_offset": lambda: [joint.disk_offset for joint in geometry.joints],
+        "link_length": lambda: [link.length for link in geometry.links],
+        "lead": lambda: [_lead(geometry, joint) for joint in range(1, len(geometry.joints) + 1)],
+        "phase": lambda: [0.0] * len(geometry.joints),
+        "minimum": lambda: [minimum],
+    }
+    if variable.of in _OF_CABLE:
+        cable = geometry.cables[geometry.cable_names.index(str(variable.at))]
+        return cable.joint if variable.of == "end" else cable.angle
+    if variable.of == "cables_per_joint":
+        counts = [
+            len([c for c in geometry.cables if c.joint == k + 1])
+            for k in range(len(geometry.joints))
+        ]
+        return counts[0] if len(set(counts)) == 1 else None
+    if variable.of not in of:
+        return None
+    values = of[variable.of]()
+    if k is not None:
+        return values[k]
+    return values[0] if len(set(values)) == 1 else None
+
+
+def _lead(geometry: Geometry, joint: int) -> float:
+    leads = {cable.lead for cable in geometry.cables if cable.joint == joint}
+    return leads.pop() if len(leads) == 1 else math.nan
+
+
+def check(variable: Variable, geometry: Geometry) -> None:
+    """Raise InvalidInput if the arm lacks the joint or the cable, or cables would be mixed up."""
+    if isinstance(variable.at, str):
+        one_of("cable", variable.at, geometry.cable_names)
+    elif variable.at is not None:
+        whole_number(f"{variable.of}.at", variable.at, 1, len(geometry.joints))
+    if variable.of == "end" and not variable.choices:
+        whole_number("end.high", variable.high, 2, len(geometry.joints))

@@ -1,0 +1,81 @@
+"""Figure of a search for designs: the front, or the progress where there is one objective."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from cdsm.plots.style import (
+    BLUE,
+    ONE_COLUMN,
+    TWO_COLUMNS,
+    VERMILLION,
+    expect,
+    heading,
+    legend_below,
+    panels,
+)
+
+if TYPE_CHECKING:
+    from cdsm.design.result import DesignSearch
+
+
+def plot_designs(found: DesignSearch) -> Figure:
+    """Plot the objectives of all designs that meet the constraints, and the front among them.
+
+    With one objective: its best value over the number of designs.
+
+    Args:
+        found: The result of :func:`cdsm.search_designs` or :func:`cdsm.refine_design`.
+
+    Raises:
+        InvalidInput: ``found`` is not such a result.
+    """
+    expect("found", found, "DesignSearch")
+    objectives = found.problem.objectives
+    scales = [each.unit for each in objectives]
+    names = [
+        f"{each.words} [{unit}]" if unit else each.words
+        for each, (unit, _) in zip(objectives, scales, strict=True)
+    ]
+    if len(objectives) == 1:
+        figure, axes = panels(ONE_COLUMN, 2.4, 1)
+        panel = axes[0, 0]
+        steps = [step for step in found.history if step.feasible]
+        panel.plot(
+            [step.designs for step in steps],
+            [step.best / scales[0][1] for step in steps],
+            color=BLUE,
+            marker=".",
+            markersize=3,
+            linewidth=1.2,
+        )
+        panel.set_xlabel("designs evaluated")
+        panel.set_ylabel(names[0])
+        return figure
+    every = found.evaluated
+    feasible = np.setdiff1d(np.flatnonzero(every.feasible), found.front)
+    pairs = [(0, k) for k in range(1, len(objectives))]
+    width = ONE_COLUMN if len(pairs) == 1 else TWO_COLUMNS
+    figure, axes = panels(width, 2.9, len(pairs))
+    for panel, (i, k) in zip(axes.flat, pairs, strict=True):
+        x, y = (every[objectives[n].key] / scales[n][1] for n in (i, k))
+        panel.plot(x[feasible], y[feasible], ".", color="0.7", markersize=3, label="feasible")
+        panel.plot(x[found.front], y[found.front], ".-", color=BLUE, linewidth=0.8, label="front")
+        chosen = found.front[found.compromise]
+        panel.plot(
+            x[chosen],
+            y[chosen],
+            "o",
+            color=VERMILLION,
+            markerfacecolor="none",
+            markersize=8,
+            label="compromise",
+        )
+        panel.set_xlabel(names[i])
+        panel.set_ylabel(names[k])
+    heading(figure, f"{len(every)} designs of {found.problem.arm.name}")
+    legend_below(figure, axes, 3)
+    return figure

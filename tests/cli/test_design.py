@@ -1,0 +1,74 @@
+"""``cdsm design`` on the example, and on problems with faults."""
+
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+import cdsm
+from cdsm.cli import app
+
+pytest.importorskip("pymoo")
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+
+def run(*words: str) -> tuple[int, str]:
+    found = CliRunner().invoke(app, ["design", *words])
+    return found.exit_code, found.output
+
+
+def written(folder: Path, text: str) -> Path:
+    (folder / "arm.toml").write_text((EXAMPLES / "arm.toml").read_text())
+    path = folder / "problem.toml"
+    path.write_text(text)
+    return path
+
+
+@pytest.mark.slow
+def test_the_example_writes_front_figures_and_the_files_of_an_arm(tmp_path: Path) -> None:
+    words = [str(EXAMPLES / "design.toml"), "--out", str(tmp_path / "a"), "--jobs", "1"]
+    code, text = run(*words, "--generations", "5", "--population", "8")
+    assert code == 0, text
+    assert "on the front" in text
+    names = "front.csv front.pdf arm.pdf arm.toml arm.urdf arm.xml holes.csv cables.csv"
+    assert {path.name for path in (tmp_path / "a").iterdir()} == {*names.split(), "designs.jsonl"}
+    arm = cdsm.Manipulator.read(tmp_path / "a" / "arm.toml")
+    assert cdsm.to_urdf(arm.geometry) == (tmp_path / "a" / "arm.urdf").read_text()
+    code, again = run(*words, "--generations", "5", "--population", "8", "--json")
+    assert code == 0
+    told = json.loads(again)
+    assert told["designs"] == 40
+    assert max(told["front"]["deflection [m]"]) <= 0.001
+    assert told["chosen"] == told["compromise"]
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (("hole_radius", "hole_radios"), "variables[1]"),
+        (("at_most = 0.001", "at_most = 0.001\nat_least = 0.0"), "constraints[1]"),
+        (('arm = "arm.toml"', ""), "arm: is missing"),
+        (("[postures]", "[postures]\nrandom = 3"), "one of random, grid and angles"),
+        (("population", "populatoin"), "did you mean population"),
+        (("[[0.0, 0.0, -4.905]]", "[[0.0, 0.0]]"), "loads"),
+    ],
+)
+def test_faults_of_a_problem_are_named(tmp_path: Path, change: tuple[str, str], said: str) -> None:
+    text = (EXAMPLES / "design.toml").read_text()
+    path = written(tmp_path, text.replace(*change, 1))
+    code, output = run(str(path), "--out", str(tmp_path / "out"))
+    assert code == 1
+    assert said in output
+    assert "problem.toml" in output
+
+
+def test_an_infeasible_problem_ends_with_3_and_says_what_it_misses(tmp_path: Path) -> None:
+    text = (EXAMPLES / "design.toml").read_text().replace("at_most = 0.001", "at_most = 1e-6")
+    path = written(tmp_path, text)
+    words = ["--generations", "1", "--population", "4", "--jobs", "1"]
+    code, output = run(str(path), "--out", str(tmp_path / "out"), *words)
+    assert code == 3
+    assert "deflection" in output
+    assert "at most 0.001 mm is asked" in output

@@ -1,0 +1,358 @@
+"""Problems, their evaluation, searches and refinements."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import cdsm
+from cdsm.design.evaluation import measure
+from cdsm.design.goals import Measure
+from cdsm.design.gradients import SMOOTH, rows_and_gradients
+from cdsm.design.store import digest
+from cdsm.support.values import Array
+
+pytest.importorskip("pymoo")
+
+LAW = cdsm.LinearElasticity(48e3)
+BENT = np.random.default_rng(2).uniform(-0.25, 0.25, (4, 6))
+
+
+def small_arm(**changes: Any) -> cdsm.Manipulator:
+    sizes: dict[str, Any] = {
+        "joints": 3,
+        "cables_per_joint": 3,
+        "link_length": 0.06,
+        "base_length": 0.03,
+        "disk_offset": 0.01,
+        "hole_radius": 0.02,
+        "link_mass": 0.1,
+        "lead": 0.1,
+        "friction": 0.05,
+    }
+    return cdsm.Manipulator(cdsm.Geometry.universal(**{**sizes, **changes}), LAW)
+
+
+def problem(**changes: Any) -> cdsm.DesignProblem:
+    whole: dict[str, Any] = {
+        "arm": small_arm(),
+        "variables": (
+            cdsm.Variable("hole_radius", 0.015, 0.03),
+            cdsm.Variable("end", 1, 3, at="cable2_1"),
+            cdsm.Variable("wire", choices=("solid-1.2mm", 48e3)),
+        ),
+        "objectives": (cdsm.Objective("motor_force"), cdsm.Objective("stiffness", "z")),
+        "postures": BENT,
+        "loads": (0.0, 0.0, -2.0, 0.0, 0.0, 0.0),
+        "minimum": 20.0,
+        "maximum": 400.0,
+    }
+    return cdsm.DesignProblem(**{**whole, **changes})
+
+
+# --- evaluation ------------------------------------------------------------------------------
+
+
+def test_quantities_are_those_of_single_postures() -> None:
+    names = ["stiffness", "payload"]
+    objectives = tuple(cdsm.Objective(name, "z") for name in names)  # type: ignore[arg-type]
+    others = ("softest", "isotropy", "margin", "deflection", "motor_force", "tension_factor",
+              "cable_clearance", "link_clearance", "disk_clearance", "workspace", "held", "mass",
+              "length", "cables", "wire_length")  # fmt: skip
+    task = problem(
+        objectives=(*objectives, *(cdsm.Objective(name) for name in others)),  # type: ignore[arg-type]
+        diameter=1e-3,
+    )
+    assert task.arm_of([0.025, 3.0, 1.0]).geometry.cables[3].joint == 3
+    row = np.array([0.025, 2.0, 1.0])
+    arm = task.arm_of(row)
+    assert arm.geometry.hole_radii == (0.025,) * 3
+    found = cdsm.evaluate_designs(task, [row])
+    poses = [arm.at(q) for q in BENT]
+    Ks = [cdsm.stiffness(p, cdsm.distribute_tension(p, 20.0, 400.0, task.loads[0])) for p in poses]
+    clear = [cdsm.clearance(p, 1e-3) for p in poses]
+    force = task.loads[0][:3]
+    expected = {
+        "stiffness (0, 0, 1)": min(K.along("z") for K in Ks),
+        "softest": min(1.0 / np.linalg.eigvalsh(K.compliance[:3, :3])[-1] for K in Ks),
+        "isotropy": min(cdsm.isotropy(K) for K in Ks),
+        "margin": min(K.margin for K in Ks),
+        "deflection": max(np.linalg.norm(K.compliance[:3, :3] @ force) for K in Ks),
+        "motor_force": max(K.tension.max() for K in Ks),
+        "tension_factor": min(cdsm.tension_factor(p) for p in poses),
+        "cable_clearance": min(each.cables for each in clear),
+        "link_clearance": min(each.links for each in clear),
+        "disk_clearance": min(each.disks for each in clear),
+        "payload (0, 0, 1)": min(
+            cdsm.payload(p, "z", 20.0, 400.0, task.loads[0]).limits["tension"] for p in poses
+        ),
+        "held": 1.0,
+        "mass": 0.3,
+        "length": 0.21,
+        "cables": 9.0,
+        "wire_length": np.max([p.cable_lengths for p in poses], axis=0).sum(),
+    }
+    for key, value in expected.items():
+        assert found[key][0] == pytest.approx(value, rel=1e-8), key
+    assert found["workspace"][0] > 0.0
+
+
+def test_a_link_keeps_its_mass_per_length_and_joints_have_values_of_their_own() -> None:
+    task = problem(
+        variables=(
+            cdsm.Variable("link_length", 0.05, 0.1, at=2),
+            cdsm.Variable("disk_offset", 0.005, 0.02, at=1),
+            cdsm.Variable("lead", 0.0, 0.5),
+            cdsm.Variable("phase", -1.0, 1.0, at=3),
+            cdsm.Variable("hole_angle", 0.0, 6.0, at="cable1_2"),
+            cdsm.Variable("minimum", 5.0, 50.0),
+        )
+    )
+    row = np.array([0.09, 0.006, 0.2, 0.5, 1.5, 33.0])
+    geometry, old = task.arm_of(row).geometry, task.arm.geometry
+    assert [link.length for link in geometry.links] == [0.06, 0.09, 0.06]
+    assert geometry.links[1].mass == pytest.approx(0.15)
+    assert [joint.disk_offset for joint in geometry.joints] == [0.006, 0.01, 0.01]
+    assert {cable.lead for cable in geometry.cables} == {0.2}
+    assert geometry.cables[1].angle == 1.5
+    assert geometry.cables[8].angle == pytest.approx(old.cables[8].angle + 0.5)
+    assert task.minimum_of(row) == 33.0
+    start = task.start
+    assert start is not None
+    assert task.arm_of(start).geometry == old
+    count = problem(variables=(cdsm.Variable("cables_per_joint", 3, 5),))
+    assert len(count.arm_of([5.0]).cables) == 15
+    assert count.arm_of([3.0]).geometry == old
+
+
+def test_a_posture_that_is_not_held_counts_and_constraints_say_how_far() -> None:
+    task = problem(
+        maximum=22.0,
+        constraints=(
+            cdsm.Constraint("mass", at_most=0.2),
+            cdsm.Constraint("stiffness", "z", at_least=1e3),
+        ),
+    )
+    found = cdsm.evaluate_designs(task, [[0.02, 2.0, 1.0]])
+    assert found["held"][0] < 1.0
+    assert found.violations[0, 0] == 1.0 - found["held"][0]
+    assert found.violations[0, 1] == pytest.approx(0.5)
+    assert not found.feasible[0]
+
+
+def test_tolerances_take_a_margin() -> None:
+    tolerances = cdsm.Tolerances(rigidity=0.05)
+    bound = cdsm.Constraint("stiffness", "z", at_least=1.0)
+    row = [[0.025, 2.0, 1.0]]
+    plain = cdsm.evaluate_designs(problem(constraints=(bound,)), row)
+    sure = cdsm.evaluate_designs(problem(constraints=(bound,), tolerances=tolerances), row)
+    key = bound.key
+    arm = sure.problem.arm_of(row[0])
+    poses = [arm.at(q) for q in BENT]
+    pulls = [cdsm.distribute_tension(p, 20.0, 400.0, sure.problem.loads[0]) for p in poses]
+    worst = int(
+        np.argmin([cdsm.stiffness(p, F).along("z") for p, F in zip(poses, pulls, strict=True)])
+    )
+    u = cdsm.uncertainty(poses[worst], pulls[worst], tolerances, direction=(0.0, 0.0, 1.0))
+    assert sure[key][0] == pytest.approx(plain[key][0] - 2.0 * u.standard_uncertainty, rel=1e-9)
+
+
+# --- searches --------------------------------------------------------------------------------
+
+
+def test_a_front_has_the_bits_of_its_seed_however_it_is_computed(tmp_path: Path) -> None:
+    kept = tmp_path / "designs.jsonl"
+    once = cdsm.search_designs(problem(), generations=4, population=8, seed=3)
+    again = cdsm.search_designs(problem(), generations=4, population=8, seed=3, store=kept)
+    other = cdsm.search_designs(problem(), generations=4, population=8, seed=4)
+    np.testing.assert_array_equal(once.evaluated.designs, again.evaluated.designs)
+    np.testing.assert_array_equal(once.evaluated.values, again.evaluated.values)
+    np.testing.assert_array_equal(once.front, again.front)
+    assert not np.array_equal(once.evaluated.designs, other.evaluated.designs)
+    # a stopped search goes on: half of the record, its last line cut off
+    lines = kept.read_text().splitlines(keepends=True)
+    kept.write_text("".join(lines[: len(lines) // 2]) + lines[-1][:20])
+    resumed = cdsm.search_designs(problem(), generations=4, population=8, seed=3, store=kept)
+    np.testing.assert_array_equal(once.evaluated.values, resumed.evaluated.values)
+    assert sorted(kept.read_text().splitlines()) == sorted("".join(lines).splitlines())
+    with pytest.raises(cdsm.StoreError, match="another problem"):
+        cdsm.search_designs(problem(maximum=300.0), generations=1, population=4, store=kept)
+
+
+def test_no_design_of_the_front_is_beaten() -> None:
+    found = cdsm.search_designs(problem(), generations=5, population=8)
+    goals = np.column_stack(
+        [each.sign * found.evaluated[each.key] for each in found.problem.objectives]
+    )
+    usable = found.evaluated.feasible == 1.0
+    for i in found.front:
+        beats = (goals[usable] <= goals[i]).all(axis=1) & (goals[usable] < goals[i]).any(axis=1)
+        assert not beats.any()
+    first = goals[found.front, 0]
+    assert (np.diff(first) >= 0.0).all()
+    assert "on the front" in str(found)
+    json.dumps(found.to_dict(), allow_nan=False)
+
+
+@pytest.mark.slow
+def test_processes_change_no_bit() -> None:
+    task = problem()
+    rows = np.array([[0.016, 1.0, 0.0], [0.02, 2.0, 1.0], [0.03, 3.0, 1.0]])
+    one, two = (cdsm.evaluate_designs(task, rows, jobs=n) for n in (1, 2))
+    np.testing.assert_array_equal(one.values, two.values)
+
+
+def test_an_infeasible_problem_is_named() -> None:
+    task = problem(constraints=(cdsm.Constraint("stiffness", "z", at_least=1e7),))
+    with pytest.raises(cdsm.InfeasibleDesign) as caught:
+        cdsm.search_designs(task, generations=2, population=4)
+    error = caught.value
+    assert error.constraints == ("stiffness (0, 0, 1)",)
+    value = measure(task, np.array(error.design)).values
+    keys = [each.key for each in task.measures]
+    far = 100.0 * (1.0 - value[keys.index("stiffness (0, 0, 1)")] / 1e7)
+    assert f"{far:.3g} % off" in str(error)
+    assert "at least 1e+04 N/mm is asked" in str(error)
+    weak = problem(maximum=21.0)
+    with pytest.raises(cdsm.InfeasibleDesign, match=r"not held: posture \d: no tension within"):
+        cdsm.search_designs(weak, generations=1, population=4)
+    short = problem(variables=(cdsm.Variable("disk_offset", 0.04, 0.05),))
+    with pytest.raises(cdsm.InfeasibleDesign, match="none of 4 designs is an arm"):
+        cdsm.search_designs(short, generations=1, population=4)
+
+
+# --- derivatives and refinement --------------------------------------------------------------
+
+CONTINUOUS = (
+    cdsm.Variable("hole_radius", 0.012, 0.04),
+    cdsm.Variable("disk_offset", 0.005, 0.02, at=2),
+    cdsm.Variable("link_length", 0.05, 0.1, at=2),
+    cdsm.Variable("lead", 0.0, 0.5),
+    cdsm.Variable("phase", -1.0, 1.0, at=3),
+    cdsm.Variable("hole_angle", -1.0, 6.0, at="cable1_2"),
+    cdsm.Variable("minimum", 5.0, 50.0),
+)
+
+
+@pytest.mark.parametrize("of", SMOOTH)
+def test_derivatives_are_limits_of_differences(of: Any) -> None:
+    task = problem(variables=CONTINUOUS)
+    x = np.array([0.021, 0.011, 0.07, 0.12, 0.1, 2.2, 20.0])
+    asked = Measure(of, "y" if of == "stiffness" else None)
+    _, exact = rows_and_gradients(task, x, asked)
+    low, high = task.bounds.T
+    errors = []
+    for step in (1e-4, 1e-5):
+        found = np.empty_like(exact)
+        for n, size in enumerate(high - low):
+            ends = []
+            for sign in (1.0, -1.0):
+                moved = x.copy()
+                moved[n] += sign * step * size
+                ends.append(rows_and_gradients(task, moved, asked)[0])
+            found[:, n] = (ends[0] - ends[1]) / (2.0 * step * size)
+        scale = abs(exact * (high - low)).max()
+        errors.append(abs((found - exact) * (high - low)).max() / scale)
+    # central differences: the error falls with the square of the step, down to rounding
+    assert errors[1] < 1e-6
+    assert errors[1] < 0.05 * errors[0] or errors[0] < 1e-8
+
+
+def test_refinement_finds_what_a_fine_search_finds() -> None:
+    task = problem(
+        variables=(cdsm.Variable("hole_radius", 0.015, 0.03), cdsm.Variable("minimum", 5.0, 50.0)),
+        objectives=(cdsm.Objective("motor_force"),),
+        constraints=(cdsm.Constraint("stiffness", "z", at_least=START),),
+    )
+    refined = cdsm.refine_design(task, [0.02, 20.0])
+    best = refined.values(0)["motor_force"]
+    radius, low = np.meshgrid(np.linspace(0.015, 0.03, 31), np.linspace(5.0, 50.0, 10))
+    grid = cdsm.evaluate_designs(task, np.column_stack([radius.ravel(), low.ravel()]))
+    goals = np.where(grid.feasible == 1.0, grid["motor_force"], np.inf)
+    assert best <= goals.min() * (1.0 + 1e-9)
+    assert best > 0.8 * goals.min()
+
+
+START = 1.5e4
+
+
+def test_problems_that_cannot_be_refined_say_why() -> None:
+    with pytest.raises(cdsm.InvalidInput, match="end of cable2_1 is not continuous"):
+        cdsm.refine_design(problem())
+    two = problem(variables=CONTINUOUS)
+    with pytest.raises(cdsm.InvalidInput, match="several objectives"):
+        cdsm.refine_design(two)
+
+
+# --- bad problems ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"variables": ()}, "one variable"),
+        ({"variables": (cdsm.Variable("end", 1, 4, at="cable2_1"),)}, "end.high: 4"),
+        ({"variables": (cdsm.Variable("hole_radius", 0.01, 0.02, at=9),)}, "hole_radius.at: 9"),
+        ({"variables": (cdsm.Variable("lead", 0.0, 0.1),) * 2}, "lead is named twice"),
+        ({"loads": np.zeros((1, 5))}, "loads: shape"),
+        (
+            {"objectives": (cdsm.Objective("deflection"),), "loads": np.zeros((1, 6))},
+            "deflection needs a force",
+        ),
+    ],
+)
+def test_bad_problems_name_what_is_wrong(changes: dict[str, Any], said: str) -> None:
+    with pytest.raises(cdsm.InvalidInput, match=said):
+        problem(**changes)
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda: cdsm.Variable("hole_radius", 0.03, 0.02), "give low < high"),
+        (lambda: cdsm.Variable("hole_radius", 0.03), "needs both"),
+        (lambda: cdsm.Variable("wire", 1.0, 2.0), "needs low and high, or|has no range"),
+        (lambda: cdsm.Variable("end", 1, 3), "name of a cable"),
+        (lambda: cdsm.Variable("minimum", 1.0, 3.0, at=1), "one value for the arm"),
+        (lambda: cdsm.Objective("stiffness"), "direction: is needed"),
+        (lambda: cdsm.Objective("mass", "z"), "direction: has no meaning"),
+        (lambda: cdsm.Constraint("mass"), "at_least or at_most"),
+        (lambda: cdsm.Objective("beauty"), "did you mean|no measure"),  # type: ignore[arg-type]
+    ],
+)
+def test_bad_parts_name_what_is_wrong(make: Any, said: str) -> None:
+    with pytest.raises(cdsm.CdsmError, match=said):
+        make()
+
+
+def test_the_digest_of_a_problem_tells_problems_apart() -> None:
+    one = digest(problem())
+    assert one == digest(problem())
+    for changes in (
+        {"minimum": 21.0},
+        {"postures": BENT / 2.0},
+        {"arm": small_arm(lead=0.2)},
+        {"tolerances": cdsm.Tolerances(rigidity=0.1)},
+    ):
+        assert digest(problem(**changes)) != one
+
+
+def test_files_for_the_workshop(tmp_path: Path) -> None:
+    found = cdsm.search_designs(problem(), generations=1, population=4)
+    arm = found.arm()
+    paths = found.write_arm(tmp_path / "best")
+    assert [path.name for path in paths] == [
+        "arm.toml", "arm.urdf", "arm.xml", "holes.csv", "cables.csv",
+    ]  # fmt: skip
+    assert cdsm.Manipulator.read(paths[0]) == arm
+    holes = [line.split(",") for line in paths[3].read_text().splitlines()]
+    assert len(holes) == 1 + sum(2 * cable.joint for cable in arm.geometry.cables)
+    radii = {float(row[4]) for row in holes[1:]}
+    assert radii == {round(1e3 * arm.geometry.hole_radius, 4)}
+    cables = [line.split(",") for line in paths[4].read_text().splitlines()]
+    lengths: Array = 1e3 * arm.cable_lengths(np.zeros(arm.nv))
+    assert [float(row[4]) for row in cables[1:]] == pytest.approx(lengths.tolist(), abs=1e-4)
+    for row in cables[1:]:
+        assert float(row[5]) <= float(row[4]) <= float(row[6])
