@@ -168,7 +168,7 @@ class Constraint(Measure):
         of: As for :class:`Objective`.
         direction: As for :class:`Objective`.
         at_least: Smallest value allowed, in SI: [N/m], [N m/rad], [m], [N], [kg] or [-]; or None.
-        at_most: Largest value allowed, in SI, or None.
+        at_most: Largest value allowed, in SI: [N/m], [N m/rad], [m], [N], [kg] or [-]; or None.
 
     Raises:
         UnknownName: ``of`` is unknown.

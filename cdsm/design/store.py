@@ -98,7 +98,7 @@ def digest(problem: DesignProblem) -> str:
         json.dumps(attributes_of(problem.arm)),
         repr((problem.variables, problem.objectives, problem.constraints)),
         repr((problem.minimum, problem.maximum, problem.diameter, problem.coverage)),
-        repr(problem.tolerances),
+        repr((problem.tolerances, problem.arm.gravity.tolist())),
         poses.description,
     ]
     data = "\n".join(parts).encode() + q.tobytes() + problem.loads.tobytes()

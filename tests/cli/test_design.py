@@ -47,11 +47,11 @@ def test_the_example_writes_front_figures_and_the_files_of_an_arm(tmp_path: Path
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (("hole_radius", "hole_radios"), "variables[1]"),
+        (('of = "hole_radius"', 'of = "hole_radios"'), "variables[1]"),
         (("at_most = 0.001", "at_most = 0.001\nat_least = 0.0"), "constraints[1]"),
         (('arm = "arm.toml"', ""), "arm: is missing"),
         (("[postures]", "[postures]\nrandom = 3"), "one of random, grid and angles"),
-        (("population", "populatoin"), "did you mean population"),
+        (("population", "populatoin"), "search.populatoin"),
         (("[[0.0, 0.0, -4.905]]", "[[0.0, 0.0]]"), "loads"),
     ],
 )

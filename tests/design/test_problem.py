@@ -334,6 +334,7 @@ def test_the_digest_of_a_problem_tells_problems_apart() -> None:
         {"minimum": 21.0},
         {"postures": BENT / 2.0},
         {"arm": small_arm(lead=0.2)},
+        {"arm": small_arm().with_gravity("y")},
         {"tolerances": cdsm.Tolerances(rigidity=0.1)},
     ):
         assert digest(problem(**changes)) != one
