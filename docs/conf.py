@@ -39,6 +39,7 @@ nitpicky = True
 nitpick_ignore_regex = [
     # other projects' types, whose indexes are on the network; and types of ours without a page
     ("py:.*", r"(?!cdsm\.).*"),
+    ("py:data", r"cdsm\..*"),
     ("py:.*", r"cdsm\.(?!paper|plots|presets|view)[a-z_]+\..*"),
     ("py:.*", r"cdsm\.[a-z_]+\.[a-z_]+\..*"),
 ]
