@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from cdsm.control.plant import SlowPlant
     from cdsm.control.run import TrackingRun
     from cdsm.control.sensors import Sensors
+    from cdsm.control.tip_force import TipForce, tip_force
     from cdsm.control.track import track
     from cdsm.design.evaluation import Designs, evaluate_designs
     from cdsm.design.goals import Constraint, Objective
@@ -204,6 +205,7 @@ __all__ = [
     "TensileTestError",
     "Tension",
     "Tensions",
+    "TipForce",
     "Tolerance",
     "Tolerances",
     "TrackingRun",
@@ -260,6 +262,7 @@ __all__ = [
     "sweep",
     "sweep_to_pandas",
     "tension_factor",
+    "tip_force",
     "to_mjcf",
     "to_urdf",
     "track",
@@ -282,6 +285,7 @@ _NAMES = {
     "control.plant": "SlowPlant",
     "control.run": "TrackingRun",
     "control.sensors": "Sensors",
+    "control.tip_force": "TipForce tip_force",
     "control.track": "track",
     "design.evaluation": "Designs evaluate_designs",
     "design.goals": "Constraint Objective",

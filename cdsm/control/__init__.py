@@ -16,6 +16,7 @@ from cdsm.control.plant import SlowPlant
 from cdsm.control.run import TrackingRun
 from cdsm.control.sensors import Sensors
 from cdsm.control.stiffness_loop import with_rigidity
+from cdsm.control.tip_force import TipForce, tip_force
 from cdsm.control.track import track
 
 __all__ = [
@@ -27,11 +28,13 @@ __all__ = [
     "Reference",
     "Sensors",
     "SlowPlant",
+    "TipForce",
     "TrackingRun",
     "feedforward",
     "limited",
     "mixed",
     "tension_control",
+    "tip_force",
     "track",
     "with_rigidity",
 ]

@@ -1,0 +1,129 @@
+"""Force at the tip from the tensions at the motors, with bounds that friction and noise leave.
+
+At a known posture the force f, and the tensions T of all segments, meet
+
+    Σ_j T_j g_j + g − J_vᵀ f = 0,   exp(−μ φ) T_j ≤ T_{j+1} ≤ exp(μ φ) T_j,   |T_1 − F| ≤ error,
+
+with the measured F of each cable. This is a polyhedron; the largest and the least u·f in it are two
+linear programs. The multipliers of each give a bound by weak duality, so that no answer of a solver
+is trusted.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cdsm.errors import InvalidInput, SolverError
+from cdsm.posture import Posture
+from cdsm.support.format import coordinates
+from cdsm.support.validation import Direction, instance, quantity, unit_direction, vector
+from cdsm.support.values import Array, ReadOnlyState
+
+_WIDEST = 1e6
+"""Largest force in the programs, over the tensions: they are bounded then."""
+
+
+@final
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TipForce(ReadOnlyState):
+    """Bounds of the force at the tip along a direction; made by :func:`tip_force`.
+
+    Attributes:
+        posture: The posture.
+        tension: Measured tensions at the motors F (C,) [N].
+        error: Largest error of each of them [N].
+        direction: Unit direction u (3,), base axes.
+        low: Least force along u [N] that friction and errors leave possible.
+        high: Largest force along u [N], likewise.
+    """
+
+    posture: Posture
+    tension: Array
+    error: float
+    direction: Array
+    low: float
+    high: float
+
+    def __str__(self) -> str:
+        return (
+            f"{self.low:.4g} to {self.high:.4g} N along {coordinates(self.direction)}, whatever "
+            "friction holds"
+        )
+
+
+def tip_force(
+    pose: Posture, tension: ArrayLike, direction: Direction, error: float = 0.0
+) -> TipForce:
+    """Bound the force at the tip from the tensions at the motors: a force without a moment.
+
+    The bounds are proved for each state of the cables that friction admits, if posture, friction
+    and masses are those of the arm.
+
+    Args:
+        pose: The true posture.
+        tension: Measured F (C,) [N].
+        direction: u (3,) in base axes, any length, or an axis such as ``"z"``.
+        error: Largest error of each measured tension [N].
+
+    Raises:
+        InvalidInput: An argument is invalid; or no force at the tip and no friction balance these
+            tensions, so that posture, tensions or error are wrong.
+        SolverError: The linear program is not solved.
+    """
+    from scipy.optimize import linprog
+
+    segments = instance("pose", pose, Posture).segments
+    chains, size = segments.chains, len(segments.lengths)
+    F = vector("tension", tension, len(pose.arm.cables), "one tension [N] per cable", "tension")
+    u = unit_direction("direction", direction)
+    off = quantity("error", error, "tension", zero=True)
+    scale = float(abs(F).max(initial=0.0)) or 1.0
+    # variables: T (S,) and f (3,), over the largest tension
+    A = np.hstack([segments.length_jacobian.T, -pose.jacobian[:3].T])
+    unit = abs(A).max(axis=1, keepdims=True)
+    A, b = A / unit, -pose.gravity_torque / unit[:, 0] / scale
+    ratio = np.exp(chains.friction * segments.wrap)
+    cone = np.zeros((2 * len(ratio), size + 3))
+    rows = np.arange(len(ratio))
+    for side, (here, there) in enumerate(((0, 1), (1, 0))):
+        cone[rows + side * len(ratio), chains.hole + there] = 1.0
+        cone[rows + side * len(ratio), chains.hole + here] = -ratio
+    low, high = np.zeros(size + 3), np.full(size + 3, _WIDEST)
+    grip = np.zeros(size)
+    grip[chains.hole] = chains.friction * segments.wrap
+    most = np.exp(np.add.reduceat(grip, chains.start[:-1]))
+    high[:size] = (most * (F + off) / scale)[chains.cable]
+    first = chains.start[:-1]
+    low[first], high[first] = np.maximum(F - off, 0.0) / scale, np.maximum(F + off, 0.0) / scale
+    low[size:] = -_WIDEST
+
+    def largest(way: Array) -> float:
+        cost = np.append(np.zeros(size), way)
+        found = linprog(-cost, cone, np.zeros(len(cone)), A, b, np.c_[low, high], method="highs-ds")
+        if found.status == 2:
+            raise InvalidInput(
+                "tension",
+                "no force at the tip balances these tensions at this posture, whatever friction "
+                "holds. The posture is wrong, or error= is too small.",
+            )
+        if found.status != 0:
+            raise SolverError("highs", f"bounds no force at the tip: {found.message}")
+        dual, pull = -found.eqlin.marginals, np.maximum(-found.ineqlin.marginals, 0.0)
+        left = cost - A.T @ dual - cone.T @ pull
+        left[abs(left) < _ROUNDING] = 0.0
+        bound = dual @ b + np.maximum(left * low, left * high).sum()
+        return scale * float(bound)
+
+    ends = -largest(-u), largest(u)
+    if not math.isfinite(ends[0] + ends[1]):
+        raise SolverError("highs", "bounds no force at the tip")
+    return TipForce(posture=pose, tension=F, error=off, direction=u, low=ends[0], high=ends[1])
+
+
+_ROUNDING = 1e-12
+"""Reduced costs that are rounding; those of the force would count a million times."""
