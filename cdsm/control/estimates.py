@@ -40,7 +40,7 @@ _FINEST: Final = 1e-9
 _LEAST_SPREAD: Final = 1e-3
 """Error of a tension [N] that even exact load cells leave."""
 
-_STEPS, _CONVERGED = 8, 1e-10
+_STEPS, _CONVERGED = 8, 1e-8
 """Gauss–Newton steps, and the step [rad] that ends them: the next is its square."""
 
 
@@ -111,7 +111,8 @@ class Observer:
                 break
         information = np.vstack([rows, prior])
         variance = float(np.linalg.inv(information.T @ information)[-1, -1])
-        pose = self.arm.at(np.clip(q, self.arm.lower, self.arm.upper))
+        inside = np.clip(q, self.arm.lower, self.arm.upper)
+        pose = pose if (inside == q).all() else self.arm.at(inside)
         return self._slid(before, pose, F, x, variance)
 
     def _slid(
