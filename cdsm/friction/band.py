@@ -49,9 +49,9 @@ class RestBand(ReadOnlyState):
         room: Size of the neighbourhood over that of all states at rest to first order [-]; 0 if
             no hole holds at the reference: it is then the one state at rest.
         proved: Whether ``low`` and ``high`` are proved. False if friction changes tensions or
-            angles so far that the outer correction does not end, as with much friction, low
-            tensions or a law that bends much (Eq. 19 with a long lead). Then both are to first
-            order, and histories may lead some percent beyond.
+            angles so far that the outer correction does not end, as with very much friction, low
+            tensions or a law that bends much (Eq. 19 at 15 or 120 N with a long lead). Then both
+            are to first order, and histories may lead some percent beyond.
     """
 
     stiffness: Stiffness

@@ -59,7 +59,8 @@ class Neighbourhood:
 
     Attributes:
         joints: Largest |δ| (nv,) [rad].
-        tensions: Largest |ΔT| (S,) [N].
+        tensions: Largest ΔT (S,) [N].
+        falls: Largest −ΔT (S,) [N]; no tension is negative.
     """
 
     def __init__(self, K: Stiffness, room: float) -> None:
@@ -80,17 +81,23 @@ class Neighbourhood:
         grip = room * chains.friction * segments.wrap
         self._steps = joints * grip
         self.joints = np.maximum(self.largest(np.eye(len(joints))), _NEAR)
-        self.tensions = np.maximum(abs((steps + common[cable]) * grip).sum(axis=1), _NEAR)
+        apart = abs((steps + common[cable]) * grip).sum(axis=1) / np.where(F > 0.0, F, 1.0)[cable]
+        self._set_tensions(apart, F[cable])
+
+    def _set_tensions(self, apart: Array, F: Array) -> None:
+        """Set the bounds of tensions from those of |ln T/F| (S,); a rise exceeds a fall."""
+        self.tensions = np.maximum(np.expm1(apart) * F, _NEAR)
+        self.falls = np.minimum(np.maximum(apart * F, _NEAR), F)
 
     def still(self, K: Stiffness) -> Self:
         """Return the states with the very angles of the reference: |ln T/F| is at most Σ μ φ."""
         segments = K.posture.segments
         chains, grip = segments.chains, np.zeros(len(segments.lengths))
         grip[chains.hole] = chains.friction * segments.wrap
-        most = np.expm1(np.add.reduceat(grip, chains.start[:-1])) * K.tension
+        apart = np.add.reduceat(grip, chains.start[:-1])[chains.cable]
         same = copy(self)
         same.joints, same._steps = np.zeros_like(self.joints), np.zeros_like(self._steps)
-        same.tensions = np.maximum(most[chains.cable], _NEAR)
+        same._set_tensions(apart, K.tension[chains.cable])
         return same
 
     def largest(self, rows: Array) -> Array:
@@ -140,7 +147,7 @@ class RestStates:
             routing.segment, routing.joint, *frames, np.ones(length.size), count, length.size
         )
         turned, straight = near.largest(H), near.largest(g)
-        low = np.maximum(-F / apart, -1.0)  # no tension is negative
+        low = -near.falls / apart
         high = np.ones(length.size)
         for c, each in enumerate(cables):
             if each.control == "force":
@@ -157,7 +164,8 @@ class RestStates:
         for c, each in enumerate(cables):
             if each.control == "position":
                 of = slice(start[c], start[c + 1])
-                wire = _Wire.of(each, float(K.tension[c]), float(apart[of].max()), unstrained)
+                ends = float(near.falls[of].max()), float(apart[of].max())
+                wire = _Wire.of(each, float(K.tension[c]), *ends, unstrained)
                 spring = 1.0 / each.series_stiffness
                 row = np.zeros((1, nv + length.size))
                 row[0, :nv] = wire.share * g[of].sum(axis=0) * within
@@ -303,12 +311,12 @@ class _Wire(NamedTuple):
     change: float
 
     @classmethod
-    def of(cls, cable: Cable, F: float, apart: float, unstrained: bool) -> _Wire:
-        """Bound b for tensions of a locked cable at most ``apart`` [N] from F [N]."""
+    def of(cls, cable: Cable, F: float, fall: float, rise: float, unstrained: bool) -> _Wire:
+        """Bound b for tensions of a locked cable from F − fall to F + rise [N]."""
         law = cable.elasticity
         strain = float(law.strain(F))
         offset = 0.0 if unstrained else strain
-        least, most = max(F - apart, 0.0), F + apart
+        least, most = F - fall, F + rise
         at = np.linspace(least, most, _CELLS + 1)
         outside = [F for F in (least, most) if not law.domain.first <= F <= law.domain.high]
         if outside:

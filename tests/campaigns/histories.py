@@ -2,7 +2,8 @@
 
 ``python -m tests.campaigns.histories 10000`` loads an arm of two hinges that often, and an arm of
 five universal joints a tenth as often, with one to three pulls each, and counts the tips outside
-the band of :func:`cdsm.rest_band`. It prints how far the farthest tip went in the band.
+the band of :func:`cdsm.rest_band`. It prints how far the farthest tip went in the band, and how far
+an adversary gets, who chooses loads and motor commands step by step.
 """
 
 import sys
@@ -62,6 +63,36 @@ def farthest(
     return outside, far
 
 
+def adversary(
+    pose: cdsm.Posture, pull: cdsm.Tension, largest: float, count: int, seed: int = 0
+) -> tuple[int, float]:
+    """Search three loads and motor commands that leave the tip far off, ``count`` times."""
+    band, rng, cables = (
+        cdsm.rest_band(pose, pull, "z"),
+        np.random.default_rng(seed),
+        len(pull.values),
+    )
+    outside, far, best, step = 0, 0.0, np.zeros((3, 3 + cables)), 1.0
+    scale = np.append(np.full(3, largest / 2.0), np.full(cables, 2e-4))
+    for k in track(range(count), "adversary"):
+        chosen = rng.random(best.shape) < (1.0 if k < count // 5 else 0.3)
+        trial = rng.normal(size=best.shape) if k < count // 5 else best.copy()
+        trial[chosen] += (k >= count // 5) * step * rng.normal(size=best.shape)[chosen]
+        wrenches, motors = np.zeros((4, 6)), np.zeros((4, cables))
+        wrenches[:3, :3], motors[:3] = (trial * scale)[:, :3], (trial * scale)[:, 3:]
+        try:
+            history = cdsm.load_cycle(pose, pull, wrenches, motors=motors, accuracy=0.1)
+        except cdsm.CdsmError:  # too much for the arm
+            continue
+        rest = history.displacement[-1, 2]
+        outside += not band.low - 1e-12 <= rest <= band.high + 1e-12
+        reached = max(rest / band.high, rest / band.low)
+        step = min(1.3 * step, 1.0) if reached > far else max(0.97 * step, 0.02)
+        if reached > far:
+            far, best = reached, trial
+    return outside, far
+
+
 def main(count: int) -> None:
     """Run the campaign."""
     for make, largest, share in ((two_hinges, 12.0, 1), (prototype, 60.0, 10)):
@@ -73,6 +104,10 @@ def main(count: int) -> None:
                 f"the farthest at {100.0 * far:.1f} % of the band, "
                 f"{time.perf_counter() - start:.0f} s",
                 flush=True,
+            )
+            outside, far = adversary(*pose_pull, largest, max(count // 20, 100))
+            print(
+                f"    searched: {outside} outside, the farthest at {100.0 * far:.1f} %", flush=True
             )
 
 

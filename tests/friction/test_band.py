@@ -10,6 +10,7 @@ import cdsm
 from cdsm import presets
 from cdsm.friction.rest_states import Neighbourhood, RestStates
 from cdsm.support.values import Array
+from tests.campaigns import histories as histories_of
 from tests.support import arms
 from tests.support.rough import rough
 
@@ -189,6 +190,24 @@ def test_force_controlled_cables_keep_their_tension_at_the_motor() -> None:
     np.testing.assert_allclose(first[1::2], F[1::2, None] * np.ones(2), rtol=1e-9)
     assert (first[::2, 0] < F[::2]).all()
     assert band.first_order < band.high < 1.5 * band.first_order
+
+
+@pytest.mark.slow
+def test_an_adversary_comes_near_the_ends_of_the_band() -> None:
+    """Who chooses loads and motor commands gets farther than chance, and never beyond."""
+    outside, far = histories_of.adversary(*histories_of.two_hinges(0.2), 12.0, 120)
+    assert not outside
+    assert 0.7 < far <= 1.0
+
+
+def test_much_friction_is_proved_too() -> None:
+    """Ratios of tensions are exponential: a neighbourhood must hold rises of expm1(Σ μ φ)."""
+    for friction in (0.25, 0.3):
+        band = cdsm.rest_band(*prototype(friction), "z")
+        assert band.proved
+        assert band.first_order < band.high < 1.7 * band.first_order
+    strand = presets.virtual_prototype(lead=0.3, friction=0.1).at(np.full(10, np.deg2rad(10.0)))
+    assert cdsm.rest_band(strand, cdsm.distribute_tension(strand, 50.0), "z").proved
 
 
 def test_without_friction_there_is_one_rest() -> None:
