@@ -225,6 +225,20 @@ def closed_loop(nb: Shown) -> None:
         assert stiffness < 4.0
 
 
+def design_of_an_arm(nb: Shown) -> None:
+    assert nb.held.limit == "deflection"
+    np.testing.assert_allclose(nb.held.force, 1.241, atol=2e-3)  # 500 g is 4.9 N
+    np.testing.assert_allclose(nb.held.limits["tension"], 72.4, atol=0.1)
+    np.testing.assert_allclose(nb.polytope.margin(), 63.95, atol=0.01)
+    best = nb.found.values(0)
+    np.testing.assert_allclose(best["motor_force"], 49.24, atol=0.5)
+    assert best["deflection"] <= 1e-3
+    assert best["disk_clearance"] >= 0.5e-3
+    assert len(nb.found.front) > 20
+    assert 0.8e-3 < max(nb.sag) < 1e-3  # the real weight, with all nonlinearity
+    assert nb.missed.constraints == ("deflection",)
+
+
 CHECKS: dict[str, Callable[[Shown], None]] = {
     "00_start_here": start,
     "01_from_geometry_to_stiffness": first_arm,
@@ -236,6 +250,7 @@ CHECKS: dict[str, Callable[[Shown], None]] = {
     "07_why_does_my_weight_test_depend_on_the_weight": weights_with_friction,
     "08_hold_4_newtons_per_millimetre": closed_loop,
     "10_is_it_true": is_it_true,
+    "09_design_an_arm": design_of_an_arm,
 }
 
 
