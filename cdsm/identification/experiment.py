@@ -232,7 +232,7 @@ def _rows(
     model_of: Callable[..., Manipulator], values: dict[str, float], loop: WeightLoop
 ) -> Array:
     """Compute the derivatives (m, P) of a loop by relative parameters, in standard deviations."""
-    exact = loop.simulated(model_of(**values))
+    exact = loop.simulated(Model.of(model_of, None, (loop,)).arm(values))
     model = Model.of(model_of, None, (exact,)).weighted(values)
     columns = []
     for name, value in values.items():

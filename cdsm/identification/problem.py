@@ -86,7 +86,7 @@ class Model:
         V = σ² 1 + σ_f² A Aᵀ + σ_F² B Bᵀ of the readings, with their derivatives A by the forces and
         B by the tensions. A force also changes the readings after it, since the holes remember.
         """
-        arm = self._arm(parameters)
+        arm = self.arm(parameters)
         paths = self._paths_at(parameters, arm)
         weights = [
             _weights(each)
@@ -102,7 +102,7 @@ class Model:
 
     def predict(self, parameters: Parameters) -> tuple[Manipulator, list[Array]]:
         """Build the arm; predict each stiffness (1,) [N/m], or loop (m,) [m] from the reference."""
-        arm = self._arm(parameters)
+        arm = self.arm(parameters)
         paths = self._paths_at(parameters, arm)
         predicted = []
         for i, (each, path) in enumerate(zip(self.measurements, paths, strict=True)):
@@ -119,16 +119,19 @@ class Model:
 
         Its loops follow those here to first order, ten times as fast and without a search.
         """
-        arm, paths, predicted = self._arm(moved), self._paths_at(here), list[Array]()
+        arm, paths, predicted = self.arm(moved), self._paths_at(here), list[Array]()
         for i, (each, path) in enumerate(zip(self.measurements, paths, strict=True)):
             if not isinstance(each, WeightLoop):
                 predicted.append(np.array([self._stiffness_of(i, arm, each, moved)]))
                 continue
             assert path is not None
-            pose, tension, wrench = self._started(arm, each, moved)
-            if not same_segments(pose, path.start.pose):
-                raise NoModelError("the cables have other segments than beside there.")
-            tips = path.beside(pose, tension, wrench) - pose.tip[:3, 3]
+            try:
+                pose, tension, wrench = self._started(arm, each, moved)
+                if not same_segments(pose, path.start.pose):
+                    raise NoModelError("the cables have other segments than beside there.")
+                tips = path.beside(pose, tension, wrench) - pose.tip[:3, 3]
+            except CdsmError as error:
+                raise NoModelError(f"measurement {label(i, each)}: {error}") from error
             predicted.append((tips @ each.axes.T).ravel())
         return self.weigh(predicted)
 
@@ -153,7 +156,8 @@ class Model:
             rows.append(found)
         return np.concatenate(rows)
 
-    def _arm(self, parameters: Parameters) -> Manipulator:
+    def arm(self, parameters: Parameters) -> Manipulator:
+        """Build the arm; raise NoModelError if there is none."""
         try:
             arm = _called("model_of", self.model_of, parameters)
         except CdsmError as error:
@@ -168,7 +172,7 @@ class Model:
         """Load the arm with all loops, or find where that was done before."""
         key = tuple(parameters.values())
         if key not in self._paths:
-            arm = arm or self._arm(parameters)
+            arm = arm or self.arm(parameters)
             found = [self._path(i, arm, parameters) for i in range(len(self.measurements))]
             while len(self._paths) >= _KEPT:
                 del self._paths[next(iter(self._paths))]

@@ -154,6 +154,15 @@ def test_parameters_that_are_not_in_the_arm_are_named() -> None:
         cdsm.plan_experiment(hinge, {}, **ASKED)
 
 
+def test_a_function_that_fails_or_builds_no_arm_is_named() -> None:
+    def broken(friction: float) -> cdsm.Manipulator:
+        raise ZeroDivisionError("friction")
+
+    for model_of, said in ((broken, "ZeroDivisionError"), (lambda friction: 3, "model_of")):
+        with pytest.raises(cdsm.InvalidInput, match=said):
+            cdsm.plan_experiment(model_of, {"friction": 0.1}, **ASKED)  # type: ignore[arg-type]
+
+
 @pytest.mark.long
 def test_simulated_experiments_confirm_the_factor() -> None:
     def spread(loops: tuple[cdsm.WeightLoop, ...], count: int = 60) -> Any:
