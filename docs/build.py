@@ -29,11 +29,12 @@ def main() -> int:
     os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
     paths = [str(ROOT), str(ROOT / "examples"), os.environ.get("PYTHONPATH", "")]
     os.environ["PYTHONPATH"] = os.pathsep.join(paths)
-    os.environ |= {
-        "TERM": "dumb",
-        "NO_COLOR": "1",
-        "COLUMNS": "100",
-    }  # for commands that pages show
+    profile = ROOT / "build" / "ipython" / "profile_default"
+    profile.mkdir(parents=True, exist_ok=True)
+    (profile / "ipython_kernel_config.py").write_text(KERNEL, encoding="utf-8")
+    os.environ["IPYTHONDIR"] = str(profile.parent)
+    # for commands that pages show
+    os.environ |= {"TERM": "dumb", "NO_COLOR": "1", "COLUMNS": "100"}
     doctrees = str(ROOT / "build" / "doctrees")
     options = ["-W", "--keep-going", "-q", "-j", "auto", "-d", doctrees]
     failed = build_main([*options, str(HERE), str(SITE)])
