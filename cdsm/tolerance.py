@@ -111,6 +111,12 @@ class Tolerance(ReadOnlyState):
         width = WIDTH[one_of("distribution of half-widths", distribution, WIDTH)]
         return cls(scalar("half_width", half_width) / width, distribution, correlation, of)  # type: ignore[arg-type]
 
+    @property
+    def is_given(self) -> bool:
+        """Whether the standard uncertainty is not zero."""
+        standard = self.standard
+        return standard > 0.0 if isinstance(standard, float) else bool(standard.any())
+
     def at(self, tension: Array) -> float | Array:
         """Return the standard uncertainty, or those (C,) at tensions (C,) [N].
 
@@ -239,13 +245,17 @@ class Tolerances:
         """
         value = getattr(self, one_of("source of uncertainty", source, SOURCES))
         every = value if isinstance(value, tuple) else (value,)
-        return tuple(each for each in every if np.any(each.standard))
+        return tuple(each for each in every if each.is_given)
 
     @property
     def given(self) -> Mapping[str, tuple[Tolerance, ...]]:
         """All tolerances that are not zero, by source."""
-        each = {name: self.parts(name) for name in SOURCES}
-        return {name: parts for name, parts in each.items() if parts}
+        found = {}
+        for name in SOURCES:
+            value = getattr(self, name)
+            if isinstance(value, tuple) or value.is_given:
+                found[name] = self.parts(name)
+        return {name: parts for name, parts in found.items() if parts}
 
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> Tolerances:

@@ -31,10 +31,9 @@ class Part(NamedTuple):
     standard: float | Array
     tolerance: Tolerance
 
-    def spread(self, sensitivity: Array, spread: Array) -> None:
-        """Add σ R σ g (n,) of partial derivatives g (n,) and correlations R (JCGM 100, Eq. 13)."""
-        weighted = self.standard * sensitivity[self.inputs]
-        spread[self.inputs] += self.standard * self.tolerance.correlated(weighted)
+    def spread(self, sensitivity: Array) -> Array:
+        """Compute σ R σ g (k,) of partial derivatives g (k,) and correlations R (JCGM 100, 13)."""
+        return np.asarray(self.standard * self.tolerance.correlated(self.standard * sensitivity))
 
     def draw(self, rng: np.random.Generator, errors: Array) -> None:
         """Draw the errors (draws, n) of the inputs.
@@ -66,9 +65,12 @@ def parts_of(
         InvalidInput: No input has such a name, two tolerances are of one input, or a tension is
             outside those of a tolerance, or so near to slack that its rigidity is not known.
     """
-    found = {}
+    found: dict[str, tuple[Part, ...]] = {}
     for source, given in tolerances.given.items():
         names, parts = labels[source], []
+        if len(given) == 1 and given[0].of == EVERY and given[0].tensions is None:
+            found[source] = (Part(_ALL, given[0].standard, given[0]),)  # the usual case
+            continue
         taken = np.zeros(len(names), dtype=np.bool_)
         for each in given:
             inputs = _ALL if each.of == EVERY else _matching(source, each.of, names)
@@ -92,9 +94,11 @@ def parts_of(
 
 def spread(parts: Sequence[Part], sensitivity: Array) -> Array:
     """Compute σ R σ g (n,) of all inputs of a source."""
+    if parts[0].inputs is _ALL:
+        return parts[0].spread(sensitivity)
     total = np.zeros_like(sensitivity)
     for part in parts:
-        part.spread(sensitivity, total)
+        total[part.inputs] = part.spread(sensitivity[part.inputs])
     return total
 
 
