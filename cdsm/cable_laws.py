@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -11,10 +13,12 @@ from cdsm.cable import Cable
 from cdsm.elasticity import Elasticity, LinearElasticity
 from cdsm.errors import ElasticityRangeError, InvalidInput
 from cdsm.kernels.stiffness import single_cable_stiffness
+from cdsm.kernels.wires import AT_ONCE, Wires
 from cdsm.support.validation import LARGEST, RANGES
 from cdsm.support.values import Array, frozen
 from cdsm.wires.continuity import find_jump
 from cdsm.wires.laws import StrandElasticity
+from cdsm.wires.quadrature import NODES, WEIGHTS, Panels
 from cdsm.wires.slack import SlackBelow
 
 OriginalLength = Literal["unstrained", "stretched"]
@@ -38,6 +42,8 @@ class CableLaws:
         held: Each different law of the position-controlled cables, with the indices of its cables.
         series: 1/k_series of all cables (C,) [m/N].
         rest: Tension at which each series spring is at rest (C,) [N]: that of zero strain.
+        asked: Each law that is not linear, with the indices of its cables.
+        own: Those of them that no kernel knows.
     """
 
     def __init__(self, cables: tuple[Cable, ...], original_length: OriginalLength) -> None:
@@ -69,6 +75,7 @@ class CableLaws:
             else:
                 self.asked.append((law, of))
         self.constant, self.linear = frozen(constant), frozen(linear)
+        self.own = [law for law, _ in self.asked if _polynomials(law) is None]
 
     def require_continuity(self) -> None:
         """Raise InvalidInput if the rigidity of a law jumps."""
@@ -82,6 +89,36 @@ class CableLaws:
                     f"to {jump.above:.6g} N, and K_θ with it. Make it continuous, e.g. by a "
                     "TabulatedElasticity through points of its strain.",
                 )
+
+    @cached_property
+    def wires(self) -> Wires:
+        """The laws that are polynomials in the tension, for the kernel of a batch."""
+        count = len(self._cables)
+        panels, ends = np.tile([0, -1], (count, 1)), np.zeros((count, 6))
+        tables: list[Panels] = []
+        for law, held in self.asked:
+            strand = _polynomials(law)
+            if strand is None:
+                continue
+            first = sum(len(table.before[0]) for table in tables)
+            tables.append(strand.panels)
+            panels[held] = first, first + len(strand.panels.before[0]) - 1
+            lowest, slack = strand.domain.first, law is not strand
+            ends[held] = (
+                law.domain.first,
+                law.domain.high,
+                law.rest if slack else -math.inf,
+                lowest,
+                strand.rigidity(lowest),
+                self._unstrained,
+            )
+        return Wires(
+            frozen(panels.astype(np.intp)),
+            frozen(ends),
+            frozen(np.hstack([np.zeros((3, 0)), *(_edges(table) for table in tables)])),
+            frozen(_coefficients([table.coefficients for table in tables])),
+            frozen(np.array([NODES, WEIGHTS])),
+        )
 
     def narrowed(self, low: Array, high: Array) -> tuple[Array, Array]:
         """Return bounds of tension (…, C) [N], narrowed by the bounds that each cable defines."""
@@ -189,6 +226,24 @@ def kinks(law: Elasticity) -> tuple[float, ...]:
     if isinstance(law, SlackBelow):
         return law.rest, *kinks(law.law)
     return law.joins if isinstance(law, StrandElasticity) else ()
+
+
+def _polynomials(law: Elasticity) -> StrandElasticity | None:
+    """Return the polynomials of a law that has them and is positive on its domain, else None."""
+    inside = law.law if isinstance(law, SlackBelow) else law
+    whole = isinstance(inside, StrandElasticity) and inside.panels.end == math.inf
+    return inside if isinstance(inside, StrandElasticity) and whole else None
+
+
+def _edges(table: Panels) -> Array:
+    return np.array([table.edges[:-1], table.edges[1:], table.before[0]])
+
+
+def _coefficients(tables: list[Array]) -> Array:
+    """Stack coefficients (powers, P) of different degree side by side; the rows fit the kernel."""
+    powers = AT_ONCE * -(-max((len(table) for table in tables), default=0) // AT_ONCE)
+    padded = [np.pad(table, ((0, powers - len(table)), (0, 0))) for table in tables]
+    return np.hstack([np.zeros((powers, 0)), *padded])
 
 
 def _checked_rigidity(law: Elasticity, tension: Array) -> Array:

@@ -85,7 +85,7 @@ class Evaluator:
         # whether the kernel needs rigidities that only Python computes
         needs_springs = bool(self._wanted.size) and self._wanted[-1] > layout.LOAD
         laws = arm._model.wire_laws if self._sticks else arm._model.laws
-        self._asks = needs_springs and bool(laws.asked)
+        self._asks = needs_springs and bool(laws.asked if self._sticks else laws.own)
         widest = _WIDTH if self._start[-1] < _LONG else _WIDTH // 2
         self._block = max(1, min(widest, len(q)))
 

@@ -33,7 +33,7 @@ from cdsm.batch.layout import (
 )
 from cdsm.kernels.bodies import Masses, gravity_torque, set_gravity_stiffness, tip_jacobian
 from cdsm.kernels.compiling import Index, Width, inlined, inner, lanes, threaded, upwards
-from cdsm.kernels.distribution import distribute, set_torque
+from cdsm.kernels.distribution import distribute, set_arms, set_torque
 from cdsm.kernels.segments import (
     SHORTEST_SEGMENT,
     add_length_hessian,
@@ -51,6 +51,7 @@ from cdsm.kernels.stiffness import (
 from cdsm.kernels.stuck import Holes, add_stuck_stiffness, sticking_scratch
 from cdsm.kernels.tension import certificate
 from cdsm.kernels.tree import Indices, Routing, Tree, empty_frames, forward_kinematics
+from cdsm.kernels.wires import Wires, set_wire_rigidity, wire_scratch
 from cdsm.support.values import Array
 
 
@@ -67,6 +68,7 @@ def evaluate_rows(
     rest: Array,
     constant: Array,
     linear: Array,
+    wires: Wires,
     holes: Holes,
     q: Array,
     tension: Array,
@@ -103,13 +105,14 @@ def evaluate_rows(
         rest: Tension at which the series springs are at rest (C,) [N].
         constant: Constant part of EA (1 + ε) (C,) [N]; 0 for motors that hold force.
         linear: Factor (C,) of the tension in EA (1 + ε): 1 for linear laws, else 0.
+        wires: Laws of cables that are polynomials in the tension.
         holes: Holes and wires of the cables.
         q: Joint angles (b, nv) [rad].
         tension: F (b, C) [N]; (0, C) if tensions are distributed or not needed.
         low: Lower bounds (b, C) [N] of distributed tensions; (0, C) if none are distributed.
         high: Upper bounds, as ``low``.
         rigidity: EA (1 + ε) (b, C) [N]; 0 under force control, negative outside the domain. (0, C)
-            if it follows from ``constant`` and ``linear``.
+            if it follows from ``constant``, ``linear`` and ``wires``.
         wire: As ``rigidity`` for cables that stick: also of those under force control.
         wrench: W (b, 6).
         start: Index in the record at which each quantity begins.
@@ -159,6 +162,7 @@ def evaluate_rows(
     arms, torque = np.empty((cables, nv, width)), np.empty((nv, width))
     six, shortest = np.empty((6, width)), np.empty(width)
     code, known = np.empty(width, dtype=np.intp), np.empty(width, dtype=np.intp)
+    wiring = wire_scratch(wires, width)
     sticking, springs = sticking_scratch(nv, width), np.empty((nv, nv, width))
     slot, magnitudes = np.zeros(cables, dtype=np.intp), np.empty((nv, nv, width))
 
@@ -190,7 +194,7 @@ def evaluate_rows(
         if last > GRAVITY:
             set_torque(JX, g, loads, torque, width)
             if low.shape[0]:
-                _set_arms(J, smallest_arm, arms, width)
+                set_arms(J, smallest_arm, arms, width)
                 distribute(blocks, arms, torque, least, most, guess, check, F, width)
                 for w in lanes(width):
                     if code[w] == OK and not (check.optimal[w] == 1.0 and guess.failed[w] < 0.0):
@@ -210,6 +214,7 @@ def evaluate_rows(
         if last > LOAD:
             if not rigidity.shape[0]:
                 _set_rigidity(constant, linear, F, stretched, width)
+                set_wire_rigidity(wires, F, stretched, wiring, width)
             for w in lanes(width):
                 if code[w] == OK and _is_negative(stretched, w):
                     code[w] = OUTSIDE_ELASTICITY
@@ -256,15 +261,6 @@ def _load(rows: Array, first: int, block: Array, width: Width) -> None:
             row = min(first + np.intp(w), rows.shape[0] - 1)
             for i in range(rows.shape[1]):
                 block[i, w] = rows[row, i]
-
-
-@inner
-def _set_arms(J: Array, smallest: float, arms: Array, width: Width) -> None:
-    """Copy J_L (C, nv, W) without moment arms of rounding."""
-    for c in upwards(0, J.shape[0]):
-        for i in upwards(0, J.shape[1]):
-            for w in lanes(width):
-                arms[c, i, w] = J[c, i, w] if abs(J[c, i, w]) >= smallest else 0.0
 
 
 @inner

@@ -38,6 +38,7 @@ def kernel_arm(arm: Manipulator, check_limits: bool) -> tuple[Any, ...]:
         model.laws.rest,
         model.laws.constant,
         model.laws.linear,
+        model.laws.wires,
         model.holes,
     )
 

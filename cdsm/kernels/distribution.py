@@ -12,7 +12,7 @@ import numpy as np
 
 from cdsm.kernels import active_set
 from cdsm.kernels.active_set import FOUND, IMPOSSIBLE, empty_state
-from cdsm.kernels.compiling import Width, inlined, inner, lanes, threaded, upwards
+from cdsm.kernels.compiling import Width, compiled, inlined, inner, lanes, threaded, upwards
 from cdsm.kernels.serpentine_guess import (
     Blocks,
     Guess,
@@ -40,6 +40,15 @@ def set_torque(
         for a in range(6):
             for w in lanes(width):
                 torque[i, w] += wrench[a, w] * jacobian[a, i, w]
+
+
+@inner
+def set_arms(J: Array, smallest: float, arms: Array, width: Width) -> None:
+    """Copy J_L (C, nv, W) without moment arms of rounding."""
+    for c in upwards(0, J.shape[0]):
+        for i in upwards(0, J.shape[1]):
+            for w in lanes(width):
+                arms[c, i, w] = J[c, i, w] if abs(J[c, i, w]) >= smallest else 0.0
 
 
 @inlined
@@ -71,6 +80,38 @@ def set_within(F: Array, low: Array, high: Array, tension: Array, width: Width) 
     for c in upwards(0, F.shape[0]):
         for w in lanes(width):
             tension[c, w] = min(max(F[c, w], low[c, w]), high[c, w])
+
+
+@compiled
+def single_guess(
+    row: Indices,
+    row_start: Indices,
+    cable: Indices,
+    cable_start: Indices,
+    jacobian: Array,
+    length_jacobian: Array,
+    gravity_torque: Array,
+    wrench: Array,
+    low: Array,
+    high: Array,
+    smallest: float,
+) -> tuple[Array, bool]:
+    """Guess the tensions (C,) of one posture; they are the least if the second result is true.
+
+    The first four arguments are the fields of :class:`Blocks`. The guess has the bits of a batch.
+    """
+    count, nv = length_jacobian.shape
+    blocks = Blocks(row, row_start, cable, cable_start)
+    JX, J = jacobian.reshape(6, nv, 1), length_jacobian.reshape(count, nv, 1)
+    g, W = gravity_torque.reshape(nv, 1), wrench.reshape(6, 1)
+    torque, arms, tension = np.empty((nv, 1)), np.empty((count, nv, 1)), np.empty((count, 1))
+    # copies are writable like the scratch, so one compilation serves both
+    least, most = low.copy().reshape(count, 1), high.copy().reshape(count, 1)
+    guess, check = empty_guess(blocks, nv, count, 1), certificate(nv, count, 1)
+    set_torque(JX, g, W, torque, None)
+    set_arms(J, smallest, arms, None)
+    distribute(blocks, arms, torque, least, most, guess, check, tension, None)
+    return tension.reshape(count), check.optimal[0] == 1.0 and guess.failed[0] < 0.0
 
 
 @threaded

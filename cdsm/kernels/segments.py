@@ -57,34 +57,114 @@ def segment_scratch(nv: int, width: int) -> Segments:
     )
 
 
-@inner
+@inlined
 def set_direction(site: Array, a: Index, b: Index, scratch: Segments, width: Width) -> None:
     """Fill u (3, W) from site a to site b, ℓ and 1/ℓ (W,)."""
-    u, length, inverse = scratch.direction, scratch.length, scratch.inverse
-    for w in lanes(width):
-        square = (site[b, 0, w] - site[a, 0, w]) ** 2 + (site[b, 1, w] - site[a, 1, w]) ** 2
-        length[w] = math.sqrt(square + (site[b, 2, w] - site[a, 2, w]) ** 2)
-    for w in lanes(width):
-        inverse[w] = 1.0 / length[w]
-    for r in axes(site.shape[1], width):
-        for w in lanes(width):
-            u[r, w] = (site[b, r, w] - site[a, r, w]) / length[w]
+    u = scratch.direction
+    _set_direction(site[a], site[b], u[0], u[1], u[2], scratch.length, scratch.inverse, width)
 
 
 @inner
+def _set_direction(
+    start: Array,
+    end: Array,
+    x: Array,
+    y: Array,
+    z: Array,
+    length: Array,
+    inverse: Array,
+    width: Width,
+) -> None:
+    for w in lanes(width):
+        dx, dy, dz = end[0, w] - start[0, w], end[1, w] - start[1, w], end[2, w] - start[2, w]
+        distance = math.sqrt(dx**2 + dy**2 + dz**2)
+        x[w], y[w], z[w] = dx / distance, dy / distance, dz / distance
+        length[w], inverse[w] = distance, 1.0 / distance
+
+
+@inlined
 def set_derivative(
     frames: Frames, sign: float, site: Index, j: Index, d: Array, width: Width
 ) -> None:
     """Fill d_j (3, W) = ±z × (x − o), or ± the slide, at the end x of a segment."""
-    origin, axis, x = frames.origin, frames.axis, frames.site
+    point, origin, axis = frames.site[site], frames.origin[j], frames.axis[j]
+    _set_derivative(point, origin, axis, sign, d[0], d[1], d[2], width)
+    if frames.slide.shape[0]:
+        _add_slide(frames.slide[j], sign, d, width)
+
+
+@inner
+def _set_derivative(
+    point: Array,
+    origin: Array,
+    axis: Array,
+    sign: float,
+    dx: Array,
+    dy: Array,
+    dz: Array,
+    width: Width,
+) -> None:
+    for w in lanes(width):
+        x, y = sign * (point[0, w] - origin[0, w]), sign * (point[1, w] - origin[1, w])
+        z = sign * (point[2, w] - origin[2, w])
+        dx[w] = axis[1, w] * z - axis[2, w] * y
+        dy[w] = axis[2, w] * x - axis[0, w] * z
+        dz[w] = axis[0, w] * y - axis[1, w] * x
+
+
+@inner
+def _add_slide(slide: Array, sign: float, d: Array, width: Width) -> None:
     for r in axes(d.shape[0], width):
-        p, q = (r + 1) % 3, (r + 2) % 3
         for w in lanes(width):
-            y, z = x[site, p, w] - origin[j, p, w], x[site, q, w] - origin[j, q, w]
-            d[r, w] = axis[j, p, w] * (sign * z) - axis[j, q, w] * (sign * y)
-        if frames.slide.shape[0]:
-            for w in lanes(width):
-                d[r, w] += sign * frames.slide[j, r, w]
+            d[r, w] += sign * slide[r, w]
+
+
+@inner
+def _add_rate(
+    u: Array, point: Array, origin: Array, axis: Array, sign: float, rate: Array, width: Width
+) -> None:
+    """Add u·d (W,) with d = ±z × (x − o)."""
+    for w in lanes(width):
+        x, y = sign * (point[0, w] - origin[0, w]), sign * (point[1, w] - origin[1, w])
+        z = sign * (point[2, w] - origin[2, w])
+        rate[w] += (
+            u[0, w] * (axis[1, w] * z - axis[2, w] * y)
+            + u[1, w] * (axis[2, w] * x - axis[0, w] * z)
+            + u[2, w] * (axis[0, w] * y - axis[1, w] * x)
+        )
+
+
+@inner
+def _add_slide_rate(u: Array, slide: Array, sign: float, rate: Array, width: Width) -> None:
+    """Add u·d (W,) with d = ± the slide."""
+    for w in lanes(width):
+        rate[w] += sign * (u[0, w] * slide[0, w] + u[1, w] * slide[1, w] + u[2, w] * slide[2, w])
+
+
+@inner
+def _set_left_factor(
+    u: Array,
+    inverse: Array,
+    d: Array,
+    axis: Array,
+    weight: Array,
+    cx: Array,
+    cy: Array,
+    cz: Array,
+    width: Width,
+) -> None:
+    """Fill a weight times the left factor c = (d − (u·d) u)/ℓ + u × z."""
+    for w in lanes(width):
+        along = u[0, w] * d[0, w] + u[1, w] * d[1, w] + u[2, w] * d[2, w]
+        cx[w] = weight[w] * (
+            (d[0, w] - along * u[0, w]) * inverse[w] + u[1, w] * axis[2, w] - u[2, w] * axis[1, w]
+        )
+        cy[w] = weight[w] * (
+            (d[1, w] - along * u[1, w]) * inverse[w] + u[2, w] * axis[0, w] - u[0, w] * axis[2, w]
+        )
+        cz[w] = weight[w] * (
+            (d[2, w] - along * u[2, w]) * inverse[w] + u[0, w] * axis[1, w] - u[1, w] * axis[0, w]
+        )
 
 
 @inner
@@ -110,7 +190,7 @@ def set_lengths(
 
     Where two sites coincide, L and J_L of the posture are meaningless.
     """
-    segment, joint, (u, length, _, d, _, _) = routing.segment, routing.joint, scratch
+    segment, joint, (u, length, _, _, _, _) = routing.segment, routing.joint, scratch
     for c in upwards(0, lengths.shape[0]):
         for w in lanes(width):
             lengths[c, w] = routing.fixed[c]
@@ -124,14 +204,15 @@ def set_lengths(
         set_direction(frames.site, a, b, scratch, width)
         for w in lanes(width):
             lengths[cable, w] += length[w]
+        for w in lanes(width):
             shortest[w] = min(shortest[w], length[w])
         for t in range(segment[s, 3], segment[s + 1, 3]):
             j = np.uint64(joint[t])
             sign, site = (1.0, b) if t >= segment[s, 4] else (-1.0, a)
-            set_derivative(frames, sign, site, j, d, width)
-            i = j - np.uint64(1)
-            for w in lanes(width):
-                jacobian[cable, i, w] += u[0, w] * d[0, w] + u[1, w] * d[1, w] + u[2, w] * d[2, w]
+            rate = jacobian[cable, j - np.uint64(1)]
+            _add_rate(u, frames.site[site], frames.origin[j], frames.axis[j], sign, rate, width)
+            if frames.slide.shape[0]:
+                _add_slide_rate(u, frames.slide[j], sign, rate, width)
 
 
 @inner
@@ -150,7 +231,7 @@ def add_length_hessian(
     ``weight`` is (C, W) and ``hessian`` (S, nv, nv, W). H_L·F needs the weight F and all slots 0.
     The whole tensor needs the weight 1 and slot c for cable c.
     """
-    u, _, inverse, d, along, left = scratch
+    u, _, inverse, d, _, left = scratch
     axis = frames.axis
     for s in range(segment.shape[0] - 1):
         cable, a, b = np.uint64(segment[s, 0]), np.uint64(segment[s, 1]), np.uint64(segment[s, 2])
@@ -169,16 +250,8 @@ def add_length_hessian(
                             )
             sign, site = (1.0, b) if t >= split else (-1.0, a)
             set_derivative(frames, sign, site, j, d, width)
-            for w in lanes(width):
-                along[w] = u[0, w] * d[0, w] + u[1, w] * d[1, w] + u[2, w] * d[2, w]
-            for r in axes(u.shape[0], width):
-                p, q = (r + 1) % 3, (r + 2) % 3
-                for w in lanes(width):
-                    left[own, r, w] = weight[cable, w] * (
-                        (d[r, w] - along[w] * u[r, w]) * inverse[w]
-                        + u[p, w] * axis[j, q, w]
-                        - u[q, w] * axis[j, p, w]
-                    )
+            c, z, force = left[own], axis[j], weight[cable]
+            _set_left_factor(u, inverse, d, z, force, c[0], c[1], c[2], width)
             # pair joint j with itself and all joints before it, also those of the other side
             for k in upwards(0, t + 1 - first):
                 i = np.uint64(joint[first + np.intp(k)])

@@ -167,39 +167,59 @@ def _set_best(
     for s in range(own.shape[0]):
         for t in range(s if i == j else s + 1, s + 1 if i == j else own.shape[0]):
             c, d = np.uint64(own[s]), np.uint64(own[t])
+            x, y, chosen = pair[0], pair[1], -1.0 if i == j else float(t)
             if i == j:
                 for w in lanes(width):
-                    pair[1, w] = lacking[0, w] / J[c, i, w]
+                    x[w] = lacking[0, w] / J[c, i, w]
                 for w in lanes(width):
-                    pair[2, w] = 0.0
+                    y[w] = 0.0
             else:
-                for w in lanes(width):
-                    pair[3, w] = J[c, i, w] * J[d, j, w] - J[c, j, w] * J[d, i, w]
-                for w in lanes(width):
-                    pair[1, w] = lacking[0, w] * J[d, j, w] - lacking[1, w] * J[d, i, w]
-                for w in lanes(width):
-                    pair[1, w] /= pair[3, w]
-                for w in lanes(width):
-                    pair[2, w] = J[c, i, w] * lacking[1, w] - J[c, j, w] * lacking[0, w]
-                for w in lanes(width):
-                    pair[2, w] /= pair[3, w]
-            for w in lanes(width):
-                x, y = pair[1, w], pair[2, w]
-                pair[0, w] = (2.0 * low[c, w] + x) * x + (2.0 * low[d, w] + y) * y
-            for w in lanes(width):
-                # cables that cannot give this torque have infinite x and y, or NaN
-                x, y = pair[1, w], pair[2, w]
-                within = 0.0 <= x < math.inf and 0.0 <= y < math.inf
-                fits = low[c, w] + x <= high[c, w] and low[d, w] + y <= high[d, w]
-                pair[0, w] = pair[0, w] if within and fits else math.inf
-            for r in range(1, 3):
-                number = float(s if r == 1 else t) if i != j or r == 1 else -1.0
-                for w in lanes(width):
-                    best[r, w] = pair[r, w] if pair[0, w] < best[0, w] else best[r, w]
-                for w in lanes(width):
-                    best[2 + r, w] = number if pair[0, w] < best[0, w] else best[2 + r, w]
-            for w in lanes(width):
-                best[0, w] = min(best[0, w], pair[0, w])
+                _solve_pair(J[c, i], J[c, j], J[d, i], J[d, j], lacking, x, y, width)
+            least, most = (low[c], low[d]), (high[c], high[d])
+            rows = best[0], best[1], best[2], best[3], best[4]
+            _keep_better(x, y, *least, *most, float(s), chosen, *rows, width)
+
+
+@inner
+def _solve_pair(
+    a: Array, b: Array, c: Array, d: Array, torque: Array, x: Array, y: Array, width: Width
+) -> None:
+    """Fill x and y (W,) so that two cables with the moment arms (a, b) and (c, d) give a torque."""
+    for w in lanes(width):
+        determinant = a[w] * d[w] - b[w] * c[w]
+        x[w] = (torque[0, w] * d[w] - torque[1, w] * c[w]) / determinant
+        y[w] = (a[w] * torque[1, w] - b[w] * torque[0, w]) / determinant
+
+
+@inner
+def _keep_better(
+    x: Array,
+    y: Array,
+    least_x: Array,
+    least_y: Array,
+    most_x: Array,
+    most_y: Array,
+    p: float,
+    q: float,
+    cost: Array,
+    best_x: Array,
+    best_y: Array,
+    best_p: Array,
+    best_q: Array,
+    width: Width,
+) -> None:
+    """Keep what is added to the cables p and q (W,) where it fits and is the least yet."""
+    for w in lanes(width):
+        # cables that cannot give the torque have infinite x and y, or NaN
+        within = 0.0 <= x[w] < math.inf and 0.0 <= y[w] < math.inf
+        fits = least_x[w] + x[w] <= most_x[w] and least_y[w] + y[w] <= most_y[w]
+        added = (2.0 * least_x[w] + x[w]) * x[w] + (2.0 * least_y[w] + y[w]) * y[w]
+        better = within and fits and added < cost[w]
+        cost[w] = added if better else cost[w]
+        best_x[w] = x[w] if better else best_x[w]
+        best_y[w] = y[w] if better else best_y[w]
+        best_p[w] = p if better else best_p[w]
+        best_q[w] = q if better else best_q[w]
 
 
 @inner

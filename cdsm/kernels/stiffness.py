@@ -124,10 +124,11 @@ def sum_terms(
         for j in upwards(0, K.shape[0]):
             for w in lanes(width):
                 K[i, j, w] = active[i, j, w] + passive[i, j, w] + gravity[i, j, w] + load[i, j, w]
-            for w in lanes(width):
-                parts[i, j, w] = abs(active[i, j, w]) + abs(passive[i, j, w])
-            for w in lanes(width):
-                parts[i, j, w] += abs(gravity[i, j, w]) + abs(load[i, j, w])
+                parts[i, j, w] = (
+                    abs(active[i, j, w])
+                    + abs(passive[i, j, w])
+                    + (abs(gravity[i, j, w]) + abs(load[i, j, w]))
+                )
 
 
 @compiled

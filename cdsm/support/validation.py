@@ -162,8 +162,12 @@ def bound(name: str, value: ArrayLike, size: int, rows: int | None = None) -> Ar
 
     If ``rows`` is given, an array (rows, size) is also allowed and keeps its shape.
     """
+    _, least, most = RANGES["tension"]
     # one float for all cables is the usual case and must be fast
-    array: Array = np.full(size, value) if isinstance(value, float) else _native(name, value)
+    number = value if isinstance(value, float) else math.nan
+    if least <= number <= most or number in (0.0, math.inf):
+        return frozen(np.full(size, number))
+    array = _native(name, value)
     if array.ndim == 0:
         array = array.repeat(size)
     if array.shape != (size,) and (rows is None or array.shape != (rows, size)):
@@ -171,7 +175,6 @@ def bound(name: str, value: ArrayLike, size: int, rows: int | None = None) -> Ar
         raise InvalidInput(
             name, f"shape {array.shape} given; give one number, or {wanted}: one per cable [N]."
         )
-    _, least, most = RANGES["tension"]
     size_of = abs(array)
     usable = ((size_of <= most) & (size_of >= least)) | (size_of == 0.0) | np.isinf(size_of)
     if np.count_nonzero(usable) < array.size:
@@ -202,7 +205,7 @@ def unit_direction(name: str, value: Direction) -> Array:
     if largest == 0.0:
         raise InvalidInput(name, "is the zero vector; give a direction, such as (0, 0, 1).")
     scaled = array / largest  # so that the norm neither overflows nor underflows
-    return frozen(scaled / np.linalg.norm(scaled))
+    return frozen(scaled / math.sqrt(np.vdot(scaled, scaled)))
 
 
 def axis_vector(name: str, axis: str) -> tuple[float, float, float]:

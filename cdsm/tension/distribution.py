@@ -5,7 +5,8 @@ chosen:
 
     min ½‖F‖²   so that   J_Lᵀ F = J_Xᵀ W − g   and   minimum ≤ F ≤ maximum.
 
-The problem is made dimensionless before a solver gets it. If it has no solution,
+Mostly the guess of :mod:`cdsm.kernels.serpentine_guess` is proven to be the solution. Otherwise the
+problem is made dimensionless, and a solver gets it. If it has no solution,
 :mod:`cdsm.tension.infeasibility` says why.
 """
 
@@ -20,6 +21,7 @@ from numpy.typing import ArrayLike
 from cdsm.cable import Cable
 from cdsm.errors import InvalidInput
 from cdsm.kernels import tension as tension_kernels
+from cdsm.kernels.distribution import single_guess
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.support.validation import bound, flag, instance, one_of, quantity, wrench_vector
@@ -49,6 +51,7 @@ def distribute_tension(
             also apply.
         wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m].
         solver: ``"daqp"`` (exact), ``"osqp"``, or another solver that qpsolvers finds installed.
+            The default is asked only if a first guess does not meet the optimality conditions.
         fixed: Tensions [N] by cable name, e.g. of motors that control force. The other tensions are
             computed. A fixed tension replaces the bounds of its cable and is never widened.
         worst_friction: Keep each segment of each cable within the bounds, whatever loads came and
@@ -72,14 +75,21 @@ def distribute_tension(
     wrench = wrench_vector("wrench", wrench)
     torque = pose.jacobian.T @ wrench - pose.gravity_torque
 
-    length = pose.arm.length
-    scaled = tension_kernels.scaled_balance(pose.length_jacobian, torque, low, high, length)
-    problem = tension_kernels.Scaled(*scaled)
-    solution = solve(problem, solver)
-    if isinstance(solution, str):
-        free = np.array([cable.name not in fixed for cable in pose.arm.cables])
-        explain(pose, problem, solver, solution, free)
-    values = solution * problem.force
+    length, certified = pose.arm.length, False
+    if solver == DEFAULT_SOLVER:
+        turned = pose.jacobian, pose.length_jacobian, pose.gravity_torque
+        smallest = tension_kernels.NO_ARM * length
+        values, certified = single_guess(
+            *pose.arm._model.blocks, *turned, wrench, low, high, smallest
+        )
+    if not certified:
+        scaled = tension_kernels.scaled_balance(pose.length_jacobian, torque, low, high, length)
+        problem = tension_kernels.Scaled(*scaled)
+        solution = solve(problem, solver)
+        if isinstance(solution, str):
+            free = np.array([cable.name not in fixed for cable in pose.arm.cables])
+            explain(pose, problem, solver, solution, free)
+        values = solution * problem.force
     return Tension(
         posture=pose,
         values=frozen(values),

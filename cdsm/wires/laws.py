@@ -169,13 +169,14 @@ class StrandElasticity(Elasticity):
         return np.asarray(polyder(self._table))
 
     @cached_property
-    def _panels(self) -> Panels:
+    def panels(self) -> Panels:
+        """Panels on which the strain is integrated."""
         return panels(self.coefficients, (self.low, *self.joins, self.high))
 
     def _integral(self, tension: ArrayLike, power: int) -> Array:
         """Integrate F^power dF/EA(F) from the low end of the domain."""
         values = self.domain.check(tension)
-        bad = values > self._panels.end
+        bad = values > self.panels.end
         if np.count_nonzero(bad):
             raise ElasticityRangeError(
                 "the rigidity is not positive everywhere below, so there is no strain. Narrow the "
@@ -183,7 +184,7 @@ class StrandElasticity(Elasticity):
                 values[bad].tolist(),
                 np.flatnonzero(bad).tolist(),
             )
-        return self._panels.integral(values, power)
+        return self.panels.integral(values, power)
 
 
 @final

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from cdsm.kernels.compiling import compiled
 from cdsm.support.values import Array
 
-_NODES, _WEIGHTS = (leggauss(12)[0] + 1.0) / 2.0, leggauss(12)[1] / 2.0
+NODES, WEIGHTS = (leggauss(12)[0] + 1.0) / 2.0, leggauss(12)[1] / 2.0
 
 _NEAREST = 6.0
 """Least ρ of a panel. ρ^-24 = 2e-19 leaves a factor of 1000 for the growth of 1/p."""
@@ -70,9 +70,9 @@ def _integrals(edges: Array, table: Array, before: Array, power: int, F: Array) 
         panel = np.searchsorted(edges[1:-1], F[i])  # an edge belongs to the panel below it
         start = edges[panel]
         width, total = F[i] - start, 0.0
-        for node in range(_NODES.shape[0]):
-            x = start + width * _NODES[node]
-            part = _WEIGHTS[node] / _horner(table, panel, x)
+        for node in range(NODES.shape[0]):
+            x = start + width * NODES[node]
+            part = WEIGHTS[node] / _horner(table, panel, x)
             total += part * x if power else part
         result[i] = before[power, panel] + width * total
     return result

@@ -14,6 +14,7 @@ import cdsm
 from cdsm.kernels import tension as tension_kernels
 from cdsm.kernels.tension import DISTANCE, OPTIMALITY
 from cdsm.support.values import Array
+from cdsm.tension import distribution
 from cdsm.tension.solvers import _polished, _shortfall
 from tests.support.arms import (
     STEEL,
@@ -363,6 +364,13 @@ def test_polishing_makes_a_near_optimum_the_optimum_at_either_bound() -> None:
         np.testing.assert_allclose(got, exact, rtol=1e-15, atol=1e-15)
 
 
+@pytest.fixture
+def guessless(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No guess is proven optimal, so the solver is asked."""
+    monkeypatch.setattr(distribution, "single_guess", lambda *_: (np.full(C, NAN), False))
+
+
+@pytest.mark.usefixtures("guessless")
 @pytest.mark.parametrize("lie", LIES)
 def test_solver_that_calls_a_wrong_point_optimal_is_caught(
     lie: str, monkeypatch: pytest.MonkeyPatch
@@ -388,6 +396,22 @@ def test_solver_that_calls_a_wrong_point_optimal_is_caught(
             assert 10.0 <= float(found[1]) <= 500.0
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_proven_guess_is_the_optimum_of_the_solver_and_the_tension_of_a_batch(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pose = random_posture(ARM, seed)
+    wrench = random_wrench(seed)
+    batch = cdsm.distribute_tensions(ARM, [pose.q] * 3, 10.0, wrench=wrench).values[1]
+    with monkeypatch.context() as patch:
+        patch.setattr(distribution, "solve", lambda *_: pytest.fail("the guess is the optimum"))
+        guessed = cdsm.distribute_tension(pose, 10.0, wrench=wrench).values
+    assert guessed.tobytes() == batch.tobytes()
+    monkeypatch.setattr(distribution, "single_guess", lambda *_: (np.full(C, NAN), False))
+    solved = cdsm.distribute_tension(pose, 10.0, wrench=wrench).values
+    np.testing.assert_allclose(guessed, solved, rtol=0.0, atol=1e-9 * solved.max())
+
+
 def test_solver_that_raises_is_reported_with_its_reason(monkeypatch: pytest.MonkeyPatch) -> None:
     def failing(*_: object, **__: object) -> qpsolvers.Solution:
         raise RuntimeError("out of cheese")
@@ -398,6 +422,7 @@ def test_solver_that_raises_is_reported_with_its_reason(monkeypatch: pytest.Monk
     assert isinstance(caught.value.__cause__, RuntimeError)
 
 
+@pytest.mark.usefixtures("guessless")
 def test_solver_that_finds_nothing_where_something_is_gets_the_blame(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

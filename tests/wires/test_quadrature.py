@@ -92,7 +92,7 @@ def test_strain_is_a_number_up_to_the_very_last_tension_that_has_one() -> None:
         zero, a, b = rng.uniform(5.0, 50.0), 10.0 ** rng.uniform(-6, 6), rng.uniform(0.0, 1.0)
         laws.append(one(a * zero, a * (b * zero - 1.0), -a * b))
     for law in laws:
-        end = law._panels.end
+        end = law.panels.end
         F = end * (1.0 - np.geomspace(1e-15, 1e-2, 80)[::-1])
         for values in (law.strain(F), law.energy(F), law.strain([end])):
             assert np.isfinite(values).all()
