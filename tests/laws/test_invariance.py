@@ -192,10 +192,10 @@ def _problem(seed: int, name: str) -> tuple[cdsm.Posture, Array, Array, Array]:
     low = rng.uniform(5.0, 30.0, len(arm.cables))
     least = cdsm.distribute_tension(pose, low, wrench=W).values
     # other tensions in balance that pull less on some cables: between the two is a maximum that
-    # the least tensions break and the others keep
+    # the least tensions break and the others keep; rounded, so that last digits ask nothing else
     raised = low + 60.0 * rng.integers(0, 2, low.size)
     other = cdsm.distribute_tension(pose, raised, wrench=W).values
-    return pose, low, np.where(other < least - 0.5, (other + least) / 2.0, 200.0), W
+    return pose, low, np.where(other < least - 0.5, np.round((other + least) / 2.0, 6), 200.0), W
 
 
 # in most draws the other tensions pull less on no cable; in the first three rows they do
