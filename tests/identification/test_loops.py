@@ -19,7 +19,7 @@ from cdsm.identification.search import problem_of
 TRUE = {"friction": 0.1, "rigidity": 48e3}
 FREE = {"friction": (0.0, 0.5), "rigidity": (1e4, 2e5)}
 FORCES = (0.0, 8.0, 16.0, 24.0, 16.0, 8.0, 0.0)
-NOISE: Any = {"displacement_std": 5e-6, "force_std": 0.05}  # the 5 µm and 0.05 N
+NOISE: Any = {"displacement_std": 5e-6, "force_std": 0.05}  # 5 µm and 0.05 N
 
 
 def hinge(

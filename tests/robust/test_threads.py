@@ -18,6 +18,8 @@ import numpy as np
 import pytest
 
 import cdsm
+from cdsm.control.plant import SlowState
+from tests.identification.test_experiment import PLAN
 from tests.support.arms import mixed_arm, random_arm, random_tension
 from tests.support.jobs import Work, balanced, batched, one_by_one, rested, solved, stiff
 from tests.test_surface import PLAIN, POSE, RESULTS, WAYS, attributes
@@ -164,6 +166,23 @@ MEASURED = [
 SOFT = random_arm(3, 2, elasticity=cdsm.LinearElasticity(100.0)).at([0.1, -0.1, 0.2, 0.1])
 UNSTABLE = cdsm.stiffness(SOFT, cdsm.distribute_tension(SOFT, 300.0))
 FIT = cdsm.fit_tensile_test(np.linspace(0.0, 2e-3, 40), np.linspace(0.0, 200.0, 40), 0.5)
+DESIGN = cdsm.DesignProblem(
+    arm=POSE.arm,
+    variables=(cdsm.Variable("lead", 0.0, 0.2),),
+    objectives=(cdsm.Objective("mass"),),
+    constraints=(cdsm.Constraint("length", at_most=1.0),),
+    postures=[POSE.q],
+    minimum=20.0,
+)
+REFINED = cdsm.refine_design(DESIGN, [0.1])
+LOOP = cdsm.WeightLoop(
+    direction="-z",
+    angles=tuple(POSE.q),
+    forces=(1.0, 0.0),
+    minimum=20.0,
+    displacement_std=5e-6,
+    force_std=0.05,
+)
 VALUES: dict[str, Any] = {
     **RESULTS,
     **PLAIN,
@@ -181,6 +200,18 @@ VALUES: dict[str, Any] = {
     "TensileTest": FIT.test,
     "Measurement": MEASURED[0],
     "Identification": cdsm.identify(wired, MEASURED, {"rigidity": (1e4, 1e6)}),
+    "WeightLoop": LOOP,
+    "ExperimentPlan": PLAN,
+    "SlowPlant": cdsm.SlowPlant(POSE.arm),
+    "MuJoCoPlant": cdsm.MuJoCoPlant(POSE.arm),
+    "Clearance": cdsm.clearance(POSE),
+    "Variable": DESIGN.variables[0],
+    "Objective": DESIGN.objectives[0],
+    "Constraint": DESIGN.constraints[0],
+    "DesignProblem": DESIGN,
+    "Designs": REFINED.evaluated,
+    "DesignSearch": REFINED,
+    "DesignProgress": cdsm.DesignProgress(1, 10, 5, 0.3, 0.0),
 }
 
 
@@ -199,6 +230,8 @@ def leaves(value: object, path: str = "") -> list[tuple[str, object]]:
     """All that a value is made of, down to arrays, numbers and texts, by the way to it."""
     if isinstance(value, cdsm.Manipulator):
         return [(path, value.urdf), *leaves(value.cables, path), (path, value.gravity)]
+    if isinstance(value, SlowState):  # its memory of the wire is its own
+        return [*leaves(value.pose, path), *leaves(value.true, path)]
     inner: list[tuple[str, object]]
     if is_dataclass(value):
         inner = [(f".{each.name}", getattr(value, each.name)) for each in fields(value)]

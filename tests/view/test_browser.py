@@ -404,7 +404,7 @@ def test_the_arm_is_in_sight_at_every_size(
 ) -> None:
     own = Page(browser, view.url, width, height)
     own.says("condition", "STABLE")
-    for _ in range(30):  # the first frames may be empty
+    for _ in range(100):  # the first frames may be empty
         picture = own.picture(f"view-{width}.png")
         free = picture[: int(0.4 * height)] if width < 576 else picture[:, : width - 390]
         brown = (free[..., 0] > 0.5) & (free[..., 2] < 0.4) & (free[..., 1] > 0.4)
