@@ -171,7 +171,7 @@ DESIGN = cdsm.DesignProblem(
     variables=(cdsm.Variable("lead", 0.0, 0.2),),
     objectives=(cdsm.Objective("mass"),),
     constraints=(cdsm.Constraint("length", at_most=1.0),),
-    postures=[POSE.q],
+    postures=np.array([POSE.q]),
     minimum=20.0,
 )
 REFINED = cdsm.refine_design(DESIGN, [0.1])
