@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm.cable import Cable, serpentine_cables
-from cdsm.elasticity import Domain, Elasticity
+from cdsm.elasticity.scaled import ScaledElasticity
 from cdsm.errors import CdsmError, GeometryError
 from cdsm.kernels.read import read_margin
 from cdsm.posture import Posture
@@ -208,26 +208,4 @@ def _with_disks(K: Stiffness, factor: float) -> tuple[Cable, ...]:
 def _stiffer(cable: Cable, factor: float) -> Cable:
     if cable.control == "force":
         return cable
-    return replace(cable, elasticity=_Stiffer(cable.elasticity, factor))
-
-
-@final
-@dataclass(frozen=True)
-class _Stiffer(Elasticity):
-    """Law with EA multiplied by a factor at every tension."""
-
-    law: Elasticity
-    factor: float
-
-    @property
-    def domain(self) -> Domain:
-        return self.law.domain
-
-    def rigidity(self, tension: ArrayLike) -> Array:
-        return self.factor * self.law.rigidity(tension)
-
-    def strain(self, tension: ArrayLike) -> Array:
-        return self.law.strain(tension) / self.factor
-
-    def energy(self, tension: ArrayLike) -> Array:
-        return self.law.energy(tension) / self.factor
+    return replace(cable, elasticity=ScaledElasticity(cable.elasticity, factor))

@@ -17,7 +17,8 @@ from numpy.typing import ArrayLike
 
 from cdsm import presets
 from cdsm.cable import Cable
-from cdsm.elasticity import Domain, Elasticity, LinearElasticity
+from cdsm.elasticity import LinearElasticity
+from cdsm.elasticity.scaled import ScaledElasticity
 from cdsm.errors import CdsmError, EquilibriumError
 from cdsm.identification.least_squares import LeastSquares, NoModelError
 from cdsm.manipulator import Manipulator
@@ -54,36 +55,6 @@ _SEARCHED: Final = {
 _LEAST_WEIGHT = 0.2  # [N]: no weight moves nothing
 _PARTS = 2  # rests on the way to a weight
 _PULLED = 1e-3  # elongation of the springs of a bearing [m]
-
-
-@final
-@dataclass(frozen=True)
-class ScaledElasticity(Elasticity):
-    """Another law with its rigidity times a factor: EA(F) = factor · EA_law(F)."""
-
-    law: Elasticity
-    factor: float
-
-    @property
-    def domain(self) -> Domain:
-        """Domain of the law."""
-        return self.law.domain
-
-    def rigidity(self, tension: ArrayLike) -> Array:
-        """Compute EA [N] at tensions [N]."""
-        return self.factor * self.law.rigidity(tension)
-
-    def rigidity_slope(self, tension: ArrayLike) -> Array:
-        """Compute dEA/dF [-] at tensions [N]."""
-        return self.factor * self.law.rigidity_slope(tension)
-
-    def strain(self, tension: ArrayLike) -> Array:
-        """Compute ε [-] at tensions [N]."""
-        return self.law.strain(tension) / self.factor
-
-    def energy(self, tension: ArrayLike) -> Array:
-        """Compute ∫ T dε [N] at tensions [N]."""
-        return self.law.energy(tension) / self.factor
 
 
 @final
