@@ -4,8 +4,7 @@ Loads x (k,) act at the tip along the columns of U (3, k), besides the wrench W.
 
     J_Lᵀ F − J_vᵀ U x = J_Xᵀ W − g,   minimum ≤ F ≤ maximum.
 
-All programs below are linear in F and x; HiGHS (Huangfu and Hall, Math. Prog. Comp. 10, 2018) of
-scipy solves them.
+All programs below are linear in F and x.
 """
 
 from __future__ import annotations
@@ -18,12 +17,8 @@ import numpy as np
 from cdsm.errors import SolverError
 from cdsm.kernels import tension as tension_kernels
 from cdsm.posture import Posture
+from cdsm.support.linear_program import INFEASIBLE, OPTIMAL, UNBOUNDED, least
 from cdsm.support.values import Array
-
-_TIGHT = {"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10}
-
-_OPTIMAL, _INFEASIBLE, _UNBOUNDED = 0, 2, 3
-"""Status of scipy's linprog."""
 
 
 class Loads(NamedTuple):
@@ -76,21 +71,17 @@ class Loads(NamedTuple):
         Raises:
             SolverError: The solver stops for another reason.
         """
-        from scipy.optimize import linprog  # slow to import
-
         count = self.low.size
         ends = [*zip(self.low * self.lever[:count], self.high * self.lever[:count], strict=True)]
         ends += [(0.0 if positive else None, None)] * along.size
         cost = np.concatenate([np.zeros(count), -along / self.lever[count:]])
         size = float(abs(cost).max()) or 1.0
-        found = linprog(
-            cost / size, A_eq=self.A, b_eq=self.b, bounds=ends, method="highs", options=_TIGHT
-        )
-        if found.status == _INFEASIBLE:
+        found = least(cost / size, A_eq=self.A, b_eq=self.b, bounds=ends)
+        if found.status == INFEASIBLE:
             return None
-        if found.status == _UNBOUNDED:
+        if found.status == UNBOUNDED:
             return math.inf, np.full(along.size, math.nan)
-        if found.status != _OPTIMAL:
+        if found.status != OPTIMAL:
             raise SolverError("highs", f"cannot tell the largest load: {found.message}")
         x = found.x[count:] / self.lever[count:] * self.force
         return float(along @ x), x
@@ -98,23 +89,19 @@ class Loads(NamedTuple):
 
 def tension_ratio(J: Array) -> float:
     """Compute max min F / max F over tensions F with J_Lᵀ F = 0 [-]; 0 if there is no closure."""
-    from scipy.optimize import linprog
-
     count, nv = J.shape
     lever = abs(J).max()
     if lever == 0.0 or np.linalg.matrix_rank(J) < nv:
         return 0.0
-    found = linprog(
+    found = least(
         np.concatenate([np.zeros(count), [-1.0]]),
         A_eq=np.hstack([J.T / lever, np.zeros((nv, 1))]),
         b_eq=np.zeros(nv),
         A_ub=np.hstack([-np.eye(count), np.ones((count, 1))]),
         b_ub=np.zeros(count),
         bounds=(0.0, 1.0),
-        method="highs",
-        options=_TIGHT,
     )
-    if found.status != _OPTIMAL:
+    if found.status != OPTIMAL:
         raise SolverError("highs", f"cannot tell the tension factor: {found.message}")
     ratio = float(found.x[-1])
     return ratio if ratio > CLOSED else 0.0

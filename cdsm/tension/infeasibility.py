@@ -11,10 +11,8 @@ from numpy.typing import NDArray
 from cdsm.errors import InfeasibleTension, SolverError
 from cdsm.kernels.tension import OPTIMALITY, Scaled
 from cdsm.posture import Posture
+from cdsm.support.linear_program import OPTIMAL, least
 from cdsm.support.values import frozen
-
-# HiGHS accepts violations of 1e-7 by default, and would not see a smaller missing torque
-_TIGHT = {"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10}
 
 
 def explain(
@@ -25,8 +23,6 @@ def explain(
     Only bounds of ``free`` cables (C,) may widen: those without a fixed tension. ``fault`` is the
     solver's result, as text.
     """
-    from scipy.optimize import linprog  # slow to import
-
     A, b, lower, upper, arm_scale, force_scale = problem
     nv, count = A.shape
     # variables: F, then the positive and the negative part of the missing torque
@@ -34,15 +30,13 @@ def explain(
     # HiGHS drops entries below 1e-9, so each cable is scaled by its own largest moment arm
     lever = abs(A).max(axis=0)
     lever = np.where(lever > 0.0, lever, 1.0)
-    nearest = linprog(
+    nearest = least(
         np.concatenate([np.zeros(count), np.ones(2 * nv)]),
         A_eq=np.hstack([A / lever, identity, -identity]),
         b_eq=b,
         bounds=[*zip(lower * lever, upper * lever, strict=True), *[(0.0, None)] * (2 * nv)],
-        method="highs",
-        options=_TIGHT,
     )
-    if nearest.status != 0:  # it is feasible and bounded by construction
+    if nearest.status != OPTIMAL:  # it is feasible and bounded by construction
         raise SolverError("highs", f"cannot tell whether tensions exist: {nearest.message}")
     values = nearest.x[:count] / lever
     if nearest.fun <= OPTIMALITY:
@@ -71,8 +65,6 @@ def explain(
 
 def _widening(problem: Scaled, free: NDArray[np.bool_]) -> float:
     """Compute how far the bounds of free cables (C,) must widen [N]; inf if this does not help."""
-    from scipy.optimize import linprog
-
     A, b, lower, upper, _, force_scale = problem
     nv, count = A.shape
     # variables: F, then the widening t: low − t <= F <= high + t, and F >= 0; a fixed
@@ -80,17 +72,15 @@ def _widening(problem: Scaled, free: NDArray[np.bool_]) -> float:
     rows = np.vstack([-np.eye(count), np.eye(count)])
     sides = np.concatenate([-lower, upper])
     finite = np.isfinite(sides)
-    found = linprog(
+    found = least(
         np.concatenate([np.zeros(count), [1.0]]),
         A_ub=np.hstack([rows, -1.0 * np.tile(free, 2)[:, None]])[finite],
         b_ub=sides[finite],
         A_eq=np.hstack([A, np.zeros((nv, 1))]),
         b_eq=b,
         bounds=(0.0, None),
-        method="highs",
-        options=_TIGHT,
     )
-    return float(found.x[-1]) * force_scale if found.status == 0 else math.inf
+    return float(found.x[-1]) * force_scale if found.status == OPTIMAL else math.inf
 
 
 def instead(solver: str) -> str:

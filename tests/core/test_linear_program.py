@@ -1,0 +1,45 @@
+"""Linear programs where the simplex method ends undecided, as with scipy 1.14.0."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.optimize
+
+import cdsm
+from cdsm.support.linear_program import INFEASIBLE, OPTIMAL, UNBOUNDED, least
+from tests.support.arms import mixed_arm, random_posture
+
+
+@pytest.fixture
+def undecided(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Make the simplex method tell nothing; return the methods that are called."""
+    called: list[str] = []
+    solve = scipy.optimize.linprog
+
+    def told(*args: Any, method: str, **rest: Any) -> Any:
+        called.append(method)
+        found = solve(*args, method=method, **rest)
+        return scipy.optimize.OptimizeResult(found, status=4) if method == "highs" else found
+
+    monkeypatch.setattr(scipy.optimize, "linprog", told)
+    return called
+
+
+def test_interior_points_decide_what_the_simplex_method_does_not(undecided: list[str]) -> None:
+    rows = {"A_ub": np.array([[1.0, 2.0]]), "b_ub": np.array([3.0])}
+    found = least(np.array([-1.0, -3.0]), **rows)
+    assert (found.status, found.fun) == (OPTIMAL, pytest.approx(-4.5))
+    assert least(np.array([1.0, 1.0]), **rows, bounds=(2.0, None)).status == INFEASIBLE
+    assert least(np.array([1.0, 1.0]), **rows, bounds=(None, 0.0)).status == UNBOUNDED
+    assert undecided == ["highs", "highs-ipm"] * 3
+
+
+def test_a_polytope_is_the_same_by_either_method(request: pytest.FixtureRequest) -> None:
+    pose = random_posture(mixed_arm(), 2)
+    simplex = cdsm.force_polytope(pose, 1.0, 200.0)
+    called = request.getfixturevalue("undecided")
+    interior = cdsm.force_polytope(pose, 1.0, 200.0)
+    assert "highs-ipm" in called
+    assert interior.margin() == pytest.approx(simplex.margin(), rel=1e-8)
+    assert interior.volume == pytest.approx(simplex.volume, rel=1e-8)
