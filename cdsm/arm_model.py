@@ -68,14 +68,26 @@ class ArmModel:
         self, body: RigidBody, cables: tuple[Cable, ...], original_length: OriginalLength
     ) -> None:
         self.body, self.tree, self.masses = body, body.tree(), body.masses()
-        self._cables, self._original_length = cables, original_length
-        self.laws = CableLaws(cables, original_length)
-        self.laws.require_continuity()
+        self._original_length = original_length
+        self._set_cables(cables)
         self.routing = route(body, self.tree, cables)
         self.blocks = find_blocks(self.routing, body.nv)
         self.arrays: tuple[Any, ...] = (*self.tree, *self.routing, *self.masses)
         self.lowest = frozen(body.lower - _LIMIT_SLACK)
         self.highest = frozen(body.upper + _LIMIT_SLACK)
+
+    def _set_cables(self, cables: tuple[Cable, ...]) -> None:
+        self._cables, self.laws = cables, CableLaws(cables, self._original_length)
+        self.laws.require_continuity()
+
+    def with_laws(self, cables: tuple[Cable, ...]) -> ArmModel:
+        """Return the model with cables through the same sites that differ in their laws only."""
+        model = type(self).__new__(type(self))
+        same = "body", "tree", "masses", "routing", "blocks", "arrays", "lowest", "highest"
+        model.__dict__.update({name: self.__dict__[name] for name in same})
+        model._original_length = self._original_length
+        model._set_cables(cables)
+        return model
 
     @cached_property
     def chains(self) -> Chains:

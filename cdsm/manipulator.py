@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, final, get_args
@@ -257,6 +258,15 @@ class Manipulator(ArmFacts):
             InvalidInput: Gravity is neither an axis nor three numbers.
         """
         return self._replace(gravity=gravity)
+
+    def _with_laws(self, laws: Sequence[Elasticity]) -> Manipulator:
+        """Return the same arm with other laws, one per cable; nothing else is checked again."""
+        pairs = zip(self.cables, laws, strict=True)
+        cables = Cables(replace(cable, elasticity=law) for cable, law in pairs)
+        arm = type(self).__new__(type(self))
+        arm._cables, arm._gravity = cables, self._gravity
+        arm._model, arm._parts = self._model.with_laws(cables), self._parts._replace(cables=cables)
+        return arm
 
     def _replace(self, **changes: Any) -> Manipulator:
         arm = type(self).__new__(type(self))
