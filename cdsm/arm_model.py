@@ -101,7 +101,7 @@ class ArmModel:
 
     @cached_property
     def chain_arrays(self) -> tuple[Any, ...]:
-        """The fields of the routing of the segments, and what the kernel of chains adds to them."""
+        """Fields of the routing of the segments, then the arrays for the kernel of chains."""
         chains, routing = self.chains, route(self.body, self.tree, self.chains.segments)
         span = np.zeros((len(chains.segments), 3), dtype=np.intp)
         moving = routing.segment[:-1, 0]

@@ -17,8 +17,9 @@ from typing import Self, final
 import numpy as np
 
 from cdsm.cable import Cable
-from cdsm.kernels.tree import Indices
-from cdsm.support.values import Array, frozen
+from cdsm.kernels import chains as chain_kernels
+from cdsm.kernels.tree import Frames, Indices, Routing
+from cdsm.support.values import Array, ReadOnlyState, frozen
 
 
 @final
@@ -75,4 +76,35 @@ class Chains:
             site=frozen(np.array([i for _, i in where], dtype=np.intp)),
             friction=frozen(np.array([site.friction for site in at])),
             wrap=frozen(np.array([site.wrap for site in at])),
+        )
+
+
+@final
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class Segments(ReadOnlyState):
+    """Segments of all cables between their holes at a posture; S segments, P holes.
+
+    Attributes:
+        chains: Which segment and which hole is whose.
+        lengths: l (S,) [m].
+        length_jacobian: ∂l/∂θ (S, nv) [m/rad]; zero for leads and segments within one link.
+        wrap: φ (P,) [rad]: angle by which the cable turns in the hole, plus the wrap of the site.
+        wrap_jacobian: ∂φ/∂θ (P, nv) [rad/rad]; 0 where the cable goes straight through.
+    """
+
+    chains: Chains
+    lengths: Array
+    length_jacobian: Array
+    wrap: Array
+    wrap_jacobian: Array
+    _routing: Routing
+    _frames: Frames
+
+    def tension_stiffness(self, tension: Array) -> Array:
+        """Compute Σ T_j ∂²l_j/∂θ² of each cable (C, nv, nv) [N m/rad], from checked T (S,) [N]."""
+        cable, (_, _, segment, joint, _) = self.chains.cable, self._routing
+        return frozen(
+            chain_kernels.single_tension_stiffness(
+                segment, joint, *self._frames, tension, cable, int(cable[-1]) + 1
+            )
         )

@@ -1,4 +1,4 @@
-"""What would hold an arm that buckles: stiffer wires or springs, other tensions or disk offsets.
+"""Remedies for an arm that buckles: stiffer wires or springs, other tensions or disk offsets.
 
 K_θ of an unstable arm has a smallest eigenvalue λ ≤ 0 (of its symmetric part). Each remedy
 multiplies one quantity by a factor s and leaves the others alone. The tensions are distributed
@@ -85,7 +85,7 @@ class Remedy(ReadOnlyState):
 
 
 def find_remedies(K: Stiffness) -> tuple[Remedy, ...]:
-    """Compute what would hold an unstable arm, each change alone; nothing for a stable arm."""
+    """Compute the remedies of an unstable arm, each change alone; none for a stable arm."""
     return () if K.is_stable else tuple(_remedies(K))
 
 
@@ -99,7 +99,7 @@ def verdict(K: Stiffness) -> str:
 
 
 def advice(K: Stiffness) -> tuple[str, ...]:
-    """Return what would hold an unstable arm, a line for each change."""
+    """Return the remedies of an unstable arm as text, a line for each change."""
     holding = [f"  {each}" for each in K.remedies if each.factor is not None]
     if holding:
         return "it would hold, by each of these alone, with", *holding

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdsm.cable import Cable
-from cdsm.cable_chains import Chains
+from cdsm.cable_chains import Segments
 from cdsm.errors import first_of
 from cdsm.geometry.contacts import overlapping
 from cdsm.kernels import chains as chain_kernels
@@ -30,37 +30,6 @@ if TYPE_CHECKING:
     from cdsm.manipulator import Manipulator
     from cdsm.stiffness_matrix import Stiffness
     from cdsm.tension import Tension
-
-
-@final
-@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class Segments(ReadOnlyState):
-    """Segments of all cables between their holes at a posture; S segments, P holes.
-
-    Attributes:
-        chains: Which segment and which hole is whose.
-        lengths: l (S,) [m].
-        length_jacobian: ∂l/∂θ (S, nv) [m/rad]; zero for leads and segments within one link.
-        wrap: φ (P,) [rad]: angle by which the cable turns in the hole, plus the wrap of the site.
-        wrap_jacobian: ∂φ/∂θ (P, nv) [rad/rad]; 0 where the cable goes straight through.
-    """
-
-    chains: Chains
-    lengths: Array
-    length_jacobian: Array
-    wrap: Array
-    wrap_jacobian: Array
-    _routing: Routing
-    _frames: Frames
-
-    def tension_stiffness(self, tension: Array) -> Array:
-        """Compute Σ T_j ∂²l_j/∂θ² of each cable (C, nv, nv) [N m/rad], from checked T (S,) [N]."""
-        cable, (_, _, segment, joint, _) = self.chains.cable, self._routing
-        return frozen(
-            chain_kernels.single_tension_stiffness(
-                segment, joint, *self._frames, tension, cable, int(cable[-1]) + 1
-            )
-        )
 
 
 @final

@@ -1,4 +1,4 @@
-"""Tolerances of what an arm is built from and of what is measured on it."""
+"""Tolerances of the parts of an arm, and of the measurements on it."""
 
 from __future__ import annotations
 
@@ -177,13 +177,13 @@ class Tolerance(ReadOnlyState):
 
 
 OneOrMore = float | Tolerance | Sequence[Tolerance]
-"""What a source may be given as."""
+"""Types of a source."""
 
 
 @final
 @dataclass(frozen=True, kw_only=True)
 class Tolerances:
-    """Tolerances of an arm: how far it may be from what was described and measured.
+    """Tolerances of an arm: its possible deviations from the description and the measurements.
 
     Each source is a :class:`Tolerance`, or a standard uncertainty (one sigma) as a number, or a
     list of tolerances that are each ``of`` other inputs. A number for ``rigidity`` or ``friction``

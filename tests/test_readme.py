@@ -84,3 +84,14 @@ def test_tolerances_that_contributing_lists_are_those_of_the_code() -> None:
         line = re.search(rf"^{name}(?:: \w+)? = (.*)", source, re.M)
         assert line is not None, (module, name)
         assert value in line[1], (module, name, line[1])
+    listed = {(module, name) for module, names, _ in rows for name in names.split(", ")}
+    sizes = {("interchange/mjcf", "_CABLE"), ("urdf", "CROSS_MASS"), ("urdf", "CROSS_INERTIA")}
+    small = {
+        (path.relative_to(ROOT / "cdsm").with_suffix("").as_posix(), name)
+        for path in (ROOT / "cdsm").rglob("*.py")
+        for name, value in re.findall(
+            r"^(\w+)(?:: Final)? = (\d[\d.]*e-\d+)\b", path.read_text("utf-8"), re.M
+        )
+        if float(value) < 1e-3
+    }
+    assert small - listed == sizes

@@ -41,7 +41,7 @@ _HEAD = """\
 
 
 _ESCAPED = re.compile(r"'''|'$|[^\t\n -~\x80-\U0010ffff]")
-"""What a literal text of TOML cannot hold."""
+"""Characters that a literal text of TOML cannot hold."""
 
 _Read = TypeVar("_Read")
 

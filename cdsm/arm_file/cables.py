@@ -13,14 +13,7 @@ from pydantic import Field
 from cdsm.arm_file.wires import SETTINGS, CableKeys, CableSettings, Wires, read_wires, wire_entries
 from cdsm.cable import Cable, Site
 from cdsm.elasticity import LinearElasticity
-from cdsm.errors import (
-    CableError,
-    FileError,
-    GeometryError,
-    InvalidInput,
-    MissingWire,
-    counted,
-)
+from cdsm.errors import CableError, FileError, GeometryError, InvalidInput, MissingWire, counted
 from cdsm.support.files import read_text, write_text
 from cdsm.support.records import (
     Friction,
@@ -178,10 +171,7 @@ def _sites(entry: _Entry) -> tuple[Site, ...]:
 
 
 def build_cables(
-    routed: Iterable[Routed],
-    settings: CableSettings,
-    wires: Wires,
-    path: str | os.PathLike[str],
+    routed: Iterable[Routed], settings: CableSettings, wires: Wires, path: str | os.PathLike[str]
 ) -> tuple[Cable, ...]:
     """Build cables with their own settings, and with those of all cables where they have none.
 

@@ -22,13 +22,13 @@ WITHOUT_FRICTION = {
     "stuck_along": "along",
     "stuck_compliance": "compliance",
 }
-"""What they are in an arm without friction."""
+"""The same readings of an arm without friction."""
 
 
 class Kept(NamedTuple):
-    """What readings are computed from: B blocks of W postures, the posture last.
+    """Arrays from which readings are computed: B blocks of W postures, the posture last.
 
-    No block is kept of what is not read.
+    Arrays that no reading needs have no blocks.
     """
 
     joint: Array  # K_θ (B, nv, nv, W)

@@ -52,8 +52,7 @@ def main(
         bool, typer.Option("--debug", help="Show where an error comes from; before the command.")
     ] = False,
     verbose: Annotated[
-        bool,
-        typer.Option("--verbose", "-v", help="Show the log of long runs; before the command."),
+        bool, typer.Option("--verbose", "-v", help="Show the log of long runs; before the command.")
     ] = False,
 ) -> None:
     """Stiffness of cable-driven serpentine manipulators."""

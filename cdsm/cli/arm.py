@@ -61,12 +61,7 @@ def stiffness(
     parts += [_sticking(held)] if held else []
     parts += [_table(budgets)] if budgets else []
     more = (sure if budgets else {}) | ({"sticking": stuck} if held else {})
-    answer(
-        as_json,
-        lambda: K.to_dict() | more,
-        *parts,
-        warnings=K.warnings[:1],
-    )
+    answer(as_json, lambda: K.to_dict() | more, *parts, warnings=K.warnings[:1])
 
 
 def _breakaways(tension: cdsm.Tension) -> dict[str, cdsm.Breakaway]:
@@ -82,7 +77,7 @@ def _breakaways(tension: cdsm.Tension) -> dict[str, cdsm.Breakaway]:
 
 
 def _sticking(held: dict[str, cdsm.Breakaway]) -> str:
-    """Write what small loads measure, a line per axis."""
+    """Write the stiffness that small loads measure, a line per axis."""
     from cdsm.stiffness_matrix.prints import model_of
 
     K = next(iter(held.values())).stiffness
@@ -103,7 +98,7 @@ def _budgets(tension: cdsm.Tension, tolerances: cdsm.Tolerances) -> dict[str, cd
 
 
 def _table(budgets: dict[str, cdsm.Uncertainty]) -> str:
-    """Write values with uncertainties, and what contributes to them [%], one column per axis."""
+    """Write values with uncertainties and their sources [%], one column per axis."""
     from cdsm.support.format import aligned
 
     def percent(source: str) -> list[float]:

@@ -1,4 +1,4 @@
-"""What an answer was computed with: wire, gravity, least tension, friction."""
+"""Conditions of an answer: wire, gravity, least tension, friction."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Conditions:
-    """First lines of an answer: what it was computed with, and the arm.
+    """First lines of an answer: its conditions, and the arm.
 
     Attributes:
         arm: The arm.
-        minimum: Lower bounds of all tensions that were asked for [N].
+        minimum: Given lower bounds of all tensions [N].
         friction: Whether the answer takes the friction of the arm into account.
     """
 

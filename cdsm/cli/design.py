@@ -27,8 +27,7 @@ def design(
         int | None, typer.Option(help="Generations; default: what the file says, or 40.", min=1)
     ] = None,
     population: Annotated[
-        int | None,
-        typer.Option(help="Designs in each; default: what the file says, or 40.", min=4),
+        int | None, typer.Option(help="Designs in each; default: what the file says, or 40.", min=4)
     ] = None,
     seed: Annotated[
         int | None, typer.Option(help="Default: what the file says, or 0.", min=0)

@@ -90,8 +90,7 @@ class ArmOptions:
         ),
     ]
     cables: Annotated[
-        Path | None,
-        _arm_option(metavar="CABLES.toml", help="Its cables, in the place of its own."),
+        Path | None, _arm_option(metavar="CABLES.toml", help="Its cables, in the place of its own.")
     ] = None
     tip: Annotated[str | None, _arm_option(help="The link of a .urdf that is its tip.")] = None
     wire: Annotated[
@@ -107,8 +106,7 @@ class ArmOptions:
         None
     )
     spring: Annotated[
-        float | None,
-        _arm_option(help="Stiffness of a spring in series with every cable [N/mm]."),
+        float | None, _arm_option(help="Stiffness of a spring in series with every cable [N/mm].")
     ] = None
     slack_below: Annotated[
         bool,
@@ -223,7 +221,7 @@ class TensionOptions:
     solver: Solver = DEFAULT_SOLVER
 
     def conditions(self, arm: cdsm.Manipulator) -> Conditions:
-        """Return what an answer with these options is computed with."""
+        """Return the conditions of an answer with these options."""
         return Conditions(arm, (self.min_tension,))
 
     def distribute(self, pose: cdsm.Posture, wrench: Array) -> cdsm.Tension:

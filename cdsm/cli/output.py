@@ -53,7 +53,7 @@ def answer(
 ) -> None:
     """Print an answer, its warnings first: its parts as text, or its numbers as strict JSON.
 
-    Warnings end the command with exit code 3. So everything is written before it is told.
+    Warnings end the command with exit code 3, so files are written before.
     """
     if as_json:
         told: Json = {"warnings": warnings}

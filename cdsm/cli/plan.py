@@ -47,10 +47,7 @@ def plan(
     out: Annotated[
         Path | None,
         typer.Option(
-            "--out",
-            "-o",
-            metavar="FILE.csv",
-            help="Angles, tensions, lengths, stiffness to write.",
+            "--out", "-o", metavar="FILE.csv", help="Angles, tensions, lengths, stiffness to write."
         ),
     ] = None,
     figure: Picture = None,

@@ -135,8 +135,7 @@ def map_sweep(
         Path, typer.Argument(metavar="SWEEP", help="Sweep to read: .nc, or a --resume folder.")
     ],
     out: Annotated[
-        Path,
-        typer.Option("--out", "-o", help="Picture to write.", metavar="FILE.pdf|svg|png"),
+        Path, typer.Option("--out", "-o", help="Picture to write.", metavar="FILE.pdf|svg|png")
     ],
     quantity: Annotated[
         str,
@@ -191,8 +190,7 @@ def _grid(text: str, arm: cdsm.Manipulator) -> cdsm.GridPoses:
             angles[name] = unit * np.linspace(given[0], given[1], int(given[2]))
         else:
             raise typer.BadParameter(
-                f"{part!r} given; a joint is JOINT=LOW:HIGH:N or JOINT=ANGLE.",
-                param_hint="--grid",
+                f"{part!r} given; a joint is JOINT=LOW:HIGH:N or JOINT=ANGLE.", param_hint="--grid"
             )
     return cdsm.GridPoses(angles, rest)
 
@@ -200,7 +198,7 @@ def _grid(text: str, arm: cdsm.Manipulator) -> cdsm.GridPoses:
 def _answer(
     as_json: bool, dataset: xarray.Dataset, written: Path, conditions: Conditions | None = None
 ) -> None:
-    """Tell what was written; a new sweep also tells its conditions and how its entries went."""
+    """Print the written file; of a new sweep also its conditions and the count of each status."""
     from cdsm.support.datasets import status_names
 
     status = dataset["status"].values

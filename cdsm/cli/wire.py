@@ -11,7 +11,7 @@ import typer
 
 import cdsm
 from cdsm.cli.options import AsJson, Picture
-from cdsm.cli.output import Json, answer
+from cdsm.cli.output import Json, answer, written
 
 
 def fit(
@@ -67,14 +67,13 @@ def fit(
     except cdsm.TensileTestError as error:
         raise cdsm.TensileTestError(_as_options(str(error))) from None
     if out is not None:
-        typer.echo(f"written: {cdsm.write_elasticity(fitted.elasticity, out)}", err=True)
+        written(cdsm.write_elasticity(fitted.elasticity, out))
     if tolerances is not None:
-        band = cdsm.Tolerances(rigidity=fitted.tolerance())
-        typer.echo(f"written: {band.write(tolerances)}", err=True)
+        written(cdsm.Tolerances(rigidity=fitted.tolerance()).write(tolerances))
     if figure is not None:
         from cdsm.support.files import write_file
 
-        typer.echo(f"written: {write_file(figure, fitted.plot().savefig)}", err=True)
+        written(write_file(figure, fitted.plot().savefig))
     read = f"{test}: {data.source}"
     answer(as_json, lambda: {"read": data.source, **_numbers(fitted)}, f"{read}\n{fitted}")
 

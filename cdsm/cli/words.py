@@ -42,7 +42,7 @@ _PYTHON: Final = (
     ("`cdsm fit`, or cdsm.read_tensile_csv and cdsm.fit_tensile_test.", "`cdsm fit`."),
     (", or start from a guess= nearer to it.", "."),
 )
-"""Remedies that the command line does not have, and what is left without them."""
+"""Remedies that the command line does not have, and the text in their place."""
 
 _NAMES: Final = "|".join(_OPTIONS)
 _ARGUMENT: Final = re.compile(rf"^({_NAMES})(?=: )|\b({_NAMES})=(?!\w)")

@@ -1,4 +1,4 @@
-"""What a plant really does: its stiffness, its margin, its proved band, and a weight hung on it.
+"""True state of a plant: its stiffness, its margin, its proved band, and a weight hung on it.
 
 Under friction one arm has many stiffnesses. Here *the* stiffness of a state is that of the arm with
 the same wire in every cable and the same load after its cables have slid until nothing holds them:
@@ -37,7 +37,7 @@ _DISPLACED: Final = 1e-3
 
 
 class Assessment(NamedTuple):
-    """What is true of one state of a plant.
+    """True stiffness and band of one state of a plant.
 
     Attributes:
         stiffness: Frictionless K_θ with the same wire and load; None if the arm buckles.

@@ -1,4 +1,4 @@
-"""Joint angles from what the motors measure: wire and tension, stretch and friction included.
+"""Joint angles from wire and tension at the motors, stretch and friction included.
 
 A cable with the wire l_0 and the tension F at its motor has the length
 
@@ -45,7 +45,7 @@ _STEPS, _CONVERGED = 8, 1e-8
 
 
 class Estimate(NamedTuple):
-    """What the controller believes about the arm.
+    """State of the arm as the controller estimates it.
 
     Attributes:
         pose: The posture, within the arm of the controller.

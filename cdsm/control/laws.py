@@ -1,4 +1,4 @@
-"""Motor laws: pure functions of what is wanted and measured, with the clamps of each.
+"""Motor laws: pure functions of reference and readings, with the clamps of each.
 
 A motor of a position-controlled cable holds the wire that it has paid out, l_0. A law says how much
 that is to be. At rest a change of l_0 changes the tension by −k Δl_0, so that each command stands
@@ -22,7 +22,7 @@ PROPORTIONAL, INTEGRAL = 0.2, 0.3
 
 
 class Reference(NamedTuple):
-    """What is wanted at one step of control.
+    """Reference values of one step of control.
 
     Attributes:
         angles: Joint angles (nv,) [rad]; [m] where a joint slides.
@@ -38,7 +38,7 @@ class Reference(NamedTuple):
 
 
 class Reading(NamedTuple):
-    """What the sensors say.
+    """Readings of the sensors at one step.
 
     Attributes:
         wire: l_0 paid out by each motor (C,) [m], from its encoder.
@@ -50,7 +50,7 @@ class Reading(NamedTuple):
 
 
 class Command(NamedTuple):
-    """What the motors are told.
+    """Command to the motors at one step.
 
     Attributes:
         wire: l_0 to pay out (C,) [m].

@@ -1,4 +1,4 @@
-"""What came of following a path in closed loop: the result of :func:`~cdsm.track`."""
+"""Result of :func:`~cdsm.track`: a path followed in closed loop."""
 
 from __future__ import annotations
 
@@ -134,7 +134,7 @@ class TrackingRun(ReadOnlyState):
         return np.flatnonzero(np.isfinite(self.band[:, 0]))
 
     def hung_weight(self, step: int, direction: int = 0) -> float:
-        """Hang a weight on the true arm as it was after a step, and return what it reads [N/m].
+        """Hang a weight on the true arm as it was after a step; return the stiffness [N/m].
 
         The motors stand still. The load swings and fades away before and after the weight is hung,
         so that friction does not hold the arm. NaN if the arm finds no rest.
@@ -156,7 +156,7 @@ class TrackingRun(ReadOnlyState):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What went wrong, worst first; empty if the path was followed to its end."""
+        """Faults, worst first; empty if the path was followed to its end."""
         said = []
         if self.outcome != "completed":
             word = {"lost": "UNSTABLE", "no rest": "BUCKLES", "wire": "WIRE"}[self.outcome]

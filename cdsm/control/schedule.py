@@ -1,4 +1,4 @@
-"""What a plan asks for at each step of control, and which motors control tension."""
+"""References of a plan at each step of control, and the motors that control tension."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ _SOFTER = 5e-3
 
 
 class Replanned(NamedTuple):
-    """What the outer loop wants at one step.
+    """Tensions that the outer loop plans at one step.
 
     Attributes:
         reference: Its tensions at the motors, and the wire for them.

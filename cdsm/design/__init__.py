@@ -1,1 +1,1 @@
-"""Design of an arm: a problem as a value, searches over it, and what they find."""
+"""Design of an arm: a problem as a value, searches over it, and their results."""

@@ -146,7 +146,7 @@ class Found(NamedTuple):
 
 
 def gathered(problem: DesignProblem, rows: Array, found: Sequence[Found]) -> Designs:
-    """Collect what was found of designs."""
+    """Collect the evaluations of designs."""
     width = len(problem.measures)
     return Designs(
         problem=problem,
@@ -177,7 +177,7 @@ class _Pool:
 
 @contextmanager
 def workers(problem: DesignProblem, jobs: int, client: Client | None) -> Iterator[_Pool]:
-    """Yield a function of designs (D, n) that yields what is found of each."""
+    """Yield a function of designs (D, n) that yields the evaluation of each."""
     if client is not None:
         from cdsm.sweeps.cluster import checked_client
 

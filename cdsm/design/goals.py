@@ -196,7 +196,7 @@ class Constraint(Measure):
 
     @property
     def asked(self) -> str:
-        """What is asked, in words."""
+        """The limit, in words."""
         which = "at most" if self.at_least is None else "at least"
         return f"{which} {self.shown(self.limit)}"
 

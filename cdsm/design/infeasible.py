@@ -1,4 +1,4 @@
-"""Why no design meets all constraints: the nearest design, and what it misses by how much."""
+"""Error where no design meets all constraints: the nearest design, and its misses."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A design problem as a frozen value: what may change, what is wanted, where and under what."""
+"""A design problem as a frozen value: variables, goals, postures and loads."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ MISSED = "held"
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class DesignProblem(ReadOnlyState):
-    """What of an arm may change, and what is wanted of it; any search works on this value.
+    """Problem of a design: variables of an arm, objectives, constraints. All searches take it.
 
     A posture is held if tensions within the bounds balance the arm under the load, and K_θ is then
     positive definite. A design must hold all postures under all loads, unless an objective or a

@@ -1,7 +1,7 @@
 """Record of the designs that a search has evaluated, so that a stopped search goes on.
 
 The file has one line for the problem and one for each design, with all bits of its numbers. A
-search with the same seed asks for the same designs again, and takes those that are there from it.
+search with the same seed asks for the same designs again, and reads the recorded ones.
 """
 
 from __future__ import annotations
@@ -69,11 +69,11 @@ class Store:
             self._path.write_text(whole, encoding="utf-8")
 
     def get(self, row: Array) -> Found | None:
-        """Return what is known of a design (n,), or None."""
+        """Return the recorded evaluation of a design (n,), or None."""
         return self._found.get(row.tobytes())
 
     def add(self, rows: Iterable[Array], found: Iterable[Found]) -> None:
-        """Keep what was found of some designs."""
+        """Record the evaluations of some designs."""
         lines = []
         for row, each in zip(rows, found, strict=True):
             self._found[row.tobytes()] = each

@@ -1,4 +1,4 @@
-"""Design variables: what of an arm a search may choose, and how a choice changes the arm."""
+"""Design variables: quantities of an arm that a search may choose, and the changed arm."""
 
 from __future__ import annotations
 

@@ -93,18 +93,17 @@ class Elasticity(ABC):
     def scaled(self, factor: float) -> Elasticity:
         """Return this law with ``factor`` times its rigidity: a stiffer or softer spool.
 
-        Strains are divided by the factor. The laws of cdsm define it; a user-defined law must
-        define it itself.
+        Strains and energies are divided by the factor.
 
         Args:
             factor: Rigidity of the new law over that of this one [-], positive.
 
         Raises:
-            InvalidInput: ``factor`` is not a positive number, or this law does not define it.
+            InvalidInput: ``factor`` is not a positive number.
         """
-        raise InvalidInput(
-            "elasticity", f"{self!r} does not say how it scales; define its scaled(factor)."
-        )
+        from cdsm.elasticity.scaled import ScaledElasticity
+
+        return ScaledElasticity(self, positive_factor(factor))
 
     @abstractmethod
     def rigidity(self, tension: ArrayLike) -> Array:

@@ -1,4 +1,4 @@
-"""The class of all errors and that of all warnings; how messages list many faults."""
+"""Base classes of all errors and warnings; lists of faults in messages."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Errors of what cdsm is given: arguments, files, geometries, URDFs, cables, joint angles."""
+"""Errors of inputs: arguments, files, geometries, URDFs, cables, joint angles."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Errors of an arm that cannot do what is asked: balance, be stiff, be at rest."""
+"""Errors of mechanics: no balance, no such stiffness, no rest."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Coulomb friction between cables and holes: what sticks, what slides, and what a load leaves.
+"""Coulomb friction between cables and holes: sticking, sliding, and the rests after loads.
 
 The capstan law bounds the tensions T and T′ on both sides of a hole: |ln T′ − ln T| ≤ μ φ, with the
 wrap angle φ. Not in this model: clearance of the cables in their holes, dependence on speed

@@ -1,4 +1,4 @@
-"""Bounds of what a linear model of an arm leaves out in a neighbourhood of a posture.
+"""Bounds of the remainders of a linear model of an arm in a neighbourhood of a posture.
 
 Sites turn with levers of at most r about the joints of their segment, across it by at most p, and
 a segment is nowhere shorter than m. Along a way that turns by σ in all, its length then has
@@ -19,14 +19,14 @@ from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.values import Array
 
 _STEP = 1e-4
-"""Step of differences [rad], [m]; what they truncate is added to the bound."""
+"""Step of differences [rad], [m]; their truncation is added to the bound."""
 
 _ITERATIONS = 30
 """Steps of a fixed point that converges by a factor of ten or more."""
 
 
 class Remainders:
-    """Bounds of what the linear parts leave out in the neighbourhood |δ| ≤ ρ.
+    """Bounds of the remainders of the linear parts in the neighbourhood |δ| ≤ ρ.
 
     Joints that slide count as turns of ρ/r on the lever r, which moves points as far.
 
@@ -81,7 +81,7 @@ class Remainders:
 
 
 class Bends:
-    """Derivatives of stiffnesses at a posture, by differences; what they truncate is bounded.
+    """Derivatives of stiffnesses at a posture, by differences; their truncation is bounded.
 
     Attributes:
         body: ∂²τ_i/∂θ_j∂θ_k (nv, nv, nv) [N m/rad²] of the torques τ of weight and wrench.
@@ -108,7 +108,7 @@ class Bends:
 
 
 def _body_remainders(K: Stiffness, within: Array, slides: NDArray[np.bool_]) -> tuple[float, Array]:
-    """Bound what the linear parts leave out of the tip's way [m] and of body torques (nv,)."""
+    """Bound the remainders of the tip's way [m] and of the body torques (nv,)."""
     model, pose = K.posture.arm._model, K.posture
     masses, tree = model.masses, model.tree
     reach = float(np.linalg.norm(tree.translation, axis=1).sum()) + float(abs(pose.q) @ slides)

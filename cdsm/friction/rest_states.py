@@ -297,7 +297,7 @@ def _cone(K: Stiffness, near: Neighbourhood, far: Remainders, size: int) -> tupl
 
 
 class _Wire(NamedTuple):
-    """b = 1/(1 + ε) of a cable over its range of tensions, between two parallel lines.
+    """Bounds of b = 1/(1 + ε) of a cable over its range of tensions: two parallel lines.
 
     b_F + slope ΔT + below ≤ b ≤ b_F + slope ΔT + above, with b_F = ``share``; |b − b_F| ≤ change.
     """

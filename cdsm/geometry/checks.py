@@ -1,4 +1,4 @@
-"""Disks of a geometry, and what makes it impossible or doubtful."""
+"""Disks of a geometry, its faults, and doubtful values."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ def _short_links(geometry: Description) -> list[str]:
 
 
 def doubts_about(geometry: Description) -> list[str]:
-    """Return what is possible, but rarely meant: lengths in mm, cables that share holes."""
+    """Return doubtful values, possible but rarely meant: lengths in mm, shared holes."""
     doubts = []
     sizes = [
         ("the arm", geometry.length, LONGEST),

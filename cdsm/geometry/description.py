@@ -1,4 +1,4 @@
-"""The fields of an arm's geometry, their checks, and what follows from them."""
+"""Fields of an arm's geometry, their checks, and derived quantities."""
 
 from __future__ import annotations
 
@@ -8,21 +8,9 @@ from typing import Annotated, Self
 from pydantic import Field, model_validator
 
 from cdsm.geometry.checks import disks_of, doubts_about, faults_of
-from cdsm.geometry.parts import (
-    MAXIMUM_JOINTS,
-    CableRoute,
-    Disk,
-    Joint,
-    Link,
-)
+from cdsm.geometry.parts import MAXIMUM_JOINTS, CableRoute, Disk, Joint, Link
 from cdsm.support.format import plural
-from cdsm.support.records import (
-    CrossFaults,
-    Length,
-    LengthOrZero,
-    Name,
-    record,
-)
+from cdsm.support.records import CrossFaults, Length, LengthOrZero, Name, record
 from cdsm.support.values import Printed
 from cdsm.support.warning import warn
 

@@ -13,13 +13,7 @@ from cdsm.errors import GeometryError
 from cdsm.geometry import tables
 from cdsm.geometry.description import Description
 from cdsm.geometry.holes import beside_the_hinges, evenly_spaced, spread_out
-from cdsm.geometry.parts import (
-    UNIVERSAL_AXES,
-    CableRoute,
-    Joint,
-    Limit,
-    Link,
-)
+from cdsm.geometry.parts import UNIVERSAL_AXES, CableRoute, Joint, Limit, Link
 from cdsm.geometry.uniform import CablesPerJoint, HoleAngles, JointCount, uniform
 from cdsm.support.files import read_text, write_text
 from cdsm.support.records import (
@@ -124,11 +118,7 @@ class Geometry(Description):
         """
         keywords = locals()  # of the call, before there are other variables
         return cls(
-            **uniform(
-                [UNIVERSAL_AXES] * joints,
-                lambda m: evenly_spaced(joints, m),
-                keywords,
-            ),
+            **uniform([UNIVERSAL_AXES] * joints, lambda m: evenly_spaced(joints, m), keywords),
             base_length=base_length,
             name=name,
         )

@@ -1,4 +1,4 @@
-"""TOML of a geometry: which tables there are, and what they build."""
+"""TOML of a geometry: its tables, and the geometry that each builds."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def _joined(cls: type[Geometry], data: dict[str, Any]) -> Geometry:
 
 
 def split_geometry(data: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Split the parsed TOML of an arm: what describes its geometry, and what does not.
+    """Split the parsed TOML of an arm into the keys of its geometry and all others.
 
     Cables belong to the geometry if its joints or links stand beside them.
     """

@@ -33,7 +33,7 @@ _GAIN = 1e-9
 
 
 class Design(NamedTuple):
-    """Candidates for tests, and what is wanted of them.
+    """Design of an experiment: candidates of tests, known information, wanted parameters.
 
     Attributes:
         information: M_i (n, r, r) of each candidate.

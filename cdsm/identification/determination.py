@@ -1,4 +1,4 @@
-"""What measurements determine: rank, covariance and correlation, and combinations left open."""
+"""Determination by measurements: rank, covariance, correlation, undetermined combinations."""
 
 from __future__ import annotations
 

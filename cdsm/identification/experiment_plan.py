@@ -1,4 +1,4 @@
-"""Plan of an experiment: which weight tests to make how often, and what they will determine."""
+"""Plan of an experiment: weight tests, their numbers, and the expected uncertainties."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Loops of a weight test: loads hung and taken off again, and what the tip did."""
+"""Loops of a weight test: loads hung and taken off again, and the motion of the tip."""
 
 from __future__ import annotations
 
@@ -141,14 +141,14 @@ class WeightLoop:
 
 
 def measured(measurement: Measurement | WeightLoop) -> Array:
-    """Return what was measured: the stiffness (1,) [N/m], or the readings (m,) [m]."""
+    """Return the measured numbers: the stiffness (1,) [N/m], or the readings (m,) [m]."""
     if isinstance(measurement, WeightLoop):
         return np.array(measurement.displacements).ravel()
     return np.array([measurement.value])
 
 
 class Weights:
-    """Weights of the readings of a loop, of which each axis has an unknown zero.
+    """Weights of the readings of a loop; the zero of each axis is unknown.
 
     With the covariance V of the readings and Z, which adds a zero to each axis, χ² is the least of
     (e + Z z)ᵀ V⁻¹ (e + Z z) over z. It is |R e|² with the symmetric root R of the matrix of that

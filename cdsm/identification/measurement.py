@@ -83,7 +83,7 @@ class Measurement:
 
 
 class Conditions(Protocol):
-    """What every measurement states: the arm before the measuring force, and its direction."""
+    """Conditions of every measurement: the arm before the force, and the direction of the force."""
 
     @property
     def direction(self) -> tuple[float, float, float] | Axis:

@@ -1,4 +1,4 @@
-"""Predict what was measured, stiffnesses and loops of weight tests, from a model of the arm."""
+"""Predict measured stiffnesses and loops of weight tests from a model of the arm."""
 
 from __future__ import annotations
 

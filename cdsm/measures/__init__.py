@@ -1,1 +1,1 @@
-"""What an arm can carry and where its cables run: measures of one posture, from its arrays."""
+"""Measures of one posture: the loads that an arm can carry, and the places of its cables."""

@@ -98,11 +98,7 @@ def clearance(pose: Posture, diameter: float = 0.0) -> Clearance:
         ("", "") if second < 0 else (arm.cables[shape.segment[first, 0]].name, other[second])
         for (first, second), other in zip(
             nearest[0].tolist(),
-            (
-                [arm.cables[c].name for c in shape.segment[:, 0]],
-                shape.bone_names,
-                shape.disk_names,
-            ),
+            ([arm.cables[c].name for c in shape.segment[:, 0]], shape.bone_names, shape.disk_names),
             strict=True,
         )
     ]
@@ -167,7 +163,7 @@ def _rows(arm: Manipulator, q: Array, threads: int) -> tuple[Array, Indices]:
 
 @lru_cache(maxsize=8)
 def _shape(arm: Manipulator) -> _Shape:
-    """Collect what can touch; kept for the last arms, since locating it takes milliseconds."""
+    """Collect the bodies that can touch; cached for the last arms: it takes milliseconds."""
     model = arm._model
     rows = model.routing.row.tolist()
     points = model.routing.point.tolist()

@@ -225,10 +225,7 @@ def _hull(loads: Loads, k: int) -> _Hull | None:
         )
     corners, faces, facets, ends = _grown(farthest, np.array(points), spanned)
     return _Hull(
-        corners,
-        faces,
-        np.vstack([flat.normals, facets]),
-        np.concatenate([flat.offsets, ends]),
+        corners, faces, np.vstack([flat.normals, facets]), np.concatenate([flat.offsets, ends])
     )
 
 

@@ -18,13 +18,7 @@ from cdsm.statics.buckling import critical_load
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.format import coordinates, plain
 from cdsm.support.status import Status
-from cdsm.support.validation import (
-    Direction,
-    instance,
-    quantity,
-    unit_direction,
-    wrench_vector,
-)
+from cdsm.support.validation import Direction, instance, quantity, unit_direction, wrench_vector
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import bounds_at, distribute_tension
 

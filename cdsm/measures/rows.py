@@ -33,12 +33,7 @@ def measured(
 
 
 def payloads(
-    arm: Manipulator,
-    q: Array,
-    wrench: Array,
-    minimum: Array,
-    maximum: float,
-    directions: Array,
+    arm: Manipulator, q: Array, wrench: Array, minimum: Array, maximum: float, directions: Array
 ) -> Array:
     """Compute the largest forces (B, D) [N] within the limits of the tensions.
 

@@ -22,7 +22,7 @@ EXPLANATION = (
     "identified from the same data within stated bounds. All of it is frictionless, links rigid. "
     "Left out: Fig. 9, a photograph, and Fig. 11, measured springs without printed numbers."
 )
-"""What the columns mean, and what is left out."""
+"""Meaning of the columns, and the figures that are left out."""
 
 
 @final

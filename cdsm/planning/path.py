@@ -22,14 +22,7 @@ from cdsm.planning.stiffness_model import StiffnessModel, checked_margin
 from cdsm.stiffness_matrix import stiffness
 from cdsm.support.format import coordinates
 from cdsm.support.progress import track
-from cdsm.support.validation import (
-    Direction,
-    bound,
-    flag,
-    instance,
-    number_array,
-    unit_directions,
-)
+from cdsm.support.validation import Direction, bound, flag, instance, number_array, unit_directions
 from cdsm.support.values import Array, frozen
 from cdsm.tension import checked_bounds
 

@@ -272,7 +272,7 @@ class PathPlan(ReadOnlyState):
         return ["sample", "status", *columns, *wanted, "reason"], rows
 
     def _readings(self, count: int) -> list[str]:
-        """Return what follows the name of each wanted stiffness: nothing if there is one."""
+        """Return the suffixes of the names of the wanted stiffnesses; empty for a single one."""
         if self.direction is None:
             return [f" {a}{b}" for a in "xyz" for b in "xyz"]
         return [""] if count == 1 else [f" {k}" for k in range(1, count + 1)]

@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable
 from functools import cache
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -32,10 +31,6 @@ from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.validation import Direction, bound, instance, scalar, unit_direction
 from cdsm.support.values import Array, frozen
 from cdsm.tension import DEFAULT_SOLVER, Tension, distribute_tension
-
-if TYPE_CHECKING:
-    pass
-
 
 _JUST = 1e-9  # relative distance from a bound to a point just beside it
 _INSET = 1e-6  # distance of the curve from an end without a slope, over the length of the curve

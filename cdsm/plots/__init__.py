@@ -25,11 +25,7 @@ from cdsm.plots.loads import (
 from cdsm.plots.maps import plot_map
 from cdsm.plots.paper import plot_paper
 from cdsm.plots.path import plot_modes, plot_path
-from cdsm.plots.planning import (
-    plot_path_plan,
-    plot_saturation,
-    plot_stiffness_ranges,
-)
+from cdsm.plots.planning import plot_path_plan, plot_saturation, plot_stiffness_ranges
 from cdsm.plots.style import save_figure
 from cdsm.plots.tracking import plot_tracking_run
 from cdsm.plots.wires import plot_cables, plot_elasticity

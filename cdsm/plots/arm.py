@@ -72,12 +72,13 @@ def plot_arm(
     unstable = stiffness is not None and not stiffness.is_stable
     if stiffness is not None and not unstable:
         _draw_ellipsoid(axes, stiffness)
-    draw_arm(
-        axes, pose, None if tension is None else tension_colors(tension).to_rgba(tension.values)
-    )
-    frame_arms(axes, None)
+    shades = None
     if tension is not None:
-        tension_bar(figure, tension_colors(tension))
+        colors = color_scale(tension.values)
+        shades = colors.to_rgba(tension.values)
+        tension_bar(figure, colors)
+    draw_arm(axes, pose, shades)
+    frame_arms(axes, None)
     heading(figure, f"{'UNSTABLE: ' if unstable else ''}{pose.arm.name}")
     picture_legend(figure, axes)
     fill_canvas(axes, 1.0 if tension is None else BESIDE_BAR)
@@ -127,7 +128,7 @@ class Ellipsoid(NamedTuple):
     longest: float
 
     def __str__(self) -> str:
-        """Return what the ellipsoid is, and its scale."""
+        """Return the meaning of the ellipsoid and its scale."""
         large, small = max(self.scale, 1.0), max(1.0 / self.scale, 1.0)
         return f"where 1 N moves the tip, scale {large:g}:{small:g}"
 
@@ -205,11 +206,6 @@ def _draw_disks(axes: Any, pose: Posture) -> None:
         ring = [0.0 * circle + disk.x, disk.radius * np.cos(circle), disk.radius * np.sin(circle)]
         edge = placement[:3, 3:] + placement[:3, :3] @ np.array(ring)
         axes.plot(*(MM * edge), color="0.45", linewidth=0.6)
-
-
-def tension_colors(tension: Tension) -> ScalarMappable:
-    """Build the colour scale from the smallest to the largest tension."""
-    return color_scale(tension.values)
 
 
 def color_scale(tensions: Array) -> ScalarMappable:

@@ -20,6 +20,7 @@ from cdsm.plots.style import (
     caption,
     direction_name,
     expect,
+    from_zero,
     heading,
     legend,
     panels,
@@ -34,9 +35,6 @@ if TYPE_CHECKING:
 
 _SAME = 1e-9
 """Largest difference between the entries of two equal unit directions."""
-
-_ROOM = 1.15
-"""Highest value of an axis that begins at zero, over the largest value drawn."""
 
 _WIDE = 12
 """Above this number of cables a figure that names them is two columns wide."""
@@ -132,7 +130,7 @@ def plot_tensions(tensions: Tensions) -> Figure:
     reach = [middle - low, high - middle]
     axes.errorbar(names, middle, reach, fmt="o", color=BLUE, markersize=3, capsize=2, linewidth=0.8)
     axes.set_ylabel("tension [N]")
-    axes.set_ylim(0.0, _ROOM * high.max() or 1.0)
+    from_zero(axes, high)
     count = f"{len(found)} of {len(tensions)} postures"
     caption(axes, f"{tensions.arm.name}: median and range, {count}")
     _name_cables(axes)
@@ -171,7 +169,7 @@ def _plot_tensions(shown: Sequence[tuple[Tension, str, str]], title: str) -> Fig
         axes.plot(names, F.values, marker, label=label, **line)
     axes.set_ylabel("tension [N]")
     caption(axes, title)
-    axes.set_ylim(0.0, _ROOM * max(F.values.max() for F, *_ in shown) or 1.0)
+    from_zero(axes, *(F.values for F, *_ in shown))
     _name_cables(axes)
     legend(axes)
     return figure

@@ -8,6 +8,7 @@ import numpy as np
 
 from cdsm.plots.style import (
     AXES,
+    BESIDE,
     BLUE,
     COLORS,
     MM,
@@ -63,8 +64,7 @@ def plot_load_history(history: LoadHistory) -> Figure:
         color = VERMILLION if j == last else BLUE
         right.plot(own, color=color, alpha=1.0 - 0.75 * shade * (j < last), label=label, lw=0.9)
     right.set(xlabel="load", ylabel="tension of each segment [N]")
-    beside = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5), "frameon": False}
-    legend(right, title=history.reference.arm.cables[cable].name, **beside)
+    legend(right, title=history.reference.arm.cables[cable].name, **BESIDE)
     lost = f"{1000.0 * history.dissipated.sum():.4g} mJ lost in {len(history.holes)} holes"
     heading(figure, f"{history.reference.arm.name}: {lost}")
     return figure

@@ -127,11 +127,7 @@ def plot_critical_load(critical: CriticalLoad) -> Figure:
     if math.isfinite(critical.factor):
         end = critical.factor, critical.margins[-1]
         axes.plot(*end, "o", color=VERMILLION, markersize=4)
-        words = {
-            "buckling": "buckles",
-            "infeasible": "no balance",
-            "elasticity": "end of a law",
-        }
+        words = {"buckling": "buckles", "infeasible": "no balance", "elasticity": "end of a law"}
         label = f"{words[critical.limit]} at {critical.factor:.4g}"
         place = {"xytext": (-6, -12), "textcoords": "offset points", "ha": "right"}
         axes.annotate(label, end, fontsize=SMALL, **place)

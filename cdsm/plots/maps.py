@@ -237,10 +237,7 @@ def _draw(
 
 
 def _legend(
-    figure: Figure,
-    counted: Sequence[Case | Map],
-    maps: Sequence[Map],
-    words: Mapping[int, str],
+    figure: Figure, counted: Sequence[Case | Map], maps: Sequence[Map], words: Mapping[int, str]
 ) -> None:
     """Draw the legend: each marker, and its share of the entries that count."""
     status = np.concatenate([each.status[np.isnan(each.values)] for each in counted])

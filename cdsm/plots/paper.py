@@ -44,10 +44,7 @@ _NOTE: Final = (
     "paper's reading: diagonal of $K_R = J^{+T} K_\\theta J^+$; "
     "hung weight: $1/(u^T C\\,u)$, what a small weight at the tip measures"
 )
-_SWEPT: Final = {
-    "young_modulus": "Young's modulus [GPa]",
-    "tension": "cable tension, mean [N]",
-}
+_SWEPT: Final = {"young_modulus": "Young's modulus [GPa]", "tension": "cable tension, mean [N]"}
 _BARS: Final = 5
 """Number of bars on a curve that show the range of tension over the cables."""
 

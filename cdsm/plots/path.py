@@ -22,15 +22,7 @@ from cdsm.plots.arm import (
     picture_legend,
     tension_bar,
 )
-from cdsm.plots.style import (
-    COLORS,
-    MM,
-    SCREEN,
-    VERMILLION,
-    expect,
-    fill_canvas,
-    heading,
-)
+from cdsm.plots.style import COLORS, MM, SCREEN, VERMILLION, expect, fill_canvas, heading
 from cdsm.support.files import as_path, write_file
 from cdsm.support.validation import number_array
 from cdsm.support.values import Array

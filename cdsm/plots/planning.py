@@ -27,6 +27,7 @@ from cdsm.plots.style import (
     caption,
     direction_name,
     expect,
+    from_zero,
     heading,
     legend,
     panels,
@@ -44,9 +45,6 @@ _SAME = 1e-9
 
 _JUMP = 3.0
 """The target jumps where a change exceeds the neighbouring changes of equal sign by this factor."""
-
-_ROOM = 1.15
-"""Highest value of an axis that begins at zero, over the largest value drawn."""
 
 
 def plot_stiffness_ranges(ranges: Mapping[str, Sequence[StiffnessRange]]) -> Figure:
@@ -173,9 +171,8 @@ def plot_path_plan(plan: PathPlan) -> Figure:
     for axes in (above, below):
         for index in (sample.index for sample in plan.infeasible):
             axes.axvspan(index - 0.5, index + 0.5, color=VERMILLION, alpha=0.15, linewidth=0.0)
-    for axes, values in ((above, [wanted, achieved]), (below, [tensions])):
-        highest = max((np.nanmax(each, initial=0.0) for each in values), default=0.0)
-        axes.set_ylim(0.0, _ROOM * highest or 1.0)
+    from_zero(above, wanted, achieved)
+    from_zero(below, tensions)
     shaded = "; shaded: infeasible" if plan.infeasible else ""
     above.set_ylabel("stiffness [N/mm]")
     caption(above, f"{plan.arm.name}{shaded}")

@@ -52,11 +52,17 @@ N_PER_MM: Final = 1e-3
 TICKS: Final = 5
 """Largest number of tick intervals on an axis of a map or a 3D picture."""
 
+ROOM: Final = 1.15
+"""Highest value of an axis that begins at zero, over the largest value drawn."""
+
 NAMED: Final = 24
 """Above this number of cables, lines are not distinct, so cables are not named."""
 
 _GAP: Final = 0.06
 """Free space around a picture [inch]."""
+
+BESIDE: Final = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5), "frameon": False}
+"""Place of a legend: at the right of its panel."""
 
 _CABLES: Final = (BLUE, VERMILLION, GREEN, ORANGE, SKY, PURPLE, BLACK, "0.6")
 _FORMATS: Final = (".pdf", ".svg", ".png")
@@ -128,6 +134,12 @@ def caption(axes: Any, text: str) -> None:
     axes.set_title(text, fontsize=TEXT)
 
 
+def from_zero(axes: Any, *values: Array) -> None:
+    """Let the upright axis of a panel begin at zero, with room above all values."""
+    highest = max((float(np.nanmax(each, initial=0.0)) for each in values), default=0.0)
+    axes.set_ylim(0.0, ROOM * highest or 1.0)
+
+
 def legend(axes: Any, **options: Any) -> Any:
     """Draw the legend of a panel in small text."""
     return axes.legend(
@@ -159,7 +171,7 @@ def cable_lines(axes: Any, x: Array, values: Array, names: Sequence[str], **line
         axes.plot(x, values[:, c], color=color, linestyle=style, label=name, **line)
     if named:
         columns = 1 + (len(names) > NAMED // 2)
-        legend(axes, loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, ncols=columns)
+        legend(axes, **BESIDE, ncols=columns)
 
 
 def equal_axes(axes: Any, zoom: float = 0.75) -> None:

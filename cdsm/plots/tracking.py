@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cdsm.plots.style import (
+    BESIDE,
     BLUE,
     COLORS,
     MM,
@@ -17,6 +18,7 @@ from cdsm.plots.style import (
     cable_lines,
     direction_name,
     expect,
+    from_zero,
     heading,
     legend,
     panels,
@@ -26,9 +28,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cdsm.control.run import TrackingRun
-
-_ROOM = 1.15
-"""Height of the panel of the stiffness over its largest value."""
 
 
 def plot_tracking_run(run: TrackingRun) -> Figure:
@@ -54,8 +53,7 @@ def plot_tracking_run(run: TrackingRun) -> Figure:
         stiffness.plot(t, N_PER_MM * wanted, "--", color=color, linewidth=0.9, label="_")
         stiffness.plot(t, N_PER_MM * found, color=color, label=f"along {name}; dashed: wanted")
     stiffness.set(ylabel="stiffness [N/mm]")
-    most = np.nanmax([run.target, run.stiffness], initial=0.0)
-    stiffness.set_ylim(0.0, _ROOM * N_PER_MM * most or 1.0)
+    from_zero(stiffness, N_PER_MM * run.target, N_PER_MM * run.stiffness)
     low, high = MM * run.band.T
     known = np.isfinite(low)
     band.fill_between(t[known], low[known], high[known], color=SKY, alpha=0.4, label="proved band")
@@ -63,7 +61,7 @@ def plot_tracking_run(run: TrackingRun) -> Figure:
     band.plot(t, moved, color=VERMILLION, label="tip")
     band.set(ylabel="held by friction [mm]")
     for panel in (stiffness, band):
-        legend(panel, loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
+        legend(panel, **BESIDE)
     cable_lines(tension, t, run.tension, run.plan.arm.cables.names)
     tension.set(xlabel="time [s]", ylabel="tension [N]")
     tension.set_ylim(bottom=0.0)

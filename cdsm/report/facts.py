@@ -217,7 +217,7 @@ class Sticking(ReadOnlyState):
 
 
 def sticking(K: Stiffness, readings: Readings | None) -> Sticking | None:
-    """Compute what sticks at the tensions of a stiffness; None if no cable does, or if unknown."""
+    """Compute the readings of an arm whose cables stick; None if none sticks, or if unknown."""
     pose, held = K.posture, holding(K.posture)
     T, J = K.tension[pose.segments.chains.cable], pose.jacobian[:3]
     if readings is None or not held.any():

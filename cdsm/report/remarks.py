@@ -30,11 +30,7 @@ _DIGITS = 1e10
 
 _NAMED = 4
 
-_LABELS = {
-    "joint": "sum K_θ",
-    "torque": "torque out of balance",
-    "lengths": "length of a cable",
-}
+_LABELS = {"joint": "sum K_θ", "torque": "torque out of balance", "lengths": "length of a cable"}
 
 
 def faults(report: Report) -> Iterator[str]:

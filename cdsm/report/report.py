@@ -14,7 +14,7 @@ from cdsm.report.facts import CableState, Optimality, Rank, Readings, Sticking
 from cdsm.report.page import to_document, to_fragment, to_text
 from cdsm.report.potential import joint_unit
 from cdsm.report.self_check import SelfCheck, self_check
-from cdsm.support.format import JointUnits, key
+from cdsm.support.format import JointUnits, key, plain
 from cdsm.support.values import Array, ReadOnlyState
 
 if TYPE_CHECKING:
@@ -105,7 +105,7 @@ class Report(ReadOnlyState):
         """Return the report as plain SI numbers for strict JSON; None for infinity and NaN."""
         K = self.stiffness
         arm = K.posture.arm
-        values: dict[str, object] = {
+        numbers = {
             "arm": arm.name,
             "trustworthy": self.trustworthy,
             "faults": self.faults,
@@ -147,7 +147,7 @@ class Report(ReadOnlyState):
             if self.sticking is None
             else {"along_N_per_m": self.sticking.along, "below_N": self.sticking.below},
         }
-        return {name: _plain(value) for name, value in values.items()}
+        return dict(plain(numbers))
 
     def to_html(self) -> str:
         """Return the report as a self-contained HTML file."""
@@ -199,16 +199,3 @@ def _cable_to_json(each: CableState) -> dict[str, object]:
         "may_fall_N": each.below,
         "may_rise_N": each.above,
     }
-
-
-def _plain(value: object) -> object:
-    """Convert a value for JSON: tuples and arrays to lists, infinity and NaN to None."""
-    if isinstance(value, dict):
-        return {name: _plain(each) for name, each in value.items()}
-    if isinstance(value, np.ndarray):
-        return _plain(value.tolist())
-    if isinstance(value, (list, tuple)):
-        return [_plain(each) for each in value]
-    if isinstance(value, float):  # also numpy.float64
-        return float(value) if math.isfinite(value) else None
-    return value

@@ -1,4 +1,4 @@
-"""What an arm does beyond its critical tension: where a slight push leaves it."""
+"""Equilibria of a slightly pushed arm below and beyond its critical tension."""
 
 from __future__ import annotations
 

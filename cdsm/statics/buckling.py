@@ -11,7 +11,7 @@ with locked motors moves when it buckles.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -32,9 +32,6 @@ from cdsm.support.validation import bound, instance, wrench_vector
 from cdsm.support.values import Array, frozen
 from cdsm.tension import DEFAULT_SOLVER, distribute_tension
 
-if TYPE_CHECKING:
-    pass
-
 _NOWHERE: Final = 1e6
 """Largest load factor that is tried. If the arm holds it, the critical factor is infinite."""
 
@@ -43,9 +40,7 @@ _SHOWN: Final = 10.0
 
 
 def critical_tension(
-    pose: Posture,
-    wrench: ArrayLike = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
-    solver: str = DEFAULT_SOLVER,
+    pose: Posture, wrench: ArrayLike = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0), solver: str = DEFAULT_SOLVER
 ) -> CriticalTension:
     """Compute the lower bound of tension at which K_θ becomes singular: det K_θ(F_min) = 0.
 

@@ -35,7 +35,7 @@ def load_cycle(
     motors: ArrayLike | None = None,
     accuracy: float = 1e-3,
 ) -> LoadHistory:
-    """Load an arm with friction slowly, load by load, and keep what its holes remember.
+    """Load an arm with friction slowly, load by load; its holes remember the loads before.
 
     Under a load the arm is in equilibrium, r(q) = Σ T_j g_j + g − J_Xᵀ W = 0 (Eq. 13 by segments).
     Friction holds |ln T_{j+1} − ln T_j| ≤ μ φ_j at each hole, and wire moves through a hole only at

@@ -1,4 +1,4 @@
-"""What a series of loads and motor commands does to an arm with friction: the result."""
+"""States of an arm with friction under a series of loads and motor commands."""
 
 from __future__ import annotations
 

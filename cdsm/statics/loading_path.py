@@ -1,4 +1,4 @@
-"""First-order changes of what slow loading does to an arm with friction: by loads, and by the arm.
+"""First-order changes of slow loading of an arm with friction: by the loads, and by the arm.
 
 Each posture at rest solves r(q, a) = 0 with the natural lengths a that the rest before it left. So
 a small change is followed from rest to rest: it changes r by δr, the posture by δq = −K⁻¹ δr, and

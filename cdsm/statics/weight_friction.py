@@ -1,4 +1,4 @@
-"""What friction in the holes does to a weight test: when it measures which stiffness."""
+"""Weight tests with friction in the holes: which weight measures which stiffness."""
 
 from __future__ import annotations
 

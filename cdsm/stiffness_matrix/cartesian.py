@@ -1,4 +1,4 @@
-"""Cartesian stiffness: what is read off K_θ at the tip.
+"""Cartesian stiffness: readings of K_θ at the tip.
 
 The paper maps K_θ to Cartesian space with J_X⁻¹, which does not exist for a redundant arm. "The
 stiffness in x" then has three different meanings. Each meaning has a name here:

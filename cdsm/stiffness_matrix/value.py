@@ -160,7 +160,7 @@ class Stiffness(CartesianReadings):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Sentences that the arm is UNSTABLE and what would hold it; empty for a stable arm."""
+        """Sentences that the arm is UNSTABLE, with its remedies; empty for a stable arm."""
         from cdsm.instability import advice, verdict
 
         return () if self.is_stable else (verdict(self), *advice(self))

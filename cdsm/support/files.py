@@ -46,7 +46,7 @@ def read_text(path: str | os.PathLike[str], *, any_encoding: bool = False) -> st
 
 
 def _decoded(data: bytes) -> str:
-    """Decode what laboratory machines write. UTF-16 has a mark, or zeros beside its letters."""
+    """Decode the files of laboratory machines. UTF-16 has a mark, or zeros beside letters."""
     if data[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE):
         return data.decode("utf-16")
     if b"\0" in data[:2]:

@@ -40,7 +40,7 @@ def track(items: _Items[_Item], what: str, *, wanted: bool = True) -> Iterator[_
 def progress_bar(
     what: str, total: int | None = None, done: int = 0, *, wanted: bool = True, rate: bool = False
 ) -> Iterator[Callable[[int], None]]:
-    """Show a bar, and yield a function that advances it; ``total`` None: nobody knows how far.
+    """Show a bar, and yield a function that advances it; ``total`` None: an unknown amount.
 
     ``rate`` adds the work per second; what was ``done`` before does not count. If the bar is not
     wanted, bars inside are not shown either.

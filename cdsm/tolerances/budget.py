@@ -1,4 +1,4 @@
-"""Budget of uncertainty of a reading: its standard uncertainty, and what contributes how much."""
+"""Budget of uncertainty of a reading: its standard uncertainty, and the part of each input."""
 
 from __future__ import annotations
 
@@ -73,10 +73,10 @@ class Uncertainty(ReadOnlyState):
 
     @cached_property
     def nonlinearity(self) -> float:
-        """What first order leaves out, over u_c [-]: root mean square over 100 drawn arms.
+        """Error of the first order over u_c [-]: root mean square over 100 drawn arms.
 
-        By so much at most, the standard uncertainty of Monte Carlo differs from u_c. It is inf if
-        one of the arms has no such reading.
+        The standard uncertainty of Monte Carlo differs from u_c by this part at most. It is inf if
+        the reading does not exist for one of the arms.
         """
         question, rng = self.question, np.random.default_rng(0)
         labels = question.labels

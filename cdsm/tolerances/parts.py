@@ -1,4 +1,4 @@
-"""Tolerances of an arm's inputs: what variance they cause, and errors drawn from them."""
+"""Tolerances of an arm's inputs: the variance that they cause, and drawn errors."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ _NONE = np.zeros(0, dtype=np.intp)
 
 
 class Ties(NamedTuple):
-    """Which input of an arm is which input of the arm of its blocks.
+    """Pairs of equal inputs: of an arm, and of the arm of its blocks.
 
     Attributes:
         labels: Names of the inputs of the arm, by source.

@@ -20,7 +20,7 @@ _FIRST: Final = np.array([0.2, -1.5, 0.75])
 """First direction from the arm to the camera: at its side, a little above it."""
 
 _MARGIN = 1.3
-"""Radius of what the camera sees, over the radius of the arm."""
+"""Radius of the visible ball, over the radius of the arm."""
 
 _OUTSIDE, _SMALL = 1.3, 0.5
 """Extent of the arm, over the fitted radius, beyond and below which the cameras are fitted anew."""

@@ -1,4 +1,4 @@
-"""Write what is shown as a command of the shell, or as lines of Python."""
+"""Write the command of the shell, or the lines of Python, that compute the page."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _CODE: Final = "display:block;white-space:pre-wrap;overflow-wrap:anywhere;margin
 
 
 def command_line(arm: Manipulator, setting: Setting, arm_arguments: Sequence[str]) -> str:
-    """Write the command of the shell that prints what is shown at a setting.
+    """Write the command of the shell that prints the numbers of a setting.
 
     ``arm_arguments`` describe the arm: its file, and options such as ``--rigidity``.
     """
@@ -52,7 +52,7 @@ def command_line(arm: Manipulator, setting: Setting, arm_arguments: Sequence[str
 
 
 def python_lines(setting: Setting) -> str:
-    """Write the lines of Python that compute what is shown at a setting of an arm ``arm``."""
+    """Write the lines of Python that compute the numbers of a setting of an arm ``arm``."""
     wrench = f"[{_joined(_wrench(setting), ', ')}]"
     bounds = [f"{setting.minimum:.12g}"]
     bounds += [f"{setting.maximum:.12g}"] if math.isfinite(setting.maximum) else []

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 _LOG = logging.getLogger(__name__)
 
 _SETTLED = 0.3
-"""Seconds without a new setting before what takes some tenths of a second is computed."""
+"""Seconds without a new setting before the remedies are computed, which takes longer."""
 
 _ARROW = 0.5
 """Length of the arrow of the largest force, as a fraction of the arm's length."""

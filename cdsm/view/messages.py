@@ -12,7 +12,7 @@ _FARTHEST = 1e6
 
 
 def scene_message(message: Any) -> dict[str, Any] | None:
-    """Return what viser may get of a message about the scene; None for any other message.
+    """Return the allowed part of a message about the scene; None for any other message.
 
     Raises:
         ValueError: A point of the message is not three finite numbers.

@@ -70,7 +70,7 @@ def page_text(shown: Shown, force_scale: float, remark: str = "") -> str:
 
 
 def basis_text(arm: Manipulator) -> str:
-    """Write what all numbers are computed with: arm, wires, gravity, friction."""
+    """Write the conditions of all numbers: arm, wires, gravity, friction."""
     friction = "friction of its holes left out" if arm.has_friction else "frictionless"
     words = f"with wire {wires_text(arm.cables)}; gravity {coordinates(arm.gravity)} m/s²"
     lines = element("div", str(arm)), element("div", _named("basis", f"{words}; {friction}"))
@@ -103,7 +103,7 @@ def tensions_text(shown: Shown) -> str:
 
 
 def _remarks(shown: Shown, remark: str) -> Iterator[tuple[str, str]]:
-    """Yield names and texts of what is to be known before the numbers."""
+    """Yield names and texts of the remarks above the numbers."""
     if remark:
         yield "remark", remark
     if shown.problem:
@@ -147,7 +147,7 @@ def _row(row: _Row) -> Markup:
 
 
 def _legend(shown: Shown, force_scale: float) -> Iterator[Markup]:
-    """Yield what the ellipsoid and the arrow mean, and their scales."""
+    """Yield the meaning and the scale of the ellipsoid and of the arrow."""
     if shown.ellipsoid is not None:
         yield _key(ELLIPSOID, "ellipsoid", f"ellipsoid: {shown.ellipsoid}")
     if shown.posture is not None and shown.setting.force.any():

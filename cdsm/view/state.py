@@ -168,7 +168,7 @@ class Shown(ReadOnlyState):
 
 
 def advised(shown: Shown) -> tuple[str, ...]:
-    """Return what would hold an unstable arm; it takes some tenths of a second."""
+    """Return the remedies of an unstable arm; it takes some tenths of a second."""
     return () if shown.stiffness is None else advice(shown.stiffness)
 
 

@@ -1,4 +1,4 @@
-"""Draw what stands still: light, the base axes, and a grid with lengths."""
+"""Draw the surroundings of the arm: light, the base axes, and a grid with lengths."""
 
 from __future__ import annotations
 
@@ -50,11 +50,7 @@ def draw_surroundings(server: viser.ViserServer, length: float) -> None:
     labels |= {f"y = {MM * y:.4g} mm": (far, y, floor) for y in (0.0, side)}
     for i, (text, place) in enumerate(labels.items()):
         scene.add_label(
-            f"/lengths/{i}",
-            text,
-            position=place,
-            font_screen_scale=0.8,
-            anchor="top-center",
+            f"/lengths/{i}", text, position=place, font_screen_scale=0.8, anchor="top-center"
         )
 
 

@@ -34,11 +34,7 @@ class TipHandle:
         self.dragged = False
         self._remark, self._q = "", np.full(arm.nv, np.nan)
         self._node = server.scene.add_transform_controls(
-            HANDLE,
-            _SIZE * arm.length,
-            disable_rotations=True,
-            depth_test=False,
-            opacity=0.7,
+            HANDLE, _SIZE * arm.length, disable_rotations=True, depth_test=False, opacity=0.7
         )
         self._node.on_update(self._on_drag)
 

@@ -1,4 +1,4 @@
-"""Wires by name, and what else may stand for a wire: a rigidity or a file."""
+"""Wires by name; a rigidity or a file can stand for a wire, too."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _NAMED = 3
 """Number of different wires that a text names."""
 
 Wire = Elasticity | str | float | os.PathLike[str]
-"""What stands for a wire: a law, a name of :data:`WIRES`, EA [N], or the path of a WIRE.toml."""
+"""A wire: its law, a name of :data:`WIRES`, EA [N], or the path of a WIRE.toml."""
 
 
 def as_wire(wire: Wire) -> Elasticity:

@@ -83,7 +83,7 @@ class SlackBelow(Elasticity):
         return np.where(below < 0.0, slack, self.law.energy(inside))
 
     def _split(self, tension: ArrayLike) -> tuple[Array, Array]:
-        """Return the tensions raised to the law's domain, and what they are below its low end."""
+        """Return the tensions raised to the law's domain, and F − rest where F is below it."""
         values = self.domain.check(tension)
         inside = np.maximum(values, self.law.domain.first)
         return inside, np.where(values < inside, values - self.rest, 0.0)

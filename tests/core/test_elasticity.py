@@ -437,6 +437,9 @@ def test_scaled_law_is_as_many_times_as_rigid_and_stretches_as_many_times_less(n
     np.testing.assert_allclose(stiffer.rigidity(F), 1.25 * law.rigidity(F), rtol=1e-12)
     np.testing.assert_allclose(stiffer.strain(F), law.strain(F) / 1.25, rtol=1e-10, atol=1e-16)
     np.testing.assert_allclose(stiffer.energy(F), law.energy(F) / 1.25, rtol=1e-10, atol=1e-14)
+    any_law = cdsm.Elasticity.scaled(law, 1.25)  # of a user-defined law
+    np.testing.assert_allclose(any_law.rigidity(F), stiffer.rigidity(F), rtol=1e-12)
+    np.testing.assert_allclose(any_law.strain(F), stiffer.strain(F), rtol=1e-10, atol=1e-16)
 
 
 @pytest.mark.parametrize("factor", [0.0, -1.0, math.inf, math.nan, "x"])

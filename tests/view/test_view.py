@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 import cdsm
-from cdsm.plots.arm import tension_colors
+from cdsm.plots.arm import color_scale
 from cdsm.support.values import Array
 from cdsm.view import Condition, Setting, View, serve, show
 from cdsm.view.panel import page_text
@@ -106,7 +106,7 @@ def test_colours_are_those_of_the_figure_and_grey_without_tensions() -> None:
     arm = soft_arm()
     shown = show(arm, setting(arm))
     assert shown.tension is not None
-    expected = tension_colors(shown.tension).to_rgba(shown.tension.values)[:, :3]
+    expected = color_scale(shown.tension.values).to_rgba(shown.tension.values)[:, :3]
     assert shown.cable_colors is not None
     np.testing.assert_allclose(shown.cable_colors / 255.0, expected, atol=1.0 / 255.0)
     grey = show(arm, setting(arm, INFEASIBLE)).cable_colors
