@@ -19,17 +19,13 @@ from cdsm.geometry import Geometry, Link
 from cdsm.manipulator import Manipulator
 from cdsm.wires.catalogue import SOLID, STRAND
 
+# fmt: off
 __all__ = [
-    "ELASTIC_STAGE",
-    "STEEL_WIRE_200GPA",
-    "STRAND_1X19",
-    "STRAND_DIAMETER",
-    "TEN_DEGREES",
-    "experimental_prototype",
-    "experimental_prototype_geometry",
-    "virtual_prototype",
+    "ELASTIC_STAGE", "STEEL_WIRE_200GPA", "STRAND_1X19", "STRAND_DIAMETER", "TEN_DEGREES",
+    "experimental_prototype", "experimental_prototype_geometry", "virtual_prototype",
     "virtual_prototype_geometry",
 ]
+# fmt: on
 
 
 def __dir__() -> list[str]:

@@ -46,31 +46,12 @@ FIGURES: Final[dict[str, Callable[[], Figure]]] = {
 }
 """Function that computes each figure, by the name of the figure."""
 
+# fmt: off
 __all__ = [
-    "BOUNDS",
-    "EXPLANATION",
-    "FIGURES",
-    "HEADER",
-    "STEPS",
-    "SUMMARY",
-    "Claim",
-    "Curve",
-    "ExperimentFigure",
-    "Figure",
-    "LeadFigure",
-    "Prototype",
-    "PrototypeFigure",
-    "PrototypeFit",
-    "RoughFit",
-    "RoughPrototype",
-    "Step",
-    "StiffnessFigure",
-    "StrandFigure",
-    "Trace",
-    "identify_prototype",
-    "identify_rough_prototype",
-    "to_dict",
-    "to_markdown",
-    "to_rows",
+    "BOUNDS", "EXPLANATION", "FIGURES", "HEADER", "STEPS", "SUMMARY", "Claim", "Curve",
+    "ExperimentFigure", "Figure", "LeadFigure", "Prototype", "PrototypeFigure", "PrototypeFit",
+    "RoughFit", "RoughPrototype", "Step", "StiffnessFigure", "StrandFigure", "Trace",
+    "identify_prototype", "identify_rough_prototype", "to_dict", "to_markdown", "to_rows",
     "to_summary",
 ]
+# fmt: on

@@ -30,33 +30,16 @@ from cdsm.plots.style import save_figure
 from cdsm.plots.tracking import plot_tracking_run
 from cdsm.plots.wires import plot_cables, plot_elasticity
 
+# fmt: off
 __all__ = [
-    "plot_arm",
-    "plot_bifurcation",
-    "plot_cables",
-    "plot_critical_load",
-    "plot_critical_tension",
-    "plot_designs",
-    "plot_elasticity",
-    "plot_force_polytope",
-    "plot_load_history",
-    "plot_map",
-    "plot_modes",
-    "plot_monte_carlo",
-    "plot_paper",
-    "plot_path",
-    "plot_path_plan",
-    "plot_saturation",
-    "plot_shares",
-    "plot_stiffness_plan",
-    "plot_stiffness_range",
-    "plot_stiffness_ranges",
-    "plot_tensions",
-    "plot_tracking_run",
-    "plot_uncertainty",
-    "plot_weight_test",
-    "save_figure",
+    "plot_arm", "plot_bifurcation", "plot_cables", "plot_critical_load", "plot_critical_tension",
+    "plot_designs", "plot_elasticity", "plot_force_polytope", "plot_load_history", "plot_map",
+    "plot_modes", "plot_monte_carlo", "plot_paper", "plot_path", "plot_path_plan",
+    "plot_saturation", "plot_shares", "plot_stiffness_plan", "plot_stiffness_range",
+    "plot_stiffness_ranges", "plot_tensions", "plot_tracking_run", "plot_uncertainty",
+    "plot_weight_test", "save_figure",
 ]
+# fmt: on
 
 
 def __dir__() -> list[str]:

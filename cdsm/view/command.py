@@ -38,9 +38,9 @@ def command_line(arm: Manipulator, setting: Setting, arm_arguments: Sequence[str
 
     ``arm_arguments`` describe the arm: its file, and options such as ``--rigidity``.
     """
-    weighs = setting.sag and bool(setting.force.any())
+    weighs, units = setting.sag and bool(setting.force.any()), JointUnits(arm.slides).shown
     options = {
-        "angles": _joined(_degrees(arm, setting)),
+        "angles": _joined(x / unit for x, (_, unit) in zip(setting.q.tolist(), units, strict=True)),
         "min-tension": f"{setting.minimum:.12g}",
         "max-tension": f"{setting.maximum:.12g}" if math.isfinite(setting.maximum) else "",
         "force": _joined(setting.force.tolist()) if weighs else "",
@@ -85,12 +85,6 @@ def command_text(arm: Manipulator, setting: Setting, arm_arguments: Sequence[str
             style="padding:0 0.8em 0.8em;font-size:0.85em",
         )
     )
-
-
-def _degrees(arm: Manipulator, setting: Setting) -> list[float]:
-    """Return the joint coordinates in degrees, or mm where a joint slides."""
-    units = JointUnits(arm.slides).shown
-    return [x / unit for x, (_, unit) in zip(setting.q.tolist(), units, strict=True)]
 
 
 def _wrench(setting: Setting) -> list[float]:

@@ -36,7 +36,7 @@ class PathPlayer:
         go: Callable[[Array], None],
         admit: Callable[[Control], None],
     ) -> None:
-        self._path, self._go = path, go
+        self._last = len(path)
         self._playing, self._closed = threading.Event(), threading.Event()
         with server.gui.add_folder("Path", order=0.0):
             last = float(len(path))
@@ -45,8 +45,8 @@ class PathPlayer:
             self._button = server.gui.add_button(
                 _PLAY, hint="From here; from the start at the end."
             )
-        self._sample.on_update(self._on_sample)
-        self._button.on_click(self._on_click)
+        self._sample.on_update(lambda _: go(path[round(self._sample.value) - 1]))
+        self._button.on_click(lambda _: self._play(not self._playing.is_set()))
         for control in (self._sample, self._speed, self._button):
             admit(control)
         self._thread = threading.Thread(target=self._run, name="cdsm path", daemon=True)
@@ -58,14 +58,8 @@ class PathPlayer:
         self._playing.set()
         self._thread.join()
 
-    def _on_sample(self, _: object) -> None:
-        self._go(self._path[round(self._sample.value) - 1])
-
-    def _on_click(self, _: object) -> None:
-        self._play(not self._playing.is_set())
-
     def _play(self, on: bool) -> None:
-        if on and round(self._sample.value) == len(self._path):
+        if on and round(self._sample.value) == self._last:
             self._sample.value = 1.0  # type: ignore[misc]
         self._button.label = _PAUSE if on else _PLAY
         (self._playing.set if on else self._playing.clear)()
@@ -74,7 +68,7 @@ class PathPlayer:
         while self._playing.wait() and not self._closed.wait(1.0 / self._speed.value):
             if not self._playing.is_set():
                 continue
-            if round(self._sample.value) >= len(self._path):
+            if round(self._sample.value) >= self._last:
                 self._play(False)
             else:
                 self._sample.value += 1.0  # type: ignore[misc]
