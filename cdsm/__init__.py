@@ -229,7 +229,7 @@ _NAMES = {
     "wires.tensile.fit": "TensileFit fit_tensile_test",
     "wires.tensile.record": "TensileTest read_tensile_csv",
 }
-"""Public names by the module they come from, which is imported when one is first touched."""
+"""Public names by their module, which is imported when one of its names is first used."""
 
 _HOME = {name: f"cdsm.{module}" for module, names in _NAMES.items() for name in names.split()}
 _MODULES = ("control", "paper", "plots", "presets", "view")

@@ -1,4 +1,4 @@
-"""Attributes of an arm that hold at every posture: names, cables, units, limits, gravity."""
+"""Properties of an arm that do not depend on its posture: names, cables, limits, gravity."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from cdsm.tolerance import Tolerances
 
 
 class ArmFacts(Printed):
-    """Base class of :class:`~cdsm.Manipulator`, which builds the model and its parts."""
+    """Base class of :class:`~cdsm.Manipulator`, which sets its fields."""
 
     _cables: Cables
     _gravity: Array
@@ -52,8 +52,8 @@ class ArmFacts(Printed):
     def length(self) -> float:
         """Length of the path from the base through the joints to the tip, all joints at zero [m].
 
-        For a robot from a URDF, it is at least the largest distance of a cable site from its joint.
-        The length is a scale for errors, so it must not be zero if the tip is on a joint.
+        For a robot from a URDF: this length, or the largest distance of a cable site from its
+        joint if that is longer. Tolerances scale with the length, so it must not be zero.
         """
         if self.is_serpentine:
             return self.geometry.length
@@ -72,7 +72,7 @@ class ArmFacts(Printed):
 
     @property
     def cables(self) -> Cables:
-        """Cables of the arm, in the order of every (C,) array: ``cables[0]``, or by name."""
+        """Cables of the arm, in the order of every (C,) array; ``cables[0]`` or by name."""
         return self._cables
 
     @property
@@ -82,17 +82,17 @@ class ArmFacts(Printed):
 
     @property
     def original_length(self) -> OriginalLength:
-        """Definition of the length l_0 of a wire in EA/l_0; see :class:`Manipulator`."""
+        """Which length of a wire is l_0 in EA/l_0; see :class:`Manipulator`."""
         return self._parts.original_length
 
     @property
     def has_friction(self) -> bool:
-        """Whether a cable has friction in a hole. Most results leave it out, and say so."""
+        """Whether a cable has friction in a hole. Results that neglect friction say so."""
         return any(any(cable.friction) for cable in self.cables)
 
     @property
     def tolerances(self) -> Tolerances:
-        """Tolerances: how far the arm may be from its description; zero if none were given."""
+        """Uncertainties of the arm's dimensions and measured values; zero if none were given."""
         return self._parts.tolerances
 
     @property
@@ -107,7 +107,7 @@ class ArmFacts(Printed):
 
     @property
     def slides(self) -> NDArray[np.bool_]:
-        """Whether each joint slides (nv,); its coordinate is then a length [m], not an angle."""
+        """Whether each joint slides, is prismatic (nv,); its coordinate is then a length [m]."""
         return self._model.body.slides
 
     @property
@@ -116,11 +116,11 @@ class ArmFacts(Printed):
         return JointUnits(self.slides).coordinates
 
     def torque_unit(self, joint: int | None = None) -> str:
-        """Return the torque unit of one joint (N where it slides), or of all joints together."""
+        """Return the torque unit of a joint, N m or (if it slides) N; None: of all joints."""
         return JointUnits(self.slides).torque(joint)
 
     def stiffness_unit(self) -> str:
-        """Return the unit of the diagonal of K_θ and its eigenvalues; N/m where joints slide."""
+        """Return the unit of the diagonal and eigenvalues of K_θ: N m/rad, N/m if joints slide."""
         return JointUnits(self.slides).stiffness()
 
     @property

@@ -1,4 +1,4 @@
-"""Parts of an arm that all computations share: bodies, tree, cable routing and cable laws.
+"""Model of an arm that all computations share: bodies, tree, cable routing and cable laws.
 
 A :class:`~cdsm.Manipulator` holds one :class:`ArmModel` in ``_model``. Modules that need more than
 the public properties of an arm read this model.
@@ -37,7 +37,7 @@ GRAVITY = (0.0, 0.0, -9.81)
 
 
 class ArmParts(NamedTuple):
-    """Parts from which an arm is built; equal arms have equal parts."""
+    """Everything that defines an arm; two arms are equal if these parts are equal."""
 
     geometry: Geometry | None
     urdf: str
@@ -50,16 +50,17 @@ class ArmParts(NamedTuple):
 
 
 class ArmModel:
-    """Arrays and cable laws of an arm that do not depend on the joint angles, checked.
+    """Arrays and cable laws of an arm that do not depend on the joint angles.
 
     Attributes:
         body: Rigid-body model.
         tree: Kinematic tree of the joints.
         routing: Cable sites and segments.
-        masses: Masses that the joints carry, and the position of the tip.
-        blocks: Blocks of joints and cables, from which tensions are guessed.
+        masses: Masses of the links, gravity, and the pose of the tip on its link.
+        blocks: Joints and cables in groups that are solved one after the other for a first guess
+            of the tensions.
         laws: Elasticities of the cables.
-        arrays: The fields of tree, routing and masses, as the kernel of one posture takes them.
+        arrays: All fields of tree, routing and masses: the arguments of ``single_pose`` before q.
         lowest: Lower joint limits (nv,) [rad], minus the rounding tolerance.
         highest: Upper joint limits (nv,) [rad], plus the rounding tolerance.
     """
@@ -81,7 +82,7 @@ class ArmModel:
         self.laws.require_continuity()
 
     def with_laws(self, cables: tuple[Cable, ...]) -> ArmModel:
-        """Return the model with cables through the same sites that differ in their laws only."""
+        """Return the model with other cable laws; the cables have the same sites as before."""
         model = type(self).__new__(type(self))
         same = "body", "tree", "masses", "routing", "blocks", "arrays", "lowest", "highest"
         model.__dict__.update({name: self.__dict__[name] for name in same})
@@ -91,17 +92,17 @@ class ArmModel:
 
     @cached_property
     def chains(self) -> Chains:
-        """The cables as segments between holes."""
+        """Cables, divided into segments between holes."""
         return Chains.of(self._cables)
 
     @cached_property
     def segment_laws(self) -> CableLaws:
-        """Elasticities of the segments."""
+        """Elasticities of the segments of :attr:`chains`."""
         return CableLaws(self.chains.segments, self._original_length)
 
     @cached_property
     def chain_arrays(self) -> tuple[Any, ...]:
-        """Fields of the routing of the segments, then the arrays for the kernel of chains."""
+        """Arguments of ``single_chains`` between the tree and q: routing, spans, holes, wraps."""
         chains, routing = self.chains, route(self.body, self.tree, self.chains.segments)
         span = np.zeros((len(chains.segments), 3), dtype=np.intp)
         moving = routing.segment[:-1, 0]
@@ -110,7 +111,7 @@ class ArmModel:
 
     @cached_property
     def wire_laws(self) -> CableLaws:
-        """Elasticities of the wires that can stick, also of those whose motor holds the force."""
+        """Elasticities of the cables; those with friction count as position-controlled."""
         forced = {c for c, cable in enumerate(self._cables) if cable.control == "force"}
         if not any(any(self._cables[c].friction) for c in forced):
             return self.laws
@@ -122,7 +123,7 @@ class ArmModel:
 
     @cached_property
     def holes(self) -> Holes:
-        """Holes and wires of the cables, for the kernels of batches."""
+        """Holes and wires of the cables, as the kernels of batches take them."""
         chains, cables, wires = self.chains, self._cables, self.wire_laws
         first = np.cumsum([0, *(len(cable.sites) for cable in cables)])
         friction, wrap = np.zeros((2, first[-1]))
@@ -141,12 +142,12 @@ class ArmModel:
         )
 
     def beyond_limits(self, q: Array) -> NDArray[np.bool_]:
-        """Check which joint angles (nv,) [rad] are beyond their limits."""
+        """Return which joint angles (nv,) [rad] are beyond their limits, bool (nv,)."""
         return np.asarray((q < self.lowest) | (q > self.highest))
 
 
 def route(body: RigidBody, tree: Tree, cables: Sequence[Cable]) -> Routing:
-    """Compute each site in the frame of its joint, and find the joints that change each segment."""
+    """Return the routing: sites in the frames of their joints, joints that move each segment."""
     row, point, fixed = [], [], np.array([cable.lead for cable in cables])
     parts: list[tuple[int, int, int, int, int]] = []
     joints: list[int] = []

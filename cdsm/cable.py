@@ -37,12 +37,12 @@ class Site:
         link: Name of the link in the URDF.
         position: Position in the link's frame [m].
         friction: μ [-]: Coulomb friction coefficient between the cable and the hole.
-        wrap: Wrap angle [rad] that adds to the angle by which the cable turns at the site, e.g. in
-            a tube or at a rounded edge.
+        wrap: Wrap angle [rad] in addition to the angle between the two segments at the site, e.g.
+            in a curved tube.
 
     Raises:
         InvalidInput: ``position`` is not three finite numbers, ``link`` is not a name, or
-            ``friction`` or ``wrap`` is negative or larger than any machine has.
+            ``friction`` or ``wrap`` is negative or too large (above 2, or 4π).
     """
 
     link: str
@@ -66,13 +66,13 @@ class Cable:
 
     The cable length L is ``lead`` plus the straight segments between neighbouring sites. The cable
     stiffness is k = 1/(l_0/EA(F) + 1/k_series); it is 0 if the motor controls force. The original
-    length of the wire is l_0 = (L − ΔF/k_series)/(1 + ε(F)). Strain ε and ΔF start at the low end
-    of the elasticity's domain. L includes the series spring, so the lead must be long enough to
-    contain it.
+    length of the wire is l_0 = (L − ΔF/k_series)/(1 + ε(F)), with ΔF = F − F_0. The strain ε is
+    zero at F_0, :attr:`Elasticity.rest`. L includes the series spring, so the lead must be long
+    enough to contain it.
 
-    All sites but the last, where the cable ends, are holes that it passes. If there is no lead, the
-    cable leaves its actuator at the first site, and that site is no hole. The lead arrives along x
-    of the first site's link. If it does not, give the place of the actuator as the first site.
+    The cable ends at its last site. All other sites are holes that it passes. Without a lead, the
+    first site is the actuator and no hole. The lead is parallel to x of the first site's link. For
+    a lead in another direction, give the position of the actuator as the first site.
 
     Attributes:
         name: Unique name within an arm.
@@ -155,7 +155,7 @@ class Cable:
         return replace(self, sites=tuple(sites))
 
     def elongation(self, tension: ArrayLike, free_length: float) -> Array:
-        """Compute Δl = l_0 ε(F) + ΔF/k_series [m], from the low end of the elasticity's domain.
+        """Compute Δl = l_0 ε(F) + ΔF/k_series [m]; Δl, ε and ΔF are 0 at the elasticity's ``rest``.
 
         Wire and series spring carry the same tension, and their elongations add up. Examples are a
         hybrid cable (Fig. 11) and a wire on a compliant drive.
@@ -182,7 +182,7 @@ class Cable:
         return np.asarray(1.0 / (_length(free_length) / rigidity + 1.0 / self.series_stiffness))
 
     def energy(self, tension: ArrayLike, free_length: float) -> Array:
-        """Compute ∫ F dΔl = l_0 ∫ F dε + Δ(F²)/(2 k_series) [J], from the low end of the domain.
+        """Compute the energy l_0 ∫ F dε + (F² − F_0²)/(2 k_series) [J]; it is 0 at F_0 = ``rest``.
 
         Arguments, shapes and errors are those of :meth:`elongation`.
         """
@@ -194,12 +194,12 @@ class Cable:
         """Compute F [N] at an elongation: the inverse of :meth:`elongation`.
 
         Args:
-            elongation: Δl [m] from the low end of the elasticity's domain, any shape.
+            elongation: Δl [m], 0 at the elasticity's ``rest``; any shape.
             free_length: l_0 of the wire [m].
 
         Raises:
             InvalidInput: ``elongation`` is not numbers, or ``free_length`` is not positive.
-            ElasticityRangeError: No tension of the domain gives one of the elongations.
+            ElasticityRangeError: For an elongation there is no tension in the domain.
         """
         return tension_at(
             number_array("elongation", elongation),
@@ -264,11 +264,12 @@ def serpentine_cables(
     series_stiffness: float = math.inf,
     control: Control = "position",
 ) -> tuple[Cable, ...]:
-    """Route the cables of a serpentine arm through the holes of its disks.
+    """Return the cables of a serpentine arm, routed through the holes of its disks.
 
     A cable of joint k passes the base disk and every disk of links 1…k−1. It ends on the first disk
-    of link k. Its holes are at (x, R cos φ, R sin φ) with the R of each disk, or its own. The i-th
-    cable of joint k has the name ``cable{k}_{i}``.
+    of link k. Its hole in a disk is at (x, R cos φ, R sin φ) in the frame of the link: x is the
+    position of the disk, φ the angle of the :class:`~cdsm.CableRoute`, R the radius of the route,
+    or the hole radius of the disk. The i-th cable of joint k has the name ``cable{k}_{i}``.
 
     Args:
         geometry: The arm.

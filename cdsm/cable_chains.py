@@ -1,9 +1,9 @@
-"""Cables as chains of segments between holes, which friction keeps apart.
+"""Cables, divided into chains of segments between holes with friction.
 
-Segment by segment, a cable runs from its actuator to its end: the lead, then one segment between
-each two neighbouring sites. Between two segments is a hole. Where the hole holds the cable, both
-segments are springs of their own. Each segment is therefore described as a cable of its own, so
-that its length, its derivatives and its stiffness come from the same code as those of a cable.
+The segments of a cable are its lead, then one segment between each two neighbouring sites. Between
+two segments is a hole. Where the cable sticks in a hole, the segments on both sides are separate
+springs. Each segment is therefore described as a :class:`Cable`: the code for cables computes its
+length, its derivatives and its stiffness.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ class Chains:
         segments: Each segment as a cable between two sites. Only the first of each cable has the
             series spring and the motor control. The lead is a segment that arrives along x of the
             link of the first site.
-        cable: Cable of each segment (S,).
-        start: First segment of each cable, and at last the number of segments (C+1,).
-        hole: Segment before each hole (P,). The segment after it is the next one.
+        cable: Index of the cable of each segment (S,).
+        start: Index of the first segment of each cable, then S (C+1,).
+        hole: Index of the segment before each hole (P,); the segment after it has the next index.
         site: Index of each hole among the sites of its cable (P,).
         friction: μ of each hole (P,) [-].
-        wrap: Wrap angle of its own of each hole (P,) [rad].
+        wrap: :attr:`Site.wrap` of each hole (P,) [rad].
     """
 
     segments: tuple[Cable, ...]
@@ -85,7 +85,7 @@ class Segments(ReadOnlyState):
     """Segments of all cables between their holes at a posture; S segments, P holes.
 
     Attributes:
-        chains: Which segment and which hole is whose.
+        chains: The segments and holes, with the cable of each.
         lengths: l (S,) [m].
         length_jacobian: ∂l/∂θ (S, nv) [m/rad]; zero for leads and segments within one link.
         wrap: φ (P,) [rad]: angle by which the cable turns in the hole, plus the wrap of the site.
@@ -101,7 +101,7 @@ class Segments(ReadOnlyState):
     _frames: Frames
 
     def tension_stiffness(self, tension: Array) -> Array:
-        """Compute Σ T_j ∂²l_j/∂θ² of each cable (C, nv, nv) [N m/rad], from checked T (S,) [N]."""
+        """Compute Σ T_j ∂²l_j/∂θ² over each cable's segments j, (C, nv, nv) [N m/rad]; T (S,)."""
         cable, (_, _, segment, joint, _) = self.chains.cable, self._routing
         return frozen(
             chain_kernels.single_tension_stiffness(

@@ -1,4 +1,4 @@
-"""Laws of rigidity of the cables of an arm: stiffness, tension bounds and original lengths."""
+"""Elasticities of all cables of an arm: stiffness, tension bounds and original lengths."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _STEP = 1e-5
 
 
 class CableLaws:
-    """Elasticities of the cables of an arm: stiffness, tension bounds and original lengths.
+    """Elasticities of all cables of an arm; C is the number of cables.
 
     A locked motor holds the original length l_0 of its wire. Under tension the length of the wire
     is ℓ = l_0 (1 + ε). The stiffness EA/l_0 is therefore EA (1 + ε)/ℓ.
@@ -39,11 +39,13 @@ class CableLaws:
             ``"stretched"``: it is ℓ, as in the paper.
 
     Attributes:
-        held: Each different law of the position-controlled cables, with the indices of its cables.
+        held: Each distinct law of the position-controlled cables, with the indices of its cables.
         series: 1/k_series of all cables (C,) [m/N].
-        rest: Tension at which each series spring is at rest (C,) [N]: that of zero strain.
-        asked: Each law that is not linear, with the indices of its cables.
-        own: Those of them that no kernel knows.
+        rest: Tension (C,) [N] at which wire strain and spring elongation are zero.
+        constant: EA of linear laws (C,) [N]; 0 for other laws and force-controlled cables.
+        linear: 1 where EA (1 + ε) = EA + F (C,): a linear law with unstrained l_0; else 0.
+        asked: The entries of ``held`` whose law is not linear.
+        own: The laws of ``asked`` that no compiled kernel can evaluate.
     """
 
     def __init__(self, cables: tuple[Cable, ...], original_length: OriginalLength) -> None:
@@ -78,7 +80,7 @@ class CableLaws:
         self.own = [law for law, _ in self.asked if _polynomials(law) is None]
 
     def require_continuity(self) -> None:
-        """Raise InvalidInput if the rigidity of a law jumps."""
+        """Raise InvalidInput if the rigidity of a law is discontinuous."""
         for law, held in self.held:
             jump = find_jump(law)
             if jump is not None:
@@ -121,7 +123,7 @@ class CableLaws:
         )
 
     def narrowed(self, low: Array, high: Array) -> tuple[Array, Array]:
-        """Return bounds of tension (…, C) [N], narrowed by the bounds that each cable defines."""
+        """Return tension bounds (…, C) [N], narrowed to the bounds that each cable defines."""
         if not self._bounded:
             return low, high
         return frozen(np.maximum(low, self._least)), frozen(np.minimum(high, self._most))
@@ -129,8 +131,8 @@ class CableLaws:
     def stiffness(self, lengths: Array, tension: Array) -> Array:
         """Compute the diagonal of K_L (C,) [N/m]: 1/(l_0/EA(F) + 1/k_series).
 
-        Force-controlled cables have the stiffness 0. The lengths L (C,) [m] and the tensions (C,)
-        [N] must be checked before, and no tension may be negative.
+        Force-controlled cables have the stiffness 0. ``lengths`` is L (C,) [m] and ``tension`` is
+        F (C,) [N], both checked and not negative.
         """
         rigidity = self.constant
         if self.asked:
@@ -155,8 +157,8 @@ class CableLaws:
         """Compute l_0 (C,) [m] of cables of length L (C,) [m] under tension F (C,) [N].
 
         The cable length includes the series spring. l_0 is therefore negative if the spring
-        stretches by more than the length of the cable. The motor of a force-controlled cable holds
-        no length: the result is L.
+        stretches by more than the length of the cable. A force-controlled cable has no l_0: its
+        entry is L.
         """
         wire = np.array(lengths)
         for law, held in self.held:
@@ -172,8 +174,8 @@ class CableLaws:
     def slopes(self, tension: Array, stiffness: Array) -> tuple[Array, Array]:
         """Compute dk/dF (C,) [1/m] and d²k/dF² (C,) [1/(N m)] of the cable stiffness k at F (C,).
 
-        The posture is constant, so l_0 changes with F. With R = EA (1 + ε), G = R′/R and the wire's
-        part of the cable compliance, w = 1 − k/k_series,
+        The posture is constant, so l_0 changes with F. A prime is d/dF. With R = EA (1 + ε),
+        G = R′/R and w = 1 − k/k_series, the wire's share of the cable compliance,
 
             k′ = k A,  k″ = k (A² + A′),  A = (1 − w)/R + w G,
             A′ = (1 − w) (A/R − G/R − A G) + w G′.
@@ -211,17 +213,17 @@ class CableLaws:
     def naming(
         self, error: ElasticityRangeError, held: slice | NDArray[np.intp]
     ) -> ElasticityRangeError:
-        """Return the error of a law with the names and the indices of its cables added."""
+        """Return the error with names and indices of cables; ``held`` are the cables of the law."""
         outside = np.arange(len(self._cables))[held][list(error.indices)].tolist()
         names = [self._cables[c].name for c in outside]
         return ElasticityRangeError(error.problem, error.tension, outside, names)
 
 
 def kinks(law: Elasticity) -> tuple[float, ...]:
-    """Return the tensions [N], in rising order, at which the slope of a law's rigidity jumps.
+    """Return the tensions [N], in rising order, at which dEA/dF of a law is discontinuous.
 
-    The slope at a kink is the slope of the range below it. A table has weak kinks at its points;
-    they are not returned.
+    At a kink, ``rigidity_slope`` returns the slope below it. The weak kinks at the points of a
+    tabulated law are not returned.
     """
     if isinstance(law, SlackBelow):
         return law.rest, *kinks(law.law)
@@ -229,7 +231,7 @@ def kinks(law: Elasticity) -> tuple[float, ...]:
 
 
 def _polynomials(law: Elasticity) -> StrandElasticity | None:
-    """Return the polynomials of a law that has them and is positive on its domain, else None."""
+    """Return the strand law in a law if its polynomials are positive everywhere; else None."""
     inside = law.law if isinstance(law, SlackBelow) else law
     whole = isinstance(inside, StrandElasticity) and inside.panels.end == math.inf
     return inside if isinstance(inside, StrandElasticity) and whole else None
@@ -240,7 +242,7 @@ def _edges(table: Panels) -> Array:
 
 
 def _coefficients(tables: list[Array]) -> Array:
-    """Stack coefficients (powers, P) of different degree side by side; the rows fit the kernel."""
+    """Join coefficients (powers, P) side by side, with zeros up to a multiple of AT_ONCE rows."""
     powers = AT_ONCE * -(-max((len(table) for table in tables), default=0) // AT_ONCE)
     padded = [np.pad(table, ((0, powers - len(table)), (0, 0))) for table in tables]
     return np.hstack([np.zeros((powers, 0)), *padded])

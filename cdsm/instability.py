@@ -1,9 +1,8 @@
-"""Remedies for an arm that buckles: stiffer wires or springs, other tensions or disk offsets.
+"""Remedies for an unstable arm: stiffer wires or springs, other tensions or disk offsets.
 
-K_θ of an unstable arm has a smallest eigenvalue λ ≤ 0 (of its symmetric part). Each remedy
-multiplies one quantity by a factor s and leaves the others alone. The tensions are distributed
-again where their problem changes. λ(s) = 0 is solved inside a bracket; dλ/d ln s is a central
-difference.
+The symmetric part of K_θ of an unstable arm has a smallest eigenvalue λ ≤ 0. Each remedy multiplies
+one quantity by a factor s and changes no other. For other tension bounds or disk offsets, the
+tensions are distributed again. λ(s) = 0 is solved by bracketing; dλ/d ln s is a central difference.
 """
 
 from __future__ import annotations
@@ -32,14 +31,14 @@ if TYPE_CHECKING:
 Change = Literal["wire", "spring", "tension", "disk offset"]
 
 _STIFFER: Final = tuple(np.geomspace(1.0, 1e3, 31)[1:].tolist())
-"""Factors of wires and springs that are tried: λ rises with each, so steps may be wide."""
+"""Factors s that are tried on wires and springs: λ rises with s, so the steps may be wide."""
 
 _MORE: Final = tuple(np.geomspace(1.0, 1e2, 61)[1:].tolist())
 _LESS: Final = tuple(np.geomspace(1.0, 1e-3, 91)[1:].tolist())
-"""Factors of tensions and disk offsets that are tried: λ may rise and fall, so steps are 8 %."""
+"""Factors s that are tried on tensions and disk offsets: λ may also fall, so steps are 8 %."""
 
 _STEP = 1e-5
-"""Step of ln s in the difference of λ: truncation and rounding stay below 1e-9 of λ."""
+"""Step of ln s in the central difference of λ; truncation and rounding stay below 1e-9 of λ."""
 
 _SAID: Final = {
     "wire": ("wires {times} times as stiff{bound}: EA {new} kN, now {old} kN", 1e3),
@@ -57,13 +56,12 @@ class Remedy(ReadOnlyState):
     Attributes:
         change: ``"wire"`` (EA of all wires), ``"spring"`` (all series springs), ``"tension"`` (the
             lower bounds of the tensions) or ``"disk offset"``.
-        now: Present values: EA(F) (n,) [N] of cables that are not force-controlled, k_series
-            (n,) [N/m] of those with a spring, lower
-            bounds (C,) [N], or disk offsets (joints,) [m].
-        factor: Factor of all these values next to 1 from which on the arm is stable [-]; None if no
-            factor that was tried makes it stable.
-        slope: dλ/d ln(factor) now [N m/rad], λ the smallest eigenvalue of K_θ: 0.01 times this is
-            its change for 1 % more. None at the end of a domain.
+        now: Present values: EA(F) (n,) [N] of the position-controlled cables, k_series (n,) [N/m]
+            of those with a spring, lower bounds (C,) [N], or disk offsets (joints,) [m].
+        factor: Factor of all these values, nearest to 1, at which the arm becomes stable [-]; None
+            if no factor that was tried makes it stable.
+        slope: dλ/d ln(factor) at the present values [N m/rad], λ the smallest eigenvalue of K_θ.
+            1 % more changes λ by 0.01 times this. None if a small change is not admissible.
     """
 
     change: Change
@@ -85,12 +83,12 @@ class Remedy(ReadOnlyState):
 
 
 def find_remedies(K: Stiffness) -> tuple[Remedy, ...]:
-    """Compute the remedies of an unstable arm, each change alone; none for a stable arm."""
+    """Return the remedies of an unstable arm, each for one change alone; empty if it is stable."""
     return () if K.is_stable else tuple(_remedies(K))
 
 
 def verdict(K: Stiffness) -> str:
-    """Return one line about an unstable arm: how unstable it is, and where."""
+    """Return one line about an unstable arm: the joint that moves most, and the eigenvalue."""
     arm, way = K.posture.arm, abs(K.critical_direction)
     return (
         f"UNSTABLE: the arm buckles, {arm.joint_names[int(way.argmax())]} most; the smallest "
@@ -99,7 +97,7 @@ def verdict(K: Stiffness) -> str:
 
 
 def advice(K: Stiffness) -> tuple[str, ...]:
-    """Return the remedies of an unstable arm as text, a line for each change."""
+    """Return lines of text about an unstable arm: the changes that would make it stable."""
     holding = [f"  {each}" for each in K.remedies if each.factor is not None]
     if holding:
         return "it would hold, by each of these alone, with", *holding
@@ -112,7 +110,7 @@ def _remedies(K: Stiffness) -> Iterator[Remedy]:
     held = [cable for cable in arm.cables if cable.control == "position"]
 
     def margin(changed: Posture, tension: Array) -> float:
-        """Smallest eigenvalue of K_θ of an arm at a posture under tensions (C,) [N]."""
+        """Compute the smallest eigenvalue of K_θ at a posture under tensions (C,) [N]."""
         k = changed.arm._model.laws.stiffness(changed.cable_lengths, tension)
         return read_margin(changed._joint_stiffness(tension, k, K.wrench)[-1])
 
@@ -171,7 +169,7 @@ def _remedy(
 
 
 def _first_zero(margin: Callable[[float], float], factors: tuple[float, ...]) -> float | None:
-    """Return the first factor from 1 on at which the arm becomes stable; None if there is none."""
+    """Return the first factor from 1 on at which ``margin`` becomes positive, or None."""
     from scipy.optimize import brentq  # slow to import
 
     before = 1.0
@@ -186,9 +184,9 @@ def _first_zero(margin: Callable[[float], float], factors: tuple[float, ...]) ->
 
 
 def _with_disks(K: Stiffness, factor: float) -> tuple[Cable, ...]:
-    """Return the cables of an arm whose disk offsets are multiplied by a factor.
+    """Return the cables of the arm with all disk offsets multiplied by a factor.
 
-    Disks that would touch at this posture raise GeometryError.
+    Raise GeometryError if disks would touch at this posture.
     """
     arm = K.posture.arm
     joints = (

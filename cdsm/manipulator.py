@@ -62,17 +62,17 @@ class Manipulator(ArmFacts):
         elasticity: One law for all cables, or one law per cable. The cables are then those of
             :func:`~cdsm.serpentine_cables`.
         cables: The cables, if ``elasticity`` is not given: any sites on any links of :attr:`urdf`.
-            Or the path of their file.
-        gravity: Gravity in base axes (3,) [m/s²], or an axis such as ``"-y"`` for 9.81 m/s²
-                along it; (0, 0, 0) for none.
-        original_length: Length l_0 of a locked wire that its stiffness EA/l_0 uses.
-            ``"unstrained"``: the length that the motor holds, ℓ/(1 + ε(F)) for a wire of length ℓ
-            under F. ``"stretched"``: ℓ, as in the paper's figures; K is then too low by the strain,
-            3–5 % for Eq. 19.
+            Or the path of a file of :func:`~cdsm.write_cables`.
+        gravity: Gravity in base axes (3,) [m/s²], or an axis such as ``"-y"`` for 9.81 m/s² along
+            it; (0, 0, 0) for none.
+        original_length: Which length is l_0 in the stiffness EA/l_0 of a wire of length ℓ under
+            tension F. ``"unstrained"``: ℓ/(1 + ε(F)), the length that a locked motor holds.
+            ``"stretched"``: ℓ, as in the paper's figures; K is then too low by the strain, 3–5 %
+            for Eq. 19.
 
     Raises:
         InvalidInput: ``elasticity`` and ``cables`` are both given or both missing, gravity is not
-            three numbers, or the rigidity of a user-defined law jumps.
+            three numbers, or the rigidity of a user-defined law is discontinuous.
         CableError: Two cables have the same name, or a cable is on an unknown link.
         UnknownName: ``original_length`` is unknown.
     """
@@ -111,8 +111,8 @@ class Manipulator(ArmFacts):
     ) -> Manipulator:
         """Build an arm from a URDF and cables: a tree of revolute, prismatic and fixed joints.
 
-        Where a joint slides, the unit of its coordinate is m and the unit of its torque is N. Other
-        units change in the same way.
+        Where a joint slides (prismatic), its coordinate is in m, its torque in N and its stiffness
+        in N/m.
 
         Args:
             urdf: Path of the URDF file, or its text.
@@ -131,7 +131,7 @@ class Manipulator(ArmFacts):
             UrdfError: The URDF is not a supported robot; lists every fault.
             UnknownName: No link is called ``tip``, or ``original_length`` is unknown.
             InvalidInput: ``joint_names`` does not name each moving joint once, or the rigidity of a
-                user-defined law jumps.
+                user-defined law is discontinuous.
             CableError: Two cables have the same name, or a cable is on an unknown link.
         """
         text = read_urdf(urdf, check_inertia=check_inertia)
@@ -158,8 +158,8 @@ class Manipulator(ArmFacts):
 
         Args:
             path: The file; :meth:`write` writes one, ``cdsm new`` another with comments.
-            wire: Wire of all cables, in the place of the file's: a law, a name, EA [N], or the path
-                of a file of :func:`~cdsm.write_elasticity`.
+            wire: Wire of all cables, instead of the wires in the file: a law, a name, EA [N], or
+                the path of a file of :func:`~cdsm.write_elasticity`.
 
         Raises:
             FileError: The file cannot be read or does not describe an arm. Every fault is listed.
@@ -178,7 +178,7 @@ class Manipulator(ArmFacts):
     def write(self, path: str | os.PathLike[str]) -> Path:
         """Write an ARM.toml from which :meth:`read` builds an equal arm; return its path.
 
-        A URDF is written into the file.
+        The text of a URDF is written into the same file.
 
         Raises:
             InvalidInput: A file cannot hold an elasticity of this kind.
@@ -199,7 +199,7 @@ class Manipulator(ArmFacts):
         joint_names: Sequence[str] | None = None,
         tolerances: Tolerances = Tolerances(),  # noqa: B008  # frozen
     ) -> None:
-        """Set all attributes from checked URDF text and, if given, its geometry."""
+        """Set all attributes; ``urdf`` is a text that has been checked."""
         self._cables = cables = _checked_cables(cables)
         self._gravity = gravity_vector("gravity", gravity)
         one_of("original_length", original_length, get_args(OriginalLength))
@@ -229,8 +229,8 @@ class Manipulator(ArmFacts):
             cables: One or more cables, or the path of their file.
 
         Raises:
-            InvalidInput: ``cables`` is not a list or tuple of cables, or the rigidity of a law
-                jumps.
+            InvalidInput: ``cables`` is not a list or tuple of cables, or the rigidity of a law is
+                discontinuous.
             CableError: Two cables have the same name, or a cable is on an unknown link.
         """
         return self._replace(cables=_checked_cables(cables))
@@ -260,7 +260,7 @@ class Manipulator(ArmFacts):
         return self._replace(gravity=gravity)
 
     def _with_laws(self, laws: Sequence[Elasticity]) -> Manipulator:
-        """Return the same arm with other laws, one per cable; nothing else is checked again."""
+        """Return the same arm with other laws, one per cable; nothing else is computed again."""
         pairs = zip(self.cables, laws, strict=True)
         cables = Cables(replace(cable, elasticity=law) for cable, law in pairs)
         arm = type(self).__new__(type(self))
@@ -274,7 +274,7 @@ class Manipulator(ArmFacts):
         return arm
 
     def plot(self, q: ArrayLike | None = None) -> Figure:
-        """Plot the arm in mm at joint angles q (nv,) [rad]; by default as straight as it can be.
+        """Plot the arm in mm at joint angles q (nv,) [rad]; None: 0, or the limit nearest to 0.
 
         Raises:
             InvalidInput: q is not (nv,) finite real numbers.

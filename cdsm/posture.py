@@ -91,7 +91,7 @@ class Posture(ReadOnlyState):
 
     @cached_property
     def moment_arms(self) -> MomentArms:
-        """Moment arm of each cable about each joint, as a table by name."""
+        """Moment arm of each cable about each joint, with names."""
         arm, values = self.arm, frozen(0.0 - self.length_jacobian)  # no zero is negative
         return MomentArms(
             values=values, cables=arm.cables.names, joints=arm.joint_names, slides=arm.slides
@@ -119,12 +119,12 @@ class Posture(ReadOnlyState):
 
     @property
     def bones(self) -> tuple[Array, ...]:
-        """Straight lines from joint to joint and to the tip, (2, 3) each [m]: a stick figure."""
+        """Lines from joint to joint and to the tip, (2, 3) each [m]: a stick figure."""
         return tuple(bone for bones in self._bones for bone in bones)
 
     @property
     def brackets(self) -> tuple[Array, ...]:
-        """Straight lines from each cable site to the bones of its link, (2, 3) each [m]."""
+        """Lines from each cable site to the nearest bone of its link, (2, 3) each [m]."""
         lines = []
         for row, site in zip(self.arm._model.routing.row, self._frames.site, strict=True):
             feet = [foot(site, bone) for bone in self._bones[row]] or [self._frames.origin[row]]
@@ -133,7 +133,7 @@ class Posture(ReadOnlyState):
         return tuple(lines)
 
     def _stick_figure(self, without: Collection[int]) -> tuple[list[Array], list[Array]]:
-        """Return bones and brackets of links, without those of some rows of joints; 0: the base."""
+        """Return bones and brackets, but not of the joints in rows ``without``; 0: the base."""
         rows = self.arm._model.routing.row.tolist()
         brackets = zip(rows, self.brackets, strict=True)
         return (
@@ -162,10 +162,10 @@ class Posture(ReadOnlyState):
 
     @cached_property
     def self_contacts(self) -> tuple[tuple[str, str], ...]:
-        """Pairs of links that pass through each other; neighbours are left to their joint limits.
+        """Pairs of links that overlap. Neighbours are left out, since joint limits separate them.
 
-        The body of a link is the cylinder around its disks. No posture is refused for a contact.
-        A robot from a URDF has none, since its bodies are unknown.
+        The body of a link is the cylinder around its disks. Overlaps raise no error. The result is
+        empty for a robot from a URDF, since the shapes of its links are unknown.
         """
         if not self.arm.is_serpentine:
             return ()
@@ -249,7 +249,7 @@ class MomentArms(ReadOnlyState):
         return float(self.values[row, self.joints.index(one_of("joint", joint, self.joints))])
 
     def to_dict(self) -> dict[str, object]:
-        """Return the arms by cable and joint for JSON, with the units in the keys."""
+        """Return the moment arms by cable and joint for JSON, with the units in the keys."""
         found: dict[str, object] = {}
         for name, chosen in (("moment_arm_m", ~self.slides), ("force_per_tension", self.slides)):
             columns = np.flatnonzero(chosen).tolist()
@@ -285,7 +285,7 @@ class MomentArms(ReadOnlyState):
 
 
 def site_paths(cables: Sequence[Cable], sites: Array) -> list[Array]:
-    """Divide the sites of all cables (P, 3) into one array for each cable."""
+    """Divide the sites of all cables (sites, 3) into one array for each cable."""
     return np.split(sites, np.cumsum([len(cable.sites) for cable in cables])[:-1])
 
 

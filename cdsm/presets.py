@@ -110,7 +110,7 @@ def experimental_prototype_geometry(
     lead: float = 0.3,
     friction: float = 0.0,
 ) -> Geometry:
-    """Build the geometry of Section V: three hinges of ±30°, turned by 30°, with one pair each.
+    """Build the geometry of Section V: three hinges of ±30°, twisted by 30°, each with two cables.
 
     The paper gives the joints, their limits, the twist and the antagonistic pairs of cables. It
     gives no dimensions: all are assumed.

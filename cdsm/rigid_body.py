@@ -34,8 +34,8 @@ class Shapes(NamedTuple):
     """Drawn shapes of a URDF.
 
     Attributes:
-        place: Move the shapes to joint angles (nv,) [rad].
-        rows: Rows of the joints whose links have shapes.
+        place: Function that moves the shapes to joint angles (nv,) [rad].
+        rows: Rows in :class:`Tree` of the joints whose links have shapes.
     """
 
     place: Callable[[Array], None]
@@ -150,7 +150,7 @@ class RigidBody:
         )
 
     def state(self, q: Array) -> BodyState:
-        """Compute everything that depends only on the joint angles (nv,) [rad].
+        """Compute the fields of :class:`BodyState` at joint angles q (nv,) [rad].
 
         The Jacobian (6, nv) is at the tip in base axes, linear rows first.
         """
@@ -190,7 +190,7 @@ class RigidBody:
         return whole
 
     def visualizer(self, urdf: str, server: object, node: str) -> Shapes | None:
-        """Draw the shapes of the URDF below a node of a viser server; None without shapes.
+        """Draw the shapes of the URDF below a node of a viser server; return None if it has none.
 
         If a shape, e.g. a mesh, cannot be read, nothing is drawn and UrdfError is raised.
         """
@@ -233,7 +233,7 @@ class RigidBody:
 
 
 def _reordered(names: tuple[str, ...], wanted: Sequence[str]) -> tuple[str, ...]:
-    """Return the wanted order; check that it names each moving joint once."""
+    """Return the wanted order of joint names; raise InvalidInput unless each joint occurs once."""
     wanted = sequence_of("joint_names", wanted, str)
     if sorted(wanted) != sorted(names):
         missing = [name for name in names if name not in wanted]

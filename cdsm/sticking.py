@@ -1,18 +1,20 @@
-"""How the tensions of the segments of cables follow the joints, where holes hold or slide.
+"""Derivatives of segment tensions with respect to joint angles, for sticking and sliding cables.
 
-A segment of length l and natural length a has the tension T = f(l/a − 1). With k = ∂T/∂l = EA/a and
-κ = −∂T/∂a = k (1 + ε), a motion δθ and a flow δa of wire change it by
+Segment j of length l_j and unstrained length a_j has the tension T_j = f(l_j/a_j − 1). With
+k = ∂T/∂l = EA/a and κ = −∂T/∂a = k (1 + ε), a joint motion δθ and a change δa_j of the unstrained
+length, as wire slides into the segment, change the tension by
 
     δT_j = k_j g_j·δθ − κ_j δa_j,   g_j = ∂l_j/∂θ.
 
-A hole that holds lets nothing through. Segments that sliding holes join are a block: in it
-Σ δa_j = 0, and δT_j follows from :func:`~cdsm.kernels.chain_problem.chain_tangent`. The torque of
-the cables changes by Σ_j T_j H_j δθ + Σ_j g_j δT_j. If each hole holds, δT_j = k_j g_j·δθ: each
-segment is a spring of its own. If no hole has friction, each cable is one block: the frictionless
-stiffness.
+No wire passes a hole in which the cable sticks. Segments that are joined by holes in which it
+slides form a block with Σ δa_j = 0; :func:`~cdsm.kernels.chain_problem.chain_tangent` computes its
+δT_j. Σ_j T_j g_j, the torque against the cables, changes by Σ_j (T_j ∂²l_j/∂θ² δθ + g_j δT_j). If
+the cables stick in all holes, δT_j = k_j g_j·δθ: each segment is a separate spring. Without
+friction, each cable is one block: this gives the frictionless stiffness.
 
-A force of 1 N at the tip of a stuck arm moves the joints by θ̇, and pulls at hole i, between the
-segments j and j + 1. To first order it begins to slide under the load
+A force of 1 N at the tip of a stuck arm moves the joints by θ̇ (nv,) [rad/N]. Hole i is between the
+segments j and j + 1, with the friction coefficient μ and the wrap angle φ_i. To first order, the
+cable begins to slide in it under the load
 
     W_i = μ φ_i/(|x_i| − y_i),   x_i = (∂ln T_{j+1}/∂θ − ∂ln T_j/∂θ)·θ̇,   y_i = μ ∂φ_i/∂θ·θ̇.
 """
@@ -31,13 +33,13 @@ from cdsm.posture import Posture
 from cdsm.support.values import Array, frozen
 
 _SLACK = 1e-100
-"""Tension [N] that stands for zero, since the kernel takes logarithms: a spring without force."""
+"""Tension [N] that replaces zero, since the kernel takes logarithms."""
 
 Flags = NDArray[np.bool_]
 
 
 def holding(pose: Posture) -> Flags:
-    """Return which holes (P,) can hold a cable: those with friction at which the cable turns."""
+    """Return in which holes (P,) a cable can stick: those with friction where the cable bends."""
     segments = pose.segments
     return np.asarray((segments.chains.friction > 0.0) & (segments.wrap > STRAIGHT))
 
@@ -47,9 +49,9 @@ def tension_gradient(pose: Posture, tension: Array, sliding: Flags) -> Array:
 
     Args:
         pose: The posture.
-        tension: T of each segment, within the domain of its law. At holes that slide, the larger
-            tension is exp(μ φ) times the smaller.
-        sliding: Whether each hole (P,) slides. Holes that cannot hold always do.
+        tension: T of each segment, within the domain of its law. Where the cable slides, the larger
+            tension at the hole is exp(μ φ) times the smaller.
+        sliding: Whether the cable slides in each hole (P,). Where it cannot stick, it always does.
 
     Raises:
         ElasticityRangeError: A tension is outside the domain of its cable's elasticity.
@@ -74,13 +76,13 @@ def tension_gradient(pose: Posture, tension: Array, sliding: Flags) -> Array:
 
 
 def first_order_loads(pose: Posture, tension: Array, gradient: Array, motion: Array) -> Array:
-    """Compute the loads W_i (P,) [N] at which the holes of a stuck arm begin to slide; inf: never.
+    """Compute the loads W_i (P,) [N] at which cables of a stuck arm begin to slide; inf: never.
 
     Args:
         pose: The posture.
         tension: T (S,) [N].
         gradient: ∂T/∂θ (S, nv) [N/rad] of the stuck arm.
-        motion: θ̇ (nv,) [rad/N].
+        motion: θ̇ (nv,) [rad/N]: joint motion under a force of 1 N.
     """
     segments = pose.segments
     chains, slack = segments.chains, tension == 0.0

@@ -1,4 +1,4 @@
-"""Tolerances of the parts of an arm, and of the measurements on it."""
+"""Tolerances: standard uncertainties of the dimensions and measured values of an arm."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from cdsm.support.values import Array, ReadOnlyState, frozen
 Distribution = Literal["normal", "uniform", "triangular"]
 
 LARGEST = {"rigidity": 0.5, "joint_angle": 0.5, "hole_angle": 0.5, "friction": 0.5}
-"""Largest standard uncertainty that is a tolerance: half of EA, half a radian, or μ = 0.5."""
+"""Largest allowed standard uncertainty by source: half of EA, 0.5 rad, or μ = 0.5."""
 
 COMMON = ("rigidity", "friction")
-"""Sources whose inputs have one common error, if nothing is said: of one spool, of one material."""
+"""Sources whose inputs share one error by default: wires of one spool, holes of one material."""
 
 WIDTH = {"uniform": math.sqrt(3.0), "triangular": math.sqrt(6.0)}
-"""Half-width of each bounded distribution over its standard deviation."""
+"""Half-width of each bounded distribution, divided by its standard deviation [-]."""
 
 EVERY = "*"
 """Pattern of the names of all inputs."""
@@ -38,12 +38,13 @@ class Tolerance(ReadOnlyState):
 
     Attributes:
         standard: Standard uncertainty u (one sigma) of each input: [rad], [m], [N], [kg], or [-].
-            Of a rigidity also one for each of ``tensions``, shape (n,) [-]: linear between them.
+            A rigidity may have one value for each of ``tensions``, shape (n,) [-]; between them, u
+            is interpolated linearly.
         distribution: ``"normal"``, ``"uniform"`` or ``"triangular"``. Only Monte Carlo needs it.
-        correlation: Correlation ρ of every two inputs [-]: 0, each input has an error of its own;
-            1, all have the same error. Or a correlation matrix (n, n) of the n inputs.
+        correlation: Correlation ρ of every two inputs [-]: 0: the errors are independent; 1: all
+            inputs have the same error. Or a correlation matrix (n, n) of the n inputs.
         of: Names of the inputs that have this tolerance, as a pattern: ``"cable1_*"``. Default all.
-        tensions: Rising tensions of the cable (n,) [N] for as many standards; else None.
+        tensions: Rising tensions (n,) [N] at which ``standard`` (n,) is given; None: one standard.
 
     Raises:
         InvalidInput: ``standard`` is negative or not a number; ``correlation`` is not between 0 and
@@ -106,7 +107,7 @@ class Tolerance(ReadOnlyState):
 
         Raises:
             InvalidInput: ``half_width`` is negative or not a number, or as for :class:`Tolerance`.
-            UnknownName: ``distribution`` is neither of the two.
+            UnknownName: ``distribution`` is not one of these two.
         """
         width = WIDTH[one_of("distribution of half-widths", distribution, WIDTH)]
         return cls(scalar("half_width", half_width) / width, distribution, correlation, of)  # type: ignore[arg-type]
@@ -118,10 +119,10 @@ class Tolerance(ReadOnlyState):
         return standard > 0.0 if isinstance(standard, float) else bool(standard.any())
 
     def at(self, tension: Array) -> float | Array:
-        """Return the standard uncertainty, or those (C,) at tensions (C,) [N].
+        """Return the standard uncertainty: one number, or (C,) at tensions (C,) [N] if it varies.
 
         Raises:
-            InvalidInput: A tension is outside those of the tolerance.
+            InvalidInput: A tension is outside the range of :attr:`tensions`.
         """
         if self.tensions is None:
             return self.standard
@@ -136,13 +137,13 @@ class Tolerance(ReadOnlyState):
         return np.asarray(np.interp(tension, self.tensions, self.standard))
 
     def matrix(self, count: int) -> Array:
-        """Return the correlations (n, n) of n inputs.
+        """Return the correlation matrix (n, n) of n inputs.
 
         Args:
             count: n.
 
         Raises:
-            InvalidInput: The matrix of correlations is for another number of inputs.
+            InvalidInput: ``correlation`` is a matrix of another size.
         """
         if isinstance(self.correlation, float):
             return self.correlation + (1.0 - self.correlation) * np.eye(count)
@@ -156,10 +157,12 @@ class Tolerance(ReadOnlyState):
         return matrix
 
     def correlated(self, values: Array) -> Array:
-        """Compute R v (n,) of the correlations R of n inputs: (1 − ρ) v + ρ Σ v for one ρ.
+        """Compute R v (n,), R the correlation matrix (n, n), v ``values``.
+
+        If ``correlation`` is one number ρ, R v = (1 − ρ) v + ρ Σ v.
 
         Raises:
-            InvalidInput: The matrix of correlations is for another number of inputs.
+            InvalidInput: ``correlation`` is a matrix of another size.
         """
         rho = self.correlation
         if isinstance(rho, float):
@@ -177,34 +180,35 @@ class Tolerance(ReadOnlyState):
 
 
 OneOrMore = float | Tolerance | Sequence[Tolerance]
-"""Types of a source."""
+"""Types of a source of :class:`Tolerances`: a standard uncertainty, or one or more tolerances."""
 
 
 @final
 @dataclass(frozen=True, kw_only=True)
 class Tolerances:
-    """Tolerances of an arm: its possible deviations from the description and the measurements.
+    """Uncertainties of the dimensions of an arm and of the values measured on it.
 
-    Each source is a :class:`Tolerance`, or a standard uncertainty (one sigma) as a number, or a
-    list of tolerances that are each ``of`` other inputs. A number for ``rigidity`` or ``friction``
-    has the correlation 1: all cables are of one spool, all disks of one material. Other numbers
-    have the correlation 0: each joint, hole, disk and link has an error of its own.
+    Each source of uncertainty is a :class:`Tolerance`, or a standard uncertainty (one sigma) as a
+    number, or a list of tolerances for different inputs, named by their ``of``. A number for
+    ``rigidity`` or ``friction`` has the correlation 1: all cables are of one spool, all disks of
+    one material. Other numbers have the correlation 0: the errors of all joints, holes, disks and
+    links are independent.
 
     Attributes:
-        rigidity: Of EA of each cable's law, relative [-].
-        joint_angle: Of each joint angle [rad]; [m] where a joint slides.
-        tension: Of each measured cable tension [N].
-        lead: Of each cable's straight length before the base disk [m].
-        hole_radius: Of the distance of each hole from the axis of its link [m].
-        hole_angle: Of the angle of each hole about the axis of its link [rad].
-        disk_offset: Of the distance of each disk from its joint [m].
-        link_length: Of each link [m].
-        link_mass: Of each link [kg].
-        friction: Of the coefficient μ of each hole with friction [-].
-        site: Of each coordinate of each cable site [m]. For arms from a URDF, which have no holes.
+        rigidity: EA of the law of each cable; relative [-].
+        joint_angle: Each joint angle [rad]; [m] where a joint slides.
+        tension: Each measured cable tension [N].
+        lead: Straight length of each cable before the base disk [m].
+        hole_radius: Distance of each hole from the axis of its link [m].
+        hole_angle: Angle of each hole about the axis of its link [rad].
+        disk_offset: Distance of each disk from its joint [m].
+        link_length: Length of each link [m].
+        link_mass: Mass of each link [kg].
+        friction: Coefficient μ of each hole with friction [-].
+        site: Each coordinate of each cable site [m]. Only for arms from a URDF.
 
     Raises:
-        InvalidInput: A tolerance is negative or not a number, or is so large that it is none.
+        InvalidInput: A tolerance is negative, not a number, or larger than a plausible error.
     """
 
     rigidity: OneOrMore = 0.0
@@ -289,7 +293,7 @@ SOURCES = tuple(field.name for field in fields(Tolerances))
 
 
 def _require_size(source: str, tolerance: Tolerance) -> None:
-    """Raise InvalidInput for a standard uncertainty that is no tolerance of this source."""
+    """Raise InvalidInput if a tolerance is too large, or has tensions where it must not."""
     if tolerance.tensions is not None and source != "rigidity":
         raise InvalidInput(source, "does not depend on tensions; give one standard.")
     largest = LARGEST.get(source, math.inf)

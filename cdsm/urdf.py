@@ -48,11 +48,10 @@ _COLORS = {"backbone": (0.35, 0.38, 0.42, 1.0), "disk": (0.85, 0.65, 0.25, 1.0)}
 def to_urdf(geometry: Geometry) -> str:
     """Return the URDF text of an arm; equal geometries give identical text.
 
-    Each link has the mass of a solid cylinder, centred at mid-link, with the hole radius of its
-    first disk. A cross,
-    or a link of mass zero, has :data:`CROSS_MASS` and :data:`CROSS_INERTIA`. Disks and backbone are
-    visual shapes. Collision shapes are left out, since neighbouring disks touch at the joint
-    limits.
+    Each link has the inertia of a solid cylinder, centred at mid-link, with the hole radius of its
+    first disk. A cross, or a link of mass zero, has :data:`CROSS_MASS` and :data:`CROSS_INERTIA`.
+    Disks and backbone are visual shapes. Collision shapes are left out, since neighbouring disks
+    touch at the joint limits.
 
     Args:
         geometry: The arm.
@@ -93,7 +92,7 @@ def urdf_text(name: str, parts: Iterable[etree._Element], comment: str) -> str:
 
 
 def joint(kind: str, name: str, parent: str, child: str, *parts: etree._Element) -> etree._Element:
-    """Build a joint of a type; ``parts`` are its origin, axis and limit."""
+    """Build a joint of type ``kind``; ``parts`` are its origin, axis and limit."""
     return E.joint(E.parent(link=parent), E.child(link=child), *parts, name=name, type=kind)
 
 
@@ -200,5 +199,5 @@ def _revolute(
 
 
 def _at(x: float) -> tuple[etree._Element, ...]:
-    """Return an origin at x on the link; none for the link's own frame."""
+    """Return the origin at x on the link; empty for x = 0."""
     return (origin((x, 0.0, 0.0)),) if x else ()

@@ -1,4 +1,4 @@
-"""Read URDFs from other sources, and refuse faults that other parsers accept.
+"""Read URDFs of other programs, and refuse faults that Pinocchio accepts.
 
 Pinocchio accepts links with two parents, impossible masses, zero axes and inverted limits. It
 prints the reason of a refusal only to standard error. This module therefore checks the text first:
@@ -35,7 +35,7 @@ _MOST_LINKS = 2000
 """Largest number of links, since Pinocchio compares the name of each link with all others."""
 
 _LONGEST_CHAIN = 400
-"""Largest number of joints in series, moving or not; ten times as many crash Pinocchio."""
+"""Largest number of joints in series, fixed ones included; 4000 crash Pinocchio."""
 
 _LOOSE = 1e-2
 """Tolerance of the inertia check for rounded values, relative to the largest principal moment."""
@@ -77,7 +77,7 @@ def _faults(robot: etree._Element, check_inertia: bool) -> list[str]:
         faults.append(f"has {len(links)} links; {_MOST_LINKS} are taken at most")
     if moving > 2 * MAXIMUM_JOINTS:
         faults.append(f"has {moving} joints that move; {2 * MAXIMUM_JOINTS} are taken at most")
-    return faults or _of_tree([str(link.get("name")) for link in links], joints)
+    return faults or _tree_faults([str(link.get("name")) for link in links], joints)
 
 
 def _names(kind: str, elements: list[etree._Element]) -> list[str]:
@@ -168,8 +168,8 @@ def _read(faults: list[str], where: str, text: str | None, count: int) -> tuple[
         return None
 
 
-def _of_tree(links: list[str], joints: list[etree._Element]) -> list[str]:
-    """Check that the links form a tree: one root, one parent for every other link, no cycle."""
+def _tree_faults(links: list[str], joints: list[etree._Element]) -> list[str]:
+    """Return faults of the tree: each link but one root must have one parent, without cycles."""
     faults: list[str] = []
     known = set(links)
     parents: dict[str, tuple[str, str]] = {}

@@ -1,4 +1,4 @@
-"""Base classes of all errors and warnings; lists of faults in messages."""
+"""Base classes of errors and warnings, and texts that list many faults."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def counted(faults: Sequence[str], most: int | None = None) -> str:
 
 
 def first_of(said: Sequence[str], most: int, what: str) -> str:
-    """Return the first ``most`` sentences and the number of others: ``…; and 3 joints more``."""
+    """Return the first ``most`` texts and the number of the others: ``…; and 3 joints more``."""
     more = len(said) - most
     return "; ".join(said[:most]) + (f"; and {more} {what} more" if more > 0 else "")
 

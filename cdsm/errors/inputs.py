@@ -1,4 +1,4 @@
-"""Errors of inputs: arguments, files, geometries, URDFs, cables, joint angles."""
+"""Errors of invalid input: arguments, files, geometries, URDFs, cables, joint angles."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ class StoreError(FileError):
     """A sweep store that holds another sweep, or that another run is writing to.
 
     Attributes:
-        differences: Differences between the stored sweep and the requested sweep, one each.
+        differences: Differences between the stored and the requested sweep, one text each.
     """
 
     def __init__(self, path: object, problem: str, differences: Sequence[str] = ()) -> None:

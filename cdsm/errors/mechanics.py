@@ -1,4 +1,4 @@
-"""Errors of mechanics: no balance, no such stiffness, no rest."""
+"""Errors of mechanics: no balance, no stiffness, no equilibrium, unreachable requests."""
 
 from __future__ import annotations
 
@@ -43,11 +43,11 @@ class InfeasibleTension(CdsmError):
     """No cable tension within the bounds balances the arm at this posture.
 
     Attributes:
-        missing: Missing torque per joint, shape (nv,) [N m] ([N] where it slides). It has the
-            smallest possible sum of magnitudes.
+        missing: Torque that the cables cannot balance, (nv,) [N m] ([N] where a joint slides), for
+            the tensions within the bounds that make the sum of its magnitudes smallest.
         joint: Name of the joint with the largest missing torque.
         relaxation: Widening of all bounds that makes the problem feasible [N]; inf if none does.
-        binding: Names of the cables at a bound in the closest attempt.
+        binding: Names of the cables that are at a bound with these tensions.
         fixed: Names of the cables with fixed tensions, if these make the problem infeasible; else
             empty.
     """
@@ -159,8 +159,8 @@ class UnreachableStiffness(CdsmError):
         target: Wanted stiffness [N/m].
         low: Smallest attainable stiffness along u [N/m].
         high: Largest attainable stiffness along u [N/m]; inf if it has no upper bound.
-        nearest: Attainable stiffness nearest to the target [N/m]: an end of the range, or the
-            nearest values found on both sides.
+        nearest: Attainable stiffness nearest to the target [N/m]: ``low`` or ``high``, or the
+            nearest values found below and above the target.
     """
 
     def __init__(
@@ -200,8 +200,10 @@ class InfeasibleDesign(CdsmError):
     """No design that a search tried meets all constraints of its problem.
 
     Attributes:
-        constraints: Names of what the nearest design misses; ``held``: some postures are not held.
-        design: The nearest design, one number for each variable; empty if none is an arm.
+        constraints: Names of the constraints that the nearest design violates; ``held``: at some
+            postures the arm cannot be balanced or is unstable.
+        design: The nearest design, one number for each variable; empty if no design gives a valid
+            arm.
     """
 
     def __init__(self, message: str, constraints: Sequence[str], design: Sequence[float]) -> None:

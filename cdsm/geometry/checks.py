@@ -1,4 +1,4 @@
-"""Disks of a geometry, its faults, and doubtful values."""
+"""Disks of a geometry, its faults, and doubts about it."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from cdsm.geometry.description import Description
 
 LONGEST = 30.0
-"""The lengths of an arm longer than this [m] are probably in millimetres."""
+"""If an arm is longer than this [m], its lengths are probably in millimetres."""
 
 _WIDEST = 1.0
 """A hole radius or disk offset larger than this [m] is probably in millimetres."""
@@ -45,7 +45,7 @@ def farthest_holes(geometry: Description) -> list[float]:
 
 
 def faults_of(geometry: Description) -> list[str]:
-    """Return the faults that concern several parts of a geometry."""
+    """Return the faults of a geometry that concern several of its parts, one text each."""
     count = len(geometry.joints)
     faults = []
     if len(geometry.links) != count:
@@ -93,7 +93,7 @@ def _short_links(geometry: Description) -> list[str]:
 
 
 def doubts_about(geometry: Description) -> list[str]:
-    """Return doubtful values, possible but rarely meant: lengths in mm, shared holes."""
+    """Return doubts as texts, e.g. lengths that look like millimetres, or shared holes."""
     doubts = []
     sizes = [
         ("the arm", geometry.length, LONGEST),

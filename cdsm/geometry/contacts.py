@@ -1,4 +1,4 @@
-"""Links of an arm that pass through each other at a posture."""
+"""Links of an arm that overlap at a posture."""
 
 from __future__ import annotations
 
@@ -11,18 +11,19 @@ from cdsm.geometry.parts import Disk
 from cdsm.support.values import Array
 
 _ROUNDS = 60
-"""Alternating projections; more change no verdict on gaps and overlaps of 1e-2 of a radius."""
+"""Number of alternating projections: enough to decide gaps and overlaps of 0.01 radius."""
 
 _TOUCHING = 1e-3
-"""A gap below this part of the radius is an overlap."""
+"""A gap below this fraction of the radius counts as an overlap."""
 
 
 def overlapping(disks: Sequence[Disk], poses: dict[str, Array]) -> list[tuple[str, str]]:
-    """Return the pairs of links, not neighbours, whose bodies overlap.
+    """Return the pairs of links whose bodies overlap; neighbours are left out.
 
-    The body of a link is the cylinder from its first disk to its last, as wide as the wider one.
+    The body of a link is the cylinder from its first disk to its last, with the larger disk radius.
     ``poses`` has the pose (4, 4) of each link. Points are projected from one cylinder onto the
-    other and back: both are convex, so the points come as near as the cylinders do.
+    other and back. Both are convex, so the distance of the points converges to that of the
+    cylinders.
     """
     links = list(poses)
     pairs = np.array([(i, j) for i, j in combinations(range(len(links)), 2) if j - i > 1])
@@ -47,7 +48,7 @@ def overlapping(disks: Sequence[Disk], poses: dict[str, Array]) -> list[tuple[st
 
 
 def _projected(points: Array, centre: Array, axis: Array, half: Array, radius: Array) -> Array:
-    """Return the nearest points (n, 3) of n cylinders, one point for each."""
+    """Return the point (n, 3) of each of n cylinders that is nearest to its entry of ``points``."""
     offset = points - centre
     along = np.einsum("ni,ni->n", offset, axis)
     across = offset - along[:, None] * axis

@@ -1,4 +1,4 @@
-"""Fields of an arm's geometry, their checks, and derived quantities."""
+"""The fields of an arm's geometry, their checks, and properties computed from them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from cdsm.support.warning import warn
 
 @record
 class Description(Printed):
-    """Fields of a :class:`~cdsm.Geometry`, which documents and builds them."""
+    """Base class of :class:`~cdsm.Geometry`, which documents these fields."""
 
     joints: Annotated[
         tuple[Joint, ...], Field(strict=False, min_length=1, max_length=MAXIMUM_JOINTS)
@@ -75,7 +75,7 @@ class Description(Printed):
     def disks(self) -> tuple[Disk, ...]:
         """All disks, base to tip: two per joint, one before and one after it.
 
-        A cable of joint k passes the first 2k−1 of them and ends on the one after.
+        A cable of joint k passes the first 2k−1 disks and ends on disk 2k.
         """
         return disks_of(self)
 

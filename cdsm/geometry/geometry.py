@@ -38,14 +38,14 @@ class Geometry(Description):
     This general constructor allows different joints, links and cables. :meth:`universal` and
     :meth:`hinged` build arms of equal or similar joints, :meth:`sections` joins several arms to
     one, and :meth:`replace` changes some attributes. Joint 1 is at x = ``base_length``, joint k+1
-    at the end of link k, and the tip at the end of the last link. Every joint has one disk
-    ``disk_offset`` before it and one after it. The holes of its disks are at its ``hole_radius``.
+    at the end of link k, and the tip at the end of the last link. Every joint has two disks, at the
+    distance ``disk_offset`` before and after it, with their holes at its ``hole_radius``.
 
     Attributes:
         name: Name of the robot: letters, digits and underscores.
         base_length: L_0: distance from the base frame to joint 1 [m].
-        hole_radius: R: distance of the holes from the arm's axis [m], at joints without one of
-            their own.
+        hole_radius: R: distance of the holes from the arm's axis [m]; for joints whose
+            ``hole_radius`` is None.
         joints: All joints, base to tip.
         links: One :class:`Link` per joint.
         cables: One :class:`CableRoute` per cable.
@@ -95,9 +95,8 @@ class Geometry(Description):
             disk_offset: h: distance from each joint centre to the disk on each side [m].
             hole_radius: R: distance of the holes from the axis, on both disks of a joint [m].
             link_mass: Mass of every link [kg].
-            lead: Straight cable between each actuator and the base disk [m]; of the cables of each
-                joint.
-            friction: μ of all cables, or of the cables of each joint, as in :class:`CableRoute`.
+            lead: Straight cable between each actuator and the base disk [m].
+            friction: Friction coefficient μ of the cables [-], as in :class:`CableRoute`.
             joint_limit: Largest angle about each axis in both directions [rad]. None: until the
                 disks touch, 2 atan(h/R), at most 80°; R is ``disk_radius`` if given.
             disk_radius: Outer radius of the disks [m]; None: 1.1 times that of the farthest hole.
@@ -106,8 +105,8 @@ class Geometry(Description):
             hole_angles: φ of the cables of a joint [rad]: one list for all joints, or a list of
                 lists, one for each joint.
             phase: Added to φ of the cables of each joint [rad].
-            spread: Angle [rad] between neighbours where g cables would share one hole: cable
-                i = 0…g−1, base to tip, is turned by (i − (g−1)/2)·spread. 0: they share it.
+            spread: Angle [rad] between the holes of g cables that would share one hole: the hole of
+                cable i = 0…g−1, base to tip, is turned by (i − (g−1)/2)·spread. 0: they share it.
             name: Name of the robot.
 
         Raises:
@@ -150,16 +149,17 @@ class Geometry(Description):
 
         Hinge k has the axis cos ψ_k y + sin ψ_k z with ψ_k = (k−1)·twist. The link frames are not
         twisted. Cable j = 0…m−1 of hinge k has its holes at φ = ψ_k + 90° + 2πj/m + phase_k: a
-        pair is at ψ_k ± 90°. With ``hole_angles``, φ = hole_angles[k][j] + phase_k, from y as well.
+        pair is at ψ_k ± 90°. With ``hole_angles``, φ = hole_angles[k][j] + phase_k, counted from y.
 
-        Where the twist brings hinges back into one plane, e.g. every second one with 90°, their
-        cables share holes; ``spread`` sets them apart, near their plane.
+        Hinges with parallel axes, e.g. every second one if the twist is 90°, have cables that share
+        holes; ``spread`` separates them.
 
         Args:
             joints: n, 1 to 100.
             twist: Angle between neighbouring hinge axes about x [rad].
             cables_per_joint: m; default 2, the antagonistic pair.
-            link_length: As for :meth:`universal`, like all following arguments [m].
+            link_length: Length of every link [m]. All arguments but ``twist`` are as for
+                :meth:`universal`.
             base_length: L_0 [m].
             disk_offset: h [m].
             hole_radius: R [m].
@@ -171,7 +171,7 @@ class Geometry(Description):
             cable_radius: Distance of the holes of each joint's cables from the axis [m].
             hole_angles: φ of the cables of a hinge [rad].
             phase: Added to φ of the cables of each hinge [rad].
-            spread: Angle between neighbours that would share a hole [rad].
+            spread: Angle between the holes of cables that would share one hole [rad].
             name: Name of the robot.
 
         Raises:
@@ -201,14 +201,14 @@ class Geometry(Description):
         """Join arms end to end to one arm of two or more sections.
 
         Each section keeps its joints, links, radii and cables. Its base frame is the tip of the
-        section before, so its ``base_length`` lengthens the last link of that. Its cables run
-        through all disks before it: at the angle of their own holes, and at the hole radius of each
-        disk, or at their own radius (``cable_radius``) if they have one.
+        section before, whose last link therefore becomes longer by its ``base_length``. Its cables
+        run through all disks before it, at an unchanged angle, and at the hole radius of each disk
+        or at their own radius (``cable_radius``).
 
         Args:
             sections: The sections, base to tip.
-            spread: As for :meth:`universal`, for cables of all sections. Or give the sections
-                another ``phase``.
+            spread: As for :meth:`universal`, for the cables of all sections. Alternatively, give
+                each section another ``phase``.
             name: Name of the robot.
 
         Raises:
@@ -273,7 +273,7 @@ class Geometry(Description):
 
         Args:
             text: The TOML text.
-            source: Name of its file, for the error.
+            source: Name of the file with the text, for the error.
 
         Raises:
             GeometryError: ``text`` is not TOML or not a geometry; lists every fault.
@@ -291,8 +291,8 @@ class Geometry(Description):
         The file has the full form that :meth:`write` writes, or one table ``[universal]`` or
         ``[hinged]``. The keys of the table are the keywords of the constructor with this name. An
         arm of sections has such a table in each ``[[sections]]`` (``[sections.universal]``), and
-        ``name`` and ``spread`` at the top. Of an ARM.toml (see :meth:`cdsm.Manipulator.read`) this
-        reads the geometry.
+        ``name`` and ``spread`` at the top. From an ARM.toml (see :meth:`cdsm.Manipulator.read`),
+        only the geometry is read.
 
         Raises:
             FileError: The file cannot be read.

@@ -10,8 +10,7 @@ from dataclasses import replace
 from cdsm.geometry.parts import CableRoute, Disk
 
 SAME_HOLE = 1e-6
-"""Holes nearer to each other than this angle [rad] are one hole: angles are rounded, holes have a
-diameter."""
+"""Holes closer than this angle [rad] are one hole, since angles are rounded."""
 
 
 def evenly_spaced(joints: int, cables: int) -> list[list[float]]:
@@ -28,9 +27,9 @@ def beside_the_hinges(rolls: Sequence[float], cables: int) -> list[list[float]]:
 
 
 def spread_out(cables: Sequence[CableRoute], spread: float) -> tuple[CableRoute, ...]:
-    """Turn cables that would share a hole apart, so that neighbours are ``spread`` [rad] apart.
+    """Return the cables, with ``spread`` [rad] between the holes of cables that would share one.
 
-    Cable i = 0…g−1 of g with one nominal hole is turned by (i − (g−1)/2)·spread.
+    The hole of cable i = 0…g−1 of g cables at one angle is turned by (i − (g−1)/2)·spread.
     """
     moved = list(cables)
     for group in same_angle(cables) if spread else ():
@@ -41,7 +40,7 @@ def spread_out(cables: Sequence[CableRoute], spread: float) -> tuple[CableRoute,
 
 
 def same_angle(cables: Sequence[CableRoute]) -> list[list[int]]:
-    """Return the groups of two or more cables, as indices, whose holes have one angle."""
+    """Return groups of two or more cables, as indices, whose holes have the same angle."""
     turn = 2.0 * math.pi
     angles = [cable.angle % turn for cable in cables]
     order = sorted(range(len(cables)), key=angles.__getitem__)
@@ -57,7 +56,7 @@ def same_angle(cables: Sequence[CableRoute]) -> list[list[int]]:
 
 
 def sharing(cables: Sequence[CableRoute], disks: Sequence[Disk]) -> list[list[int]]:
-    """Return the groups of two or more cables, as indices, that share a hole of some disk."""
+    """Return groups of two or more cables, as indices, that share a hole of some disk."""
     found: dict[tuple[int, ...], None] = {}
     for group in same_angle(cables):
         for d, disk in enumerate(disks):

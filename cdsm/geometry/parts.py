@@ -37,10 +37,10 @@ class Joint:
             link. Any length; no axis is zero, and two axes are not parallel.
         disk_offset: h: distance from the joint centre to the disk on each side [m].
         limit: Largest angle about each axis in both directions [rad]; None: until the disks touch.
-        hole_radius: R: distance of the holes of its two disks from the arm's axis [m]; None: that
-            of the :class:`Geometry`.
-        disk_radius: Outer radius of its two disks [m]; None: 1.1 times that of the farthest hole,
-            and the disks touch at the circle of the holes.
+        hole_radius: R: distance of the holes of its two disks from the arm's axis [m]; None: the
+            ``hole_radius`` of the :class:`Geometry`.
+        disk_radius: Outer radius of its two disks [m]; None: 1.1 times the radius of the farthest
+            hole, but for the default ``limit`` the disks touch at the hole radius.
 
     Raises:
         GeometryError: Some attributes are invalid; lists every fault.
@@ -88,14 +88,14 @@ class Link:
 
 @record
 class CableRoute:
-    """Path of one cable: a hole at the same angle on every disk until its last disk.
+    """Path of one cable: a hole at the same angle on every disk, from the base to its last disk.
 
     Attributes:
         joint: Number of the joint it drives, from 1; it ends on the first disk after the joint.
         angle: φ: angle of its holes about x, from y towards z [rad].
         lead: Straight cable between the actuator and the base disk [m].
-        friction: μ [-]: Coulomb friction coefficient in every hole that the cable passes. With no
-            lead the cable starts at the base disk, and nothing slides there.
+        friction: μ [-]: Coulomb friction coefficient in every hole that the cable passes. Without
+            a lead, the actuator is at the base disk, and there is no friction there.
         radius: Distance of its holes from the arm's axis on every disk [m], e.g. of an inner ring;
             None: the hole radius of each disk.
 
@@ -114,9 +114,9 @@ class Disk(NamedTuple):
     """One disk of an arm.
 
     Attributes:
-        link: Name of its link in the URDF.
-        x: Its place along x of the link [m].
-        joint: Number of the joint it stands beside, from 1.
+        link: Name in the URDF of the link that carries it.
+        x: Position along x of the link [m].
+        joint: Number of the joint next to it, from 1.
         hole_radius: R: distance of its holes from the axis [m].
         radius: Outer radius [m].
     """
@@ -128,7 +128,7 @@ class Disk(NamedTuple):
     radius: float
 
     def radius_of(self, route: CableRoute) -> float:
-        """Return the distance of the hole of a cable from the axis [m]."""
+        """Return the distance of the hole of a cable from the axis of the disk [m]."""
         return self.hole_radius if route.radius is None else route.radius
 
     def hole(self, route: CableRoute) -> tuple[float, float, float]:

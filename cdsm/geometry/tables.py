@@ -1,4 +1,4 @@
-"""TOML of a geometry: its tables, and the geometry that each builds."""
+"""TOML of a geometry: build a geometry from its tables, and write its full form."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ ARM_KEYS = (
     *("gravity", "original_length", "wire", "wires", "urdf"),
     *("series_stiffness", "control", "minimum", "maximum", "tolerances"),
 )
-"""Keys of an ARM.toml that do not describe its geometry; ``cables`` may."""
+"""Keys of an ARM.toml that do not belong to the geometry; ``cables`` may belong to it."""
 
 
 def build(cls: type[Geometry], data: dict[str, Any]) -> Geometry:
-    """Build a geometry from parsed TOML: see :meth:`read`; raise GeometryError."""
+    """Build a geometry from parsed TOML, or raise GeometryError; see :meth:`Geometry.read`."""
     builders: dict[str, Callable[..., Geometry]] = {
         "universal": cls.universal,
         "hinged": cls.hinged,
@@ -55,7 +55,7 @@ def build(cls: type[Geometry], data: dict[str, Any]) -> Geometry:
 
 
 def build_only(cls: type[Geometry], data: dict[str, Any]) -> Geometry:
-    """Build the geometry of a file that may describe more of an arm; raise GeometryError."""
+    """Build the geometry from the TOML of a whole arm or of a geometry, or raise GeometryError."""
     described, rest = split_geometry(data)
     if "urdf" in rest and not described:
         raise GeometryError(
@@ -72,7 +72,7 @@ class _Sections:
 
 
 def _joined(cls: type[Geometry], data: dict[str, Any]) -> Geometry:
-    """Build an arm of the tables ``[[sections]]``; raise GeometryError with every fault."""
+    """Join the tables ``[[sections]]`` to one geometry; raise GeometryError with every fault."""
     given = parse(_Sections, data)
     parts, faults = [], []
     for i, section in enumerate(given.sections, start=1):
@@ -86,9 +86,9 @@ def _joined(cls: type[Geometry], data: dict[str, Any]) -> Geometry:
 
 
 def split_geometry(data: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Split the parsed TOML of an arm into the keys of its geometry and all others.
+    """Split the parsed TOML of an arm into the keys of its geometry and all other keys.
 
-    Cables belong to the geometry if its joints or links stand beside them.
+    ``cables`` belongs to the geometry if there are ``joints`` or ``links``, or no other keys.
     """
     kept = set(ARM_KEYS)
     if data.keys() - {"cables"} and not data.keys() & {"joints", "links"}:

@@ -1,4 +1,4 @@
-"""Parts of arms whose joints are alike: one number for all joints, or one for each."""
+"""Parts of arms with similar joints; each size is one number, or one number per joint."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ _SIZES = (
     *("link_length", "disk_offset", "hole_radius", "link_mass", "lead", "friction"),
     *("joint_limit", "disk_radius", "cable_radius", "phase"),
 )
-"""Keywords that are one value for all joints, or one for each."""
+"""Keywords whose value is one number for all joints, or a list with one per joint."""
 
 
 def uniform(

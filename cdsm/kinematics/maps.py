@@ -21,7 +21,7 @@ from cdsm.support.validation import instance, number_array, scalar, vector
 from cdsm.support.values import Array, frozen
 
 _TOLERANCE = 1e-9
-"""Default tolerance: lengths and positions in arm lengths, and angles in rad."""
+"""Default tolerance [-]: lengths and positions divided by the arm length, angles in rad."""
 
 _SMALLEST_TOLERANCE = 1e-12
 """Smallest tolerance. Rounding of a chain of 40 joints is about 1e-14."""
@@ -45,8 +45,8 @@ def solve_joint_angles(
         arm: The arm.
         cable_lengths: L (C,) [m], lead included, in the order of ``arm.cables``.
         guess: Start of the search (nv,) [rad], within the limits; the straight arm if not given.
-        tolerance: Largest misfit √Σ(L(θ) − L)² over the arm's length [-] at which the lengths count
-            as reachable. For measured lengths, give their error: an exact fit does not exist.
+        tolerance: Largest misfit ‖L(θ) − L‖/arm length [-] at which the lengths count as reachable.
+            For measured lengths, give their error, since no exact fit exists.
 
     Returns:
         The solution. If the arm cannot have these lengths, ``reachable`` is false, and ``angles``
@@ -81,9 +81,9 @@ def inverse_kinematics(
 ) -> KinematicSolution:
     """Find joint angles for a tip target: min ½‖θ − guess‖² so that tip(θ) = target (Eq. 7).
 
-    The angles are within the joint limits. A redundant arm reaches its target in many ways. This
-    solution is the nearest to the guess, at least in a neighbourhood: except for joints at a limit,
-    θ − guess has no component in the null space of the tip Jacobian.
+    The angles are within the joint limits. A redundant arm has many solutions. This one is nearest
+    to the guess, at least locally: except for joints at a limit, θ − guess has no component in the
+    null space of the tip Jacobian.
 
     Args:
         arm: The arm.
@@ -109,7 +109,7 @@ def inverse_kinematics(
 
 
 def _solve(residual: Residual, guess: Array, tolerance: float) -> dict[str, Any]:
-    """Search for the solution; return the fields that both kinds of solution have."""
+    """Find the solution; return the fields that both classes of solutions have."""
     tolerance = scalar("tolerance", tolerance)
     if not _SMALLEST_TOLERANCE <= tolerance < 1.0:
         raise InvalidInput(

@@ -4,18 +4,19 @@ The residual r(q) is dimensionless. If r = 0 is possible, the solution solves
 
     min ½‖q − guess‖²   so that   r(q) = 0   and   lower ≤ q ≤ upper.
 
-Otherwise it has the least ½‖r‖². Either solution is the limit ε → 0 of
+Otherwise it has the least ½‖r‖². Both are the limit ε → 0 of the solution of
 
     min ½‖r‖² + ½ε‖q − guess‖²   so that   lower ≤ q ≤ upper.
 
 This least-squares problem has full rank, even with redundant joints or redundant equations. scipy
-solves it for falling ε. The first search starts at the guess, each other at the last solution.
-Newton's method then takes the step to ε = 0. It holds the joints that rest on limits.
+solves it for decreasing ε, each time from the previous solution, first from the guess. Newton's
+method then solves it for ε = 0, with the joints at active limits fixed.
 
 In a test with 108 reachable poses of arms of 3 to 20 joints, this method reached all poses to
-rounding, and all solutions meet the conditions for nearest. SLSQP reached 56, and 103 from a
-least-squares solution. Sequential quadratic programs (DAQP) reached 83. pink weighs the target
-against the posture: it came within 1e-6 of 93, or within 1e-9 of 102 (only 20 of them nearest).
+rounding, and all its solutions meet the optimality conditions. SLSQP reached 56 from the guess, and
+103 from a least-squares solution. Sequential quadratic programs (DAQP) reached 83. pink minimises a
+weighted sum of both terms: it came within 1e-6 of 93 poses, or, with other weights, within 1e-9 of
+102 (only 20 of these solutions are nearest to the guess).
 """
 
 from __future__ import annotations
@@ -32,23 +33,23 @@ from cdsm.kinematics.residuals import Residual, usable_limits
 from cdsm.support.values import Array
 
 Limits = NDArray[np.int_]
-"""Limits on which the joints rest (nv,): −1 lower, 1 upper, 0 none."""
+"""Active limit of each joint (nv,): −1 lower, 1 upper, 0 none."""
 
 # fewer stages more often end far from the guess, more stages only take longer
 _WEIGHTS = (1e-2, 1e-4, 1e-6, 1e-8)
-"""Falling values of ε."""
+"""Decreasing values of ε."""
 
 _STARTS = 12
-"""Number of random postures to search from, if the guess leads to no solution."""
+"""Number of random start postures, if the search from the guess finds no solution."""
 
 _NEAR = 1e-6
-"""Below this residual, the exact solution r = 0 is tried."""
+"""If ‖r‖ is below this, the problem with r = 0 is solved as well."""
 
 _SINGULAR, _FLAT = 1e-9, 1e-12
 """Singular values and eigenvalues below this share of the largest count as zero."""
 
 _LONGEST, _ATTEMPTS = 0.2, 60
-"""Longest Newton step [rad], within which the curvature holds, and largest number of steps."""
+"""Longest Newton step [rad], since the quadratic model is local; largest number of steps."""
 
 _CONVERGED = 1e-11
 """Newton's method has converged below this residual and gradient. It usually reaches 1e-15."""
@@ -59,9 +60,9 @@ class _NewtonStep(NamedTuple):
 
     Attributes:
         move: Step (free,) [rad].
-        gradient: Gradient of the objective (or Lagrangian) by all joint angles (nv,).
+        gradient: Gradient of the objective (or Lagrangian) with respect to all joint angles (nv,).
         error: Violation of the optimality conditions.
-        convex: Whether the joint angles are near a minimum, not a saddle.
+        convex: Whether the Hessian is positive semidefinite: near a minimum, not at a saddle.
     """
 
     move: Array
@@ -76,8 +77,8 @@ _Newton = Callable[[Array, NDArray[np.bool_]], _NewtonStep]
 def nearest(residual: Residual, guess: Array, tolerance: float) -> tuple[Array, int]:
     """Find the joint angles nearest to the guess with ‖r‖ within a tolerance, or with least ‖r‖.
 
-    They are nearest in a neighbourhood; another way to fold the arm may be nearer. If the guess
-    leads to no solution, random postures are tried in turn (always the same postures).
+    They are nearest locally; a differently folded arm may be nearer still. If the search from the
+    guess finds no solution, it is repeated from random postures, the same ones in each call.
 
     Returns:
         The joint angles (nv,) [rad] within the limits, and the number of evaluations of r.
@@ -108,7 +109,7 @@ class _Search:
         self.iterations = 0
 
     def solve_from(self, start: Array) -> tuple[Array, float]:
-        """Find a solution, to the last digit if Newton's method converges, and its ‖r‖."""
+        """Return a solution, exact to rounding if Newton's method converges, and its ‖r‖."""
         q, held = self.fit(start, _WEIGHTS[-1], 1e-6)
         best, held = self._active_set(self._least_residual_step, q, held)
         if best is None:  # singular: use least squares only
@@ -119,7 +120,7 @@ class _Search:
         return best, self._size(best)
 
     def fit(self, start: Array, weight: float, tolerance: float) -> tuple[Array, Limits]:
-        """Solve for one ε. Return the joint angles and the limits they rest on."""
+        """Solve the problem for ε = ``weight``. Return the joint angles and their active limits."""
         root = math.sqrt(weight)
         regularisation = root * np.eye(start.size)
         found = least_squares(
@@ -140,7 +141,7 @@ class _Search:
         return float(np.linalg.norm(self.residual.evaluate(q)[0]))
 
     def _nearest_step(self, q: Array, free: NDArray[np.bool_]) -> _NewtonStep:
-        """Compute the step to min ½‖q − guess‖² with r = 0: to r = 0, then along r = 0."""
+        """Compute a Newton step for min ½‖q − guess‖² with r = 0: to r = 0, then along it."""
         r, J = self.residual.evaluate(q)
         away = q - self.guess
         left, values, right = np.linalg.svd(J[:, free])
@@ -163,7 +164,7 @@ class _Search:
         return _NewtonStep(move, gradient, error, convex)
 
     def _active_set(self, newton: _Newton, q: Array, held: Limits) -> tuple[Array | None, Limits]:
-        """Find the held limits by Newton's method. Return angles (None on failure) and limits."""
+        """Solve with an active set of limits; return angles (None: failed) and limits."""
         held = held.copy()
         for _ in range(2 * q.size + 5):
             q = np.where(held < 0, self.lower, np.where(held > 0, self.upper, q))
@@ -184,7 +185,7 @@ class _Search:
     def _iterate(
         self, newton: _Newton, q: Array, free: NDArray[np.bool_]
     ) -> tuple[Array, Array | None]:
-        """Iterate Newton's method for the free joints; the gradient is None on failure."""
+        """Iterate Newton's method for the free joints; return q and gradient (None: failed)."""
         least = math.inf
         for _ in range(_ATTEMPTS):
             step = newton(q, free)
@@ -200,7 +201,7 @@ class _Search:
 
 
 def _downhill(H: Array, gradient: Array) -> tuple[Array, bool]:
-    """Compute a Newton step, reversed where H has negative curvature, zero where H is flat."""
+    """Return a descent step −|H|⁻¹ gradient, zero along flat directions, and if H is convex."""
     values, vectors = np.linalg.eigh((H + H.T) / 2.0)
     flat = abs(values) <= _FLAT * abs(values).max(initial=0.0)
     rate = np.where(flat, math.inf, abs(values))

@@ -1,7 +1,7 @@
 """Residuals of the two inverse problems that :mod:`cdsm.kinematics.nearest` solves.
 
-The second derivatives equal terms of the stiffness. Weights on cable lengths act like tensions, and
-weights on the tip act like a dead wrench.
+The second derivatives equal terms of the stiffness: H_L·F, with weights on the cable lengths as F,
+and ∂(J_Xᵀ W)/∂θ, with weights on the tip as the wrench W.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from cdsm.rigid_body import rotation_vector
 from cdsm.support.values import Array, frozen
 
 LIMIT_MARGIN = 1e-5
-"""A joint nearer to its limit than this share of the limit counts as at the limit."""
+"""A joint is at its limit if it is closer to it than this fraction of the limit."""
 
 _NO_WRENCH = frozen(np.zeros(6))
 
@@ -37,17 +37,17 @@ class Residual(ABC):
 
     @abstractmethod
     def curvature(self, q: Array, weight: Array) -> Array:
-        """Compute the second derivative of weight · r (nv, nv), valid where r = 0."""
+        """Compute the Hessian of weight · r (nv, nv); it is exact where r = 0."""
 
     def hessian(self, q: Array) -> Array:
-        """Compute the second derivative of ½‖r‖² (nv, nv), valid for all r."""
+        """Compute the Hessian of ½‖r‖² (nv, nv); it is exact for all r."""
         r, J = self.evaluate(q)
         return self.curvature(q, r) + J.T @ J
 
 
 @final
 class LengthResidual(Residual):
-    """Cable lengths less the wanted lengths (C,), over the length of the arm."""
+    """(L(q) − wanted lengths)/arm length (C,)."""
 
     def evaluate(self, q: Array) -> tuple[Array, Array]:
         """As in :class:`Residual`."""
@@ -55,7 +55,7 @@ class LengthResidual(Residual):
         return (pose.cable_lengths - self.target) / length, pose.length_jacobian / length
 
     def curvature(self, q: Array, weight: Array) -> Array:
-        """As in :class:`Residual`: H_L·F of tensions F = weight."""
+        """As in :class:`Residual`: H_L·F with F = weight/arm length."""
         tension = frozen(weight / self.arm.length)
         pose = self.arm.at(q, check_limits=False)
         return pose._joint_stiffness(tension, frozen(np.zeros(weight.size)), _NO_WRENCH)[0]
@@ -63,7 +63,7 @@ class LengthResidual(Residual):
 
 @final
 class TipResidual(Residual):
-    """Tip less target (3,) or (6,): position over the arm length, then rotation vector."""
+    """Position error/arm length (3,); for a target pose, then the rotation vector [rad] (6,)."""
 
     def evaluate(self, q: Array) -> tuple[Array, Array]:
         """As in :class:`Residual`."""
@@ -76,7 +76,7 @@ class TipResidual(Residual):
         return np.concatenate([offset, turn]), np.vstack([linear, turn_jacobian @ angular])
 
     def curvature(self, q: Array, weight: Array) -> Array:
-        """As in :class:`Residual`: ∂(J_Xᵀ W)/∂θ of a dead wrench W = weight."""
+        """As in :class:`Residual`: ∂(J_Xᵀ W)/∂θ of a dead wrench W, from weight."""
         # at r = 0, ∂r/∂q is J_X up to the length
         wrench = np.zeros(6)
         wrench[: weight.size] = weight
@@ -93,7 +93,7 @@ class TipResidual(Residual):
 
 
 def usable_limits(arm: Manipulator) -> tuple[Array, Array]:
-    """Return the joint limits, slightly narrower where holes of touching disks coincide."""
+    """Return lower and upper joint limits, slightly inside if holes coincide at a limit."""
     # a cable through coincident holes has no direction, so the arm cannot be evaluated there
     limits = arm.lower.copy(), arm.upper.copy()
     for limit in limits:

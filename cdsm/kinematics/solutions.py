@@ -1,7 +1,7 @@
 """Solutions of inverse kinematics.
 
 All solutions are within the joint limits. If disks touch at a limit and their holes coincide, a
-cable has no direction. Solutions then stay away from the limit by 1e-5 of it.
+cable has no direction. Solutions then end at 1 − 1e-5 times the limit.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class _Solution(ReadOnlyState, ABC):
     @property
     @abstractmethod
     def _misfit(self) -> float:
-        """Misfit in arm lengths and rad, to be compared with the tolerance."""
+        """Misfit [-] that is compared with the tolerance."""
 
     @property
     def reachable(self) -> bool:
@@ -85,8 +85,8 @@ class _Solution(ReadOnlyState, ABC):
 class JointSolution(_Solution):
     """Joint angles for given cable lengths; made by :func:`solve_joint_angles`.
 
-    All arrays are read-only. The lengths count as reached if the norm of :attr:`residual` over the
-    arm length is within the tolerance.
+    All arrays are read-only. The lengths count as reached if the norm of :attr:`residual`, divided
+    by the arm length, is within the tolerance.
 
     Attributes:
         arm: The arm.
@@ -103,7 +103,7 @@ class JointSolution(_Solution):
 
     @cached_property
     def residual(self) -> Array:
-        """Cable lengths at the solution less the wanted lengths (C,) [m]."""
+        """``lengths`` − ``cable_lengths``: found minus wanted cable lengths (C,) [m]."""
         return frozen(self.lengths - self.cable_lengths)
 
     @property
@@ -128,7 +128,7 @@ class JointSolution(_Solution):
 
     @property
     def redundancy(self) -> int:
-        """Number of joint motions that change no cable length: nv − rank J_L.
+        """Number of independent joint motions that change no cable length: nv − rank J_L.
 
         If it is 0 and no limit is active, the angles are unique in a neighbourhood.
         """

@@ -1,4 +1,4 @@
-"""Checks of the Dataset of a sweep: it needs a status with a word for each number."""
+"""Checks of the xarray Dataset of a sweep: its ``status`` must have a word for each number."""
 
 from __future__ import annotations
 

@@ -46,7 +46,7 @@ def read_text(path: str | os.PathLike[str], *, any_encoding: bool = False) -> st
 
 
 def _decoded(data: bytes) -> str:
-    """Decode the files of laboratory machines. UTF-16 has a mark, or zeros beside letters."""
+    """Decode UTF-8, UTF-16 (with a byte-order mark or zero bytes beside its letters) or cp1252."""
     if data[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE):
         return data.decode("utf-16")
     if b"\0" in data[:2]:
@@ -109,7 +109,7 @@ def make_folder(path: str | os.PathLike[str]) -> Path:
 
 
 def as_path(path: str | os.PathLike[str]) -> Path:
-    """Check that the system can use a path; the file may or may not exist.
+    """Return a path that the system can use; the file may or may not exist.
 
     Raises:
         InvalidInput: ``path`` is not a path.

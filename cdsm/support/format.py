@@ -33,7 +33,7 @@ def span(values: Array, form: Callable[[float], str] = "{:.4g}".format) -> str:
 
 
 def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
-    """Return lines of text: the first column to the left, the others to the right, all aligned."""
+    """Return the rows as aligned lines: the first column to the left, the others to the right."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     return [
         "  ".join([first.ljust(widths[0]), *map(str.rjust, others, widths[1:])]).rstrip()
@@ -63,13 +63,13 @@ def place(value: float, unit: str) -> str:
 
 
 def beyond(joint: str, value: float, low: float, high: float, unit: str) -> str:
-    """Return as text that a joint coordinate [rad or m] is beyond its limits."""
+    """Return a sentence which says that a joint coordinate [rad or m] is beyond its limits."""
     said = f"{joint} = {place(value, unit)} is outside {place(low, unit)} to {place(high, unit)}"
     return f"{said} ({value:.4g} {unit} of {low:.4g} to {high:.4g} {unit})"
 
 
 def told_apart(values: Sequence[float]) -> list[str]:
-    """Return numbers with four digits, or more where different ones would read alike."""
+    """Return numbers as text with four digits, or more if different numbers would look the same."""
     for digits in (4, 6, 8, 12):
         texts = [f"{value:.{digits}g}" for value in values]
         if len(set(texts)) == len(set(values)):
@@ -115,7 +115,7 @@ class JointUnits(NamedTuple):
         return np.where(self.slides, length, 1.0)
 
     def to_dict(self, names: Sequence[str], q: Array) -> dict[str, object]:
-        """Return joint coordinates q (..., nv) by joint name; angles [rad] and ways [m] apart."""
+        """Return q (..., nv) by joint name: ``angles_rad``, and ``ways_m`` of joints that slide."""
         found: dict[str, object] = {}
         for key_of, chosen in (("angles_rad", ~self.slides), ("ways_m", self.slides)):
             if chosen.any() or key_of == "angles_rad":
@@ -124,7 +124,7 @@ class JointUnits(NamedTuple):
         return found
 
     def joined(self, turning: str, sliding: str, joint: int | None = None) -> str:
-        """Return the unit of one joint, or of all together, from those of both kinds."""
+        """Return the unit of a joint, ``turning`` or ``sliding``; None: of all joints."""
         slides = self.slides if joint is None else self.slides[joint : joint + 1]
         if slides.all():
             return sliding

@@ -10,17 +10,17 @@ if TYPE_CHECKING:
     from scipy.optimize import OptimizeResult
 
 OPTIMAL, INFEASIBLE, UNBOUNDED = 0, 2, 3
-"""Status of a solved program; the others tell nothing of it."""
+"""Status numbers of scipy that decide a program; all others leave it undecided."""
 
 _TIGHT: Final = 1e-10
-"""Violation of a constraint, of order one, that is none; HiGHS accepts 1e-7 unless told."""
+"""Allowed violation of a constraint of order one; the default of HiGHS is 1e-7."""
 
 
 def least(cost: Array, **constraints: Any) -> OptimizeResult:
-    """Minimise cost · x under the constraints of scipy's ``linprog``.
+    """Minimise cost · x under the constraints of scipy's ``linprog``; return its result.
 
-    With some scipy (1.14), the simplex method ends undecided at this tolerance; interior points,
-    with a crossover to a corner, then take its place.
+    If the simplex method ends undecided at this tolerance (e.g. in scipy 1.14), the interior-point
+    method with crossover to a vertex solves the program again.
     """
     from scipy.optimize import linprog  # slow to import
 

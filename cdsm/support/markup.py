@@ -26,5 +26,5 @@ def element(name: str, *contents: str, **attributes: str) -> Markup:
 
 
 def row(tag: str, cells: Iterable[str]) -> Markup:
-    """Build a row of a table; ``tag`` of the cells is ``th`` or ``td``."""
+    """Build a row of a table; ``tag`` is the element of each cell, ``th`` or ``td``."""
     return element("tr", *(element(tag, cell) for cell in cells))

@@ -29,7 +29,7 @@ class _Items(Sized, Iterable[_Item], Protocol[_Item]):
 
 
 def track(items: _Items[_Item], what: str, *, wanted: bool = True) -> Iterator[_Item]:
-    """Yield the items, and show how many are done."""
+    """Yield the items, and show a bar with the number of finished items."""
     with progress_bar(what, len(items), wanted=wanted) as advance:
         for item in items:
             yield item
@@ -40,10 +40,10 @@ def track(items: _Items[_Item], what: str, *, wanted: bool = True) -> Iterator[_
 def progress_bar(
     what: str, total: int | None = None, done: int = 0, *, wanted: bool = True, rate: bool = False
 ) -> Iterator[Callable[[int], None]]:
-    """Show a bar, and yield a function that advances it; ``total`` None: an unknown amount.
+    """Show a bar, and yield a function that advances it; ``total`` None: the end is unknown.
 
-    ``rate`` adds the work per second; what was ``done`` before does not count. If the bar is not
-    wanted, bars inside are not shown either.
+    ``rate`` adds the number of items per second, without those that were ``done`` before. If the
+    bar is not ``wanted``, bars opened inside it are not shown either.
     """
     outermost = _outermost.get()
     token = _outermost.set(False)
@@ -57,7 +57,7 @@ def progress_bar(
 
 @contextmanager
 def progress_allowed(wanted: bool) -> Iterator[None]:
-    """Show no bars inside unless wanted."""
+    """Hide all bars that are opened inside this context, unless ``wanted``."""
     token = _outermost.set(_outermost.get() and wanted)
     try:
         yield
@@ -66,7 +66,7 @@ def progress_allowed(wanted: bool) -> Iterator[None]:
 
 
 class _Bar:
-    """Bar that a timer shows."""
+    """Progress bar that appears after :data:`DELAY` seconds."""
 
     def __init__(self, what: str, total: int | None, done: int, rate: bool, *, shown: bool) -> None:
         self._what, self._total, self._done, self._rate = what, total, done, rate

@@ -41,7 +41,7 @@ def _plain(value: object) -> object:
 
 
 def _in_range(kind: str, zero: bool = False) -> Callable[[float], float]:
-    """Return a check of a field against :data:`~cdsm.support.validation.RANGES`."""
+    """Return a validator that checks a value against its range in ``RANGES``."""
 
     def check(value: float) -> float:
         problem = within(kind, value, zero=zero)
@@ -70,7 +70,7 @@ Point = Annotated[
 Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$", max_length=64)]
 
 ONE, EACH = "(one)", "(each)"
-"""Tags of one value for all joints and of one for each; no part of a name in a fault."""
+"""Tags: one value for all joints, or one value for each joint. Faults do not print them."""
 
 
 def one_or_each(value: object) -> str:
@@ -119,7 +119,7 @@ def checked_keywords(function: _Function) -> _Function:
 
 
 def _reporting(validated: _Function, kind: Callable[..., Any]) -> _Function:
-    """Return the function with pydantic's error replaced by one :class:`GeometryError`."""
+    """Return the function such that it raises one :class:`GeometryError`, not pydantic's error."""
 
     @wraps(validated)
     def call(*args: object, **values: object) -> object:
@@ -148,7 +148,7 @@ def read_toml(text: str) -> dict[str, Any]:
 
 
 def parse(kind: type[_Record], data: object) -> _Record:
-    """Build a record from parsed TOML; raise one :class:`GeometryError` with all faults."""
+    """Build a record from parsed TOML; raise one :class:`GeometryError` that lists all faults."""
     # only from JSON does pydantic's strict mode accept a table as a record and an array as a tuple;
     # JSON has no dates, so they become strings, which only names accept
     return _reporting(TypeAdapter(kind).validate_json, kind)(json.dumps(data, default=str))

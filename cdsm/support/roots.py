@@ -18,11 +18,11 @@ def rising_root(
     stretch: Callable[[Array], Array],
     slope: Callable[[Array], Array],
 ) -> tuple[Array, Array]:
-    """Find tensions F [N] between bounds at which a rising stretch(F) has the wanted values.
+    """Solve stretch(F) = wanted for tensions F [N] between bounds; stretch must rise with F.
 
-    It returns the tensions and the slopes of stretch(F) there. All arrays have the same shape; an
-    upper bound may be infinite. Newton's method runs inside a shrinking bracket, so it converges
-    for every rising law. scipy's ``find_root`` and ``brentq`` take ten times as long.
+    Return the tensions and the slopes of stretch there. All arrays have the same shape; an upper
+    bound may be infinite. Newton's method runs inside a shrinking bracket, so it converges for
+    every rising function. scipy's ``find_root`` and ``brentq`` take ten times as long.
     """
     first, last, previous = lower, upper, np.full(np.shape(wanted), math.inf)
     guess = np.minimum(np.maximum(guess, first), last)

@@ -20,10 +20,10 @@ from cdsm.errors import (
 
 @unique
 class Status(IntEnum):
-    """Status of one posture of a batch; it tells which quantities exist. All others are NaN.
+    """Status of one posture of a batch: which quantities exist; the others are NaN.
 
-    It names the first failure, and the error that a single posture would raise. An arm that buckles
-    (negative margin) and an infinite stiffness ``along`` (immobile direction) are not failures.
+    It is the first failure, with the error that a single posture raises. An unstable arm (negative
+    margin) and an infinite stiffness ``along`` (immobile direction) are not failures.
     """
 
     OK = 0
@@ -36,10 +36,11 @@ class Status(IntEnum):
     """No tensions within the bounds balance the arm (InfeasibleTension): only quantities of the
     joint angles alone exist."""
     SOLVER_FAILED = 4
-    """The solver finds no tensions, though tensions exist (SolverError): as INFEASIBLE."""
+    """The solver finds no tensions, though some exist (SolverError): the same quantities exist as
+    for INFEASIBLE."""
     OUTSIDE_ELASTICITY = 5
     """A tension is outside the domain of its law (ElasticityRangeError): tensions, residual, active
-    and load part exist, quantities that need the stiffness of the cables do not."""
+    and load terms exist; quantities that need the cable stiffness do not."""
     SINGULAR = 6
     """K_θ is singular (SingularStiffness): along, compliance and cartesian do not exist. If the tip
     is also IMMOBILE, pseudoinverse does not exist."""
@@ -49,7 +50,7 @@ class Status(IntEnum):
 
     @classmethod
     def of(cls, error: CdsmError) -> Status | None:
-        """Return the status for an error; None if a posture cannot raise this error."""
+        """Return the status that stands for an error; None if there is none."""
         return next((status for kind, status in _ERRORS.items() if isinstance(error, kind)), None)
 
 

@@ -40,7 +40,7 @@ class Table(NamedTuple):
         return self.rows[0][1]
 
     def column(self, at: int, refuse: Callable[[str], NoReturn], first: int = 1) -> Array:
-        """Return the numbers of a column from row ``first`` on; ``refuse`` raises for bad cells."""
+        """Return the numbers of column ``at`` from row ``first`` on; bad cells call ``refuse``."""
         numbers = []
         for line, cells in self.rows[first:]:
             cell = cells[at] if at < len(cells) else ""
@@ -65,12 +65,12 @@ def read_table(
     skip: int = 0,
     any_encoding: bool = False,
 ) -> Table:
-    """Read a table. Its delimiter is the one that leaves numbers in most lines.
+    """Read a table. Its delimiter is the one with which most lines have two or more numbers.
 
     Args:
         path: The file.
-        delimiters: Delimiters to try; if lines cannot tell them apart, the first one that the
-            first line holds.
+        delimiters: Delimiters to try. If several do equally well, one that occurs in the first
+            line is preferred, in this order.
         skip: Number of lines at the top that are not read.
         any_encoding: Read other encodings than UTF-8, see :func:`~cdsm.support.files.read_text`.
 

@@ -23,7 +23,7 @@ def data_frame(
     index: str,
     labels: NDArray[Any] | Sequence[object],
 ) -> pandas.DataFrame:
-    """Build a table of columns by name, with an index by name and labels."""
+    """Build a pandas table from columns by name; ``index`` is the name of the row ``labels``."""
     need("sweep", "pandas")
     import pandas
 
@@ -35,7 +35,7 @@ def dataset(
     labels: Mapping[str, Sequence[object] | NDArray[Any]],
     **attributes: str,
 ) -> xarray.Dataset:
-    """Build a Dataset of variables (dimensions, values, SI unit), and labels of the dimensions."""
+    """Build a Dataset from variables (dimensions, values, SI unit) and labels by dimension."""
     need("sweep", "xarray")
     import xarray
 
@@ -51,7 +51,7 @@ def dataset(
 
 
 def tidy(dataset: xarray.Dataset) -> pandas.DataFrame:
-    """Build a table: a row for each entry of ``status``, a column for each component, with unit."""
+    """Build a pandas table: a row per entry of ``status``, a column per component, with units."""
     import pandas
 
     status = dataset["status"]
@@ -78,7 +78,7 @@ def tidy(dataset: xarray.Dataset) -> pandas.DataFrame:
 def _components(
     variable: xarray.DataArray, status: xarray.DataArray
 ) -> Iterator[tuple[str, NDArray[Any]]]:
-    """Yield name and column of each component of a variable; one entry per entry of the status."""
+    """Yield the name suffix and column of each component of a variable; rows as in ``status``."""
     inner = [dim for dim in variable.dims if dim not in status.dims]
     names = [map(str, variable[dim].values.tolist()) for dim in inner]
     for places in itertools.product(*(enumerate(each) for each in names)):

@@ -1,7 +1,7 @@
-"""Checks of all inputs: native float64, right shape, finite, of a size that machines have.
+"""Checks of all inputs: native float64, right shape, finite, of a plausible size.
 
-A quantity outside its range in :data:`RANGES` raises a named error here. So all other code needs
-no defence against overflow or denormal numbers.
+A quantity outside its range in :data:`RANGES` raises a named error here, so other code need not
+guard against overflow or denormal numbers.
 """
 
 from __future__ import annotations
@@ -46,9 +46,9 @@ RANGES: Final = {
     "wrap": Range("rad", 1e-6, 4.0 * math.pi),
     "wrench": Range("N, N m", 1e-9, 1e9),
 }
-"""Range of each quantity; generous, from a hair of rubber to the cables of a bridge.
+"""Range of each quantity: generous, from a hair of rubber to the cables of a bridge.
 
-A coefficient of friction above 2 is that of no machine, nor is a wrap of more than two turns.
+No machine has a friction coefficient above 2 or a wrap of more than two turns.
 """
 
 WRENCH: Final = "force [N], then moment [N m], base axes"
@@ -70,7 +70,7 @@ AXES: Final[dict[str, tuple[float, float, float]]] = {
 
 
 def within(quantity: str, value: float, *, zero: bool = False, infinite: bool = False) -> str:
-    """Return why a positive quantity is outside its range; an empty text if it is inside."""
+    """Return a text that says why a quantity is outside its range; empty if it is inside."""
     unit, low, high = RANGES[quantity]
     if low <= value <= high or (zero and value == 0.0) or (infinite and value == math.inf):
         return ""
@@ -104,7 +104,8 @@ _MANY = 5000
 def number_array(name: str, value: ArrayLike, kind: str | None = None) -> Array:
     """Return a new native float64 array of finite numbers, or raise :class:`InvalidInput`.
 
-    ``kind`` limits the magnitudes from above; small magnitudes pass, as they may be rounding.
+    ``kind`` is a key of :data:`RANGES`; only its upper end is checked, since small magnitudes may
+    be rounding.
     """
     array = _native(name, value)
     unit, _, largest = ("", 0.0, LARGEST) if kind is None else RANGES[kind]
@@ -147,8 +148,8 @@ def sequence_of(name: str, value: Iterable[_Kind], kind: type[_Kind]) -> tuple[_
 def vector(name: str, value: ArrayLike, size: int, meaning: str, kind: str | None = None) -> Array:
     """Return a new, read-only, finite vector (size,), or raise :class:`InvalidInput`.
 
-    The error says the ``meaning`` of the entries ("one angle [rad] per joint"). ``kind`` is their
-    key in :data:`RANGES`.
+    The error quotes ``meaning``, e.g. "one angle [rad] per joint". ``kind`` is the key of the
+    entries in :data:`RANGES`.
     """
     array = number_array(name, value, kind)
     if array.shape != (size,):

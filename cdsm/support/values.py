@@ -29,7 +29,7 @@ class Printed:
 
 
 class ReadOnlyState(Printed):
-    """Base class of frozen dataclasses; their arrays stay read-only after copying and pickling."""
+    """Base class of frozen dataclasses whose arrays stay read-only after copying and pickling."""
 
     def __getstate__(self) -> dict[str, object]:
         # only fields: cached properties can be large
