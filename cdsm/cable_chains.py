@@ -29,8 +29,8 @@ class Chains:
 
     Attributes:
         segments: Each segment as a cable between two sites. Only the first of each cable has the
-            series spring and the motor control. The lead is a segment that arrives along x of the
-            link of the first site.
+            series spring and, if the cable has friction, the motor control. The lead is a segment
+            that arrives along x of the link of the first site.
         cable: Index of the cable of each segment (S,).
         start: Index of the first segment of each cable, then S (C+1,).
         hole: Index of the segment before each hole (P,); the segment after it has the next index.
@@ -59,7 +59,9 @@ class Chains:
                 sites.insert(0, replace(sites[0], position=(x - cable.lead, y, z)))
             pairs = list(pairwise(replace(site, friction=0.0, wrap=0.0) for site in sites))
             first = replace(cable, sites=pairs[0], lead=0.0)
-            rest = replace(first, series_stiffness=math.inf, control="position")
+            # without friction the motor holds the tension of all segments, and none is a spring
+            control = "position" if any(cable.friction) else cable.control
+            rest = replace(first, series_stiffness=math.inf, control=control)
             own = [first, *(replace(rest, sites=pair) for pair in pairs[1:])]
             passed = range(len(cable.sites) - len(pairs), len(cable.sites) - 1)
             hole += [len(segments) + i for i in range(len(passed))]

@@ -32,7 +32,7 @@ from cdsm.kernels.chains import STRAIGHT
 from cdsm.posture import Posture
 from cdsm.support.values import Array, frozen
 
-_SLACK = 1e-100
+SLACK = 1e-100
 """Tension [N] that replaces zero, since the kernel takes logarithms."""
 
 Flags = NDArray[np.bool_]
@@ -70,7 +70,7 @@ def tension_gradient(pose: Posture, tension: Array, sliding: Flags) -> Array:
     slides[chains.hole] = sliding | ~holding(pose)
     friction = np.zeros_like(segments.length_jacobian)
     friction[chains.hole] = chains.friction[:, None] * segments.wrap_jacobian
-    T = np.where(tension > 0.0, tension, _SLACK)
+    T = np.where(tension > 0.0, tension, SLACK)
     gradient = segments.length_jacobian
     return frozen(chain_tangent(start, forced, stretch, compliance, T, slides, gradient, friction))
 

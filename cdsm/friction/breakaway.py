@@ -23,7 +23,7 @@ from cdsm.errors import EquilibriumError, InvalidInput
 from cdsm.friction.chain_problem import ChainProblem
 from cdsm.friction.stuck import assemble_segments, stuck_stiffness
 from cdsm.posture import Posture
-from cdsm.sticking import first_order_loads, holding
+from cdsm.sticking import SLACK, first_order_loads, holding
 from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.format import coordinates
 from cdsm.support.validation import Direction, unit_direction
@@ -41,6 +41,10 @@ _ITERATIONS = 50
 
 _CONVERGED = 1e-10
 """Relative change of the load that ends the search: the error left is its square."""
+
+_ROUNDING = 1e-5
+"""Relative changes below that no longer fall are rounding: a straight hole holds next to nothing,
+and tensions are EA times a difference of lengths."""
 
 
 @final
@@ -107,8 +111,8 @@ def breakaway(
     load = first
     where: tuple[str | None, int | None, str | None] = (None, None, None)
     if 0.0 < first < math.inf:
-        hole = int(loads.argmin())
-        load, hole = _reached(K, u, motion * first, first, hole)
+        load, hole = _reached(K, u, motion)
+    if 0.0 < load < math.inf:
         chains = pose.segments.chains
         cable, site = pose.arm.cables[chains.cable[chains.hole[hole]]], int(chains.site[hole])
         where = cable.name, site + 1, cable.sites[site].link
@@ -131,11 +135,11 @@ def hole_loads(K: Stiffness, u: Array) -> tuple[Array, Array]:
     return first_order_loads(K.posture, T, gradient, motion), motion
 
 
-def _reached(K: Stiffness, u: Array, motion: Array, load: float, hole: int) -> tuple[float, int]:
+def _reached(K: Stiffness, u: Array, motion: Array) -> tuple[float, int]:
     """Find the load [N] at which the first hole of the stuck, loaded arm reaches its bound.
 
-    Newton's method for joints and load, from the first-order answer of the given hole; another hole
-    that is beyond its bound there takes its place.
+    Newton's method for joints and load, from the answer to first order in the tensions; another
+    hole that is beyond its bound there takes its place.
     """
     pose, arm = K.posture, K.posture.arm
     chains, held = pose.segments.chains, holding(pose)
@@ -145,12 +149,15 @@ def _reached(K: Stiffness, u: Array, motion: Array, load: float, hole: int) -> t
     forced = [cable.control == "force" for cable in arm.cables]
     ratio, none = np.ones(T.size), np.zeros(held.size, dtype=np.bool_)
     ratio[chains.hole[held]] = _HELD
-    torque = u @ pose.jacobian[:3]
-    q, T = pose.q + motion, T + gradient @ motion
+    load, hole = _first(pose, T, gradient @ motion, motion)
+    if math.isinf(load):
+        return load, hole
+    q, T, last = pose.q + load * motion, T + load * (gradient @ motion), math.inf
     for _ in range(_ITERATIONS):
         moved = arm.at(q, check_limits=False)
         lengths, wrap = moved.segments.lengths, moved.segments.wrap
-        T = problem.settle(lengths, natural, ratio, np.where(forced, K.tension, np.nan), T).tension
+        settled = problem.settle(lengths, natural, ratio, np.where(forced, K.tension, np.nan), T)
+        T = np.maximum(settled.tension, SLACK)
         wrench = K.wrench.copy()
         wrench[:3] += load * u
         now = assemble_segments(moved, frozen(T), none, frozen(wrench), "stuck")
@@ -167,17 +174,31 @@ def _reached(K: Stiffness, u: Array, motion: Array, load: float, hole: int) -> t
         residual = now.residual - K.residual
         step = np.linalg.solve(bordered, -np.append(residual, beyond[hole]))
         q, T, load = q + step[:-1], T + gradient @ step[:-1], load + float(step[-1])
-        if abs(step[-1]) <= _CONVERGED * load:
+        change, last = last, abs(step[-1]) / load
+        if last <= _CONVERGED or change / 2.0 <= last <= _ROUNDING:
             worst = int(beyond.argmax())
-            if beyond[worst] <= _REACHED * chains.friction[worst] * wrap[worst]:
+            if beyond[worst] <= (_REACHED + 4.0 * last) * chains.friction[worst] * wrap[worst]:
                 return load, hole
-            hole = worst
+            hole, last = worst, math.inf
     raise EquilibriumError(
         f"the stuck arm has no equilibrium up to a load of {load:.4g} N",
         residual,
         0.0,
         arm.joint_names[int(abs(residual).argmax())],
     )
+
+
+def _first(pose: Posture, T: Array, growth: Array, motion: Array) -> tuple[float, int]:
+    """Return the least load [N] at which T + load Ṫ (S,) reach a ratio exp(μ φ), and the hole."""
+    chains, wrap = pose.segments.chains, pose.segments.wrap
+    ratio = np.exp(chains.friction * wrap)
+    turning = T[chains.hole] * chains.friction * (pose.segments.wrap_jacobian @ motion)
+    before, after = growth[chains.hole], growth[chains.hole + 1]
+    rate = np.maximum(after - ratio * before, before - ratio * after) - ratio * turning
+    reached = holding(pose) & (rate > 0.0)
+    grip = (ratio - 1.0) * T[chains.hole]
+    loads = np.divide(grip, rate, out=np.full(rate.size, math.inf), where=reached)
+    return float(loads.min()), int(loads.argmin())
 
 
 def segment_state(K: Stiffness) -> tuple[Array, Array]:

@@ -36,6 +36,9 @@ resolved further; and where no rest is found."""
 _ROUNDING = 16.0 * float(np.finfo(np.float64).eps)
 """Relative rounding of the stored energy."""
 
+_OF_LENGTHS = 2.0**-52
+"""Rounding of a length, over it: its tension does this work."""
+
 
 class Load(NamedTuple):
     """Load and motor commands that act on an arm."""
@@ -175,6 +178,7 @@ class SlowLoading(NamedTuple):
         settled = end.settled
         uncertain = np.linalg.lstsq(settled.stiffness, settled.rounding, rcond=None)[0]
         noise = abs(torque[2]) @ abs(uncertain) + _ROUNDING * (abs(before) + abs(after))
+        noise += _OF_LENGTHS * (settled.chain.tension @ settled.pose.segments.lengths)
         return passage, float(noise)
 
     def _stored(self, state: State) -> float:

@@ -51,20 +51,24 @@ def command_line(arm: Manipulator, setting: Setting, arm_arguments: Sequence[str
     return shlex.join(["cdsm", "weigh" if weighs else "stiffness", *arm_arguments, *given])
 
 
-def python_lines(setting: Setting) -> str:
+def python_lines(arm: Manipulator, setting: Setting) -> str:
     """Write the lines of Python that compute the numbers of a setting of an arm ``arm``."""
     wrench = f"[{_joined(_wrench(setting), ', ')}]"
     bounds = [f"{setting.minimum:.12g}"]
     bounds += [f"{setting.maximum:.12g}"] if math.isfinite(setting.maximum) else []
     held = [] if setting.sag or not setting.force.any() else [f"wrench={wrench}"]
     solver = [] if setting.solver == DEFAULT_SOLVER else [f"solver={setting.solver!r}"]
+    if not setting.sag:
+        last = "K = cdsm.stiffness(pose, tension)"
+    elif arm.has_friction:
+        last = f"K = cdsm.load_cycle(pose, tension, [{wrench}]).stiffness(-1)"
+    else:
+        last = f"rest = cdsm.equilibrium(pose, tension, {wrench})"
     return "\n".join(
         [
             f"pose = arm.at([{_joined(setting.q.tolist(), ', ')}])",
             f"tension = cdsm.distribute_tension({', '.join(['pose', *bounds, *held, *solver])})",
-            f"rest = cdsm.equilibrium(pose, tension, {wrench})"
-            if setting.sag
-            else "K = cdsm.stiffness(pose, tension)",
+            last,
         ]
     )
 
@@ -72,7 +76,7 @@ def python_lines(setting: Setting) -> str:
 def command_text(arm: Manipulator, setting: Setting, arm_arguments: Sequence[str] | None) -> str:
     """Write the end of the page: the command and buttons; Python without arguments of an arm."""
     if arm_arguments is None:
-        where, command = "in Python", python_lines(setting)
+        where, command = "in Python", python_lines(arm, setting)
     else:
         where, command = "in a shell", command_line(arm, setting, arm_arguments)
     return str(

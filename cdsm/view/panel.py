@@ -11,10 +11,11 @@ import numpy as np
 
 from cdsm.manipulator import Manipulator
 from cdsm.plots.style import AXES, MM, N_PER_MM
-from cdsm.support.format import MODEL, coordinates
+from cdsm.stiffness_matrix.prints import model_of
+from cdsm.support.format import coordinates, plural
 from cdsm.support.markup import Markup, element
 from cdsm.support.values import Array
-from cdsm.view.state import ELLIPSOID, FORCE, Condition, Shown
+from cdsm.view.state import ELLIPSOID, FORCE, SLIDES, STICKS, Condition, Shown
 from cdsm.wires.catalogue import wires_text
 
 _GREEN, _RED, _AMBER, _GREY = "#2f855a", "#c53030", "#b7791f", "#718096"
@@ -25,7 +26,7 @@ _COLORS: Final = {
     Condition.LEFT_REFERENCE: _AMBER,
 }
 _TEXT: Final = "padding:0 0.8em;margin-bottom:0.6em;font-size:0.85em;overflow-y:auto;"
-_BOX: Final = _TEXT + "height:26em"
+_BOX: Final = _TEXT + "height:27em"
 """Style of the panel. Its height is fixed, so that sliders do not move while they are dragged."""
 
 _LIST: Final = _TEXT + "max-height:16em"
@@ -62,7 +63,7 @@ def page_text(shown: Shown, force_scale: float, remark: str = "") -> str:
     if rows:
         parts.append(element("table", *rows, style=_TABLE))
     if shown.stiffness is not None:
-        parts.append(element("div", MODEL, style="color:gray"))
+        parts.append(element("div", _named("model", model_of(shown.stiffness)), style="color:gray"))
     parts += _legend(shown, force_scale)
     if shown.tensions is not None:
         parts += _color_bar(shown.tensions)
@@ -71,7 +72,7 @@ def page_text(shown: Shown, force_scale: float, remark: str = "") -> str:
 
 def basis_text(arm: Manipulator) -> str:
     """Write the conditions of all numbers: arm, wires, gravity, friction."""
-    friction = "friction of its holes left out" if arm.has_friction else "frictionless"
+    friction = "friction in its holes where it sags" if arm.has_friction else "frictionless"
     words = f"with wire {wires_text(arm.cables)}; gravity {coordinates(arm.gravity)} m/s²"
     lines = element("div", str(arm)), element("div", _named("basis", f"{words}; {friction}"))
     return str(element("div", *lines, style=_TEXT + "color:gray"))
@@ -152,6 +153,13 @@ def _legend(shown: Shown, force_scale: float) -> Iterator[Markup]:
         yield _key(ELLIPSOID, "ellipsoid", f"ellipsoid: {shown.ellipsoid}")
     if shown.posture is not None and shown.setting.force.any():
         yield _key(FORCE, "arrow", f"arrow: force at the tip, {MM * force_scale:.3g} mm per N")
+    sticking, sliding = map(len, shown.holes)
+    if sticking or sliding:
+        yield element(
+            "div",
+            *(_swatch(STICKS), " ", _named("sticking", f"{plural(sticking, 'hole')} stick,")),
+            *(" ", _swatch(SLIDES), " ", _named("sliding", f"{sliding} slide")),
+        )
 
 
 def _key(color: tuple[int, int, int], name: str, text: str) -> Markup:

@@ -16,7 +16,7 @@ from cdsm.posture import Posture
 from cdsm.support.values import Array
 from cdsm.view.cable_names import CableNames
 from cdsm.view.camera import Ball, Cameras
-from cdsm.view.state import ELLIPSOID, FORCE, GREY, Condition, Shown
+from cdsm.view.state import ELLIPSOID, FORCE, GREY, SLIDES, STICKS, Condition, Shown
 from cdsm.view.surroundings import draw_surroundings
 
 if TYPE_CHECKING:
@@ -68,6 +68,12 @@ class Scene:
                 f"/cables/{i}", _NOTHING, GREY, thickness=2.5, thickness_units="screen"
             )
             for i in range(len(arm.cables))
+        ]
+        self._holes = [
+            scene.add_line_segments(
+                f"/holes/{name}", _NOTHING, color, thickness=thick * length, visible=False
+            )
+            for name, color, thick in (("stick", STICKS, 0.012), ("slide", SLIDES, 0.018))
         ]
         # hidden if there is no posture
         self._parts = (cables,) if self._shapes is None else (body, cables)
@@ -139,15 +145,18 @@ class Scene:
         )
 
     def _draw_lines(self, shown: Shown) -> None:
-        """Draw links without shapes as sticks, and the reference of an arm that sags."""
+        """Draw links without shapes as sticks, the reference of an arm that sags, and holes."""
         pose, reference = shown.posture, shown.reference
         shaped = frozenset() if self._shapes is None else self._shapes.rows
         bones, brackets = ([], []) if pose is None else pose._stick_figure(shaped)
         before = list(reference.bones) if shown.rest and reference else []
+        sticking, sliding = shown.holes
         for node, lines in (
             (self._sticks, bones),
             (self._brackets, brackets),
             (self._reference, before),
+            (self._holes[0], sticking),
+            (self._holes[1], sliding),
         ):
             node.visible = len(lines) > 0
             if node.visible:

@@ -12,13 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdsm.errors import CdsmError, EquilibriumError, InvalidInput
+from cdsm.friction.stuck import stuck_stiffness
 from cdsm.instability import advice, verdict
 from cdsm.kernels.principal import principal_stiffness
 from cdsm.manipulator import Manipulator
 from cdsm.plots.arm import Ellipsoid, color_scale, ellipsoid
 from cdsm.posture import Posture
 from cdsm.statics.equilibrium import Equilibrium
+from cdsm.statics.load_cycle import load_cycle
+from cdsm.statics.load_history import LoadHistory
 from cdsm.statics.rest_search import equilibrium
+from cdsm.sticking import holding
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.status import Status
 from cdsm.support.values import Array, ReadOnlyState, frozen
@@ -29,6 +33,11 @@ GREY: Final = (150, 150, 150)
 
 ELLIPSOID: Final = (200, 85, 61)
 FORCE: Final = (59, 111, 182)
+STICKS: Final = (40, 40, 45)
+SLIDES: Final = (220, 38, 127)
+
+_BEAD: Final = 0.013
+"""Half the length of the mark of a hole, as a fraction of the arm's length."""
 
 
 class Condition(Enum):
@@ -73,7 +82,8 @@ class Setting(ReadOnlyState):
         maximum: Upper bound of all tensions [N].
         force: Force at the tip, in base axes (3,) [N].
         sag: Whether the force moves the arm. The cables are then tensioned at ``q`` without the
-            force, and the motors are locked. Otherwise the tensions hold ``q`` under the force.
+            force, and the motors are locked; where holes have friction, cables stick and slide in
+            them. Otherwise the tensions hold ``q`` under the force.
         solver: Solver of the tension distribution.
     """
 
@@ -105,6 +115,7 @@ class Shown(ReadOnlyState):
         stiffness: Stiffness at the posture that is shown; None if the tensions are missing or
             outside the domain of the law.
         rest: Equilibrium under the force; None if the arm does not sag, or none was found.
+        history: The way to it of an arm with friction; None without friction, or if ``rest`` is.
     """
 
     setting: Setting
@@ -114,6 +125,7 @@ class Shown(ReadOnlyState):
     tension: Tension | None = None
     stiffness: Stiffness | None = None
     rest: Equilibrium | None = None
+    history: LoadHistory | None = None
 
     @property
     def posture(self) -> Posture | None:
@@ -159,6 +171,27 @@ class Shown(ReadOnlyState):
         return frozen(np.asarray(colors, dtype=np.uint8)[:, :3].copy())
 
     @cached_property
+    def holes(self) -> tuple[Array, Array]:
+        """Short lines (n, 2, 3) [m] through the holes in which cables stick, and slide.
+
+        A hole without friction, or through which the cable goes straight, is neither. In an arm
+        that is held no cable slides.
+        """
+        pose = self.posture
+        if pose is None or self.tensions is None or not pose.arm.has_friction:
+            return np.empty((0, 2, 3)), np.empty((0, 2, 3))
+        chains = pose.segments.chains
+        slides = np.zeros(chains.hole.size, dtype=np.bool_)
+        if self.history is not None:
+            slides = self.history.sliding[-1] != 0
+        where = zip(chains.cable[chains.hole], chains.site, strict=True)
+        ways = np.array([pose.cable_paths[c][i : i + 2] for c, i in where])
+        along = ways[:, 1] - ways[:, 0]
+        along *= _BEAD * pose.arm.length / np.linalg.norm(along, axis=1, keepdims=True)
+        lines = ways[:, :1] + np.stack([-along, along], axis=1)
+        return frozen(lines[holding(pose) & ~slides]), frozen(lines[slides])
+
+    @cached_property
     def ellipsoid(self) -> Ellipsoid | None:
         """Ellipsoid of :func:`cdsm.plots.plot_arm`; None if the arm is not stable."""
         pose = self.posture
@@ -174,7 +207,7 @@ def advised(shown: Shown) -> tuple[str, ...]:
 
 def show(arm: Manipulator, setting: Setting) -> Shown:
     """Compute the results for an arm at a setting; every error becomes a condition."""
-    pose = tension = K = rest = None
+    pose = tension = K = rest = history = None
     condition, problem = Condition.STABLE, ""
     try:
         pose = arm.at(setting.q)
@@ -183,8 +216,14 @@ def show(arm: Manipulator, setting: Setting) -> Shown:
         tension = distribute_tension(pose, setting.minimum, setting.maximum, held, setting.solver)
         K = stiffness(pose, tension)
         if setting.sag:
+            if arm.has_friction:
+                K = stuck_stiffness(pose, tension)
             stable, K = K.is_stable, None
-            rest = equilibrium(pose, tension, force)
+            if arm.has_friction:
+                history = load_cycle(pose, tension, force[None])
+                rest = _rest(history)
+            else:
+                rest = equilibrium(pose, tension, force)
             K = rest.stiffness
             _ = rest.compliance
             condition = Condition.STABLE if stable else Condition.LEFT_REFERENCE
@@ -209,4 +248,20 @@ def show(arm: Manipulator, setting: Setting) -> Shown:
         tension=tension,
         stiffness=K,
         rest=rest,
+        history=history,
+    )
+
+
+def _rest(history: LoadHistory) -> Equilibrium:
+    """Return the last state of an arm with friction as an equilibrium, with its tangent K_θ."""
+    K, reaction = history.stiffness(-1), history.reaction[-1].copy()
+    return Equilibrium(
+        reference=history.reference,
+        reference_tension=history.reference_tension,
+        wrench=K.wrench,
+        stiffness=K,
+        reaction=frozen(reaction),
+        residual=frozen(K.residual - reaction),
+        history=(),
+        iterations=0,
     )

@@ -24,7 +24,9 @@ def prototype(friction: float, lead: float = 0.3) -> tuple[cdsm.Posture, Array]:
     return pose, cdsm.distribute_tension(pose, 50.0).values
 
 
-def first_slip(pose: cdsm.Posture, F: Array, u: Array, guess: float) -> tuple[float, int]:
+def first_slip(
+    pose: cdsm.Posture, F: Array, u: Array, guess: float, near: float = 0.5
+) -> tuple[float, int]:
     """Load at which a hole of an arm of clamped linear springs reaches μφ, and the hole."""
     start, chains = pose.segments, pose.segments.chains
     natural = start.lengths / (1.0 + F[chains.cable] / EA)
@@ -45,7 +47,9 @@ def first_slip(pose: cdsm.Posture, F: Array, u: Array, guess: float) -> tuple[fl
         ratio = np.log(T[chains.hole + 1] / T[chains.hole])
         return np.asarray(abs(ratio) - chains.friction * moved.segments.wrap)
 
-    load = float(brentq(lambda W: margin(W).max(), 0.5 * guess, 1.5 * guess, xtol=1e-13))
+    load = float(
+        brentq(lambda W: margin(W).max(), (1.0 - near) * guess, (1.0 + near) * guess, xtol=1e-13)
+    )
     return load, int(margin(load).argmax())
 
 
@@ -60,6 +64,28 @@ def test_load_is_that_of_the_first_slip(friction: float, direction: str) -> None
     assert found.cable == pose.arm.cables[chains.cable[chains.hole[hole]]].name
     assert found.site == chains.site[hole] + 1
     assert found.load == pytest.approx(found.first_order, rel=0.03)
+
+
+def test_random_postures_slip_where_scipy_finds_it() -> None:
+    """Holes that hold next to nothing, loads of rounding, and holes that overtake the first.
+
+    In the arm of seed 30 the first-order loads name another hole than the one that slips: a cable
+    there loses all its tension, and the logarithm of its ratio is far from linear.
+    """
+    overtaken = 0
+    for seed in (7, 30, 107, 357):
+        rng = np.random.default_rng([seed, 5])
+        kind = ("universal", "hinged")[seed % 2]
+        plain = arms.random_arm(seed, int(rng.integers(1, 5)), kind, LAW)
+        arm = rough(plain, float(rng.choice([0.05, 0.1, 0.3, 1.0])))
+        pose = arm.at(rng.uniform(-0.9, 0.9, arm.nv) * arm.upper)
+        F = cdsm.distribute_tension(pose, float(rng.uniform(5.0, 80.0))).values
+        for direction in "xyz":
+            found = cdsm.breakaway(pose, F, direction)
+            load, hole = first_slip(pose, F, found.direction, found.load, 0.05)
+            assert found.load == pytest.approx(load, rel=1e-6)
+            overtaken += int(found.hole_loads.argmin()) != hole
+    assert overtaken
 
 
 @pytest.mark.slow

@@ -196,6 +196,35 @@ def test_lead_and_motor_control_do_not_count_while_cables_stick() -> None:
         np.testing.assert_allclose(other, K[0], rtol=1e-12, atol=1e-12 * abs(K[0]).max())
 
 
+@pytest.mark.parametrize("held", [0.0, 1.0, 900.0])
+def test_law_of_a_cable_without_friction_is_not_asked_where_its_motor_holds_the_force(
+    held: float,
+) -> None:
+    """Such a cable may have any tension: Eq. 19 is defined from 2.2 to 810 N only."""
+    arm = presets.virtual_prototype(lead=0.3, friction=0.1)
+    first, *others = arm.cables
+    smooth = tuple(replace(site, friction=0.0) for site in first.sites)
+    free = replace(first, sites=smooth, control="force")
+    F = np.append(held, np.full(14, 50.0))
+    found = []
+    for law in (presets.STRAND_1X19, LAW):
+        mixed = arm.with_cables([replace(free, elasticity=law), *others])
+        pose = mixed.at(np.full(10, presets.TEN_DEGREES))
+        load = cdsm.breakaway(pose, F, "z").load
+        band = cdsm.rest_band(pose, F, "z").first_order
+        found.append([load, band, *cdsm.stuck_stiffness(pose, F).joint.ravel()])
+        batch = cdsm.evaluate(mixed, pose.q[None], F[None], outputs=("stuck_joint",))[
+            "stuck_joint"
+        ][0]
+        np.testing.assert_allclose(batch.ravel(), found[-1][2:], rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(found[0], found[1], rtol=1e-12, atol=1e-9)
+    # with friction beyond the motor, segments of this cable are springs, and its law is asked
+    rough_arm = arm.with_cables([replace(first, control="force"), *others])
+    if held != 0.0:
+        with pytest.raises(cdsm.ElasticityRangeError, match="cable1_1"):
+            cdsm.stuck_stiffness(rough_arm.at(pose.q), F)
+
+
 def test_straight_arm_does_not_stick() -> None:
     arm = presets.virtual_prototype(LAW, lead=0.3, friction=0.2)
     pose, F = arm.at(np.zeros(10)), np.full(15, 50.0)

@@ -9,9 +9,11 @@ import pytest
 
 import cdsm
 from cdsm import presets
+from cdsm.statics.slow_loading import SlowLoading
 from cdsm.support.values import Array
 from tests.campaigns import histories
 from tests.support.arms import random_arm, random_posture, random_tension
+from tests.support.rough import rough
 
 WIRE = cdsm.LinearElasticity(48e3)
 
@@ -190,6 +192,26 @@ def test_work_of_motors_is_accounted_for(control: cdsm.cable.Control) -> None:
     np.testing.assert_array_less(T[0, 1:], T[0, :-1])
     assert T[0, 0] / T[0, 1] == pytest.approx(grip, rel=0.02)
     np.testing.assert_array_less(T[1, :-1], T[1, 1:])
+
+
+@pytest.mark.parametrize(("seed", "law"), [(0, WIRE), (20, presets.STRAND_1X19.slack_below())])
+def test_rounding_of_the_energy_divides_no_steps(
+    seed: int, law: cdsm.Elasticity, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Tensions that balance the arm to 1e-7 do almost no work on the way to the same wrench."""
+    pose = rough(random_arm(seed, 2, "universal", law), 0.1).at(np.array([0.05, -0.1, 0.1, 0.02]))
+    pull = cdsm.distribute_tension(pose, 50.0).values
+    rests, rest = [], SlowLoading.rest
+
+    def counted(self: SlowLoading, *arguments: Any) -> Any:
+        rests.append(arguments)
+        return rest(self, *arguments)
+
+    monkeypatch.setattr(SlowLoading, "rest", counted)
+    for off in (0.0, 1e-9, 1e-7, 1e-5):
+        F = pull * (1.0 + off * np.random.default_rng(seed).normal(size=pull.size))
+        cdsm.load_cycle(pose, F, np.zeros((1, 6)))
+    assert len(rests) < 40
 
 
 # --- breakaway, tangents ----------------------------------------------------------------------

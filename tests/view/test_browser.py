@@ -475,3 +475,28 @@ def test_a_link_does_not_lead_the_page_to_another_server(browser: Any, view: Vie
         page.close()
         other.shutdown()
     assert not led.is_set()
+
+
+@pytest.mark.slow
+@needs_viser
+def test_holes_in_which_cables_slide_are_seen(browser: Any) -> None:
+    arm = soft_arm().with_friction(0.1)
+    q, force = np.deg2rad(DEGREES), (0.0, 0.0, -0.3)
+    with serve(arm, port=0, q=q, minimum=STABLE, maximum=200.0, force=force, sag=True) as view:
+        page = Page(browser, view.url)
+        sticking, sliding = map(len, view.shown.holes)
+        assert sticking
+        assert sliding
+        page.says("sliding", f"{sliding} slide")
+        page.says("sticking", f"{sticking} holes stick,")
+        for _ in range(30):  # the first frames may be empty
+            picture = page.picture("view-sliding.png")[:, :800]
+            red, green, blue = (picture[..., i] for i in range(3))
+            magenta = (red > 0.7) & (green < 0.35) & (blue > 0.35) & (blue < 0.75)
+            if magenta.sum() > 20 * sliding:
+                break
+        else:
+            pytest.fail("no hole that slides in view-sliding.png")
+        page.type("force z [N]", 0.0)  # a load that is gone from the start leaves nothing
+        page.says("sliding", "0 slide")
+        assert not page.errors

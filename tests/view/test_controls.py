@@ -111,12 +111,15 @@ def test_the_command_prints_what_the_page_shows(file: Path, changes: dict[str, A
     assert tensions == [f"{F:.3f}" for F in shown.tensions]
 
 
+@pytest.mark.parametrize("friction", [0.0, 0.2])
 @pytest.mark.parametrize("changes", SETTINGS.values(), ids=SETTINGS)
-def test_the_lines_of_python_compute_what_the_page_shows(changes: dict[str, Any]) -> None:
-    arm = soft_arm()
+def test_the_lines_of_python_compute_what_the_page_shows(
+    changes: dict[str, Any], friction: float
+) -> None:
+    arm = soft_arm().with_friction(friction)
     at = replace(Setting(q=setting(arm).q, minimum=STABLE, force=np.zeros(3)), **changes)
     names: dict[str, object] = {"arm": arm, "cdsm": cdsm}
-    exec(python_lines(at), names)
+    exec(python_lines(arm, at), names)
     shown = show(arm, at)
     rest, K = names.get("rest"), names.get("K")
     found = K if rest is None else rest

@@ -105,3 +105,46 @@ def test_joints_on_their_stops_are_named_and_do_not_yield() -> None:
     assert shown.along is not None
     np.testing.assert_allclose(shown.along, 1.0 / np.diag(C), rtol=1e-12)
     assert (shown.along > [shown.rest.stiffness.along(u) for u in np.eye(3)]).any()
+
+
+def test_an_arm_with_friction_sags_less_and_shows_which_holes_slide() -> None:
+    arm = soft_arm().with_friction(0.1)
+    free, shown = sagged(soft_arm()), sagged(arm)
+    pose = arm.at(setting(arm).q)
+    pull = cdsm.distribute_tension(pose, STABLE, 200.0)
+    wrench = np.array([[*FORCE, 0.0, 0.0, 0.0]])
+    history = cdsm.load_cycle(pose, pull, wrench)
+    assert shown.condition is Condition.STABLE
+    assert shown.rest is not None
+    assert free.rest is not None
+    np.testing.assert_allclose(shown.rest.displacement, history.displacement[0], atol=1e-9)
+    moved = [float(each.displacement @ FORCE) for each in (shown.rest, free.rest)]
+    assert 0.0 < moved[0] < moved[1]
+    sticking, sliding = shown.holes
+    slides = np.flatnonzero(history.sliding[0])
+    assert 0 < slides.size == len(sliding)
+    assert len(sticking) + len(sliding) == len(history.holes)
+    name, _, site = history.holes[slides[0]].partition(" site ")
+    at_rest = history.pose(0)
+    path = at_rest.cable_paths[arm.cables.names.index(name)]
+    np.testing.assert_allclose(sliding[0].mean(axis=0), path[int(site) - 1], atol=1e-9)
+    said = numbers(page_text(shown, 0.01))
+    assert said["sticking"] == f"{len(sticking)} holes stick,"
+    assert said["model"] == "cables sliding, μ = 0.1, rigid links, tangent"
+    K = history.stiffness(0)
+    assert said["along-z"] == f"{K.along('z') / 1e3:.4g}"
+    # a held arm has no history: nothing slides, and its stiffness is the frictionless one
+    held = show(arm, setting(arm, force=FORCE))
+    assert [len(each) for each in held.holes] == [len(history.holes), 0]
+    assert numbers(page_text(held, 0.01))["model"].startswith("frictionless")
+    assert [len(each) for each in free.holes] == [0, 0]
+    assert "sliding" not in numbers(page_text(free, 0.01))
+
+
+def test_below_breakaway_no_hole_slides() -> None:
+    arm = soft_arm().with_friction(0.3)
+    pose = arm.at(setting(arm).q)
+    pull = cdsm.distribute_tension(pose, STABLE, 200.0)
+    load = cdsm.breakaway(pose, pull, "z").load
+    assert len(sagged(arm, force=(0.0, 0.0, 0.99 * load)).holes[1]) == 0
+    assert len(sagged(arm, force=(0.0, 0.0, 1.01 * load)).holes[1]) == 1
