@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -42,6 +42,13 @@ def track(
             autocompletion=_laws,
         ),
     ] = "stiffness",
+    plant: Annotated[
+        Literal["slow", "mujoco"],
+        typer.Option(
+            help="The true arm: at rest at each step, with friction; or with inertia and damping "
+            "(extra mujoco), without friction."
+        ),
+    ] = "slow",
     payload: Annotated[
         float, typer.Option(help="Mass [kg] that the controller does not know of.")
     ] = 0.0,
@@ -66,15 +73,26 @@ def track(
         float, typer.Option(help="How much the stiffness loop may change a tension per step [N].")
     ] = 10.0,
     bands: Annotated[int, typer.Option(help="Prove a band at every so many steps; 0: never.")] = 1,
+    felt: Annotated[
+        int,
+        typer.Option(help="Feel the stiffness with the motors at every so many steps; 0: never."),
+    ] = 0,
     min_tension: MinTension = 10.0,
     max_tension: MaxTension = math.inf,
     seed: Annotated[int, typer.Option(help="Seed of the noise.")] = 0,
     out: Annotated[
         Path | None,
-        typer.Option("--out", "-o", metavar="RUN.nc", help="All numbers over time to write."),
+        typer.Option(
+            "--out", "-o", metavar="RUN.nc|RUN.csv", help="Numbers over time to write; .nc: all."
+        ),
     ] = None,
     animate: Annotated[
-        Path | None, typer.Option(metavar="RUN.gif", help="Animation of the true arm to write.")
+        Path | None,
+        typer.Option(
+            metavar="RUN.gif|RUN.csv",
+            help="Motion of the true arm to write: a picture, or a table over time that `cdsm view "
+            "ARM.toml --path RUN.csv` plays.",
+        ),
     ] = None,
     figure: Picture = None,
     as_json: AsJson = False,
@@ -87,7 +105,16 @@ def track(
     """
     from cdsm.cli.path_file import one_target, read_path
     from cdsm.control import with_rigidity
+    from cdsm.support.validation import quantity
 
+    _require_ending("--out", out, ".nc", ".csv")
+    _require_ending("--animate", animate, ".gif", ".csv")
+    _require_ending("--figure", figure, ".pdf", ".svg", ".png")
+    quantity("--true-friction", true_friction or 0.0, "friction", zero=True)
+    if not 0.0 < true_rigidity < math.inf:
+        raise typer.BadParameter(
+            f"{true_rigidity:g} given; a positive number is needed.", param_hint="--true-rigidity"
+        )
     robot = arm.read()
     file = read_path(path, robot)
     u, wanted = _wanted(stiffness)
@@ -102,10 +129,11 @@ def track(
         answer(as_json, plan.to_dict, conditions, plan, warnings=warnings)
     true = with_rigidity(robot, true_rigidity) if true_rigidity != 1.0 else robot
     true = true if true_friction is None else true.with_friction(true_friction)
+    arm_there = cdsm.MuJoCoPlant(true, period) if plant == "mujoco" else cdsm.SlowPlant(true)
     run = cdsm.track(
         plan,
         law,
-        cdsm.SlowPlant(true),
+        arm_there,
         cdsm.Sensors(
             encoder=1e-3 * encoder,
             tension_noise=tension_noise,
@@ -120,15 +148,21 @@ def track(
         period=period,
         rate=rate,
         bands=bands,
+        felt=felt,
         seed=seed,
     )
     if out is not None:
         written(run.write(out))
     write_picture(figure, lambda: run.plot())
     if animate is not None:
-        run.plot(animate)
-        written(animate)
+        written(run.write(animate) if animate.suffix.lower() == ".csv" else run.animate(animate))
     answer(as_json, run.to_dict, conditions, run, warnings=run.warnings)
+
+
+def _require_ending(option: str, path: Path | None, *endings: str) -> None:
+    """Refuse a file that could not be written, before minutes are spent on its content."""
+    if path is not None and path.suffix.lower() not in endings:
+        raise typer.BadParameter(f"{path} ends in none of {', '.join(endings)}.", param_hint=option)
 
 
 def _wanted(text: str) -> tuple[Sequence[float], float | None]:
@@ -138,4 +172,8 @@ def _wanted(text: str) -> tuple[Sequence[float], float | None]:
     if not given:
         return u, None
     (wanted,) = numbers("--stiffness", value, 1, "AXIS=N/mm")
+    if not 0.0 < wanted < math.inf:
+        raise typer.BadParameter(
+            f"{wanted:g} N/mm given; a positive number is needed.", param_hint="--stiffness"
+        )
     return u, 1000.0 * wanted

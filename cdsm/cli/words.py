@@ -6,10 +6,14 @@ import re
 from typing import Final
 
 _OPTIONS: Final = {
+    "bands": "--bands",
     "count": "--count",
     "damping": "--damping",
     "damping_ratio": "--damping-ratio",
+    "delay": "--delay",
     "direction": "--direction",
+    "encoder": "--encoder",
+    "felt": "--felt",
     "force": "--force",
     "gauge_length": "--gauge-length",
     "gravity": "--gravity",
@@ -30,6 +34,8 @@ _OPTIONS: Final = {
     "steps": "--steps",
     "store": "--resume",
     "target": "--target",
+    "tension_bias": "--tension-bias",
+    "tension_noise": "--tension-noise",
     "wire": "--wire",
     "wrench": "--wrench",
 }
@@ -38,6 +44,7 @@ _OPTIONS: Final = {
 _PYTHON: Final = (
     (", or, in Python, pass check_limits=False to compute beyond them.", "."),
     ("Raise starts=, ask", "Ask"),
+    ("give arm.with_friction(0.0).", "give --true-friction 0."),
     ("slack_below()", "--slack-below"),
     ("`cdsm fit`, or cdsm.read_tensile_csv and cdsm.fit_tensile_test.", "`cdsm fit`."),
     (", or start from a guess= nearer to it.", "."),

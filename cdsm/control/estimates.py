@@ -115,6 +115,13 @@ class Observer:
         pose = pose if (inside == q).all() else self.arm.at(inside)
         return self._slid(before, pose, F, x, variance)
 
+    def gain(self, estimate: Estimate, reading: Reading) -> Array:
+        """Compute κ = −∂F/∂l_0 (C,) [N/m] at constant lengths; 0 where a motor holds a tension."""
+        F = np.maximum(reading.tension, self._least)
+        stretch = 1.0 + estimate.softness * self._mean_strain(estimate.pose, estimate.shares, F)
+        soft = self._compliance(reading.wire, F) * estimate.softness
+        return np.where(self._held, stretch / soft, 0.0)
+
     def _slid(
         self, before: Estimate, pose: Posture, F: Array, softness: float, variance: float
     ) -> Estimate:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import math
 import os
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -14,17 +12,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdsm.control.assessment import hung_weight
+from cdsm.control.labelled import labelled, numbers, rows, table
 from cdsm.control.plant import SlowPlant
 from cdsm.errors import InvalidInput
 from cdsm.planning.path_plan import PathPlan
 from cdsm.support.extras import need
 from cdsm.support.files import as_path, write_file
 from cdsm.support.format import aligned, plain, plural
-from cdsm.support.tidy import dataset
 from cdsm.support.validation import whole_number
 from cdsm.support.values import Array, ReadOnlyState, frozen
 
 if TYPE_CHECKING:
+    import pandas
     import xarray
     from matplotlib.figure import Figure
 
@@ -61,8 +60,11 @@ class TrackingRun(ReadOnlyState):
         saturated: Whether a clamp changed the command of each motor (n, C).
         stiffness: True stiffness along each direction (n, D) [N/m].
         margin: Smallest eigenvalue of the true K_θ (n,) [N m/rad].
+        felt: Stiffness that the motors felt along each direction (n, D) [N/m]; NaN where the
+            controller did not try, or could not.
+        banded: Whether a band was sought (n,).
         band: Least and largest proved displacement along the first direction (n, 2) [m], about the
-            rest without friction; NaN where none was asked for or proved.
+            rest without friction; NaN where none was sought or proved.
         displacement: Displacement of the tip from that rest along the first direction (n,) [m].
         wrench: Load (n, 6): force [N], then moment [N m].
         estimated_force: Force at the tip that the controller believed in (n, 3) [N].
@@ -91,6 +93,8 @@ class TrackingRun(ReadOnlyState):
     saturated: NDArray[np.bool_]
     stiffness: Array
     margin: Array
+    felt: Array
+    banded: NDArray[np.bool_]
     band: Array
     displacement: Array
     wrench: Array
@@ -123,15 +127,16 @@ class TrackingRun(ReadOnlyState):
         return frozen(self.stiffness / self.target - 1.0)
 
     @cached_property
+    def proved(self) -> NDArray[np.bool_]:
+        """Whether a band was proved (n,); never more often than it was sought, ``banded``."""
+        return frozen(np.isfinite(self.band[:, 0]))
+
+    @cached_property
     def inside(self) -> NDArray[np.bool_]:
         """Whether the tip is inside its proved band (B,), for the B steps that have one."""
-        low, high = self.band[self._banded].T
-        moved = self.displacement[self._banded]
+        low, high = self.band[self.proved].T
+        moved = self.displacement[self.proved]
         return frozen(np.asarray((low - _ROUNDING <= moved) & (moved <= high + _ROUNDING)))
-
-    @property
-    def _banded(self) -> NDArray[np.intp]:
-        return np.flatnonzero(np.isfinite(self.band[:, 0]))
 
     def hung_weight(self, step: int, direction: int = 0) -> float:
         """Hang a weight on the true arm as it was after a step; return the stiffness [N/m].
@@ -160,7 +165,7 @@ class TrackingRun(ReadOnlyState):
         said = []
         if self.outcome != "completed":
             word = {"lost": "UNSTABLE", "no rest": "BUCKLES", "wire": "WIRE"}[self.outcome]
-            said.append(f"{word} at {self._end:.4g} s: {self.reason}")
+            said.append(f"{word} at {self.end:.4g} s: {self.reason}")
         unstable = np.flatnonzero(~(self.margin > 0.0))
         if unstable.size:
             said.append(
@@ -178,93 +183,48 @@ class TrackingRun(ReadOnlyState):
         return tuple(said)
 
     @property
-    def _end(self) -> float:
+    def end(self) -> float:
+        """Time of the last step [s]: of a failure, when it happened."""
         return float(self.time[-1]) if len(self.time) else 0.0
 
     def to_xarray(self) -> xarray.Dataset:
-        """Return a labelled Dataset over time, in SI units.
+        """Return a labelled Dataset over time, in SI units; every variable has its unit.
 
         Raises:
             MissingExtra: xarray is not installed.
         """
-        arm, names = self.plan.arm, "xyz"
-        labels: dict[str, Sequence[object] | NDArray[Any]] = {
-            "time": self.time,
-            "axis": list(names),
-            "component": [f"{kind}{axis}" for kind in "fm" for axis in names],
-            "joint": arm.joint_names,
-            "cable": arm.cables.names,
-            "end": ["low", "high"],
-        }
-        angle, of_cable = "rad, or m where a joint slides", ("time", "cable")
-        variables: dict[str, tuple[tuple[str, ...], NDArray[Any], str]] = {
-            "goal": (("time", "axis"), self.goals, "m"),
-            "tip": (("time", "axis"), self.tips, "m"),
-            "tip_error": (("time",), self.tip_error, "m"),
-            "target": (("time", "direction"), self.target, "N/m"),
-            "stiffness": (("time", "direction"), self.stiffness, "N/m"),
-            "direction_vector": (("direction", "axis"), self.directions, "1"),
-            "margin": (("time",), self.margin, arm.stiffness_unit()),
-            "joint_position": (("time", "joint"), self.angles, angle),
-            "estimated_joint_position": (("time", "joint"), self.estimated_angles, angle),
-            "wanted_tension": (of_cable, self.wanted_tension, "N"),
-            "commanded_tension": (of_cable, self.commanded_tension, "N"),
-            "commanded_wire": (of_cable, self.commanded_wire, "m"),
-            "measured_tension": (of_cable, self.measured_tension, "N"),
-            "tension": (of_cable, self.tension, "N"),
-            "saturated": (of_cable, self.saturated, "1"),
-            "band": (("time", "end"), self.band, "m"),
-            "displacement": (("time",), self.displacement, "m"),
-            "wrench": (("time", "component"), self.wrench, "N, N m"),
-            "estimated_force": (("time", "axis"), self.estimated_force, "N"),
-            "rigidity": (("time",), self.rigidity, "1"),
-        }
-        title = f"{arm.name} in closed loop, law {self.law}"
-        data = dataset(variables, labels, title=title, outcome=self.outcome, reason=self.reason)
-        data["time"].attrs["units"] = "s"
-        return data
+        return labelled(self)
 
-    def write(self, path: str | os.PathLike[str]) -> Path:
-        """Write :meth:`to_xarray` as NetCDF (``.nc``), completely or not at all; return the path.
+    def to_pandas(self) -> pandas.DataFrame:
+        """Return a table over time in SI: true joint angles, tip, tensions and stiffness.
 
         Raises:
-            InvalidInput: The path does not end in ``.nc``.
-            MissingExtra: netCDF4 is not installed.
+            MissingExtra: pandas is not installed.
+        """
+        return table(self)
+
+    def write(self, path: str | os.PathLike[str]) -> Path:
+        """Write :meth:`to_xarray` (``.nc``) or :meth:`to_pandas` (``.csv``); return the path.
+
+        ``cdsm view ARM.toml --path RUN.csv`` plays the table.
+
+        Raises:
+            InvalidInput: The path ends neither in ``.nc`` nor in ``.csv``.
+            MissingExtra: pandas or netCDF4 is not installed.
             FileError: The file cannot be written.
         """
-        if as_path(path).suffix.lower() != ".nc":
-            raise InvalidInput("path", f"{str(path)!r} given; it must end in .nc (NetCDF).")
+        suffix = as_path(path).suffix.lower()
+        if suffix == ".csv":
+            return write_file(path, self.to_pandas().to_csv)
+        if suffix != ".nc":
+            raise InvalidInput("path", f"{str(path)!r} ends neither in .nc (NetCDF) nor in .csv.")
         need("sweep", "netCDF4")
         data = self.to_xarray()
         return write_file(path, lambda aside: data.to_netcdf(aside, engine="netcdf4"))
 
     def to_dict(self) -> dict[str, object]:
         """Return the numbers of the table in SI for JSON, with units in the keys."""
-        return dict(plain(self._numbers))
-
-    @property
-    def _numbers(self) -> dict[str, Any]:
-        off = abs(self.stiffness_error)
-        known = off[np.isfinite(off).all(axis=1)]
-        return {
-            "law": self.law,
-            "steps": len(self.time),
-            "outcome": self.outcome,
-            "reason": self.reason,
-            "ended_s": self._end,
-            "tip_error_mean_m": _mean(self.tip_error),
-            "tip_error_largest_m": float(self.tip_error.max(initial=0.0)),
-            "stiffness_error_mean": _mean(known.ravel()),
-            "stiffness_error_largest": float(known.max()) if known.size else math.nan,
-            "least_tension_N": float(self.tension.min(initial=math.inf)),
-            "largest_tension_N": float(self.tension.max(initial=0.0)),
-            "least_margin_Nm_per_rad": float(np.nanmin(self.margin, initial=math.inf)),
-            "saturated_motors": self.saturated_motors,
-            "steps_not_planned": len(self.refused),
-            "steps_with_band": len(self.inside),
-            "share_inside_band": _mean(self.inside.astype(float)),
-            "estimated_rigidity": float(self.rigidity[-1]) if len(self.rigidity) else math.nan,
-        }
+        return dict(plain(numbers(self)))
 
     @property
     def saturated_motors(self) -> tuple[str, ...]:
@@ -276,45 +236,37 @@ class TrackingRun(ReadOnlyState):
         """Plot tip error, stiffness, tensions and the proved band over time.
 
         Args:
-            animate: A ``.gif`` to write too, in which the true arm follows the path.
+            animate: A ``.gif`` to write too; see :meth:`animate`.
 
         Raises:
             InvalidInput: ``animate`` does not end in ``.gif``.
             FileError: The animation cannot be written.
         """
-        from cdsm.plots import plot_path, plot_tracking_run  # matplotlib imports slowly
+        from cdsm.plots import plot_tracking_run  # matplotlib imports slowly
 
         if animate is not None:
-            plot_path([state.pose for state in self.states], animate=animate, tensions=self.tension)
+            self.animate(animate)
         return plot_tracking_run(self)
+
+    def animate(self, path: str | os.PathLike[str]) -> Path:
+        """Write a ``.gif`` in which the true arm follows the path; return its path.
+
+        Raises:
+            InvalidInput: The path does not end in ``.gif``, or no step was completed.
+            FileError: The file cannot be written.
+        """
+        from cdsm.plots import plot_path
+
+        plot_path([state.pose for state in self.states], animate=path, tensions=self.tension)
+        return as_path(path)
 
     def __repr__(self) -> str:
         return f"<TrackingRun of {self.plan.arm.name}, law {self.law}, {self.outcome}>"
 
     def __str__(self) -> str:
-        n = self._numbers
-        low, high = n["least_tension_N"], n["largest_tension_N"]
-        banded, share = n["steps_with_band"], n["share_inside_band"]
-        rows = [
-            ("tip error, mean and largest", f"{1e3 * n['tip_error_mean_m']:.3g}, "
-             f"{1e3 * n['tip_error_largest_m']:.3g} mm"),
-            ("stiffness error, mean and largest", f"{100.0 * n['stiffness_error_mean']:.3g}, "
-             f"{100.0 * n['stiffness_error_largest']:.3g} %"),
-            ("tensions at the motors", f"{low:.4g} to {high:.4g} N"),
-            ("least margin to buckling", f"{n['least_margin_Nm_per_rad']:.4g} "
-             f"{self.plan.arm.stiffness_unit()}"),
-            ("saturated motors", ", ".join(self.saturated_motors) or "none"),
-            ("rigidity of the wires, as estimated", f"{100.0 * n['estimated_rigidity']:.4g} %"),
-            ("inside the proved band", f"{100.0 * share:.4g} % of {plural(banded, 'step')}"
-             if banded else "no band was proved"),
-        ]  # fmt: skip
         head = f"law {self.law}: {plural(len(self.time), 'step')}, {self.outcome}"
-        return "\n".join([*self.warnings, head, *aligned(rows)])
+        return "\n".join([*self.warnings, head, *aligned(rows(self))])
 
 
 _ROUNDING = 1e-9
 """Distance beyond a band [m] that is rounding of a place of rest."""
-
-
-def _mean(values: Array) -> float:
-    return float(values.mean()) if values.size else math.nan

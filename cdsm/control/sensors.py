@@ -9,6 +9,7 @@ from typing import Final, final
 import numpy as np
 
 from cdsm.control.laws import Reading
+from cdsm.errors import InvalidInput
 from cdsm.support.validation import quantity, scalar, whole_number
 
 LARGEST_NOISE: Final = 4.0
@@ -39,8 +40,10 @@ class Sensors:
     delay: int = 0
 
     def __post_init__(self) -> None:
-        encoder = quantity("encoder", self.encoder, "length", zero=True)
-        noise = quantity("tension_noise", self.tension_noise, "tension", zero=True)
+        encoder = scalar("encoder", self.encoder)
+        if encoder < 0.0:  # any fineness is good
+            raise InvalidInput("encoder", f"{encoder:g} m given; 0 or more is needed.")
+        noise = quantity("tension_noise", self.tension_noise, "force", zero=True)
         # the class is frozen: plain assignment is refused
         self.__dict__.update(
             encoder=encoder,

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from cdsm.control.assessment import Assessment, assess
 from cdsm.control.estimates import Estimate, Observer
+from cdsm.control.felt import felt_stiffness
 from cdsm.control.laws import LAWS, Command, Law, Moment, Reading, Reference
 from cdsm.control.plant import Plant, PlantState, SlowPlant, require_unstrained
 from cdsm.control.run import Outcome, TrackingRun
@@ -56,6 +57,7 @@ def track(
     replan: bool | None = None,
     tension_controlled: Sequence[str] | None = None,
     bands: int = 1,
+    felt: int = 0,
     seed: int = 0,
 ) -> TrackingRun:
     """Follow a planned path in closed loop, against a plant that may differ from the plan's arm.
@@ -88,6 +90,9 @@ def track(
             best.
         bands: A proved band is computed at every so many steps, some 20 ms each; 0: never. An arm
             without friction has none.
+        felt: At every so many steps the motors excite the tip a little, and the controller feels
+            how stiff it is (:mod:`cdsm.control.felt`); 0: never. This is done to a copy of the arm,
+            so that the run stays the same.
         seed: Seed of the noise: the same seed gives the same bits.
 
     Raises:
@@ -113,7 +118,8 @@ def track(
         outer = StiffnessLoop(arm, schedule.directions, low, high, limit)
     forced = choose_cables(plan, tension_controlled)
     random = np.random.default_rng(whole_number("seed", seed, 0))
-    every = whole_number("bands", bands, 0)
+    every, feels = whole_number("bands", bands, 0), whole_number("felt", felt, 0)
+    apart = random.spawn(1)[0]  # the noise of the run does not depend on what is felt
     observer = Observer(arm, sensors)
 
     reference = schedule.references[0]
@@ -145,7 +151,11 @@ def track(
         truth.append(state.true)
         banded = every > 0 and k % every == 0 and plant.arm.has_friction
         judged = assess(plant.arm, state, wrenches[k], schedule.directions[0], banded=banded)
-        records.append(_Step(wanted, reading, estimate, command, state, judged))
+        found = [
+            felt_stiffness(plant, state, wrenches[k], observer, estimate, (low, high), u, apart)
+            for u in (schedule.directions if feels and k % feels == 0 else ())
+        ]
+        records.append(_Step(wanted, reading, estimate, command, state, judged, banded, found))
         before, last, wire = wanted, reading, command.wire
         off = float(np.linalg.norm(state.pose.tip[:3, 3] - schedule.tips[k]))
         if off > _LOST * arm.length:
@@ -186,6 +196,8 @@ class _Step(NamedTuple):
     command: Command
     state: PlantState
     judged: Assessment
+    banded: bool
+    felt: list[float]
 
 
 def _columns(schedule: Schedule, wrenches: Array, records: list[_Step]) -> dict[str, Any]:
@@ -217,6 +229,8 @@ def _columns(schedule: Schedule, wrenches: Array, records: list[_Step]) -> dict[
         ),
         "stiffness": rows([[_along(K, each) for each in u] for K in rests], len(u)),
         "margin": rows([nan if K is None else K.margin for K in rests]),
+        "felt": rows([record.felt or [nan] * len(u) for record in records], len(u)),
+        "banded": frozen(np.array([record.banded for record in records], dtype=np.bool_)),
         "band": rows([(nan, nan) if each is None else (each.low, each.high) for each in bands], 2),
         "displacement": frozen((tips - places) @ u[0]),
         "estimated_force": rows([record.estimate.force for record in records], 3),

@@ -29,6 +29,9 @@ if TYPE_CHECKING:
 
     from cdsm.control.run import TrackingRun
 
+_HALF = 0.5
+"""Part of the wanted stiffness below which the panel begins at zero."""
+
 
 def plot_tracking_run(run: TrackingRun) -> Figure:
     """Plot a closed loop over time: tip error, stiffness, the proved band, and all tensions.
@@ -46,20 +49,23 @@ def plot_tracking_run(run: TrackingRun) -> Figure:
     error.plot(t, MM * run.tip_error, color=BLUE)
     error.set(ylabel="tip error [mm]")
     error.set_ylim(bottom=0.0)
-    for u, color, wanted, found in zip(
-        run.directions, COLORS, run.target.T, run.stiffness.T, strict=False
-    ):
+    each = zip(run.directions, COLORS, run.target.T, run.stiffness.T, run.felt.T, strict=False)
+    for u, color, wanted, found, felt in each:
         name = direction_name(u)
         stiffness.plot(t, N_PER_MM * wanted, "--", color=color, linewidth=0.9, label="_")
         stiffness.plot(t, N_PER_MM * found, color=color, label=f"along {name}; dashed: wanted")
+        if np.isfinite(felt).any():
+            stiffness.plot(t, N_PER_MM * felt, "o", color=color, markersize=3, label="felt")
     stiffness.set(ylabel="stiffness [N/mm]")
-    from_zero(stiffness, N_PER_MM * run.target, N_PER_MM * run.stiffness)
+    ratio = np.concatenate([run.stiffness, run.felt]) / np.tile(run.target, (2, 1))
+    if np.nanmin(ratio, initial=1.0) < _HALF:  # else a few percent would not be seen
+        from_zero(stiffness, *(N_PER_MM * each for each in (run.target, run.stiffness, run.felt)))
     low, high = MM * run.band.T
-    known = np.isfinite(low)
-    band.fill_between(t[known], low[known], high[known], color=SKY, alpha=0.4, label="proved band")
+    at = run.banded  # where none was proved the area has a gap
+    band.fill_between(t[at], low[at], high[at], color=SKY, alpha=0.4, label="proved band")
     moved = MM * run.displacement
     band.plot(t, moved, color=VERMILLION, label="tip")
-    band.set(ylabel="held by friction [mm]")
+    band.set(ylabel="off the rest\nwithout friction [mm]")
     for panel in (stiffness, band):
         legend(panel, **BESIDE)
     cable_lines(tension, t, run.tension, run.plan.arm.cables.names)

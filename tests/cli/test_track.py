@@ -1,6 +1,7 @@
 """``cdsm track``: a loop from files, its files, and what it says when it fails."""
 
 import json
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 import xarray as xr
 
 import cdsm
+from cdsm.cli.path_file import read_path
 from tests.cli.test_commands import call
 from tests.support.tracking import small_path
 
@@ -30,7 +32,7 @@ def test_track_tells_and_writes_what_the_api_does(files: tuple[Path, Path], tmp_
     shown = call("track", *files, *options, "--out", out, "--figure", png, "--animate", gif)
     assert shown.exit_code == 0, shown.output
     assert "law stiffness: 5 steps, completed" in shown.stdout
-    assert "100 % of 5 steps" in shown.stdout
+    assert "100 % of 5 proved steps (0 not proved)" in shown.stdout
     plan = small_path(0.1)
     plan = cdsm.plan_path(plan.arm, "z", 15e3, 10.0, 250.0, angles=plan.angles, progress=False)
     run = cdsm.track(
@@ -59,11 +61,83 @@ def test_loop_that_fails_is_told_first_and_ends_with_three(files: tuple[Path, Pa
     assert told["warnings"][0].startswith(("UNSTABLE", "BUCKLES", "WIRE"))
 
 
-@pytest.mark.parametrize("stiffness", ["q=15", "z=stiff", "z"])
+def test_mujoco_moves_the_arm_and_its_motion_is_a_path(
+    files: tuple[Path, Path], tmp_path: Path
+) -> None:
+    pytest.importorskip("mujoco")
+    options = ["--stiffness", "z=15", "--plant", "mujoco", "--felt", "4", "--true-rigidity", "0.9"]
+    motion = tmp_path / "motion.csv"
+    shown = call("track", *files, *options, "--max-tension", "250", "--animate", motion)
+    assert shown.exit_code == 0, shown.output
+    assert "% off at 3 steps" in shown.stdout
+    path = read_path(motion, small_path().arm)
+    assert path.angles is not None
+    assert abs(path.angles[-1] - small_path().angles[-1]).max() < np.deg2rad(0.5)
+    refused = call("track", *files, *options, "--friction", "0.1")
+    assert "has friction" in refused.stderr
+    assert "--true-friction 0" in refused.stderr
+    allowed = [*options, "--friction", "0.05", "--true-friction", "0", "--steps", "1"]
+    assert call("track", *files, *allowed).exit_code == 0
+
+
+def test_without_mujoco_its_extra_is_named(
+    files: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    shown = call("track", *files, "--stiffness", "z=15", "--plant", "mujoco")
+    assert shown.exit_code == 1
+    assert "mujoco is not installed" in shown.stderr
+
+
+@pytest.mark.parametrize("stiffness", ["q=15", "z=stiff", "z", "z=-4", "z=nan", "z=inf", "z=0"])
 def test_wrong_stiffness_is_refused(stiffness: str, files: tuple[Path, Path]) -> None:
     shown = call("track", *files, "--stiffness", stiffness)
     assert shown.exit_code == 2
     assert "--stiffness" in shown.stderr
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "said"),
+    [
+        ("--law", "pid", "no law is called 'pid'"),
+        ("--plant", "gazebo", "'gazebo' is not one of 'slow'"),
+        ("--payload", "nan", "--payload: nan"),
+        ("--payload", "-1", "--payload: -1 kg"),
+        ("--payload-from", "2", "--payload-from: 2 given"),
+        ("--true-rigidity", "0", "--true-rigidity"),
+        ("--true-rigidity", "nan", "--true-rigidity"),
+        ("--true-friction", "-0.1", "--true-friction: -0.1"),
+        ("--encoder", "-1", "--encoder: -0.001 m"),
+        ("--tension-noise", "-1", "--tension-noise: -1 N given; 0, or"),
+        ("--tension-bias", "nan", "--tension-bias: nan"),
+        ("--delay", "-1", "--delay: -1"),
+        ("--steps", "0", "--steps: 0"),
+        ("--period", "-1", "--period: -1 s"),
+        ("--rate", "0", "--rate: 0 N"),
+        ("--bands", "-1", "--bands: -1"),
+        ("--felt", "-1", "--felt: -1"),
+        ("--seed", "-1", "--seed: -1"),
+        ("--max-tension", "5", "--max-tension: 5 N"),
+        ("--out", "run.txt", ".nc, .csv"),
+        ("--animate", "run.mp4", ".gif, .csv"),
+        ("--figure", "run.bmp", ".pdf, .svg, .png"),
+    ],
+)
+def test_each_wrong_option_is_named(
+    option: str, value: str, said: str, files: tuple[Path, Path]
+) -> None:
+    """And no file is written."""
+    shown = call("track", *files, "--stiffness", "z=15", f"{option}={value}")
+    assert shown.exit_code in (1, 2)
+    assert said in " ".join(shown.stderr.replace("│", " ").split())
+    assert sorted(path.name for path in files[0].parent.iterdir()) == ["arm.toml", "path.csv"]
+
+
+def test_path_without_columns_is_named(files: tuple[Path, Path]) -> None:
+    files[1].write_text("a,b\n1,2\n", encoding="utf-8")
+    shown = call("track", *files, "--stiffness", "z=15")
+    assert shown.exit_code == 1
+    assert "path.csv: has columns for neither of joint angles" in shown.stderr
 
 
 def test_target_out_of_range_is_told_before_anything_moves(files: tuple[Path, Path]) -> None:

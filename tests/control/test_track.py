@@ -9,6 +9,7 @@ import pytest
 
 import cdsm
 from cdsm import control
+from cdsm.cli.path_file import read_path
 from tests.support.tracking import WANTED, circle, small_path
 
 BOUNDS: Any = {"minimum": 10.0, "maximum": 250.0}
@@ -32,8 +33,10 @@ def test_same_seed_same_bits() -> None:
         return cdsm.track(small_path(0.1), sensors=sensors, steps=2, bands=0, seed=seed, **BOUNDS)
 
     one, again, other = run(3), run(3), run(4)
-    for field in ("tips", "tension", "measured_tension", "commanded_wire", "stiffness"):
-        np.testing.assert_array_equal(getattr(one, field), getattr(again, field))
+    for field in dataclasses.fields(one):
+        value = getattr(one, field.name)
+        if isinstance(value, np.ndarray):
+            np.testing.assert_array_equal(value, getattr(again, field.name), err_msg=field.name)
     assert (one.measured_tension != other.measured_tension).any()
 
 
@@ -123,6 +126,9 @@ def test_target_that_no_tension_gives_is_named_and_the_last_tensions_are_kept() 
         ({"rate": -1.0}, "rate"),
         ({"tension_controlled": ["cable9"]}, "cable9"),
         ({"seed": -1}, "seed"),
+        ({"bands": -1}, "bands"),
+        ({"felt": 0.5}, "felt"),
+        ({"payload": float("nan")}, "payload"),
     ],
 )
 def test_wrong_arguments_are_refused(wrong: dict[str, object], said: str) -> None:
@@ -139,6 +145,14 @@ def test_plan_with_gaps_is_refused() -> None:
         cdsm.track(broken)
 
 
+def test_payload_that_no_tensions_within_the_bounds_balance_is_named() -> None:
+    plan = small_path()
+    run = cdsm.track(plan, payload=3.0, steps=6, bands=0, minimum=10.0, maximum=150.0)
+    assert run.refused
+    assert any(text.startswith("NOT PLANNED at ") for text in run.warnings)
+    assert (run.commanded_tension <= 150.0).all()
+
+
 # --- the result -----------------------------------------------------------------------------
 
 
@@ -147,7 +161,7 @@ def test_dataset_has_units_and_is_written_whole(tmp_path: Path) -> None:
 
     run = cdsm.track(small_path(0.1), steps=2, **BOUNDS)
     data = run.to_xarray()
-    assert all("units" in data[name].attrs for name in data.data_vars)
+    assert all(data[name].attrs["units"] for name in data.data_vars)
     assert data["time"].attrs["units"] == "s"
     path = run.write(tmp_path / "run.nc")
     with xr.open_dataset(path) as again:
@@ -156,7 +170,29 @@ def test_dataset_has_units_and_is_written_whole(tmp_path: Path) -> None:
     with pytest.raises(cdsm.InvalidInput, match=r"\.nc"):
         run.write(tmp_path / "run.txt")
     assert run.to_dict()["share_inside_band"] == 1.0
-    assert "100 % of 5 steps" in str(run)
+    assert "100 % of 5 proved steps (0 not proved)" in str(run)
+
+
+def test_steps_whose_band_is_not_proved_are_told() -> None:
+    """A long lead and much friction: the law bends too much for a proof at some steps."""
+    plan = small_path(0.3, lead=0.5, target=(1e3, 2e3, 4e3))
+    run = cdsm.track(plan, "feedforward", steps=2, **BOUNDS)
+    numbers = run.to_dict()
+    missing = int((run.banded & ~run.proved).sum())
+    assert run.banded.all()
+    assert 0 < missing < 5
+    assert numbers["steps_without_proof"] == missing
+    assert numbers["share_inside_band"] == 1.0
+    assert f"({missing} not proved)" in str(run)
+    few = cdsm.track(plan, "feedforward", steps=1, bands=2, **BOUNDS)
+    np.testing.assert_array_equal(few.banded, [True, False, True])
+
+
+def test_table_over_time_is_a_path_that_can_be_played(tmp_path: Path) -> None:
+    run = cdsm.track(small_path(), steps=2, **BOUNDS)
+    path = read_path(run.write(tmp_path / "run.csv"), run.plan.arm)
+    assert path.angles is not None
+    np.testing.assert_allclose(path.angles, run.angles, rtol=1e-15)
 
 
 def test_figure_and_animation_are_drawn(tmp_path: Path) -> None:
@@ -166,7 +202,7 @@ def test_figure_and_animation_are_drawn(tmp_path: Path) -> None:
     assert [axes.get_ylabel() for axes in figure.axes] == [
         "tip error [mm]",
         "stiffness [N/mm]",
-        "held by friction [mm]",
+        "off the rest\nwithout friction [mm]",
         "tension [N]",
     ]
     with pytest.raises(cdsm.InvalidInput, match="TrackingRun"):

@@ -12,7 +12,9 @@ WANTED = 4000.0
 
 
 @cache
-def small_path(friction: float = 0.0) -> cdsm.PathPlan:
+def small_path(
+    friction: float = 0.0, lead: float = 0.1, target: float | tuple[float, ...] = 15e3
+) -> cdsm.PathPlan:
     """Two universal joints with the strand of Eq. 19; three samples of a bend."""
     geometry = cdsm.Geometry.universal(
         joints=2,
@@ -22,11 +24,11 @@ def small_path(friction: float = 0.0) -> cdsm.PathPlan:
         disk_offset=0.012,
         hole_radius=0.02,
         link_mass=0.05,
-        lead=0.1,
+        lead=lead,
     )
     arm = cdsm.Manipulator(geometry, presets.STRAND_1X19).with_friction(friction)
     angles = np.deg2rad([[6.0, -4.0, 5.0, 3.0], [7.0, -3.0, 6.0, 3.0], [8.0, -2.0, 7.0, 3.0]])
-    return cdsm.plan_path(arm, "z", 15e3, 10.0, 250.0, angles=angles, progress=False)
+    return cdsm.plan_path(arm, "z", target, 10.0, 250.0, angles=angles, progress=False)
 
 
 @cache

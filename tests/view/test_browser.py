@@ -12,9 +12,11 @@ import numpy as np
 import pytest
 
 import cdsm
+from cdsm.cli.path_file import read_path
 from cdsm.support.values import Array
 from cdsm.view import View, serve
 from tests.support.patience import HANGS
+from tests.support.tracking import small_path
 from tests.view.test_view import (
     DEGREES,
     INFEASIBLE,
@@ -393,6 +395,23 @@ def test_a_path_is_played_in_the_browser(browser: Any) -> None:
             own.says(name, text)
         own.page.get_by_role("button", name="Play").wait_for(timeout=PATIENCE)
         assert view._guard.refused == 0
+        own.page.close()
+
+
+@needs_viser
+def test_the_motion_of_a_closed_loop_is_played(browser: Any, tmp_path: Path) -> None:
+    """What `cdsm track --animate RUN.csv` writes, as `cdsm view --path RUN.csv` reads it."""
+    run = cdsm.track(small_path(), steps=2, minimum=10.0, maximum=250.0)
+    motion = read_path(run.write(tmp_path / "run.csv"), run.plan.arm).angles
+    with serve(run.plan.arm, port=0, minimum=10.0, angles=motion) as view:
+        own = Page(browser, view.url)
+        own.page.get_by_role("button", name="Play").click()
+        last = np.rad2deg(run.angles[-1]).tolist()
+        for name, text in answers(view.arm, last, 10.0).items():
+            own.says(name, text)
+        np.testing.assert_allclose(view.shown.setting.q, run.angles[-1], atol=1e-6)
+        assert view._guard.refused == 0
+        own.picture("view-closed-loop.png")
         own.page.close()
 
 
