@@ -1,1 +1,1 @@
-"""An arm as one TOML file: its robot, its cables and their wires, gravity."""
+"""Arms as TOML files: robot, cables, wires, gravity, tolerances."""

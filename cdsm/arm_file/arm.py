@@ -16,7 +16,7 @@ from cdsm.arm_file.cables import (
     cable_lines,
     read_routed,
     setting_lines,
-    today,
+    with_current_keys,
 )
 from cdsm.arm_file.tolerances import from_table, tolerance_lines
 from cdsm.arm_file.wires import CableKeys, CableSettings, read_wires, wire_entries
@@ -65,7 +65,7 @@ class _Urdf:
 
 @record
 class _Keys(CableKeys):
-    """All keys at the top of a file. Values of type Any are checked by their own readers."""
+    """Top-level keys of an ARM.toml. Fields of type Any are checked by their own readers."""
 
     gravity: Annotated[tuple[_G, _G, _G], Field(strict=False)] = GRAVITY
     original_length: OriginalLength = "unstrained"
@@ -95,7 +95,7 @@ def read_arm(path: str | os.PathLike[str], wire: Wire | None) -> ArmParts:
     data = attempt(read_toml, text)
     if data is None:
         raise FileError(path, faults[0])
-    described, rest = split_geometry(today(data))
+    described, rest = split_geometry(with_current_keys(data))
     keys = attempt(parse, _Keys, rest)
     geometry = robot = routed = wires = cables = tolerances = None
     if "urdf" not in rest:
@@ -135,7 +135,7 @@ def _tolerances(given: object) -> Tolerances:
 
 
 def _routed(cables: object, geometry: Geometry | None) -> list[Routed]:
-    """Return the paths of the cables: of ``[[cables]]``, or of the geometry with settings."""
+    """Return the cables of ``[[cables]]``, or those of the geometry with their settings."""
     if geometry is None or isinstance(cables, list):
         return read_routed(cables)
     tables = {} if cables is None else cables
@@ -198,7 +198,7 @@ def _geometry_lines(geometry: Geometry) -> list[str]:
 
 
 def _urdf_lines(parts: ArmParts) -> list[str]:
-    """Return the lines of a table [urdf] with the text inside, readable if TOML can hold it so."""
+    """Return the lines of a table [urdf] with the URDF text, unescaped where TOML allows it."""
     urdf, lines = parts.urdf, ["[urdf]", f"tip = {toml_value(parts.tip)}"]
     lines.append(f"joint_names = {toml_value(parts.joint_names)}")
     try:

@@ -97,7 +97,8 @@ def read_cables(path: str | os.PathLike[str], wire: Wire | None = None) -> tuple
 
     Args:
         path: The file.
-        wire: Wire of all cables, in the place of the file's: a law, a name, EA [N], or a WIRE.toml.
+        wire: Wire of all cables, instead of the wires in the file: a law, a name, EA [N], or a
+            WIRE.toml.
 
     Raises:
         FileError: The file cannot be read or does not describe cables. Every fault is listed.
@@ -106,7 +107,7 @@ def read_cables(path: str | os.PathLike[str], wire: Wire | None = None) -> tuple
     text = read_text(path)
     forced = None if wire is None else as_wire(wire)
     try:
-        keys = parse(CableKeys, today(read_toml(text)))
+        keys = parse(CableKeys, with_current_keys(read_toml(text)))
         wires = read_wires(keys, forced)
         return build_cables(read_routed(keys.cables), keys, wires, path)
     except GeometryError as error:
@@ -114,8 +115,8 @@ def read_cables(path: str | os.PathLike[str], wire: Wire | None = None) -> tuple
     raise FileError(path, f"cannot be read as cables, {counted(faults)}")
 
 
-def today(data: dict[str, Any]) -> dict[str, Any]:
-    """Return the data of a file with the keys of today in the place of older ones."""
+def with_current_keys(data: dict[str, Any]) -> dict[str, Any]:
+    """Return the data of a file with older keys replaced by the current ones."""
     if "elasticities" in data:
         data["wires"] = data.pop("elasticities")
     cables = data.get("cables")
@@ -126,11 +127,11 @@ def today(data: dict[str, Any]) -> dict[str, Any]:
 
 
 _ANY = LinearElasticity(1.0)
-"""Stands for a wire that is missing, until all other faults of the file are known."""
+"""Placeholder for a missing wire, so that all other faults of the file are found first."""
 
 
 class Routed(NamedTuple):
-    """A cable before its wire is known: where it stands in the file, its path and its settings."""
+    """A cable without its wire: its key in the file, its path and its own settings."""
 
     where: str
     name: str
@@ -160,7 +161,7 @@ def read_routed(cables: object) -> list[Routed]:
 
 
 def _sites(entry: _Entry) -> tuple[Site, ...]:
-    """Build the sites of a cable; holes without a friction of their own have that of the cable."""
+    """Build the sites of a cable; the friction of the cable is the default for its holes."""
     passed = range(0 if entry.lead > 0.0 else 1, len(entry.sites) - 1)
     sites = []
     for i, site in enumerate(entry.sites):
@@ -173,7 +174,7 @@ def _sites(entry: _Entry) -> tuple[Site, ...]:
 def build_cables(
     routed: Iterable[Routed], settings: CableSettings, wires: Wires, path: str | os.PathLike[str]
 ) -> tuple[Cable, ...]:
-    """Build cables with their own settings, and with those of all cables where they have none.
+    """Build the cables. ``settings`` apply to every cable that does not have its own.
 
     Raises:
         GeometryError: Some settings are faulty; lists every fault.

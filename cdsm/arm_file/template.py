@@ -1,4 +1,4 @@
-"""A new ARM.toml with a comment on every key, complete and ready to run."""
+"""Text of a new, complete ARM.toml with a comment on every key."""
 
 from __future__ import annotations
 
@@ -88,8 +88,8 @@ def template(
         name: Name of the file.
         wire: Name of a wire, or EA [N].
         gravity: Gravity in base axes [m/s²].
-        sections: One arm, or the sections of one: ``"universal"`` or ``"hinged"``, and the keywords
-            of this constructor.
+        sections: For each section of the arm (one for a simple arm): ``"universal"`` or
+            ``"hinged"``, and the keywords of this constructor of :class:`Geometry`.
     """
     lines = [
         _HEAD.format(

@@ -18,7 +18,7 @@ from cdsm.wires.files import from_table, table_of
 
 @record
 class CableSettings:
-    """Settings of all cables or of one cable in a file; None if the file does not have one."""
+    """Settings in a file, of all cables or of one cable; None where the file has none."""
 
     wire: Any = None
     series_stiffness: SpringStiffness | None = None
@@ -29,7 +29,7 @@ class CableSettings:
 
 @record
 class CableKeys(CableSettings):
-    """Keys at the top of a file. Values of type Any are checked by their own readers."""
+    """Top-level keys of a file. Fields of type Any are checked by their own readers."""
 
     wires: Any = Field(default_factory=dict)
     cables: Any = None
@@ -40,14 +40,14 @@ SETTINGS = ("series_stiffness", "control", "minimum", "maximum")
 
 
 class Wires(NamedTuple):
-    """The wires of a file: laws by name, of all cables, and the law that replaces any other."""
+    """The laws of a file: by name, the default of all cables, and one that replaces all others."""
 
     named: dict[str, Elasticity]
     usual: Elasticity | None
     forced: Elasticity | None
 
     def of(self, given: object) -> Elasticity | None:
-        """Return the law of a cable whose key ``wire`` is given, or None if it has no wire."""
+        """Return the law of a cable whose key ``wire`` is ``given``; None if it has no wire."""
         own = None if given is None else read_wire(given, self.named)
         return self.forced or own or self.usual
 
@@ -74,7 +74,7 @@ def read_wires(keys: CableKeys, forced: Elasticity | None) -> Wires:
 
 
 def read_wire(given: object, named: Mapping[str, Elasticity], key: str = "wire") -> Elasticity:
-    """Read a name, EA [N] or the table of a law; raise GeometryError with faults at ``key``."""
+    """Return the law for a name, EA [N] or a table; GeometryError names its faults and ``key``."""
     try:
         if isinstance(given, dict):
             return from_table(given)

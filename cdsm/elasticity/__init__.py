@@ -1,7 +1,7 @@
 """Elasticity of the cable material: axial rigidity EA [N] as a function of tension [N].
 
 A cable of unstretched length l_0 under tension F has the stiffness dF/dL = EA(F)/l_0. EA is the
-*tangent* rigidity. This chapter is independent of the robot; :mod:`cdsm.wires` has more laws.
+*tangent* rigidity. This package is independent of the robot; :mod:`cdsm.wires` has more laws.
 """
 
 from cdsm.elasticity.domain import Domain as Domain

@@ -18,12 +18,12 @@ from cdsm.support.values import Array
 @final
 @dataclass(frozen=True)
 class Domain:
-    """Range of tensions [N] on which an elasticity is defined; iterates as (low, high).
+    """Range of tensions [N] on which an elasticity is defined; ``low, high = domain`` unpacks it.
 
     Attributes:
         low: Smallest tension [N].
         high: Largest tension [N], included unless infinite.
-        low_included: Whether ``low`` belongs to the domain.
+        low_included: Whether ``low`` itself belongs to the domain.
 
     Raises:
         InvalidInput: Not two numbers with 0 <= low < high, or ``low_included`` is not a bool.

@@ -1,4 +1,4 @@
-"""Tensions at which a rising function, such as the strain of a law, has wanted values."""
+"""Inverse of a rising function of the tension, such as the strain of a law."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ def tension_at(
     """Find the tensions F [N] at which a rising function stretch(F) has the wanted values.
 
     ``wanted`` is a strain [-] or an elongation [m] of any shape; the error calls it ``name``.
-    ``stretch`` is zero or less at the low end of ``domain``, and ``slope`` is its derivative. If no
-    tension of the domain gives one of the values, ElasticityRangeError is raised.
+    ``stretch`` is zero or less at the low end of ``domain``, and ``slope`` is its derivative.
+    ElasticityRangeError is raised if a wanted value is not reached in the domain.
     """
     low, high, most = *domain, RANGES["tension"].high
     if math.isinf(high):  # an unbounded law: search only as far as needed

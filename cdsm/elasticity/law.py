@@ -29,9 +29,9 @@ class Elasticity(ABC):
     """Axial elasticity of a cable. All methods take any shape and return the same shape.
 
     A user-defined law must define :attr:`domain`, :meth:`rigidity`, :meth:`strain` and
-    :meth:`energy`. The rigidity must be positive and continuous; its slope may jump.
-    :class:`~cdsm.Manipulator` samples the rigidity and refuses a law if it finds a jump of more
-    than 0.01 %.
+    :meth:`energy`. The rigidity must be positive and continuous; its slope may be
+    discontinuous. :class:`~cdsm.Manipulator` samples the rigidity and raises an error if it finds a
+    discontinuity of more than 0.01 %.
     """
 
     @property
@@ -75,13 +75,13 @@ class Elasticity(ABC):
     def slack_below(self) -> Elasticity:
         """Return this law with a slack branch: it is continued down to zero tension.
 
-        Below the low end F_0 of this law, EA keeps its value EA(F_0), so it stays continuous and
-        positive. Strains count from F_0 as before, so answers within the law stay the same. Below
-        it ε = (F − F_0)/EA(F_0) is negative. The cable is slack at ε = −F_0/EA(F_0), and below.
+        Below the low end F_0 of this law, EA is constant, EA(F_0), so it stays continuous and
+        positive. The strain is still zero at F_0, so nothing changes above F_0. Below F_0,
+        ε = (F − F_0)/EA(F_0) is negative. The cable is slack at ε = −F_0/EA(F_0) and below.
 
         The branch is an assumption; no tensile test has measured it. The strand of Eq. 19 has
-        EA = 16.4 N from 2.2 N down and is slack after shortening by 13 %: it is that soft where
-        its polynomial begins. A law that begins at zero is returned as it is.
+        EA = 16.4 N below 2.2 N and is slack after shortening by 13 %, since its polynomial is that
+        soft at 2.2 N. A law whose domain contains zero is returned unchanged.
 
         Raises:
             InvalidInput: The wire would be shorter than half its length when it is slack.
@@ -137,7 +137,7 @@ class Elasticity(ABC):
 
     @abstractmethod
     def strain(self, tension: ArrayLike) -> Array:
-        """Compute the strain Δl/l_0 = ∫ dF/EA(F) [-] from :attr:`rest`, the domain's low end.
+        """Compute the strain Δl/l_0 = ∫ dF/EA(F) [-], the integral from :attr:`rest` to F.
 
         Args:
             tension: F [N], any shape.
@@ -150,7 +150,7 @@ class Elasticity(ABC):
     def energy(self, tension: ArrayLike) -> Array:
         """Compute the elastic energy ∫ F dε = ∫ F dF/EA(F) [N] = [J/m] per unstretched metre.
 
-        It starts at :attr:`rest`, like :meth:`strain`.
+        It is zero at :attr:`rest`, like :meth:`strain`.
 
         Args:
             tension: F [N], any shape.
@@ -163,11 +163,11 @@ class Elasticity(ABC):
         """Compute the tension F [N] at a strain: the inverse of :meth:`strain`.
 
         Args:
-            strain: Δl/l_0 [-] from :attr:`rest`, any shape.
+            strain: Δl/l_0 [-], zero at :attr:`rest`; any shape.
 
         Raises:
             InvalidInput: ``strain`` is not numbers.
-            ElasticityRangeError: No tension of the domain gives one of the strains.
+            ElasticityRangeError: For a strain there is no tension in the domain.
         """
         wanted = number_array("strain", strain)
         return tension_at(
@@ -177,7 +177,7 @@ class Elasticity(ABC):
     def secant_rigidity(self, tension: ArrayLike) -> Array:
         """Compute the secant rigidity ΔF/(Δl/l_0) [N] of Eq. 18 from :attr:`rest`.
 
-        It equals :meth:`rigidity` there, and everywhere if EA is constant. Argument and
+        At :attr:`rest` it equals :meth:`rigidity`; if EA is constant, everywhere. Argument and
         errors are those of :meth:`rigidity`.
         """
         values = self.domain.check(tension)

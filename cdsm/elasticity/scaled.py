@@ -1,4 +1,4 @@
-"""Any law with its rigidity times a factor."""
+"""A law whose rigidity is that of another law, times a factor."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from cdsm.support.values import Array
 @final
 @dataclass(frozen=True)
 class ScaledElasticity(Elasticity):
-    """Another law with its rigidity times a factor: EA(F) = factor · EA_law(F)."""
+    """Law with the rigidity of another law, times a factor: EA(F) = factor · EA_law(F)."""
 
     law: Elasticity
     factor: float
@@ -38,5 +38,5 @@ class ScaledElasticity(Elasticity):
         return self.law.strain(tension) / self.factor
 
     def energy(self, tension: ArrayLike) -> Array:
-        """Compute ∫ T dε [N] at tensions [N]."""
+        """Compute ∫ F dε [N] at tensions F [N]."""
         return self.law.energy(tension) / self.factor

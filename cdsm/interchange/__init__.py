@@ -1,1 +1,1 @@
-"""Cable files, and files of other programs: MuJoCo and CASPR."""
+"""Files of other programs: export to MuJoCo, import from CASPR."""

@@ -133,7 +133,7 @@ def _read_cables(
 
 
 def _unique(name: str, used: dict[str, int]) -> str:
-    """Number a name that is used already. Update the highest number of each name in ``used``."""
+    """Return the name, numbered if it is in ``used`` (highest number of each name); update it."""
     label, count = name, used.get(name, 1)
     while label in used:
         count += 1
@@ -182,7 +182,7 @@ def _cable(
 
 
 def _urdf(name: str, bodies: Sequence[Body]) -> str:
-    """Write the URDF text. ``tool0`` is at the end of the last link."""
+    """Return the URDF text. ``tool0`` is at the end of the last link."""
     links, joints = [E.link(name=BASE)], []
     names = [BASE, *(body.name for body in bodies)]
     for body in bodies:

@@ -65,11 +65,11 @@ class Body:
         joints: The single joints, in order from the parent.
         joint_names: Names of the single joints, in the order of CASPR's coordinates.
         parent: Number of the parent link.
-        place: Position of the joint on the parent (3,) [m].
+        place: Position of the joint in the frame of the parent (3,) [m].
         mass: Mass [kg].
-        centre: Centre of mass, from the joint (3,) [m].
+        centre: Centre of mass in the frame of the link (3,) [m].
         inertia: Inertia about the centre of mass (3, 3) [kg m²].
-        end: End of the link (3,) [m].
+        end: End of the link in its frame (3,) [m].
     """
 
     number: int
@@ -208,7 +208,7 @@ def refuse(path: Path, faults: Sequence[str]) -> None:
 
 
 def read_root(path: Path, tag: str, template: str) -> etree._Element:
-    """Read the root element of a file."""
+    """Read the root element ``tag`` of a file; its DOCTYPE may name CASPR's ``template``."""
     try:
         return parse_xml(read_text(path), tag, _TEMPLATE.format(template))
     except XmlFault as error:

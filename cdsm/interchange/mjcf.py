@@ -5,8 +5,8 @@ cable has its tangent stiffness k there. Its rest length gives the tension F:
 
     F = k (L − L_rest),    L_rest = L(q) − F/k
 
-Below L_rest the cable is slack. With constant EA that is all there is, and the model is exact
-everywhere. Otherwise the elasticity would change away from the posture.
+Below L_rest the cable is slack. With constant EA, the model is exact at every posture. Otherwise k
+of the real cable changes with its tension.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ _CONTROLS = {
 
 @dataclass(frozen=True)
 class MuJoCoModel:
-    """MJCF text with what was chosen for it."""
+    """MJCF text, and the settings that were chosen for it."""
 
     text: str
     motion: Motion
@@ -78,16 +78,16 @@ def to_mjcf(
     model does not contain the wrench: give it to MuJoCo at run time (``xfrc_applied`` acts at the
     centre of mass of a link).
 
-    The model starts at the posture: ``mjData`` has it when it is made, and so has the keyframe
-    ``pose``. The joint coordinates are those of cdsm. What pulls the cables is one of
+    The model starts at the posture: a new ``mjData`` has its joint coordinates, and so has the
+    keyframe ``pose``. The joint coordinates are those of cdsm. ``actuators`` is one of
 
     - ``length``: one motor per cable holds its original length, as in :func:`~cdsm.equilibrium`.
       Its force is k (u + L_rest − L), never a push. Its ``ctrl`` u is the length of wire that it
       pays out [m]; u = 0 holds the posture. A force-controlled cable keeps F; there u is tension
       added to F [N].
-    - ``tension``: one motor per cable pulls with the tension ``ctrl`` [N]. The keyframe has F, and
-      ``mjData`` begins with none. The cables add no stiffness: most arms are unstable then, and
-      need a controller.
+    - ``tension``: one motor per cable pulls with the tension ``ctrl`` [N]. The keyframe has F; in a
+      new ``mjData``, ``ctrl`` is zero. The cables add no passive stiffness: most arms are then
+      unstable and need a controller.
     - ``none``: each cable is a spring of stiffness k and rest length L_rest. Springs softer than
       F/L would need a negative rest length; they are motors without ``ctrl``, and so are
       force-controlled cables.
@@ -100,7 +100,7 @@ def to_mjcf(
     Damping: the cables damp with c = β k [N s/m]. A mode has the ratio ζ = β (J_L φ)ᵀ k (J_L φ)/2ω,
     about β ω/2. β gives the least damped mode the ``damping_ratio``, mostly the lowest one; all
     others settle as fast or faster. Modes with less than half of their ω² from the cables do not
-    count and are damped less. The comment in the file says from which ratio to which.
+    count and are damped less. A comment in the file gives the range of the ratios.
 
     A comment at the top states time step, damping and actuators. If K_θ is not positive definite,
     the model leaves the posture by itself. Then the comment says UNSTABLE, a warning is issued, and
@@ -168,7 +168,7 @@ def mujoco_model(
     damping_ratio: float | None = None,
     damping: float | None = None,
 ) -> MuJoCoModel:
-    """Build the model of :func:`to_mjcf`, with what was chosen for it."""
+    """Build the model of :func:`to_mjcf`, with the settings that were chosen for it."""
     instance("arm", arm, Manipulator)
     if (pose is None) != (tension is None):
         raise InvalidInput("tension", "give pose and tension, or neither; one says nothing alone.")
@@ -230,7 +230,7 @@ def _checked(name: str, value: float | None) -> float | None:
 
 
 def _missing(K: Stiffness) -> Iterator[str]:
-    """Say why the model leaves its posture although K_θ is stable: load or tensions are missing."""
+    """Yield lines that say why the model leaves its posture: a load, or torque is missing."""
     if K.wrench.any():
         load = f"{coordinates(K.wrench[:3])} N, {coordinates(K.wrench[3:])} N m"
         yield f"load       {load} is not in the model: apply it to {K.posture.arm.tip_link}"
@@ -240,7 +240,7 @@ def _missing(K: Stiffness) -> Iterator[str]:
 
 
 def _without_motors(K: Stiffness) -> Stiffness:
-    """Return K_θ of the same tensions held by force: no cable adds passive stiffness."""
+    """Return K_θ if motors control the same tensions: no cable adds passive stiffness."""
     arm = K.posture.arm
     free = arm.with_cables([replace(cable, control="force") for cable in arm.cables])
     return stiffness(free.at(K.posture.q, check_limits=False), K.tension, wrench=K.wrench)
@@ -252,7 +252,7 @@ def _without_motors(K: Stiffness) -> Stiffness:
 def _cables(
     root: etree._Element, arm: Manipulator, K: Stiffness | None, actuators: str, damping: Array
 ) -> list[float]:
-    """Add the tendons and what pulls them. Return the ``ctrl`` of the motors at the posture."""
+    """Add the tendons and their actuators. Return ``ctrl`` of the motors at the posture."""
     tendon, motors = etree.SubElement(root, "tendon"), etree.Element("actuator")
     at_start = []
     for c, cable in enumerate(arm.cables):

@@ -27,14 +27,14 @@ _ROUNDING = 1e-9
 _JOINTS = {"revolute": "hinge", "prismatic": "slide"}
 _SITE = 1e-3  # radius [m] of a drawn hole
 _STICK = 0.008  # radius of a stick over the length of the arm
-_GHOST = {"contype": "0", "conaffinity": "0", "mass": "0"}  # drawn, but neither heavy nor touched
+_GHOST = {"contype": "0", "conaffinity": "0", "mass": "0"}  # drawn, without mass or contacts
 
 
 def add_bodies(root: etree._Element, arm: Manipulator, start: Mapping[str, float]) -> list[Carried]:
     """Add the tree of links, its joints at the coordinates ``start`` [rad, m]; return its masses.
 
     MuJoCo's ``ref`` is the coordinate of a joint in the configuration in which the file places the
-    bodies: joints turn by qpos − ref. So ``mjData`` begins there.
+    bodies: a joint is moved by qpos − ref. So a new ``mjData`` starts there.
     """
     robot = parse_xml(arm.urdf, "robot")
     links = {str(link.get("name")): link for link in robot.findall("link")}
@@ -126,7 +126,7 @@ def _inertia(inertia: etree._Element, R: Array) -> Array:
 
 
 def _shape(body: etree._Element, visual: etree._Element) -> bool:
-    """Draw a cylinder, box or sphere; return whether it is one. Meshes are separate files."""
+    """Draw a cylinder, box or sphere; return False for other shapes. Meshes are separate files."""
     shape = visual.find("geometry/*")
     if shape is None or shape.tag not in ("cylinder", "box", "sphere"):
         return False
@@ -156,7 +156,7 @@ def _sticks(
 
 
 def _placed(element: etree._Element, kind: str | None = None, start: float = 0.0) -> dict[str, str]:
-    """Return place and turn of an origin, of a joint at the coordinate ``start``."""
+    """Return pos and quat of an origin; a joint of a ``kind`` is moved to ``start`` [rad or m]."""
     place, turn = _origin(element)
     if kind is not None and start:
         axis = _axis(element) / np.linalg.norm(_axis(element))

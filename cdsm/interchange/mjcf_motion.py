@@ -14,10 +14,10 @@ from cdsm.support.format import JointUnits
 from cdsm.support.values import Array
 
 DAMPING_RATIO = 0.05
-"""Default damping of the least damped mode, as a part of critical damping."""
+"""Default damping ratio of the least damped mode [-]."""
 
 _SHARE = 0.5
-"""Least part of ω² from the wires, for a mode that they are to damp."""
+"""Least share of ω² from the cables, for modes that count for the damping."""
 
 _DEFAULT_STEP = 2e-3  # MuJoCo's own time step [s]
 
@@ -42,10 +42,11 @@ def choose_motion(
     ratio: float | None,
     damping: float | None,
 ) -> Motion:
-    """Choose the time step for the fastest motion, and the damping.
+    """Choose the time step for the highest natural frequency, and the damping.
 
-    Without a ``damping`` of the joints, the wires damp: c = β k. β gives the least damped mode its
-    ``ratio``. Joint dampers as strong would hold the slow motions of a long arm back tenfold.
+    If ``damping`` of the joints is None, the cables damp with c = β k; β gives the least damped
+    mode the ``ratio``. Joint dampers that damp this mode as much would slow down the slow motions
+    of a long arm tenfold.
     """
     wires, joints = np.zeros(len(arm.cables)), damping or 0.0
     step, reason = _DEFAULT_STEP, "MuJoCo's own"

@@ -3,8 +3,8 @@
     K_θ = H_L·F + J_Lᵀ K_L J_L + ∂g/∂θ − ∂(J_Xᵀ W)/∂θ                          (Eq. 16)
           active   passive       gravity   load
 
-``assembly`` computes it, ``value`` holds it, ``cartesian`` has what is read off it at the
-tip, ``shares`` what each cable contributes, and ``prints`` its table and its numbers for JSON.
+The module ``assembly`` computes K_θ, and ``value`` is the result. ``cartesian`` computes the
+stiffness at the tip, ``shares`` the contribution of each cable, ``prints`` tables and JSON.
 """
 
 from cdsm.stiffness_matrix.assembly import assemble as assemble

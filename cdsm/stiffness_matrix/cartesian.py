@@ -1,4 +1,4 @@
-"""Cartesian stiffness: readings of K_θ at the tip.
+"""Cartesian stiffness at the tip, computed from K_θ.
 
 The paper maps K_θ to Cartesian space with J_X⁻¹, which does not exist for a redundant arm. "The
 stiffness in x" then has three different meanings. Each meaning has a name here:
@@ -34,7 +34,7 @@ _NO_DIRECTIONS = frozen(np.zeros((0, 3)))
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CartesianReadings(ReadOnlyState):
-    """Readings of K_θ and its terms at the tip of an arm; :class:`~cdsm.Stiffness` has them.
+    """Stiffness and compliance at the tip; base class of :class:`~cdsm.Stiffness`.
 
     Attributes:
         posture: The posture.
@@ -54,7 +54,7 @@ class CartesianReadings(ReadOnlyState):
 
     @cached_property
     def compliance(self) -> Array:
-        """Compliance C = J_X K_θ⁻¹ J_Xᵀ (6, 6): tip motion per wrench, as the real arm moves.
+        """Compliance C = J_X K_θ⁻¹ J_Xᵀ (6, 6): tip motion per wrench at the tip.
 
         Linear rows first: C_vv [m/N], C_vω [m/(N m)] = [rad/N], C_ωω [rad/(N m)].
 
@@ -67,9 +67,9 @@ class CartesianReadings(ReadOnlyState):
 
     @cached_property
     def cartesian(self) -> Array:
-        """Matrix (C_vv)⁻¹ (3, 3) [N/m]: force per tip displacement, while the tip may rotate.
+        """Matrix (C_vv)⁻¹ (3, 3) [N/m]: force per tip displacement, with the tip free to rotate.
 
-        A diagonal entry is the stiffness while the other two translations are *held*. It is never
+        A diagonal entry is the stiffness if the other two translations are *locked*. It is never
         less than :meth:`along`, and often several times larger.
 
         Raises:
@@ -81,9 +81,9 @@ class CartesianReadings(ReadOnlyState):
         return frozen(found["cartesian"].reshape(3, 3))
 
     def cartesian_in(self, directions: Iterable[Direction]) -> Array:
-        """Compute (U C_vv Uᵀ)⁻¹ (n, n) [N/m]: force per tip displacement in a plane or along lines.
+        """Compute (U C_vv Uᵀ)⁻¹ (n, n) [N/m]: force per tip displacement in some directions only.
 
-        For planar arms, whose tip moves in the plane of U only: their stiffness in this plane.
+        It is for planar arms: their tip cannot leave a plane, so :attr:`cartesian` does not exist.
 
         Args:
             directions: U, n orthogonal directions in base axes: names as ``("x", "z")``, or (n, 3).
@@ -161,14 +161,14 @@ class CartesianReadings(ReadOnlyState):
 
     @cached_property
     def _parts(self) -> Array:
-        """Sum of the magnitudes of the four terms (nv, nv) [N m/rad]."""
+        """Sum of the magnitudes of the four terms (nv, nv) [N m/rad]: scale of rounding errors."""
         parts = abs(self.active) + abs(self.passive) + abs(self.gravity) + abs(self.load)
         return frozen(parts)
 
     def _read(
         self, matrix: Array, name: str, directions: Array = _NO_DIRECTIONS
     ) -> tuple[int, dict[str, Array]]:
-        """Return the status and a reading of K_θ, or of one of its terms."""
+        """Return the status and the quantity ``name``, computed from K_θ or one of its terms."""
         status = np.full((1, 1), readings.READ)
         K, parts, JX = (
             each[None, :, :, None] for each in (matrix, self._parts, self.posture.jacobian)
@@ -177,7 +177,7 @@ class CartesianReadings(ReadOnlyState):
         return int(status[0, 0]), found
 
     def _refuse(self, status: int, what: str = "") -> None:
-        """Raise an error if a reading does not exist; a named reading also needs a mobile tip."""
+        """Raise SingularStiffness unless the status is READ; ``what`` also needs a mobile tip."""
         if status == readings.READ:
             return
         if what and self._read(self.joint, "pseudoinverse")[0] == readings.IMMOBILE:

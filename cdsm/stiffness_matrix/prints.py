@@ -1,4 +1,4 @@
-"""A stiffness for people and for JSON: its printed table, the notes below it, its numbers."""
+"""Text and JSON of a stiffness: the printed table, the notes below it, the numbers."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def table(K: Stiffness) -> list[tuple[str, ...]]:
 
 
 def _cartesian_entry(K: Stiffness, i: int) -> float:
-    """Return a diagonal entry of ``cartesian``, or of that of the axes that can move [N/m]."""
+    """Return a diagonal entry of ``cartesian``, or of the matrix for the mobile axes [N/m]."""
     try:
         return float(K.cartesian[i, i])
     except SingularStiffness:
@@ -57,7 +57,7 @@ def _cartesian_entry(K: Stiffness, i: int) -> float:
 
 
 def notes(K: Stiffness) -> tuple[str, ...]:
-    """Return the lines below the table: why entries are missing; whether the arm is stable."""
+    """Return the lines below the table: reasons of missing entries, and the stability."""
     try:
         _ = K.cartesian
         missing = []
@@ -85,7 +85,7 @@ def model_of(K: Stiffness) -> str:
 
 
 def numbers(K: Stiffness) -> dict[str, object]:
-    """Return :meth:`Stiffness.to_dict`."""
+    """Return the numbers of :meth:`Stiffness.to_dict`."""
 
     def read(reading: Callable[[], object]) -> object:
         try:

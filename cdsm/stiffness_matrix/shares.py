@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from cdsm.stiffness_matrix import Stiffness
 
 _ROUNDING = 1e-15
-"""Contributions below this part of the total are printed as zero."""
+"""Contributions below this fraction of the total are printed as zero."""
 
 
 @final
@@ -28,7 +28,7 @@ class Shares(ReadOnlyState):
     """Contributions to the stiffness in one direction; their sum is :attr:`total`.
 
     Attributes:
-        stiffness: The stiffness that is divided.
+        stiffness: The stiffness from which they are computed.
         direction: The unit direction (3,), base axes.
         passive: Contribution of each cable's elasticity, (C,) [N/m].
         active: Contribution of each cable's tension, (C,) [N/m]; mostly negative.

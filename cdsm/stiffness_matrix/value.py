@@ -1,4 +1,4 @@
-"""The stiffness of an arm as a frozen value: K_θ with its four terms, and its readings."""
+"""The stiffness of an arm as a frozen value: K_θ with its four terms."""
 
 from __future__ import annotations
 
@@ -40,11 +40,12 @@ class Stiffness(CartesianReadings):
         posture: The posture.
         tension: F (C,) [N].
         wrench: W (6,): force [N], then moment [N m].
-        cable_stiffness: Diagonal of K_L (C,) [N/m]; 0 for force-controlled cables. It is that of
-            the whole cable, without friction.
+        cable_stiffness: Diagonal of K_L (C,) [N/m], of whole cables without friction; 0 for
+            force-controlled cables.
         active: H_L·F (nv, nv) [N m/rad]; also called geometric.
         passive: J_Lᵀ K_L J_L (nv, nv) [N m/rad]; also called material or elastic. With friction it
-            is Σ g_j ∂T_j/∂θ over the segments; it is not symmetric if cables slide.
+            is Σ_j (∂l_j/∂θ)ᵀ ∂T_j/∂θ over the segments j of length l_j and tension T_j; it is not
+            symmetric if cables slide.
         gravity: ∂g/∂θ (nv, nv) [N m/rad].
         load: −∂(J_Xᵀ W)/∂θ (nv, nv) [N m/rad]; not symmetric if W has a moment.
         joint: K_θ, sum of the four terms (nv, nv) [N m/rad]: row torque, column angle.
@@ -52,8 +53,8 @@ class Stiffness(CartesianReadings):
             reference posture; None if the motors are locked at this posture.
         distribution: The :class:`~cdsm.Tension` that gave the tensions; None for tensions as an
             array.
-        friction: ``"frictionless"``; ``"stuck"``, if the holes with friction hold their cables; or
-            ``"sliding"``, if cables slide in some of them.
+        friction: ``"frictionless"``; ``"stuck"``: the cables stick in all holes with friction;
+            ``"sliding"``: they slide in some of them.
         segment_tension: T (S,) [N] of the segments of :attr:`Posture.segments`; None if
             frictionless.
         tension_gradient: ∂T/∂θ (S, nv) [N/rad] of these segments; None if frictionless.
@@ -72,8 +73,9 @@ class Stiffness(CartesianReadings):
     def free_lengths(self) -> Array:
         """Original lengths l_0 (C,) [m] of the wires, as used in :attr:`cable_stiffness`.
 
-        The locked motors hold l_0 = (L − ΔF/k_series)/(1 + ε(F)). It is negative if the series
-        spring stretches by more than the length of the cable. For a force-controlled cable it is L.
+        The locked motors keep l_0 = (L − ΔF/k_series)/(1 + ε(F)) constant; symbols as in
+        :class:`Cable`. It is negative if the series spring stretches by more than the length of the
+        cable. For a force-controlled cable it is L.
         """
         if self.free_length is not None:
             return self.free_length
@@ -147,12 +149,13 @@ class Stiffness(CartesianReadings):
 
     @cached_property
     def remedies(self) -> tuple[Remedy, ...]:
-        """Changes that would each hold an unstable arm here; empty for a stable arm.
+        """Changes that would make an unstable arm stable, each alone; empty for a stable arm.
 
-        Wires and series springs made stiffer, other lower bounds of the tensions, other disk
-        offsets: for each the factor at which the smallest eigenvalue of K_θ is zero, found by a
-        bracketed root. The posture and the wrench stay. Tensions of your own are not distributed
-        again: for them only wires and springs are tried. Some tenths of a second.
+        They are stiffer wires, stiffer series springs, other lower bounds of the tensions, or other
+        disk offsets. For each, the factor at which the smallest eigenvalue of K_θ is zero is found
+        by bracketing. The posture and the wrench stay the same. Tensions of your own are not
+        distributed again: for them only wires and springs are tried. It takes some tenths of a
+        second.
         """
         from cdsm.instability import find_remedies  # here, since a stable arm does not need it
 
@@ -160,7 +163,7 @@ class Stiffness(CartesianReadings):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Sentences that the arm is UNSTABLE, with its remedies; empty for a stable arm."""
+        """Lines that say that the arm is UNSTABLE, with its remedies; empty for a stable arm."""
         from cdsm.instability import advice, verdict
 
         return () if self.is_stable else (verdict(self), *advice(self))
@@ -200,9 +203,9 @@ class Stiffness(CartesianReadings):
         return self.posture.plot(self.distribution, self)
 
     def to_dict(self) -> dict[str, object]:
-        """Return the stiffness in SI for JSON, with units in the keys; None if it does not exist.
+        """Return the stiffness in SI for JSON, with units in the keys.
 
-        Three numbers are x, y, z.
+        Lists of three numbers are for x, y and z. A number that does not exist is None.
         """
         return prints.numbers(self)
 

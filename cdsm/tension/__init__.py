@@ -1,4 +1,4 @@
-"""Cable tensions that balance an arm: the value, its problem, its solvers; why there are none."""
+"""Cable tensions that balance an arm: distribution, solvers, result, reasons of failure."""
 
 from cdsm.tension.distribution import bounds_at as bounds_at
 from cdsm.tension.distribution import checked_bounds as checked_bounds

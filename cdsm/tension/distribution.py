@@ -5,9 +5,9 @@ chosen:
 
     min ½‖F‖²   so that   J_Lᵀ F = J_Xᵀ W − g   and   minimum ≤ F ≤ maximum.
 
-Mostly the guess of :mod:`cdsm.kernels.serpentine_guess` is proven to be the solution. Otherwise the
-problem is made dimensionless, and a solver gets it. If it has no solution,
-:mod:`cdsm.tension.infeasibility` says why.
+First, :mod:`cdsm.kernels.serpentine_guess` guesses the tensions. If the guess meets the optimality
+conditions, as it mostly does, it is the solution. Otherwise a solver solves the dimensionless
+problem. If it finds no solution, :mod:`cdsm.tension.infeasibility` finds the reason.
 """
 
 from __future__ import annotations
@@ -46,21 +46,22 @@ def distribute_tension(
     Args:
         pose: The posture.
         minimum: Lower bound [N], for all cables or (C,); not negative, since cables only pull.
-            Commands take 10 N if none is given, since a strand has no rigidity at 0 N.
+            The default of the command line is 10 N, since a strand has no rigidity at 0 N.
         maximum: Upper bound [N], for all cables or (C,); inf: no bound. Bounds that a cable defines
             also apply.
         wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m].
         solver: ``"daqp"`` (exact), ``"osqp"``, or another solver that qpsolvers finds installed.
-            The default is asked only if a first guess does not meet the optimality conditions.
+            The default is called only if a first guess does not meet the optimality conditions.
         fixed: Tensions [N] by cable name, e.g. of motors that control force. The other tensions are
             computed. A fixed tension replaces the bounds of its cable and is never widened.
-        worst_friction: Keep each segment of each cable within the bounds, whatever loads came and
-            went before. At this posture friction holds all tensions of a cable within
-            exp(±Σ μ φ) of F, with the sum over its holes. The bounds narrow by these factors.
+        worst_friction: Keep the tension of each segment of each cable within the bounds, for any
+            earlier loads. With the friction coefficients μ and wrap angles φ of the holes of a
+            cable, its tensions lie between F exp(−Σ μ φ) and F exp(Σ μ φ). The bounds narrow by
+            these factors.
 
     Raises:
         InvalidInput: A bound, a fixed tension or the wrench has the wrong shape or is not a number,
-            or the bounds contradict each other, also because of the worst friction.
+            or a minimum is above its maximum, also because of ``worst_friction``.
         InfeasibleTension: No tension within the bounds balances the arm. The error gives the
             missing torque. If wider bounds help, it says how far the bounds of cables without a
             fixed tension must widen.
@@ -104,7 +105,7 @@ def distribute_tension(
 def bounds_at(
     pose: Posture, minimum: ArrayLike, maximum: ArrayLike, worst_friction: bool
 ) -> tuple[Array, Array]:
-    """Return valid bounds (C,) [N] at a posture; the worst friction narrows them."""
+    """Return checked bounds (C,) [N] at a posture, narrowed if ``worst_friction`` is True."""
     low, high = checked_bounds(pose.arm, minimum, maximum)
     if flag("worst_friction", worst_friction):
         loss = np.exp(grip(pose))
@@ -113,7 +114,7 @@ def bounds_at(
 
 
 def grip(pose: Posture) -> Array:
-    """Compute Σ μ φ of the holes of each cable (C,) [-]."""
+    """Compute Σ μ φ (C,) [-] over the holes of each cable: friction coefficient, wrap angle."""
     segments = pose.segments
     chains = segments.chains
     of_holes = chains.friction * segments.wrap
@@ -124,7 +125,7 @@ def grip(pose: Posture) -> Array:
 def checked_bounds(
     arm: Manipulator, minimum: ArrayLike, maximum: ArrayLike, rows: int | None = None
 ) -> tuple[Array, Array]:
-    """Return valid bounds (C,) [N] of the tensions, including those that the cables define.
+    """Return checked bounds (C,) [N] of the tensions, narrowed by the bounds that cables define.
 
     With ``rows`` a bound may also have the shape (rows, C): one row per posture. Invalid bounds
     raise InvalidInput.

@@ -1,4 +1,4 @@
-"""Why no tensions were found: the missing torque and the widening of bounds, by linear programs."""
+"""Reasons why no tensions exist: the missing torque and the widening of bounds, by LPs."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from cdsm.support.values import frozen
 def explain(
     pose: Posture, problem: Scaled, solver: str, fault: str, free: NDArray[np.bool_]
 ) -> NoReturn:
-    """Find by linear programs why a solver found no tensions, and raise the error.
+    """Find by linear programs why a solver found no tensions, and raise an error that says it.
 
     Only bounds of ``free`` cables (C,) may widen: those without a fixed tension. ``fault`` is the
     solver's result, as text.
@@ -64,7 +64,7 @@ def explain(
 
 
 def _widening(problem: Scaled, free: NDArray[np.bool_]) -> float:
-    """Compute how far the bounds of free cables (C,) must widen [N]; inf if this does not help."""
+    """Compute how far the bounds of free cables (C,) must widen [N]; inf if no widening helps."""
     A, b, lower, upper, _, force_scale = problem
     nv, count = A.shape
     # variables: F, then the widening t: low − t <= F <= high + t, and F >= 0; a fixed
@@ -84,7 +84,7 @@ def _widening(problem: Scaled, free: NDArray[np.bool_]) -> float:
 
 
 def instead(solver: str) -> str:
-    """Return as text what to do if a solver fails."""
+    """Return a text that says what to do if a solver fails."""
     if solver == "daqp":
         return "Change the posture, the load or the bounds a little, or try another solver."
     return "Use solver='daqp'."

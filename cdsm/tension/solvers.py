@@ -1,4 +1,4 @@
-"""Quadratic-programming solvers, their settings, and the check of what they return.
+"""Quadratic-programming solvers, their settings, and the check of their solutions.
 
 A solution is accepted only if it meets the optimality conditions.
 """
@@ -52,7 +52,7 @@ def installed_solver(solver: str) -> str:
 
 
 def solve(problem: tension_kernels.Scaled, solver: str) -> Array | str:
-    """Return the verified optimum, or the fault as text: no solution, or not the optimum."""
+    """Return the verified optimum; or a text, if there is no solution or not the optimum."""
     import qpsolvers
     from scipy.sparse import csc_matrix
 
@@ -90,7 +90,7 @@ def solve(problem: tension_kernels.Scaled, solver: str) -> Array | str:
 
 
 def _shortfall(problem: tension_kernels.Scaled, point: tuple[Array, ...]) -> str:
-    """Return as text why a point and its multipliers are not the optimum; empty if they are."""
+    """Return why a point and its multipliers are not the optimum, as text; empty if they are."""
     # equal to qpsolvers' primal_residual, dual_residual and duality_gap, ten times faster
     primal, dual, gap = tension_kernels.single_optimality(*problem[:4], *point)
     size = max(1.0, float(abs(point[0]).max()))
@@ -105,7 +105,7 @@ def _shortfall(problem: tension_kernels.Scaled, point: tuple[Array, ...]) -> str
 
 
 def _polished(problem: tension_kernels.Scaled, point: tuple[Array, ...]) -> tuple[Array, ...]:
-    """Solve the optimality conditions exactly for the bounds that a near-optimum makes active."""
+    """Return the exact solution for the active bounds of a point near the optimum."""
     A, b, low, high, *_ = problem
     x, _, z = point
     at_low, at_high = x - low < -z, high - x < z

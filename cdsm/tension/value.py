@@ -35,7 +35,7 @@ class Tension(ReadOnlyState):
         wrench: W (6,) at ``tool0``, base axes: force [N], then moment [N m].
         minimum: Lower bounds (C,) [N].
         maximum: Upper bounds (C,) [N].
-        solver: Name of the solver that was to find the tensions.
+        solver: Name of the requested solver, even if a first guess was optimal.
         residual: Residual J_Lᵀ F − (J_Xᵀ W − g) of Eq. 13, (nv,) [N m].
         least: Whether the tensions are the smallest; False if they were chosen for a stiffness.
     """

@@ -1,4 +1,4 @@
-"""Wires by name; a rigidity or a file can stand for a wire, too."""
+"""Wires by name, by a rigidity EA, or by a file."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ WIRES: Final[dict[str, Elasticity]] = {"1x19-1.2mm": STRAND, "solid-1.2mm": SOLI
 _FILES = (".toml", ".csv", ".txt", ".tsv")  # of tables too: their reader says to fit them first
 
 _NAMED = 3
-"""Number of different wires that a text names."""
+"""Largest number of different wires that a text names."""
 
 Wire = Elasticity | str | float | os.PathLike[str]
-"""A wire: its law, a name of :data:`WIRES`, EA [N], or the path of a WIRE.toml."""
+"""Ways to give a wire: its law, a name of :data:`WIRES`, EA [N], or the path of a WIRE.toml."""
 
 
 def as_wire(wire: Wire) -> Elasticity:
@@ -83,7 +83,7 @@ def label(law: Elasticity) -> str:
 
 
 def wires_text(cables: Iterable[Cable]) -> str:
-    """Return the wires of cables and their springs, as text."""
+    """Return a text that names the wires of cables and their springs."""
     counts = Counter(
         label(cable.elasticity)
         + (

@@ -1,4 +1,4 @@
-"""Search for jumps in the rigidity of a user-defined law. K_θ needs a continuous EA(F)."""
+"""Search for discontinuities of a user-defined law. K_θ needs a continuous EA(F)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _JUMP = 1e-4  # share of EA: a smaller step counts as rounding of the law
 
 
 class Jump(NamedTuple):
-    """Tension [N] of a jump, and the rigidities [N] just below and just above this tension."""
+    """Discontinuity of EA: its tension [N], and EA [N] just below and just above it."""
 
     tension: float
     below: float
@@ -25,12 +25,12 @@ class Jump(NamedTuple):
 
 
 def find_jump(law: Elasticity) -> Jump | None:
-    """Find the largest jump of the rigidity of a law. Return None if EA(F) is continuous.
+    """Find the largest discontinuity of the rigidity of a law; None if EA(F) is continuous.
 
     EA is sampled at 257 tensions. Each interval is then halved repeatedly, and the half with the
     larger change of EA is kept. This ends when the change is below 1e-4 of EA, or the interval is
     as narrow as rounding. A steep continuous law passes, because its change shrinks with the
-    interval. A jump much smaller than the change of EA over an interval may be missed.
+    interval. A discontinuity much smaller than the change of EA over an interval may be missed.
 
     Laws of this library are continuous by construction and are not sampled. If a user-defined law
     raises an error, return None, because the first use of the law reports the error.

@@ -100,9 +100,9 @@ class StrandElasticity(Elasticity):
         continuous, and as level as possible from 400 to 810 N, where the text calls EA
         near-constant. Otherwise it is nearest to the printed values. Linear programs find it
         (``tests/laws/test_errata.py``). At 31 N, the slope falls from 1022 to 368. No law with
-        these digits has one slope there. The least fall, from 662, takes every other digit to the
-        end of its rounding. The polynomial is negative below 2.11 N, so the domain is
-        (2.2 N, 810 N].
+        these digits has a continuous slope there. The least fall, from 662, would put every other
+        coefficient at the limit of its rounding. The polynomial is negative below 2.11 N, so the
+        domain is (2.2 N, 810 N].
         """
         return cls(EQ19, joins=(31.0,), low=2.2, high=810.0)
 
@@ -170,7 +170,7 @@ class StrandElasticity(Elasticity):
 
     @cached_property
     def panels(self) -> Panels:
-        """Panels on which the strain is integrated."""
+        """Panels for the numerical integration of the strain."""
         return panels(self.coefficients, (self.low, *self.joins, self.high))
 
     def _integral(self, tension: ArrayLike, power: int) -> Array:

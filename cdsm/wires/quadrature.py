@@ -30,7 +30,7 @@ _NEAREST = 6.0
 """Least ρ of a panel. ρ^-24 = 2e-19 leaves a factor of 1000 for the growth of 1/p."""
 
 _ROUNDING = 1e-14
-"""A polynomial below this share of the sum of the magnitudes of its terms counts as zero."""
+"""A polynomial below this fraction of the sum of the magnitudes of its terms counts as zero."""
 
 _NEGLIGIBLE = 1e-30  # share of the largest term of a polynomial: a smaller term is neglected
 _NARROWEST = 4  # width of a panel in units in the last place; panels shrink towards a root
@@ -82,10 +82,10 @@ class Panels(NamedTuple):
     """Panels from the low end up to :attr:`end`; made by :func:`panels`.
 
     Attributes:
-        edges: Ends of the panels, (P+1,).
+        edges: Tensions at which the panels begin and end (P+1,) [N].
         coefficients: Coefficients of the polynomial on each panel, lowest power first, (powers, P).
         before: ∫ Fⁿ dF/p from the low end to the beginning of each panel, n = 0 and 1, (2, P).
-        end: Tension from which p is not positive; inf if p is positive everywhere.
+        end: Tension from which p is not positive [N]; inf if p is positive everywhere.
     """
 
     edges: Array

@@ -57,7 +57,7 @@ class RisingCurve:
         return np.asarray(self.chords[k] * (b * t * t + 2.0 * t * u + a * u * u) / D**2)
 
     def second_derivative(self, x: Array) -> Array:
-        """Compute the second derivative y'', same shape as x. It jumps at the points."""
+        """Compute the second derivative y'', same shape as x. It is discontinuous at the points."""
         k, t, u, a, b, D = self._locate(x)
         N = b * t * t + 2.0 * t * u + a * u * u
         dN, dD = 2.0 * ((b - 1.0) * t + (1.0 - a) * u), (a + b - 2.0) * (u - t)

@@ -14,13 +14,13 @@ from cdsm.errors import InvalidInput
 from cdsm.support.values import Array
 
 _SHORTEST: Final = 0.5
-"""Least length of a slack wire over that at the low end of its law."""
+"""Least length of a slack wire, divided by its length at the low end of its law."""
 
 
 @final
 @dataclass(frozen=True)
 class SlackBelow(Elasticity):
-    """A law with the constant rigidity of its low end below it; see :meth:`Elasticity.slack_below`.
+    """A law continued to 0 N with the rigidity of its low end; see :meth:`Elasticity.slack_below`.
 
     Attributes:
         law: The law. Within its domain, rigidity, strain and energy are the law's own, to the bit.
@@ -83,7 +83,7 @@ class SlackBelow(Elasticity):
         return np.where(below < 0.0, slack, self.law.energy(inside))
 
     def _split(self, tension: ArrayLike) -> tuple[Array, Array]:
-        """Return the tensions raised to the law's domain, and F − rest where F is below it."""
+        """Return the tensions, raised to the law's domain, and F − rest, 0 where F is inside it."""
         values = self.domain.check(tension)
         inside = np.maximum(values, self.law.domain.first)
         return inside, np.where(values < inside, values - self.rest, 0.0)

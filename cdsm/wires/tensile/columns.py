@@ -138,7 +138,7 @@ def _header(table: Table, k: int) -> Header:
 
 
 def _numbered(table: Table) -> Header:
-    """Return a header for columns that are only numbered."""
+    """Return a header that numbers the columns, for a table without names."""
     first = next((k for k in range(len(table.rows)) if _is_data(table, k)), 0)
     line, cells = table.rows[first]
     columns = [Column(at, f"column {at + 1}", None, None) for at in range(len(cells))]

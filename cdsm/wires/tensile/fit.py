@@ -54,10 +54,11 @@ class Stage:
 class Band(ReadOnlyState):
     """Confidence band of EA: it covers EA at each tension with 95 %, for the scatter of the points.
 
-    The band is that of a rougher curve than the fitted one, exp(m ± t s). m is the ln EA of this
-    curve, s its standard deviation from the residuals around each tension, and t that of Student
-    for as many degrees of freedom. Its bias is far below its scatter, where the fitted curve rounds
-    off bends of EA. So the band is wider than the scatter of the law, which may touch its edge.
+    The band exp(m ± t s) belongs to a rougher curve than the fitted one. m is ln EA of the rougher
+    curve, s the standard deviation of m from the residuals near each tension, and t the quantile of
+    Student's distribution for their degrees of freedom. The bias of the rougher curve is far below
+    its scatter; the fitted curve rounds off bends of EA. So the band is wider than the scatter of
+    the fitted law, which may touch its edge.
 
     Measured, in 100 tests of 400 points each: of Eq. 19, a linear wire and a wire with a toe, with
     0.5 N and 2 N of noise, it covers 95.3 % of all cases, and at each of 16 tensions from 10 N to
@@ -98,7 +99,7 @@ class TensileFit(ReadOnlyState):
         test: The test.
         method: ``monotone`` or ``polynomial``.
         start: Displacement at the low end of the domain [m].
-        notes: One sentence for each part that was left out or cut, and for each doubt.
+        notes: One sentence for each part of the test that was left out, and for each doubt.
     """
 
     elasticity: Elasticity
@@ -127,10 +128,10 @@ class TensileFit(ReadOnlyState):
         )
 
     def tolerance(self, of: str = EVERY) -> Tolerance:
-        """Return the band as the tolerance of the rigidity of cables of this wire.
+        """Return the band as a tolerance for the rigidity of cables made of this wire.
 
-        The standard uncertainty of EA(F) is half the width of ln EA over 1.96; all cables are of
-        one spool, so they share one error.
+        The standard uncertainty of EA(F) is half the width of the band of ln EA, divided by 1.96.
+        All cables are of one spool, so they share one error.
 
         Args:
             of: Names of these cables, as for :class:`~cdsm.Tolerance`.

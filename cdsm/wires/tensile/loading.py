@@ -16,7 +16,7 @@ FEWEST = 8
 """Least number of points of a fit. Fewer points show no bend."""
 _MOST = 800  # fitted points; more are averaged, which makes the fit faster
 _OUTLYING = 5e-3
-"""An outlier is farther from its neighbours than this share of the range."""
+"""An outlier is farther from its neighbours than this fraction of the range."""
 _AROUND = 25  # neighbouring points over which the noise is assumed constant
 _SURE = 3.0  # standard deviations beyond which a rise of the force is certain
 _MAD = 1.4826  # standard deviation of normal noise over its median magnitude
@@ -129,7 +129,7 @@ def _outliers(values: Array) -> NDArray[np.bool_]:
 
 
 def local_noise(errors: Array) -> Array:
-    """Estimate the standard deviation (n,) of the errors (n,) nearby, at least that of all."""
+    """Estimate the local standard deviation (n,) of errors (n,), at least that of all of them."""
     width = min(_AROUND, len(errors))
     near = np.pad(abs(errors), (width // 2, width - 1 - width // 2), mode="reflect")
     local = np.median(np.lib.stride_tricks.sliding_window_view(near, width), axis=1)

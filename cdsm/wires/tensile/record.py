@@ -34,7 +34,7 @@ class TensileTest(ReadOnlyState):
         displacement: Displacement of the crosshead or extensometer, shape (n,) [m].
         force: Force, shape (n,) [N], tension positive.
         gauge_length: Free length of the wire between the grips or the clips [m].
-        source: What was read from a file: its columns and their units. Empty for arrays.
+        source: Columns and units that were read from a file; empty for arrays.
 
     Raises:
         InvalidInput: A field is not finite numbers.
@@ -130,7 +130,7 @@ def read_tensile_csv(
 
 
 def _scale(column: Column, given: str | None) -> float:
-    """Return the unit of a column in SI."""
+    """Return the factor that converts a column to SI."""
     kind = column.kind or ""
     known, keyword = UNITS[kind], "force_unit" if kind == "force" else "displacement_unit"
     for each in (column.unit, given):

@@ -138,7 +138,7 @@ class Curve:
         return np.asarray(inside + before + np.maximum(strain - grid[-1], 0.0) * rigidity[-1])
 
     def jacobian(self, strain: Array) -> Array:
-        """Derive :meth:`force` by the coefficients and by the strain at the anchor (n, k + 1)."""
+        """Compute derivatives of :meth:`force` w.r.t. coefficients and anchor strain (n, k + 1)."""
         tensions, grid = self.basis.tensions, self.strain
         inside = np.clip(strain, grid[0], grid[-1])
         at = np.clip(np.searchsorted(grid, inside) - 1, 0, len(grid) - 2)
@@ -201,9 +201,9 @@ class Curve:
         """Compute a confidence interval of log EA at each tension of the grid: middle, half-width.
 
         The most likely curve is smooth, so it is biased where EA bends, and its own scatter covers
-        the truth too seldom there. The interval is that of a rougher curve: :data:`_ROUGHER` times
-        less smoothing than its likelihood allows leaves a bias far below the scatter. The scatter
-        is that of the neighbouring points, with their own degrees of freedom.
+        the truth too seldom there. The interval belongs to a rougher curve, with :data:`_ROUGHER`
+        times less smoothing than the likelihood allows, whose bias is far below its scatter. The
+        scatter is estimated from the neighbouring points, with their own degrees of freedom.
         """
         loosest = self.loosest(points)
         rough = replace(loosest, smoothing=loosest.smoothing / _ROUGHER).refitted(points)

@@ -10,7 +10,7 @@ from cdsm.wires.tensile.loading import Points, local_noise
 from cdsm.wires.tensile.spline import Curve, Spread
 
 YIELD = 0.8
-"""Plasticity begins where EA falls below this share of its largest value and stays there."""
+"""Plasticity begins where EA falls below this fraction of its largest value and stays there."""
 PRETENSIONED = 0.5
 """Pre-tensioning ends where d ln EA/d ln F falls below this: midway from EA ∝ F to constant EA."""
 _CERTAIN = 3.0  # standard deviations beyond which a fact is certain
