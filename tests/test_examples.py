@@ -4,6 +4,7 @@ import array
 import math
 from pathlib import Path
 
+import known_arms
 import mujoco_weight
 import numpy as np
 import pytest
@@ -72,3 +73,33 @@ def test_matlab_uses_names_that_exist(path: Path) -> None:
                 thing: object = cdsm
                 for part in word.removeprefix("py.cdsm.").split("."):
                     thing = getattr(thing, part)
+
+
+def test_the_files_of_known_arms_are_those_that_the_example_writes() -> None:
+    written = known_arms.files()
+    assert {path.name for path in known_arms.FOLDER.iterdir()} == set(written)
+    for name, text in written.items():
+        assert (known_arms.FOLDER / name).read_bytes() == text.encode(), name
+
+
+@pytest.mark.parametrize(
+    ("name", "q", "cables"),
+    [
+        ("sjtu_snake", [0.02] * 24, 36),
+        ("carex", [0.1, 0.16, 0.58, 0.39], 6),
+        ("myo_shoulder", [0.5, -0.26, 0.06], 9),
+        ("bm_arm", [-0.08, -0.48, -0.16, -0.17], 6),
+        ("simplex", [0.0] * 12, 12),
+    ],
+)
+def test_known_arms_are_read_and_name_their_source(name: str, q: list[float], cables: int) -> None:
+    path = known_arms.FOLDER / f"{name}.toml"
+    arm = cdsm.Manipulator.read(path)
+    assert (arm.nv, len(arm.cables)) == (len(q), cables)
+    assert arm.urdf == (known_arms.FOLDER / f"{name}.urdf").read_text(encoding="utf-8")
+    comment = [line for line in path.read_text(encoding="utf-8").splitlines() if line[:1] == "#"]
+    assert any("20" in line for line in comment)
+    assert any("osen here" in line for line in comment)
+    if name != "simplex":  # which stands by its prestress: test_tensegrity.py
+        pose = arm.at(q)
+        assert cdsm.stiffness(pose, cdsm.distribute_tension(pose, 20.0 * (len(q) > 20))).is_stable
