@@ -65,12 +65,14 @@ if TYPE_CHECKING:
     from cdsm.friction.stuck import sliding_stiffness, stuck_stiffness
     from cdsm.geometry import CableRoute, Geometry, Joint, Link
     from cdsm.identification import (
+        ArmParameters,
         ExperimentPlan,
         Identification,
         Measurement,
         WeightLoop,
         identify,
         plan_experiment,
+        read_loops,
     )
     from cdsm.instability import Remedy
     from cdsm.interchange.caspr import read_caspr
@@ -122,32 +124,32 @@ if TYPE_CHECKING:
 
 # fmt: off
 __all__ = [
-    "Batch", "Bifurcation", "Breakaway", "Cable", "CableError", "CableRoute", "Cables", "CdsmError",
-    "CdsmWarning", "Clearance", "ClusterError", "Constraint", "CriticalLoad", "CriticalTension",
-    "DesignProblem", "DesignProgress", "DesignSearch", "Designs", "Domain", "Elasticity",
-    "ElasticityRangeError", "Equilibrium", "EquilibriumError", "ExperimentPlan", "FileError",
-    "ForcePolytope", "Geometry", "GeometryError", "GridPoses", "HalfWay", "Identification",
-    "InfeasibleDesign", "InfeasibleSample", "InfeasibleTension", "InvalidInput", "Joint",
-    "JointLimitError", "JointSolution", "KinematicSolution", "LinearElasticity", "LinearPrediction",
-    "Link", "LoadHistory", "Manipulator", "Measurement", "MissingExtra", "MissingWire", "Modes",
-    "MomentArms", "MonteCarlo", "MuJoCoPlant", "Objective", "PathPlan", "PathPoses", "Payload",
-    "PoseSet", "Posture", "RandomPoses", "Remedy", "Report", "RestBand", "Saturation", "SelfCheck",
-    "Sensors", "Shares", "SingularMass", "SingularStiffness", "Site", "SlowPlant", "SolverError",
-    "Status", "Stiffness", "StiffnessGradient", "StiffnessPlan", "StiffnessRange", "StoreError",
-    "StrandElasticity", "SweepStatus", "TabulatedElasticity", "TensileFit", "TensileTest",
-    "TensileTestError", "Tension", "Tensions", "TipForce", "Tolerance", "Tolerances", "TrackingRun",
-    "Uncertainty", "UnknownName", "UnreachableStiffness", "UrdfError", "Variable", "WeightLoop",
-    "WeightTest", "WireUse", "bifurcation", "breakaway", "clearance", "critical_load",
-    "critical_tension", "distribute_tension", "distribute_tensions", "equilibrium", "evaluate",
-    "evaluate_designs", "fit_tensile_test", "force_polytope", "has_wrench_closure", "identify",
-    "in_series", "inverse_kinematics", "isotropy", "load_cycle", "modes", "monte_carlo", "payload",
-    "plan_experiment", "plan_path", "plan_stiffness", "presets", "read_cables", "read_caspr",
-    "read_elasticity", "read_problem", "read_sweep", "read_tensile_csv", "refine_design",
-    "rest_band", "saturation", "search_designs", "serpentine_cables", "sliding_stiffness",
-    "solve_joint_angles", "stiffness", "stiffness_gradient", "stiffness_range", "stuck_stiffness",
-    "sweep", "sweep_to_pandas", "tension_factor", "tip_force", "to_mjcf", "to_urdf", "track",
-    "uncertainty", "weight_test", "wire_use", "write_cables", "write_elasticity", "write_mjcf",
-    "write_sweep", "write_urdf",
+    "ArmParameters", "Batch", "Bifurcation", "Breakaway", "Cable", "CableError", "CableRoute",
+    "Cables", "CdsmError", "CdsmWarning", "Clearance", "ClusterError", "Constraint", "CriticalLoad",
+    "CriticalTension", "DesignProblem", "DesignProgress", "DesignSearch", "Designs", "Domain",
+    "Elasticity", "ElasticityRangeError", "Equilibrium", "EquilibriumError", "ExperimentPlan",
+    "FileError", "ForcePolytope", "Geometry", "GeometryError", "GridPoses", "HalfWay",
+    "Identification", "InfeasibleDesign", "InfeasibleSample", "InfeasibleTension", "InvalidInput",
+    "Joint", "JointLimitError", "JointSolution", "KinematicSolution", "LinearElasticity",
+    "LinearPrediction", "Link", "LoadHistory", "Manipulator", "Measurement", "MissingExtra",
+    "MissingWire", "Modes", "MomentArms", "MonteCarlo", "MuJoCoPlant", "Objective", "PathPlan",
+    "PathPoses", "Payload", "PoseSet", "Posture", "RandomPoses", "Remedy", "Report", "RestBand",
+    "Saturation", "SelfCheck", "Sensors", "Shares", "SingularMass", "SingularStiffness", "Site",
+    "SlowPlant", "SolverError", "Status", "Stiffness", "StiffnessGradient", "StiffnessPlan",
+    "StiffnessRange", "StoreError", "StrandElasticity", "SweepStatus", "TabulatedElasticity",
+    "TensileFit", "TensileTest", "TensileTestError", "Tension", "Tensions", "TipForce", "Tolerance",
+    "Tolerances", "TrackingRun", "Uncertainty", "UnknownName", "UnreachableStiffness", "UrdfError",
+    "Variable", "WeightLoop", "WeightTest", "WireUse", "bifurcation", "breakaway", "clearance",
+    "critical_load", "critical_tension", "distribute_tension", "distribute_tensions", "equilibrium",
+    "evaluate", "evaluate_designs", "fit_tensile_test", "force_polytope", "has_wrench_closure",
+    "identify", "in_series", "inverse_kinematics", "isotropy", "load_cycle", "modes", "monte_carlo",
+    "payload", "plan_experiment", "plan_path", "plan_stiffness", "presets", "read_cables",
+    "read_caspr", "read_elasticity", "read_loops", "read_problem", "read_sweep", "read_tensile_csv",
+    "refine_design", "rest_band", "saturation", "search_designs", "serpentine_cables",
+    "sliding_stiffness", "solve_joint_angles", "stiffness", "stiffness_gradient", "stiffness_range",
+    "stuck_stiffness", "sweep", "sweep_to_pandas", "tension_factor", "tip_force", "to_mjcf",
+    "to_urdf", "track", "uncertainty", "weight_test", "wire_use", "write_cables",
+    "write_elasticity", "write_mjcf", "write_sweep", "write_urdf",
 ]
 # fmt: on
 
@@ -182,8 +184,8 @@ _NAMES = {
     "friction.stuck": "sliding_stiffness stuck_stiffness",
     "geometry": "CableRoute Geometry Joint Link",
     "instability": "Remedy",
-    "identification": "ExperimentPlan Identification Measurement WeightLoop identify "
-    "plan_experiment",
+    "identification": "ArmParameters ExperimentPlan Identification Measurement WeightLoop identify "
+    "plan_experiment read_loops",
     "interchange.caspr": "read_caspr",
     "interchange.mjcf": "to_mjcf write_mjcf",
     "kinematics.maps": "inverse_kinematics solve_joint_angles",

@@ -6,6 +6,7 @@ import math
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
+from functools import cached_property
 from pathlib import Path
 from typing import Literal, Self, final, get_args
 
@@ -156,18 +157,18 @@ class Tolerance(ReadOnlyState):
             )
         return matrix
 
-    def correlated(self, values: Array) -> Array:
-        """Compute R v (n,), R the correlation matrix (n, n), v ``values``.
+    def variance(self, values: Array) -> float:
+        """Compute vᵀ R v, R the correlation matrix (n, n), v ``values``.
 
-        If ``correlation`` is one number ρ, R v = (1 − ρ) v + ρ Σ v.
-
+        If ``correlation`` is one number ρ, vᵀ R v = (1 − ρ) v·v + ρ (Σ v)².
         Raises:
             InvalidInput: ``correlation`` is a matrix of another size.
         """
         rho = self.correlation
         if isinstance(rho, float):
-            return np.asarray((1.0 - rho) * values + rho * values.sum())
-        return np.asarray(self.matrix(values.size) @ values)
+            common = rho * float(values.sum()) ** 2 if rho else 0.0
+            return (1.0 - rho) * float(values @ values) + common
+        return max(float(values @ self.matrix(values.size) @ values), 0.0)
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Tolerance) and all(
@@ -251,7 +252,7 @@ class Tolerances:
         every = value if isinstance(value, tuple) else (value,)
         return tuple(each for each in every if each.is_given)
 
-    @property
+    @cached_property
     def given(self) -> Mapping[str, tuple[Tolerance, ...]]:
         """All tolerances that are not zero, by source."""
         found = {}

@@ -17,6 +17,7 @@ from cdsm.cli.arm import check, export, stiffness, urdf
 from cdsm.cli.command import Command, as_command
 from cdsm.cli.cycle import cycle
 from cdsm.cli.design import design
+from cdsm.cli.identify import identify
 from cdsm.cli.loads import buckle, weigh
 from cdsm.cli.new import new
 from cdsm.cli.output import debug_wanted
@@ -67,7 +68,7 @@ def main(
 
 _ALL = (
     *(new, urdf, stiffness, check, weigh, cycle, buckle, plan, sweep, map_sweep),
-    *(design, track, view, fit, export, reproduce, warm),
+    *(design, track, view, fit, identify, export, reproduce, warm),
 )
 for command in _ALL:
     name = "map" if command is map_sweep else command.__name__

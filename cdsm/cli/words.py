@@ -12,9 +12,11 @@ _OPTIONS: Final = {
     "damping_ratio": "--damping-ratio",
     "delay": "--delay",
     "direction": "--direction",
+    "displacement_std": "--reading-std",
     "encoder": "--encoder",
     "felt": "--felt",
     "force": "--force",
+    "force_std": "--force-std",
     "gauge_length": "--gauge-length",
     "gravity": "--gravity",
     "host": "--host",
@@ -34,8 +36,12 @@ _OPTIONS: Final = {
     "steps": "--steps",
     "store": "--resume",
     "target": "--target",
+<<<<<<< HEAD
     "tension_bias": "--tension-bias",
     "tension_noise": "--tension-noise",
+=======
+    "tension_std": "--tension-std",
+>>>>>>> f354bb6 (cdsm identify: friction, rigidity, springs and sizes from a file of loops, or a plan of tests; a budget costs a third less)
     "wire": "--wire",
     "wrench": "--wrench",
 }

@@ -1,14 +1,17 @@
 """Identification of the parameters of an arm from stiffnesses and loops measured on the arm."""
 
+from cdsm.identification.arm_parameters import ArmParameters
 from cdsm.identification.experiment import plan_experiment
 from cdsm.identification.experiment_plan import ExperimentPlan
 from cdsm.identification.intervals import Profile
 from cdsm.identification.loop import WeightLoop
+from cdsm.identification.loops_file import read_loops
 from cdsm.identification.measurement import Measurement
 from cdsm.identification.result import Identification
 from cdsm.identification.search import identify
 
 __all__ = [
+    "ArmParameters",
     "ExperimentPlan",
     "Identification",
     "Measurement",
@@ -16,4 +19,5 @@ __all__ = [
     "WeightLoop",
     "identify",
     "plan_experiment",
+    "read_loops",
 ]

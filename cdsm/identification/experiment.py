@@ -85,6 +85,32 @@ def plan_experiment(
         InvalidInput: An argument is invalid, or no candidate works, or determines what is wanted.
         UnknownName: ``model_of`` does not take a parameter; or ``wanted`` or ``known`` names none.
     """
+    noise = (displacement_std, force_std, tension_std)
+    candidates = _candidates(postures, directions, weights, minimum, noise, steps)
+    return plan_tests(
+        model_of,
+        parameters,
+        candidates,
+        tests=tests,
+        wanted=wanted,
+        known=known,
+        criterion=criterion,
+        progress=progress,
+    )
+
+
+def plan_tests(
+    model_of: Callable[..., Manipulator],
+    parameters: Mapping[str, float],
+    candidates: Sequence[WeightLoop],
+    *,
+    tests: int,
+    wanted: Sequence[str] | None = None,
+    known: Mapping[str, float] | None = None,
+    criterion: Criterion = "D",
+    progress: bool = True,
+) -> ExperimentPlan:
+    """Choose among any loops as :func:`plan_experiment` does; their labels differ."""
     values = _checked_parameters(parameters)
     check_call("model_of", model_of, 0, tuple(values))
     one_of("criterion", criterion, ("D", "A"))
@@ -97,8 +123,6 @@ def plan_experiment(
                 raise UnknownName(f"parameter in {kind}", name, names, "Name one of the arm.")
     if not chosen:
         raise InvalidInput("wanted", "names no parameter; leave it out for all of them.")
-    noise = (displacement_std, force_std, tension_std)
-    candidates = _candidates(postures, directions, weights, minimum, noise, steps)
     sizes = np.array(list(values.values()))
     prior = np.zeros((len(names), len(names)))
     for name, std in (known or {}).items():

@@ -16,7 +16,7 @@ from cdsm.identification.intervals import NEGLIGIBLE, Profile
 from cdsm.identification.loop import WeightLoop, measured
 from cdsm.identification.measurement import Measurement, label
 from cdsm.manipulator import Manipulator
-from cdsm.support.format import MODEL
+from cdsm.support.format import MODEL, plain
 from cdsm.support.validation import flag, scalar
 from cdsm.support.values import Array, ReadOnlyState, frozen
 
@@ -145,6 +145,24 @@ class Identification(ReadOnlyState):
                 )
             intervals[name] = (low, high)
         return intervals
+
+    def to_dict(self) -> dict[str, object]:
+        """Return the result as plain numbers for JSON; each parameter in its own unit."""
+        intervals = self.confidence()
+        return dict(
+            plain(
+                {
+                    "parameters": {
+                        name: {"value": value, "std": std, "interval_95": intervals[name]}
+                        for name, value, std in zip(self.names, self.values, self.std, strict=True)
+                    },
+                    "correlation": self.correlation,
+                    "chi_square": self.chi_square,
+                    "degrees_of_freedom": self.freedom,
+                    "rank": self.rank,
+                }
+            )
+        )
 
     def plot(self) -> Figure:
         """Plot predicted over measured stiffness [N/mm], and residuals in standard deviations."""

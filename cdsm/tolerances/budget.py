@@ -6,23 +6,21 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, final, get_args
+from typing import TYPE_CHECKING, final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm.errors import CdsmError, InvalidInput, SingularStiffness
 from cdsm.posture import Posture
-from cdsm.statics.buckling import critical_tension
-from cdsm.stiffness_matrix import stiffness
-from cdsm.support.validation import instance, one_of, scalar, unit_direction
+from cdsm.support.validation import scalar
 from cdsm.support.values import Array, ReadOnlyState, frozen
-from cdsm.tension import Tension, distribute_tension
+from cdsm.tension import Tension
 from cdsm.tolerance import Tolerances
 from cdsm.tolerances.inputs import inputs_of
-from cdsm.tolerances.parts import Part, draw_errors, spread, standards
+from cdsm.tolerances.parts import Part, draw_errors, standards, variance
+from cdsm.tolerances.question import asked, chosen
 from cdsm.tolerances.readings import Question, Reading
-from cdsm.tolerances.stuck import blocks_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -249,7 +247,7 @@ def uncertainty(
         )
     gradient = question.gradient()
     variances = {
-        source: max(float(gradient[source] @ spread(parts, gradient[source])), 0.0)
+        source: variance(parts, gradient[source])
         for source, parts in question.parts(tolerances).items()
     }
     ranked = sorted(variances, key=lambda source: -variances[source])
@@ -261,60 +259,6 @@ def uncertainty(
         contributions={source: math.sqrt(variances[source]) for source in ranked},
         sensitivities={source: frozen(g) for source, g in gradient.items()},
     )
-
-
-def chosen(pose: Posture, tolerances: Tolerances | None) -> Tolerances:
-    """Return the tolerances, or those of the arm; raise InvalidInput if there are none."""
-    if tolerances is not None:
-        return instance("tolerances", tolerances, Tolerances)
-    own = instance("pose", pose, Posture).arm.tolerances
-    if not own.given:
-        raise InvalidInput(
-            "tolerances",
-            "none given, and the arm has none; give Tolerances(rigidity=0.05, …), or a table "
-            "[tolerances] in its file.",
-        )
-    return own
-
-
-def asked(
-    pose: Posture,
-    tension: Tension | ArrayLike,
-    direction: ArrayLike | None,
-    of: Reading,
-    cable: str | None,
-    wrench: ArrayLike | None,
-) -> Question:
-    """Check the arguments of :func:`uncertainty` and return the reading that they ask for."""
-    one_of("reading", of, get_args(Reading))
-    K = stiffness(pose, tension, wrench)
-    for name, value, wanted in (
-        ("direction", direction, of in ("along", "stuck", "tip")),
-        ("cable", cable, of == "tension"),
-    ):
-        if (value is not None) != wanted:
-            raise InvalidInput(
-                name, f"is needed for {of}." if wanted else f"has no meaning for {of}."
-            )
-    if of in ("tension", "critical_tension"):
-        instance("tension", tension, Tension)
-    if of == "critical_tension":
-        critical = critical_tension(pose, K.wrench).minimum
-        if not math.isfinite(critical):
-            raise InvalidInput("of", "the arm does not buckle, so no tension is critical.")
-        K = stiffness(pose, distribute_tension(pose, critical, wrench=K.wrench))
-    ties = None
-    if of == "stuck":
-        if not pose.arm.has_friction:
-            raise InvalidInput(
-                "of", "the arm has no friction in its holes; see Manipulator.with_friction."
-            )
-        blocks, F, ties = blocks_of(pose, K.tension)
-        K = stiffness(blocks, F, K.wrench)
-    u = None if direction is None else unit_direction("direction", direction)
-    names = [each.name for each in pose.arm.cables]
-    index = None if cable is None else names.index(one_of("cable", cable, names))
-    return Question(of, K, u, index, ties)
 
 
 def coverage_factor(probability: float) -> float:

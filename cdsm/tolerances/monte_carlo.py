@@ -25,8 +25,9 @@ from cdsm.support.validation import flag, scalar, whole_number
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension
 from cdsm.tolerance import Tolerances
-from cdsm.tolerances.budget import Uncertainty, chosen, decimals, uncertainty
+from cdsm.tolerances.budget import Uncertainty, decimals, uncertainty
 from cdsm.tolerances.parts import draw_errors
+from cdsm.tolerances.question import chosen
 from cdsm.tolerances.readings import Question, Reading
 
 if TYPE_CHECKING:

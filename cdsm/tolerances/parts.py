@@ -31,9 +31,9 @@ class Part(NamedTuple):
     standard: float | Array
     tolerance: Tolerance
 
-    def spread(self, sensitivity: Array) -> Array:
-        """Compute σ R σ g (k,) of partial derivatives g (k,) and correlations R (JCGM 100, 13)."""
-        return np.asarray(self.standard * self.tolerance.correlated(self.standard * sensitivity))
+    def variance(self, sensitivity: Array) -> float:
+        """Compute gᵀ σ R σ g of partial derivatives g (k,) and correlations R (JCGM 100, 13)."""
+        return self.tolerance.variance(self.standard * sensitivity)
 
     def draw(self, rng: np.random.Generator, errors: Array) -> None:
         """Draw the errors (draws, n) of the inputs.
@@ -92,14 +92,9 @@ def parts_of(
     return found
 
 
-def spread(parts: Sequence[Part], sensitivity: Array) -> Array:
-    """Compute σ R σ g (n,) of all inputs of a source."""
-    if parts[0].inputs is _ALL:
-        return parts[0].spread(sensitivity)
-    total = np.zeros_like(sensitivity)
-    for part in parts:
-        total[part.inputs] = part.spread(sensitivity[part.inputs])
-    return total
+def variance(parts: Sequence[Part], sensitivity: Array) -> float:
+    """Compute what the inputs of a source add to the variance of a reading."""
+    return sum(part.variance(sensitivity[part.inputs]) for part in parts)
 
 
 def standards(parts: Sequence[Part], count: int) -> Array:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -81,6 +82,12 @@ class Question(ReadOnlyState):
         tension = (self.ties or self.stiffness).tension
         return parts_of(tolerances, self.labels, tension)
 
+    @cached_property
+    def _along(self) -> tuple[float, Array]:
+        """Stiffness along the direction [N/m], and joint motion per unit force (nv,)."""
+        assert self.direction is not None
+        return self.stiffness._along(self.direction)
+
     def value(self) -> float:
         """Return the reading itself."""
         K = self.stiffness
@@ -92,7 +99,7 @@ class Question(ReadOnlyState):
         if self.direction is None:
             return K.margin
         if self.of in ("along", "stuck"):
-            return K.along(self.direction)
+            return self._along[0]
         return float(self.direction @ K.posture.tip[:3, 3])
 
     def gradient(self) -> dict[str, Array]:
@@ -100,7 +107,7 @@ class Question(ReadOnlyState):
         K, inputs = self.stiffness, inputs_of(self.stiffness.posture.arm)
         if self.of in ("along", "stuck"):
             assert self.direction is not None
-            gradient = _along_gradient(K, inputs, self.direction)
+            gradient = _along_gradient(K, inputs, self.direction, *self._along)
             return gradient if self.ties is None else self.ties.gather(gradient)
         if self.of == "tip":
             assert self.direction is not None
@@ -137,21 +144,20 @@ class Question(ReadOnlyState):
         return np.asarray(1.0 / np.einsum("ni,ni->n", force, motion))
 
 
-def _along_gradient(K: Stiffness, inputs: Inputs, u: Array) -> dict[str, Array]:
-    """Compute the derivatives of 1/(uᵀ C_vv u), by source."""
-    force = u @ K.posture.jacobian[:3]
-    right = np.asarray(np.linalg.solve(K.joint, force), np.float64)
-    square = 1.0 / float(force @ right) ** 2
+def _along_gradient(
+    K: Stiffness, inputs: Inputs, u: Array, along: float, motion: Array
+) -> dict[str, Array]:
+    """Compute the derivatives of 1/(uᵀ C_vv u), by source, from itself and K_θ⁻¹ J_vᵀ u."""
+    right, towards = along * motion, along * u  # squared, the derivative of 1/(uᵀ C_vv u)
     if not K.wrench[3:].any():
-        partials = _gradient(K, inputs, right, u)
-    else:
-        # K_θ is not symmetric: a bilinear form of two motions, by the forms of sum and difference
-        left = np.asarray(np.linalg.solve(K.joint.T, force), np.float64)
-        plus = _gradient(K, inputs, (left + right) / 2.0, u)
-        minus = _gradient(K, inputs, (left - right) / 2.0, _NOWHERE)
-        partials = {name: plus[name] - minus[name] for name in plus}
-        partials["joint_angle"] += _skew_gradient(K, left, right)
-    return {name: square * g for name, g in partials.items()}
+        return _gradient(K, inputs, right, towards)
+    # K_θ is not symmetric: a bilinear form of two motions, by the forms of sum and difference
+    left = along * np.asarray(np.linalg.solve(K.joint.T, u @ K.posture.jacobian[:3]), np.float64)
+    plus = _gradient(K, inputs, (left + right) / 2.0, towards)
+    minus = _gradient(K, inputs, (left - right) / 2.0, _NOWHERE)
+    partials = {name: plus[name] - minus[name] for name in plus}
+    partials["joint_angle"] += _skew_gradient(K, left, right)
+    return partials
 
 
 def _gradient(K: Stiffness, inputs: Inputs, motion: Array, direction: Array) -> dict[str, Array]:

@@ -150,27 +150,34 @@ def test_errors_of_forces_and_tensions_count_with_their_correlations() -> None:
     assert mean[1] > 3.0 * freedom
 
 
-def inside(seed: int) -> dict[str, bool]:
+def held_by(
+    model_of: Any, loops: list[WeightLoop], true: dict[str, float], free: Any
+) -> dict[str, bool]:
     """Whether the 95 % interval of each parameter holds the true value.
 
     It does if Δχ² with the parameter held there is below its limit: the definition, and far faster
     than the whole interval.
     """
-    model = Model.of(hinge, None, tuple(measured(seed))).weighted(TRUE)
-    problem = problem_of(model, FREE)
-    true = problem.box.point(np.array(list(TRUE.values())))
+    model = Model.of(model_of, None, tuple(loops)).weighted(true)
+    problem = problem_of(model, free)
+    at = problem.box.point(np.array(list(true.values())))
     loose: Any = {"method": "trf", "tolerances": (1e-4, 1e-6, 1e-6), "most": 50}
-    best = problem.search(true, **loose)
+    best = problem.search(at, **loose)
     model = model.weighted(problem.parameters(best))
-    problem = problem_of(model, FREE)
+    problem = problem_of(model, free)
     least = problem.cost(problem.search(best, **loose))
     held = {}
-    for i, name in enumerate(TRUE):
-        start = np.where(np.arange(true.size) == i, true, best)
-        others = [j for j in range(true.size) if j != i]
+    for i, name in enumerate(true):
+        start = np.where(np.arange(at.size) == i, at, best)
+        others = [j for j in range(at.size) if j != i]
         rise = problem.cost(problem.search(start, over=others, **loose)) - least
         held[name] = rise <= 1.959964**2
     return held
+
+
+def inside(seed: int) -> dict[str, bool]:
+    """Whether the intervals of one experiment hold friction and rigidity."""
+    return held_by(hinge, measured(seed), TRUE, FREE)
 
 
 @pytest.mark.slow
@@ -197,6 +204,62 @@ def test_intervals_hold_the_truth_in_93_to_97_of_100_experiments() -> None:
     seeds = 600  # 0.95 is known to 0.9 %; within 95 ± 2 % unless by chance of 1 in 40
     counts = np.sum([list(inside(seed).values()) for seed in range(seeds)], axis=0)
     assert ((counts / seeds >= 0.93) & (counts / seeds <= 0.97)).all(), counts
+
+
+SEVERAL = {
+    "friction": 0.1,
+    "rigidity": 1.0,
+    "spring": 1e5,
+    "hole_radius@1": 0.025,
+    "hole_radius@2": 0.02,
+}
+"""Parameters of an arm of two hinges, with cables of different lengths."""
+
+RANGES = {
+    "friction": (0.0, 0.5),
+    "rigidity": (0.3, 3.0),
+    "spring": (2e4, 1e6),
+    "hole_radius@1": (0.015, 0.04),
+    "hole_radius@2": (0.01, 0.035),
+}
+
+
+def several(seed: int) -> dict[str, bool]:
+    """Whether the intervals of one experiment hold friction, rigidity, springs and both radii."""
+    geometry = cdsm.Geometry.hinged(
+        joints=2,
+        twist=math.pi / 2.0,
+        link_length=0.1,
+        base_length=0.02,
+        disk_offset=0.015,
+        hole_radius=[0.025, 0.02],
+        link_mass=0.05,
+        lead=[0.1, 0.6],
+    )
+    parameters = cdsm.ArmParameters(
+        cdsm.Manipulator(geometry, cdsm.LinearElasticity(48e3)), SEVERAL
+    )
+    truth, random = parameters(**SEVERAL), np.random.default_rng([seed, 21])
+    loops = [
+        WeightLoop(
+            direction=direction,
+            angles=angles,
+            forces=(0.0, 10.0, 20.0, 10.0, 0.0),
+            minimum=150.0,
+            **NOISE,
+        ).simulated(truth, random)
+        for angles in ((0.3, 0.3), (-0.3, 0.35), (0.3, -0.1))
+        for direction in ("-z", "y")
+    ]
+    return held_by(parameters, loops, SEVERAL, RANGES)
+
+
+@pytest.mark.long
+def test_intervals_of_several_parameters_hold_the_truth() -> None:
+    seeds = 300
+    counts = np.sum([list(several(seed).values()) for seed in range(seeds)], axis=0)
+    fewest, most = binom.interval(0.99, seeds, 0.95)
+    assert ((fewest <= counts) & (counts <= most)).all(), counts
 
 
 # --- what cannot be told --------------------------------------------------------------------

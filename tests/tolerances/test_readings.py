@@ -10,8 +10,8 @@ import pytest
 import cdsm
 from cdsm.support.values import Array
 from cdsm.tolerance import SOURCES
-from cdsm.tolerances.budget import asked
 from cdsm.tolerances.drawn import DrawnArms
+from cdsm.tolerances.question import asked
 from cdsm.tolerances.readings import Question, Reading
 from tests.support import arms
 from tests.support.differences import assert_second_order

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import cdsm
-from cdsm.tolerances.budget import asked
+from cdsm.tolerances.question import asked
 from tests.support import arms
 from tests.tolerances.test_budget import WORKSHOP, posture, readme_arm
 

@@ -1,0 +1,170 @@
+"""Parameters of an arm by name: dimensions, masses, rigidity, springs, friction."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import Any, Final, NamedTuple, final
+
+import numpy as np
+
+from cdsm.cable import serpentine_cables
+from cdsm.elasticity import LinearElasticity
+from cdsm.errors import InvalidInput
+from cdsm.geometry import Geometry
+from cdsm.manipulator import Manipulator
+from cdsm.support.validation import instance, one_of, scalar, text
+
+
+class _Kind(NamedTuple):
+    """Parameter of an arm.
+
+    Attributes:
+        unit: Unit in which people read it.
+        size: That unit in SI.
+        part: ``joints``, ``links`` or ``cables`` of the geometry, if that holds it.
+        attribute: Its name there.
+    """
+
+    unit: str
+    size: float
+    part: str = ""
+    attribute: str = ""
+
+
+KINDS: Final = {
+    "friction": _Kind("", 1.0),
+    "rigidity": _Kind("", 1.0),
+    "spring": _Kind("N/mm", 1e3),
+    "lead": _Kind("mm", 1e-3, "cables", "lead"),
+    "hole_radius": _Kind("mm", 1e-3, "joints", "hole_radius"),
+    "disk_offset": _Kind("mm", 1e-3, "joints", "disk_offset"),
+    "link_length": _Kind("mm", 1e-3, "links", "length"),
+    "link_mass": _Kind("g", 1e-3, "links", "mass"),
+}
+"""Parameters of an arm."""
+
+
+@final
+class ArmParameters:
+    """Arm as a function of some of its parameters, as :func:`identify` wants it.
+
+    A parameter is that of all joints or links, or of one, counted from the base: ``"hole_radius"``,
+    ``"hole_radius@2"``. ``lead``, ``friction``, ``rigidity`` and ``spring`` with a number are those
+    of the cables of that joint. ``friction`` is μ, ``rigidity`` a factor on the EA of the arm's
+    laws [-], ``spring`` the stiffness in series with each cable [N/m], the others are in SI. Names
+    with @ are given as ``parameters(**{"hole_radius@2": 0.025})``.
+
+    Args:
+        arm: The arm; what is not named stays as it is.
+        names: Names of the parameters, in any order.
+
+    Raises:
+        UnknownName: There is no such parameter.
+        InvalidInput: The arm has no such joint or no geometry, or a name is given twice, or as a
+            whole and of one joint.
+    """
+
+    def __init__(self, arm: Manipulator, names: Iterable[str]) -> None:
+        self.arm = instance("arm", arm, Manipulator)
+        self.geometry: Geometry = arm.geometry  # refuses arms from a URDF
+        self.names = tuple(text("names", name) for name in names)
+        if self.arm.cables.names != self.geometry.cable_names:
+            raise InvalidInput("arm", "has other cables than those of its geometry.")
+        joints, taken = len(self.geometry.joints), set[tuple[str, int]]()
+        self._places: dict[str, tuple[str, tuple[int, ...]]] = {}
+        for name in self.names:
+            kind, at, number = name.partition("@")
+            one_of("parameter of an arm", kind, KINDS)
+            if at and not (number.isdecimal() and 1 <= int(number) <= joints):
+                raise InvalidInput(name, f"the arm has the joints 1 to {joints}.")
+            where = (int(number),) if at else tuple(range(1, joints + 1))
+            if taken & {(kind, k) for k in where}:
+                raise InvalidInput(name, f"frees {kind} of a joint twice.")
+            taken |= {(kind, k) for k in where}
+            self._places[name] = kind, where
+
+    def unit(self, name: str) -> tuple[str, float]:
+        """Return the unit in which people read a parameter, and its size in SI."""
+        kind = KINDS[self._places[name][0]]
+        return kind.unit, kind.size
+
+    @property
+    def present(self) -> dict[str, float]:
+        """Value of each parameter in the arm, in SI: the median where joints differ."""
+        return {name: float(np.median(self._values(name))) for name in self.names}
+
+    def __call__(self, **values: float) -> Manipulator:
+        """Build the arm with these values.
+
+        Raises:
+            GeometryError: The values do not make an arm.
+            UnknownName: A parameter is not among :attr:`names`.
+            InvalidInput: A rigidity is not positive, or a value is not a number.
+            CableError: A spring is not positive.
+        """
+        geometry, parts = self.geometry, dict[str, list[Any]]()
+        of_cables: dict[str, dict[int, float]] = {"friction": {}, "rigidity": {}, "spring": {}}
+        for name, given in values.items():
+            one_of("parameter", name, self.names)
+            value, (kind, where) = scalar(name, given), self._places[name]
+            part, attribute = KINDS[kind].part, KINDS[kind].attribute
+            if not part:
+                of_cables[kind].update(dict.fromkeys(where, value))
+                continue
+            own = parts.setdefault(part, list(getattr(geometry, part)))
+            for i, k in enumerate(_joints_of(geometry, part)):
+                if k in where:
+                    own[i] = replace(own[i], **{attribute: value})
+        if parts:
+            geometry = geometry.replace(**{part: tuple(own) for part, own in parts.items()})
+        cables = []
+        routed = serpentine_cables(geometry, LinearElasticity(1.0))
+        for old, new, route in zip(self.arm.cables, routed, geometry.cables, strict=True):
+            sites = tuple(
+                replace(site, position=moved.position)
+                for site, moved in zip(old.sites, new.sites, strict=True)
+            )
+            cable = replace(old, sites=sites, lead=new.lead)
+            k = route.joint
+            if k in of_cables["friction"]:
+                cable = cable.with_friction(of_cables["friction"][k])
+            if k in of_cables["rigidity"]:
+                law = cable.elasticity.scaled(of_cables["rigidity"][k])
+                cable = replace(cable, elasticity=law)
+            if k in of_cables["spring"]:
+                cable = replace(cable, series_stiffness=of_cables["spring"][k])
+            cables.append(cable)
+        return Manipulator(
+            geometry,
+            cables=cables,
+            gravity=self.arm.gravity,
+            original_length=self.arm.original_length,
+        )
+
+    def _values(self, name: str) -> list[float]:
+        """Return the values of a parameter at its joints in SI."""
+        (kind, where), geometry = self._places[name], self.geometry
+        cables = [
+            cable
+            for cable, route in zip(self.arm.cables, geometry.cables, strict=True)
+            if route.joint in where
+        ]
+        if kind == "rigidity":
+            return [1.0]
+        if kind == "spring":
+            return [cable.series_stiffness for cable in cables]
+        if kind == "friction":
+            return [max(site.friction for site in cable.sites) for cable in cables]
+        if kind == "hole_radius":
+            return [geometry.hole_radii[k - 1] for k in where]
+        part, attribute = KINDS[kind].part, KINDS[kind].attribute
+        parts = zip(_joints_of(geometry, part), getattr(geometry, part), strict=True)
+        return [getattr(each, attribute) for k, each in parts if k in where]
+
+
+def _joints_of(geometry: Geometry, part: str) -> list[int]:
+    """Return the number of the joint of each joint, link or cable."""
+    if part == "cables":
+        return [route.joint for route in geometry.cables]
+    return list(range(1, len(geometry.joints) + 1))

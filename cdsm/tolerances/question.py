@@ -1,0 +1,75 @@
+"""What is asked of a budget or a Monte Carlo run: the checked reading, and the tolerances."""
+
+from __future__ import annotations
+
+import math
+from typing import get_args
+
+from numpy.typing import ArrayLike
+
+from cdsm.errors import InvalidInput
+from cdsm.posture import Posture
+from cdsm.statics.buckling import critical_tension
+from cdsm.stiffness_matrix import stiffness
+from cdsm.support.validation import instance, one_of, unit_direction
+from cdsm.tension import Tension, distribute_tension
+from cdsm.tolerance import Tolerances
+from cdsm.tolerances.readings import Question, Reading
+from cdsm.tolerances.stuck import blocks_of
+
+READINGS = get_args(Reading)
+"""Names of all readings."""
+
+
+def chosen(pose: Posture, tolerances: Tolerances | None) -> Tolerances:
+    """Return the tolerances, or those of the arm; raise InvalidInput if there are none."""
+    if tolerances is not None:
+        return instance("tolerances", tolerances, Tolerances)
+    own = instance("pose", pose, Posture).arm.tolerances
+    if not own.given:
+        raise InvalidInput(
+            "tolerances",
+            "none given, and the arm has none; give Tolerances(rigidity=0.05, …), or a table "
+            "[tolerances] in its file.",
+        )
+    return own
+
+
+def asked(
+    pose: Posture,
+    tension: Tension | ArrayLike,
+    direction: ArrayLike | None,
+    of: Reading,
+    cable: str | None,
+    wrench: ArrayLike | None,
+) -> Question:
+    """Check the arguments of :func:`uncertainty` and return the reading that they ask for."""
+    one_of("reading", of, READINGS)
+    K = stiffness(pose, tension, wrench)
+    for name, value, wanted in (
+        ("direction", direction, of in ("along", "stuck", "tip")),
+        ("cable", cable, of == "tension"),
+    ):
+        if (value is not None) != wanted:
+            raise InvalidInput(
+                name, f"is needed for {of}." if wanted else f"has no meaning for {of}."
+            )
+    if of in ("tension", "critical_tension"):
+        instance("tension", tension, Tension)
+    if of == "critical_tension":
+        critical = critical_tension(pose, K.wrench).minimum
+        if not math.isfinite(critical):
+            raise InvalidInput("of", "the arm does not buckle, so no tension is critical.")
+        K = stiffness(pose, distribute_tension(pose, critical, wrench=K.wrench))
+    ties = None
+    if of == "stuck":
+        if not pose.arm.has_friction:
+            raise InvalidInput(
+                "of", "the arm has no friction in its holes; see Manipulator.with_friction."
+            )
+        blocks, F, ties = blocks_of(pose, K.tension)
+        K = stiffness(blocks, F, K.wrench)
+    u = None if direction is None else unit_direction("direction", direction)
+    names = [each.name for each in pose.arm.cables]
+    index = None if cable is None else names.index(one_of("cable", cable, names))
+    return Question(of, K, u, index, ties)

@@ -1,0 +1,102 @@
+"""Loops of weight tests from CSV files."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import cdsm
+from tests.identification.test_loops import hinge
+
+GOOD = """\
+# any comment
+test,joint1 [deg],direction,minimum [N],force [N],displacement [mm],remark
+up,20,-z,200,0,0.001,first
+up,,,,8,0.25,
+up,,,,0,0.06,
+side,-10,z,150,0,0,
+side,-10,z,150,5,0.1,
+"""
+
+
+def read(tmp_path: Path, text: str, **options: object) -> tuple[cdsm.WeightLoop, ...]:
+    path = tmp_path / "loops.csv"
+    path.write_text(text, encoding="utf-8")
+    options = {"displacement_std": 5e-6, "force_std": 0.05} | options
+    return cdsm.read_loops(path, hinge(), **options)  # type: ignore[arg-type]
+
+
+def test_loops_come_out_in_si(tmp_path: Path) -> None:
+    up, side = read(tmp_path, GOOD)
+    assert up == cdsm.WeightLoop(
+        direction="-z",
+        angles=(np.deg2rad(20.0),),
+        forces=(0.0, 8.0, 0.0),
+        displacements=(1e-6, 0.25e-3, 0.06e-3),
+        displacement_std=5e-6,
+        force_std=0.05,
+        minimum=200.0,
+        label="up",
+    )
+    assert side.angles == pytest.approx((np.deg2rad(-10.0),))
+    assert (side.direction, side.minimum) == ((0.0, 0.0, 1.0), 150.0)
+
+
+def test_three_axes_and_measured_tensions(tmp_path: Path) -> None:
+    head = "test,direction,cable1_1 [N],cable1_2 [N],force [N],x [um],y [um],z [um]\n"
+    (loop,) = read(tmp_path, f"{head}a,-z,60,50,0,1,2,3\na,,,,5,4,5,6\n")
+    assert loop.tension == (60.0, 50.0)
+    assert loop.minimum is None
+    assert loop.angles == (0.0,)
+    expected = np.array([[1e-6, 2e-6, 3e-6], [4e-6, 5e-6, 6e-6]])
+    np.testing.assert_allclose(np.array(loop.displacements), expected)
+
+
+def test_planned_tests_have_no_readings(tmp_path: Path) -> None:
+    (loop,) = read(tmp_path, "test,direction,force [N]\na,z,0\na,,5\n", minimum=100.0)
+    assert loop.displacements is None
+    assert loop.minimum == 100.0
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        (",8,", ",eight,", ("line 4", "column force", "'eight'")),
+        ("0.25", "inf", ("line 4", "column displacement", "'inf'")),
+        ("0.25", "", ("line 4", "column displacement", "''")),
+        ("joint1 [deg]", "joint1", ("joint1 [deg]", "joint1 [rad]")),
+        ("force [N]", "force [kg]", ("force", "force [N]")),
+        ("force [N]", "load [N]", ("has no column force", "force [N]")),
+        ("direction", "axis", ("has no column direction",)),
+        (",-z,", ",down,", ("line 3", "direction", "'down'", "-z")),
+        ("up,,,,0,", "up,21,,,0,", ("line 5", "column joint1", "'21'", "'20'")),
+        (
+            "side,-10,z,150,0,0,\nside,-10,z,150,5",
+            "s,9,z,9,0,0,\ns,,,,5,0,\nup,,,,5",
+            ("line 8", "up", "goes on"),
+        ),
+        ("side,-10,z,150,0", ",-10,z,150,0", ("line 6", "no name")),
+        ("side,-10,z,150,5", "side,-10,z,150,0", ("test side", "two sizes")),
+        ("remark", "force [N]", ("two columns called force",)),
+        ("remark", "cable1_1 [N]", ("minimum and cable1_1",)),
+        ("minimum [N]", "tension", ("no tensions", "cable1_1 [N]")),
+    ],
+)
+def test_faults_name_line_and_column(
+    tmp_path: Path, old: str, new: str, said: tuple[str, ...]
+) -> None:
+    with pytest.raises(cdsm.FileError) as caught:
+        read(tmp_path, GOOD.replace(old, new, 1))
+    for part in ("loops.csv", *said):
+        assert part in str(caught.value)
+
+
+def test_other_faults(tmp_path: Path) -> None:
+    with pytest.raises(cdsm.FileError, match="holds no loops"):
+        read(tmp_path, "test,force [N]\n")
+    with pytest.raises(cdsm.FileError, match="leave out minimum="):
+        read(tmp_path, GOOD, minimum=100.0)
+    with pytest.raises(cdsm.InvalidInput, match="displacement_std: -1"):
+        read(tmp_path, GOOD, displacement_std=-1.0)
+    with pytest.raises(cdsm.FileError, match="no column cable1_2"):
+        read(tmp_path, GOOD.replace("minimum [N]", "cable1_1 [N]"))
