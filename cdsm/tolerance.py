@@ -161,6 +161,7 @@ class Tolerance(ReadOnlyState):
         """Compute vᵀ R v, R the correlation matrix (n, n), v ``values``.
 
         If ``correlation`` is one number ρ, vᵀ R v = (1 − ρ) v·v + ρ (Σ v)².
+
         Raises:
             InvalidInput: ``correlation`` is a matrix of another size.
         """

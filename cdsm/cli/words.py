@@ -36,12 +36,9 @@ _OPTIONS: Final = {
     "steps": "--steps",
     "store": "--resume",
     "target": "--target",
-<<<<<<< HEAD
     "tension_bias": "--tension-bias",
     "tension_noise": "--tension-noise",
-=======
     "tension_std": "--tension-std",
->>>>>>> f354bb6 (cdsm identify: friction, rigidity, springs and sizes from a file of loops, or a plan of tests; a budget costs a third less)
     "wire": "--wire",
     "wrench": "--wrench",
 }
