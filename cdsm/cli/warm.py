@@ -13,11 +13,12 @@ def warm(as_json: AsJson = False) -> None:
     import numpy as np
 
     import cdsm
+    from cdsm.kernels.compiling import at_once
     from cdsm.support.progress import progress_bar
 
     start = time.perf_counter()
     arm = cdsm.presets.virtual_prototype()
-    with progress_bar("compiling kernels, up to two minutes"):
+    with at_once(), progress_bar("compiling kernels, up to two minutes"):
         pose = arm.at(np.full(arm.nv, 0.05))
         tension = cdsm.distribute_tension(pose, minimum=40.0)
         K = cdsm.stiffness(pose, tension)

@@ -76,7 +76,11 @@ def set_wraps(
             for w in lanes(width):
                 normal[r, w] = u[m, w] * v[n, w] - u[n, w] * v[m, w]
         for w in lanes(width):
-            sine[w] = math.sqrt(normal[0, w] ** 2 + normal[1, w] ** 2 + normal[2, w] ** 2)
+            sine[w] = math.sqrt(
+                normal[0, w] * normal[0, w]
+                + normal[1, w] * normal[1, w]
+                + normal[2, w] * normal[2, w]
+            )
         for w in lanes(width):
             cosine = u[0, w] * v[0, w] + u[1, w] * v[1, w] + u[2, w] * v[2, w]
             wrap[h, w] = math.atan2(sine[w], cosine) + own[h]

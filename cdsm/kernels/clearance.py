@@ -37,7 +37,8 @@ def _between(p: Array, q: Array, r: Array, s: Array) -> float:
     t = min(max((b * k - d) / a, 0.0), 1.0) if a > 0.0 else 0.0
     square = 0.0
     for i in range(3):
-        square += (p[i] + t * (q[i] - p[i]) - r[i] - k * (s[i] - r[i])) ** 2
+        way = p[i] + t * (q[i] - p[i]) - r[i] - k * (s[i] - r[i])
+        square += way * way
     return math.sqrt(square)
 
 
@@ -100,9 +101,10 @@ def _apart(p: Array, q: Array, r: Array, s: Array) -> float:
     """Return a lower bound of the distance of two segments: of spheres around them."""
     first = second = between = 0.0
     for i in range(3):
-        first += (q[i] - p[i]) ** 2
-        second += (s[i] - r[i]) ** 2
-        between += (p[i] + q[i] - r[i] - s[i]) ** 2
+        x, y, way = q[i] - p[i], s[i] - r[i], p[i] + q[i] - r[i] - s[i]
+        first += x * x
+        second += y * y
+        between += way * way
     return 0.5 * (math.sqrt(between) - math.sqrt(first) - math.sqrt(second))
 
 

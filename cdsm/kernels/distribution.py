@@ -10,8 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cdsm.kernels import active_set
-from cdsm.kernels.active_set import FOUND, IMPOSSIBLE, empty_state
+from cdsm.kernels.active_set import FOUND, IMPOSSIBLE, empty_state, search
 from cdsm.kernels.compiling import Width, compiled, inlined, inner, lanes, threaded, upwards
 from cdsm.kernels.serpentine_guess import (
     Blocks,
@@ -150,7 +149,7 @@ def _search_one(
         and is_provably_infeasible(blocks, J, b, low, high, guess, np.zeros((count, 1)))
     ):
         return INFEASIBLE
-    found = active_set.search(rows, torque, lowest, highest, state)
+    found = search(rows, torque, lowest, highest, state)
     if found == FOUND:
         F, y, check = state.F.reshape(count, 1), state.y.reshape(nv, 1), certificate(nv, count, one)
         set_optimal(J, b, low, high, F, y, check, one)

@@ -60,9 +60,9 @@ def stiffness_of_draws(
             fixed[c] = lead[n, c]
             for a in range(first[c], first[c + 1] - 1):
                 if row[a] == row[a + 1]:
-                    square = (site[n, a + 1, 0] - site[n, a, 0]) ** 2
-                    square += (site[n, a + 1, 1] - site[n, a, 1]) ** 2
-                    fixed[c] += math.sqrt(square + (site[n, a + 1, 2] - site[n, a, 2]) ** 2)
+                    x = site[n, a + 1, 0] - site[n, a, 0]
+                    y, z = site[n, a + 1, 1] - site[n, a, 1], site[n, a + 1, 2] - site[n, a, 2]
+                    fixed[c] += math.sqrt(x * x + y * y + z * z)
         pose, JX, L, J, g, weight, joint_origin, axis, slide, place, _ = single_pose(
             parent,
             order,

@@ -185,7 +185,9 @@ def set_way(site: Array, p: Index, scratch: Segments, width: Width) -> None:
         for w in lanes(width):
             across[r, w] = site[far, r, w] - site[p, r, w]
     for w in lanes(width):
-        square = across[0, w] ** 2 + across[1, w] ** 2 + across[2, w] ** 2
+        square = (
+            across[0, w] * across[0, w] + across[1, w] * across[1, w] + across[2, w] * across[2, w]
+        )
         length[w] = math.sqrt(square)
 
 
@@ -197,8 +199,8 @@ def set_holding(own: float, a: Array, b: Array, holds: Array, width: Width) -> N
         x = a[1, w] * b[2, w] - a[2, w] * b[1, w]
         y = a[2, w] * b[0, w] - a[0, w] * b[2, w]
         z = a[0, w] * b[1, w] - a[1, w] * b[0, w]
-        sizes = (a[0, w] ** 2 + a[1, w] ** 2 + a[2, w] ** 2) * (
-            b[0, w] ** 2 + b[1, w] ** 2 + b[2, w] ** 2
+        sizes = (a[0, w] * a[0, w] + a[1, w] * a[1, w] + a[2, w] * a[2, w]) * (
+            b[0, w] * b[0, w] + b[1, w] * b[1, w] + b[2, w] * b[2, w]
         )
         turns = x * x + y * y + z * z - STRAIGHT * STRAIGHT * sizes
         back = -(a[0, w] * b[0, w] + a[1, w] * b[1, w] + a[2, w] * b[2, w])

@@ -97,8 +97,9 @@ class CartesianReadings(ReadOnlyState):
             raise InvalidInput("directions", "are not orthogonal; give axes of a plane.")
         rows = self.posture.jacobian[:3]
         vectors, moved, _ = np.linalg.svd(U @ rows)
-        if moved[-1] <= readings.FLAT * np.linalg.norm(rows, 2):
-            u: Array = np.asarray(vectors[:, len(moved) - 1] @ U, dtype=np.float64)
+        # two joints cannot move the tip in three directions
+        if len(moved) < len(U) or moved[-1] <= readings.FLAT * np.linalg.norm(rows, 2):
+            u: Array = np.asarray(vectors[:, -1] @ U, dtype=np.float64)
             raise SingularStiffness(f"the tip cannot move along {axis_of(u)}.", frozen(u))
         inverse = np.linalg.inv(U @ self.compliance[:3, :3] @ U.T)
         return frozen(np.asarray(inverse, dtype=np.float64))

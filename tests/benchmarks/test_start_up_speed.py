@@ -1,7 +1,8 @@
 """What it costs to start, as ratios of processes: an import, a first stiffness, a help page.
 
-The floor is Python with numpy, Pinocchio and numba, without which no arm is computed. The first
-kernel, compiled before, costs two floors alone: numba imports scipy.linalg, and clears up at exit.
+The floor is Python with numpy, Pinocchio and numba, without which no arm is computed. Python runs
+the first calls of kernels itself: a first kernel of the cache would cost two floors alone, since
+numba imports scipy.linalg and clears up at exit.
 """
 
 import os

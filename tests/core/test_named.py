@@ -155,6 +155,27 @@ def test_planar_arms_have_a_cartesian_stiffness_in_their_plane() -> None:
     np.testing.assert_allclose(K.cartesian_in(["x", "y", "z"]), K.cartesian, rtol=1e-9)
 
 
+def test_an_arm_of_two_coordinates_prints_and_has_a_cartesian_stiffness_where_it_moves() -> None:
+    geometry = cdsm.Geometry.universal(
+        joints=1,
+        cables_per_joint=3,
+        link_length=0.05,
+        base_length=0.02,
+        disk_offset=0.01,
+        hole_radius=0.03,
+        link_mass=0.1,
+    )
+    pose = cdsm.Manipulator(geometry, cdsm.LinearElasticity(1e5)).at([0.1, -0.05])
+    bent = cdsm.stiffness(pose, cdsm.distribute_tension(pose, 20.0))
+    row = next(line for line in str(bent).splitlines() if line.startswith("cartesian"))
+    assert row.split()[-3:] == ["-", "-", "-"]
+    with pytest.raises(cdsm.SingularStiffness) as refused:
+        bent.cartesian_in(("x", "y", "z"))
+    # along the bone, which only turns about the joint
+    bone = pose.tip[:3, 3] - pose.joint_positions[0]
+    assert abs(refused.value.direction @ bone) == pytest.approx(np.linalg.norm(bone))
+
+
 U = (0.0, 0.3, 1.0)
 PLAN = cdsm.plan_path(
     POSE.arm, U, [K.along(U), 1e9], 10.0, 200.0, angles=[POSE.q, POSE.q], rate=50.0
