@@ -1,6 +1,6 @@
 """Command line of cdsm. Options take mm, degrees and N/mm.
 
-A command imports what it runs when it runs, so that help pages are there at once.
+Each command imports its modules when it runs, so that help pages appear at once.
 """
 
 from __future__ import annotations

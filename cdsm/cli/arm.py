@@ -128,7 +128,7 @@ def check(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Check a stiffness: derive it anew by differences, and report all that speaks against it.
+    """Check a stiffness: compare it with finite differences, and report every problem.
 
     The options are those of `cdsm stiffness`.
     Exit code 0: it can be trusted; 3: it cannot, and the report says why.

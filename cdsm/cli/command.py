@@ -1,4 +1,4 @@
-"""How typer runs our commands: shared options, older names, errors as messages or JSON, help."""
+"""Adapt our commands to typer: shared options, older names, errors as messages or JSON, help."""
 
 from __future__ import annotations
 

@@ -55,7 +55,7 @@ class Conditions:
         return wires_text(self.arm.cables)
 
     def to_dict(self) -> Json:
-        """Return them for JSON, in SI units."""
+        """Return the conditions for JSON, in SI units."""
         return {
             "computed_with": {
                 "wire": self.wire,

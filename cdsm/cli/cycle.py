@@ -42,9 +42,9 @@ def cycle(
     figure: Picture = None,
     as_json: AsJson = False,
 ) -> None:
-    """Load the tip slowly up and down; see the loop that friction in the holes leaves.
+    """Load the tip slowly up and down, and print the hysteresis due to friction in the holes.
 
-    --force or --mass is the largest load; --wrench is what the arm always carries.
+    --force or --mass is the largest load; --wrench is a constant load besides.
     """
     import numpy as np
 

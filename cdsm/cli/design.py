@@ -1,4 +1,4 @@
-"""``cdsm design``: search the best designs of an arm, and write the chosen one for the workshop."""
+"""``cdsm design``: find the best designs of an arm, and write the chosen one for the workshop."""
 
 from __future__ import annotations
 
@@ -43,9 +43,9 @@ def design(
     jobs: Annotated[int | None, typer.Option(help="Processes; default: all cores.", min=1)] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Search the best designs of an arm; write front, figure, and the chosen arm with its tables.
+    """Find the best designs of an arm; write the front, a figure, and the chosen arm with tables.
 
-    A stopped search goes on from what --out holds.
+    A stopped search resumes from the files in --out.
     """
     from cdsm.design.problem_file import read_problem
     from cdsm.support.files import make_folder, write_text

@@ -34,11 +34,11 @@ def weigh(
     figure: Picture = None,
     as_json: AsJson = False,
 ) -> None:
-    """Hang a weight at the tip with the motors locked, and see how far it goes (Eq. 20).
+    """Hang a weight at the tip with the motors locked; print the displacement (Eq. 20).
 
-    --force or --mass is the weight; --wrench is what the arm carries before. Exit code 0; 3 if the
-    arm does not stay at its posture without the weight, or buckles under it. With --friction, it
-    also says which weights measure which stiffness.
+    --force or --mass is the weight; --wrench is a load before it. Exit code 0; 3 if the arm does
+    not stay at its posture without the weight, or buckles under it. With --friction, it also says
+    which weights measure which stiffness.
     """
     if not weight.given:
         raise typer.BadParameter("give it or --mass: the weight.", param_hint="--force")
@@ -74,10 +74,10 @@ def buckle(
     figure: Picture = None,
     as_json: AsJson = False,
 ) -> None:
-    """Find the tension at which the arm buckles, and the multiple of a load that it holds.
+    """Find the tension at which the arm buckles, and the largest multiple of a load it can carry.
 
-    --force or --mass is the load that is multiplied; --wrench is what the arm always carries. Exit
-    code 0; 3 if the arm is unstable at every tension, or without the load already.
+    --force or --mass is the load that is multiplied; --wrench is a constant load besides. Exit
+    code 0; 3 if the arm is unstable at every tension, or already without the load.
     """
     loaded = weight.given or load is not None
     for option, value in (("--min-tension", min_tension), ("--max-tension", max_tension)):

@@ -1,4 +1,4 @@
-"""``cdsm new``: write an ARM.toml to begin with."""
+"""``cdsm new``: write a first ARM.toml."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def new(
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a file.")] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Write an ARM.toml, complete and with a comment on every key; any command takes it at once."""
+    """Write a complete ARM.toml with a comment on every key; every command can read it."""
     from cdsm.arm_file.template import template
     from cdsm.support.files import write_text
     from cdsm.support.validation import one_of

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from cdsm.support.values import Array
 
 DEFAULT_SOLVER: Final = "daqp"
-"""As in :mod:`cdsm.tension`, which the help pages do not wait for."""
+"""Equal to the default of :mod:`cdsm.tension`, whose import would delay the help pages."""
 
 _arm_option = partial(typer.Option, rich_help_panel="The arm")
 _tension_option = partial(typer.Option, rich_help_panel="Tensions and load")
@@ -249,7 +249,7 @@ class WeightOptions:
         return self.force is not None or self.mass is not None
 
     def vector(self, arm: cdsm.Manipulator) -> Array:
-        """Return the force of both (3,) [N]."""
+        """Return the sum of both forces (3,) [N]."""
         import numpy as np
 
         force = np.zeros(3)

@@ -89,7 +89,7 @@ def write_picture(path: Path | None, draw: Callable[[], Figure]) -> None:
 
 
 def written(path: Path) -> None:
-    """Tell on the standard error that a file is written."""
+    """Print to standard error that a file is written."""
     typer.echo(f"written: {path}", err=True)
 
 
@@ -117,7 +117,7 @@ def misuse_reported(as_json: bool) -> Iterator[None]:
 
 @contextmanager
 def reported(as_json: bool) -> Iterator[None]:
-    """Turn an error into a message, or into JSON, and an exit code; --debug shows where it is.
+    """Turn an error into a message, or into JSON, and an exit code; --debug raises it.
 
     A warning of cdsm becomes one line, too.
     """

@@ -110,7 +110,7 @@ def sweep(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Stiffness over a grid, a path or random postures, under one or several tension bounds."""
+    """Compute the stiffness over a grid, a path or random postures, under one or more bounds."""
     from cdsm.sweeps.export import check_target
 
     robot = arm.read()
@@ -159,7 +159,7 @@ def map_sweep(
     bins: Annotated[int, typer.Option(help="Cells along the longest side of a map.")] = 40,
     as_json: AsJson = False,
 ) -> None:
-    """Colour the reachable workspace by a quantity of a sweep."""
+    """Plot the reachable workspace, coloured by a quantity of a sweep."""
     dataset = cdsm.read_sweep(sweep)
     slab = None
     if section is not None:

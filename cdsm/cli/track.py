@@ -97,7 +97,7 @@ def track(
     figure: Picture = None,
     as_json: AsJson = False,
 ) -> None:
-    """Follow a path in closed loop at a wanted stiffness, against an arm that differs.
+    """Simulate a closed loop along a path at a wanted stiffness, with an arm that differs.
 
     The arm of the file is what the controller believes in; --true-rigidity, --true-friction and
     --payload say how the true one differs. Exit code 0; 3 if the loop is unstable, the arm buckles,

@@ -9,7 +9,7 @@ from cdsm.cli.output import answer
 
 
 def warm(as_json: AsJson = False) -> None:
-    """Compile all kernels now, once on this machine, so that nothing waits for them later."""
+    """Compile all kernels now, once on this machine, so that later commands start at once."""
     import numpy as np
 
     import cdsm

@@ -63,7 +63,7 @@ OLDER: Final[dict[str, dict[str, str]]] = {
     "check": {"--html": "--out"},
     "export": {"--mjcf": "--out"},
 }
-"""Older names of the options of a command, which go with the next release."""
+"""Older names of the options of a command; the next release removes them."""
 
 
 def in_options(message: str) -> str:

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from cdsm.tension import Tension
 
 BESIDE_BAR = 0.82
-"""Fraction of the width of a figure that is left of the scale of tensions."""
+"""Fraction of the width of a figure to the left of the tension scale."""
 
 _FLATTEST = 0.35
 """Smallest range of an axis, as a fraction of the largest."""
@@ -119,7 +119,7 @@ class Ellipsoid(NamedTuple):
 
     Attributes:
         surface: Points of the drawn surface (3, 13, 25) [m].
-        scale: Drawn over true displacement [-], a power of ten.
+        scale: Drawn displacement divided by true displacement [-], a power of ten.
         longest: Largest true displacement per force [m/N].
     """
 

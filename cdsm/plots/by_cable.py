@@ -74,12 +74,12 @@ def plot_shares(shares: Shares) -> Figure:
 
 
 def plot_stiffness_plan(plan: StiffnessPlan, attainable: StiffnessRange | None = None) -> Figure:
-    """Plot the planned tension of each cable, between those of the softest and the stiffest arm.
+    """Plot the planned tension of each cable, with those of the softest and the stiffest arm.
 
     Args:
         plan: Result of :func:`~cdsm.plan_stiffness`.
-        attainable: Range of stiffness along the single direction of the plan, at its posture, if
-            its ends shall be shown.
+        attainable: Range of stiffness along the single direction of the plan, at its posture. If
+            given, the tensions of the softest and the stiffest arm are drawn too.
 
     Raises:
         InvalidInput: The arguments are not a plan and a range, or differ in posture or direction.

@@ -1,4 +1,4 @@
-"""Figure of a search for designs: the front, or the progress where there is one objective."""
+"""Figure of a search for designs: the Pareto front, or the progress for a single objective."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 def plot_designs(found: DesignSearch) -> Figure:
-    """Plot the objectives of all designs that meet the constraints, and the front among them.
+    """Plot the objectives of all designs that meet the constraints, and their Pareto front.
 
     With one objective: its best value over the number of designs.
 

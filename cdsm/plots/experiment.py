@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def plot_experiment_plan(plan: ExperimentPlan) -> Figure:
-    """Plot the 95 % intervals to expect, and how useful one more test of each candidate is."""
+    """Plot the expected 95 % intervals, and the gain from one more test of each candidate."""
     figure, ((left, right),) = panels(TWO_COLUMNS, 3.2, 2)
     place, width = np.arange(len(plan.names)), 0.38
     for shift, std, colour, label in (

@@ -1,4 +1,4 @@
-"""Figure of the forces that an arm holds at its tip."""
+"""Figure of the tip forces that the cables can balance."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ if TYPE_CHECKING:
 
 
 def plot_force_polytope(polytope: ForcePolytope) -> Figure:
-    """Plot the forces that an arm holds [N], and the smallest that it does not hold.
+    """Plot the tip forces [N] that the cables can balance, and the worst direction.
 
     Args:
         polytope: The result of :func:`cdsm.force_polytope`.
 
     Raises:
-        InvalidInput: ``polytope`` is not one, or has no surface: the tip cannot move in some
-            direction, or the cables hold forces in one plane only.
+        InvalidInput: ``polytope`` is not a force polytope, or has no surface: the tip cannot move
+            in some direction, or the cables balance forces in one plane only.
     """
     expect("polytope", polytope, "ForcePolytope")
     if not len(polytope.faces):

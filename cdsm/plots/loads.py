@@ -112,7 +112,7 @@ def plot_critical_tension(critical: CriticalTension) -> Figure:
 
 
 def plot_critical_load(critical: CriticalLoad) -> Figure:
-    """Plot the stability margin over the factor of the load, as far as the arm holds it.
+    """Plot the stability margin over the factor of the load, up to the critical factor.
 
     Args:
         critical: Result of :func:`~cdsm.critical_load`.

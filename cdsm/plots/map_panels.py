@@ -22,13 +22,13 @@ _FLAT = 1e-9
 """The tips are in a plane if their extent along an axis is below this fraction of the largest."""
 
 _SLICE = 0.04
-"""Half thickness of the slices of a cloud of tips, over its extent."""
+"""Half thickness of the slices of a cloud of tips, divided by its extent."""
 
 _THIN = 0.15
 """Least ratio of the sides of a map."""
 
 _ROOM = 0.05
-"""Margin around the tips, over their largest extent."""
+"""Margin around the tips, divided by their largest extent."""
 
 
 class Slice(NamedTuple):
@@ -41,7 +41,7 @@ class Slice(NamedTuple):
     plane: tuple[int, int]
 
     def holds(self, points: Array) -> NDArray[np.bool_]:
-        """Check which points (N, 3) [mm] are in the slab."""
+        """Return which points (N, 3) [mm] are in the slab."""
         return np.asarray(abs(points[:, self.normal] - self.place) <= self.half)
 
 
@@ -118,7 +118,7 @@ def _title(dataset: xarray.Dataset, dim: str, place: int) -> str:
 
 
 def slices_of(points: Array, section: tuple[str, float, float] | None) -> tuple[list[Slice], bool]:
-    """Find the slabs to show, and whether they are slices of a cloud."""
+    """Return the slabs to show, and whether they are slices of a cloud of tips."""
     if section is not None:
         return [_slab(section)], False
     if not len(points):

@@ -52,7 +52,7 @@ _WIDE = 30.0
 """The colours are logarithmic if the ratio of largest to smallest value exceeds this."""
 
 _MIDDLE = (0.05, 0.95)
-"""Values further from these quantiles than these are from each other are outliers."""
+"""A value is an outlier if it is further outside these quantiles than they are apart."""
 
 _TALLEST = 4.0
 """Largest height of a panel [inch]."""
@@ -87,9 +87,10 @@ def plot_map(
     Tips in a plane and sections are dots, or cells if a statistic is given. A cloud of tips is
     shown in three slices through its middle, as cells. Many postures may put the tip into one cell;
     the statistic tells which value it shows. Entries without the quantity are marked by their
-    status, in cells only where nothing else is. Unstable entries are marked too, because their
-    stiffness has no meaning, except in a map of the margin. Outliers, far from the middle 90 % of
-    the values, and infinite values have a colour of their own, at the ends of the colour bar.
+    status, in maps of cells only outside cells with a value. Unstable entries are marked too,
+    because their stiffness has no meaning, except in a map of the margin. Outliers, far from the
+    middle 90 % of the values, and infinite values have a colour of their own, at the ends of the
+    colour bar.
 
     Args:
         dataset: Result of :func:`~cdsm.sweeps.run.sweep` with the output ``tip_position``. Use
@@ -174,7 +175,7 @@ def plot_map(
 
 
 def _colors(values: Array) -> tuple[ScalarMappable, str]:
-    """Build the scale of the finite values without outliers; say at which ends it is exceeded."""
+    """Return the colour scale of finite values without outliers, and where values exceed it."""
     finite = values[np.isfinite(values)] if np.isfinite(values).any() else np.array([0.0, 1.0])
     low, high = float(finite.min()), float(finite.max())
     wide = low > 0.0 and high > _WIDE * low

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from cdsm.wires.tensile.fit import TensileFit
 
 _BROAD = 0.25
-"""Stages wider than this part of all have their name in level lines."""
+"""Stages wider than this fraction of the whole range have horizontal names."""
 
 _MOST_LABELS = 30
 """Above this number of measurements the axis shows numbers, not names."""

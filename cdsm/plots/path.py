@@ -45,7 +45,7 @@ _SHAPES: Final = 3
 """Number of modes that are drawn."""
 
 _DEFLECTED: Final = 0.25
-"""Largest displacement of the tip in the picture of a mode, over the length of the arm."""
+"""Largest displacement of the tip in the picture of a mode, divided by the arm length."""
 
 
 def plot_path(
@@ -54,7 +54,7 @@ def plot_path(
     animate: str | os.PathLike[str] | None = None,
     tensions: ArrayLike | None = None,
 ) -> Figure:
-    """Plot some postures of a path over each other, from pale to dark, with the way of the tip.
+    """Plot some postures of a path over each other, from pale to dark, with the path of the tip.
 
     Args:
         path: Postures of one arm, in order; or a plan, of which the planned samples are drawn.

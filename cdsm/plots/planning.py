@@ -44,18 +44,19 @@ _SAME = 1e-9
 """Largest entry of a unit direction outside a plane in which it lies."""
 
 _JUMP = 3.0
-"""The target jumps where a change exceeds the neighbouring changes of equal sign by this factor."""
+"""A change of the target is a step if it exceeds the neighbouring changes of its sign by this
+factor."""
 
 
 def plot_stiffness_ranges(ranges: Mapping[str, Sequence[StiffnessRange]]) -> Figure:
     """Plot attainable stiffness over the direction, as a polar diagram in N/mm.
 
-    A curve for each largest stiffness, and the smallest of the last entry shaded. The other half of
-    the circle is the same, since ``along(-u)`` is ``along(u)``.
+    Each entry gives a curve of its largest stiffness. The smallest stiffness of the last entry is
+    shaded. Both halves of the circle are equal, since ``along(-u)`` is ``along(u)``.
 
     Args:
-        ranges: Ranges by label, such as the bound of the tensions. The directions of each rise
-            from 0° to below 180° in one coordinate plane, such as that of y and z.
+        ranges: Ranges by label, such as the bound of the tensions. All directions are in one
+            coordinate plane, such as that of y and z, from 0° to below 180°.
 
     Raises:
         InvalidInput: A range is missing or of the wrong type, or the directions are not in one
@@ -140,13 +141,13 @@ def plot_saturation(found: Saturation) -> Figure:
 def plot_path_plan(plan: PathPlan) -> Figure:
     """Plot wanted and planned stiffness, and tensions, over the samples of a path.
 
-    Infeasible samples are shaded. Target jumps are steps. Up to 24 cables have colours and names.
+    Infeasible samples are shaded. Up to 24 cables have colours and names.
 
     Args:
         plan: Result of :func:`~cdsm.planning.path.plan_path` for one direction or several.
 
     Raises:
-        InvalidInput: ``plan`` is not a plan of a path, or is a plan of ``cartesian``.
+        InvalidInput: ``plan`` is not a plan of a path, or its target is the Cartesian matrix.
     """
     expect("plan", plan, "PathPlan")
     if plan.direction is None:
@@ -183,7 +184,7 @@ def plot_path_plan(plan: PathPlan) -> Figure:
 
 
 def _stepped(values: Array) -> tuple[Array, Array]:
-    """Build a line through the samples (S,); a jump becomes a step half-way between two samples."""
+    """Build a line through the samples (S,); large changes are steps half-way between samples."""
     changes = np.diff(values)
     around = np.pad(changes, 1)
     # only neighbouring changes of equal sign make a ramp; up and back down is two jumps

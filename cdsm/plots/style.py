@@ -53,7 +53,7 @@ TICKS: Final = 5
 """Largest number of tick intervals on an axis of a map or a 3D picture."""
 
 ROOM: Final = 1.15
-"""Highest value of an axis that begins at zero, over the largest value drawn."""
+"""Upper limit of an axis that begins at zero, divided by the largest value drawn."""
 
 NAMED: Final = 24
 """Above this number of cables, lines are not distinct, so cables are not named."""
@@ -135,7 +135,7 @@ def caption(axes: Any, text: str) -> None:
 
 
 def from_zero(axes: Any, *values: Array) -> None:
-    """Let the upright axis of a panel begin at zero, with room above all values."""
+    """Set the range of the y-axis of a panel: from zero to above the largest of all values."""
     highest = max((float(np.nanmax(each, initial=0.0)) for each in values), default=0.0)
     axes.set_ylim(0.0, ROOM * highest or 1.0)
 

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from cdsm.control.run import TrackingRun
 
 _HALF = 0.5
-"""Part of the wanted stiffness below which the panel begins at zero."""
+"""The stiffness axis begins at zero if values are below this fraction of the wanted stiffness."""
 
 
 def plot_tracking_run(run: TrackingRun) -> Figure:

@@ -1,4 +1,4 @@
-"""Name cables in the picture: all of them, or one that was clicked."""
+"""Labels of cables in the picture: of all cables, or of one that was clicked."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ if TYPE_CHECKING:
     import viser
 
 _NEAR: Final = 0.012
-"""Angle [rad] between a clicked ray and a cable that it hits: some 12 pixels."""
+"""Largest angle [rad] between a clicked ray and a cable that it hits: about 12 pixels."""
 
 
 def clicked_cable(paths: Sequence[Array], origin: Array, direction: Array) -> int | None:
-    """Return the cable that is nearest to a ray from a camera, or None if none is near.
+    """Return the index of the cable nearest to a ray from a camera; None if no cable is near.
 
     ``paths`` are as ``cable_paths`` of a posture; origin (3,) and direction (3,) are of the ray.
     """
@@ -50,7 +50,7 @@ class CableNames:
         self.chosen: int | None = None
 
     def choose(self, shown: Shown, origin: Array, direction: Array) -> None:
-        """Name the clicked cable alone; without one, no cable."""
+        """Label only the cable at a clicked ray; no cable if none is near."""
         if shown.posture is not None:
             self.chosen = clicked_cable(shown.posture.cable_paths, origin, direction)
 

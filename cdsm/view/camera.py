@@ -23,7 +23,7 @@ _MARGIN = 1.3
 """Radius of the visible ball, over the radius of the arm."""
 
 _OUTSIDE, _SMALL = 1.3, 0.5
-"""Extent of the arm, over the fitted radius, beyond and below which the cameras are fitted anew."""
+"""The cameras are fitted again if the arm's extent/fitted radius is above or below these."""
 
 _USUAL = 4.0 / 3.0
 """Width over height of the picture for which the first camera is placed."""
@@ -45,7 +45,7 @@ class Ball:
 
     @classmethod
     def around(cls, points: Array, least: float) -> Self:
-        """Build a ball around points (P, 3), with at least some radius."""
+        """Build a ball around points (P, 3) [m], with a radius of at least ``least`` [m]."""
         middle = (points.min(axis=0) + points.max(axis=0)) / 2.0
         return cls(middle, max(float(np.linalg.norm(points - middle, axis=1).max()), least))
 
@@ -87,7 +87,7 @@ class _Browser:
 class Cameras:
     """Cameras of all browsers of a viser server, fitted to a ball.
 
-    The camera of a browser is fitted anew if its size changes, unless its user has moved it.
+    The camera of a browser is fitted again if its size changes, unless its user has moved it.
     """
 
     def __init__(self, server: viser.ViserServer, ball: Ball) -> None:

@@ -27,7 +27,7 @@ _SAVE: Final = (
     "link.download=document.title.split(':')[0]+'.png';"
     "link.click();window.URL.revokeObjectURL(link.href)})"
 )
-"""Save the largest canvas, which is the scene. ``URL`` alone is that of the page here."""
+"""Save the largest canvas, which is the scene. In ``onclick``, ``URL`` alone is the address."""
 
 _BUTTON: Final = "padding:0.3em 0.8em;margin-right:0.6em;cursor:pointer"
 _CODE: Final = "display:block;white-space:pre-wrap;overflow-wrap:anywhere;margin-bottom:0.6em"
@@ -74,7 +74,7 @@ def python_lines(arm: Manipulator, setting: Setting) -> str:
 
 
 def command_text(arm: Manipulator, setting: Setting, arm_arguments: Sequence[str] | None) -> str:
-    """Write the end of the page: the command and buttons; Python without arguments of an arm."""
+    """Return the end of the page: command and buttons; Python if ``arm_arguments`` is None."""
     if arm_arguments is None:
         where, command = "in Python", python_lines(arm, setting)
     else:

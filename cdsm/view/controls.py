@@ -110,7 +110,7 @@ class Controls:
             joint.move(angle)
 
     def add_switch(self, label: str, hint: str, on: bool) -> viser.GuiCheckboxHandle:
-        """Add a switch."""
+        """Add a checkbox that calls ``changed``."""
         switch = self._gui.add_checkbox(label, on, hint=hint)
         switch.on_update(lambda _: self._changed())
         self._admit(switch)

@@ -66,7 +66,7 @@ Control = (
 
 
 class _Address(str):
-    """Listening address of one guard, told by identity from equal strings of other servers."""
+    """Listening address of one guard; its identity tells it from equal strings of other servers."""
 
     __slots__ = ()
 
@@ -225,7 +225,7 @@ class _Connection(ServerConnection):
 
 
 def _is_loopback(name: str) -> bool:
-    """Return whether a name always means this machine only, whoever resolves the name."""
+    """Return whether a host name always means this machine, however it is resolved."""
     try:
         return ipaddress.ip_address(name).is_loopback
     except ValueError:

@@ -49,7 +49,7 @@ class _Row(NamedTuple):
 def page_text(shown: Shown, force_scale: float, remark: str = "") -> str:
     """Write the panel of one setting. Each number is in an element with ``data-cdsm="name"``.
 
-    ``force_scale`` [m/N] is the length of the arrow of the force. ``remark`` is said above the
+    ``force_scale`` [m/N] is the length of the arrow of the force. ``remark`` is shown above the
     numbers.
     """
     color = _COLORS.get(shown.condition, _GREY)
@@ -79,7 +79,7 @@ def basis_text(arm: Manipulator) -> str:
 
 
 def tensions_text(shown: Shown) -> str:
-    """Write the list of cables with their tensions and those that are at a bound or slack."""
+    """Write the list of cables with their tensions; those at a bound or slack are marked."""
     if shown.tensions is None or shown.posture is None or shown.cable_colors is None:
         return str(element("div", "unknown", style=_LIST))
     marks: dict[str, str] = {}
@@ -114,7 +114,7 @@ def _remarks(shown: Shown, remark: str) -> Iterator[tuple[str, str]]:
 
 
 def _numbers(shown: Shown) -> Iterator[_Row]:
-    """Yield the numbers that exist."""
+    """Yield the table rows of all results that exist."""
     K, principal, tensions, pose = shown.stiffness, shown.principal, shown.tensions, shown.posture
     if shown.along is not None and principal is not None:
         along = {f"along-{axis}": _stiffness(F) for axis, F in zip(AXES, shown.along, strict=True)}

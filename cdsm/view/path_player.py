@@ -25,7 +25,7 @@ class PathPlayer:
     Args:
         server: Where to add the controls.
         path: One row per sample (S, …).
-        go: Moves the arm to a row, and returns when this is shown.
+        go: Moves the arm to a row of ``path``, and returns when it is shown.
         admit: Receives every control that browsers may use.
     """
 
@@ -53,7 +53,7 @@ class PathPlayer:
         self._thread.start()
 
     def close(self) -> None:
-        """Stop playing, for ever."""
+        """Stop playing, and end the thread."""
         self._closed.set()
         self._playing.set()
         self._thread.join()

@@ -170,7 +170,7 @@ class Scene:
 
 
 def _straight(arm: Manipulator) -> Posture | None:
-    """Return the arm as straight as it goes; None if two sites of a cable coincide there."""
+    """Return the straightest posture within the limits; None if two sites of a cable coincide."""
     try:
         return arm.at(np.clip(np.zeros(arm.nv), arm.lower, arm.upper))
     except CableError:

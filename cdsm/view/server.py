@@ -68,14 +68,14 @@ def serve(
         tips: A path to play, as tip positions (S, 3) [m]; give only one kind of path.
         solver: Solver of :func:`~cdsm.distribute_tension`.
         largest_tension: Right end of the slider of the lower bound [N].
-        largest_force: Ends of the sliders of the force [N]; larger if ``force`` is larger.
+        largest_force: The sliders of the force go to ± this [N], or further if ``force`` does.
         arm_arguments: Arguments that describe the arm in a shell. The page then gives a command of
             the shell, otherwise lines of Python.
 
     Raises:
         MissingExtra: viser is not installed (extra ``[view]``).
         InvalidInput: A value has the wrong type or shape, or the port is not available.
-        CdsmError: The installed viser cannot be guarded.
+        CdsmError: The server of the installed viser cannot be protected.
         JointLimitError: An angle is beyond its limit.
         UnknownName: The solver is not installed.
     """

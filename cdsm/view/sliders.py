@@ -47,7 +47,7 @@ class Range:
 
 
 def slider_range(label: str, low: float, high: float, initial: float, unit: float = 1.0) -> Range:
-    """Compute a slider between two SI values; its ends and its step are round numbers.
+    """Return the range of a slider between two SI values; its ends and its step are round numbers.
 
     The ends lie within the two values, but they always include the unrounded ``initial``.
     """
@@ -67,7 +67,7 @@ def slider_range(label: str, low: float, high: float, initial: float, unit: floa
 
 
 def joint_ranges(arm: Manipulator, q: Array) -> tuple[Range, ...]:
-    """Compute one slider per joint within the joint limits, in degrees, or mm if it slides."""
+    """Return the slider range of each joint within its limits, in degrees, or mm if it slides."""
     most = np.where(arm.slides, _LENGTHS * arm.length, _TURN)
     low, high = np.maximum(arm.lower, -most), np.minimum(arm.upper, most)
     units = JointUnits(arm.slides).shown

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 _LINE, _SECTION = (222, 222, 226), (180, 180, 188)
 _CELLS: Final = 5
-"""Cells of the grid between two lines with a length."""
+"""Number of grid cells between two labelled lines."""
 
 _ROUNDING = 1e-9
 """Rounding of a logarithm."""
@@ -55,7 +55,7 @@ def draw_surroundings(server: viser.ViserServer, length: float) -> None:
 
 
 def section(length: float) -> float:
-    """Compute the distance [m] of lines with a length: 1, 2 or 5 times a power of ten.
+    """Compute the distance [m] of labelled grid lines: 1, 2 or 5 times a power of ten.
 
     It is the largest such distance up to a third of the length of the arm.
     """

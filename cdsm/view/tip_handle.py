@@ -47,12 +47,12 @@ class TipHandle:
             self._changed()
 
     def aim(self, target: Array) -> None:
-        """Ask for joint angles that bring the tip to a target (3,) [m]."""
+        """Set the target of the tip (3,) [m], and request joint angles that reach it."""
         self._target = target
         self._changed()
 
     def solve(self, q: Array) -> Array | None:
-        """Find joint angles (nv,) near ``q`` for the target; None if it has not moved."""
+        """Return joint angles (nv,) near ``q`` for a new target; None if there are none."""
         target, self._target = self._target, None
         if target is None:
             return None
@@ -71,11 +71,11 @@ class TipHandle:
         return found.angles
 
     def moved_to(self, q: Array) -> None:
-        """Keep the angles (nv,) to which the sliders were moved; sliders round."""
+        """Store the angles (nv,) of the sliders, which round them."""
         self._q = q
 
     def remark(self, q: Array) -> str:
-        """Return why the handle is not at the tip, if the sliders have not moved since."""
+        """Return why the handle is not at the tip; empty if the sliders have moved since."""
         return self._remark if np.array_equal(q, self._q) else ""
 
     def update(self, shown: Shown) -> None:

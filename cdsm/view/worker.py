@@ -11,7 +11,7 @@ from concurrent import futures
 class Worker:
     """A thread that runs a job on request. All requests during a run cause one further run.
 
-    Many threads request runs, faster than the job ends. It reads the newest state when it starts.
+    Many threads request runs, faster than the job runs. Each run uses the newest state.
     """
 
     def __init__(self, job: Callable[[], None]) -> None:
@@ -33,7 +33,7 @@ class Worker:
         futures.wait([self._last] if self._last else [])
 
     def is_left_alone(self, seconds: float) -> bool:
-        """Wait, within the job, whether nobody requests a run for some seconds."""
+        """Wait, within the job; return whether no run was requested for some seconds."""
         return not self._asked.wait(seconds)
 
     def close(self) -> None:
