@@ -29,93 +29,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from copy import copy
-from typing import Any, NamedTuple, Self
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from cdsm.cable import Cable
 from cdsm.errors import ElasticityRangeError, SolverError
+from cdsm.friction.neighbourhood import Neighbourhood
 from cdsm.friction.remainders import Bends, Remainders
 from cdsm.kernels.chains import single_tension_stiffness
 from cdsm.kernels.stiffness import single_load_stiffness
 from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.values import Array, frozen
 
-_NEAR = 1e-9
-"""Least neighbourhood [rad], [m] or [N]: that of an arm without friction is rounding."""
-
 _CELLS = 8192
 """Intervals of tension in each of which a strain is only known to rise."""
-
-
-class Neighbourhood:
-    """States near a reference: ``room`` times those that are at rest to first order.
-
-    With the relative changes y_j = ΔT_j/F − ȳ of a cable about their mean over its wire, the wire
-    gives F ȳ = k Σ_j g_j·δ, with k the stiffness of the whole cable. Equilibrium becomes
-    K_θ δ = −Σ_j F y_j g_j with the frictionless K_θ. Each step of y at a hole is free within ±μ φ,
-    so any sum over y is largest where each step has its sign: a closed form.
-
-    Attributes:
-        joints: Largest |δ| (nv,) [rad].
-        tensions: Largest ΔT (S,) [N].
-        falls: Largest −ΔT (S,) [N]; no tension is negative.
-    """
-
-    def __init__(self, K: Stiffness, room: float) -> None:
-        segments = K.posture.segments
-        chains, laws = segments.chains, K.posture.arm._model.segment_laws
-        cable, start, F = chains.cable, chains.start, K.tension
-        with np.errstate(divide="ignore"):
-            soft = 1.0 / laws.stiffness(segments.lengths, F[cable])
-        steps = np.zeros((cable.size, chains.hole.size))
-        for i, hole in enumerate(chains.hole):
-            of = slice(start[cable[hole]], start[cable[hole] + 1])
-            after = np.arange(of.start, of.stop) > hole
-            forced = not np.isfinite(soft[of.start])  # the motor holds the tension at the start
-            mean = 0.0 if forced else soft[of][after].sum() / soft[of].sum()
-            steps[of, i] = (after - mean) * F[cable[hole]]
-        joints = -np.linalg.solve(K.joint, segments.length_jacobian.T @ steps)
-        common = K.cable_stiffness[:, None] * (K.posture.length_jacobian @ joints)
-        grip = room * chains.friction * segments.wrap
-        self._steps = joints * grip
-        self.joints = np.maximum(self.largest(np.eye(len(joints))), _NEAR)
-        apart = abs((steps + common[cable]) * grip).sum(axis=1) / np.where(F > 0.0, F, 1.0)[cable]
-        self._set_tensions(apart, F[cable])
-
-    def _set_tensions(self, apart: Array, F: Array) -> None:
-        """Set the bounds of tensions from those of |ln T/F| (S,); a rise exceeds a fall."""
-        self.tensions = np.maximum(np.expm1(apart) * F, _NEAR)
-        self.falls = np.minimum(np.maximum(apart * F, _NEAR), F)
-
-    def still(self, K: Stiffness) -> Self:
-        """Return the states with the very angles of the reference: |ln T/F| is at most Σ μ φ."""
-        segments = K.posture.segments
-        chains, grip = segments.chains, np.zeros(len(segments.lengths))
-        grip[chains.hole] = chains.friction * segments.wrap
-        apart = np.add.reduceat(grip, chains.start[:-1])[chains.cable]
-        same = copy(self)
-        same.joints, same._steps = np.zeros_like(self.joints), np.zeros_like(self._steps)
-        same._set_tensions(apart, K.tension[chains.cable])
-        return same
-
-    def largest(self, rows: Array) -> Array:
-        """Compute the largest |a·δ| of rows a (…, nv)."""
-        return np.asarray(abs(rows @ self._steps).sum(axis=-1))
-
-    def curved(self, forms: Array) -> Array:
-        """Compute a bound of |δᵀ A δ|/2 for quadratic forms A (…, nv, nv).
-
-        It is a sum over pairs of holes: joints that turn against each other cancel in each pair.
-        """
-        both = self._steps.T @ forms @ self._steps
-        return np.asarray(abs(both).sum(axis=(-2, -1)) / 2.0)
-
-    def cubed(self, form: Array) -> float:
-        """Compute a bound of |Σ A_ijk δ_i δ_j δ_k|/6 of a cubic form A (nv, nv, nv), likewise."""
-        first = np.tensordot(self._steps, form, (0, 0))
-        return float(abs(self._steps.T @ first @ self._steps).sum()) / 6.0
 
 
 class End(NamedTuple):
@@ -133,7 +61,7 @@ class RestStates:
     correction.
     """
 
-    def __init__(self, K: Stiffness, near: Neighbourhood) -> None:
+    def __init__(self, K: Stiffness, near: Neighbourhood, bends: Bends) -> None:
         from scipy.sparse import csc_array
 
         pose, cables = K.posture, K.posture.arm.cables
@@ -141,7 +69,7 @@ class RestStates:
         segments = pose.segments
         chains, g, length = segments.chains, segments.length_jacobian, segments.lengths
         cable, start = chains.cable, chains.start
-        F, far, bends = K.tension[cable], Remainders(K, within), Bends(K)
+        F, far = K.tension[cable], Remainders(K, within)
         routing, frames, count = segments._routing, segments._frames, np.arange(length.size)
         H = single_tension_stiffness(
             routing.segment, routing.joint, *frames, np.ones(length.size), count, length.size

@@ -8,7 +8,9 @@ from scipy.optimize import linprog
 
 import cdsm
 from cdsm import presets
-from cdsm.friction.rest_states import Neighbourhood, RestStates
+from cdsm.friction.neighbourhood import Neighbourhood
+from cdsm.friction.remainders import Bends
+from cdsm.friction.rest_states import RestStates
 from cdsm.support.values import Array
 from tests.campaigns import histories as histories_of
 from tests.support import arms
@@ -210,6 +212,23 @@ def test_much_friction_is_proved_too() -> None:
     assert cdsm.rest_band(strand, cdsm.distribute_tension(strand, 50.0), "z").proved
 
 
+@pytest.mark.parametrize(
+    ("friction", "bound"), [(0.1, 30.0), (0.1, 80.0), (0.05, 15.0), (0.05, 120.0)]
+)
+def test_bands_are_proved_while_friction_turns_joints_by_less_than_a_degree(
+    friction: float, bound: float
+) -> None:
+    arm = presets.virtual_prototype(lead=0.3, friction=friction)
+    pose = arm.at(np.full(10, presets.TEN_DEGREES))
+    pull = cdsm.distribute_tension(pose, bound)
+    band = cdsm.rest_band(pose, pull, "z")
+    assert band.proved
+    assert band.first_order < min(-band.low, band.high)
+    assert max(-band.low, band.high) < 2.0 * band.first_order
+    turned = Neighbourhood(cdsm.stiffness(pose, pull), 1.0).joints.max()
+    assert np.rad2deg(turned) < 0.8
+
+
 def test_without_friction_there_is_one_rest() -> None:
     pose, pull = prototype(0.0)
     band = cdsm.rest_band(pose, pull, "z")
@@ -224,7 +243,7 @@ def test_bounds_are_proved_by_the_multipliers_alone() -> None:
     """Weak duality: the bound of any multipliers is at least the optimum."""
     pose, pull = prototype(0.1)
     K = cdsm.stiffness(pose, pull)
-    states = RestStates(K, Neighbourhood(K, 1.25))
+    states = RestStates(K, Neighbourhood(K, 1.25), Bends(K))
     for u in np.eye(3):
         end = states.displacement(u)
         assert end.bound > end.value > 0.0
