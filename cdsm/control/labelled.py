@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 
     from cdsm.control.run import TrackingRun
 
+_LISTED = 3
+"""Largest number of motors whose names are printed."""
+
 
 def labelled(run: TrackingRun) -> xarray.Dataset:
     """Return a Dataset over time, in SI units."""
@@ -122,7 +125,7 @@ def rows(run: TrackingRun) -> list[tuple[str, str]]:
         ("tensions at the motors", f"{low:.4g} to {high:.4g} N"),
         ("least margin to buckling", f"{n['least_margin_Nm_per_rad']:.4g} "
          f"{run.plan.arm.stiffness_unit()}"),
-        ("saturated motors", ", ".join(run.saturated_motors) or "none"),
+        ("saturated motors", _some(run.saturated_motors, run.tension.shape[1])),
         ("rigidity of the wires, as estimated", f"{100.0 * n['estimated_rigidity']:.4g} %"),
         ("inside the proved band", _inside(run)),
     ]  # fmt: skip
@@ -132,6 +135,11 @@ def rows(run: TrackingRun) -> list[tuple[str, str]]:
             ("stiffness felt by the motors", f"{felt} at {plural(n['steps_felt'], 'step')}")
         )
     return lines
+
+
+def _some(names: tuple[str, ...], count: int) -> str:
+    listed = ", ".join(names) if len(names) <= _LISTED else f"{len(names)} of {count}"
+    return listed or "none"
 
 
 def _inside(run: TrackingRun) -> str:

@@ -64,13 +64,13 @@ class Command(NamedTuple):
 
 
 class Moment(NamedTuple):
-    """All that a law may know at one step of control.
+    """Arguments of a motor law at one step of control.
 
     Attributes:
-        reference: What is wanted now.
-        reading: What is measured now.
-        reference_before: What was wanted at the step before.
-        reading_before: What was measured at the step before.
+        reference: Reference of this step.
+        reading: Readings of this step.
+        reference_before: Reference of the step before.
+        reading_before: Readings of the step before.
         command: Wire commanded at the step before (C,) [m].
         minimum: Lower bounds of the tensions (C,) [N].
         maximum: Upper bounds of the tensions (C,) [N].

@@ -62,7 +62,10 @@ def tip_force(
     """Bound the force at the tip from the tensions at the motors: a force without a moment.
 
     The bounds are proved for each state of the cables that friction admits, if posture, friction
-    and masses are those of the arm.
+    and masses are those of the arm. The posture must be known, from joint encoders or a camera.
+    For one that :func:`track` estimates from the motors nothing is proved: friction hides the
+    strain inside the holes, and so do the rigidity of the wires and their errors. ``estimated_force``
+    of its result is the best guess there, without bounds.
 
     Args:
         pose: The true posture.

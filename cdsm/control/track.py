@@ -188,7 +188,7 @@ def _share(name: str, value: float) -> float:
 
 
 class _Step(NamedTuple):
-    """Everything about one step."""
+    """Record of one step."""
 
     wanted: Reference
     reading: Reading

@@ -215,8 +215,14 @@ def closed_loop(nb: Shown) -> None:
     assert abs(worst["feedforward"] - 0.79) < 0.02
     assert abs(worst["tension"] - 0.10) < 0.03
     assert worst["mixed"] > 0.3
-    assert nb.stiff.inside.all()
-    assert len(nb.stiff.inside) == 5
+    for tried in nb.runs.values():
+        assert tried.inside.all()
+        assert (tried.commanded_tension >= 10.0).all()
+        assert (tried.commanded_tension <= 250.0).all()
+    assert nb.stiff.proved.sum() == nb.stiff.banded.sum() == 9
+    assert nb.runs["feedforward"].proved.sum() < 9
+    assert 0.05 < np.nanmax(abs(nb.stiff.felt / nb.stiff.stiffness - 1.0)) < 0.2
+    assert nb.felt["no friction"] < 4.0
     assert abs(nb.stiff.rigidity[-1] - 0.9) < 1e-3
     assert abs(nb.force[2] + 0.2 * 9.81) < 0.2
     assert nb.stiff.tip_error.max() < 1e-3 < nb.runs["tension"].tip_error.max()
