@@ -62,10 +62,9 @@ def tip_force(
     """Bound the force at the tip from the tensions at the motors: a force without a moment.
 
     The bounds are proved for each state of the cables that friction admits, if posture, friction
-    and masses are those of the arm. The posture must be known, from joint encoders or a camera.
-    For one that :func:`track` estimates from the motors nothing is proved: friction hides the
-    strain inside the holes, and so do the rigidity of the wires and their errors. ``estimated_force``
-    of its result is the best guess there, without bounds.
+    and masses are those of the arm. The posture must be known, from joint encoders or a camera. At
+    a posture that :func:`track` estimates from the motors nothing is proved, since friction hides
+    the strain between the holes: ``estimated_force`` of its result has no bounds.
 
     Args:
         pose: The true posture.
