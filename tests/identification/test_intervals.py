@@ -10,6 +10,7 @@ from scipy.stats import binom, norm, t
 import cdsm
 from cdsm.identification import Measurement, Profile, identify
 from cdsm.support.values import Array
+from tests.support.arms import readme_geometry
 
 GEOMETRY = cdsm.Geometry.hinged(
     joints=1,
@@ -215,16 +216,7 @@ def test_profiles_cost_about_as_many_predictions_as_stated() -> None:
 
 def strand_arm(hole_radius: float, drive: float, lead: float) -> cdsm.Manipulator:
     """Of universal joints; its three parameters correlate at 0.99."""
-    geometry = cdsm.Geometry.universal(
-        joints=4,
-        cables_per_joint=3,
-        link_length=0.06,
-        base_length=0.03,
-        disk_offset=0.012,
-        hole_radius=hole_radius,
-        link_mass=0.12,
-        lead=lead,
-    )
+    geometry = readme_geometry(hole_radius=hole_radius, lead=lead)
     cables = cdsm.serpentine_cables(geometry, cdsm.presets.STRAND_1X19, series_stiffness=drive)
     return cdsm.Manipulator(geometry, cables=cables)
 

@@ -8,6 +8,7 @@ import pytest
 
 import cdsm
 from cdsm.identification import Measurement, identify
+from tests.support.arms import readme_geometry
 
 STRAND = cdsm.presets.STRAND_1X19
 DOWN = (0.0, 0.0, -1.0)
@@ -17,16 +18,7 @@ FREE = {"hole_radius": (0.02, 0.04), "lead": (0.05, 1.0)}
 
 def snake(hole_radius: float = 0.025, lead: float = 0.3, mass: float = 0.12) -> cdsm.Manipulator:
     """The arm of README."""
-    geometry = cdsm.Geometry.universal(
-        joints=4,
-        cables_per_joint=3,
-        link_length=0.06,
-        base_length=0.03,
-        disk_offset=0.012,
-        hole_radius=hole_radius,
-        link_mass=mass,
-        lead=lead,
-    )
+    geometry = readme_geometry(hole_radius=hole_radius, link_mass=mass, lead=lead)
     return cdsm.Manipulator(geometry, elasticity=STRAND)
 
 

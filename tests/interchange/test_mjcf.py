@@ -15,7 +15,7 @@ import cdsm
 from cdsm.interchange.mjcf_bodies import add_bodies
 from cdsm.statics.natural_modes import mass_matrix
 from cdsm.support.values import Array
-from tests.support.arms import mixed_arm, random_arm, random_posture, random_wrench
+from tests.support.arms import mixed_arm, random_arm, random_posture, random_wrench, readme_geometry
 from tests.support.foreign import POSTURE, TENSION, crab
 
 mujoco: Any = pytest.importorskip("mujoco")
@@ -174,16 +174,7 @@ def hinged(joints: int, **changes: Any) -> cdsm.Manipulator:
 
 
 def universal(joints: int, link_mass: float) -> cdsm.Manipulator:
-    geometry = cdsm.Geometry.universal(
-        joints=joints,
-        cables_per_joint=3,
-        link_length=0.06,
-        base_length=0.03,
-        disk_offset=0.012,
-        hole_radius=0.025,
-        link_mass=link_mass,
-        lead=0.3,
-    )
+    geometry = readme_geometry(joints=joints, link_mass=link_mass)
     return cdsm.Manipulator(geometry, cdsm.presets.STRAND_1X19)
 
 

@@ -12,7 +12,7 @@ from scipy.linalg import eigh
 
 import cdsm
 from cdsm.support.values import Array
-from tests.support.arms import mixed_arm, random_posture
+from tests.support.arms import mixed_arm, random_posture, readme_geometry
 from tests.support.foreign import POSTURE, TENSION, crab
 
 mujoco: Any = pytest.importorskip("mujoco")
@@ -30,16 +30,7 @@ def finger() -> tuple[cdsm.Posture, cdsm.Tension]:
 def eight_joints(
     law: cdsm.Elasticity = cdsm.presets.STRAND_1X19,
 ) -> tuple[cdsm.Posture, cdsm.Tension]:
-    geometry = cdsm.Geometry.universal(
-        joints=8,
-        cables_per_joint=3,
-        link_length=0.06,
-        base_length=0.03,
-        disk_offset=0.012,
-        hole_radius=0.025,
-        link_mass=0.05,
-        lead=0.3,
-    )
+    geometry = readme_geometry(joints=8, link_mass=0.05)
     pose = cdsm.Manipulator(geometry, law).at(np.deg2rad(np.tile([5.0, -3.0], 8)))
     return pose, cdsm.distribute_tension(pose, 20.0)
 

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 import cdsm
 from cdsm.kinematics.residuals import LengthResidual, Residual, TipResidual
 from cdsm.support.values import Array
-from tests.support.arms import STEEL, mixed_arm, random_arm, random_posture
+from tests.support.arms import STEEL, mixed_arm, random_arm, random_posture, readme_geometry
 from tests.support.differences import assert_second_order
 
 ARMS: dict[str, Callable[[], cdsm.Manipulator]] = {
@@ -48,16 +48,7 @@ def planar_arm(joints: int, **changes: Any) -> cdsm.Manipulator:
 
 def limited_arm() -> cdsm.Manipulator:
     """Limits well before the disks touch, and so near that they are met."""
-    geometry = cdsm.Geometry.universal(
-        joints=4,
-        cables_per_joint=3,
-        link_length=0.06,
-        base_length=0.03,
-        disk_offset=0.012,
-        hole_radius=0.025,
-        link_mass=0.1,
-        joint_limit=0.4,
-    )
+    geometry = readme_geometry(link_mass=0.1, joint_limit=0.4, lead=0.0)
     return cdsm.Manipulator(geometry, STEEL)
 
 

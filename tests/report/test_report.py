@@ -20,6 +20,7 @@ from cdsm.report.differences import gradients, hessians
 from cdsm.support.values import Array, frozen
 from tests.interchange.test_caspr import toy
 from tests.support import arms, foreign, locked
+from tests.support.arms import readme_geometry
 
 TERMS = ("active", "passive", "gravity", "load", "joint")
 
@@ -137,16 +138,7 @@ def test_moment_has_no_potential_and_is_checked_by_the_torque() -> None:
 
 CRAB = foreign.crab(locked.TABLE)
 TWELVE = cdsm.Manipulator(
-    cdsm.Geometry.universal(
-        joints=12,
-        cables_per_joint=3,
-        link_length=0.06,
-        base_length=0.03,
-        disk_offset=0.012,
-        hole_radius=0.025,
-        link_mass=0.05,
-        lead=0.3,
-    ),
+    readme_geometry(joints=12, link_mass=0.05),
     cdsm.presets.STRAND_1X19,
 )
 SLIDING = cdsm.stiffness(CRAB.at(foreign.POSTURE), foreign.TENSION, wrench=arms.random_wrench(3))

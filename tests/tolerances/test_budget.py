@@ -12,21 +12,13 @@ import cdsm
 from cdsm.tolerances.inputs import inputs_of
 from cdsm.tolerances.parts import draw, parts_of
 from tests.support import arms
+from tests.support.arms import readme_geometry
 
 LAW = cdsm.LinearElasticity(48e3)
 
 
 def readme_arm() -> cdsm.Manipulator:
-    geometry = cdsm.Geometry.universal(
-        joints=4,
-        cables_per_joint=3,
-        link_length=0.06,
-        base_length=0.03,
-        disk_offset=0.012,
-        hole_radius=0.025,
-        link_mass=0.12,
-        lead=0.3,
-    )
+    geometry = readme_geometry()
     return cdsm.Manipulator(geometry, LAW)
 
 

@@ -11,21 +11,13 @@ from typer.testing import CliRunner
 import cdsm
 from cdsm.cli import app
 from cdsm.support.values import Array
+from tests.support.arms import readme_geometry
 
 STRAND = cdsm.presets.STRAND_1X19
 TABLE = cdsm.TabulatedElasticity((4.0, 10.0, 40.0, 300.0), (0.0, 1e-3, 3e-3, 1e-2))
 LAWS: dict[str, cdsm.Elasticity] = {"strand": STRAND, "table": TABLE}
 
-GEOMETRY = cdsm.Geometry.universal(
-    joints=4,
-    cables_per_joint=3,
-    link_length=0.06,
-    base_length=0.03,
-    disk_offset=0.012,
-    hole_radius=0.025,
-    link_mass=0.12,
-    lead=0.3,
-)
+GEOMETRY = readme_geometry()
 BENT = np.deg2rad([10.0, 5.0, 10.0, 5.0, -8.0, 0.0, -8.0, 0.0])
 
 
