@@ -80,7 +80,7 @@ class Cable:
         elasticity: Law EA(F).
         lead: Straight cable between the actuator and the first site [m].
         series_stiffness: k_series of a spring or drive in series [N/m]; inf: no spring.
-        control: ``"position"``: the motor holds the length; ``"force"``: it holds the tension.
+        control: What the motor keeps constant, ``"position"``: length; ``"force"``: tension.
         minimum: Smallest allowed tension [N]; every tension distribution respects it.
         maximum: Largest allowed tension [N]; every tension distribution respects it; inf: no limit.
 

@@ -30,8 +30,8 @@ _STEP = 1e-5
 class CableLaws:
     """Elasticities of all cables of an arm; C is the number of cables.
 
-    A locked motor holds the original length l_0 of its wire. Under tension the length of the wire
-    is ℓ = l_0 (1 + ε). The stiffness EA/l_0 is therefore EA (1 + ε)/ℓ.
+    A locked motor keeps the original length l_0 of its wire constant. Under tension the length of
+    the wire is ℓ = l_0 (1 + ε). The stiffness EA/l_0 is therefore EA (1 + ε)/ℓ.
 
     Args:
         cables: Cables of the arm.

@@ -1,7 +1,7 @@
 """An arm with its cables.
 
-:class:`Manipulator` holds everything that does not change. :class:`Posture` holds everything that
-depends only on the joint angles. A posture is frozen and always complete.
+:class:`Manipulator` has all data that do not change. :class:`Posture` has all results that depend
+only on the joint angles. A posture is frozen and always complete.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ class Manipulator(ArmFacts):
         gravity: Gravity in base axes (3,) [m/s²], or an axis such as ``"-y"`` for 9.81 m/s² along
             it; (0, 0, 0) for none.
         original_length: Which length is l_0 in the stiffness EA/l_0 of a wire of length ℓ under
-            tension F. ``"unstrained"``: ℓ/(1 + ε(F)), the length that a locked motor holds.
+            tension F. ``"unstrained"``: ℓ/(1 + ε(F)), constant if the motor is locked.
             ``"stretched"``: ℓ, as in the paper's figures; K is then too low by the strain, 3–5 %
             for Eq. 19.
 
@@ -181,7 +181,7 @@ class Manipulator(ArmFacts):
         The text of a URDF is written into the same file.
 
         Raises:
-            InvalidInput: A file cannot hold an elasticity of this kind.
+            InvalidInput: An elasticity of this kind cannot be written to a file.
             FileError: The file cannot be written; an existing file stays unchanged.
         """
         from cdsm.arm_file.arm import arm_text

@@ -157,9 +157,9 @@ def experimental_prototype(
 ) -> Manipulator:
     """Build the prototype of Section V-A; each pair has a position- and a force-controlled cable.
 
-    The first cable of each pair (``cable1_1`` …) holds its length. The second (``cable1_2`` …)
-    holds its tension and adds no passive stiffness. Give its tension to
-    :func:`~cdsm.distribute_tension` as ``fixed``.
+    The motor of the first cable of each pair (``cable1_1`` …) keeps its length constant. The motor
+    of the second (``cable1_2`` …) keeps its tension constant and adds no passive stiffness. Give
+    this tension to :func:`~cdsm.distribute_tension` as ``fixed``.
 
     Args:
         elasticity: Elasticity of all cables; the repaired Eq. 19 by default.

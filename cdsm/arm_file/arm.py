@@ -41,7 +41,7 @@ _HEAD = """\
 
 
 _ESCAPED = re.compile(r"'''|'$|[^\t\n -~\x80-\U0010ffff]")
-"""Characters that a literal text of TOML cannot hold."""
+"""Characters that a literal string of TOML cannot contain."""
 
 _Read = TypeVar("_Read")
 
@@ -163,7 +163,7 @@ def arm_text(parts: ArmParts) -> str:
     """Return the text of a file from which :func:`read_arm` reads equal parts.
 
     Raises:
-        InvalidInput: A file cannot hold an elasticity of this kind.
+        InvalidInput: An elasticity of this kind cannot be written to a file.
     """
     geometry, cables = parts.geometry, parts.cables
     wires, tables = wire_entries(cables)

@@ -71,7 +71,7 @@ def write_cables(cables: Sequence[Cable], path: str | os.PathLike[str]) -> Path:
         path: The file. An existing file is replaced.
 
     Raises:
-        InvalidInput: No cables are given, or a file cannot hold an elasticity of this kind.
+        InvalidInput: No cables are given, or an elasticity of this kind cannot be written.
         FileError: The file cannot be written.
     """
     cables = sequence_of("cables", cables, Cable)

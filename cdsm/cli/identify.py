@@ -113,7 +113,7 @@ def _ranges(free: list[str]) -> dict[str, Range | None]:
 
 
 class _Shown:
-    """Parameters of an arm in people's units; their labels hold the units."""
+    """Parameters of an arm in units for people, which their labels contain."""
 
     def __init__(self, parameters: ArmParameters) -> None:
         self._parameters = parameters
@@ -133,14 +133,14 @@ class _Shown:
 
     @property
     def present(self) -> dict[str, float]:
-        """Values of the arm by label."""
+        """Present values of the parameters by label."""
         return {
             self.label(name): value / self._parameters.unit(name)[1]
             for name, value in self._parameters.present.items()
         }
 
     def bounds(self, name: str, given: Range | None) -> Range:
-        """Return the bounds of a parameter: those given, or from half to twice its value."""
+        """Return the bounds of a parameter: the given ones, or half to twice its present value."""
         if given is not None:
             return given
         if name.partition("@")[0] == "friction":

@@ -54,7 +54,7 @@ class Elasticity(ABC):
         """Write the elasticity to a TOML file, as :func:`~cdsm.write_elasticity`; return its path.
 
         Raises:
-            InvalidInput: A file cannot hold an elasticity of this kind.
+            InvalidInput: An elasticity of this kind cannot be written to a file.
             FileError: The file cannot be written.
         """
         from cdsm.wires.files import write_elasticity  # which imports this module

@@ -24,7 +24,7 @@ def first_of(said: Sequence[str], most: int, what: str) -> str:
 
 
 NAMED = 4
-"""Number of joints or cables that a message names; the attributes of the error hold all of them."""
+"""Number of joints or cables that a message names; the attributes of the error list all."""
 
 
 def named(words: Sequence[str]) -> str:

@@ -58,7 +58,7 @@ class FileError(CdsmError, OSError):
 
 
 class StoreError(FileError):
-    """A sweep store that holds another sweep, or that another run is writing to.
+    """A sweep store that contains another sweep, or that another run is writing to.
 
     Attributes:
         differences: Differences between the stored and the requested sweep, one text each.

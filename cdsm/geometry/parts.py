@@ -40,7 +40,7 @@ class Joint:
         hole_radius: R: distance of the holes of its two disks from the arm's axis [m]; None: the
             ``hole_radius`` of the :class:`Geometry`.
         disk_radius: Outer radius of its two disks [m]; None: 1.1 times the radius of the farthest
-            hole, but for the default ``limit`` the disks touch at the hole radius.
+            hole; the default ``limit`` then uses the hole radius.
 
     Raises:
         GeometryError: Some attributes are invalid; lists every fault.

@@ -81,9 +81,9 @@ def to_mjcf(
     The model starts at the posture: a new ``mjData`` has its joint coordinates, and so has the
     keyframe ``pose``. The joint coordinates are those of cdsm. ``actuators`` is one of
 
-    - ``length``: one motor per cable holds its original length, as in :func:`~cdsm.equilibrium`.
+    - ``length``: one motor per cable keeps its original length, as in :func:`~cdsm.equilibrium`.
       Its force is k (u + L_rest − L), never a push. Its ``ctrl`` u is the length of wire that it
-      pays out [m]; u = 0 holds the posture. A force-controlled cable keeps F; there u is tension
+      pays out [m]; u = 0 keeps the posture. A force-controlled cable keeps F; there u is tension
       added to F [N].
     - ``tension``: one motor per cable pulls with the tension ``ctrl`` [N]. The keyframe has F; in a
       new ``mjData``, ``ctrl`` is zero. The cables add no passive stiffness: most arms are then
@@ -230,7 +230,7 @@ def _checked(name: str, value: float | None) -> float | None:
 
 
 def _missing(K: Stiffness) -> Iterator[str]:
-    """Yield lines that say why the model leaves its posture: a load, or torque is missing."""
+    """Yield lines that say why the model leaves its posture: no load, or unbalanced tensions."""
     if K.wrench.any():
         load = f"{coordinates(K.wrench[:3])} N, {coordinates(K.wrench[3:])} N m"
         yield f"load       {load} is not in the model: apply it to {K.posture.arm.tip_link}"

@@ -201,7 +201,7 @@ class _Search:
 
 
 def _downhill(H: Array, gradient: Array) -> tuple[Array, bool]:
-    """Return a descent step −|H|⁻¹ gradient, zero along flat directions, and if H is convex."""
+    """Return the step −|H|⁻¹ gradient, zero where H is flat, and whether H has no negative part."""
     values, vectors = np.linalg.eigh((H + H.T) / 2.0)
     flat = abs(values) <= _FLAT * abs(values).max(initial=0.0)
     rate = np.where(flat, math.inf, abs(values))

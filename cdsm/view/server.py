@@ -63,7 +63,7 @@ def serve(
         maximum: Upper bound of all tensions [N].
         force: First force at the tip, in base axes (3,) [N].
         sag: Whether the force first moves the arm to its :func:`~cdsm.equilibrium`. Otherwise the
-            tensions hold the posture under the force.
+            tensions balance the force at the posture.
         angles: A path to play, as joint angles (S, nv) [rad]; the arm starts at the first.
         tips: A path to play, as tip positions (S, 3) [m]; give only one kind of path.
         solver: Solver of :func:`~cdsm.distribute_tension`.

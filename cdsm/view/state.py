@@ -83,7 +83,7 @@ class Setting(ReadOnlyState):
         force: Force at the tip, in base axes (3,) [N].
         sag: Whether the force moves the arm. The cables are then tensioned at ``q`` without the
             force, and the motors are locked; where holes have friction, cables stick and slide in
-            them. Otherwise the tensions hold ``q`` under the force.
+            them. Otherwise the tensions balance the force at ``q``.
         solver: Solver of the tension distribution.
     """
 
@@ -115,7 +115,7 @@ class Shown(ReadOnlyState):
         stiffness: Stiffness at the posture that is shown; None if the tensions are missing or
             outside the domain of the law.
         rest: Equilibrium under the force; None if the arm does not sag, or none was found.
-        history: The way to it of an arm with friction; None without friction, or if ``rest`` is.
+        history: Load history from the reference to ``rest``; None without friction or ``rest``.
     """
 
     setting: Setting
@@ -172,10 +172,10 @@ class Shown(ReadOnlyState):
 
     @cached_property
     def holes(self) -> tuple[Array, Array]:
-        """Short lines (n, 2, 3) [m] through the holes in which cables stick, and slide.
+        """Marks of holes, as lines (n, 2, 3) [m]: where cables stick, and where they slide.
 
-        A hole without friction, or through which the cable goes straight, is neither. In an arm
-        that is held no cable slides.
+        Holes without friction, and holes that a cable passes straight, have no mark. Unless
+        the arm sags, no cable slides.
         """
         pose = self.posture
         if pose is None or self.tensions is None or not pose.arm.has_friction:

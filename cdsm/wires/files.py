@@ -55,7 +55,7 @@ _KINDS: dict[str, tuple[type[Elasticity], type[_Linear | _Strand | _Tabulated]]]
 
 
 def table_of(elasticity: Elasticity) -> list[str]:
-    """Return the lines of the TOML table of an elasticity. Raise if no file can hold its kind."""
+    """Return the lines of the TOML table of an elasticity; InvalidInput for an unknown kind."""
     if isinstance(elasticity, SlackBelow):
         return [*table_of(elasticity.law), "slack_below = true"]
     for law, entry in _KINDS.values():
@@ -90,7 +90,7 @@ def write_elasticity(elasticity: Elasticity, path: str | os.PathLike[str]) -> Pa
         path: The file. An existing file is replaced.
 
     Raises:
-        InvalidInput: The elasticity is of another kind, and a file cannot hold it.
+        InvalidInput: The elasticity is of another kind, which cannot be written.
         FileError: The file cannot be written.
     """
     units = "# Elasticity of a wire: tensions and rigidity in N, strains without unit\n"

@@ -199,7 +199,7 @@ def _check_span(strain: Array, force: Array, gauge_length: float) -> None:
 
 
 def _check_rigidity(points: Points, gauge_length: float) -> None:
-    """Raise if no wire has such a rigidity over the upper half of the rise."""
+    """Raise if the rigidity over the upper half of the force range is implausible."""
     upper = points.force >= (points.force[0] + points.force[-1]) / 2.0
     rise, reach = np.ptp(points.force[upper]), np.ptp(points.strain[upper])
     rigidity = float(rise / max(reach, 1e-30))
@@ -227,7 +227,7 @@ def _likely(rigidity: float, reach: float, gauge_length: float) -> str:
 
 
 def _is_loading(strain: Array) -> NDArray[np.bool_]:
-    """Mark the points whose strain exceeds all strains before, up to the noise."""
+    """Return which points have a strain above all earlier strains, up to the noise."""
     jitter = 4.0 * _MAD * float(np.median(abs(np.diff(strain, 2)))) / np.sqrt(6.0)
     jitter = min(jitter, 0.005 * float(np.ptp(strain)))
     kept: NDArray[np.bool_] = strain >= np.maximum.accumulate(strain) - jitter

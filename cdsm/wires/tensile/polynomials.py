@@ -75,7 +75,7 @@ def _positive(rows: list[list[float]], edges: tuple[float, ...]) -> list[tuple[f
 
 
 def _joins_of(points: Points, join: float) -> tuple[float, ...]:
-    """Return the join if each side of it is wide enough and has enough points, else nothing."""
+    """Return the join if both sides of it are wide enough and have enough points, else ()."""
     below = int(np.count_nonzero(points.force <= join))
     enough = 2 * (_DEGREE + 1)
     low, high = float(points.force.min()), float(points.force.max())

@@ -276,7 +276,7 @@ class Curve:
 
 
 def fit_curve(points: Points, noise: float) -> Curve:
-    """Fit the curve. Restricted likelihood gives its smoothing (Fellner-Schall iteration).
+    """Fit the curve; restricted likelihood determines the smoothing (Fellner-Schall iteration).
 
     ``noise`` is a first estimate of the noise of one point [N].
     """

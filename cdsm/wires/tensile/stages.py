@@ -54,7 +54,7 @@ def pretension_end(tensions: Array, rigidity: Array, deviation: Array) -> float 
 
 
 def refuse_jumps(curve: Curve, points: Points) -> None:
-    """Raise if the force jumps: EA of the curve exceeds ten times EA of every measured chord."""
+    """Raise if the force is discontinuous: EA exceeds ten times EA of every measured chord."""
     first, last = curve.force(points.strain[[0, -1]])
     inside = (curve.basis.tensions >= first) & (curve.basis.tensions <= last)
     steepest = int(np.where(inside, curve.rigidity, 0.0).argmax())
