@@ -21,6 +21,9 @@ from cdsm.support.values import Array
 _STEP = 1e-4
 """Step of differences [rad], [m]; their truncation is added to the bound."""
 
+TOO_FAR = "finds no band: friction may hold the arm too far away"
+"""The problem of a neighbourhood that is too wide."""
+
 _ITERATIONS = 30
 """Steps of a fixed point that converges by a factor of ten or more."""
 
@@ -57,7 +60,7 @@ class Remainders:
             r = lever * math.exp(turn)
             m = segments.lengths[s] - r * turn
             if m <= 0.0:  # sites may meet
-                raise SolverError("highs", "finds no band: friction may hold the arm too far away")
+                raise SolverError("highs", TOO_FAR)
             moved = np.cross(axis[rows], ends)  # of either end: a hole sees the far one turn
             if slide.size:
                 moved = moved + slide[rows]

@@ -36,10 +36,11 @@ import numpy as np
 from cdsm.cable import Cable
 from cdsm.errors import ElasticityRangeError, SolverError
 from cdsm.friction.neighbourhood import Neighbourhood
-from cdsm.friction.remainders import Bends, Remainders
+from cdsm.friction.remainders import TOO_FAR, Bends, Remainders
 from cdsm.kernels.chains import single_tension_stiffness
 from cdsm.kernels.stiffness import single_load_stiffness
 from cdsm.stiffness_matrix import Stiffness
+from cdsm.support.validation import LARGEST
 from cdsm.support.values import Array, frozen
 
 _CELLS = 8192
@@ -66,6 +67,8 @@ class RestStates:
 
         pose, cables = K.posture, K.posture.arm.cables
         within, apart, nv = near.joints, near.tensions, near.joints.size
+        if apart.max() > LARGEST:
+            raise SolverError("highs", TOO_FAR)
         segments = pose.segments
         chains, g, length = segments.chains, segments.length_jacobian, segments.lengths
         cable, start = chains.cable, chains.start
@@ -210,7 +213,7 @@ def _cone(K: Stiffness, near: Neighbourhood, far: Remainders, size: int) -> tupl
     with np.errstate(over="ignore"):  # a neighbourhood as wide as that holds no band
         curved = rest + most**2 / 2.0 * np.exp(most)
     if not np.isfinite(curved).all():
-        raise SolverError("highs", "finds no band: friction may hold the arm too far away")
+        raise SolverError("highs", TOO_FAR)
     blocks, bounds = [], []
     for here, there in ((hole, hole + 1), (hole + 1, hole)):
         rows = np.zeros((hole.size, size))

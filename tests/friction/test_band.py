@@ -265,5 +265,13 @@ def test_what_is_not_proved_says_so(bound: float) -> None:
     assert not band.proved
     assert band.high == -band.low == band.first_order
     assert str(band).endswith("(to first order, not proved)")
-    assert not cdsm.rest_band(*prototype(2.0), "z").proved
     assert cdsm.rest_band(*prototype(0.1), "z").proved
+
+
+@pytest.mark.parametrize("bound", [1.0, 50.0, 800.0])
+def test_friction_that_may_hold_the_arm_anywhere_proves_nothing(bound: float) -> None:
+    """Tensions beyond all machines, bounds that overflow and sites that meet are no errors here."""
+    pose, _ = prototype(2.0)
+    band = cdsm.rest_band(pose, cdsm.distribute_tension(pose, bound), "z")
+    assert not band.proved
+    assert band.high == -band.low == band.first_order
