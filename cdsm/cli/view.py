@@ -3,31 +3,21 @@
 from __future__ import annotations
 
 import contextlib
-import math
 import webbrowser
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 import cdsm
-from cdsm.cli.conditions import Conditions
-from cdsm.cli.options import (
-    ANGLES,
-    DEFAULT_SOLVER,
-    ArmOptions,
-    AsJson,
-    MaxTension,
-    MinTension,
-    Solver,
-    WeightOptions,
-)
+from cdsm.cli.options import ANGLES, ArmOptions, AsJson, TensionOptions, WeightOptions
 from cdsm.cli.output import Json, answer
 
 
 def view(
     arm: ArmOptions,
+    tensions: TensionOptions,
     weight: WeightOptions,
     angles: Annotated[str | None, ANGLES] = None,
     path: Annotated[
@@ -38,12 +28,9 @@ def view(
             "joints in deg (mm where they slide), or x, y, z of the tip in mm.",
         ),
     ] = None,
-    min_tension: MinTension = 10.0,
-    max_tension: MaxTension = math.inf,
     sag: Annotated[
         bool, typer.Option("--sag", help="To begin with, let the force move the arm.")
     ] = False,
-    solver: Solver = DEFAULT_SOLVER,
     largest_tension: Annotated[
         float, typer.Option(help="Right end of the slider of the least tension [N].")
     ] = 200.0,
@@ -75,19 +62,19 @@ def view(
             host=host,
             port=port,
             q=None if pose is None else pose.q,
-            minimum=min_tension,
-            maximum=max_tension,
+            minimum=tensions.min_tension,
+            maximum=tensions.max_tension,
             force=weight.vector(robot),
             sag=sag,
             angles=motion.angles,
             tips=motion.tips,
-            solver=solver,
+            solver=tensions.solver,
             largest_tension=largest_tension,
             largest_force=largest_force,
             arm_arguments=_arguments(arm),
         ) as page:
             text = f"shown at {page.url}; Ctrl-C ends it"
-            conditions = Conditions(robot, (min_tension,))
+            conditions = replace(tensions.conditions(robot), friction=sag)
             told: Json = {"name": robot.name, "url": page.url}
             answer(as_json, lambda: told, conditions, text)
             if browser:
