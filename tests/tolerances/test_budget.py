@@ -323,6 +323,8 @@ def test_bad_input_is_named() -> None:
     pose, tension = posture()
     with pytest.raises(cdsm.InvalidInput, match=r"lead: .*-0.001 given; a tolerance is not neg"):
         cdsm.Tolerances(lead=-1e-3)
+    with pytest.raises(cdsm.UnknownName, match=r"'rigidty'; did you mean 'rigidity'"):
+        cdsm.Tolerances(rigidty=0.05)  # type: ignore[call-arg]
     with pytest.raises(cdsm.InvalidInput, match=r"rigidity: .*relative"):
         cdsm.Tolerances(rigidity=5.0)
     with pytest.raises(cdsm.InvalidInput, match="not positive semidefinite"):

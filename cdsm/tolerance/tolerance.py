@@ -1,29 +1,19 @@
-"""Tolerances: standard uncertainties of the dimensions and measured values of an arm."""
+"""Tolerance of inputs of one kind: standard uncertainty, distribution, correlation."""
 
 from __future__ import annotations
 
 import math
-import os
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
-from functools import cached_property
-from pathlib import Path
 from typing import Literal, Self, final, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm.errors import InvalidInput
-from cdsm.support.validation import number_array, one_of, scalar, sequence_of, text
+from cdsm.support.validation import number_array, one_of, scalar, text
 from cdsm.support.values import Array, ReadOnlyState, frozen
 
 Distribution = Literal["normal", "uniform", "triangular"]
-
-LARGEST = {"rigidity": 0.5, "joint_angle": 0.5, "hole_angle": 0.5, "friction": 0.5}
-"""Largest allowed standard uncertainty by source: half of EA, 0.5 rad, or μ = 0.5."""
-
-COMMON = ("rigidity", "friction")
-"""Sources whose inputs share one error by default: wires of one spool, holes of one material."""
 
 WIDTH = {"uniform": math.sqrt(3.0), "triangular": math.sqrt(6.0)}
 """Half-width of each bounded distribution, divided by its standard deviation [-]."""
@@ -179,133 +169,6 @@ class Tolerance(ReadOnlyState):
 
     def __hash__(self) -> int:
         return hash((self.distribution, self.of))
-
-
-OneOrMore = float | Tolerance | Sequence[Tolerance]
-"""Types of a source of :class:`Tolerances`: a standard uncertainty, or one or more tolerances."""
-
-
-@final
-@dataclass(frozen=True, kw_only=True)
-class Tolerances:
-    """Uncertainties of the dimensions of an arm and of the values measured on it.
-
-    Each source of uncertainty is a :class:`Tolerance`, or a standard uncertainty (one sigma) as a
-    number, or a list of tolerances for different inputs, named by their ``of``. A number for
-    ``rigidity`` or ``friction`` has the correlation 1: all cables are of one spool, all disks of
-    one material. Other numbers have the correlation 0: the errors of all joints, holes, disks and
-    links are independent.
-
-    Attributes:
-        rigidity: EA of the law of each cable; relative [-].
-        joint_angle: Each joint angle [rad]; [m] where a joint slides.
-        tension: Each measured cable tension [N].
-        lead: Straight length of each cable before the base disk [m].
-        hole_radius: Distance of each hole from the axis of its link [m].
-        hole_angle: Angle of each hole about the axis of its link [rad].
-        disk_offset: Distance of each disk from its joint [m].
-        link_length: Length of each link [m].
-        link_mass: Mass of each link [kg].
-        friction: Coefficient μ of each hole with friction [-].
-        site: Each coordinate of each cable site [m]. Only for arms from a URDF.
-
-    Raises:
-        InvalidInput: A tolerance is negative, not a number, or larger than a plausible error.
-    """
-
-    rigidity: OneOrMore = 0.0
-    joint_angle: OneOrMore = 0.0
-    tension: OneOrMore = 0.0
-    lead: OneOrMore = 0.0
-    hole_radius: OneOrMore = 0.0
-    hole_angle: OneOrMore = 0.0
-    disk_offset: OneOrMore = 0.0
-    link_length: OneOrMore = 0.0
-    link_mass: OneOrMore = 0.0
-    friction: OneOrMore = 0.0
-    site: OneOrMore = 0.0
-
-    def __post_init__(self) -> None:
-        for name in SOURCES:
-            value = getattr(self, name)
-            try:
-                if isinstance(value, (list, tuple)):
-                    value = sequence_of("tolerances", value, Tolerance)
-                elif not isinstance(value, Tolerance):
-                    value = Tolerance(value, correlation=float(name in COMMON))
-                self.__dict__[name] = value
-                for each in self.parts(name):
-                    _require_size(name, each)
-            except InvalidInput as error:
-                said = str(error).removeprefix("standard: ").removeprefix(f"{name}: ")
-                raise InvalidInput(name, said) from None
-
-    def parts(self, source: str) -> tuple[Tolerance, ...]:
-        """Return the tolerances of a source that are not zero.
-
-        Args:
-            source: Name of the source, one of the attributes.
-
-        Raises:
-            UnknownName: There is no such source.
-        """
-        value = getattr(self, one_of("source of uncertainty", source, SOURCES))
-        every = value if isinstance(value, tuple) else (value,)
-        return tuple(each for each in every if each.is_given)
-
-    @cached_property
-    def given(self) -> Mapping[str, tuple[Tolerance, ...]]:
-        """All tolerances that are not zero, by source."""
-        found = {}
-        for name in SOURCES:
-            value = getattr(self, name)
-            if isinstance(value, tuple) or value.is_given:
-                found[name] = self.parts(name)
-        return {name: parts for name, parts in found.items() if parts}
-
-    @classmethod
-    def read(cls, path: str | os.PathLike[str]) -> Tolerances:
-        """Read tolerances from a TOML file; ``[tolerances]`` of an ARM.toml has the same keys.
-
-        Each key is a source. Its value is a standard uncertainty, or a table with ``standard`` or
-        ``within`` (a half-width), ``distribution``, ``correlation``, ``of`` and ``tensions``, or a
-        list of such tables.
-
-        Raises:
-            FileError: The file cannot be read, is not TOML, or does not hold tolerances. Every
-                fault is listed.
-        """
-        from cdsm.arm_file.tolerances import read_tolerances  # pydantic: slow to import
-
-        return read_tolerances(path)
-
-    def write(self, path: str | os.PathLike[str]) -> Path:
-        """Write a TOML file from which :meth:`read` builds equal tolerances; return its path.
-
-        Raises:
-            FileError: The file cannot be written; an existing file stays unchanged.
-        """
-        from cdsm.arm_file.tolerances import write_tolerances
-
-        return write_tolerances(self, path)
-
-
-SOURCES = tuple(field.name for field in fields(Tolerances))
-"""Names of all sources of uncertainty."""
-
-
-def _require_size(source: str, tolerance: Tolerance) -> None:
-    """Raise InvalidInput if a tolerance is too large, or has tensions where it must not."""
-    if tolerance.tensions is not None and source != "rigidity":
-        raise InvalidInput(source, "does not depend on tensions; give one standard.")
-    largest = LARGEST.get(source, math.inf)
-    if isinstance(tolerance.standard, float) and tolerance.standard > largest:
-        unit = {"rigidity": "relative", "friction": "a coefficient"}.get(source, "in rad")
-        raise InvalidInput(
-            source,
-            f"a standard uncertainty of {tolerance.standard:g} given; up to {largest:g} is a "
-            f"tolerance. It is {unit}.",
-        )
 
 
 def _correlation(value: object) -> float | Array:
