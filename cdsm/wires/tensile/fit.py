@@ -62,10 +62,10 @@ class Band(ReadOnlyState):
 
     Measured, in 100 tests of 400 points each: of Eq. 19, a linear wire and a wire with a toe, with
     0.5 N and 2 N of noise, it covers 95.3 % of all cases, and at each of 16 tensions from 10 N to
-    790 N between 89 and 100 %, as 100 tests scatter. In 240 other tests of Eq. 19 with 0.5 N it
-    covers 93 to 97.5 % at each of 13 tensions, but 91 % at 80 N, where EA bends: 95 % is not
-    promised at a bend. Where EA is discontinuous (a kink of force over strain), no curve follows:
-    the band misses EA within some newtons of the kink.
+    790 N between 89 and 100 %, as 100 tests scatter. In 300 other tests of Eq. 19 with 0.5 N it
+    covers 93 to 98 % at each of 13 tensions, but 92 % at 80 N, where EA bends: 95 % is not promised
+    at a bend. Where EA is discontinuous (a kink of force over strain), no curve follows: the band
+    misses EA within some newtons of the kink.
 
     The band leaves out errors of calibration and gauge length, and errors that neighbouring points
     share (drift, ripple, slip). ``TensileFit.notes`` names shared errors if the residuals show
