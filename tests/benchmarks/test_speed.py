@@ -1,5 +1,6 @@
 """Speed, as ratios against naive baselines in the same run; each compares the numbers first."""
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -63,6 +64,36 @@ def test_cost_grows_less_than_fourfold_from_5_to_20_joints(clock: Clock) -> None
         lambda: cdsm.stiffness(small.at(q5), tension5),
         most=4.0,
         slow_repeat=50,
+    )
+
+
+READINGS: dict[str, Callable[[cdsm.Stiffness], object]] = {
+    "along": lambda K: K.along("z"),
+    "cartesian": lambda K: K.cartesian,
+    "compliance": lambda K: K.compliance,
+    "pseudoinverse": lambda K: K.pseudoinverse(),
+    "margin": lambda K: K.margin,
+}
+DEARER = {("cartesian", 5): 1.7, ("margin", 40): 1.8}
+"""What costs more: three calls of kernels beside 60 µs, an eigenvalue of 80 rows."""
+
+
+@pytest.mark.speed
+@pytest.mark.parametrize("clock", ["speed"], indirect=True)
+@pytest.mark.parametrize("joints", [5, 40])
+@pytest.mark.parametrize("name", READINGS)
+def test_a_reading_costs_at_most_half_of_posture_and_stiffness(
+    clock: Clock, name: str, joints: int
+) -> None:
+    one, q, tension = problem(joints)
+    read = READINGS[name]
+    clock.race(
+        f"{name} on top of posture + stiffness, n = {joints}: cost over both alone",
+        lambda: read(cdsm.stiffness(one.at(q), tension)),
+        lambda: cdsm.stiffness(one.at(q), tension),
+        most=DEARER.get((name, joints), 1.5),
+        slow_repeat=20,
+        fast_repeat=20,
     )
 
 

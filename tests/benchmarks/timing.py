@@ -5,6 +5,8 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from cdsm.kernels.compiling import at_once
+
 
 def seconds(
     run: Callable[[], object], repeat: int, watch: Callable[[], float] = time.perf_counter
@@ -50,7 +52,8 @@ class Clock:
         Raises:
             AssertionError: The ratio is below ``least`` or above ``most``.
         """
-        slow(), fast()  # warm up: compile, fill caches
+        with at_once():  # warm up: compile, fill caches
+            slow(), fast()
         best_slow = best_fast = math.inf
         ratio = math.nan
         for round_ in range(4 * rounds):
