@@ -83,6 +83,7 @@ def design(
     paths = [
         write_text(folder / "front.csv", found.to_csv()),
         cdsm.plots.save_figure(found.plot(), folder / "front.pdf"),
+        write_text(folder / "front.html", found.to_html()),
         cdsm.plots.save_figure(found.arm(number).plot(), folder / "arm.pdf"),
         *found.write_arm(folder, number),
     ]

@@ -1,44 +1,26 @@
-"""Evaluation of designs: every quantity of a problem, over all its postures and loads."""
+"""Evaluation of many designs: in this process, in several, or on a cluster."""
 
 from __future__ import annotations
 
-import math
-import warnings
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from multiprocessing import get_context
-from typing import TYPE_CHECKING, Any, NamedTuple, final
+from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm.batch import evaluate
-from cdsm.design.goals import Measure
 from cdsm.design.problem import MISSED, DesignProblem
-from cdsm.errors import CdsmError, CdsmWarning, GeometryError, InvalidInput
-from cdsm.kernels.principal import principal_stiffness
-from cdsm.manipulator import Manipulator
-from cdsm.measures.clearance import KINDS as CLEARANCES
-from cdsm.measures.rows import measured, payloads
+from cdsm.design.quantities import Found, measure
+from cdsm.errors import InvalidInput
 from cdsm.support.progress import progress_bar
-from cdsm.support.status import Status
 from cdsm.support.validation import number_array, whole_number
 from cdsm.support.values import Array, ReadOnlyState, frozen
-from cdsm.tension import distribute_tension
-from cdsm.tolerances.budget import uncertainty
-from cdsm.tolerances.readings import Reading
 
 if TYPE_CHECKING:
     from distributed import Client
-
-_SURE: dict[str, tuple[Reading, float]] = {
-    "stiffness": ("along", -1.0),
-    "margin": ("margin", -1.0),
-    "motor_force": ("tension", 1.0),
-}
-"""Readings with an uncertainty, and the side on which it counts."""
 
 
 @final
@@ -138,13 +120,6 @@ def evaluate_designs(
     return gathered(problem, rows, found)
 
 
-class Found(NamedTuple):
-    """Quantities (m,) of one design, and why it is no arm."""
-
-    values: Array
-    fault: str = ""
-
-
 def gathered(problem: DesignProblem, rows: Array, found: Sequence[Found]) -> Designs:
     """Collect the evaluations of designs."""
     width = len(problem.measures)
@@ -204,130 +179,3 @@ def _set_problem(problem: DesignProblem) -> None:
 
 def _in_worker(row: Array) -> Found:
     return measure(_problem[0], row)
-
-
-def measure(problem: DesignProblem, row: Array) -> Found:
-    """Compute the quantities of one design (n,)."""
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", CdsmWarning)  # cables may share a hole
-            arm = problem.arm_of(row)
-    except GeometryError as error:
-        return Found(np.full(len(problem.measures), math.nan), "; ".join(error.faults))
-    except CdsmError as error:
-        return Found(np.full(len(problem.measures), math.nan), str(error))
-    return Found(_Arm(problem, row, arm).values())
-
-
-class _Arm:
-    """Quantities of the arm of one design."""
-
-    def __init__(self, problem: DesignProblem, row: Array, arm: Manipulator) -> None:
-        self.problem, self.arm, self.minimum = problem, arm, problem.minimum_of(row)
-        q = problem.postures_of(arm)
-        self.poses = q
-        self.q = np.repeat(q, len(problem.loads), axis=0)
-        self.loads = np.tile(problem.loads, (len(q), 1))
-        wanted = {each.of for each in problem.measures}
-        outputs = ["tip", "tension", "margin", "compliance", "cable_lengths"]
-        self.found = evaluate(
-            arm,
-            self.q,
-            None,
-            self.loads,
-            outputs,
-            minimum=self.minimum,
-            maximum=problem.maximum,
-            threads=1,
-        )
-        known = np.isin(self.found.status, (Status.OK, Status.IMMOBILE))
-        self.held = known & (self.found["margin"] > 0.0)
-        self.of_pose: dict[str, Array] = {}
-        if wanted & {*CLEARANCES, "tension_factor"}:
-            inside = self.found.status[:: len(problem.loads)] != Status.BEYOND_LIMITS
-            names = sorted(wanted & {*CLEARANCES, "tension_factor"})
-            with_wire = {
-                name: problem.diameter * (1.0 if name == CLEARANCES[0] else 0.5)
-                for name in CLEARANCES
-            }
-            for name, values in measured(arm, q[inside], names, 1).items():
-                self.of_pose[name] = values - with_wire.get(name, 0.0)
-
-    def values(self) -> Array:
-        """Return all quantities (m,)."""
-        return np.array([self._value(each) for each in self.problem.measures])
-
-    def rows(self, each: Measure) -> Array:
-        """Return a quantity of the tensions at all postures and loads that are held."""
-        C = self.found["compliance"][self.held][:, :3, :3]
-        if each.of == "stiffness":
-            u = np.array(each.direction)
-            with np.errstate(divide="ignore"):
-                return np.asarray(1.0 / np.maximum(np.einsum("i,nij,j->n", u, C, u), 0.0))
-        if each.of == "deflection":
-            moved = np.einsum("nij,nj->ni", C, self.loads[self.held, :3])
-            return np.asarray(np.linalg.norm(moved, axis=1))
-        if each.of == "motor_force":
-            return np.asarray(self.found["tension"][self.held].max(axis=1))
-        if each.of == "margin":
-            return np.asarray(self.found["margin"][self.held])
-        return principal_stiffness(C)[each.of]
-
-    def _value(self, each: Measure) -> float:
-        arm, held = self.arm, self.held
-        if each.of == "held":
-            return float(held.mean())
-        if each.of == "mass":
-            return sum(link.mass for link in arm.geometry.links)
-        if each.of == "length":
-            return arm.geometry.length
-        if each.of == "cables":
-            return float(len(arm.cables))
-        if each.of == "workspace":
-            return _volume(self.found["tip"][held][:, :3, 3])
-        if each.of in self.of_pose:
-            return float(self.of_pose[each.of].min(initial=math.inf))
-        if not held.any():
-            return math.nan
-        if each.of == "wire_length":
-            return float(self.found["cable_lengths"][held].max(axis=0).sum())
-        if each.of == "payload":
-            u = np.array(each.direction)[None]
-            low = np.full(int(held.sum()), self.minimum)
-            force = payloads(arm, self.q[held], self.loads[held], low, self.problem.maximum, u)
-            return float(force.min())
-        rows = self.rows(each)
-        least = each.of in ("deflection", "motor_force")
-        worst = int(rows.argmax() if least else rows.argmin())
-        return float(rows[worst]) + self._margin(each, worst)
-
-    def _margin(self, each: Measure, worst: int) -> float:
-        """Return k u of a reading at its worst posture, with its sign; 0 without tolerances."""
-        problem = self.problem
-        bounded = any(constraint.key == each.key for constraint in problem.constraints)
-        if problem.tolerances is None or each.of not in _SURE or not bounded:
-            return 0.0
-        n = int(np.flatnonzero(self.held)[worst])
-        of, sign = _SURE[each.of]
-        pose = self.arm.at(self.q[n])
-        F = distribute_tension(pose, self.minimum, problem.maximum, self.loads[n])
-        cable = self.arm.cables.names[int(F.values.argmax())] if of == "tension" else None
-        found = uncertainty(
-            pose,
-            F,
-            problem.tolerances,
-            of=of,
-            cable=cable,
-            direction=each.direction,
-        )
-        return sign * problem.coverage * found.standard_uncertainty
-
-
-def _volume(tips: Array) -> float:
-    """Return the volume of the hull of points (n, 3) [m³]; 0 if they are flat."""
-    from scipy.spatial import ConvexHull, QhullError
-
-    try:
-        return float(ConvexHull(tips).volume)
-    except (QhullError, ValueError):
-        return 0.0

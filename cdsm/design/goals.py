@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Final, Literal, NamedTuple, final, get_args
 
@@ -17,6 +18,7 @@ MeasureName = Literal[
     "deflection",
     "motor_force",
     "payload",
+    "capacity_margin",
     "tension_factor",
     "cable_clearance",
     "link_clearance",
@@ -26,7 +28,11 @@ MeasureName = Literal[
     "mass",
     "length",
     "cables",
+    "joint_range",
     "wire_length",
+    "wire_strain",
+    "wire_safety",
+    "wire_life",
 ]
 
 
@@ -60,6 +66,7 @@ KINDS: Final[dict[str, Kind]] = {
     "deflection": Kind("largest deflection under the load", "m", _MM, "least"),
     "motor_force": Kind("largest tension", "N", ("N", 1.0), "least"),
     "payload": Kind("least payload along", "N", ("N", 1.0), "most", directed=True),
+    "capacity_margin": Kind("least payload in any direction", "N", ("N", 1.0), "most"),
     "tension_factor": Kind("least tension factor", "1", _ONE, "most"),
     "cable_clearance": Kind("least clearance between cables", "m", _MM, "most"),
     "link_clearance": Kind("least clearance of links", "m", _MM, "most"),
@@ -69,7 +76,11 @@ KINDS: Final[dict[str, Kind]] = {
     "mass": Kind("mass of the links", "kg", ("kg", 1.0), "least"),
     "length": Kind("length", "m", _MM, "most"),
     "cables": Kind("number of cables", "1", _ONE, "least"),
+    "joint_range": Kind("least limit of a joint", "rad", ("°", math.pi / 180.0), "most"),
     "wire_length": Kind("wire, leads included", "m", ("m", 1.0), "least"),
+    "wire_strain": Kind("largest strain of a wire", "1", ("%", 1e-2), "least"),
+    "wire_safety": Kind("least breaking load over tension", "1", _ONE, "most"),
+    "wire_life": Kind("least life margin of a wire", "1", _ONE, "most"),
 }
 """Quantities of a design. Over postures and loads, the worst one counts."""
 
@@ -132,11 +143,15 @@ class Objective(Measure):
 
     Attributes:
         of: ``"stiffness"``, ``"softest"``, ``"isotropy"``, ``"margin"``, ``"deflection"``,
-            ``"motor_force"``, ``"payload"``, ``"tension_factor"``, ``"cable_clearance"``,
-            ``"link_clearance"``, ``"disk_clearance"``, ``"workspace"``, ``"held"``, ``"mass"``,
-            ``"length"``, ``"cables"`` or ``"wire_length"``. Of all postures and loads, the worst
-            counts. ``deflection`` is |C_vv f| for the force f of the load, to first order; the
-            ``workspace`` is the volume of the hull of all tips that are held.
+            ``"motor_force"``, ``"payload"``, ``"capacity_margin"``, ``"tension_factor"``,
+            ``"cable_clearance"``, ``"link_clearance"``, ``"disk_clearance"``, ``"workspace"``,
+            ``"held"``, ``"mass"``, ``"length"``, ``"cables"``, ``"joint_range"``,
+            ``"wire_length"``, ``"wire_strain"``, ``"wire_safety"`` or ``"wire_life"``. Of all
+            postures and loads, the worst counts. ``deflection`` is |C_vv f| for the force f of the
+            load, to first order; ``payload`` and ``capacity_margin`` are the largest force, besides
+            the load, within the limits of the tensions, along u and in any direction; the
+            ``workspace`` is the volume of the hull of all tips that are held; the wires are as in
+            :func:`~cdsm.wire_use`.
         direction: u of ``stiffness`` and ``payload``: an axis such as ``"-z"``, or (3,).
         goal: ``"most"`` or ``"least"``; None: what is usual, e.g. the most stiffness.
 

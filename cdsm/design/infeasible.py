@@ -67,7 +67,11 @@ def _first_reason(designs: Designs, best: int) -> str:
         for load in problem.loads:
             try:
                 pose = arm.at(q)
-                K = stiffness(pose, distribute_tension(pose, minimum, problem.maximum, load))
+                rough = problem.worst_friction
+                K = stiffness(
+                    pose,
+                    distribute_tension(pose, minimum, problem.maximum, load, worst_friction=rough),
+                )
             except CdsmError as error:
                 return f"posture {n}: {error}"
             if not K.is_stable:

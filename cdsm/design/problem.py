@@ -17,7 +17,14 @@ from cdsm.design.variables import WHOLE, Value, Variable, changed, check, presen
 from cdsm.errors import InvalidInput
 from cdsm.manipulator import Manipulator
 from cdsm.support.format import plural
-from cdsm.support.validation import instance, number_array, scalar, sequence_of
+from cdsm.support.validation import (
+    flag,
+    instance,
+    number_array,
+    quantity,
+    scalar,
+    sequence_of,
+)
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.sweeps.poses import PoseSet, poses_of
 from cdsm.tension import checked_bounds
@@ -47,7 +54,12 @@ class DesignProblem(ReadOnlyState):
         loads: Wrenches W (n, 6) at ``tool0``, base axes: force [N], then moment [N m].
         minimum: Lower bound of all tensions [N], if it is no variable.
         maximum: Upper bound of all tensions [N].
-        diameter: Diameter of the cables [m], for clearances.
+        worst_friction: As for :func:`~cdsm.distribute_tension`: all segments of the cables stay
+            within the bounds, whatever loads came before. ``motor_force`` and the quantities of
+            wires are then of the largest tension that friction can hold along each cable.
+        diameter: Diameter of the cables [m], for clearances and the life of wires.
+        breaking_load: Breaking load of the wire [N], for ``wire_safety``.
+        bend_diameter: Diameter of the bend in the holes [m], for ``wire_life``.
         tolerances: Tolerances of every design; constraints on ``stiffness``, ``margin`` and
             ``motor_force`` must then hold with a margin of ``coverage`` standard uncertainties.
         coverage: k of that margin [-].
@@ -66,7 +78,10 @@ class DesignProblem(ReadOnlyState):
     loads: Array = field(default_factory=lambda: np.zeros((1, 6)))
     minimum: float = 10.0
     maximum: float = math.inf
+    worst_friction: bool = False
     diameter: float = 0.0
+    breaking_load: float | None = None
+    bend_diameter: float | None = None
     tolerances: Tolerances | None = None
     coverage: float = 2.0
 
@@ -94,12 +109,22 @@ class DesignProblem(ReadOnlyState):
         if not isinstance(postures, PoseSet):
             postures = frozen(number_array("postures", postures))
         poses_of(self.arm, postures)  # raises for a wrong shape
-        checked_bounds(self.arm, self.minimum, self.maximum)
-        if (
-            any(measure.of == "deflection" for measure in (*objectives, *constraints))
-            and not loads[:, :3].any(axis=1).all()
-        ):
+        high = checked_bounds(self.arm, self.minimum, self.maximum)[1]
+        flag("worst_friction", self.worst_friction)
+        quantity("diameter", self.diameter, "length", zero=True)
+        if self.breaking_load is not None:
+            quantity("breaking_load", self.breaking_load, "force")
+        if self.bend_diameter is not None:
+            quantity("bend_diameter", self.bend_diameter, "length")
+        asked = {measure.of for measure in (*objectives, *constraints)}
+        if "deflection" in asked and not loads[:, :3].any(axis=1).all():
             raise InvalidInput("loads", "deflection needs a force in every load.")
+        if "capacity_margin" in asked and math.isinf(high.max()):
+            raise InvalidInput("maximum", "capacity_margin needs a finite one [N].")
+        if "wire_safety" in asked and self.breaking_load is None:
+            raise InvalidInput("breaking_load", "is needed for wire_safety [N].")
+        if "wire_life" in asked and not (self.bend_diameter and self.diameter):
+            raise InvalidInput("bend_diameter", "is needed with diameter for wire_life [m].")
         if self.tolerances is not None:
             instance("tolerances", self.tolerances, Tolerances)
         self.__dict__.update(
@@ -169,7 +194,7 @@ class DesignProblem(ReadOnlyState):
         return tuple(found)
 
     def arm_of(self, design: ArrayLike) -> Manipulator:
-        """Build the arm of a design (n,).
+        """Build the arm of a design (n,); its cables have the bounds of the tensions.
 
         Args:
             design: As for :meth:`values`.
@@ -183,6 +208,7 @@ class DesignProblem(ReadOnlyState):
         law = None if new.wire is None else as_wire(new.wire)
         routed = serpentine_cables(new.geometry, law or old[0].elasticity)
         like = old if len(routed) == len(old) else (old[0],) * len(routed)
+        minimum = self.minimum_of(design)
         cables = [
             replace(
                 kept,
@@ -190,6 +216,8 @@ class DesignProblem(ReadOnlyState):
                 sites=cable.sites,
                 lead=cable.lead,
                 elasticity=law or kept.elasticity,
+                minimum=max(kept.minimum, minimum),
+                maximum=min(kept.maximum, self.maximum),
             )
             for cable, kept in zip(routed, like, strict=True)
         ]

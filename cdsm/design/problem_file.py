@@ -71,7 +71,10 @@ class _File:
     loads: Any = None
     minimum: Number = 10.0
     maximum: Number | None = None
+    worst_friction: bool = False
     diameter: Number = 0.0
+    breaking_load: Number | None = None
+    bend_diameter: Number | None = None
     tolerances: str | None = None
     coverage: Number = 2.0
     search: _Search = Field(default_factory=lambda: _Search())
@@ -101,8 +104,8 @@ def read_problem(path: str | os.PathLike[str]) -> ProblemFile:
     a list of wrenches (6 numbers) or forces (3). ``[[variables]]``, ``[[objectives]]`` and
     ``[[constraints]]`` have the attributes of :class:`Variable` (``joint`` or ``cable`` for
     ``at``), :class:`Objective` and :class:`Constraint`. ``tolerances`` is a file of
-    :class:`Tolerances`; ``minimum``, ``maximum``, ``diameter`` and ``coverage`` are as for
-    :class:`DesignProblem`. ``[search]`` has ``generations``, ``population`` and ``seed``.
+    :class:`Tolerances`. ``[search]`` has ``generations``, ``population`` and ``seed``. All other
+    keys are as for :class:`DesignProblem`.
 
     Args:
         path: The file; ``examples/design.toml`` is one with comments.
@@ -155,7 +158,10 @@ def _problem(file: _File, folder: Path) -> DesignProblem:
         loads=_loads(file.loads),
         minimum=file.minimum,
         maximum=math.inf if file.maximum is None else file.maximum,
+        worst_friction=file.worst_friction,
         diameter=file.diameter,
+        breaking_load=file.breaking_load,
+        bend_diameter=file.bend_diameter,
         tolerances=tolerances,
         coverage=file.coverage,
     )

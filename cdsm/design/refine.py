@@ -186,8 +186,9 @@ def _check(problem: DesignProblem) -> None:
             raise InvalidInput("problem", f"{variable.name} is not continuous; use search_designs.")
     if len(problem.objectives) != 1:
         raise InvalidInput("problem", "has several objectives; leave one, or use search_designs.")
-    if problem.tolerances is not None:
-        raise InvalidInput("problem", "has tolerances; use search_designs.")
+    for name in ("tolerances", "worst_friction"):
+        if getattr(problem, name):
+            raise InvalidInput("problem", f"has {name}; use search_designs.")
     objective = problem.objectives[0]
     if objective.goal != KINDS[objective.of].best:
         raise InvalidInput("problem", f"{objective.of} at its {objective.goal} is not smooth.")

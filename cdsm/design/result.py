@@ -20,6 +20,7 @@ from cdsm.interchange.mjcf import write_mjcf
 from cdsm.manipulator import Manipulator
 from cdsm.support.files import make_folder, write_text
 from cdsm.support.format import aligned, plain, plural
+from cdsm.support.markup import Document
 from cdsm.support.tidy import data_frame
 from cdsm.support.validation import whole_number
 from cdsm.support.values import Array, ReadOnlyState
@@ -207,34 +208,36 @@ class DesignSearch(ReadOnlyState):
 
         return plot_designs(self)
 
+    def to_html(self) -> Document:
+        """Return a page with the front: a click on a design shows its arm and its numbers.
+
+        It needs no other file. A notebook shows it in a frame.
+        """
+        from cdsm.design.page import page_of  # matplotlib imports slowly
+
+        return page_of(self)
+
     def __repr__(self) -> str:
         return f"<DesignSearch: {plural(len(self.front), 'design')} on the front>"
 
     def __str__(self) -> str:
-        problem = self.problem
-        keys = [each.key for each in problem.measures]
-        head = ["design", *(v.name for v in problem.variables)]
-        head += [f"{m.key}" for m in problem.measures]
-        rows = []
-        every = range(len(self.front))
-        for i in [*every][:_PRINTED]:
-            row = problem.values(self.design(i))
-            values = self.values(i)
-            rows.append(
-                [
-                    f"{i}{'*' if i == self.compromise else ''}",
-                    *(v.shown(x) for v, x in zip(problem.variables, row, strict=True)),
-                    *(m.shown(values[k]) for m, k in zip(problem.measures, keys, strict=True)),
-                ]
-            )
-        lines = aligned([head, *rows])
         feasible = int(self.evaluated.feasible.sum())
         counted = plural(len(self.evaluated), "design")
         more = f", {_PRINTED} shown" if len(self.front) > _PRINTED else ""
-        return "\n".join(
-            [
-                f"{counted}, {feasible} feasible, {len(self.front)} on the front{more}; * is the "
-                "compromise",
-                *lines,
-            ]
+        head = (
+            f"{counted}, {feasible} feasible, {len(self.front)} on the front{more}; * is the "
+            "compromise"
         )
+        return "\n".join([head, *aligned(self._table()[: _PRINTED + 1])])
+
+    def _table(self) -> list[list[str]]:
+        """Return head and rows of the front in people's units."""
+        problem = self.problem
+        head = ["design", *(v.name for v in problem.variables), *(m.key for m in problem.measures)]
+        rows = [head]
+        for i in range(len(self.front)):
+            row, values = problem.values(self.design(i)), self.values(i).values()
+            chosen = (v.shown(x) for v, x in zip(problem.variables, row, strict=True))
+            found = (m.shown(x) for m, x in zip(problem.measures, values, strict=True))
+            rows.append([f"{i}{'*' if i == self.compromise else ''}", *chosen, *found])
+        return rows

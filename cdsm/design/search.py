@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cdsm.design.evaluation import Designs, Found, gathered, violations, workers
+from cdsm.design.evaluation import Designs, gathered, violations, workers
 from cdsm.design.infeasible import explain
 from cdsm.design.problem import DesignProblem
+from cdsm.design.quantities import Found
 from cdsm.design.result import DesignProgress, DesignSearch
 from cdsm.design.store import Store
 from cdsm.design.variables import WHOLE

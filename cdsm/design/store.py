@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from cdsm.design.evaluation import Found
 from cdsm.design.problem import DesignProblem
+from cdsm.design.quantities import Found
 from cdsm.errors import FileError, StoreError
 from cdsm.support.files import as_path
 from cdsm.support.values import Array
@@ -98,6 +98,7 @@ def digest(problem: DesignProblem) -> str:
         json.dumps(attributes_of(problem.arm)),
         repr((problem.variables, problem.objectives, problem.constraints)),
         repr((problem.minimum, problem.maximum, problem.diameter, problem.coverage)),
+        repr((problem.worst_friction, problem.breaking_load, problem.bend_diameter)),
         repr((problem.tolerances, problem.arm.gravity.tolist())),
         poses.description,
     ]

@@ -1,22 +1,20 @@
 """Force polytope: all forces at the tip that an arm holds within the limits of its cables.
 
 The forces f that some tensions balance, J_Lᵀ F = J_Xᵀ W + J_vᵀ f − g with minimum ≤ F ≤ maximum,
-are a projection of a polytope. The hull method finds it (Lassez and Lassez, 1992; for robots
-Skuric, Padois and Daney, RA-L 2022): hull of known vertices, one linear program along the normal of
-each facet, until none finds a farther force.
+are a projection of a polytope.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple, final
+from typing import TYPE_CHECKING, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cdsm.errors import InvalidInput, SolverError
+from cdsm.measures.hull import hull_of
 from cdsm.measures.program import Loads
 from cdsm.posture import Posture
 from cdsm.support.format import key, plain
@@ -26,9 +24,6 @@ from cdsm.tension import bounds_at, distribute_tension
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-_FLAT = 1e-8
-"""Widths of a polytope over its size that are zero."""
 
 _NO_MOTION = 1e-9
 """Singular values of J_v over the arm's length that are zero: the tip cannot move that way."""
@@ -161,12 +156,9 @@ def force_polytope(
     if not np.isfinite(high).all():
         cable = pose.arm.cables[int(np.isinf(high).argmax())].name
         raise InvalidInput("maximum", f"{cable} has none; give a finite one [N].")
-    axes, size, _ = np.linalg.svd(pose.jacobian[:3])
-    moving = np.zeros(3, dtype=np.bool_)
-    moving[: size.size] = size > _NO_MOTION * pose.arm.length
-    basis, unbounded = axes[:, moving], axes[:, ~moving].T
+    basis, unbounded = directions_of(pose.jacobian, pose.arm.length)
     loads = Loads.of(pose, low, high, W, basis)
-    hull = _hull(loads, basis.shape[1])
+    hull = hull_of(loads)
     if hull is None:
         distribute_tension(pose, minimum, maximum, W, worst_friction=worst_friction)
         raise SolverError("highs", "finds no force, though tensions balance none. Change a bound.")
@@ -183,118 +175,9 @@ def force_polytope(
     )
 
 
-class _Hull(NamedTuple):
-    """Corners (n, k), triangles (m, 3), normals (n, k) and offsets (n,) of a polytope."""
-
-    points: Array
-    faces: NDArray[np.intp]
-    normals: Array
-    offsets: Array
-
-
-_Farthest = Callable[[Array], tuple[float, Array]]
-
-
-def _hull(loads: Loads, k: int) -> _Hull | None:
-    """Compute the polytope of all loads in k dimensions; None if it is empty."""
-
-    def farthest(normal: Array) -> tuple[float, Array]:
-        found = loads.largest(normal)
-        if found is None:
-            raise SolverError("highs", "calls a problem infeasible that it solved before.")
-        return found
-
-    if loads.largest(np.zeros(k)) is None:
-        return None
-    # the space that the polytope spans; in the others its width is zero
-    points, normals, offsets = _span(farthest, k)
-    start, *others = points
-    spanned = np.linalg.svd(np.array([p - start for p in others]).reshape(-1, k))[2][: len(others)]
-    flat = _Hull(
-        np.array(points),
-        np.zeros((0, 3), np.intp),
-        np.array(normals).reshape(-1, k),
-        np.array(offsets),
-    )
-    if len(spanned) < 2:
-        along = [(u, *farthest(u)) for v in spanned for u in (v, -v)]
-        return flat._replace(
-            points=np.array([x for *_, x in along] or points),
-            normals=np.vstack([flat.normals, *[u[None] for u, *_ in along]]),
-            offsets=np.concatenate([flat.offsets, [b for _, b, _ in along]]),
-        )
-    corners, faces, facets, ends = _grown(farthest, np.array(points), spanned)
-    return _Hull(
-        corners, faces, np.vstack([flat.normals, facets]), np.concatenate([flat.offsets, ends])
-    )
-
-
-def _span(farthest: _Farthest, k: int) -> tuple[list[Array], list[Array], list[float]]:
-    """Return points that span the polytope, and facets in pairs where its width is zero."""
-    found: list[Array] = []
-    normals: list[Array] = []
-    offsets: list[float] = []
-    tried = np.zeros((0, k))
-    points: list[Array] = []
-    while len(tried) < k:
-        u = np.linalg.svd(np.vstack([tried, np.zeros((1, k))]))[2][-1]  # at right angles to all
-        (most, above), (least, below) = farthest(u), farthest(-u)
-        found += [above, below]
-        points = points or [above]
-        size = max(float(np.ptp(np.array(found), axis=0).max()), abs(most), abs(least))
-        if most + least <= _FLAT * size:
-            normals += [u, -u]
-            offsets += [most, least]
-            tried = np.vstack([tried, u])
-            continue
-        apart = max((above, below), key=lambda x: abs(float(u @ (x - points[0]))))
-        points.append(apart)
-        tried = np.vstack([tried, apart - points[0]])
-        tried = np.linalg.svd(tried, full_matrices=False)[2]
-    return points, normals, offsets
-
-
-def _grown(
-    farthest: _Farthest, points: Array, spanned: Array
-) -> tuple[Array, NDArray[np.intp], Array, Array]:
-    """Return corners, triangles, normals and offsets of a polytope that spans 2 or 3 dimensions."""
-    from scipy.spatial import ConvexHull
-
-    start = points[0]
-    size = float(np.ptp(points, axis=0).max())
-    done: dict[tuple[float, ...], tuple[Array, float]] = {}
-    while True:
-        inside = (points - start) @ spanned.T
-        hull = ConvexHull(inside / size)
-        rest = []
-        for *flat, _ in np.unique(np.round(hull.equations, 9), axis=0):
-            if tuple(flat) not in done:
-                rest.append(tuple(flat))
-        farther = []
-        for flat in rest:
-            normal = np.array(flat) @ spanned
-            normal /= np.linalg.norm(normal)
-            most, x = farthest(normal)
-            reached = float((points @ normal).max())
-            if most > reached + _FLAT * size:
-                farther.append(x)
-            else:
-                done[flat] = normal, most
-        if not farther:
-            break
-        points = np.vstack([points, *[x[None] for x in farther]])
-        size = float(np.ptp(points, axis=0).max())
-    # only facets of the last hull
-    last = {tuple(each[:-1]) for each in np.unique(np.round(hull.equations, 9), axis=0)}
-    facets = [done[flat] for flat in done if flat in last]
-    corners = hull.vertices
-    place = {int(v): i for i, v in enumerate(corners)}
-    faces = np.zeros((0, 3), np.intp)
-    if spanned.shape[0] == 3:
-        faces = np.array([[place[int(v)] for v in each] for each in hull.simplices], np.intp)
-    return (
-        points[corners],
-        faces,
-        np.array([n for n, _ in facets]),
-        np.array([b for _, b in facets]),
-    )
+def directions_of(jacobian: Array, length: float) -> tuple[Array, Array]:
+    """Return unit directions in which J_X (6, nv) moves the tip (3, k), and the others (3−k, 3)."""
+    axes, size, _ = np.linalg.svd(jacobian[:3])
+    moving = np.zeros(3, dtype=np.bool_)
+    moving[: size.size] = size > _NO_MOTION * length
+    return axes[:, moving], axes[:, ~moving].T

@@ -4,7 +4,7 @@ Loads x (k,) act at the tip along the columns of U (3, k), besides the wrench W.
 
     J_Lᵀ F − J_vᵀ U x = J_Xᵀ W − g,   minimum ≤ F ≤ maximum.
 
-All programs below are linear in F and x.
+All programs below are linear in F and x. A kernel solves and proves most of them, HiGHS the others.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import numpy as np
 
 from cdsm.errors import SolverError
 from cdsm.kernels import tension as tension_kernels
+from cdsm.measures.simplex import single_largest
 from cdsm.posture import Posture
 from cdsm.support.linear_program import INFEASIBLE, OPTIMAL, UNBOUNDED, least
 from cdsm.support.values import Array
@@ -72,18 +73,22 @@ class Loads(NamedTuple):
             SolverError: The solver stops for another reason.
         """
         count = self.low.size
-        ends = [*zip(self.low * self.lever[:count], self.high * self.lever[:count], strict=True)]
-        ends += [(0.0 if positive else None, None)] * along.size
-        cost = np.concatenate([np.zeros(count), -along / self.lever[count:]])
-        size = float(abs(cost).max()) or 1.0
-        found = least(cost / size, A_eq=self.A, b_eq=self.b, bounds=ends)
-        if found.status == INFEASIBLE:
-            return None
-        if found.status == UNBOUNDED:
-            return math.inf, np.full(along.size, math.nan)
-        if found.status != OPTIMAL:
-            raise SolverError("highs", f"cannot tell the largest load: {found.message}")
-        x = found.x[count:] / self.lever[count:] * self.force
+        tensions, loads = self.lever[:count], self.lever[count:]
+        low = np.append(self.low * tensions, np.full(along.size, 0.0 if positive else -math.inf))
+        high = np.append(self.high * tensions, np.full(along.size, math.inf))
+        cost = np.append(np.zeros(count), along / loads)
+        cost /= float(abs(cost).max()) or 1.0
+        best = np.empty_like(cost)
+        if not single_largest(cost, self.A, self.b, low, high, best):
+            found = least(-cost, A_eq=self.A, b_eq=self.b, bounds=np.column_stack([low, high]))
+            if found.status == INFEASIBLE:
+                return None
+            if found.status == UNBOUNDED:
+                return math.inf, np.full(along.size, math.nan)
+            if found.status != OPTIMAL:
+                raise SolverError("highs", f"cannot tell the largest load: {found.message}")
+            best = found.x
+        x = best[count:] / loads * self.force
         return float(along @ x), x
 
 

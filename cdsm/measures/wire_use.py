@@ -14,6 +14,9 @@ from cdsm.support.validation import flag, instance, quantity
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension, grip
 
+ROPE_WIRE: Final = 1770e6
+"""Strength of the usual grade of rope wire [Pa]."""
+
 LONG_LIFE: Final = 0.001
 """Ratio of bearing pressure to strength below which wire rope on sheaves has a long life [-]."""
 
@@ -79,7 +82,7 @@ def wire_use(
     diameter: float,
     breaking_load: float,
     bend_diameter: float,
-    strength: float = 1770e6,
+    strength: float = ROPE_WIRE,
     worst_friction: bool = False,
 ) -> WireUse:
     """Compute strain, safety and life margin of the wires under tensions.
@@ -118,12 +121,20 @@ def wire_use(
             raise ElasticityRangeError(error.problem, error.tension, [c], [cable.name]) from None
     with np.errstate(divide="ignore"):  # a slack cable is never at its limit
         safety = np.where(largest > 0.0, limit / largest, math.inf)
-        life = np.where(largest > 0.0, LONG_LIFE * S * d * D / (2.0 * largest), math.inf)
     return WireUse(
         tension=tension,
         largest=frozen(np.array(largest)),
         strain=frozen(strain),
         safety=frozen(safety),
         bend_ratio=D / d,
-        life_margin=frozen(life),
+        life_margin=frozen(life_margin(largest, d, D, S)),
     )
+
+
+def life_margin(
+    tension: Array, diameter: float, bend_diameter: float, strength: float = ROPE_WIRE
+) -> Array:
+    """Return 0.001 S_u/p of tensions [N], p = 2F/(d D); inf where a cable is slack."""
+    with np.errstate(divide="ignore"):
+        pressure = 2.0 * tension / (diameter * bend_diameter)
+        return np.where(tension > 0.0, LONG_LIFE * strength / pressure, math.inf)

@@ -64,6 +64,8 @@ def plot_designs(found: DesignSearch) -> Figure:
         x, y = (every[objectives[n].key] / scales[n][1] for n in (i, k))
         panel.plot(x[feasible], y[feasible], ".", color="0.7", markersize=3, label="feasible")
         panel.plot(x[found.front], y[found.front], ".-", color=BLUE, linewidth=0.8, label="front")
+        for number, n in enumerate(found.front):  # a page finds them by their names
+            panel.plot(x[n], y[n], "o", color=BLUE, markersize=4, gid=f"design-{number}-{k}")
         chosen = found.front[found.compromise]
         panel.plot(
             x[chosen],

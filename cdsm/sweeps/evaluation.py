@@ -13,7 +13,7 @@ from cdsm import batch
 from cdsm.elasticity import Elasticity
 from cdsm.kernels.principal import principal_stiffness
 from cdsm.manipulator import Manipulator
-from cdsm.measures.rows import MEASURED, measured, payloads
+from cdsm.measures.rows import MEASURED, capacity_margins, measured, payloads
 from cdsm.support.values import Array, ReadOnlyState
 from cdsm.sweeps.quantities import DIRECTIONAL, QUANTITIES
 from cdsm.sweeps.status import LOST, SweepStatus
@@ -108,12 +108,12 @@ def evaluate(task: SweepTask, q: Array, threads: int | None = None) -> BlockResu
         tension = _spread(pull.values, place, shape)
         if "tension" in stages:
             answer["tension"] = tension
+        held = p, w, m = np.nonzero(status == SweepStatus.OK)
+        bounds = task.arm, q[p], task.wrenches[w], task.minima[m], task.maximum
         if "payload" in stages:
-            held = p, w, m = np.nonzero(status == SweepStatus.OK)
-            force = payloads(
-                task.arm, q[p], task.wrenches[w], task.minima[m], task.maximum, task.directions
-            )
-            answer["payload"] = _spread(force, held, shape)
+            answer["payload"] = _spread(payloads(*bounds, task.directions, threads), held, shape)
+        if "capacity_margin" in stages:
+            answer["capacity_margin"] = _spread(capacity_margins(*bounds), held, shape)
     if not of_law:
         return answer | {"status": np.stack([status] * len(task.laws), axis=1)}
 

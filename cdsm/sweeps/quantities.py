@@ -58,6 +58,9 @@ QUANTITIES: Final[dict[str, Quantity]] = {
         "tension",
         ("direction",),
     ),
+    "capacity_margin": Quantity(
+        "largest force in any direction within the limits of the tensions", "N", "tension"
+    ),
     "cable_stiffness": Quantity("cable stiffness, diagonal of K_L", "N m-1", "joint", ("cable",)),
     "active_stiffness": Quantity("active part of K, H_L F (Eq. 16)", "N m rad-1", "joint", _JOINTS),
     "passive_stiffness": Quantity(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, final
@@ -142,6 +143,8 @@ def specify(
         "maximum": label((), maximum, "upper bound of all tensions", "N"),
     }
     names = _outputs(outputs)
+    if "capacity_margin" in names and math.isinf(maximum):
+        raise InvalidInput("maximum", "capacity_margin needs a finite one [N].")
     if any("direction" in QUANTITIES[name].dims for name in names):
         u = directions.values
         labels |= directions.labels

@@ -32,7 +32,7 @@ def test_the_example_writes_front_figures_and_the_files_of_an_arm(tmp_path: Path
     code, text = run(*words, "--generations", "5", "--population", "8")
     assert code == 0, text
     assert "on the front" in text
-    names = "front.csv front.pdf arm.pdf arm.toml arm.urdf arm.xml holes.csv cables.csv"
+    names = "front.csv front.pdf front.html arm.pdf arm.toml arm.urdf arm.xml holes.csv cables.csv"
     assert {path.name for path in (tmp_path / "a").iterdir()} == {*names.split(), "designs.jsonl"}
     arm = cdsm.Manipulator.read(tmp_path / "a" / "arm.toml")
     assert cdsm.to_urdf(arm.geometry) == (tmp_path / "a" / "arm.urdf").read_text()

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import cdsm
-from cdsm.design.evaluation import measure
 from cdsm.design.goals import Measure
 from cdsm.design.gradients import SMOOTH, rows_and_gradients
+from cdsm.design.quantities import measure
 from cdsm.design.store import digest
 from cdsm.support.values import Array
 
@@ -55,15 +55,20 @@ def problem(**changes: Any) -> cdsm.DesignProblem:
 # --- evaluation ------------------------------------------------------------------------------
 
 
-def test_quantities_are_those_of_single_postures() -> None:
+@pytest.mark.parametrize("rough", [False, True])
+def test_quantities_are_those_of_single_postures(rough: bool) -> None:
     names = ["stiffness", "payload"]
     objectives = tuple(cdsm.Objective(name, "z") for name in names)  # type: ignore[arg-type]
     others = ("softest", "isotropy", "margin", "deflection", "motor_force", "tension_factor",
               "cable_clearance", "link_clearance", "disk_clearance", "workspace", "held", "mass",
-              "length", "cables", "wire_length")  # fmt: skip
+              "length", "cables", "wire_length", "capacity_margin", "joint_range", "wire_strain",
+              "wire_safety", "wire_life")  # fmt: skip
     task = problem(
         objectives=(*objectives, *(cdsm.Objective(name) for name in others)),  # type: ignore[arg-type]
         diameter=1e-3,
+        breaking_load=900.0,
+        bend_diameter=4e-3,
+        worst_friction=rough,
     )
     assert task.arm_of([0.025, 3.0, 1.0]).geometry.cables[3].joint == 3
     row = np.array([0.025, 2.0, 1.0])
@@ -71,7 +76,11 @@ def test_quantities_are_those_of_single_postures() -> None:
     assert arm.geometry.hole_radii == (0.025,) * 3
     found = cdsm.evaluate_designs(task, [row])
     poses = [arm.at(q) for q in BENT]
-    Ks = [cdsm.stiffness(p, cdsm.distribute_tension(p, 20.0, 400.0, task.loads[0])) for p in poses]
+    bounds, worst = (20.0, 400.0, task.loads[0]), {"worst_friction": rough}
+    pulls = [cdsm.distribute_tension(p, *bounds, worst_friction=rough) for p in poses]
+    Ks = [cdsm.stiffness(p, pull) for p, pull in zip(poses, pulls, strict=True)]
+    wire: dict[str, Any] = {"diameter": 1e-3, "breaking_load": 900.0, "bend_diameter": 4e-3}
+    use = [cdsm.wire_use(pull, **wire, worst_friction=rough) for pull in pulls]
     clear = [cdsm.clearance(p, 1e-3) for p in poses]
     force = task.loads[0][:3]
     expected = {
@@ -80,13 +89,18 @@ def test_quantities_are_those_of_single_postures() -> None:
         "isotropy": min(cdsm.isotropy(K) for K in Ks),
         "margin": min(K.margin for K in Ks),
         "deflection": max(np.linalg.norm(K.compliance[:3, :3] @ force) for K in Ks),
-        "motor_force": max(K.tension.max() for K in Ks),
+        "motor_force": max(each.largest.max() for each in use),
+        "wire_strain": max(each.strain.max() for each in use),
+        "wire_safety": min(each.safety.min() for each in use),
+        "wire_life": min(each.life_margin.min() for each in use),
+        "capacity_margin": min(cdsm.force_polytope(p, *bounds, **worst).margin() for p in poses),
+        "joint_range": arm.upper.min(),
         "tension_factor": min(cdsm.tension_factor(p) for p in poses),
         "cable_clearance": min(each.cables for each in clear),
         "link_clearance": min(each.links for each in clear),
         "disk_clearance": min(each.disks for each in clear),
         "payload (0, 0, 1)": min(
-            cdsm.payload(p, "z", 20.0, 400.0, task.loads[0]).limits["tension"] for p in poses
+            cdsm.payload(p, "z", *bounds, **worst).limits["tension"] for p in poses
         ),
         "held": 1.0,
         "mass": 0.3,
@@ -140,6 +154,23 @@ def test_a_posture_that_is_not_held_counts_and_constraints_say_how_far() -> None
     assert found.violations[0, 0] == 1.0 - found["held"][0]
     assert found.violations[0, 1] == pytest.approx(0.5)
     assert not found.feasible[0]
+
+
+def test_a_posture_that_the_worst_friction_takes_is_not_held() -> None:
+    row = [[0.025, 2.0, 1.0]]
+    free, rough = (problem(maximum=36.0, worst_friction=each) for each in (False, True))
+    held = []
+    for q in BENT:
+        pose = rough.arm_of(row[0]).at(q)
+        try:
+            cdsm.distribute_tension(pose, 20.0, 36.0, rough.loads[0], worst_friction=True)
+            held.append(1.0)
+        except cdsm.InfeasibleTension:
+            held.append(0.0)
+    assert cdsm.evaluate_designs(rough, row)["held"][0] == np.mean(held)
+    assert np.mean(held) < cdsm.evaluate_designs(free, row)["held"][0]
+    narrow = problem(maximum=20.1, worst_friction=True)  # less than friction takes
+    assert cdsm.evaluate_designs(narrow, row)["held"][0] == 0.0
 
 
 def test_tolerances_take_a_margin() -> None:
@@ -202,6 +233,22 @@ def test_processes_change_no_bit() -> None:
     rows = np.array([[0.016, 1.0, 0.0], [0.02, 2.0, 1.0], [0.03, 3.0, 1.0]])
     one, two = (cdsm.evaluate_designs(task, rows, jobs=n) for n in (1, 2))
     np.testing.assert_array_equal(one.values, two.values)
+
+
+@pytest.mark.slow
+def test_a_cluster_changes_no_bit_of_a_search() -> None:
+    distributed = pytest.importorskip("distributed")
+    once = cdsm.search_designs(problem(), generations=3, population=6, seed=3)
+    with (
+        distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0"
+        ) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        found = cdsm.search_designs(problem(), generations=3, population=6, seed=3, client=client)
+    np.testing.assert_array_equal(once.evaluated.designs, found.evaluated.designs)
+    np.testing.assert_array_equal(once.evaluated.values, found.evaluated.values)
+    np.testing.assert_array_equal(once.front, found.front)
 
 
 def test_an_infeasible_problem_is_named() -> None:
@@ -281,6 +328,10 @@ START = 1.5e4
 def test_problems_that_cannot_be_refined_say_why() -> None:
     with pytest.raises(cdsm.InvalidInput, match="end of cable2_1 is not continuous"):
         cdsm.refine_design(problem())
+    with pytest.raises(cdsm.InvalidInput, match="has worst_friction"):
+        cdsm.refine_design(
+            problem(variables=CONTINUOUS, objectives=(cdsm.Objective("mass"),), worst_friction=True)
+        )
     two = problem(variables=CONTINUOUS)
     with pytest.raises(cdsm.InvalidInput, match="several objectives"):
         cdsm.refine_design(two)
@@ -297,6 +348,12 @@ def test_problems_that_cannot_be_refined_say_why() -> None:
         ({"variables": (cdsm.Variable("hole_radius", 0.01, 0.02, at=9),)}, "hole_radius.at: 9"),
         ({"variables": (cdsm.Variable("lead", 0.0, 0.1),) * 2}, "lead is named twice"),
         ({"loads": np.zeros((1, 5))}, "loads: shape"),
+        ({"objectives": (cdsm.Objective("wire_safety"),)}, "breaking_load: is needed"),
+        ({"objectives": (cdsm.Objective("wire_life"),)}, "bend_diameter: is needed"),
+        (
+            {"objectives": (cdsm.Objective("capacity_margin"),), "maximum": np.inf},
+            "capacity_margin needs a finite one",
+        ),
         (
             {"objectives": (cdsm.Objective("deflection"),), "loads": np.zeros((1, 6))},
             "deflection needs a force",
@@ -348,6 +405,13 @@ def test_files_for_the_workshop(tmp_path: Path) -> None:
         "arm.toml", "arm.urdf", "arm.xml", "holes.csv", "cables.csv",
     ]  # fmt: skip
     assert cdsm.Manipulator.read(paths[0]) == arm
+    # the pretension is that of the problem: every command that reads the arm keeps it
+    assert {(cable.minimum, cable.maximum) for cable in arm.cables} == {(20.0, 400.0)}
+    page = found.to_html()
+    for i in range(len(found.front)):
+        assert f'<g id="design-{i}-1">' in page
+        assert f'<tr data-design="{i}">' in page
+    assert "srcdoc" in page._repr_html_()
     holes = [line.split(",") for line in paths[3].read_text().splitlines()]
     assert len(holes) == 1 + sum(2 * cable.joint for cable in arm.geometry.cables)
     radii = {float(row[4]) for row in holes[1:]}

@@ -14,7 +14,9 @@ import cdsm
 from cdsm.support.values import Array
 from cdsm.sweeps.quantities import QUANTITIES
 
-EVERYTHING = tuple(QUANTITIES)
+EVERYTHING = tuple(name for name in QUANTITIES if name != "capacity_margin")
+"""All quantities that need no upper bound of the tensions."""
+
 STEEL = cdsm.LinearElasticity(48e3)
 LAWS = {"strand": cdsm.presets.STRAND_1X19, "steel": STEEL}
 WRENCHES = {"none": np.zeros(6), "pulled": np.array([1.0, 0.5, -2.0, 0.0, 0.05, 0.1])}

@@ -1,0 +1,197 @@
+"""Quantities of one design: of its arm, over all postures and loads of a problem."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cdsm.batch import evaluate
+from cdsm.design.goals import KINDS, Measure
+from cdsm.design.problem import DesignProblem
+from cdsm.errors import CdsmError, CdsmWarning, ElasticityRangeError, GeometryError
+from cdsm.kernels.principal import principal_stiffness
+from cdsm.manipulator import Manipulator
+from cdsm.measures.clearance import KINDS as CLEARANCES
+from cdsm.measures.rows import capacity_margins, measured, payloads
+from cdsm.measures.wire_use import life_margin
+from cdsm.support.status import Status
+from cdsm.support.values import Array
+from cdsm.tension import checked_bounds, distribute_tension, grip
+from cdsm.tolerances.budget import uncertainty
+from cdsm.tolerances.readings import Reading
+
+_SURE: dict[str, tuple[Reading, float]] = {
+    "stiffness": ("along", -1.0),
+    "margin": ("margin", -1.0),
+    "motor_force": ("tension", 1.0),
+}
+"""Readings with an uncertainty, and the side on which it counts."""
+
+
+class Found(NamedTuple):
+    """Quantities (m,) of one design, and why it is no arm."""
+
+    values: Array
+    fault: str = ""
+
+
+def measure(problem: DesignProblem, row: Array) -> Found:
+    """Compute the quantities of one design (n,)."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", CdsmWarning)  # cables may share a hole
+            arm = problem.arm_of(row)
+    except GeometryError as error:
+        return Found(np.full(len(problem.measures), math.nan), "; ".join(error.faults))
+    except CdsmError as error:
+        return Found(np.full(len(problem.measures), math.nan), str(error))
+    return Found(_Arm(problem, row, arm).values())
+
+
+class _Arm:
+    """Quantities of the arm of one design."""
+
+    def __init__(self, problem: DesignProblem, row: Array, arm: Manipulator) -> None:
+        self.problem, self.arm = problem, arm
+        q = problem.postures_of(arm)
+        self.q = np.repeat(q, len(problem.loads), axis=0)
+        self.loads = np.tile(problem.loads, (len(q), 1))
+        # friction holds the tensions along a cable within these factors
+        self.grip, self.low, self.high, held = self._bounds(q, problem.minimum_of(row))
+        self.found = evaluate(
+            arm,
+            self.q,
+            None,
+            self.loads,
+            ["tip", "tension", "margin", "compliance", "cable_lengths"],
+            minimum=self.low,
+            maximum=self.high,
+            threads=1,
+        )
+        known = np.isin(self.found.status, (Status.OK, Status.IMMOBILE))
+        self.held = held & known & (self.found["margin"] > 0.0)
+        self.of_pose: dict[str, Array] = {}
+        wanted = {each.of for each in problem.measures} & {*CLEARANCES, "tension_factor"}
+        if wanted:
+            inside = self.found.status[:: len(problem.loads)] != Status.BEYOND_LIMITS
+            for name, values in measured(arm, q[inside], sorted(wanted), 1).items():
+                between = {CLEARANCES[0]: 1.0, "tension_factor": 0.0}.get(name, 0.5)
+                self.of_pose[name] = values - between * problem.diameter
+
+    def _bounds(self, q: Array, minimum: float) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
+        """Return grips and bounds of the tensions (R, C), and which rows have any (R,)."""
+        problem, arm = self.problem, self.arm
+        total = np.zeros((len(self.q), len(arm.cables)))
+        if problem.worst_friction:
+            each = [grip(arm.at(row, check_limits=False)) for row in q]
+            total = np.repeat(each, len(problem.loads), axis=0)
+        given = checked_bounds(arm, minimum, problem.maximum)
+        low, high = given[0] * np.exp(total), given[1] * np.exp(-total)
+        exist = np.asarray((low <= high).all(axis=1))
+        # rows without any are computed with what is given, and count as not held
+        low[~exist], high[~exist] = given
+        return total, low, high, exist
+
+    def values(self) -> Array:
+        """Return all quantities (m,)."""
+        return np.array([self._value(each) for each in self.problem.measures])
+
+    def rows(self, each: Measure) -> Array:
+        """Return a quantity of the tensions at all postures and loads that are held."""
+        held, problem = self.held, self.problem
+        C = self.found["compliance"][held][:, :3, :3]
+        if each.of == "stiffness":
+            u = np.array(each.direction)
+            with np.errstate(divide="ignore"):
+                return np.asarray(1.0 / np.maximum(np.einsum("i,nij,j->n", u, C, u), 0.0))
+        if each.of == "deflection":
+            moved = np.einsum("nij,nj->ni", C, self.loads[held, :3])
+            return np.asarray(np.linalg.norm(moved, axis=1))
+        if each.of == "margin":
+            return np.asarray(self.found["margin"][held])
+        if each.of in ("softest", "isotropy"):
+            return principal_stiffness(C)[each.of]
+        bounds = self.q[held], self.loads[held], self.low[held], self.high[held]
+        if each.of == "payload":
+            return payloads(self.arm, *bounds, np.array(each.direction)[None], 1)[:, 0]
+        if each.of == "capacity_margin":
+            return capacity_margins(self.arm, *bounds)
+        # the largest tension along each cable
+        F = self.found["tension"][held] * np.exp(self.grip[held])
+        if each.of == "motor_force":
+            return np.asarray(F.max(axis=1))
+        if each.of == "wire_strain":
+            return self._strain(F)
+        assert problem.breaking_load is not None  # the problem has checked what wires need
+        if each.of == "wire_safety":
+            return np.asarray(problem.breaking_load / F.max(axis=1))
+        assert problem.bend_diameter is not None
+        return life_margin(F.max(axis=1), problem.diameter, problem.bend_diameter)
+
+    def _strain(self, F: Array) -> Array:
+        """Return the largest strain of tensions (R, C) in each row; inf outside a law's domain."""
+        found = np.empty_like(F)
+        for c, cable in enumerate(self.arm.cables):
+            try:
+                found[:, c] = cable.elasticity.strain(F[:, c])
+            except ElasticityRangeError:
+                found[:, c] = math.inf
+        return np.asarray(found.max(axis=1))
+
+    def _value(self, each: Measure) -> float:
+        arm, held = self.arm, self.held
+        if each.of == "held":
+            return float(held.mean())
+        if each.of == "mass":
+            return sum(link.mass for link in arm.geometry.links)
+        if each.of == "length":
+            return arm.geometry.length
+        if each.of == "cables":
+            return float(len(arm.cables))
+        if each.of == "joint_range":
+            return float(arm.upper.min())
+        if each.of == "workspace":
+            return _volume(self.found["tip"][held][:, :3, 3])
+        if each.of in self.of_pose:
+            return float(self.of_pose[each.of].min(initial=math.inf))
+        if not held.any():
+            return math.nan
+        if each.of == "wire_length":
+            return float(self.found["cable_lengths"][held].max(axis=0).sum())
+        rows = self.rows(each)
+        worst = int(rows.argmax() if KINDS[each.of].best == "least" else rows.argmin())
+        return float(rows[worst]) + self._margin(each, worst)
+
+    def _margin(self, each: Measure, worst: int) -> float:
+        """Return k u of a reading at its worst posture, with its sign; 0 without tolerances."""
+        problem = self.problem
+        bounded = any(constraint.key == each.key for constraint in problem.constraints)
+        if problem.tolerances is None or each.of not in _SURE or not bounded:
+            return 0.0
+        n = int(np.flatnonzero(self.held)[worst])
+        of, sign = _SURE[each.of]
+        pose = self.arm.at(self.q[n])
+        F = distribute_tension(pose, self.low[n], self.high[n], self.loads[n])
+        cable, factor = None, 1.0
+        if of == "tension":
+            largest = F.values * np.exp(self.grip[n])
+            cable = self.arm.cables.names[int(largest.argmax())]
+            factor = math.exp(float(self.grip[n, largest.argmax()]))
+        found = uncertainty(
+            pose, F, problem.tolerances, of=of, cable=cable, direction=each.direction
+        )
+        return sign * problem.coverage * factor * found.standard_uncertainty
+
+
+def _volume(tips: Array) -> float:
+    """Return the volume of the hull of points (n, 3) [m³]; 0 if they are flat."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        return float(ConvexHull(tips).volume)
+    except (QhullError, ValueError):
+        return 0.0

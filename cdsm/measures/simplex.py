@@ -1,0 +1,206 @@
+"""Kernels of small linear programs: the simplex method with bounds (Dantzig, 1963), and its proof.
+
+Programs here have some ten equations and some twenty variables, so a dense inverse of the basis is
+fastest: tens of microseconds, of which a general solver needs a millisecond to begin.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from cdsm.kernels.compiling import compiled, threaded
+from cdsm.kernels.tension import scaled_balance
+from cdsm.kernels.tree import Indices
+from cdsm.support.values import Array
+
+_ROUNDING = 1e-11
+"""Reduced costs and pivots that are none; coefficients are of order one."""
+
+_PROOF = 1e-10
+"""Violation of a constraint, over the size of what it bounds, that is none."""
+
+_AT_LOW, _AT_HIGH, _FREE, _BASIC = 0, 1, 2, 3
+
+
+@compiled
+def single_largest(cost: Array, A: Array, b: Array, low: Array, high: Array, x: Array) -> bool:
+    """Maximise cost · x with A x = b, low ≤ x ≤ high; return whether x is proved to be best.
+
+    It is not where no x exists, where the cost has no largest value, and where rounding is too
+    large. Entries of ``cost`` and ``A`` are of order one.
+    """
+    m, n = A.shape
+    state = np.empty(n, dtype=np.intp)
+    for j in range(n):
+        if low[j] > -math.inf:
+            x[j], state[j] = low[j], _AT_LOW
+        elif high[j] < math.inf:
+            x[j], state[j] = high[j], _AT_HIGH
+        else:
+            x[j], state[j] = 0.0, _FREE
+    # artificial variables n + i take what is missing of equation i
+    basis, value, inverse = np.empty(m, dtype=np.intp), np.empty(m), np.zeros((m, m))
+    for i in range(m):
+        missing = b[i]
+        for j in range(n):
+            missing -= A[i, j] * x[j]
+        basis[i], value[i] = n + i, abs(missing)
+        inverse[i, i] = 1.0 if missing >= 0.0 else -1.0
+    price, column = np.empty(m), np.empty(m)
+    first, most = True, 20 * (m + n)
+    for step in range(2 * most):
+        for k in range(m):
+            price[k] = 0.0
+            for i in range(m):
+                own = 0.0 if basis[i] >= n else cost[basis[i]]
+                if first:
+                    own = -1.0 if basis[i] >= n else 0.0
+                price[k] += own * inverse[i, k]
+        enters, best, way = -1, _ROUNDING, 1.0
+        for j in range(n):
+            if state[j] == _BASIC or low[j] == high[j]:
+                continue
+            gain = 0.0 if first else cost[j]
+            for i in range(m):
+                gain -= price[i] * A[i, j]
+            if state[j] == _AT_HIGH or (state[j] == _FREE and gain < 0.0):
+                gain, sign = -gain, -1.0
+            else:
+                sign = 1.0
+            if gain > best:
+                enters, way = j, sign
+                if step > most:  # Bland's rule, which cannot cycle
+                    break
+                best = gain
+        if enters < 0:
+            if not first:
+                return _proved(cost, A, b, low, high, x, state, basis, inverse, price)
+            first = False
+            for i in range(m):
+                if basis[i] >= n and value[i] > _PROOF:
+                    return False
+            continue
+        for i in range(m):
+            column[i] = 0.0
+            for k in range(m):
+                column[i] += inverse[i, k] * A[k, enters]
+        # how far it may go: to its other bound, or until a basic variable is at one
+        far, leaves, pivot = high[enters] - low[enters], -1, 0.0
+        for i in range(m):
+            rate = -way * column[i]
+            if abs(rate) <= _ROUNDING:
+                continue
+            at_low, at_high = 0.0, math.inf if first else 0.0
+            if basis[i] < n:
+                at_low, at_high = low[basis[i]], high[basis[i]]
+            room = (at_high - value[i] if rate > 0.0 else value[i] - at_low) / abs(rate)
+            room = max(room, 0.0)
+            if room < far or (room == far and abs(rate) > pivot):
+                far, leaves, pivot = room, i, abs(rate)
+        if far == math.inf:
+            return False
+        for i in range(m):
+            value[i] -= way * column[i] * far
+            if basis[i] < n:
+                x[basis[i]] = value[i]
+        x[enters] += way * far
+        if leaves < 0:
+            state[enters] = _AT_HIGH if way > 0.0 else _AT_LOW
+            x[enters] = high[enters] if way > 0.0 else low[enters]
+            continue
+        old = basis[leaves]
+        if old < n:
+            falls = way * column[leaves] > 0.0
+            state[old] = _AT_LOW if falls else _AT_HIGH
+            x[old] = low[old] if falls else high[old]
+        basis[leaves], state[enters], value[leaves] = enters, _BASIC, x[enters]
+        for k in range(m):
+            inverse[leaves, k] /= column[leaves]
+        for i in range(m):
+            if i != leaves:
+                for k in range(m):
+                    inverse[i, k] -= column[i] * inverse[leaves, k]
+    return False
+
+
+@compiled
+def _proved(
+    cost: Array,
+    A: Array,
+    b: Array,
+    low: Array,
+    high: Array,
+    x: Array,
+    state: Indices,
+    basis: Indices,
+    inverse: Array,
+    price: Array,
+) -> bool:
+    """Correct x by its residual; return whether it meets the conditions of a maximum."""
+    m, n = A.shape
+    left, size = b.copy(), np.abs(b)
+    for i in range(m):
+        for j in range(n):
+            left[i] -= A[i, j] * x[j]
+            size[i] = max(size[i], abs(A[i, j] * x[j]))
+    for i in range(m):
+        if basis[i] < n:
+            for k in range(m):
+                x[basis[i]] += inverse[i, k] * left[k]
+    for i in range(m):
+        missing = b[i]
+        for j in range(n):
+            missing -= A[i, j] * x[j]
+        if not abs(missing) <= _PROOF * max(size[i], 1.0):
+            return False
+    for j in range(n):
+        slack = _PROOF * max(abs(x[j]), 1.0)
+        if not low[j] - slack <= x[j] <= high[j] + slack:
+            return False
+        gain = cost[j]
+        for i in range(m):
+            gain -= price[i] * A[i, j]
+        # a variable at a bound gains nothing by leaving it; the others gain nothing at all
+        rises = state[j] != _AT_HIGH and low[j] < high[j]
+        falls = state[j] != _AT_LOW and low[j] < high[j]
+        if (rises and gain > _PROOF) or (falls and gain < -_PROOF):
+            return False
+    return True
+
+
+@threaded
+def payload_rows(
+    J: Array,
+    torque: Array,
+    motion: Array,
+    low: Array,
+    high: Array,
+    reach: float,
+    force: Array,
+) -> None:
+    """Compute the largest forces (B, D) [N] of rows; NaN where the method proves none.
+
+    J_L (B, C, nv), the torque J_Xᵀ W − g (B, nv), J_vᵀ u (B, D, nv), the bounds (B, C).
+    """
+    rows, count, nv = J.shape
+    columns, x = np.empty((nv, count + 1)), np.empty(count + 1)
+    ends, cost = np.empty((2, count + 1)), np.zeros(count + 1)
+    cost[count] = 1.0
+    for n in range(rows):
+        A, b, least, most, arm, unit = scaled_balance(J[n], torque[n], low[n], high[n], reach)
+        ends[0, count], ends[1, count] = 0.0, math.inf
+        for d in range(motion.shape[1]):
+            for c in range(count + 1):
+                size = 0.0
+                for i in range(nv):
+                    columns[i, c] = A[i, c] if c < count else -motion[n, d, i] / arm
+                    size = max(size, abs(columns[i, c]))
+                lever = size if size > 0.0 else 1.0
+                for i in range(nv):
+                    columns[i, c] /= lever
+                if c < count:
+                    ends[0, c], ends[1, c] = least[c] * lever, most[c] * lever
+            proved = single_largest(cost, columns, b, ends[0], ends[1], x)
+            force[n, d] = x[count] / lever * unit if proved else math.nan
