@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from multiprocessing import get_context
-from typing import TYPE_CHECKING, Any, final
+from typing import TYPE_CHECKING, final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -131,42 +131,38 @@ def gathered(problem: DesignProblem, rows: Array, found: Sequence[Found]) -> Des
     )
 
 
-class _Pool:
-    """Computes designs in this process, in others, or on a cluster; answers in their order."""
-
-    def __init__(self, problem: DesignProblem, pool: Any, client: Any) -> None:
-        self._problem, self._pool, self._client = problem, pool, client
-
-    def __call__(self, rows: Array) -> Iterator[Found]:
-        if self._client is not None:
-            sent = self._client.scatter(self._problem, broadcast=True)
-            yield from self._client.gather(
-                [self._client.submit(measure, sent, row, pure=False) for row in rows]
-            )
-        elif self._pool is not None:
-            chunk = max(1, min(16, len(rows) // 8))
-            yield from self._pool.map(_in_worker, rows, chunksize=chunk)
-        else:
-            yield from (measure(self._problem, row) for row in rows)
+_Compute = Callable[[Array], Iterable[Found]]
 
 
 @contextmanager
-def workers(problem: DesignProblem, jobs: int, client: Client | None) -> Iterator[_Pool]:
-    """Yield a function of designs (D, n) that yields the evaluation of each."""
+def workers(problem: DesignProblem, jobs: int, client: Client | None) -> Iterator[_Compute]:
+    """Yield a function of designs (D, n) that returns their evaluations, in order."""
+    whole_number("jobs", jobs, 1)
     if client is not None:
-        from cdsm.sweeps.cluster import checked_client
+        yield _on_cluster(problem, client)
+    elif jobs == 1:
+        yield lambda rows: (measure(problem, row) for row in rows)
+    else:
+        # spawn: a forked process would inherit threads of BLAS
+        with ProcessPoolExecutor(jobs, get_context("spawn"), _set_problem, (problem,)) as pool:
+            try:
+                yield lambda rows: pool.map(
+                    _in_worker, rows, chunksize=max(1, min(16, len(rows) // 8))
+                )
+            except BaseException:
+                pool.shutdown(wait=False, cancel_futures=True)
+                raise
 
-        checked_client(client)
-    if whole_number("jobs", jobs, 1) == 1 or client is not None:
-        yield _Pool(problem, None, client)
-        return
-    # spawn: a forked process would inherit threads of BLAS
-    with ProcessPoolExecutor(jobs, get_context("spawn"), _set_problem, (problem,)) as pool:
-        try:
-            yield _Pool(problem, pool, None)
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+
+def _on_cluster(problem: DesignProblem, client: Client) -> _Compute:
+    from cdsm.sweeps.cluster import checked_client
+
+    checked_client(client)
+    # workers forget what is sent once nobody holds it, so it is sent once
+    sent = client.scatter(problem, broadcast=True, hash=False)
+    return lambda rows: client.gather(
+        [client.submit(measure, sent, row, pure=False) for row in rows]
+    )
 
 
 _problem: list[DesignProblem] = []
