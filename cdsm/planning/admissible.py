@@ -23,7 +23,7 @@ _FLAT = 1e-10  # singular values of J_Lᵀ below this part of the largest count 
 
 
 class Optimum(NamedTuple):
-    """Variables of a quadratic program, multipliers y of its equations and z >= 0 of its cuts."""
+    """Solution x of :func:`solve`, with multipliers y of A x = b and z ≥ 0 of G x ≤ h."""
 
     x: Array
     y: Array
@@ -32,15 +32,15 @@ class Optimum(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Admissible:
-    """Tensions F with J_Lᵀ F = τ and low ≤ F ≤ high, in the domains of their elasticities.
+    """Admissible tensions F (C,) [N]: J_Lᵀ F = J_Xᵀ W − g (Eq. 13) and low ≤ F ≤ high.
 
     Attributes:
         least: The least admissible tensions (Eq. 17), with the bounds of the caller.
-        low: Lower bounds (C,) [N], including the domains.
-        high: Upper bounds (C,) [N], including the domains; may hold inf.
-        scale: Size of the least tensions [N].
-        rows: Orthonormal basis (r, C) of the row space of J_Lᵀ.
-        null: Orthonormal basis (C, p) of the null space of J_Lᵀ.
+        low: Lower bounds (C,) [N], within the domains of the elasticities.
+        high: Upper bounds (C,) [N], within the domains of the elasticities; inf if there is none.
+        scale: Largest of the least tensions [N], or 1 N if all are zero.
+        rows: Orthonormal basis (r, C) of the row space of J_Lᵀ, whose rank is r.
+        null: Orthonormal basis (C, p) of the null space of J_Lᵀ, p = C − r.
     """
 
     least: Tension
@@ -52,7 +52,7 @@ class Admissible:
 
     @cached_property
     def kinks(self) -> list[tuple[int, float]]:
-        """Kinks (jumps of the slope of EA) within bounds: pairs of cable index and tension [N]."""
+        """Kinks of EA(F) (its slope is discontinuous) within bounds: (cable index, tension [N])."""
         return [
             (c, kink)
             for c, cable in enumerate(self.least.posture.arm.cables)
@@ -75,7 +75,7 @@ class Admissible:
         return low, high
 
     def imbalance(self, F: Array) -> Array:
-        """Return the residual (r,) [N] of the balance for tensions F (C,) [N]."""
+        """Return rows · (least − F) (r,) [N] for tensions F (C,) [N]; zero if F balances."""
         return np.asarray(self.rows @ (self.least.values - F))
 
     def nearest(self, wanted: Array, low: Array, high: Array) -> Array | None:
@@ -90,7 +90,7 @@ class Admissible:
         return None if found is None else np.minimum(np.maximum(found.x * size, low), high)
 
     def within(self, change: Array, F: Array) -> Admissible | None:
-        """Return a copy limited to a change of F (C,) [N]; None if no tensions balance the arm."""
+        """Return a copy with |ΔF| ≤ ``change`` (C,) [N] from F; None if it has no tensions."""
         low, high = np.maximum(self.low, F - change), np.minimum(self.high, F + change)
         least = self.nearest(np.zeros_like(F), low, high) if (low <= high).all() else None
         if least is None:
@@ -98,7 +98,7 @@ class Admissible:
         return replace(self, least=self._balanced(least), low=low, high=high)
 
     def tension(self, F: Array) -> Tension:
-        """Convert tensions F (C,) [N] to a :class:`Tension` whose balance is exact again."""
+        """Convert F (C,) [N] to a :class:`Tension`; remove the rounding from its balance."""
         exact = self.nearest(F, *self.piece(F))  # removes the rounding of short steps
         return replace(self._balanced(F if exact is None else exact), least=False)
 

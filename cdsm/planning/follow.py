@@ -1,4 +1,4 @@
-"""Tensions along a path: each search starts from the samples before, within the rate."""
+"""Tensions along a path, planned sample by sample; a rate limits their change per step."""
 
 from __future__ import annotations
 
@@ -41,10 +41,11 @@ class Follower:
     planned: list[Sample] = field(default_factory=list)
 
     def add(self, sample: Sample) -> InfeasibleSample | None:
-        """Plan one more sample. Return None, or the failure.
+        """Plan one more sample. Return None if it succeeds, else the reason of the failure.
 
-        It takes the least tensions within the rate from the last sample. If these miss the target
-        but others hit it, the samples before are planned again until they lead to the others.
+        The plan takes the least tensions within the rate of the last planned sample. If no tensions
+        within the rate hit the target, but other tensions do, earlier samples are planned again so
+        that they lead to the other tensions.
 
         Raises:
             UnreachableStiffness: No tensions hit the single target at any rate.
@@ -70,7 +71,7 @@ class Follower:
     def _near(
         self, region: Admissible | None, sample: Sample, other: Sample | None
     ) -> Admissible | None:
-        """Return the tensions of a region of a sample within the rate from another sample."""
+        """Return the part of a sample's region that is within the rate of another sample."""
         if region is None or other is None:
             return region
         return region.within(self.rate * abs(other.index - sample.index), other.F)
@@ -78,7 +79,7 @@ class Follower:
     def _search(
         self, sample: Sample, region: Admissible | None, start: Array, centre: Array | float = 0.0
     ) -> Sample | None:
-        """Search once for the least tensions, or for the nearest to a centre."""
+        """Search once for the tensions nearest to ``centre`` (C,) [N]; None if they miss."""
         if region is None:
             return None
         found = _search(sample.model, region, sample.constraints, start, centre)
@@ -96,9 +97,9 @@ class Follower:
     def _replan_towards(self, goal: Sample) -> bool:
         """Plan the last samples again so that they lead to a goal within the rate; return success.
 
-        The loop goes backwards from the last sample. Each sample stays within the rate of the next
-        one and comes as near as possible to the one before. It ends when a sample is within the
-        rate of both.
+        The loop goes backwards from the last sample. Each sample stays within the rate of its
+        successor and comes as near as possible to its predecessor. The loop ends when a sample is
+        within the rate of both.
         """
         later = [goal]
         for k in reversed(range(max(len(self.planned) - _BACK, 0), len(self.planned))):
@@ -131,10 +132,10 @@ class Follower:
 def least_change(
     model: StiffnessModel, constraints: Constraints, before: Array, rate: Array
 ) -> Array | None:
-    """Return the tensions (C,) [N] nearest to those before that hit the targets, within a rate.
+    """Return tensions (C,) [N] that hit the targets, nearest to ``before`` and within a rate.
 
-    If none are found that hit them, they come as near as one search finds. None if no tensions
-    within the rate hold the arm.
+    If none hit the targets, return the tensions of least miss that one search finds. Return None if
+    no tensions within the rate hold the arm stable.
     """
     region = model.region.within(rate, before)
     found = None if region is None else _search(model, region, constraints, before, before)
@@ -150,9 +151,9 @@ def _search(
     start: Array,
     centre: Array | float,
 ) -> tuple[Program, ConstraintValues] | None:
-    """Search once, from the tensions of a region nearest to a start, for those nearest to a centre.
+    """Search once for the tensions nearest to a centre; begin in the region, nearest to a start.
 
-    Return the program and where the search ends; None if the region or the start holds no arm.
+    Return the program and the result; None if no stable tensions to begin with are found.
     """
     F = region.nearest(start, region.low, region.high)
     if F is None:

@@ -1,10 +1,10 @@
-"""Exact derivatives of a :class:`Stiffness` by the cable tensions.
+"""Exact derivatives of a :class:`Stiffness` with respect to the cable tensions.
 
     ∂K_θ/∂F_c = H_c + k′_c J_c J_cᵀ,    k = 1/(l_0/EA(F) + 1/k_series)
 
-H_c is the Hessian of the length of cable c, and J_c its gradient (Eq. 16). Let R be rows of the tip
-Jacobian. The tip stiffness X = (R K_θ⁻¹ Rᵀ)⁻¹ changes by Mᵀ ∂K_θ M. M = K_θ⁻¹ Rᵀ X is the joint
-motion per unit motion of the tip.
+J_c and H_c are the gradient and the Hessian of the length of cable c (Eq. 16). k is its stiffness,
+and k′_c = dk/dF_c. Let R be rows of the tip Jacobian. The tip stiffness X = (R K_θ⁻¹ Rᵀ)⁻¹ changes
+by Mᵀ ∂K_θ M. M = K_θ⁻¹ Rᵀ X is the joint motion per unit motion of the tip.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ from cdsm.support.values import Array, ReadOnlyState, frozen
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class StiffnessGradient(ReadOnlyState):
-    """Derivatives of a stiffness by the cable tensions, named as in :class:`~cdsm.Stiffness`.
+    """Derivatives of a :class:`~cdsm.Stiffness` with respect to tensions; same names as there.
 
     Posture and wrench are fixed. A change of one tension alone breaks the balance (Eq. 13), so
     combine the derivatives along changes that keep it.
 
     Attributes:
         stiffness: K, whose tensions are the point of differentiation.
-        cable_stiffness: dk/dF (C,) of each cable by its own tension [1/m]; 0 under force control.
+        cable_stiffness: dk_c/dF_c (C,) [1/m] of each cable; 0 under force control.
     """
 
     stiffness: Stiffness
@@ -63,7 +63,7 @@ class StiffnessGradient(ReadOnlyState):
         return frozen(self._through(self.stiffness.posture.jacobian[:3], self.stiffness.cartesian))
 
     def along(self, direction: Direction) -> Array:
-        """Return ∂(1/(uᵀ C_vv u))/∂F = along² wᵀ ∂K_θ/∂F w with w = K_θ⁻¹ J_vᵀ u, (C,) [1/m].
+        """Return ∂s/∂F = s² wᵀ ∂K_θ/∂F w (C,) [1/m] of s = ``K.along(u)``, with w = K_θ⁻¹ J_vᵀ u.
 
         Args:
             direction: u: an axis such as ``"z"``, or (3,) in base axes, any length.
@@ -93,10 +93,12 @@ class StiffnessGradient(ReadOnlyState):
 
 
 def stiffness_gradient(stiffness: Stiffness) -> StiffnessGradient:
-    """Compute the derivatives of a stiffness by the cable tensions, with dEA/dF and series springs.
+    """Compute the derivatives of a stiffness with respect to the cable tensions.
 
-    ∂K_θ/∂F_c = H_c + k′_c J_c J_cᵀ. For example, ``stiffness_gradient(K).along(u)`` is the gradient
-    of ``K.along(u)``. At a kink of an elasticity, the slope is that below the kink.
+    ∂K_θ/∂F_c = H_c + k′_c J_c J_cᵀ, with the gradient J_c and the Hessian H_c of the length of
+    cable c and k′_c = dk_c/dF_c. k′_c includes dEA/dF and the series spring. For example,
+    ``stiffness_gradient(K).along(u)`` is the gradient of ``K.along(u)``. At a kink of an
+    elasticity, the slope is that below the kink.
 
     Args:
         stiffness: K, the result of :func:`~cdsm.stiffness`.

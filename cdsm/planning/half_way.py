@@ -22,7 +22,7 @@ class HalfWay(ReadOnlyState):
     A position-controlled cable has the mean of its two unstretched lengths l_0. A force-controlled
     cable has the mean of its two tensions. The mean of the two wrenches acts. The arm is in
     equilibrium, r(q) = J_Lᵀ F(q) + g − J_Xᵀ W = 0 (Eq. 13), near the mean of the two postures. The
-    misfit falls with the square of the step.
+    misfit is of second order in the step between the samples.
 
     Attributes:
         index: Number of the first sample, from 0.
@@ -31,7 +31,7 @@ class HalfWay(ReadOnlyState):
         achieved: ``along`` or ``cartesian`` [N/m], (), (n,) or (3, 3); or None.
         misfit: ‖achieved/target − 1‖ [-], or ‖achieved − target‖/‖target‖ for ``cartesian``; inf
             without equilibrium.
-        reason: Why the arm does not come to rest; otherwise empty.
+        reason: Why no equilibrium was found; otherwise empty.
     """
 
     index: int

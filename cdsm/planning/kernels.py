@@ -1,6 +1,8 @@
 """Numba kernels of the searches. In numpy a plan would take 1.4 times as long (n = 5).
 
-Shapes: C cables, nv joint angles, r rows of the tip Jacobian, n constraints.
+Shapes: C cables, nv joint angles, r rows of the tip Jacobian, n constraints. J_c and H_c are the
+gradient and the Hessian of the length of cable c, k_c is its stiffness, k′_c = dk_c/dF_c
+(``slope``) and k″_c = d²k_c/dF_c² (``bend``).
 """
 
 from __future__ import annotations
@@ -17,7 +19,7 @@ _CURVATURE = 1e-6  # curvatures below this part of the largest are raised to it
 def stiffness_at(
     constant: Array, hessian: Array, length_jacobian: Array, tension: Array, springs: Array
 ) -> tuple[Array, Array, Array]:
-    """Return K_θ = constant + Σ F_c H_c + k_c J_c J_cᵀ, and eigen-pairs of its symmetric part."""
+    """Return K_θ = constant + Σ (F_c H_c + k_c J_c J_cᵀ), and eigenpairs of its symmetric part."""
     K = constant.copy()
     count, nv = length_jacobian.shape
     for c in range(count):
@@ -135,10 +137,10 @@ def constraint_hessian(
 
 @compiled
 def convex(W: Array, null: Array, held: Array) -> Array:
-    """Return a positive definite matrix that equals W, where W is convex, on the steps that matter.
+    """Return a positive definite matrix that equals W on the admissible steps if W is convex there.
 
-    These steps keep the balance, with the orthonormal basis ``null`` (C, p), and constraints with
-    the gradients ``held`` (n, C).
+    Admissible steps keep the balance (columns of ``null`` (C, p) are an orthonormal basis) and do
+    not change constraints, to first order (rows of ``held`` (n, C) are the gradients).
     """
     count, p = null.shape
     inner = np.dot(np.ascontiguousarray(null.T), np.dot(W, null))

@@ -26,7 +26,7 @@ def checked_starts(starts: object, seed: object) -> tuple[int, int]:
 def target_constraints(
     model: StiffnessModel, directions: Array | None, target: Array
 ) -> Constraints:
-    """Build constraints for a target [N/m] along directions, or of ``cartesian`` if None."""
+    """Build constraints for a target [N/m] of ``along``; of ``cartesian`` if directions is None."""
     K = stiffness(model.pose, model.region.least)
     if directions is None:
         _ = K.cartesian  # raises if it does not exist
@@ -48,7 +48,7 @@ def along_constraints(model: StiffnessModel, directions: Array, targets: Array) 
 
 
 def cartesian_constraints(model: StiffnessModel, target: Array) -> Constraints:
-    """Build (cartesian − target)/‖target‖ (symmetric part), weighted to keep the sum of squares."""
+    """Build (cartesian − target)/‖target‖ as 6 constraints (symmetric part) of the same norm."""
     weights = []
     for i in range(3):
         for j in range(i, 3):
@@ -61,7 +61,7 @@ def cartesian_constraints(model: StiffnessModel, target: Array) -> Constraints:
 
 
 def achieved(K: Stiffness, directions: Array | None) -> Array:
-    """Return ``along`` or ``cartesian``, as planned: (), (n,) or (3, 3) [N/m]."""
+    """Return ``along`` of the directions () or (n,), else ``cartesian`` (3, 3) [N/m]."""
     if directions is None:
         return K.cartesian
     along = [K.along(u) for u in directions.reshape(-1, 3)]
@@ -77,7 +77,7 @@ def misfit(achieved: Array, target: Array, directions: Array | None) -> float:
 
 
 def unstable(arm: Manipulator, problem: str, mode: Array) -> SingularStiffness:
-    """Build the error of an arm that no tensions hold, with its softest joint motion (nv,)."""
+    """Build the error of an arm that no tensions make stable; mode (nv,) is its softest motion."""
     mode = mode * np.sign(mode[abs(mode).argmax()])
     remedy = "Change the bounds, the posture or the load, take stiffer cables, or lower margin."
     if all(cable.control == "force" for cable in arm.cables):

@@ -67,12 +67,12 @@ def plan_path(
     before it: k·rate if they are k samples apart. The plan takes the least tensions within this
     limit. If these miss the target although others hit it, up to 50 earlier samples are planned
     again, backwards. They still hit their targets, with tensions that lead to this sample. If this
-    fails, the sample has the status ``"rate"``, and the next sample has more steps. So after a jump
-    of the target the plan misses as many samples as the motors need. Give a ramp if the arm must
-    follow in between.
+    fails, the sample has the status ``"rate"``, and the next sample may change the tensions by one
+    rate more. So after a step of the target the plan misses samples until the motors can reach it.
+    Give a ramp if the arm must follow in between.
 
     The plan hits the targets at the samples. ``between`` of the result gives the stiffness half-way
-    between two samples. Its misfit falls with the square of the step.
+    between two samples. Its misfit is of second order in the step between samples.
 
     Args:
         arm: The arm.

@@ -73,7 +73,7 @@ class PathPlan(ReadOnlyState):
         tensions: F (P, C) [N].
         achieved: ``stiffness.along`` or ``stiffness.cartesian``, (P,), (P, n) or (P, 3, 3) [N/m].
         stiffness: K_θ at each planned sample, with its posture and wrench.
-        infeasible: The other samples, each with its reason.
+        infeasible: The samples that are not planned, each with its reason.
         iterations: Iterations of all searches.
     """
 
@@ -96,7 +96,7 @@ class PathPlan(ReadOnlyState):
 
     @cached_property
     def steps(self) -> Array:
-        """Largest tension change per step since the last planned sample (P,) [N]; first 0."""
+        """Largest tension change per step since the previous planned sample (P,) [N]; first 0."""
         changes = np.zeros(len(self.planned))
         moved = abs(np.diff(self.tensions, axis=0)).max(axis=1, initial=0.0)
         changes[1:] = moved / np.diff(self.planned)
@@ -125,8 +125,8 @@ class PathPlan(ReadOnlyState):
     def between(self) -> tuple[HalfWay, ...]:
         """Arm half-way between each two consecutive planned samples.
 
-        The motors move evenly between the samples. Half the step leaves a quarter of the misfit.
-        The first use takes some milliseconds per pair.
+        The motors move at constant speed between samples. Half the step gives a quarter of the
+        misfit. The first use takes some milliseconds per pair.
         """
         pairs = list(zip(self.planned, self.planned[1:], strict=False))
         l_0, targets = self.unstrained_lengths, self.target
@@ -272,7 +272,7 @@ class PathPlan(ReadOnlyState):
         return ["sample", "status", *columns, *wanted, "reason"], rows
 
     def _readings(self, count: int) -> list[str]:
-        """Return the suffixes of the names of the wanted stiffnesses; empty for a single one."""
+        """Return suffixes for the column names of several target stiffnesses; ``[""]`` for one."""
         if self.direction is None:
             return [f" {a}{b}" for a in "xyz" for b in "xyz"]
         return [""] if count == 1 else [f" {k}" for k in range(1, count + 1)]

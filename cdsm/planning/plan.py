@@ -1,4 +1,4 @@
-"""Plan the least tensions that give an arm a wanted stiffness."""
+"""Plan the least tensions with which an arm has a target stiffness."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class StiffnessPlan(ReadOnlyState):
     """Tensions for a wanted stiffness, with the arguments of the plan.
 
     Attributes:
-        tension: The tensions; if several are equally near to the target, those with the least ‖F‖.
+        tension: The tensions. If several are equally near to the target, they have the least ‖F‖.
         stiffness: K_θ under these tensions.
         direction: Unit directions u in base axes, (3,) or (n, 3); None for ``cartesian``.
         target: The target [N/m]: a number, one per direction (n,), or (3, 3).
@@ -76,7 +76,7 @@ class StiffnessPlan(ReadOnlyState):
 
     @property
     def spread(self) -> float:
-        """Relative excess of the largest effort found over the least [-]."""
+        """(Largest − least)/least of ``efforts`` [-]: 0 if all searches end at the same effort."""
         return float(self.efforts[-1] / self.efforts[0] - 1.0) if self.efforts.size else 0.0
 
     def plot(self, attainable: StiffnessRange | None = None) -> Figure:
@@ -147,9 +147,9 @@ def plan_stiffness(
     is hit within 1e-6; otherwise an error is raised. Several directions or ``cartesian`` are hit if
     possible. If not, the sum of their squared relative misses is least, and ``reached`` is false.
 
-    The searches are local. With the laws of this library they mostly end at one effort. With one
-    user-defined law, the effort found was 3.6 % above the least. A ``spread`` above zero warns of
-    this. A ``spread`` of zero does not exclude it. More ``starts`` help.
+    The searches are local. With the laws of this library they mostly end at the same effort ‖F‖.
+    With one user-defined law, the effort found was 3.6 % above the least. A ``spread`` above zero
+    warns of this. A ``spread`` of zero does not exclude it. More ``starts`` help.
 
     Args:
         pose: The posture.

@@ -34,7 +34,7 @@ _AS_NEAR = 1e-8  # misses up to this count as zero: next to buckling a search ma
 
 
 class Planner:
-    """Searches from a number of starts for tensions with which the constraints are zero.
+    """Search, from several starts, for the least tensions F with constraints c(F) = 0.
 
     Attributes:
         efforts: ‖F‖ [N] at the end of each search that hit the target, rising.
@@ -53,7 +53,7 @@ class Planner:
         self._ends: list[ConstraintValues] = []
 
     def least(self) -> ConstraintValues | None:
-        """Return the least tensions that hit the target, or None if several are not hit at once.
+        """Return the least tensions that hit all targets; None if several cannot be hit together.
 
         Raises:
             UnreachableStiffness: No tensions hit the single target.
@@ -64,7 +64,7 @@ class Planner:
         return found
 
     def nearest(self) -> ConstraintValues:
-        """Return the least tensions among those with the least sum of squared misses."""
+        """Return the tensions with the least sum of squared misses; of several, the least."""
         program = replace(self.program, objective=NEAREST)
 
         def misses(place: ConstraintValues) -> float:
@@ -79,7 +79,7 @@ class Planner:
         return least if kept else best
 
     def _within_range(self, u: Array, target: float) -> ConstraintValues:
-        """Return the least tensions for a target [N/m] along u (3,) if it is within the range."""
+        """Return the least tensions for a target [N/m] along u (3,); raise if out of range."""
         softest, stiffest = range_ends(self.model, u, _RANGE_STARTS, self.seed)
         low = 0.0 if softest.open else softest.value
         high = math.inf if stiffest.open else stiffest.value
@@ -106,7 +106,7 @@ class Planner:
         return found
 
     def _best(self, points: Iterable[Evaluation]) -> ConstraintValues | None:
-        """Return the least tensions that hit the target from some starts, or None."""
+        """Search from all ``points``; return the least tensions that hit the target, or None."""
         begin = list(points)
         near = [
             float(point.F.max())
@@ -124,7 +124,7 @@ class Planner:
         return hits[0]
 
     def _nearly_hit(self, seen: list[ConstraintValues]) -> ConstraintValues | None:
-        """Return the least tensions seen that hit the single target within 1e-6, or None."""
+        """Return the least of some tensions that hit the single target within 1e-6, or None."""
         least = min(float(abs(place.values[0])) for place in seen)
         if least > REACHED:
             return None
@@ -134,7 +134,7 @@ class Planner:
         return best
 
     def _starts(self) -> Iterator[Evaluation]:
-        """Return the starts: least tensions, points that hit one target, and random points."""
+        """Yield the starts: least tensions, points that hit a single target, and random points."""
         anchor = self.begin.anchor
         least = anchor.backtracked(self.model.region.least.values)
         points = [] if least is None else [least]
@@ -167,14 +167,14 @@ class Planner:
         return sorted(stable, key=lambda point: float(point.F @ point.F))
 
     def _bridges(self, seen: list[ConstraintValues]) -> list[Evaluation]:
-        """Find points that hit the single target between the nearest points on either side."""
+        """Find points that hit the single target between the nearest below and above it."""
         order = sorted(seen, key=lambda place: float(abs(place.values[0])))
         below = [place.evaluation for place in order if place.values[0] < 0.0][:_SIDES]
         above = [place.evaluation for place in order if place.values[0] > 0.0][:_SIDES]
         return [place for one in below for place in self._crossings(one, above, 1e-15)]
 
     def _miss(self, point: Evaluation) -> float:
-        """Return the miss of the single target; -1 (zero stiffness) if the arm buckles."""
+        """Return the relative miss of the single target [-]; -1 (zero stiffness) if unstable."""
         return float(self.constraints.at(point).values[0]) if point.reserve >= 0.0 else -1.0
 
     def _search(self, program: Program, point: Evaluation) -> ConstraintValues:

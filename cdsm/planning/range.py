@@ -80,7 +80,7 @@ class StiffnessRange(ReadOnlyState):
         return plot_stiffness_range(self)
 
     def to_dict(self) -> dict[str, object]:
-        """Return both ends and their tensions in SI for JSON, with units in the keys."""
+        """Return both stiffnesses and their tensions in SI for JSON, with units in the keys."""
         numbers = {
             **self.posture._coordinates,
             "direction": self.direction,
@@ -178,7 +178,7 @@ def stiffness_range(
 
 
 class RangeEnd(NamedTuple):
-    """One end of the range."""
+    """The lowest or highest stiffness that the searches found, and the tensions there."""
 
     evaluation: Evaluation  # at the end of the best search
     tension: Tension  # there, with exact balance
@@ -190,7 +190,7 @@ class RangeEnd(NamedTuple):
 def range_ends(
     model: StiffnessModel, u: Array, starts: int, seed: int
 ) -> tuple[RangeEnd, RangeEnd]:
-    """Find both ends of the range along a unit direction (3,)."""
+    """Find the lowest and the highest stiffness along a unit direction (3,)."""
     region = model.region
     if np.isfinite(region.high).all():
         return _bounded_ends(model, region, u, starts, seed)

@@ -36,13 +36,15 @@ class Saturation(ReadOnlyState):
 
     Attributes:
         direction: u (3,), a unit direction in base axes.
-        fraction: Part of the largest slope [-] below which tension does not pay.
-        bound: The lower bound [N] at which the slope has fallen to this part of the largest slope.
-            It is inf if the slope stays above it, and the start if the stiffness never rises.
-        tension: The least tensions with this bound, or with the bound of the end.
+        fraction: Part of the largest slope [-] below which more tension hardly stiffens the arm.
+        bound: The lower bound [N] at which the slope has fallen to ``fraction`` of the largest
+            slope. It is inf if the slope stays above this value, and the first bound if the
+            stiffness never rises.
+        tension: The least tensions with ``bound``, or with the last bound of the curve if it is
+            inf.
         stiffness: K_θ under these tensions.
         steepest: The lower bound [N] with the largest slope.
-        steepest_slope: d along/d bound there [1/m].
+        steepest_slope: Derivative of the stiffness with respect to the bound at ``steepest`` [1/m].
         stiffest: The lower bound [N] with the largest stiffness: an end of the curve, or a maximum
             between, above which tension softens the arm.
         limit: Why the curve ends: ``"buckling"``, ``"maximum"`` (the bound ``maximum``),

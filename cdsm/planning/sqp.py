@@ -15,11 +15,11 @@ L = f + y·c − z·reserve, with the multipliers y and z of the step before. So
     so that  J_Lᵀ d = 0,  c + G d = s − t,  s, t ≥ 0,  reserve + ∂reserve·d ≥ 0,
              bounds,  |d_c| ≤ radius.
 
-s and t are the violations of c above and below. With them the program has a solution even if the
-linearized c cannot be met ("elastic mode"). The penalty weight ρ (``price``) makes the penalty
-exact if it exceeds the largest multiplier of c. It rises tenfold until c is met, or until a rise
-does not help. Once c is met, it falls to three times the multiplier: a large ρ shortens the steps
-along a curved c.
+s and t are the positive and the negative violations of c, and ρ is their weight. With them the
+program has a solution even if the linearized c cannot be met ("elastic mode"). The penalty weight ρ
+(``price``) makes the penalty exact if it exceeds the largest multiplier of c. It rises tenfold
+until c is met, or until a rise does not help. Once c is met, it falls to three times the
+multiplier: a large ρ shortens the steps along a curved c.
 
 **The curvature W.** W is the exact Hessian of L, with the second derivatives of K_θ⁻¹ and λ_min,
 made positive definite by :func:`cdsm.planning.kernels.convex` on the steps that keep the balance, c
@@ -98,7 +98,7 @@ class Program:
     centre: Array | float = 0.0
 
     def merit(self, at: ConstraintValues, price: float) -> float:
-        """Return f plus the penalty of c."""
+        """Return f at a point; for the effort plus ``price`` times the penalty of c."""
         c = at.values
         if self.objective.effort:
             x = (at.evaluation.F - self.centre) / self.unit
@@ -106,11 +106,11 @@ class Program:
         return self.objective.linear * float(c.sum()) + 0.5 * self.objective.square * float(c @ c)
 
     def met(self, at: ConstraintValues) -> bool:
-        """Check that c = 0, if this is required."""
+        """Return whether c = 0; True for objectives that do not require it."""
         return not self.objective.effort or bool((abs(at.values) <= MET).all())
 
     def better(self, one: ConstraintValues, other: ConstraintValues) -> bool:
-        """Check that one point is better than another by more than rounding."""
+        """Return whether point ``one`` is better than ``other`` by more than rounding."""
         if self.met(one) != self.met(other):
             return self.met(one)
         price = 0.0 if self.met(one) else _LARGEST_PRICE
@@ -119,7 +119,7 @@ class Program:
 
 
 def search(program: Program, start: Evaluation) -> ConstraintValues:
-    """Find a local optimum from stable tensions; cross kinks of rigidities if better."""
+    """Find a local optimum from stable tensions; cross kinks of rigidities if that is better."""
     best = _search(program, start, in_piece=False)
     for _ in range(_CROSSINGS):
         for F in _beyond_kinks(program.region, best.evaluation.F):
@@ -136,7 +136,7 @@ def search(program: Program, start: Evaluation) -> ConstraintValues:
 
 
 def _beyond_kinks(region: Admissible, F: Array) -> Iterator[Array]:
-    """Move tensions (C,) [N] across the kinks they are at: first all of them, then one each."""
+    """Yield tensions (C,) [N] moved across the kinks they are at: first all, then one at a time."""
     at = [(c, kink) for c, kink in region.kinks if abs(F[c] - kink) <= _AT_KINK * kink]
     for group in ([at] if len(at) > 1 else []) + [[pair] for pair in at]:
         beyond = F.copy()
@@ -146,7 +146,7 @@ def _beyond_kinks(region: Admissible, F: Array) -> Iterator[Array]:
 
 
 def _search(program: Program, start: Evaluation, *, in_piece: bool) -> ConstraintValues:
-    """Find a local optimum; with ``in_piece`` only in the piece of the start."""
+    """Find a local optimum; with ``in_piece`` only between the kinks around the start."""
     region, iterate = program.region, program.constraints.at(start)
     y, z = np.zeros(iterate.values.size if program.objective.effort else 0), 0.0
     price, radius = _FIRST_PRICE, _FIRST_RADIUS
@@ -197,8 +197,8 @@ class _Step(NamedTuple):
 class _LocalModel:
     """f, c and the convex curvature of the Lagrangian at an iterate, as functions of d = ΔF/size.
 
-    y and z are the multipliers of c and of the reserve in the step before; ``bounds`` are those of
-    the tensions [N], and ``radius`` that of the entries of d.
+    y and z are the multipliers of c and of the reserve in the previous step. ``bounds`` limit the
+    tensions [N]; ``radius`` limits each |d_c|.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""Starting points of searches: stable tensions far apart."""
+"""Starting points of searches: stable tensions that lie far apart."""
 
 from __future__ import annotations
 
@@ -74,10 +74,11 @@ class StartPoints:
 
 
 def _stabilize(model: StiffnessModel, region: Admissible, start: Evaluation) -> Evaluation:
-    """Find the tensions with about the largest reserve, by cutting planes in a trust region.
+    """Find tensions with about the largest reserve λ_min − floor, by cutting planes.
 
-    vᵀ K_θ(F) v is an upper bound of the smallest eigenvalue for every unit v. The two softest modes
-    of each iterate are kept. Linear in F, they bound the reserve of the next iterate.
+    vᵀ K_θ(F) v is an upper bound of the smallest eigenvalue for every unit v. This bound is linear
+    in F if K_θ is. The bounds of the two softest modes of each iterate limit the reserve of the
+    next iterate, which stays within a trust region.
     """
     iterate, radius, unit = start, 1.0, model.scale
     modes: list[Array] = []

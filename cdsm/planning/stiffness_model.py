@@ -105,18 +105,20 @@ class Evaluation:
 
     @cached_property
     def reserve_gradient(self) -> Array:
-        """Derivative of the reserve by the tensions (C,) [m/rad²]."""
+        """Derivative of the reserve with respect to the tensions (C,) [m/rad²]."""
         return self.mode_gradient(self.eigenvectors[:, :1])
 
     def mode_gradient(self, v: Array) -> Array:
-        """Return the derivative of vᵀ K_θ v by the tensions (C,) [m/rad²] for v (nv, 1)."""
+        """Return ∂(vᵀ K_θ v)/∂F (C,) [m/rad²] for v (nv, 1)."""
         v = np.ascontiguousarray(v)
         return kernels.form_by_tension(*self.model.geometry, self.spring_slopes[0], v, v)[:, 0, 0]
 
     def reserve_hessian(self) -> Array:
-        """Return the second derivative of the reserve by the tensions (C, C) [m/(N rad²)].
+        """Return ∂²reserve/∂F² (C, C) [m/(N rad²)].
 
-        2 Σ_j (vᵀ ∂_c K_θ v_j)(v_jᵀ ∂_d K_θ v)/(λ − λ_j) + δ_cd vᵀ J_c k″_c J_cᵀ v, v of λ = λ_min.
+        Entry cd: 2 Σ_j (vᵀ ∂_c K_θ v_j)(v_jᵀ ∂_d K_θ v)/(λ − λ_j) + δ_cd vᵀ J_c k″_c J_cᵀ v. v is
+        the eigenvector of λ = λ_min, v_j are the others; ∂_c = ∂/∂F_c, and δ_cd is 1 for c = d,
+        else 0.
         """
         J, v = self.model.pose.length_jacobian, np.ascontiguousarray(self.eigenvectors[:, :1])
         first, second = self.spring_slopes
@@ -128,7 +130,7 @@ class Evaluation:
         return result
 
     def backtracked(self, F: Array) -> Evaluation | None:
-        """Return the first stable point on the line from tensions F (C,) [N] to here, or None."""
+        """Return the first stable point on the line from F (C,) [N] to these tensions, or None."""
         start = self.model.at(F)
         if start.reserve >= 0.0:
             return start
@@ -149,7 +151,7 @@ class Evaluation:
 
 
 class Constraint(NamedTuple):
-    """Values E_j : X [-] of one tip stiffness X = (R K_θ⁻¹ Rᵀ)⁻¹."""
+    """Values Σ_ab E_j,ab X_ab [-] (j = 1 … n) of one tip stiffness X = (R K_θ⁻¹ Rᵀ)⁻¹."""
 
     rows: Array  # R (r, nv) [m/rad]
     weights: Array  # E (n, r, r) [m/N]
@@ -177,8 +179,9 @@ class Constraints:
 class ConstraintValues:
     """c(F) at stable tensions, with its first and second derivatives.
 
-    M = K_θ⁻¹ Rᵀ X is the joint motion per motion of the tip. P = K_θ⁻¹ − M R K_θ⁻¹ is the joint
-    motion per torque while the tip is held.
+    R are rows of the tip Jacobian and X = (R K_θ⁻¹ Rᵀ)⁻¹. M = K_θ⁻¹ Rᵀ X is the joint motion per
+    motion of the tip. P = K_θ⁻¹ − M R K_θ⁻¹ is the joint motion per torque with the tip fixed. Here
+    ∂_c means ∂/∂F_c; δ_cd is 1 for c = d, else 0.
 
         ∂X/∂F_c = Mᵀ ∂_c K_θ M,
         ∂²X/∂F_c∂F_d = −Mᵀ (∂_c K_θ P ∂_d K_θ + ∂_d K_θ P ∂_c K_θ) M + δ_cd Mᵀ J_c k″_c J_cᵀ M.
@@ -210,7 +213,7 @@ class ConstraintValues:
         )
 
     def hessian(self, y: Array) -> Array:
-        """Return the second derivative of y · c by the tensions (C, C) [1/N²] for y (n,)."""
+        """Return ∂²(y · c)/∂F² (C, C) [1/N²] for y (n,)."""
         slopes = *self.evaluation.model.geometry, *self.evaluation.spring_slopes
         total, first = np.zeros((self.evaluation.F.size,) * 2), 0
         each = zip(self._parts, self._tips, strict=True)

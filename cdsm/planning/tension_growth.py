@@ -50,11 +50,11 @@ def saturation(
 
     F*(b) are the least tensions with the lower bound b (Eq. 17). The slope of the stiffness is
     d along/db = ∂along/∂F · dF*/db, where dF*/db follows from the cables at their bounds. The
-    result is the first b above the largest slope at which the slope has fallen to ``fraction`` of
-    the largest. A strand starts soft, so its largest slope is large (Section IV-C). Where its
-    rigidity has levelled off, the active part remains. Then more tension softens the arm if springs
-    or leads (straight cables between actuators and base disk) keep the wires from stiffening as
-    they stretch.
+    result is the first b, beyond the b of largest slope, at which the slope has fallen to
+    ``fraction`` of the largest. A strand starts soft, so its largest slope is large (Section IV-C).
+    Where its rigidity has levelled off, tension acts only through the active part of K_θ (Eq. 16).
+    Then more tension softens the arm if springs or leads (straight cables between actuators and
+    base disk) keep the wires from stiffening as they stretch.
 
     Args:
         pose: The posture, which stays fixed.
@@ -121,7 +121,7 @@ def saturation(
 
 
 def _stable(at: StiffnessAt, low: float, high: float) -> tuple[float, float]:
-    """Return the first stable range of lower bounds [N], without its edges."""
+    """Return the first stable range (low, high) of lower bounds [N], without its bounds."""
     places, margins, stable = stable_ranges(at, low, high)
     if not stable:
         best = at(float(places[int(margins.argmax())]))
@@ -137,7 +137,7 @@ def _stable(at: StiffnessAt, low: float, high: float) -> tuple[float, float]:
 
 
 def _bends(at: StiffnessAt, places: Array) -> Array:
-    """Find the lower bounds [N], rising, at which the slope jumps; start from ``places``.
+    """Find the bounds [N], rising, between ``places`` [N] at which the slope is discontinuous.
 
     There a cable reaches or leaves a bound, or passes a kink of its rigidity. If the same cables
     are at their bounds at both ends of an interval, F*(b) is linear in the interval.

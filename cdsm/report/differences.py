@@ -31,7 +31,7 @@ _CONVERGING = 0.05
 """Two extrapolations have not converged if their relative difference is larger."""
 
 _AMPLIFIED = np.array([6.7, 99.0])
-"""Error of extrapolated first and second differences, in noise of f over h and over h².
+"""Error of extrapolated first and second differences, over noise/h and noise/h².
 
 The extrapolation weighs differences of step h/4 by 64/45, of step h/2 by 20/45. A diagonal entry of
 the second differences has four times the noise of f.
@@ -53,7 +53,7 @@ def gradients(f: Sampled, size: int, first: float, noise: Noise) -> Estimates:
 
 
 def hessians(f: Sampled, size: int, first: float, noise: Noise) -> Estimates:
-    """Compute Hessians (T, n, n) of T functions (P, n) → (P, T), else as :func:`gradients`."""
+    """Compute Hessians (T, n, n) of T functions (P, n) → (P, T) at zero, and error bounds (T,)."""
     unit = np.eye(size)
     i, j = np.triu_indices(size, 1)
     pairs = (s * unit[i] + t * unit[j] for s in (1.0, -1.0) for t in (1.0, -1.0))
@@ -77,7 +77,7 @@ def _extrapolated(
     """Halve the step until rounding dominates; keep the best extrapolation of each function.
 
     The error bound is twice the error of the *coarser* of two extrapolations. So it is valid even
-    at a kink, where the error falls only in proportion to h.
+    if a derivative is discontinuous, where the error falls only in proportion to h.
     """
     found: list[Array] = []
     best, error = np.zeros(0), np.full(noise(first).shape, np.inf)

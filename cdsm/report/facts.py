@@ -32,7 +32,7 @@ RANK = 1e-9
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Rank(ReadOnlyState):
-    """Rank and condition number of a matrix whose lengths are divided by the arm's length.
+    """Rank and condition number of a matrix made dimensionless with the arm's length.
 
     Attributes:
         rank: Number of singular values above :data:`RANK` times the largest.
@@ -117,7 +117,7 @@ class Readings(ReadOnlyState):
 
     @property
     def spread(self) -> Array:
-        """Return the largest over the smallest finite stiffness (3,) [-]; inf if signs differ."""
+        """Return largest over smallest finite stiffness per axis (3,) [-]; inf if signs differ."""
         spread = np.ones(3)
         rows = np.array([self.along, self.cartesian, self.pseudoinverse])
         for i, column in enumerate(rows.T):
@@ -137,7 +137,7 @@ def ranks(K: Stiffness) -> tuple[Rank, Rank, Rank]:
 
 
 def closure(K: Stiffness) -> float:
-    """Compute how evenly tensions n can cause no torque: max min n/max n, J_Lᵀ n = 0, n ≥ 0 [-].
+    """Compute the largest min(n)/max(n) [-] of tensions n ≥ 0 without torque: J_Lᵀ n = 0.
 
     Zero means that the arm cannot be pretensioned by all cables.
     """
@@ -157,7 +157,7 @@ def closure(K: Stiffness) -> float:
 
 
 def imbalance(K: Stiffness) -> tuple[float, str, float]:
-    """Return the largest residual of Eq. 13 [N m], its joint, and residual over torque size.
+    """Return the largest residual of Eq. 13 [N m], its joint, and residual / :func:`torque_size`.
 
     The force at a joint that slides is multiplied by the arm's length.
     """
@@ -205,11 +205,11 @@ def _number(cable: Cable, answer: Callable[[], Array]) -> float | None:
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Sticking(ReadOnlyState):
-    """Readings of small loads on an arm whose cables have friction in their holes.
+    """Tip stiffnesses that small loads measure on an arm with friction in its holes.
 
     Attributes:
         along: Stiffness along x, y, z while all cables stick (3,) [N/m].
-        below: Loads along x, y, z (3,) [N] up to which they stick, to first order.
+        below: Loads along x, y, z (3,) [N] up to which all cables stick, to first order.
     """
 
     along: Array
@@ -217,7 +217,7 @@ class Sticking(ReadOnlyState):
 
 
 def sticking(K: Stiffness, readings: Readings | None) -> Sticking | None:
-    """Compute the readings of an arm whose cables stick; None if none sticks, or if unknown."""
+    """Compute the tip stiffnesses while cables stick; None if no cable sticks, or if unknown."""
     pose, held = K.posture, holding(K.posture)
     T, J = K.tension[pose.segments.chains.cable], pose.jacobian[:3]
     if readings is None or not held.any():
@@ -268,8 +268,8 @@ class Optimality:
         at_minimum: Names of the cables at their lower bound.
         at_maximum: Names of the cables at their upper bound.
         feasibility: Largest violation of balance and bounds [-].
-        stationarity: Largest entry of the KKT residual F + J_L λ + μ [-]; None if the tensions were
-            chosen for a stiffness and so need not be the least.
+        stationarity: Largest entry of the KKT residual F + J_L λ + μ [-]; None if the tensions are
+            those of a stiffness plan, which need not be the least.
     """
 
     solver: str

@@ -1,10 +1,12 @@
-"""Potential U of an arm near a posture, term by term, and the torque residual there.
+"""Potential U of an arm near a posture, term by term, and the residual torque there.
 
     U(q) = Σ F_c (L_c − L_c0) + Σ [E_c(F_c(L_c)) − E_c(F_c) − F_c (L_c − L_c0)] + V(q) − f·x(q)
            active               passive                                           gravity  load
 
-U uses only cable lengths, places of links and energies of cables. It uses no moment arms, no
-Hessian and no rigidity. A moment has no potential; it does the work m·ω.
+L_c is the length of cable c, F_c its tension and E_c its stored energy. L_c0 and F_c without
+argument are the values at the posture. V is the potential of gravity, f the force at the tip x. U
+uses only cable lengths, poses of links and energies of cables. It uses no moment arms, no Hessian
+and no rigidity. A moment has no potential; it does the work m·ω.
 """
 
 from __future__ import annotations
@@ -29,7 +31,7 @@ if TYPE_CHECKING:
 
 
 ONE_SIDED = 1e-4
-"""A tension counts as at an end or a kink of its law if their relative distance is at most this."""
+"""A tension counts as at a bound or kink of its law if their relative distance is at most this."""
 
 _BESIDE = 1e-6
 """A tension counts as at a point of a tabulated law if their relative distance is at most this."""
@@ -47,7 +49,7 @@ class LockedCable(NamedTuple):
     free_length: float
 
     def pulls(self, longer: Array) -> Array:
-        """Compute the tensions (P,) [N] of the cable when longer by ``longer`` (P, C) [m]."""
+        """Compute the tensions (P,) [N] after elongations ``longer`` (P, C) [m] of all cables."""
         cable, start = self.cable, self.free_length
         more = longer[:, self.number]
         return evaluate_law(
@@ -55,14 +57,14 @@ class LockedCable(NamedTuple):
         )
 
     def stored(self, longer: Array) -> Array:
-        """Compute the energy (P,) [J] that the longer cable stores beyond F times elongation."""
+        """Compute E(longer cable) − E(posture) − F·ΔL (P,) [J] for elongations ΔL (P, C) [m]."""
         cable, F, start = self.cable, self.tension, self.free_length
         pulls = self.pulls(longer)
         more = evaluate_law(cable, lambda: cable.energy(pulls, start) - cable.energy(F, start))
         return np.asarray(more - F * longer[:, self.number])
 
     def room(self) -> float:
-        """Return the distance [N] from the tension to the nearest end or kink of the law."""
+        """Return the distance [N] from the tension to the nearest bound or kink of the law."""
         F, law = self.tension, self.cable.elasticity
         edges = [law.domain.low, law.domain.high, *kinks(law)]
         law = law.law if isinstance(law, SlackBelow) else law
@@ -73,7 +75,7 @@ class LockedCable(NamedTuple):
         return min(abs(F - edge) for edge in edges)
 
     def one_sided(self) -> list[str]:
-        """Return a message for each end or kink of the law at the tension; mostly none."""
+        """Return a message for each bound or kink of the law at the tension; mostly none."""
         F, law = self.tension, self.cable.elasticity
         if F == 0.0:
             return [f"{self.cable.name} is slack (0 N), and K_θ counts it as if it were taut"]
@@ -110,7 +112,7 @@ _FIRST = 2.0**-4
 """Largest step [rad], or in arm lengths for joints that slide."""
 
 _ULPS = 2.0 * float(np.finfo(np.float64).eps)
-"""Relative rounding error of a place or a length, which is a sum over the links."""
+"""Relative rounding error of a position or a length, which is a sum over the links."""
 
 _ROOT = 2e-13
 """Relative error of a tension that is computed from the elongation."""
@@ -119,13 +121,13 @@ _ROOT = 2e-13
 class Neighbourhood:
     """The arm near a posture, with motors locked at this posture.
 
-    Posture, tensions, wrench and original lengths are those of K; its cable stiffness only chooses
-    steps. ``places`` (P, nv) are joint displacements from the posture in units of :attr:`unit`. So
-    all derivatives with respect to ``places`` are in N m.
+    Posture, tensions, wrench and original lengths are those of K; its cable stiffness is only used
+    to choose step sizes. ``places`` (P, nv) are joint displacements from the posture in units of
+    :attr:`unit`. So all derivatives with respect to ``places`` are in N m.
 
     Attributes:
-        held: The position-controlled cables. Slack ones without stiffness, as at some equilibria,
-            are left out: moving the arm does not tension them.
+        held: The position-controlled cables. Slack cables without stiffness (at some equilibria)
+            are left out: a small motion does not tension them.
         unit: 1 rad for each joint that turns, the arm's length for each joint that slides (nv,).
     """
 
@@ -145,11 +147,11 @@ class Neighbourhood:
     # --- potentials ---------------------------------------------------------------------------
 
     def kinematic(self, places: Array) -> Array:
-        """Compute active, gravity and load part of U (P, 3) [N m]; the load is the force alone."""
+        """Compute active, gravity and load part of U (P, 3) [N m]; the load is only the force."""
         return self._kinematic(places, np.zeros(3))
 
     def work(self, places: Array) -> Array:
-        """Compute active, gravity and load part (P, 3) [N m]; moments are exact to first order."""
+        """As :meth:`kinematic`, with the work of the moment, which is exact to first order."""
         return self._kinematic(places, self._wrench[3:])
 
     def _kinematic(self, places: Array, moment: Array) -> Array:
@@ -180,7 +182,7 @@ class Neighbourhood:
     # --- torques and lengths ------------------------------------------------------------------
 
     def kinematic_torques(self, places: Array) -> Array:
-        """Compute J_Lᵀ F, g and −J_Xᵀ W (P, 3, nv) [N m] with the tensions of the posture."""
+        """Compute torques J_Lᵀ F, g and −J_Xᵀ W (P, 3, nv) [N m] with F of the posture."""
         torques = []
         for q in self._angles(places):
             pose = self._pose.arm.at(q, check_limits=False)
@@ -189,7 +191,7 @@ class Neighbourhood:
         return np.array(torques) * self.unit
 
     def elastic_torques(self, places: Array) -> Array:
-        """Compute J_Lᵀ (F(L) − F) (P, 1, nv) [N m]."""
+        """Compute torques of the change of tension, J_Lᵀ (F(L) − F) (P, 1, nv) [N m]."""
         poses = [self._pose.arm.at(q, check_limits=False) for q in self._angles(places)]
         longer = np.array([pose.cable_lengths for pose in poses]) - self._pose.cable_lengths
         more = np.zeros_like(longer)
@@ -199,7 +201,7 @@ class Neighbourhood:
         return np.array(torques)[:, None] * self.unit
 
     def measured_lengths(self) -> Array:
-        """Compute L (C,) [m] a second time, from the places of all sites found by Pinocchio.
+        """Compute L (C,) [m] a second time, from the link poses that Pinocchio computes.
 
         L includes the lead (the straight cable between its actuator and the base disk).
         """
@@ -224,7 +226,7 @@ class Neighbourhood:
 
     @property
     def first_elastic_step(self) -> float:
-        """Return a step ≤ :attr:`first_step` that moves no tension past half way to a law's end."""
+        """Return a step ≤ :attr:`first_step` that keeps tensions between bounds and kinks."""
         step = self.first_step
         for each in self.held:
             rise = self._k[each.number] * self._arms[each.number]
@@ -233,7 +235,7 @@ class Neighbourhood:
 
     @cached_property
     def _straightness(self) -> float:
-        """Return the joint displacement, in :attr:`unit`, that could shorten a segment to zero."""
+        """Return the least joint displacement, in :attr:`unit`, that may close a cable segment."""
         pose = self._pose
         routing = pose.arm._model.routing
         segment, joint = routing.segment, routing.joint
@@ -249,7 +251,7 @@ class Neighbourhood:
 
     @property
     def length_noise(self) -> Array:
-        """Return the rounding error of the cable lengths (C,) [m], from sums and from places."""
+        """Return the rounding error of the cable lengths (C,) [m], from sums and site positions."""
         return np.asarray(_ULPS * (self._pose.cable_lengths + self._pose.arm.length))
 
     def kinematic_noise(self, step: float) -> Array:

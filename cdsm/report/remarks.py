@@ -1,4 +1,4 @@
-"""Remarks on a stiffness: faults, which forbid to trust it, and notes."""
+"""Remarks on a stiffness: faults (it can't be trusted) and notes (how to read it)."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ APART = 0.1
 """A note is given if the three tip stiffnesses differ by more than this part."""
 
 CLOSE = 0.05
-"""A note is given if a tension is nearer than this part of itself to an end of its law."""
+"""A note is given if a tension is nearer than this part of itself to a bound of its law."""
 
 _SINGULAR = 1e-12
 """A margin of at most this part of the norm of K_θ is rounding."""

@@ -32,16 +32,16 @@ class Report(ReadOnlyState):
         residual: Largest residual |J_Lᵀ F + g − J_Xᵀ W| of Eq. 13 [N m]; the force at a joint that
             slides is multiplied by the arm's length.
         residual_joint: Name of the joint with the largest residual.
-        imbalance: The residual over the size of the torques that it sums [-].
+        imbalance: ``residual`` over the size of the torques that it sums [-].
         optimality: Optimality conditions of Eq. 17; None if the tensions were not distributed.
         cables: Tension, stiffness and domain of each cable.
         jacobian_rank: Rank and condition number of J_X.
         translation_rank: Rank and condition number of the linear rows of J_X.
         cable_rank: Rank and condition number of J_Lᵀ; full if cables can give every joint torque.
-        closure: Best ratio of least to largest tension among tensions without torque [-]; zero if
-            the arm cannot be pretensioned by all cables.
+        closure: Largest ratio min(n)/max(n) [-] of tensions n that cause no joint torque; zero if
+            the arm cannot be pretensioned with all cables.
         readings: The three tip stiffnesses along the base axes; None if K_θ is singular.
-        sticking: What loads measure that are too small to make a cable slide; None if no cable
+        sticking: Tip stiffnesses under loads too small to make a cable slide; None if no cable
             sticks, or if K_θ is singular.
     """
 
@@ -96,7 +96,7 @@ class Report(ReadOnlyState):
 
     @cached_property
     def condition(self) -> float:
-        """Return the condition number of K_θ [-], with ways of joints in lengths of the arm."""
+        """Return the condition number of K_θ [-], made dimensionless with the arm's length."""
         unit = joint_unit(self.stiffness.posture.arm)
         values = np.linalg.svd(self.stiffness.joint * unit[:, None] * unit, compute_uv=False)
         return float(values[0] / values[-1]) if values[-1] > 0.0 else math.inf

@@ -1,9 +1,9 @@
 """Check of K_θ by central differences at the same posture, in two ways.
 
-First, K_θ is the Hessian of the potential, computed from lengths, places and energies alone. This
-way shares with Eq. 16 only the places of cables and links. Second, K_θ is the derivative of the
-torque residual. This way uses the gradients, which are checked separately, and gains some digits. A
-moment at the tip has no potential: then only the torque checks the load term.
+First, K_θ is the Hessian of the potential, computed from lengths, poses and energies alone. This
+check shares with Eq. 16 only the positions of cables and links. Second, K_θ is the derivative of
+the residual torque. This check uses the gradients, which are checked separately, and is more
+precise. A moment at the tip has no potential: then only the torque checks the load term.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ _SUM = 16.0 * float(np.finfo(np.float64).eps)
 
 
 class _Anew(NamedTuple):
-    """Value computed by differences with its error bound; or the reason why there is no value."""
+    """Value computed by differences with its error bound, or the reason why there is none."""
 
     value: Array | None
     reason: str = ""
@@ -61,7 +61,7 @@ _NONE = _Anew(None)
 @final
 @dataclass(frozen=True, kw_only=True)
 class Difference:
-    """Difference between a matrix and the same matrix by central differences, in its unit.
+    """Difference between a matrix and its value by central differences, in its unit.
 
     Attributes:
         found: Largest magnitude of an entry of the difference.
@@ -83,7 +83,8 @@ class Agreement:
         name: ``"active"``, ``"passive"``, ``"gravity"``, ``"load"``, ``"joint"`` (the sum of these
             four terms), ``"torque"`` (the residual of Eq. 13) or ``"lengths"`` of the cables.
         unit: ``"N m/rad"``; for the torque ``"N m"``, for the lengths ``"m"``.
-        largest: Largest entry; for the torque the size of its parts, for the lengths the longest.
+        largest: Largest magnitude of an entry of the term; for the torque, of its summed parts; for
+            the lengths, the longest.
         potential: Comparison with differences of the potential; None if there is no potential.
         torque: Comparison with differences of the torque, or None.
         verdict: ``"DIFFERS"``: a difference is larger than expected. ``"agrees"``: no difference
@@ -191,7 +192,7 @@ def _derived(
     noise: Noise,
     step: float,
 ) -> list[_Anew]:
-    """Compute derivatives of three kinematic parts, or one elastic part; an error is a reason."""
+    """Compute derivatives of three kinematic parts or one elastic part; errors become reasons."""
     try:
         values, errors = derive(f, near.unit.size, step, noise)
     except CdsmError as error:
@@ -218,7 +219,7 @@ def _compare(
     torque: _Anew = _NONE,
     whole: float = 0.0,
 ) -> Agreement:
-    """Compare a given matrix with its estimates; ``whole`` is the largest entry of K_θ."""
+    """Compare a matrix with its values by differences; ``whole`` is the largest entry of K_θ."""
     unit = _UNITS.get(name, "N m/rad")
     enough = max(RESOLVED * largest, _NEGLIGIBLE * whole)
     differences = [

@@ -24,23 +24,24 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _UNMOVED: Final = 1e-9
-"""Motion of the tip in a buckling mode, over the length of the arm [1/rad], that is none."""
+"""Largest tip motion of a buckling mode, over the arm's length [1/rad], that counts as zero."""
 
 _AROUND: Final = frozen(np.linspace(0.8, 1.3, 26))
-"""Default lower bounds, over the critical one."""
+"""Default lower bounds of tension as multiples of the critical bound."""
 
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Bifurcation(ReadOnlyState):
-    """Equilibria of a slightly pushed arm around its critical tension, its motors locked.
+    """Equilibria of a slightly pushed arm with locked motors, around its critical tension.
 
     Below the critical tension the arm hardly moves. Above it the posture is still an equilibrium,
     but an unstable one, and the arm comes to rest elsewhere. Made by :func:`bifurcation`.
 
     Attributes:
         critical: The critical tension, with its posture and wrench.
-        push: The push (6,) along the motion of buckling: force [N], then moment [N m].
+        push: The push (6,) in the direction in which buckling moves the tip: force [N], then moment
+            [N m], which is zero.
         bounds: Lower bounds of tension (n,) [N], rising.
         rests: Equilibrium under the push at each bound.
     """
@@ -95,7 +96,7 @@ class Bifurcation(ReadOnlyState):
 def bifurcation(
     critical: CriticalTension, push: float = 1e-3, bounds: ArrayLike | None = None
 ) -> Bifurcation:
-    """Push an arm aside by a slight force, with tensions below and above the critical ones.
+    """Compute the equilibria of a slightly pushed arm, with tensions below and above buckling.
 
     At each bound the motors are locked at the posture of ``critical`` under the least tensions. The
     force acts at the tip, in the direction in which buckling moves it.
@@ -110,7 +111,7 @@ def bifurcation(
             move the tip; or ``push`` or ``bounds`` are not positive numbers.
         InfeasibleTension: No tensions balance the arm at one of the bounds.
         ElasticityRangeError: A tension is outside the domain of its cable's elasticity.
-        EquilibriumError: The pushed arm comes to no rest.
+        EquilibriumError: No equilibrium of the pushed arm was found.
     """
     instance("critical", critical, CriticalTension)
     if not critical.stable or math.isinf(critical.minimum):

@@ -22,7 +22,7 @@ SAMPLES: Final = 96
 """Number of places that a scan evaluates. A stable range narrower than one step is not seen."""
 
 PRECISION: Final = 1e-12
-"""Relative precision of a place found by bisection or root finding."""
+"""Relative precision of a ``place`` found by bisection or root finding."""
 
 _ABOVE: Final = 1.0 + 1e-9
 """Factor just above the low end of a domain, because a domain may exclude its low end."""
@@ -49,7 +49,7 @@ def _balances(at: StiffnessAt, place: float) -> bool:
 
 
 def tension_domain(arm: Manipulator) -> tuple[float, float]:
-    """Return the tensions [N] within all maxima and the domains of position-controlled cables."""
+    """Return the range [N] within all maxima and the domains of position-controlled cables."""
     domains = [each.elasticity.domain for each in arm.cables if each.control == "position"]
     low = max((each.low for each in domains), default=0.0) * _ABOVE
     ends = [*(each.high for each in domains), *(each.maximum for each in arm.cables)]
@@ -57,7 +57,7 @@ def tension_domain(arm: Manipulator) -> tuple[float, float]:
 
 
 def last_true(true: Callable[[float], bool], a: float, b: float) -> tuple[float, float]:
-    """Return the last number from a to b for which a condition holds; the next, for which not."""
+    """Bisect from a (condition true) to b (false); return the last true and the next number."""
     nothing = PRECISION**2 * b  # a may be zero, and the condition false right above it
     while b - a > max(PRECISION * b, nothing):
         middle = (a + b) / 2.0
@@ -70,7 +70,7 @@ def scan_end(at: StiffnessAt, low: float, highest: float) -> float:
 
     The scan ends where no tensions balance the arm within the domains of the elasticities. If
     tensions balance the arm at every bound, the scan ends where the terms of K_θ that grow with the
-    tension decide its sign.
+    tension decide whether it is positive definite.
     """
     if math.isinf(highest):
         # At large bounds the tensions grow in proportion to the bound. The active part of K_θ

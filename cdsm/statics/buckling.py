@@ -33,10 +33,10 @@ from cdsm.support.values import Array, frozen
 from cdsm.tension import DEFAULT_SOLVER, distribute_tension
 
 _NOWHERE: Final = 1e6
-"""Largest load factor that is tried. If the arm holds it, the critical factor is infinite."""
+"""Largest load factor that is tried. If the arm stays stable under it, the factor is infinite."""
 
 _SHOWN: Final = 10.0
-"""Largest load factor of the curve of an arm that holds every load."""
+"""Largest load factor of the curve if the critical factor is infinite."""
 
 
 def critical_tension(
@@ -97,7 +97,7 @@ def critical_load(
     *,
     carried: ArrayLike = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
 ) -> CriticalLoad:
-    """Compute the factor λ up to which an arm at a fixed posture holds λ W and the carried wrench.
+    """Compute the factor λ up to which an arm at a fixed posture is stable under λ W + carried.
 
     Args:
         pose: The posture, which stays fixed. Tensions are distributed again for every load.
@@ -109,7 +109,7 @@ def critical_load(
 
     Raises:
         InvalidInput: ``wrench`` is zero; or ``wrench``, ``carried`` or a bound is invalid.
-        InfeasibleTension: The arm does not hold its own weight and ``carried``.
+        InfeasibleTension: No tensions balance the arm under its own weight and ``carried``.
         ElasticityRangeError: A tension without the load is outside the domain of its elasticity.
     """
     count = len(instance("pose", pose, Posture).arm.cables)
@@ -156,6 +156,6 @@ def critical_load(
 
 
 def _mode(K: Stiffness) -> Array:
-    """Return the softest joint motion, its largest entry positive (eigenvectors have no sign)."""
+    """Return the softest joint motion (nv,), signed so that its largest entry is positive."""
     mode = K.critical_direction
     return frozen(mode * np.sign(mode[abs(mode).argmax()]))

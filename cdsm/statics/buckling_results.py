@@ -28,13 +28,14 @@ class CriticalTension(ReadOnlyState):
         minimum: Lower bound of tension [N] at which the arm, stable below, buckles. It is inf if
             the arm is stable up to the end of :attr:`examined`. It is the low end of
             :attr:`examined` if the arm is stable at no bound.
-        mode: Unit joint motion (nv,) of the smallest eigenvalue of K_θ at that bound. If the arm
-            does not buckle: at the bound where the arm is softest.
-        tension: F (C,) [N] at the bound of ``mode``.
+        mode: Unit joint motion (nv,) of the smallest eigenvalue of K_θ at ``minimum``; at the bound
+            where the arm is softest if it does not buckle.
+        tension: F (C,) [N] at the bound to which ``mode`` belongs.
         stable: Ranges (low, high) [N] of the lower bound in which the arm is stable.
         examined: Range [N] of the lower bound that was scanned. It ends where no tensions balance
             the arm within the domains of the elasticities. If tensions balance the arm at every
-            bound, it ends where the terms that grow with the tension decide the sign of K_θ.
+            bound, it ends where the terms that grow with the tension decide whether K_θ is positive
+            definite.
         bounds: Lower bounds (n,) [N] that were evaluated.
         margins: Smallest eigenvalue of K_θ at each of these bounds (n,) [N m/rad].
     """
@@ -104,12 +105,14 @@ class CriticalLoad(ReadOnlyState):
         posture: The fixed posture.
         wrench: W (6,) that is multiplied by the factor: force [N], then moment [N m].
         carried: Constant wrench (6,) that acts in addition: force [N], then moment [N m].
-        factor: Largest factor [-] up to which the arm holds; inf if it holds a million times W.
+        factor: Largest factor [-] up to which the arm is balanced and stable; inf if it is under a
+            million times W.
         limit: Reason of the failure: ``"buckling"``, ``"infeasible"`` (no tensions balance the
             load), ``"elasticity"`` (a tension leaves the domain of its cable) or ``"none"``.
-        mode: Unit joint motion (nv,) of the smallest eigenvalue of K_θ at this factor.
-        tension: F (C,) [N] at this factor.
-        factors: Factors (n,) [-] that the arm holds, from zero to this one; below ten if it is inf.
+        mode: Unit joint motion (nv,) of the smallest eigenvalue of K_θ at ``factor``.
+        tension: F (C,) [N] at ``factor``.
+        factors: Factors (n,) [-] under which the arm is stable, from zero to ``factor``; to at most
+            ten if ``factor`` is inf.
         margins: Smallest eigenvalue of K_θ at each of these factors (n,) [N m/rad].
     """
 

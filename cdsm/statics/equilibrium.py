@@ -25,13 +25,13 @@ if TYPE_CHECKING:
 
 
 _IMMOBILE = 1e-14
-"""A compliance along a direction below this part of the largest is rounding."""
+"""Relative to the largest compliance: a smaller compliance along a direction is rounding."""
 
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Equilibrium(ReadOnlyState):
-    """Equilibrium of an arm under a load, with load and reference. All arrays are read-only.
+    """Equilibrium of an arm under a load, with its arguments. All arrays are read-only.
 
     Attributes:
         reference: The posture at which the motors were locked.
@@ -43,7 +43,7 @@ class Equilibrium(ReadOnlyState):
             this posture and tension. It does not include the stops.
         reaction: Torque of the stops on the joints (nv,) [N m]: positive at a lower limit, negative
             at an upper limit, zero elsewhere.
-        residual: J_Lᵀ F + g − J_Xᵀ W − reaction (nv,) [N m], the remaining imbalance.
+        residual: Residual torque J_Lᵀ F + g − J_Xᵀ W − reaction (nv,) [N m].
         history: Largest residual [N m] at every accepted iterate of the last load step.
         iterations: Number of iterations over all load steps.
     """
@@ -79,19 +79,19 @@ class Equilibrium(ReadOnlyState):
 
     @property
     def stable(self) -> bool:
-        """Whether K_θ (symmetric part) is positive definite for the joints that no stop pushes.
+        """Whether K_θ (symmetric part) is positive definite for the joints without stop reaction.
 
         It is False for a neutral state, for example if all cables are slack. It is also False if
-        only stops that do not push yet bar the softest motion.
+        the softest motion is blocked only by stops whose reaction is still zero.
         """
         values = eigenvalues(self.stiffness.joint, self._off_stops)
         return bool((values > FLAT * abs(values).max(initial=0.0)).all())
 
     @cached_property
     def compliance(self) -> Array:
-        """Tip motion per wrench (6, 6), blocks [m/N] to [rad/(N m)], with joints at stops fixed.
+        """Tip motion per wrench (6, 6), from [m/N] to [rad/(N m)]; joints at stops are fixed.
 
-        C = J_X K_θ⁻¹ J_Xᵀ over the joints that no stop pushes.
+        C = J_X K_θ⁻¹ J_Xᵀ over the joints without stop reaction.
 
         Raises:
             SingularStiffness: K_θ of these joints is singular.
@@ -125,7 +125,7 @@ class Equilibrium(ReadOnlyState):
 
         Raises:
             InvalidInput: ``direction`` is not three finite numbers, or is zero.
-            SingularStiffness: K_θ of the joints off their stops is singular.
+            SingularStiffness: K_θ of the joints that are not at stops is singular.
         """
         if not self.at_limit:
             return self.stiffness.along(direction)
@@ -136,7 +136,7 @@ class Equilibrium(ReadOnlyState):
 
     @property
     def _off_stops(self) -> NDArray[np.intp]:
-        """Indices of the joints that no stop pushes."""
+        """Indices of the joints without stop reaction."""
         return np.flatnonzero(self.reaction == 0.0)
 
     @property

@@ -17,13 +17,13 @@ _FAR = 0.1
 """Largest joint motion [rad] between two equilibria that :func:`follow` connects."""
 
 _DENSE = 0.02
-"""Distance [rad] between postures whose stability is checked. A shorter loss is not seen."""
+"""Distance [rad] between postures whose stability is checked; shorter unstable parts go unseen."""
 
 _FINEST = 2.0**-12
 """Relative precision of a buckling load."""
 
 _SLIGHT = 1e-9
-"""Part of the load below which the precision of a buckling load is absolute."""
+"""Smallest buckling load, as a part of the load, whose precision is relative, not absolute."""
 
 
 def follow_load(
@@ -72,9 +72,10 @@ def follow(before: Equilibrium, wrench: Array, start: Array | None = None) -> Eq
 
 
 def _is_stable_between(loaded: LoadedArm, start: Iterate, search: RestSearch[Iterate]) -> bool:
-    """Check that the straight path to the equilibrium is short, and K_θ positive definite on it.
+    """Return whether the straight path to the equilibrium is short and K_θ > 0 along it.
 
-    An arm that snaps through has an unstable posture on this path. The search may have jumped it.
+    An arm that snaps through has an unstable posture on this path. The search may have stepped over
+    it.
     """
     path = search.state.q - start.q
     length = float(abs(path).max())

@@ -1,11 +1,11 @@
-"""Loaded arm whose cables stick and slip in their holes: tensions of segments, imbalance, tangent.
+"""Loaded arm whose cables stick and slip in their holes: segment tensions, residual, ∂r/∂q.
 
     r(q) = Σ_j T_j g_j + g − J_Xᵀ W,    ∂r/∂q = Σ_j (T_j H_j + g_jᵀ ∂T_j/∂q) + ∂g/∂q − ∂(J_Xᵀ W)/∂q
 
-g_j and H_j are the gradient and the Hessian of the length of segment j. At a posture the tensions
-follow from the natural lengths before the move (:mod:`cdsm.friction.chain_problem`). ∂r/∂q is not
-symmetric where holes slide: friction has no potential. Without friction this is
-:class:`~cdsm.statics.locked_motors.LoadedArm`.
+T_j is the tension of segment j; g_j and H_j are the gradient and the Hessian of its length. g is
+the gravity torque. At a posture the tensions follow from the natural lengths before the move
+(:mod:`cdsm.friction.chain_problem`). ∂r/∂q is not symmetric where holes slide: friction has no
+potential. Without friction this is :class:`~cdsm.statics.locked_motors.LoadedArm`.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from cdsm.support.values import Array
 
 
 class Settled(NamedTuple):
-    """Arm at one posture, balanced or not, with its cables slipped as far as friction lets them."""
+    """Arm at one posture, balanced or not; its cables have slipped until friction stops them."""
 
     pose: Posture
     chain: Chain
@@ -38,12 +38,12 @@ class Settled(NamedTuple):
         return self.pose.q
 
     def holding_back(self, torque: Array | float) -> Settled:
-        """Return this posture with a torque (nv,) [N m] that holds part of the load back."""
+        """Return this state with a torque (nv,) [N m] that is subtracted from its residual."""
         return self._replace(torque=self.residual - torque)
 
 
 class FrictionalArm(NamedTuple):
-    """Arm under a wrench, its cables with the natural lengths that they had before the move."""
+    """Arm under a wrench, with the natural lengths of its segments before the move."""
 
     problem: ChainProblem
     limits: tuple[Array, Array]  # lowest and highest angles (nv,) [rad]

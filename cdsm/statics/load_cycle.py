@@ -24,7 +24,7 @@ MOST_LOADS = 100_000
 """Largest number of loads of a history."""
 
 _LEAST, _MOST = 1e-12, 0.1
-"""Range of the accuracy: work that rounding leaves unaccounted for, and a tenth of the work."""
+"""Range of ``accuracy``: the energy error that rounding causes, and a tenth of the work."""
 
 
 def load_cycle(
@@ -35,39 +35,42 @@ def load_cycle(
     motors: ArrayLike | None = None,
     accuracy: float = 1e-3,
 ) -> LoadHistory:
-    """Load an arm with friction slowly, load by load; its holes remember the loads before.
+    """Compute the states of an arm with friction under a series of slowly applied loads.
 
     Under a load the arm is in equilibrium, r(q) = Σ T_j g_j + g − J_Xᵀ W = 0 (Eq. 13 by segments).
-    Friction holds |ln T_{j+1} − ln T_j| ≤ μ φ_j at each hole, and wire moves through a hole only at
-    this bound, towards the larger tension. So the answer depends on all loads before: it starts at
-    the reference, with one tension in all segments of a cable, as after shaking the arm. From load
-    to load everything changes in proportion and slowly, without inertia. Joint limits are stops.
-    Without friction each load gives the :func:`~cdsm.equilibrium`.
+    T_j is the tension of segment j, g_j the gradient of its length, μ the friction coefficient and
+    φ_j the angle by which hole j bends the cable. At each hole |ln T_{j+1} − ln T_j| ≤ μ φ_j, and
+    wire moves through a hole only at this bound, towards the larger tension. So each state depends
+    on all earlier loads. The first state is the reference, with one tension in all segments of a
+    cable, as after shaking the arm. Between two loads the wrench and the commands change linearly
+    and slowly, without inertia. Joint limits are stops. Without friction each load gives the
+    :func:`~cdsm.equilibrium`.
 
-    The equations determine the answer at each posture, but in rare cases several postures are in
-    equilibrium. Then the arm goes to the one that the search from the last posture finds.
+    The equations determine the tensions at each posture, but in rare cases several postures are in
+    equilibrium. Then the result is the one that the search from the previous posture finds.
 
     Args:
         pose: The reference posture, at which the motors are locked.
         tension: F at the reference: the result of :func:`~cdsm.distribute_tension`, or other
             tensions (C,) [N]. If they do not balance the arm, it settles on the way to the first
             load.
-        wrenches: W of each load (n, 6) at ``tool0`` in base axes: force [N], then moment [N m]. The
-            way to the first one starts at the wrench of the ``Tension``, or at zero.
+        wrenches: W of each load (n, 6) at ``tool0`` in base axes: force [N], then moment [N m].
+            Before the first load the wrench is that of the ``Tension``, or zero.
         motors: Commands of the motors at each load (n, C): for a position-controlled cable the
             natural length of wire taken in since the reference [m], positive if it pulls; for a
-            force-controlled cable its tension [N]. Default: nothing, and F.
-        accuracy: Largest part of the work of each step that may stay unaccounted for by stored
-            energy and dissipation, from 1e-12 to 0.1. Steps are divided until it is met. Tips and
-            tensions are far more accurate: they depend on sub-steps only if a hole stops sliding
-            within one.
+            force-controlled cable its tension [N]. Default: 0 m, and the tension F at the
+            reference.
+        accuracy: Largest error of the energy balance (work − stored energy − dissipation) of each
+            step, relative to the work, from 1e-12 to 0.1. Steps are divided until the error is
+            smaller. Tips and tensions are far more accurate: they depend on sub-steps only if a
+            hole stops sliding within one.
 
     Raises:
         InvalidInput: As for :func:`~cdsm.stiffness`; or the posture is beyond a joint limit; or
             ``wrenches``, ``motors`` or ``accuracy`` are not as above.
         ElasticityRangeError: A tension at the reference or at a load is outside the domain of its
             law.
-        EquilibriumError: The arm finds no place to rest on the way to a load, which is named.
+        EquilibriumError: No equilibrium was found on the way to a load. The error names the load.
     """
     F, W = checked_tension(pose, tension, None)
     pose.arm._model.laws.stiffness(pose.cable_lengths, F)  # in the domains of the laws

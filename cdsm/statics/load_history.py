@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _SHOWN = 24
-"""Most loads that print shows; of longer histories, the first and the last ones."""
+"""Largest number of loads that ``print`` shows; of more, it shows the first and the last."""
 
 
 @final
@@ -42,7 +42,7 @@ class LoadHistory(ReadOnlyState):
 
     Attributes:
         reference: Posture at which the motors were locked.
-        reference_tension: F (C,) [N] there, the same in all segments of a cable.
+        reference_tension: F (C,) [N] at the reference, the same in all segments of a cable.
         wrenches: W at each load (n, 6): force [N], then moment [N m].
         motors: Commands at each load (n, C): natural length [m] that a position-controlled motor
             has taken in since the reference, or the tension [N] of a force-controlled one.
@@ -52,12 +52,12 @@ class LoadHistory(ReadOnlyState):
         slip: Natural length of wire that moved through each hole on the way to each load (n, P)
             [m]; positive towards the end of the cable.
         sliding: Holes that slide as the load is reached (n, P): 1 towards the end of the cable, −1
-            towards its motor, 0 where the hole holds; also 0 where it has no friction.
+            towards its motor, 0 where the cable sticks or the hole has no friction.
         reaction: Torque of the stops on the joints at each load (n, nv) [N m].
-        load_work: Work of the load on the way to each load (n,) [J].
-        motor_work: Work of the motors, likewise (n,) [J].
-        stored: Change of the energy of cables, springs and weights, likewise (n,) [J].
-        dissipated: Work lost in the holes, likewise (n,) [J]; never negative.
+        load_work: Work of the load during the step to each load (n,) [J].
+        motor_work: Work of the motors during the same step (n,) [J].
+        stored: Change of the energy of cables, springs and weights in the same step (n,) [J].
+        dissipated: Work lost to friction in the same step (n,) [J]; never negative.
     """
 
     reference: Posture
@@ -112,7 +112,7 @@ class LoadHistory(ReadOnlyState):
         return self.reference.arm.at(self.angles[self._index(load)], check_limits=False)
 
     def stiffness(self, load: int) -> Stiffness:
-        """Compute the tangent stiffness at a load, while the holes that slide there slide on.
+        """Compute the tangent stiffness at a load if sliding holes continue to slide.
 
         Raises:
             InvalidInput: There is no such load.

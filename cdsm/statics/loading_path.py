@@ -1,13 +1,14 @@
-"""First-order changes of slow loading of an arm with friction: by the loads, and by the arm.
+"""Derivatives of the tips of a slowly loaded arm with friction, for changed loads or a changed arm.
 
-Each posture at rest solves r(q, a) = 0 with the natural lengths a that the rest before it left. So
-a small change is followed from rest to rest: it changes r by δr, the posture by δq = −K⁻¹ δr, and
-the natural lengths that are left by δa = δA(q, T). Holes that slide go on sliding, others go on
-holding. This is the derivative wherever no hole is just about to start or to stop.
+A "rest" is an equilibrium on the way. Each rest solves r(q, a) = 0, where a are the natural lengths
+of the segments at the previous rest; A(q, T) are those at this rest. So a small change is followed
+from rest to rest: it changes the residual torque by δr, the posture by δq = −K⁻¹ δr with K = ∂r/∂q,
+and the natural lengths by δA(q, T). Holes that slide continue to slide, others continue to stick.
+This is the derivative wherever no hole is just about to start or to stop sliding.
 
-A change of the loads is followed with the tangents of the rests. Any change of the arm is followed
-by an arm beside it: its natural lengths and imbalances at the recorded postures are differences,
-not searches. A change of size δ is exact but for terms in δ².
+A change of the loads is followed with the tangents of the rests. A change of the arm is followed by
+evaluating the changed arm at the recorded postures, without a search: its natural lengths and
+residuals there give δa and δr. The error for a change of size δ is of order δ².
 """
 
 from __future__ import annotations
@@ -23,10 +24,10 @@ from cdsm.statics.slow_loading import Load, SlowLoading, State
 from cdsm.support.values import Array
 
 _PARTS = 16
-"""Rests over the swing of the loads. Where holes stop, tips err by up to 0.2 % of their motion."""
+"""Number of rests over the range of the loads. Tips err by up to 0.2 % where holes stop sliding."""
 
 _SHORTEST = 2.0**-6
-"""Smallest part of a step to a rest that is tried if the arm finds none at its end."""
+"""Smallest part of a step that is tried if no rest is found at the end of the step."""
 
 
 class _Rest(NamedTuple):
@@ -36,10 +37,10 @@ class _Rest(NamedTuple):
 
 
 class LoadingPath(NamedTuple):
-    """Rests of an arm with friction on the way through a series of loads.
+    """Equilibria ("rests") of an arm with friction during a series of loads.
 
-    Their number does not depend on the arm, as the sub-steps of :func:`~cdsm.load_cycle` do: a
-    small change of the arm changes the tips smoothly.
+    Their number does not depend on the arm, unlike that of the sub-steps of
+    :func:`~cdsm.load_cycle`. So a small change of the arm changes the tips smoothly.
     """
 
     loading: SlowLoading
@@ -52,12 +53,12 @@ class LoadingPath(NamedTuple):
     def of(
         cls, pose: Posture, tension: Array, wrench: Array, forces: Array, parts: int = _PARTS
     ) -> LoadingPath:
-        """Load an arm, at rest at a posture under ``wrench`` (6,), with more forces (n, 3) [N].
+        """Load an arm that is balanced at a posture under ``wrench`` (6,) by forces (n, 3) [N].
 
-        ``parts`` is the number of rests over the swing of the forces.
+        ``parts`` is the number of rests over the range of the forces.
 
         Raises:
-            CdsmError: The posture is beyond a joint limit, or the arm finds no rest on the way.
+            CdsmError: The posture is beyond a joint limit, or no equilibrium was found on the way.
         """
         loading = slow_loading(pose, tension, wrench, 1.0)
         start = state = loading.begin(tension, wrench)
@@ -91,9 +92,9 @@ class LoadingPath(NamedTuple):
         return np.array([self.rests[i].state.pose.tip[:3, 3] for i in self.last])
 
     def beside(self, pose: Posture, tension: Array, wrench: Array) -> Array:
-        """Compute the tips (n, 3) [m] of an arm that hardly differs, under the same loads.
+        """Compute the tips (n, 3) [m] of a slightly different arm under the same loads.
 
-        ``pose`` is its reference posture; its cables have as many segments.
+        ``pose`` is its reference posture. Each cable has the same number of segments as here.
         """
         loading = slow_loading(pose, tension, wrench, 1.0)
         start = loading.begin(tension, wrench)
@@ -110,7 +111,7 @@ class LoadingPath(NamedTuple):
         return np.array([tips[i] for i in self.last])
 
     def by_forces(self, direction: Array) -> Array:
-        """Compute ∂tip/∂f (n, 3, n) [m/N]: of each tip by each force along a unit vector (3,)."""
+        """Compute ∂tip_i/∂f_j (n, 3, n) [m/N] for forces f_j along a unit vector (3,)."""
         count, problem, first = len(self.last), self.loading.problem, self.loading.start[:-1]
         each, none = np.eye(count), np.zeros(count)
         natural = np.zeros((len(self.start.settled.chain.natural), count))
@@ -135,7 +136,7 @@ class LoadingPath(NamedTuple):
 
 
 def _motion(state: State, imbalance: Array) -> Array:
-    """Compute δq (nv, m) that balances an imbalance (nv, m) while joints on stops stay there."""
+    """Compute δq (nv, m) that balances residuals (nv, m) [N m]; joints at stops do not move."""
     free = np.flatnonzero(state.reaction == 0.0)
     moved = np.zeros_like(imbalance)
     moved[free] = -np.linalg.solve(state.settled.stiffness[np.ix_(free, free)], imbalance[free])
@@ -143,7 +144,7 @@ def _motion(state: State, imbalance: Array) -> Array:
 
 
 def _given_way(state: State) -> Array:
-    """Compute ∂A/∂q (S, nv) [m/rad]: of the natural lengths that a rest leaves, by its posture."""
+    """Compute ∂A/∂q (S, nv) [m/rad] with the natural lengths A of the segments at a rest."""
     chain, settled = state.settled.chain, state.settled
     by_length = settled.pose.segments.length_jacobian / chain.stretch[:, None]
     left = by_length - chain.compliance[:, None] * settled.slope
@@ -151,5 +152,5 @@ def _given_way(state: State) -> Array:
 
 
 def same_segments(one: Posture, other: Posture) -> bool:
-    """Return whether the cables of two arms have as many segments, each."""
+    """Return whether each cable has the same number of segments in both arms."""
     return np.array_equal(one.segments.chains.start, other.segments.chains.start)

@@ -1,4 +1,4 @@
-"""Loaded arm with locked motors: cable tensions F(L) and torque imbalance."""
+"""Loaded arm with locked motors: cable tensions F(L) and residual torque."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _APART = 1e-6
 """A joint stops this far [rad] before its disks touch, where a cable would have no direction."""
 
 _BEYOND = 1e-9
-"""A tension beyond the end of a law by this part is rounding: the arm may start at the end."""
+"""A tension outside the domain of a law by at most this part is rounding."""
 
 
 class Iterate(NamedTuple):
@@ -45,7 +45,7 @@ class Iterate(NamedTuple):
         return self.K.joint
 
     def holding_back(self, torque: Array | float) -> Iterate:
-        """Return this posture with a torque (nv,) [N m] that holds part of the load back."""
+        """Return this state with a torque (nv,) [N m] that is subtracted from its residual."""
         return self._replace(torque=self.K.residual - torque)
 
 
@@ -54,9 +54,9 @@ class LoadedArm:
 
     A position-controlled cable keeps its original length l_0. Its elongation is that at the
     reference plus the change of its length. A force-controlled cable keeps its tension. Below the
-    domain of its law a cable keeps the stiffness of the low end until its tension is zero; then it
-    is slack. Above the domain it keeps the stiffness of the high end. Only iterates may leave the
-    domain: :meth:`require_domains` rejects such tensions in a solution.
+    domain of its law a cable has the stiffness of the lower bound until its tension is zero; then
+    it is slack. Above the domain it has the stiffness of the upper bound. Only iterates may leave
+    the domain: :meth:`require_domains` rejects such tensions in a solution.
 
     Args:
         reference: The posture at which the motors were locked.
@@ -138,7 +138,7 @@ def require_domains(
 
 
 def stops(reference: Posture) -> tuple[Array, Array]:
-    """Return the angles (nv,) [rad] at which joints rest on stops; the reference is between."""
+    """Return lowest and highest angles (nv,) [rad] of the stops; the reference is between them."""
     arm, q = reference.arm, reference.q
     touching = np.zeros(arm.nv, dtype=np.bool_)  # joints that their disks stop
     if arm.is_serpentine:
@@ -161,10 +161,11 @@ def rounding(K: Stiffness) -> Array:
 
 
 def tilt_torque(pose: Posture, tension: Array) -> Array:
-    """Compute the torque (nv,) [N m] per relative rounding of the sites, which tilts the segments.
+    """Compute the error of the torques (nv,) [N m] per relative rounding error of the sites.
 
-    ``tension`` [N] is that of each segment that joints can change. Short segments tilt most.
-    Between disks that nearly touch this is most of the rounding.
+    This error rotates the segments, short ones most. Between disks that nearly touch it is the
+    largest part of the rounding. ``tension`` [N] has an entry for each segment that joints can
+    change.
     """
     routing = pose.arm._model.routing
     segment, joint = routing.segment, routing.joint
@@ -185,8 +186,8 @@ def tilt_torque(pose: Posture, tension: Array) -> Array:
 class _LockedLaw:
     """Position-controlled cables with one law; all arrays are over these cables.
 
-    Beyond the ends of its law a cable keeps the stiffness of the end. ``lengths`` L [m] and
-    ``tension`` F [N] are those at the reference.
+    Outside the domain of its law a cable has the stiffness of the nearest bound. ``lengths`` L [m]
+    and ``tension`` F [N] are those at the reference.
     """
 
     def __init__(
@@ -228,7 +229,7 @@ class _LockedLaw:
         self._start = lengths - elongation  # L where the law begins [m]
 
     def _elongation(self, F: Array) -> Array:
-        """Compute Δl = l_0 ε(F) + ΔF/k_series [m] from the low end of the law."""
+        """Compute Δl = l_0 Δε + ΔF/k_series [m] relative to the lower bound of the law."""
         wire = self._free_length * (self.law.strain(F) - self._least_strain)
         return np.asarray(wire + (F - self.law.domain.low) * self._series)
 
@@ -237,7 +238,7 @@ class _LockedLaw:
         return np.asarray(self._free_length / self.law.rigidity(F) + self._series)
 
     def tension(self, lengths: Array, near: Array) -> tuple[Array, Array]:
-        """Compute F [N] and dF/dL [N/m] at L [m], searched from F = ``near``."""
+        """Compute F [N] and dF/dL [N/m] at L [m]; the search starts at F = ``near``."""
         elongation = lengths - self._start
         inside = np.minimum(np.maximum(elongation, 0.0), self._span)
         F, compliance = rising_root(

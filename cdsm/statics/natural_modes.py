@@ -1,7 +1,7 @@
 """Small vibrations of an arm about a posture: K_θ φ = ω² M φ.
 
 M is the joint-space mass matrix of the links. Cables have no mass here. If K_θ is not positive
-definite, some motions grow. Such a motion has a growth rate, not a frequency.
+definite, some motions grow exponentially. Such a motion has a growth rate instead of a frequency.
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ _MASSLESS = 1e-12
 """A motion has no mass if its eigenvalue of M is below this part of the largest."""
 
 _STAND_IN = 0.02
-"""Largest part of the kinetic energy that stand-in masses may have: 1 % of the frequency."""
+"""Largest part of the kinetic energy in stand-in masses: they change a frequency by 1 %."""
 
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Modes(ReadOnlyState):
-    """Natural modes of an arm, with the stiffness they follow from; made by :func:`modes`.
+    """Natural modes of an arm and the stiffness from which they follow; made by :func:`modes`.
 
     S of the nv modes vibrate. The other modes grow; a stable arm has none of them. All arrays are
     read-only. Shapes are columns of joint angles, mass-normalised and orthogonal in M and K_θ:
@@ -65,7 +65,7 @@ class Modes(ReadOnlyState):
         return not self.growth_rates.size
 
     def plot(self) -> Figure:
-        """Plot the arm in mm, deflected by its lowest modes, or by those that grow."""
+        """Plot the arm in mm, deflected by its growing modes if it has any, else by its lowest."""
         from cdsm.plots import plot_modes  # matplotlib imports slowly
 
         return plot_modes(self)
@@ -212,7 +212,8 @@ class Carried(NamedTuple):
 def mass_matrix(pose: Posture, carried: Iterable[Carried]) -> Array:
     """Compute the joint-space mass matrix (nv, nv) [kg m²] of the bodies on the links.
 
-    M = Σ m J_vᵀ J_v + J_ωᵀ I J_ω, with J_v of the centre of mass, J_ω of the rotation.
+    M = Σ (m J_vᵀ J_v + J_ωᵀ I J_ω), with the Jacobians J_v of the centre of mass and J_ω of the
+    rotation, and the inertia I about the centre of mass.
     """
     arm, frames = pose.arm, pose._frames
     M = np.zeros((arm.nv, arm.nv))

@@ -1,4 +1,4 @@
-"""Finds the equilibrium of a loaded arm whose motors are locked.
+"""Find the equilibrium of a loaded arm whose motors are locked.
 
     r(q) = J_Lᵀ F(q) + g − J_Xᵀ W = 0,    ∂r/∂q = K_θ                       (Eqs. 13 and 16)
 
@@ -38,9 +38,9 @@ def equilibrium(
 
     Solve r(q) = J_Lᵀ F(q) + g − J_Xᵀ W = 0 (Eq. 13). The elongation of a cable is its elongation at
     the reference plus its change of length. For a pure force the solution is a minimum of the
-    potential of cables, weight and load. The search goes down from the reference and leaves
-    saddles. So an arm that buckles comes to rest beside the posture that became unstable. Joint
-    limits act as stops.
+    potential of cables, weight and load. The search decreases the potential from the reference and
+    leaves saddle points. So an arm that buckles comes to rest beside the posture that became
+    unstable. Joint limits act as stops.
 
     The whole load acts from the start. It is divided into steps only if the search fails. If
     several equilibria exist, slow loading (:func:`~cdsm.weight_test`) may reach another one.
@@ -98,7 +98,7 @@ def require_between_stops(pose: Posture) -> None:
 
 
 def settled(loaded: LoadedArm, search: RestSearch[Iterate], iterations: int) -> Equilibrium:
-    """Return the equilibrium that a search has found; check that all laws are defined there."""
+    """Return the equilibrium that a search has found; check that tensions are in their domains."""
     K = search.state.K
     loaded.require_domains(K.tension)
     reaction = np.where(search.at_stop, K.residual, 0.0)
@@ -117,7 +117,7 @@ def settled(loaded: LoadedArm, search: RestSearch[Iterate], iterations: int) -> 
 def no_rest(
     reference: Posture, pose: Posture, residual: Array, reached: float, load: str = "the load"
 ) -> EquilibriumError:
-    """Return the error of a search that ends with an imbalance (nv,), at a part of the load."""
+    """Return the error of a search that ended with ``residual`` (nv,) at a part of the load."""
     frozen(residual)
     worst = int(abs(residual).argmax())
     joint = pose.arm.joint_names[worst]

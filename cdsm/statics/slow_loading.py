@@ -1,16 +1,16 @@
-"""Carry an arm with friction in its holes from load to load: sub-steps, work and dissipation.
+"""Move an arm with friction in its holes from load to load: sub-steps, work and dissipation.
 
-A sub-step solves r(q) = 0 with the natural lengths that its start left. It is exact if no hole
-stops sliding within it: then only its ends matter. The energy tells whether that was so, and
-whether the energies themselves are accurate. Over a sub-step,
+A sub-step solves r(q) = 0 with the natural lengths at its start. It is exact if no hole stops
+sliding within it: then the path between start and end does not matter. The energy balance shows
+whether this holds, and whether the energies themselves are accurate. Over a sub-step,
 
     work of load and motors = change of stored energy + dissipation.
 
 The stored energy is a function of the state. The work is ∫ Q·dq with the torque Q = J_Xᵀ W of the
 load, and ∫ P du of a motor that takes in the natural length u, with P = T (1 + ε) − ∫ T dε. The
-dissipation is Σ_j ∫ (P_{j+1} − P_j) ds_j with the slips s_j of the holes. To first order in the
-strain P is T. The integrals follow from both halves of a sub-step by Simpson's rule. A sub-step is
-halved until both sides agree.
+dissipation is Σ_j ∫ (P_{j+1} − P_j) ds_j with the slips s_j of the holes. T is the tension of a
+segment and ε its strain. To first order in ε, P is T. The integrals follow from both halves of a
+sub-step by Simpson's rule. A sub-step is halved until both sides agree.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ from cdsm.statics.trust_region import RestSearch, find_rest
 from cdsm.support.values import Array
 
 _FINEST, _SHORTEST = 2.0**-12, 2.0**-6
-"""Smallest sub-steps, as a part of the step between two loads: for the energy, where a snap is not
-resolved further; and where no rest is found."""
+"""Smallest sub-steps, as a part of the step between two loads: where the energy balance stays
+inaccurate (the arm snaps through), and where no equilibrium is found."""
 
 _ROUNDING = 16.0 * float(np.finfo(np.float64).eps)
 """Relative rounding of the stored energy."""
 
 _OF_LENGTHS = 2.0**-52
-"""Rounding of a length, over it: its tension does this work."""
+"""Relative rounding of a cable length; times length and tension, it is an error of the work."""
 
 
 class Load(NamedTuple):
@@ -48,14 +48,14 @@ class Load(NamedTuple):
     motors: Array  # per cable (C,): natural length taken in [m]; or tension [N] of a force motor
 
     def towards(self, other: Load, part: float) -> Load:
-        """Return the load at a part of the way to another one, which is exact at its end."""
+        """Return self + part · (other − self); for part = 1 exactly ``other``."""
         if part == 1.0:
             return other
         return Load(*(a + part * (b - a) for a, b in zip(self, other, strict=True)))
 
 
 class State(NamedTuple):
-    """An arm at rest under a load. The natural lengths of its segments are its memory."""
+    """An arm in equilibrium under a load. The natural lengths of its segments store its history."""
 
     load: Load
     settled: Settled
@@ -69,7 +69,7 @@ class State(NamedTuple):
 
 
 class Passage(NamedTuple):
-    """Energies [J] and slips on the way from one load to another."""
+    """Energies [J] and slips [m] of the step from one load to another."""
 
     load_work: float
     motor_work: float
@@ -83,7 +83,7 @@ class Passage(NamedTuple):
         return self.load_work + self.motor_work - self.stored - self.dissipated
 
     def joined(self, other: Passage) -> Passage:
-        """Return this passage and the next one as one."""
+        """Return the sum of this passage and the next."""
         return Passage(
             self.load_work + other.load_work,
             self.motor_work + other.motor_work,
@@ -114,7 +114,7 @@ class SlowLoading(NamedTuple):
         return State(Load(wrench, settled.residual, motors), settled, none, none)
 
     def carry(self, before: State, load: Load, what: str) -> tuple[State, Passage]:
-        """Carry an arm at rest to another load; ``what`` names it if it finds no rest there."""
+        """Change the load of an arm in equilibrium; ``what`` names the load in an error message."""
         first, state = before.load, before
         total = Passage(0.0, 0.0, 0.0, 0.0, np.zeros(before.settled.chain.slip.size))
         reached, part, turnover = 0.0, 1.0, 0.0
@@ -145,7 +145,7 @@ class SlowLoading(NamedTuple):
         return FrictionalArm(self.problem, self.limits, natural, wrench, forced)
 
     def rest(self, before: State, load: Load) -> tuple[State | None, RestSearch[Settled]]:
-        """Find the rest of an arm under a new load; None if there is none near."""
+        """Find the equilibrium under a new load, or None; also return the search."""
         old, natural = before.settled, before.settled.chain.natural.copy()
         taken = np.where(self.forced, 0.0, load.motors - before.load.motors)
         natural[self.start[:-1]] -= taken
@@ -160,7 +160,7 @@ class SlowLoading(NamedTuple):
         return State(load, search.state, reaction, search.state.q - old.q), search
 
     def _energies(self, start: State, middle: State, end: State) -> tuple[Passage, float]:
-        """Compute the energies of a sub-step from its middle, and their rounding [J]."""
+        """Compute the energies of a sub-step from start, middle and end, and their rounding [J]."""
         states = (start, middle, end)
         torque = [s.load.wrench @ s.pose.jacobian + s.load.held for s in states]
         P = [self.problem.potential(s.settled.chain.tension) for s in states]
@@ -188,7 +188,7 @@ class SlowLoading(NamedTuple):
 
 
 def _ahead(arm: FrictionalArm, old: Settled, start: Settled, held: Array) -> Settled:
-    """Return the arm moved on with the tangent of the last step, if that leaves less imbalance."""
+    """Return the arm after a Newton step with the last tangent if this reduces the residual."""
     try:
         step = np.linalg.solve(old.stiffness, -start.torque)
         near = start._replace(slope=old.slope)
@@ -199,14 +199,14 @@ def _ahead(arm: FrictionalArm, old: Settled, start: Settled, held: Array) -> Set
 
 
 def _work(force: list[Array], way: list[Array]) -> float:
-    """Integrate force over way from start, middle and end; exact for parabolas over time."""
+    """Integrate force over displacement from start, middle and end; exact for quadratics."""
     half, whole = way[1] - way[0], way[2] - way[0]
     ends = force[0] @ (4.0 * half - whole) + force[2] @ (3.0 * whole - 4.0 * half)
     return float(ends + 4.0 * (force[1] @ whole)) / 6.0
 
 
 def _dissipated(jump: list[Array], half: Array, other: Array) -> float:
-    """Integrate the jumps of P at holes over the slips of both halves; no term is negative."""
+    """Integrate the differences of P at holes over the slips of both halves: terms ≥ 0 [J]."""
     start, middle, end = jump
     whole, again = half + other, half * other > 0.0
     simpson = start * (4.0 * half - whole) + 4.0 * middle * whole + end * (3.0 * whole - 4.0 * half)

@@ -1,13 +1,14 @@
 """Find the equilibrium r(q) = 0 between stops: a trust-region search that ends with Newton steps.
 
-The torque imbalance r need not be the gradient of a potential. So a step p is judged by the work
-∫ r·dq along it. With K = ∂r/∂q, to the fourth order of its length, the work is
+The residual torque r need not be the gradient of a potential. So the work ∫ r·dq along a step p
+tells its quality. With K = ∂r/∂q, to the fourth order of its length, the work is
 
     ½ (r₀ + r₁)·p + (pᵀK₀p − pᵀK₁p)/12.
 
-It stays exact where the difference of two potentials would be rounding. If r is a gradient, this is
-the trust-region method with the exact Hessian, which goes down and leaves saddles. Near the end
-every step is a full Newton step with the complete K, not only its symmetric part.
+Subscripts 0 and 1 denote the start and the end of the step. The formula stays accurate where the
+difference of two potentials would be rounding. If r is a gradient, this is the trust-region method
+with the exact Hessian, which decreases the potential and leaves saddle points. Near the end every
+step is a full Newton step with the complete K, not only its symmetric part.
 
 scipy's trust-exact does not fit: it has no stops, and it needs a potential. A moment at the tip has
 no potential. Where there is one, BFGS takes thirty times as long to minimise it
@@ -48,18 +49,18 @@ class Iterate(Protocol):
 
     @property
     def torque(self) -> Array:
-        """Imbalance r minus the torque held back (nv,) [N m]."""
+        """Residual r minus the torque of :meth:`holding_back` (nv,) [N m]."""
 
     @property
     def rounding(self) -> Array:
-        """Rounding of the imbalance (nv,) [N m]."""
+        """Rounding error of the residual (nv,) [N m]."""
 
     @property
     def stiffness(self) -> Array:
         """∂r/∂q (nv, nv) [N m/rad]."""
 
     def holding_back(self, torque: Array | float) -> Self:
-        """Return this posture with a torque (nv,) [N m] that holds part of the load back."""
+        """Return this state with a torque (nv,) [N m] that is subtracted from its residual."""
 
 
 State = TypeVar("State", bound=Iterate)
@@ -119,7 +120,7 @@ class _Free(NamedTuple):
 def find_rest(
     loaded: Loaded[State], start: State, held_back: Array | float = 0.0
 ) -> RestSearch[State]:
-    """Find the equilibrium from an iterate while a torque (nv,) holds part of the load back."""
+    """Find the equilibrium r = ``held_back`` (nv,) [N m] from an iterate."""
     stops = loaded.stops()
     state, radius = start.holding_back(held_back), _FIRST
     free = _Free.of(state, *stops)
@@ -160,7 +161,7 @@ def work(before: Iterate, after: Iterate) -> float:
 def _trial(
     state: Iterate, free: _Free, stops: tuple[Array, Array], radius: float
 ) -> tuple[Array, float]:
-    """Return the next joint angles (nv,) and the predicted work: 0 if no step goes down."""
+    """Return the next joint angles (nv,) and the predicted work [J]: 0 if no step is downhill."""
     # at a saddle r is rounding and must not decide the way to leave it
     torque, signs = (0.0 * state.torque, (1.0, -1.0)) if free.balanced else (state.torque, (1.0,))
     q, expected = state.q, 0.0
@@ -188,7 +189,7 @@ def _descend(
     radius: float,
     sign: float,
 ) -> Array:
-    """Go down the quadratic model. A joint that meets its stop stays there."""
+    """Return joint angles (nv,) that decrease the quadratic model; a joint stays at its stop."""
     (lower, upper), q, indices, spectrum = stops, state.q.copy(), free.indices, free.spectrum
     while indices.size and radius > 0.0:
         r = torque + state.stiffness @ (q - state.q)
@@ -210,7 +211,7 @@ def _descend(
 def _step(
     torque: Array, stiffness: Array, values: Array, vectors: Array, radius: float, sign: float
 ) -> Array:
-    """Minimize r·p + ½ pᵀKp with |p| <= radius; the sign chooses between p and −p if r does not."""
+    """Minimize r·p + ½ pᵀKp with |p| ≤ radius; if r = 0, ``sign`` chooses between p and −p."""
     along = vectors.T @ torque
     size, largest = float(np.linalg.norm(along)), float(abs(values).max())
     if size == 0.0 and values[0] >= 0.0:

@@ -21,13 +21,13 @@ SLIDING = 1.25
 """The arm slides where its tangent stiffness is at most this times the frictionless one."""
 
 _SETTLED, _MOST_CYCLES = 0.01, 64
-"""Change of the dithered stiffness, when cycles are doubled, that ends their search; its end."""
+"""Relative change on doubling the cycles at which the dither has converged; most cycles."""
 
 _GROWTH, _MOST = 1.25, 100.0
-"""Growth of the load from trial to trial, and its largest value over the breakaway load."""
+"""Factor of the load from trial to trial; largest load as a multiple of the breakaway load."""
 
 _HALVINGS = 6
-"""Bisections of the load from which the arm slides: to 0.4 %."""
+"""Number of bisections of the load from which the arm slides; they reach 0.4 %."""
 
 
 @final
@@ -36,9 +36,11 @@ class WeightFriction(ReadOnlyState):
     """Loads and stiffnesses of a weight test on an arm with friction in its holes.
 
     Attributes:
-        breakaway: Load along the weight below which nothing slides, and where it slides first.
+        breakaway: Load in the direction of the weight below which no cable slides, and the hole
+            that slides first.
         frictionless: Tangent stiffness along the weight without friction [N/m].
-        history: The weight hung in steps: the first entry is the arm without it.
+        history: The states while the weight is applied in steps; entry 0 is the arm without the
+            weight.
     """
 
     breakaway: Breakaway
@@ -47,20 +49,20 @@ class WeightFriction(ReadOnlyState):
 
     @property
     def stuck(self) -> float:
-        """Tangent stiffness along the weight while all cables stick [N/m]: of small weights."""
+        """Tangent stiffness [N/m] along the weight while all cables stick (small weights)."""
         return self.breakaway.stiffness.along(self.breakaway.direction)
 
     @property
     def secant(self) -> float:
-        """Weight over displacement along it, with friction [N/m]; inf without motion."""
+        """Weight over displacement in its direction, with friction [N/m]; inf without motion."""
         return self._secant(self.history.tip)
 
     @cached_property
     def sliding_load(self) -> float:
         """Weight [N] from which the arm slides: its tangent is within 25 % of the frictionless one.
 
-        It is found by loading the arm further and further. 0 without friction; inf if the arm does
-        not slide up to 100 breakaway loads, or finds no rest before.
+        The load is increased until this holds. 0 without friction; inf if the arm does not slide up
+        to 100 times the breakaway load, or if no equilibrium is found before.
         """
         first, u = self.breakaway.load, self.breakaway.direction
         if not 0.0 < first < math.inf:
@@ -100,16 +102,17 @@ class WeightFriction(ReadOnlyState):
 
     @property
     def dithered(self) -> float:
-        """Weight over displacement [N/m] after shaking the load by ±:attr:`sliding_load`, fading.
+        """Weight over displacement [N/m] after dither: the load alternates with fading amplitude.
 
-        :attr:`dither_cycles` about the weight fade evenly to nothing. NaN if the arm does not
-        slide, finds no rest on the way, or does not settle in 64 cycles.
+        Dither adds ± amplitude to the weight. The amplitude falls linearly from
+        :attr:`sliding_load` to zero in :attr:`dither_cycles` cycles. NaN if the arm does not slide,
+        no equilibrium is found on the way, or the result does not converge within 64 cycles.
         """
         return self._dither[1]
 
     @property
     def dither_cycles(self) -> int:
-        """Number of fading cycles after which twice as many change the stiffness by at most 1 %.
+        """Number of dither cycles; doubling it changes the stiffness by at most 1 %.
 
         The stiffness then is near the frictionless one, but not equal: shaking along the load does
         not move all cables. 0 without friction, and where ``dithered`` is NaN.
@@ -134,7 +137,7 @@ class WeightFriction(ReadOnlyState):
         return 0, math.nan
 
     def _shaken(self, size: float, cycles: int) -> float:
-        """Compute weight over displacement [N/m] after so many fading cycles from ±size [N]."""
+        """Compute weight over displacement [N/m] after dither cycles that begin with ±size [N]."""
         history, u = self.history, np.append(self.breakaway.direction, np.zeros(3))
         fading = size * (1.0 - np.arange(2 * cycles) / (2.0 * cycles))
         fading[1::2] *= -1.0

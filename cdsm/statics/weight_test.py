@@ -32,10 +32,10 @@ MOST_STEPS = 1000
 """Largest number of steps. A curve with more points is not smoother, but takes long."""
 
 _MEASURED = 1e-12
-"""Smallest tip displacement, over the length of the arm, that has about three correct digits."""
+"""Smallest tip displacement over the arm's length that has about three correct digits."""
 
 _DISPLACED = 1e-9
-"""Tip displacement, over the length of the arm, that is more than rounding of the balance."""
+"""Smallest tip displacement over the arm's length that is more than rounding of the balance."""
 
 
 @final
@@ -55,7 +55,7 @@ class LinearPrediction(ReadOnlyState):
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class WeightTest(ReadOnlyState):
-    """An arm while a weight at its tip grows in equal steps.
+    """States of an arm while a weight at its tip is increased in equal steps.
 
     If the arm has friction in its holes, tips, displacements and stiffness are those with friction.
 
@@ -63,7 +63,7 @@ class WeightTest(ReadOnlyState):
         force: ΔF (3,) [N], the dead force at the full load, base axes.
         without: Frictionless equilibrium without the weight, under ``wrench`` alone.
         loaded: Frictionless equilibrium at each step; the last one is under the full load.
-        friction: What friction does to the test; None for an arm without friction.
+        friction: Loads and stiffnesses with friction; None for an arm without friction.
     """
 
     force: Array
@@ -142,7 +142,7 @@ class WeightTest(ReadOnlyState):
 
     @cached_property
     def tensions(self) -> Array:
-        """Cable tensions at each step (n, C) [N]; with friction at the motors."""
+        """Cable tensions at each step (n, C) [N]; with friction, those at the motors."""
         if self.friction is not None:
             return frozen(np.array([T[1:, 0] for T in self.friction.history.tensions]).T)
         return frozen(np.array([each.tension for each in self.loaded]))
@@ -223,7 +223,7 @@ def weight_test(
     steps: int = 1,
     wrench: ArrayLike | None = None,
 ) -> WeightTest:
-    """Hang a weight at the tip of an arm with locked motors: C = ΔX/ΔF (Eq. 20).
+    """Compute the stiffness under a weight hung at the tip, with locked motors: C = ΔX/ΔF (Eq. 20).
 
     The test is nonlinear: the tensions follow the elongations, and the posture changes. For a small
     force the result is 1/:meth:`~cdsm.Stiffness.along`. With friction in the holes it depends on
