@@ -100,8 +100,8 @@ def distribute_tensions(
     """Compute the least tensions that balance an arm at many postures: min ‖F‖² (Eqs. 13, 17).
 
     Tensions are accepted only if they meet the optimality conditions of
-    :func:`~cdsm.distribute_tension`. A posture is called infeasible only with a proof. All other
-    postures are solved by :func:`~cdsm.distribute_tension`.
+    :func:`~cdsm.distribute_tension`. A posture is called infeasible only with a proof. Postures for
+    which the kernels find neither are solved by :func:`~cdsm.distribute_tension`.
 
     Args:
         arm: The arm.
@@ -110,7 +110,7 @@ def distribute_tensions(
         maximum: Upper bound [N]: one number, (C,) or (B, C); inf for no bound.
         wrench: W (6,) for all postures or (B, 6) at ``tool0`` in base axes: force [N], then moment
             [N m]; zero if not given.
-        check_limits: Pass over postures beyond the joint limits.
+        check_limits: Skip postures beyond the joint limits; their status is ``BEYOND_LIMITS``.
         threads: Maximum number of threads; by default one for each core.
 
     Raises:

@@ -33,7 +33,7 @@ OUTPUTS = (*(name for name in QUANTITIES if name != "tension"), "tension")
 """Names of the quantities that :func:`evaluate` computes."""
 
 DEFAULT_OUTPUTS = ("tip", "compliance", "margin")
-"""Default outputs: place of the tip, its compliance, and the stability margin."""
+"""Default outputs: pose of the tip, its compliance, and the stability margin."""
 
 
 @final
@@ -43,8 +43,8 @@ class Batch(ReadOnlyState):
 
     Names, shapes and units are those of :class:`~cdsm.Posture` and :class:`~cdsm.Stiffness`, with
     the posture as first axis. A quantity that does not exist is NaN; :attr:`status` says why.
-    A batch has no picture of its own, since its rows have no order and any outputs: plot
-    :meth:`to_pandas`, or draw a :func:`~cdsm.sweep` with :func:`cdsm.plots.plot_map`.
+    A batch has no ``plot``, since its rows have no order: plot :meth:`to_pandas`, or draw a
+    :func:`~cdsm.sweep` with :func:`cdsm.plots.plot_map`.
 
     Attributes:
         arm: The arm.
@@ -53,7 +53,8 @@ class Batch(ReadOnlyState):
         wrench: W (6,) for all postures, or (B, 6): force [N], then moment [N m].
         minimum: Lower bounds (C,) for all postures or (B, C) [N]; None if F was not distributed.
         maximum: Upper bounds (C,) for all postures or (B, C) [N], or None.
-        direction: Unit direction (3,) of ``along`` and its like, or several (D, 3); or None.
+        direction: Unit direction (3,) of ``along``, ``stuck_along`` and ``breakaway``, or several
+            (D, 3); or None.
         status: :class:`Status` of each posture (B,).
         outputs: Names of the requested quantities.
         values: The requested quantities, (B, …) each, in SI units: [m], [N], [rad].
@@ -149,13 +150,13 @@ def evaluate(
             ``"cable_stiffness"``, ``"residual"``, ``"margin"``, ``"compliance"``, ``"cartesian"``,
             ``"along"``, ``"pseudoinverse"``. While cables stick in their holes, see
             :func:`~cdsm.stuck_stiffness`: ``"stuck_joint"``, ``"stuck_along"``,
-            ``"stuck_compliance"``, and ``"breakaway"`` [N], the load that ends it to first order
-            (:attr:`Breakaway.first_order`). And ``"tension"``.
+            ``"stuck_compliance"``, and ``"breakaway"`` [N], the load at which the first cable
+            slides, to first order (:attr:`Breakaway.first_order`). Also ``"tension"``.
         direction: u of ``"along"``, ``"stuck_along"`` and ``"breakaway"``: an axis such as ``"z"``,
             or (3,), any length; or several (D, 3), then these outputs are (B, D).
         minimum: Lower bounds [N] for :func:`distribute_tensions`, which then finds the tensions.
         maximum: Upper bounds [N] of distributed tensions; no bounds if not given.
-        check_limits: Pass over postures beyond the joint limits.
+        check_limits: Skip postures beyond the joint limits; their status is ``BEYOND_LIMITS``.
         threads: Maximum number of threads; by default one for each core. All threads call a
             user-defined elasticity.
 

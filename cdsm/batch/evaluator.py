@@ -1,4 +1,4 @@
-"""Evaluation of the postures of a batch, slice by slice, with checked arguments."""
+"""Evaluation of the postures of a batch in ranges of rows, with checked arguments."""
 
 from __future__ import annotations
 
@@ -30,20 +30,20 @@ _WIDTH = 32
 """Number of postures in a block: some vectors of the processor. More need too much cache."""
 
 _LONG = 2**15
-"""Numbers for one posture from which a block has half the width."""
+"""Size of a posture's record (count of numbers) from which a block has half the width."""
 
 _CACHE, _FEWEST = 2**16, 8
-"""Numbers of K_θ and P that are kept for the readings, and the least number of their blocks."""
+"""Count of numbers kept for readings (quantities that need K_θ⁻¹), and least count of blocks."""
 
 _CODES = np.array([OK, Status.INFEASIBLE, UNDECIDED], dtype=np.uint8)
 """Status of each outcome of a search: OPTIMAL, INFEASIBLE, UNDECIDED."""
 
 
 class Evaluator:
-    """Evaluation of slices of the postures; arguments as in :func:`cdsm.batch.evaluate`.
+    """Evaluation of ranges of rows (postures); arguments as in :func:`cdsm.batch.evaluate`.
 
-    ``tension`` is F (C,) or (B, C) [N]. ``bounds`` are the lower and the upper bounds of tensions
-    that are distributed, (C,) or (B, C) [N]. Without both, no output depends on tensions.
+    ``tension`` is F (C,) or (B, C) [N]. ``bounds`` are the lower and the upper bounds of
+    distributed tensions, (C,) or (B, C) [N]. If neither is given, no output depends on tensions.
 
     Attributes:
         values: The outputs in the order of ``names``, filled by :meth:`run`.
@@ -100,12 +100,12 @@ class Evaluator:
         ]
 
     def run(self, status: Codes, threads: int | None) -> None:
-        """Fill the values and the status (B,), slice by slice, in several threads."""
+        """Fill the values and the status (B,) in several threads, each for ranges of rows."""
         count = checked_threads(threads)
         run_slices(lambda part: self._fill(part, status), len(self._q), self._block, count)
 
     def _fill(self, part: slice, status: Codes) -> None:
-        """Fill the values and the status (B,) of a slice of the postures."""
+        """Fill the values and the status (B,) of one range of rows."""
         rows, found, out = np.arange(part.start, part.stop), status[part], self._out[part]
         if self._bounds is None:
             tension = self._nothing if self._tension is None else self._of(self._tension, rows)
@@ -143,7 +143,7 @@ class Evaluator:
         self._evaluate(rows, frozen(tension), self._wanted, found, out)
 
     def _search(self, rows: Indices) -> tuple[Array, Codes]:
-        """Search the tensions of postures whose guess is not the optimum; return their codes."""
+        """Search for tensions of postures whose guess is not optimal; also return status codes."""
         nv, cables = self._arm.nv, len(self._arm.cables)
         needed = np.array([layout.JACOBIAN, layout.LENGTH_JACOBIAN, layout.GRAVITY_TORQUE])
         out, found = np.empty((rows.size, (7 + cables) * nv)), np.zeros(rows.size, dtype=np.uint8)
@@ -184,7 +184,7 @@ class Evaluator:
         out: Array,
         blocks: int,
     ) -> Kept:
-        """Fill what is not a reading; return what the readings of so many blocks need."""
+        """Fill all quantities but the readings; return the arrays that the readings need."""
         given = low = high = rigidity = wire = self._nothing
         model = self._arm._model
         if tension is not None:
@@ -228,7 +228,7 @@ class Evaluator:
         return Kept(K, parts, JX, stuck_K, stuck_parts, wire)
 
     def _read(self, kept: Kept, rows: Indices, wanted: Indices, found: Codes, out: Array) -> None:
-        """Fill the wanted readings, and the status of postures that lack one."""
+        """Fill the wanted readings, and the status of postures in which one does not exist."""
         status = np.full(kept.jacobian.shape[0] * self._block, UNREAD)
         status[: found.size][found == OK] = READ
         stuck = np.isin(wanted, STUCK)
@@ -252,7 +252,7 @@ class Evaluator:
             found[state == IMMOBILE] = Status.IMMOBILE
 
     def _of(self, values: Array, rows: Indices) -> Array:
-        """Return the values (b, n) of some postures; one row (n,) for all is repeated."""
+        """Return the values (b, n) of some rows of (B, n); repeat values (n,) for all rows."""
         whole = np.broadcast_to(values, (len(self._q), *values.shape[-1:]))
         return frozen(np.ascontiguousarray(whole[rows]))
 

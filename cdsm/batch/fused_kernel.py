@@ -110,22 +110,22 @@ def evaluate_rows(
         q: Joint angles (b, nv) [rad].
         tension: F (b, C) [N]; (0, C) if tensions are distributed or not needed.
         low: Lower bounds (b, C) [N] of distributed tensions; (0, C) if none are distributed.
-        high: Upper bounds, as ``low``.
+        high: Upper bounds, with the shape of ``low``.
         rigidity: EA (1 + ε) (b, C) [N]; 0 under force control, negative outside the domain. (0, C)
             if it follows from ``constant``, ``linear`` and ``wires``.
-        wire: As ``rigidity`` for cables that stick: also of those under force control.
+        wire: As ``rigidity``, for cables that stick: it is not 0 under force control.
         wrench: W (b, 6).
         start: Index in the record at which each quantity begins.
         wanted: Numbers of the requested quantities, rising.
         last: Largest number of a quantity that must be computed.
         slides: Whether the passive stiffness of cables that slide freely is needed.
-        sticks: Whether that of cables that stick is needed.
+        sticks: Whether the passive stiffness of cables that stick is needed.
         width: Number of postures in a block.
         joint: K_θ of B blocks (B, nv, nv, W), for the readings; (0, nv, nv, W) if there are none.
-        parts: Sum of the magnitudes of the four terms, as ``joint``.
-        jacobian: J_X (B, 6, nv, W), as ``joint``.
-        stuck: K_θ while the cables stick as ``joint``.
-        stuck_parts: Sum of the magnitudes of its four terms, as ``stuck``.
+        parts: Sum of the magnitudes of the four terms of K_θ, with the shape of ``joint``.
+        jacobian: J_X (B, 6, nv, W) for the readings, or no blocks.
+        stuck: K_θ while the cables stick, with the shape of ``joint``.
+        stuck_parts: Sum of the magnitudes of the four terms of ``stuck``, with its shape.
         out: The requested quantities in one row per posture; NaN where they do not exist.
         status: On entry OK, or why no tensions were found; on return the status of the posture.
             UNDECIDED: the guess of its tensions is not the optimum.
@@ -255,7 +255,7 @@ def evaluate_rows(
 
 @inner
 def _load(rows: Array, first: int, block: Array, width: Width) -> None:
-    """Copy rows (b, n) from the first one on to a block (n, W); after the last row, repeat it."""
+    """Copy W rows of (b, n), from row ``first``, to a block (n, W); repeat the last if needed."""
     if rows.shape[0]:
         for w in lanes(width):
             row = min(first + np.intp(w), rows.shape[0] - 1)
@@ -265,7 +265,7 @@ def _load(rows: Array, first: int, block: Array, width: Width) -> None:
 
 @inner
 def _set_residual(F: Array, J: Array, torque: Array, residual: Array, width: Width) -> None:
-    """Fill the residual of Eq. 13 (nv, W), J_Lᵀ F less the torque J_Xᵀ W − g."""
+    """Fill the residual (nv, W) of Eq. 13: J_Lᵀ F minus ``torque`` = J_Xᵀ W − g."""
     for i in upwards(0, residual.shape[0]):
         for w in lanes(width):
             residual[i, w] = -torque[i, w]
@@ -284,7 +284,7 @@ def _set_rigidity(constant: Array, linear: Array, F: Array, rigidity: Array, wid
 
 @inlined
 def _note(code: Indices, number: int, known: Indices, width: Width) -> None:
-    """Note for postures that are OK that all quantities up to a number are known."""
+    """Set ``known`` to number + 1 for postures that are OK: so many quantities are known."""
     for w in lanes(width):
         if code[w] == OK:
             known[w] = number + 1

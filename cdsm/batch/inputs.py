@@ -1,4 +1,4 @@
-"""Checks of the arguments of a batch, and its division into slices that fit the cache."""
+"""Checks of the arguments of a batch, and its division into ranges of rows (slices)."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def given_wrench(value: ArrayLike | None, rows: int) -> Array:
 
 
 def run_slices(work: Callable[[slice], None], rows: int, block: int, threads: int) -> None:
-    """Call ``work`` for slices that cover all postures, in several threads.
+    """Call ``work`` for slices that together cover all rows, in several threads.
 
     These are Python threads; the kernels release the interpreter lock. Parallel loops of numba
     take seconds longer to compile. On some machines two threads cannot enter such a loop at once;

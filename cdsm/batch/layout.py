@@ -22,7 +22,7 @@ OUTSIDE_ELASTICITY = int(Status.OUTSIDE_ELASTICITY)
 SINGULAR = int(Status.SINGULAR)
 IMMOBILE = int(Status.IMMOBILE)
 UNDECIDED = 255
-"""The guess of the tensions is not the optimum: a search, or ``distribute_tension``, decides."""
+"""Status while the guess of tensions is not optimal: a search or ``distribute_tension`` follows."""
 
 QUANTITIES = (
     "tip",
@@ -48,8 +48,8 @@ QUANTITIES = (
     "stuck_compliance",
     "breakaway",
 )
-"""Quantities in the order of the record: of the joint angles alone; with tensions; with the
-rigidity of the cables; with a regular K_θ; with a regular K_θ of the arm whose cables stick."""
+"""Quantities in the order of the record: those of the joint angles alone; then those that also need
+tensions; the rigidity of the cables; a regular K_θ; a regular K_θ of the stuck arm."""
 
 (
     TIP,
@@ -77,7 +77,7 @@ rigidity of the cables; with a regular K_θ; with a regular K_θ of the arm whos
 ) = range(len(QUANTITIES))
 
 DIRECTIONAL = ("along", "stuck_along", "breakaway")
-"""Quantities that belong to the directions."""
+"""Quantities that have a value for each direction."""
 
 
 def shapes(nv: int, cables: int, directions: int) -> tuple[tuple[int, ...], ...]:

@@ -1,4 +1,4 @@
-"""Readings of blocks of postures while cables stick: stiffness, and the load that ends it."""
+"""Readings of an arm whose cables stick: tip stiffness, and the load at which they slide."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ WITHOUT_FRICTION = {
     "stuck_along": "along",
     "stuck_compliance": "compliance",
 }
-"""The same readings of an arm without friction."""
+"""Names of the equal quantities of an arm without friction, by the names of the stuck arm."""
 
 
 class Kept(NamedTuple):
-    """Arrays from which readings are computed: B blocks of W postures, the posture last.
+    """Arrays from which readings are computed: B blocks of W postures; W is the last axis.
 
     Arrays that no reading needs have no blocks.
     """

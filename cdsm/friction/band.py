@@ -1,4 +1,4 @@
-"""Bands that hold whatever the history: where an arm with friction may rest, and its tensions."""
+"""Proved bands of tip positions and tensions at which an arm with friction may rest."""
 
 from __future__ import annotations
 
@@ -23,38 +23,39 @@ from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension
 
 _ROOM = 1.1
-"""The neighbourhood over the first-order band, and its growth where it does not hold the band."""
+"""Size of the first neighbourhood over the first-order band; its growth if it is too small."""
 
 _WIDENINGS = 8
-"""Number of neighbourhoods before there is no band."""
+"""Largest number of neighbourhoods that are tried; then the band is not proved."""
 
 _INSIDE = 0.999
-"""A band that reaches the ends of its neighbourhood, but for rounding, needs a larger one."""
+"""A band that reaches this part of its neighbourhood needs a larger neighbourhood."""
 
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class RestBand(ReadOnlyState):
-    """Region in which the tip of an arm with locked motors may rest, after any loads.
+    """Range of tip positions at which an arm with locked motors may rest, after any loads.
 
     If ``proved``, ``low`` and ``high`` hold for all states of rest in a neighbourhood of the
-    reference: ``room`` times the set of all states that are at rest to first order. So do
-    ``tensions``, ``end_tensions`` and ``loads``, which raise SolverError or ElasticityRangeError if
-    they cannot be proved. A simulation may come near to these bounds, but not beyond.
+    reference: ``room`` times the set of all states that are at rest to first order. The same is
+    true of ``tensions``, ``end_tensions`` and ``loads``, which raise SolverError or
+    ElasticityRangeError if they cannot be proved. A simulation may come near to these bounds, but
+    not beyond.
 
     Attributes:
         stiffness: Frictionless K of the reference, with its posture, tensions and wrench.
         direction: Unit direction u (3,) of the displacement, base axes.
         low: Least displacement of the tip from the reference along u [m], not positive.
         high: Largest displacement of the tip from the reference along u [m], not negative.
-        first_order: Largest displacement either way to first order [m], in closed form.
-        room: Size of the neighbourhood over that of all states at rest to first order [-]; 0 if
-            no hole holds at the reference: it is then the one state at rest.
-        proved: Whether ``low`` and ``high`` are proved. False where the outer correction does not
-            end, since second-order parts are as large as the band: both are then to first order,
-            and histories may lead some percent beyond. The paper's arm with a lead of 0.3 m is
-            proved while friction turns no joint by more than 0.7°: with Eq. 19 from 30 to 80 N at
-            μ = 0.1 and from 15 to 120 N at μ = 0.05, and with EA = 48 kN up to μ = 0.3 at 50 N.
+        first_order: Largest displacement along ±u to first order [m], in closed form.
+        room: Size of the neighbourhood over that of all states at rest to first order [-]; 0 if no
+            cable can stick at the reference: it is then the only state of rest.
+        proved: Whether ``low`` and ``high`` are proved. False if no neighbourhood is large enough,
+            because second-order terms are as large as the band. Then both are only of first order,
+            and the tip may rest some percent beyond them. The paper's arm with a lead of 0.3 m is
+            proved while friction turns no joint by more than 0.7°: with Eq. 19 from 30 to 80 N at μ
+            = 0.1 and from 15 to 120 N at μ = 0.05, and with EA = 48 kN up to μ = 0.3 at 50 N.
     """
 
     stiffness: Stiffness
@@ -87,8 +88,8 @@ class RestBand(ReadOnlyState):
     def loads(self) -> Array:
         """Least and largest force along u (2,) [N] under which the reference may stay at rest.
 
-        They come on top of the wrench of the reference. Each load between them has an admissible
-        state of tensions that balances it at the very angles of the reference.
+        They are added to the wrench of the reference. For each load between them, tensions that
+        friction allows balance the arm at exactly the angles of the reference.
         """
         if self.room == 0.0:
             return frozen(np.zeros(2))
@@ -110,7 +111,7 @@ def rest_band(
     direction: Direction,
     wrench: ArrayLike | None = None,
 ) -> RestBand:
-    """Compute where the tip may rest along a direction, whatever loads came and went before.
+    """Compute where along a direction the tip may rest, for any earlier loads.
 
     The reference is the posture with the given tension in all segments of each cable. The motors
     are locked there, or hold their force. Loads beyond ``wrench`` have come and gone. The band is
@@ -119,7 +120,7 @@ def rest_band(
 
     Args:
         pose: The posture of the reference.
-        tension: As for :func:`~cdsm.stiffness`. Torque out of balance is held there.
+        tension: As for :func:`~cdsm.stiffness`. A residual torque is kept as a constant load.
         direction: u (3,) in base axes, any length, or an axis such as ``"-z"``.
         wrench: W (6,), which still acts, as for :func:`~cdsm.stiffness`.
 

@@ -6,8 +6,9 @@ the load of hole i is therefore
 
     W_i = μ φ_i / (|x_i| − y_i),   x_i = d(ln T_{j+1} − ln T_j)/dW,   y_i = μ dφ_i/dW,
 
-or none, where |x_i| ≤ y_i. Starting from the smallest of them, Newton's method finds the load at
-which the loaded arm itself, with clamped segments, reaches the bound.
+or infinite if |x_i| ≤ y_i. μ is the friction coefficient, φ_i the wrap angle and T_j the tension of
+segment j. From the smallest W_i, Newton's method finds the load at which the loaded arm, with all
+its cables stuck, reaches the bound.
 """
 
 from __future__ import annotations
@@ -31,13 +32,13 @@ from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension
 
 _HELD = 1e300
-"""Ratio of tensions that a hole holds while it cannot slide."""
+"""Ratio of tensions that no hole reaches: with it cables stick under every load."""
 
 _REACHED = 1e-9
-"""Relative excess over the bound of another hole that is rounding."""
+"""Relative excess over the bound of a hole that counts as rounding."""
 
 _ITERATIONS = 50
-"""Newton steps; 3 to 5 are usual, and some more where another hole goes first."""
+"""Largest number of Newton steps; usually 3 to 5, and more if another hole slides first."""
 
 _CONVERGED = 1e-10
 """Relative change of the load that ends the search: the error left is its square."""
@@ -57,12 +58,12 @@ class Breakaway(ReadOnlyState):
         direction: Unit direction u (3,) of the force, base axes.
         load: The breakaway load [N], more than the wrench of ``stiffness``; inf if no cable ever
             slides, as the force moves no joint; 0 without friction.
-        first_order: The same in closed form [N], to first order in the load.
-        hole_loads: Closed form of each hole (P,) [N]; inf where the cable never begins to slide,
-            also because it always does.
+        first_order: The breakaway load in closed form [N], to first order in the load.
+        hole_loads: First-order load at which each hole begins to slide (P,) [N]; inf where it never
+            begins to, also because the hole cannot stick.
         cable: Name of the cable that slides first; None if the load is 0 or inf.
-        site: Number of the hole among the sites of this cable, from 1; None likewise.
-        link: Name of the link of this hole; None likewise.
+        site: Number of the hole among the sites of ``cable``, from 1; None if ``cable`` is.
+        link: Name of the link of the hole; None if ``cable`` is.
     """
 
     stiffness: Stiffness
@@ -94,7 +95,8 @@ def breakaway(
 
     Args:
         pose: The posture.
-        tension: As for :func:`~cdsm.stiffness`. Tensions out of balance are held there.
+        tension: As for :func:`~cdsm.stiffness`. If they do not balance the arm, the residual torque
+            is kept as a constant load.
         direction: u (3,) of the force in base axes, any length, or an axis such as ``"-z"``.
         wrench: As for :func:`~cdsm.stiffness`.
 
@@ -102,7 +104,7 @@ def breakaway(
         InvalidInput: As for :func:`~cdsm.stiffness`, or ``direction`` is no direction.
         ElasticityRangeError: A tension leaves the domain of its cable's elasticity.
         SingularStiffness: The stuck arm is about to buckle.
-        EquilibriumError: The arm does not stick up to the load found: it buckles before.
+        EquilibriumError: The stuck arm buckles below the load found.
     """
     u = unit_direction("direction", direction)
     K = stuck_stiffness(pose, tension, wrench)
@@ -138,8 +140,8 @@ def hole_loads(K: Stiffness, u: Array) -> tuple[Array, Array]:
 def _reached(K: Stiffness, u: Array, motion: Array) -> tuple[float, int]:
     """Find the load [N] at which the first hole of the stuck, loaded arm reaches its bound.
 
-    Newton's method for joints and load, from the answer to first order in the tensions; another
-    hole that is beyond its bound there takes its place.
+    Newton's method for joints and load starts at the first-order result. If another hole is beyond
+    its bound at the solution, the search is repeated for that hole.
     """
     pose, arm = K.posture, K.posture.arm
     chains, held = pose.segments.chains, holding(pose)
@@ -189,7 +191,7 @@ def _reached(K: Stiffness, u: Array, motion: Array) -> tuple[float, int]:
 
 
 def _first(pose: Posture, T: Array, growth: Array, motion: Array) -> tuple[float, int]:
-    """Return the least load [N] at which T + load Ṫ (S,) reach a ratio exp(μ φ), and the hole."""
+    """Return the least load [N] at which T + load·growth reaches a ratio exp(μ φ), and the hole."""
     chains, wrap = pose.segments.chains, pose.segments.wrap
     ratio = np.exp(chains.friction * wrap)
     turning = T[chains.hole] * chains.friction * (pose.segments.wrap_jacobian @ motion)

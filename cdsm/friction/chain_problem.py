@@ -17,7 +17,7 @@ _ITERATIONS = 60
 """Newton steps on a law of rigidity. Linear laws need one, strands 3 to 6."""
 
 _UNDAMPED = 20
-"""Newton steps that are not halved; a law with kinks may make full steps cycle."""
+"""Number of full Newton steps; later steps are halved, since kinks of a law may make them cycle."""
 
 _CONVERGED = 1e-13
 """Relative change of the tensions that ends the iteration: the error left is its square."""
@@ -37,9 +37,9 @@ class Chain(NamedTuple):
 class ChainProblem:
     """Laws, series springs and motors of all cables, divided into segments.
 
-    A force-controlled motor holds the tension of the first segment, a position-controlled motor its
-    wire. The series spring belongs to the first segment. Beyond the ends of its law a segment keeps
-    the rigidity of the end; a cable whose tension is zero is slack.
+    A force-controlled motor keeps the tension of the first segment constant, a position-controlled
+    motor the length of wire. The series spring belongs to the first segment. Outside the domain of
+    its law a segment has the rigidity of the nearest bound; a cable whose tension is zero is slack.
 
     Args:
         cables: Cables of the arm.
@@ -82,10 +82,10 @@ class ChainProblem:
     def settle(
         self, length: Array, natural: Array, ratio: Array, forced: Array, near: Array
     ) -> Chain:
-        """Solve the chain problem of lengths l, old natural lengths a and ρ = exp(μ φ), all (S,).
+        """Solve for the tensions from lengths l, old natural lengths a and ρ = exp(μ φ), all (S,).
 
-        ``forced`` (C,) [N] is the tension that a motor holds, or NaN. Roots are searched from the
-        tensions ``near`` (S,) [N].
+        ``forced`` (C,) [N] is the tension of force-controlled motors, NaN for others. The search
+        starts at the tensions ``near`` (S,) [N].
         """
         T = near
         for attempt in range(_ITERATIONS):
@@ -141,12 +141,12 @@ class ChainProblem:
         )
 
     def stored(self, natural: Array, tension: Array) -> float:
-        """Compute the energy [J] in all segments and series springs, from the low ends of laws."""
+        """Compute the energy [J] of segments and series springs from the lower bounds of laws."""
         spring = self._spring @ (tension**2 - self._rest**2) / 2.0
         return float(natural @ self._energy(tension) + spring)
 
     def potential(self, tension: Array) -> Array:
-        """Compute T (1 + ε) − ∫ T dε (S,) [N]: the work that brings wire under tension, per length.
+        """Compute T (1 + ε) − ∫ T dε (S,) [N]: the work per length that puts wire under tension T.
 
         Wire that moves from one segment to another dissipates the difference. To first order in the
         strain this is the difference of the tensions.
@@ -166,7 +166,7 @@ class ChainProblem:
         return base, softness
 
     def _energy(self, tension: Array) -> Array:
-        """Compute ∫ T dε (S,) [N] from the low ends of the laws."""
+        """Compute ∫ T dε (S,) [N] from the lower bounds of the laws."""
         energy = self._softness * tension**2 / 2.0
         for law, of in self._curved:
             T, (inside, rigidity) = tension[of], _within(law, tension[of])

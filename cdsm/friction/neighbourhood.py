@@ -1,4 +1,4 @@
-"""States of rest near a reference to first order: how far joints and tensions go in them."""
+"""States of rest near a reference, to first order: largest changes of joints and tensions."""
 
 from __future__ import annotations
 
@@ -11,16 +11,17 @@ from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.values import Array
 
 _NEAR = 1e-9
-"""Least neighbourhood [rad], [m] or [N]: that of an arm without friction is rounding."""
+"""Smallest neighbourhood [rad], [m] or [N], used if that of the arm is smaller or zero."""
 
 
 class Neighbourhood:
-    """States near a reference: ``room`` times those that are at rest to first order.
+    """States near a reference: ``room`` times the set of those at rest to first order.
 
     With the relative changes y_j = ΔT_j/F − ȳ of a cable about their mean over its wire, the wire
-    gives F ȳ = k Σ_j g_j·δ, with k the stiffness of the whole cable. Equilibrium becomes
-    K_θ δ = −Σ_j F y_j g_j with the frictionless K_θ. Each step of y at a hole is free within ±μ φ,
-    so any sum over y is largest where each step has its sign: a closed form.
+    gives F ȳ = k Σ_j g_j·δ, with k the stiffness of the whole cable. δ is the change of the joint
+    angles and g_j the gradient of the length of segment j. Equilibrium becomes K_θ δ = −Σ_j F y_j
+    g_j with the frictionless K_θ. At each hole y changes by any amount within ±μ φ, so a linear
+    form in y is largest with +μ φ or −μ φ at each hole: a closed form.
 
     Attributes:
         joints: Largest |δ| (nv,) [rad].
@@ -50,12 +51,12 @@ class Neighbourhood:
         self._set_tensions(apart, F[cable])
 
     def _set_tensions(self, apart: Array, F: Array) -> None:
-        """Set the bounds of tensions from those of |ln T/F| (S,); a rise exceeds a fall."""
+        """Set the bounds of tensions from bounds ``apart`` (S,) of |ln T/F|; rises exceed falls."""
         self.tensions = np.maximum(np.expm1(apart) * F, _NEAR)
         self.falls = np.minimum(np.maximum(apart * F, _NEAR), F)
 
     def still(self, K: Stiffness) -> Self:
-        """Return the states with the very angles of the reference: |ln T/F| is at most Σ μ φ."""
+        """Return the states with exactly the angles of the reference: |ln T/F| ≤ Σ μ φ."""
         segments = K.posture.segments
         chains, grip = segments.chains, np.zeros(len(segments.lengths))
         grip[chains.hole] = chains.friction * segments.wrap
@@ -72,12 +73,12 @@ class Neighbourhood:
     def curved(self, forms: Array) -> Array:
         """Compute a bound of |δᵀ A δ|/2 for quadratic forms A (…, nv, nv).
 
-        It is a sum over pairs of holes: joints that turn against each other cancel in each pair.
+        It is a sum over pairs of holes; in each pair, opposite joint motions cancel.
         """
         both = self._steps.T @ forms @ self._steps
         return np.asarray(abs(both).sum(axis=(-2, -1)) / 2.0)
 
     def cubed(self, form: Array) -> float:
-        """Compute a bound of |Σ A_ijk δ_i δ_j δ_k|/6 of a cubic form A (nv, nv, nv), likewise."""
+        """Compute a bound of |Σ A_ijk δ_i δ_j δ_k|/6 of a cubic form A (nv, nv, nv)."""
         first = np.tensordot(self._steps, form, (0, 0))
         return float(abs(self._steps.T @ first @ self._steps).sum()) / 6.0

@@ -1,9 +1,9 @@
 """Bounds of the remainders of a linear model of an arm in a neighbourhood of a posture.
 
-Sites turn with levers of at most r about the joints of their segment, across it by at most p, and
-a segment is nowhere shorter than m. Along a way that turns by σ in all, its length then has
-|l′′′| ≤ (3 r p²/m² + 3 r p/m + r) σ³. Its direction turns by p σ/m, with a second derivative of at
-most (2 p r/m² + p²/m² + r/m) σ².
+Let r be the largest distance of a segment's sites from the joints that change it, p the largest
+motion of the sites across the segment per turn, m its smallest length, and σ the sum of the turns.
+Then the third derivative of its length has |l′′′| ≤ (3 r p²/m² + 3 r p/m + r) σ³. Its direction
+turns by p σ/m, with a second derivative of at most (2 p r/m² + p²/m² + r/m) σ².
 """
 
 from __future__ import annotations
@@ -29,17 +29,17 @@ _ITERATIONS = 30
 
 
 class Remainders:
-    """Bounds of the remainders of the linear parts in the neighbourhood |δ| ≤ ρ.
+    """Bounds of the remainders of Taylor expansions in the neighbourhood |δ| ≤ ρ.
 
-    Joints that slide count as turns of ρ/r on the lever r, which moves points as far.
+    A prismatic joint counts as a rotation by ρ/r with the lever r, which moves points as far.
 
     Attributes:
-        length: of each segment, from its second-order expansion (S,) [m].
-        gradient: of each ∂l/∂θ (S, nv) [m/rad].
-        turn: of each wrap angle, from a constant (P,) [rad].
-        wrap: of each wrap angle, from its tangent (P,) [rad]; inf where it may vanish.
-        tip: of the displacement of the tip, from its third-order expansion [m].
-        body: of the torques of weight and wrench, from their second-order expansions (nv,) [N m].
+        length: Of the length of each segment, from its second-order expansion (S,) [m].
+        gradient: Of the gradient ∂l/∂θ of each length, from its tangent (S, nv) [m/rad].
+        turn: Of each wrap angle, from a constant (P,) [rad].
+        wrap: Of each wrap angle, from its tangent (P,) [rad]; inf where the angle may be zero.
+        tip: Of the displacement of the tip, from its third-order expansion [m].
+        body: Of the torques of weight and wrench, from their second-order expansions (nv,) [N m].
     """
 
     def __init__(self, K: Stiffness, within: Array) -> None:
@@ -84,7 +84,7 @@ class Remainders:
 
 
 class Bends:
-    """Derivatives of stiffnesses at a posture, by differences; their truncation is bounded.
+    """Second derivatives of the torques at a posture, by differences with a bounded error.
 
     Attributes:
         body: ∂²τ_i/∂θ_j∂θ_k (nv, nv, nv) [N m/rad²] of the torques τ of weight and wrench.
@@ -111,7 +111,7 @@ class Bends:
 
 
 def _body_remainders(K: Stiffness, within: Array, slides: NDArray[np.bool_]) -> tuple[float, Array]:
-    """Bound the remainders of the tip's way [m] and of the body torques (nv,)."""
+    """Bound the remainders of the tip displacement [m] and of the body torques (nv,) [N m]."""
     model, pose = K.posture.arm._model, K.posture
     masses, tree = model.masses, model.tree
     reach = float(np.linalg.norm(tree.translation, axis=1).sum()) + float(abs(pose.q) @ slides)

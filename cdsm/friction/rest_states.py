@@ -1,4 +1,4 @@
-"""All states of rest of an arm with friction near a reference, as a polyhedron that holds them.
+"""Polyhedron that contains all states of rest of an arm with friction near a reference.
 
 A state of rest near a reference has joint angles θ_0 + δ and segment tensions T with
 
@@ -7,18 +7,19 @@ A state of rest near a reference has joint angles θ_0 + δ and segment tensions
     exp(−μ φ_i(θ)) ≤ T_{j+1}/T_j ≤ exp(μ φ_i(θ))                      (friction at each hole)
 
 To first order in δ and ΔT this is a polyhedron, and the largest and smallest displacement of the
-tip in it are two linear programs. All that is left out, nonlinear laws included, is bounded in a
-neighbourhood |δ_i| ≤ ρ_i, |ΔT_j| ≤ ρ_T and added to the right-hand sides. The polyhedron then
+tip in it are two linear programs. All neglected terms, also those of nonlinear laws, are bounded in
+a neighbourhood |δ_i| ≤ ρ_i, |ΔT_j| ≤ ρ_T and added to the right-hand sides. The polyhedron then
 contains all states of rest in the neighbourhood (outer correction):
 
-- Sites turn with levers of at most r about the joints of their segment, across it by at most p,
-  and a segment is nowhere shorter than m. Then |l′′′| ≤ c = 3 r p²/m² + 3 r p/m + r per turn. With
-  σ = Σ ρ_i over its joints, l departs from its second-order expansion by at most c σ³/6, and
-  ∂l/∂θ_i from its tangent by c σ²/2.
-- δ is a sum of one motion per hole, so quadratic and cubic forms of δ are sums over two and three
+- Let r be the largest distance of a segment's sites from the joints that change it, p the largest
+  motion of the sites across the segment per turn, and m its smallest length. Then the third
+  derivative of its length per turn has |l′′′| ≤ c = 3 r p²/m² + 3 r p/m + r. With σ = Σ ρ_i over
+  its joints, l differs from its second-order expansion by at most c σ³/6, and ∂l/∂θ_i from its
+  tangent by at most c σ²/2.
+- δ is a sum of one motion per hole. So quadratic and cubic forms of δ are sums over two and three
   holes, bounded term by term: those of the lengths, of the torques of weight and wrench, and of the
-  way of the tip, whose expansions go on with the bounds of :mod:`~cdsm.friction.remainders`.
-- The wrap angles are tangent to their gradients, or constant, up to likewise bounds.
+  tip displacement. The remainders are bounded by :mod:`~cdsm.friction.remainders`.
+- The wrap angles are replaced by their tangents, or by constants, with bounded errors.
 - Over a range |ΔT| ≤ ρ_T of tensions, 1/(1 + ε) falls, and lies between two parallel lines.
 - Products of δ and ΔT are at most those of ρ and ρ_T.
 
@@ -44,11 +45,11 @@ from cdsm.support.validation import LARGEST
 from cdsm.support.values import Array, frozen
 
 _CELLS = 8192
-"""Intervals of tension in each of which a strain is only known to rise."""
+"""Number of tension intervals; within each, the strain is only known to increase."""
 
 
 class End(NamedTuple):
-    """Largest value over the polyhedron: as solved, as proved, and how near to its ρ it is."""
+    """Largest value over the polyhedron, solved and proved; largest |variable| over its bound."""
 
     value: float
     bound: float
@@ -56,7 +57,7 @@ class End(NamedTuple):
 
 
 class RestStates:
-    """The polyhedron of states of rest with |δ| ≤ ρ and |ΔT| ≤ ρ_T; ``near`` holds both.
+    """Polyhedron of states of rest with |δ| ≤ ρ and |ΔT| ≤ ρ_T; ``near`` contains ρ and ρ_T.
 
     The variables are δ/ρ, ΔT/ρ_T, and one slack per equation, whose bounds are the outer
     correction.
@@ -144,7 +145,7 @@ class RestStates:
         return frozen(np.maximum(np.array(bounds), 0.0))
 
     def load(self, u: Array) -> float:
-        """Compute the largest force [N] along u (3,) that some tensions balance; use ρ = 0."""
+        """Compute the largest force [N] along u (3,) that some tensions balance; requires ρ = 0."""
         from scipy.sparse import csc_array, hstack
 
         nv = self._near.joints.size
@@ -168,7 +169,7 @@ class RestStates:
         return widened._largest(np.append(np.zeros(self._low.size), 1.0)).bound
 
     def _largest(self, cost: Array) -> End:
-        """Maximize cost · x; the bound is that of the multipliers, by weak duality."""
+        """Maximize cost · x; the multipliers give the proved bound (weak duality)."""
         from scipy.optimize import linprog
 
         scale = float(abs(cost).max())
@@ -194,10 +195,10 @@ class RestStates:
 
 
 def _cone(K: Stiffness, near: Neighbourhood, far: Remainders, size: int) -> tuple[Any, Array]:
-    """Return the friction cone, A x ≤ b, of variables x (size,): T_{j+1} ≤ e^{μφ} T_j, and back.
+    """Return the friction cone A x ≤ b: T_{j+1} ≤ e^{μφ} T_j and T_j ≤ e^{μφ} T_{j+1}.
 
-    With ψ = μ (φ(θ) − φ_0), e^ψ ≤ 1 + ψ + ψ²/2 e^|ψ|. The linear part of ψ stands in A, where φ has
-    a tangent.
+    With ψ = μ (φ(θ) − φ_0), e^ψ ≤ 1 + ψ + ψ²/2 e^|ψ|. The linear part of ψ is in A if φ is
+    differentiable; otherwise b bounds it.
     """
     from scipy.sparse import csc_array
 

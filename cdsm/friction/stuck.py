@@ -1,4 +1,4 @@
-"""Stiffness of an arm whose cables stick in their holes, or slide in some of them."""
+"""Stiffness of an arm whose cables stick in all their holes, or slide in some of them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from cdsm.support.values import Array, frozen
 from cdsm.tension import Tension
 
 _RATIO = 1e-9
-"""Relative deviation of a ratio of tensions that is rounding."""
+"""Largest relative deviation of a ratio of tensions that counts as rounding."""
 
 _NO_WRENCH = frozen(np.zeros(6))
 
@@ -25,12 +25,13 @@ def stuck_stiffness(
 ) -> Stiffness:
     """Compute the stiffness while all cables stick: what a load below :func:`breakaway` measures.
 
-    Each segment between two holes is a spring k_j = EA(F)/a_j of its own, with the natural length
-    a_j of its wire: K_θ = Σ_j (F H_j + k_j g_j g_jᵀ) + gravity + load, with g_j = ∂l_j/∂θ and H_j
-    = ∂²l_j/∂θ². Lead, springs in series and motors of force behind a hole that holds do not count.
-    A hole without friction, or through which the cable goes straight, does not hold: its segments
-    are one spring. An arm without friction has the stiffness of :func:`~cdsm.stiffness`. With the
-    same tensions, the result minus this stiffness is positive semidefinite.
+    Each segment between two holes is a separate spring k_j = EA(F)/a_j with the natural length a_j:
+    K_θ = Σ_j (F H_j + k_j g_j g_jᵀ) + gravity + load, with g_j = ∂l_j/∂θ and H_j = ∂²l_j/∂θ². l_j
+    is the length of segment j. Lead, series spring and force-controlled motor have no effect if the
+    first hole sticks. A hole without friction, or through which the cable goes straight, cannot
+    stick: the segments on both sides are one spring. An arm without friction has the stiffness of
+    :func:`~cdsm.stiffness`. With the same tensions, the result minus this stiffness is positive
+    semidefinite.
 
     Arguments and errors are those of :func:`~cdsm.stiffness`. All segments of a cable have its
     tension, as after some shaking of the arm.
@@ -49,15 +50,16 @@ def sliding_stiffness(
 
     Segments that sliding holes join share their wire, and their tensions keep the ratio
     exp(±μ φ). K_θ = Σ_j (T_j H_j + g_j ∂T_j/∂θ) + gravity + load is not symmetric, and may be
-    softer than the frictionless stiffness in some joint motions. It holds as long as the same holes
-    slide in the same directions.
+    softer than the frictionless stiffness in some joint motions. It is valid as long as the same
+    holes slide in the same directions.
 
     Args:
         pose: The posture.
         tension: T (S,) [N] of the segments of :attr:`Posture.segments`, not negative; or F (C,) [N]
             at the actuators: the tensions beyond each sliding hole then follow from it.
-        sliding: One sign per hole of :attr:`Posture.segments`, (P,): 0 where the hole holds, 1
-            where the tension after it is the larger one by exp(μ φ), −1 where it is the smaller.
+        sliding: One sign per hole of :attr:`Posture.segments`, (P,): 0 where the cable sticks, 1
+            where the tension behind the hole is larger by the factor exp(μ φ), −1 where it is
+            smaller by this factor.
         wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m]; default zero.
 
     Raises:

@@ -96,9 +96,9 @@ SUMMARY = ("number that deviates most", "compared", "deviation", "paper", "compu
 
 
 def to_summary(figures: Sequence[Figure]) -> list[tuple[str, ...]]:
-    """Return one row of text per figure: the number that deviates most; :data:`SUMMARY` has heads.
+    """Return a row of text per figure: the number that deviates most; heads: :data:`SUMMARY`.
 
-    A deviation is relative to the largest of the paper's numbers of its claim.
+    A deviation is relative to the largest number of the paper in the same claim.
     """
     rows: list[tuple[str, ...]] = []
     for figure in figures:

@@ -1,8 +1,8 @@
 """Curves of stiffness of the virtual prototype, over Young's modulus or tension.
 
-Every number is computed in three readings: ``pseudoinverse`` with the stretched length as original
-length, as in the paper; ``pseudoinverse`` with the original length; and ``along`` with the original
-length, the stiffness that a small weight at the tip measures.
+Every number is computed in three ways ("readings"): ``pseudoinverse`` with the stretched length L
+instead of the original length l_0, as in the paper; ``pseudoinverse`` with l_0; and ``along`` with
+l_0, the stiffness that a small weight at the tip measures.
 """
 
 from __future__ import annotations
@@ -100,7 +100,7 @@ class StiffnessFigure(Figure):
 
 
 class Pair(NamedTuple):
-    """Curves of one case: with the stretched length (as in the paper), with the original one."""
+    """Curves of one case: with the stretched length (as in the paper) and the original length."""
 
     stretched: Curve
     original: Curve
@@ -109,7 +109,7 @@ class Pair(NamedTuple):
     def claim(
         self, measure: Callable[[Array, Array], Array], searched: str = KEPT, **texts: Any
     ) -> Claim:
-        """Build a claim from a measure of total stiffness and part, in the three readings."""
+        """Build a claim from a function of total stiffness and part, for the three readings."""
         paper, original = self.stretched, self.original
         return Claim(
             computed=floats(measure(paper.pseudoinverse, paper.pseudoinverse_part)),
@@ -157,5 +157,5 @@ def at_minimum(arm: Manipulator, q: Array, minimum: float) -> Stiffness:
 
 
 def readings(K: Stiffness) -> Array:
-    """Compute the diagonal of K_R and the stiffness for a small weight in x, y, z (2, 3) [N/m]."""
+    """Compute diagonal of K_R (row 0) and stiffness for a small weight (row 1), (2, 3) [N/m]."""
     return np.array([np.diag(K.pseudoinverse()), [K.along(axis) for axis in np.eye(3)]])

@@ -41,7 +41,7 @@ _PRINTED, _HALF = np.concatenate(EQ19_PRINTED), np.concatenate(HALF_UNITS)
 
 
 def least_bend() -> tuple[float, float]:
-    """Return dEA/dF [-] below and above 31 N of the continuous law whose slope changes least there.
+    """Return dEA/dF [-] below and above 31 N of the continuous law with the least change of slope.
 
     The slopes differ even with a free coefficient of F⁶: no law of these digits is smooth at 31 N.
     """
@@ -85,9 +85,9 @@ def _branches(rows: Array) -> tuple[Array, Array]:
 def _least(
     cost: Array, positive: Array, bounds: Sequence[tuple[float | None, float | None]]
 ) -> Array:
-    """Find the coefficients c (14,) with least cost·c so that positive·c ≥ 0, continuous at 31 N.
+    """Find the coefficients c (14,) of a law that minimise cost·c with positive·c ≥ 0.
 
-    ``bounds`` are those of d. A solution exists here.
+    The law is continuous at 31 N; ``bounds`` limit d. A solution exists for the printed digits.
     """
     lower, upper = _branches(powers(JOIN)[0])
     join = lower - upper

@@ -1,7 +1,7 @@
-"""Table II again with what Section V leaves out: friction, bearings, and a strand off Eq. 19.
+"""Fit of Table II with effects that Section V leaves out: friction, bearings, a softer strand.
 
-The tests hang a weight slowly on the shaken arm, so friction in the holes holds it at first. A
-bearing is a spring parallel to its joint: a pair of springs between the disks beside the joint. The
+The tests hang a weight slowly on the shaken arm, so cables stick in the holes at first. A bearing
+is a spring parallel to its joint: a pair of springs between the disks beside the joint. The
 rigidity of all cables is Eq. 19 times one factor, since they come from one spool.
 """
 
@@ -60,7 +60,7 @@ _PULLED = 1e-3  # elongation of the springs of a bearing [m]
 @final
 @dataclass(frozen=True, kw_only=True)
 class RoughPrototype:
-    """A prototype of Section V with what the paper leaves out.
+    """A prototype of Section V with friction, bearings and another rigidity of the strand.
 
     Attributes:
         prototype: The other parameters.
@@ -76,7 +76,7 @@ class RoughPrototype:
 
     @property
     def spring(self) -> float:
-        """Stiffness of each of both springs of a bearing [N/m]: 2 k R² is that of the bearing."""
+        """Stiffness k [N/m] of each of the two springs of a bearing, whose stiffness is 2 k R²."""
         return self.bearing / (2.0 * self.prototype.hole_radius**2)
 
     def arm(self) -> Manipulator:
@@ -107,10 +107,10 @@ class RoughPrototype:
         return arm.with_cables([*arm.cables, *springs])
 
     def weigh(self) -> list[LoadingPath]:
-        """Hang the weight of each entry of Table II, row by row.
+        """Compute the loading by the weight of each entry of Table II, row by row.
 
         Raises:
-            CdsmError: No tension balances the arm, or it finds no rest under a weight.
+            CdsmError: No tensions balance the arm, or no equilibrium is found under a weight.
         """
         pose = self.arm().at(POSTURE)
         return [
@@ -120,7 +120,7 @@ class RoughPrototype:
         ]
 
     def weigh_beside(self, paths: Sequence[LoadingPath]) -> Array:
-        """Compute the tips (15, 3) [m] to first order beside a prototype with these paths."""
+        """Compute the tips (15, 3) [m] to first order from the paths of a similar prototype."""
         pose = self.arm().at(POSTURE)
         tensions = np.repeat(self._tensions(pose), 3, axis=0)
         pairs = zip(paths, tensions, strict=True)
@@ -137,7 +137,7 @@ class RoughPrototype:
         return np.asarray(((weights**2).sum(axis=1) / work).reshape(5, 3))
 
     def _tensions(self, pose: Posture) -> Array:
-        """Distribute the tensions (5, C) [N] of each row; both springs of a bearing balance."""
+        """Distribute the tensions (5, C) [N] of each row; springs of a bearing cause no torque."""
         names = pose.arm.cables.names
         springs = [c for c, name in enumerate(names) if name.startswith("bearing")]
         fixed = dict[str, float]()
@@ -158,7 +158,7 @@ class RoughPrototype:
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class RoughFit:
-    """The prototype that explains Table II best with added parameters.
+    """The prototype with added parameters that explains Table II best.
 
     Attributes:
         prototype: Identified parameters.
@@ -174,9 +174,9 @@ class RoughFit:
 def identify_rough_prototype(added: Sequence[str] = tuple(ADDED)) -> RoughFit:
     """Fit Table II as printed with friction, bearings and a factor on Eq. 19 as parameters.
 
-    Searched are the 11 dimensions, weights and the tension offset that Table II depends on, within
-    :data:`~cdsm.paper.BOUNDS`, and those of :data:`ADDED` that are named. The tensions of the rows
-    are even. With all three, 14 parameters serve 15 numbers.
+    The search varies the 11 parameters on which Table II depends (dimensions, weights, tension
+    offset), within :data:`~cdsm.paper.BOUNDS`, and the named parameters of :data:`ADDED`. The
+    tensions of the rows are even. With all three, 14 parameters are fitted to 15 numbers.
 
     Raises:
         UnknownName: A name is not in :data:`ADDED`.

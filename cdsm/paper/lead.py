@@ -2,8 +2,8 @@
 
 The lead is the straight cable between its actuator and the base disk. With EA constant, tension
 has two effects. The active stiffness softens the arm. The original length l_0 of a locked wire is
-shorter than the cable, which stiffens the arm: EA/l_0 = (EA + F)/L. Only this effect depends on
-the cable length, hence on the lead. The paper takes l_0 = L and has the first effect only.
+shorter than the cable, which stiffens the arm: EA/l_0 = (EA + F)/L. Only the second effect depends
+on the cable length, hence on the lead. The paper takes l_0 = L and has only the first effect.
 """
 
 from __future__ import annotations

@@ -112,8 +112,8 @@ class Prototype:
         """Compute stiffness (N, 3) [N/m] along x, y, z at N reported tensions [N].
 
         Raises:
-            CdsmError: No tension of the position-controlled cables balances the arm, or it leaves
-                the domain of their law, or the arm is unstable.
+            CdsmError: No tensions of the position-controlled cables balance the arm, a tension
+                leaves the domain of its law, or the arm is unstable.
         """
         return self._measured(pose, tensions, np.zeros((3, 3)))
 
@@ -121,7 +121,7 @@ class Prototype:
         """Compute force over displacement (N, 3) [N/m] with the weights of Table II.
 
         Raises:
-            CdsmError: The reasons of :meth:`measure`, also with the weights hung.
+            CdsmError: As for :meth:`measure`, without or with the weights.
         """
         return self._measured(pose, tensions, self.weights)
 

@@ -63,7 +63,7 @@ START, UNEVEN_START, TABLE_START = (
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Step:
-    """One reading of Section V.
+    """One interpretation of Section V: its numbers and the free parameters.
 
     Attributes:
         label: Name in tables and figures.
@@ -81,7 +81,7 @@ class Step:
 
     @property
     def numbers(self) -> tuple[str, ...]:
-        """Names of the numbers to explain."""
+        """Names of the numbers of the paper to which the prototype is fitted."""
         return NAMES[: TABLE_II.size] if self.table_alone else NAMES
 
     @property
@@ -116,7 +116,7 @@ STEPS: Final = (
         table_alone=True,
     ),
 )
-"""Readings of Section V. Each has more freedom than the one before. A good fit proves none."""
+"""Interpretations of Section V, each freer than the previous. A good fit proves none of them."""
 
 
 @final
@@ -125,7 +125,7 @@ class PrototypeFit:
     """The prototype that explains the numbers best, with its residuals.
 
     Attributes:
-        step: Reading of Section V.
+        step: Interpretation of Section V.
         prototype: Identified parameters.
         predicted: Numbers of Section V for the identified prototype.
         residuals: Residuals of :meth:`Predicted.residuals`, in the order of ``step.numbers``.
@@ -201,7 +201,7 @@ identified = cache(identify_prototype)
 """Function :func:`identify_prototype` that keeps its results."""
 
 section_v_claim = partial(Claim, searched="all parameters of the prototype")
-"""Make a :class:`Claim` of Section V. Measured with weights, it has one reading only."""
+"""Make a :class:`Claim` of Section V. It is measured with weights, so it has one number only."""
 
 
 @final

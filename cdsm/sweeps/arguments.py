@@ -59,7 +59,7 @@ class Choice(Generic[_Values]):
 def laws_of(
     elasticity: Elasticity | Mapping[str, Elasticity] | None,
 ) -> Choice[tuple[Elasticity | None, ...]]:
-    """Check the elasticities; each is used for all cables, None keeps those of the arm."""
+    """Check the elasticities; each is used for all cables; None keeps the arm's own laws."""
     if elasticity is None or isinstance(elasticity, Elasticity):
         return Choice("elasticity", (elasticity,), None)
     if not isinstance(elasticity, Mapping) or not all(

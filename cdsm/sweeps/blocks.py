@@ -13,8 +13,8 @@ Block = Mapping[str, slice]
 def extents(poses: Mapping[str, int], most: int) -> dict[str, int]:
     """Return the size of a block along each dimension: at most ``most`` postures, at least one.
 
-    A block takes the last dimensions completely, a part of the dimension before, and one entry of
-    all others. So the blocks cover all postures in order without gaps.
+    A block takes the last dimensions completely, a part of the dimension in front of them, and one
+    entry of all others. So the blocks cover all postures in order without gaps.
     """
     room, extent = most, {}
     for dim, size in reversed(list(poses.items())):

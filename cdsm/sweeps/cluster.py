@@ -37,7 +37,7 @@ def checked_client(client: object) -> None:
 def on_cluster(
     client: Client, specification: Specification, blocks: Iterable[Block]
 ) -> Iterator[tuple[Block, BlockResult | None]]:
-    """Yield each block, when it is computed, with its result; None if its workers died.
+    """Yield each block and its result as soon as it is computed; None if its workers died.
 
     If a worker dies, dask gives its blocks to other workers, at most ``allowed-failures`` times.
     Then dask gives up, also for blocks that only waited on the worker. So each of these blocks is

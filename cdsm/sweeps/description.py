@@ -1,4 +1,4 @@
-"""Arm and laws of elasticity as texts, so that a Dataset tells from which arm it comes."""
+"""Arm and laws of elasticity as texts, which a Dataset stores to identify its arm."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def law_text(law: Elasticity) -> str:
 
 
 def changed_laws(one: str, other: str) -> tuple[str, ...]:
-    """Return the classes of laws whose digest changed; empty if the texts differ in more."""
+    """Return the classes of laws of which only the digest changed; empty if more differs."""
     if _SAMPLED.sub(r"\1 \2", one) != _SAMPLED.sub(r"\1 \2", other):
         return ()
     pairs = zip(_SAMPLED.findall(one), _SAMPLED.findall(other), strict=True)

@@ -9,7 +9,7 @@ CASES: Final = ("elasticity", "wrench", "minimum")
 """Dimensions of the cases; each exists only if several values of the argument are given."""
 
 STAGES: Final = ("pose", "tension", "joint", "tip", "matrix", "principal")
-"""Conditions for a quantity to exist; each needs those before it, but principal needs no matrix."""
+"""Conditions for a quantity to exist. Each needs all earlier ones; principal needs no matrix."""
 
 
 @final
@@ -31,7 +31,7 @@ class Quantity:
 
     @property
     def cases(self) -> tuple[str, ...]:
-        """Return those arguments of a sweep, of :data:`CASES`, on which the quantity depends."""
+        """Return the dimensions of :data:`CASES` on which the quantity depends."""
         return {"pose": (), "tension": CASES[1:]}.get(self.stage, CASES)
 
 
@@ -104,7 +104,7 @@ QUANTITIES: Final[dict[str, Quantity]] = {
 DIRECTIONAL: Final = frozenset(
     name for name, each in QUANTITIES.items() if "direction" in each.dims
 )
-"""Quantities that belong to directions."""
+"""Names of the quantities that have a value for each direction."""
 
 DEFAULT: Final = ("tip_position", "along", "margin", "softest", "stiffest", "anisotropy")
-"""Default outputs; maps are drawn from them."""
+"""Default outputs, which the maps need."""

@@ -32,7 +32,7 @@ _AXES = ("x", "y", "z")
 _STATUS = Quantity("what became of the entry", "1", "joint")
 
 _OF_SLIDES = {"N m": "N", "N m rad-1": "N m-1"}
-"""Units of torque and joint stiffness for joints that turn, and for joints that slide."""
+"""Units of torque and joint stiffness: of revolute joints, and the same of prismatic joints."""
 
 EMPTY = {"status": np.int8(SweepStatus.PENDING)}
 """Initial value of ``status``; the initial value of all outputs is NaN."""
@@ -59,7 +59,7 @@ class Specification:
         return (*self.task.outputs, "status")
 
     def dims(self, name: str) -> tuple[str, ...]:
-        """Return the dimensions of an output or of ``status``: poses, cases, its own."""
+        """Return the dimensions of an output or ``status``: of poses, of cases, of the quantity."""
         quantity = QUANTITIES.get(name, _STATUS)
         wanted = (*self.poses.sizes, *quantity.cases, *quantity.dims)
         return tuple(dim for dim in wanted if dim in self.frame.sizes)

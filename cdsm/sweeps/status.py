@@ -1,4 +1,4 @@
-"""Status of the entries of a sweep, and the quantities that each status loses."""
+"""Status of the entries of a sweep, and the quantities that do not exist for each status."""
 
 from __future__ import annotations
 
