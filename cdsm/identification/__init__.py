@@ -1,4 +1,4 @@
-"""Identification of the parameters of an arm from stiffnesses and loops measured on the arm."""
+"""Identification of the parameters of an arm from measured stiffnesses and loading loops."""
 
 from cdsm.identification.arm_parameters import ArmParameters
 from cdsm.identification.experiment import plan_experiment

@@ -21,9 +21,9 @@ class _Kind(NamedTuple):
 
     Attributes:
         unit: Unit in which people read it.
-        size: That unit in SI.
-        part: ``joints``, ``links`` or ``cables`` of the geometry, if that holds it.
-        attribute: Its name there.
+        size: Size of ``unit`` in SI.
+        part: ``joints``, ``links`` or ``cables``: the part of the geometry that has it, if any.
+        attribute: Its name in this part.
     """
 
     unit: str
@@ -47,22 +47,22 @@ KINDS: Final = {
 
 @final
 class ArmParameters:
-    """Arm as a function of some of its parameters, as :func:`identify` wants it.
+    """Arm as a function of some of its parameters; a ``model_of`` for :func:`identify`.
 
-    A parameter is that of all joints or links, or of one, counted from the base: ``"hole_radius"``,
-    ``"hole_radius@2"``. ``lead``, ``friction``, ``rigidity`` and ``spring`` with a number are those
-    of the cables of that joint. ``friction`` is μ, ``rigidity`` a factor on the EA of the arm's
+    A parameter belongs to all joints or links (``"hole_radius"``), or to one, counted from the base
+    (``"hole_radius@2"``). ``lead``, ``friction``, ``rigidity`` and ``spring`` with a number belong
+    to the cables of that joint. ``friction`` is μ, ``rigidity`` a factor on the EA of the arm's
     laws [-], ``spring`` the stiffness in series with each cable [N/m], the others are in SI. Names
     with @ are given as ``parameters(**{"hole_radius@2": 0.025})``.
 
     Args:
-        arm: The arm; what is not named stays as it is.
+        arm: The arm; parameters that are not named keep their values.
         names: Names of the parameters, in any order.
 
     Raises:
         UnknownName: There is no such parameter.
-        InvalidInput: The arm has no such joint or no geometry, or a name is given twice, or as a
-            whole and of one joint.
+        InvalidInput: The arm has no such joint or no geometry, or a name is given twice, or both
+            for all joints and for one joint.
     """
 
     def __init__(self, arm: Manipulator, names: Iterable[str]) -> None:
@@ -164,7 +164,7 @@ class ArmParameters:
 
 
 def _joints_of(geometry: Geometry, part: str) -> list[int]:
-    """Return the number of the joint of each joint, link or cable."""
+    """Return the joint number to which each joint, link or cable of the geometry belongs."""
     if part == "cables":
         return [route.joint for route in geometry.cables]
     return list(range(1, len(geometry.joints) + 1))

@@ -1,10 +1,11 @@
 """Optimal design of experiments: which tests determine parameters best, and how far from best.
 
-Test i has the information M_i = J_iᵀ J_i, with its derivatives J_i by the parameters in standard
-deviations. Tests made n_i times determine the parameters with the covariance C = (M_0 + Σ n_i
-M_i)⁻¹, M_0 of what is known before. For the wanted rows L of parameters, a design is judged by
-f = det(L C Lᵀ)^(−1/s) (D, s wanted) or f = 1/tr(L C Lᵀ) (A). Both are concave and homogeneous in
-the information, so no design of N tests has a larger f than
+Test i has the information M_i = J_iᵀ J_i. J_i are the derivatives of its readings, in standard
+deviations, with respect to the parameters. Tests made n_i times determine the parameters with the
+covariance C = (M_0 + Σ n_i M_i)⁻¹, where M_0 is the prior information. L (s, r) selects the s
+wanted parameters. The criterion of a design is f = det(L C Lᵀ)^(−1/s) (D-optimal) or f = 1/tr(L C
+Lᵀ) (A-optimal). Both are concave and homogeneous in the information, so no design of N tests has a
+larger f than
 
     f · (tr M_0 G + N max_i tr M_i G) / tr M G,   G = C Lᵀ (L C Lᵀ)⁻¹ L C (D) or C Lᵀ L C (A):
 
@@ -26,7 +27,7 @@ Criterion = Literal["D", "A"]
 _ITERATIONS = 2000  # steps that find shares, at most
 
 _OPTIMAL = 0.999
-"""Proved efficiency that ends the search of shares."""
+"""Proved efficiency at which the search for shares ends."""
 
 _GAIN = 1e-9
 """Smallest gain of ln f that is worth an exchange."""
@@ -37,7 +38,7 @@ class Design(NamedTuple):
 
     Attributes:
         information: M_i (n, r, r) of each candidate.
-        known: M_0 (r, r) of what is known before.
+        known: M_0 (r, r), the prior information.
         wanted: L (s, r).
         criterion: ``"D"`` or ``"A"``.
         tests: Number N of tests.

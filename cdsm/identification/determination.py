@@ -1,4 +1,4 @@
-"""Determination by measurements: rank, covariance, correlation, undetermined combinations."""
+"""Which parameters measurements determine: rank, covariance, undetermined combinations."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from cdsm.support.values import Array, frozen
 
 @dataclass(frozen=True, eq=False)
 class Determination:
-    """Linear analysis of measurements.
+    """Linear analysis of which parameters measurements determine.
 
     Attributes:
         names: Names of the parameters (P,).
@@ -35,7 +35,7 @@ class Determination:
 
     @cached_property
     def covariance(self) -> Array:
-        """Covariance (JᵀJ)⁻¹ (P, P); an undetermined parameter has infinite variance."""
+        """Covariance (JᵀJ)⁻¹ (P, P); undetermined parameters have infinite variance."""
         values, right = self._svd
         inner = right[self.determined].T / values[self.determined]
         covariance = inner @ inner.T / np.outer(self._column_norms, self._column_norms)
@@ -58,12 +58,12 @@ class Determination:
 
     @property
     def dependent(self) -> Any:
-        """One parameter per undetermined combination. Holding these determines the others."""
+        """One parameter per undetermined combination; if they are fixed, all are determined."""
         return qr(self._null, mode="r", pivoting=True)[1][: len(self._null)]
 
     @property
     def coordinates(self) -> Array:
-        """Matrix (P, rank) from coordinates of all that is determined to parameters."""
+        """Matrix (P, rank) from coordinates of the determined combinations to the parameters."""
         scaled = self._svd[1][self.determined].T
         return np.asarray(scaled / self._column_norms[:, None])
 
@@ -100,7 +100,7 @@ class Determination:
 
     @cached_property
     def determined(self) -> Any:
-        """Whether each singular value counts."""
+        """Whether each singular value is above rounding, so that its combination is determined."""
         values = self._svd[0]
         return values > RANK_TOLERANCE * max(values[0], RANK_TOLERANCE)
 

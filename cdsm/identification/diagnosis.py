@@ -20,7 +20,7 @@ _UNLIKELY = 1e-3
 
 
 _LEFT = 1e-2
-"""Fall of χ² that is left by a search with loops: their kinks end it a tenth of a σ early."""
+"""Fall of χ² that a search with loops may miss: their kinks end it a tenth of a σ early."""
 
 
 def warnings_of(result: Identification) -> list[str]:

@@ -56,12 +56,14 @@ def plan_experiment(
 ) -> ExperimentPlan:
     """Choose the weight tests that determine parameters of an arm best; see :func:`identify`.
 
-    Each posture, direction and weight is a candidate: a :class:`WeightLoop` from no force to the
-    weight and back. The plan says how often to make which, by a D- or A-optimal design: it makes
-    det C (the volume of the confidence region) or tr C (the sum of relative variances) of the
-    wanted parameters least. A proved bound tells how much better any other plan could be.
+    Each combination of posture, direction and weight is a candidate: a :class:`WeightLoop` from
+    zero force to the weight and back. The plan gives the number of repetitions of each candidate.
+    It minimises det C (D-optimal: the volume of the confidence region) or tr C (A-optimal: the sum
+    of relative variances) of the covariance C of the wanted parameters. A proved bound limits how
+    much better any other plan could be.
 
-    The derivatives are those at the expected values. If the arm turns out otherwise, plan again.
+    The derivatives are those at the expected values. If the identified values differ much, plan
+    again.
 
     Args:
         model_of: Function that builds the arm from the parameters, as for :func:`identify`.
@@ -70,19 +72,20 @@ def plan_experiment(
         directions: Directions of the weights: names of axes, or (n, 3) in base axes.
         weights: Largest forces of the loops (n,) [N].
         minimum: Lower bound of the tensions before the test [N], one number or (C,).
-        tests: Number of loops that will be made, repetitions included.
+        tests: Total number of loops, repetitions included.
         displacement_std: Standard deviation of a reading along the weight [m].
         force_std: Standard deviation of a force [N].
         tension_std: Standard deviation of each tension [N].
-        steps: Steps from no force to the largest.
-        wanted: Names of the parameters that matter; the others only have to be told apart from
-            them. Default: all.
-        known: Standard deviations of parameters that are known before [own unit].
+        steps: Number of steps from zero force to the largest.
+        wanted: Names of the parameters to determine well; the others are unknown, but their
+            uncertainty does not count. Default: all.
+        known: Prior standard deviations of known parameters, by name, in the parameter's unit.
         criterion: ``"D"`` or ``"A"``.
         progress: Show a bar on the standard error, if that is a terminal.
 
     Raises:
-        InvalidInput: An argument is invalid, or no candidate works, or determines what is wanted.
+        InvalidInput: An argument is invalid, or no candidate can be tested, or none determines the
+            wanted parameters.
         UnknownName: ``model_of`` does not take a parameter; or ``wanted`` or ``known`` names none.
     """
     noise = (displacement_std, force_std, tension_std)
@@ -110,7 +113,7 @@ def plan_tests(
     criterion: Criterion = "D",
     progress: bool = True,
 ) -> ExperimentPlan:
-    """Choose among any loops as :func:`plan_experiment` does; their labels differ."""
+    """Choose among given loops as :func:`plan_experiment` does; their labels must differ."""
     values = _checked_parameters(parameters)
     check_call("model_of", model_of, 0, tuple(values))
     one_of("criterion", criterion, ("D", "A"))
@@ -255,7 +258,7 @@ def _named(u: Array) -> str:
 def _rows(
     model_of: Callable[..., Manipulator], values: dict[str, float], loop: WeightLoop
 ) -> Array:
-    """Compute the derivatives (m, P) of a loop by relative parameters, in standard deviations."""
+    """Compute ∂r/∂ln p (m, P) of a loop: residuals r in standard deviations, parameters p."""
     exact = loop.simulated(Model.of(model_of, None, (loop,)).arm(values))
     model = Model.of(model_of, None, (exact,)).weighted(values)
     columns = []

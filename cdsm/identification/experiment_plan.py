@@ -36,15 +36,17 @@ class ExperimentPlan(ReadOnlyState):
         wanted: Names of the parameters that matter.
         criterion: ``"D"`` or ``"A"``.
         candidates: The candidates that can be tested.
-        counts: How often to make each (n,).
-        even: How often an evenly spaced choice of as many tests makes each (n,).
-        jacobians: Derivatives (n, P) [-] of the readings of each candidate by relative parameters,
-            in standard deviations.
-        known: Rows (P, P) [-] of what is known before: 1/σ of relative parameters on the diagonal.
-        efficiency: Proved lower bound of f/f_best [-], 1 for the best plan; variances relative to
-            those of the best plan are at most 1/efficiency, in the mean of the criterion. 0 if the
-            tests are too few to determine what is wanted.
-        sensitivities: What one more test of a candidate would add, over the most useful (n,) [-].
+        counts: Number of repetitions of each candidate (n,).
+        even: Repetitions (n,) in a reference plan: as many tests, evenly spaced over the
+            candidates.
+        jacobians: Derivatives [-] of the readings of each candidate, in standard deviations, with
+            respect to relative parameters: (m, P) each, for m readings.
+        known: Prior knowledge (P, P) [-]: 1/σ of relative parameters on the diagonal.
+        efficiency: Proved lower bound of f/f_best [-], 1 for the best plan; f is the criterion. The
+            variances, averaged as in the criterion, are at most 1/efficiency times those of the
+            best plan. 0 if the tests are too few to determine what is wanted.
+        sensitivities: Gain of one more test of each candidate, relative to the largest gain (n,)
+            [-].
         open_combinations: Combinations of relative parameters that no candidate determines.
         failures: Label and reason of each candidate that cannot be tested.
     """
@@ -71,7 +73,7 @@ class ExperimentPlan(ReadOnlyState):
 
     @property
     def even_tests(self) -> tuple[WeightLoop, ...]:
-        """As many loops, evenly spaced over the candidates."""
+        """The loops of the reference plan: as many, evenly spaced over the candidates."""
         pairs = zip(self.candidates, self.even.tolist(), strict=True)
         return tuple(loop for loop, count in pairs for _ in range(count))
 
@@ -82,7 +84,7 @@ class ExperimentPlan(ReadOnlyState):
 
     @cached_property
     def even_std(self) -> Array:
-        """Standard deviation to expect from the evenly spaced tests (P,) [m, kg, N/m, …]."""
+        """Standard deviations to expect from ``even_tests`` (P,) [m, kg, N/m, …]."""
         return self._std(self.even)
 
     @property
@@ -92,7 +94,7 @@ class ExperimentPlan(ReadOnlyState):
 
     @property
     def factors(self) -> dict[str, float]:
-        """Width of the intervals of the evenly spaced tests over that of the plan, if wanted."""
+        """Interval width with ``even_tests`` over that of the plan [-], by wanted parameter."""
         found = zip(self.names, self.even_std, self.std, strict=True)
         return {
             name: float(even / std) if math.isfinite(std) else math.nan

@@ -49,15 +49,15 @@ class LowerOptimumError(Exception):
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Profile(ReadOnlyState):
-    """Profile of one parameter: least χ² with the parameter held, over the held value.
+    """Profile of one parameter: least χ² with the parameter fixed, as a function of its value.
 
     Attributes:
-        values: Held values of the parameter (n,) [m, N/m, …], rising, in the unit of ``model_of``.
-        rise: Δχ² (n,) [-]: least χ² with the parameter held, less the least χ² of all.
-        slope: Derivative of Δχ² by the value (n,) [1/m, m/N, …].
+        values: Fixed values of the parameter (n,) [m, N/m, …], rising, in the unit of ``model_of``.
+        rise: Δχ² (n,) [-]: least χ² with the parameter fixed, minus the least χ² of all.
+        slope: Derivative of Δχ² with respect to the value (n,) [1/m, m/N, …].
         best: Index of the optimum in ``values``.
-        ends: Reasons why the profile ends, downward and upward: ``""`` (no interval needs more),
-            ``"bound"``, or the error of the model.
+        ends: Reasons why the profile ends, downward and upward: ``""`` (Δχ² is large enough for all
+            intervals), ``"bound"``, or the error of the model.
         bounds: Bounds of the parameter (2,) [m, N/m, …].
     """
 
@@ -87,14 +87,14 @@ class Profile(ReadOnlyState):
 
 
 def _crossing(u: Array, height: Array, slope: Array, rise: float) -> float:
-    """Find where the cubic with given heights and slopes at two places (2,) reaches a rise."""
+    """Find u at which the cubic with given values and slopes at u[0] and u[1] equals ``rise``."""
     width = u[1] - u[0]
     cubic = CubicHermiteSpline((0.0, 1.0), height - rise, width * slope)
     return float(u[0] + width * brentq(cubic, 0.0, 1.0, xtol=1e-12))
 
 
 class _Knot(NamedTuple):
-    """Point on a profile, with derivatives by the coordinate u of the held parameter."""
+    """Point on a profile, with derivatives with respect to u, the fixed parameter in 0…1."""
 
     point: Array  # in the unit cube (P,)
     rise: float  # Δχ² [-]
@@ -111,10 +111,10 @@ class Profiler:
         problem: The least-squares problem.
         best: The optimum (P,), in the unit cube.
         jacobian: ∂r/∂point (n, P) at the optimum.
-        i: Index of the held parameter.
+        i: Index of the fixed parameter.
         others: Indices of the parameters that are fitted again.
         exact: Values of Δχ² where the profile must be exact, rising.
-        far: Largest Δχ² of the profile, above all in ``exact``.
+        far: Largest Δχ² of the profile, above all values in ``exact``.
     """
 
     problem: LeastSquares
@@ -126,7 +126,7 @@ class Profiler:
     far: float
 
     def profile(self) -> Profile:
-        """Compute the profile to both sides. Raise LowerOptimumError if χ² is below the least."""
+        """Compute the profile on both sides; raise LowerOptimumError if it finds a lower χ²."""
         (down, first), (up, last) = self._follow(-1), self._follow(1)
         knots = [*reversed(down), *up[1:]]
         box = Box(self.problem.box.bounds[[self.i]])
@@ -154,7 +154,7 @@ class Profiler:
         return knots, ""
 
     def _next(self, here: _Knot, side: Side, goal: float) -> _Knot | str:
-        """Compute a knot farther out, near where Δχ² reaches a goal, or the reason for none."""
+        """Compute a knot farther out, near where Δχ² reaches a goal; without one, the reason."""
         u = float(here.point[self.i])
         room = 1.0 - u if side > 0 else u
         if room == 0.0:
@@ -186,7 +186,7 @@ class Profiler:
             knots.insert(last + 1, between)
 
     def _moved(self, here: _Knot, step: float) -> _Knot | str:
-        """Compute the knot one step along the tangent, or the reason why the model has none."""
+        """Compute the knot after one step along the tangent, or the reason why there is none."""
         problem, others = self.problem, self.others
         point = np.clip(here.point + step * here.tangent, 0.0, 1.0)
         if (failure := problem.failure(point)) is not None:

@@ -70,8 +70,8 @@ class LeastSquares:
         residuals_of: Function from parameters by name to r (n,). May raise :class:`NoModelError`.
         count: Number n of residuals.
         bounds: (low, high) of each parameter.
-        beside: Function from two sets of parameters to r (n,) at the second, if that is faster so
-            near the first; exact to first order in the distance.
+        beside: Faster function for differences, or None: from two near sets of parameters to r (n,)
+            at the second, exact to first order in their distance.
     """
 
     def __init__(
@@ -89,7 +89,7 @@ class LeastSquares:
 
     @property
     def followed(self) -> bool:
-        """Whether residuals beside a point are followed to first order."""
+        """Whether residuals near a point come from ``beside``, exact to first order only."""
         return self._beside is not None
 
     def parameters(self, point: Array) -> dict[str, float]:
@@ -126,8 +126,8 @@ class LeastSquares:
     ) -> Array:
         """Compute ∂r/∂point (n, P) by one-sided or central differences.
 
-        If ``over`` is given, only its columns are computed. Near a bound or an end of the model,
-        central differences become one-sided differences of second order.
+        If ``over`` is given, only its columns are computed. Near a bound, or where the model ceases
+        to exist, central differences become one-sided differences of second order.
         """
         chosen = range(len(self.names)) if over is None else over
         return np.column_stack([self._column(point, i, central) for i in chosen])

@@ -1,4 +1,4 @@
-"""Loops of a weight test: loads hung and taken off again, and the motion of the tip."""
+"""Loops of a weight test: forces applied and removed again, and the motion of the tip."""
 
 from __future__ import annotations
 
@@ -26,11 +26,12 @@ from cdsm.tension import distribute_tension
 @final
 @dataclass(frozen=True, kw_only=True)
 class WeightLoop:
-    """Loop of a weight test: forces hung and taken off again, and readings of the tip.
+    """Loop of a weight test: forces applied and removed again, and readings of the tip.
 
-    The arm is shaken at the posture, so that one tension is left in all of a cable, and its motors
-    are locked. Then the forces act one after the other, as in :func:`~cdsm.load_cycle`. A reading
-    is the position of the tip along the direction, or in x, y and z. Its zero does not matter.
+    The arm is shaken at the posture, so that each cable has one tension along its length, and its
+    motors are locked. Then the forces act one after the other, as in :func:`~cdsm.load_cycle`. A
+    reading is the position of the tip along the direction, or in x, y and z. Its offset does not
+    matter.
 
     Attributes:
         direction: Direction of the forces: an axis such as ``"-z"``, kept as its vector, or (3,) in
@@ -101,7 +102,7 @@ class WeightLoop:
 
     @property
     def informative(self) -> int:
-        """Number of readings, less one for the zero of each axis."""
+        """Number of readings minus one for the unknown offset of each axis."""
         return (len(self.forces) - 1) * len(self.axes)
 
     @property
@@ -148,15 +149,16 @@ def measured(measurement: Measurement | WeightLoop) -> Array:
 
 
 class Weights:
-    """Weights of the readings of a loop; the zero of each axis is unknown.
+    """Weights of the readings of a loop; each axis has an unknown offset.
 
-    With the covariance V of the readings and Z, which adds a zero to each axis, χ² is the least of
-    (e + Z z)ᵀ V⁻¹ (e + Z z) over z. It is |R e|² with the symmetric root R of the matrix of that
-    quadratic form, so an entry of R e is the residual of its reading in standard deviations.
+    e are the errors predicted − measured, V their covariance, and Z z adds the offset z of each
+    axis. χ² is the least (e + Z z)ᵀ V⁻¹ (e + Z z) over all z. It is |R e|² with the symmetric root
+    R of the matrix of that quadratic form, so an entry of R e is the residual of its reading in
+    standard deviations.
 
     Attributes:
         root: R (m, m) [1/m] for the m readings, axis by axis within each force.
-        zero: Matrix (k, m) that gives the zeros −z of errors e.
+        zero: Matrix (k, m) that gives the offsets −z (k,) from errors e (m,).
     """
 
     def __init__(self, covariance: Array, axes: int) -> None:

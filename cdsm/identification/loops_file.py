@@ -46,7 +46,7 @@ def read_loops(
     - ``direction``: of the forces, an axis such as ``-z``.
     - ``force [N]``: along the direction, 0 where nothing hangs.
     - ``displacement [mm]`` along the direction, or ``x [mm]``, ``y [mm]`` and ``z [mm]``; [um] or
-      [m]. Any zero. Left out, the tests are planned and not yet made.
+      [m]. Any offset. Without these columns the tests are planned, not yet made.
     - The cables of the arm, ``cable1_1 [N]``: their tensions before the first force; or
       ``minimum [N]``, the lower bound from which they are distributed.
 
@@ -184,7 +184,7 @@ class _Reader:
         return row[1][column.at] if column.at < len(row[1]) else ""
 
     def _same(self, rows: list[tuple[int, list[str]]], column: _Column) -> str:
-        """Return the cell of the first row, which all others repeat or leave empty."""
+        """Return the cell of the first row; raise FileError if another row has a different one."""
         first = self._cell(rows[0], column)
         for row in rows[1:]:
             if self._cell(row, column) not in (first, ""):

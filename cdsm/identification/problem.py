@@ -27,13 +27,13 @@ from cdsm.tension import Tension, distribute_tension
 Parameters = dict[str, float]
 
 _STEP = 1e-4
-"""Difference of a tension [N] that gives the derivative of a loop by it."""
+"""Step of a tension [N] for the derivative of a loop with respect to it."""
 
 _KEPT = 8  # sets of parameters whose loops are kept
 
 
 class UserFaultError(Exception):
-    """Wraps the :class:`InvalidInput` for a user-defined function that fails."""
+    """Error that carries the :class:`InvalidInput` of a user-defined function that fails."""
 
 
 @dataclass(frozen=True)
@@ -83,8 +83,10 @@ class Model:
     def weighted(self, parameters: Parameters) -> Model:
         """Return the same model with all errors of loops in its weights, as at some parameters.
 
-        V = σ² 1 + σ_f² A Aᵀ + σ_F² B Bᵀ of the readings, with their derivatives A by the forces and
-        B by the tensions. A force also changes the readings after it, since the holes remember.
+        The covariance of the readings is V = σ² 1 + σ_f² A Aᵀ + σ_F² B Bᵀ. A and B are their
+        derivatives with respect to the forces and tensions; σ, σ_f and σ_F are the standard
+        deviations of readings, forces and tensions. With friction, a force also changes all later
+        readings.
         """
         arm = self.arm(parameters)
         paths = self._paths_at(parameters, arm)
@@ -101,7 +103,7 @@ class Model:
         return self.weigh(self.predict(parameters)[1])
 
     def predict(self, parameters: Parameters) -> tuple[Manipulator, list[Array]]:
-        """Build the arm; predict each stiffness (1,) [N/m], or loop (m,) [m] from the reference."""
+        """Build the arm; predict each stiffness (1,) [N/m] or loop (m,) [m] (0 at the start)."""
         arm = self.arm(parameters)
         paths = self._paths_at(parameters, arm)
         predicted = []
@@ -115,9 +117,9 @@ class Model:
         return arm, predicted
 
     def residuals_beside(self, here: Parameters, moved: Parameters) -> Array:
-        """Compute the residuals (n,) of an arm that hardly differs from the one here.
+        """Compute the residuals (n,) for slightly changed parameters ``moved``, to first order.
 
-        Its loops follow those here to first order, ten times as fast and without a search.
+        Its loops follow from those at ``here`` without a search, ten times as fast.
         """
         arm, paths, predicted = self.arm(moved), self._paths_at(here), list[Array]()
         for i, (each, path) in enumerate(zip(self.measurements, paths, strict=True)):
@@ -147,7 +149,7 @@ class Model:
         return np.concatenate(rows)
 
     def as_read(self, predicted: list[Array]) -> Array:
-        """Return predictions as they were read (n,) [N/m or m]: loops with their zeros."""
+        """Return predictions with the fitted offsets of the loops added (n,) [N/m or m]."""
         rows = []
         for each, weights, found in zip(self.measurements, self.weights, predicted, strict=True):
             if weights is not None:
@@ -169,7 +171,7 @@ class Model:
     def _paths_at(
         self, parameters: Parameters, arm: Manipulator | None = None
     ) -> list[LoadingPath | None]:
-        """Load the arm with all loops, or find where that was done before."""
+        """Compute the paths of all loops, or return stored ones; None for a stiffness."""
         key = tuple(parameters.values())
         if key not in self._paths:
             arm = arm or self.arm(parameters)
@@ -200,7 +202,7 @@ class Model:
     def _tension(
         self, pose: Posture, measurement: Conditions, parameters: Parameters
     ) -> tuple[Tension | ArrayLike, ArrayLike | None]:
-        """Return the tensions of a measurement, and its wrench if they do not hold it."""
+        """Return the tensions of a measurement, and its wrench unless a Tension contains it."""
         tension: Tension | ArrayLike
         if self.tension_of is not None:
             tension = _called("tension_of", self.tension_of, parameters, pose, measurement)
@@ -212,7 +214,7 @@ class Model:
         return tension, None if isinstance(tension, Tension) else measurement.wrench
 
     def _slopes(self, arm: Manipulator, loop: WeightLoop, path: LoadingPath) -> tuple[Array, Array]:
-        """Compute the derivatives of the readings by the forces (m, n) and tensions (m, C)."""
+        """Compute derivatives of the readings with respect to forces (m, n) and tensions (m, C)."""
         u, axes, pose = unit_direction("direction", loop.direction), loop.axes, path.start.pose
         by_forces = np.zeros((len(loop.forces) * len(axes), 0))
         by_tensions = by_forces
@@ -278,7 +280,7 @@ def _weights(
     by_forces: Array | None = None,
     by_tensions: Array | None = None,
 ) -> Weights | None:
-    """Return the weights of a loop with the derivatives of its readings by what is inexact."""
+    """Return the weights of a loop from the derivatives of its readings; None for a stiffness."""
     if not isinstance(measurement, WeightLoop):
         return None
     axes = len(measurement.axes)

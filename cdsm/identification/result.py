@@ -37,9 +37,9 @@ class Identification(ReadOnlyState):
         values: Values of the parameters (P,) [m, kg, N/m, …].
         bounds: Bounds of the parameters (P, 2), low and high [m, kg, N/m, …].
         measurements: The measurements.
-        predicted: Stiffnesses of the model [N/m], and its loops as they were read [m] (n,).
+        predicted: Stiffnesses of the model [N/m], and its loops with their fitted offsets [m] (n,).
         residuals: Residuals r (n,) in standard deviations [-]: (predicted − measured)/σ of a
-            stiffness; of a loop, with the errors of its forces and tensions and its zeros.
+            stiffness; of a loop, weighted by its :class:`~cdsm.identification.loop.Weights`.
         jacobian: J = ∂r/∂p (n, P) [1/m, m/N, …], r in standard deviations.
         arm: Arm with these values.
         warnings: One sentence for each reason not to trust the result; empty if there is none.
@@ -74,7 +74,7 @@ class Identification(ReadOnlyState):
 
     @property
     def freedom(self) -> int:
-        """Degrees of freedom: n less :attr:`rank` and one for the zero of each axis of a loop."""
+        """Degrees of freedom: n − :attr:`rank` − 1 for the offset of each axis of each loop."""
         zeros = sum(len(loop.axes) for loop in self._loops)
         return len(self.predicted) - zeros - self.rank
 
@@ -110,13 +110,13 @@ class Identification(ReadOnlyState):
     def confidence(
         self, level: float = 0.95, *, scaled: bool = False
     ) -> dict[str, tuple[float, float]]:
-        """Compute intervals that hold each true parameter with a probability [m, kg, N/m, …].
+        """Compute intervals that contain each true parameter with a probability [m, kg, N/m, …].
 
-        The interval of p_i follows from profile likelihood: hold p_i, fit the other parameters
+        The interval of p_i follows from profile likelihood: fix p_i, fit the other parameters
         within their bounds, and require Δχ² ≤ q². q is the quantile of a normal variable. For a
-        linear model the interval is value ± q·std. For other models it may be asymmetric. An end is
-        -inf or inf if Δχ² stays below q² up to the bound of the parameter or the end of the model.
-        Then the measurements set no end, and :attr:`warnings` report it at 95 %.
+        linear model the interval is value ± q·std. For other models it may be asymmetric. A limit
+        is -inf or inf if Δχ² stays below q² up to the bound of the parameter, or as far as the
+        model exists. Then the measurements set no limit, and :attr:`warnings` report it at 95 %.
 
         Args:
             level: The probability, between 0 and 1.
@@ -246,7 +246,7 @@ class Identification(ReadOnlyState):
         )
 
     def _rise(self, level: float, *, scaled: bool) -> float:
-        """Compute Δχ² [-] at the ends of an interval."""
+        """Compute Δχ² [-] at the limits of an interval."""
         half = (1.0 + level) / 2.0
         if not scaled:
             return float(ndtri(half) ** 2)
@@ -256,7 +256,7 @@ class Identification(ReadOnlyState):
 
     @property
     def _goals(self) -> tuple[list[float], float]:
-        """Δχ² [-] at the ends of 95 % intervals, rising, and the largest Δχ² of the profiles."""
+        """Δχ² [-] at the limits of 95 % intervals, rising, and the largest Δχ² of the profiles."""
         exact, far = [self._rise(0.95, scaled=False)], self._rise(0.999, scaled=False)
         if self.freedom:
             exact.append(self._rise(0.95, scaled=True))

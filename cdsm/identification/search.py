@@ -1,4 +1,4 @@
-"""Identify the parameters of an arm from stiffnesses and loops measured, by least squares."""
+"""Identify the parameters of an arm from measured stiffnesses and loops, by least squares."""
 
 from __future__ import annotations
 
@@ -37,10 +37,10 @@ _COARSE, _FINE = (1e-10,) * 3, (1e-14,) * 3
 """ftol, xtol and gtol of the searches with one-sided and with central differences."""
 
 _OF_LOOPS = (1e-6, 1e-8, 1e-8)
-"""The same of searches with loops: χ² is far more exact than it can tell."""
+"""The same for searches with loops: smaller changes of χ² have no meaning."""
 
 _REWEIGHINGS = 2
-"""How often errors of forces become errors of readings with the model found so far."""
+"""Number of times that the weights of loops are computed again from the model found so far."""
 
 _EVALUATIONS = 200  # of a search, at most, without those of the differences
 
@@ -61,8 +61,8 @@ def identify(
     arm.at(angles), tension, force, wrench=wrench).stiffness``. The search turns back if the model
     has no stable stiffness, buckles under the force, or a tension leaves the domain of a law.
 
-    A :class:`WeightLoop` is predicted as by :func:`~cdsm.load_cycle`, friction and history
-    included, so its width tells friction. Errors of its forces and tensions count as errors of its
+    A :class:`WeightLoop` is predicted as by :func:`~cdsm.load_cycle`, with friction and history, so
+    its width determines the friction. Errors of its forces and tensions count as errors of its
     readings, with their correlations. Derivatives of loops are implicit, without a search.
 
     Most of the time goes into predictions of all measurements. The search needs about 50 P of them,
@@ -85,7 +85,8 @@ def identify(
         model_of: Function that builds the arm from the free parameters (dimensions, masses,
             springs, leads, …), given by keyword.
         measurements: Stiffnesses and loops. They have at least as many numbers as there are
-            parameters; a loop has one number less than readings, since its zero is not known.
+            parameters; a loop has one number less than readings per axis, since its offset is
+            unknown.
         free: Bounds (low, high) of each parameter, in the unit in which ``model_of`` takes it. If
             they are positive and a factor of 100 or more apart, the logarithm is searched.
         start: First value of each parameter. If not given, several searches start from points
@@ -136,7 +137,7 @@ def identify(
 
 
 def problem_of(model: Model, bounds: Mapping[str, tuple[float, float]]) -> LeastSquares:
-    """Return the least-squares problem of a model; loops are followed beside a point."""
+    """Return the least-squares problem of a model; differences of loops are of first order."""
     beside = model.residuals_beside if model.loops else None
     return LeastSquares(model.residuals, model.count, bounds, beside)
 

@@ -1,1 +1,1 @@
-"""Measures of one posture: the loads that an arm can carry, and the places of its cables."""
+"""Measures of one posture: loads that an arm can carry, cable clearance, closure, wire use."""

@@ -1,4 +1,4 @@
-"""Clearance of the cables: from each other, from the links, from the edges of the disks."""
+"""Clearance of the cables: between each other, to the links, to the edges of the disks."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ KINDS = ("cable_clearance", "link_clearance", "disk_clearance")
 """Clearances in the order of the kernel."""
 
 _BACKBONE = 0.2
-"""Radius of a link's backbone over that of the holes of its first disk, as the URDF draws it."""
+"""Radius of a link's backbone over hole radius of its first disk, as in the URDF's shapes."""
 
 _ON = 1e-9
 """A site this near to a disk [m] is on the disk."""
@@ -33,7 +33,7 @@ _ON = 1e-9
 class Clearance(ReadOnlyState):
     """Smallest signed distances of the cables of an arm; made by :func:`clearance`.
 
-    A negative distance is the depth of an overlap. It is inf if there is no such pair.
+    A negative distance is the depth of an overlap; inf means that there is no such pair.
 
     Attributes:
         posture: The posture.
@@ -42,7 +42,8 @@ class Clearance(ReadOnlyState):
         links: Between a cable and the backbone of a link [m].
         disks: Between a cable and a disk through which it does not run, or the edge of one
             through which it runs [m].
-        nearest: What is nearest, two names for each of the three; empty names: there is none.
+        nearest: Names of the two nearest bodies for each of the three distances; empty without a
+            pair.
     """
 
     posture: Posture
@@ -78,9 +79,9 @@ def clearance(pose: Posture, diameter: float = 0.0) -> Clearance:
 
     Cables are straight between their sites, with round sections; leads are left out. Links are
     backbones as the URDF draws them: from joint to joint, 0.2 R thick in radius; those of an arm
-    from a URDF are lines. Disks are plates without thickness. A cable that runs through its own
-    hole has the distance of the hole from the edge of the disk; through any other part of a disk
-    the distance is negative.
+    from a URDF are lines. Disks are plates without thickness. For a cable in its own hole the
+    distance is that from the cable's surface to the edge of the disk. For a cable that pierces a
+    disk elsewhere it is negative.
 
     Args:
         pose: The posture.
@@ -115,7 +116,7 @@ def clearance(pose: Posture, diameter: float = 0.0) -> Clearance:
 def clearances(
     arm: Manipulator, q: ArrayLike, diameter: float = 0.0, *, threads: int | None = None
 ) -> dict[str, Array]:
-    """Compute the clearances of :func:`clearance` at many postures, (B,) [m] each, by name.
+    """Compute the distances of :func:`clearance` at many postures, (B,) [m] each, by name.
 
     Args:
         arm: The arm.
@@ -133,7 +134,7 @@ def clearances(
 
 
 class _Shape(NamedTuple):
-    """Points, segments, bones and disks of an arm, as the kernel takes them; names for people."""
+    """Points, cable segments, backbones and disks of an arm for the kernel, with their names."""
 
     routing: Routing
     segment: Indices
@@ -163,7 +164,7 @@ def _rows(arm: Manipulator, q: Array, threads: int) -> tuple[Array, Indices]:
 
 @lru_cache(maxsize=8)
 def _shape(arm: Manipulator) -> _Shape:
-    """Collect the bodies that can touch; cached for the last arms: it takes milliseconds."""
+    """Collect the bodies that can touch; cached for the last arms, since it takes milliseconds."""
     model = arm._model
     rows = model.routing.row.tolist()
     points = model.routing.point.tolist()

@@ -1,4 +1,4 @@
-"""Wrench closure, tension factor, and isotropy: how evenly cables act, and stiffness is."""
+"""Wrench closure, tension factor (evenness of tensions) and isotropy (of the stiffness)."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from cdsm.support.validation import instance
 
 
 def tension_factor(pose: Posture) -> float:
-    """Compute how evenly cables can pull against each other [-]: max min F / max F, J_Lᵀ F = 0.
+    """Compute the tension factor [-]: the largest min(F)/max(F) of F ≥ 0 with J_Lᵀ F = 0.
 
-    1: all tensions alike move nothing. 0: not all cables can be taut without a load, so the arm has
-    no wrench closure (:func:`has_wrench_closure`). The ratio is the largest of all tensions, by a
-    linear program. Pham, Yeo, Yang and Chen, Robotics and Autonomous Systems 57 (2009), take that
-    of one solution, so theirs may be smaller.
+    1: equal tensions cause no joint torque. 0: not all cables can be taut without a load, so the
+    arm has no wrench closure (:func:`has_wrench_closure`). A linear program finds the largest
+    ratio. Pham, Yeo, Yang and Chen, Robotics and Autonomous Systems 57 (2009), use the ratio of one
+    solution, so their factor may be smaller.
 
     Args:
         pose: The posture.
@@ -28,7 +28,7 @@ def tension_factor(pose: Posture) -> float:
 
 
 def has_wrench_closure(pose: Posture) -> bool:
-    """Return whether cables that only pull can balance any joint torque, if strong enough.
+    """Return whether unlimited tensions F ≥ 0 can balance every joint torque.
 
     This needs J_Lᵀ of full rank, and F > 0 with J_Lᵀ F = 0 (Gouttefarde and Gosselin, IEEE T-RO 22,
     2006). With limits of the tensions, see :func:`force_polytope`.
@@ -44,7 +44,7 @@ def has_wrench_closure(pose: Posture) -> bool:
 
 
 def isotropy(stiffness: Stiffness) -> float:
-    """Compute the stiffness of the tip in its softest over that in its stiffest direction [-].
+    """Compute the least tip stiffness of all directions over the largest [-].
 
     Both are extremes of 1/(uᵀ C_vv u), Eq. 20. 1: equal in all directions; 0: infinite in one.
 

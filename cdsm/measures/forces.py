@@ -1,4 +1,4 @@
-"""Force polytope: all forces at the tip that an arm holds within the limits of its cables.
+"""Force polytope: all forces at the tip that tensions within their bounds can balance.
 
 The forces f that some tensions balance, J_Lᵀ F = J_Xᵀ W + J_vᵀ f − g with minimum ≤ F ≤ maximum,
 are a projection of a polytope.
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _NO_MOTION = 1e-9
-"""Singular values of J_v over the arm's length that are zero: the tip cannot move that way."""
+"""Smaller singular values of J_v/(arm's length) count as zero: the tip cannot move along them."""
 
 _NO_WRENCH = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
@@ -34,9 +34,10 @@ _NO_WRENCH = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class ForcePolytope(ReadOnlyState):
-    """All forces on the tip that an arm holds; made by :func:`force_polytope`.
+    """All forces at the tip that an arm can balance; made by :func:`force_polytope`.
 
-    They are the loads f with ``normals`` @ f ≤ ``offsets``, in base axes, besides ``wrench``.
+    They are the forces f (3,) [N] in base axes, added to ``wrench``, with ``normals`` @ f ≤
+    ``offsets``.
 
     Attributes:
         posture: The posture.
@@ -63,7 +64,7 @@ class ForcePolytope(ReadOnlyState):
 
     @property
     def worst_direction(self) -> Array:
-        """Unit direction (3,) of the smallest force that the arm does not hold."""
+        """Unit direction (3,) in which the smallest force exceeds what the arm can balance."""
         return np.asarray(self.normals[int(self.offsets.argmin())])
 
     @property
@@ -75,10 +76,10 @@ class ForcePolytope(ReadOnlyState):
         return float(abs(np.linalg.det(corners)).sum()) / 6.0
 
     def margin(self, force: ArrayLike = (0.0, 0.0, 0.0)) -> float:
-        """Compute the distance of a load from the nearest facet [N]: min b_i − n_i·f.
+        """Compute the distance of a force f from the nearest facet [N]: min_i (b_i − n_i·f).
 
-        It is the largest force in the worst direction that may be added. It is negative if the arm
-        does not hold the load.
+        n_i and b_i are the rows of ``normals`` and ``offsets``. The distance is the largest force
+        that may be added in every direction. It is negative if the arm cannot balance f.
 
         Args:
             force: f (3,) [N].
@@ -146,8 +147,8 @@ def force_polytope(
     Raises:
         InvalidInput: An argument has the wrong shape, or a cable has no upper bound and so the
             arm holds any force.
-        InfeasibleTension: No tensions within the bounds balance any force at the tip, and also not
-            none; the error says how far off.
+        InfeasibleTension: No tensions within the bounds balance any force at the tip, not even
+            zero; the error gives the smallest violation.
         SolverError: A linear program fails.
     """
     instance("pose", pose, Posture)

@@ -1,4 +1,4 @@
-"""Payload: the largest force that an arm holds at its tip."""
+"""Payload: the largest force at the tip under which an arm is balanced and stable."""
 
 from __future__ import annotations
 
@@ -36,15 +36,15 @@ _STEPS: Final = np.arange(1, 17) / 16.0
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Payload(ReadOnlyState):
-    """Largest force that an arm holds at its tip; made by :func:`payload`.
+    """Largest admissible force at the tip; made by :func:`payload`.
 
     Attributes:
         posture: The posture.
         direction: Unit direction (3,) of the force, base axes.
-        worst: Whether it is the worst of all directions.
+        worst: Whether ``direction`` is the worst of all directions.
         force: The largest force [N]: the smallest of ``limits``.
-        limit: What limits it.
-        limits: Largest force [N] for each limit alone; inf: none.
+        limit: Which limit gives ``force``, a key of ``limits``.
+        limits: Largest force [N] for each limit alone; inf if it does not limit the force.
     """
 
     posture: Posture
@@ -85,14 +85,14 @@ def payload(
     deflection: float = math.inf,
     worst_friction: bool = False,
 ) -> Payload:
-    """Compute the largest force f that the arm holds at its tip, besides W.
+    """Compute the largest admissible force f along u at the tip, added to the wrench W.
 
         f = max f  so that  J_Lᵀ F = J_Xᵀ W + f J_vᵀ u − g,  minimum ≤ F ≤ maximum,
 
     also f |C_vv u| ≤ ``deflection``, and K_θ positive definite under all loads up to f u. K_θ is
-    that of the least tensions under each load, C_vv that without the load: motors hold the cables,
-    then the force moves the tip, to first order. The worst direction has the smallest f: along the
-    normal of the nearest facet of the :func:`force_polytope`, or in the softest direction of C_vv.
+    that of the least tensions under each load. C_vv is that without the load: the motors are locked
+    before the force moves the tip, to first order. The worst direction has the smallest f. It is
+    the normal of the nearest facet of the :func:`force_polytope`, or the softest direction of C_vv.
     Loads that buckle the arm are then searched for in 26 directions, 16 loads in each.
 
     Args:
@@ -102,7 +102,7 @@ def payload(
         maximum: Upper bound of the tensions [N], for all cables or (C,); for the worst direction
             finite.
         wrench: W (6,) at ``tool0`` in base axes that always acts: force [N], then moment [N m].
-        deflection: Largest displacement of the tip [m] that is allowed; inf: any.
+        deflection: Largest allowed displacement of the tip [m]; inf for no limit.
         worst_friction: As for :func:`~cdsm.distribute_tension`, in the limit of the tensions.
 
     Raises:
@@ -160,7 +160,7 @@ def _along(
 
 
 def largest_force(loads: Loads) -> float:
-    """Return the largest force [N] of loads in one direction; 0 if the arm holds none."""
+    """Return the largest force [N] along one direction; 0 if the arm cannot balance any."""
     found = loads.largest(np.ones(1), positive=True)
     return 0.0 if found is None else found[0]
 
@@ -194,7 +194,7 @@ def _until_unstable(
 ) -> tuple[Array, float, str]:
     """Return the direction, and the force at which K_θ fails, and why; inf if none up to ``most``.
 
-    Of the worst direction, neighbouring ones are searched too; a worse one takes its place.
+    With ``worst``, neighbouring directions are searched too, and the worst one is returned.
     """
     if not K.is_stable:
         return u, 0.0, "buckling"

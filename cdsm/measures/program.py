@@ -23,7 +23,7 @@ from cdsm.support.values import Array
 
 
 class Loads(NamedTuple):
-    """Balance under loads, in dimensionless form; see the module.
+    """Balance under loads, in dimensionless form; symbols as in the module's docstring.
 
     Attributes:
         A: [J_Lᵀ, −J_vᵀ U], scaled (nv, C+k).
@@ -61,9 +61,9 @@ class Loads(NamedTuple):
         return cls(columns / lever, b, low, high, lever, force)
 
     def largest(self, along: Array, *, positive: bool = False) -> tuple[float, Array] | None:
-        """Compute the largest a·x over all loads that the arm holds, and an x (k,) that has it.
+        """Compute the largest a·x over all loads x that tensions balance, and one such x (k,).
 
-        The value is inf if there is no largest; x is then NaN. None: the arm holds no load at all.
+        The value is inf, and x is NaN, if a·x is unbounded. Return None if no load is balanced.
 
         Args:
             along: a (k,).
@@ -93,7 +93,7 @@ class Loads(NamedTuple):
 
 
 def tension_ratio(J: Array) -> float:
-    """Compute max min F / max F over tensions F with J_Lᵀ F = 0 [-]; 0 if there is no closure."""
+    """Compute the largest min(F)/max(F) [-] of F ≥ 0 with J_Lᵀ F = 0; 0 without wrench closure."""
     count, nv = J.shape
     lever = abs(J).max()
     if lever == 0.0 or np.linalg.matrix_rank(J) < nv:
@@ -113,4 +113,4 @@ def tension_ratio(J: Array) -> float:
 
 
 CLOSED = 1e-9
-"""Smaller ratios of tensions are rounding of the linear program: no closure."""
+"""Smaller ratios of tensions are rounding of the linear program and count as no closure."""

@@ -22,13 +22,13 @@ from cdsm.support.values import Array
 from cdsm.tension import checked_bounds
 
 MEASURED: Final = ("tension_factor", *KINDS)
-"""Measures of joint angles alone."""
+"""Measures that depend on the joint angles alone."""
 
 
 def measured(
     arm: Manipulator, q: Array, names: Sequence[str], threads: int | None = None
 ) -> dict[str, Array]:
-    """Compute measures of :data:`MEASURED` at postures (B, nv), (B,) each."""
+    """Compute measures of :data:`MEASURED` at postures q (B, nv); return (B,) for each name."""
     found: dict[str, Array] = {}
     if any(name in KINDS for name in names):
         found |= clearances(arm, q, threads=threads)

@@ -1,4 +1,4 @@
-"""How much of its strength and life a wire gives: strain, safety, bending over the holes."""
+"""Use of a wire's strength and life: strain, safety factor, bending over the holes."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class WireUse(ReadOnlyState):
 
     Attributes:
         tension: The tensions and their posture.
-        largest: Largest tension along each cable (C,) [N]; with the worst friction above F.
+        largest: Largest tension along each cable (C,) [N]: F, or more with ``worst_friction``.
         strain: ε(F) of each cable (C,) [-].
         safety: Breaking load over the largest tension (C,) [-].
         bend_ratio: D/d: diameter of the bend over that of the wire [-].
@@ -89,8 +89,8 @@ def wire_use(
 
     The bearing pressure of a wire on a bend is p = 2F/(d D) (Drucker and Tachau, J. Appl. Mech. 12,
     1945). Wire rope has a long life where p/S_u is below 0.001 (Shigley's Mechanical Engineering
-    Design, section 17-6); the life margin is 0.001 S_u/p. It is a rule for rope on sheaves: for
-    the edge of a hole a comparison of designs, not a number of cycles.
+    Design, section 17-6); the life margin is 0.001 S_u/p. This rule is for rope on sheaves. For the
+    edge of a hole it compares designs but gives no number of cycles.
 
     Args:
         tension: The tensions.
