@@ -33,7 +33,7 @@ class Designs(ReadOnlyState):
         designs: The designs (D, n) [m, rad, N, -], a row each; see :meth:`DesignProblem.values`.
         values: Quantities (D, n) in SI: [N/m], [N m/rad], [m], [N], [kg] or [-]; a column for each
             of ``problem.measures``. NaN where one does not exist.
-        faults: Why a design is no arm; else empty.
+        faults: Why the values of a design do not make an arm; empty if they do.
     """
 
     problem: DesignProblem
@@ -45,7 +45,7 @@ class Designs(ReadOnlyState):
         """Return a quantity (D,) by its key, as ``mass`` or ``stiffness (0, 0, 1)``.
 
         Raises:
-            InvalidInput: The problem does not ask for it.
+            InvalidInput: The quantity is not in ``problem.measures``.
         """
         keys = [each.key for each in self.problem.measures]
         if key not in keys:
@@ -54,15 +54,15 @@ class Designs(ReadOnlyState):
 
     @property
     def violations(self) -> Array:
-        """How far each design misses each constraint, over the limit (D, n) [-]; 0: not at all.
+        """Violation of each constraint over its limit (D, 1 + constraints) [-]; 0 if it is met.
 
-        The first column is the share of postures that are not held, if all must be.
+        Column 0 is the share of postures that are not held, if all must be held; else 0.
         """
         return violations(self.problem, self.values)
 
     @property
     def feasible(self) -> Array:
-        """Whether each design meets all constraints (D,) [-], as 0 and 1."""
+        """Whether each design meets all constraints (D,): 1 or 0."""
         return np.asarray((self.violations == 0.0).all(axis=1), dtype=np.float64)
 
     def __len__(self) -> int:
@@ -73,7 +73,7 @@ class Designs(ReadOnlyState):
 
 
 def violations(problem: DesignProblem, values: Array) -> Array:
-    """Compute the violations (D, 1+n) of quantities (D, m): of holding all, of each constraint."""
+    """Compute the violations (D, 1+n) of quantities (D, m): postures not held, each constraint."""
     keys = [each.key for each in problem.measures]
     held = values[:, keys.index(MISSED)]
     found = [np.where(held == held, 1.0 - held, 1.0) if problem.needs_all else np.zeros(len(held))]
@@ -98,7 +98,7 @@ def evaluate_designs(
         designs: (D, n) [m, rad, N, -], a row each; see :meth:`DesignProblem.values`.
         jobs: Number of processes. With more than one, a script needs the usual guard
             ``if __name__ == "__main__":``.
-        client: Client of a dask cluster, in the place of processes.
+        client: Client of a dask cluster, instead of processes.
         progress: Show a bar, if there is a terminal.
 
     Raises:

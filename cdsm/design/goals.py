@@ -1,4 +1,4 @@
-"""Goals of a design: quantities of an arm over its postures and loads, to make best or to bound."""
+"""Goals of a design: quantities over all postures and loads, to optimise or to bound."""
 
 from __future__ import annotations
 
@@ -43,8 +43,8 @@ class Kind(NamedTuple):
         words: Name in words.
         unit: SI unit.
         shown: Unit for people, and its size in SI.
-        best: Whether the most or the least is best.
-        directed: Whether it belongs to a direction.
+        best: Whether the largest or the smallest value is best.
+        directed: Whether it has a direction.
     """
 
     words: str
@@ -82,7 +82,7 @@ KINDS: Final[dict[str, Kind]] = {
     "wire_safety": Kind("least breaking load over tension", "1", _ONE, "most"),
     "wire_life": Kind("least life margin of a wire", "1", _ONE, "most"),
 }
-"""Quantities of a design. Over postures and loads, the worst one counts."""
+"""Quantities of a design. Each is the worst value over all postures and loads."""
 
 
 @dataclass(frozen=True)
@@ -113,7 +113,7 @@ class Measure:
 
     @property
     def key(self) -> str:
-        """Name of its column: ``mass``, ``stiffness (0, 0, 1)``."""
+        """Name of the column of the quantity: ``mass``, ``stiffness (0, 0, 1)``."""
         if self.direction is None:
             return self.of
         return f"{self.of} {coordinates(self.direction, '.3g')}"  # type: ignore[arg-type]
@@ -139,21 +139,22 @@ class Measure:
 @final
 @dataclass(frozen=True)
 class Objective(Measure):
-    """A quantity that a search makes best.
+    """A quantity that a search maximises or minimises.
 
     Attributes:
         of: ``"stiffness"``, ``"softest"``, ``"isotropy"``, ``"margin"``, ``"deflection"``,
             ``"motor_force"``, ``"payload"``, ``"capacity_margin"``, ``"tension_factor"``,
             ``"cable_clearance"``, ``"link_clearance"``, ``"disk_clearance"``, ``"workspace"``,
             ``"held"``, ``"mass"``, ``"length"``, ``"cables"``, ``"joint_range"``,
-            ``"wire_length"``, ``"wire_strain"``, ``"wire_safety"`` or ``"wire_life"``. Of all
-            postures and loads, the worst counts. ``deflection`` is |C_vv f| for the force f of the
-            load, to first order; ``payload`` and ``capacity_margin`` are the largest force, besides
-            the load, within the limits of the tensions, along u and in any direction; the
+            ``"wire_length"``, ``"wire_strain"``, ``"wire_safety"`` or ``"wire_life"``. The worst
+            value over all postures and loads counts. ``deflection`` is |C_vv f| for the force f of
+            the load, to first order; ``payload`` and ``capacity_margin`` are the largest force,
+            besides the load, within the limits of the tensions, along u and in any direction; the
             ``workspace`` is the volume of the hull of all tips that are held; the wires are as in
             :func:`~cdsm.wire_use`.
         direction: u of ``stiffness`` and ``payload``: an axis such as ``"-z"``, or (3,).
-        goal: ``"most"`` or ``"least"``; None: what is usual, e.g. the most stiffness.
+        goal: ``"most"`` or ``"least"``; None: the usual one, e.g. the most stiffness, the least
+            mass.
 
     Raises:
         UnknownName: ``of`` or ``goal`` is unknown.
@@ -170,7 +171,7 @@ class Objective(Measure):
 
     @property
     def sign(self) -> float:
-        """−1 if the most is wanted, else 1: the sign with which searches make it least."""
+        """−1 if the most is wanted, else 1: searches minimise sign · value."""
         return -1.0 if self.goal == "most" else 1.0
 
 
@@ -216,7 +217,7 @@ class Constraint(Measure):
         return f"{which} {self.shown(self.limit)}"
 
     def violation(self, value: float) -> float:
-        """Return by how much a value misses the limit, over the limit [-]; 0 if it does not."""
+        """Return by how much a value violates the limit, over the limit [-]; 0 if it does not."""
         short = self.limit - value if self.at_least is not None else value - self.limit
         size = abs(self.limit) or KINDS[self.of].shown[1]
         return max(short / size, 0.0) if short == short else float("inf")

@@ -1,9 +1,10 @@
-"""Exact derivatives of the quantities of a design by its continuous variables.
+"""Exact derivatives of the quantities of a design with respect to its continuous variables.
 
-The kernel of sensitivities gives the derivative of a stiffness by every hole, disk, link, lead and
-mass at constant tensions, and by the tensions. Those follow the design: they are the least in
-balance, so the derivative of their distribution is added. A variable moves many holes and disks at
-once; its column of the chain rule says which, and how far.
+The kernel of sensitivities gives the derivatives of a stiffness with respect to every hole, disk,
+link, lead and mass at constant tensions, and with respect to the tensions. The tensions depend on
+the design: they are the least that balance the arm. So the derivative of their distribution is
+added. A variable moves many holes and disks at once; its column in the chain rule says which, and
+how far.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ SMOOTH: Final = ("stiffness", "margin", "deflection", "motor_force", "mass", "le
 """Quantities with exact derivatives."""
 
 _ALIKE = 1e-20
-"""Squared distance of two unit vectors that are one."""
+"""Two unit vectors are equal if their squared distance is below this."""
 
 
 class Chain:
@@ -46,7 +47,7 @@ class Chain:
         self._bound = np.array([each.of == "minimum" for each in problem.variables])
 
     def apply(self, by_input: dict[str, Array], by_bound: float = 0.0) -> Array:
-        """Turn derivatives by the inputs of each source into those by the variables (n,)."""
+        """Convert derivatives with respect to the inputs of each source to the variables (n,)."""
         found = np.array(
             [
                 sum(float(weights @ by_input[source]) for source, weights in column.items())
@@ -84,10 +85,11 @@ def rows_and_gradients(
 ) -> tuple[Array, Array]:
     """Compute a quantity at each posture and load (R,), and its derivatives (R, n).
 
-    Of ``motor_force`` there is a row for each cable.
+    ``motor_force`` has a row for each cable too.
 
     Raises:
-        InvalidInput: The quantity has no exact derivatives, or the tensions have none here.
+        InvalidInput: The quantity has no exact derivatives, or the tensions have none for this
+            design.
         InfeasibleTension: A posture is not held.
         SingularStiffness: The arm is unstable at a posture.
     """
@@ -125,7 +127,7 @@ def rows_and_gradients(
 
 
 def _reading(K: Stiffness, measure: Measure, chain: Chain) -> tuple[float, Array]:
-    """Return a reading of a stiffness and its derivatives by the variables (n,)."""
+    """Return a reading of a stiffness and its derivatives with respect to the variables (n,)."""
     if measure.of == "deflection":
         force = K.wrench[:3]
         value, partial = _displacement(K, force)
@@ -143,7 +145,8 @@ def _reading(K: Stiffness, measure: Measure, chain: Chain) -> tuple[float, Array
 def _displacement(K: Stiffness, force: Array) -> tuple[float, dict[str, Array]]:
     """Return |C_vv f| and its derivatives at constant tensions, by source.
 
-    With n along the displacement it is |f| nᵀ C f̂ = |f| (c(n + f̂) − c(n − f̂))/4, c(u) = uᵀ C u.
+    With unit vectors n of the displacement and f̂ of the force f, and c(u) = uᵀ C_vv u, it is |f|
+    nᵀ C_vv f̂ = |f| (c(n + f̂) − c(n − f̂))/4.
     """
     if K.wrench[3:].any():
         raise InvalidInput("deflection", "under a moment has no exact derivatives here.")
@@ -172,7 +175,7 @@ def _joints(arm: Manipulator, variable: Variable) -> list[int]:
 
 
 def _column(arm: Manipulator, inputs: Inputs, variable: Variable) -> dict[str, Array]:
-    """Return how far a variable moves the inputs of each source, per unit."""
+    """Return the derivatives of the inputs of each source with respect to a variable."""
     geometry, of, joints = arm.geometry, variable.of, _joints(arm, variable)
     labels = inputs.labels
     disks = [disk.joint - 1 for disk in geometry.disks]

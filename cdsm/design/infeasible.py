@@ -1,4 +1,4 @@
-"""Error where no design meets all constraints: the nearest design, and its misses."""
+"""Error if no design meets all constraints: the nearest design, and its violations."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from cdsm.tension import distribute_tension
 
 
 def explain(designs: Designs) -> NoReturn:
-    """Raise InfeasibleDesign for the design that misses the constraints by least in sum."""
+    """Raise InfeasibleDesign with the design that has the smallest sum of violations."""
     problem, missed = designs.problem, designs.violations
     total = np.where(np.isfinite(missed), missed, np.inf).sum(axis=1)
     arms = np.array([not fault for fault in designs.faults])
@@ -57,7 +57,7 @@ def explain(designs: Designs) -> NoReturn:
 
 
 def _first_reason(designs: Designs, best: int) -> str:
-    """Return why the first posture that is not held is not."""
+    """Return why the first of the postures that are not held is not held."""
     problem, row = designs.problem, designs.designs[best]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", CdsmWarning)

@@ -32,13 +32,13 @@ from cdsm.tolerance import Tolerances
 from cdsm.wires.catalogue import as_wire
 
 MISSED = "held"
-"""The requirement of every problem that does not ask for a share: all postures are held."""
+"""Name of the requirement, in every problem without another goal for it, to hold all postures."""
 
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class DesignProblem(ReadOnlyState):
-    """Problem of a design: variables of an arm, objectives, constraints. All searches take it.
+    """Design problem: variables of an arm, objectives, constraints; the argument of all searches.
 
     A posture is held if tensions within the bounds balance the arm under the load, and K_θ is then
     positive definite. A design must hold all postures under all loads, unless an objective or a
@@ -47,12 +47,12 @@ class DesignProblem(ReadOnlyState):
     Attributes:
         arm: The arm that is changed; it was made from a Geometry.
         variables: What may change.
-        objectives: What is made best; one or more.
-        constraints: What must hold.
+        objectives: Quantities to optimise; one or more.
+        constraints: Limits of quantities.
         postures: Joint angles q (P, nv) [rad], or a pose set; its random postures lie within the
             joint limits of each design.
         loads: Wrenches W (n, 6) at ``tool0``, base axes: force [N], then moment [N m].
-        minimum: Lower bound of all tensions [N], if it is no variable.
+        minimum: Lower bound of all tensions [N], unless it is a variable.
         maximum: Upper bound of all tensions [N].
         worst_friction: As for :func:`~cdsm.distribute_tension`: all segments of the cables stay
             within the bounds, whatever loads came before. ``motor_force`` and the quantities of
@@ -61,8 +61,8 @@ class DesignProblem(ReadOnlyState):
         breaking_load: Breaking load of the wire [N], for ``wire_safety``.
         bend_diameter: Diameter of the bend in the holes [m], for ``wire_life``.
         tolerances: Tolerances of every design; constraints on ``stiffness``, ``margin`` and
-            ``motor_force`` must then hold with a margin of ``coverage`` standard uncertainties.
-        coverage: k of that margin [-].
+            ``motor_force`` must then be met with a margin of ``coverage`` standard uncertainties.
+        coverage: Coverage factor: number of standard uncertainties in this margin [-].
 
     Raises:
         InvalidInput: An argument is invalid; two variables change the same thing; the arm was made
@@ -138,7 +138,7 @@ class DesignProblem(ReadOnlyState):
 
     @cached_property
     def measures(self) -> tuple[Measure, ...]:
-        """All quantities that are asked for, each once, and the share of postures held."""
+        """All quantities of objectives and constraints, each once, and ``held``."""
         asked = {each.key: each for each in (*self.objectives, *self.constraints)}
         asked.setdefault(MISSED, Measure("held"))
         return tuple(Measure(each.of, each.direction) for each in asked.values())
@@ -152,7 +152,7 @@ class DesignProblem(ReadOnlyState):
 
     @cached_property
     def bounds(self) -> Array:
-        """Smallest and largest number of each variable (n, 2); of choices their index."""
+        """Smallest and largest number of each variable (n, 2); for choices, of their indices."""
         return frozen(
             np.array(
                 [
@@ -165,7 +165,7 @@ class DesignProblem(ReadOnlyState):
 
     @property
     def is_continuous(self) -> bool:
-        """Whether all variables take all values of a range."""
+        """Whether all variables are real numbers in a range."""
         return all(variable.is_continuous for variable in self.variables)
 
     def values(self, design: ArrayLike) -> tuple[Value, ...]:
@@ -201,7 +201,7 @@ class DesignProblem(ReadOnlyState):
 
         Raises:
             InvalidInput: As for :meth:`values`.
-            GeometryError: The values do not make an arm; lists every fault.
+            GeometryError: The values do not make an arm; the error lists every fault.
         """
         new = changed(self.arm.geometry, self.variables, self.values(design))
         old = self.arm.cables
@@ -256,7 +256,7 @@ class DesignProblem(ReadOnlyState):
 
     @cached_property
     def start(self) -> Array | None:
-        """The design (n,) [m, rad, N, -] of the given arm; None if it is none of this problem."""
+        """The given arm as a design (n,) [m, rad, N, -]; None if variables cannot express it."""
         found = []
         for variable, (low, high) in zip(self.variables, self.bounds.tolist(), strict=True):
             value: Value | None = present(variable, self.arm.geometry, self.minimum)

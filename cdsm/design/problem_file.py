@@ -1,4 +1,4 @@
-"""PROBLEM.toml: a design problem and its search in one file, in people's units where named so."""
+"""PROBLEM.toml: a design problem and its search in one file."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ class _File:
 
 
 class ProblemFile(NamedTuple):
-    """A problem and the search that its file asks for.
+    """A design problem and the settings of its search, read from a file.
 
     Attributes:
         problem: The problem.

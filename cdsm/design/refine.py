@@ -21,15 +21,15 @@ from cdsm.support.validation import instance, whole_number
 from cdsm.support.values import Array, frozen
 
 _SAFE = 1e-7
-"""Relative distance that a refined design keeps from each limit, so that rounding breaks none."""
+"""Relative distance of a refined design from each limit, so that rounding violates none."""
 
 
 _ROUNDS = 2
-"""Number of times that a design is improved and then brought inside its limits."""
+"""Number of times that a design is improved and then moved inside its limits."""
 
 
 class _Rows(NamedTuple):
-    """Values (R,) and derivatives (R, n) of a measure over its size."""
+    """Values (R,) and derivatives (R, n) of a measure, both divided by its size."""
 
     values: Array
     slopes: Array
@@ -40,9 +40,9 @@ def refine_design(
 ) -> DesignSearch:
     """Improve a design of continuous variables by SLSQP (Kraft, 1988), with exact derivatives.
 
-    The worst posture counts, so the problem solved is smooth: min t with t ≥ the objective at every
-    posture and load, and every constraint at every posture and load. The result is a minimum near
-    the start; see :func:`search_designs` for the whole range.
+    The objective is the worst value over postures and loads, which has kinks. So SLSQP solves the
+    smooth problem min t with t ≥ the objective, and with each constraint, at every posture and
+    load. The result is a minimum near the start; see :func:`search_designs` for the whole range.
 
     Args:
         problem: The problem; its variables are continuous, it has one objective, and all quantities
@@ -141,11 +141,11 @@ def refine_design(
 
 
 class _LeftTheArm(Exception):
-    """A step to a design that holds not all postures."""
+    """Error of a step to a design that does not hold all postures."""
 
 
 def _all_rows(problem: DesignProblem, x: Array, size: Array) -> dict[str, _Rows]:
-    """Return all quantities and their derivatives by the scaled variables."""
+    """Return all quantities and their derivatives with respect to the scaled variables."""
     found: dict[str, _Rows] = {}
     for each in (*problem.objectives, *problem.constraints):
         if each.key not in found:

@@ -1,4 +1,4 @@
-"""Results of a search: the front, tables and pictures of it, and files for the chosen arm."""
+"""Results of a search: the Pareto front, its tables and figures, and files of a chosen arm."""
 
 from __future__ import annotations
 
@@ -35,14 +35,15 @@ _PRINTED = 20
 
 
 class DesignProgress(NamedTuple):
-    """The best of a search so far.
+    """State of a search after a generation.
 
     Attributes:
         generation: Number of the generation, from 1.
         designs: Number of designs that were evaluated.
         feasible: Number of these that meet all constraints.
-        best: Best value of the first objective, in SI; while none is feasible, of the nearest one.
-        missed: Smallest sum of violations [-].
+        best: Best feasible value of the first objective, in SI; before there is one, that of the
+            design with the smallest violations.
+        missed: Smallest sum of violations [-]; 0 once a design is feasible.
     """
 
     generation: int
@@ -61,9 +62,9 @@ class DesignSearch(ReadOnlyState):
         problem: The problem.
         seed: Seed of the search.
         evaluated: All designs that were evaluated.
-        front: Those that no other beats in all objectives (n,), as indices; the best in the first
-            objective first.
-        history: The best so far after each generation.
+        front: Pareto front: indices (n,) of the feasible designs that no other design beats in all
+            objectives, sorted by the first objective, the best first.
+        history: State of the search after each generation.
     """
 
     problem: DesignProblem
@@ -74,9 +75,9 @@ class DesignSearch(ReadOnlyState):
 
     @property
     def compromise(self) -> int:
-        """Number on the front of the design nearest to the best of every objective.
+        """Number on the front of the design nearest to the best value of every objective.
 
-        Distances are over the range of each objective on the front.
+        Differences are divided by the range of each objective on the front.
         """
         goals = self._goals
         size = np.ptp(goals, axis=0)

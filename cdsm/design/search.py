@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from distributed import Client
 
 _FAR = 1e3
-"""Violation that stands for a design that is no arm, and for a quantity that does not exist."""
+"""Violation assigned to a design that makes no arm, and to a quantity that does not exist."""
 
 
 def search_designs(
@@ -42,22 +42,22 @@ def search_designs(
     report: Callable[[DesignProgress], None] | None = None,
     progress: bool = True,
 ) -> DesignSearch:
-    """Search the best designs of a problem: all compromises between its objectives (Pareto front).
+    """Search for the best designs of a problem: the Pareto front of its objectives.
 
-    NSGA-II of pymoo, for continuous variables, whole numbers and choices together. The first
+    NSGA-II of pymoo handles continuous variables, whole numbers and choices together. The first
     designs are random, and the given arm is one of them if it lies within the ranges. The same
     problem and the same seed give the same bits, whatever ``jobs``, ``client`` and ``store`` are.
 
     Args:
         problem: The problem.
-        generations: Number of generations, the random one included.
+        generations: Number of generations, including the first, random one.
         population: Number of designs in each.
         seed: Seed of all random numbers.
-        store: File that keeps each evaluated design. A new search with the same arguments goes on
-            from there; one with more generations begins with the same designs.
+        store: File that keeps each evaluated design. A new search with the same arguments resumes
+            from it; one with more generations begins with the same designs.
         jobs: Number of processes, as for :func:`evaluate_designs`.
-        client: Client of a dask cluster, in the place of processes.
-        report: Is called after each generation with the best so far.
+        client: Client of a dask cluster, instead of processes.
+        report: Function that is called after each generation with its :class:`DesignProgress`.
         progress: Show a bar, if there is a terminal.
 
     Raises:
@@ -116,7 +116,7 @@ def search_designs(
 def pareto(designs: Designs) -> Indices:
     """Return the feasible designs that no other beats in all objectives, as rows (m,).
 
-    They are in the order of the first objective, the best first; equal ones count once.
+    They are sorted by the first objective, the best first; equal designs count once.
     """
     problem = designs.problem
     goals = np.column_stack([each.sign * designs[each.key] for each in problem.objectives])
@@ -152,7 +152,7 @@ def _best(
 
 
 def _algorithm(problem: DesignProblem, population: int, generations: int, seed: int) -> Any:
-    """Build pymoo's algorithm, ready to be asked."""
+    """Build pymoo's algorithm, ready for its first ``ask``."""
     from pymoo.algorithms.moo.nsga2 import NSGA2
     from pymoo.core.mixed import (
         MixedVariableDuplicateElimination,
@@ -201,7 +201,7 @@ def _numbers(problem: DesignProblem, chosen: dict[str, Any]) -> Array:
 def _tell(
     problem: DesignProblem, algorithm: Any, asked: Any, designs: Array, told: list[Found]
 ) -> None:
-    """Give pymoo objectives and violations."""
+    """Give pymoo the objectives and violations of the designs that it asked for."""
     whole = gathered(problem, designs, told)
     goals = np.column_stack([each.sign * whole[each.key] for each in problem.objectives])
     missed = np.nan_to_num(whole.violations, nan=_FAR, posinf=_FAR)

@@ -1,4 +1,4 @@
-"""Record of the designs that a search has evaluated, so that a stopped search goes on.
+"""Record of the designs that a search has evaluated, so that a stopped search can resume.
 
 The file has one line for the problem and one for each design, with all bits of its numbers. A
 search with the same seed asks for the same designs again, and reads the recorded ones.
@@ -25,7 +25,7 @@ from cdsm.sweeps.poses import poses_of
 
 
 class Store:
-    """Designs that are evaluated, by their bits.
+    """Evaluated designs, found by the exact bits of their numbers.
 
     Args:
         path: The file; None keeps them in memory.

@@ -47,7 +47,7 @@ UNITS: Final = {
 @final
 @dataclass(frozen=True)
 class Variable:
-    """Something of an arm that a search may choose.
+    """Design variable: a quantity of an arm that a search may choose.
 
     Attributes:
         of: ``"hole_radius"``, ``"disk_offset"``, ``"link_length"`` [m]: of one joint or of all.
@@ -58,8 +58,8 @@ class Variable:
             ``"minimum"`` [N]: lower bound of all tensions, the pretension.
         low: Smallest value, in SI: [m], [rad] or [N]; None with ``choices``.
         high: Largest value, in SI: [m], [rad] or [N]; None with ``choices``.
-        at: Number of a joint, or name of a cable of the arm that is changed; None: all.
-        choices: Values to choose from, in the place of a range; for a wire always.
+        at: Number of the joint, or name of the cable, that is changed; None: all.
+        choices: Values to choose from, instead of a range; always needed for a wire.
 
     Raises:
         UnknownName: ``of`` is unknown.
@@ -113,7 +113,7 @@ class Variable:
 
     @property
     def is_continuous(self) -> bool:
-        """Whether the variable takes all values of a range."""
+        """Whether the variable is a real number in a range."""
         return not self.choices and self.of not in WHOLE
 
     def shown(self, value: Value) -> str:
@@ -199,7 +199,7 @@ def _change(
 
 
 def _even(geometry: Geometry, count: int) -> list[CableRoute]:
-    """Return evenly spaced cables, so many of each joint, like the first one of each joint now."""
+    """Return ``count`` evenly spaced cables per joint, like the first cable of each joint now."""
     n = len(geometry.joints)
     if all(len(joint.axes) == 2 for joint in geometry.joints):
         angles = evenly_spaced(n, count)
@@ -214,7 +214,7 @@ def _even(geometry: Geometry, count: int) -> list[CableRoute]:
 
 
 def present(variable: Variable, geometry: Geometry, minimum: float) -> float | None:
-    """Return the value that a variable has in an arm; None if joints or cables differ in it."""
+    """Return the value of a variable in an arm; None if joints or cables have different values."""
     k = variable.at - 1 if isinstance(variable.at, int) else None
     of: dict[str, Callable[[], list[float]]] = {
         "hole_radius": lambda: [*geometry.hole_radii],
@@ -247,7 +247,7 @@ def _lead(geometry: Geometry, joint: int) -> float:
 
 
 def check(variable: Variable, geometry: Geometry) -> None:
-    """Raise InvalidInput if the arm lacks the joint or the cable, or cables would be mixed up."""
+    """Raise an error if the arm lacks the joint or the cable of a variable."""
     if isinstance(variable.at, str):
         one_of("cable", variable.at, geometry.cable_names)
     elif variable.at is not None:

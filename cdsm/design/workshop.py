@@ -19,7 +19,7 @@ _DIGITS = 4
 def hole_table(arm: Manipulator) -> str:
     """Return a CSV with a row for each hole of each disk, in mm and degrees.
 
-    Angles are about x of the link, from y towards z; a cable that ends at a disk is fixed there.
+    Angles are about the x axis of the link, from y towards z. A cable is fixed at its last disk.
 
     Args:
         arm: The arm.
@@ -43,8 +43,9 @@ def hole_table(arm: Manipulator) -> str:
 def cable_table(arm: Manipulator, q: Array) -> str:
     """Return a CSV with a row for each cable: wire, lead, and lengths in mm.
 
-    The length is that of the straight arm, lead included. Over the postures (P, nv) the motor winds
-    from the shortest to the longest; the cut is the longest, without what the ends need.
+    The length is that of the straight arm, lead included. The motor must wind the cable between its
+    shortest and longest length over the postures. The cut is the longest length, without an
+    allowance for fixing the two ends.
 
     Args:
         arm: The arm.

@@ -1,4 +1,4 @@
-"""Gradients of tensions that are distributed anew: of one cable, and at which the arm buckles.
+"""Gradients of distributed tensions: of the tension of a cable, and of the critical tension.
 
 The tensions of free cables are F_f = Bᵀ λ with B F_f = τ − B_b F_b (Eqs. 13, 17), B = J_Lᵀ of the
 free cables, b the cables at a bound. For weights y of the tensions, μ = (B Bᵀ)⁻¹ B y_f and
@@ -6,9 +6,10 @@ r = y_f − Bᵀ μ,
 
     Σ y_c dF_c = r·dBᵀ λ + μ·(dτ − dJ_Lᵀ F).
 
-Both terms are derivatives of work at constant tensions: of Σ r_c L̇_c on the motion λ, and of the
-torque out of balance on the motion −μ. So the kernel of the stiffness gives them too. The formula
-holds while the same cables stay at their bounds.
+τ = J_Xᵀ W − g is the torque that the cables balance. Both terms are derivatives of power at
+constant tensions: of Σ r_c L̇_c for the joint velocity λ, and of the residual torque for the joint
+velocity −μ. So the kernel of the stiffness computes them too. The formula holds while the same
+cables stay at their bounds.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ from cdsm.tolerances.inputs import Inputs, Places
 _NO_VELOCITY = np.zeros(3)
 
 _DETERMINED = 1e-12
-"""Smaller singular values of B Bᵀ, over the largest: the free cables do not balance the arm."""
+"""Free cables cannot balance the arm if a singular value of B Bᵀ over the largest is smaller."""
 
 
 class Balance(NamedTuple):
@@ -56,19 +57,19 @@ class Balance(NamedTuple):
         return cls(tension, free, np.linalg.inv(B @ B.T))
 
     def multipliers(self, weights: Array) -> Array:
-        """Compute μ (nv,) of weights y (C,)."""
+        """Compute μ = (B Bᵀ)⁻¹ B y_f (nv,) of weights y (C,)."""
         B = self.tension.posture.length_jacobian[self.free].T
         return np.asarray(self.inverse @ (B @ weights[self.free]))
 
     def by_bound(self, weights: Array) -> float:
-        """Compute Σ y_c dF_c/dF_min if one lower bound of all cables rises."""
+        """Compute Σ y_c dF_c/dF_min for a lower bound F_min that is common to all cables."""
         low = self.tension.values - self.tension.minimum
         held = ~self.free & (low <= OPTIMALITY * self.tension.values.max(initial=0.0))
         J = self.tension.posture.length_jacobian
         return float(weights[held].sum() - self.multipliers(weights) @ J[held].sum(axis=0))
 
     def gradient(self, inputs: Inputs, weights: Array) -> dict[str, Array]:
-        """Compute the derivatives of Σ y_c F_c by source; 0 by tension, rigidity and lead."""
+        """Compute the derivatives of Σ y_c F_c by source; 0 for tension, rigidity and lead."""
         F, free = self.tension.values, self.free
         B = self.tension.posture.length_jacobian[free].T
         mu = self.multipliers(weights)
@@ -102,11 +103,11 @@ class Balance(NamedTuple):
 def buckling_gradient(
     balance: Balance, inputs: Inputs, margin: Mapping[str, Array]
 ) -> dict[str, Array]:
-    """Compute the derivatives of the lower bound at which the smallest eigenvalue is zero.
+    """Compute the derivatives of the lower bound at which the smallest eigenvalue of K_θ is zero.
 
-    ``margin`` holds the derivatives of the eigenvalue at constant tensions. With y its derivatives
-    by the tensions, dF_min = −(∂λ + Σ y_c dF_c)/(Σ y_c dF_c/dF_min). The tensions are those of the
-    distribution, so a measured tension does not matter.
+    ``margin`` contains the derivatives ∂λ of the eigenvalue at constant tensions, and y with
+    respect to the tensions. Then dF_min = −(∂λ + Σ y_c dF_c)/(Σ y_c dF_c/dF_min). The tensions are
+    distributed, so a measured tension has no influence.
     """
     weights = margin["tension"]
     moved, slope = balance.gradient(inputs, weights), balance.by_bound(weights)

@@ -1,4 +1,4 @@
-"""Budget of uncertainty of a reading: its standard uncertainty, and the part of each input."""
+"""Uncertainty budget of a reading: its standard uncertainty and the contribution of each source."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 LINEAR = 0.05
-"""Largest part of the uncertainty that first order leaves out where it says that it holds."""
+"""Largest ``nonlinearity`` with which the first order counts as sufficient."""
 
 _PROBED = 100
-"""Drawn arms that probe whether first order holds."""
+"""Number of drawn arms with which the error of first order is estimated."""
 
 _ROUNDING = 1e-9
-"""Uncertainty over the value that is none; the error of a root of a kinked curve is 1e-10."""
+"""A smaller relative uncertainty is rounding; the error of a root of a kinked curve is 1e-10."""
 
 
 @final
@@ -41,15 +41,15 @@ class Uncertainty(ReadOnlyState):
     """A reading with its standard uncertainty, and the contributions to it (JCGM 100).
 
     Attributes:
-        question: The reading: which one, of which stiffness, in which direction.
+        question: The reading: its name, its stiffness, and its direction or cable.
         tolerances: The tolerances.
         value: The reading of the arm as described [N/m], [N m/rad], [m] or [N].
         standard_uncertainty: u_c = √Σ u_i² over the sources, as the value [N/m], [N m/rad], [m] or
             [N].
         contributions: u_i of each source that has a tolerance, largest first, as the value [N/m],
             [N m/rad], [m] or [N].
-        sensitivities: Partial derivatives (n,) of the value by the n inputs of each source, in the
-            unit of the value per [-], [rad], [m], [N] or [kg].
+        sensitivities: Partial derivatives (n,) of the value with respect to the n inputs of each
+            source, in the unit of the value per [-], [rad], [m], [N] or [kg].
     """
 
     question: Question
@@ -92,7 +92,7 @@ class Uncertainty(ReadOnlyState):
 
     @property
     def is_linear(self) -> bool:
-        """Whether first order is enough: it leaves out at most 5 % of the uncertainty.
+        """Whether first order is sufficient: its error is at most 5 % of the uncertainty.
 
         If not, see :func:`~cdsm.monte_carlo`.
         """
@@ -111,10 +111,10 @@ class Uncertainty(ReadOnlyState):
         return self.value - half, self.value + half
 
     def largest_inputs(self, count: int = 5) -> tuple[tuple[str, str, float], ...]:
-        """Return source, name and |∂f/∂x| u(x) of the inputs that contribute most one by one.
+        """Return source, name and |∂f/∂x| u(x) of the inputs x with the largest contributions.
 
         Args:
-            count: How many.
+            count: Number of inputs.
         """
         labels = self.question.labels
         each = [
@@ -181,7 +181,7 @@ class Uncertainty(ReadOnlyState):
 
     @property
     def shown(self) -> str:
-        """Value and standard uncertainty, rounded to two digits of it, in the unit of prints."""
+        """Value and standard uncertainty in people's units; the uncertainty has two digits."""
         _, size = self.question.unit
         u = self.standard_uncertainty / size
         places = decimals(u)
@@ -202,14 +202,14 @@ def uncertainty(
     cable: str | None = None,
     wrench: ArrayLike | None = None,
 ) -> Uncertainty:
-    """Compute how sure a reading of a stiffness is, to first order (JCGM 100, Eq. 13).
+    """Compute the standard uncertainty of a reading to first order (JCGM 100, Eq. 13).
 
         u_c² = Σ_s σ_s² g_sᵀ R_s g_s
 
-    Each source s has the standard uncertainty σ, the correlations R of its inputs, and the exact
-    partial derivatives g of the reading by them. For all but the last two readings the tensions
-    are measured, so they are inputs like all others. For ``"tension"`` and
-    ``"critical_tension"`` they are distributed anew for every arm; cables at a bound stay there.
+    Source s (such as all hole radii) has the standard uncertainty σ_s, the correlations R_s of its
+    inputs, and the exact partial derivatives g_s of the reading with respect to them. For
+    ``"tension"`` and ``"critical_tension"`` the tensions are distributed anew for every arm; cables
+    at a bound stay there. For all other readings the tensions are measured: they are inputs too.
 
     Args:
         pose: The posture.
@@ -218,11 +218,11 @@ def uncertainty(
             in the table ``[tolerances]`` of its file.
         direction: u (3,) in base axes, any length: for ``"along"``, ``"stuck"``, ``"tip"`` only.
         of: ``"along"``: the stiffness along u [N/m], without friction. ``"stuck"``: the same while
-            all cables stick in their holes, see :func:`~cdsm.stuck_stiffness`; the coefficient of
-            friction does not enter it, only which holes can hold. ``"margin"``: the smallest
-            eigenvalue of K_θ [N m/rad]. ``"tip"``: the tip's coordinate along u [m]. ``"tension"``:
-            the distributed tension of a cable [N]. ``"critical_tension"``: the lower bound of
-            tension at which the arm buckles [N]; see :func:`~cdsm.critical_tension`.
+            all cables stick in their holes, see :func:`~cdsm.stuck_stiffness`; it does not depend
+            on the coefficient of friction, only on which holes have friction. ``"margin"``: the
+            smallest eigenvalue of K_θ [N m/rad]. ``"tip"``: the tip's coordinate along u [m].
+            ``"tension"``: the distributed tension of a cable [N]. ``"critical_tension"``: the lower
+            bound of tension at which the arm buckles [N]; see :func:`~cdsm.critical_tension`.
         cable: Name of the cable, for ``"tension"`` only.
         wrench: As for :func:`~cdsm.stiffness`.
 
@@ -272,7 +272,7 @@ def coverage_factor(probability: float) -> float:
 
 
 def decimals(uncertainty: float) -> int:
-    """Return the decimals with which an uncertainty has two significant digits, 0 to 12."""
+    """Return how many decimals (0 to 12) show two significant digits of an uncertainty."""
     if not 0.0 < uncertainty < math.inf:
         return 4
     return min(max(1 - math.floor(math.log10(uncertainty)), 0), 12)

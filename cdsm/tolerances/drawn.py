@@ -16,13 +16,13 @@ from cdsm.support.values import Array
 from cdsm.tolerances.inputs import inputs_of
 
 _CONVERGED = 1e-10
-"""Relative step that ends the search of a critical tension: the error left is its square."""
+"""Relative step at which the search for a critical tension ends; its error is the step's square."""
 
 _STEPS = 40
-"""Secant steps; 5 are usual."""
+"""Largest number of secant steps; 5 are usual."""
 
 _LONGEST = 0.2
-"""Longest step over the tension."""
+"""Longest step relative to the tension."""
 
 
 class Drawn(NamedTuple):
@@ -66,7 +66,7 @@ class DrawnArms:
         )
 
     def evaluate(self, tension: Array | None = None) -> Drawn:
-        """Compute all arms at tensions (N, C), by default those measured."""
+        """Compute all arms at tensions (N, C) [N]; by default the drawn measured tensions."""
         F = self._tension if tension is None else tension
         rigidity, strain = laws_at(self._K, F)
         held = self._K.cable_stiffness > 0.0
@@ -84,7 +84,7 @@ class DrawnArms:
         return found
 
     def distributed(self, minimum: Array | None = None, drawn: Drawn | None = None) -> Array:
-        """Distribute the tensions (N, C) of all arms anew, for lower bounds (N,) or those given.
+        """Distribute tensions (N, C) [N] of all arms, with lower bounds (N,) or the given ones.
 
         Raises:
             InvalidInput: No tensions balance one of the arms.
@@ -110,10 +110,10 @@ class DrawnArms:
         return tension
 
     def critical(self, start: float) -> Array:
-        """Find the lower bounds (N,) [N] at which the arms buckle, near that of the arm itself.
+        """Find the lower bounds (N,) [N] at which the arms buckle, near that of the nominal arm.
 
         Raises:
-            InvalidInput: An arm does not buckle near there.
+            InvalidInput: An arm does not buckle near the nominal critical tension.
         """
         arms, root = self.evaluate(), np.full(self._count, start)
 

@@ -1,9 +1,9 @@
 """Inputs of a stiffness that have tolerances, and how each of them changes the arrays of an arm.
 
 Site positions, joint origins, centres of mass and the tip depend linearly on hole radii, disk
-offsets and link lengths. One sparse matrix therefore serves both ways: its transpose turns the
-derivatives by all places into derivatives by the inputs, and the matrix itself turns drawn errors
-into displaced places.
+offsets and link lengths. One sparse matrix therefore serves two purposes: it turns drawn errors of
+the inputs into displacements of these points, and its transpose turns derivatives with respect to
+the points into derivatives with respect to the inputs.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _ON_DISKS = ("hole_radius", "hole_angle", "disk_offset", "link_length")
 
 
 class Places(NamedTuple):
-    """All places that an arm is built from, in the frames of its joints [m].
+    """All points that define an arm, in the frames of its joints [m].
 
     Attributes:
         site: Cable sites (…, P, 3).
@@ -48,7 +48,7 @@ class Places(NamedTuple):
         return np.concatenate([place.ravel() for place in self])
 
     def moved(self, by: Array) -> Places:
-        """Return the places with displacements (N, n) added: arrays with one more axis."""
+        """Return the points of N arms, displaced by (N, n) [m]; the arrays get a first axis N."""
         ends = np.cumsum([place.size for place in self])[:-1]
         parts = np.split(by, ends, axis=1)
         return Places(
@@ -60,7 +60,7 @@ _found: WeakKeyDictionary[Manipulator, Inputs] = WeakKeyDictionary()
 
 
 def inputs_of(arm: Manipulator) -> Inputs:
-    """Return the inputs of an arm; kept with it, since finding them takes milliseconds."""
+    """Return the inputs of an arm; cached, since finding them takes milliseconds."""
     inputs = _found.get(arm)
     if inputs is None:
         inputs = _found[arm] = Inputs(arm)
@@ -71,11 +71,11 @@ class Inputs:
     """Inputs of an arm, source by source.
 
     Attributes:
-        places: The places of the arm as described.
+        places: The points of the nominal arm.
         first: First site of each cable, and the number of sites, (C+1,).
         link_rows: Row of the joint that moves each link with a mass, (links,).
         labels: Names of the inputs of each source.
-        columns: Their columns in :attr:`map`.
+        columns: Columns of the inputs of each source in :attr:`map`.
         map: Displacement of all coordinates of :attr:`places` per input (n, inputs), sparse.
     """
 
@@ -115,12 +115,12 @@ class Inputs:
         self._transposed = csr_matrix(self.map.T)
 
     def by_source(self, by_place: Places) -> dict[str, Array]:
-        """Turn derivatives by all places into those by the inputs that move them (inputs,)."""
+        """Convert derivatives with respect to points to those with respect to inputs (inputs,)."""
         by_input = self._transposed @ by_place.stacked()
         return {source: by_input[columns] for source, columns in self.columns.items()}
 
     def displaced(self, errors: Mapping[str, Array]) -> Array:
-        """Return the displacements (N, n) of all places by errors (N, inputs) of some sources."""
+        """Return the displacements (N, n) of all points for errors (N, inputs) of some sources."""
         count = len(next(iter(errors.values())))
         every = np.zeros((count, self.map.shape[1]))
         for source, columns in self.columns.items():

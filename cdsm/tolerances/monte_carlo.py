@@ -35,11 +35,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _BLOCK = 1000
-"""Draws that one thread computes at a time; each block has random numbers of its own."""
+"""Number of draws in a block; each block has its own random numbers."""
 
 
 AGREES = 0.1
-"""Largest distance of the ends of both 95 % intervals, over the uncertainty, if they agree."""
+"""Largest difference of the limits of 95 % intervals that agree, over the uncertainty."""
 
 
 @final
@@ -48,7 +48,7 @@ class MonteCarlo(ReadOnlyState):
     """Values of a reading for drawn arms; made by :func:`monte_carlo`.
 
     Attributes:
-        budget: The same reading to first order.
+        budget: Uncertainty of the same reading to first order.
         values: The reading of each drawn arm (n,) [N/m], [N m/rad], [m] or [N].
         seed: Seed of the random numbers.
     """
@@ -183,11 +183,11 @@ def monte_carlo(
 
     Raises:
         InvalidInput: As for :func:`~cdsm.uncertainty`, or ``draws`` or ``seed`` is out of range, or
-            no tensions balance a drawn arm, or it does not buckle, where that is asked.
+            no tensions balance a drawn arm, or it does not buckle, if the reading needs that.
         UnknownName: As for :func:`~cdsm.uncertainty`.
         ElasticityRangeError: A drawn tension is outside the domain of its cable's law.
         SingularStiffness: The reading does not exist.
-        FileError: The folder cannot be used, or holds another run.
+        FileError: The folder cannot be used, or contains another run.
     """
     count = whole_number("draws", draws, 100, 10**8)
     start = whole_number("seed", seed, 0)

@@ -1,4 +1,4 @@
-"""Tolerances of an arm's inputs: the variance that they cause, and drawn errors."""
+"""Tolerances of an arm's inputs: the variance of a reading that they cause, and drawn errors."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ class Part(NamedTuple):
     """Inputs of one source that share a tolerance, and their standard uncertainties.
 
     Attributes:
-        inputs: Their indices; a slice if they are all.
-        standard: Standard uncertainty of all, or of each (k,).
+        inputs: Indices of the inputs; a slice if they are all inputs of the source.
+        standard: Standard uncertainty: one number for all, or (k,).
         tolerance: The tolerance.
     """
 
@@ -38,8 +38,8 @@ class Part(NamedTuple):
     def draw(self, rng: np.random.Generator, errors: Array) -> None:
         """Draw the errors (draws, n) of the inputs.
 
-        Correlated errors that are not normal are sums of independent ones: each input keeps its
-        standard uncertainty and correlations, but for 0 < ρ < 1 not quite its distribution.
+        Correlated errors that are not normal are sums of independent ones: each input has its exact
+        standard uncertainty and correlations; for 0 < ρ < 1 its distribution is only approximate.
         """
         tolerance, rho = self.tolerance, self.tolerance.correlation
         draws, count = errors[:, self.inputs].shape
@@ -63,7 +63,8 @@ def parts_of(
 
     Raises:
         InvalidInput: No input has such a name, two tolerances are of one input, or a tension is
-            outside those of a tolerance, or so near to slack that its rigidity is not known.
+            outside the range for which a tolerance is given, or so near to slack that its rigidity
+            is not known.
     """
     found: dict[str, tuple[Part, ...]] = {}
     for source, given in tolerances.given.items():
@@ -93,7 +94,7 @@ def parts_of(
 
 
 def variance(parts: Sequence[Part], sensitivity: Array) -> float:
-    """Compute what the inputs of a source add to the variance of a reading."""
+    """Compute the part of the variance of a reading that the inputs of a source cause."""
     return sum(part.variance(sensitivity[part.inputs]) for part in parts)
 
 

@@ -1,4 +1,4 @@
-"""What is asked of a budget or a Monte Carlo run: the checked reading, and the tolerances."""
+"""Checked arguments of a budget or a Monte Carlo run: the reading, and the tolerances."""
 
 from __future__ import annotations
 

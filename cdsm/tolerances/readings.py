@@ -1,7 +1,7 @@
 """Readings with a budget: their values, gradients, and values at displaced inputs.
 
-Each reading has two sides that never meet but in the tests: the gradient by all inputs of one
-posture, for the budget, and the values of many drawn arms, for Monte Carlo.
+Each reading has two independent computations: the gradient with respect to all inputs, for the
+budget, and the values of many drawn arms, for Monte Carlo. The tests compare them.
 """
 
 from __future__ import annotations
@@ -36,10 +36,10 @@ class Question(ReadOnlyState):
     Attributes:
         of: The reading.
         stiffness: The stiffness; for ``critical_tension`` that at the critical tension, for
-            ``stuck`` that of the arm of blocks.
+            ``stuck`` that of the equivalent arm (:mod:`cdsm.tolerances.stuck`).
         direction: The unit direction (3,) of ``along``, ``stuck`` and ``tip``; else None.
         cable: Index of the cable of ``tension``; else None.
-        ties: How the inputs of the arm of blocks are tied, for ``stuck``; else None.
+        ties: For ``stuck``, which inputs of the equivalent arm are the same input; else None.
     """
 
     of: Reading
@@ -103,7 +103,7 @@ class Question(ReadOnlyState):
         return float(self.direction @ K.posture.tip[:3, 3])
 
     def gradient(self) -> dict[str, Array]:
-        """Compute the partial derivative of the reading by every input, by source (inputs,)."""
+        """Compute the derivatives of the reading for the inputs of each source (inputs,)."""
         K, inputs = self.stiffness, inputs_of(self.stiffness.posture.arm)
         if self.of in ("along", "stuck"):
             assert self.direction is not None
@@ -126,7 +126,8 @@ class Question(ReadOnlyState):
 
         Raises:
             ElasticityRangeError: A tension leaves the domain of its cable's law.
-            InvalidInput: No tensions balance an arm, or it does not buckle, where that is asked.
+            InvalidInput: No tensions balance an arm, or it does not buckle, if the reading needs
+                that.
         """
         arms = DrawnArms(self.stiffness, self.ties.scatter(errors) if self.ties else errors)
         if self.of == "tension":
@@ -147,7 +148,7 @@ class Question(ReadOnlyState):
 def _along_gradient(
     K: Stiffness, inputs: Inputs, u: Array, along: float, motion: Array
 ) -> dict[str, Array]:
-    """Compute the derivatives of 1/(uᵀ C_vv u), by source, from itself and K_θ⁻¹ J_vᵀ u."""
+    """Compute the derivatives of ``along`` = 1/(uᵀ C_vv u) by source; motion = K_θ⁻¹ J_vᵀ u."""
     right, towards = along * motion, along * u  # squared, the derivative of 1/(uᵀ C_vv u)
     if not K.wrench[3:].any():
         return _gradient(K, inputs, right, towards)
@@ -161,7 +162,7 @@ def _along_gradient(
 
 
 def _gradient(K: Stiffness, inputs: Inputs, motion: Array, direction: Array) -> dict[str, Array]:
-    """Compute the derivatives of zᵀ K_θ z − 2 u·J_v z with z and u fixed, by source."""
+    """Compute the derivatives of zᵀ K_θ z − 2 u·J_v z by source; motion z, direction u fixed."""
     pose, F, k = K.posture, K.tension, K.cable_stiffness
     laws = pose.arm._model.laws
     rigidity, strain = laws_at(K, F)
@@ -190,7 +191,8 @@ def _gradient(K: Stiffness, inputs: Inputs, motion: Array, direction: Array) -> 
 def _skew_gradient(K: Stiffness, left: Array, right: Array) -> Array:
     """Compute ∂/∂q of −m·(ω_r × ω_l)/2 (nv,), the skew part of the load term between two motions.
 
-    ω = J_ω z of the tip. Joint i turns the part of ω that is due to the joints from i on.
+    m is the moment at the tip, ω = J_ω z its angular velocity for a joint motion z: ω_l and ω_r for
+    ``left`` and ``right``. Joint i turns the part of ω that is due to the joints from i on.
     """
     turns, chain = K.posture.jacobian[3:], K.posture.arm._model.masses.tip_joints
     moment, found = K.wrench[3:], np.zeros(left.size)
@@ -221,7 +223,7 @@ def _tip_gradient(K: Stiffness, inputs: Inputs, direction: Array) -> dict[str, A
 
 
 def _stretched_slope(K: Stiffness, strain: Array) -> Array:
-    """Compute the derivative of EA (1 + ε) by F (C,) [-]: EA′ (1 + ε) + 1, or EA′."""
+    """Compute d(EA (1 + ε))/dF (C,) [-]: EA′ (1 + ε) + 1; EA′ if l_0 is the stretched length."""
     arm = K.posture.arm
     slope = np.zeros_like(strain)
     for law, held in arm._model.laws.held:

@@ -1,7 +1,8 @@
-"""The arm that a stuck arm is: each block between holes that hold is a cable of its own.
+"""Equivalent arm of a stuck arm: each block (cable between two sticking holes) is a cable.
 
-While all cables stick, K_θ is the stiffness of that arm. Its inputs are tied: the blocks of a cable
-share its rigidity and its tension, and both blocks at a hole share the hole.
+While all cables stick, K_θ is the stiffness of the equivalent arm ("arm of blocks"). Some of its
+inputs are the same input of the arm: the blocks of a cable have one rigidity and one tension, and
+both blocks at a hole have this hole.
 """
 
 from __future__ import annotations
@@ -23,16 +24,16 @@ from cdsm.support.values import Array
 from cdsm.tolerances.inputs import inputs_of
 
 _NONE = np.zeros(0, dtype=np.intp)
-"""Inputs of a source that the arm of blocks does not have: its holes have no friction."""
+"""No inputs: the arm of blocks has no friction."""
 
 
 class Ties(NamedTuple):
-    """Pairs of equal inputs: of an arm, and of the arm of its blocks.
+    """Correspondence between the inputs of an arm and those of its arm of blocks.
 
     Attributes:
         labels: Names of the inputs of the arm, by source.
-        tension: Tensions of its cables (C,) [N].
-        inputs: For each input of the arm of blocks, that of the arm; −1 where there is none.
+        tension: Tensions of the cables of the arm (C,) [N].
+        inputs: Index of the arm's input for each input of the arm of blocks; −1 if there is none.
     """
 
     labels: Mapping[str, Sequence[str]]
@@ -40,14 +41,14 @@ class Ties(NamedTuple):
     inputs: Mapping[str, Indices]
 
     def gather(self, gradient: Mapping[str, Array]) -> dict[str, Array]:
-        """Sum the derivatives by the inputs of the arm of blocks over those that are one."""
+        """Sum derivatives for the arm of blocks over the inputs that are one input of the arm."""
         found = {source: np.zeros(len(names)) for source, names in self.labels.items()}
         for source, at in self.inputs.items():
             np.add.at(found[source], at[at >= 0], gradient[source][at >= 0])
         return found
 
     def scatter(self, errors: Mapping[str, Array]) -> dict[str, Array]:
-        """Return the errors (N, inputs) of the arm of blocks."""
+        """Return errors (N, inputs) of the arm's inputs as errors of the arm of blocks."""
         found = {}
         for source, drawn in errors.items():
             at = self.inputs.get(source, _NONE)
