@@ -1,4 +1,4 @@
-"""Closed loop of position and stiffness: motor laws, sensors, plants and estimates."""
+"""Closed-loop control of position and stiffness: motor laws, sensors, plants, estimation."""
 
 from cdsm.control.laws import (
     Command,

@@ -1,10 +1,9 @@
-"""True state of a plant: its stiffness, its margin, its proved band, and a weight hung on it.
+"""True stiffness of a plant, its proved band of rest, and weight tests on it.
 
-Under friction one arm has many stiffnesses. Here *the* stiffness of a state is that of the arm with
-the same wire in every cable and the same load after its cables have slid until nothing holds them:
-the frictionless K_θ of that rest. A weight hung on the arm measures it if the load is shaken before
-and after (:func:`hung_weight`); without shaking, small weights measure the stuck arm, which is
-several times stiffer.
+An arm with friction has many stiffnesses. Here *the* stiffness of a state is the frictionless K_θ
+at the equilibrium without friction, with the same wire in every cable and the same load. A weight
+hung on the arm measures it if the load is shaken before and after (:func:`hung_weight`); without
+shaking, small weights measure the stuck arm, which is several times stiffer.
 """
 
 from __future__ import annotations
@@ -27,13 +26,13 @@ from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.values import Array
 
 _CYCLES: Final = 4
-"""Fading cycles of the shaking, as in :class:`~cdsm.WeightTest`."""
+"""Number of cycles in which the shaking fades, as in :class:`~cdsm.WeightTest`."""
 
 _SHAKEN: Final = 3.0
-"""Amplitude of the shaking over the breakaway load: from there on all cables slide."""
+"""Amplitude of the shaking over the breakaway load; with it all cables slide."""
 
 _DISPLACED: Final = 1e-3
-"""Displacement by the weight, over the length of the arm."""
+"""Displacement that the weight causes, over the length of the arm."""
 
 
 class Assessment(NamedTuple):
@@ -41,7 +40,8 @@ class Assessment(NamedTuple):
 
     Attributes:
         stiffness: Frictionless K_θ with the same wire and load; None if the arm buckles.
-        band: Where the tip may rest along a direction, about the place of ``stiffness``, or None.
+        band: Where the tip may rest along a direction, relative to the posture of ``stiffness``; or
+            None.
     """
 
     stiffness: Stiffness | None
@@ -51,7 +51,7 @@ class Assessment(NamedTuple):
 def assess(
     arm: Manipulator, state: PlantState, wrench: Array, u: Array, *, banded: bool
 ) -> Assessment:
-    """Find the frictionless rest beside a state, and the proved band about it along u (3,)."""
+    """Find the frictionless equilibrium near a state, and the proved band about it along u (3,)."""
     try:
         K = slid_out(arm, state, wrench)
     except CdsmError:
@@ -63,11 +63,11 @@ def assess(
 
 
 def slid_out(arm: Manipulator, state: PlantState, wrench: Array) -> Stiffness:
-    """Return K_θ of the rest that a state of an arm has once no hole holds a cable.
+    """Return K_θ at the equilibrium with the wire and load of a state, but without friction.
 
     Raises:
-        EquilibriumError: There is none: the arm buckles.
-        ElasticityRangeError: A cable leaves its law.
+        EquilibriumError: There is no equilibrium: the arm buckles.
+        ElasticityRangeError: A tension leaves the domain of its law.
     """
     pose, (wire, F) = state.pose, state.true
     lengths = pose.cable_lengths.copy()
@@ -86,9 +86,9 @@ def slid_out(arm: Manipulator, state: PlantState, wrench: Array) -> Stiffness:
 def hung_weight(plant: SlowPlant, state: SlowState, u: Array) -> float:
     """Hang a weight on a plant with its motors stopped, and shake it; return N/m along u (3,).
 
-    The load swings about its mean by three breakaway loads along u and fades in four cycles, first
-    without the weight and then with it. The weight moves the tip by about 0.1 % of the arm. NaN if
-    the arm finds no rest on the way.
+    First without the weight and then with it, the load is shaken along u: its amplitude is three
+    breakaway loads and fades in four cycles. The weight moves the tip by about 0.1 % of the arm's
+    length. NaN if no equilibrium is found on the way.
     """
     arm, load = plant.arm, state.state.load
     try:

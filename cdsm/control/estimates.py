@@ -1,16 +1,18 @@
-"""Joint angles from wire and tension at the motors, stretch and friction included.
+"""Estimation of joint angles from wire and tension at the motors, with stretch and friction.
 
 A cable with the wire l_0 and the tension F at its motor has the length
 
     L(q) = l_0 (1 + ε̄/s) + (F − F_rest)/k_series,   ε̄ = Σ_j l_j ε(ρ_j F)/Σ_j l_j,
 
-with the tension ρ_j F of segment j, and s the rigidity of all wires over what their law says. There
-are more cables than joints. So their lengths give the angles and s: the arm calibrates its own
-wire while it moves. s adds up what all steps say (recursive least squares); the angles are those of
-one step.
+with the length l_j and the tension ρ_j F of segment j, the strain ε of the law, the tension F_rest
+at which the series spring is at rest, and the rigidity factor s: the actual rigidity of all wires
+over that of their laws. There are more cables than joints. So their lengths give the angles and s:
+the wire is calibrated while the arm moves. s follows from all steps (recursive least squares), the
+angles from one step.
 
-ρ_j is what friction leaves of the tension on the way to segment j. The estimate keeps a model of
-the wire in each segment: at each step it moves through the holes as friction lets it.
+ρ_j is the tension of segment j over that at the motor; friction makes it differ from 1. The
+estimate contains the length of wire in each segment, which moves through the holes at each step
+according to the friction law.
 """
 
 from __future__ import annotations
@@ -32,13 +34,13 @@ from cdsm.posture import Posture
 from cdsm.support.values import Array
 
 UNSURE: Final = 0.3
-"""Standard deviation of 1/s before anything is measured."""
+"""Standard deviation of 1/s before the first measurement."""
 
 _FINEST: Final = 1e-9
-"""Error of a length [m] that even exact sensors leave."""
+"""Smallest assumed error of a length [m], also with exact sensors."""
 
 _LEAST_SPREAD: Final = 1e-3
-"""Error of a tension [N] that even exact load cells leave."""
+"""Smallest assumed error of a tension [N], also with exact load cells."""
 
 _STEPS, _CONVERGED = 8, 1e-8
 """Gauss–Newton steps, and the step [rad] that ends them: the next is its square."""
@@ -49,13 +51,13 @@ class Estimate(NamedTuple):
 
     Attributes:
         pose: The posture, within the arm of the controller.
-        tension: Mean tension over the wire of each cable (C,) [N].
-        ratio: Mean tension over that at the motor (C,) [-].
+        tension: Mean tension along each cable (C,) [N].
+        ratio: Mean tension along each cable divided by that at the motor (C,) [-].
         force: Force at the tip (3,) [N], base axes.
-        softness: 1/s: strain over what the law says [-].
+        softness: 1/s: strain divided by that of the law [-].
         variance: Variance of ``softness`` [-].
-        natural: Wire in each segment (S,) [m]; the memory of friction.
-        shares: Tension of each segment over that at the motor (S,) [-].
+        natural: Natural length of wire in each segment (S,) [m]; it stores the history of friction.
+        shares: ρ: tension of each segment divided by that at the motor (S,) [-].
     """
 
     pose: Posture
@@ -70,7 +72,7 @@ class Estimate(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Observer:
-    """Estimates of the arm of a controller from its sensors."""
+    """Observer: it estimates the state of the arm from the sensors."""
 
     arm: Manipulator
     sensors: Sensors
@@ -116,7 +118,7 @@ class Observer:
         return self._slid(before, pose, F, x, variance)
 
     def gain(self, estimate: Estimate, reading: Reading) -> Array:
-        """Compute κ = −∂F/∂l_0 (C,) [N/m] at constant lengths; 0 where a motor holds a tension."""
+        """Compute κ = −∂F/∂l_0 (C,) [N/m] at constant lengths; 0 for force-controlled motors."""
         F = np.maximum(reading.tension, self._least)
         stretch = 1.0 + estimate.softness * self._mean_strain(estimate.pose, estimate.shares, F)
         soft = self._compliance(reading.wire, F) * estimate.softness
@@ -141,7 +143,8 @@ class Observer:
     def _tip_force(self, pose: Posture, tension: Array) -> Array:
         """Compute the force (3,) [N] at the tip that balances tensions (S,) [N] best.
 
-        J_vᵀ f = Σ_j T_j g_j + g, weighted by what noise and friction leave uncertain of it.
+        Weighted least squares of J_vᵀ f = Σ_j T_j g_j + g, with g_j the gradient of the length of
+        segment j. The weights follow from the uncertainty of noise and friction.
         """
         segments = pose.segments
         chains, J = segments.chains, pose.length_jacobian

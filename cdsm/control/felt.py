@@ -1,12 +1,12 @@
-"""Stiffness felt at the tip: motors pull as a weight would, and sensors tell how far the tip goes.
+"""Stiffness measured by the motors: they excite the tip, and sensors give its displacement.
 
-A force f at the tip loads the joints with J_vᵀ f. Changes x of the tensions load them alike if
-−J_Lᵀ x = J_vᵀ f. Motors that pay out the wire −x/κ, with κ = −∂F/∂l_0 of each cable, move the
-joints as f does. Wire and tension give the posture before and after. So the controller checks the
-whole of K_θ with the sensors that it has.
+A force f at the tip causes the joint torques J_vᵀ f. Changes x of the tensions cause the same
+torques if −J_Lᵀ x = J_vᵀ f. Motors that pay out the wire −x/κ, with κ = −∂F/∂l_0 of each cable,
+move the joints as f does. Wire and tension give the posture before and after. So the controller
+measures the stiffness with its own sensors.
 
-Without friction this is the stiffness. Under friction it is too high: holes keep part of a motor's
-pull from the joints, and the estimate does not know all of it.
+Without friction the result is the stiffness. With friction it is too high: friction reduces the
+effect of the motors on the joints, and the estimate does not include all of this.
 """
 
 from __future__ import annotations
@@ -25,21 +25,21 @@ from cdsm.stiffness_matrix import stiffness
 from cdsm.support.values import Array
 
 _DISPLACED: Final = 5e-3
-"""Displacement of the tip either way, over the length of the arm."""
+"""Displacement of the tip in each direction, over the length of the arm."""
 
 _RESERVE: Final = 0.5
-"""Largest part of the way to a bound of a tension that the excitation goes."""
+"""Largest change of a tension by the excitation, over its distance from the nearest bound."""
 
 _READINGS: Final = 64
-"""Readings of the load cells that are averaged at rest."""
+"""Number of load cell readings that are averaged at rest."""
 
 
 def virtual_force(pose: Posture, gain: Array, force: Array) -> Array:
-    """Compute the wire (C,) [m] to pay out that moves the joints as a force at the tip does.
+    """Compute the wire (C,) [m] to pay out to move the joints as a force at the tip would.
 
     Args:
         pose: The posture.
-        gain: κ of each cable (C,) [N/m]; 0 where the motor itself holds the tension.
+        gain: κ of each cable (C,) [N/m]; 0 for force-controlled cables.
         force: f (3,) [N], base axes.
     """
     held = gain > 0.0
@@ -59,11 +59,11 @@ def felt_stiffness(
     u: Array,
     random: np.random.Generator,
 ) -> float:
-    """Excite an arm both ways along u (3,) with its motors; return the stiffness felt [N/m].
+    """Move the tip along ±u (3,) with the motors; return the measured stiffness [N/m].
 
-    The arm is a copy: ``state`` does not change. The tip moves by 0.5 % of the arm, or less where
-    half the way to a bound of a tension is reached. NaN if the arm finds no rest, if the controller
-    believes in an arm that gives way, or if a tension is at its bound.
+    The arm is a copy: ``state`` does not change. The tip moves by 0.5 % of the arm's length, or
+    less if a tension would come closer to its bound than half its distance. NaN if no equilibrium
+    is found, if the estimated arm is unstable, or if a tension is at its bound.
     """
     wire, F = observer.sensors.read([state.true], random)
     gain = observer.gain(estimate, Reading(wire, F))

@@ -1,10 +1,10 @@
 """Motor laws: pure functions of reference and readings, with the clamps of each.
 
-A motor of a position-controlled cable holds the wire that it has paid out, l_0. A law says how much
-that is to be. At rest a change of l_0 changes the tension by −k Δl_0, so that each command stands
-for a tension, F + k (l_0 measured − l_0 commanded). No law commands a tension outside the bounds:
-below is slack, above is overload. A law of one's own is any function of a :class:`Moment` that
-returns :func:`limited` of the wire that it wants.
+The motor of a position-controlled cable keeps the length of wire that it has paid out, l_0,
+constant. A law computes the next l_0. At rest a change of l_0 changes the tension by −k Δl_0, so
+each command corresponds to a tension, F + k (l_0 measured − l_0 commanded). No law commands a
+tension outside the bounds: below, a cable may be slack; above, overloaded. A user-defined law is
+any function of a :class:`Moment` that returns :func:`limited` of its wire.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from cdsm.support.values import Array
 
 PROPORTIONAL, INTEGRAL = 0.2, 0.3
-"""Gains of the tension control, as parts of the tension error that one step takes away."""
+"""Gains of the tension control [-]: parts of the tension error that one step corrects."""
 
 
 class Reference(NamedTuple):
@@ -28,7 +28,7 @@ class Reference(NamedTuple):
         angles: Joint angles (nv,) [rad]; [m] where a joint slides.
         tension: F (C,) [N].
         wire: l_0 paid out at these angles and tensions (C,) [m].
-        stiffness: k of each cable (C,) [N/m]; 0 where the motor itself holds the tension.
+        stiffness: k of each cable (C,) [N/m]; 0 for force-controlled cables.
     """
 
     angles: Array
@@ -54,7 +54,7 @@ class Command(NamedTuple):
 
     Attributes:
         wire: l_0 to pay out (C,) [m].
-        tension: The tension that this stands for (C,) [N], within the bounds.
+        tension: The tension that corresponds to ``wire`` (C,) [N], within the bounds.
         saturated: Whether the clamp changed the command of each motor (C,).
     """
 
@@ -69,9 +69,9 @@ class Moment(NamedTuple):
     Attributes:
         reference: Reference of this step.
         reading: Readings of this step.
-        reference_before: Reference of the step before.
-        reading_before: Readings of the step before.
-        command: Wire commanded at the step before (C,) [m].
+        reference_before: Reference of the previous step.
+        reading_before: Readings of the previous step.
+        command: Wire commanded at the previous step (C,) [m].
         minimum: Lower bounds of the tensions (C,) [N].
         maximum: Upper bounds of the tensions (C,) [N].
         forced: Cables of which a mixed law controls the tension (C,).
@@ -92,9 +92,9 @@ Law = Callable[[Moment], Command]
 
 
 def limited(moment: Moment, wire: Array) -> Command:
-    """Clamp the wire (C,) [m] of a law so that no tension that it stands for leaves the bounds.
+    """Clamp the wire (C,) [m] of a law so that the commanded tensions stay within the bounds.
 
-    The tensions are those measured, changed by the step of the wire while the arm stands still.
+    The commanded tensions follow from the measured ones and the change of wire at constant posture.
     """
     reading, k = moment.reading, moment.reference.stiffness
     asked = reading.tension + k * (reading.wire - wire)
@@ -102,16 +102,16 @@ def limited(moment: Moment, wire: Array) -> Command:
 
 
 def feedforward(moment: Moment) -> Command:
-    """Pay out the wire of the loaded equilibrium, stretch included. It needs no sensor at all."""
+    """Pay out the wire of the plan, with its stretch under load. This law needs no sensor."""
     return _clamped(moment, moment.reference.wire, moment.reference.tension)
 
 
 def tension_control(moment: Moment) -> Command:
-    """Control the tension of every cable about that of the plan: PI, with the wire fed forward.
+    """Control the tensions of all cables to those of the plan: PI, with the wire as feedforward.
 
     Δl_0 = Δl_0 wanted − (P Δe + I e)/k with the error e = F wanted − F measured. It needs a load
-    cell at every cable. An arm that only its cables make stiff leaves its posture slowly, since no
-    motor holds a length.
+    cell at every cable. An arm without other springs drifts slowly from its posture, since no motor
+    controls a length.
     """
     return limited(moment, _regulated(moment))
 
@@ -119,8 +119,8 @@ def tension_control(moment: Moment) -> Command:
 def mixed(moment: Moment) -> Command:
     """Control the tension of some cables, and pay out the wire of the plan for all others.
 
-    The arm of the paper has one of both in each pair. It needs a load cell at every cable for the
-    clamps.
+    The arm of the paper has one cable of each kind in each pair. The clamps need a load cell at
+    every cable.
     """
     return limited(moment, np.where(moment.forced, _regulated(moment), moment.reference.wire))
 

@@ -1,8 +1,8 @@
-"""The arm that is controlled, with inertia and damping: MuJoCo moves the exported model.
+"""Plant with inertia and damping: MuJoCo simulates the exported model of the arm.
 
-The exported motors have constant stiffness, as MuJoCo has it. Here they get the tangent of the law
-of their wire again some ten times per step of control, so that the arm rests where cdsm's does.
-Cables slide freely in their holes.
+The exported motors have constant stiffness, since MuJoCo knows no other. Here their stiffness and
+force are set to the tangent of their wire's law ten times per step of control, so that the arm has
+the same equilibria as in cdsm. Cables slide freely in their holes.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from cdsm.support.validation import quantity
 from cdsm.support.values import Array, frozen
 
 _TANGENTS: Final = 10
-"""Number of times per step that motors and load follow the posture."""
+"""Number of updates of the motors' tangents and of the load per step."""
 
 
 class MuJoCoState(NamedTuple):
@@ -41,7 +41,7 @@ class MuJoCoState(NamedTuple):
 class MuJoCoPlant:
     """Arm with inertia and damping, moved by MuJoCo from one step of control to the next.
 
-    It need not be at rest when the next command comes.
+    The arm may still move when the next command comes.
 
     Attributes:
         arm: The true arm, without friction in its holes.
@@ -68,7 +68,7 @@ class MuJoCoPlant:
             )
 
     def begin(self, q: Array, tension: Array, wrench: Array) -> MuJoCoState:
-        """Return the arm at rest at joint angles (nv,) with cables of a tension (C,) [N]."""
+        """Return the arm at rest at joint angles (nv,) with tensions (C,) [N]."""
         import mujoco
 
         pose = self.arm.at(q)
@@ -83,8 +83,8 @@ class MuJoCoPlant:
         """Return the arm a period later, under a command and a wrench (6,).
 
         Raises:
-            SolverError: The arm moves beyond all bounds.
-            ElasticityRangeError: A cable leaves its law.
+            SolverError: The simulation diverges.
+            ElasticityRangeError: A tension leaves the domain of its law.
         """
         import mujoco
 
@@ -110,7 +110,7 @@ class MuJoCoPlant:
         return MuJoCoState(model, pose, Reading(command.wire, frozen(F)), data.qvel.copy())
 
     def _pull(self, model: Any, lengths: Array, command: Command) -> None:
-        """Give each motor the tangent F + k (L' − L) of the law of its wire; lead left out."""
+        """Set each motor to the tangent F + k (L' − L) of its wire's law; L excludes the lead."""
         cables = self.arm.cables
         L = lengths + [cable.lead for cable in cables]
         F = self._tensions(L, command)
@@ -122,7 +122,7 @@ class MuJoCoPlant:
             model.actuator_biasprm[motor, :3] = k * lengths[c] - F[c], -k, 0.0
 
     def _tensions(self, lengths: Array, command: Command) -> Array:
-        """Compute F (C,) [N] of cables of some lengths (C,) [m] with the commanded wire."""
+        """Compute F (C,) [N] from cable lengths (C,) [m] and the commanded wire."""
         F = command.tension.copy()
         for c, cable in enumerate(self.arm.cables):
             if cable.control == "position":

@@ -1,4 +1,4 @@
-"""The arm that is controlled: cdsm's own, loaded slowly, with friction and history."""
+"""Plants: the controlled arm; here quasi-static, with friction and history."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from cdsm.support.values import Array, frozen
 
 
 class PlantState(Protocol):
-    """State of a plant, which does not change; a move gives another one."""
+    """Immutable state of a plant; a move returns a new one."""
 
     @property
     def pose(self) -> Posture:
@@ -46,12 +46,12 @@ class Plant(Protocol[AnyState]):
         """Return the arm after its motors followed a command under a wrench (6,).
 
         Raises:
-            CdsmError: The arm finds no place to rest, or a cable leaves its law.
+            CdsmError: No equilibrium was found, or a tension leaves the domain of its law.
         """
 
 
 class SlowState(NamedTuple):
-    """State of a :class:`SlowPlant`: the wire in each segment is its memory."""
+    """State of a :class:`SlowPlant`: the wire in each segment stores its history."""
 
     loading: SlowLoading
     reference_wire: Array  # l_0 at the reference (C,) [m]
@@ -75,12 +75,12 @@ class SlowState(NamedTuple):
 class SlowPlant:
     """Quasi-static arm whose cables stick and slide in their holes, as in :func:`~cdsm.load_cycle`.
 
-    Its motors follow each command exactly and slowly. Its wire, friction, sizes and load may differ
-    from those that the controller believes in.
+    Its motors follow each command exactly and slowly. Its wire, friction, dimensions and load may
+    differ from those in the controller's model.
 
     Attributes:
         arm: The true arm.
-        accuracy: Largest part of the work [-] of a step that may stay unaccounted for.
+        accuracy: Largest error of the energy balance of a step, relative to the work [-].
 
     Raises:
         InvalidInput: ``original_length`` of the arm is not ``"unstrained"``.
@@ -105,7 +105,7 @@ class SlowPlant:
         """Return the arm after its motors followed a command under a wrench (6,).
 
         Raises:
-            EquilibriumError: The arm finds no place to rest on the way: it buckles.
+            EquilibriumError: No equilibrium was found on the way: the arm buckles.
         """
         loading = state.loading
         taken_in = state.reference_wire - command.wire
@@ -118,7 +118,7 @@ class SlowPlant:
 
 
 def require_unstrained(name: str, arm: Manipulator) -> None:
-    """Raise InvalidInput if the arm reads stretched lengths, which no motor pays out."""
+    """Raise InvalidInput if the original lengths of the arm are not unstretched lengths."""
     if arm.original_length != "unstrained":
         raise InvalidInput(
             name, 'has original_length = "stretched"; motors pay out unstrained lengths.'

@@ -37,10 +37,9 @@ Outcome = Literal["completed", "lost", "no rest", "wire"]
 class TrackingRun(ReadOnlyState):
     """Closed loop along a path, step by step; made by :func:`track`.
 
-    n steps, C cables, D wanted directions. Under friction, *the* stiffness of a state is that of
-    the arm with the same wire and load once its cables have slid until nothing holds them:
-    :meth:`hung_weight` measures it, since it shakes the load. NaN stands where an arm has no such
-    rest.
+    n steps, C cables, D wanted directions. With friction, *the* stiffness of a state is that at the
+    equilibrium without friction, with the same wire and load. :meth:`hung_weight` measures it,
+    since it shakes the load. NaN if there is no such equilibrium.
 
     Attributes:
         plan: The plan that was followed.
@@ -50,26 +49,27 @@ class TrackingRun(ReadOnlyState):
         goals: Planned tip positions (n, 3) [m].
         target: Wanted stiffness (n, D) [N/m].
         angles: True joint angles (n, nv) [rad]; [m] where a joint slides.
-        estimated_angles: Angles that the controller believed in before each step (n, nv) [rad].
+        estimated_angles: Angles that the controller estimated before each step (n, nv) [rad].
         tips: True tip positions (n, 3) [m].
         wanted_tension: References of the tensions at the motors (n, C) [N].
-        commanded_tension: Tensions that the commands stand for (n, C) [N], within the bounds.
-        commanded_wire: Wire that the motors were told to pay out (n, C) [m].
+        commanded_tension: Tensions that correspond to the commands (n, C) [N], within the bounds.
+        commanded_wire: Commanded wire to pay out (n, C) [m].
         measured_tension: Readings of the load cells before each step (n, C) [N].
         tension: True tensions at the motors (n, C) [N].
         saturated: Whether a clamp changed the command of each motor (n, C).
         stiffness: True stiffness along each direction (n, D) [N/m].
         margin: Smallest eigenvalue of the true K_θ (n,) [N m/rad].
-        felt: Stiffness that the motors felt along each direction (n, D) [N/m]; NaN where the
-            controller did not try, or could not.
-        banded: Whether a band was sought (n,).
-        band: Least and largest proved displacement along the first direction (n, 2) [m], about the
-            rest without friction; NaN where none was sought or proved.
-        displacement: Displacement of the tip from that rest along the first direction (n,) [m].
+        felt: Stiffness measured with the motors along each direction (n, D) [N/m]; NaN where it was
+            not measured, or could not be.
+        banded: Whether a band was computed (n,).
+        band: Least and largest proved displacement along the first direction (n, 2) [m], from the
+            equilibrium without friction; NaN where none was computed or proved.
+        displacement: Displacement of the tip from the equilibrium without friction along the first
+            direction (n,) [m].
         wrench: Load (n, 6): force [N], then moment [N m].
-        estimated_force: Force at the tip that the controller believed in (n, 3) [N].
+        estimated_force: Force at the tip that the controller estimated (n, 3) [N].
         rigidity: Rigidity of the wires over that of their laws, as estimated (n,) [-].
-        refused: Reasons why the outer loop kept its tensions, by step.
+        refused: Reasons why the outer loop could not plan and kept its previous tensions, by step.
         outcome: ``"completed"``; ``"lost"``: the tip left its path, the loop is unstable; ``"no
             rest"``: the arm buckled; ``"wire"``: a cable left its law.
         reason: What stopped the loop, in words; or empty.
@@ -123,12 +123,12 @@ class TrackingRun(ReadOnlyState):
 
     @cached_property
     def stiffness_error(self) -> Array:
-        """Stiffness over the wanted one, minus 1 (n, D) [-]; NaN where there is none."""
+        """True stiffness/target − 1 (n, D) [-]; NaN where the arm has no stiffness."""
         return frozen(self.stiffness / self.target - 1.0)
 
     @cached_property
     def proved(self) -> NDArray[np.bool_]:
-        """Whether a band was proved (n,); never more often than it was sought, ``banded``."""
+        """Whether a band was computed (``banded``) and proved (n,)."""
         return frozen(np.isfinite(self.band[:, 0]))
 
     @cached_property
@@ -141,8 +141,8 @@ class TrackingRun(ReadOnlyState):
     def hung_weight(self, step: int, direction: int = 0) -> float:
         """Hang a weight on the true arm as it was after a step; return the stiffness [N/m].
 
-        The motors stand still. The load swings and fades away before and after the weight is hung,
-        so that friction does not hold the arm. NaN if the arm finds no rest.
+        The motors stand still. The load is shaken with fading amplitude before and after the weight
+        is hung, so that friction hardly affects the result. NaN if no equilibrium is found.
 
         Args:
             step: Number of the step; negative numbers count from the last.
@@ -269,4 +269,4 @@ class TrackingRun(ReadOnlyState):
 
 
 _ROUNDING = 1e-9
-"""Distance beyond a band [m] that is rounding of a place of rest."""
+"""Distance beyond a band [m] that counts as rounding."""

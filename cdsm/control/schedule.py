@@ -1,4 +1,4 @@
-"""References of a plan at each step of control, and the motors that control tension."""
+"""References at each step of control, from a plan; choice of the tension-controlled cables."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from cdsm.support.values import Array
 
 
 class Schedule(NamedTuple):
-    """References at n steps: the motors move evenly from one sample of the plan to the next.
+    """References at n steps, linearly interpolated between the samples of a plan.
 
     Attributes:
         references: Reference of each step.
@@ -36,7 +36,7 @@ class Schedule(NamedTuple):
 
     @classmethod
     def of(cls, plan: PathPlan, steps: int) -> Self:
-        """Divide the way from each sample of a complete plan to the next into steps."""
+        """Divide the path from each sample of a complete plan to the next into equal steps."""
         size = len(plan.planned)
         at = np.linspace(0.0, size - 1.0, (size - 1) * steps + 1)
         before = np.minimum(at.astype(int), max(size - 2, 0))
@@ -80,8 +80,8 @@ def checked_plan(plan: PathPlan) -> Manipulator:
 def tension_controlled(plan: PathPlan, names: Sequence[str] | None) -> NDArray[np.bool_]:
     """Return which cables (C,) a mixed law controls by tension.
 
-    Lengths of as many cables as there are joints give the posture. By default these are the cables
-    that do so best at the first sample, found by a QR decomposition of J_Lᵀ with pivots.
+    The lengths of the other cables, as many as there are joints, give the posture. By default those
+    are chosen that do so best at the first sample, by a pivoted QR decomposition of J_Lᵀ.
     """
     cables = plan.arm.cables.names
     forced = np.ones(len(cables), dtype=np.bool_)

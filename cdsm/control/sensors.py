@@ -1,4 +1,4 @@
-"""Encoders and load cells: quantised, noisy, biased and late."""
+"""Encoders and load cells with quantisation, noise, bias and delay."""
 
 from __future__ import annotations
 
@@ -26,7 +26,8 @@ class Sensors:
 
     Attributes:
         encoder: Length [m] of one count of an encoder; 0: exact.
-        tension_noise: Standard deviation [N] of a load cell, Gaussian, cut off at four of them.
+        tension_noise: Standard deviation [N] of the Gaussian noise of a load cell, cut off at four
+            of them.
         tension_bias: Constant error of all load cells [N].
         delay: Steps of control by which all readings are late.
 
@@ -53,7 +54,7 @@ class Sensors:
         )
 
     def read(self, truth: Sequence[Reading], random: np.random.Generator) -> Reading:
-        """Measure the last of some true states, or an earlier one if the sensors are late.
+        """Measure the last of some true states, or an earlier one if there is a delay.
 
         Args:
             truth: Wire and tension at all steps so far.

@@ -1,4 +1,4 @@
-"""The outer loop: tensions for the wanted stiffness, planned again at the estimated posture."""
+"""Outer loop: it plans the tensions for the target stiffness again at the estimated posture."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from cdsm.planning.stiffness_model import StiffnessModel
 from cdsm.support.values import Array
 
 _SOFTER = 5e-3
-"""Change of the softness of the wire from which the arm is built again with it."""
+"""Change of the estimated softness 1/s from which the arm is built again with it."""
 
 
 class Replanned(NamedTuple):
     """Tensions that the outer loop plans at one step.
 
     Attributes:
-        reference: Its tensions at the motors, and the wire for them.
-        mean: Mean tensions over the wire of each cable (C,) [N], which give the stiffness.
-        refused: Why nothing could be planned, and the tensions before were kept; or empty.
+        reference: Planned tensions at the motors, and the wire for them.
+        mean: Mean tensions along each cable (C,) [N], from which the stiffness follows.
+        refused: Why nothing could be planned, so that the previous tensions were kept; or empty.
     """
 
     reference: Reference
@@ -37,9 +37,9 @@ class Replanned(NamedTuple):
 
 @dataclass(eq=False)
 class StiffnessLoop:
-    """Plans the tensions of the next step: the nearest to those before that give the stiffness.
+    """Planner of the next tensions: the nearest to the previous ones with the target stiffness.
 
-    Where the rate does not allow that, it goes towards them.
+    If the rate does not allow these, it goes towards them.
 
     Attributes:
         arm: The arm of the controller.
@@ -66,10 +66,10 @@ class StiffnessLoop:
         """Plan a step.
 
         Args:
-            wanted: The plan at this step, of which the angles are kept.
+            wanted: The reference of the plan at this step; its angles are kept.
             target: Stiffness [N/m], () or (n,).
-            estimate: Posture, load, wire and friction as far as they are known.
-            before: Mean tensions of the step before (C,) [N].
+            estimate: Estimated posture, load, wire and friction.
+            before: Mean tensions of the previous step (C,) [N].
         """
         arm, mean, refused = self._with_softness(estimate.softness), before, ""
         try:
@@ -94,7 +94,7 @@ class StiffnessLoop:
         return Replanned(reference, mean, refused)
 
     def _with_softness(self, softness: float) -> Manipulator:
-        """Return the arm with the rigidity that its wire seems to have."""
+        """Return the arm with the estimated rigidity of its wire."""
         if abs(softness - self._softness) > _SOFTER:
             self._softness = softness
             self._calibrated = with_rigidity(self.arm, 1.0 / softness)

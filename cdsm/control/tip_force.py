@@ -1,12 +1,13 @@
-"""Force at the tip from the tensions at the motors, with bounds that friction and noise leave.
+"""Bounds of the force at the tip from the tensions at the motors, with friction and noise.
 
 At a known posture the force f, and the tensions T of all segments, meet
 
     Σ_j T_j g_j + g − J_vᵀ f = 0,   exp(−μ φ) T_j ≤ T_{j+1} ≤ exp(μ φ) T_j,   |T_1 − F| ≤ error,
 
-with the measured F of each cable. This is a polyhedron; the largest and the least u·f in it are two
-linear programs. The multipliers of each give a bound by weak duality, so that no answer of a solver
-is trusted.
+with the measured tension F of each cable, the gradient g_j of the length of segment j, the gravity
+torque g, the friction coefficient μ and the wrap angle φ of each hole. This is a polyhedron; the
+largest and the least u·f in it are two linear programs. The multipliers of each give a bound by
+weak duality, so that no answer of a solver is trusted.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from cdsm.support.validation import Direction, instance, quantity, unit_directio
 from cdsm.support.values import Array, ReadOnlyState
 
 _WIDEST = 1e6
-"""Largest force in the programs, over the tensions: they are bounded then."""
+"""Bound of the force in the programs, over the tensions, so that they are bounded."""
 
 
 @final
@@ -38,8 +39,8 @@ class TipForce(ReadOnlyState):
         tension: Measured tensions at the motors F (C,) [N].
         error: Largest error of each of them [N].
         direction: Unit direction u (3,), base axes.
-        low: Least force along u [N] that friction and errors leave possible.
-        high: Largest force along u [N], likewise.
+        low: Least force along u [N] that is possible with friction and errors.
+        high: Largest force along u [N] that is possible with friction and errors.
     """
 
     posture: Posture
@@ -128,4 +129,4 @@ def tip_force(
 
 
 _ROUNDING = 1e-12
-"""Reduced costs that are rounding; those of the force would count a million times."""
+"""Smaller reduced costs are rounding; for the force they would count a million times."""

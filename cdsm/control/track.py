@@ -1,4 +1,4 @@
-"""Follow a planned path in closed loop: plan, motor law, plant, sensors, estimate, and again."""
+"""Follow a planned path in closed loop: sensors, estimate, motor law and plant at each step."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ from cdsm.support.values import Array, frozen
 from cdsm.tension import checked_bounds
 
 _MOST_STEPS: Final = 1000
-"""Most steps of control from sample to sample."""
+"""Largest number of steps of control between two samples."""
 
 _LOST: Final = 0.1
 """Tip error over the length of the arm [-] from which the loop counts as unstable."""
@@ -68,7 +68,7 @@ def track(
     the wire of the others; ``"stiffness"`` is the mixed law in an outer loop, which plans the
     tensions again at the estimated posture. No law commands a tension outside the bounds.
 
-    The plan's arm is what the controller believes in, friction included. The loop starts at rest at
+    The plan's arm, with its friction, is the model of the controller. The loop starts at rest at
     the first sample with the planned tensions. An unstable loop, an arm that buckles and a target
     that cannot be planned are answers: ``outcome``, ``reason`` and ``warnings`` of the result.
 
@@ -78,21 +78,20 @@ def track(
         plant: The true arm. Default: :class:`SlowPlant` of the plan's arm.
         sensors: The sensors; default: encoders of 10 µm, exact load cells.
         minimum: Lower bounds of the commanded tensions [N], for all cables or (C,).
-        maximum: Upper bounds [N], likewise.
+        maximum: Upper bounds of the commanded tensions [N], for all cables or (C,).
         payload: Mass [kg] that the controller does not know of; it hangs at the tip.
-        payload_from: Part of the path [-] after which it hangs there, from 0 to 1.
+        payload_from: Part of the path [-], from 0 to 1, after which the payload hangs at the tip.
         steps: Steps of control from one sample of the path to the next.
         period: Time between two steps [s].
         rate: Largest change of a tension that the outer loop plans per step [N], or (C,).
         replan: Whether the outer loop runs; default: for ``"stiffness"`` only.
-        tension_controlled: Names of the cables whose tension a mixed law controls. Default: as many
-            as there are more cables than joints, so that the lengths of the others give the posture
-            best.
-        bands: A proved band is computed at every so many steps, some 20 ms each; 0: never. An arm
-            without friction has none.
-        felt: At every so many steps the motors excite the tip a little, and the controller feels
-            how stiff it is (:mod:`cdsm.control.felt`); 0: never. This is done to a copy of the arm,
-            so that the run stays the same.
+        tension_controlled: Names of the cables whose tension a mixed law controls. Default: C − nv
+            cables, chosen so that the lengths of the others give the posture best.
+        bands: Number of steps from one proved band to the next, some 20 ms each; 0: none. An arm
+            without friction has no band.
+        felt: Number of steps from one measurement of the stiffness with the motors to the next
+            (:mod:`cdsm.control.felt`); 0: none. This is done to a copy of the arm, so that the run
+            stays the same.
         seed: Seed of the noise: the same seed gives the same bits.
 
     Raises:
