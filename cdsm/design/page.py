@@ -71,7 +71,7 @@ def page_of(found: DesignSearch) -> Document:
 
 
 def _pictures(found: DesignSearch) -> list[str]:
-    """Draw the arms of the front at the first posture, to one scale, as addresses of pictures."""
+    """Draw the arms of the front at the first posture, to one scale; return data URLs."""
     poses = []
     for number in range(len(found.front)):
         arm = found.arm(number)

@@ -29,11 +29,11 @@ _SURE: dict[str, tuple[Reading, float]] = {
     "margin": ("margin", -1.0),
     "motor_force": ("tension", 1.0),
 }
-"""Readings with an uncertainty, and the side on which it counts."""
+"""Reading whose uncertainty counts in each quantity, and the sign with which it counts."""
 
 
 class Found(NamedTuple):
-    """Quantities (m,) of one design, and why it is no arm."""
+    """Quantities (m,) of one design, and why it does not make an arm (empty if it does)."""
 
     values: Array
     fault: str = ""
@@ -101,7 +101,7 @@ class _Arm:
         return np.array([self._value(each) for each in self.problem.measures])
 
     def rows(self, each: Measure) -> Array:
-        """Return a quantity of the tensions at all postures and loads that are held."""
+        """Return a quantity that depends on tensions at all postures and loads that are held."""
         held, problem = self.held, self.problem
         C = self.found["compliance"][held][:, :3, :3]
         if each.of == "stiffness":
@@ -167,7 +167,7 @@ class _Arm:
         return float(rows[worst]) + self._margin(each, worst)
 
     def _margin(self, each: Measure, worst: int) -> float:
-        """Return k u of a reading at its worst posture, with its sign; 0 without tolerances."""
+        """Return ± coverage · u of a reading at its worst posture; 0 without tolerances."""
         problem = self.problem
         bounded = any(constraint.key == each.key for constraint in problem.constraints)
         if problem.tolerances is None or each.of not in _SURE or not bounded:
@@ -188,7 +188,7 @@ class _Arm:
 
 
 def _volume(tips: Array) -> float:
-    """Return the volume of the hull of points (n, 3) [m³]; 0 if they are flat."""
+    """Return the volume [m³] of the convex hull of points (n, 3) [m]; 0 if they are coplanar."""
     from scipy.spatial import ConvexHull, QhullError
 
     try:

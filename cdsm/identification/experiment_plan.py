@@ -40,7 +40,7 @@ class ExperimentPlan(ReadOnlyState):
         even: Repetitions (n,) in a reference plan: as many tests, evenly spaced over the
             candidates.
         jacobians: Derivatives [-] of the readings of each candidate, in standard deviations, with
-            respect to relative parameters: (m, P) each, for m readings.
+            respect to relative parameters: a row (P,) for each reading.
         known: Prior knowledge (P, P) [-]: 1/σ of relative parameters on the diagonal.
         efficiency: Proved lower bound of f/f_best [-], 1 for the best plan; f is the criterion. The
             variances, averaged as in the criterion, are at most 1/efficiency times those of the

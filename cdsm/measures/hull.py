@@ -1,7 +1,8 @@
-"""Hull of all loads that an arm holds, by one linear program for each facet.
+"""Convex hull of all loads that tensions balance, by one linear program for each facet.
 
-Hull method (Lassez and Lassez, 1992; for robots Skuric, Padois and Daney, RA-L 2022): hull of known
-vertices, one linear program along the normal of each facet, until none finds a farther load.
+Hull method (Lassez and Lassez, 1992; for robots Skuric, Padois and Daney, RA-L 2022): take the hull
+of the known vertices, solve a linear program along the normal of each facet, and repeat until no
+program finds a vertex outside the hull.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from cdsm.measures.program import Loads
 from cdsm.support.values import Array
 
 _FLAT = 1e-8
-"""Widths of a polytope over its size that are zero."""
+"""Smaller widths of a polytope, relative to its size, count as zero."""
 
 
 class Hull(NamedTuple):
@@ -33,7 +34,7 @@ _Farthest = Callable[[Array], tuple[float, Array]]
 
 
 def hull_of(loads: Loads) -> Hull | None:
-    """Compute the polytope of all loads x (k,); None if it is empty."""
+    """Compute the polytope of all loads x (k,) that tensions balance; None if it is empty."""
     k = loads.lever.size - loads.low.size
 
     def farthest(normal: Array) -> tuple[float, Array]:
