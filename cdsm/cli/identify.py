@@ -68,7 +68,7 @@ def identify(
 
     described = arm.read()
     ranges = _ranges(free)
-    parameters = ArmParameters(described, ranges)
+    parameters = ArmParameters(described, tuple(ranges))
     read = cdsm.read_loops(
         loops,
         described,

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any, Final, NamedTuple, final
 
 import numpy as np
@@ -46,6 +45,7 @@ KINDS: Final = {
 
 
 @final
+@dataclass(frozen=True)
 class ArmParameters:
     """Arm as a function of some of its parameters; a ``model_of`` for :func:`identify`.
 
@@ -55,7 +55,7 @@ class ArmParameters:
     laws [-], ``spring`` the stiffness in series with each cable [N/m], the others are in SI. Names
     with @ are given as ``parameters(**{"hole_radius@2": 0.025})``.
 
-    Args:
+    Attributes:
         arm: The arm; parameters that are not named keep their values.
         names: Names of the parameters, in any order.
 
@@ -65,28 +65,38 @@ class ArmParameters:
             for all joints and for one joint.
     """
 
-    def __init__(self, arm: Manipulator, names: Iterable[str]) -> None:
-        self.arm = instance("arm", arm, Manipulator)
-        self.geometry: Geometry = arm.geometry  # refuses arms from a URDF
-        self.names = tuple(text("names", name) for name in names)
+    arm: Manipulator
+    names: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        instance("arm", self.arm, Manipulator)
+        object.__setattr__(self, "names", tuple(text("names", name) for name in self.names))
         if self.arm.cables.names != self.geometry.cable_names:
             raise InvalidInput("arm", "has other cables than those of its geometry.")
-        joints, taken = len(self.geometry.joints), set[tuple[str, int]]()
-        self._places: dict[str, tuple[str, tuple[int, ...]]] = {}
+        taken = set[tuple[str, int]]()
         for name in self.names:
-            kind, at, number = name.partition("@")
-            one_of("parameter of an arm", kind, KINDS)
-            if at and not (number.isdecimal() and 1 <= int(number) <= joints):
-                raise InvalidInput(name, f"the arm has the joints 1 to {joints}.")
-            where = (int(number),) if at else tuple(range(1, joints + 1))
+            kind, where = self._place(name)
             if taken & {(kind, k) for k in where}:
                 raise InvalidInput(name, f"frees {kind} of a joint twice.")
             taken |= {(kind, k) for k in where}
-            self._places[name] = kind, where
+
+    @property
+    def geometry(self) -> Geometry:
+        """Geometry of the arm; an arm from a URDF has none."""
+        return self.arm.geometry
+
+    def _place(self, name: str) -> tuple[str, tuple[int, ...]]:
+        """Return the kind of a parameter, and the numbers of its joints."""
+        kind, at, number = name.partition("@")
+        one_of("parameter of an arm", kind, KINDS)
+        joints = len(self.geometry.joints)
+        if at and not (number.isdecimal() and 1 <= int(number) <= joints):
+            raise InvalidInput(name, f"the arm has the joints 1 to {joints}.")
+        return kind, (int(number),) if at else tuple(range(1, joints + 1))
 
     def unit(self, name: str) -> tuple[str, float]:
         """Return the unit in which people read a parameter, and its size in SI."""
-        kind = KINDS[self._places[name][0]]
+        kind = KINDS[self._place(name)[0]]
         return kind.unit, kind.size
 
     @property
@@ -107,7 +117,7 @@ class ArmParameters:
         of_cables: dict[str, dict[int, float]] = {"friction": {}, "rigidity": {}, "spring": {}}
         for name, given in values.items():
             one_of("parameter", name, self.names)
-            value, (kind, where) = scalar(name, given), self._places[name]
+            value, (kind, where) = scalar(name, given), self._place(name)
             part, attribute = KINDS[kind].part, KINDS[kind].attribute
             if not part:
                 of_cables[kind].update(dict.fromkeys(where, value))
@@ -144,7 +154,7 @@ class ArmParameters:
 
     def _values(self, name: str) -> list[float]:
         """Return the values of a parameter at its joints in SI."""
-        (kind, where), geometry = self._places[name], self.geometry
+        (kind, where), geometry = self._place(name), self.geometry
         cables = [
             cable
             for cable, route in zip(self.arm.cables, geometry.cables, strict=True)

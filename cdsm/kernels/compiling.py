@@ -140,9 +140,12 @@ def _patient(function: _Function) -> _Function:
     load_or_compile, spent = kernel._compile_for_args, 0.0
     stored = getattr(kernel._cache, "_cache_file", None)
 
-    def run(*arguments: Any) -> Any:
+    @cache
+    def worth() -> tuple[float, int]:
+        return _KEPT if stored is not None and stored._load_index() else _NEW
+
+    def run(start: float, *arguments: Any) -> Any:
         nonlocal spent
-        start = time.thread_time()
         try:
             with np.errstate(all="ignore"):
                 return _native(_plain(kernel.py_func)(*arguments))
@@ -151,10 +154,11 @@ def _patient(function: _Function) -> _Function:
 
     def choose(*arguments: Any) -> Callable[..., Any]:
         """Return what numba calls for types of arguments of which it has no compiled kernel."""
-        seconds, numbers = _KEPT if stored is not None and stored._load_index() else _NEW
+        start = time.thread_time()
+        seconds, numbers = worth()
         few = sum(getattr(each, "size", 0) for each in arguments) <= numbers
         if few and spent < seconds and not _at_once:
-            return run
+            return partial(run, start)
         return cast(Callable[..., Any], load_or_compile(*arguments))
 
     kernel._compile_for_args = choose

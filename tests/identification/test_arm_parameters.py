@@ -29,7 +29,7 @@ def test_nothing_changed_is_the_same_arm() -> None:
 
 
 def test_each_parameter_is_where_it_says() -> None:
-    names = ["friction@2", "rigidity", "spring@1", "lead@2", "hole_radius@1", "link_mass"]
+    names = ("friction@2", "rigidity", "spring@1", "lead@2", "hole_radius@1", "link_mass")
     arm = cdsm.ArmParameters(ARM, names)(
         **{"friction@2": 0.3, "rigidity": 0.5, "spring@1": 2e4, "lead@2": 0.4},
         **{"hole_radius@1": 0.03, "link_mass": 0.2},
@@ -49,20 +49,20 @@ def test_each_parameter_is_where_it_says() -> None:
 @pytest.mark.parametrize(
     ("names", "said"),
     [
-        (["hole_radus"], "hole_radus"),
-        (["hole_radius@3"], "joints 1 to 2"),
-        (["hole_radius@x"], "joints 1 to 2"),
-        (["lead", "lead"], "lead: frees lead of a joint twice"),
-        (["lead@1", "lead"], "lead: frees lead of a joint twice"),
+        (("hole_radus",), "hole_radus"),
+        (("hole_radius@3",), "joints 1 to 2"),
+        (("hole_radius@x",), "joints 1 to 2"),
+        (("lead", "lead"), "lead: frees lead of a joint twice"),
+        (("lead@1", "lead"), "lead: frees lead of a joint twice"),
     ],
 )
-def test_bad_names_are_refused(names: list[str], said: str) -> None:
+def test_bad_names_are_refused(names: tuple[str, ...], said: str) -> None:
     with pytest.raises(cdsm.CdsmError, match=said):
         cdsm.ArmParameters(ARM, names)
 
 
 def test_bad_values_are_refused() -> None:
-    parameters = cdsm.ArmParameters(ARM, ["rigidity", "spring", "hole_radius", "friction"])
+    parameters = cdsm.ArmParameters(ARM, ("rigidity", "spring", "hole_radius", "friction"))
     for name, value in (("rigidity", -1.0), ("spring", 0.0), ("hole_radius", -1.0)):
         with pytest.raises(cdsm.CdsmError, match=r"-1|positive|0"):
             parameters(**{name: value})
@@ -72,4 +72,4 @@ def test_bad_values_are_refused() -> None:
         parameters(lead=0.1)
     free = cdsm.Manipulator.from_urdf(ARM.urdf, ARM.cables, tip="tool0")
     with pytest.raises(cdsm.InvalidInput, match="geometry"):
-        cdsm.ArmParameters(free, ["lead"])
+        cdsm.ArmParameters(free, ("lead",))

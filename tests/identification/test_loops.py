@@ -237,7 +237,7 @@ def several(seed: int) -> dict[str, bool]:
         lead=[0.1, 0.6],
     )
     parameters = cdsm.ArmParameters(
-        cdsm.Manipulator(geometry, cdsm.LinearElasticity(48e3)), SEVERAL
+        cdsm.Manipulator(geometry, cdsm.LinearElasticity(48e3)), tuple(SEVERAL)
     )
     truth, random = parameters(**SEVERAL), np.random.default_rng([seed, 21])
     loops = [

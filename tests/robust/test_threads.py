@@ -200,6 +200,7 @@ VALUES: dict[str, Any] = {
     "TensileTest": FIT.test,
     "Measurement": MEASURED[0],
     "Identification": cdsm.identify(wired, MEASURED, {"rigidity": (1e4, 1e6)}),
+    "ArmParameters": cdsm.ArmParameters(POSE.arm, ("hole_radius", "friction")),
     "WeightLoop": LOOP,
     "ExperimentPlan": PLAN,
     "SlowPlant": cdsm.SlowPlant(POSE.arm),
