@@ -82,11 +82,10 @@ class ForcePolytope(ReadOnlyState):
         that may be added in every direction. It is negative if the arm cannot balance f.
 
         Args:
-            force: f (3,) [N].
+            force: f (3,) [N], or several (n, 3): then the smallest of their margins.
 
         Raises:
-            InvalidInput: ``force`` is not (3,) or (n, 3) numbers. Of several loads, the smallest
-                margin is returned.
+            InvalidInput: ``force`` is not (3,) or (n, 3) numbers.
         """
         loads = number_array("force", force, "force")
         if loads.ndim not in (1, 2) or loads.shape[-1] != 3 or not loads.size:
