@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 _DPI = 110
 """Resolution of the pictures [1/inch]: some 50 kB each."""
 
+_SHOWN = 60
+"""Number of designs of a front that a page shows, evenly spread over it; each has a picture."""
+
 _STYLE = """
 body{font:14px/1.4 system-ui,sans-serif;margin:1em;color:#1b1b1b}
 .side{display:flex;flex-wrap:wrap;align-items:center;gap:1em}
@@ -44,8 +47,10 @@ choose(document.body.dataset.compromise);
 
 def page_of(found: DesignSearch) -> Document:
     """Return a page in HTML that needs no other file and no network."""
-    arms = []
-    for i, picture in enumerate(_pictures(found)):
+    arms, count = [], len(found.front)
+    chosen = np.linspace(0, count - 1, min(count, _SHOWN)).round()
+    shown = np.unique(np.append(chosen, found.compromise)).astype(int).tolist()
+    for i, picture in zip(shown, _pictures(found, shown), strict=True):
         image = element("img", src=picture, alt=f"arm of design {i}")
         name = element("figcaption", f"design {i} at the first posture")
         arms.append(element("figure", image, name, class_="arm", data_design=str(i)))
@@ -54,12 +59,14 @@ def page_of(found: DesignSearch) -> Document:
     lines += [
         element("tr", *(element("td", cell) for cell in row), data_design=str(i))
         for i, row in enumerate(rows)
+        if i in shown
     ]
-    title = f"{len(rows)} best of {len(found.evaluated)} designs of {found.problem.arm.name}"
-    front = element("div", _svg(plot_designs(found)), class_="front")
+    best = f"{len(shown)} of {count}" if len(shown) < count else f"{count}"
+    title = f"{best} best of {len(found.evaluated)} designs of {found.problem.arm.name}"
+    front = element("div", _svg(plot_designs(found, shown)), class_="front")
     body = element(
         "body",
-        element("p", "Click a point or a row. The lengths of all arms are to one scale."),
+        element("p", f"{title}. Click a point or a row; all arms are drawn to one scale."),
         element("div", front, *arms, class_="side"),
         element("div", element("table", *lines), class_="wide"),
         element("script", Markup(_SCRIPT)),
@@ -70,10 +77,10 @@ def page_of(found: DesignSearch) -> Document:
     return Document(f"<!DOCTYPE html>\n{element('html', top, style, body, lang='en')}\n")
 
 
-def _pictures(found: DesignSearch) -> list[str]:
-    """Draw the arms of the front at the first posture, to one scale; return data URLs."""
+def _pictures(found: DesignSearch, shown: list[int]) -> list[str]:
+    """Draw arms of the front at the first posture, to one scale; return data URLs."""
     poses = []
-    for number in range(len(found.front)):
+    for number in shown:
         arm = found.arm(number)
         poses.append(arm.at(found.problem.postures_of(arm)[0], check_limits=False))
     figure, axes = arm_axes()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,13 +23,15 @@ if TYPE_CHECKING:
     from cdsm.design.result import DesignSearch
 
 
-def plot_designs(found: DesignSearch) -> Figure:
+def plot_designs(found: DesignSearch, named: Sequence[int] = ()) -> Figure:
     """Plot the objectives of all designs that meet the constraints, and their Pareto front.
 
     With one objective: its best value over the number of designs.
 
     Args:
         found: The result of :func:`cdsm.search_designs` or :func:`cdsm.refine_design`.
+        named: Numbers of designs on the front whose points get a name in an SVG,
+            ``design-NUMBER-OBJECTIVE``.
 
     Raises:
         InvalidInput: ``found`` is not such a result.
@@ -64,7 +67,8 @@ def plot_designs(found: DesignSearch) -> Figure:
         x, y = (every[objectives[n].key] / scales[n][1] for n in (i, k))
         panel.plot(x[feasible], y[feasible], ".", color="0.7", markersize=3, label="feasible")
         panel.plot(x[found.front], y[found.front], ".-", color=BLUE, linewidth=0.8, label="front")
-        for number, n in enumerate(found.front):  # a page finds them by their names
+        for number in named:  # a page finds them by these names
+            n = found.front[number]
             panel.plot(x[n], y[n], "o", color=BLUE, markersize=4, gid=f"design-{number}-{k}")
         chosen = found.front[found.compromise]
         panel.plot(

@@ -11,7 +11,7 @@ FOUND = np.deg2rad(
         *(314.30024, 25.6282, 150.53409, 269.27611, 145.89248, 266.46728, 381.1744),
     ]
 )
-"""Hole angles that ``refine_design`` finds from the paper's routing in 190 evaluations."""
+"""Hole angles that ``refine_design`` finds from the paper's routing in 406 evaluations."""
 
 PULL = 50.0
 
@@ -55,8 +55,8 @@ def test_the_motors_of_the_paper_s_arm_may_be_smaller_at_the_same_stiffness() ->
 @pytest.mark.slow
 def test_a_refinement_goes_from_the_paper_s_routing_to_a_better_one() -> None:
     problem = routing()
-    found = cdsm.refine_design(problem, iterations=12)
+    found = cdsm.refine_design(problem)
     assert problem.start is not None
     start = cdsm.evaluate_designs(problem, [problem.start])["motor_force"][0]
     assert found.evaluated.feasible[found.front[0]] == 1.0
-    assert start / found.values(0)["motor_force"] > 1.2
+    assert start / found.values(0)["motor_force"] == pytest.approx(1.397, abs=2e-3)

@@ -421,3 +421,19 @@ def test_files_for_the_workshop(tmp_path: Path) -> None:
     assert [float(row[4]) for row in cables[1:]] == pytest.approx(lengths.tolist(), abs=1e-4)
     for row in cables[1:]:
         assert float(row[5]) <= float(row[4]) <= float(row[6])
+
+
+def test_a_page_of_a_long_front_shows_some_of_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    task = problem(
+        variables=(cdsm.Variable("link_length", 0.05, 0.1),),
+        objectives=(cdsm.Objective("mass"), cdsm.Objective("length")),
+    )
+    found = cdsm.search_designs(task, generations=2, population=16)
+    count = len(found.front)
+    assert count > 3
+    monkeypatch.setattr("cdsm.design.page._SHOWN", 2)
+    page = found.to_html()
+    shown = [i for i in range(count) if f'<tr data-design="{i}">' in page]
+    assert {0, found.compromise, count - 1} == set(shown)
+    assert page.count("<img") == len(shown) == page.count('<g id="design-')
+    assert f"{len(shown)} of {count} best of 32 designs" in page
