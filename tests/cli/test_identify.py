@@ -33,7 +33,7 @@ def files(tmp_path: Path) -> tuple[Path, Path]:
     """An arm as described, and loops that another one gave."""
     arm, loops = tmp_path / "arm.toml", tmp_path / "loops.csv"
     arm.write_text(ARM, encoding="utf-8")
-    truth = cdsm.ArmParameters(cdsm.Manipulator.read(arm), TRUE)(**TRUE)
+    truth = cdsm.ArmParameters(cdsm.Manipulator.read(arm), tuple(TRUE))(**TRUE)
     random, forces = np.random.default_rng(2), (0.0, 8.0, 16.0, 24.0, 16.0, 8.0, 0.0)
     lines = ["test,joint1 [deg],direction,minimum [N],force [N],displacement [mm]"]
     for angle in (25.0, -23.0):
