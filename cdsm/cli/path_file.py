@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import Final, NamedTuple, NoReturn
 
@@ -11,10 +10,9 @@ import typer
 
 from cdsm.errors import FileError
 from cdsm.manipulator import Manipulator
-from cdsm.support.tables import name_and_unit, read_table
+from cdsm.support.tables import ANGLE, column_in, named_columns, read_table
 from cdsm.support.values import Array
 
-_ANGLE: Final = {"deg": math.pi / 180.0, "°": math.pi / 180.0, "rad": 1.0}
 _LENGTH: Final = {"mm": 1e-3, "m": 1.0}
 _STIFFNESS: Final = {"N/mm": 1e3, "N/m": 1.0}
 
@@ -47,12 +45,7 @@ def read_path(path: Path, arm: Manipulator) -> PathFile:
     table = read_table(path)
     if len(table.rows) < 2:
         refuse("holds no path; a header and one line per sample are needed")
-    found: dict[str, tuple[int, str]] = {}
-    for at, cell in enumerate(table.header):
-        name, unit = name_and_unit(cell)
-        if name in found:
-            refuse(f"has two columns called {name}; give each once")
-        found[name] = at, unit
+    found = named_columns(table, refuse)
 
     def columns(wanted: dict[str, dict[str, float]], *, some: bool = False) -> Array | None:
         """Read the columns of these names in SI; None if the file has none of them.
@@ -63,18 +56,14 @@ def read_path(path: Path, arm: Manipulator) -> PathFile:
             return None
         values = []
         for name, known in wanted.items():
-            at, unit = found.get(name, (-1, ""))
-            if some and at < 0:
+            if some and name not in found:
                 values.append(np.zeros(len(table.rows) - 1))
                 continue
-            if unit not in known:
-                fault = f"the column {name} has no unit that is known"
-                names = " or ".join(f"{name} [{unit}]" for unit in known)
-                refuse(f"{fault if at >= 0 else f'has no column {name}'}; call it {names}")
-            values.append(known[unit] * table.column(at, refuse))
+            at, size = column_in(known, name, found, refuse)
+            values.append(size * table.column(at, refuse))
         return np.array(values).T
 
-    kinds = [_LENGTH if slides else _ANGLE for slides in arm.slides]
+    kinds = [_LENGTH if slides else ANGLE for slides in arm.slides]
     angles = columns(dict(zip(arm.joint_names, kinds, strict=True)), some=True)
     tips, target = columns(dict.fromkeys("xyz", _LENGTH)), columns({"target": _STIFFNESS})
     if (angles is None) == (tips is None):

@@ -13,10 +13,9 @@ from numpy.typing import ArrayLike
 from cdsm.errors import FileError, InvalidInput
 from cdsm.identification.loop import WeightLoop
 from cdsm.manipulator import Manipulator
-from cdsm.support.tables import Table, name_and_unit, read_table
+from cdsm.support.tables import ANGLE, Table, column_in, named_columns, read_table
 from cdsm.support.validation import AXES, instance
 
-_ANGLE: Final = {"deg": math.pi / 180.0, "°": math.pi / 180.0, "rad": 1.0}
 _LENGTH: Final = {"mm": 1e-3, "um": 1e-6, "µm": 1e-6, "m": 1.0}
 _FORCE: Final = {"N": 1.0}
 
@@ -83,13 +82,8 @@ class _Reader:
         self._path, self._arm, self._table = path, arm, table
         if len(table.rows) < 2:
             self._refuse("holds no loops; a header and one line per reading are needed")
-        self._header: dict[str, tuple[int, str]] = {}
-        for at, cell in enumerate(table.header):
-            name, unit = name_and_unit(cell)
-            if name in self._header:
-                self._refuse(f"has two columns called {name}; give each once")
-            self._header[name] = at, unit
-        kinds = [_LENGTH if slides else _ANGLE for slides in arm.slides]
+        self._header = named_columns(table, self._refuse)
+        kinds = [_LENGTH if slides else ANGLE for slides in arm.slides]
         self._joints = [
             self._column(name, units) if name in self._header else None
             for name, units in zip(arm.joint_names, kinds, strict=True)
@@ -169,16 +163,12 @@ class _Reader:
 
     def _column(self, name: str, units: dict[str, float] | None = None) -> _Column:
         """Find a column, with one of these units."""
-        at, unit = self._header.get(name, (-1, ""))
-        if units is None:
-            if at < 0:
-                self._refuse(f"has no column {name}")
-            return _Column(at, name, 1.0)
-        if unit not in units:
-            fault = f"the column {name} has no unit that is known"
-            names = " or ".join(f"{name} [{unit}]" for unit in units)
-            self._refuse(f"{fault if at >= 0 else f'has no column {name}'}; call it {names}")
-        return _Column(at, name, units[unit])
+        if units is not None:
+            at, size = column_in(units, name, self._header, self._refuse)
+            return _Column(at, name, size)
+        if name not in self._header:
+            self._refuse(f"has no column {name}")
+        return _Column(self._header[name][0], name, 1.0)
 
     def _cell(self, row: tuple[int, list[str]], column: _Column) -> str:
         return row[1][column.at] if column.at < len(row[1]) else ""

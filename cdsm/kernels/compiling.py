@@ -125,11 +125,11 @@ _at_once = False
 def at_once() -> Iterator[None]:
     """Compile every kernel that is called."""
     global _at_once
-    _at_once = True
+    before, _at_once = _at_once, True
     try:
         yield
     finally:
-        _at_once = False
+        _at_once = before
 
 
 def _patient(function: _Function) -> _Function:

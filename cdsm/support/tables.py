@@ -7,7 +7,7 @@ import math
 import os
 import re
 from collections.abc import Callable
-from typing import NamedTuple, NoReturn
+from typing import Final, NamedTuple, NoReturn
 
 import numpy as np
 
@@ -17,6 +17,9 @@ from cdsm.support.values import Array
 
 _LONGEST_CELL = 1000
 """Maximum number of characters of a cell; numbers and names are shorter."""
+
+ANGLE: Final = {"deg": math.pi / 180.0, "°": math.pi / 180.0, "rad": 1.0}
+"""Units of angles in a header, in SI."""
 
 _TRIED = 500  # lines that tell the delimiter; titles are fewer
 
@@ -100,6 +103,35 @@ def name_and_unit(cell: str) -> tuple[str, str]:
     found = re.fullmatch(r"(.*?)\s*(?:\[(.*)\])?", cell, re.DOTALL)
     assert found is not None
     return found[1], found[2] or ""
+
+
+def named_columns(table: Table, refuse: Callable[[str], NoReturn]) -> dict[str, tuple[int, str]]:
+    """Return index and unit of each column by its name; a name given twice calls ``refuse``."""
+    found: dict[str, tuple[int, str]] = {}
+    for at, cell in enumerate(table.header):
+        name, unit = name_and_unit(cell)
+        if name in found:
+            refuse(f"has two columns called {name}; give each once")
+        found[name] = at, unit
+    return found
+
+
+def column_in(
+    known: dict[str, float],
+    name: str,
+    found: dict[str, tuple[int, str]],
+    refuse: Callable[[str], NoReturn],
+) -> tuple[int, float]:
+    """Return the index of a column in one of the known units, and that unit in SI.
+
+    A missing column, or one without a known unit, calls ``refuse``.
+    """
+    at, unit = found.get(name, (-1, ""))
+    if unit not in known:
+        fault = f"the column {name} has no unit that is known"
+        names = " or ".join(f"{name} [{unit}]" for unit in known)
+        refuse(f"{fault if at >= 0 else f'has no column {name}'}; call it {names}")
+    return at, known[unit]
 
 
 def _cells(path: str | os.PathLike[str], number: int, line: str, delimiter: str) -> list[str]:

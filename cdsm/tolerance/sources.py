@@ -102,12 +102,7 @@ class Tolerances:
     @cached_property
     def given(self) -> Mapping[str, tuple[Tolerance, ...]]:
         """All tolerances that are not zero, by source."""
-        found = {}
-        for name in SOURCES:
-            value = getattr(self, name)
-            if isinstance(value, tuple) or value.is_given:
-                found[name] = self.parts(name)
-        return {name: parts for name, parts in found.items() if parts}
+        return {name: parts for name in SOURCES if (parts := self.parts(name))}
 
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> Tolerances:
