@@ -1,13 +1,18 @@
 """Where compiled kernels are kept, and when they are compiled again."""
 
+import importlib
 import os
+import pkgutil
 import shutil
 import subprocess
 import sys
 from pathlib import Path
+from types import ModuleType
 
 import pytest
+from numba.core.dispatcher import Dispatcher
 
+import cdsm
 from tests.support.patience import HANGS
 from tests.support.processes import ROOT
 
@@ -104,3 +109,16 @@ def test_first_calls_compile_nothing_and_give_the_same_bits(tmp_path: Path) -> N
     compiled, said = run(FIRST, "0")
     assert said.split()[-2:] == ["1", "1"]
     assert first == compiled
+
+
+def test_kernels_call_kernels_by_name() -> None:
+    """Python runs the first calls; it would call a compiled kernel if that is reached by module."""
+    for found in pkgutil.walk_packages(cdsm.__path__, "cdsm."):
+        if found.name == "cdsm.__main__":
+            continue
+        names = vars(importlib.import_module(found.name))
+        for kernel in [each for each in names.values() if isinstance(each, Dispatcher)]:
+            used = kernel.py_func.__globals__
+            for name in kernel.py_func.__code__.co_names:
+                other = used.get(name)
+                assert not (isinstance(other, ModuleType) and other.__name__.startswith("cdsm"))
