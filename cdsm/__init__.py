@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from cdsm import view as view
     from cdsm.arm_file.cables import read_cables, write_cables
     from cdsm.batch import Batch, Tensions, distribute_tensions, evaluate
-    from cdsm.cable import Cable, Cables, Site, in_series, serpentine_cables
+    from cdsm.cable import Cable, Cables, Site, in_series
     from cdsm.control.mujoco_plant import MuJoCoPlant
     from cdsm.control.plant import SlowPlant
     from cdsm.control.run import TrackingRun
@@ -64,6 +64,7 @@ if TYPE_CHECKING:
     from cdsm.friction.breakaway import Breakaway, breakaway
     from cdsm.friction.stuck import sliding_stiffness, stuck_stiffness
     from cdsm.geometry import CableRoute, Geometry, Joint, Link
+    from cdsm.geometry.cables import serpentine_cables
     from cdsm.identification import (
         ArmParameters,
         ExperimentPlan,
@@ -157,7 +158,7 @@ __all__ = [
 _NAMES = {
     "arm_file.cables": "read_cables write_cables",
     "batch": "Batch Tensions distribute_tensions evaluate",
-    "cable": "Cable Cables Site in_series serpentine_cables",
+    "cable": "Cable Cables Site in_series",
     "control.mujoco_plant": "MuJoCoPlant",
     "control.plant": "SlowPlant",
     "control.run": "TrackingRun",
@@ -183,6 +184,7 @@ _NAMES = {
     "friction.breakaway": "Breakaway breakaway",
     "friction.stuck": "sliding_stiffness stuck_stiffness",
     "geometry": "CableRoute Geometry Joint Link",
+    "geometry.cables": "serpentine_cables",
     "instability": "Remedy",
     "identification": "ArmParameters ExperimentPlan Identification Measurement WeightLoop identify "
     "plan_experiment read_loops",

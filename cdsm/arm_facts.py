@@ -1,24 +1,35 @@
-"""Properties of an arm that do not depend on its posture: names, cables, limits, gravity."""
+"""What an arm is made of: names, cables, limits, gravity; and arms with other parts."""
 
 from __future__ import annotations
 
+import os
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import cached_property
+from typing import Any, Self, get_args
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from cdsm.arm_model import ArmModel, ArmParts
-from cdsm.cable import Cables
+from cdsm.cable import Cable, Cables
 from cdsm.cable_laws import OriginalLength
-from cdsm.errors import InvalidInput
+from cdsm.elasticity import Elasticity
+from cdsm.errors import CableError, InvalidInput
 from cdsm.geometry import Geometry
+from cdsm.rigid_body import RigidBody
 from cdsm.support.format import JointUnits, plural
+from cdsm.support.validation import Direction, gravity_vector, instance, one_of, sequence_of
 from cdsm.support.values import Array, Printed
 from cdsm.tolerance import Tolerances
 
+CablesOrFile = Sequence[Cable] | str | os.PathLike[str]
+"""Cables, or the path of their file."""
+
 
 class ArmFacts(Printed):
-    """Base class of :class:`~cdsm.Manipulator`, which sets its fields."""
+    """Base class of :class:`~cdsm.Manipulator`: its parts, and copies with other parts."""
 
     _cables: Cables
     _gravity: Array
@@ -27,11 +38,7 @@ class ArmFacts(Printed):
 
     @property
     def geometry(self) -> Geometry:
-        """Geometry from which the arm was built.
-
-        Raises:
-            InvalidInput: The arm was built from a URDF.
-        """
+        """Geometry from which the arm was built; InvalidInput for an arm from a URDF."""
         if self._parts.geometry is None:
             raise InvalidInput(
                 "geometry", f"{self.name} was made from a URDF and has none; see arm.urdf."
@@ -141,3 +148,99 @@ class ArmFacts(Printed):
         if self.is_serpentine:
             free = f"{plural(len(self.geometry.joints), 'joint')} ({free})"
         return f"{self.name}: {free}, {plural(len(self.cables), 'cable')}, {self.length:.6g} m long"
+
+    def _build(
+        self,
+        geometry: Geometry | None,
+        urdf: str,
+        cables: CablesOrFile,
+        tip: str,
+        gravity: ArrayLike,
+        original_length: OriginalLength,
+        joint_names: Sequence[str] | None = None,
+        tolerances: Tolerances = Tolerances(),  # noqa: B008  # frozen
+    ) -> None:
+        """Set all attributes; ``urdf`` is a text that has been checked."""
+        self._cables = cables = _checked_cables(cables)
+        self._gravity = gravity_vector("gravity", gravity)
+        one_of("original_length", original_length, get_args(OriginalLength))
+        body = RigidBody(urdf, tip, self._gravity, joint_names)
+        self._model = ArmModel(body, cables, original_length)
+        g = tuple(self._gravity.tolist())
+        self._parts = ArmParts(
+            geometry, urdf, cables, tip, g, original_length, body.joint_names, tolerances
+        )
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, type(self)) and self._parts == other._parts
+
+    def __hash__(self) -> int:
+        return hash(self.urdf)  # a user-defined elasticity may not be hashable
+
+    def __getstate__(self) -> ArmParts:
+        return self._parts
+
+    def __setstate__(self, parts: ArmParts) -> None:
+        self._build(*parts)
+
+    def with_cables(self, cables: CablesOrFile) -> Self:
+        """Return an arm with the same robot and other cables.
+
+        Args:
+            cables: One or more cables, or the path of their file.
+
+        Raises:
+            InvalidInput: ``cables`` is not a list or tuple of cables, or the rigidity of a law is
+                discontinuous.
+            CableError: Two cables have the same name, or a cable is on an unknown link.
+        """
+        return self._replace(cables=_checked_cables(cables))
+
+    def with_friction(self, friction: float) -> Self:
+        """Return the same arm with one friction coefficient μ [-] in all holes.
+
+        Raises:
+            InvalidInput: ``friction`` is negative, above 2, or not a number.
+        """
+        return self._replace(cables=tuple(cable.with_friction(friction) for cable in self.cables))
+
+    def with_tolerances(self, tolerances: Tolerances) -> Self:
+        """Return the same arm with other :class:`Tolerances`; InvalidInput for another type."""
+        return self._replace(tolerances=instance("tolerances", tolerances, Tolerances))
+
+    def with_gravity(self, gravity: Direction) -> Self:
+        """Return the same arm under another gravity: (3,) [m/s²] in base axes, or ``"-y"``.
+
+        Raises:
+            InvalidInput: Gravity is neither an axis nor three numbers.
+        """
+        return self._replace(gravity=gravity)
+
+    def _with_laws(self, laws: Sequence[Elasticity]) -> Self:
+        """Return the same arm with other laws, one per cable; nothing else is computed again."""
+        pairs = zip(self.cables, laws, strict=True)
+        cables = Cables(replace(cable, elasticity=law) for cable, law in pairs)
+        arm = type(self).__new__(type(self))
+        arm._cables, arm._gravity = cables, self._gravity
+        arm._model, arm._parts = self._model.with_laws(cables), self._parts._replace(cables=cables)
+        return arm
+
+    def _replace(self, **changes: Any) -> Self:
+        arm = type(self).__new__(type(self))
+        arm._build(*self._parts._replace(**changes))
+        return arm
+
+
+def _checked_cables(cables: CablesOrFile) -> Cables:
+    if isinstance(cables, (str, os.PathLike)):
+        from cdsm.arm_file.cables import read_cables
+
+        return Cables(read_cables(cables))
+    cables = Cables(sequence_of("cables", cables, Cable))
+    if not cables:
+        raise InvalidInput("cables", "none given; an arm needs at least one.")
+    counts = Counter(cable.name for cable in cables)
+    for name, count in counts.items():
+        if count > 1:
+            raise CableError(name, "the name is used twice; every cable needs its own.")
+    return cables

@@ -1,6 +1,6 @@
 """Model of an arm that all computations share: bodies, tree, cable routing and cable laws.
 
-A :class:`~cdsm.Manipulator` holds one :class:`ArmModel` in ``_model``. Modules that need more than
+A :class:`~cdsm.Manipulator` has one :class:`ArmModel` in ``_model``. Modules that need more than
 the public properties of an arm read this model.
 """
 
@@ -23,7 +23,7 @@ from cdsm.geometry import Geometry
 from cdsm.kernels import segments
 from cdsm.kernels.serpentine_guess import find_blocks
 from cdsm.kernels.stuck import Holes
-from cdsm.kernels.tree import Routing, Tree
+from cdsm.kernels.tree import Indices, Routing, Tree
 from cdsm.rigid_body import RigidBody
 from cdsm.support.values import Array, frozen
 from cdsm.tolerance import Tolerances
@@ -110,6 +110,13 @@ class ArmModel:
         return *routing, frozen(span), chains.hole, chains.wrap
 
     @cached_property
+    def moving(self) -> tuple[Indices, Indices, Indices, Indices]:
+        """Sites a and b of each segment; segment and joint of each entry of ``routing.joint``."""
+        segment, joint = self.routing.segment, self.routing.joint
+        over = np.repeat(np.arange(len(segment) - 1), np.diff(segment[:, 3]))
+        return frozen(segment[:-1, 1].copy()), frozen(segment[:-1, 2].copy()), frozen(over), joint
+
+    @cached_property
     def wire_laws(self) -> CableLaws:
         """Elasticities of the cables; those with friction count as position-controlled."""
         forced = {c for c, cable in enumerate(self._cables) if cable.control == "force"}
@@ -124,16 +131,14 @@ class ArmModel:
     @cached_property
     def holes(self) -> Holes:
         """Holes and wires of the cables, as the kernels of batches take them."""
-        chains, cables, wires = self.chains, self._cables, self.wire_laws
+        cables, wires = self._cables, self.wire_laws
         first = np.cumsum([0, *(len(cable.sites) for cable in cables)])
-        friction, wrap = np.zeros((2, first[-1]))
-        site = first[chains.cable[chains.hole]] + chains.site
-        friction[site], wrap[site] = chains.friction, chains.wrap
+        sites = [site for cable in cables for site in cable.sites]
         links = [cable.sites[0].link for cable in cables]
         return Holes(
             first=frozen(first.astype(np.intp)),
-            friction=frozen(friction),
-            wrap=frozen(wrap),
+            friction=frozen(np.array([site.friction for site in sites])),
+            wrap=frozen(np.array([site.wrap for site in sites])),
             lead=frozen(np.array([cable.lead for cable in cables])),
             axis=frozen(np.array([self.body.locate(link)[1][:, 0] for link in links])),
             locked=frozen(np.array([float(cable.control == "position") for cable in cables])),
@@ -142,7 +147,7 @@ class ArmModel:
         )
 
     def beyond_limits(self, q: Array) -> NDArray[np.bool_]:
-        """Return which joint angles (nv,) [rad] are beyond their limits, bool (nv,)."""
+        """Return for each joint angle (nv,) [rad] whether it is beyond its limits, (nv,)."""
         return np.asarray((q < self.lowest) | (q > self.highest))
 
 

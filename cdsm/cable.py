@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, SupportsIndex, final, get_args, overload
 
@@ -12,9 +11,7 @@ from numpy.typing import ArrayLike
 
 from cdsm.elasticity import Elasticity, tension_at
 from cdsm.errors import CableError, CdsmError, InvalidInput
-from cdsm.geometry import Geometry
 from cdsm.support.validation import (
-    instance,
     number_array,
     one_of,
     quantity,
@@ -139,9 +136,14 @@ class Cable:
         )
 
     @property
+    def _holes(self) -> range:
+        """Indices of the sites that the cable passes."""
+        return range(0 if self.lead > 0.0 else 1, len(self.sites) - 1)
+
+    @property
     def friction(self) -> tuple[float, ...]:
         """Friction coefficient μ [-] of each hole that the cable passes, actuator side first."""
-        return tuple(site.friction for site in self.sites[0 if self.lead > 0.0 else 1 : -1])
+        return tuple(self.sites[i].friction for i in self._holes)
 
     def with_friction(self, friction: float) -> Cable:
         """Return the same cable with one friction coefficient μ [-] in all holes that it passes.
@@ -149,8 +151,8 @@ class Cable:
         Raises:
             InvalidInput: ``friction`` is negative, above 2, or not a number.
         """
-        sites, passed = list(self.sites), range(0 if self.lead > 0.0 else 1, len(self.sites) - 1)
-        for i in passed:
+        sites = list(self.sites)
+        for i in self._holes:
             sites[i] = replace(sites[i], friction=friction)
         return replace(self, sites=tuple(sites))
 
@@ -242,67 +244,9 @@ def _length(value: float) -> float:
 
 
 def in_series(*stiffness: float) -> float:
-    """Compute the stiffness of springs in series, 1/Σ(1/k) [N/m], e.g. a spring and its drive.
-
-    Args:
-        stiffness: One or more positive k [N/m]; inf for a rigid spring.
-
-    Raises:
-        InvalidInput: A stiffness is not positive, or no stiffness is given.
-    """
+    """Compute 1/Σ(1/k) [N/m] of springs in series, k [N/m] or inf; InvalidInput if not positive."""
     if not stiffness:
         raise InvalidInput("stiffness", "none given; give one or more in N/m.")
     springs = [quantity("stiffness", k, "stiffness", infinite=True) for k in stiffness]
     compliance = float((1.0 / np.array(springs)).sum())
     return 1.0 / compliance if compliance > 0.0 else math.inf
-
-
-def serpentine_cables(
-    geometry: Geometry,
-    elasticity: Elasticity | Sequence[Elasticity],
-    *,
-    series_stiffness: float = math.inf,
-    control: Control = "position",
-) -> tuple[Cable, ...]:
-    """Return the cables of a serpentine arm, routed through the holes of its disks.
-
-    A cable of joint k passes the base disk and every disk of links 1…k−1. It ends on the first disk
-    of link k. Its hole in a disk is at (x, R cos φ, R sin φ) in the frame of the link: x is the
-    position of the disk, φ the angle of the :class:`~cdsm.CableRoute`, R the radius of the route,
-    or the hole radius of the disk. The i-th cable of joint k has the name ``cable{k}_{i}``.
-
-    Args:
-        geometry: The arm.
-        elasticity: One law for all cables, or one law per cable in the geometry's order.
-        series_stiffness: k_series of all cables [N/m], as in :class:`Cable`.
-        control: Motor control of all cables, as in :class:`Cable`.
-
-    Raises:
-        InvalidInput: The number of elasticities is neither one nor the number of cables.
-        CableError: A cable is invalid.
-    """
-    count = len(instance("geometry", geometry, Geometry).cables)
-    elasticities = (elasticity,) * count if isinstance(elasticity, Elasticity) else elasticity
-    if not isinstance(elasticities, Sequence) or len(elasticities) != count:
-        raise InvalidInput(
-            "elasticity", f"{elasticity!r} given; give one Elasticity, or one for each of {count}."
-        )
-    cables, disks = [], geometry.disks
-    for name, route, material in zip(
-        geometry.cable_names, geometry.cables, elasticities, strict=True
-    ):
-        *passed, end = disks[: 2 * route.joint]
-        sites = [Site(disk.link, disk.hole(route), route.friction) for disk in passed]
-        if route.lead == 0.0:
-            sites[0] = replace(sites[0], friction=0.0)
-        cables.append(
-            Cable(
-                name=name,
-                sites=(*sites, Site(end.link, end.hole(route))),
-                elasticity=material,
-                lead=route.lead,
-                series_stiffness=series_stiffness,
-                control=control,
-            )
-        )
-    return tuple(cables)

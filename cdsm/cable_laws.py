@@ -87,8 +87,8 @@ class CableLaws:
                 name = np.array(self._cables, dtype=object)[held][0].name
                 raise InvalidInput(
                     "elasticity",
-                    f"the rigidity of {name} jumps at {jump.tension:.6g} N from {jump.below:.6g} "
-                    f"to {jump.above:.6g} N, and K_θ with it. Make it continuous, e.g. by a "
+                    f"the rigidity of {name} is discontinuous at {jump.tension:.6g} N: it changes "
+                    f"from {jump.below:.6g} to {jump.above:.6g} N. Make it continuous, e.g. by a "
                     "TabulatedElasticity through points of its strain.",
                 )
 

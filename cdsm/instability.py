@@ -16,9 +16,10 @@ from typing import TYPE_CHECKING, Final, Literal, final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm.cable import Cable, serpentine_cables
+from cdsm.cable import Cable
 from cdsm.elasticity.scaled import ScaledElasticity
 from cdsm.errors import CdsmError, GeometryError
+from cdsm.geometry.cables import serpentine_cables
 from cdsm.kernels.read import read_margin
 from cdsm.posture import Posture
 from cdsm.support.format import enough, span

@@ -7,40 +7,28 @@ only on the joint angles. A posture is frozen and always complete.
 from __future__ import annotations
 
 import os
-from collections import Counter
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, final, get_args
+from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm.arm_facts import ArmFacts
-from cdsm.arm_model import GRAVITY, ArmModel, ArmParts
-from cdsm.cable import Cable, Cables, serpentine_cables
+from cdsm.arm_facts import ArmFacts, CablesOrFile
+from cdsm.arm_model import GRAVITY
 from cdsm.cable_laws import OriginalLength
 from cdsm.elasticity import Elasticity
 from cdsm.errors import CableError, InvalidInput, JointLimitError
 from cdsm.geometry import Geometry
+from cdsm.geometry.cables import serpentine_cables
 from cdsm.kernels.posture import single_pose
 from cdsm.kernels.segments import SHORTEST_SEGMENT
 from cdsm.kernels.tree import Frames
 from cdsm.posture import Posture, site_paths
-from cdsm.rigid_body import RigidBody
 from cdsm.support.files import write_text
-from cdsm.support.validation import (
-    Direction,
-    flag,
-    gravity_vector,
-    instance,
-    one_of,
-    sequence_of,
-    vector,
-)
+from cdsm.support.validation import flag, instance, vector
 from cdsm.support.values import Array, frozen
-from cdsm.tolerance import Tolerances
 from cdsm.urdf import TIP, to_urdf
 from cdsm.urdf_reader import read_urdf
 
@@ -48,9 +36,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cdsm.wires.catalogue import Wire
-
-CablesOrFile = Sequence[Cable] | str | os.PathLike[str]
-"""Cables, or the path of their file."""
 
 
 @final
@@ -143,7 +128,7 @@ class Manipulator(ArmFacts):
     def read(cls, path: str | os.PathLike[str], wire: Wire | None = None) -> Manipulator:
         """Read an arm from an ARM.toml: robot, cables, wires, gravity.
 
-        The file holds a geometry in a form of :meth:`Geometry.read`, or a table ``[urdf]`` with
+        The file has a geometry in a form of :meth:`Geometry.read`, or a table ``[urdf]`` with
         ``tip``, and ``file`` (a path, from the folder of this file) or ``text``; optional are
         ``joint_names`` and ``check_inertia`` (see :meth:`from_urdf`). All other keys are optional:
 
@@ -187,91 +172,6 @@ class Manipulator(ArmFacts):
         from cdsm.arm_file.arm import arm_text
 
         return write_text(path, arm_text(self._parts))
-
-    def _build(
-        self,
-        geometry: Geometry | None,
-        urdf: str,
-        cables: CablesOrFile,
-        tip: str,
-        gravity: ArrayLike,
-        original_length: OriginalLength,
-        joint_names: Sequence[str] | None = None,
-        tolerances: Tolerances = Tolerances(),  # noqa: B008  # frozen
-    ) -> None:
-        """Set all attributes; ``urdf`` is a text that has been checked."""
-        self._cables = cables = _checked_cables(cables)
-        self._gravity = gravity_vector("gravity", gravity)
-        one_of("original_length", original_length, get_args(OriginalLength))
-        body = RigidBody(urdf, tip, self._gravity, joint_names)
-        self._model = ArmModel(body, cables, original_length)
-        g = tuple(self._gravity.tolist())
-        self._parts = ArmParts(
-            geometry, urdf, cables, tip, g, original_length, body.joint_names, tolerances
-        )
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Manipulator) and self._parts == other._parts
-
-    def __hash__(self) -> int:
-        return hash(self.urdf)  # a user-defined elasticity may not be hashable
-
-    def __getstate__(self) -> ArmParts:
-        return self._parts
-
-    def __setstate__(self, parts: ArmParts) -> None:
-        self._build(*parts)
-
-    def with_cables(self, cables: CablesOrFile) -> Manipulator:
-        """Return an arm with the same robot and other cables.
-
-        Args:
-            cables: One or more cables, or the path of their file.
-
-        Raises:
-            InvalidInput: ``cables`` is not a list or tuple of cables, or the rigidity of a law is
-                discontinuous.
-            CableError: Two cables have the same name, or a cable is on an unknown link.
-        """
-        return self._replace(cables=_checked_cables(cables))
-
-    def with_friction(self, friction: float) -> Manipulator:
-        """Return the same arm with one friction coefficient μ [-] in all holes.
-
-        Raises:
-            InvalidInput: ``friction`` is negative, above 2, or not a number.
-        """
-        return self._replace(cables=tuple(cable.with_friction(friction) for cable in self.cables))
-
-    def with_tolerances(self, tolerances: Tolerances) -> Manipulator:
-        """Return the same arm with other tolerances.
-
-        Raises:
-            InvalidInput: ``tolerances`` are not :class:`Tolerances`.
-        """
-        return self._replace(tolerances=instance("tolerances", tolerances, Tolerances))
-
-    def with_gravity(self, gravity: Direction) -> Manipulator:
-        """Return the same arm under another gravity: (3,) [m/s²] in base axes, or ``"-y"``.
-
-        Raises:
-            InvalidInput: Gravity is neither an axis nor three numbers.
-        """
-        return self._replace(gravity=gravity)
-
-    def _with_laws(self, laws: Sequence[Elasticity]) -> Manipulator:
-        """Return the same arm with other laws, one per cable; nothing else is computed again."""
-        pairs = zip(self.cables, laws, strict=True)
-        cables = Cables(replace(cable, elasticity=law) for cable, law in pairs)
-        arm = type(self).__new__(type(self))
-        arm._cables, arm._gravity = cables, self._gravity
-        arm._model, arm._parts = self._model.with_laws(cables), self._parts._replace(cables=cables)
-        return arm
-
-    def _replace(self, **changes: Any) -> Manipulator:
-        arm = type(self).__new__(type(self))
-        arm._build(*self._parts._replace(**changes))
-        return arm
 
     def plot(self, q: ArrayLike | None = None) -> Figure:
         """Plot the arm in mm at joint angles q (nv,) [rad]; None: 0, or the limit nearest to 0.
@@ -349,18 +249,3 @@ class Manipulator(ArmFacts):
                         "no direction there. Move a site, or change the posture.",
                     )
         return tuple(pose)
-
-
-def _checked_cables(cables: CablesOrFile) -> Cables:
-    if isinstance(cables, (str, os.PathLike)):
-        from cdsm.arm_file.cables import read_cables
-
-        return Cables(read_cables(cables))
-    cables = Cables(sequence_of("cables", cables, Cable))
-    if not cables:
-        raise InvalidInput("cables", "none given; an arm needs at least one.")
-    counts = Counter(cable.name for cable in cables)
-    for name, count in counts.items():
-        if count > 1:
-            raise CableError(name, "the name is used twice; every cable needs its own.")
-    return cables

@@ -153,11 +153,7 @@ class Posture(ReadOnlyState):
         return tuple(map(tuple, bones))
 
     def link_pose(self, link: str) -> Array:
-        """Compute the pose of a link's frame in the base frame, (4, 4) [m].
-
-        Raises:
-            UnknownName: No link has this name.
-        """
+        """Compute the pose (4, 4) [m] of a link's frame in base axes, or raise UnknownName."""
         return frozen(self.arm._model.body.placement(self.q, link))
 
     @cached_property
@@ -239,11 +235,7 @@ class MomentArms(ReadOnlyState):
     slides: NDArray[np.bool_]
 
     def __getitem__(self, names: tuple[str, str]) -> float:
-        """Return the arm of a cable about a joint [m]; [-] where the joint slides.
-
-        Raises:
-            UnknownName: No cable, or no joint, has this name.
-        """
+        """Return an arm [m], [-] where the joint slides; UnknownName for an unknown name."""
         cable, joint = names
         row = self.cables.index(one_of("cable", cable, self.cables))
         return float(self.values[row, self.joints.index(one_of("joint", joint, self.joints))])
@@ -261,11 +253,7 @@ class MomentArms(ReadOnlyState):
         return found
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Return a table with a row for each cable and a column for each joint, in SI.
-
-        Raises:
-            MissingExtra: pandas is not installed.
-        """
+        """Return a table in SI, a row for each cable; MissingExtra without pandas."""
         units = np.where(self.slides, "-", "m").tolist()
         names = [f"{joint} [{unit}]" for joint, unit in zip(self.joints, units, strict=True)]
         return data_frame(dict(zip(names, self.values.T, strict=True)), "cable", self.cables)

@@ -12,10 +12,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm.cable import serpentine_cables
 from cdsm.cable_laws import OriginalLength
 from cdsm.elasticity import Elasticity, LinearElasticity
 from cdsm.geometry import Geometry, Link
+from cdsm.geometry.cables import serpentine_cables
 from cdsm.manipulator import Manipulator
 from cdsm.wires.catalogue import SOLID, STRAND
 

@@ -238,12 +238,12 @@ def _reordered(names: tuple[str, ...], wanted: Sequence[str]) -> tuple[str, ...]
     if sorted(wanted) != sorted(names):
         missing = [name for name in names if name not in wanted]
         others = [name for name in wanted if name not in names or wanted.count(name) > 1]
-        told = ", ".join(
+        faults = ", ".join(
             f"{what} {', '.join(map(repr, dict.fromkeys(some)))}"
             for what, some in (("leaves out", missing), ("has too many of", others))
             if some
         )
-        raise InvalidInput("joint_names", f"{told}; name each joint that moves once.")
+        raise InvalidInput("joint_names", f"{faults}; name each joint that moves once.")
     return wanted
 
 

@@ -51,13 +51,7 @@ def to_urdf(geometry: Geometry) -> str:
     Each link has the inertia of a solid cylinder, centred at mid-link, with the hole radius of its
     first disk. A cross, or a link of mass zero, has :data:`CROSS_MASS` and :data:`CROSS_INERTIA`.
     Disks and backbone are visual shapes. Collision shapes are left out, since neighbouring disks
-    touch at the joint limits.
-
-    Args:
-        geometry: The arm.
-
-    Raises:
-        InvalidInput: ``geometry`` is not a Geometry.
+    touch at the joint limits. InvalidInput if ``geometry`` is not a Geometry.
     """
     instance("geometry", geometry, Geometry)
     disks = geometry.disks
@@ -114,10 +108,6 @@ def write_urdf(geometry: Geometry, path: str | os.PathLike[str]) -> Path:
 
     Pinocchio and yourdfpy read a temporary file before it replaces ``path``. Their tip poses are
     compared at the zero posture, at both limits and at random postures.
-
-    Args:
-        geometry: The arm.
-        path: The file to write.
 
     Raises:
         InvalidInput: ``geometry`` is not a Geometry.

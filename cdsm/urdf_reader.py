@@ -56,8 +56,8 @@ def read_urdf(source: str | os.PathLike[str], *, check_inertia: bool = True) -> 
         raise UrdfError(f"{name}: {error}.") from None
     faults = _faults(robot, check_inertia)
     if faults:
-        told = listed(faults, most=20)
-        raise UrdfError(f"{name} is no robot that cdsm takes, {len(faults)} found:{told}")
+        listing = listed(faults, most=20)
+        raise UrdfError(f"{name} is no robot that cdsm takes, {len(faults)} found:{listing}")
     return text
 
 
@@ -120,11 +120,11 @@ def _check_joint(faults: list[str], joint: etree._Element) -> None:
     where, kind = f"joint {joint.get('name')}", joint.get("type")
     if kind not in TAKEN:
         remedy = _INSTEAD.get(str(kind), f"one of {', '.join(TAKEN)} is needed")
-        faults.append(f"{where}: type {kind!r} is not taken; {remedy}")
+        faults.append(f"{where}: type {kind!r} is not supported; {remedy}")
     if joint.find("mimic") is not None:
         faults.append(
-            f"{where}: mimics another joint, which is not taken; remove <mimic> to let it move, or "
-            "make it fixed"
+            f"{where}: mimics another joint, which is not supported; remove <mimic> to let it "
+            "move, or make it fixed"
         )
     for end in ("parent", "child"):
         element = joint.find(end)

@@ -21,11 +21,12 @@ from cdsm.arm_file.cables import (
 from cdsm.arm_file.tolerances import from_table, tolerance_lines
 from cdsm.arm_file.wires import CableKeys, CableSettings, read_wires, wire_entries
 from cdsm.arm_model import GRAVITY, ArmParts
-from cdsm.cable import Cable, serpentine_cables
+from cdsm.cable import Cable
 from cdsm.cable_laws import OriginalLength
 from cdsm.elasticity import LinearElasticity
 from cdsm.errors import FileError, GeometryError, UnknownName, UrdfError, counted
 from cdsm.geometry import Geometry, split_geometry
+from cdsm.geometry.cables import serpentine_cables
 from cdsm.geometry.tables import build, lines_of
 from cdsm.support.files import read_text
 from cdsm.support.records import CrossFaults, Number, parse, read_toml, record, toml_value
@@ -101,7 +102,7 @@ def read_arm(path: str | os.PathLike[str], wire: Wire | None) -> ArmParts:
     if "urdf" not in rest:
         geometry = attempt(build, Geometry, described)
     elif described:
-        faults.append(f"urdf: stands beside {next(iter(described))}; an arm has one of them")
+        faults.append(f"urdf: is given beside {next(iter(described))}; an arm has one of them")
     if keys is not None:
         robot, wires = keys.urdf, attempt(read_wires, keys, forced)
         tolerances = attempt(_tolerances, keys.tolerances)
@@ -160,11 +161,7 @@ def _routed(cables: object, geometry: Geometry | None) -> list[Routed]:
 
 
 def arm_text(parts: ArmParts) -> str:
-    """Return the text of a file from which :func:`read_arm` reads equal parts.
-
-    Raises:
-        InvalidInput: An elasticity of this kind cannot be written to a file.
-    """
+    """Return the text of an ARM.toml; InvalidInput if an elasticity cannot be written."""
     geometry, cables = parts.geometry, parts.cables
     wires, tables = wire_entries(cables)
     settings = [setting_lines(cable) for cable in cables]

@@ -26,7 +26,7 @@ def read_tolerances(path: str | os.PathLike[str]) -> Tolerances:
 
 def write_tolerances(tolerances: Tolerances, path: str | os.PathLike[str]) -> Path:
     """Write a file from which :func:`read_tolerances` builds equal tolerances."""
-    head = "# Tolerances of an arm, one sigma: rad, m, N, kg; of rigidity relative.\n"
+    head = "# Tolerances of an arm, one sigma: rad, m, N, kg; rigidity and spring relative.\n"
     return write_text(path, "\n".join([head, *tolerance_lines(tolerances)]) + "\n")
 
 
@@ -65,7 +65,7 @@ def _tolerance(name: str, value: object) -> Tolerance:
 
 
 def tolerance_lines(tolerances: Tolerances) -> list[str]:
-    """Return one TOML line for each source that is not zero."""
+    """Return one TOML line for each source of uncertainty that is not zero."""
     every, none = ((name, getattr(tolerances, name)) for name in SOURCES), Tolerances()
     return [f"{name} = {_value(value)}" for name, value in every if value != getattr(none, name)]
 

@@ -55,29 +55,17 @@ class Tensions(ReadOnlyState):
         return frozen(self.status == OK)
 
     def plot(self) -> Figure:
-        """Plot the median tension [N] of each cable over the postures, and its range.
-
-        Raises:
-            InvalidInput: No posture has tensions.
-        """
+        """Plot median tension [N] and range of each cable; InvalidInput if none were found."""
         from cdsm.plots import plot_tensions  # matplotlib imports slowly
 
         return plot_tensions(self)
 
     def to_xarray(self) -> xarray.Dataset:
-        """Return tensions and status as a Dataset in SI, labelled by posture, joint and cable.
-
-        Raises:
-            MissingExtra: xarray is not installed.
-        """
+        """Return tensions and status as a labelled Dataset in SI; MissingExtra without xarray."""
         return to_dataset(self.arm, self.q, self.status, {"tension": self.values})
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Return a tidy table in SI: a row for each posture, a column for each joint and cable.
-
-        Raises:
-            MissingExtra: xarray is not installed.
-        """
+        """Return a table in SI, a row for each posture; MissingExtra without xarray."""
         return tidy(self.to_xarray())
 
     def __len__(self) -> int:

@@ -87,20 +87,12 @@ class Batch(ReadOnlyState):
         return frozen(self.status == layout.OK)
 
     def to_xarray(self) -> xarray.Dataset:
-        """Return the quantities as a Dataset in SI, labelled by posture, joint, cable and axis.
-
-        Raises:
-            MissingExtra: xarray is not installed.
-        """
+        """Return the quantities as a labelled Dataset in SI; MissingExtra without xarray."""
         values = dict(zip(self.outputs, self.values, strict=True))
         return to_dataset(self.arm, self.q, self.status, values, self.direction)
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Return a tidy table in SI: a row for each posture, a column for each component.
-
-        Raises:
-            MissingExtra: xarray is not installed.
-        """
+        """Return a table in SI, a row for each posture; MissingExtra without xarray."""
         return tidy(self.to_xarray())
 
     def __len__(self) -> int:
@@ -157,8 +149,8 @@ def evaluate(
         minimum: Lower bounds [N] for :func:`distribute_tensions`, which then finds the tensions.
         maximum: Upper bounds [N] of distributed tensions; no bounds if not given.
         check_limits: Skip postures beyond the joint limits; their status is ``BEYOND_LIMITS``.
-        threads: Maximum number of threads; by default one for each core. All threads call a
-            user-defined elasticity.
+        threads: Maximum number of threads; by default one for each core. A user-defined elasticity
+            is called from all threads.
 
     Raises:
         InvalidInput: An argument has the wrong shape or is not a number; a tension is negative; two
@@ -234,7 +226,7 @@ def _checked_load(
         given = None if tension is None else given_tension(arm, tension, len(q))
         return given, given_wrench(wrench, len(q)), np.zeros(len(q), dtype=np.uint8)
     if tension.arm != arm or not np.array_equal(tension.q, q):
-        raise InvalidInput("tension", "was distributed at other postures; do it at these.")
+        raise InvalidInput("tension", "was distributed at other postures; distribute it at these.")
     if wrench is not None:
         raise InvalidInput("wrench", "comes with the Tensions; leave it out here.")
     return tension.values, tension.wrench, tension.status.copy()

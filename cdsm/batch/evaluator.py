@@ -16,6 +16,7 @@ from cdsm.batch.stuck_readings import STUCK, WITHOUT_FRICTION, Kept, read_stuck
 from cdsm.cable_laws import CableLaws
 from cdsm.elasticity import Elasticity
 from cdsm.errors import ElasticityRangeError, InfeasibleTension, SolverError
+from cdsm.kernels.compiling import WIDTH, is_new
 from cdsm.kernels.distribution import search_tensions
 from cdsm.kernels.read import read
 from cdsm.kernels.readings import IMMOBILE, READ, SINGULAR, UNREAD
@@ -26,14 +27,14 @@ from cdsm.support.status import Status
 from cdsm.support.values import Array, frozen
 from cdsm.tension import distribute_tension
 
-_WIDTH = 32
-"""Number of postures in a block: some vectors of the processor. More need too much cache."""
-
 _LONG = 2**15
 """Size of a posture's record (count of numbers) from which a block has half the width."""
 
 _CACHE, _FEWEST = 2**16, 8
 """Count of numbers kept for readings (quantities that need K_θ⁻¹), and least count of blocks."""
+
+_BLOCK, _BATCH = 2**22, 2**27
+"""Numbers in the records of a block, and of a batch, up to which Python runs a new kernel."""
 
 _CODES = np.array([OK, Status.INFEASIBLE, UNDECIDED], dtype=np.uint8)
 """Status of each outcome of a search: OPTIMAL, INFEASIBLE, UNDECIDED."""
@@ -86,7 +87,10 @@ class Evaluator:
         needs_springs = bool(self._wanted.size) and self._wanted[-1] > layout.LOAD
         laws = arm._model.wire_laws if self._sticks else arm._model.laws
         self._asks = needs_springs and bool(laws.asked if self._sticks else laws.own)
-        widest = _WIDTH if self._start[-1] < _LONG else _WIDTH // 2
+        record = int(self._start[-1])
+        widest = WIDTH if record < _LONG else WIDTH // 2
+        if len(q) * record <= _BATCH and is_new(evaluate_rows):
+            widest = max(widest, _BLOCK // record)
         self._block = max(1, min(widest, len(q)))
 
         shapes = dict(zip(QUANTITIES, layout.shapes(nv, cables, count), strict=True))

@@ -103,7 +103,7 @@ def evaluate_rows(
         smallest_arm: Moment arms below this are rounding in the balance of tensions [m].
         series: 1/k_series of the cables (C,) [m/N].
         rest: Tension at which the series springs are at rest (C,) [N].
-        constant: Constant part of EA (1 + ε) (C,) [N]; 0 for motors that hold force.
+        constant: Constant part of EA (1 + ε) (C,) [N]; 0 under force control.
         linear: Factor (C,) of the tension in EA (1 + ε): 1 for linear laws, else 0.
         wires: Laws of cables that are polynomials in the tension.
         holes: Holes and wires of the cables.
@@ -257,10 +257,9 @@ def evaluate_rows(
 def _load(rows: Array, first: int, block: Array, width: Width) -> None:
     """Copy W rows of (b, n), from row ``first``, to a block (n, W); repeat the last if needed."""
     if rows.shape[0]:
-        for w in lanes(width):
-            row = min(first + np.intp(w), rows.shape[0] - 1)
-            for i in range(rows.shape[1]):
-                block[i, w] = rows[row, i]
+        for i in upwards(0, rows.shape[1]):
+            for w in lanes(width):
+                block[i, w] = rows[min(first + np.intp(w), rows.shape[0] - 1), i]
 
 
 @inner
@@ -300,7 +299,6 @@ def _is_negative(rigidity: Array, w: Index) -> bool:
 
 @inlined
 def _is_beyond(q: Array, lowest: Array, highest: Array, w: Index) -> bool:
-    """Check whether an angle of posture w is beyond its limits."""
     beyond = False
     for i in range(q.shape[0]):
         beyond = beyond or q[i, w] < lowest[i] or q[i, w] > highest[i]
@@ -348,11 +346,12 @@ def _store(
     status: Codes,
 ) -> None:
     """Copy the requested quantities of a block to its rows; NaN where they are not known."""
-    for w in range(min(record.shape[1], out.shape[0] - first)):
-        at, row = 0, first + w
-        status[row] = code[w]
-        for number in wanted:
-            exists = number < known[w]
-            for i in range(start[number], start[number + 1]):
-                out[row, at] = record[i, w] if exists else math.nan
-                at += 1
+    count = min(record.shape[1], out.shape[0] - first)
+    for w in lanes(count):
+        status[first + np.intp(w)] = code[w]
+    at = 0
+    for number in wanted:
+        for i in upwards(start[number], start[number + 1]):
+            for w in lanes(count):
+                out[first + np.intp(w), at] = record[i, w] if number < known[w] else math.nan
+            at += 1

@@ -22,7 +22,7 @@ OUTSIDE_ELASTICITY = int(Status.OUTSIDE_ELASTICITY)
 SINGULAR = int(Status.SINGULAR)
 IMMOBILE = int(Status.IMMOBILE)
 UNDECIDED = 255
-"""Status while the guess of tensions is not optimal: a search or ``distribute_tension`` follows."""
+"""Internal status: the guess of tensions is not optimal; a search or a solver follows."""
 
 QUANTITIES = (
     "tip",

@@ -22,7 +22,7 @@ WITHOUT_FRICTION = {
     "stuck_along": "along",
     "stuck_compliance": "compliance",
 }
-"""Names of the equal quantities of an arm without friction, by the names of the stuck arm."""
+"""For each quantity of the stuck arm, the one that it equals if there is no friction."""
 
 
 class Kept(NamedTuple):
@@ -73,6 +73,7 @@ def read_stuck(
             frozen(np.ascontiguousarray(tension)),
             frozen(wire),
             np.ascontiguousarray(values["motion"]),
+            width,
             load[: len(q)],
         )
         set_breakaway(*arguments)

@@ -47,13 +47,20 @@ def _version(wanted: bool) -> None:
 @app.callback()
 def main(
     version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show it and exit.")
+        bool,
+        typer.Option(
+            "--version", callback=_version, is_eager=True, help="Show the version and exit."
+        ),
     ] = False,
     debug: Annotated[
-        bool, typer.Option("--debug", help="Show where an error comes from; before the command.")
+        bool,
+        typer.Option("--debug", help="Show the traceback of an error. Give it before the command."),
     ] = False,
     verbose: Annotated[
-        bool, typer.Option("--verbose", "-v", help="Show the log of long runs; before the command.")
+        bool,
+        typer.Option(
+            "--verbose", "-v", help="Show the log of long runs. Give it before the command."
+        ),
     ] = False,
 ) -> None:
     """Stiffness of cable-driven serpentine manipulators."""

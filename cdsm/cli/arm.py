@@ -15,7 +15,9 @@ from cdsm.cli.output import Json, answer, by_cable, written
 
 
 def urdf(
-    geometry: Annotated[Path, typer.Argument(metavar="ARM.toml", help="Geometry to read.")],
+    geometry: Annotated[
+        Path, typer.Argument(metavar="ARM.toml", help="File with the geometry of the arm.")
+    ],
     out: Annotated[
         Path, typer.Option("--out", "-o", metavar="FILE.urdf", help="URDF file to write.")
     ],
@@ -37,7 +39,7 @@ def stiffness(
         Path | None,
         typer.Option(
             metavar="T.toml",
-            help="Tolerances: how sure the stiffness is, and why. Default: those in ARM.toml.",
+            help="Tolerances, for the uncertainty of the stiffness; default: those in ARM.toml.",
         ),
     ] = None,
     as_json: AsJson = False,
@@ -124,7 +126,7 @@ def check(
     angles: Angles = "0",
     out: Annotated[
         Path | None,
-        typer.Option("--out", "-o", metavar="FILE.html", help="Write it as a page too."),
+        typer.Option("--out", "-o", metavar="FILE.html", help="Also write the report as a page."),
     ] = None,
     as_json: AsJson = False,
 ) -> None:
@@ -151,23 +153,26 @@ def export(
     out: Annotated[
         Path | None,
         typer.Option(
-            "--out", "-o", metavar="FILE.xml", help="MuJoCo model to write, its cables pulled."
+            "--out",
+            "-o",
+            metavar="FILE.xml",
+            help="MuJoCo model to write, its cables under tension.",
         ),
     ] = None,
     cables_out: Annotated[
-        Path | None, typer.Option(metavar="FILE.toml", help="File of its cables to write.")
+        Path | None, typer.Option(metavar="FILE.toml", help="File to write the cables to.")
     ] = None,
     angles: Angles = "0",
     actuators: Annotated[
         Literal["length", "tension", "none"],
-        typer.Option(help="Of the MuJoCo model; length: locked motors."),
+        typer.Option(help="Motors of the MuJoCo model control length, tension, or there are none."),
     ] = "length",
     damping_ratio: Annotated[
         float | None,
-        typer.Option(help="Of its least damped mode, by its cables; 0.05 if left out."),
+        typer.Option(help="Damping ratio of the least damped mode, by the cables; default 0.05."),
     ] = None,
     damping: Annotated[
-        float | None, typer.Option(help="Of each of its joints instead [N m s/rad].")
+        float | None, typer.Option(help="Damping of each joint instead [N m s/rad].")
     ] = None,
     as_json: AsJson = False,
 ) -> None:

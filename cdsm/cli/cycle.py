@@ -28,12 +28,12 @@ def cycle(
     weight: WeightOptions,
     wrench: options.Wrench = None,
     angles: Angles = "0",
-    cycles: Annotated[int, typer.Option(help="How often it comes and goes.", min=1, max=100)] = 2,
+    cycles: Annotated[int, typer.Option(help="Number of cycles.", min=1, max=100)] = 2,
     steps: Annotated[
-        int, typer.Option(help="Loads from none to the largest.", min=1, max=1000)
+        int, typer.Option(help="Steps from zero load to the largest.", min=1, max=1000)
     ] = 12,
     one_sided: Annotated[
-        bool, typer.Option("--one-sided", help="Only take it off; do not pull the other way.")
+        bool, typer.Option("--one-sided", help="Unload to zero; do not reverse the load.")
     ] = False,
     out: Annotated[
         Path | None,
@@ -44,7 +44,7 @@ def cycle(
 ) -> None:
     """Load the tip slowly up and down, and print the hysteresis due to friction in the holes.
 
-    --force or --mass is the largest load; --wrench is a constant load besides.
+    --force or --mass is the largest load; --wrench is a constant load in addition.
     """
     import numpy as np
 
@@ -67,17 +67,17 @@ def cycle(
     write_picture(figure, history.plot)
     lost = float(history.dissipated[-len(way) :].sum())
     left = float(np.linalg.norm(history.displacement[-1]))
-    told = (
+    note = (
         f"the last cycle loses {1000.0 * lost:.4g} mJ; without load the tip is left "
         f"{1e6 * left:.4g} µm from where it was"
     )
     if not pose.arm.has_friction:
-        told = "the holes have no friction, so there is no loop: give --friction, e.g. 0.1"
+        note = "the holes have no friction, so there is no loop: give --friction, e.g. 0.1"
     conditions = dataclasses.replace(tensions.conditions(pose.arm), friction=True)
     answer(
         as_json,
         lambda: history.to_dict() | {"lost_in_last_cycle_J": lost, "left_over_m": left},
         conditions,
         history,
-        told,
+        note,
     )

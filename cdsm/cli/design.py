@@ -22,15 +22,15 @@ def design(
             metavar="PROBLEM.toml", help="The problem; examples/design.toml is one with comments."
         ),
     ],
-    out: Annotated[Path, typer.Option("--out", "-o", help="Folder of the results; it is made.")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the results.")],
     generations: Annotated[
-        int | None, typer.Option(help="Generations; default: what the file says, or 40.", min=1)
+        int | None, typer.Option(help="Generations; default: those of the file, or 40.", min=1)
     ] = None,
     population: Annotated[
-        int | None, typer.Option(help="Designs in each; default: what the file says, or 40.", min=4)
+        int | None, typer.Option(help="Designs per generation; default: of the file, or 40.", min=4)
     ] = None,
     seed: Annotated[
-        int | None, typer.Option(help="Default: what the file says, or 0.", min=0)
+        int | None, typer.Option(help="Seed; default: that of the file, or 0.", min=0)
     ] = None,
     choose: Annotated[
         int | None,
@@ -70,18 +70,20 @@ def design(
         )
 
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    processes = jobs or cores or 1
     found = cdsm.search_designs(
         task,
         generations=generations or file.generations,
         population=population or file.population,
         seed=file.seed if seed is None else seed,
         store=folder / _RECORD,
-        jobs=jobs or cores or 1,
+        jobs=processes,
         report=tell,
     )
     number = found.compromise if choose is None else choose
     paths = [
-        write_text(folder / "front.csv", found.to_csv()),
+        write_text(folder / "designs.csv", found.evaluated.to_csv()),
+        write_text(folder / "front.csv", found.measured(jobs=processes).to_csv()),
         cdsm.plots.save_figure(found.plot(), folder / "front.pdf"),
         write_text(folder / "front.html", found.to_html()),
         cdsm.plots.save_figure(found.arm(number).plot(), folder / "arm.pdf"),

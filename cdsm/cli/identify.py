@@ -50,7 +50,7 @@ def identify(
         int | None,
         typer.Option(
             metavar="TESTS",
-            help="Do not identify: plan so many tests. Those of LOOPS.csv are the candidates; "
+            help="Do not identify, but plan so many tests. Those of LOOPS.csv are the candidates; "
             "readings are not needed.",
             min=1,
         ),
@@ -60,7 +60,7 @@ def identify(
 ) -> None:
     """Find friction, rigidity, springs and dimensions from loops of weight tests.
 
-    Forces come and go along a direction, motors locked; the width of the loop tells friction. Each
+    A force is applied and removed along a direction, motors locked; friction widens the loop. Each
     parameter has its 95 % interval; warnings say what the tests do not determine.
     """
     from cdsm.identification.arm_parameters import ArmParameters
@@ -88,8 +88,8 @@ def identify(
     inside = all(low <= start[label] <= high for label, (low, high) in bounds.items())
     found = cdsm.identify(shown.arm_of, read, bounds, start=start if inside else None)
     write_picture(figure, found.plot)
-    told = [f"warning: {sentence}" for sentence in found.warnings]
-    answer(as_json, found.to_dict, found, warnings=told)
+    warnings = [f"warning: {sentence}" for sentence in found.warnings]
+    answer(as_json, found.to_dict, found, warnings=warnings)
 
 
 def _ranges(free: list[str]) -> dict[str, Range | None]:
@@ -133,7 +133,6 @@ class _Shown:
 
     @property
     def present(self) -> dict[str, float]:
-        """Present values of the parameters by label."""
         return {
             self.label(name): value / self._parameters.unit(name)[1]
             for name, value in self._parameters.present.items()

@@ -30,7 +30,7 @@ def weigh(
     weight: WeightOptions,
     wrench: options.Wrench = None,
     angles: Angles = "0",
-    steps: Annotated[int, typer.Option(help="Equal steps to hang it in.")] = 5,
+    steps: Annotated[int, typer.Option(help="Equal steps of the weight.")] = 5,
     figure: Picture = None,
     as_json: AsJson = False,
 ) -> None:
@@ -64,7 +64,8 @@ def buckle(
         ),
     ] = None,
     min_tension: Annotated[
-        float | None, typer.Option(help="Lower bound of all tensions under the load [N]; 10.")
+        float | None,
+        typer.Option(help="Lower bound of all tensions under the load [N]; default 10."),
     ] = None,
     max_tension: Annotated[
         float | None, typer.Option(help="Upper bound of all tensions under the load [N].")
@@ -76,7 +77,7 @@ def buckle(
 ) -> None:
     """Find the tension at which the arm buckles, and the largest multiple of a load it can carry.
 
-    --force or --mass is the load that is multiplied; --wrench is a constant load besides. Exit
+    --force or --mass is the load that is multiplied; --wrench is a constant load in addition. Exit
     code 0; 3 if the arm is unstable at every tension, or already without the load.
     """
     loaded = weight.given or load is not None

@@ -23,46 +23,52 @@ def new(
         int | None, typer.Option(metavar="N", help="N universal joints.", **_kind)
     ] = None,
     hinged: Annotated[
-        int | None, typer.Option(metavar="N", help="N hinges, each turned by --twist.", **_kind)
+        int | None, typer.Option(metavar="N", help="N hinges; see --twist.", **_kind)
     ] = None,
     sections: Annotated[
         str | None,
         typer.Option(
             metavar="N,N,...",
-            help="Sections of N universal joints each, base to tip; each one is narrower by a "
-            "quarter.",
+            help="Sections of N universal joints each, base to tip; each one is a quarter "
+            "narrower.",
             **_kind,
         ),
     ] = None,
     twist: Annotated[
         float | None,
-        typer.Option(help="Of --hinged: from each axis to the next, in degrees; 90.", **_size),
+        typer.Option(
+            help="Angle from each axis of --hinged to the next [degrees]; default 90.", **_size
+        ),
     ] = None,
     cables_per_joint: Annotated[
-        int | None, typer.Option(help="3; of hinges 2, the antagonistic pair.", **_size)
+        int | None, typer.Option(help="Default 3; for hinges 2, an antagonistic pair.", **_size)
     ] = None,
-    link_length: Annotated[float, typer.Option(help="Of every link, in mm.", **_size)] = 60.0,
+    link_length: Annotated[float, typer.Option(help="Length of every link [mm].", **_size)] = 60.0,
     base_length: Annotated[
-        float, typer.Option(help="From the base frame to joint 1, in mm.", **_size)
+        float, typer.Option(help="Distance from the base frame to joint 1 [mm].", **_size)
     ] = 30.0,
     disk_offset: Annotated[
-        float, typer.Option(help="From each joint to its two disks, in mm.", **_size)
+        float, typer.Option(help="Distance from each joint to its two disks [mm].", **_size)
     ] = 5.0,
     hole_radius: Annotated[
-        float, typer.Option(help="Of the holes from the axis, in mm.", **_size)
+        float, typer.Option(help="Distance of the holes from the axis [mm].", **_size)
     ] = 20.0,
-    link_mass: Annotated[float, typer.Option(help="Of every link, in kg.", **_size)] = 0.05,
+    link_mass: Annotated[float, typer.Option(help="Mass of every link [kg].", **_size)] = 0.05,
     lead: Annotated[
-        float, typer.Option(help="Straight cable from actuator to base disk, in mm.", **_size)
+        float, typer.Option(help="Straight cable from actuator to base disk [mm].", **_size)
     ] = 100.0,
     wire: Annotated[
         str, typer.Option(metavar="NAME|EA", help="Wire of all cables: a name, or EA in N.")
     ] = "1x19-1.2mm",
     gravity: Annotated[
         str,
-        typer.Option(metavar="GX,GY,GZ|AXIS", help="In m/s², base axes, or 9.81 along an axis."),
+        typer.Option(
+            metavar="GX,GY,GZ|AXIS", help="Gravity, base axes [m/s²]; or an axis for 9.81."
+        ),
     ] = "-z",
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a file.")] = False,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace an existing file.")
+    ] = False,
     as_json: AsJson = False,
 ) -> None:
     """Write a complete ARM.toml with a comment on every key; every command can read it."""
@@ -112,5 +118,5 @@ def new(
     whole = cdsm.Manipulator(geometry, as_wire(law), gravity=gravity_of(gravity))
     text = template(arm.name, law, tuple(whole.gravity.tolist()), parts)
     written = write_text(arm, text)
-    told: Json = {"name": geometry.name, "length_m": geometry.length, "written": [str(written)]}
-    answer(as_json, lambda: told, whole, f"written: {written}; try cdsm check {written}")
+    facts: Json = {"name": geometry.name, "length_m": geometry.length, "written": [str(written)]}
+    answer(as_json, lambda: facts, whole, f"written: {written}; try cdsm check {written}")

@@ -45,8 +45,8 @@ def directions() -> list[str]:
 
 
 ANGLES = typer.Option(
-    help="Joint angles in degrees (mm where a joint slides): by name, the others are 0; in order; "
-    "or one for all joints. 0 if left out.",
+    help="Joint angles in degrees (mm where a joint slides): by name (others 0), in order, or "
+    "one for all joints. Default: 0.",
     metavar="JOINT=DEG,...|DEG,DEG,...|DEG",
     show_default=False,
 )
@@ -57,7 +57,7 @@ PATH_COLUMNS: Final = (
 )
 MinTension = Annotated[
     float,
-    _tension_option(help="Lower bound of all tensions [N]; in Python 0, where strands go slack."),
+    _tension_option(help="Lower bound of all tensions [N]; the default in Python is 0."),
 ]
 MaxTension = Annotated[float, _tension_option(help="Upper bound of all tensions [N].")]
 Wrench = Annotated[
@@ -72,9 +72,9 @@ Solver = Annotated[
 ]
 Picture = Annotated[
     Path | None,
-    typer.Option(metavar="FILE.pdf|svg|png", help="Picture to write, vectors or 300 dpi."),
+    typer.Option(metavar="FILE.pdf|svg|png", help="Figure to write: vectors, or 300 dpi."),
 ]
-AsJson = Annotated[bool, typer.Option("--json", help="Print SI numbers as JSON, errors too.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print answer (SI) and errors as JSON.")]
 
 
 @dataclass(frozen=True)
@@ -90,16 +90,17 @@ class ArmOptions:
         ),
     ]
     cables: Annotated[
-        Path | None, _arm_option(metavar="CABLES.toml", help="Its cables, in the place of its own.")
+        Path | None,
+        _arm_option(metavar="CABLES.toml", help="Cables that replace those of the arm."),
     ] = None
-    tip: Annotated[str | None, _arm_option(help="The link of a .urdf that is its tip.")] = None
+    tip: Annotated[str | None, _arm_option(help="Link of a .urdf that is the tip.")] = None
     wire: Annotated[
         str | None,
         _arm_option(
             metavar="NAME|EA|WIRE.toml",
             autocompletion=_wires,
-            help="Wire of all cables: a name such as 1x19-1.2mm, a constant rigidity in N, or a "
-            "file that `cdsm fit` writes; default: what the files say.",
+            help="Wire of all cables: a name such as 1x19-1.2mm, a constant EA in N, or a "
+            "file that `cdsm fit` writes; default: those of the file.",
         ),
     ] = None
     rigidity: Annotated[float | None, _arm_option(help="Older name of --wire EA.", hidden=True)] = (
@@ -112,18 +113,18 @@ class ArmOptions:
         bool,
         _arm_option(
             "--slack-below",
-            help="Continue the wires below their laws: constant rigidity down to 0 N, then slack.",
+            help="Continue laws of wires below their range: constant EA down to 0 N, then slack.",
         ),
     ] = False
     friction: Annotated[
         float | None,
-        _arm_option(help="Friction coefficient in all holes; default: what the files say, or 0."),
+        _arm_option(help="Friction coefficient in all holes; default: that of the file, or 0."),
     ] = None
     gravity: Annotated[
         str | None,
         _arm_option(
-            help="In m/s², base axes, or an axis for 9.81 along it, such as -y; default: what the "
-            "file says, or -z.",
+            help="Gravity, base axes [m/s²], or an axis for 9.81 along it, such as -y; default: "
+            "that of the file, or -z.",
             metavar="GX,GY,GZ|AXIS",
             autocompletion=directions,
         ),
@@ -269,7 +270,7 @@ class LoadOptions(WeightOptions):
     wrench: Wrench = None
 
     def at_tip(self, arm: cdsm.Manipulator) -> Array:
-        """Return the load (6,): force [N], then moment [N m]."""
+        """Return the load W (6,) at ``tool0`` in base axes: force [N], then moment [N m]."""
         carried = wrench_of(self.wrench)
         carried[:3] += self.vector(arm)
         return carried

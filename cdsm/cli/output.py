@@ -56,11 +56,11 @@ def answer(
     Warnings end the command with exit code 3, so files are written before.
     """
     if as_json:
-        told: Json = {"warnings": warnings}
+        numbers: Json = {"warnings": warnings}
         for part in parts:
             if isinstance(part, Conditions):
-                told |= part.to_dict()
-        _print_json(told | as_dict())
+                numbers |= part.to_dict()
+        _print_json(numbers | as_dict())
     else:
         texts = (
             "\n".join(line for line in in_options(str(part)).splitlines() if line not in warnings)
@@ -71,10 +71,10 @@ def answer(
         raise typer.Exit(UNMET)
 
 
-def _print_json(told: Json) -> None:
+def _print_json(numbers: Json) -> None:
     from cdsm.support.format import plain
 
-    typer.echo(json.dumps(plain(told), indent=1, allow_nan=False, default=str))
+    typer.echo(json.dumps(plain(numbers), indent=1, allow_nan=False, default=str))
 
 
 def by_cable(arm: cdsm.Manipulator, values: Array) -> Json:
@@ -105,7 +105,7 @@ def _show(
 
 @contextmanager
 def misuse_reported(as_json: bool) -> Iterator[None]:
-    """Turn an error of usage into JSON, if wanted, and exit code 2; else it is left to typer."""
+    """Turn an error of usage into JSON, if wanted, and exit code 2; else typer reports it."""
     try:
         yield
     except _UsageError as error:

@@ -1,4 +1,4 @@
-"""``cdsm reproduce``: recompute the paper."""
+"""``cdsm reproduce``: recompute the paper on the stiffness of such arms (see README)."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ def reproduce(
     ] = Path("reproduction"),
     kind: Annotated[
         Literal["pdf", "svg", "png"],
-        typer.Option("--format", help="Kind of the figures; pdf and svg are vectors."),
+        typer.Option("--format", help="Format of the figures; pdf and svg are vectors."),
     ] = "png",
     as_json: AsJson = False,
 ) -> None:
     """Recompute Figs. 3 to 8, 10, 12 and 13 of the paper: figures, table and numbers.
 
-    Prints, for each figure, the number that deviates most from the paper. The table of all numbers,
-    with assumptions and other readings, is reproduction.md.
+    Prints, for each figure, the number that deviates most from the paper. reproduction.md has
+    all numbers, what was assumed, and what other interpretations of the paper's text give.
     """
     from cdsm.support.files import make_folder, write_text
     from cdsm.support.format import aligned

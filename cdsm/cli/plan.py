@@ -22,7 +22,7 @@ def plan(
     direction: Annotated[
         str,
         typer.Option(
-            help="Along which the arm is to be so stiff: an axis such as z or -y, or a vector.",
+            help="Direction of the wanted stiffness: an axis such as z or -y, or a vector.",
             metavar="AXIS|X,Y,Z",
             autocompletion=options.directions,
         ),
@@ -36,28 +36,31 @@ def plan(
         Path | None,
         typer.Option(
             metavar="PATH.csv",
-            help=f"Instead of --angles, a line per sample. {options.PATH_COLUMNS}",
+            help=f"Path instead of --angles, a line per sample. {options.PATH_COLUMNS}",
         ),
     ] = None,
     rate: Annotated[
-        float, typer.Option(help="How much a tension may change per sample of --path [N].")
+        float, typer.Option(help="Largest change of a tension per sample of --path [N].")
     ] = math.inf,
     min_tension: MinTension = 10.0,
     max_tension: MaxTension = math.inf,
     out: Annotated[
         Path | None,
         typer.Option(
-            "--out", "-o", metavar="FILE.csv", help="Angles, tensions, lengths, stiffness to write."
+            "--out",
+            "-o",
+            metavar="FILE.csv",
+            help="Table of tensions, lengths, stiffness to write.",
         ),
     ] = None,
     figure: Picture = None,
     animation: Annotated[
         Path | None,
-        typer.Option(metavar="FILE.gif", help="Of --path: the arm as it moves, to write."),
+        typer.Option(metavar="FILE.gif", help="Animation of the arm along --path to write."),
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Find the least tensions that make an arm as stiff as wanted, at a posture or along a path.
+    """Find the least tensions with a wanted stiffness, at a posture or along a path.
 
     Exit code 0; 3 if no tensions reach the target, at a posture or at some samples of the path. The
     other samples are written all the same.
@@ -100,5 +103,5 @@ def plan(
             written(cdsm.plan_path(pose.arm, u, wanted, *bounds, angles=[pose.q]).write(out))
         write_picture(figure, lambda: best.plot(attainable))
         conditions = Conditions(pose.arm, (min_tension,))
-        told = [attainable, best]
-        answer(as_json, lambda: attainable.to_dict() | best.to_dict(), conditions, *told)
+        results = [attainable, best]
+        answer(as_json, lambda: attainable.to_dict() | best.to_dict(), conditions, *results)

@@ -37,8 +37,8 @@ class PoseOptions:
     grid: Annotated[
         str | None,
         typer.Option(
-            help="Joints with first and last angle and their number, or one angle, in degrees (mm "
-            "where they slide); joints that are not named stay at 0.",
+            help="Joints with first angle, last angle and number of angles, or one angle, in "
+            "degrees (mm where they slide); joints that are not named stay at 0.",
             metavar="JOINT=LOW:HIGH:N,...",
         ),
     ] = None
@@ -51,12 +51,12 @@ class PoseOptions:
         ),
     ] = None
     count: Annotated[
-        int | None, typer.Option(help="Postures along --path; default: its own.", min=2)
+        int | None, typer.Option(help="Postures along --path; default: its waypoints.", min=2)
     ] = None
     random: Annotated[
-        int | None, typer.Option(help="So many Sobol points within the joint limits.", min=1)
+        int | None, typer.Option(help="Number of Sobol points within the joint limits.", min=1)
     ] = None
-    seed: Annotated[int | None, typer.Option(help="Of --random; 0.")] = None
+    seed: Annotated[int | None, typer.Option(help="Seed of --random; default 0.")] = None
 
     def read(self, arm: cdsm.Manipulator) -> cdsm.PoseSet:
         """Build the set of postures from its options."""
@@ -77,11 +77,33 @@ class PoseOptions:
 
             file = read_path(self.path, arm)
             if file.angles is None or file.target is not None:
-                raise cdsm.FileError(
-                    self.path, "holds tips or targets; a sweep goes along joint angles."
-                )
+                raise cdsm.FileError(self.path, "has tips or targets; a sweep needs joint angles.")
             return cdsm.PathPoses(file.angles, self.count)
         return cdsm.RandomPoses(self.random or 0, self.seed or 0)
+
+
+@dataclass(frozen=True)
+class MeasureOptions:
+    """Options of payloads, clearances and the use of wires."""
+
+    worst_friction: Annotated[
+        bool,
+        typer.Option(
+            "--worst-friction",
+            help="Keep all segments of the cables within the bounds, whatever loads came before; "
+            "wires are then under their largest tension.",
+        ),
+    ] = False
+    diameter: Annotated[
+        float, typer.Option(help="Diameter of the cables [mm], for clearances and wire_life.")
+    ] = 0.0
+    breaking_load: Annotated[
+        float | None, typer.Option(help="Breaking load of the wire [N], for wire_safety.")
+    ] = None
+    bend_diameter: Annotated[
+        float | None,
+        typer.Option(help="Diameter of the bend in the holes [mm], for wire_life."),
+    ] = None
 
 
 def sweep(
@@ -91,6 +113,7 @@ def sweep(
     ],
     poses: PoseOptions,
     load: LoadOptions,
+    measures: MeasureOptions,
     min_tension: Annotated[
         str, typer.Option(help="Lower bound of all tensions [N], or several.", metavar="N,N,...")
     ] = "10",
@@ -98,7 +121,7 @@ def sweep(
     quantities: Annotated[
         str,
         typer.Option(
-            help=f"What to compute, of {', '.join(QUANTITIES)}; default: {', '.join(DEFAULT)}.",
+            help=f"Quantities: {', '.join(QUANTITIES)}; default: {', '.join(DEFAULT)}.",
             metavar="NAME,NAME,...",
             show_default=False,
             autocompletion=_quantities,
@@ -106,7 +129,7 @@ def sweep(
     ] = ",".join(DEFAULT),
     resume: Annotated[
         Path | None,
-        typer.Option(help="Folder to keep results in as they come; goes on from what is there."),
+        typer.Option(help="Folder that keeps finished results; a stopped sweep resumes from it."),
     ] = None,
     as_json: AsJson = False,
 ) -> None:
@@ -124,9 +147,13 @@ def sweep(
         maximum=max_tension,
         wrench=load.at_tip(robot),
         outputs=[name.strip() for name in quantities.split(",")],
+        worst_friction=measures.worst_friction,
+        diameter=measures.diameter / 1000.0,
+        breaking_load=measures.breaking_load,
+        bend_diameter=None if measures.bend_diameter is None else measures.bend_diameter / 1000.0,
         store=resume,
     )
-    conditions = Conditions(robot, tuple(low))
+    conditions = Conditions(robot, tuple(low), friction=measures.worst_friction)
     _answer(as_json, dataset, cdsm.write_sweep(dataset, out), conditions)
 
 
@@ -140,21 +167,23 @@ def map_sweep(
     quantity: Annotated[
         str,
         typer.Option(
-            help="What to show: softest, stiffest, anisotropy, margin, along, or another number.",
+            help="Quantity to show: softest, stiffest, anisotropy, margin, along, or another.",
             autocompletion=_quantities,
         ),
     ] = "softest",
     section: Annotated[
         str | None,
         typer.Option(
-            help="Show the tips within a slab: its normal (x, y or z), place and half thickness "
+            help="Show the tips within a slab: its normal (x, y or z), position, half thickness "
             "in mm, as in y=0:20.",
             metavar="AXIS=PLACE:HALF",
         ),
     ] = None,
     statistic: Annotated[
         Literal["median", "min", "max"] | None,
-        typer.Option(help="Of the postures in a cell; a cloud of tips shows the median."),
+        typer.Option(
+            help="Statistic of the postures in a cell; default for a cloud of tips: median."
+        ),
     ] = None,
     bins: Annotated[int, typer.Option(help="Cells along the longest side of a map.")] = 40,
     as_json: AsJson = False,
@@ -208,8 +237,8 @@ def _answer(
     if conditions is not None:
         listed = ", ".join(f"{count} {word}" for word, count in counts.items() if count)
         lines.insert(0, f"{dataset.attrs['title']}, {dataset.attrs['poses']}: {listed}")
-    told: Json = {"entries": counts, "written": [str(written)]}
+    facts: Json = {"entries": counts, "written": [str(written)]}
     first = () if conditions is None else (conditions,)
     unstable = counts.get("unstable", 0)
     warnings = [f"UNSTABLE at {unstable} of {status.size} entries"] if unstable else []
-    answer(as_json, lambda: told, *first, "\n".join(lines), warnings=warnings)
+    answer(as_json, lambda: facts, *first, "\n".join(lines), warnings=warnings)

@@ -37,7 +37,7 @@ def track(
     law: Annotated[
         str,
         typer.Option(
-            help="What the motors do: feedforward, tension, mixed, or stiffness, which plans again "
+            help="Motor law: feedforward, tension, mixed, or stiffness, which plans tensions again "
             "at the estimated posture.",
             autocompletion=_laws,
         ),
@@ -45,37 +45,44 @@ def track(
     plant: Annotated[
         Literal["slow", "mujoco"],
         typer.Option(
-            help="The true arm: at rest at each step, with friction; or with inertia and damping "
-            "(extra mujoco), without friction."
+            help="The true arm: quasi-static, with friction; or with inertia and damping (extra "
+            "mujoco), without friction."
         ),
     ] = "slow",
     payload: Annotated[
         float, typer.Option(help="Mass [kg] that the controller does not know of.")
     ] = 0.0,
     payload_from: Annotated[
-        float, typer.Option(help="Part of the path after which it hangs at the tip.")
+        float, typer.Option(help="Part of the path [0 to 1] after which the payload hangs.")
     ] = 0.5,
     true_rigidity: Annotated[
-        float, typer.Option(help="Rigidity of the true wires over what the controller believes.")
+        float, typer.Option(help="True rigidity of the wires over that of the model.")
     ] = 1.0,
     true_friction: Annotated[
-        float | None, typer.Option(help="Friction coefficient of the true holes; default: known.")
+        float | None, typer.Option(help="True friction coefficient; default: that of the model.")
     ] = None,
-    encoder: Annotated[float, typer.Option(help="One count of an encoder [mm].")] = 0.01,
+    encoder: Annotated[float, typer.Option(help="Resolution of the encoders [mm].")] = 0.01,
     tension_noise: Annotated[
-        float, typer.Option(help="Standard deviation of the load cells [N].")
+        float, typer.Option(help="Standard deviation of load cell noise [N].")
     ] = 0.0,
-    tension_bias: Annotated[float, typer.Option(help="Error of all load cells [N].")] = 0.0,
-    delay: Annotated[int, typer.Option(help="Steps by which the sensors are late.")] = 0,
-    steps: Annotated[int, typer.Option(help="Steps of control from sample to sample.")] = 5,
-    period: Annotated[float, typer.Option(help="Time between two steps [s].")] = 0.05,
+    tension_bias: Annotated[
+        float, typer.Option(help="Constant error of all load cells [N].")
+    ] = 0.0,
+    delay: Annotated[int, typer.Option(help="Delay of the sensors in steps.")] = 0,
+    steps: Annotated[int, typer.Option(help="Control steps from sample to sample.")] = 5,
+    period: Annotated[float, typer.Option(help="Time between two control steps [s].")] = 0.05,
     rate: Annotated[
-        float, typer.Option(help="How much the stiffness loop may change a tension per step [N].")
+        float, typer.Option(help="Largest change of a tension per step, stiffness loop [N].")
     ] = 10.0,
-    bands: Annotated[int, typer.Option(help="Prove a band at every so many steps; 0: never.")] = 1,
+    bands: Annotated[
+        int,
+        typer.Option(
+            help="Steps between two computations of where friction lets the arm rest; 0: none."
+        ),
+    ] = 1,
     felt: Annotated[
         int,
-        typer.Option(help="Feel the stiffness with the motors at every so many steps; 0: never."),
+        typer.Option(help="Steps between measurements of the stiffness by the motors; 0: none."),
     ] = 0,
     min_tension: MinTension = 10.0,
     max_tension: MaxTension = math.inf,
@@ -83,24 +90,24 @@ def track(
     out: Annotated[
         Path | None,
         typer.Option(
-            "--out", "-o", metavar="RUN.nc|RUN.csv", help="Numbers over time to write; .nc: all."
+            "--out", "-o", metavar="RUN.nc|RUN.csv", help="Results over time to write; .nc has all."
         ),
     ] = None,
     animate: Annotated[
         Path | None,
         typer.Option(
             metavar="RUN.gif|RUN.csv",
-            help="Motion of the true arm to write: a picture, or a table over time that `cdsm view "
+            help="Motion of the true arm to write: a GIF, or a table over time that `cdsm view "
             "ARM.toml --path RUN.csv` plays.",
         ),
     ] = None,
     figure: Picture = None,
     as_json: AsJson = False,
 ) -> None:
-    """Simulate a closed loop along a path at a wanted stiffness, with an arm that differs.
+    """Simulate a closed loop along a path at a wanted stiffness, with model errors.
 
-    The arm of the file is what the controller believes in; --true-rigidity, --true-friction and
-    --payload say how the true one differs. Exit code 0; 3 if the loop is unstable, the arm buckles,
+    The arm of the file is the controller's model; --true-rigidity, --true-friction and --payload
+    say how the true arm differs. Exit code 0; 3 if the loop is unstable, the arm buckles,
     or a sample cannot be planned.
     """
     from cdsm.cli.path_file import one_target, read_path

@@ -29,13 +29,13 @@ def view(
         ),
     ] = None,
     sag: Annotated[
-        bool, typer.Option("--sag", help="To begin with, let the force move the arm.")
+        bool, typer.Option("--sag", help="Start with the arm moved by the force.")
     ] = False,
     largest_tension: Annotated[
-        float, typer.Option(help="Right end of the slider of the least tension [N].")
+        float, typer.Option(help="Upper end of the slider of the lower bound of tension [N].")
     ] = 200.0,
     largest_force: Annotated[
-        float, typer.Option(help="Ends of the sliders of the force [N].")
+        float, typer.Option(help="Upper end of the sliders of the force [N].")
     ] = 20.0,
     host: Annotated[
         str,
@@ -50,7 +50,7 @@ def view(
     ] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Show an arm in the browser, live: move joints, tip, tension and load; see how stiff it is."""
+    """Show an arm in the browser: move joints, tip, tension and load, and see its stiffness."""
     from cdsm.cli.path_file import PathFile, read_path
 
     with contextlib.suppress(KeyboardInterrupt):  # Ctrl-C ends the view, also while it starts
@@ -75,8 +75,8 @@ def view(
         ) as page:
             text = f"shown at {page.url}; Ctrl-C ends it"
             conditions = replace(tensions.conditions(robot), friction=sag)
-            told: Json = {"name": robot.name, "url": page.url}
-            answer(as_json, lambda: told, conditions, text)
+            facts: Json = {"name": robot.name, "url": page.url}
+            answer(as_json, lambda: facts, conditions, text)
             if browser:
                 webbrowser.open(page.url)
             page.wait()

@@ -18,7 +18,7 @@ def fit(
     test: Annotated[Path, typer.Argument(metavar="TEST.csv", help="Tensile test to read.")],
     gauge_length: Annotated[
         float | None,
-        typer.Option(help="Length of the tested wire in mm; default: what the file says."),
+        typer.Option(help="Length of the tested wire in mm; default: that of the file."),
     ] = None,
     columns: Annotated[
         str | None,
@@ -28,7 +28,7 @@ def fit(
             "default: by the names in the header.",
         ),
     ] = None,
-    skip: Annotated[int, typer.Option(help="Lines at the top that are not read.")] = 0,
+    skip: Annotated[int, typer.Option(help="Lines at the top to skip.")] = 0,
     units: Annotated[
         str | None,
         typer.Option(
@@ -36,11 +36,11 @@ def fit(
             help="Units of displacement and force if the file has none, such as mm,N.",
         ),
     ] = None,
-    method: Annotated[str, typer.Option(help="monotone, or polynomial as in the paper.")] = (
+    method: Annotated[str, typer.Option(help="Fit: monotone, or polynomial as in the paper.")] = (
         "monotone"
     ),
     out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="Elasticity to write, as TOML.")
+        Path | None, typer.Option("--out", "-o", help="Law of rigidity to write, as TOML.")
     ] = None,
     tolerances: Annotated[
         Path | None,
@@ -49,7 +49,7 @@ def fit(
     figure: Picture = None,
     as_json: AsJson = False,
 ) -> None:
-    """Fit the rigidity of a wire to its tensile test: report, and if wanted figure and TOML.
+    """Fit the rigidity of a wire to its tensile test; print a report, write its law and a figure.
 
     It reads the text files of testing machines: titles before the header, other languages, decimal
     commas, units in a line of their own.

@@ -63,7 +63,7 @@ def assess(
 
 
 def slid_out(arm: Manipulator, state: PlantState, wrench: Array) -> Stiffness:
-    """Return K_θ at the equilibrium with the wire and load of a state, but without friction.
+    """Return K_θ at the equilibrium without friction, with the wire and load of a state.
 
     Raises:
         EquilibriumError: There is no equilibrium: the arm buckles.

@@ -72,7 +72,7 @@ class Estimate(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Observer:
-    """Observer: it estimates the state of the arm from the sensors."""
+    """Estimator of joint angles, rigidity factor and tip force from readings of the motors."""
 
     arm: Manipulator
     sensors: Sensors
@@ -89,7 +89,7 @@ class Observer:
 
     def update(self, before: Estimate, reading: Reading) -> Estimate:
         """Return the estimate after one more reading."""
-        held = self._held
+        held = self._position_controlled
         F, wire = np.maximum(reading.tension, self._least), reading.wire
         pose, x, variance = before.pose, before.softness, before.variance
         strain = self._mean_strain(pose, before.shares, F)
@@ -115,16 +115,16 @@ class Observer:
         variance = float(np.linalg.inv(information.T @ information)[-1, -1])
         inside = np.clip(q, self.arm.lower, self.arm.upper)
         pose = pose if (inside == q).all() else self.arm.at(inside)
-        return self._slid(before, pose, F, x, variance)
+        return self._after_sliding(before, pose, F, x, variance)
 
     def gain(self, estimate: Estimate, reading: Reading) -> Array:
         """Compute κ = −∂F/∂l_0 (C,) [N/m] at constant lengths; 0 for force-controlled motors."""
         F = np.maximum(reading.tension, self._least)
         stretch = 1.0 + estimate.softness * self._mean_strain(estimate.pose, estimate.shares, F)
         soft = self._compliance(reading.wire, F) * estimate.softness
-        return np.where(self._held, stretch / soft, 0.0)
+        return np.where(self._position_controlled, stretch / soft, 0.0)
 
-    def _slid(
+    def _after_sliding(
         self, before: Estimate, pose: Posture, F: Array, softness: float, variance: float
     ) -> Estimate:
         """Move the wire of the model through its holes to a new posture."""
@@ -184,7 +184,7 @@ class Observer:
         return ChainProblem(arm.cables, chains.start, even, unstrained=True)
 
     @cached_property
-    def _held(self) -> NDArray[np.bool_]:
+    def _position_controlled(self) -> NDArray[np.bool_]:
         return np.array([cable.control == "position" for cable in self.arm.cables])
 
     @cached_property

@@ -35,12 +35,9 @@ _READINGS: Final = 64
 
 
 def virtual_force(pose: Posture, gain: Array, force: Array) -> Array:
-    """Compute the wire (C,) [m] to pay out to move the joints as a force at the tip would.
+    """Compute the wire (C,) [m] to pay out to move the joints as a force (3,) [N] at the tip would.
 
-    Args:
-        pose: The posture.
-        gain: κ of each cable (C,) [N/m]; 0 for force-controlled cables.
-        force: f (3,) [N], base axes.
+    ``gain`` is κ of each cable (C,) [N/m]; 0 for force-controlled cables.
     """
     held = gain > 0.0
     J, wire = pose.length_jacobian[held], np.zeros(gain.size)

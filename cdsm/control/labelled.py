@@ -114,7 +114,7 @@ def numbers(run: TrackingRun) -> dict[str, Any]:
 
 
 def rows(run: TrackingRun) -> list[tuple[str, str]]:
-    """Return the lines of the printed table: what, and how much."""
+    """Return the lines of the printed table: name and value."""
     n = numbers(run)
     low, high = n["least_tension_N"], n["largest_tension_N"]
     lines = [
@@ -125,7 +125,7 @@ def rows(run: TrackingRun) -> list[tuple[str, str]]:
         ("tensions at the motors", f"{low:.4g} to {high:.4g} N"),
         ("least margin to buckling", f"{n['least_margin_Nm_per_rad']:.4g} "
          f"{run.plan.arm.stiffness_unit()}"),
-        ("saturated motors", _some(run.saturated_motors, run.tension.shape[1])),
+        ("saturated motors", _names_or_count(run.saturated_motors, run.tension.shape[1])),
         ("rigidity of the wires, as estimated", f"{100.0 * n['estimated_rigidity']:.4g} %"),
         ("inside the proved band", _inside(run)),
     ]  # fmt: skip
@@ -137,7 +137,7 @@ def rows(run: TrackingRun) -> list[tuple[str, str]]:
     return lines
 
 
-def _some(names: tuple[str, ...], count: int) -> str:
+def _names_or_count(names: tuple[str, ...], count: int) -> str:
     listed = ", ".join(names) if len(names) <= _LISTED else f"{len(names)} of {count}"
     return listed or "none"
 

@@ -107,11 +107,11 @@ def feedforward(moment: Moment) -> Command:
 
 
 def tension_control(moment: Moment) -> Command:
-    """Control the tensions of all cables to those of the plan: PI, with the wire as feedforward.
+    """Control the tensions of all cables to those of the plan: PI, and the planned Δl_0 added.
 
-    Δl_0 = Δl_0 wanted − (P Δe + I e)/k with the error e = F wanted − F measured. It needs a load
-    cell at every cable. An arm without other springs drifts slowly from its posture, since no motor
-    controls a length.
+    Δl_0 = Δl_0 wanted − (P Δe + I e)/k with the error e = F wanted − F measured. P and I
+    are PROPORTIONAL and INTEGRAL. Every cable needs a load cell. No motor controls a length, so an
+    arm without springs in its joints drifts slowly from its posture.
     """
     return limited(moment, _regulated(moment))
 

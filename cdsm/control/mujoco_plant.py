@@ -104,7 +104,7 @@ class MuJoCoPlant:
             mujoco.mj_applyFT(model, data, wrench[:3], wrench[3:], tip, body, data.qfrc_applied)
             mujoco.mj_step(model, data, steps)
         if not np.isfinite(data.qpos).all() or data.warning.number.any():
-            raise SolverError("mujoco", "loses the arm: it moves beyond all bounds")
+            raise SolverError("mujoco", "diverges: the arm moves beyond all bounds")
         pose = self.arm.at(data.qpos[address].copy(), check_limits=False)
         F = self._tensions(pose.cable_lengths, command)
         return MuJoCoState(model, pose, Reading(command.wire, frozen(F)), data.qvel.copy())

@@ -40,7 +40,7 @@ class Plant(Protocol[AnyState]):
         """The true arm."""
 
     def begin(self, q: Array, tension: Array, wrench: Array) -> AnyState:
-        """Return the arm at rest at joint angles (nv,) with cables of a tension (C,) [N]."""
+        """Return the arm at rest at joint angles (nv,) with tensions (C,) [N] along the cables."""
 
     def move(self, state: AnyState, command: Command, wrench: Array) -> AnyState:
         """Return the arm after its motors followed a command under a wrench (6,).
@@ -93,7 +93,7 @@ class SlowPlant:
         require_unstrained("arm", self.arm)
 
     def begin(self, q: Array, tension: Array, wrench: Array) -> SlowState:
-        """Return the arm at rest at joint angles (nv,) with cables of a tension (C,) [N]."""
+        """Return the arm at rest at joint angles (nv,) with tensions (C,) [N] along the cables."""
         pose = self.arm.at(q)
         loading = slow_loading(pose, tension, wrench, self.accuracy)
         wire = CableLaws(self.arm.cables, "unstrained").original_lengths(
@@ -102,11 +102,7 @@ class SlowPlant:
         return SlowState(loading, wire, loading.begin(tension, wrench))
 
     def move(self, state: SlowState, command: Command, wrench: Array) -> SlowState:
-        """Return the arm after its motors followed a command under a wrench (6,).
-
-        Raises:
-            EquilibriumError: No equilibrium was found on the way: the arm buckles.
-        """
+        """Move the arm as :meth:`Plant.move`; EquilibriumError if it buckles on the way."""
         loading = state.loading
         taken_in = state.reference_wire - command.wire
         motors = np.where(loading.forced, command.tension, taken_in)
@@ -118,7 +114,7 @@ class SlowPlant:
 
 
 def require_unstrained(name: str, arm: Manipulator) -> None:
-    """Raise InvalidInput if the original lengths of the arm are not unstretched lengths."""
+    """Raise InvalidInput about ``name`` unless original lengths of the arm are unstrained ones."""
     if arm.original_length != "unstrained":
         raise InvalidInput(
             name, 'has original_length = "stretched"; motors pay out unstrained lengths.'

@@ -16,9 +16,9 @@ from cdsm.control.labelled import labelled, numbers, rows, table
 from cdsm.control.plant import SlowPlant
 from cdsm.errors import InvalidInput
 from cdsm.planning.path_plan import PathPlan
-from cdsm.support.extras import need
-from cdsm.support.files import as_path, write_file
+from cdsm.support.files import as_path
 from cdsm.support.format import aligned, plain, plural
+from cdsm.support.tidy import write_labelled
 from cdsm.support.validation import whole_number
 from cdsm.support.values import Array, ReadOnlyState, frozen
 
@@ -188,19 +188,11 @@ class TrackingRun(ReadOnlyState):
         return float(self.time[-1]) if len(self.time) else 0.0
 
     def to_xarray(self) -> xarray.Dataset:
-        """Return a labelled Dataset over time, in SI units; every variable has its unit.
-
-        Raises:
-            MissingExtra: xarray is not installed.
-        """
+        """Return a labelled Dataset over time, in SI units; MissingExtra without xarray."""
         return labelled(self)
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Return a table over time in SI: true joint angles, tip, tensions and stiffness.
-
-        Raises:
-            MissingExtra: pandas is not installed.
-        """
+        """Return angles, tip, tensions and stiffness over time; MissingExtra without pandas."""
         return table(self)
 
     def write(self, path: str | os.PathLike[str]) -> Path:
@@ -213,14 +205,7 @@ class TrackingRun(ReadOnlyState):
             MissingExtra: pandas or netCDF4 is not installed.
             FileError: The file cannot be written.
         """
-        suffix = as_path(path).suffix.lower()
-        if suffix == ".csv":
-            return write_file(path, self.to_pandas().to_csv)
-        if suffix != ".nc":
-            raise InvalidInput("path", f"{str(path)!r} ends neither in .nc (NetCDF) nor in .csv.")
-        need("sweep", "netCDF4")
-        data = self.to_xarray()
-        return write_file(path, lambda aside: data.to_netcdf(aside, engine="netcdf4"))
+        return write_labelled(path, self.to_pandas, self.to_xarray)
 
     def to_dict(self) -> dict[str, object]:
         """Return the numbers of the table in SI for JSON, with units in the keys."""
@@ -235,12 +220,7 @@ class TrackingRun(ReadOnlyState):
     def plot(self, animate: str | os.PathLike[str] | None = None) -> Figure:
         """Plot tip error, stiffness, tensions and the proved band over time.
 
-        Args:
-            animate: A ``.gif`` to write too; see :meth:`animate`.
-
-        Raises:
-            InvalidInput: ``animate`` does not end in ``.gif``.
-            FileError: The animation cannot be written.
+        ``animate`` is a ``.gif`` to write too; arguments and errors as for :meth:`animate`.
         """
         from cdsm.plots import plot_tracking_run  # matplotlib imports slowly
 

@@ -54,11 +54,9 @@ class Sensors:
         )
 
     def read(self, truth: Sequence[Reading], random: np.random.Generator) -> Reading:
-        """Measure the last of some true states, or an earlier one if there is a delay.
+        """Measure the last true state of ``truth``, or an earlier one if there is a delay.
 
-        Args:
-            truth: Wire and tension at all steps so far.
-            random: Source of the noise; the same number of draws is taken at each call.
+        Each call draws the same number of random numbers.
         """
         now = truth[max(len(truth) - 1 - self.delay, 0)]
         wire = now.wire

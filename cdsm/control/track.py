@@ -187,8 +187,6 @@ def _share(name: str, value: float) -> float:
 
 
 class _Step(NamedTuple):
-    """Record of one step."""
-
     wanted: Reference
     reading: Reading
     estimate: Estimate
@@ -200,7 +198,6 @@ class _Step(NamedTuple):
 
 
 def _columns(schedule: Schedule, wrenches: Array, records: list[_Step]) -> dict[str, Any]:
-    """Return the arrays of a result, a row for each step."""
     n, u, nan = len(records), schedule.directions, math.nan
     rests = [record.judged.stiffness for record in records]
     bands = [record.judged.band for record in records]

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import csv
+import io
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from multiprocessing import get_context
-from typing import TYPE_CHECKING, final
+from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cdsm.design.goals import KINDS
 from cdsm.design.problem import MISSED, DesignProblem
 from cdsm.design.quantities import Found, measure
+from cdsm.design.variables import UNITS
 from cdsm.errors import InvalidInput
 from cdsm.support.progress import progress_bar
 from cdsm.support.validation import number_array, whole_number
@@ -64,6 +68,29 @@ class Designs(ReadOnlyState):
     def feasible(self) -> Array:
         """Whether each design meets all constraints (D,): 1 or 0."""
         return np.asarray((self.violations == 0.0).all(axis=1), dtype=np.float64)
+
+    def to_csv(self) -> str:
+        """Return a table as CSV: a row for each design, with variables and all quantities in SI.
+
+        The last columns are 1 for a feasible design, and why a design does not make an arm.
+        """
+        out = io.StringIO()
+        table = csv.writer(out, lineterminator="\n")
+        columns = self._columns() | {"feasible": self.feasible.astype(int), "fault": self.faults}
+        table.writerow(["design", *columns])
+        table.writerows([i, *row] for i, row in enumerate(zip(*columns.values(), strict=True)))
+        return out.getvalue()
+
+    def _columns(self) -> dict[str, Sequence[Any]]:
+        """Return a column for each variable and quantity, headed by its unit."""
+        rows = [self.problem.values(each) for each in self.designs]
+        found: dict[str, Sequence[Any]] = {}
+        for variable, column in zip(self.problem.variables, zip(*rows, strict=True), strict=True):
+            unit = UNITS.get(variable.of)
+            found[variable.name + (f" [{unit}]" if unit else "")] = column
+        for each in self.problem.measures:
+            found[f"{each.key} [{KINDS[each.of].unit}]"] = self[each.key].tolist()
+        return found
 
     def __len__(self) -> int:
         return len(self.designs)
@@ -121,7 +148,7 @@ def evaluate_designs(
 
 
 def gathered(problem: DesignProblem, rows: Array, found: Sequence[Found]) -> Designs:
-    """Collect the evaluations of designs."""
+    """Build the :class:`Designs` from the evaluation of each row."""
     width = len(problem.measures)
     return Designs(
         problem=problem,

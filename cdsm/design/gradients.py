@@ -56,25 +56,13 @@ class Chain:
         )
         return np.asarray(found + self._bound * by_bound)
 
-    def mass(self) -> Array:
-        """Return the derivatives of the mass of all links (n,) [kg]."""
+    def of_links(self, of: str) -> Array:
+        """Return the derivatives of the mass [kg] or the length [m] of all links (n,)."""
         links = self._arm.geometry.links
+        slopes = [link.mass / link.length if of == "mass" else 1.0 for link in links]
         return np.array(
             [
-                sum(
-                    links[k].mass / links[k].length
-                    for k in _joints(self._arm, variable)
-                    if variable.of == "link_length"
-                )
-                for variable in self._problem.variables
-            ]
-        )
-
-    def length(self) -> Array:
-        """Return the derivatives of the length of the arm (n,) [m]."""
-        return np.array(
-            [
-                float(len(_joints(self._arm, each)) * (each.of == "link_length"))
+                sum(slopes[k] for k in _joints(self._arm, each)) * (each.of == "link_length")
                 for each in self._problem.variables
             ]
         )
@@ -102,8 +90,7 @@ def rows_and_gradients(
     if measure.of in ("mass", "length"):
         links = arm.geometry.links
         value = sum(link.mass for link in links) if measure.of == "mass" else arm.geometry.length
-        slope = chain.mass() if measure.of == "mass" else chain.length()
-        return np.array([value]), slope[None]
+        return np.array([value]), chain.of_links(measure.of)[None]
     minimum = problem.minimum_of(design)
     values, slopes = [], []
     for q in problem.postures_of(arm):

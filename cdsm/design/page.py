@@ -10,9 +10,9 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
-from cdsm.plots.arm import arm_axes, draw_arm, frame_arms
+from cdsm.plots.arm import draw_arm, frame_arms
 from cdsm.plots.designs import plot_designs
-from cdsm.plots.style import fill_canvas
+from cdsm.plots.style import fill_canvas, picture_axes
 from cdsm.support.markup import Document, Markup, element
 
 if TYPE_CHECKING:
@@ -83,7 +83,7 @@ def _pictures(found: DesignSearch, shown: list[int]) -> list[str]:
     for number in shown:
         arm = found.arm(number)
         poses.append(arm.at(found.problem.postures_of(arm)[0], check_limits=False))
-    figure, axes = arm_axes()
+    figure, axes = picture_axes()
     for pose in poses:
         draw_arm(axes, pose)
     limits = np.array([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()])

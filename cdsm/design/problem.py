@@ -4,27 +4,22 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import final
+from typing import final, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm.cable import serpentine_cables
-from cdsm.design.goals import Constraint, Measure, Objective
+from cdsm.design.goals import KINDS, Constraint, Measure, MeasureName, Objective
 from cdsm.design.variables import WHOLE, Value, Variable, changed, check, present
 from cdsm.errors import InvalidInput
+from cdsm.geometry.cables import serpentine_cables
 from cdsm.manipulator import Manipulator
+from cdsm.measures.rows import require
 from cdsm.support.format import plural
-from cdsm.support.validation import (
-    flag,
-    instance,
-    number_array,
-    quantity,
-    scalar,
-    sequence_of,
-)
+from cdsm.support.validation import instance, number_array, scalar, sequence_of
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.sweeps.poses import PoseSet, poses_of
 from cdsm.tension import checked_bounds
@@ -56,7 +51,7 @@ class DesignProblem(ReadOnlyState):
         maximum: Upper bound of all tensions [N].
         worst_friction: As for :func:`~cdsm.distribute_tension`: all segments of the cables stay
             within the bounds, whatever loads came before. ``motor_force`` and the quantities of
-            wires are then of the largest tension that friction can hold along each cable.
+            wires are then of the largest tension that friction can cause along each cable.
         diameter: Diameter of the cables [m], for clearances and the life of wires.
         breaking_load: Breaking load of the wire [N], for ``wire_safety``.
         bend_diameter: Diameter of the bend in the holes [m], for ``wire_life``.
@@ -109,22 +104,19 @@ class DesignProblem(ReadOnlyState):
         if not isinstance(postures, PoseSet):
             postures = frozen(number_array("postures", postures))
         poses_of(self.arm, postures)  # raises for a wrong shape
-        high = checked_bounds(self.arm, self.minimum, self.maximum)[1]
-        flag("worst_friction", self.worst_friction)
-        quantity("diameter", self.diameter, "length", zero=True)
-        if self.breaking_load is not None:
-            quantity("breaking_load", self.breaking_load, "force")
-        if self.bend_diameter is not None:
-            quantity("bend_diameter", self.bend_diameter, "length")
+        checked_bounds(self.arm, self.minimum, self.maximum)
         asked = {measure.of for measure in (*objectives, *constraints)}
+        require(
+            asked,
+            self.arm,
+            self.maximum,
+            worst_friction=self.worst_friction,
+            diameter=self.diameter,
+            breaking_load=self.breaking_load,
+            bend_diameter=self.bend_diameter,
+        )
         if "deflection" in asked and not loads[:, :3].any(axis=1).all():
             raise InvalidInput("loads", "deflection needs a force in every load.")
-        if "capacity_margin" in asked and math.isinf(high.max()):
-            raise InvalidInput("maximum", "capacity_margin needs a finite one [N].")
-        if "wire_safety" in asked and self.breaking_load is None:
-            raise InvalidInput("breaking_load", "is needed for wire_safety [N].")
-        if "wire_life" in asked and not (self.bend_diameter and self.diameter):
-            raise InvalidInput("bend_diameter", "is needed with diameter for wire_life [m].")
         if self.tolerances is not None:
             instance("tolerances", self.tolerances, Tolerances)
         self.__dict__.update(
@@ -142,6 +134,15 @@ class DesignProblem(ReadOnlyState):
         asked = {each.key: each for each in (*self.objectives, *self.constraints)}
         asked.setdefault(MISSED, Measure("held"))
         return tuple(Measure(each.of, each.direction) for each in asked.values())
+
+    def in_full(self) -> DesignProblem:
+        """Return the problem with every quantity for which it has the data as an objective."""
+        full, asked = self, {each.of for each in self.measures}
+        for of in get_args(MeasureName):
+            if of not in asked and not KINDS[of].directed:
+                with suppress(InvalidInput):  # names what is missing, such as a breaking load
+                    full = replace(full, objectives=(*full.objectives, Objective(of)))
+        return full
 
     @property
     def needs_all(self) -> bool:
@@ -169,13 +170,9 @@ class DesignProblem(ReadOnlyState):
         return all(variable.is_continuous for variable in self.variables)
 
     def values(self, design: ArrayLike) -> tuple[Value, ...]:
-        """Return the value of each variable in a design (n,); raises InvalidInput if outside.
+        """Return the value of each variable in a design: one number per variable (n,), in SI.
 
-        Args:
-            design: One number for each variable: its value in SI, or the index of its choice.
-
-        Raises:
-            InvalidInput: ``design`` is not (n,) numbers, or one is outside its range.
+        Numbers are values, or indices of choices. InvalidInput if one is outside its range.
         """
         x = number_array("design", design)
         low, high = self.bounds.T
@@ -194,10 +191,7 @@ class DesignProblem(ReadOnlyState):
         return tuple(found)
 
     def arm_of(self, design: ArrayLike) -> Manipulator:
-        """Build the arm of a design (n,); its cables have the bounds of the tensions.
-
-        Args:
-            design: As for :meth:`values`.
+        """Build the arm of a design (n,), see :meth:`values`; its cables have the tension bounds.
 
         Raises:
             InvalidInput: As for :meth:`values`.
@@ -229,28 +223,14 @@ class DesignProblem(ReadOnlyState):
         )
 
     def minimum_of(self, design: ArrayLike) -> float:
-        """Return the lower bound of the tensions [N] of a design (n,).
-
-        Args:
-            design: As for :meth:`values`.
-
-        Raises:
-            InvalidInput: As for :meth:`values`.
-        """
+        """Return the lower bound of the tensions [N] of a design (n,), as for :meth:`values`."""
         for variable, value in zip(self.variables, self.values(design), strict=True):
             if variable.of == "minimum":
                 return float(value)
         return float(self.minimum)
 
     def postures_of(self, arm: Manipulator) -> Array:
-        """Return the postures q (P, nv) [rad] of the arm of a design.
-
-        Args:
-            arm: The arm.
-
-        Raises:
-            InvalidInput: The pose set does not belong to such an arm.
-        """
+        """Return the postures q (P, nv) [rad] of an arm; InvalidInput if the set does not fit."""
         poses = poses_of(arm, self.postures)
         return poses.angles({dim: slice(0, size) for dim, size in poses.sizes.items()})
 

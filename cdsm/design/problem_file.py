@@ -13,7 +13,7 @@ from pydantic import Field
 from cdsm.design.goals import Constraint, Objective
 from cdsm.design.problem import DesignProblem
 from cdsm.design.variables import Variable
-from cdsm.errors import CdsmError, FileError, GeometryError, counted
+from cdsm.errors import CdsmError, FileError, GeometryError, InvalidInput, counted
 from cdsm.manipulator import Manipulator
 from cdsm.support.files import read_text
 from cdsm.support.records import Integer, Number, parse, read_toml, record
@@ -179,7 +179,7 @@ def _built(entry: Any) -> Any:
 def _postures(entry: _Postures) -> PoseSet | Any:
     given = [entry.random, entry.grid, entry.angles]
     if sum(each is not None for each in given) != 1:
-        raise GeometryError(["give one of random, grid and angles"])
+        raise InvalidInput("random", "give one of random, grid and angles.")
     if entry.random is not None:
         return RandomPoses(entry.random, entry.seed)
     return GridPoses(entry.grid) if entry.grid is not None else entry.angles

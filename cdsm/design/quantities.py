@@ -7,20 +7,25 @@ import warnings
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cdsm.batch import evaluate
 from cdsm.design.goals import KINDS, Measure
 from cdsm.design.problem import DesignProblem
-from cdsm.errors import CdsmError, CdsmWarning, ElasticityRangeError, GeometryError
+from cdsm.errors import CdsmError, CdsmWarning, GeometryError
 from cdsm.kernels.principal import principal_stiffness
 from cdsm.manipulator import Manipulator
 from cdsm.measures.clearance import KINDS as CLEARANCES
-from cdsm.measures.rows import capacity_margins, measured, payloads
-from cdsm.measures.wire_use import life_margin
+from cdsm.measures.rows import (
+    capacity_margins,
+    friction_losses,
+    measured,
+    narrowed_bounds,
+    payloads,
+)
+from cdsm.measures.wire_use import life_margin, safety, strains
 from cdsm.support.status import Status
 from cdsm.support.values import Array
-from cdsm.tension import checked_bounds, distribute_tension, grip
+from cdsm.tension import distribute_tension
 from cdsm.tolerances.budget import uncertainty
 from cdsm.tolerances.readings import Reading
 
@@ -53,15 +58,18 @@ def measure(problem: DesignProblem, row: Array) -> Found:
 
 
 class _Arm:
-    """Quantities of the arm of one design."""
-
     def __init__(self, problem: DesignProblem, row: Array, arm: Manipulator) -> None:
         self.problem, self.arm = problem, arm
         q = problem.postures_of(arm)
         self.q = np.repeat(q, len(problem.loads), axis=0)
         self.loads = np.tile(problem.loads, (len(q), 1))
-        # friction holds the tensions along a cable within these factors
-        self.grip, self.low, self.high, held = self._bounds(q, problem.minimum_of(row))
+        loss = np.ones((len(q), len(arm.cables)))
+        if problem.worst_friction:
+            loss = friction_losses(arm, q, 1)
+        self.loss = np.repeat(loss, len(problem.loads), axis=0)
+        self.low, self.high, held = narrowed_bounds(
+            arm, problem.minimum_of(row), problem.maximum, self.loss
+        )
         self.found = evaluate(
             arm,
             self.q,
@@ -78,26 +86,9 @@ class _Arm:
         wanted = {each.of for each in problem.measures} & {*CLEARANCES, "tension_factor"}
         if wanted:
             inside = self.found.status[:: len(problem.loads)] != Status.BEYOND_LIMITS
-            for name, values in measured(arm, q[inside], sorted(wanted), 1).items():
-                between = {CLEARANCES[0]: 1.0, "tension_factor": 0.0}.get(name, 0.5)
-                self.of_pose[name] = values - between * problem.diameter
-
-    def _bounds(self, q: Array, minimum: float) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
-        """Return grips and bounds of the tensions (R, C), and which rows have any (R,)."""
-        problem, arm = self.problem, self.arm
-        total = np.zeros((len(self.q), len(arm.cables)))
-        if problem.worst_friction:
-            each = [grip(arm.at(row, check_limits=False)) for row in q]
-            total = np.repeat(each, len(problem.loads), axis=0)
-        given = checked_bounds(arm, minimum, problem.maximum)
-        low, high = given[0] * np.exp(total), given[1] * np.exp(-total)
-        exist = np.asarray((low <= high).all(axis=1))
-        # rows without any are computed with what is given, and count as not held
-        low[~exist], high[~exist] = given
-        return total, low, high, exist
+            self.of_pose = measured(arm, q[inside], sorted(wanted), problem.diameter, 1)
 
     def values(self) -> Array:
-        """Return all quantities (m,)."""
         return np.array([self._value(each) for each in self.problem.measures])
 
     def rows(self, each: Measure) -> Array:
@@ -121,26 +112,16 @@ class _Arm:
         if each.of == "capacity_margin":
             return capacity_margins(self.arm, *bounds)
         # the largest tension along each cable
-        F = self.found["tension"][held] * np.exp(self.grip[held])
+        F = self.found["tension"][held] * self.loss[held]
         if each.of == "motor_force":
             return np.asarray(F.max(axis=1))
         if each.of == "wire_strain":
-            return self._strain(F)
+            return np.asarray(np.nan_to_num(strains(self.arm, F), nan=math.inf).max(axis=1))
         assert problem.breaking_load is not None  # the problem has checked what wires need
         if each.of == "wire_safety":
-            return np.asarray(problem.breaking_load / F.max(axis=1))
+            return safety(F.max(axis=1), problem.breaking_load)
         assert problem.bend_diameter is not None
         return life_margin(F.max(axis=1), problem.diameter, problem.bend_diameter)
-
-    def _strain(self, F: Array) -> Array:
-        """Return the largest strain of tensions (R, C) in each row; inf outside a law's domain."""
-        found = np.empty_like(F)
-        for c, cable in enumerate(self.arm.cables):
-            try:
-                found[:, c] = cable.elasticity.strain(F[:, c])
-            except ElasticityRangeError:
-                found[:, c] = math.inf
-        return np.asarray(found.max(axis=1))
 
     def _value(self, each: Measure) -> float:
         arm, held = self.arm, self.held
@@ -178,9 +159,8 @@ class _Arm:
         F = distribute_tension(pose, self.low[n], self.high[n], self.loads[n])
         cable, factor = None, 1.0
         if of == "tension":
-            largest = F.values * np.exp(self.grip[n])
-            cable = self.arm.cables.names[int(largest.argmax())]
-            factor = math.exp(float(self.grip[n, largest.argmax()]))
+            c = int((F.values * self.loss[n]).argmax())
+            cable, factor = self.arm.cables.names[c], float(self.loss[n, c])
         found = uncertainty(
             pose, F, problem.tolerances, of=of, cable=cable, direction=each.direction
         )

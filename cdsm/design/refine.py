@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from contextlib import suppress
 from typing import NamedTuple
 
@@ -14,8 +13,8 @@ from cdsm.design.goals import KINDS, Measure
 from cdsm.design.gradients import SMOOTH, rows_and_gradients
 from cdsm.design.infeasible import explain
 from cdsm.design.problem import DesignProblem
-from cdsm.design.result import DesignProgress, DesignSearch
-from cdsm.design.search import pareto
+from cdsm.design.result import DesignSearch
+from cdsm.design.search import pareto, progress_of
 from cdsm.errors import CdsmError, InvalidInput
 from cdsm.support.validation import instance, whole_number
 from cdsm.support.values import Array, frozen
@@ -158,23 +157,12 @@ def _all_rows(problem: DesignProblem, x: Array, size: Array) -> dict[str, _Rows]
 
 
 def _finished(problem: DesignProblem, visited: list[Array]) -> DesignSearch:
-    """Return the best feasible design that was visited."""
     whole = evaluate_designs(problem, np.array(visited), progress=False)
     front = pareto(whole)
     if not len(front):
         explain(whole)
-    objective = problem.objectives[0]
-    goals = np.where(whole.feasible == 1.0, objective.sign * whole[objective.key], math.inf)
-    history = tuple(
-        DesignProgress(
-            i + 1,
-            i + 1,
-            int(whole.feasible[: i + 1].sum()),
-            float(objective.sign * goals[: i + 1].min()),
-            float(whole.violations[: i + 1].sum(axis=1).min()),
-        )
-        for i in range(len(whole))
-    )
+    count = range(1, len(whole) + 1)
+    history = tuple(progress_of(problem, n, whole.values[:n]) for n in count)
     return DesignSearch(
         problem=problem, seed=0, evaluated=whole, front=frozen(front), history=history
     )
@@ -188,7 +176,11 @@ def _check(problem: DesignProblem) -> None:
         raise InvalidInput("problem", "has several objectives; leave one, or use search_designs.")
     for name in ("tolerances", "worst_friction"):
         if getattr(problem, name):
-            raise InvalidInput("problem", f"has {name}; use search_designs.")
+            raise InvalidInput(
+                "problem",
+                f"has {name}, of which no exact derivatives are computed; use search_designs, or "
+                "refine without it and check the design by evaluate_designs with it.",
+            )
     objective = problem.objectives[0]
     if objective.goal != KINDS[objective.of].best:
         raise InvalidInput("problem", f"{objective.of} at its {objective.goal} is not smooth.")

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, final
+from typing import TYPE_CHECKING, NamedTuple, final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cdsm.design.evaluation import Designs
-from cdsm.design.goals import KINDS
+from cdsm.design.evaluation import Designs, evaluate_designs
 from cdsm.design.problem import DesignProblem
 from cdsm.design.workshop import cable_table, hole_table
 from cdsm.interchange.mjcf import write_mjcf
@@ -23,11 +20,12 @@ from cdsm.support.format import aligned, plain, plural
 from cdsm.support.markup import Document
 from cdsm.support.tidy import data_frame
 from cdsm.support.validation import whole_number
-from cdsm.support.values import Array, ReadOnlyState
+from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.urdf import write_urdf
 
 if TYPE_CHECKING:
     import pandas
+    from distributed import Client
     from matplotlib.figure import Figure
 
 _PRINTED = 20
@@ -62,9 +60,10 @@ class DesignSearch(ReadOnlyState):
         problem: The problem.
         seed: Seed of the search.
         evaluated: All designs that were evaluated.
-        front: Pareto front: indices (n,) of the feasible designs that no other design beats in all
-            objectives, sorted by the first objective, the best first.
-        history: State of the search after each generation.
+        front: Pareto front: indices (n,) into ``evaluated`` of the feasible designs for which no
+            other is at least as good in all objectives and better in one; the best in the first
+            objective comes first.
+        history: Number of designs so far and the best of them, after each generation.
     """
 
     problem: DesignProblem
@@ -91,36 +90,18 @@ class DesignSearch(ReadOnlyState):
         return np.column_stack(every)
 
     def design(self, number: int | None = None) -> Array:
-        """Return a design (n,) of the front [m, rad, N, -]; None: the compromise.
+        """Return design ``number`` of the front (n,) [m, rad, N, -], from 0; None: the compromise.
 
-        Args:
-            number: Its number on the front, from 0.
-
-        Raises:
-            InvalidInput: The front has no such number.
+        Raises InvalidInput if the front has no such number.
         """
         return np.asarray(self.evaluated.designs[self.front[self._number(number)]])
 
     def arm(self, number: int | None = None) -> Manipulator:
-        """Build the arm of a design of the front; None: the compromise.
-
-        Args:
-            number: Its number on the front, from 0.
-
-        Raises:
-            InvalidInput: The front has no such number.
-        """
+        """Build the arm of a design of the front; ``number`` as for :meth:`design`."""
         return self.problem.arm_of(self.design(number))
 
     def values(self, number: int | None = None) -> dict[str, float]:
-        """Return all quantities of a design of the front by name, in SI; None: the compromise.
-
-        Args:
-            number: Its number on the front, from 0.
-
-        Raises:
-            InvalidInput: The front has no such number.
-        """
+        """Return all quantities of a design by name, in SI; ``number`` as for :meth:`design`."""
         row = self.evaluated.values[self.front[self._number(number)]]
         keys = [each.key for each in self.problem.measures]
         return dict(zip(keys, row.tolist(), strict=True))
@@ -155,38 +136,45 @@ class DesignSearch(ReadOnlyState):
             write_text(into / "cables.csv", cable_table(arm, q)),
         ]
 
-    def to_csv(self) -> str:
-        """Return a table of the front as CSV: variables and all quantities in SI."""
-        out = io.StringIO()
-        table = csv.writer(out, lineterminator="\n")
-        columns = self._columns()
-        table.writerow(["design", *columns])
-        table.writerows([i, *row] for i, row in enumerate(zip(*columns.values(), strict=True)))
-        return out.getvalue()
+    def measured(
+        self, *, jobs: int = 1, client: Client | None = None, progress: bool = True
+    ) -> Designs:
+        """Evaluate the designs of the front in every quantity for which the problem has the data.
 
-    def _columns(self) -> dict[str, list[Any]]:
-        """Return a column for each variable and quantity, headed by its unit."""
-        from cdsm.design.variables import UNITS
+        ``measured().to_csv()`` is the table of the front; ``evaluated.to_csv()`` that of all
+        designs, in the quantities of the problem.
 
-        rows = [self.problem.values(each) for each in self.evaluated.designs[self.front]]
-        found: dict[str, list[Any]] = {}
-        for variable, column in zip(self.problem.variables, zip(*rows, strict=True), strict=True):
-            unit = UNITS.get(variable.of)
-            found[variable.name + (f" [{unit}]" if unit else "")] = [*column]
-        for each in self.problem.measures:
-            values = self.evaluated[each.key][self.front].tolist()
-            found[f"{each.key} [{KINDS[each.of].unit}]"] = values
-        return found
-
-    def to_pandas(self) -> pandas.DataFrame:
-        """Return the table of the front in SI, a row for each design.
+        Args:
+            jobs: As for :func:`evaluate_designs`.
+            client: As for :func:`evaluate_designs`.
+            progress: Show a bar, if there is a terminal.
 
         Raises:
-            MissingExtra: pandas is not installed.
+            InvalidInput: ``jobs`` is below 1.
         """
+        return evaluate_designs(
+            self.problem.in_full(),
+            self._front.designs,
+            jobs=jobs,
+            client=client,
+            progress=progress,
+        )
+
+    @property
+    def _front(self) -> Designs:
+        """The designs of the front, with their quantities."""
+        whole = self.evaluated
+        return replace(
+            whole,
+            designs=frozen(whole.designs[self.front]),
+            values=frozen(whole.values[self.front]),
+            faults=("",) * len(self.front),
+        )
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """Return a table of the front in SI, a row per design; MissingExtra without pandas."""
         names = [str(i) for i in range(len(self.front))]
-        columns: dict[str, Any] = {name: np.array(c) for name, c in self._columns().items()}
-        return data_frame(columns, "design", names)
+        return data_frame(self._front._columns(), "design", names)
 
     def to_dict(self) -> dict[str, object]:
         """Return the front and the compromise in SI for JSON, with units in the keys."""
@@ -195,15 +183,14 @@ class DesignSearch(ReadOnlyState):
             "feasible": int(self.evaluated.feasible.sum()),
             "seed": self.seed,
             "compromise": self.compromise,
-            "front": self._columns(),
+            "front": self._front._columns(),
         }
         return dict(plain(numbers))
 
     def plot(self) -> Figure:
-        """Plot two or three objectives of all designs, with the front and the compromise.
+        """Plot two or three objectives of all designs, with the front and :attr:`compromise`.
 
-        Raises:
-            InvalidInput: The problem has one objective: there is no front; it plots the progress.
+        With one objective: its best value over the number of designs.
         """
         from cdsm.plots import plot_designs  # matplotlib imports slowly
 

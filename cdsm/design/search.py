@@ -92,12 +92,13 @@ def search_designs(
             new = _unknown(kept, designs)
             kept.add(new, compute(new) if len(new) else ())
             answers = [kept.get(row) for row in designs]
-            told = [each for each in answers if each is not None]
+            evaluated = [each for each in answers if each is not None]
             advance(len(designs))
-            _tell(problem, algorithm, asked, designs, told)
+            _tell(problem, algorithm, asked, designs, evaluated)
             rows += [*designs]
-            found += told
-            history.append(_best(problem, step, rows, found))
+            found += evaluated
+            values = np.array([each.values for each in found])
+            history.append(progress_of(problem, step + 1, values))
             if report is not None:
                 report(history[-1])
     whole = gathered(problem, np.array(rows), found)
@@ -137,18 +138,16 @@ def _unknown(kept: Store, designs: Array) -> Array:
     return np.array([*new.values()]).reshape(-1, designs.shape[1])
 
 
-def _best(
-    problem: DesignProblem, step: int, rows: list[Array], found: list[Found]
-) -> DesignProgress:
-    values = np.array([each.values for each in found])
+def progress_of(problem: DesignProblem, generation: int, values: Array) -> DesignProgress:
+    """Return the state of a search after designs with these quantities (D, m)."""
     missed = violations(problem, values).sum(axis=1)
     feasible = missed == 0.0
     first = problem.objectives[0]
     column = [each.key for each in problem.measures].index(first.key)
     goal = np.where(feasible, first.sign * values[:, column], math.inf)
     best = int(goal.argmin()) if feasible.any() else int(missed.argmin())
-    value = float(values[best, column])
-    return DesignProgress(step + 1, len(rows), int(feasible.sum()), value, float(missed.min()))
+    value, least = float(values[best, column]), float(missed.min())
+    return DesignProgress(generation, len(values), int(feasible.sum()), value, least)
 
 
 def _algorithm(problem: DesignProblem, population: int, generations: int, seed: int) -> Any:
@@ -199,10 +198,10 @@ def _numbers(problem: DesignProblem, chosen: dict[str, Any]) -> Array:
 
 
 def _tell(
-    problem: DesignProblem, algorithm: Any, asked: Any, designs: Array, told: list[Found]
+    problem: DesignProblem, algorithm: Any, asked: Any, designs: Array, evaluated: list[Found]
 ) -> None:
     """Give pymoo the objectives and violations of the designs that it asked for."""
-    whole = gathered(problem, designs, told)
+    whole = gathered(problem, designs, evaluated)
     goals = np.column_stack([each.sign * whole[each.key] for each in problem.objectives])
     missed = np.nan_to_num(whole.violations, nan=_FAR, posinf=_FAR)
     lost = ~np.isfinite(goals).all(axis=1)

@@ -10,6 +10,7 @@ import hashlib
 import json
 import os
 from collections.abc import Iterable
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +34,7 @@ class Store:
 
     Raises:
         FileError: The file cannot be read or written.
-        StoreError: The file holds the designs of another problem.
+        StoreError: The file has designs of another problem.
     """
 
     def __init__(self, path: str | os.PathLike[str] | None, problem: DesignProblem) -> None:
@@ -57,7 +58,7 @@ class Store:
         if first != head:
             raise StoreError(
                 self._path,
-                "holds the designs of another problem, or is no record of designs. Ask the same "
+                "contains designs of another problem, or no record of designs. Repeat that "
                 "again, or give another folder.",
             )
         for line in lines[:-1]:  # the last one is empty, or was cut off
@@ -94,12 +95,11 @@ def digest(problem: DesignProblem) -> str:
     """Return a digest of everything on which the quantities of a problem depend."""
     poses = poses_of(problem.arm, problem.postures)
     q = poses.angles({dim: slice(0, size) for dim, size in poses.sizes.items()})
+    rest = [each.name for each in fields(problem) if each.name not in ("arm", "postures", "loads")]
     parts = [
         json.dumps(attributes_of(problem.arm)),
-        repr((problem.variables, problem.objectives, problem.constraints)),
-        repr((problem.minimum, problem.maximum, problem.diameter, problem.coverage)),
-        repr((problem.worst_friction, problem.breaking_load, problem.bend_diameter)),
-        repr((problem.tolerances, problem.arm.gravity.tolist())),
+        repr([getattr(problem, name) for name in rest]),
+        repr(problem.arm.gravity.tolist()),
         poses.description,
     ]
     data = "\n".join(parts).encode() + q.tobytes() + problem.loads.tobytes()

@@ -127,7 +127,7 @@ class Variable:
 
 
 def _whole(name: str, value: float) -> int:
-    """Return a whole number that a file may hold as a float."""
+    """Return a variable as a whole number; files may hold it as a float such as 3.0."""
     return whole_number(name, round(value) if float(value).is_integer() else value, 1)
 
 
@@ -140,11 +140,7 @@ class Changed(NamedTuple):
 
 
 def changed(geometry: Geometry, variables: Sequence[Variable], values: Iterable[Value]) -> Changed:
-    """Return the geometry, the wire and the lower bound with the values of all variables.
-
-    Raises:
-        GeometryError: The values do not make an arm.
-    """
+    """Return the parts of the arm with these values; GeometryError if they make no arm."""
     wire: Wire | None = None
     minimum = None
     joints, links, cables = [*geometry.joints], [*geometry.links], [*geometry.cables]
@@ -182,7 +178,6 @@ def _change(
     links: list[Link],
     cables: list[CableRoute],
 ) -> None:
-    """Change a variable of joint k."""
     if of == "hole_radius":
         joints[k] = replace(joints[k], hole_radius=value)
     elif of == "disk_offset":

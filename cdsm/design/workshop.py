@@ -17,12 +17,9 @@ _DIGITS = 4
 
 
 def hole_table(arm: Manipulator) -> str:
-    """Return a CSV with a row for each hole of each disk, in mm and degrees.
+    """Return a CSV with a row for each hole of each disk of an arm, in mm and degrees.
 
     Angles are about the x axis of the link, from y towards z. A cable is fixed at its last disk.
-
-    Args:
-        arm: The arm.
     """
     geometry = arm.geometry
     rows = []
@@ -44,12 +41,8 @@ def cable_table(arm: Manipulator, q: Array) -> str:
     """Return a CSV with a row for each cable: wire, lead, and lengths in mm.
 
     The length is that of the straight arm, lead included. The motor must wind the cable between its
-    shortest and longest length over the postures. The cut is the longest length, without an
-    allowance for fixing the two ends.
-
-    Args:
-        arm: The arm.
-        q: Postures (P, nv) [rad].
+    shortest and longest length over the postures q (P, nv) [rad]. The cut is the longest length,
+    without an allowance for fixing the two ends.
     """
     straight = arm.cable_lengths(np.clip(0.0, arm.lower, arm.upper))
     inside = [row for row in q if not arm._model.beyond_limits(row).any()]

@@ -58,10 +58,7 @@ class Domain:
         return self.low if self.low_included else math.nextafter(self.low, math.inf)
 
     def check(self, tension: ArrayLike) -> Array:
-        """Return the tensions as a float array of the same shape; check that all are in the domain.
-
-        Args:
-            tension: F [N], any shape.
+        """Return tensions [N] of any shape as a float array; check that they are in the domain.
 
         Raises:
             InvalidInput: ``tension`` is not finite numbers.

@@ -41,22 +41,13 @@ class Elasticity(ABC):
 
     @staticmethod
     def read(path: str | os.PathLike[str]) -> Elasticity:
-        """Read an elasticity from a TOML file, as :func:`~cdsm.read_elasticity`.
-
-        Raises:
-            FileError: The file cannot be read or does not describe an elasticity.
-        """
+        """Read an elasticity from a TOML file; see :func:`~cdsm.read_elasticity`."""
         from cdsm.wires.files import read_elasticity  # which imports this module
 
         return read_elasticity(path)
 
     def write(self, path: str | os.PathLike[str]) -> Path:
-        """Write the elasticity to a TOML file, as :func:`~cdsm.write_elasticity`; return its path.
-
-        Raises:
-            InvalidInput: An elasticity of this kind cannot be written to a file.
-            FileError: The file cannot be written.
-        """
+        """Write the elasticity to a TOML file; see :func:`~cdsm.write_elasticity`."""
         from cdsm.wires.files import write_elasticity  # which imports this module
 
         return write_elasticity(self, path)
@@ -93,13 +84,7 @@ class Elasticity(ABC):
     def scaled(self, factor: float) -> Elasticity:
         """Return this law with ``factor`` times its rigidity: a stiffer or softer spool.
 
-        Strains and energies are divided by the factor.
-
-        Args:
-            factor: Rigidity of the new law over that of this one [-], positive.
-
-        Raises:
-            InvalidInput: ``factor`` is not a positive number.
+        Strains and energies are divided by the factor [-]. InvalidInput if it is not positive.
         """
         from cdsm.elasticity.scaled import ScaledElasticity
 
@@ -118,16 +103,11 @@ class Elasticity(ABC):
         """
 
     def rigidity_slope(self, tension: ArrayLike) -> Array:
-        """Compute dEA/dF [-], the slope of the tangent rigidity.
+        """Compute the slope dEA/dF [-] of the tangent rigidity, at tensions of any shape.
 
         By default it is the central difference over F ± 6e-6 max(F, 1 N), with about ten correct
         digits. Near an end of :attr:`domain` the difference is one-sided. A law may override it.
-
-        Args:
-            tension: F [N], any shape.
-
-        Raises:
-            ElasticityRangeError: A tension is outside :attr:`domain`.
+        ElasticityRangeError outside the domain.
         """
         values = self.domain.check(tension)
         step = _STEP * np.maximum(values, 1.0)
@@ -137,26 +117,16 @@ class Elasticity(ABC):
 
     @abstractmethod
     def strain(self, tension: ArrayLike) -> Array:
-        """Compute the strain Δl/l_0 = ∫ dF/EA(F) [-], the integral from :attr:`rest` to F.
+        """Compute the strain Δl/l_0 = ∫ dF/EA(F) [-] from :attr:`rest` to F of any shape.
 
-        Args:
-            tension: F [N], any shape.
-
-        Raises:
-            ElasticityRangeError: As for :meth:`rigidity`.
+        ElasticityRangeError as for :meth:`rigidity`.
         """
 
     @abstractmethod
     def energy(self, tension: ArrayLike) -> Array:
         """Compute the elastic energy ∫ F dε = ∫ F dF/EA(F) [N] = [J/m] per unstretched metre.
 
-        It is zero at :attr:`rest`, like :meth:`strain`.
-
-        Args:
-            tension: F [N], any shape.
-
-        Raises:
-            ElasticityRangeError: As for :meth:`rigidity`.
+        It is zero at :attr:`rest`; F has any shape. ElasticityRangeError as for :meth:`rigidity`.
         """
 
     def tension(self, strain: ArrayLike) -> Array:

@@ -40,15 +40,7 @@ class LinearElasticity(Elasticity):
 
     @classmethod
     def of_wire(cls, young_modulus: float, diameter: float) -> LinearElasticity:
-        """Compute EA = E π d²/4 of a solid round wire.
-
-        Args:
-            young_modulus: E [Pa].
-            diameter: d [m].
-
-        Raises:
-            InvalidInput: E or d is not a positive finite number.
-        """
+        """Compute EA = E π d²/4 of a solid wire, E [Pa], d [m]; InvalidInput if not positive."""
         for name, value in (("young_modulus", young_modulus), ("diameter", diameter)):
             if scalar(name, value) <= 0.0:
                 raise InvalidInput(name, f"{value:g} given; it must be positive.")

@@ -35,9 +35,9 @@ _INSIDE = 0.999
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class RestBand(ReadOnlyState):
-    """Range of tip positions at which an arm with locked motors may rest, after any loads.
+    """Range of tip positions at which an arm with locked motors may rest, after any earlier loads.
 
-    If ``proved``, ``low`` and ``high`` hold for all states of rest in a neighbourhood of the
+    If ``proved``, ``low`` and ``high`` bound all states of rest in a neighbourhood of the
     reference: ``room`` times the set of all states that are at rest to first order. The same is
     true of ``tensions``, ``end_tensions`` and ``loads``, which raise SolverError or
     ElasticityRangeError if they cannot be proved. A simulation may come near to these bounds, but
@@ -114,15 +114,15 @@ def rest_band(
     """Compute where along a direction the tip may rest, for any earlier loads.
 
     The reference is the posture with the given tension in all segments of each cable. The motors
-    are locked there, or hold their force. Loads beyond ``wrench`` have come and gone. The band is
-    proved by linear programs with an outer correction for finite displacements and nonlinear laws,
-    unless :attr:`RestBand.proved` is false.
+    are locked there, or control force. Any other loads may have acted before, besides ``wrench``.
+    The band is proved by linear programs with an outer correction for finite displacements and
+    nonlinear laws, unless :attr:`RestBand.proved` is false.
 
     Args:
         pose: The posture of the reference.
         tension: As for :func:`~cdsm.stiffness`. A residual torque is kept as a constant load.
         direction: u (3,) in base axes, any length, or an axis such as ``"-z"``.
-        wrench: W (6,), which still acts, as for :func:`~cdsm.stiffness`.
+        wrench: W (6,), the load that acts now, as for :func:`~cdsm.stiffness`.
 
     Raises:
         InvalidInput: As for :func:`~cdsm.stiffness`, or ``direction`` is no direction.

@@ -41,11 +41,11 @@ _ITERATIONS = 50
 """Largest number of Newton steps; usually 3 to 5, and more if another hole slides first."""
 
 _CONVERGED = 1e-10
-"""Relative change of the load that ends the search: the error left is its square."""
+"""Relative change of the load that ends the search: the remaining error is its square."""
 
 _ROUNDING = 1e-5
-"""Relative changes below that no longer fall are rounding: a straight hole holds next to nothing,
-and tensions are EA times a difference of lengths."""
+"""Changes of the load below this part that no longer fall are rounding: an almost straight hole has
+almost no friction, and tensions are EA times a difference of lengths."""
 
 
 @final
@@ -191,7 +191,7 @@ def _reached(K: Stiffness, u: Array, motion: Array) -> tuple[float, int]:
 
 
 def _first(pose: Posture, T: Array, growth: Array, motion: Array) -> tuple[float, int]:
-    """Return the least load [N] at which T + load·growth reaches a ratio exp(μ φ), and the hole."""
+    """Find the least load [N], and the hole, at which T + load·growth has the ratio exp(μ φ)."""
     chains, wrap = pose.segments.chains, pose.segments.wrap
     ratio = np.exp(chains.friction * wrap)
     turning = T[chains.hole] * chains.friction * (pose.segments.wrap_jacobian @ motion)

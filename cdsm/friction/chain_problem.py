@@ -20,7 +20,7 @@ _UNDAMPED = 20
 """Number of full Newton steps; later steps are halved, since kinks of a law may make them cycle."""
 
 _CONVERGED = 1e-13
-"""Relative change of the tensions that ends the iteration: the error left is its square."""
+"""Relative change of the tensions that ends the iteration: the remaining error is its square."""
 
 
 class Chain(NamedTuple):
@@ -175,6 +175,6 @@ class ChainProblem:
 
 
 def _within(law: Elasticity, tension: Array) -> tuple[Array, Array]:
-    """Return the tensions moved into the domain of a law, and its rigidities there [N]."""
+    """Return the tensions clipped to the domain of a law, and its rigidities there [N]."""
     inside = np.clip(tension, law.domain.first, law.domain.high)
     return inside, np.asarray(law.rigidity(inside))

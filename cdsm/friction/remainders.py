@@ -21,8 +21,8 @@ from cdsm.support.values import Array
 _STEP = 1e-4
 """Step of differences [rad], [m]; their truncation is added to the bound."""
 
-TOO_FAR = "finds no band: friction may hold the arm too far away"
-"""The problem of a neighbourhood that is too wide."""
+TOO_FAR = "finds no band: friction may keep the arm too far from the reference"
+"""Error message if a neighbourhood is so wide that the bounds do not exist."""
 
 _ITERATIONS = 30
 """Steps of a fixed point that converges by a factor of ten or more."""

@@ -88,8 +88,8 @@ def _short_links(geometry: Description) -> list[str]:
     ]
     if not short:
         return []
-    told = first_of(short, 1, "links")
-    return [f"disk_offset: too large: {told}; lower disk_offset, or lengthen the links"]
+    names = first_of(short, 1, "links")
+    return [f"disk_offset: too large: {names}; lower disk_offset, or lengthen the links"]
 
 
 def doubts_about(geometry: Description) -> list[str]:

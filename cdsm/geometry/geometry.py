@@ -116,11 +116,8 @@ class Geometry(Description):
             CdsmWarning: As for :class:`Geometry`.
         """
         keywords = locals()  # of the call, before there are other variables
-        return cls(
-            **uniform([UNIVERSAL_AXES] * joints, lambda m: evenly_spaced(joints, m), keywords),
-            base_length=base_length,
-            name=name,
-        )
+        axes = [UNIVERSAL_AXES] * joints
+        return cls(**uniform(axes, lambda m: evenly_spaced(joints, m), keywords))
 
     @classmethod
     @checked_keywords
@@ -145,54 +142,23 @@ class Geometry(Description):
         spread: Number = 0.0,
         name: Name = "arm",
     ) -> Self:
-        """Build an arm of n hinges; ``twist`` turns each axis about x from the previous one.
+        """Build an arm of n hinges; ``twist`` [rad] turns each axis about x from the previous one.
 
         Hinge k has the axis cos ψ_k y + sin ψ_k z with ψ_k = (k−1)·twist. The link frames are not
-        twisted. Cable j = 0…m−1 of hinge k has its holes at φ = ψ_k + 90° + 2πj/m + phase_k: a
-        pair is at ψ_k ± 90°. With ``hole_angles``, φ = hole_angles[k][j] + phase_k, counted from y.
+        twisted. Cable j = 0…m−1 of hinge k has its holes at φ = ψ_k + 90° + 2πj/m + phase_k: by
+        default (m = 2) an antagonistic pair at ψ_k ± 90°. With ``hole_angles``, φ =
+        hole_angles[k][j] + phase_k, counted from y. All other arguments, errors and warnings are
+        those of :meth:`universal`.
 
         Hinges with parallel axes, e.g. every second one if the twist is 90°, have cables that share
         holes; ``spread`` separates them.
-
-        Args:
-            joints: n, 1 to 100.
-            twist: Angle between neighbouring hinge axes about x [rad].
-            cables_per_joint: m; default 2, the antagonistic pair.
-            link_length: Length of every link [m]. All arguments but ``twist`` are as for
-                :meth:`universal`.
-            base_length: L_0 [m].
-            disk_offset: h [m].
-            hole_radius: R [m].
-            link_mass: Mass of every link [kg].
-            lead: Straight cable between each actuator and the base disk [m].
-            friction: μ of all cables, as in :class:`CableRoute`.
-            joint_limit: Largest angle in both directions [rad].
-            disk_radius: Outer radius of the disks [m].
-            cable_radius: Distance of the holes of each joint's cables from the axis [m].
-            hole_angles: φ of the cables of a hinge [rad].
-            phase: Added to φ of the cables of each hinge [rad].
-            spread: Angle between the holes of cables that would share one hole [rad].
-            name: Name of the robot.
-
-        Raises:
-            GeometryError: Some arguments are invalid; lists every fault.
-
-        Warns:
-            CdsmWarning: As for :class:`Geometry`.
         """
         keywords = locals()  # of the call, before there are other variables
         if cables_per_joint is None and hole_angles is None:
             keywords["cables_per_joint"] = 2
         rolls = [k * twist for k in range(joints)]
-        return cls(
-            **uniform(
-                [((0.0, math.cos(roll), math.sin(roll)),) for roll in rolls],
-                lambda m: beside_the_hinges(rolls, m),
-                keywords,
-            ),
-            base_length=base_length,
-            name=name,
-        )
+        axes = [((0.0, math.cos(roll), math.sin(roll)),) for roll in rolls]
+        return cls(**uniform(axes, lambda m: beside_the_hinges(rolls, m), keywords))
 
     @classmethod
     def sections(
@@ -245,13 +211,9 @@ class Geometry(Description):
         )
 
     def replace(self, **changes: Any) -> Geometry:
-        """Return this geometry with other attributes, checked as in the constructor.
+        """Return this geometry with other attributes, e.g. ``replace(hole_radius=0.02)``.
 
-        Args:
-            changes: Attributes of :class:`Geometry`, such as ``hole_radius=0.02``.
-
-        Raises:
-            GeometryError: The changed geometry is invalid; lists every fault.
+        Raises GeometryError, which lists every fault, if the changed geometry is invalid.
         """
         return replace(self, **changes)
 
@@ -260,23 +222,14 @@ class Geometry(Description):
         return tables.text_of(self)
 
     def write(self, path: str | os.PathLike[str]) -> Path:
-        """Write :meth:`to_toml` to a file and return its path; a failure leaves no partial file.
-
-        Raises:
-            FileError: The file cannot be written.
-        """
+        """Write :meth:`to_toml` to a file and return its path; FileError on failure."""
         return write_text(path, self.to_toml())
 
     @classmethod
     def from_toml(cls, text: str, source: str | None = None) -> Geometry:
-        """Build a geometry from TOML text: see :meth:`read`.
+        """Build a geometry from TOML text: see :meth:`read`; ``source`` names its file in errors.
 
-        Args:
-            text: The TOML text.
-            source: Name of the file with the text, for the error.
-
-        Raises:
-            GeometryError: ``text`` is not TOML or not a geometry; lists every fault.
+        Raises GeometryError, which lists every fault, if the text is no TOML or no geometry.
         """
         instance("text", text, str)
         try:

@@ -45,7 +45,7 @@ def uniform(
     usual_angles: Callable[[int], list[list[float]]],
     keywords: Mapping[str, Any],
 ) -> dict[str, Any]:
-    """Return joints, links, cables and hole radius of a Geometry; raise GeometryError.
+    """Return the attributes of a Geometry; raise GeometryError.
 
     ``axes`` has the axes of each joint. ``usual_angles`` returns the hole angles of each joint for
     a number of cables per joint, if no ``hole_angles`` are given. ``keywords`` are those of
@@ -60,7 +60,7 @@ def uniform(
         if isinstance(value, Sequence) and len(value) != n
     ]
     if (cables_per_joint is None) == (hole_angles is None):
-        given = "is missing" if hole_angles is None else "stands beside hole_angles"
+        given = "is missing" if hole_angles is None else "is given beside hole_angles"
         faults.append(f"cables_per_joint: {given}; give cables_per_joint or hole_angles")
     elif hole_angles is not None and isinstance(hole_angles[0], Sequence) and len(hole_angles) != n:
         faults.append(
@@ -90,6 +90,8 @@ def uniform(
         for angle in angles[k]
     ]
     return {
+        "name": keywords["name"],
+        "base_length": keywords["base_length"],
         "hole_radius": hole_radius,
         "joints": tuple(
             Joint(

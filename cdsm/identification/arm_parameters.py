@@ -7,10 +7,10 @@ from typing import Any, Final, NamedTuple, final
 
 import numpy as np
 
-from cdsm.cable import serpentine_cables
 from cdsm.elasticity import LinearElasticity
 from cdsm.errors import InvalidInput
 from cdsm.geometry import Geometry
+from cdsm.geometry.cables import serpentine_cables
 from cdsm.manipulator import Manipulator
 from cdsm.support.validation import instance, one_of, scalar, text
 

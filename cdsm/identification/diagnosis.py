@@ -20,15 +20,15 @@ _UNLIKELY = 1e-3
 
 
 _LEFT = 1e-2
-"""Fall of χ² that a search with loops may miss: their kinks end it a tenth of a σ early."""
+"""Decrease of χ² that a search with loops may miss: kinks of χ² stop it a tenth of a σ early."""
 
 
 def warnings_of(result: Identification) -> list[str]:
     """Return one sentence for each reason not to trust a result."""
     sentences = [
         f"not identifiable (rank {result.rank} of {len(result.names)}): no prediction changes with "
-        f"{combination}, so their values are one choice of many. Fix one, or measure what tells "
-        "them apart."
+        f"{combination}, so their values are one choice of many. Fix one, or measure what "
+        "separates them."
         for combination in result._determination.open_combinations
     ]
     correlation, std = result.correlation, result.std
@@ -47,8 +47,8 @@ def warnings_of(result: Identification) -> list[str]:
         sentences.append(
             f"the model does not explain the measurements within their σ: χ² = "
             f"{result.chi_square:.4g} with {result.freedom} degrees of freedom, worst at "
-            f"{result._labels[worst]} with {result.residuals[worst]:+.3g} σ. The intervals hold "
-            "for a right model only."
+            f"{result._labels[worst]} with {result.residuals[worst]:+.3g} σ. The intervals are "
+            "valid for a right model only."
         )
     return sentences
 
@@ -83,7 +83,7 @@ def _open_ends(result: Identification, i: int) -> list[str]:
         if profile.ends[k] != "bound":
             reach = f"{profile.values[(0, -1)[k]]:.4g}, where the model ends: {profile.ends[k]}"
         sentences.append(
-            f"{name} has no {('lower', 'upper')[k]} end at 95 %: the measurements agree with "
+            f"{name} has no {('lower', 'upper')[k]} limit at 95 %: the measurements agree with "
             f"everything up to {reach}"
         )
     return sentences

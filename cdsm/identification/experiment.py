@@ -212,7 +212,6 @@ def _candidates(
     noise: tuple[float, float, float],
     steps: int,
 ) -> list[WeightLoop]:
-    """Build a loop for each posture, direction and weight."""
     angles, forces = number_array("postures", postures), number_array("weights", weights, "force")
     if angles.ndim != 2 or not angles.size:
         raise InvalidInput(

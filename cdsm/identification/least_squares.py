@@ -1,6 +1,6 @@
 """Solve least squares within bounds, for a model that may not exist for some parameters.
 
-    min Σ r_i(p)²   so that   low ≤ p ≤ high
+    min Σ r_i(p)²   subject to   low ≤ p ≤ high
 
 Each parameter is scaled to 0…1 between its bounds, so the search runs over a unit cube. Where the
 model does not exist, the residuals are infinite, and scipy's search shortens its step.
@@ -161,7 +161,7 @@ class LeastSquares:
         raise InvalidInput(
             "free",
             f"at {self.describe(point)} the model has a stiffness for all measurements, "
-            f"but beside it, in {self.names[i]}, it has none either way. Change the bounds.",
+            f"but none for a slightly smaller or larger {self.names[i]}. Change the bounds.",
         )
 
     def search(

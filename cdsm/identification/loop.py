@@ -72,7 +72,7 @@ class WeightLoop:
             raise InvalidInput(
                 "forces",
                 f"{self.forces!r} given; a loop needs forces of at least two sizes, one after the "
-                "other, as 0, 2, 4, 2, 0 N: only differences of readings tell something.",
+                "other, as 0, 2, 4, 2, 0 N: only differences of readings are used.",
             )
         checked: dict[str, object] = checked_conditions(self) | {"forces": tuple(forces.tolist())}
         if self.displacements is not None:
@@ -122,7 +122,7 @@ class WeightLoop:
             random: Source of the errors of readings, forces and tensions. None: without errors.
 
         Raises:
-            CdsmError: The arm cannot hold the tensions or the forces; see :func:`~cdsm.load_cycle`.
+            CdsmError: The arm has no equilibrium under the forces; see :func:`~cdsm.load_cycle`.
         """
         instance("arm", arm, Manipulator)
         pose, wrench = arm.at(self.angles), np.array(self.wrench)
@@ -161,7 +161,15 @@ class Weights:
         zero: Matrix (k, m) that gives the offsets −z (k,) from errors e (m,).
     """
 
-    def __init__(self, covariance: Array, axes: int) -> None:
+    def __init__(
+        self, loop: WeightLoop, by_forces: Array | None = None, by_tensions: Array | None = None
+    ) -> None:
+        """Weigh the errors of the readings, and of forces and tensions by the derivatives given."""
+        axes = len(loop.axes)
+        covariance = loop.displacement_std**2 * np.eye(len(loop.forces) * axes)
+        for slope, std in (by_forces, loop.force_std), (by_tensions, loop.tension_std):
+            if slope is not None:
+                covariance += std**2 * slope @ slope.T
         inverse = np.linalg.inv(covariance)
         zeros = np.tile(np.eye(axes), (len(covariance) // axes, 1))
         normal = zeros.T @ inverse

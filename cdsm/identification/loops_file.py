@@ -76,8 +76,6 @@ def read_loops(
 
 
 class _Reader:
-    """Columns of a file and what they mean."""
-
     def __init__(self, path: str | os.PathLike[str], arm: Manipulator, table: Table) -> None:
         self._path, self._arm, self._table = path, arm, table
         if len(table.rows) < 2:
@@ -105,7 +103,6 @@ class _Reader:
         return [self._column(name, _FORCE) for name in self._arm.cables.names] if cables else []
 
     def loops(self, minimum: ArrayLike | None, **std: float) -> tuple[WeightLoop, ...]:
-        """Build the loops."""
         if not self._tensions and minimum is None:
             self._refuse(
                 "has no tensions; add a column minimum [N] or one for each cable, such as "
@@ -127,7 +124,6 @@ class _Reader:
     def _loop(
         self, label: str, rows: list[tuple[int, list[str]]], bound: object, **std: float
     ) -> WeightLoop:
-        """Build the loop of some rows."""
         first = rows[0]
         direction = self._same(rows, self._direction)
         if direction not in AXES:
@@ -187,7 +183,6 @@ class _Reader:
     def _number(
         self, row: tuple[int, list[str]], column: _Column, cell: str | None = None
     ) -> float:
-        """Return a number in SI."""
         cell = self._cell(row, column) if cell is None else cell
         value = self._table.number(cell)
         if not math.isfinite(value):

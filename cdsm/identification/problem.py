@@ -62,7 +62,7 @@ class Model:
         measurements: tuple[Measurement | WeightLoop, ...],
     ) -> Model:
         """Return the model with weights that count the errors of the readings only."""
-        weights = [_weights(each) for each in measurements]
+        weights = (Weights(each) if isinstance(each, WeightLoop) else None for each in measurements)
         return cls(model_of, tension_of, measurements, tuple(weights))
 
     @property
@@ -91,9 +91,9 @@ class Model:
         arm = self.arm(parameters)
         paths = self._paths_at(parameters, arm)
         weights = [
-            _weights(each)
-            if path is None or not isinstance(each, WeightLoop)
-            else _weights(each, *self._slopes(arm, each, path))
+            Weights(each, *self._slopes(arm, each, path))
+            if isinstance(each, WeightLoop) and path
+            else None
             for each, path in zip(self.measurements, paths, strict=True)
         ]
         return replace(self, weights=tuple(weights))
@@ -161,7 +161,7 @@ class Model:
     def arm(self, parameters: Parameters) -> Manipulator:
         """Build the arm; raise NoModelError if there is none."""
         try:
-            arm = _called("model_of", self.model_of, parameters)
+            arm = _call_model("model_of", self.model_of, parameters)
         except CdsmError as error:
             raise NoModelError(f"model_of: {error}") from error
         if not isinstance(arm, Manipulator):
@@ -175,19 +175,22 @@ class Model:
         key = tuple(parameters.values())
         if key not in self._paths:
             arm = arm or self.arm(parameters)
-            found = [self._path(i, arm, parameters) for i in range(len(self.measurements))]
+            near = next(reversed(self._paths.values()), [None] * len(self.measurements))
+            found = [self._path(i, arm, parameters, path) for i, path in enumerate(near)]
             while len(self._paths) >= _KEPT:
                 del self._paths[next(iter(self._paths))]
             self._paths[key] = found
         return self._paths[key]
 
-    def _path(self, i: int, arm: Manipulator, parameters: Parameters) -> LoadingPath | None:
+    def _path(
+        self, i: int, arm: Manipulator, parameters: Parameters, near: LoadingPath | None
+    ) -> LoadingPath | None:
         loop = self.measurements[i]
         if not isinstance(loop, WeightLoop):
             return None
         try:
             pose, tension, wrench = self._started(arm, loop, parameters)
-            return LoadingPath.of(pose, tension, wrench, loop.applied)
+            return LoadingPath.of(pose, tension, wrench, loop.applied, near=near)
         except CdsmError as error:
             raise NoModelError(f"measurement {label(i, loop)}: {error}") from error
 
@@ -205,7 +208,7 @@ class Model:
         """Return the tensions of a measurement, and its wrench unless a Tension contains it."""
         tension: Tension | ArrayLike
         if self.tension_of is not None:
-            tension = _called("tension_of", self.tension_of, parameters, pose, measurement)
+            tension = _call_model("tension_of", self.tension_of, parameters, pose, measurement)
         elif measurement.tension is not None:
             tension = measurement.tension
         else:
@@ -238,7 +241,6 @@ class Model:
             raise NoModelError(f"measurement {label(i, measurement)}: {error}") from error
 
     def _along(self, arm: Manipulator, measurement: Measurement, parameters: Parameters) -> float:
-        """Compute the stiffness [N/m] of one measurement."""
         pose = arm.at(measurement.angles)
         K = stiffness(pose, *self._tension(pose, measurement, parameters))
         if not K.is_stable:
@@ -259,7 +261,6 @@ class Model:
         return value
 
     def _secant(self, measurement: Measurement, K: Stiffness) -> float:
-        """Compute the stiffness [N/m] of a weight test on the model."""
         # start at the equilibrium of the last parameters: a tenth of the time of weight_test
         pose, last = K.posture, self._last_rest.get(measurement)
         force = measurement.force * unit_direction("direction", measurement.direction)
@@ -275,23 +276,9 @@ class Model:
         return test.stiffness
 
 
-def _weights(
-    measurement: Measurement | WeightLoop,
-    by_forces: Array | None = None,
-    by_tensions: Array | None = None,
-) -> Weights | None:
-    """Return the weights of a loop from the derivatives of its readings; None for a stiffness."""
-    if not isinstance(measurement, WeightLoop):
-        return None
-    axes = len(measurement.axes)
-    covariance = measurement.displacement_std**2 * np.eye(len(measurement.forces) * axes)
-    for slope, std in (by_forces, measurement.force_std), (by_tensions, measurement.tension_std):
-        if slope is not None:
-            covariance += std**2 * slope @ slope.T
-    return Weights(covariance, axes)
-
-
-def _called(name: str, function: Callable[..., Any], parameters: Parameters, *args: object) -> Any:
+def _call_model(
+    name: str, function: Callable[..., Any], parameters: Parameters, *args: object
+) -> Any:
     try:
         return function(*args, **parameters)
     except CdsmError:
@@ -301,7 +288,7 @@ def _called(name: str, function: Callable[..., Any], parameters: Parameters, *ar
         raise UserFaultError(
             InvalidInput(
                 name,
-                f"fails at {where}: {error!r}. Mend it, narrow the bounds, or let it raise a "
+                f"fails at {where}: {error!r}. Correct it, narrow the bounds, or let it raise a "
                 "CdsmError where there is no such arm.",
             )
         ) from error

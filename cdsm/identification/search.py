@@ -37,7 +37,7 @@ _COARSE, _FINE = (1e-10,) * 3, (1e-14,) * 3
 """ftol, xtol and gtol of the searches with one-sided and with central differences."""
 
 _OF_LOOPS = (1e-6, 1e-8, 1e-8)
-"""The same for searches with loops: smaller changes of χ² have no meaning."""
+"""ftol, xtol and gtol of searches with loops, whose χ² is less exact."""
 
 _REWEIGHINGS = 2
 """Number of times that the weights of loops are computed again from the model found so far."""
@@ -67,8 +67,8 @@ def identify(
 
     Most of the time goes into predictions of all measurements. The search needs about 50 P of them,
     and the profiles of :meth:`Identification.confidence` about 20 P². A measurement with a force
-    takes ten times as long as one without, and longer if the arm moves far; a loop, a tenth of a
-    second.
+    takes ten times as long as one without, and longer if the arm moves far; a loop, some tens
+    of milliseconds.
 
     ::
 
@@ -110,8 +110,8 @@ def identify(
         raise InvalidInput(
             "measurements",
             f"{count} given for {len(bounds)} parameters, {', '.join(bounds)}; give at "
-            "least as many, or free fewer parameters. A loop counts its readings less one, which "
-            "its zero takes.",
+            "least as many, or free fewer parameters. A loop counts its readings minus one, "
+            "since its offset is unknown.",
         )
     check_call("model_of", model_of, 0, tuple(bounds))
     if tension_of is not None:
@@ -232,7 +232,7 @@ def _starts(problem: LeastSquares, start: Mapping[str, float] | None) -> list[Ar
     raise InvalidInput(
         "free" if start is None else "start",
         f"{where} every measurement a stable prediction. At {problem.describe(points[0])}, "
-        f"{failure} Mend that, narrow the bounds, or give another start.",
+        f"{failure} Correct that, narrow the bounds, or give another start.",
     ) from failure.__cause__
 
 

@@ -148,7 +148,7 @@ def _cable(
 ) -> Cable:
     if element.tag != "cable_ideal":
         raise XmlFault(
-            f"<{element.tag}> {name}: only <cable_ideal> is taken, give the elasticity here"
+            f"<{element.tag}> {name}: only <cable_ideal> is supported; give the elasticity here"
         )
     reference = element.get("attachment_reference")
     if reference not in ("com", "joint"):
@@ -160,7 +160,7 @@ def _cable(
     sites = []
     for place in element.findall("attachments/*"):
         if place.tag != "attachment":
-            raise XmlFault(f"{name}: <{place.tag}> is not taken; a cable passes points only")
+            raise XmlFault(f"{name}: <{place.tag}> is not supported; a cable passes points only")
         number = whole(f"{name}: <link>", place.findtext("link"))
         if not 0 <= number <= len(bodies):
             raise XmlFault(f"{name}: there is no link {number}, but 0 to {len(bodies)}")

@@ -115,11 +115,11 @@ def read_bodies(path: Path) -> tuple[Body, ...]:
 
 def _body(element: etree._Element, name: str) -> Body:
     if element.tag != "link_rigid":
-        raise XmlFault(f"<{element.tag}> {name}: only <link_rigid> is taken")
+        raise XmlFault(f"<{element.tag}> {name}: only <link_rigid> is supported")
     joint = element.find("joint")
     kind = None if joint is None else joint.get("type")
     if joint is None or kind not in (known := (*_JOINTS, *_OBLIQUE)):
-        raise XmlFault(f"{name}: the joint type {kind!r} is not taken; {', '.join(known)} are")
+        raise XmlFault(f"{name}: the joint type {kind!r} is not supported; {', '.join(known)} are")
     (mass,) = numbers(f"{name}: <mass>", _text_of(element, name, "physical/mass"), 1)
     centre, end, place = (
         np.array(numbers(f"{name}: <{where}>", _text_of(element, name, where), 3))

@@ -26,7 +26,7 @@ from cdsm.interchange.mjcf_bodies import add_bodies, row
 from cdsm.interchange.mjcf_motion import Motion, choose_motion
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
-from cdsm.report.facts import imbalance
+from cdsm.report.facts import balance_error
 from cdsm.report.remarks import BALANCED
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.files import write_text
@@ -141,18 +141,10 @@ def write_mjcf(
 ) -> Path:
     """Write the text of :func:`to_mjcf` to a file, completely or not at all. Return its path.
 
-    Args:
-        arm: As for :func:`to_mjcf`.
-        path: The file. An existing file is replaced.
-        pose: As for :func:`to_mjcf`.
-        tension: As for :func:`to_mjcf` [N].
-        actuators: As for :func:`to_mjcf`.
-        damping_ratio: As for :func:`to_mjcf` [-].
-        damping: As for :func:`to_mjcf` [N m s/rad].
+    An existing file is replaced. All other arguments and errors are those of :func:`to_mjcf`.
 
     Raises:
         FileError: The file cannot be written.
-        CdsmError: As for :func:`to_mjcf`.
     """
     model = mujoco_model(arm, pose, tension, actuators, damping_ratio, damping)
     if model.unstable is not None:
@@ -171,7 +163,7 @@ def mujoco_model(
     """Build the model of :func:`to_mjcf`, with the settings that were chosen for it."""
     instance("arm", arm, Manipulator)
     if (pose is None) != (tension is None):
-        raise InvalidInput("tension", "give pose and tension, or neither; one says nothing alone.")
+        raise InvalidInput("tension", "give pose and tension, or neither.")
     if pose is not None and instance("pose", pose, Posture).arm != arm:
         raise InvalidInput("pose", "is of another arm; take arm.at(q).")
     K = None if pose is None or tension is None else stiffness(pose, tension)
@@ -234,7 +226,7 @@ def _missing(K: Stiffness) -> Iterator[str]:
     if K.wrench.any():
         load = f"{coordinates(K.wrench[:3])} N, {coordinates(K.wrench[3:])} N m"
         yield f"load       {load} is not in the model: apply it to {K.posture.arm.tip_link}"
-    left, joint, part = imbalance(K)
+    left, joint, part = balance_error(K)
     if part > BALANCED:
         yield f"balance    {left:.4g} N m are missing, most at {joint}: the arm leaves the posture"
 

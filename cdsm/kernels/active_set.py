@@ -1,13 +1,15 @@
-"""Dual active-set method for tension distribution (Goldfarb and Idnani), as a numba kernel.
+"""Dual active-set method of Goldfarb and Idnani for the tension problem, as a numba kernel.
 
-It is used where the guess of :mod:`cdsm.kernels.serpentine_guess` fails. It starts at the least
-tensions that balance the arm without bounds. It adds one violated bound after the other, and drops
-a bound whose multiplier would change its sign. It ends at the optimum, or at a proof of
-infeasibility. Every step builds and solves a system with
+    min ½‖F‖²   subject to   J_Lᵀ F = b   and   low ≤ F ≤ high.
 
-    S = Σ J_c J_cᵀ  over the free cables,
+It runs where the guess of :mod:`cdsm.kernels.serpentine_guess` fails. It starts at the optimum
+without bounds. It adds one violated bound after the other, and drops a bound whose multiplier would
+change its sign. It ends at the optimum, or at a proof of infeasibility. Each step builds and solves
+a new system, so that errors do not accumulate, with the matrix
 
-so that no error builds up. The caller verifies the optimum or the proof.
+    S = Σ J_cᵀ J_c  over the free cables, which are at no bound; J_c is row c of J_L.
+
+The caller verifies the optimum or the proof.
 
 The alternative is the solver DAQP, with one Python call per posture and a linear program to prove
 infeasibility. Time per posture with this search and without it: 7 and 75 µs if 18 of 400 postures
@@ -29,7 +31,7 @@ from cdsm.kernels.tree import Indices
 from cdsm.support.values import Array
 
 FOUND, IMPOSSIBLE, LOST = range(3)
-"""Outcome: F and y are the optimum; y proves infeasibility; the search failed."""
+"""Outcome of a search: F and y are the optimum; y proves infeasibility; no result."""
 
 _REGULAR = 1e-13
 """Smallest accepted ratio of smallest to largest pivot of S."""
@@ -38,7 +40,7 @@ _DEPENDENT = 1e-10
 """If 1 − J_p S⁻¹ J_pᵀ is at most this, F_p cannot move while the free cables keep the balance."""
 
 _ROUNDING = 1e-13
-"""Smaller violations of a bound, relative to the largest tension, and slopes are rounding."""
+"""Violations of a bound below this part of the largest tension are rounding, as are such slopes."""
 
 _STEPS = 20
 """Maximum number of steps per cable; one or two are usual."""
@@ -105,14 +107,16 @@ def search(J: Array, b: Array, low: Array, high: Array, state: State) -> int:
                 w[i] = J[p, i]
             if not _solve_free(J, state):
                 return LOST
+            # per unit step F_p changes by this; 0 if no other tensions can balance the change
             way = 1.0 - row_product(J, p, w)
             whole = sign * (bound - F[p]) / way if way > _DEPENDENT else math.inf
+            # the largest step at which no multiplier changes its sign, and whose bound is dropped
             part, dropped = math.inf, -1
             for c in range(F.shape[0]):
                 slope = side[c] * sign * row_product(J, c, w)
                 if side[c] != 0 and slope < -_ROUNDING and multiplier[c] < -part * slope:
                     part, dropped = -multiplier[c] / slope, c
-            if whole == math.inf and part == math.inf:
+            if whole == math.inf and part == math.inf:  # p can never reach its bound
                 for i in range(y.shape[0]):
                     y[i] = -sign * w[i]
                 return IMPOSSIBLE
@@ -134,7 +138,7 @@ def search(J: Array, b: Array, low: Array, high: Array, state: State) -> int:
 
 @inner
 def _most_violated(F: Array, low: Array, high: Array, side: Indices) -> tuple[int, float]:
-    """Find the free cable farthest outside its bounds (or −1), and 1 if below, −1 if above."""
+    """Find the free cable farthest outside its bounds or −1; 1 if it is below them, else −1."""
     p, sign, worst = -1, 0.0, 0.0
     for c in range(F.shape[0]):
         worst = max(worst, _ROUNDING * abs(F[c]))
@@ -148,7 +152,7 @@ def _most_violated(F: Array, low: Array, high: Array, side: Indices) -> tuple[in
 
 @inner
 def _solve_for_sides(J: Array, b: Array, low: Array, high: Array, state: State) -> bool:
-    """Fill F and y: put fixed cables at their bounds, and balance with the least free tensions."""
+    """Fill F (bounds, and the least free tensions that balance) and y; False if S is singular."""
     F, y, side, _, _, _, w = state
     for i in range(b.shape[0]):
         w[i] = b[i]

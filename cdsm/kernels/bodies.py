@@ -1,12 +1,13 @@
 """Numba kernels of the rigid bodies: tip pose, tip Jacobian, gravity torque and stiffness.
 
 Pinocchio computes the same, but its calls from Python take longer than all other computations. A
-test compares the two to rounding. Joint i moves bodies of total mass M and S = Σ m c. With r_i = S
-− M o_i and gravity γ,
+test compares the two to rounding. Joint i turns about the axis z_i through o_i. It moves bodies of
+total mass M and first moment S = Σ m c, with their centres of mass c. With r_i = S − M o_i and the
+acceleration of gravity γ,
 
-    g_i = −γ·(z_i × r_i),    ∂g_i/∂θ_j = −γ·(z_i × (z_j × r_j)) for i before or equal to j.
+    g_i = −γ·(z_i × r_i),    ∂g_i/∂θ_j = −γ·(z_i × (z_j × r_j)) if i is j or moves joint j.
 
-If joint j slides along s, M s replaces z_j × r_j.
+If joint j slides along s, M s replaces z_j × r_j, and z_j is 0.
 """
 
 from __future__ import annotations
@@ -54,7 +55,7 @@ def tip_jacobian(
 ) -> None:
     """Fill the tip pose (4, 4, W), and J_X (6, nv, W) in the columns of joints that move the tip.
 
-    The other columns, and the zeros in the last row of the pose, must be there before.
+    The caller sets the other columns and the last row of the pose to zero.
     """
     origin, axis, slide, _ = frames
     i = np.uint64(masses.tip)
@@ -94,7 +95,7 @@ def gravity_torque(
     torque: Array,
     width: Width,
 ) -> None:
-    """Fill g (nv, W), and of each joint γ × z and M, z × r in the rows of carried (nv+1, 7, W)."""
+    """Fill g (nv, W), and ``carried`` (nv+1, 7, W) with γ × z, z × r and M of each joint."""
     parent, order = tree.parent, tree.order
     origin, axis, slide, _ = frames
     gravity = masses.gravity
@@ -113,7 +114,7 @@ def gravity_torque(
         for r in upwards(3, carried.shape[1]):
             for w in lanes(width):
                 carried[before, r, w] += carried[i, r, w]
-        for r in axes(origin.shape[1], width):  # r = S − M o, for a moment in the place of γ × z
+        for r in axes(origin.shape[1], width):  # r = S − M o, kept here until γ × z replaces it
             for w in lanes(width):
                 carried[i, r, w] = carried[i, 3 + r, w] - carried[i, 6, w] * origin[i, r, w]
         for r in axes(origin.shape[1], width):

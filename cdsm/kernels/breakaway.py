@@ -1,8 +1,10 @@
 """Numba kernel of breakaway, for blocks of postures: the load at which the first hole slides.
 
-A force W u at the tip of a stuck arm moves the joints by θ̇ = K_θ⁻¹ J_vᵀu per newton. The block of
-segments after a hole pulls with Ṫ′ = k′ l̇′, the one before it with Ṫ = k l̇. The hole begins to
-slide, to first order in the load, at
+A force W e at the tip of a stuck arm, e a unit vector, moves the joints by θ̇ = K_θ⁻¹ J_vᵀ e per
+newton; a dot is a derivative with respect to W. A block is the segments of a cable between two
+holes where it sticks. Its tension is T, before the load F; its length l, its stiffness k. Per
+newton the tension changes by Ṫ = k l̇ before a hole, and by Ṫ′ = k′ l̇′ after it. With friction μ and
+wrap angle φ the hole begins to slide, to first order in the load, at
 
     W = μ φ/(|Ṫ′ − Ṫ|/F − μ φ̇),   φ̇ = −(u̇·v + u·v̇)/sin φ,
 
@@ -33,14 +35,14 @@ from cdsm.kernels.tree import Frames, Routing, Tree, empty_frames, forward_kinem
 from cdsm.support.values import Array
 
 ROUNDING = 1e-12
-"""Pull of a hole, over the largest, that is rounding."""
+"""A hole never slides if its |Ṫ′ − Ṫ|/F − μ φ̇ is below this part of the largest |Ṫ′ − Ṫ|/F."""
 
 
 class Velocities(NamedTuple):
-    """Velocities per newton: of the joints and the sites, and of what a cable does at a hole.
+    """Derivatives with respect to the load W.
 
-    Turning and origin of each joint (nv+1, 3, W), sites (P, 3, W), the directions before and after
-    a hole (3, W) each, and l̇ of the open block (W,).
+    Angular velocity and velocity of the origin of each joint (nv+1, 3, W); velocities of the sites
+    (P, 3, W); u̇ and v̇ (3, W) at the present hole; l̇ (W,) of the open block up to this hole.
     """
 
     turn: Array
@@ -52,10 +54,10 @@ class Velocities(NamedTuple):
 
 
 class Pulls(NamedTuple):
-    """Pulls |Ṫ′ − Ṫ|/F, μ φ̇ and μ φ of the holes, each kept where its second block ends (P, W).
+    """|Ṫ′ − Ṫ|/F, μ φ̇ and μ φ of each hole (P, W), stored where the block after it ends.
 
-    μ φ is negative where no block ends. ``last`` (3, W) are Ṫ/F, μ φ̇ and μ φ of the hole at which
-    the open block began.
+    μ φ is −1 where no block ends. ``last`` (3, W) are Ṫ/F of the block before the open one, and μ φ̇
+    and μ φ of the hole between the two.
     """
 
     pull: Array
@@ -75,23 +77,25 @@ def set_breakaway(
     tension: Array,
     wire: Array,
     motion: Array,
+    width: int,
     out: Array,
 ) -> None:
-    """Fill the breakaway load (b, D) [N] of b postures; inf where no hole ever slides.
+    """Fill the breakaway loads (b, D) [N] of b postures in D directions.
 
     Args:
-        tree: The joints.
-        routing: The cables.
-        holes: Their holes and wires.
+        tree: Joints of the arm.
+        routing: Cable sites of the arm.
+        holes: Holes and wires of its cables.
         series: 1/k_series of the cables (C,) [m/N].
         rest: Tension at which the series springs are at rest (C,) [N].
         q: Joint angles (b, nv) [rad].
         tension: F (b, C) [N].
         wire: EA (1 + ε) of the wires at F (b, C) [N].
         motion: θ̇ of the stuck arm in B blocks of W postures (B, nv, D, W) [rad/N].
-        out: The loads; 0 where no hole holds.
+        width: W.
+        out: The loads; inf where no hole ever slides, 0 where no cable sticks.
     """
-    nv, width, cables = motion.shape[1], motion.shape[3], series.shape[0]
+    nv, cables = motion.shape[1], series.shape[0]
     rows, sites = tree.parent.shape[0], routing.row.shape[0]
     angles, F, EA = np.empty((nv, width)), np.empty((cables, width)), np.empty((cables, width))
     frames, scratch = empty_frames(tree, routing, width), segment_scratch(nv, width)
@@ -141,7 +145,7 @@ def _set_velocities(
     rates: Velocities,
     width: Width,
 ) -> None:
-    """Fill the velocities of joints and sites under the joint velocities of one direction."""
+    """Fill the velocities of joints and sites for θ̇ of one direction."""
     turn, moved, d = rates.turn, rates.origin, np.uint64(direction)
     for k in range(tree.order.shape[0]):
         i = np.uint64(tree.order[k])
@@ -186,7 +190,6 @@ def _set_pulls(
     pulls: Pulls,
     width: Width,
 ) -> None:
-    """Fill the pulls of all holes."""
     u, length, _, _, along, _ = scratch
     for p in upwards(0, pulls.grip.shape[0]):
         for w in lanes(width):
@@ -196,6 +199,7 @@ def _set_pulls(
     for c in upwards(0, holes.lead.shape[0]):
         open_blocks(holes, c, tension, series, rest, block, width)
         set_lead(routing, holes, c, rotation, block.before, width)
+        # the lead turns with the link of the first site, and keeps its length
         i = np.uint64(routing.row[holes.first[c]])
         for a in range(3):
             m, n = (a + 1) % 3, (a + 2) % 3
@@ -219,7 +223,7 @@ def _set_pulls(
                 for w in lanes(width):
                     apart = rates.site[far, r, w] - rates.site[p, r, w]
                     rates.after[r, w] = (apart - along[w] * u[r, w]) / length[w]
-            if holes.friction[p] > 0.0:
+            if holes.friction[p] > 0.0:  # where the cable bends, a block ends
                 set_holding(holes.wrap[p], block.before, u, block.holds, width)
                 _note_hole(holes, p, tension, wire, c, u, block, rates, pulls, width)
             for r in upwards(0, u.shape[0]):
@@ -249,7 +253,7 @@ def _note_hole(
     pulls: Pulls,
     width: Width,
 ) -> None:
-    """Note the pull of the hole before the block that ends at site p, and begin with this hole."""
+    """Store the pull of the hole before the block that ends at p; start the next block there."""
     set_stiffness(wire, c, block, width)
     u, mu, own = block.before, holes.friction[p], holes.wrap[p]
     for w in lanes(width):
@@ -268,7 +272,7 @@ def _note_hole(
         for r in range(3):
             cosine += u[r, w] * v[r, w]
             change -= rates.before[r, w] * v[r, w] + u[r, w] * rates.after[r, w]
-        # a slack cable holds nothing: any pull moves it
+        # a slack cable has no friction: any change of the load makes it slide
         grip = mu * (math.atan2(sine, cosine) + own) if F > 0.0 else 0.0
         pulls.last[0, w], pulls.last[2, w] = rate, grip
         pulls.last[1, w] = mu * change / sine if sine > STRAIGHT else 0.0
@@ -278,7 +282,7 @@ def _note_hole(
 
 @inlined
 def _set_loads(pulls: Pulls, load: Array, width: Width) -> None:
-    """Fill the least load (W,) of all holes; inf if none ever slides, 0 if none holds."""
+    """Fill the least load (W,) of all holes; inf if none ever slides, 0 if no cable sticks."""
     for w in lanes(width):
         most, found, held = 0.0, math.inf, False
         for p in range(pulls.grip.shape[0]):

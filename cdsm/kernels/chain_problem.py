@@ -17,8 +17,8 @@ conditions of
 
     minimize Σ_j D_j(y_j),   D_j′ = a_j − A_j(e^y),   subject to |y_{j+1} − y_j| ≤ μ φ_j,
 
-and the slips are the multipliers. D_j′ rises, so the problem is strictly convex: there is one
-answer. No segment of a tense cable is slack.
+and the slips are the multipliers. D_j′ increases with y, so the problem is strictly convex and has
+one solution. If one segment of a cable is under tension, all are.
 
 Dynamic programming on the chain solves it exactly ("taut string"). Let V_j(y) be the least sum over
 the segments from j to the end of the cable if segment j has y. Let y*_j be its minimizer. The
@@ -27,12 +27,12 @@ choice of y_{j+1} is the point z nearest to y*_{j+1} within y ± μφ_j. Therefo
     V_j′(y) = D_j′(y) + V_{j+1}′(z) if y*_{j+1} is beyond y ± μφ_j,   and D_j′(y) if not.
 
 From the end of the cable to the motor, the root y*_j of the rising V_j′ is found by Newton's method
-inside a bracket. A locked motor gives y_1 = y*_1, a motor that holds the tension gives y_1. From
-there y_{j+1} = z. A hole slides if z is not y*_{j+1}; then s_j = −V_{j+1}′(z). All this runs in T
-instead of y, so that T = 0 is an ordinary number: there the cable is slack.
+inside a bracket. A locked motor makes y_1 = y*_1; a motor that controls the tension prescribes y_1.
+Then y_{j+1} = z, segment by segment. A hole slides if z is not y*_{j+1}; then s_j = −V_{j+1}′(z).
+The code uses T instead of y, so that a slack cable, T = 0, is an ordinary case.
 
-One value of V_j′ takes as long as its block of sliding holes. So N segments take O(N) where few
-holes slide, and O(N²) where all do.
+V_j′ has one term for each segment up to the next hole that sticks. So N segments take O(N) where
+few holes slide, and O(N²) where all do.
 
 In this kernel 1 + ε(T) = base + softness · T. For other laws :mod:`cdsm.friction.chain_problem`
 repeats it with the tangent of the law, which is Newton's method.
@@ -54,7 +54,7 @@ _ROUNDING = 2.0**-52
 """Rounding of V_j′ over the natural lengths in its sum; of a tension over itself."""
 
 _ITERATIONS = 200
-"""Steps that find a root. Newton's method needs 3 to 6; bisection from a bracket would need 60."""
+"""Maximum number of steps to find a root. Newton's method needs 3 to 6, bisection would need 60."""
 
 
 class Wire(NamedTuple):
@@ -71,7 +71,7 @@ class Wire(NamedTuple):
 
 @inner
 def _surplus(wire: Wire, j: int, T: float) -> tuple[float, float]:
-    """Compute D_j′ = a_j − A_j(T) [m] and its derivative by T [m/N]."""
+    """Compute D_j′ = a_j − A_j(T) [m] and its derivative with respect to T [m/N]."""
     stretch = wire.base[j] + wire.softness[j] * T
     natural = (wire.length[j] - wire.spring[j] * (T - wire.rest[j])) / stretch
     return wire.natural[j] - natural, (wire.spring[j] + natural * wire.softness[j]) / stretch
@@ -79,7 +79,7 @@ def _surplus(wire: Wire, j: int, T: float) -> tuple[float, float]:
 
 @inner
 def _next(T: float, ratio: float, best: float) -> float:
-    """Return the tension nearest to ``best`` that friction allows beside T."""
+    """Return the tension nearest to ``best`` that friction allows in the segment after T."""
     return min(max(best, T / ratio), T * ratio)
 
 
@@ -87,7 +87,7 @@ def _next(T: float, ratio: float, best: float) -> float:
 def _slope(
     wire: Wire, best: Array, j: int, last: int, tension: float
 ) -> tuple[float, float, float]:
-    """Compute V_j′ [m], its derivative by T [m/N], and the natural length in its sum [m]."""
+    """Compute V_j′ [m] at a tension, ∂V_j′/∂T [m/N], and the natural length of its segments [m]."""
     total, rise = _surplus(wire, j, tension)
     T, size = tension, abs(wire.natural[j])
     for i in range(j + 1, last + 1):
@@ -103,7 +103,7 @@ def _slope(
 
 @inner
 def _root(wire: Wire, best: Array, j: int, last: int, near: float) -> float:
-    """Find y*_j as a tension; zero if V_j′ > 0 for all tensions."""
+    """Find the tension exp(y*_j), starting at ``near``; zero if V_j′ ≥ 0 at all tensions."""
     if _slope(wire, best, j, last, 0.0)[0] >= 0.0:
         return 0.0
     low, high, T = 0.0, math.inf, near if near > 0.0 else 1.0
@@ -116,7 +116,7 @@ def _root(wire: Wire, best: Array, j: int, last: int, near: float) -> float:
         new = T - value / rise
         if abs(new - T) <= _ROUNDING * T or abs(value) <= _ROUNDING * size:
             return max(new, 0.0)
-        if not low < new < high:
+        if not low < new < high:  # Newton's step leaves the bracket: bisect, or double
             new = (low + high) / 2.0 if math.isfinite(high) else 2.0 * T
         T = new
     return T
@@ -138,8 +138,8 @@ def solve_chains(
     """Solve the chain problem of all cables; see :class:`Wire` for the arrays (S,).
 
     ``start`` (C+1,) is the first segment of each cable, and the number of segments at the end.
-    ``forced`` (C,) [N] is the tension that a motor holds in the first segment; NaN: it holds the
-    wire. The roots are searched from the tensions ``near`` (S,) [N].
+    ``forced`` (C,) [N] is the tension that a motor keeps in the first segment; NaN if the motor is
+    locked. Newton's method starts at the tensions ``near`` (S,) [N].
 
     Returns:
         T (S,) [N]; the slip (S,) [m] of natural length from each segment to the next one; whether
@@ -151,6 +151,7 @@ def solve_chains(
     for c in range(start.shape[0] - 1):
         first, last = start[c], start[c + 1] - 1
         held = math.isnan(forced[c])
+        # minimizers from the end to the motor, tensions back to the end, then the slips
         for j in range(last, first, -1):
             best[j] = _root(wire, best, j, last, near[j])
         best[first] = _root(wire, best, first, last, near[first]) if held else forced[c]
@@ -185,16 +186,16 @@ def chain_tangent(
         ∂ln T_a/∂θ = Σ_j (g_j/(1 + ε_j) − compliance_j T_j ψ_j) / Σ_j compliance_j T_j,
         ∂T_j/∂θ = T_j (∂ln T_a/∂θ + ψ_j).
 
-    A motor that holds the tension holds T_a of its block. A slack cable stays slack. ``stretch`` is
-    1 + ε (S,), ``gradient`` g (S, nv) [m/rad], and ``friction_gradient`` μ ∂φ/∂θ (S, nv) [1/rad] of
-    the hole to the next segment.
+    A motor that controls the tension keeps T_a of the first block constant. A slack cable stays
+    slack. ``stretch`` is 1 + ε (S,), ``gradient`` g (S, nv) [m/rad], and ``friction_gradient`` μ
+    ∂φ/∂θ (S, nv) [1/rad] of the hole to the next segment.
     """
     size, nv = gradient.shape
     result = np.zeros((size, nv))
     for c in range(start.shape[0] - 1):
         a = start[c]
         while a < start[c + 1]:
-            end = a + 1
+            end = a + 1  # of the block that begins at segment a
             while end < start[c + 1] and slides[end - 1]:
                 end += 1
             if tension[a] > 0.0:

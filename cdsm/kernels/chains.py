@@ -8,9 +8,10 @@ it, φ = atan2(|u × v|, u·v). With the unit vectors p ⊥ u and q ⊥ v in the
 
     ∂φ/∂θ_i = −(p·d_i/ℓ_u + q·e_i/ℓ_v),   p = ((u × v) × u)/|u × v|,   q = (v × (u × v))/|u × v|.
 
-d and e are the derivatives of both segments as the link of the hole sees them: a joint between the
-hole and the far end of a segment moves only that end. Where the cable goes straight through, φ has
-a kink: it is |a·δθ| for small motions. Its gradient there is 0, the mean over both sides.
+The segments before and after the hole have the lengths ℓ_u and ℓ_v. d_i and e_i are the derivatives
+of the vectors along them (end minus start) with respect to θ_i, in the link of the hole. Where the
+cable goes straight through, φ has a kink, |a·δθ| with some vector a; the gradient is set to 0, the
+mean of both sides.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ import math
 
 import numpy as np
 
-from cdsm.kernels.compiling import Width, compiled, inner, lanes, upwards
+from cdsm.kernels.compiling import Width, compiled, inner, lanes, threaded, upwards
 from cdsm.kernels.segments import (
     Segments,
     add_length_hessian,
@@ -41,7 +42,7 @@ from cdsm.kernels.tree import (
 from cdsm.support.values import Array
 
 STRAIGHT = 1e-9
-"""Wrap angle [rad] below which a cable goes straight through a hole, but for rounding."""
+"""Wrap angle [rad] below which a cable counts as straight in a hole: the angle is rounding."""
 
 
 @inner
@@ -60,9 +61,10 @@ def set_wraps(
 ) -> None:
     """Fill φ (P, W), and ∂φ/∂θ (P, nv, W), of every hole.
 
-    Segment s is between the sites 2 s and 2 s + 1. ``span`` (S, 3) is the start of its joints in
-    ``joint``, the start of those on the path to its second site, and their end. ``own`` (P,) is the
-    wrap angle that a hole adds. ``normal`` (7, W) is scratch: u × v, p/ℓ_u or q/ℓ_v, and |u × v|.
+    Segment s is between the sites 2 s and 2 s + 1; ``hole`` (P,) is the segment before each hole.
+    ``span`` (S, 3) are places in ``joint``: where the joints of a segment start, where those on the
+    path to its second site start, and where they end. ``own`` (P,) is a constant angle added to φ.
+    ``normal`` (7, W) is scratch: u × v, p/ℓ_u or q/ℓ_v, and |u × v|.
     """
     u, v, sine = before.direction, after.direction, normal[6]
     for h in upwards(0, hole.shape[0]):
@@ -87,7 +89,7 @@ def set_wraps(
         for i in upwards(0, gradient.shape[1]):
             for w in lanes(width):
                 gradient[h, i, w] = 0.0
-        for side in range(2):
+        for side in range(2):  # p and d of the segment before the hole, then q and e
             far, scratch = (first, before) if side == 0 else (second, after)
             a, inverse, sign = scratch.direction, scratch.inverse, 1.0 if side == 0 else -1.0
             for r in range(3):
@@ -160,6 +162,41 @@ def single_chains(
     )
 
 
+@threaded
+def grip_rows(
+    tree: Tree,
+    routing: Routing,
+    hole: Indices,
+    own: Array,
+    cable: Indices,
+    friction: Array,
+    q: Array,
+    grip: Array,
+) -> None:
+    """Fill Σ μ φ (B, C) [-] over the holes of each cable at joint angles q (B, nv) [rad].
+
+    ``routing`` is that of the segments; ``cable`` and ``friction`` (P,) are those of the holes.
+    """
+    rows, nv = q.shape
+    frames, before, after = (
+        empty_frames(tree, routing, 1),
+        segment_scratch(nv, 1),
+        segment_scratch(nv, 1),
+    )
+    rotation, normal = np.empty((tree.parent.shape[0], 3, 3, 1)), np.empty((7, 1))
+    wrap, gradient = np.empty((hole.shape[0], 1)), np.empty((hole.shape[0], 0, 1))
+    span = np.zeros((routing.fixed.shape[0], 3), dtype=np.intp)  # no joints: no gradient
+    for n in range(rows):
+        angles = q[n].copy().reshape(nv, 1)
+        forward_kinematics(tree, routing, angles, np.empty((2, 1)), rotation, frames, None)
+        set_wraps(
+            span, routing.joint, hole, own, frames, before, after, wrap, gradient, normal, None
+        )
+        grip[n] = 0.0
+        for h in range(hole.shape[0]):
+            grip[n, cable[h]] += friction[h] * wrap[h, 0]
+
+
 @compiled
 def single_tension_stiffness(
     segment: Indices,
@@ -172,7 +209,7 @@ def single_tension_stiffness(
     slot: Indices,
     slots: int,
 ) -> Array:
-    """Compute Σ T_j ∂²l_j/∂θ² over the segments of each slot, (slots, nv, nv), of one posture."""
+    """Compute Σ T_j ∂²l_j/∂θ² (slots, nv, nv) over the segments j of each cable, at one posture."""
     nv = origin.shape[0] - 1
     total, weight = np.zeros((slots, nv, nv, 1)), tension.reshape(tension.shape[0], 1)
     frames = one_frames(origin, axis, slide, site)

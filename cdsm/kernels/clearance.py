@@ -16,12 +16,12 @@ from cdsm.support.values import Array
 
 _GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 _CUTS = 40
-"""Cuts of the golden section: the place is found to 4e-9 of the segment, the distance better."""
+"""Steps of the golden-section search: the nearest point is found to 4e-9 of the segment."""
 
 
 @inner
 def _between(p: Array, q: Array, r: Array, s: Array) -> float:
-    """Compute the distance of the segments from p to q and from r to s, points (3,) [m]."""
+    """Compute the distance [m] between the segments pq and rs; their ends are (3,) [m]."""
     a = b = c = d = e = 0.0
     for i in range(3):
         u, v, w = q[i] - p[i], s[i] - r[i], p[i] - r[i]
@@ -44,7 +44,7 @@ def _between(p: Array, q: Array, r: Array, s: Array) -> float:
 
 @inner
 def _to_disk(p: Array, q: Array, centre: Array, axis: Array, radius: float) -> float:
-    """Compute the distance of a segment from a disk; if it runs through it, −way to the edge."""
+    """Compute the distance from segment pq to a disk; if pq pierces it, minus that to the edge."""
     z0 = z1 = 0.0
     for i in range(3):
         z0 += (p[i] - centre[i]) * axis[i]
@@ -68,7 +68,7 @@ def _to_disk(p: Array, q: Array, centre: Array, axis: Array, radius: float) -> f
             low, a, at_a = a, b, at_b
             b = low + _GOLDEN * (high - low)
             at_b = _off(p, q, centre, axis, radius, z0, z1, b)
-    ends = min(
+    ends = min(  # the section never evaluates the two ends
         _off(p, q, centre, axis, radius, z0, z1, 0.0),
         _off(p, q, centre, axis, radius, z0, z1, 1.0),
     )
@@ -77,7 +77,7 @@ def _to_disk(p: Array, q: Array, centre: Array, axis: Array, radius: float) -> f
 
 @inner
 def _radius(p: Array, q: Array, centre: Array, axis: Array, t: float) -> float:
-    """Compute the distance of a point of a segment from the axis of a disk."""
+    """Compute the distance from the point p + t (q − p) to the axis of a disk."""
     square = along = 0.0
     for i in range(3):
         way = p[i] + t * (q[i] - p[i]) - centre[i]
@@ -90,15 +90,15 @@ def _radius(p: Array, q: Array, centre: Array, axis: Array, t: float) -> float:
 def _off(
     p: Array, q: Array, centre: Array, axis: Array, radius: float, z0: float, z1: float, t: float
 ) -> float:
-    """Compute the squared distance of a point of a segment from a disk."""
+    """Compute the squared distance from the point p + t (q − p) to a disk."""
     z = z0 + t * (z1 - z0)
     out = max(_radius(p, q, centre, axis, t) - radius, 0.0)
     return float(z * z + out * out)
 
 
 @inner
-def _apart(p: Array, q: Array, r: Array, s: Array) -> float:
-    """Return a lower bound of the distance of two segments: of spheres around them."""
+def _sphere_distance(p: Array, q: Array, r: Array, s: Array) -> float:
+    """Return the distance between spheres around two segments, a lower bound of theirs."""
     first = second = between = 0.0
     for i in range(3):
         x, y, way = q[i] - p[i], s[i] - r[i], p[i] + q[i] - r[i] - s[i]
@@ -122,7 +122,7 @@ def clearance_rows(
     distance: Array,
     nearest: Indices,
 ) -> None:
-    """Fill the smallest distances of cables (B, 3) [m], and which pair has each (B, 3, 2).
+    """Fill the smallest distances of cables (B, 3) [m], and the pairs that have them (B, 3, 2).
 
     Args:
         tree: The joints.
@@ -133,11 +133,11 @@ def clearance_rows(
         bone_radius: Radius of each bone (n,) [m].
         disk: Centre, and a point on the axis 1 m from it, of each disk (D, 2).
         disk_radius: Radius of each disk (D,) [m].
-        own: Whether each segment ends in a hole of each disk (S, D).
+        own: 1 or 2 if the first or second end of a segment is in a hole of the disk, else 0 (S, D).
         q: Joint angles (B, nv) [rad].
-        distance: Between axes of two cables; between the axis of a cable and the surface of a bone;
-            between the axis of a cable and a disk, or in its own hole from the edge.
-        nearest: Segments of the pair; segment and bone; segment and disk; −1: there is none.
+        distance: Between the axes of two cables; between the axis of a cable and the surface of a
+            bone; between the axis of a cable and a disk, or the edge of a disk whose hole it is in.
+        nearest: Two segments; segment and bone; segment and disk; −1 if there is no pair.
     """
     rows, nv = q.shape
     count = tree.parent.shape[0]
@@ -157,13 +157,13 @@ def clearance_rows(
                 if segment[j, 0] == cable:
                     continue
                 c, d = segment[j, 1], segment[j, 2]
-                if _apart(point[a], point[b], point[c], point[d]) < distance[n, 0]:
+                if _sphere_distance(point[a], point[b], point[c], point[d]) < distance[n, 0]:
                     found = _between(point[a], point[b], point[c], point[d])
                     if found < distance[n, 0]:
                         distance[n, 0], nearest[n, 0, 0], nearest[n, 0, 1] = found, j, i
             for j in range(bone.shape[0]):
                 c, d = bone[j]
-                bound = _apart(point[a], point[b], point[c], point[d]) - bone_radius[j]
+                bound = _sphere_distance(point[a], point[b], point[c], point[d]) - bone_radius[j]
                 if bound < distance[n, 1]:
                     found = _between(point[a], point[b], point[c], point[d]) - bone_radius[j]
                     if found < distance[n, 1]:
@@ -176,7 +176,10 @@ def clearance_rows(
                 if own[i, j]:
                     end = 0.0 if own[i, j] == 1 else 1.0
                     found = radius - _radius(point[a], point[b], point[c], axis, end)
-                elif _apart(point[a], point[b], point[c], point[c]) - radius < distance[n, 2]:
+                elif (
+                    _sphere_distance(point[a], point[b], point[c], point[c]) - radius
+                    < distance[n, 2]
+                ):
                     found = _to_disk(point[a], point[b], point[c], axis, radius)
                 else:
                     continue

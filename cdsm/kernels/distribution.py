@@ -1,9 +1,9 @@
-"""Kernel of tension distribution: it guesses or searches tensions, then verifies them.
+"""Numba kernels of tension distribution (Eq. 17): guess or search, then verify the tensions.
 
-min ½‖F‖²   so that   J_Lᵀ F = J_Xᵀ W − g   and   low ≤ F ≤ high.
+    min ½‖F‖²   subject to   J_Lᵀ F = J_Xᵀ W − g   and   low ≤ F ≤ high.
 
-Most guesses of a block of postures are optimal. The others are searched one by one, by a kernel
-that is compiled when it is first needed.
+Most guesses of a block of postures are optimal. The other postures are solved one by one, by a
+kernel that is compiled when it is first needed.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def set_torque(
 
 @inner
 def set_arms(J: Array, smallest: float, arms: Array, width: Width) -> None:
-    """Copy J_L (C, nv, W) without moment arms of rounding."""
+    """Copy J_L (C, nv, W); moment arms below ``smallest`` [m] are rounding and become zero."""
     for c in upwards(0, J.shape[0]):
         for i in upwards(0, J.shape[1]):
             for w in lanes(width):
@@ -62,7 +62,7 @@ def distribute(
     tension: Array,
     width: Width,
 ) -> None:
-    """Guess the least tensions (C, W); they are if ``certificate`` is optimal, and none failed.
+    """Guess the least tensions (C, W); right where ``certificate`` is optimal and no block failed.
 
     J is J_L (C, nv, W), with moment arms of rounding set to zero; b is the torque to balance (nv,
     W); ``low`` and ``high`` are the bounds (C, W).
@@ -75,7 +75,7 @@ def distribute(
 
 @inner
 def set_within(F: Array, low: Array, high: Array, tension: Array, width: Width) -> None:
-    """Fill the tensions (C, W) with F within the bounds: rounding may not cross an active bound."""
+    """Fill the tensions (C, W) with F, limited to the bounds, which rounding may have crossed."""
     for c in upwards(0, F.shape[0]):
         for w in lanes(width):
             tension[c, w] = min(max(F[c, w], low[c, w]), high[c, w])
@@ -95,9 +95,10 @@ def single_guess(
     high: Array,
     smallest: float,
 ) -> tuple[Array, bool]:
-    """Guess the tensions (C,) of one posture; they are the least if the second result is true.
+    """Guess the least tensions (C,) [N] of one posture, and say whether they are optimal.
 
-    The first four arguments are the fields of :class:`Blocks`. The guess has the bits of a batch.
+    The first four arguments are the fields of :class:`Blocks`; the others are J_X, J_L, g, W, the
+    bounds, and the least moment arm that counts [m]. The bits are those of a block of postures.
     """
     count, nv = length_jacobian.shape
     blocks = Blocks(row, row_start, cable, cable_start)
@@ -123,7 +124,7 @@ def search_tensions(
     tension: Array,
     outcome: Indices,
 ) -> None:
-    """Fill the tensions (r, C) and the outcome (r,) of postures whose guess is not the optimum.
+    """Solve for the tensions (r, C) of postures whose guess is wrong; fill the outcome (r,).
 
     J is (r, C, nv) and b (r, nv); ``low`` and ``high`` are (r, C): as in :func:`distribute`.
     Without an outcome OPTIMAL, the tensions are meaningless.

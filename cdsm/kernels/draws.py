@@ -51,7 +51,7 @@ def stiffness_of_draws(
     The first arguments are those of :func:`~cdsm.kernels.posture.single_pose` that all arms share;
     then ``first`` (C+1,), the first site of each cable, and 1/k_series and the tension at rest of
     the series springs (C,). Each arm has its own q (N, nv), tensions and EA (1 + ε) (N, C), leads
-    (N, C), masses (N, nv+1), and its own places (N, …) in the frames of the joints.
+    (N, C), masses (N, nv+1), and (N, …) sites, joint origins, centres of mass and tip.
     """
     cables, fixed = tension.shape[1], np.empty(tension.shape[1])
     none = np.zeros(cables)

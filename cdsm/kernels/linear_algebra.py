@@ -5,7 +5,7 @@ that run these kernels: the inverse of an 80×80 matrix then took 16 ms. Microse
 alone / in a block of 32 / in LAPACK called from a kernel:
 
     n                                      5               10               20              40
-    linear system, 10 sides  0.3 / 0.1 / 1.0  0.9 / 0.4 / 2.0  3.3 / 1.8 / 4.9     14 / 9 / 13
+    linear system, 10 right  0.3 / 0.1 / 1.0  0.9 / 0.4 / 2.0  3.3 / 1.8 / 4.9     14 / 9 / 13
     smallest eigenvalue      0.6 / 0.2 / 1.5  2.0 / 0.5 / 4.5   6.7 / 2.5 / 13    30 / 16 / 54
     singular values, 3 rows  0.8 / 0.2 / 3.1  1.2 / 0.3 / 3.2  1.2 / 0.5 / 3.3  1.9 / 0.8 / 4.2
 """
@@ -236,10 +236,10 @@ def _tridiagonalise(A: Array, d: Array, e: Array, scratch: Array, width: Width) 
 
 @inner
 def singular_values(rows: Array, left: Array, values: Array, scratch: Array, width: Width) -> None:
-    """Replace three rows (3, n, W) by left (3, 3, W) and values (3, W) times orthonormal rows.
+    """Decompose matrices of three rows (3, n, W) as U S V; ``left`` becomes U, ``rows`` becomes V.
 
-    Jacobi rotations make the rows orthogonal. They are not sorted, and rows of length zero stay
-    zero. ``scratch`` is (5, W).
+    U is (3, 3, W), ``values`` (3, W) are the diagonal of S, not sorted. Jacobi rotations make the
+    rows orthogonal; rows of length zero stay zero. ``scratch`` is (5, W).
     """
     aa, bb, ab, cosine, sine = scratch[0], scratch[1], scratch[2], scratch[3], scratch[4]
     for i in upwards(0, left.shape[0]):

@@ -19,6 +19,10 @@ def principal_stiffness(compliance: Array) -> dict[str, Array]:
 
     Args:
         compliance: C_vv (..., 3, 3) [m/N], positive semidefinite, as for stable arms.
+
+    Returns:
+        By name: softest and stiffest [N/m], inf if rigid; their directions (..., 3); anisotropy,
+        stiffest/softest, 1 if the tip cannot move; isotropy, its inverse.
     """
     values, vectors = np.linalg.eigh((compliance + compliance.swapaxes(-1, -2)) / 2.0)
     most = values[..., 2]

@@ -25,7 +25,7 @@ def read(
 ) -> dict[str, Array]:
     """Compute the wanted readings of blocks of postures; set their status.
 
-    Postures that are UNREAD stay so; their readings are meaningless. If the tip is immobile,
+    UNREAD postures keep their status; their readings are meaningless. If the tip is immobile,
     pseudoinverse and cartesian are NaN. If K_θ is singular, ``along`` is NaN, or infinite in
     directions in which the tip cannot move; compliance and cartesian are meaningless.
 
@@ -34,7 +34,7 @@ def read(
         parts: P (B, nv, nv, W), the sum of the magnitudes of the four terms.
         JX: J_X (B, 6, nv, W).
         directions: Unit vectors u (D, 3) of ``along``.
-        wanted: Of ``margin``, ``pseudoinverse``, ``along``, ``compliance``, ``cartesian``.
+        wanted: Any of ``margin``, ``pseudoinverse``, ``along``, ``compliance``, ``cartesian``.
         status: READ or UNREAD (B, W); on return also SINGULAR or IMMOBILE.
         width: W, or None for one posture.
 
@@ -53,7 +53,7 @@ def read(
     if "pseudoinverse" in wanted:
         found["pseudoinverse"] = matrix = np.empty((blocks, 3, 3, side))
         kernels.set_pseudoinverses(K, left, right, status, matrix, width)
-    # behind K_θ and a probing torque: J_vᵀu, then J_Xᵀ, then Vᵀ
+    # columns of the system: K_θ, a probing torque, J_vᵀu, J_Xᵀ, Vᵀ
     first = nv + 1 + ("along" in wanted) * len(directions)
     columns = first + 6 * ("compliance" in wanted) + 3 * ("cartesian" in wanted)
     if columns == nv + 1:
@@ -89,9 +89,9 @@ def read_margin(K: Array) -> float:
 
 
 def _find_singular(K: Array, scale: Array, peak: Array, status: Indices) -> None:
-    """Set the status of the doubtful postures whose K_θ is singular, by its singular values.
+    """Set SINGULAR where ``peak`` > 0 and the singular values of K_θ confirm it.
 
-    They take ten times as long as all the rest, and are rarely needed.
+    Singular values take ten times as long as all the rest, and are rarely needed.
     """
     for b, w in np.argwhere(peak > 0.0):
         if peak[b, w] < math.inf:  # else a joint has zero stiffness in all terms

@@ -1,4 +1,4 @@
-"""Kernels that compute readings of K_θ: stability margin, compliance and Cartesian stiffness.
+"""Numba kernels of readings of K_θ: stability margin, compliance and Cartesian stiffness.
 
 The arrays hold blocks of postures: the first axis is the block, the last one the posture in it. One
 posture is one block of one, with the width None. :mod:`cdsm.kernels.read` calls these kernels. Each
@@ -136,10 +136,11 @@ def _set_product(K: Array, right: Array, image: Array, width: Width) -> None:
 def solve(
     K: Array, parts: Array, system: Array, status: Indices, scale: Array, peak: Array, width: Width
 ) -> int:
-    """Replace the columns B behind the first nv + 1 of the system by K_θ⁻¹ B; count the doubtful.
+    """Replace the columns B behind the first nv + 1 of the system by K_θ⁻¹ B.
 
     K is K_θ and ``parts`` is P, (B, nv, nv, W). ``scale`` becomes D^-½ (B, nv, W). ``peak`` (B, W)
-    becomes the largest entry of D^-½ P D^-½ where K_θ may be singular, else 0.
+    becomes the largest entry of D^-½ P D^-½ where K_θ may be singular, else 0. Returns the number
+    of such postures.
     """
     rows, largest, doubtful = np.empty((4, K.shape[3])), np.empty(K.shape[3]), 0
     moved = np.empty(K.shape[3])
@@ -307,7 +308,7 @@ def _set_unit(both: Array, width: Width) -> None:
 
 @inner
 def _project(A: Array, B: Array, first: Index, out: Array, width: Width) -> None:
-    """Fill the first m columns of out with A (m, nv, W) times m columns of B (nv, …, W)."""
+    """Set out (m, m) to A (m, nv) times the m columns of B from ``first`` on, in each posture."""
     m = A.shape[0]
     for a in upwards(0, m):
         for c in upwards(0, m):

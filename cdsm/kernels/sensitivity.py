@@ -1,26 +1,28 @@
-"""Numba kernel of the derivatives of a stiffness by everything that an arm is built from.
+"""Numba kernel of derivatives of a stiffness with respect to dimensions and masses of an arm.
 
-Every reading of a stiffness has one quantity in common: with a fixed joint motion z,
+All derivatives of stiffnesses follow from those of one quantity. With a fixed joint motion z,
 
     Φ = zᵀ K_θ z = Σ_c (F_c L̈_c + k_c L̇_c²) − Σ_b m_b γ·ẍ_b − f·ẍ_tip − m·ω̇_tip,
 
-where a dot is the derivative along q̇ = z, q̈ = 0. The smallest eigenvalue of K_θ has the gradient
-of Φ with z its eigenvector. For the compliance c = uᵀ J_v K_θ⁻¹ J_vᵀ u, z = K_θ⁻¹ J_vᵀ u gives
+where a dot is the derivative along q̇ = z, q̈ = 0. The cables c have tensions F and stiffnesses k,
+the bodies b have masses m_b and centres x_b; γ is gravity, W = (f, m) the load at the tip. The
+smallest eigenvalue of K_θ has the gradient of Φ with z its unit eigenvector. The compliance c = uᵀ
+J_v K_θ⁻¹ J_vᵀ u has, with z = K_θ⁻¹ J_vᵀ u,
 
     dc = −dΨ,    Ψ = Φ − 2 u·ẋ_tip.
 
-Ψ depends only on places x, velocities ẋ and accelerations ẍ of points that links carry: cable
-sites, centres of mass and the tip. The kernel finds its derivatives X, V, A by these three, point
-by point, and then turns them into derivatives by what moves the points:
+Ψ depends only on positions x, velocities ẋ and accelerations ẍ of points of links: cable sites,
+centres of mass and the tip. The kernel computes X = ∂Ψ/∂x, V = ∂Ψ/∂ẋ and A = ∂Ψ/∂ẍ of each point,
+and from them the derivatives with respect to
 
-- by the position of a point in its link. A displacement δ changes x by δ, ẋ by ω × δ and ẍ by ω̇ × δ
-  + ω × (ω × δ).
-- by the origin of a joint in its parent link: the sum of the same over all points beyond it.
-- by a joint angle: the points beyond the joint turn, and their motion relative to the parent link
+- the position of a point in its link: a displacement δ changes x by δ, ẋ by ω × δ and ẍ by ω̇ × δ +
+  ω × (ω × δ);
+- the origin of a joint in its parent link: the sum of these over all points beyond the joint;
+- a joint angle: the points beyond the joint turn, and their motion relative to the parent link
   turns with them.
 
-One pass over the cables and one over the points of each joint give all derivatives together, where
-differences would take two evaluations of K_θ for each.
+One pass over the cables and one over the points of each joint give all derivatives. Differences
+would take two evaluations of K_θ for each.
 """
 
 from __future__ import annotations
@@ -109,7 +111,8 @@ def _add_cable(
 ) -> tuple[float, float]:
     """Add the derivatives of F L̈ + k L̇² + p L̇ of one cable; return L̈ and L̇.
 
-    ``point`` and ``weight`` (N, 3, 3) hold x, ẋ, ẍ and the derivatives by them. ``slope`` is ∂k/∂L.
+    ``point`` (N, 3, 3) are x, ẋ and ẍ of each site, ``weight`` (N, 3, 3) X, V and A. ``slope`` is
+    ∂k/∂L.
     """
     rate = bend = 0.0
     u, v, w = np.empty(3), np.empty(3), np.empty(3)
@@ -149,7 +152,7 @@ def _add_cable(
 
 @inner
 def _pull_back(turning: Array, rate: Array, weight: Array, scratch: Array, pulled: Array) -> None:
-    """Fill X + V × ω + A × ω̇ + (A × ω) × ω (3,): the derivative by a displacement in a frame."""
+    """Fill X + V × ω + A × ω̇ + (A × ω) × ω (3,), ∂Ψ/∂δ for a displacement δ in a moving frame."""
     X, V, A = weight[0], weight[1], weight[2]
     _cross(A, turning, scratch)
     w, e, s = turning, rate, scratch
@@ -173,17 +176,17 @@ def _by_joint(
     tip: Index,
     placement: Array,
 ) -> float:
-    """Fill the derivative by the origin of joint i (3,) in base axes; return that by its angle.
+    """Fill ∂Ψ/∂(origin of joint i) (3,) in base axes; return ∂Ψ/∂q_i.
 
     ``beyond`` (nv+1,) marks the rows that joint i moves. ``spin`` and ``spin_rate`` (3,) are the
-    derivatives by ω and ω̇ of the tip.
+    derivatives with respect to ω and ω̇ of the tip.
     """
     origin, axis, slide = frames
     turning, rate, velocity, acceleration = motion
     w, e = turning[before], rate[before]
     arm, v, a, back, scratch = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     total, moment = np.zeros(3), np.zeros(3)
-    # the joint's own slide moves its origin beyond the point fixed to the parent
+    # a sliding joint moves its own origin relative to the parent
     for n in range(row.shape[0]):
         if beyond[row[n]] == 0.0:
             continue
@@ -279,17 +282,17 @@ def single_gradient(
             − a (Σ_b m_b γ·ẍ_b + f·ẍ_tip + m·ω̇_tip) − b (Σ_b m_b γ·ẋ_b + f·ẋ_tip + m·ω_tip)
 
     With a = 1 and p = b = 0 it is zᵀ K_θ z + v·ẋ_tip. With F = k = v = a = 0, b = 1 and p the
-    tensions, it is the work of the torque out of balance (Eq. 13) on the motion z.
+    tensions, it is zᵀ (J_Lᵀ F + g − J_Xᵀ W), the work of the residual of Eq. 13 on the motion z.
 
     The first arguments are those of :func:`~cdsm.kernels.posture.single_pose`. ``first`` (C+1,) is
     the first site of each cable, ``z`` (nv,) the joint motion, ``velocity`` v (3,), ``stiffness``
     k (C,), ``slope`` ∂k/∂L (C,), ``pull`` p (C,), ``bent`` a and ``turned`` b.
 
     Returns:
-        Ψ, and its derivatives by q (nv,), by the site positions in the frames of their joints (P,
-        3), by the origins of the joints in their parents (nv+1, 3), by the centres of mass (nv+1,
-        3), by the tip's position (3,), by the masses (nv+1,), by tension at constant k (C,), and by
-        k (C,). The derivative by the length of a straight lead is ``slope`` times the last one.
+        Ψ, and its derivatives with respect to q (nv,), the sites in the frames of their joints (P,
+        3), the origins of the joints in their parents (nv+1, 3), the centres of mass (nv+1, 3), the
+        position of the tip (3,), the masses (nv+1,), the tensions at constant k (C,), and k (C,).
+        The derivative with respect to the length of a lead is ``slope`` times the last one.
     """
     tree = Tree(parent, order, turn, translation, joint_axis, joint_slide)
     routing = Routing(row, point, segment, joint, fixed)
@@ -304,7 +307,7 @@ def single_gradient(
     )
     _set_motion(tree, origin, axis, slide, z, motion)
     turning, rate, moving, acceleration = motion
-    # all points that matter: sites, centres of mass, tip
+    # all points: sites, centres of mass, tip
     count = sites + rows + 1
     at = np.empty(count, dtype=np.intp)
     x, weight = np.empty((count, 3, 3)), np.zeros((count, 3, 3))

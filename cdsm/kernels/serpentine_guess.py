@@ -4,9 +4,9 @@ The cables that end at a joint turn this joint and the joints before it, but no 
 J_Lᵀ is block triangular. From the last joint to the first, one cable per axis (at most two) is
 raised above its lower bound to balance the joint. From the first joint to the last, the multipliers
 follow from these cables. Mostly this guess is the optimum. With three cables for each universal
-joint, it was the optimum in all of 9000 random postures up to half the joint limits. Up to nine
-tenths of the limits, it was the optimum in three of four postures. A guess takes 0.3 to 1.5 µs, a
-search by :mod:`cdsm.kernels.active_set` 9 to 16 µs.
+joint, it was the optimum in all of 9000 random postures up to half the joint limits, and in three
+of four postures up to nine tenths of the limits. A guess takes 0.3 to 1.5 µs, a search by
+:mod:`cdsm.kernels.active_set` 9 to 16 µs.
 """
 
 from __future__ import annotations
@@ -82,11 +82,12 @@ class Guess(NamedTuple):
     Attributes:
         F: Tensions (C, W) [N].
         y: Multipliers with J_L y = F for the cables above their lower bounds (nv, W).
-        failed: The block of joints that no two cables balance (W,), or −1.
+        failed: The first block that no pair of its cables balances (W,), or −1.
         lacking: Missing torque of that block (2, W).
-        chosen: Numbers of the two cables above their bounds, in each block of joints (K, 2, W).
+        chosen: The two cables above their lower bounds, numbered within each of the K blocks (K, 2,
+            W).
         best: Cost, tensions to add and numbers of the best pair of cables (5, W).
-        pair: The same of one pair, and its determinant (4, W).
+        pair: Scratch of the pair that is tried (4, W).
     """
 
     F: Array
@@ -118,8 +119,8 @@ def guess_tensions(
 ) -> None:
     """Fill tensions that balance the arm with the fewest cables above their lower bounds.
 
-    W is the number of postures. J is J_L (C, nv, W), b the torque to balance (nv, W), ``low`` and
-    ``high`` are the bounds (C, W). The search ends early if none of the W postures can be balanced.
+    J is J_L (C, nv, W), b the torque to balance (nv, W), ``low`` and ``high`` are the bounds (C,
+    W). The search ends early if no posture of the block can be balanced.
     """
     row, row_start, cable, cable_start = blocks
     F, failed, lacking, best = guess.F, guess.failed, guess.lacking, guess.best
@@ -159,7 +160,7 @@ def guess_tensions(
 def _set_best(
     J: Array, low: Array, high: Array, own: Indices, i: Index, j: Index, guess: Guess, width: Width
 ) -> None:
-    """Find the pair of cables that gives the lacking torque at least ‖F‖²; one cable if i is j."""
+    """Find the two cables that give the missing torque at the least ‖F‖²; one cable if i is j."""
     lacking, best, pair = guess.lacking, guess.best, guess.pair
     for r in range(5):
         for w in lanes(width):
@@ -184,7 +185,7 @@ def _set_best(
 def _solve_pair(
     a: Array, b: Array, c: Array, d: Array, torque: Array, x: Array, y: Array, width: Width
 ) -> None:
-    """Fill x and y (W,) so that two cables with the moment arms (a, b) and (c, d) give a torque."""
+    """Fill the tensions x and y (W,) with which moment arms (a, b) and (c, d) give a torque."""
     for w in lanes(width):
         determinant = a[w] * d[w] - b[w] * c[w]
         x[w] = (torque[0, w] * d[w] - torque[1, w] * c[w]) / determinant
@@ -208,7 +209,7 @@ def _keep_better(
     best_q: Array,
     width: Width,
 ) -> None:
-    """Keep what is added to the cables p and q (W,) where it fits and is the least yet."""
+    """Keep the tensions added to cables p and q (W,) if they are admissible and cost least."""
     for w in lanes(width):
         # cables that cannot give the torque have infinite x and y, or NaN
         within = 0.0 <= x[w] < math.inf and 0.0 <= y[w] < math.inf
@@ -231,7 +232,7 @@ def set_multipliers(
     y, chosen, p, q = guess.y, guess.chosen, guess.best, guess.pair
     for k in range(first, row_start.shape[0] - 1):
         i, j = np.uint64(row[row_start[k]]), np.uint64(row[row_start[k + 1] - 1])
-        # of the two chosen cables p and q: J at i, J at j, and F − J y of the blocks before
+        # rows of p and q, the two chosen cables: J at i, J at j, and F − J y of the earlier blocks
         for r in range(3):
             for w in lanes(width):
                 p[r, w] = q[r, w] = 0.0
@@ -272,7 +273,7 @@ def is_provably_infeasible(
     from the torques of the block's cables; mostly the line is along one of these torques. For the
     joints behind it, v is such that their chosen cables do no work.
 
-    The arrays are those of one posture, with a last axis of 1; ``zero`` (C, 1) holds zeros.
+    The arrays are those of one posture, with a last axis of 1; ``zero`` (C, 1) are zeros.
     """
     row, row_start, cable, cable_start = blocks
     k, v, count, nv = int(guess.failed[0]), guess.y, J.shape[0], J.shape[1]

@@ -1,4 +1,4 @@
-"""Numba kernels of the terms of Eq. 16, for blocks of postures; the posture is the last axis."""
+"""Numba kernels of the terms of K_θ (Eq. 16), for blocks of W postures (last axis)."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def set_cable_stiffness(
     stiffness: Array,
     width: Width,
 ) -> None:
-    """Fill k = 1/(l_0/EA + 1/k_series) (C, W) [N/m]; 0 where EA is 0, for motors that hold force.
+    """Fill k = 1/(l_0/EA + 1/k_series) (C, W) [N/m]; 0 where EA is 0: the motor controls the force.
 
     The length of the wire is the cable length L without the series spring, ℓ = L − (F −
     F_0)/k_series. Therefore l_0/EA = ℓ/(EA (1 + ε)). ``rigidity`` is EA (1 + ε) (C, W) [N],
@@ -47,7 +47,7 @@ def add_passive_stiffness(
             min(c + np.uint64(1), count - np.uint64(1)),
             min(c + np.uint64(2), count - np.uint64(1)),
         )
-        end = nv  # only the joints before its end change a cable's length
+        end = nv  # joints behind the end of a cable do not change its length
         while end > 0 and not _moves(J, c, d, e, end - one, width):
             end -= one
         for i in range(end):

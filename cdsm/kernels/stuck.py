@@ -1,13 +1,13 @@
 """Numba kernels of stuck cables, for blocks of postures: their passive stiffness.
 
-While a cable sticks, the segments between two holes that hold are one spring (a block) with
+A hole holds a cable if it has friction and the cable bends there. While a cable sticks, its
+segments between two such holes are one spring, called a block here, with
 
-    k = 1/(l/EA + 1/k_series),   passive stiffness Σ_blocks k g gᵀ,   g = ∂l/∂θ.
+    k = 1/(l_0/EA + 1/k_series),   passive stiffness Σ_blocks k g gᵀ,   g = ∂l/∂θ,
 
-l is the natural length of the block; only the first block of a cable has the series spring, and
-its stiffness is zero if the motor holds the force. A hole holds if it has friction and the cable
-turns there. Which holes hold depends on the posture: each posture of a block closes its blocks at
-its own holes.
+its length l and its original length l_0. Only the first block of a cable has the series spring; it
+has no stiffness if the motor controls the force. Which holes hold depends on the posture, so blocks
+of one cable end at other holes in other postures.
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ from cdsm.support.values import Array
 
 
 class Holes(NamedTuple):
-    """Holes and wires of all cables; sites P are counted through all cables, as in Routing.
+    """Holes and wires of all cables; the P sites of all cables follow each other, as in Routing.
 
     Attributes:
-        first: Number of the first site of each cable, and at last the number of sites (C+1,).
+        first: Index of the first site of each cable, and P at the end (C+1,).
         friction: μ of each site (P,) [-]; 0 where no hole is.
-        wrap: Wrap angle of its own of each site (P,) [rad].
+        wrap: Constant angle added to the wrap angle at each site (P,) [rad].
         lead: Length of each lead (C,) [m].
         axis: Direction of each lead in the frame of the joint of its first site (C, 3).
-        locked: 1 for each cable with a locked motor, 0 where the motor holds the force (C,).
+        locked: 1 for each cable with a locked motor, 0 where the motor controls the force (C,).
         constant: Constant part of EA (1 + ε) of each wire (C,) [N].
         linear: Factor (C,) of the tension in EA (1 + ε): 1 for linear laws, else 0.
     """
@@ -49,11 +49,11 @@ class Holes(NamedTuple):
 
 
 class Sticking(NamedTuple):
-    """Scratch: the open block of a cable, in W postures.
+    """Scratch: the block of a cable that is being added up, in W postures.
 
-    Its natural length under tension l and the compliance of its spring (W,), whether its motor is
-    locked (W,), ∂l/∂θ (nv, W); whether a hole holds (W,), the stiffness (W,), a product (W,), and
-    the direction of the cable before the hole (3, W).
+    Its length l without the spring, the compliance of the spring, and 1 unless its motor controls
+    the force, (W,) each; ∂l/∂θ (nv, W); 1 where the present hole holds, the stiffness of the block
+    and a product, (W,) each; the direction of the cable before the hole (3, W).
     """
 
     length: Array
@@ -98,7 +98,7 @@ def add_stuck_stiffness(
 ) -> None:
     """Add Σ k g gᵀ over the blocks of all cables to a matrix (nv, nv, W), for i ≤ j only.
 
-    ``wire`` is EA (1 + ε) (C, W) [N], also of cables whose motor holds the force.
+    ``wire`` is EA (1 + ε) (C, W) [N], also of cables whose motor controls the force.
     """
     segment, joint, across = routing.segment, routing.joint, scratch.direction
     d, along, inverse = scratch.derivative, scratch.along, scratch.inverse
@@ -123,6 +123,7 @@ def add_stuck_stiffness(
                     block.before[r, w] = across[r, w]
             for w in lanes(width):
                 block.length[w] += scratch.length[w]
+            # add u·d to g; segments that no joint changes are not in the routing
             if s < segment.shape[0] - 1 and np.uint64(segment[s, 1]) == p:
                 for w in lanes(width):
                     inverse[w] = 1.0 / scratch.length[w]
@@ -155,7 +156,7 @@ def open_blocks(
     block: Sticking,
     width: Width,
 ) -> None:
-    """Open the first block of cable c: its lead and its series spring."""
+    """Start the first block of cable c with its lead and its series spring."""
     for w in lanes(width):
         block.length[w] = holes.lead[c] - series[c] * (tension[c, w] - rest[c])
     for w in lanes(width):
@@ -178,7 +179,7 @@ def set_lead(
 
 @inner
 def set_way(site: Array, p: Index, scratch: Segments, width: Width) -> None:
-    """Fill the way (3, W) from site p to the next one in place of u, and its length (W,)."""
+    """Fill the vector (3, W) from site p to the next one in place of u, and its length (W,)."""
     across, length = scratch.direction, scratch.length
     far = p + np.uint64(1)
     for r in upwards(0, across.shape[0]):
@@ -193,7 +194,7 @@ def set_way(site: Array, p: Index, scratch: Segments, width: Width) -> None:
 
 @inner
 def set_holding(own: float, a: Array, b: Array, holds: Array, width: Width) -> None:
-    """Fill 1 where a hole with friction holds (W,): the cable turns from a to b (3, W), else 0."""
+    """Fill ``holds`` (W,): 1 where a hole holds a cable that bends from a to b (3, W), else 0."""
     more = own - STRAIGHT
     for w in lanes(width):
         x = a[1, w] * b[2, w] - a[2, w] * b[1, w]
@@ -219,7 +220,7 @@ def set_stiffness(wire: Array, c: Index, block: Sticking, width: Width) -> None:
 
 @inner
 def open_next(block: Sticking, width: Width) -> None:
-    """Open the next block where a hole holds: no spring in series, no motor."""
+    """Start the next block, with no series spring and no motor, where a hole holds."""
     length, soft, locked, holds = block.length, block.soft, block.locked, block.holds
     for w in lanes(width):
         length[w] = 0.0 if holds[w] > 0.0 else length[w]

@@ -1,10 +1,10 @@
 """Numba kernels of the tension problem: make it dimensionless, and verify every solution.
 
-    min ½‖F‖²   so that   J_Lᵀ F = τ   and   low ≤ F ≤ high.
+    min ½‖F‖²   subject to   J_Lᵀ F = τ   and   low ≤ F ≤ high.
 
 The problem is strictly convex. A point from any solver or guess is the optimum if it meets the
-Karush-Kuhn-Tucker conditions. A Farkas vector proves that the constraints are infeasible. The
-tolerances below hold for single postures and batches.
+Karush-Kuhn-Tucker conditions. A Farkas vector proves that the constraints are infeasible. Single
+postures and batches use the same tolerances.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from cdsm.kernels.compiling import Width, compiled, inner, lanes, upwards
 from cdsm.support.values import Array
 
 NO_ARM = 1e-15
-"""Moment arm, relative to the arm's length, that counts as rounding (cable through the axis)."""
+"""Moment arm, over the length of the arm, that counts as rounding: the cable crosses the axis."""
 
 OPTIMALITY = 1e-9
 """Largest accepted violation of balance, bounds and stationarity, relative to the largest force."""
@@ -138,16 +138,16 @@ def set_violations(
     violations: Array,
     width: Width,
 ) -> None:
-    """Measure how far points x are from the optimum of min ½‖x‖² so that Jᵀ x = b, low ≤ x ≤ high.
+    """Measure how far x is from the optimum of min ½‖x‖² subject to Jᵀ x = b, low ≤ x ≤ high.
 
-    J is (n, m, W), b is (m, W), and low, high and x are (n, W); high may hold inf. y (m, W) are the
+    J is (n, m, W), b is (m, W), and low, high and x are (n, W); high may be inf. y (m, W) are the
     multipliers of the equations. z (n, W) are the multipliers of the bounds: negative at low,
     positive at high.
 
     The first three rows of ``violations`` (5, W) are all zero exactly at the optimum. First, the
     largest violation of balance (divided by the largest moment arm) and of the bounds. Second, the
-    largest entry of x + J y + z, or of z⁺ where high is infinite. Third, the duality gap |xᵀx + bᵀy
-    + lowᵀz⁻ + highᵀz⁺|; twice the gap bounds the squared distance from the optimum.
+    largest |x + J y + z|, or z⁺ where high is infinite. Third, the duality gap |xᵀx + bᵀy + lowᵀz⁻
+    + highᵀz⁺|; twice the gap bounds the squared distance from the optimum.
     """
     primal, dual, gap, arm, term = (
         violations[0],
@@ -203,8 +203,8 @@ def set_optimal(
 ) -> None:
     """Set ``scratch.optimal`` (W,) to 1 where F (C, W) is the optimum, else to 0.
 
-    v (nv, W) gives J_L v = F for cables between their bounds. The multipliers are y = −v, and z =
-    J_L v − F at a bound, elsewhere 0.
+    v (nv, W) satisfies J_L v = F for cables between their bounds. The multipliers are y = −v, and z
+    = J_L v − F at a bound, elsewhere 0.
     """
     y, z, violations, force, optimal = scratch
     for w in lanes(width):

@@ -1,7 +1,7 @@
-"""Numba kernel of laws of rigidity that are polynomials in the tension, as of the strand (Eq. 19).
+"""Numba kernel of laws EA(F) that are polynomials on intervals (panels) of tension, such as Eq. 19.
 
-Polynomials and integrals have the bits of :mod:`cdsm.wires.quadrature`, which takes one tension
-after the other and twice as long.
+The results have the bits of :mod:`cdsm.wires.quadrature`, which takes one tension at a time and
+twice as long.
 """
 
 from __future__ import annotations
@@ -19,14 +19,15 @@ AT_ONCE = 4
 
 
 class Wires(NamedTuple):
-    """Laws of all cables; the panels of different laws stand one after the other.
+    """Laws of all cables; the panels of one law follow those of another.
 
     Attributes:
-        panels: First and last panel of the law of each cable (C, 2); last below first: another law.
+        panels: First and last panel of the law of each cable (C, 2); last below first if the law is
+            no polynomial.
         ends: Of each law (C, 6): least and largest tension; tension below which the wire is slack
-            and its rigidity constant, −inf if the law has no slack branch; least tension of the
-            polynomials and the rigidity there [N]; 1 if the original length is the unstrained one.
-        edges: Begin and end of each panel [N], and the strain at its begin (3, P).
+            and EA constant, −inf if there is none; least tension of the polynomials, and EA there
+            [N]; 1 if the original length is the unstrained one, 0 if it is the stretched one.
+        edges: Start and end of each panel [N], and the strain at its start (3, P).
         coefficients: Of the polynomial on each panel, lowest power first (powers, P).
         nodes: Nodes and weights of the Gauss rule on (0, 1), (2, N).
     """
@@ -76,7 +77,7 @@ def set_wire_rigidity(
             x[w] = max(tension[c, w], lowest)
         for w in lanes(width):
             panel[w] = first
-        for p in upwards(first, last):
+        for p in upwards(first, last):  # the panel of each tension, without a branch
             end = wires.edges[1, p]
             for w in lanes(width):
                 panel[w] += 1 if x[w] > end else 0
@@ -91,7 +92,7 @@ def set_wire_rigidity(
             inside[w] = x[w] - begin[w]
         for w in lanes(width):
             total[w] = 0.0
-        for n in upwards(0, wires.nodes.shape[1]):
+        for n in upwards(0, wires.nodes.shape[1]):  # Gauss rule for ∫ dF/EA from the panel's start
             at, weight = wires.nodes[0, n], wires.nodes[1, n]
             for w in lanes(width):
                 node[w] = begin[w] + inside[w] * at

@@ -79,7 +79,7 @@ def inverse_kinematics(
     *,
     tolerance: float = _TOLERANCE,
 ) -> KinematicSolution:
-    """Find joint angles for a tip target: min ½‖θ − guess‖² so that tip(θ) = target (Eq. 7).
+    """Find joint angles for a tip target: min ½‖θ − guess‖² with tip(θ) = target (Eq. 7).
 
     The angles are within the joint limits. A redundant arm has many solutions. This one is nearest
     to the guess, at least locally: except for joints at a limit, θ − guess has no component in the
@@ -165,6 +165,6 @@ def _checked_target(target: ArrayLike) -> Array:
         )
     if np.linalg.det(R) < 0.0:
         raise InvalidInput(
-            "target", "its upper left 3×3 block mirrors: its determinant is −1; turn an axis round."
+            "target", "its upper left 3×3 block mirrors: its determinant is −1; reverse an axis."
         )
     return frozen(array)

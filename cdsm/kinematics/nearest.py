@@ -2,11 +2,11 @@
 
 The residual r(q) is dimensionless. If r = 0 is possible, the solution solves
 
-    min ½‖q − guess‖²   so that   r(q) = 0   and   lower ≤ q ≤ upper.
+    min ½‖q − guess‖²   subject to   r(q) = 0   and   lower ≤ q ≤ upper.
 
 Otherwise it has the least ½‖r‖². Both are the limit ε → 0 of the solution of
 
-    min ½‖r‖² + ½ε‖q − guess‖²   so that   lower ≤ q ≤ upper.
+    min ½‖r‖² + ½ε‖q − guess‖²   subject to   lower ≤ q ≤ upper.
 
 This least-squares problem has full rank, even with redundant joints or redundant equations. scipy
 solves it for decreasing ε, each time from the previous solution, first from the guess. Newton's

@@ -116,16 +116,10 @@ def clearance(pose: Posture, diameter: float = 0.0) -> Clearance:
 def clearances(
     arm: Manipulator, q: ArrayLike, diameter: float = 0.0, *, threads: int | None = None
 ) -> dict[str, Array]:
-    """Compute the distances of :func:`clearance` at many postures, (B,) [m] each, by name.
+    """Compute the distances of :func:`clearance` at postures q (B, nv) [rad], (B,) [m] by name.
 
-    Args:
-        arm: The arm.
-        q: Joint angles (B, nv) [rad].
-        diameter: Diameter of all cables [m].
-        threads: Maximum number of threads; by default one for each core.
-
-    Raises:
-        InvalidInput: ``q`` is not (B, nv) numbers, or ``diameter`` is negative.
+    ``threads`` is the maximum number of threads; by default one for each core. Raises InvalidInput
+    as :func:`clearance` does, and if ``q`` is not (B, nv) numbers.
     """
     angles = postures(instance("arm", arm, Manipulator), q)
     d = quantity("diameter", diameter, "length", zero=True)

@@ -14,15 +14,8 @@ def tension_factor(pose: Posture) -> float:
 
     1: equal tensions cause no joint torque. 0: not all cables can be taut without a load, so the
     arm has no wrench closure (:func:`has_wrench_closure`). A linear program finds the largest
-    ratio. Pham, Yeo, Yang and Chen, Robotics and Autonomous Systems 57 (2009), use the ratio of one
-    solution, so their factor may be smaller.
-
-    Args:
-        pose: The posture.
-
-    Raises:
-        InvalidInput: ``pose`` is not a posture.
-        SolverError: The linear program fails.
+    ratio; SolverError if it fails. Pham, Yeo, Yang and Chen, Robotics and Autonomous Systems 57
+    (2009), use the ratio of one solution, so their factor may be smaller.
     """
     return tension_ratio(instance("pose", pose, Posture).length_jacobian)
 
@@ -31,29 +24,17 @@ def has_wrench_closure(pose: Posture) -> bool:
     """Return whether unlimited tensions F ≥ 0 can balance every joint torque.
 
     This needs J_Lᵀ of full rank, and F > 0 with J_Lᵀ F = 0 (Gouttefarde and Gosselin, IEEE T-RO 22,
-    2006). With limits of the tensions, see :func:`force_polytope`.
-
-    Args:
-        pose: The posture.
-
-    Raises:
-        InvalidInput: ``pose`` is not a posture.
-        SolverError: The linear program fails.
+    2006). With limits of the tensions, see :func:`force_polytope`. SolverError if the linear
+    program fails.
     """
     return tension_factor(pose) > 0.0
 
 
 def isotropy(stiffness: Stiffness) -> float:
-    """Compute the least tip stiffness of all directions over the largest [-].
+    """Compute the least tip stiffness of all directions over the largest [-], for a stable arm.
 
     Both are extremes of 1/(uᵀ C_vv u), Eq. 20. 1: equal in all directions; 0: infinite in one.
-
-    Args:
-        stiffness: The stiffness; it must be stable.
-
-    Raises:
-        InvalidInput: ``stiffness`` is not a stiffness.
-        SingularStiffness: K_θ is singular.
+    Raises SingularStiffness if K_θ is singular.
     """
     K = instance("stiffness", stiffness, Stiffness)
     return float(principal_stiffness(K.compliance[:3, :3])["isotropy"])

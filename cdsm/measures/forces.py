@@ -48,8 +48,8 @@ class ForcePolytope(ReadOnlyState):
         faces: Corners of the triangles of its surface (m, 3), as indices; (0, 3) if it has none.
         normals: Outward unit normals of its facets (n, 3) [-].
         offsets: Distance of each facet from the force zero (n,) [N]; negative: zero is outside.
-        unbounded: Unit directions (n, 3) in which the tip cannot move; links alone hold any force
-            along them, and ``vertices`` have no part along them.
+        unbounded: Unit directions (n, 3) in which the tip cannot move; the links balance any force
+            along them, and ``vertices`` have no component along them.
     """
 
     posture: Posture
@@ -144,8 +144,8 @@ def force_polytope(
             bounds in every segment, whatever loads came before.
 
     Raises:
-        InvalidInput: An argument has the wrong shape, or a cable has no upper bound and so the
-            arm holds any force.
+        InvalidInput: An argument has the wrong shape, or a cable has no upper bound, so that the
+            polytope is unbounded.
         InfeasibleTension: No tensions within the bounds balance any force at the tip, not even
             zero; the error gives the smallest violation.
         SolverError: A linear program fails.

@@ -62,7 +62,7 @@ def hull_of(loads: Loads) -> Hull | None:
             normals=np.vstack([flat.normals, *[u[None] for u, *_ in along]]),
             offsets=np.concatenate([flat.offsets, [b for _, b, _ in along]]),
         )
-    corners, faces, facets, ends = _grown(farthest, np.array(points), spanned)
+    corners, faces, facets, ends = _polytope(farthest, np.array(points), spanned)
     return Hull(
         corners,
         faces,
@@ -96,10 +96,10 @@ def _span(farthest: _Farthest, k: int) -> tuple[list[Array], list[Array], list[f
     return points, normals, offsets
 
 
-def _grown(
+def _polytope(
     farthest: _Farthest, points: Array, spanned: Array
 ) -> tuple[Array, NDArray[np.intp], Array, Array]:
-    """Return corners, triangles, normals and offsets of a polytope that spans 2 or 3 dimensions."""
+    """Build corners, triangles, normals and offsets of a polytope of 2 or 3 dimensions."""
     from scipy.spatial import ConvexHull
 
     start = points[0]

@@ -87,7 +87,7 @@ def payload(
 ) -> Payload:
     """Compute the largest admissible force f along u at the tip, added to the wrench W.
 
-        f = max f  so that  J_Lᵀ F = J_Xᵀ W + f J_vᵀ u − g,  minimum ≤ F ≤ maximum,
+        f = max f  subject to  J_Lᵀ F = J_Xᵀ W + f J_vᵀ u − g,  minimum ≤ F ≤ maximum,
 
     also f |C_vv u| ≤ ``deflection``, and K_θ positive definite under all loads up to f u. K_θ is
     that of the least tensions under each load. C_vv is that without the load: the motors are locked
@@ -151,7 +151,7 @@ def _along(
     compliance: Array,
     allowed: float,
 ) -> dict[str, float]:
-    """Return the largest force along u by tensions and by deflection [N]."""
+    """Return the largest force [N] along u by tensions, and by an ``allowed`` deflection [m]."""
     low, high = bounds_at(pose, minimum, maximum, worst_friction)
     return {
         "tension": largest_force(Loads.of(pose, low, high, W, u[:, None])),

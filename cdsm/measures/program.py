@@ -86,7 +86,7 @@ class Loads(NamedTuple):
             if found.status == UNBOUNDED:
                 return math.inf, np.full(along.size, math.nan)
             if found.status != OPTIMAL:
-                raise SolverError("highs", f"cannot tell the largest load: {found.message}")
+                raise SolverError("highs", f"finds no largest load: {found.message}")
             best = found.x
         x = best[count:] / loads * self.force
         return float(along @ x), x
@@ -107,7 +107,7 @@ def tension_ratio(J: Array) -> float:
         bounds=(0.0, 1.0),
     )
     if found.status != OPTIMAL:
-        raise SolverError("highs", f"cannot tell the tension factor: {found.message}")
+        raise SolverError("highs", f"finds no tension factor: {found.message}")
     ratio = float(found.x[-1])
     return ratio if ratio > CLOSED else 0.0
 

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Final
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from cdsm.batch import evaluate
 from cdsm.batch.inputs import checked_threads, run_slices
+from cdsm.errors import InvalidInput
+from cdsm.kernels.chains import grip_rows
+from cdsm.kernels.tree import Routing
 from cdsm.manipulator import Manipulator
 from cdsm.measures.clearance import KINDS, clearances
 from cdsm.measures.forces import directions_of
@@ -18,6 +21,7 @@ from cdsm.measures.hull import hull_of
 from cdsm.measures.payload import largest_force
 from cdsm.measures.program import Loads, tension_ratio
 from cdsm.measures.simplex import payload_rows
+from cdsm.support.validation import flag, quantity
 from cdsm.support.values import Array
 from cdsm.tension import checked_bounds
 
@@ -25,17 +29,82 @@ MEASURED: Final = ("tension_factor", *KINDS)
 """Measures that depend on the joint angles alone."""
 
 
+def require(
+    names: Collection[str],
+    arm: Manipulator,
+    maximum: ArrayLike,
+    *,
+    worst_friction: bool,
+    diameter: float,
+    breaking_load: float | None,
+    bend_diameter: float | None,
+) -> None:
+    """Check the arguments of measures; raise InvalidInput if a measure lacks what it needs."""
+    if flag("worst_friction", worst_friction) and not arm.has_friction:
+        raise InvalidInput(
+            "worst_friction",
+            f"{arm.name} has no friction in its holes; leave it out, or give them a coefficient: "
+            "friction = in ARM.toml, --friction, Manipulator.with_friction.",
+        )
+    quantity("diameter", diameter, "length", zero=True)
+    if breaking_load is not None:
+        quantity("breaking_load", breaking_load, "force")
+    if bend_diameter is not None:
+        quantity("bend_diameter", bend_diameter, "length")
+    if "capacity_margin" in names and math.isinf(checked_bounds(arm, 0.0, maximum)[1].max()):
+        raise InvalidInput("maximum", "capacity_margin needs a finite one [N].")
+    if "wire_safety" in names and breaking_load is None:
+        raise InvalidInput("breaking_load", "is needed for wire_safety [N].")
+    if "wire_life" in names and not (bend_diameter and diameter):
+        raise InvalidInput("bend_diameter", "is needed with diameter for wire_life [m].")
+
+
 def measured(
-    arm: Manipulator, q: Array, names: Sequence[str], threads: int | None = None
+    arm: Manipulator,
+    q: Array,
+    names: Sequence[str],
+    diameter: float = 0.0,
+    threads: int | None = None,
 ) -> dict[str, Array]:
     """Compute measures of :data:`MEASURED` at postures q (B, nv); return (B,) for each name."""
     found: dict[str, Array] = {}
     if any(name in KINDS for name in names):
-        found |= clearances(arm, q, threads=threads)
+        found |= clearances(arm, q, diameter, threads=threads)
     if "tension_factor" in names:
         J = evaluate(arm, q, outputs=("length_jacobian",), threads=threads)["length_jacobian"]
         found["tension_factor"] = np.array([tension_ratio(each) for each in J])
     return {name: found[name] for name in names}
+
+
+def friction_losses(arm: Manipulator, q: Array, threads: int | None = None) -> Array:
+    """Compute exp(Σ μ φ) (B, C) [-] of each cable at postures q (B, nv).
+
+    It is the largest ratio of two tensions along a cable.
+    """
+    model, grip = arm._model, np.empty((len(q), len(arm.cables)))
+    *routing, _, hole, own = model.chain_arrays
+    holes = hole, own, model.chains.cable[hole], model.chains.friction
+
+    def fill(part: slice) -> None:
+        grip_rows(model.tree, Routing(*routing), *holes, q[part], grip[part])
+
+    run_slices(fill, len(q), 1, checked_threads(threads))
+    return np.exp(grip)
+
+
+def narrowed_bounds(
+    arm: Manipulator, minimum: ArrayLike, maximum: ArrayLike, loss: Array
+) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Narrow bounds (), (B,) or (B, C) [N] by :func:`friction_losses`.
+
+    Every segment of a cable is then within the bounds. Return the lower and upper bounds (B, C),
+    and which postures have any (B,); the others keep the given bounds.
+    """
+    given = _each_bound(arm, minimum, maximum, loss.shape)
+    low, high = given[0] * loss, given[1] / loss
+    exist = np.asarray((low <= high).all(axis=1))
+    keep = exist[:, None]
+    return np.where(keep, low, given[0]), np.where(keep, high, given[1]), exist
 
 
 def payloads(
@@ -70,7 +139,7 @@ def payloads(
 def capacity_margins(
     arm: Manipulator, q: Array, wrench: Array, minimum: ArrayLike, maximum: ArrayLike
 ) -> Array:
-    """Compute the distances (B,) [N] of no force from the facets of the force polytopes.
+    """Compute :meth:`ForcePolytope.margin` (B,) [N] of the zero force at postures q (B, nv).
 
     Arguments are those of :func:`payloads`; a posture takes milliseconds.
     """
@@ -95,12 +164,14 @@ def _balances(
     names = ("jacobian", "length_jacobian", "gravity_torque")
     found = evaluate(arm, q, outputs=names, check_limits=False, threads=threads)
     JX, J, g = (found[name] for name in names)
-    shape = len(q), len(arm.cables)
-    least, most = (np.asarray(bound, dtype=np.float64) for bound in (minimum, maximum))
-    low, high = checked_bounds(arm, _each(least, shape), _each(most, shape), len(q))
+    low, high = _each_bound(arm, minimum, maximum, (len(q), len(arm.cables)))
     return JX, J, np.einsum("nij,ni->nj", JX, wrench) - g, low, high
 
 
-def _each(bound: Array, shape: tuple[int, int]) -> Array:
-    """Return a bound of each row, (), (B,) or (B, C), for each cable."""
-    return np.broadcast_to(bound[:, None] if bound.ndim == 1 else bound, shape)
+def _each_bound(
+    arm: Manipulator, minimum: ArrayLike, maximum: ArrayLike, shape: tuple[int, int]
+) -> tuple[Array, Array]:
+    """Return checked bounds of tension (B, C) [N] from one for all, for B postures, or (B, C)."""
+    bounds = (np.asarray(bound, dtype=np.float64) for bound in (minimum, maximum))
+    low, high = (np.broadcast_to(b[:, None] if b.ndim == 1 else b, shape) for b in bounds)
+    return checked_bounds(arm, low, high, shape[0])

@@ -16,10 +16,10 @@ from cdsm.kernels.tree import Indices
 from cdsm.support.values import Array
 
 _ROUNDING = 1e-11
-"""Reduced costs and pivots that are none; coefficients are of order one."""
+"""Reduced costs and pivots below this are rounding; coefficients are of order one."""
 
 _PROOF = 1e-10
-"""Violation of a constraint, over the size of what it bounds, that is none."""
+"""Violation of a constraint, relative to the bounded quantity, that is rounding."""
 
 _AT_LOW, _AT_HIGH, _FREE, _BASIC = 0, 1, 2, 3
 
@@ -28,8 +28,8 @@ _AT_LOW, _AT_HIGH, _FREE, _BASIC = 0, 1, 2, 3
 def single_largest(cost: Array, A: Array, b: Array, low: Array, high: Array, x: Array) -> bool:
     """Maximise cost · x with A x = b, low ≤ x ≤ high; return whether x is proved to be best.
 
-    It is not where no x exists, where the cost has no largest value, and where rounding is too
-    large. Entries of ``cost`` and ``A`` are of order one.
+    False if no x exists, if the cost has no largest value, or if rounding is too large. Entries of
+    ``cost`` and ``A`` are of order one.
     """
     m, n = A.shape
     state = np.empty(n, dtype=np.intp)

@@ -9,6 +9,7 @@ from typing import Final, final
 import numpy as np
 
 from cdsm.errors import ElasticityRangeError
+from cdsm.manipulator import Manipulator
 from cdsm.support.format import aligned, plain
 from cdsm.support.validation import flag, instance, quantity
 from cdsm.support.values import Array, ReadOnlyState, frozen
@@ -98,7 +99,7 @@ def wire_use(
         breaking_load: Breaking load of the wire [N].
         bend_diameter: D: diameter of the bend on which the wire lies in its holes [m].
         strength: S_u of its material [Pa]; the usual grade of rope wire, 1770 N/mm², by default.
-        worst_friction: Take the largest tension that friction can hold along each cable,
+        worst_friction: Take the largest tension that friction can cause along each cable,
             F exp(Σ μ φ).
 
     Raises:
@@ -119,22 +120,38 @@ def wire_use(
             strain[c] = cable.elasticity.strain(largest[c])
         except ElasticityRangeError as error:
             raise ElasticityRangeError(error.problem, error.tension, [c], [cable.name]) from None
-    with np.errstate(divide="ignore"):  # a slack cable is never at its limit
-        safety = np.where(largest > 0.0, limit / largest, math.inf)
     return WireUse(
         tension=tension,
         largest=frozen(np.array(largest)),
         strain=frozen(strain),
-        safety=frozen(safety),
+        safety=frozen(safety(largest, limit)),
         bend_ratio=D / d,
         life_margin=frozen(life_margin(largest, d, D, S)),
     )
 
 
+def safety(tension: Array, breaking_load: float) -> Array:
+    """Return the breaking load [N] over tensions [N]; inf where a cable is slack."""
+    with np.errstate(divide="ignore"):
+        return np.where(tension > 0.0, breaking_load / tension, math.inf)
+
+
+def strains(arm: Manipulator, tension: Array) -> Array:
+    """Return ε(F) of each cable for tensions (B, C) [N]; NaN outside the domain of its law."""
+    found = np.full(tension.shape, math.nan)
+    for c, cable in enumerate(arm.cables):
+        law, F = cable.elasticity, tension[:, c]
+        first, high = law.domain.first, law.domain.high
+        inside = (first <= F) & (high >= F)
+        if inside.any():  # a user-defined law may fail on empty arrays
+            found[inside, c] = law.strain(F[inside])
+    return found
+
+
 def life_margin(
     tension: Array, diameter: float, bend_diameter: float, strength: float = ROPE_WIRE
 ) -> Array:
-    """Return 0.001 S_u/p of tensions [N], p = 2F/(d D); inf where a cable is slack."""
+    """Return 0.001 S_u/p of tensions F [N], S_u ``strength``, p = 2F/(d D); inf at 0 N."""
     with np.errstate(divide="ignore"):
         pressure = 2.0 * tension / (diameter * bend_diameter)
         return np.where(tension > 0.0, LONG_LIFE * strength / pressure, math.inf)

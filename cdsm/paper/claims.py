@@ -65,7 +65,7 @@ class Claim:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Figure(ABC):
-    """One recomputed figure of the paper. Subclasses hold the curves.
+    """One recomputed figure of the paper. Subclasses have the curves.
 
     Attributes:
         name: ``"fig3"``, ``"lead"`` and so on.
@@ -87,7 +87,7 @@ class Figure(ABC):
 
 
 def floats(values: Iterable[float]) -> tuple[float, ...]:
-    """Convert values to the tuple of floats that a claim holds."""
+    """Convert values to the tuple of floats of a claim."""
     return tuple(float(value) for value in values)
 
 

@@ -107,11 +107,7 @@ class RoughPrototype:
         return arm.with_cables([*arm.cables, *springs])
 
     def weigh(self) -> list[LoadingPath]:
-        """Compute the loading by the weight of each entry of Table II, row by row.
-
-        Raises:
-            CdsmError: No tensions balance the arm, or no equilibrium is found under a weight.
-        """
+        """Load the arm with the weights of Table II, entry by entry; CdsmError on failure."""
         pose = self.arm().at(POSTURE)
         return [
             LoadingPath.of(pose, F, np.zeros(6), weight[None], _PARTS)

@@ -92,11 +92,7 @@ class Prototype:
         return POSTURE, np.array([self.angle_1, self.angle_2, self.angle_3])
 
     def arm(self, cable_stiffness: float | None = None) -> Manipulator:
-        """Build the arm with the 1×19 strand, or with hybrid cables of one stiffness [N/m].
-
-        Raises:
-            GeometryError: The dimensions do not make a valid arm.
-        """
+        """Build the arm with the strand or with hybrid cables [N/m]; GeometryError if invalid."""
         return presets.experimental_prototype(
             presets.STRAND_1X19 if cable_stiffness is None else _RIGID,
             series_stiffness=self.drive_stiffness if cable_stiffness is None else cable_stiffness,
@@ -118,11 +114,7 @@ class Prototype:
         return self._measured(pose, tensions, np.zeros((3, 3)))
 
     def weigh(self, pose: Posture, tensions: ArrayLike) -> Array:
-        """Compute force over displacement (N, 3) [N/m] with the weights of Table II.
-
-        Raises:
-            CdsmError: As for :meth:`measure`, without or with the weights.
-        """
+        """Compute weight over displacement (N, 3) [N/m]; errors as for :meth:`measure`."""
         return self._measured(pose, tensions, self.weights)
 
     def _measured(self, pose: Posture, tensions: ArrayLike, weights: Array) -> Array:
@@ -147,11 +139,7 @@ class Prototype:
         return np.array(rows)
 
     def predict(self, table_alone: bool = False) -> Predicted:
-        """Predict the numbers of Section V, or those of Table II alone.
-
-        Raises:
-            CdsmError: An experiment has no stable equilibrium; see :meth:`measure`.
-        """
+        """Predict the numbers of Section V, or of Table II alone; errors as for :meth:`measure`."""
         table = self.weigh(self.arm().at(POSTURE), self.levels)
         if table_alone:
             return Predicted(table=frozen(table))

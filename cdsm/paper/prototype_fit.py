@@ -174,7 +174,7 @@ def identify_prototype(step: Step) -> PrototypeFit:
         raise InvalidInput("start", f"{step.start} is not within {bounds}.")
     point = problem.box.point(start)
     if problem.failure(point) is not None:
-        raise InvalidInput("start", f"{step.start} cannot hold itself. Start elsewhere.")
+        raise InvalidInput("start", f"{step.start} has no stable equilibrium. Start elsewhere.")
     # the step of the finite differences is large against rounding errors of the weight tests
     point = least_squares(
         problem.residuals,

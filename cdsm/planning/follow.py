@@ -49,7 +49,7 @@ class Follower:
 
         Raises:
             UnreachableStiffness: No tensions hit the single target at any rate.
-            SingularStiffness: No admissible tensions hold the arm at any rate.
+            SingularStiffness: No admissible tensions make the arm stable, at any rate.
         """
         region = sample.model.region
         last = self.planned[-1] if self.planned else None
@@ -135,7 +135,7 @@ def least_change(
     """Return tensions (C,) [N] that hit the targets, nearest to ``before`` and within a rate.
 
     If none hit the targets, return the tensions of least miss that one search finds. Return None if
-    no tensions within the rate hold the arm stable.
+    no tensions within the rate make the arm stable.
     """
     region = model.region.within(rate, before)
     found = None if region is None else _search(model, region, constraints, before, before)

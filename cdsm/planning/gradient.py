@@ -65,12 +65,8 @@ class StiffnessGradient(ReadOnlyState):
     def along(self, direction: Direction) -> Array:
         """Return ∂s/∂F = s² wᵀ ∂K_θ/∂F w (C,) [1/m] of s = ``K.along(u)``, with w = K_θ⁻¹ J_vᵀ u.
 
-        Args:
-            direction: u: an axis such as ``"z"``, or (3,) in base axes, any length.
-
-        Raises:
-            InvalidInput: ``direction`` is neither an axis nor three finite numbers, or is zero.
-            SingularStiffness: The stiffness along u is infinite, or K_θ is singular.
+        Argument and errors are those of :meth:`cdsm.Stiffness.along`; SingularStiffness if s is
+        inf.
         """
         u = unit_direction("direction", direction)
         self.stiffness._require_mobile(u)
@@ -93,15 +89,12 @@ class StiffnessGradient(ReadOnlyState):
 
 
 def stiffness_gradient(stiffness: Stiffness) -> StiffnessGradient:
-    """Compute the derivatives of a stiffness with respect to the cable tensions.
+    """Compute the derivatives of a stiffness K with respect to the cable tensions.
 
     ∂K_θ/∂F_c = H_c + k′_c J_c J_cᵀ, with the gradient J_c and the Hessian H_c of the length of
     cable c and k′_c = dk_c/dF_c. k′_c includes dEA/dF and the series spring. For example,
     ``stiffness_gradient(K).along(u)`` is the gradient of ``K.along(u)``. At a kink of an
     elasticity, the slope is that below the kink.
-
-    Args:
-        stiffness: K, the result of :func:`~cdsm.stiffness`.
 
     Raises:
         InvalidInput: ``stiffness`` is not a frictionless ``Stiffness``, or the slope of a

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from cdsm.kernels.compiling import compiled
+from cdsm.kernels.linear_algebra import eliminate
 from cdsm.support.values import Array
 
 _CURVATURE = 1e-6  # curvatures below this part of the largest are raised to it
@@ -32,12 +33,24 @@ def stiffness_at(
 
 
 @compiled
+def _inverse(A: Array) -> Array:
+    """Return A⁻¹ of a regular matrix; ``np.linalg.inv`` differs from numba's in the last bits."""
+    n = len(A)
+    M = np.zeros((n, 2 * n, 1))
+    for i in range(n):
+        M[i, n + i, 0] = 1.0
+        for j in range(n):
+            M[i, j, 0] = A[i, j]
+    eliminate(M, np.empty((4, 1)), None)
+    return np.ascontiguousarray(M[:, n:, 0])
+
+
+@compiled
 def tip_stiffness(K: Array, rows: Array) -> tuple[Array, Array, Array, Array]:
     """Return X = (R K_θ⁻¹ Rᵀ)⁻¹, K_θ⁻¹ Rᵀ X, K_θ⁻ᵀ Rᵀ Xᵀ and K_θ⁻¹ of a regular K_θ."""
-    inverse = np.empty_like(K)
-    inverse[:, :] = np.linalg.inv(K)
+    inverse = _inverse(K)
     soft = np.dot(inverse, rows.T)
-    X: Array = np.linalg.inv(np.dot(rows, soft))
+    X = _inverse(np.dot(rows, soft))
     right: Array = np.dot(soft, X)
     left: Array = np.dot(np.ascontiguousarray(np.dot(rows, inverse).T), np.ascontiguousarray(X.T))
     return X, right, left, inverse

@@ -84,7 +84,7 @@ def unstable(arm: Manipulator, problem: str, mode: Array) -> SingularStiffness:
         remedy = "All motors control force, so that no cable resists by its elasticity: have some "
         remedy += 'hold their length (control="position").'
     joint = arm.joint_names[int(abs(mode).argmax())]
-    return SingularStiffness(f"{problem}; it gives way mostly in {joint}. {remedy}", frozen(mode))
+    return SingularStiffness(f"{problem}; it buckles mostly in {joint}. {remedy}", frozen(mode))
 
 
 def checked_targets(directions: Array | None, target: ArrayLike) -> Array:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import groupby
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, final
+from typing import TYPE_CHECKING, Literal, final
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from cdsm.cable_laws import CableLaws
 from cdsm.errors import CdsmError
 from cdsm.manipulator import Manipulator
 from cdsm.planning.half_way import HalfWay, half_way
+from cdsm.planning.path_table import held_cables, path_table
 from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.files import write_text
 from cdsm.support.format import JointUnits, plain
@@ -27,9 +28,6 @@ from cdsm.support.values import Array, ReadOnlyState, frozen
 if TYPE_CHECKING:
     import pandas
     from matplotlib.figure import Figure
-
-_NO_ANGLE = 1e-15
-"""A smaller joint coordinate [rad or m] of a path is rounding."""
 
 Status = Literal["posture", "balance", "elasticity", "singular", "stiffness", "rate"]
 
@@ -43,9 +41,9 @@ class InfeasibleSample:
         index: Number of the sample, from 0.
         status: ``"posture"`` (a joint limit, a cable without direction, or a tip out of reach),
             ``"balance"`` (no tensions within the bounds), ``"elasticity"`` (no tensions within the
-            domains), ``"singular"`` (no tensions hold the arm, or the tip cannot move along u),
-            ``"stiffness"`` (no tensions hit the target) or ``"rate"`` (tensions hit the target, but
-            differ too much from those of the samples before).
+            domains), ``"singular"`` (no tensions make the arm stable, or the tip cannot move along
+            u), ``"stiffness"`` (no tensions hit the target) or ``"rate"`` (tensions hit the target,
+            but differ too much from those of the samples before).
         reason: The reason in words, with the remedy.
         error: The error of a plan of this sample alone, with its data; or None.
     """
@@ -67,7 +65,7 @@ class PathPlan(ReadOnlyState):
         arm: The arm.
         direction: Unit directions u in base axes, (3,) or (n, 3); None for ``cartesian``.
         target: The target at every sample [N/m]: (S,), one per direction (S, n), or (S, 3, 3).
-        rate: Largest change of a tension per step (C,) [N]; may hold inf.
+        rate: Largest change of a tension per step (C,) [N]; may be inf.
         planned: Numbers of the planned samples, from 0.
         angles: Joint angles (P, nv) [rad]; [m] where a joint slides.
         tensions: F (P, C) [N].
@@ -119,7 +117,7 @@ class PathPlan(ReadOnlyState):
         motors = CableLaws(self.arm.cables, "unstrained")
         pairs = zip(self.cable_lengths, self.tensions, strict=True)
         rows = np.array([motors.original_lengths(L, F) for L, F in pairs])
-        return frozen(rows.reshape(self.tensions.shape)[:, self._held])
+        return frozen(rows.reshape(self.tensions.shape)[:, held_cables(self.arm)])
 
     @cached_property
     def between(self) -> tuple[HalfWay, ...]:
@@ -141,11 +139,6 @@ class PathPlan(ReadOnlyState):
             for k, (i, j) in enumerate(track(pairs, "looking half-way between the samples"))
             if j == i + 1
         )
-
-    @property
-    def _held(self) -> list[int]:
-        """Indices of the position-controlled cables."""
-        return [c for c, each in enumerate(self.arm.cables) if each.control == "position"]
 
     @property
     def tips(self) -> Array:
@@ -198,12 +191,8 @@ class PathPlan(ReadOnlyState):
         return dict(plain(numbers))
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Return the table of :meth:`write` in SI, a row for each sample; NaN where none exists.
-
-        Raises:
-            MissingExtra: pandas is not installed.
-        """
-        header, rows = self._table
+        """Return the table of :meth:`write`, a row per sample; MissingExtra without pandas."""
+        header, rows = path_table(self)
         columns = [[None if x == "" else x for x in column] for column in zip(*rows, strict=True)]
         table = dict(zip(header, columns, strict=True))
         return data_frame(table, "sample", table.pop("sample"))
@@ -222,7 +211,7 @@ class PathPlan(ReadOnlyState):
         Raises:
             FileError: The file cannot be written.
         """
-        header, rows = self._table
+        header, rows = path_table(self)
         text = io.StringIO()
         writer = csv.writer(text, lineterminator="\n")
         writer.writerow(header)
@@ -230,52 +219,8 @@ class PathPlan(ReadOnlyState):
         return write_text(path, text.getvalue())
 
     def write_csv(self, path: str | os.PathLike[str]) -> Path:
-        """Write the plan with :meth:`write`; this old name is kept for one release.
-
-        Raises:
-            FileError: The file cannot be written.
-        """
+        """Write the plan with :meth:`write`; this old name is kept for one release."""
         return self.write(path)
-
-    @property
-    def _table(self) -> tuple[list[str], list[list[Any]]]:
-        """Header and rows of the written table; cells without a value are empty."""
-        names = self.arm.cables.names
-        joints = zip(self.arm.joint_names, self.arm.joint_units, strict=True)
-        size = len(self.target)
-        targets = self.target.reshape(size, -1)
-        numbered = self._readings(targets.shape[1])
-        columns = [
-            *(f"{name} [{unit}]" for name, unit in joints),
-            *(f"{name} tension [N]" for name in names),
-            *(f"{name} length [m]" for name in names),
-            *(f"{names[c]} unstrained length [m]" for c in self._held),
-            *("tip x [m]", "tip y [m]", "tip z [m]"),
-            *(f"stiffness{number} [N/m]" for number in numbered),
-        ]
-        achieved = self.achieved.reshape(len(self.planned), targets.shape[1])
-        # inverse kinematics leaves angles such as 1e-33, which are 0
-        angles = np.where(abs(self.angles) < _NO_ANGLE, 0.0, self.angles)
-        blocks = angles, self.tensions, self.cable_lengths, self.unstrained_lengths
-        numbers = np.hstack([*blocks, self.tips, achieved]).tolist()
-        rows: list[list[Any]] = [
-            [i, "planned", *row, *targets[i].tolist(), ""]
-            for i, row in zip(self.planned, numbers, strict=True)
-        ]
-        rows += [
-            [i, each.status, *[""] * len(columns), *targets[i].tolist(), each.reason]
-            for each in self.infeasible
-            for i in [each.index]
-        ]
-        rows.sort(key=lambda row: int(row[0]))
-        wanted = (f"target{number} [N/m]" for number in numbered)
-        return ["sample", "status", *columns, *wanted, "reason"], rows
-
-    def _readings(self, count: int) -> list[str]:
-        """Return suffixes for the column names of several target stiffnesses; ``[""]`` for one."""
-        if self.direction is None:
-            return [f" {a}{b}" for a in "xyz" for b in "xyz"]
-        return [""] if count == 1 else [f" {k}" for k in range(1, count + 1)]
 
     def __repr__(self) -> str:
         return f"<PathPlan of {len(self.planned)} of {len(self.target)} samples>"

@@ -82,11 +82,7 @@ class StiffnessPlan(ReadOnlyState):
     def plot(self, attainable: StiffnessRange | None = None) -> Figure:
         """Plot the planned tensions [N], between those of the softest and the stiffest arm.
 
-        Args:
-            attainable: Range of stiffness to show beside the plan of one direction, if given.
-
-        Raises:
-            InvalidInput: The range is of another posture or direction.
+        ``attainable`` is the range of stiffness of this posture and direction; InvalidInput if not.
         """
         from cdsm.plots import plot_stiffness_plan  # matplotlib imports slowly
 
@@ -170,11 +166,11 @@ def plan_stiffness(
         InvalidInput: ``direction`` is not finite or is zero; a target is not positive; ``minimum``
             exceeds ``maximum``; or another argument is invalid.
         UnreachableStiffness: No admissible tensions give this stiffness along the single direction.
-            The error holds the stiffness that they give.
+            The error gives the stiffness that is possible.
         InfeasibleTension: No tensions within the bounds and domains balance the arm.
         ElasticityRangeError: The bounds and the domain of an elasticity do not overlap.
-        SingularStiffness: The tip cannot move along a direction, or no admissible tensions hold the
-            arm.
+        SingularStiffness: The tip cannot move along a direction, or no admissible tensions make the
+            arm stable.
     """
     model = StiffnessModel(pose, minimum, maximum, wrench, margin)
     number, seed = checked_starts(starts, seed)

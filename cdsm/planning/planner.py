@@ -53,11 +53,7 @@ class Planner:
         self._ends: list[ConstraintValues] = []
 
     def least(self) -> ConstraintValues | None:
-        """Return the least tensions that hit all targets; None if several cannot be hit together.
-
-        Raises:
-            UnreachableStiffness: No tensions hit the single target.
-        """
+        """Return the least tensions that hit all targets; None, or for one UnreachableStiffness."""
         found = self._best(self._starts())
         if found is None and self.constraints.single is not None:
             return self._within_range(*self.constraints.single)
@@ -147,7 +143,7 @@ class Planner:
     def _crossings(
         self, hub: Evaluation, others: list[Evaluation], precision: float = 1e-2
     ) -> list[Evaluation]:
-        """Find stable points that hit the single target between a hub and others; least first."""
+        """Find stable points between a hub and others that hit the single target, least first."""
         at_hub, guesses = self._miss(hub), []
         for other in others:
             at_other, way = self._miss(other), other.F - hub.F
@@ -167,7 +163,7 @@ class Planner:
         return sorted(stable, key=lambda point: float(point.F @ point.F))
 
     def _bridges(self, seen: list[ConstraintValues]) -> list[Evaluation]:
-        """Find points that hit the single target between the nearest below and above it."""
+        """Find such points between the points nearest to the target, below and above it."""
         order = sorted(seen, key=lambda place: float(abs(place.values[0])))
         below = [place.evaluation for place in order if place.values[0] < 0.0][:_SIDES]
         above = [place.evaluation for place in order if place.values[0] > 0.0][:_SIDES]

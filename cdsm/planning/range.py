@@ -118,7 +118,7 @@ def stiffness_range(
     seed: int = 0,
     progress: bool = True,
 ) -> StiffnessRange:
-    """Compute smallest and largest ``along(u)`` of all tensions that hold the arm (Eqs. 13, 20).
+    """Compute the smallest and largest ``along(u)`` that admissible tensions give (Eqs. 13, 20).
 
     The constraints on F are those of :func:`~cdsm.plan_stiffness`. With a rigidity that is constant
     or levels off, ``along`` is a concave function of F. It has one maximum and many minima in the
@@ -150,7 +150,8 @@ def stiffness_range(
             the stiffness does not stop changing with the tension.
         InfeasibleTension: No tensions within the bounds and domains balance the arm.
         ElasticityRangeError: The bounds and the domain of an elasticity do not overlap.
-        SingularStiffness: The tip cannot move along u, or no admissible tensions hold the arm.
+        SingularStiffness: The tip cannot move along u, or no admissible tensions make the arm
+            stable.
     """
     model = StiffnessModel(pose, minimum, maximum, wrench, margin)
     u = unit_direction("direction", direction)
@@ -160,8 +161,8 @@ def stiffness_range(
     if low.open or high.open:
         raise InvalidInput(
             "maximum",
-            f"none given, and tensions of {_LIMITS[-1]:g} times the least still change the "
-            f"stiffness along {coordinates(u)}, which has no end; give one.",
+            f"none given, and the stiffness along {coordinates(u)} still changes at "
+            f"tensions of {_LIMITS[-1]:g} times the least; give one.",
         )
     return StiffnessRange(
         direction=u,

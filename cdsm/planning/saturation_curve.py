@@ -95,11 +95,7 @@ class Saturation(ReadOnlyState):
         return dict(plain(numbers))
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Return a table of stiffness [N/m] and slope [1/m], a row for each lower bound [N].
-
-        Raises:
-            MissingExtra: pandas is not installed.
-        """
+        """Return a table with a row for each lower bound [N]; MissingExtra without pandas."""
         columns = {"along [N/m]": self.curve[:, 1], "slope [1/m]": self.curve[:, 2]}
         return data_frame(columns, "minimum [N]", self.curve[:, 0])
 

@@ -1,18 +1,17 @@
 r"""Sequential quadratic programming over the admissible tensions of a stable arm.
 
-    min f(F)   so that   c(F) = 0,  J_Lᵀ F = τ,  low ≤ F ≤ high,  λ_min(K_θ(F)) ≥ floor.
+    min f(F)   subject to   c(F) = 0,  J_Lᵀ F = τ,  low ≤ F ≤ high,  λ_min(K_θ(F)) ≥ floor.
 
-c is nonlinear, the balance is linear, and the stable tensions are not known in advance. Every
-iterate balances the arm and is stable, so K_θ can be inverted there.
+Only c and the last condition are nonlinear. Every iterate balances the arm and is stable, so K_θ
+can be inverted there.
 
-scipy's SLSQP with differences takes more than three times as long for 5 joints
-(tests/benchmarks/test_planning_speed.py).
+scipy's SLSQP with differences is three times as slow (tests/benchmarks/test_planning_speed.py).
 
 **The quadratic program of a step.** Let d = ΔF/size, g = ∂f/∂d and G = ∂c/∂d. The Lagrangian is
 L = f + y·c − z·reserve, with the multipliers y and z of the step before. Solve
 
     min ½ dᵀ W d + g·d + ρ Σ(s + t) + ½ ρ Σ(s² + t²)
-    so that  J_Lᵀ d = 0,  c + G d = s − t,  s, t ≥ 0,  reserve + ∂reserve·d ≥ 0,
+    subject to  J_Lᵀ d = 0,  c + G d = s − t,  s, t ≥ 0,  reserve + ∂reserve·d ≥ 0,
              bounds,  |d_c| ≤ radius.
 
 s and t are the positive and the negative violations of c, and ρ is their weight. With them the
@@ -98,7 +97,7 @@ class Program:
     centre: Array | float = 0.0
 
     def merit(self, at: ConstraintValues, price: float) -> float:
-        """Return f at a point; for the effort plus ``price`` times the penalty of c."""
+        """Return f at a point, plus ``price`` times the penalty of c if f is the effort."""
         c = at.values
         if self.objective.effort:
             x = (at.evaluation.F - self.centre) / self.unit
@@ -106,7 +105,7 @@ class Program:
         return self.objective.linear * float(c.sum()) + 0.5 * self.objective.square * float(c @ c)
 
     def met(self, at: ConstraintValues) -> bool:
-        """Return whether c = 0; True for objectives that do not require it."""
+        """Return whether abs(c) ≤ MET; always True for objectives other than the effort."""
         return not self.objective.effort or bool((abs(at.values) <= MET).all())
 
     def better(self, one: ConstraintValues, other: ConstraintValues) -> bool:
@@ -162,7 +161,7 @@ def _search(program: Program, start: Evaluation, *, in_piece: bool) -> Constrain
         y, z, price, length = step.y, step.z, step.price, float(abs(step.d).max(initial=0.0))
         small = length <= _ARRIVED and bool((abs(local.c) <= _ARRIVED).all())
         if small or step.predicted <= _ROUNDING * max(1.0, abs(program.merit(iterate, price))):
-            if not in_piece:
+            if not in_piece:  # finish on one side of the kinks, where c is smooth
                 in_piece = True
             elif not program.met(iterate) and price < _LARGEST_PRICE:
                 price = min(100.0 * price, _LARGEST_PRICE)  # converged, but only at this low price
@@ -246,6 +245,7 @@ class _LocalModel:
         A[:rank, :count], A[rank:, :count] = region.rows, self.G
         A[rank:, misses[:m]], A[rank:, misses[m:]] = -np.eye(m), np.eye(m)
         b = np.append(region.imbalance(evaluation.F) / size, -c)
+        # d = 0 stays admissible, even if rounding has put F beyond a bound
         box = (
             np.append(np.maximum(np.minimum(low, 0.0), -self.radius), none),
             np.append(np.minimum(np.maximum(high, 0.0), self.radius), none + np.inf),
@@ -253,7 +253,7 @@ class _LocalModel:
         stability = np.append(-evaluation.reserve_gradient * size / scale, none)
         cuts = stability[None], np.array([max(evaluation.reserve, 0.0) / scale])
         best, miss = None, math.inf
-        while True:
+        while True:  # raise the penalty until c is met, then lower it to what is needed
             P[misses, misses] = q[misses] = price
             found = solve(P, q, (A, b), box, cuts)
             if found is None:

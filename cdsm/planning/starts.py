@@ -28,7 +28,7 @@ class StartPoints:
         points: The anchor, and stable points towards the corners. More directions only add points.
 
     Raises:
-        SingularStiffness: No admissible tensions were found that hold the arm stable.
+        SingularStiffness: No admissible tensions were found that make the arm stable.
     """
 
     def __init__(
@@ -114,7 +114,7 @@ def _stabilize(model: StiffnessModel, region: Admissible, start: Evaluation) -> 
     unit_name = model.pose.arm.stiffness_unit()
     raise unstable(
         model.pose.arm,
-        "no admissible tensions hold the arm stable: at best the smallest eigenvalue of K_θ is "
-        f"{iterate.eigenvalues[0]:.4g} {unit_name}, and {model.floor:.4g} {unit_name} is asked for",
+        "no admissible tensions make the arm stable: at best the smallest eigenvalue of K_θ is "
+        f"{iterate.eigenvalues[0]:.4g} {unit_name}, and {model.floor:.4g} {unit_name} is required",
         iterate.eigenvectors[:, 0],
     )

@@ -99,7 +99,7 @@ def saturation(
         return _slope(at(lower), u)
 
     places = log_samples(first, last)
-    bends = _bends(at, places[(places >= first) & (places <= last)])
+    bends = _kinks(at, places[(places >= first) & (places <= last)])
     beside = np.outer([1.0 - _JUST, 1.0 + _JUST], bends).ravel()
     places = np.unique(np.clip(np.concatenate([places, beside]), first, last))
     curve = np.array([(place, at(place).along(u), slope(place)) for place in places.tolist()])
@@ -136,7 +136,7 @@ def _stable(at: StiffnessAt, low: float, high: float) -> tuple[float, float]:
     return first + inset * (first > low), last - inset * (last < high)
 
 
-def _bends(at: StiffnessAt, places: Array) -> Array:
+def _kinks(at: StiffnessAt, places: Array) -> Array:
     """Find the bounds [N], rising, between ``places`` [N] at which the slope is discontinuous.
 
     There a cable reaches or leaves a bound, or passes a kink of its rigidity. If the same cables
@@ -211,7 +211,6 @@ def _falls(curve: Array, slope: Callable[[float], float], start: float, level: f
 def _stiffest(
     curve: Array, value: Callable[[float], float], slope: Callable[[float], float]
 ) -> float:
-    """Return the lower bound [N] with the largest stiffness."""
     best = int(curve[:, 1].argmax())
     if 0 < best < len(curve) - 1 and curve[best - 1, 2] > 0.0 > curve[best + 1, 2]:
         top = sign_change(slope, float(curve[best - 1, 0]), float(curve[best + 1, 0]))

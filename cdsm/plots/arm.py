@@ -14,8 +14,6 @@ from cdsm.errors import InvalidInput
 from cdsm.plots.style import (
     AXES,
     MM,
-    ONE_COLUMN,
-    SCREEN,
     SKY,
     SMALL,
     TEXT,
@@ -24,6 +22,7 @@ from cdsm.plots.style import (
     expect,
     fill_canvas,
     heading,
+    picture_axes,
 )
 from cdsm.support.values import Array, frozen
 
@@ -67,8 +66,10 @@ def plot_arm(
         expect("stiffness", stiffness, "Stiffness")
         taken = stiffness.posture
         if taken is not pose and not (taken.arm == pose.arm and (taken.q == pose.q).all()):
-            raise InvalidInput("stiffness", "was taken at another posture; take it at this one.")
-    figure, axes = arm_axes()
+            raise InvalidInput(
+                "stiffness", "was computed at another posture; compute it at this one."
+            )
+    figure, axes = picture_axes()
     unstable = stiffness is not None and not stiffness.is_stable
     if stiffness is not None and not unstable:
         _draw_ellipsoid(axes, stiffness)
@@ -83,14 +84,6 @@ def plot_arm(
     picture_legend(figure, axes)
     fill_canvas(axes, 1.0 if tension is None else BESIDE_BAR)
     return figure
-
-
-def arm_axes() -> tuple[Figure, Any]:
-    """Build a figure of one column with 3D axes."""
-    figure = Figure(figsize=(ONE_COLUMN, ONE_COLUMN), dpi=SCREEN)
-    axes: Any = figure.add_subplot(projection="3d")
-    axes.view_init(elev=24.0, azim=-62.0)
-    return figure, axes
 
 
 def picture_legend(figure: Figure, axes: Any) -> None:
@@ -128,7 +121,6 @@ class Ellipsoid(NamedTuple):
     longest: float
 
     def __str__(self) -> str:
-        """Return the meaning of the ellipsoid and its scale."""
         large, small = max(self.scale, 1.0), max(1.0 / self.scale, 1.0)
         return f"where 1 N moves the tip, scale {large:g}:{small:g}"
 
@@ -173,15 +165,15 @@ def draw_arm(axes: Any, pose: Posture, colors: Array | None = None) -> None:
         axes.plot(*(MM * path.T), color=color, linewidth=0.9)
 
 
-def frame_arms(axes: Any, limits: Array | None) -> None:
-    """Set labels, and limits (3, 2) [mm] with equal scales; None: around all that is drawn."""
+def frame_arms(axes: Any, limits: Array | None, label: str = "{} [mm]") -> None:
+    """Set labels, and limits (3, 2) with equal scales; None: around all that is drawn."""
     axes.tick_params(labelsize=SMALL, pad=-3)
     if limits is None:
         limits = np.array([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()])
     ranges = np.ptp(limits, axis=1)
     ranges = np.maximum(ranges, _FLATTEST * ranges.max())  # keep space around a flat arm
     for name, middle, size in zip(AXES, limits.mean(axis=1), ranges, strict=True):
-        getattr(axes, f"set_{name}label")(f"{name} [mm]", fontsize=TEXT, labelpad=-3)
+        getattr(axes, f"set_{name}label")(label.format(name), fontsize=TEXT, labelpad=-3)
         getattr(axes, f"set_{name}lim")(middle - size / 2.0, middle + size / 2.0)
     equal_axes(axes, 1.0)
 

@@ -17,11 +17,7 @@ if TYPE_CHECKING:
 def plot_uncertainty(budget: Uncertainty) -> Figure:
     """Plot the contribution of each source to the standard uncertainty, and their root sum square.
 
-    Args:
-        budget: Result of :func:`~cdsm.uncertainty`.
-
-    Raises:
-        InvalidInput: ``budget`` is not a budget.
+    InvalidInput if ``budget`` is no result of :func:`~cdsm.uncertainty`.
     """
     expect("budget", budget, "Uncertainty")
     unit, size = budget.question.unit
@@ -43,11 +39,7 @@ def plot_uncertainty(budget: Uncertainty) -> Figure:
 def plot_monte_carlo(run: MonteCarlo) -> Figure:
     """Plot the distribution of the drawn values, and the normal distribution of first order.
 
-    Args:
-        run: Result of :func:`~cdsm.monte_carlo`.
-
-    Raises:
-        InvalidInput: ``run`` is not a Monte Carlo run.
+    InvalidInput if ``run`` is no result of :func:`~cdsm.monte_carlo`.
     """
     expect("run", run, "MonteCarlo")
     (unit, size), first = run.budget.question.unit, run.budget

@@ -43,11 +43,7 @@ _WIDE = 12
 def plot_shares(shares: Shares) -> Figure:
     """Plot the contribution of each cable, of gravity and of the load to a stiffness as bars.
 
-    Args:
-        shares: Result of :meth:`~cdsm.Stiffness.shares`.
-
-    Raises:
-        InvalidInput: ``shares`` is not the shares of a stiffness.
+    InvalidInput if ``shares`` is no result of :meth:`Stiffness.shares <cdsm.Stiffness.shares>`.
     """
     expect("shares", shares, "Shares")
     arm = shares.stiffness.posture.arm
@@ -102,11 +98,7 @@ def plot_stiffness_plan(plan: StiffnessPlan, attainable: StiffnessRange | None =
 def plot_stiffness_range(attainable: StiffnessRange) -> Figure:
     """Plot the tension of each cable for the softest and for the stiffest arm.
 
-    Args:
-        attainable: Result of :func:`~cdsm.stiffness_range`.
-
-    Raises:
-        InvalidInput: ``attainable`` is not a range of stiffness.
+    InvalidInput if ``attainable`` is no result of :func:`~cdsm.stiffness_range`.
     """
     expect("attainable", attainable, "StiffnessRange")
     return _plot_tensions(_ends(attainable), _along(attainable))
@@ -115,16 +107,12 @@ def plot_stiffness_range(attainable: StiffnessRange) -> Figure:
 def plot_tensions(tensions: Tensions) -> Figure:
     """Plot the median tension of each cable over many postures, with the least and the largest.
 
-    Args:
-        tensions: Result of :func:`~cdsm.distribute_tensions`.
-
-    Raises:
-        InvalidInput: ``tensions`` are not tensions of many postures, or none were found.
+    InvalidInput if ``tensions`` is no result of :func:`~cdsm.distribute_tensions`, or all are NaN.
     """
     expect("tensions", tensions, "Tensions")
     found, names = tensions.values[tensions.ok], tensions.arm.cables.names
     if not len(found):
-        raise InvalidInput("tensions", "hold no posture with tensions; see their status.")
+        raise InvalidInput("tensions", "have no posture with tensions; see their status.")
     figure, ((axes,),) = panels(_width(names), 2.8, 1)
     low, middle, high = np.quantile(found, [0.0, 0.5, 1.0], axis=0)
     reach = [middle - low, high - middle]

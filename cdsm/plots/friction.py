@@ -30,13 +30,8 @@ def plot_load_history(history: LoadHistory) -> Figure:
     """Plot the force over the displacement along it, and the tensions along one cable.
 
     The direction is that of the largest force. Where no force acts, the displacement is plotted
-    load by load. The cable is the one in which the tensions differ most.
-
-    Args:
-        history: Result of :func:`~cdsm.load_cycle`.
-
-    Raises:
-        InvalidInput: ``history`` is not a load history.
+    load by load. The cable is the one in which the tensions differ most. InvalidInput if
+    ``history`` is no result of :func:`~cdsm.load_cycle`.
     """
     expect("history", history, "LoadHistory")
     figure, ((left, right),) = panels(TWO_COLUMNS, 3.0, 2)

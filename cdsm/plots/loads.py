@@ -38,13 +38,7 @@ _ROOM = 0.08
 def plot_weight_test(test: WeightTest) -> Figure:
     """Plot load over tip displacement, nonlinear and linear, and tensions over load.
 
-    Up to 24 cables are named.
-
-    Args:
-        test: Result of :func:`~cdsm.weight_test`. Several steps show a curve.
-
-    Raises:
-        InvalidInput: ``test`` is not a weight test.
+    Up to 24 cables are named. InvalidInput if ``test`` is no result of :func:`~cdsm.weight_test`.
     """
     expect("test", test, "WeightTest")
     figure, ((left, right),) = panels(TWO_COLUMNS, 3.0, 2)
@@ -70,11 +64,7 @@ def plot_weight_test(test: WeightTest) -> Figure:
 def plot_critical_tension(critical: CriticalTension) -> Figure:
     """Plot the stability margin over the lower bound of tension; unstable ranges are shaded.
 
-    Args:
-        critical: Result of :func:`~cdsm.critical_tension`.
-
-    Raises:
-        InvalidInput: ``critical`` is not a critical tension.
+    InvalidInput if ``critical`` is no result of :func:`~cdsm.critical_tension`.
     """
     expect("critical", critical, "CriticalTension")
     figure, ((axes,),) = panels(ONE_COLUMN, 2.6, 1)
@@ -114,11 +104,7 @@ def plot_critical_tension(critical: CriticalTension) -> Figure:
 def plot_critical_load(critical: CriticalLoad) -> Figure:
     """Plot the stability margin over the factor of the load, up to the critical factor.
 
-    Args:
-        critical: Result of :func:`~cdsm.critical_load`.
-
-    Raises:
-        InvalidInput: ``critical`` is not a critical load.
+    InvalidInput if ``critical`` is no result of :func:`~cdsm.critical_load`.
     """
     expect("critical", critical, "CriticalLoad")
     figure, ((axes,),) = panels(ONE_COLUMN, 2.6, 1)
@@ -143,11 +129,7 @@ def plot_critical_load(critical: CriticalLoad) -> Figure:
 def plot_bifurcation(found: Bifurcation) -> Figure:
     """Plot how far a slight push moves the tip, over the lower bound of tension.
 
-    Args:
-        found: Result of :func:`~cdsm.bifurcation`.
-
-    Raises:
-        InvalidInput: ``found`` is not a bifurcation.
+    InvalidInput if ``found`` is no result of :func:`~cdsm.bifurcation`.
     """
     expect("found", found, "Bifurcation")
     figure, ((axes,),) = panels(ONE_COLUMN, 2.4, 1)

@@ -86,7 +86,7 @@ def plot_map(
 
     Tips in a plane and sections are dots, or cells if a statistic is given. A cloud of tips is
     shown in three slices through its middle, as cells. Many postures may put the tip into one cell;
-    the statistic tells which value it shows. Entries without the quantity are marked by their
+    the statistic determines which value it shows. Entries without the quantity are marked by their
     status, in maps of cells only outside cells with a value. Unstable entries are marked too,
     because their stiffness has no meaning, except in a map of the margin. Outliers, far from the
     middle 90 % of the values, and infinite values have a colour of their own, at the ends of the
@@ -105,8 +105,8 @@ def plot_map(
 
     Raises:
         InvalidInput: ``dataset`` is not a sweep or has too many panels, ``quantity`` has more than
-            one number per entry, ``section`` is invalid or holds no tip, or ``bins`` is not a whole
-            number from 2 to 500.
+            one number per entry, ``section`` is invalid or contains no tip, or ``bins`` is not a
+            whole number from 2 to 500.
         UnknownName: The sweep has no such quantity or no tip positions, or the axis or the
             statistic is unknown.
         MissingExtra: xarray is not installed.
@@ -240,7 +240,7 @@ def _draw(
 def _legend(
     figure: Figure, counted: Sequence[Case | Map], maps: Sequence[Map], words: Mapping[int, str]
 ) -> None:
-    """Draw the legend: each marker, and its share of the entries that count."""
+    """Draw the legend of ``maps``: marker, word and share of ``counted`` of each status."""
     status = np.concatenate([each.status[np.isnan(each.values)] for each in counted])
     total = sum(each.status.size for each in counted)
     handles = []

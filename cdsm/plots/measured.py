@@ -114,7 +114,6 @@ def plot_identification(fit: Identification, labels: Sequence[str], title: str) 
 
 
 def _plot_stiffnesses(axes: Any, fit: Identification, rows: Sequence[int]) -> None:
-    """Plot predicted over measured stiffness."""
     measured, predicted = N_PER_MM * fit.measured[rows], N_PER_MM * fit.predicted[rows]
     sigma = [N_PER_MM * fit._rows[k].std for k in rows]  # type: ignore[union-attr]
     ends = [min(measured.min(), predicted.min()), max(measured.max(), predicted.max())]

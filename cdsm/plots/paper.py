@@ -98,14 +98,14 @@ def _plot_moduli(result: paper.StiffnessFigure) -> Figure:
         for i, axes in enumerate(row):
             for curve, look in zip(result.curves, looks, strict=True):
                 values = N_PER_MM * getattr(curve, name)[:, i]
-                axes.plot(_swept(result, curve), values, label=curve.label, **look)
+                axes.plot(_abscissa(result, curve), values, label=curve.label, **look)
                 passive = N_PER_MM * getattr(curve, f"{name}_part")[:, i]
             axes.plot(
-                _swept(result, curve)[::4], passive[::4], "k.", ms=4, label="passive part alone"
+                _abscissa(result, curve)[::4], passive[::4], "k.", ms=4, label="passive part alone"
             )
             axes.set_ylim(0.0, 1.12 * values.max())
     first = result.curves[0]
-    x, stated = _swept(result, first), "paper: proportional, twice at 320 GPa"
+    x, stated = _abscissa(result, first), "paper: proportional, twice at 320 GPa"
     for i, axes in enumerate(grid[0]):
         doubled = N_PER_MM * ratio[i] * first.pseudoinverse[0, i]
         axes.plot(x[-1], doubled, "kD", markerfacecolor="none", markersize=6, label=stated)
@@ -221,7 +221,7 @@ def _plot_postures(result: paper.StiffnessFigure) -> Figure:
                 for each, look in ((original, _WIDE), (curve, {"linestyle": STYLES[i]})):
                     values = N_PER_MM * getattr(each, name)[:, i]
                     label = f"{axis}, {_LENGTHS[each.original_length]}"
-                    axes.plot(_swept(result, each), values, color=color, label=label, **look)
+                    axes.plot(_abscissa(result, each), values, color=color, label=label, **look)
             axes.set_yscale("log")
             if column == 0:
                 axes.set_ylabel(f"{reading} [N/mm]")
@@ -248,7 +248,7 @@ def _draw_curve(axes: Any, curve: paper.Curve, values: Array, **line: Any) -> No
     )
 
 
-def _swept(result: paper.StiffnessFigure, curve: paper.Curve) -> Array:
+def _abscissa(result: paper.StiffnessFigure, curve: paper.Curve) -> Array:
     return curve.swept / 1e9 if result.swept == "young_modulus" else curve.tension[:, 1]
 
 

@@ -15,14 +15,22 @@ from numpy.typing import ArrayLike
 from cdsm.errors import InvalidInput
 from cdsm.plots.arm import (
     BESIDE_BAR,
-    arm_axes,
     color_scale,
     draw_arm,
     frame_arms,
     picture_legend,
     tension_bar,
 )
-from cdsm.plots.style import COLORS, MM, SCREEN, VERMILLION, expect, fill_canvas, heading
+from cdsm.plots.style import (
+    COLORS,
+    MM,
+    SCREEN,
+    VERMILLION,
+    expect,
+    fill_canvas,
+    heading,
+    picture_axes,
+)
 from cdsm.support.files import as_path, write_file
 from cdsm.support.validation import number_array
 from cdsm.support.values import Array
@@ -63,13 +71,13 @@ def plot_path(
         tensions: Tensions (n, C) [N] for the colours. Default: those of a plan.
 
     Raises:
-        InvalidInput: ``path`` is not postures of one arm or holds none, or ``animate`` does not
+        InvalidInput: ``path`` is not postures of one arm or is empty, or ``animate`` does not
             end in ``.gif``.
         FileError: The animation cannot be written.
     """
     poses, planned = _postures(path)
     colored = planned if tensions is None else number_array("tensions", tensions)
-    figure, axes = arm_axes()
+    figure, axes = picture_axes()
     shown = np.unique(np.linspace(0, len(poses) - 1, _GHOSTS).round().astype(int)).tolist()
     limits = _limits(poses)
     for k, shade in zip(shown[:-1], np.linspace(0.8, 0.5, len(shown) - 1), strict=True):
@@ -90,17 +98,12 @@ def plot_path(
 def plot_modes(modes: Modes) -> Figure:
     """Plot an arm deflected by its lowest modes; of an unstable arm by those that grow fastest.
 
-    Deflections are enlarged: the tip moves by at most 25 % of the length of the arm.
-
-    Args:
-        modes: Result of :func:`~cdsm.modes`.
-
-    Raises:
-        InvalidInput: ``modes`` is not the modes of an arm.
+    Deflections are enlarged: the tip moves by at most 25 % of the length of the arm. InvalidInput
+    if ``modes`` is no result of :func:`~cdsm.modes`.
     """
     expect("modes", modes, "Modes")
     pose = modes.stiffness.posture
-    figure, axes = arm_axes()
+    figure, axes = picture_axes()
     _draw_skeleton(axes, pose, "0.6")
     named = [(rate, f"grows at {rate:.3g}/s") for rate in modes.growth_rates]
     named += [(frequency, f"{frequency:.3g} Hz") for frequency in modes.frequencies]
@@ -132,14 +135,14 @@ def _postures(path: PathPlan | Sequence[Posture]) -> tuple[list[Posture], Array 
     for pose in poses:
         expect("path", pose, "Posture")
         if pose.arm != poses[0].arm:
-            raise InvalidInput("path", "holds postures of two arms; give those of one.")
+            raise InvalidInput("path", "has postures of two arms; give those of one.")
     if not poses:
-        raise InvalidInput("path", "holds no posture to draw; plan, or give, one at least.")
+        raise InvalidInput("path", "has no posture to draw; give at least one.")
     return poses, tensions
 
 
 def _limits(poses: Sequence[Posture]) -> Array:
-    """Return the limits (3, 2) [mm] of axes that hold all postures."""
+    """Return the limits (3, 2) [mm] of axes that contain all postures."""
     points = MM * np.concatenate(
         [each for pose in poses for each in (*pose.cable_paths, *pose.bones)]
     )
@@ -158,7 +161,7 @@ def _animate(
     """Write a GIF; a frame for each posture, or for 150 of them."""
     if as_path(path).suffix.lower() != ".gif":
         raise InvalidInput("animate", f"{str(path)!r} given; it must end in .gif.")
-    figure, axes = arm_axes()
+    figure, axes = picture_axes()
     colors = None if tensions is None else color_scale(tensions)
     if colors is not None:
         tension_bar(figure, colors)

@@ -44,8 +44,8 @@ _SAME = 1e-9
 """Largest entry of a unit direction outside a plane in which it lies."""
 
 _JUMP = 3.0
-"""A change of the target is a step if it exceeds the neighbouring changes of its sign by this
-factor."""
+"""A change of the target is drawn as a step if it exceeds neighbouring changes of equal sign by
+this factor."""
 
 
 def plot_stiffness_ranges(ranges: Mapping[str, Sequence[StiffnessRange]]) -> Figure:
@@ -66,7 +66,7 @@ def plot_stiffness_ranges(ranges: Mapping[str, Sequence[StiffnessRange]]) -> Fig
     for one in every:
         expect("ranges", one, "StiffnessRange")
     if not every or not all(ranges.values()):
-        raise InvalidInput("ranges", "holds none; give ranges of several directions by label.")
+        raise InvalidInput("ranges", "is empty; give ranges of several directions by label.")
     u = np.array([one.direction for one in every])
     normal = int(abs(u).max(axis=0).argmin())
     if abs(u[:, normal]).max() > _SAME:
@@ -106,11 +106,7 @@ def plot_stiffness_ranges(ranges: Mapping[str, Sequence[StiffnessRange]]) -> Fig
 def plot_saturation(found: Saturation) -> Figure:
     """Plot stiffness, and its gain per newton, over the lower bound of the tensions.
 
-    Args:
-        found: Result of :func:`~cdsm.saturation`.
-
-    Raises:
-        InvalidInput: ``found`` is not a saturation.
+    InvalidInput if ``found`` is no result of :func:`~cdsm.saturation`.
     """
     expect("found", found, "Saturation")
     bound, along, slope = found.curve.T
@@ -141,13 +137,8 @@ def plot_saturation(found: Saturation) -> Figure:
 def plot_path_plan(plan: PathPlan) -> Figure:
     """Plot wanted and planned stiffness, and tensions, over the samples of a path.
 
-    Infeasible samples are shaded. Up to 24 cables have colours and names.
-
-    Args:
-        plan: Result of :func:`~cdsm.planning.path.plan_path` for one direction or several.
-
-    Raises:
-        InvalidInput: ``plan`` is not a plan of a path, or its target is the Cartesian matrix.
+    Infeasible samples are shaded. Up to 24 cables have colours and names. InvalidInput if ``plan``
+    is no result of :func:`~cdsm.plan_path`, or its target is the Cartesian matrix.
     """
     expect("plan", plan, "PathPlan")
     if plan.direction is None:
@@ -187,7 +178,7 @@ def _stepped(values: Array) -> tuple[Array, Array]:
     """Build a line through the samples (S,); large changes are steps half-way between samples."""
     changes = np.diff(values)
     around = np.pad(changes, 1)
-    # only neighbouring changes of equal sign make a ramp; up and back down is two jumps
+    # only neighbouring changes of equal sign make a ramp; up and back down is two steps
     ramp = np.maximum(around[:-2] * np.sign(changes), around[2:] * np.sign(changes))
     last = np.flatnonzero(abs(changes) > _JUMP * np.maximum(ramp, 0.0))
     at = np.repeat(last + 1, 2)

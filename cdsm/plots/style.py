@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import textwrap
 from collections.abc import Sequence
+from itertools import product
 from pathlib import Path
 from typing import Any, Final
 
@@ -18,6 +19,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import Bbox
+from mpl_toolkits.mplot3d import Axes3D, proj3d  # type: ignore[import-untyped]
 
 from cdsm.errors import InvalidInput
 from cdsm.support.files import as_path, write_file
@@ -183,6 +185,31 @@ def equal_axes(axes: Any, zoom: float = 0.75) -> None:
         getattr(axes, f"{letter}axis").set_major_locator(ticks)
 
 
+class _Picture(Axes3D):  # type: ignore[misc]
+    """3D axes that take the space of what they show, not of the larger square around it.
+
+    Notebooks crop figures to these boxes.
+    """
+
+    def get_tightbbox(self, renderer: Any = None, **options: Any) -> Bbox:
+        """Return the box around the cube of the axes, with ticks and labels [pixel]."""
+        corners = np.array([*product(*np.reshape(self.get_w_lims(), (3, 2)))])
+        x, y, _ = proj3d.proj_transform(*corners.T, self.get_proj())
+        box = Bbox.null()
+        box.update_from_data_xy(self.transData.transform(np.transpose([x, y])))
+        return Bbox.union(
+            [box, *(each.get_tightbbox(renderer) for each in self._axis_map.values())]
+        )
+
+
+def picture_axes() -> tuple[Figure, Any]:
+    """Build a figure of one column with 3D axes."""
+    figure = Figure(figsize=(ONE_COLUMN, ONE_COLUMN), dpi=SCREEN)
+    axes: Any = figure.add_subplot(axes_class=_Picture)
+    axes.view_init(elev=24.0, azim=-62.0)
+    return figure, axes
+
+
 def fill_canvas(axes: Any, right: float = 1.0) -> None:
     """Enlarge a 3D picture until it fills its figure, up to a fraction ``right`` of the width.
 
@@ -199,8 +226,7 @@ def fill_canvas(axes: Any, right: float = 1.0) -> None:
         )
         renderer: Any = FigureCanvasAgg(figure).get_renderer()  # type: ignore[no-untyped-call]
         place = axes.get_window_extent()
-        parts = [axis.get_tightbbox(renderer) for axis in axes._axis_map.values()]
-        box = Bbox.union(parts)
+        box = axes.get_tightbbox(renderer)
         scale = (right - 2.0 * _GAP / figure.get_figwidth()) * width / box.width
         height = below + scale * box.height + above
         figure.set_figheight(height / figure.dpi)

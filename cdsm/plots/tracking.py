@@ -1,4 +1,4 @@
-"""Plot a closed loop over time: tip, stiffness, tensions, and the proved band."""
+"""Plot a closed loop over time: tip, stiffness, tensions, and where the tip may rest."""
 
 from __future__ import annotations
 
@@ -34,13 +34,9 @@ _HALF = 0.5
 
 
 def plot_tracking_run(run: TrackingRun) -> Figure:
-    """Plot a closed loop over time: tip error, stiffness, the proved band, and all tensions.
+    """Plot a closed loop over time: tip error with the band of rest states, stiffness, tensions.
 
-    Args:
-        run: Result of :func:`~cdsm.track`.
-
-    Raises:
-        InvalidInput: ``run`` is not the result of a closed loop.
+    InvalidInput if ``run`` is no result of :func:`~cdsm.track`.
     """
     expect("run", run, "TrackingRun")
     figure, axes = panels(TWO_COLUMNS, 6.4, 1, 4, sharex=True)

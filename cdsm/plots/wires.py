@@ -38,11 +38,7 @@ _ENDLESS: Final = 1000.0
 def plot_elasticity(law: Elasticity) -> Figure:
     """Plot tangent and secant rigidity EA [kN] over the tension [N].
 
-    Args:
-        law: Any elasticity. A law without an end is drawn up to 1000 N.
-
-    Raises:
-        InvalidInput: ``law`` is not an elasticity.
+    A law without an end is drawn up to 1000 N. InvalidInput if ``law`` is not an elasticity.
     """
     expect("law", law, "Elasticity")
     tension = _tensions(law.domain)

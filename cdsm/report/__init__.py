@@ -1,6 +1,7 @@
-"""Truth report: checks of a stiffness matrix that tell whether it can be trusted."""
+"""Truth report: checks that show whether a stiffness matrix can be trusted."""
 
-from cdsm.report.facts import CableState, Optimality, Rank, Readings
+from cdsm.report.facts import CableState, Rank, Readings
+from cdsm.report.optimality import Optimality
 from cdsm.report.report import Report, report_on
 from cdsm.report.self_check import Agreement, Difference, SelfCheck, self_check
 

@@ -117,8 +117,8 @@ def _self_check(report: Report) -> Section:
         (
             "sum, K_θ" if each.name == "joint" else each.name,
             f"{each.largest:.4g} {each.unit}",
-            _off(each.potential, each),
-            _off(each.torque, each),
+            _deviation(each.potential, each),
+            _deviation(each.torque, each),
             each.verdict,
         )
         for each in report.self_check.compared
@@ -241,7 +241,7 @@ def _conventions(report: Report) -> Section:
     return "Units, frame and signs", (), sentences
 
 
-def _off(difference: Difference | None, of: Agreement) -> str:
+def _deviation(difference: Difference | None, of: Agreement) -> str:
     if difference is None:
         return "-"
     if of.largest == 0.0:

@@ -40,7 +40,7 @@ _BESIDE = 1e-6
 class LockedCable(NamedTuple):
     """A position-controlled cable with locked motor, computed from strain and energy of its law.
 
-    It has the tension F [N] at the posture, and the motor holds its original length l_0 [m].
+    It has the tension F [N] at the posture, and the motor keeps its original length l_0 [m].
     """
 
     number: int
@@ -151,7 +151,7 @@ class Neighbourhood:
         return self._kinematic(places, np.zeros(3))
 
     def work(self, places: Array) -> Array:
-        """As :meth:`kinematic`, with the work of the moment, which is exact to first order."""
+        """Compute :meth:`kinematic` (P, 3) [N m] with the work of the moment, to first order."""
         return self._kinematic(places, self._wrench[3:])
 
     def _kinematic(self, places: Array, moment: Array) -> Array:
@@ -222,7 +222,7 @@ class Neighbourhood:
     @property
     def first_step(self) -> float:
         """Return a first step so small that no cable segment loses more than half its length."""
-        return min(_FIRST, self._straightness / 4.0)
+        return min(_FIRST, self._closing_motion / 4.0)
 
     @property
     def first_elastic_step(self) -> float:
@@ -234,7 +234,7 @@ class Neighbourhood:
         return float(step)
 
     @cached_property
-    def _straightness(self) -> float:
+    def _closing_motion(self) -> float:
         """Return the least joint displacement, in :attr:`unit`, that may close a cable segment."""
         pose = self._pose
         routing = pose.arm._model.routing
@@ -251,7 +251,7 @@ class Neighbourhood:
 
     @property
     def length_noise(self) -> Array:
-        """Return the rounding error of the cable lengths (C,) [m], from sums and site positions."""
+        """Estimate the rounding errors (C,) [m] of cable lengths, from sums and from the sites."""
         return np.asarray(_ULPS * (self._pose.cable_lengths + self._pose.arm.length))
 
     def kinematic_noise(self, step: float) -> Array:
@@ -271,7 +271,7 @@ class Neighbourhood:
     def kinematic_torque_noise(self, step: float) -> Array:
         """Return the rounding error of kinematic torques (3,) [N m]; large at short segments."""
         noise = self.kinematic_noise(step)
-        noise[0] *= 1.0 + 1.0 / self._straightness
+        noise[0] *= 1.0 + 1.0 / self._closing_motion
         return noise
 
     def elastic_torque_noise(self, step: float) -> Array:
@@ -279,7 +279,7 @@ class Neighbourhood:
         k = self._k
         errors = k * self.length_noise + _ROOT * self._tension * (k > 0.0)
         tilted = 2.0 * step * (k * self._arms) @ self.length_noise
-        return np.array([errors @ self._arms + tilted / self._straightness])
+        return np.array([errors @ self._arms + tilted / self._closing_motion])
 
 
 def joint_unit(arm: Manipulator) -> Array:

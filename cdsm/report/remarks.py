@@ -23,7 +23,7 @@ CLOSE = 0.05
 """A note is given if a tension is nearer than this part of itself to a bound of its law."""
 
 _SINGULAR = 1e-12
-"""A margin of at most this part of the norm of K_θ is rounding."""
+"""An eigenvalue of at most this part of the norm of K_θ is rounding."""
 
 _DIGITS = 1e10
 """Condition number of K_θ above which K_θ⁻¹ has less than six digits."""
@@ -47,10 +47,10 @@ def faults(report: Report) -> Iterator[str]:
         yield f"self-check not possible of the {' and '.join(labels)}: {reason}"
     if report.imbalance > BALANCED:
         yield (
-            f"the tensions do not balance the arm: {report.residual:.3g} N m are left, most at "
-            f"{report.residual_joint}, {report.imbalance:.1e} of the torques ({BALANCED:g} is "
-            "allowed). K_θ is that of an arm held here by something else; distribute_tension "
-            "balances it."
+            f"the tensions do not balance the arm: the residual is {report.residual:.3g} N m "
+            f"at {report.residual_joint}, {report.imbalance:.1e} of the torques ({BALANCED:g} is "
+            "allowed). K_θ is right only if another load balances the arm here; distribute_tension "
+            "finds tensions that do."
         )
     arm = K.posture.arm
     if not K.is_stable:
@@ -65,8 +65,8 @@ def faults(report: Report) -> Iterator[str]:
     if found is not None and not found.optimal:
         least = found.stationarity
         yield (
-            f"the tensions are not what {found.solver} was asked for: bounds and balance are "
-            f"missed by {found.feasibility:.1e}"
+            f"the tensions of {found.solver} are not optimal: bounds and balance are "
+            f"violated by {found.feasibility:.1e}"
             + ("." if least is None else f", stationarity by {least:.1e}.")
         )
 
@@ -88,7 +88,7 @@ def notes(report: Report) -> Iterator[str]:
         yield (
             f"along, cartesian and pseudoinverse differ in {', '.join(apart)}, by up to "
             f"{spread.max():.3g} times: use along, which is what a small weight measures; "
-            "cartesian holds the other two translations, pseudoinverse is the paper's reading."
+            "cartesian locks the other two translations, pseudoinverse is the paper's reading."
         )
 
 
@@ -109,13 +109,13 @@ def _of_tensions(report: Report) -> Iterator[str]:
             )
     if report.optimality is None:
         came = "were given" if K.free_length is None else "follow from an equilibrium"
-        yield f"the tensions {came}, not distributed: nothing says they are the least."
+        yield f"the tensions {came}, not distributed: they need not be the least."
     elif report.optimality.stationarity is None:
         yield "the tensions were chosen for a stiffness: they are not the least."
     held = [each for each in report.cables if each.control == "position"]
     pulled = [each for each in held if not each.is_slack]
     if slack := [each.name for each in held if each.is_slack]:
-        yield f"slack cables, 0 N: {_listed(slack)}. They stiffen one way only; raise minimum=."
+        yield f"slack cables, 0 N: {_listed(slack)}. They stiffen one direction; raise minimum=."
     if forced := [each.name for each in report.cables if each.control == "force"]:
         yield f"force-controlled, no passive stiffness: {_listed(forced)}."
     low = [each.name for each in pulled if each.below <= CLOSE * each.tension]
@@ -124,13 +124,13 @@ def _of_tensions(report: Report) -> Iterator[str]:
         if names:
             yield (
                 f"within {100.0 * CLOSE:g} % of the {end} end of their law: {_listed(names)}. "
-                "Beyond it nothing is known."
+                "The law is not defined beyond it."
             )
     pairs = zip(K.posture.arm.cables, K.free_lengths, strict=True)
     if lost := [cable.name for cable, l0 in pairs if l0 <= 0.0]:
         yield (
             f"the series spring stretches by more than the whole cable is long: {_listed(lost)}. "
-            "Give a lead that holds the spring; until then K is off by up to F/EA."
+            "Give a longer lead; without it K is off by up to F/EA."
         )
     if K.wrench[3:].any():
         yield (
@@ -143,9 +143,9 @@ def _of_ranks(report: Report) -> Iterator[str]:
     cables, tip, jacobian = report.cable_rank, report.translation_rank, report.jacobian_rank
     nv = report.stiffness.posture.arm.nv
     if cables.rank < nv:
-        yield f"the cables give {cables.rank} of {nv} joint torques: they do not hold all."
+        yield f"the cables give {cables.rank} of {nv} joint torques: they cannot balance all."
     elif report.closure == 0.0:
-        yield "not all tensions can grow together without a torque: no pretension at will."
+        yield "the cables cannot all be pretensioned without a joint torque."
     if tip.rank < 3:
         yield (
             f"the joints move the tip in {tip.rank} of 3 directions here: in the others it is "
@@ -154,7 +154,7 @@ def _of_ranks(report: Report) -> Iterator[str]:
     if jacobian.rank < jacobian.full:
         yield f"J_X has rank {jacobian.rank} here, not {jacobian.full}."
     if report.condition > _DIGITS:
-        yield f"K_θ has the condition {report.condition:.1g}: the compliance loses digits."
+        yield f"K_θ has the condition number {report.condition:.1g}: the compliance loses digits."
 
 
 def _numbers(values: Array) -> str:

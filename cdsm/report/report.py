@@ -1,4 +1,4 @@
-"""Report that tells whether a stiffness can be trusted."""
+"""Report that shows whether a stiffness can be trusted."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, final
 import numpy as np
 
 from cdsm.report import facts, remarks
-from cdsm.report.facts import CableState, Optimality, Rank, Readings, Sticking
+from cdsm.report.facts import CableState, Rank, Readings, Sticking
+from cdsm.report.optimality import Optimality, optimality
 from cdsm.report.page import to_document, to_fragment, to_text
 from cdsm.report.potential import joint_unit
 from cdsm.report.self_check import SelfCheck, self_check
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Report(ReadOnlyState):
-    """Report that tells whether a stiffness can be trusted; made by :meth:`Stiffness.report`.
+    """Report that shows whether a stiffness can be trusted; made by :meth:`Stiffness.report`.
 
     Attributes:
         stiffness: The stiffness to check.
@@ -166,7 +167,7 @@ class Report(ReadOnlyState):
 
 def report_on(K: Stiffness) -> Report:
     """Compute the report on a stiffness."""
-    residual, joint, imbalance = facts.imbalance(K)
+    residual, joint, imbalance = facts.balance_error(K)
     tip, translation, cables = facts.ranks(K)
     pull, readings = K.distribution, facts.readings(K)
     return Report(
@@ -175,7 +176,7 @@ def report_on(K: Stiffness) -> Report:
         residual=residual,
         residual_joint=joint,
         imbalance=imbalance,
-        optimality=None if pull is None else facts.optimality(K, pull),
+        optimality=None if pull is None else optimality(K, pull),
         cables=facts.cable_states(K),
         jacobian_rank=tip,
         translation_rank=translation,

@@ -47,7 +47,7 @@ _SUM = 16.0 * float(np.finfo(np.float64).eps)
 """Rounding error of a sum, relative to the sum of the magnitudes of its terms."""
 
 
-class _Anew(NamedTuple):
+class _Recomputed(NamedTuple):
     """Value computed by differences with its error bound, or the reason why there is none."""
 
     value: Array | None
@@ -55,7 +55,7 @@ class _Anew(NamedTuple):
     error: float = 0.0
 
 
-_NONE = _Anew(None)
+_NONE = _Recomputed(None)
 
 
 @final
@@ -142,9 +142,9 @@ def self_check(K: Stiffness) -> SelfCheck:
     possible names the reason.
     """
     near = Neighbourhood(K)
-    energies, torques = _terms_anew(near)
+    energies, torques = _recomputed_terms(near)
     if K.wrench[3:].any():
-        energies[3] = _Anew(None, "a moment has no potential")
+        energies[3] = _Recomputed(None, "a moment has no potential")
 
     scaled = near.unit[:, None] * near.unit
     given = np.array([getattr(K, name) for name in _TERMS]) * scaled
@@ -157,66 +157,72 @@ def self_check(K: Stiffness) -> SelfCheck:
     whole = _compare("joint", joint, size, _summed(energies), _summed(torques), size)
     J, k = K.posture.length_jacobian, K.cable_stiffness[:, None, None]
     by_cable = k * J[:, :, None] * J[:, None, :] * scaled
-    terms[1] = _adds_up(terms[1], given[1], by_cable, "J_Lᵀ K_L J_L of its cables")
-    terms.append(_adds_up(whole, joint, given, "the sum of its four terms"))
+    terms[1] = _with_sum_checked(terms[1], given[1], by_cable, "J_Lᵀ K_L J_L of its cables")
+    terms.append(_with_sum_checked(whole, joint, given, "the sum of its four terms"))
 
-    work = _derived(gradients, near, near.work, near.kinematic_noise, near.first_step)
+    work = _differentiated(gradients, near, near.work, near.kinematic_noise, near.first_step)
     statics = _compare("torque", K.residual * near.unit, torque_size(K), _summed(work))
 
     # two programs compute places along the links, so the results differ by some more rounding
-    measured = _Anew(near.measured_lengths(), error=16.0 * float(near.length_noise.max()))
+    measured = _Recomputed(near.measured_lengths(), error=16.0 * float(near.length_noise.max()))
     lengths = K.posture.cable_lengths
     same = _compare("lengths", lengths, float(lengths.max()), measured)
     return SelfCheck(terms=tuple(terms), statics=statics, lengths=same)
 
 
-def _terms_anew(near: Neighbourhood) -> tuple[list[_Anew], list[_Anew]]:
+def _recomputed_terms(near: Neighbourhood) -> tuple[list[_Recomputed], list[_Recomputed]]:
     """Compute active, passive, gravity and load term from the potential, and from the torque."""
     step = near.first_step
-    moved = _derived(hessians, near, near.kinematic, near.kinematic_noise, step)
-    turned = _derived(gradients, near, near.kinematic_torques, near.kinematic_torque_noise, step)
+    moved = _differentiated(hessians, near, near.kinematic, near.kinematic_noise, step)
+    turned = _differentiated(
+        gradients, near, near.kinematic_torques, near.kinematic_torque_noise, step
+    )
     if one_sided := [reason for cable in near.held for reason in cable.one_sided()]:
         named = first_of(one_sided, _NAMED, "cables")
-        stored = pulled = [_Anew(None, f"K_θ has another value on either side: {named}.")]
+        stored = pulled = [_Recomputed(None, f"K_θ has another value on either side: {named}.")]
     else:
         step = near.first_elastic_step
-        stored = _derived(hessians, near, near.elastic, near.elastic_noise, step)
-        pulled = _derived(gradients, near, near.elastic_torques, near.elastic_torque_noise, step)
+        stored = _differentiated(hessians, near, near.elastic, near.elastic_noise, step)
+        pulled = _differentiated(
+            gradients, near, near.elastic_torques, near.elastic_torque_noise, step
+        )
     return [moved[0], stored[0], *moved[1:]], [turned[0], pulled[0], *turned[1:]]
 
 
-def _derived(
+def _differentiated(
     derive: Callable[[Sampled, int, float, Noise], Estimates],
     near: Neighbourhood,
     f: Sampled,
     noise: Noise,
     step: float,
-) -> list[_Anew]:
+) -> list[_Recomputed]:
     """Compute derivatives of three kinematic parts or one elastic part; errors become reasons."""
     try:
         values, errors = derive(f, near.unit.size, step, noise)
     except CdsmError as error:
-        return [_Anew(None, str(error))] * 3
+        return [_Recomputed(None, str(error))] * 3
     return [
-        _Anew(value, error=float(error)) if np.isfinite(error) else _Anew(None, _UNSETTLED)
+        _Recomputed(value, error=float(error))
+        if np.isfinite(error)
+        else _Recomputed(None, _UNSETTLED)
         for value, error in zip(values, errors, strict=True)
     ]
 
 
-def _summed(parts: list[_Anew]) -> _Anew:
+def _summed(parts: list[_Recomputed]) -> _Recomputed:
     """Add values and error bounds; if a value is missing, return the reason."""
     values = [each.value for each in parts if each.value is not None]
     if len(values) < len(parts):
-        return _Anew(None, next(each.reason for each in parts if each.value is None))
-    return _Anew(np.sum(values, axis=0), error=sum(each.error for each in parts))
+        return _Recomputed(None, next(each.reason for each in parts if each.value is None))
+    return _Recomputed(np.sum(values, axis=0), error=sum(each.error for each in parts))
 
 
 def _compare(
     name: str,
     given: Array,
     largest: float,
-    potential: _Anew,
-    torque: _Anew = _NONE,
+    potential: _Recomputed,
+    torque: _Recomputed = _NONE,
     whole: float = 0.0,
 ) -> Agreement:
     """Compare a matrix with its values by differences; ``whole`` is the largest entry of K_θ."""
@@ -251,7 +257,7 @@ def _compare(
     )
 
 
-def _adds_up(found: Agreement, matrix: Array, parts: Array, what: str) -> Agreement:
+def _with_sum_checked(found: Agreement, matrix: Array, parts: Array, what: str) -> Agreement:
     """Change the verdict to DIFFERS if a matrix (nv, nv) is not the sum of parts (n, nv, nv)."""
     off = float(abs(matrix - parts.sum(axis=0)).max())
     if off <= _SUM * float(abs(parts).sum(axis=0).max()) or found.verdict == "DIFFERS":

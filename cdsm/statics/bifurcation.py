@@ -73,11 +73,7 @@ class Bifurcation(ReadOnlyState):
         return dict(plain(numbers))
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Return a table of tip displacements [m], a row for each lower bound [N].
-
-        Raises:
-            MissingExtra: pandas is not installed.
-        """
+        """Return the tip displacements [m] at each lower bound [N]; MissingExtra without pandas."""
         columns = dict(zip(("x [m]", "y [m]", "z [m]"), self.displacements.T, strict=True))
         return data_frame(columns, "minimum [N]", self.bounds)
 

@@ -34,7 +34,7 @@ StiffnessAt = Callable[[float], Stiffness]
 
 
 def failure_at(at: StiffnessAt, place: float) -> Limit:
-    """Return why the arm fails at a place, or ``"none"`` if the arm holds."""
+    """Return why the arm fails at a place; ``"none"`` if it is balanced and stable."""
     try:
         return "none" if at(place).is_stable else "buckling"
     except (InfeasibleTension, SolverError):  # a solver may fail on the very edge

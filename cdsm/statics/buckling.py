@@ -42,10 +42,10 @@ _SHOWN: Final = 10.0
 def critical_tension(
     pose: Posture, wrench: ArrayLike = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0), solver: str = DEFAULT_SOLVER
 ) -> CriticalTension:
-    """Compute the lower bound of tension at which K_θ becomes singular: det K_θ(F_min) = 0.
+    """Compute the lower bound F_min [N] of tension at which K_θ stops being positive definite.
 
-    K_θ is that of :func:`~cdsm.stiffness`; its symmetric part decides. F is the result of
-    :func:`~cdsm.distribute_tension` with this lower bound on all cables.
+    K_θ, of which the symmetric part counts, is that of :func:`~cdsm.stiffness` at the tensions of
+    :func:`~cdsm.distribute_tension` with the lower bound F_min on all cables.
 
     Args:
         pose: The posture, which stays fixed.

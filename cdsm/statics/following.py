@@ -23,13 +23,13 @@ _FINEST = 2.0**-12
 """Relative precision of a buckling load."""
 
 _SLIGHT = 1e-9
-"""Smallest buckling load, as a part of the load, whose precision is relative, not absolute."""
+"""Buckling loads below this part of the load are found to this absolute precision."""
 
 
 def follow_load(
     before: Equilibrium, wrench: Array, added: Array, reached: float, goal: float
 ) -> Equilibrium:
-    """Follow the stable equilibria from one part of the load to a larger part."""
+    """Follow stable equilibria under wrench + λ · added from λ = ``reached`` to λ = ``goal``."""
     step = goal - reached
     while reached < goal:
         part = min(goal, reached + step)
@@ -43,7 +43,7 @@ def follow_load(
             joint = before.pose.arm.joint_names[int(abs(mode).argmax())]
             raise EquilibriumError(
                 f"the arm buckles at {100.0 * reached:.4g} % of the load, under "
-                f"{reached * float(np.linalg.norm(added)):.4g} N: {joint} gives way",
+                f"{reached * float(np.linalg.norm(added)):.4g} N: {joint} buckles",
                 residual=before.residual,
                 load_factor=reached,
                 joint=joint,

@@ -60,19 +60,29 @@ class FrictionalArm(NamedTuple):
         pose = near.pose.arm.at(q, check_limits=False)
         return self.at(pose, np.maximum(near.chain.tension + near.slope @ (q - near.q), 0.0))
 
+    def settled(self, pose: Posture, near: Array) -> Chain:
+        """Compute the cables at a posture. The search for tensions starts at ``near`` (S,) [N]."""
+        segments, ratio = pose.segments, np.ones(near.size)
+        ratio[segments.chains.hole] = np.exp(segments.chains.friction * segments.wrap)
+        return self.problem.settle(segments.lengths, self.natural, ratio, self.forced, near)
+
+    def residual(self, pose: Posture, tension: Array) -> Array:
+        """Compute r (nv,) [N m] of segment tensions (S,) [N]."""
+        pull = tension @ pose.segments.length_jacobian
+        return np.asarray(pull + pose.gravity_torque - self.wrench @ pose.jacobian)
+
     def at(self, pose: Posture, near: Array) -> Settled:
         """Compute the arm at a posture. The search for its tensions starts at ``near`` (S,) [N]."""
-        segments = pose.segments
-        holes, nv = segments.chains, pose.q.size
+        chain, segments = self.settled(pose, near), pose.segments
+        holes, nv, T = segments.chains, pose.q.size, chain.tension
         lengths, J = segments.lengths, segments.length_jacobian
-        ratio, grip = np.ones(lengths.size), np.zeros((lengths.size, nv + 1))
-        ratio[holes.hole] = np.exp(holes.friction * segments.wrap)
-        grip[holes.hole, :nv] = holes.friction[:, None] * segments.wrap_jacobian
-        chain = self.problem.settle(lengths, self.natural, ratio, self.forced, near)
         # the last column is the rounding of the tensions, from that of all lengths
-        slopes = self.problem.tangent(chain, self.forced, np.c_[J, lengths], grip)
+        gradient, grip = np.empty((T.size, nv + 1)), np.zeros((T.size, nv + 1))
+        gradient[:, :nv], gradient[:, nv] = J, lengths
+        grip[holes.hole, :nv] = holes.friction[:, None] * segments.wrap_jacobian
+        slopes = self.problem.tangent(chain, self.forced, gradient, grip)
         slope, rounded = slopes[:, :nv].copy(), abs(slopes[:, nv])
-        model, T = pose.arm._model, chain.tension
+        model = pose.arm._model
         segment, joint = model.chain_arrays[2:4]
         *_, K = stiffness_kernels.single_stiffness(
             segment,
@@ -87,7 +97,7 @@ class FrictionalArm(NamedTuple):
             model.masses.tip_joints,
         )
         K = K + J.T @ slope
-        residual = T @ J + pose.gravity_torque - self.wrench @ pose.jacobian
+        residual = self.residual(pose, T)
         terms = (T + rounded) @ abs(J) + abs(self.wrench) @ abs(pose.jacobian)
         terms += abs(pose.gravity_torque) + abs(K) @ abs(pose.q)
         terms += tilt_torque(pose, T[segment[:-1, 0]])

@@ -70,7 +70,7 @@ def load_cycle(
             ``wrenches``, ``motors`` or ``accuracy`` are not as above.
         ElasticityRangeError: A tension at the reference or at a load is outside the domain of its
             law.
-        EquilibriumError: No equilibrium was found on the way to a load. The error names the load.
+        EquilibriumError: No equilibrium was found in the step to a load. The error names the load.
     """
     F, W = checked_tension(pose, tension, None)
     pose.arm._model.laws.stiffness(pose.cable_lengths, F)  # in the domains of the laws
@@ -97,7 +97,7 @@ def load_cycle(
     history = []
     for k, (wrench, command) in enumerate(track(tuple(zip(loads, commands, strict=True)), "loads")):
         state, passage = loading.carry(
-            state, Load(wrench, none, command), f"the way to load {k + 1}"
+            state, Load(wrench, none, command), f"the step to load {k + 1}"
         )
         _require_domains(loading, state, k)
         history.append((state, passage))
@@ -128,7 +128,6 @@ def _commands(motors: ArrayLike, forced: NDArray[np.bool_]) -> Array:
 
 
 def _require_domains(loading: SlowLoading, state: State, load: int) -> None:
-    """Raise ElasticityRangeError if a tension is outside the domain of its law."""
     cables, T = loading.reference.arm.cables, state.settled.chain.tension
     first = loading.start[:-1]
     # a motor that holds the tension of a cable without friction needs no law

@@ -12,14 +12,11 @@ from typing import TYPE_CHECKING, Any, final
 import numpy as np
 from numpy.typing import NDArray
 
-from cdsm.errors import InvalidInput
 from cdsm.friction.stuck import assemble_segments
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Friction, Stiffness
-from cdsm.support.extras import need
-from cdsm.support.files import as_path, write_file
 from cdsm.support.format import plain
-from cdsm.support.tidy import data_frame, dataset
+from cdsm.support.tidy import data_frame, dataset, write_labelled
 from cdsm.support.validation import whole_number
 from cdsm.support.values import Array, ReadOnlyState, frozen
 
@@ -49,8 +46,8 @@ class LoadHistory(ReadOnlyState):
         angles: Joint coordinates at each load (n, nv) [rad].
         tip: Position of the tip at each load (n, 3) [m].
         segment_tensions: T of each segment at each load (n, S) [N].
-        slip: Natural length of wire that moved through each hole on the way to each load (n, P)
-            [m]; positive towards the end of the cable.
+        slip: Natural length of wire that moved through each hole during the step to each load (n,
+            P) [m]; positive towards the end of the cable.
         sliding: Holes that slide as the load is reached (n, P): 1 towards the end of the cable, −1
             towards its motor, 0 where the cable sticks or the hole has no friction.
         reaction: Torque of the stops on the joints at each load (n, nv) [N m].
@@ -104,19 +101,11 @@ class LoadHistory(ReadOnlyState):
         return tuple(f"{cables[c].name} site {site + 1}" for c, site in pairs)
 
     def pose(self, load: int) -> Posture:
-        """Return the posture at a load, counted from 0; negative numbers count from the last.
-
-        Raises:
-            InvalidInput: There is no such load.
-        """
+        """Return the posture at load number ``load``; negative: from the last. Or InvalidInput."""
         return self.reference.arm.at(self.angles[self._index(load)], check_limits=False)
 
     def stiffness(self, load: int) -> Stiffness:
-        """Compute the tangent stiffness at a load if sliding holes continue to slide.
-
-        Raises:
-            InvalidInput: There is no such load.
-        """
+        """Compute the tangent stiffness at load number ``load``, while sliding holes slide on."""
         k = self._index(load)
         signs = self.sliding[k]
         friction: Friction = "sliding" if signs.any() else "stuck"
@@ -124,11 +113,7 @@ class LoadHistory(ReadOnlyState):
         return assemble_segments(self.pose(k), T, signs, frozen(W), friction)
 
     def to_xarray(self) -> xarray.Dataset:
-        """Return a labelled Dataset over load, axis, joint, cable, segment and hole, in SI units.
-
-        Raises:
-            MissingExtra: xarray is not installed.
-        """
+        """Return the states as a labelled Dataset in SI units; MissingExtra without xarray."""
         arm, chains = self.reference.arm, self.reference.segments.chains
         names = np.array(arm.cables.names)
         first = np.flatnonzero(np.diff(chains.cable, prepend=-1))
@@ -169,8 +154,7 @@ class LoadHistory(ReadOnlyState):
     def to_pandas(self) -> pandas.DataFrame:
         """Return a table with a row per load: wrench, displacement, sliding holes, energies.
 
-        Raises:
-            MissingExtra: pandas is not installed.
+        MissingExtra without pandas.
         """
         loads, moved = self.wrenches.T, self.displacement.T
         columns: dict[str, NDArray[Any]] = {
@@ -209,14 +193,7 @@ class LoadHistory(ReadOnlyState):
             MissingExtra: pandas or netCDF4 is not installed.
             FileError: The file cannot be written.
         """
-        suffix = as_path(path).suffix.lower()
-        if suffix == ".csv":
-            return write_file(path, self.to_pandas().to_csv)
-        if suffix != ".nc":
-            raise InvalidInput("path", f"{str(path)!r} ends neither in .nc (NetCDF) nor in .csv.")
-        need("sweep", "netCDF4")
-        data = self.to_xarray()
-        return write_file(path, lambda aside: data.to_netcdf(aside, engine="netcdf4"))
+        return write_labelled(path, self.to_pandas, self.to_xarray)
 
     def plot(self) -> Figure:
         """Plot force over displacement, and the tensions along the cable that changes most."""

@@ -1,10 +1,11 @@
 """Derivatives of the tips of a slowly loaded arm with friction, for changed loads or a changed arm.
 
-A "rest" is an equilibrium on the way. Each rest solves r(q, a) = 0, where a are the natural lengths
-of the segments at the previous rest; A(q, T) are those at this rest. So a small change is followed
-from rest to rest: it changes the residual torque by δr, the posture by δq = −K⁻¹ δr with K = ∂r/∂q,
-and the natural lengths by δA(q, T). Holes that slide continue to slide, others continue to stick.
-This is the derivative wherever no hole is just about to start or to stop sliding.
+A "rest" is an equilibrium between two loads, or at a load. Each rest solves r(q, a) = 0, where a
+are the natural lengths of the segments at the previous rest; A(q, T) are those at this rest. So a
+small change is followed from rest to rest: it changes the residual torque by δr, the posture by δq
+= −K⁻¹ δr with K = ∂r/∂q, and the natural lengths by δA(q, T). Holes that slide continue to slide,
+others continue to stick. This is the derivative wherever no hole is just about to start or to stop
+sliding.
 
 A change of the loads is followed with the tangents of the rests. A change of the arm is followed by
 evaluating the changed arm at the recorded postures, without a search: its natural lengths and
@@ -13,6 +14,8 @@ residuals there give δa and δr. The error for a change of size δ is of order 
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -36,7 +39,8 @@ class _Rest(NamedTuple):
     part: float  # of the way
 
 
-class LoadingPath(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class LoadingPath:
     """Equilibria ("rests") of an arm with friction during a series of loads.
 
     Their number does not depend on the arm, unlike that of the sub-steps of
@@ -51,11 +55,18 @@ class LoadingPath(NamedTuple):
 
     @classmethod
     def of(
-        cls, pose: Posture, tension: Array, wrench: Array, forces: Array, parts: int = _PARTS
+        cls,
+        pose: Posture,
+        tension: Array,
+        wrench: Array,
+        forces: Array,
+        parts: int = _PARTS,
+        near: LoadingPath | None = None,
     ) -> LoadingPath:
         """Load an arm that is balanced at a posture under ``wrench`` (6,) by forces (n, 3) [N].
 
-        ``parts`` is the number of rests over the range of the forces.
+        ``parts`` is the number of rests over the range of the forces. The searches start from the
+        motions of a ``near`` path, of a similar arm under the same loads: up to twice as fast.
 
         Raises:
             CdsmError: The posture is beyond a joint limit, or no equilibrium was found on the way.
@@ -72,7 +83,8 @@ class LoadingPath(NamedTuple):
             part = longest = 1.0 / max(1.0, np.ceil(parts * change / swing - 0.01))
             while reached < 1.0:
                 goal = reached + part if reached + 1.5 * part < 1.0 else 1.0
-                found, search = loading.rest(state, before.towards(target, goal))
+                motion = near.motion(len(rests), k, goal) if near else None
+                found, search = loading.rest(state, before.towards(target, goal), motion)
                 if found is not None:
                     state, reached = found, goal
                     rests.append(_Rest(state, k, reached))
@@ -81,7 +93,7 @@ class LoadingPath(NamedTuple):
                 else:
                     left = np.where(search.at_stop, 0.0, search.state.torque)
                     raise no_rest(
-                        pose, search.state.pose, left, reached, f"the way to load {k + 1}"
+                        pose, search.state.pose, left, reached, f"the step to load {k + 1}"
                     )
             last.append(len(rests) - 1)
         return cls(loading, tension, start, tuple(rests), tuple(last))
@@ -90,6 +102,29 @@ class LoadingPath(NamedTuple):
     def tips(self) -> Array:
         """Tip at each load (n, 3) [m]."""
         return np.array([self.rests[i].state.pose.tip[:3, 3] for i in self.last])
+
+    def motion(self, i: int, load: int, part: float) -> Array | None:
+        """Return the motion (nv,) [rad] to rest i; None if it is at another part of the loads."""
+        if i < len(self.rests) and self.rests[i][1:] == (load, part):
+            return self.rests[i].state.motion
+        return None
+
+    @cached_property
+    def _responses(self) -> list[tuple[Array, Array]]:
+        """Return −K⁻¹ (nv, nv) and ∂A/∂q (S, nv) [m/rad] of each rest; 0 for joints at stops.
+
+        −K⁻¹ is the motion per residual torque; A are the natural lengths of the segments.
+        """
+        responses = []
+        for state, _, _ in self.rests:
+            chain, settled = state.settled.chain, state.settled
+            free = np.ix_(*2 * [np.flatnonzero(state.reaction == 0.0)])
+            give = np.zeros_like(settled.stiffness)
+            give[free] = -np.linalg.inv(settled.stiffness[free])
+            by_length = settled.pose.segments.length_jacobian / chain.stretch[:, None]
+            left = by_length - chain.compliance[:, None] * settled.slope
+            responses.append((give, np.where((chain.tension == 0.0)[:, None], 0.0, left)))
+        return responses
 
     def beside(self, pose: Posture, tension: Array, wrench: Array) -> Array:
         """Compute the tips (n, 3) [m] of a slightly different arm under the same loads.
@@ -100,14 +135,15 @@ class LoadingPath(NamedTuple):
         start = loading.begin(tension, wrench)
         natural, motors = start.settled.chain.natural, start.load.motors
         held, tips = self.start.load.held, list[Array]()
-        for rest in self.rests:
-            state, near = rest.state, rest.state.settled
+        for (state, _, _), (give, left) in zip(self.rests, self._responses, strict=True):
+            near = state.settled
             share = (held @ state.load.held) / (held @ held) if held.any() else 0.0
             arm = loading.arm(natural, state.load.wrench, motors)
-            beside = arm.at(pose.arm.at(near.q, check_limits=False), near.chain.tension)
-            moved = _motion(state, (beside.residual - share * start.load.held)[:, None])[:, 0]
-            natural = beside.chain.natural + _given_way(state) @ moved
-            tips.append(beside.pose.tip[:3, 3] + beside.pose.jacobian[:3] @ moved)
+            beside = pose.arm.at(near.q, check_limits=False)
+            chain = arm.settled(beside, near.chain.tension)
+            moved = give @ (arm.residual(beside, chain.tension) - share * start.load.held)
+            natural = chain.natural + left @ moved
+            tips.append(beside.tip[:3, 3] + beside.jacobian[:3] @ moved)
         return np.array([tips[i] for i in self.last])
 
     def by_forces(self, direction: Array) -> Array:
@@ -116,7 +152,7 @@ class LoadingPath(NamedTuple):
         each, none = np.eye(count), np.zeros(count)
         natural = np.zeros((len(self.start.settled.chain.natural), count))
         tips = list[Array]()
-        for state, k, part in self.rests:
+        for (state, k, part), (give, left) in zip(self.rests, self._responses, strict=True):
             chain, pose = state.settled.chain, state.pose
             added = part * each[k] + (1.0 - part) * (each[k - 1] if k else none)
             forced = np.where(self.loading.forced, state.load.motors, np.nan)
@@ -124,31 +160,15 @@ class LoadingPath(NamedTuple):
             pulled = problem.tangent(chain, forced, -chain.stretch[:, None] * natural, grip)
             J = pose.jacobian[:3]
             imbalance = pose.segments.length_jacobian.T @ pulled - np.outer(direction @ J, added)
-            moved = _motion(state, imbalance)
+            moved = give @ imbalance
             # a slack cable keeps its wire, spread evenly
             wire = np.add.reduceat(chain.natural, first)
             share = np.add.reduceat(natural, first) / wire[:, None]
             spread = chain.natural[:, None] * share[pose.segments.chains.cable]
-            left = _given_way(state) @ moved - chain.compliance[:, None] * pulled
-            natural = np.where((chain.tension == 0.0)[:, None], spread, left)
+            taut = left @ moved - chain.compliance[:, None] * pulled
+            natural = np.where((chain.tension == 0.0)[:, None], spread, taut)
             tips.append(J @ moved)
         return np.array([tips[i] for i in self.last])
-
-
-def _motion(state: State, imbalance: Array) -> Array:
-    """Compute δq (nv, m) that balances residuals (nv, m) [N m]; joints at stops do not move."""
-    free = np.flatnonzero(state.reaction == 0.0)
-    moved = np.zeros_like(imbalance)
-    moved[free] = -np.linalg.solve(state.settled.stiffness[np.ix_(free, free)], imbalance[free])
-    return moved
-
-
-def _given_way(state: State) -> Array:
-    """Compute ∂A/∂q (S, nv) [m/rad] with the natural lengths A of the segments at a rest."""
-    chain, settled = state.settled.chain, state.settled
-    by_length = settled.pose.segments.length_jacobian / chain.stretch[:, None]
-    left = by_length - chain.compliance[:, None] * settled.slope
-    return np.where((chain.tension == 0.0)[:, None], 0.0, left)
 
 
 def same_segments(one: Posture, other: Posture) -> bool:

@@ -167,15 +167,13 @@ def tilt_torque(pose: Posture, tension: Array) -> Array:
     largest part of the rounding. ``tension`` [N] has an entry for each segment that joints can
     change.
     """
-    routing = pose.arm._model.routing
-    segment, joint = routing.segment, routing.joint
+    start, end, over, joint = pose.arm._model.moving
     site, origin = pose._frames.site, pose._frames.origin
-    start, end = segment[:-1, 1:3].T
-    apart = np.linalg.norm(site[end] - site[start], axis=1)
-    far = np.linalg.norm(site[end], axis=1)
-    over = np.repeat(np.arange(start.size), np.diff(segment[:, 3]))
-    arm = np.linalg.norm(site[end][over] - origin[joint], axis=1)
-    force = (tension * far / apart)[over] * arm
+    far = site[end]
+    arms = np.concatenate([far - site[start], far, far[over] - origin[joint]])
+    sizes = np.sqrt(np.add.reduce(arms * arms, axis=1))
+    apart, away, arm = np.split(sizes, (start.size, 2 * start.size))
+    force = (tension * away / apart)[over] * arm
     torque = np.bincount(joint, force, minlength=len(origin))[1:]
     return np.asarray(torque, dtype=np.float64)
 
@@ -210,7 +208,7 @@ class _LockedLaw:
             which = np.flatnonzero(softest <= 0.0).tolist()
             raise ElasticityRangeError(
                 "stretches the series spring by more than the whole cable is long, so that no wire "
-                "is left. Give the cable a lead that holds its spring, a stiffer spring or less "
+                "is left. Give the cable a longer lead, a stiffer spring or less "
                 "tension.",
                 tension[which].tolist(),
                 which,

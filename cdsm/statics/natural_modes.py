@@ -30,7 +30,7 @@ _MASSLESS = 1e-12
 """A motion has no mass if its eigenvalue of M is below this part of the largest."""
 
 _STAND_IN = 0.02
-"""Largest part of the kinetic energy in stand-in masses: they change a frequency by 1 %."""
+"""Largest share of placeholder masses in the kinetic energy; it changes a frequency by 1 %."""
 
 
 @final
@@ -131,7 +131,7 @@ def modes(pose: Posture, stiffness: Stiffness) -> Modes:
     """
     arm = instance("pose", pose, Posture).arm
     if not instance("stiffness", stiffness, Stiffness).posture._equals(pose):
-        raise InvalidInput("stiffness", "was taken at another posture; take it at this one.")
+        raise InvalidInput("stiffness", "was computed at another posture; compute it at this one.")
     M = arm._model.body.mass_matrix(pose.q)
     spectrum, motions = np.linalg.eigh(M)
     if spectrum[0] <= _MASSLESS * spectrum[-1]:
@@ -142,7 +142,7 @@ def modes(pose: Posture, stiffness: Stiffness) -> Modes:
         raise SingularMass(
             f"a motion of {arm.joint_names[int(abs(motion).argmax())]} moves links of no mass, or "
             f"of hardly any: {100.0 * shares[-1]:.3g} % of its kinetic energy is that of crosses "
-            "and massless links, whose mass only stands in. Give the links their link_mass.",
+            "and massless links, which have placeholder masses. Give the links their link_mass.",
             frozen(motion),
         )
     squares, shapes = eigh((stiffness.joint + stiffness.joint.T) / 2.0, M)
@@ -160,7 +160,7 @@ def modes(pose: Posture, stiffness: Stiffness) -> Modes:
 
 
 def _stand_in_mass(pose: Posture) -> Array:
-    """Compute the part of M (nv, nv) that comes from the stand-in masses of crosses and links."""
+    """Compute the part of M (nv, nv) of placeholder masses: crosses, and links without mass."""
     if not pose.arm.is_serpentine:
         return np.zeros((pose.arm.nv, pose.arm.nv))
     inertia, stand_ins = CROSS_INERTIA * np.eye(3), []
@@ -176,11 +176,7 @@ def _stand_in_mass(pose: Posture) -> Array:
 
 
 def motions(stiffness: Stiffness, M: Array) -> tuple[Array, Array]:
-    """Solve K_θ φ = ω² M φ. Return ω² (nv,) [1/s²], rising, and φ (nv, nv) with φᵀMφ = 1.
-
-    Raises:
-        SingularMass: M is singular.
-    """
+    """Return ω² (nv,) [1/s²], rising, and φ (nv, nv), φᵀMφ = 1, or raise SingularMass."""
     # scaled by joint: the mass of the last link may be rounding beside that of the arm
     unit = 1.0 / np.sqrt(M.diagonal())
     K, M = (matrix * unit * unit[:, None] for matrix in (stiffness.joint, M))

@@ -140,19 +140,26 @@ class SlowLoading(NamedTuple):
         return state, total
 
     def arm(self, natural: Array, wrench: Array, motors: Array) -> FrictionalArm:
-        """Return the loaded arm with the natural lengths (S,) [m] that its segments had before."""
+        """Return the arm under a load, with natural lengths (S,) [m] before wire slips."""
         forced = np.where(self.forced, motors, np.nan)
         return FrictionalArm(self.problem, self.limits, natural, wrench, forced)
 
-    def rest(self, before: State, load: Load) -> tuple[State | None, RestSearch[Settled]]:
-        """Find the equilibrium under a new load, or None; also return the search."""
+    def rest(
+        self, before: State, load: Load, motion: Array | None = None
+    ) -> tuple[State | None, RestSearch[Settled]]:
+        """Find the equilibrium under a new load, or None; also return the search.
+
+        The search starts after the ``motion`` (nv,) [rad], an estimate, if it is given.
+        """
         old, natural = before.settled, before.settled.chain.natural.copy()
         taken = np.where(self.forced, 0.0, load.motors - before.load.motors)
         natural[self.start[:-1]] -= taken
         arm = self.arm(natural, load.wrench, load.motors)
-        start = arm.at(old.pose, old.chain.tension).holding_back(load.held)
-        if before.motion @ start.torque < 0.0:  # it moves on the same way: what slid slides on
-            start = _ahead(arm, old, start, load.held)
+        start = None if motion is None else _guess(arm, old, motion, load.held)
+        if start is None:
+            start = arm.at(old.pose, old.chain.tension).holding_back(load.held)
+            if before.motion @ start.torque < 0.0:  # it moves on the same way: what slid slides on
+                start = _newton_step(arm, old, start, load.held)
         search = find_rest(arm, start, load.held)
         if not search.converged:
             return None, search
@@ -187,8 +194,16 @@ class SlowLoading(NamedTuple):
         return weight + self.problem.stored(chain.natural, chain.tension)
 
 
-def _ahead(arm: FrictionalArm, old: Settled, start: Settled, held: Array) -> Settled:
-    """Return the arm after a Newton step with the last tangent if this reduces the residual."""
+def _guess(arm: FrictionalArm, old: Settled, motion: Array, held: Array) -> Settled | None:
+    """Return the arm after a motion (nv,) [rad], or None if sites meet there."""
+    try:
+        return arm.moved(np.clip(old.q + motion, *arm.limits), old).holding_back(held)
+    except CdsmError:
+        return None
+
+
+def _newton_step(arm: FrictionalArm, old: Settled, start: Settled, held: Array) -> Settled:
+    """Return the arm after a Newton step with the last tangent; ``start`` if that is not better."""
     try:
         step = np.linalg.solve(old.stiffness, -start.torque)
         near = start._replace(slope=old.slope)

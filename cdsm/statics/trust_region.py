@@ -1,7 +1,7 @@
 """Find the equilibrium r(q) = 0 between stops: a trust-region search that ends with Newton steps.
 
 The residual torque r need not be the gradient of a potential. So the work ∫ r·dq along a step p
-tells its quality. With K = ∂r/∂q, to the fourth order of its length, the work is
+measures its quality. With K = ∂r/∂q, to the fourth order of its length, the work is
 
     ½ (r₀ + r₁)·p + (pᵀK₀p − pᵀK₁p)/12.
 
@@ -88,7 +88,7 @@ class RestSearch(NamedTuple, Generic[State]):
 
 
 class _Free(NamedTuple):
-    """Joints of an iterate that no stop holds."""
+    """Joints of an iterate that are not at a stop."""
 
     at_stop: NDArray[np.bool_]  # which joints a stop holds (nv,)
     indices: NDArray[np.intp]  # indices of the free joints

@@ -21,7 +21,7 @@ SLIDING = 1.25
 """The arm slides where its tangent stiffness is at most this times the frictionless one."""
 
 _SETTLED, _MOST_CYCLES = 0.01, 64
-"""Relative change on doubling the cycles at which the dither has converged; most cycles."""
+"""Dither has converged if doubling its cycles changes less than this part; most cycles tried."""
 
 _GROWTH, _MOST = 1.25, 100.0
 """Factor of the load from trial to trial; largest load as a multiple of the breakaway load."""
@@ -128,7 +128,7 @@ class WeightFriction(ReadOnlyState):
         before, cycles = math.inf, 1
         try:
             while cycles <= _MOST_CYCLES:
-                after = self._shaken(size, cycles)
+                after = self._dithered_stiffness(size, cycles)
                 if abs(after - before) <= _SETTLED * after:
                     return cycles // 2, before
                 before, cycles = after, 2 * cycles
@@ -136,7 +136,7 @@ class WeightFriction(ReadOnlyState):
             pass
         return 0, math.nan
 
-    def _shaken(self, size: float, cycles: int) -> float:
+    def _dithered_stiffness(self, size: float, cycles: int) -> float:
         """Compute weight over displacement [N/m] after dither cycles that begin with ±size [N]."""
         history, u = self.history, np.append(self.breakaway.direction, np.zeros(3))
         fading = size * (1.0 - np.arange(2 * cycles) / (2.0 * cycles))
@@ -147,7 +147,7 @@ class WeightFriction(ReadOnlyState):
         return self._secant(load_cycle(pose, F, path, accuracy=1e-2).tip)
 
     @property
-    def _off(self) -> float:
+    def _deviation(self) -> float:
         """Deviation of the dithered stiffness from the frictionless one [%]."""
         return 100.0 * (self.dithered / self.frictionless - 1.0)
 
@@ -203,7 +203,7 @@ class WeightFriction(ReadOnlyState):
                 f"so take the difference of two weights above {self.sliding_load:.3g} N; or shake "
                 f"the load by ±{self.sliding_load:.3g} N, fading in "
                 f"{plural(self.dither_cycles, 'cycle')}: then this weight measures "
-                f"{self.dithered / 1000.0:.4g} N/mm, {self._off:+.0f} % off the frictionless; more "
-                "cycles change it by less than 1 %"
+                f"{self.dithered / 1000.0:.4g} N/mm, {self._deviation:+.0f} % off the frictionless"
+                "; more cycles change it by less than 1 %"
             )
         return "\n".join(rows)

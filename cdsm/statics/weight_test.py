@@ -102,7 +102,7 @@ class WeightTest(ReadOnlyState):
 
     @property
     def settled_first(self) -> bool:
-        """Whether the arm, unbalanced or unstable, left its reference before the weight."""
+        """Whether the arm moved to another equilibrium before any weight was hung on it."""
         moved = float(np.linalg.norm(self.without.displacement))
         return moved > _DISPLACED * self.without.pose.arm.length
 
@@ -181,11 +181,7 @@ class WeightTest(ReadOnlyState):
         return dict(plain(numbers))
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Return a table of tip displacement [m] and tensions [N], a row for each load [N].
-
-        Raises:
-            MissingExtra: pandas is not installed.
-        """
+        """Return displacement [m] and tensions [N] at each load; MissingExtra without pandas."""
         names = [f"{name} tension [N]" for name in self.without.pose.arm.cables.names]
         moved = zip(("x [m]", "y [m]", "z [m]"), self.displacements.T, strict=True)
         columns = {**dict(moved), **dict(zip(names, self.tensions.T, strict=True))}

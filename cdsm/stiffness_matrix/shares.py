@@ -44,11 +44,7 @@ class Shares(ReadOnlyState):
     load: float
 
     def __getitem__(self, cable: str) -> float:
-        """Return the contribution of a cable, passive and active together [N/m].
-
-        Raises:
-            UnknownName: No cable has this name.
-        """
+        """Return passive + active contribution of a cable [N/m], or raise UnknownName."""
         names = self.stiffness.posture.arm.cables.names
         return float(self.cables[names.index(one_of("cable", cable, names))])
 
@@ -83,11 +79,7 @@ class Shares(ReadOnlyState):
         return dict(plain(numbers))
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Return a table of passive and active contributions [N/m], a row for each cable.
-
-        Raises:
-            MissingExtra: pandas is not installed.
-        """
+        """Return both contributions of each cable [N/m] as a table; MissingExtra without pandas."""
         columns = {"passive [N/m]": self.passive, "active [N/m]": self.active}
         return data_frame(columns, "cable", self.stiffness.posture.arm.cables.names)
 

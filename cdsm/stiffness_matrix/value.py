@@ -116,14 +116,8 @@ class Stiffness(CartesianReadings):
         """Compute the contribution of each cable's elasticity and tension to :meth:`along`.
 
         With the joint motion δθ per unit tip displacement along u, along(u) = δθᵀ K_θ δθ. K_θ is a
-        sum over cables, gravity and load.
-
-        Args:
-            direction: u: an axis such as ``"z"`` or ``"-z"``, or (3,) in base axes, any length.
-
-        Raises:
-            InvalidInput: ``direction`` is neither an axis nor three finite numbers, or is zero.
-            SingularStiffness: The stiffness along u is infinite, or K_θ is singular.
+        sum over cables, gravity and load. Argument and errors are those of :meth:`along`;
+        SingularStiffness also if the stiffness along u is infinite.
         """
         u = unit_direction("direction", direction)
         self._require_mobile(u)
@@ -183,11 +177,7 @@ class Stiffness(CartesianReadings):
         return report_on(self.require_frictionless())
 
     def require_frictionless(self) -> Stiffness:
-        """Return this stiffness if it is frictionless.
-
-        Raises:
-            InvalidInput: Its cables stick or slide.
-        """
+        """Return this stiffness; InvalidInput if its cables stick or slide."""
         if self.friction != "frictionless":
             raise InvalidInput(
                 "stiffness", f"the cables are {self.friction}; give a frictionless K of stiffness."
@@ -210,11 +200,7 @@ class Stiffness(CartesianReadings):
         return prints.numbers(self)
 
     def to_xarray(self) -> xarray.Dataset:
-        """Return the terms of K_θ, tensions and cable stiffnesses as a Dataset in SI, labelled.
-
-        Raises:
-            MissingExtra: xarray is not installed.
-        """
+        """Return terms, tensions and k as a labelled Dataset in SI; MissingExtra without xarray."""
         arm, square = self.posture.arm, ("joint", "joint_column")
         unit = arm.stiffness_unit()
         terms = {name: (square, getattr(self, name), unit) for name in get_args(Term)}

@@ -95,16 +95,12 @@ def write_file(path: str | os.PathLike[str], fill: Callable[[Path], object]) -> 
 
 
 def make_folder(path: str | os.PathLike[str]) -> Path:
-    """Create a folder and its parents if missing; return its path.
-
-    Raises:
-        FileError: The folder cannot be created, or the path is a file.
-    """
+    """Create a folder and its parents if missing, return its path; FileError on failure."""
     path = as_path(path)
     try:
         path.mkdir(parents=True, exist_ok=True)
     except (OSError, ValueError) as error:
-        raise FileError(path, f"cannot be made a folder: {_reason(error)}.") from None
+        raise FileError(path, f"cannot be created as a folder: {_reason(error)}.") from None
     return path
 
 

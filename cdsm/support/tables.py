@@ -54,7 +54,7 @@ class Table(NamedTuple):
         return np.array(numbers)
 
     def number(self, cell: str) -> float:
-        """Return the number in a cell; NaN if the cell holds no number."""
+        """Return the number in a cell; NaN if the cell has no number."""
         try:
             return float(cell if self.delimiter == "," else cell.replace(",", "."))
         except ValueError:

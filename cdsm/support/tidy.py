@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Mapping, Sequence
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,6 +14,7 @@ from numpy.typing import NDArray
 from cdsm.errors import InvalidInput
 from cdsm.support.datasets import status_names
 from cdsm.support.extras import need
+from cdsm.support.files import as_path, write_file
 
 if TYPE_CHECKING:
     import pandas
@@ -48,6 +51,29 @@ def dataset(
         {dim: list(values) for dim, values in labels.items() if dim in used},
         attributes,
     )
+
+
+def write_labelled(
+    path: str | os.PathLike[str],
+    table: Callable[[], pandas.DataFrame],
+    labelled: Callable[[], xarray.Dataset],
+) -> Path:
+    """Write a table (``.csv``) or a Dataset (``.nc``), which is built only if needed."""
+    suffix = checked_suffix(path)
+    if suffix == ".csv":
+        return write_file(path, table().to_csv)
+    data = labelled()
+    return write_file(path, lambda aside: data.to_netcdf(aside, engine="netcdf4"))
+
+
+def checked_suffix(path: str | os.PathLike[str]) -> str:
+    """Return ``.csv`` or ``.nc``, in lower case; raise InvalidInput for other paths."""
+    suffix = as_path(path).suffix.lower()
+    if suffix not in (".nc", ".csv"):
+        raise InvalidInput("path", f"{str(path)!r} ends neither in .nc (NetCDF) nor in .csv.")
+    if suffix == ".nc":
+        need("sweep", "netCDF4")
+    return suffix
 
 
 def tidy(dataset: xarray.Dataset) -> pandas.DataFrame:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from distributed import Client, Future
 
 _QUEUED = 2
-"""Blocks submitted for each thread of the cluster, so that no thread waits for its next block."""
+"""Number of blocks submitted per thread of the cluster, so that no thread waits for work."""
 
 _GO_ON = "What a store holds is kept: run the same again with store= to go on from there."
 

@@ -21,7 +21,7 @@ _SAMPLES = np.ldexp(np.arange(4.0, 8.0), np.arange(-12, 18)[:, None]).ravel()
 """Tensions [N] from 1e-3 to 1e6, four per octave, with equal bits on every machine."""
 
 _WITHIN = 65
-"""Number of evenly spaced tensions over a domain; narrow domains hold few of ``_SAMPLES``."""
+"""Number of evenly spaced tensions over a domain; narrow domains contain few of ``_SAMPLES``."""
 
 _SAMPLED = re.compile(r"\b([\w.<>]+) (\w+), samples ([0-9a-f]{16})")
 """Text of a user-defined law: its class, its state, and a digest of domain, EA and strain."""
@@ -80,7 +80,7 @@ def _answers(law: Elasticity) -> str:
 
 
 def _answer(law: Elasticity, name: str, tension: float) -> str:
-    """Return one number of a law with all bits, or the name of the error that the law raises."""
+    """Return what a method of a law returns at a tension [N], exactly, or the name of its error."""
     try:
         value: Array = np.asarray(getattr(law, name)(np.array([tension])), dtype=np.float64)
         return float(value.reshape(())).hex()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, final
@@ -13,7 +14,15 @@ from cdsm import batch
 from cdsm.elasticity import Elasticity
 from cdsm.kernels.principal import principal_stiffness
 from cdsm.manipulator import Manipulator
-from cdsm.measures.rows import MEASURED, capacity_margins, measured, payloads
+from cdsm.measures.rows import (
+    MEASURED,
+    capacity_margins,
+    friction_losses,
+    measured,
+    narrowed_bounds,
+    payloads,
+)
+from cdsm.measures.wire_use import life_margin, safety, strains
 from cdsm.support.values import Array, ReadOnlyState
 from cdsm.sweeps.quantities import DIRECTIONAL, QUANTITIES
 from cdsm.sweeps.status import LOST, SweepStatus
@@ -52,6 +61,10 @@ class SweepTask(ReadOnlyState):
         maximum: Upper bound [N].
         directions: Unit directions (D, 3).
         outputs: Names from :data:`~cdsm.sweeps.quantities.QUANTITIES`.
+        worst_friction: Whether all segments of the cables stay within the bounds.
+        diameter: Diameter of the cables [m].
+        breaking_load: Breaking load of the wire [N].
+        bend_diameter: Diameter of the bend in the holes [m].
     """
 
     arm: Manipulator
@@ -61,6 +74,10 @@ class SweepTask(ReadOnlyState):
     maximum: float
     directions: Array
     outputs: tuple[str, ...]
+    worst_friction: bool
+    diameter: float
+    breaking_load: float
+    bend_diameter: float
 
     @property
     def cases(self) -> int:
@@ -94,36 +111,44 @@ def evaluate(task: SweepTask, q: Array, threads: int | None = None) -> BlockResu
     rows, status_of_pose = _rows(computed, task.arm, q, threads=threads)
     exist = status_of_pose == SweepStatus.OK
     wanted = [name for name in of_pose if name in MEASURED]
-    for name, values in measured(task.arm, q[exist], wanted, threads).items():
-        rows[name] = _spread(values, (exist,), exist.shape)
+    for name, values in measured(task.arm, q[exist], wanted, task.diameter, threads).items():
+        rows[name] = _over_all_cases(values, (exist,), exist.shape)
     answer: BlockResult = {**rows}
     status = np.tile(status_of_pose[:, None, None], (1, *shape[1:]))
     if len(stages) > len(of_pose):
-        place = p, w, m = np.nonzero(status == SweepStatus.OK)
-        low = np.repeat(task.minima[m, None], len(task.arm.cables), axis=1)
+        # along a cable the tensions differ by this factor at most
+        loss = np.ones((len(q), len(task.arm.cables)))
+        if task.worst_friction:
+            loss[exist] = friction_losses(task.arm, q[exist], threads)
+        p, _, m = place = np.nonzero(status == SweepStatus.OK)
+        low, high, bounded = narrowed_bounds(task.arm, task.minima[m], task.maximum, loss[p])
         pull = batch.distribute_tensions(
-            task.arm, q[p], low, task.maximum, task.wrenches[w], threads=threads
+            task.arm, q[p], low, high, task.wrenches[place[1]], threads=threads
         )
-        status[place] = pull.status
-        tension = _spread(pull.values, place, shape)
-        if "tension" in stages:
-            answer["tension"] = tension
-        held = p, w, m = np.nonzero(status == SweepStatus.OK)
-        bounds = task.arm, q[p], task.wrenches[w], task.minima[m], task.maximum
-        if "payload" in stages:
-            answer["payload"] = _spread(payloads(*bounds, task.directions, threads), held, shape)
-        if "capacity_margin" in stages:
-            answer["capacity_margin"] = _spread(capacity_margins(*bounds), held, shape)
+        status[place] = np.where(bounded, pull.status, SweepStatus.INFEASIBLE)
+        held = status[place] == SweepStatus.OK
+        p, w, _ = place = tuple(each[held] for each in place)
+        F = pull.values[held]
+        bounds = task.arm, q[p], task.wrenches[w], low[held], high[held]
+        of_tension: dict[str, Callable[[], Array]] = {
+            "tension": lambda: F,
+            "payload": lambda: payloads(*bounds, task.directions, threads),
+            "capacity_margin": lambda: capacity_margins(*bounds),
+            "wire_safety": lambda: safety(F * loss[p], task.breaking_load),
+            "wire_life": lambda: life_margin(F * loss[p], task.diameter, task.bend_diameter),
+        }
+        for name, stage in stages.items():
+            if stage == "tension":
+                answer[name] = _over_all_cases(of_tension[name](), place, shape)
     if not of_law:
         return answer | {"status": np.stack([status] * len(task.laws), axis=1)}
 
-    place = p, w, _ = np.nonzero(status == SweepStatus.OK)
     by_law: list[BlockResult] = []
     for arm in task.arms:
         rows, status_of_law = _stiffnesses(
-            task, arm, q[p], tension[place], task.wrenches[w], of_law, threads
+            task, arm, q[p], F, loss[p], task.wrenches[w], of_law, threads
         )
-        by_law.append({name: _spread(rows[name], place, shape) for name in of_law})
+        by_law.append({name: _over_all_cases(rows[name], place, shape) for name in of_law})
         by_law[-1]["status"] = status.copy()
         by_law[-1]["status"][place] = status_of_law
     return answer | {name: np.stack([each[name] for each in by_law], axis=1) for name in by_law[0]}
@@ -134,13 +159,14 @@ def _stiffnesses(
     arm: Manipulator,
     q: Array,
     tension: Array,
+    loss: Array,
     wrench: Array,
     names: list[str],
     threads: int | None,
 ) -> tuple[Rows, Statuses]:
     """Compute quantities that also depend on tensions (R, C) [N] and elasticity."""
     extreme = [name for name in names if QUANTITIES[name].stage == "principal"]
-    needed = [name for name in names if name not in extreme]
+    needed = [name for name in names if name not in (*extreme, "wire_strain")]
     needed += ["margin", "translational_compliance"] if extreme else ["margin"]
     rows, status = _rows(
         list(dict.fromkeys(needed)),
@@ -151,11 +177,18 @@ def _stiffnesses(
         direction=None if DIRECTIONAL.isdisjoint(names) else task.directions,
         threads=threads,
     )
+    if "wire_strain" in names:
+        # friction may take a tension along a cable out of the domain of its law
+        strain = strains(arm, tension * loss)
+        status[np.isnan(strain).any(axis=1)] = SweepStatus.OUTSIDE_ELASTICITY
+        rows["wire_strain"] = strain
+        for values in rows.values():
+            values[status == SweepStatus.OUTSIDE_ELASTICITY] = np.nan
     if extreme:
         # extreme stiffnesses exist in stable rows; a margin may be NaN
         exist = (rows["margin"] > 0.0) & (status != SweepStatus.SINGULAR)
         found = principal_stiffness(rows["translational_compliance"][exist])
-        rows |= {name: _spread(found[name], (exist,), exist.shape) for name in extreme}
+        rows |= {name: _over_all_cases(found[name], (exist,), exist.shape) for name in extreme}
     buckles = (rows["margin"] <= 0.0) & np.isin(status, (SweepStatus.OK, SweepStatus.IMMOBILE))
     status[buckles] = SweepStatus.UNSTABLE
     return rows, status
@@ -189,7 +222,7 @@ def _rows(
     return rows, status
 
 
-def _spread(rows: Array, place: _Place, shape: tuple[int, ...]) -> Array:
+def _over_all_cases(rows: Array, place: _Place, shape: tuple[int, ...]) -> Array:
     """Build an array of all cases from rows of some cases; NaN in all other cases."""
     full = np.full((*shape, *rows.shape[1:]), np.nan)
     full[place] = rows

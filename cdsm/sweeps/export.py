@@ -11,7 +11,7 @@ from cdsm.errors import FileError, InvalidInput
 from cdsm.support.datasets import check_sweep
 from cdsm.support.extras import need
 from cdsm.support.files import as_path, write_file
-from cdsm.support.tidy import tidy
+from cdsm.support.tidy import checked_suffix, tidy
 
 if TYPE_CHECKING:
     import pandas
@@ -95,12 +95,8 @@ def check_target(path: str | os.PathLike[str]) -> None:
         MissingExtra: netCDF4 is needed and not installed.
         FileError: The path is a folder, or its folder does not exist.
     """
+    checked_suffix(path)
     path = as_path(path)
-    kind = path.suffix.lower()
-    if kind not in (".nc", ".csv"):
-        raise InvalidInput("path", f"{str(path)!r} ends neither in .nc (NetCDF) nor in .csv.")
-    if kind == ".nc":
-        need("sweep", "netCDF4")
     if path.is_dir():
         raise FileError(path, "is a folder; give the path of a file.")
     if not path.parent.is_dir():
@@ -131,7 +127,6 @@ def _write_netcdf(dataset: xarray.Dataset, path: Path) -> None:
 
 
 def _write_table(dataset: xarray.Dataset, path: Path) -> None:
-    """Write a long table, in parts of limited size."""
     if not dataset["status"].ndim:
         dataset = dataset.expand_dims("entry")
     status = dataset["status"]

@@ -20,8 +20,8 @@ class Quantity:
     Attributes:
         long_name: Name in words.
         units: SI units in the notation of UDUNITS.
-        stage: Condition for the quantity to exist: one of :data:`STAGES`.
-        dims: Dimensions after those of poses and cases.
+        stage: What must exist for the quantity to exist: one of :data:`STAGES`.
+        dims: Its own dimensions, which follow those of poses and cases.
     """
 
     long_name: str
@@ -46,10 +46,10 @@ QUANTITIES: Final[dict[str, Quantity]] = {
     "tension_factor": Quantity(
         "tension factor, largest min F / max F with J_L^T F = 0; 0: no wrench closure", "1", "pose"
     ),
-    "cable_clearance": Quantity("least distance of the axes of two cables", "m", "pose"),
-    "link_clearance": Quantity("least distance of a cable's axis from a backbone", "m", "pose"),
+    "cable_clearance": Quantity("least distance of two cables", "m", "pose"),
+    "link_clearance": Quantity("least distance of a cable from a backbone", "m", "pose"),
     "disk_clearance": Quantity(
-        "least distance of a cable's axis from a disk, or of its hole from the edge", "m", "pose"
+        "least distance of a cable from a disk, or in its hole from the edge", "m", "pose"
     ),
     "tension": Quantity("least cable tensions F in balance (Eq. 17)", "N", "tension", ("cable",)),
     "payload": Quantity(
@@ -61,6 +61,14 @@ QUANTITIES: Final[dict[str, Quantity]] = {
     "capacity_margin": Quantity(
         "largest force in any direction within the limits of the tensions", "N", "tension"
     ),
+    "wire_safety": Quantity("breaking load over the tension", "1", "tension", ("cable",)),
+    "wire_life": Quantity(
+        "life margin of a wire, 0.001 over pressure in the hole over strength",
+        "1",
+        "tension",
+        ("cable",),
+    ),
+    "wire_strain": Quantity("strain of a wire", "1", "joint", ("cable",)),
     "cable_stiffness": Quantity("cable stiffness, diagonal of K_L", "N m-1", "joint", ("cable",)),
     "active_stiffness": Quantity("active part of K, H_L F (Eq. 16)", "N m rad-1", "joint", _JOINTS),
     "passive_stiffness": Quantity(

@@ -49,6 +49,10 @@ def sweep(
     wrench: ArrayLike | Mapping[str, ArrayLike] = _NO_WRENCH,
     direction: Direction | Sequence[Direction] | Mapping[str, Direction] = _AXES,
     outputs: Iterable[str] = DEFAULT,
+    worst_friction: bool = False,
+    diameter: float = 0.0,
+    breaking_load: float | None = None,
+    bend_diameter: float | None = None,
     store: str | os.PathLike[str] | None = None,
     client: Client | None = None,
     chunk: int | None = None,
@@ -59,7 +63,7 @@ def sweep(
     At each posture the tensions F are the least that balance the arm (Eqs. 13, 17), and the
     stiffness is that under F (Eq. 16). A failure sets the ``status`` of its entry, see
     :class:`~cdsm.SweepStatus`; NaN stands only where the status says so. Coordinates and variables
-    have ``long_name`` and ``units`` (SI). The attributes hold geometry, cables and version.
+    have ``long_name`` and ``units`` (SI). The attributes have geometry, cables and version.
 
     Args:
         arm: The arm.
@@ -75,11 +79,17 @@ def sweep(
         direction: Direction of ``along``: an axis such as ``"z"``, or (3,), any length. Several,
             axes, (D, 3) or by name, make the dimension ``direction``.
         outputs: Names of quantities: keys of :data:`~cdsm.sweeps.quantities.QUANTITIES`.
+        worst_friction: As for :func:`~cdsm.distribute_tension`: all segments of the cables stay
+            within the bounds, whatever loads came before. Tensions, loads and stiffnesses are then
+            those of the narrower bounds; the wires are under the largest tension along each cable.
+        diameter: Diameter of the cables [m], for clearances and ``wire_life``.
+        breaking_load: Breaking load of the wire [N], for ``wire_safety``.
+        bend_diameter: Diameter of the bend in the holes [m], for ``wire_life``.
         store: Zarr folder to which entries are written during the run. A new run with the same
             arguments computes only missing entries, also those of lost workers, with the bits of an
             uninterrupted run. The returned Dataset reads from the store when needed. A user-defined
             law is identified by its class, its state, and EA and strain at up to 185 tensions; if
-            these have changed, the store holds another sweep.
+            these have changed, the store has another sweep.
         client: Client of a dask cluster; the run waits while the cluster has no workers. None uses
             the threads of this machine.
         chunk: Number of stiffness matrices per block; an existing store keeps its own number.
@@ -93,7 +103,7 @@ def sweep(
         UnknownName: A joint or an output does not exist.
         MissingExtra: xarray, zarr or distributed is not installed.
         FileError: The store cannot be created, read or written.
-        StoreError: The store holds another sweep, a user-defined law has changed, or another run is
+        StoreError: The store has another sweep, a user-defined law has changed, or another run is
             writing to the store.
         ClusterError: The scheduler is gone, or a worker cannot compute.
     """
@@ -110,6 +120,10 @@ def sweep(
         wrench=wrench,
         direction=direction,
         outputs=outputs,
+        worst_friction=worst_friction,
+        diameter=diameter,
+        breaking_load=breaking_load,
+        bend_diameter=bend_diameter,
     )
     cases = specification.task.cases
     most = _NUMBERS // arm.nv if chunk is None else whole_number("chunk", chunk, 1)

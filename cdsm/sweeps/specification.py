@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, final
@@ -14,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from cdsm.elasticity import Elasticity
 from cdsm.errors import InvalidInput
 from cdsm.manipulator import Manipulator
+from cdsm.measures.rows import require
 from cdsm.support.format import JointUnits
 from cdsm.support.validation import Direction, instance, one_of, unit_direction, wrench_vector
 from cdsm.sweeps.arguments import bounds_of, label, laws_of, vectors_of
@@ -30,6 +30,19 @@ if TYPE_CHECKING:
 _AXES = ("x", "y", "z")
 
 _STATUS = Quantity("what became of the entry", "1", "joint")
+
+_WIRE = {
+    "diameter": ("diameter of the cables", "m"),
+    "breaking_load": ("breaking load of the wire", "N"),
+    "bend_diameter": ("diameter of the bend in the holes", "m"),
+}
+"""Names in words and units of the sizes of the wire."""
+
+_WORST = (
+    "all segments of the cables stay within the bounds, and wires are under their largest tension, "
+    "whatever loads came before"
+)
+"""Meaning of ``worst_friction``, an attribute of the Dataset."""
 
 _OF_SLIDES = {"N m": "N", "N m rad-1": "N m-1"}
 """Units of torque and joint stiffness: of revolute joints, and the same of prismatic joints."""
@@ -124,6 +137,10 @@ def specify(
     wrench: ArrayLike | Mapping[str, ArrayLike],
     direction: Direction | Sequence[Direction] | Mapping[str, Direction],
     outputs: Iterable[str],
+    worst_friction: bool,
+    diameter: float,
+    breaking_load: float | None,
+    bend_diameter: float | None,
 ) -> Specification:
     """Check the arguments of a sweep, and label all dimensions and coordinates."""
     import xarray
@@ -143,8 +160,21 @@ def specify(
         "maximum": label((), maximum, "upper bound of all tensions", "N"),
     }
     names = _outputs(outputs)
-    if "capacity_margin" in names and math.isinf(maximum):
-        raise InvalidInput("maximum", "capacity_margin needs a finite one [N].")
+    wire = {
+        "diameter": diameter,
+        "breaking_load": breaking_load or 0.0,
+        "bend_diameter": bend_diameter or 0.0,
+    }
+    require(
+        names,
+        arm,
+        maximum,
+        worst_friction=worst_friction,
+        diameter=diameter,
+        breaking_load=breaking_load,
+        bend_diameter=bend_diameter,
+    )
+    labels |= {name: label((), wire[name], *_WIRE[name]) for name in _WIRE if wire[name]}
     if any("direction" in QUANTITIES[name].dims for name in names):
         u = directions.values
         labels |= directions.labels
@@ -164,6 +194,8 @@ def specify(
         if dim in used:
             labels[dim] = label((dim,), np.array(along), long_name)
     attributes = attributes_of(arm) | {"poses": poses.description}
+    if worst_friction:
+        attributes["worst_friction"] = _WORST
     if laws.values != (None,):
         of = ["all cables"] if laws.names is None else laws.names.tolist()
         texts = [law_text(law) for law in laws.values if law is not None]
@@ -176,6 +208,8 @@ def specify(
         maximum=maximum,
         directions=directions.values,
         outputs=names,
+        worst_friction=worst_friction,
+        **wire,
     )
     frame = xarray.Dataset(coords=labels, attrs=attributes)
     return Specification(task=task, poses=poses, frame=frame)

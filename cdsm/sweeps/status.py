@@ -28,7 +28,8 @@ class SweepStatus(IntEnum):
     SOLVER_FAILED = Status.SOLVER_FAILED
     """The solver found no tensions, though tensions exist: as INFEASIBLE."""
     OUTSIDE_ELASTICITY = Status.OUTSIDE_ELASTICITY
-    """A tension is outside the domain of its law: the stiffness does not exist."""
+    """A tension is outside the domain of its law: the stiffness does not exist. With
+    ``wire_strain`` and friction, also if a tension along a cable is outside."""
     SINGULAR = Status.SINGULAR
     """K_θ is singular (the arm is about to buckle): Cartesian quantities do not exist."""
     IMMOBILE = Status.IMMOBILE

@@ -113,7 +113,7 @@ def _make(path: Path, specification: Specification, extent: Mapping[str, int]) -
             if not path.exists():  # else another run was faster; its store is checked later
                 raise
     except (OSError, ValueError) as error:
-        raise FileError(path, f"cannot be made a store: {error}.") from None
+        raise FileError(path, f"cannot be created as a store: {error}.") from None
     finally:
         shutil.rmtree(aside, ignore_errors=True)
 
@@ -146,7 +146,7 @@ def _check(path: Path, specification: Specification) -> None:
     if different:
         raise StoreError(
             path,
-            "holds another sweep; ask the same again, or give another path to store=:"
+            "contains another sweep; repeat that one, or give another path to store=:"
             + listed(different, most=8),
             different,
         )

@@ -3,7 +3,7 @@
 The balance (Eq. 17) does not determine the tensions of a redundant arm. As usual, the smallest are
 chosen:
 
-    min ½‖F‖²   so that   J_Lᵀ F = J_Xᵀ W − g   and   minimum ≤ F ≤ maximum.
+    min ½‖F‖²   subject to   J_Lᵀ F = J_Xᵀ W − g   and   minimum ≤ F ≤ maximum.
 
 First, :mod:`cdsm.kernels.serpentine_guess` guesses the tensions. If the guess meets the optimality
 conditions, as it mostly does, it is the solution. Otherwise a solver solves the dimensionless

@@ -43,7 +43,7 @@ def explain(
         raise SolverError(
             solver,
             f"{fault}, though one exists with tensions of up to {values.max() * force_scale:.2g} N:"
-            f" the arm is at the edge of what its cables can hold. {instead(solver)}",
+            f" the arm is at the edge of what its cables can balance. {instead(solver)}",
         )
 
     widening = _widening(problem, free)

@@ -58,11 +58,7 @@ class Tension(ReadOnlyState):
         return tuple(zip(self.keys(), self.values.tolist(), strict=True))
 
     def __getitem__(self, cable: str) -> float:
-        """Return the tension of a cable [N].
-
-        Raises:
-            UnknownName: No cable has this name.
-        """
+        """Return the tension of a cable [N]; UnknownName if there is no such cable."""
         return dict(self.items())[one_of("cable", cable, self.keys())]
 
     def __iter__(self) -> Iterator[str]:
@@ -111,11 +107,7 @@ class Tension(ReadOnlyState):
         return dict(plain(numbers))
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Return a table of tension and bounds [N], a row for each cable.
-
-        Raises:
-            MissingExtra: pandas is not installed.
-        """
+        """Return tension and bounds [N] of each cable as a table; MissingExtra without pandas."""
         columns = {
             "tension [N]": self.values,
             "minimum [N]": self.minimum,

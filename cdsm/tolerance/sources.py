@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 import os
 from collections.abc import Mapping, Sequence
@@ -14,8 +15,8 @@ from cdsm.errors import InvalidInput
 from cdsm.support.validation import one_of, sequence_of
 from cdsm.tolerance.tolerance import Tolerance
 
-LARGEST = {"rigidity": 0.5, "joint_angle": 0.5, "hole_angle": 0.5, "friction": 0.5}
-"""Largest allowed standard uncertainty by source: half of EA, 0.5 rad, or μ = 0.5."""
+LARGEST = dict.fromkeys(("rigidity", "spring", "joint_angle", "hole_angle", "friction"), 0.5)
+"""Largest allowed standard uncertainty by source: half of EA or k_series, 0.5 rad, or μ = 0.5."""
 
 COMMON = ("rigidity", "friction")
 """Sources whose inputs share one error by default: wires of one spool, holes of one material."""
@@ -37,6 +38,8 @@ class Tolerances:
 
     Attributes:
         rigidity: EA of the law of each cable; relative [-].
+        spring: Stiffness k_series of the spring in series with each cable, such as its anchor or
+            its drive; relative [-].
         joint_angle: Each joint angle [rad]; [m] where a joint slides.
         tension: Each measured cable tension [N].
         lead: Straight length of each cable before the base disk [m].
@@ -54,6 +57,7 @@ class Tolerances:
     """
 
     rigidity: OneOrMore = 0.0
+    spring: OneOrMore = 0.0
     joint_angle: OneOrMore = 0.0
     tension: OneOrMore = 0.0
     lead: OneOrMore = 0.0
@@ -87,14 +91,7 @@ class Tolerances:
                 raise InvalidInput(name, said) from None
 
     def parts(self, source: str) -> tuple[Tolerance, ...]:
-        """Return the tolerances of a source that are not zero.
-
-        Args:
-            source: Name of the source, one of the attributes.
-
-        Raises:
-            UnknownName: There is no such source.
-        """
+        """Return the tolerances of a source that are not zero; UnknownName for another name."""
         value = getattr(self, one_of("source of uncertainty", source, SOURCES))
         every = value if isinstance(value, tuple) else (value,)
         return tuple(each for each in every if each.is_given)
@@ -113,7 +110,7 @@ class Tolerances:
         list of such tables.
 
         Raises:
-            FileError: The file cannot be read, is not TOML, or does not hold tolerances. Every
+            FileError: The file cannot be read, is not TOML, or has no tolerances. Every
                 fault is listed.
         """
         from cdsm.arm_file.tolerances import read_tolerances  # pydantic: slow to import
@@ -131,6 +128,9 @@ class Tolerances:
         return write_tolerances(self, path)
 
 
+# help and completion show the fields, not the keywords of __new__
+Tolerances.__new__.__signature__ = inspect.signature(Tolerances.__init__)  # type: ignore[attr-defined]
+
 SOURCES = tuple(field.name for field in fields(Tolerances))
 """Names of all sources of uncertainty."""
 
@@ -141,7 +141,8 @@ def _require_size(source: str, tolerance: Tolerance) -> None:
         raise InvalidInput(source, "does not depend on tensions; give one standard.")
     largest = LARGEST.get(source, math.inf)
     if isinstance(tolerance.standard, float) and tolerance.standard > largest:
-        unit = {"rigidity": "relative", "friction": "a coefficient"}.get(source, "in rad")
+        unit = "in rad" if "angle" in source else "relative"
+        unit = "a coefficient" if source == "friction" else unit
         raise InvalidInput(
             source,
             f"a standard uncertainty of {tolerance.standard:g} given; up to {largest:g} is a "

@@ -128,14 +128,7 @@ class Tolerance(ReadOnlyState):
         return np.asarray(np.interp(tension, self.tensions, self.standard))
 
     def matrix(self, count: int) -> Array:
-        """Return the correlation matrix (n, n) of n inputs.
-
-        Args:
-            count: n.
-
-        Raises:
-            InvalidInput: ``correlation`` is a matrix of another size.
-        """
+        """Return R (n, n), the correlations of n = ``count`` inputs; InvalidInput for another n."""
         if isinstance(self.correlation, float):
             return self.correlation + (1.0 - self.correlation) * np.eye(count)
         matrix = self.correlation
@@ -148,12 +141,9 @@ class Tolerance(ReadOnlyState):
         return matrix
 
     def variance(self, values: Array) -> float:
-        """Compute vᵀ R v, R the correlation matrix (n, n), v ``values``.
+        """Compute vᵀ R v, v ``values``, R of :meth:`matrix`; InvalidInput if R has another size.
 
         If ``correlation`` is one number ρ, vᵀ R v = (1 − ρ) v·v + ρ (Σ v)².
-
-        Raises:
-            InvalidInput: ``correlation`` is a matrix of another size.
         """
         rho = self.correlation
         if isinstance(rho, float):

@@ -69,7 +69,7 @@ class Balance(NamedTuple):
         return float(weights[held].sum() - self.multipliers(weights) @ J[held].sum(axis=0))
 
     def gradient(self, inputs: Inputs, weights: Array) -> dict[str, Array]:
-        """Compute the derivatives of Σ y_c F_c by source; 0 for tension, rigidity and lead."""
+        """Compute the derivatives of Σ y_c F_c by source; 0 for those of wires."""
         F, free = self.tension.values, self.free
         B = self.tension.posture.length_jacobian[free].T
         mu = self.multipliers(weights)
@@ -91,6 +91,7 @@ class Balance(NamedTuple):
         _, by_q, *by_places, by_mass, _, _ = single_gradient(*arguments)
         return {
             "rigidity": none,
+            "spring": np.zeros(len(inputs.labels["spring"])),
             "joint_angle": by_q,
             "tension": none,
             "lead": none,
@@ -103,11 +104,11 @@ class Balance(NamedTuple):
 def buckling_gradient(
     balance: Balance, inputs: Inputs, margin: Mapping[str, Array]
 ) -> dict[str, Array]:
-    """Compute the derivatives of the lower bound at which the smallest eigenvalue of K_θ is zero.
+    """Compute the derivatives of the critical tension F_min, at which λ_min(K_θ) = 0, by source.
 
-    ``margin`` contains the derivatives ∂λ of the eigenvalue at constant tensions, and y with
-    respect to the tensions. Then dF_min = −(∂λ + Σ y_c dF_c)/(Σ y_c dF_c/dF_min). The tensions are
-    distributed, so a measured tension has no influence.
+    ``margin`` are the derivatives of λ_min at constant tensions: ∂λ with respect to the inputs of
+    each source, and y = ∂λ/∂F under the key ``tension``. Then dF_min = −(∂λ + Σ y_c dF_c)/(Σ y_c
+    dF_c/dF_min). Measured tensions have the derivative 0.
     """
     weights = margin["tension"]
     moved, slope = balance.gradient(inputs, weights), balance.by_bound(weights)

@@ -32,7 +32,7 @@ _PROBED = 100
 """Number of drawn arms with which the error of first order is estimated."""
 
 _ROUNDING = 1e-9
-"""A smaller relative uncertainty is rounding; the error of a root of a kinked curve is 1e-10."""
+"""A smaller relative uncertainty is rounding: critical tensions are found to 1e-10 only."""
 
 
 @final
@@ -101,21 +101,13 @@ class Uncertainty(ReadOnlyState):
     def interval(self, probability: float = 0.95) -> tuple[float, float]:
         """Return the coverage interval value ± k u_c, with k of the normal distribution.
 
-        Args:
-            probability: Between 0 and 1.
-
-        Raises:
-            InvalidInput: ``probability`` is not between 0 and 1.
+        Raises InvalidInput if the probability is not between 0 and 1.
         """
         half = coverage_factor(probability) * self.standard_uncertainty
         return self.value - half, self.value + half
 
     def largest_inputs(self, count: int = 5) -> tuple[tuple[str, str, float], ...]:
-        """Return source, name and |∂f/∂x| u(x) of the inputs x with the largest contributions.
-
-        Args:
-            count: Number of inputs.
-        """
+        """Return source, name and |∂f/∂x| u(x) of the ``count`` inputs x that contribute most."""
         labels = self.question.labels
         each = [
             (source, name, abs(float(g)) * float(u))
@@ -280,6 +272,7 @@ def decimals(uncertainty: float) -> int:
 
 _SHOWN = {
     "rigidity": (1e-2, " %"),
+    "spring": (1e-2, " %"),
     "joint_angle": (math.pi / 180.0, " deg"),
     "hole_angle": (math.pi / 180.0, " deg"),
     "tension": (1.0, " N"),

@@ -48,6 +48,10 @@ class DrawnArms:
 
         self._tension = drawn("tension", K.tension)
         self._scale = 1.0 + errors.get("rigidity", np.zeros((self._count, 1)))
+        softer = np.zeros_like(self._tension)
+        if "spring" in errors:  # 1/k_series of the drawn springs, less that of the nominal ones
+            softer[:, model.laws.series > 0.0] = 1.0 / (1.0 + errors["spring"]) - 1.0
+        self._softer = softer * model.laws.series
         q, lead = drawn("joint_angle", pose.q), np.array([cable.lead for cable in pose.arm.cables])
         mass = np.repeat(model.masses.mass[None], self._count, axis=0)
         if "link_mass" in errors:
@@ -71,6 +75,9 @@ class DrawnArms:
         rigidity, strain = laws_at(self._K, F)
         held = self._K.cable_stiffness > 0.0
         stretched = np.where(held, rigidity * (self._scale + strain), 0.0)  # ε falls as EA rises
+        # a spring softer by c is in k = 1/(l_0/EA + 1/k_series) like a wire longer by c·EA
+        laws, (lead, *own) = self._K.posture.arm._model.laws, self._own
+        lead = lead + self._softer * (stretched - (F - laws.rest))
         count, (cables, nv) = self._count, self._K.posture.length_jacobian.shape
         found = Drawn(
             joint=np.empty((count, nv, nv)),
@@ -79,7 +86,7 @@ class DrawnArms:
             length_jacobian=np.empty((count, cables, nv)),
             torque=np.empty((count, nv)),
         )
-        arguments: tuple[Any, ...] = (*self._same, F, stretched, *self._own, *found)
+        arguments: tuple[Any, ...] = (*self._same, F, stretched, lead, *own, *found)
         stiffness_of_draws(*arguments)
         return found
 

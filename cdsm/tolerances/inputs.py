@@ -44,7 +44,7 @@ class Places(NamedTuple):
     tip: Array
 
     def stacked(self) -> Array:
-        """Return all coordinates in one vector (n,)."""
+        """Return all coordinates of one arm as a vector (n,), in the order of the fields."""
         return np.concatenate([place.ravel() for place in self])
 
     def moved(self, by: Array) -> Places:
@@ -96,6 +96,7 @@ class Inputs:
         ]
         self.labels: dict[str, tuple[str, ...]] = {
             "rigidity": tuple(cables),
+            "spring": tuple(cables[c] for c in np.flatnonzero(model.laws.series)),
             "joint_angle": arm.joint_names,
             "tension": tuple(cables),
             "lead": tuple(cables),
@@ -132,13 +133,15 @@ class Inputs:
         """Raise InvalidInput for a source that the arm does not have."""
         for name in tolerances.given:
             if not self.labels.get(name):
-                raise InvalidInput(
-                    name,
-                    f"{arm.name} has no friction in its holes; see Manipulator.with_friction."
-                    if name == "friction"
-                    else f"{arm.name} was made from a URDF and has no holes on disks; give site, "
-                    "the tolerance [m] of each coordinate of its cable sites.",
+                lacks = {
+                    "friction": "has no friction in its holes; see Manipulator.with_friction.",
+                    "spring": "has no springs in series; see series_stiffness of a Cable.",
+                }
+                otherwise = (
+                    "was made from a URDF and has no holes on disks; give site, the tolerance [m] "
+                    "of each coordinate of its cable sites."
                 )
+                raise InvalidInput(name, f"{arm.name} {lacks.get(name, otherwise)}")
 
     def _disks(self, arm: Manipulator, sites: list[str]) -> dict[str, csr_matrix]:
         """Label the inputs of holes, disks and links; return the sites that they move."""

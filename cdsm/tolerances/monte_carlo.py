@@ -70,11 +70,7 @@ class MonteCarlo(ReadOnlyState):
     def interval(self, probability: float = 0.95) -> tuple[float, float]:
         """Return the probabilistically symmetric coverage interval (JCGM 101, 7.7).
 
-        Args:
-            probability: Between 0 and 1.
-
-        Raises:
-            InvalidInput: ``probability`` is not between 0 and 1.
+        Argument and error are those of :meth:`Uncertainty.interval`.
         """
         p = scalar("probability", probability)
         if not 0.0 < p < 1.0:
@@ -198,7 +194,7 @@ def monte_carlo(
     budget = uncertainty(
         pose, tension, tolerances, direction=direction, of=of, cable=cable, wrench=wrench
     )
-    folder = None if store is None else _opened(store, budget, start)
+    folder = None if store is None else _open_store(store, budget, start)
     values = np.empty(count)
     compute = partial(_block, budget.question, tolerances, start, folder)
     blocks = list(_blocks(count))
@@ -250,13 +246,13 @@ def _block(
     return values
 
 
-def _opened(store: str | os.PathLike[str], budget: Uncertainty, seed: int) -> Path:
-    """Create the folder of a run, or check that it holds this run."""
+def _open_store(store: str | os.PathLike[str], budget: Uncertainty, seed: int) -> Path:
+    """Create the folder of a run, or check that it has this run."""
     folder = make_folder(store)
     parts = [budget.question.of, repr(budget.value), repr(budget.standard_uncertainty), str(seed)]
     parts += tolerance_lines(budget.tolerances)
     mark, path = hashlib.sha256("\n".join(parts).encode()).hexdigest(), folder / "run.txt"
     if path.exists() and read_text(path) != mark:
-        raise FileError(folder, "holds another Monte Carlo run; give an empty folder.")
+        raise FileError(folder, "contains another Monte Carlo run; give an empty folder.")
     write_text(path, mark)
     return folder

@@ -86,7 +86,7 @@ def parts_of(
                 raise InvalidInput(
                     source,
                     f"its standard uncertainty reaches {np.max(standard):.3g} at these tensions; "
-                    f"up to {LARGEST[source]:g} is a tolerance. Raise the tensions.",
+                    f"the largest allowed is {LARGEST[source]:g}. Raise the tensions.",
                 )
             parts.append(Part(inputs, standard, each))
         found[source] = tuple(parts)

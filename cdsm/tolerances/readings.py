@@ -170,6 +170,7 @@ def _gradient(K: Stiffness, inputs: Inputs, motion: Array, direction: Array) -> 
     wire = pose.cable_lengths - laws.series * (F - laws.rest)
     by_stretched = k**2 * wire / stretched**2  # zero where the motor holds the force
     slope = -(k**2) / stretched
+    by_spring = k**2 * laws.series * (1.0 - (F - laws.rest) / stretched)
     by_force = k**2 * laws.series / stretched + by_stretched * _stretched_slope(K, strain)
     arguments: tuple[Any, ...] = (
         *pose.arm._model.arrays,
@@ -179,6 +180,7 @@ def _gradient(K: Stiffness, inputs: Inputs, motion: Array, direction: Array) -> 
     _, by_q, *by_places, by_mass, by_tension, by_stiffness = single_gradient(*arguments)
     return {
         "rigidity": by_stiffness * by_stretched * rigidity,
+        "spring": (by_stiffness * by_spring)[laws.series > 0.0],
         "joint_angle": by_q,
         "tension": by_tension + by_stiffness * by_force,
         "lead": by_stiffness * slope,

@@ -41,14 +41,14 @@ class Ties(NamedTuple):
     inputs: Mapping[str, Indices]
 
     def gather(self, gradient: Mapping[str, Array]) -> dict[str, Array]:
-        """Sum derivatives for the arm of blocks over the inputs that are one input of the arm."""
+        """Return derivatives for the inputs of the arm: the sums of those for the arm of blocks."""
         found = {source: np.zeros(len(names)) for source, names in self.labels.items()}
         for source, at in self.inputs.items():
             np.add.at(found[source], at[at >= 0], gradient[source][at >= 0])
         return found
 
     def scatter(self, errors: Mapping[str, Array]) -> dict[str, Array]:
-        """Return errors (N, inputs) of the arm's inputs as errors of the arm of blocks."""
+        """Return errors (N, inputs) for the arm as errors for the inputs of the arm of blocks."""
         found = {}
         for source, drawn in errors.items():
             at = self.inputs.get(source, _NONE)
@@ -88,11 +88,13 @@ def blocks_of(pose: Posture, tension: Array) -> tuple[Posture, Array, Ties]:
             own.append(c)
     stuck = arm.with_cables(blocks)
     cable_of = np.array(own, dtype=np.intp)
-    ties = Ties(inputs_of(arm).labels, tension, _tied(arm, stuck, cable_of, names, behind))
+    ties = Ties(
+        inputs_of(arm).labels, tension, _matching_inputs(arm, stuck, cable_of, names, behind)
+    )
     return stuck.at(pose.q, check_limits=False), tension[cable_of], ties
 
 
-def _tied(
+def _matching_inputs(
     arm: Manipulator,
     stuck: Manipulator,
     cable_of: Indices,
@@ -107,6 +109,9 @@ def _tied(
             found[source] = cable_of
         elif source == "lead":
             found[source] = np.where(behind, -1, cable_of)
+        elif source == "spring":
+            each = [at[label.rpartition(":")[0]] for label in labels]
+            found[source] = np.array(each, dtype=np.intp)
         elif source == "site":
             sites = (label.rpartition(", ") for label in labels)
             each = [at[f"{names[site]}, {axis}"] for site, _, axis in sites]

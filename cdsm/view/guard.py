@@ -66,7 +66,7 @@ Control = (
 
 
 class _Address(str):
-    """Listening address of one guard; its identity tells it from equal strings of other servers."""
+    """Listening address of one guard; its identity distinguishes it from equal strings."""
 
     __slots__ = ()
 
@@ -134,7 +134,7 @@ class Guard:
     def _answer(
         self, reply: _Reply, connection: ServerConnection, request: Request
     ) -> Response | None:
-        """Refuse a request for a page or a websocket, or let viser answer it."""
+        """Return the refusal of a request for a page or a websocket, or what viser answers."""
         hosts = request.headers.get_all("Host")
         _, first, rest = [*request.path.partition("?")[0].split("/", 2), "", ""][:3]
         fault = self._fault(hosts, request.headers.get_all("Origin"), first)
@@ -165,7 +165,7 @@ class Guard:
             return "a request without the token"
         return ""
 
-    def _kept(self, raw: bytes) -> bytes | None:
+    def _permitted(self, raw: bytes) -> bytes | None:
         """Return a message of a client, packed again for viser, or None if it is refused."""
         try:
             # packed again: of two fields with one name, viser may read the one not checked here
@@ -219,7 +219,7 @@ class _Connection(ServerConnection):
         self._guard = guard
 
     async def recv(self, decode: bool | None = None) -> Any:
-        while (kept := self._guard._kept(await super().recv(decode=False))) is None:
+        while (kept := self._guard._permitted(await super().recv(decode=False))) is None:
             pass
         return kept
 

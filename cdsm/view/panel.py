@@ -71,7 +71,7 @@ def page_text(shown: Shown, force_scale: float, remark: str = "") -> str:
 
 
 def basis_text(arm: Manipulator) -> str:
-    """Write the conditions of all numbers: arm, wires, gravity, friction."""
+    """Write what all numbers of the page assume: arm, wires, gravity, friction."""
     friction = "friction in its holes where it sags" if arm.has_friction else "frictionless"
     words = f"with wire {wires_text(arm.cables)}; gravity {coordinates(arm.gravity)} m/s²"
     lines = element("div", str(arm)), element("div", _named("basis", f"{words}; {friction}"))
@@ -114,7 +114,6 @@ def _remarks(shown: Shown, remark: str) -> Iterator[tuple[str, str]]:
 
 
 def _numbers(shown: Shown) -> Iterator[_Row]:
-    """Yield the table rows of all results that exist."""
     K, principal, tensions, pose = shown.stiffness, shown.principal, shown.tensions, shown.posture
     if shown.along is not None and principal is not None:
         along = {f"along-{axis}": _stiffness(F) for axis, F in zip(AXES, shown.along, strict=True)}

@@ -147,6 +147,6 @@ def _check_free(host: str, port: int) -> None:
     except OSError as error:
         raise InvalidInput(
             "port",
-            f"{port} on {host} cannot be had: {os.strerror(error.errno or 0)}. "
+            f"{port} on {host} is not available: {os.strerror(error.errno or 0)}. "
             "Give another port, or 0 for any free one.",
         ) from None

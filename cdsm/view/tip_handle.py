@@ -71,7 +71,7 @@ class TipHandle:
         return found.angles
 
     def moved_to(self, q: Array) -> None:
-        """Store the angles (nv,) of the sliders, which round them."""
+        """Store the angles (nv,) to which the sliders were moved, rounded as they round."""
         self._q = q
 
     def remark(self, q: Array) -> str:

@@ -112,13 +112,10 @@ class StrandElasticity(Elasticity):
         return Domain(self.low, self.high, low_included=False)
 
     def polynomial(self, tension: ArrayLike) -> Array:
-        """Evaluate the polynomials [N] without checks: for plots, and to show a misprint.
+        """Evaluate the polynomials [N] at F of any shape without checks: to show a misprint.
 
-        Args:
-            tension: F [N], any shape. The outer ranges extend beyond the domain.
-
-        Raises:
-            InvalidInput: ``tension`` is not finite numbers.
+        The outer ranges extend beyond the domain. InvalidInput if ``tension`` is not finite
+        numbers.
         """
         values = number_array("tension", tension)
         return piecewise(self._joins, self._table, values)
@@ -132,7 +129,7 @@ class StrandElasticity(Elasticity):
     def rigidity(self, tension: ArrayLike) -> Array:
         """Compute EA(F) [N]; see :meth:`Elasticity.rigidity`."""
         values = self.domain.check(tension)
-        result = self.polynomial(values)
+        result = piecewise(self._joins, self._table, values)
         bad = result <= 0.0
         if np.count_nonzero(bad):
             raise ElasticityRangeError(

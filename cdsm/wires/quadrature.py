@@ -100,11 +100,9 @@ class Panels(NamedTuple):
 
 
 def panels(rows: Sequence[Sequence[float]], edges: Sequence[float]) -> Panels:
-    """Divide piecewise polynomials into panels.
+    """Divide piecewise polynomials, lowest powers first, into panels.
 
-    Args:
-        rows: Coefficients of each polynomial, lowest power first.
-        edges: Start of the first range, then the end of each range. They rise.
+    ``edges`` are the start of the first range, then the end of each range. They rise.
     """
     ends: list[float] = [edges[0]]
     piece: list[int] = []

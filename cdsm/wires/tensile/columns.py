@@ -114,7 +114,7 @@ def find_header(table: Table, wanted: Sequence[str | int] | None) -> tuple[Heade
 
 
 def _is_data(table: Table, k: int) -> bool:
-    """Return whether a row holds two numbers or more."""
+    """Return whether a row has two numbers or more."""
     return sum(math.isfinite(table.number(cell)) for cell in table.rows[k][1]) > 1
 
 
@@ -125,7 +125,7 @@ def _rows_of_data(table: Table, first: int) -> int:
 
 
 def _header(table: Table, k: int) -> Header:
-    """Read row k as a header, with the units of the row below it, if it holds units."""
+    """Read row k as a header, with the units of the row below it, if it has units."""
     below = table.rows[k + 1][1] if k + 1 < len(table.rows) else []
     units = [cell.strip("[]() ") for cell in below]
     has_units = not _KNOWN.isdisjoint(units)
@@ -164,7 +164,7 @@ def _column(at: int, cell: str, below: str) -> Column:
 
 
 def _candidates(header: Header, wanted: Sequence[str | int] | None) -> list[list[Column]]:
-    """Return the columns that may hold the displacement, and those that may hold the force."""
+    """Return the columns that may be the displacement, and those that may be the force."""
     if wanted is not None:
         return [_wanted(header, name, kind) for name, kind in zip(wanted, _BOTH, strict=True)]
 

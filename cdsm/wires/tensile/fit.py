@@ -95,7 +95,7 @@ class TensileFit(ReadOnlyState):
         rms: Root mean square of measured minus fitted force over the domain [N]. Averaged points
             count as one point.
         tensions: About 200 tensions F over the domain, rising, shape (n,) [N].
-        band: 95 % confidence band of EA at these tensions; None for ``polynomial``.
+        band: 95 % confidence :class:`Band` of EA at these tensions; None for ``polynomial``.
         test: The test.
         method: ``monotone`` or ``polynomial``.
         start: Displacement at the low end of the domain [m].
@@ -131,13 +131,8 @@ class TensileFit(ReadOnlyState):
         """Return the band as a tolerance for the rigidity of cables made of this wire.
 
         The standard uncertainty of EA(F) is half the width of the band of ln EA, divided by 1.96.
-        All cables are of one spool, so they share one error.
-
-        Args:
-            of: Names of these cables, as for :class:`~cdsm.Tolerance`.
-
-        Raises:
-            InvalidInput: A fit by polynomials has no band.
+        All cables are of one spool, so they share one error; ``of`` are their names, as for
+        :class:`~cdsm.Tolerance`. InvalidInput for a fit by polynomials, which has no band.
         """
         if self.band is None:
             raise InvalidInput("method", "a fit by polynomials has no band; fit by 'monotone'.")
@@ -146,10 +141,7 @@ class TensileFit(ReadOnlyState):
         return Tolerance(standard, correlation=1.0, of=of, tensions=self.band.tensions)
 
     def plot(self) -> Figure:
-        """Plot force over displacement with the fit, and rigidity with its band and stages.
-
-        Units: displacement in mm, force in N, rigidity in kN.
-        """
+        """Plot force [N] over displacement [mm] with the fit; EA [kN] with band and stages."""
         from cdsm.plots.measured import plot_tensile_fit  # matplotlib imports slowly
 
         return plot_tensile_fit(self)
@@ -192,9 +184,10 @@ def fit_tensile_test(
         InvalidInput: An argument is not finite numbers.
         UnknownName: ``method`` is unknown.
         TensileTestError: The arrays differ in length, there are fewer than 8 points, the gauge
-            length is not positive, the wire is compressed, the force does not rise or jumps, the
-            units are impossible (the likely mistake is named), fewer than 8 points lie below the
-            yield (20 for polynomials), or the polynomials are not positive on half the range.
+            length is not positive, the wire is compressed, the force does not rise or is
+            discontinuous, the units are impossible (the likely mistake is named), fewer than 8
+            points lie below the yield (20 for polynomials), or the polynomials are not positive on
+            half the range.
     """
     one_of("method", method, _METHODS)
     join = scalar("join", join)

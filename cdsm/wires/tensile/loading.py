@@ -129,7 +129,7 @@ def _outliers(values: Array) -> NDArray[np.bool_]:
 
 
 def local_noise(errors: Array) -> Array:
-    """Estimate the local standard deviation (n,) of errors (n,), at least that of all of them."""
+    """Estimate the local standard deviation (n,) of errors (n,); nowhere below the overall one."""
     width = min(_AROUND, len(errors))
     near = np.pad(abs(errors), (width // 2, width - 1 - width // 2), mode="reflect")
     local = np.median(np.lib.stride_tricks.sliding_window_view(near, width), axis=1)
@@ -137,7 +137,7 @@ def local_noise(errors: Array) -> Array:
 
 
 def _slips(points: Points, gauge_length: float, least: float) -> list[str]:
-    """Note where the force falls while the displacement grows, and rises again."""
+    """Return a note for each place where the force falls while the displacement grows."""
     highest = np.maximum.accumulate(points.force)
     fall = highest - points.force
     notes = []
@@ -167,7 +167,7 @@ def _slack(points: Points, noise: float, least: float) -> int:
 
 
 def _trends(points: Points, noise: float, least: float) -> tuple[Array, Array]:
-    """Compute the rise [N] per point of the first 1, 2, … points, and its standard deviation."""
+    """Compute the slope [N per point] of the first n points, for each n, and its deviation."""
     w, x, y = points.count, np.arange(len(points.force)), points.force - points.force[0]
     total = np.cumsum(w)
     xx, xy, yy = (

@@ -16,18 +16,16 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import BSpline
 from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import least_squares
 from scipy.special import stdtrit
 
 from cdsm.support.values import Array
+from cdsm.wires.tensile.basis import Basis
 from cdsm.wires.tensile.loading import Points
 
-_INTERVALS = 48  # of the spline, at most; more do not change the curve of a wire
 _NEAR = 41  # neighbouring points over which the noise is assumed constant
 _ROUGHER = 1000.0  # less smoothing of the band's curve: its bias is then far below its scatter
-_GRID = 1200  # tensions: strain error below 1e-4 where EA varies thousandfold
 
 
 def _running_integral(values: Array, tensions: Array, axis: int = -1) -> Array:
@@ -47,35 +45,6 @@ def _neighbours(values: Array) -> Array:
 def _least_variance(points: Points) -> float:
     """Compute the variance [N²] below which a test counts as exact."""
     return (1e-6 * float(np.ptp(points.force))) ** 2
-
-
-class Basis(NamedTuple):
-    """B-splines (g, k) over a grid of tensions (g,) [N], and their roughness (k, k)."""
-
-    tensions: Array
-    splines: Array
-    roughness: Array
-
-
-def _basis(points: Points, noise: float) -> Basis:
-    """Build splines from the first force to the largest.
-
-    Their knots are equally spaced in the mean of log(F + corner) and F, each scaled to 0…1. So they
-    are nearly equally spaced below the corner [N], and denser there than above.
-    """
-    low, high = max(float(points.force[0]) - 3.0 * noise, 0.0), float(points.force.max())
-    corner = max(low, 8.0 * noise, 5e-3 * high)
-    fine = low + corner * np.expm1(np.linspace(0.0, np.log1p((high - low) / corner), 8 * _GRID))
-    place = np.log1p((fine - low) / corner) / np.log1p((high - low) / corner)
-    place = (place + (fine - low) / (high - low)) / 2.0
-    t = np.linspace(0.0, 1.0, _GRID)
-    intervals = int(np.clip(len(points.force) // 2, 3, _INTERVALS))
-    # with uniform knots beyond the ends, a straight log EA has no difference penalty
-    beyond = np.arange(1, 4) / intervals
-    knots = np.concatenate((-beyond[::-1], np.linspace(0.0, 1.0, intervals + 1), 1.0 + beyond))
-    splines = BSpline.design_matrix(t, knots, 3).toarray()
-    second = np.diff(np.eye(splines.shape[1]), 2, axis=0)
-    return Basis(np.interp(t, place, fine), splines, second.T @ second)
 
 
 class Spread(NamedTuple):
@@ -126,7 +95,7 @@ class Curve:
 
     @cached_property
     def strain(self) -> Array:
-        """Strain ε (g,) [-] on the grid, with the origin of the points."""
+        """Strain ε (g,) [-] on the grid, zero where that of the points is zero."""
         stretch = _running_integral(1.0 / self.rigidity, self.basis.tensions)
         return np.asarray(self.anchor_strain + stretch - stretch[self.anchor])
 
@@ -261,7 +230,7 @@ class Curve:
         return np.pad(self.smoothing * self.basis.roughness, (0, 1))
 
     def _linearised(self, points: Points) -> tuple[Array, Array]:
-        """Return Jacobian (n, k + 1) and residual (n,), weighted to the noise of one point."""
+        """Return ∂force/∂unknowns (n, k + 1) and errors (n,), times √(points per average)."""
         weight = np.sqrt(points.count)
         error = weight * (points.force - self.force(points.strain))
         return weight[:, None] * self.jacobian(points.strain), error
@@ -280,11 +249,11 @@ def fit_curve(points: Points, noise: float) -> Curve:
 
     ``noise`` is a first estimate of the noise of one point [N].
     """
-    basis = _basis(points, noise)
+    basis = Basis.of(points, noise)
     tensions, size = basis.tensions, basis.splines.shape[1]
     # start from secants so coarse that they are positive
     force = np.maximum.accumulate(points.force) + 1e-9 * tensions[-1] * np.arange(len(points.force))
-    places = tensions[np.linspace(0, _GRID - 1, 13).astype(int)]
+    places = tensions[np.linspace(0, len(tensions) - 1, 13).astype(int)]
     secants = np.diff(places) / np.maximum(
         np.diff(np.interp(places, force, points.strain)), 1e-3 * np.ptp(points.strain) / 12
     )

@@ -61,9 +61,9 @@ def refuse_jumps(curve: Curve, points: Points) -> None:
     measured = float((np.diff(points.force) / np.diff(points.strain)).max())
     if curve.rigidity[steepest] > _JUMP * measured:
         raise TensileTestError(
-            f"the force jumps near {curve.basis.tensions[steepest]:.4g} N while the displacement "
-            "hardly grows, and no smooth curve follows it. Look for a wire gripped anew, a stuck "
-            "extensometer, or units that change midway."
+            f"the force is discontinuous near {curve.basis.tensions[steepest]:.4g} N while the "
+            "displacement hardly grows, and no smooth curve follows it. Look for a wire "
+            "gripped anew, a stuck extensometer, or units that change midway."
         )
 
 
