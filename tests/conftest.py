@@ -1,13 +1,32 @@
 """What several test files share and is worth computing once; and which tests are quick."""
 
+import os
+import pickle
 import signal
+from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
 
 from cdsm import paper
+from cdsm.support.files import write_file
 
-Results = dict[str, paper.Figure]
+
+class Results(dict[str, paper.Figure]):
+    """The paper's figures, each recomputed when it is first asked for, by one of the workers."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+
+    def __missing__(self, name: str) -> paper.Figure:
+        kept = self._folder / f"{name}.pickle"
+        if kept.exists():
+            self[name] = pickle.loads(kept.read_bytes())
+        else:
+            self[name] = paper.FIGURES[name]()
+            write_file(kept, lambda aside: aside.write_bytes(pickle.dumps(self[name])))
+        return self[name]
+
 
 # a test is about numbers; how long it takes depends on what else the machine does
 settings.register_profile("cdsm", deadline=None, suppress_health_check=[HealthCheck.too_slow])
@@ -31,6 +50,6 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 @pytest.fixture(scope="session")
-def results() -> Results:
-    """The paper's figures, recomputed."""
-    return {name: compute() for name, compute in paper.FIGURES.items()}
+def results(tmp_path_factory: pytest.TempPathFactory) -> Results:
+    folder = tmp_path_factory.getbasetemp()
+    return Results(folder.parent if "PYTEST_XDIST_WORKER" in os.environ else folder)

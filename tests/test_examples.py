@@ -6,6 +6,7 @@ from pathlib import Path
 
 import known_arms
 import mujoco_weight
+import newton_rest
 import numpy as np
 import pytest
 from ros2_stiffness_node import answer
@@ -52,6 +53,29 @@ def test_mujoco_comes_to_rest_where_cdsm_says() -> None:
     arm = mujoco_weight.posture()
     theirs, ours = mujoco_weight.simulate(*arm), mujoco_weight.compute(*arm)
     assert np.linalg.norm(theirs - ours) < 1e-4 * np.linalg.norm(ours)
+
+
+def test_tendons_for_newton_are_the_cables_span_by_span() -> None:
+    pose = newton_rest.arm(0.3).at([0.1, -0.2])
+    tension = cdsm.distribute_tension(pose, 20.0)
+    K = cdsm.stiffness(pose, tension)
+    tendons = newton_rest.guides(pose, tension)
+    assert [len(points) for points in tendons] == [1 + len(c.sites) for c in pose.arm.cables]
+    np.testing.assert_allclose(
+        [sum(each.rest for each in points[1:]) for points in tendons], K.free_lengths, rtol=1e-14
+    )
+    np.testing.assert_allclose(
+        [sum(each.compliance for each in points) for points in tendons],
+        1.0 / K.cable_stiffness,
+        rtol=1e-14,
+    )
+    places = [np.eye(4), pose.link_pose("link1"), pose.link_pose("link2")]
+    for points, length in zip(tendons, pose.cable_lengths, strict=True):
+        assert [each.friction for each in points] == [None, *[0.3] * (len(points) - 2), None]
+        path = np.array([(places[each.link] @ (*each.offset, 1.0))[:3] for each in points])
+        assert np.linalg.norm(np.diff(path, axis=0), axis=1).sum() == pytest.approx(
+            length, rel=1e-14
+        )
 
 
 def test_what_matlab_hands_over_is_taken() -> None:

@@ -190,7 +190,7 @@ def test_arm_without_a_wire_asks_for_one(tmp_path: Path) -> None:
         ("joints = 2", "joints = 0", "joints"),
         ("joints = 2", "jonits = 2", "jonits: is not a key that is known here; did you mean joi"),
         ("[universal]", "[hinged]\n[universal]", "stands outside"),
-        ("[universal]", "[urdf]\ntip = 'a'\n[universal]", "urdf: stands beside universal"),
+        ("[universal]", "[urdf]\ntip = 'a'\n[universal]", "urdf: is given beside universal"),
         ("[universal]", "[universal", "is not TOML"),
     ],
 )

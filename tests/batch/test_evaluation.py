@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import ArrayLike
 
 import cdsm
-from cdsm.batch import evaluation, fused_kernel
+from cdsm.batch import evaluation, evaluator, fused_kernel
 from cdsm.batch.evaluation import OUTPUTS
 from cdsm.batch.inputs import run_slices
 from cdsm.batch.layout import DIRECTIONAL, QUANTITIES
@@ -299,8 +299,8 @@ def test_tensions_that_were_distributed_carry_their_wrench() -> None:
 # --- rows, chunks and threads ---------------------------------------------------------------
 
 
-def test_rows_do_not_know_of_each_other() -> None:
-    """The same bits whatever the chunk, the thread and the neighbours of a row."""
+def test_rows_do_not_know_of_each_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The same bits whatever the block, the chunk, the thread and the neighbours of a row."""
     arm = random_arm(1, 2)
     q, tension, wrench = problem(arm, 9000)
     q[::7] *= 3.0  # some beyond their limits, in between
@@ -314,6 +314,10 @@ def test_rows_do_not_know_of_each_other() -> None:
     assert 1000 < np.count_nonzero(whole.status == cdsm.Status.BEYOND_LIMITS) < 2000
     every = slice(None)
     assert bits(every, 1) == bits(every, 2) == bits(every, 7)
+    for width in (1, 5, 96):
+        with monkeypatch.context() as patch:
+            patch.setattr(evaluator, "WIDTH", width)
+            assert bits(every, 1) == [whole.status.tobytes(), *(v.tobytes() for v in whole.values)]
     picked = np.random.default_rng(1).permutation(9000)[:2500]
     parts = bits(picked, 2)
     assert parts == [whole.status[picked].tobytes(), *(v[picked].tobytes() for v in whole.values)]

@@ -123,3 +123,33 @@ def test_batched_tension_is_fifteen_times_faster_than_one_by_one(clock: Clock | 
             slow_repeat=50,
             fast_repeat=1,
         )
+
+
+@pytest.mark.parametrize(("joints", "most", "least"), [(5, 3.0, 15.0), (20, 2.5, 3.0)])
+def test_one_posture_to_its_reading_costs_little_more_than_its_stiffness(
+    joints: int, most: float, least: float, clock: Clock | None
+) -> None:
+    rows, low = 800, 20.0 if joints == 5 else 60.0
+    one, q, tension, _ = problem(joints, rows)
+
+    def single() -> float:
+        pose = one.at(q[0])
+        return cdsm.stiffness(pose, cdsm.distribute_tension(pose, low)).along("z")
+
+    def stiffness() -> cdsm.Stiffness:
+        return cdsm.stiffness(one.at(q[0]), tension[0])
+
+    def batch() -> Array:
+        outputs = ("along",)
+        return cdsm.evaluate(one, q, minimum=low, outputs=outputs, direction="z", threads=1)[
+            "along"
+        ]
+
+    assert single() == pytest.approx(batch()[0], rel=1e-9)
+    if clock:
+        what = f"at, tension, stiffness, along, n = {joints}"
+        over, times = f"{what}: cost over posture + stiffness", f"{what}: batch, times faster"
+        clock.race(over, single, stiffness, most=most, slow_repeat=20, fast_repeat=20, rounds=10)
+        clock.race(
+            times, single, batch, least=least, rows=rows, slow_repeat=20, fast_repeat=1, rounds=10
+        )

@@ -1,1 +1,1 @@
-"""Long runs by hand, which pytest does not collect."""
+"""Long runs by hand, and what makes them; pytest collects short versions of two."""

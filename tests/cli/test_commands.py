@@ -386,7 +386,7 @@ def test_wire_file_is_the_elasticity_of_the_cables(geometry: Path, tmp_path: Pat
         (("urdf", "{geometry}", "-o", "absent/arm.urdf"), "folder absent does not exist"),
         (("check", "{geometry}", "--out", "absent/r.html"), "folder absent does not exist"),
         (("check", "{geometry}", "--min-tension", "1"), "domain (2.2 N, 810 N]"),
-        (("reproduce", "--out", "{geometry}"), "cannot be made a folder"),
+        (("reproduce", "--out", "{geometry}"), "cannot be created as a folder"),
     ],
 )
 def test_failure_is_one_message_and_exit_code_1(

@@ -32,8 +32,19 @@ def test_the_example_writes_front_figures_and_the_files_of_an_arm(tmp_path: Path
     code, text = run(*words, "--generations", "5", "--population", "8")
     assert code == 0, text
     assert "on the front" in text
-    names = "front.csv front.pdf front.html arm.pdf arm.toml arm.urdf arm.xml holes.csv cables.csv"
-    assert {path.name for path in (tmp_path / "a").iterdir()} == {*names.split(), "designs.jsonl"}
+    names = (
+        "designs.csv front.csv front.pdf front.html arm.pdf arm.toml arm.urdf arm.xml holes.csv "
+        "cables.csv designs.jsonl"
+    )
+    assert {path.name for path in (tmp_path / "a").iterdir()} == {*names.split()}
+    head, *rows = (tmp_path / "a" / "designs.csv").read_text().splitlines()
+    assert len(rows) == 40
+    # the front has all measures for which the problem has the data: no breaking load
+    front = (tmp_path / "a" / "front.csv").read_text().splitlines()[0]
+    assert "isotropy [1],margin [N m/rad]" in front
+    assert "wire_strain [1]" in front
+    assert "wire_safety" not in front
+    assert head.count(",") < front.count(",")
     arm = cdsm.Manipulator.read(tmp_path / "a" / "arm.toml")
     assert cdsm.to_urdf(arm.geometry) == (tmp_path / "a" / "arm.urdf").read_text()
     code, again = run(*words, "--generations", "5", "--population", "8", "--json")

@@ -88,7 +88,7 @@ def test_map_draws_a_sweep(tmp_path: Path) -> None:
         (("--path", "{folder}/absent.csv"), 1, "absent.csv: does not exist"),
         (("--path", "{folder}/names.csv"), 1, "has columns for neither of joint angles"),
         (("--path", "{folder}/empty.csv"), 1, "holds no path"),
-        (("--path", "{folder}/tips.csv"), 1, "a sweep goes along joint angles"),
+        (("--path", "{folder}/tips.csv"), 1, "a sweep needs joint angles"),
         (("--random", "8", "--grid", "joint1_1=0:1:2"), 2, "give one of --grid, --path"),
         ((), 2, "give one of --grid, --path"),
         (("--random", "8", "--quantities", "marign"), 1, "did you mean 'margin'"),

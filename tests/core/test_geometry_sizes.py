@@ -124,7 +124,7 @@ def test_disks_and_inertias_of_the_urdf_have_the_radii_of_their_joints() -> None
         ({"hole_angles": [[0.1], 0.2, [0.3]]}, "hole_angles[2]"),
         ({"hole_angles": []}, "hole_angles"),
         ({"hole_angles": 0.5}, "hole_angles"),
-        ({"hole_angles": [0.1], "cables_per_joint": 1}, "stands beside hole_angles"),
+        ({"hole_angles": [0.1], "cables_per_joint": 1}, "is given beside hole_angles"),
         ({"cables_per_joint": None}, "cables_per_joint: is missing; give cables_per_joint or hole"),
         ({"disk_radius": 0.02}, "disk_radius: too small: at joint 1 it is 0.02 m"),
         ({"cable_radius": 0.03, "disk_radius": 0.025}, "the farthest hole is at 0.03 m"),

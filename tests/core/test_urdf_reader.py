@@ -63,7 +63,7 @@ def test_generated_arms_pass() -> None:
     [
         (
             changed('type="revolute"', 'type="continuous"'),
-            "j1: type 'continuous' is not taken",
+            "j1: type 'continuous' is not supported",
         ),
         (changed('type="revolute"', 'type="floating"'), "fix the base"),
         (changed('type="revolute"', 'type="planar"'), "two prismatic and one revolute"),

@@ -224,6 +224,17 @@ def test_no_design_of_the_front_is_beaten() -> None:
     first = goals[found.front, 0]
     assert (np.diff(first) >= 0.0).all()
     assert "on the front" in str(found)
+    full = found.measured(progress=False)
+    np.testing.assert_array_equal(full["motor_force"], found.evaluated["motor_force"][found.front])
+    arm = found.arm(0)
+    factors = [cdsm.tension_factor(arm.at(q)) for q in BENT]
+    assert full["tension_factor"][0] == pytest.approx(min(factors), rel=1e-9)
+    assert full["capacity_margin"].min() > 0.0
+    head, *rows = full.to_csv().splitlines()
+    assert len(rows) == len(found.front)
+    assert head.startswith("design,hole_radius [m],end of cable2_1,wire,motor_force [N],")
+    assert head.endswith(",feasible,fault")
+    assert all(row.endswith(",1,") for row in rows)
     json.dumps(found.to_dict(), allow_nan=False)
 
 
@@ -320,6 +331,9 @@ def test_refinement_finds_what_a_fine_search_finds() -> None:
     goals = np.where(grid.feasible == 1.0, grid["motor_force"], np.inf)
     assert best <= goals.min() * (1.0 + 1e-9)
     assert best > 0.8 * goals.min()
+    last = refined.history[-1]
+    assert (last.designs, last.best, last.missed) == (len(refined.evaluated), best, 0.0)
+    assert np.isfinite([each.best for each in refined.history]).all()
 
 
 START = 1.5e4
@@ -328,7 +342,7 @@ START = 1.5e4
 def test_problems_that_cannot_be_refined_say_why() -> None:
     with pytest.raises(cdsm.InvalidInput, match="end of cable2_1 is not continuous"):
         cdsm.refine_design(problem())
-    with pytest.raises(cdsm.InvalidInput, match="has worst_friction"):
+    with pytest.raises(cdsm.InvalidInput, match=r"has worst_friction, .* refine without it"):
         cdsm.refine_design(
             problem(variables=CONTINUOUS, objectives=(cdsm.Objective("mass"),), worst_friction=True)
         )

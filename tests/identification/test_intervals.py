@@ -118,7 +118,7 @@ def test_interval_that_the_measurements_do_not_end_is_open_and_said() -> None:
     assert high == math.inf
     assert 0.0 < low < found.values[0]
     (said,) = (each for each in found.warnings if each.startswith("softness"))
-    assert "softness has no upper end at 95 %" in said
+    assert "softness has no upper limit at 95 %" in said
     assert f"its bound, {0.9 / least:g}" in said
     assert "inf" in str(found)
     # with less asked the end is within the bounds
@@ -137,7 +137,7 @@ def test_interval_that_the_model_ends_is_open_and_says_why() -> None:
 
     found = identify(model_of, readings(0.3), {"softness": (1e-4, 1e-1)})
     assert found.confidence()["softness"][1] == math.inf
-    (said,) = (each for each in found.warnings if "no upper end" in each)
+    (said,) = (each for each in found.warnings if "no upper limit" in each)
     assert "where the model ends" in said
     assert "no such wire is sold" in said
 
@@ -163,7 +163,7 @@ def test_optimum_on_a_bound_leaves_the_interval_of_the_values_within() -> None:
 
     assert chi_square(high) - chi_square(beyond) == pytest.approx(norm.ppf(0.975) ** 2, rel=5e-3)
     assert any(each.startswith("softness is at its lower bound") for each in found.warnings)
-    assert not any("no lower end" in each for each in found.warnings)
+    assert not any("no lower limit" in each for each in found.warnings)
 
 
 def test_profile_that_leads_to_a_deeper_valley_moves_the_optimum_there() -> None:

@@ -48,7 +48,9 @@ def test_where_there_is_no_model_residuals_are_infinite_and_the_reason_is_kept()
     assert problem(0.8).failure(here) is None
     assert np.isinf(problem(0.8).residuals(beyond)).all()
     assert str(problem(0.8).failure(beyond)) == "too much"
-    with pytest.raises(cdsm.InvalidInput, match=r"free: at a = 0, b = 0 .* in a, it has none"):
+    with pytest.raises(
+        cdsm.InvalidInput, match=r"free: at a = 0, b = 0 .* none for a slightly smaller"
+    ):
         problem(0.0).jacobian(np.array([0.0, 0.5]))
 
 

@@ -15,6 +15,7 @@ import cdsm
 from cdsm.identification import Measurement, WeightLoop, identify
 from cdsm.identification.problem import Model
 from cdsm.identification.search import problem_of
+from tests.support.coverage import Experiment
 
 TRUE = {"friction": 0.1, "rigidity": 48e3}
 FREE = {"friction": (0.0, 0.5), "rigidity": (1e4, 2e5)}
@@ -100,7 +101,7 @@ def test_loops_and_stiffnesses_determine_together_what_neither_does_alone() -> N
     # a loop tells rigidity over length; the stiffness of another arm's posture tells as little
     free = {**FREE, "lead": (0.1, 1.0)}
     start = {**TRUE, "lead": 0.25}
-    exact = [loop.simulated(hinge()) for loop in PLANNED]
+    exact = [PLANNED[0].simulated(hinge())]
     alone = identify(hinge, exact, free, start=start)
     assert alone.correlation[1, 2] > 0.99
     assert any("rigidity and lead are correlated" in warning for warning in alone.warnings)
@@ -138,127 +139,39 @@ def test_errors_of_forces_and_tensions_count_with_their_correlations() -> None:
     exact = loop.simulated(hinge())
     plain = Model.of(hinge, None, (exact,))
     random, freedom = np.random.default_rng(5), len(FORCES) - 1
-    drawn = [np.array(loop.simulated(hinge(), random).displacements) for _ in range(200)]
+    drawn = [np.array(loop.simulated(hinge(), random).displacements) for _ in range(60)]
     mean = []
     for model in (plain.weighted(TRUE), plain):
         (weights,) = model.weights
         assert weights is not None
         rows = np.array([weights.root @ (row - np.array(exact.displacements)) for row in drawn])
         mean.append((rows**2).sum(axis=1).mean())
-    # weighed, they are standard normal numbers; the mean of 200 draws is known to 4 %
-    assert mean[0] == pytest.approx(freedom, rel=0.12)
+    # weighed, they are standard normal numbers; the mean of 60 draws is known to 7 %
+    assert mean[0] == pytest.approx(freedom, rel=0.2)
     assert mean[1] > 3.0 * freedom
 
 
-def held_by(
-    model_of: Any, loops: list[WeightLoop], true: dict[str, float], free: Any
-) -> dict[str, bool]:
-    """Whether the 95 % interval of each parameter holds the true value.
-
-    It does if Δχ² with the parameter held there is below its limit: the definition, and far faster
-    than the whole interval.
-    """
-    model = Model.of(model_of, None, tuple(loops)).weighted(true)
-    problem = problem_of(model, free)
-    at = problem.box.point(np.array(list(true.values())))
-    loose: Any = {"method": "trf", "tolerances": (1e-4, 1e-6, 1e-6), "most": 50}
-    best = problem.search(at, **loose)
-    model = model.weighted(problem.parameters(best))
-    problem = problem_of(model, free)
-    least = problem.cost(problem.search(best, **loose))
-    held = {}
-    for i, name in enumerate(true):
-        start = np.where(np.arange(at.size) == i, at, best)
-        others = [j for j in range(at.size) if j != i]
-        rise = problem.cost(problem.search(start, over=others, **loose)) - least
-        held[name] = rise <= 1.959964**2
-    return held
-
-
-def inside(seed: int) -> dict[str, bool]:
-    """Whether the intervals of one experiment hold friction and rigidity."""
-    return held_by(hinge, measured(seed), TRUE, FREE)
+def experiment() -> Experiment:
+    return Experiment(hinge, PLANNED, TRUE, FREE)
 
 
 @pytest.mark.slow
 def test_the_short_way_to_coverage_is_that_of_the_intervals() -> None:
     for seed in (0, 11):
-        loops = measured(seed)
-        found = FOUND if seed == 0 else identify(hinge, loops, FREE, start=TRUE)
+        found = FOUND if seed == 0 else identify(hinge, measured(seed), FREE, start=TRUE)
         intervals = found.confidence()
-        assert inside(seed) == {
+        assert experiment().held(np.random.default_rng([seed, 20])) == {
             name: low <= TRUE[name] <= high for name, (low, high) in intervals.items()
         }
 
 
 @pytest.mark.slow
 def test_most_intervals_hold_the_truth() -> None:
-    seeds = 40
-    counts = np.sum([list(inside(seed).values()) for seed in range(seeds)], axis=0)
+    # tests/campaigns/identified.py resolves 2 %, for dimensions and springs too
+    seeds, planned = 20, experiment()
+    held = [planned.held(np.random.default_rng([seed, 20])) for seed in range(seeds)]
+    counts = np.sum([list(each.values()) for each in held], axis=0)
     fewest, most = binom.interval(0.998, seeds, 0.95)
-    assert ((fewest <= counts) & (counts <= most)).all(), counts
-
-
-@pytest.mark.long
-def test_intervals_hold_the_truth_in_93_to_97_of_100_experiments() -> None:
-    seeds = 600  # 0.95 is known to 0.9 %; within 95 ± 2 % unless by chance of 1 in 40
-    counts = np.sum([list(inside(seed).values()) for seed in range(seeds)], axis=0)
-    assert ((counts / seeds >= 0.93) & (counts / seeds <= 0.97)).all(), counts
-
-
-SEVERAL = {
-    "friction": 0.1,
-    "rigidity": 1.0,
-    "spring": 1e5,
-    "hole_radius@1": 0.025,
-    "hole_radius@2": 0.02,
-}
-"""Parameters of an arm of two hinges, with cables of different lengths."""
-
-RANGES = {
-    "friction": (0.0, 0.5),
-    "rigidity": (0.3, 3.0),
-    "spring": (2e4, 1e6),
-    "hole_radius@1": (0.015, 0.04),
-    "hole_radius@2": (0.01, 0.035),
-}
-
-
-def several(seed: int) -> dict[str, bool]:
-    """Whether the intervals of one experiment hold friction, rigidity, springs and both radii."""
-    geometry = cdsm.Geometry.hinged(
-        joints=2,
-        twist=math.pi / 2.0,
-        link_length=0.1,
-        base_length=0.02,
-        disk_offset=0.015,
-        hole_radius=[0.025, 0.02],
-        link_mass=0.05,
-        lead=[0.1, 0.6],
-    )
-    parameters = cdsm.ArmParameters(
-        cdsm.Manipulator(geometry, cdsm.LinearElasticity(48e3)), tuple(SEVERAL)
-    )
-    truth, random = parameters(**SEVERAL), np.random.default_rng([seed, 21])
-    loops = [
-        WeightLoop(
-            direction=direction,
-            angles=angles,
-            forces=(0.0, 10.0, 20.0, 10.0, 0.0),
-            minimum=150.0,
-            **NOISE,
-        ).simulated(truth, random)
-        for angles in ((0.3, 0.3), (-0.3, 0.35), (0.3, -0.1))
-        for direction in ("-z", "y")
-    ]
-    return held_by(parameters, loops, SEVERAL, RANGES)
-
-
-@pytest.mark.long
-def test_intervals_of_several_parameters_hold_the_truth() -> None:
-    seeds = 300
-    counts = np.sum([list(several(seed).values()) for seed in range(seeds)], axis=0)
-    fewest, most = binom.interval(0.99, seeds, 0.95)
     assert ((fewest <= counts) & (counts <= most)).all(), counts
 
 

@@ -546,7 +546,7 @@ CASES: dict[str, tuple[Callable[[], object], type[cdsm.CdsmError], tuple[str, ..
     "model fails": (
         lambda: identify(fails, EXACT, ONE),
         cdsm.InvalidInput,
-        ("model_of: fails at hole_radius=0.035: KeyError('disk')", "Mend it"),
+        ("model_of: fails at hole_radius=0.035: KeyError('disk')", "Correct it"),
     ),
     "model without an arm": (
         lambda: identify(lambda hole_radius: 3, EXACT, ONE),  # type: ignore[arg-type, return-value]

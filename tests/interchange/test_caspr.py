@@ -386,7 +386,7 @@ def test_files_may_be_given_one_by_one(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("links", "cables", "said"),
     [
-        (link(1, "R_Y").replace("R_Y", "S_QUATERNION"), cable(), "'S_QUATERNION' is not taken"),
+        (link(1, "R_Y").replace("R_Y", "S_QUATERNION"), cable(), "'S_QUATERNION' is not supported"),
         (link(1, "R_Y") + link(3, "R_X"), cable(), "numbered [1, 3], not 1 to 2"),
         (link(1, "R_Y") + link(2, "R_X", parent=2), cable(), "its parent is link 2"),
         (link(1, "R_Y", mass=-1), cable(), "<mass> -1 kg"),
@@ -394,7 +394,11 @@ def test_files_may_be_given_one_by_one(tmp_path: Path) -> None:
         (link(1, "R_Y", ref="moon"), cable(), "com or joint is needed"),
         (link(1, "R_Y", low="0.7"), cable(), "q_min 0.7 is above q_max 0.6"),
         (link(1, "R_Y", low="0 0"), cable(), "joint q_min: '0 0' given; a number is needed"),
-        (link(1, "R_Y").replace("link_rigid", "link_soft"), cable(), "only <link_rigid> is taken"),
+        (
+            link(1, "R_Y").replace("link_rigid", "link_soft"),
+            cable(),
+            "only <link_rigid> is supported",
+        ),
         ("", cable(), "holds no link"),
         (link(1, "R_Y"), cable(), "there is no link 2, but 0 to 1"),
         (
@@ -407,7 +411,7 @@ def test_files_may_be_given_one_by_one(tmp_path: Path) -> None:
             cable()
             .replace("<attachment><link>0", "<base_rotating_pulley><link>0")
             .replace("</attachment>", "</base_rotating_pulley>", 1),
-            "<base_rotating_pulley> is not taken",
+            "<base_rotating_pulley> is not supported",
         ),
         (link(1, "R_Y") + link(2, "R_X"), cable(ref="sky"), "attachment_reference 'sky'"),
         (link(1, "R_Y") + link(2, "R_X"), cable(low=9, high=4), "tensions from 9 to 4 N"),

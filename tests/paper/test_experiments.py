@@ -180,7 +180,7 @@ def test_a_start_out_of_bounds_or_unable_to_hold_itself_is_refused() -> None:
     with pytest.raises(cdsm.InvalidInput, match="not within"):
         paper.identify_prototype(replace(STEPS[0], start=replace(START, lead=0.6)))
     weak = replace(START, hole_radius=0.016, highest_hybrid_tension=80.0)
-    with pytest.raises(cdsm.InvalidInput, match="cannot hold itself"):
+    with pytest.raises(cdsm.InvalidInput, match="has no stable equilibrium"):
         paper.identify_prototype(replace(STEPS[0], start=weak))
 
 

@@ -41,7 +41,7 @@ def test_arm_is_held_exactly_as_long_as_some_tension_holds_it(above: float) -> N
     if above < 0.0:
         assert cdsm.stiffness_range(pose, DOWN, minimum).high > 0.0
     else:
-        with pytest.raises(cdsm.SingularStiffness, match=r"hold the arm stable.*joint1"):
+        with pytest.raises(cdsm.SingularStiffness, match=r"make the arm stable.*joint1"):
             cdsm.stiffness_range(pose, DOWN, minimum)
 
 

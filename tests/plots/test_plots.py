@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.lines import Line2D
+from mpl_toolkits.mplot3d import proj3d  # type: ignore[import-untyped]
 from mpl_toolkits.mplot3d.art3d import Line3D, Line3DCollection  # type: ignore[import-untyped]
 from PIL import Image
 
@@ -124,9 +126,9 @@ def test_a_scale_is_a_power_of_ten_and_keeps_the_ellipsoid_in_sight(softer: floa
 def test_paper_figures_show_both_readings_in_newton_per_millimetre(
     results: Results,
 ) -> None:
-    for result in results.values():
-        if not isinstance(result, paper.StiffnessFigure):
-            continue
+    for name in ("fig3", "fig4", "fig6", "fig7", "fig8"):
+        result = results[name]
+        assert isinstance(result, paper.StiffnessFigure)
         figure = plots.plot_paper(result)
         labels = [axes.get_ylabel() for axes in figure.axes]
         # one label serves a row; of changes it says so
@@ -402,18 +404,31 @@ def test_figures_are_one_or_two_columns_wide_and_printed_at_300_dpi(tmp_path: Pa
         plots.save_figure(figure, tmp_path / "a.jpg")
 
 
-def test_arm_fills_its_canvas() -> None:
-    figure = cdsm.presets.virtual_prototype().plot()
-    figure.draw_without_rendering()
-    axes: Any = figure.axes[0]
-    renderer = FigureCanvasAgg(figure).get_renderer()  # type: ignore[no-untyped-call]
-    boxes = [axis.get_tightbbox(renderer) for axis in axes._axis_map.values()]
-    low = np.min([box.min for box in boxes], axis=0)
-    high = np.max([box.max for box in boxes], axis=0)
-    size = figure.get_size_inches() * figure.dpi
-    assert (high - low > np.array([0.9, 0.75]) * size).all()
-    assert (low >= 0.0).all()
-    assert (high <= size).all()
+def test_pictures_fill_their_canvas_below_their_title_also_when_cropped() -> None:
+    arm = cdsm.presets.virtual_prototype()
+    pose = arm.at(np.full(arm.nv, 0.1))
+    K = cdsm.stiffness(pose, cdsm.distribute_tension(pose, 20.0))
+    forces = cdsm.force_polytope(pose, 5.0, 200.0)
+    pictures = arm.plot(), K.plot(), cdsm.modes(pose, K).plot(), forces.plot()
+    for figure in (*pictures, plots.plot_path([pose])):
+        figure.draw_without_rendering()
+        renderer = FigureCanvasAgg(figure).get_renderer()  # type: ignore[no-untyped-call]
+        axes: Any = figure.axes[0]
+        corners = axes.xaxis.get_view_interval(), axes.yaxis.get_view_interval()
+        cube = np.array([*product(*corners, axes.zaxis.get_view_interval())])
+        x, y, _ = proj3d.proj_transform(*cube.T, axes.get_proj())
+        drawn = axes.transData.transform(np.transpose([x, y]))
+        boxes = [axis.get_tightbbox(renderer) for axis in axes._axis_map.values()]
+        low = np.min([drawn.min(axis=0), *(box.min for box in boxes)], axis=0)
+        high = np.max([drawn.max(axis=0), *(box.max for box in boxes)], axis=0)
+        size = figure.get_size_inches() * figure.dpi
+        right = 1.0 if len(figure.axes) == 1 else 0.8
+        assert (high - low > np.array([0.9 * right, 0.65]) * size).all()
+        assert (low >= 0.0).all()
+        assert high[1] <= figure._suptitle.get_window_extent().ymin  # type: ignore[attr-defined]
+        cropped = figure.get_tightbbox(renderer)
+        assert min(cropped.min) >= 0.0
+        assert (cropped.max <= figure.get_size_inches()).all()
 
 
 def test_every_result_that_people_look_at_has_a_picture(tmp_path: Path) -> None:

@@ -102,7 +102,7 @@ def test_a_full_disk_leaves_what_was_there(refused: dict[str, list[dict[str, Any
     *files, new, store, again = refused["full disk"]
     assert [each["what"] for each in files][: len(WRITERS)] == list(WRITERS)
     assert_refused(files, "No space left on device")
-    assert "s.zarr: cannot be made a store: " in new["said"]
+    assert "s.zarr: cannot be created as a store: " in new["said"]
     assert set(new["left"]) == OLD_FILES  # not even the store begun
     assert "s.zarr: cannot be written: " in store["said"]
     assert "No space left" in store["said"]

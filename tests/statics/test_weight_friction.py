@@ -45,7 +45,7 @@ def test_small_weights_measure_the_stuck_arm_and_increments_of_large_ones_the_fr
     assert 1.0 < large.friction.dithered / frictionless.linear.stiffness < 1.15
     cycles = large.friction.dither_cycles
     assert cycles in (1, 2, 4, 8, 16)
-    more = large.friction._shaken(slides, 2 * cycles)
+    more = large.friction._dithered_stiffness(slides, 2 * cycles)
     assert more == pytest.approx(large.friction.dithered, rel=0.01)
     assert f"fading in {cycles} cycle" in str(large.friction)
     assert large.friction.to_dict()["dither_cycles"] == cycles

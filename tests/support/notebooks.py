@@ -16,7 +16,13 @@ ROOT = Path(__file__).parents[2]
 FOLDER = ROOT / "notebooks"
 EXECUTED = ROOT / "build" / "notebooks"
 
-_SHARP = '%matplotlib inline\n%config InlineBackend.figure_formats = ["retina"]'
+_FIRST = """\
+%matplotlib inline
+%config InlineBackend.figure_formats = ["retina"]
+import logging
+logging.getLogger("cdsm").setLevel("ERROR")
+"""
+"""Runs before each notebook: figures are sharp; nothing is said of compiling."""
 
 
 def run(name: str) -> Path:
@@ -28,7 +34,7 @@ def run(name: str) -> Path:
     notebook = nbformat.read(FOLDER / f"{name}.ipynb", as_version=4)
     cell = nbformat.v4.new_code_cell
     check = f"from tests.notebooks.test_numbers import check\ncheck({name!r}, globals())"
-    notebook.cells = [cell(_SHARP), *notebook.cells, cell(check)]
+    notebook.cells = [cell(_FIRST), *notebook.cells, cell(check)]
     path = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
     client = NotebookClient(
         notebook, timeout=3600, kernel_name="python3", resources={"metadata": {"path": FOLDER}}

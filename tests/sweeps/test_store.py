@@ -41,6 +41,10 @@ def specified(**changes: Any) -> Specification:
         "wrench": np.zeros(6),
         "direction": {"x": (1, 0, 0), "y": (0, 1, 0), "z": (0, 0, 1)},
         "outputs": ["margin"],
+        "worst_friction": False,
+        "diameter": 0.0,
+        "breaking_load": None,
+        "bend_diameter": None,
     }
     return specify(short_arm(), GRID, **{**given, **changes})
 

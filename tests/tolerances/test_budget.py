@@ -1,5 +1,6 @@
 """Budgets: what correlations do, what first order is worth, what is refused."""
 
+import inspect
 import math
 from collections.abc import Callable
 from dataclasses import replace
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 
 import cdsm
+from cdsm.tolerance.sources import SOURCES
 from cdsm.tolerances.inputs import inputs_of
 from cdsm.tolerances.parts import draw, parts_of
 from tests.support import arms
@@ -317,6 +319,27 @@ def test_friction_does_not_enter_the_frictionless_stiffness() -> None:
     assert "without influence on it: friction" in str(budget)
     with pytest.raises(cdsm.InvalidInput, match="friction: arm has no friction in its holes"):
         cdsm.uncertainty(pose, tension, tolerances, direction="z")
+
+
+def test_springs_in_series_share_the_compliance_with_the_wire() -> None:
+    pose, tension = posture()
+    with pytest.raises(cdsm.InvalidInput, match="spring: arm has no springs in series; see ser"):
+        cdsm.uncertainty(pose, tension, cdsm.Tolerances(spring=0.1), direction="z")
+    wires = [replace(cable, series_stiffness=1e5) for cable in pose.arm.cables]
+    K = cdsm.stiffness(pose.arm.with_cables(wires).at(pose.q), tension.values)
+    common = cdsm.Tolerance(0.1, correlation=1.0)
+    budget = cdsm.uncertainty(
+        K.posture, K.tension, cdsm.Tolerances(rigidity=0.1, spring=common), direction="z"
+    )
+    # k = 1/(l_0/EA + 1/k_series): each has its share of 1/k; active part and gravity are left
+    shares = K.cable_stiffness.mean() / 1e5, 1.0 - K.cable_stiffness.mean() / 1e5
+    for source, share in zip(("spring", "rigidity"), shares, strict=True):
+        u = budget.contributions[source] / budget.value
+        assert u == pytest.approx(0.1 * share, rel=0.1)
+
+
+def test_tolerances_show_their_sources_in_help_and_completion() -> None:
+    assert tuple(inspect.signature(cdsm.Tolerances).parameters) == SOURCES
 
 
 def test_bad_input_is_named() -> None:

@@ -386,7 +386,7 @@ def test_a_port_in_use_is_named_and_nothing_is_left_running() -> None:
     threads = threading.active_count()
     with socket.create_server(("127.0.0.1", 0)) as other:
         port = other.getsockname()[1]
-        with pytest.raises(cdsm.InvalidInput, match=f"port: {port} on 127.0.0.1 cannot be had"):
+        with pytest.raises(cdsm.InvalidInput, match=f"port: {port} on 127.0.0.1 is not available"):
             serve(soft_arm(), port=port)
     with pytest.raises(cdsm.InvalidInput, match="host"):
         serve(soft_arm(), host="no.such.host.invalid", port=0)

@@ -80,7 +80,7 @@ def test_arm_refuses_a_jump_by_name() -> None:
     laws: list[cdsm.Elasticity] = [cdsm.presets.STRAND_1X19] * len(geometry.cables)
     laws[1] = Own(step(31.0, 500.0))
     name = cdsm.serpentine_cables(geometry, cdsm.presets.STRAND_1X19)[1].name
-    said = f"{name} jumps at 31 N from 10620 to 11120 N.*TabulatedElasticity"
+    said = f"{name} is discontinuous at 31 N: it changes from 10620 to 11120 N.*TabulatedElasticity"
     with pytest.raises(cdsm.InvalidInput, match=said):
         cdsm.Manipulator(geometry, laws)
     laws[1] = CONTINUOUS["kink"]

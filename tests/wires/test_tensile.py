@@ -229,21 +229,11 @@ def covered(law: str, noise: float, seeds: range) -> Array:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("noise", [0.5, 2.0])
-def test_band_covers_the_truth_as_often_as_it_says(noise: float) -> None:
-    shares = [covered(law, noise, range(12)).mean() for law in RIGIDITIES]
-    # 95 %; a test holds some six independent places, so that 36 tests scatter by 1.5 %
+def test_band_covers_the_truth_as_often_as_it_says() -> None:
+    # tests/campaigns/bands.py tells it at each tension
+    shares = [covered(law, noise, range(4)).mean() for law in RIGIDITIES for noise in (0.5, 2.0)]
+    # 95 %; a test holds some six independent places, so that 24 tests scatter by 1.8 %
     assert np.mean(shares) == pytest.approx(0.95, abs=0.04)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("noise", [0.5, 2.0])
-@pytest.mark.parametrize("law", RIGIDITIES)
-def test_band_covers_the_truth_at_each_tension(law: str, noise: float) -> None:
-    shares = covered(law, noise, range(400)).mean(axis=0)
-    # 93 to 97 % are promised; 400 tests scatter by 1.1 %, and the worst of 14 by twice that
-    assert shares.min() > 0.93 - 0.022
-    assert shares.max() < 0.97 + 0.022
 
 
 def test_band_misses_a_kink_and_what_lies_next_to_it() -> None:
@@ -398,7 +388,12 @@ NOISE = np.random.default_rng(0)
         (RAMP / 1e9, PULL, GAUGE, "rigidity would be"),
         (np.random.default_rng(0).permutation(RAMP), PULL, GAUGE, "order"),
         (0.0 * RAMP, PULL, GAUGE, "never changes"),
-        (RAMP[::5], PULL[::5] + 1000.0 * (RAMP[::5] > 0.006), GAUGE, "force jumps near 771"),
+        (
+            RAMP[::5],
+            PULL[::5] + 1000.0 * (RAMP[::5] > 0.006),
+            GAUGE,
+            "force is discontinuous near 771",
+        ),
     ],
 )
 def test_tests_that_cannot_be_fitted_are_refused(
