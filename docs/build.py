@@ -20,8 +20,9 @@ KERNEL = """\
 c.Application.log_level = "ERROR"
 c.IPKernelApp.matplotlib = "inline"
 c.InlineBackend.figure_formats = ["retina"]
+c.InteractiveShellApp.exec_lines = ['import logging; logging.getLogger("cdsm").setLevel("ERROR")']
 """
-"""Settings of the kernels that run the cells of pages: figures are shown, and sharp."""
+"""Settings of the kernels that run cells: figures are sharp; nothing is said of compiling."""
 
 
 def main() -> int:

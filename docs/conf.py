@@ -1,6 +1,5 @@
 """Settings of the site. ``docs/build.py`` builds it; nothing is fetched while it does."""
 
-import re
 import sys
 from importlib.util import find_spec
 from pathlib import Path
@@ -8,7 +7,9 @@ from pathlib import Path
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE.parent))
 
+from docutils import nodes
 from sphinx.application import Sphinx
+from sphinx.util.inspect import TypeAliasForwardRef
 
 from docs import directives, generate
 
@@ -56,6 +57,8 @@ nb_merge_streams = True
 
 autodoc_member_order = "bysource"
 autodoc_typehints_format = "short"
+autodoc_type_aliases = {name: name for name in ("Array", "ArrayLike", "Direction")}
+TypeAliasForwardRef.__repr__ = lambda self: self.name  # type: ignore[method-assign]  # in unions
 autodoc_preserve_defaults = True
 napoleon_numpy_docstring = False
 napoleon_attr_annotations = False
@@ -86,21 +89,37 @@ def _escape(
         lines[i] = "``".join(parts)
 
 
+def _keep_colon(
+    app: Sphinx, kind: str, name: str, thing: object, options: object, lines: list[str]
+) -> None:
+    """Keep napoleon from taking what is before a colon for the type of a property."""
+    if kind in ("attribute", "property"):
+        lines[:0] = ["..", ""]
+
+
 def _shorten(*event: object) -> tuple[str, str] | None:
-    """Write Array for numpy's own long name of an array of float64."""
+    """Write ... for defaults that are made, which Sphinx cannot read."""
     if event[-2] is None:
         return None
-    long = re.compile(
-        r"(numpy\.)?ndarray\[tuple\[(typing\.)?Any, \.\.\.\], (numpy\.)?dtype\[(.*?)\]\]"
-    )
-    signature, returned = (long.sub("Array", str(text or "")) for text in event[-2:])
-    return signature, returned
+    return str(event[-2]).replace("<factory>", "..."), str(event[-1] or "")
+
+
+def _show_as_shell(app: Sphinx, page: nodes.document) -> None:
+    """Show cells of commands as a shell takes them, without the ! that runs them."""
+    for block in page.findall(nodes.literal_block):
+        lines = block.astext().splitlines()
+        if lines and all(line.startswith("!") for line in lines):
+            block.rawsource = "\n".join(line[1:] for line in lines)
+            block.children = [nodes.Text(block.rawsource)]
+            block["language"] = "sh"
 
 
 def setup(app: Sphinx) -> None:
     """Write the generated pages before Sphinx looks for pages."""
     directives.setup(app)
     app.connect("config-inited", lambda *_: generate.all_pages())
+    app.connect("doctree-read", _show_as_shell)
+    app.connect("autodoc-process-docstring", _keep_colon, priority=400)  # before napoleon
     app.connect("autodoc-process-docstring", _escape)
     app.connect("autodoc-process-signature", _shorten)
     # the constants of presets are found there, not where their classes are

@@ -212,7 +212,7 @@ def hole() -> Any:
         axes.plot([start[0], start[0] * 9], [start[1], start[1] * 9], color=GRAY, linewidth=7.0)
     arc = np.linspace(0.0, -turn, 40)
     axes.plot(np.cos(arc), np.sin(arc), color=VERMILLION, linewidth=1.0)
-    axes.text(1.1, -0.25, "wrap angle $\\beta$", color=VERMILLION, fontsize=TEXT)
+    axes.text(1.1, -0.25, "wrap angle $\\varphi$", color=VERMILLION, fontsize=TEXT)
     for place, text in ((left, "$T_j$"), (right, "$T_{j+1}$")):
         axes.annotate("", 1.25 * place, place, arrowprops={"arrowstyle": "->", "color": BLUE})
         axes.text(*(1.25 * place + [0.0, 0.14]), text, color=BLUE, fontsize=TEXT + 1, ha="center")

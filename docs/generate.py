@@ -5,8 +5,10 @@ from importlib import import_module, metadata
 from inspect import isclass, ismodule
 from pathlib import Path
 from pkgutil import iter_modules
+from typing import Any
 
 import typer.main
+import yaml
 from sphinx.pycode import ModuleAnalyzer
 
 import cdsm
@@ -65,7 +67,7 @@ def version() -> str:
 
 def all_pages() -> None:
     """Write all generated pages; pages whose text is the same keep their date."""
-    pages = {**_tutorials(), **interface(), **commands()}
+    pages = {**_tutorials(), **interface(), **commands(), **citation()}
     for name, text in pages.items():
         path = GENERATED / name
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -188,6 +190,31 @@ def commands() -> dict[str, str]:
                 meaning += f" Default: `{option.default}`."
             rows += [f": {meaning}", ""]
     return {"commands.md": "\n".join(rows)}
+
+
+def citation() -> dict[str, str]:
+    """Return the page that says how to cite: the software and the paper of CITATION.cff."""
+    cff = yaml.safe_load((HERE.parent / "CITATION.cff").read_text(encoding="utf-8"))
+    rows = [
+        "# Cite",
+        cff["message"],
+        f"```bibtex\n{_entry(cff, 'cdsm')}\n\n{_entry(cff['references'][0], 'dai')}\n```",
+        f"The licence of cdsm is {cff['license']}. `CITATION.cff` also names the solvers inside.\n",
+    ]
+    return {"cite.md": "\n\n".join(rows)}
+
+
+def _entry(work: dict[str, Any], key: str) -> str:
+    """Write a work of CITATION.cff as an entry of BibTeX, with ``notes`` as its note."""
+    people = [
+        f"{{{each['name']}}}" if "name" in each else "{family-names}, {given-names}".format(**each)
+        for each in work["authors"]
+    ]
+    fields = {"author": " and ".join(people), "title": f"{{{work['title']}}}"}
+    names = {"journal": "journal", "year": "year", "version": "version", "notes": "note"}
+    fields |= {field: work[name] for name, field in names.items() if name in work}
+    lines = "".join(f"  {name} = {{{value}}},\n" for name, value in fields.items())
+    return f"@{work['type']}{{{key},\n{lines}}}"
 
 
 def _plain(text: str) -> str:

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 FILE = Path(__file__).with_suffix(".json")
-QUESTIONS = 20_000
+QUESTIONS = 100_000
 POSTURES = 1_000_000
 
 
@@ -59,7 +59,7 @@ def _table(header: list[str], rows: list[list[str]]) -> str:
 
 
 def measure() -> dict[str, Any]:
-    """Measure everything; some five minutes on a machine that does nothing else."""
+    """Measure everything; some ten minutes on a machine that does nothing else."""
     import cdsm
     from tests.benchmarks import honesty as asked
 

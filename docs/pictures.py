@@ -13,8 +13,8 @@ from matplotlib.colors import Normalize
 from PIL import Image
 
 import cdsm
-from cdsm.plots.arm import arm_axes, draw_arm
-from cdsm.plots.style import MM, TEXT, equal_axes
+from cdsm.plots.arm import draw_arm
+from cdsm.plots.style import MM, TEXT, equal_axes, picture_axes
 
 FOLDER = Path(__file__).parent / "pictures"
 FRAMES = 48
@@ -46,7 +46,7 @@ def animation() -> None:
     poses = [arm.at(angles) for angles in plan.angles]
     tips = MM * np.array([pose.tip[:3, 3] for pose in [*poses, poses[0]]])
     scale = Normalize(plan.tensions.min(), plan.tensions.max())
-    figure, axes = arm_axes()
+    figure, axes = picture_axes()
     figure.set_size_inches(3.5, 2.7)
     axes.set_position((-0.14, -0.26, 1.34, 1.5))
     canvas: Any = FigureCanvasAgg(figure)

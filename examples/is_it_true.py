@@ -20,7 +20,7 @@ import cdsm
 from cdsm.support.values import Array
 
 SIMPLEX = "Feron, Rhode-Barbarigos, Latteur, J. Struct. Eng. 149(7), 2023"
-PAPER = "Dai, Wang, Wang, Yuan, RA-L 2025"
+PAPER = "Dai, Wang, Wang, Yuan, RA-L 2026"
 ELASTICA = "Bisshopp and Drucker, Q. Appl. Math. 3, 1945: elastica"
 
 
@@ -228,15 +228,15 @@ def paper() -> Iterator[Row]:
 def markdown(table: list[Row]) -> str:
     """Return the table in Markdown."""
     lines = [
-        "| what | source | theirs | cdsm | difference | uncertainty |",
-        "|---|---|--:|--:|--:|--:|",
+        "| what | theirs | cdsm | difference | uncertainty | source |",
+        "|---|--:|--:|--:|--:|---|",
     ]
     for row in table:
         open_ = "not stated" if math.isnan(row.uncertainty) else f"{row.uncertainty:.1g}"
         unit = "" if row.unit == "-" else f" {row.unit}"
         lines.append(
-            f"| {row.what} | {row.source} | {row.theirs:.5g}{unit} | {row.ours:.5g}{unit} | "
-            f"{row.difference:+.1g} | {open_} |"
+            f"| {row.what} | {row.theirs:.5g}{unit} | {row.ours:.5g}{unit} | "
+            f"{row.difference:+.1g} | {open_} | {row.source} |"
         )
     return "\n".join(lines)
 

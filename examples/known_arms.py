@@ -257,8 +257,8 @@ rehabilitation, IEEE Trans. Robot. 28(4), 922-931, 2012.
 paper. The arm hangs along -z. Bounds of the tension: CASPR's.
 {CHOSEN}, and izz of the links (0 there).""",
     myo_shoulder: f"""\
-Shoulder of the MYO-arm: C. Richter et al., Scalability in neural control of musculoskeletal robots,
-IEEE Robot. Autom. Mag., 2016.
+Shoulder of the MYO-arm: C. Richter et al., Musculoskeletal robots: scalability in neural control,
+IEEE Robot. Autom. Mag. 23(4), 128-137, 2016, doi 10.1109/MRA.2016.2535081.
 {CASPR}
 SCDM/spherical_manipulators/myorob_shoulder, which names that paper. The arm hangs along -z. Mass
 and inertia of 1 are CASPR's, so are the bounds of the tension.
