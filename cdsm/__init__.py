@@ -3,8 +3,8 @@
     geometry = cdsm.Geometry.universal(...)            # or read from TOML
     arm = cdsm.Manipulator(geometry, elasticity=...)   # URDF, rigid-body model, cables
     pose = arm.at(q)                                   # kinematics, cable lengths, gravity torque
-    pull = cdsm.distribute_tension(pose, minimum=50.0) # tensions that balance the load
-    K = cdsm.stiffness(pose, pull)                     # joint and Cartesian stiffness
+    tension = cdsm.distribute_tension(pose, minimum=50.0)  # tensions that balance the load
+    K = cdsm.stiffness(pose, tension)                  # joint and Cartesian stiffness
 
 All units are SI. The x-axis of the base frame lies along the straight arm.
 """

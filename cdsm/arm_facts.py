@@ -60,7 +60,7 @@ class ArmFacts(Printed):
         """Length of the path from the base through the joints to the tip, all joints at zero [m].
 
         For a robot from a URDF: this length, or the largest distance of a cable site from its
-        joint if that is longer. Tolerances scale with the length, so it must not be zero.
+        joint if that is longer. Numerical tolerances scale with it, so it must not be zero.
         """
         if self.is_serpentine:
             return self.geometry.length
@@ -114,7 +114,7 @@ class ArmFacts(Printed):
 
     @property
     def slides(self) -> NDArray[np.bool_]:
-        """Whether each joint slides, is prismatic (nv,); its coordinate is then a length [m]."""
+        """Whether each joint is prismatic (nv,); its coordinate is then a length [m]."""
         return self._model.body.slides
 
     @property

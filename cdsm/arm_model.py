@@ -102,7 +102,7 @@ class ArmModel:
 
     @cached_property
     def chain_arrays(self) -> tuple[Any, ...]:
-        """Arguments of ``single_chains`` between the tree and q: routing, spans, holes, wraps."""
+        """Arguments of ``single_chains`` after the tree: routing, spans, holes, wraps."""
         chains, routing = self.chains, route(self.body, self.tree, self.chains.segments)
         span = np.zeros((len(chains.segments), 3), dtype=np.intp)
         moving = routing.segment[:-1, 0]
@@ -111,14 +111,22 @@ class ArmModel:
 
     @cached_property
     def moving(self) -> tuple[Indices, Indices, Indices, Indices]:
-        """Sites a and b of each segment; segment and joint of each entry of ``routing.joint``."""
+        """Which joints move which segment, as (a, b, segment, joint).
+
+        ``a`` and ``b`` are the two sites of each segment. ``segment`` and ``joint`` list each pair
+        of a segment and a joint that moves it.
+        """
         segment, joint = self.routing.segment, self.routing.joint
         over = np.repeat(np.arange(len(segment) - 1), np.diff(segment[:, 3]))
         return frozen(segment[:-1, 1].copy()), frozen(segment[:-1, 2].copy()), frozen(over), joint
 
     @cached_property
     def wire_laws(self) -> CableLaws:
-        """Elasticities of the cables; those with friction count as position-controlled."""
+        """Elasticities of the cables; cables with friction are taken as position-controlled.
+
+        A motor that controls force keeps it constant only up to the first hole that sticks. The
+        wire behind this hole has a stiffness.
+        """
         forced = {c for c, cable in enumerate(self._cables) if cable.control == "force"}
         if not any(any(self._cables[c].friction) for c in forced):
             return self.laws

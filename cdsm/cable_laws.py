@@ -44,7 +44,7 @@ class CableLaws:
         rest: Tension (C,) [N] at which wire strain and spring elongation are zero.
         constant: EA of linear laws (C,) [N]; 0 for other laws and force-controlled cables.
         linear: 1 where EA (1 + ε) = EA + F (C,): a linear law with unstrained l_0; else 0.
-        asked: The entries of ``held`` whose law is not linear.
+        asked: The entries of ``held`` whose law is not linear: its EA is computed at each tension.
         own: The laws of ``asked`` that no compiled kernel can evaluate.
     """
 
@@ -231,7 +231,11 @@ def kinks(law: Elasticity) -> tuple[float, ...]:
 
 
 def _polynomials(law: Elasticity) -> StrandElasticity | None:
-    """Return the strand law in a law if its polynomials are positive everywhere; else None."""
+    """Return the strand law that kernels can evaluate for a law; None if there is none.
+
+    It is the law itself, or the law below which it adds a slack branch. Its polynomials must be
+    positive on the whole domain.
+    """
     inside = law.law if isinstance(law, SlackBelow) else law
     whole = isinstance(inside, StrandElasticity) and inside.panels.end == math.inf
     return inside if isinstance(inside, StrandElasticity) and whole else None
@@ -242,7 +246,10 @@ def _edges(table: Panels) -> Array:
 
 
 def _coefficients(tables: list[Array]) -> Array:
-    """Join coefficients (powers, P) side by side, with zeros up to a multiple of AT_ONCE rows."""
+    """Join tables of polynomial coefficients, one column per polynomial, into one array.
+
+    Zeros fill the rows, one per power, up to a multiple of AT_ONCE.
+    """
     powers = AT_ONCE * -(-max((len(table) for table in tables), default=0) // AT_ONCE)
     padded = [np.pad(table, ((0, powers - len(table)), (0, 0))) for table in tables]
     return np.hstack([np.zeros((powers, 0)), *padded])

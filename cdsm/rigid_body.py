@@ -125,7 +125,7 @@ class RigidBody:
         return way
 
     def _local_twists(self) -> Array:
-        """Compute each joint's motion in its own frame (nv, 6): linear [-], then angular [rad]."""
+        """Compute the unit twist of each joint in its own frame (nv, 6), linear part first."""
         model, data = self._model, self._data()
         pin.computeJointJacobians(model, data, pin.neutral(model))
         return np.array(
@@ -218,7 +218,7 @@ class RigidBody:
         return list(self._model.supports[joint])[1:]
 
     def _row(self, joint: int) -> int:
-        """Return our row of a Pinocchio joint; the base is 0 in both numberings."""
+        """Return the row in :class:`Tree` of a Pinocchio joint; the base is 0 in both."""
         return 1 + int(self._ours[joint - 1]) if joint else 0
 
     def _frame(self, link: str) -> int:

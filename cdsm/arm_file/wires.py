@@ -18,7 +18,7 @@ from cdsm.wires.files import from_table, table_of
 
 @record
 class CableSettings:
-    """Settings in a file, of all cables or of one cable; None where the file has none."""
+    """Settings of all cables or of one cable in a file; None for a key that the file lacks."""
 
     wire: Any = None
     series_stiffness: SpringStiffness | None = None

@@ -20,10 +20,10 @@ _TOUCHING = 1e-3
 def overlapping(disks: Sequence[Disk], poses: dict[str, Array]) -> list[tuple[str, str]]:
     """Return the pairs of links whose bodies overlap; neighbours are left out.
 
-    The body of a link is the cylinder from its first disk to its last, with the larger disk radius.
-    ``poses`` has the pose (4, 4) of each link. Points are projected from one cylinder onto the
-    other and back. Both are convex, so the distance of the points converges to that of the
-    cylinders.
+    The body of a link is the cylinder from its first disk to its last, with the larger of their
+    radii. ``poses`` has the pose (4, 4) of each link. For each pair, a point is projected onto one
+    cylinder, then onto the other, and so on. Both are convex, so the distance between two such
+    projections converges to the distance between the cylinders.
     """
     links = list(poses)
     pairs = np.array([(i, j) for i, j in combinations(range(len(links)), 2) if j - i > 1])
@@ -48,7 +48,10 @@ def overlapping(disks: Sequence[Disk], poses: dict[str, Array]) -> list[tuple[st
 
 
 def _projected(points: Array, centre: Array, axis: Array, half: Array, radius: Array) -> Array:
-    """Return the point (n, 3) of each of n cylinders that is nearest to its entry of ``points``."""
+    """Project one point onto each of n solid cylinders: return the nearest points (n, 3).
+
+    ``axis`` (n, 3) are unit vectors; ``half`` (n,) is half the length of each cylinder.
+    """
     offset = points - centre
     along = np.einsum("ni,ni->n", offset, axis)
     across = offset - along[:, None] * axis

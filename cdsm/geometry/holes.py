@@ -14,13 +14,16 @@ SAME_HOLE = 1e-6
 
 
 def evenly_spaced(joints: int, cables: int) -> list[list[float]]:
-    """Return φ = 2π((k−1) + n j)/(n m) of cable j < m of joint k ≤ n, as a list per joint."""
+    """Return the hole angles φ = 2π((k−1) + n j)/(n m) [rad] of cables j < m, per joint k ≤ n."""
     n, m = joints, cables
     return [[2.0 * math.pi * (k + n * j) / (n * m) for j in range(m)] for k in range(n)]
 
 
 def beside_the_hinges(rolls: Sequence[float], cables: int) -> list[list[float]]:
-    """Return φ = ψ + 90° + 2πj/m of cable j < m of a hinge about cos ψ y + sin ψ z, per hinge."""
+    """Return the hole angles φ = ψ + 90° + 2πj/m of cables j < m of each hinge [rad].
+
+    ``rolls`` has ψ of each hinge [rad]; its axis is cos ψ y + sin ψ z.
+    """
     # evenly spaced, starting 90 degrees from the axis: two cables form the antagonistic pair
     turns = [2.0 * math.pi * j / cables for j in range(cables)]
     return [[roll + math.pi / 2 + turn for turn in turns] for roll in rolls]

@@ -108,7 +108,7 @@ def text_of(geometry: Geometry) -> str:
 
 
 def lines_of(geometry: Geometry, prefix: str = "") -> list[str]:
-    """Return the lines of the full form, with a prefix before the names of tables."""
+    """Return the TOML lines of :func:`text_of`; ``prefix`` comes before the names of tables."""
     lines = toml_lines(geometry, ("name", "base_length", "hole_radius"))
     for joint in geometry.joints:
         lines += ["", f"[[{prefix}joints]]", *toml_lines(joint)]

@@ -114,7 +114,7 @@ def to_mjcf(
             ``none``.
         damping_ratio: ζ of the least damped mode [-]; 0.05 by default. It needs tensions.
         damping: Damping of every joint instead [N m s/rad], [N s/m] where it slides. MuJoCo
-            integrates damping implicitly, so none needs a smaller time step.
+            integrates damping implicitly, so strong damping needs no smaller time step.
 
     Raises:
         InvalidInput: Only one of ``pose`` and ``tension`` is given, the posture is of another arm,
@@ -232,7 +232,7 @@ def _missing(K: Stiffness) -> Iterator[str]:
 
 
 def _without_motors(K: Stiffness) -> Stiffness:
-    """Return K_θ if motors control the same tensions: no cable adds passive stiffness."""
+    """Return the stiffness with the same tensions if all motors control force: no passive term."""
     arm = K.posture.arm
     free = arm.with_cables([replace(cable, control="force") for cable in arm.cables])
     return stiffness(free.at(K.posture.q, check_limits=False), K.tension, wrench=K.wrench)

@@ -110,7 +110,11 @@ def _inertial(body: etree._Element, link: etree._Element, moves: bool) -> list[C
 
 
 def _inertia(inertia: etree._Element, R: Array) -> Array:
-    """Compute I (3, 3) in the link frame, adjusted for MuJoCo. Statics does not use I."""
+    """Compute the inertia (3, 3) in the link frame, with moments that MuJoCo accepts.
+
+    MuJoCo refuses zero moments, and a largest moment near the sum of the other two. ``R`` rotates
+    from the frame of the inertia to that of the link.
+    """
     xx, yy, zz, xy, xz, yz = (
         float(inertia.get(key)) for key in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
     )

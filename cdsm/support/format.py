@@ -21,7 +21,7 @@ def coordinates(values: Iterable[float], form: str = ".4g") -> str:
 
 
 def enough(value: float, *, up: bool) -> str:
-    """Return a positive number rounded up or down to four digits, so that it suffices."""
+    """Return a bound with four digits, rounded to the safe side: ``up`` or down."""
     step = 10.0 ** (math.floor(math.log10(value)) - 3) if value > 0.0 else 1.0
     return f"{(math.ceil if up else math.floor)(value / step) * step:.4g}"
 
@@ -111,7 +111,10 @@ class JointUnits(NamedTuple):
         return self.joined("N m/rad", "N/m")
 
     def levers(self, length: float) -> Array:
-        """Return 1 rad for joints that turn, the arm's length [m] for joints that slide (nv,)."""
+        """Return a scale of each joint coordinate (nv,): 1 rad, or ``length`` [m] if it slides.
+
+        A coordinate divided by its scale has no unit, so joints of both kinds can be compared.
+        """
         return np.where(self.slides, length, 1.0)
 
     def to_dict(self, names: Sequence[str], q: Array) -> dict[str, object]:
@@ -124,7 +127,7 @@ class JointUnits(NamedTuple):
         return found
 
     def joined(self, turning: str, sliding: str, joint: int | None = None) -> str:
-        """Return the unit of a joint, ``turning`` or ``sliding``; None: of all joints."""
+        """Return ``turning`` or ``sliding``, as the joint moves; of all joints: both with "or"."""
         slides = self.slides if joint is None else self.slides[joint : joint + 1]
         if slides.all():
             return sliding

@@ -19,8 +19,8 @@ _TIGHT: Final = 1e-10
 def least(cost: Array, **constraints: Any) -> OptimizeResult:
     """Minimise cost · x under the constraints of scipy's ``linprog``; return its result.
 
-    If the simplex method ends undecided at this tolerance (e.g. in scipy 1.14), the interior-point
-    method with crossover to a vertex solves the program again.
+    If the simplex method ends undecided at the tolerance :data:`_TIGHT` (e.g. in scipy 1.14), the
+    interior-point method with crossover to a vertex solves the program again.
     """
     from scipy.optimize import linprog  # slow to import
 

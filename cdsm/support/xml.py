@@ -89,7 +89,7 @@ def _names_dtd(text: str, system: str) -> bool:
 
 
 def numbers(where: str, text: str | None, count: int) -> tuple[float, ...]:
-    """Return the ``count`` finite numbers in a text; XmlFault names ``where`` they are not."""
+    """Return the ``count`` finite numbers in a text, or raise XmlFault, which quotes ``where``."""
     words = (text or "").split()
     try:
         values = tuple(float(word) for word in words if "_" not in word)

@@ -70,7 +70,7 @@ class Tolerances:
     site: OneOrMore = 0.0
 
     def __new__(cls, **given: OneOrMore) -> Self:
-        """Raise UnknownName for a source that there is not, before the fields are set."""
+        """Raise UnknownName for a source that does not exist, before the fields are set."""
         for name in given:
             one_of("source of uncertainty", name, SOURCES)
         return super().__new__(cls)
@@ -136,7 +136,7 @@ SOURCES = tuple(field.name for field in fields(Tolerances))
 
 
 def _require_size(source: str, tolerance: Tolerance) -> None:
-    """Raise InvalidInput if a tolerance is too large, or has tensions where it must not."""
+    """Raise InvalidInput if a tolerance is too large, or not of rigidity but has ``tensions``."""
     if tolerance.tensions is not None and source != "rigidity":
         raise InvalidInput(source, "does not depend on tensions; give one standard.")
     largest = LARGEST.get(source, math.inf)

@@ -141,9 +141,11 @@ class Tolerance(ReadOnlyState):
         return matrix
 
     def variance(self, values: Array) -> float:
-        """Compute vᵀ R v, v ``values``, R of :meth:`matrix`; InvalidInput if R has another size.
+        """Compute the variance vᵀ R v of a sum of n correlated errors.
 
-        If ``correlation`` is one number ρ, vᵀ R v = (1 − ρ) v·v + ρ (Σ v)².
+        v (n,) are the standard deviations of the errors with their signs, ``values``; R is
+        :meth:`matrix`. For one correlation ρ, vᵀ R v = (1 − ρ) v·v + ρ (Σ v)². InvalidInput if the
+        size of R is not n.
         """
         rho = self.correlation
         if isinstance(rho, float):

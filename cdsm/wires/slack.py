@@ -83,7 +83,10 @@ class SlackBelow(Elasticity):
         return np.where(below < 0.0, slack, self.law.energy(inside))
 
     def _split(self, tension: ArrayLike) -> tuple[Array, Array]:
-        """Return the tensions, raised to the law's domain, and F − rest, 0 where F is inside it."""
+        """Return max(F, low) and min(F − low, 0) at tensions F, with the low end of the law.
+
+        The first is inside the domain of the law; the second is the part of F on the slack branch.
+        """
         values = self.domain.check(tension)
         inside = np.maximum(values, self.law.domain.first)
         return inside, np.where(values < inside, values - self.rest, 0.0)

@@ -25,8 +25,9 @@ class Basis(NamedTuple):
     def of(cls, points: Points, noise: float) -> Basis:
         """Build splines from the first force to the largest.
 
-        Their knots are equally spaced in the mean of log(F + corner) and F, each scaled to 0…1. So
-        they are nearly equally spaced below the corner [N], and denser there than above.
+        The knots are equally spaced in the mean of log(F − F_0 + corner) and F, each scaled to 0…1.
+        So they are nearly equally spaced in F below the corner [N], and denser there than above it.
+        The corner is a small force, well above the ``noise`` [N]; F_0 is the first force.
         """
         low, high = max(float(points.force[0]) - 3.0 * noise, 0.0), float(points.force.max())
         corner = max(low, 8.0 * noise, 5e-3 * high)

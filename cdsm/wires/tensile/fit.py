@@ -52,20 +52,20 @@ class Stage:
 @final
 @dataclass(frozen=True, eq=False)
 class Band(ReadOnlyState):
-    """Confidence band of EA: it covers EA at each tension with 95 %, for the scatter of the points.
+    """Confidence band: it contains EA at each tension with 95 %, given the scatter of the points.
 
     The band exp(m ± t s) belongs to a rougher curve than the fitted one. m is ln EA of the rougher
     curve, s the standard deviation of m from the residuals near each tension, and t the quantile of
-    Student's distribution for their degrees of freedom. The bias of the rougher curve is far below
-    its scatter; the fitted curve rounds off bends of EA. So the band is wider than the scatter of
-    the fitted law, which may touch its edge.
+    Student's distribution for their degrees of freedom. The fitted curve is biased where EA bends:
+    it rounds off the bend. The bias of the rougher curve is far below its scatter. The band is
+    therefore wider than the scatter of the fitted law, and this law may touch the edge of the band.
 
-    Measured, in 100 tests of 400 points each: of Eq. 19, a linear wire and a wire with a toe, with
-    0.5 N and 2 N of noise, it covers 95.3 % of all cases, and at each of 16 tensions from 10 N to
-    790 N between 89 and 100 %, as 100 tests scatter. In 300 other tests of Eq. 19 with 0.5 N it
-    covers 93 to 98 % at each of 13 tensions, but 92 % at 80 N, where EA bends: 95 % is not promised
-    at a bend. Where EA is discontinuous (a kink of force over strain), no curve follows: the band
-    misses EA within some newtons of the kink.
+    Measured, in 100 tests of 400 points each: of Eq. 19, a linear wire and a wire with a soft toe,
+    with 0.5 N and 2 N of noise, it covers 95.3 % of all cases. At each of 16 tensions from 10 N to
+    790 N it covers between 89 and 100 %, the usual scatter of 100 tests. In 300 other tests of
+    Eq. 19 with 0.5 N it covers 93 to 98 % at each of 13 tensions, but 92 % at 80 N, where EA bends:
+    95 % is not promised at a bend. Where EA is discontinuous (a kink of force over strain), the
+    smooth curve cannot follow it: the band misses EA within some newtons of the kink.
 
     The band leaves out errors of calibration and gauge length, and errors that neighbouring points
     share (drift, ripple, slip). ``TensileFit.notes`` names shared errors if the residuals show

@@ -115,7 +115,10 @@ def loading(test: TensileTest) -> tuple[Points, float, tuple[str, ...]]:
 
 
 def _outliers(values: Array) -> NDArray[np.bool_]:
-    """Find single values far from their neighbours. A peak stands out by one step at most."""
+    """Find single values far from their neighbours.
+
+    A real peak stands out by at most the step between the values next to it, so it is no outlier.
+    """
     # extrapolate the missing neighbour at each end
     first, last = 2.0 * values[1] - values[2], 2.0 * values[-2] - values[-3]
     before, after = np.append(first, values[:-1]), np.append(values[1:], last)

@@ -54,11 +54,11 @@ class Spread(NamedTuple):
         inverse: Inverse of the normal matrix with the penalty (k + 1, k + 1).
         noise: Standard deviation of one point [N].
         freedom: Degrees of freedom: number of points less the sum of their leverages.
-        errors: Errors of the points (n,) [N], weighted to the noise of a single point: residuals,
-            enlarged by the part that the curve follows.
+        errors: Studentized residuals (n,) [N]: residuals over √(1 − leverage), times √(points per
+            average), so that each has the noise of a single point.
         deviation: Standard deviation of log EA on the grid (g,), from scatter and smoothing. The
-            scatter is that of the neighbouring points, so it may grow with the force. The squared
-            bias of the smoothing is that of a curve with the roughness of this one on average
+            scatter is estimated from the neighbouring points, so it may grow with the force. The
+            bias of the smoothing is estimated on average, from the roughness of this curve
             (Nychka, J. Am. Stat. Assoc. 83, 1988).
     """
 
@@ -169,10 +169,11 @@ class Curve:
     def interval(self, points: Points, probability: float) -> tuple[Array, Array]:
         """Compute a confidence interval of log EA at each tension of the grid: middle, half-width.
 
-        The most likely curve is smooth, so it is biased where EA bends, and its own scatter covers
-        the truth too seldom there. The interval belongs to a rougher curve, with :data:`_ROUGHER`
-        times less smoothing than the likelihood allows, whose bias is far below its scatter. The
-        scatter is estimated from the neighbouring points, with their own degrees of freedom.
+        The most likely curve is smooth, so it is biased where EA bends. An interval from its
+        scatter alone would contain EA too rarely there. The interval therefore belongs to a rougher
+        curve, with :data:`_ROUGHER` times less smoothing than the likelihood allows. Its bias is
+        far below its scatter. The scatter and its degrees of freedom are those of the neighbouring
+        points.
         """
         loosest = self.loosest(points)
         rough = replace(loosest, smoothing=loosest.smoothing / _ROUGHER).refitted(points)
@@ -196,8 +197,8 @@ class Curve:
     def loosest(self, points: Points) -> Curve:
         """Find the curve with the least smoothing that its restricted likelihood allows.
 
-        There −2 log likelihood is 1 above its minimum (one standard deviation). Without a bend in
-        the points, the most likely curve is straight, and its band would be too narrow.
+        Its −2 log likelihood is 1 above the minimum (one standard deviation). If the points show no
+        bend, the most likely curve is straight, and a band around it would be too narrow.
         """
         least, chosen = np.inf, self
         for smoothing in self.smoothing * 10.0 ** np.arange(0.0, -6.0, -0.25):
