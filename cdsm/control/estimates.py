@@ -78,7 +78,7 @@ class Observer:
     sensors: Sensors
 
     def begin(self, q: Array, reading: Reading) -> Estimate:
-        """Return the estimate at known joint angles (nv,), with even tensions along the cables."""
+        """Return the estimate at known joint angles (nv,), with equal tension along each cable."""
         pose = self.arm.at(q)
         cable = pose.segments.chains.cable
         F = np.maximum(reading.tension, self._least)

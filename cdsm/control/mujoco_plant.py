@@ -110,7 +110,10 @@ class MuJoCoPlant:
         return MuJoCoState(model, pose, Reading(command.wire, frozen(F)), data.qvel.copy())
 
     def _pull(self, model: Any, lengths: Array, command: Command) -> None:
-        """Set each motor to the tangent F + k (L' − L) of its wire's law; L excludes the lead."""
+        """Set each motor to the force F + k (L' − L) when MuJoCo's tendon has the length L'.
+
+        L (C,) is ``lengths`` [m] without the leads, F the tension there, k the tangent stiffness.
+        """
         cables = self.arm.cables
         L = lengths + [cable.lead for cable in cables]
         F = self._tensions(L, command)

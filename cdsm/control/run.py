@@ -71,7 +71,7 @@ class TrackingRun(ReadOnlyState):
         rigidity: Rigidity of the wires over that of their laws, as estimated (n,) [-].
         refused: Reasons why the outer loop could not plan and kept its previous tensions, by step.
         outcome: ``"completed"``; ``"lost"``: the tip left its path, the loop is unstable; ``"no
-            rest"``: the arm buckled; ``"wire"``: a cable left its law.
+            rest"``: the arm buckled; ``"wire"``: a tension left the domain of its law.
         reason: What stopped the loop, in words; or empty.
         states: States of the plant, which :meth:`hung_weight` loads further.
     """
@@ -184,7 +184,7 @@ class TrackingRun(ReadOnlyState):
 
     @property
     def end(self) -> float:
-        """Time of the last step [s]: of a failure, when it happened."""
+        """Time of the last step [s]; after a failure, the time of the failure."""
         return float(self.time[-1]) if len(self.time) else 0.0
 
     def to_xarray(self) -> xarray.Dataset:

@@ -95,8 +95,8 @@ def track(
         seed: Seed of the noise: the same seed gives the same bits.
 
     Raises:
-        InvalidInput: The plan is not complete, or is one of ``cartesian``; or another argument is
-            invalid.
+        InvalidInput: The plan is not complete, or is for ``cartesian`` instead of directions; or
+            another argument is invalid.
         UnknownName: There is no such law or cable.
     """
     arm = checked_plan(instance("plan", plan, PathPlan))

@@ -58,9 +58,10 @@ class Designs(ReadOnlyState):
 
     @property
     def violations(self) -> Array:
-        """Violation of each constraint over its limit (D, 1 + constraints) [-]; 0 if it is met.
+        """Relative violation of each constraint (D, 1 + constraints) [-]; 0 if it is met.
 
-        Column 0 is the share of postures that are not held, if all must be held; else 0.
+        A violation is relative to the limit. Column 0 is the share of postures that are not held if
+        all must be held; else it is 0.
         """
         return violations(self.problem, self.values)
 
@@ -100,7 +101,7 @@ class Designs(ReadOnlyState):
 
 
 def violations(problem: DesignProblem, values: Array) -> Array:
-    """Compute the violations (D, 1+n) of quantities (D, m): postures not held, each constraint."""
+    """Compute :attr:`Designs.violations` from the quantities (D, m) of D designs."""
     keys = [each.key for each in problem.measures]
     held = values[:, keys.index(MISSED)]
     found = [np.where(held == held, 1.0 - held, 1.0) if problem.needs_all else np.zeros(len(held))]

@@ -150,8 +150,8 @@ class Objective(Measure):
             value over all postures and loads counts. ``deflection`` is |C_vv f| for the force f of
             the load, to first order; ``payload`` and ``capacity_margin`` are the largest force,
             besides the load, within the limits of the tensions, along u and in any direction; the
-            ``workspace`` is the volume of the hull of all tips that are held; the wires are as in
-            :func:`~cdsm.wire_use`.
+            ``workspace`` is the volume of the convex hull of the tips at all postures that are
+            held; the wires are as in :func:`~cdsm.wire_use`.
         direction: u of ``stiffness`` and ``payload``: an axis such as ``"-z"``, or (3,).
         goal: ``"most"`` or ``"least"``; None: the usual one, e.g. the most stiffness, the least
             mass.

@@ -148,7 +148,11 @@ class _Arm:
         return float(rows[worst]) + self._margin(each, worst)
 
     def _margin(self, each: Measure, worst: int) -> float:
-        """Return ± coverage · u of a reading at its worst posture; 0 without tolerances."""
+        """Return ± coverage · u, u the standard uncertainty of a quantity at its worst posture.
+
+        It is 0 without tolerances or without a constraint on the quantity. ``worst`` is the index
+        of the posture and load in :meth:`rows`.
+        """
         problem = self.problem
         bounded = any(constraint.key == each.key for constraint in problem.constraints)
         if problem.tolerances is None or each.of not in _SURE or not bounded:

@@ -28,7 +28,7 @@ _ROUNDS = 2
 
 
 class _Rows(NamedTuple):
-    """Values (R,) and derivatives (R, n) of a measure, both divided by its size."""
+    """Values (R,) of a measure, and derivatives (R, n) for variables divided by their range."""
 
     values: Array
     slopes: Array
@@ -46,7 +46,7 @@ def refine_design(
     Args:
         problem: The problem; its variables are continuous, it has one objective, and all quantities
             are of ``stiffness``, ``margin``, ``deflection``, ``motor_force``, ``mass`` and
-            ``length``, the usual goals.
+            ``length``. The objective has its default ``goal``.
         start: Design (n,) [m, rad, N] to begin with; None: the given arm.
         iterations: Maximum number of iterations.
 
@@ -140,11 +140,11 @@ def refine_design(
 
 
 class _LeftTheArm(Exception):
-    """Error of a step to a design that does not hold all postures."""
+    """Raised if SLSQP tries a design that does not hold all postures."""
 
 
 def _all_rows(problem: DesignProblem, x: Array, size: Array) -> dict[str, _Rows]:
-    """Return all quantities and their derivatives with respect to the scaled variables."""
+    """Compute all quantities of the design x (n,); ``size`` is the range of each variable (n,)."""
     found: dict[str, _Rows] = {}
     for each in (*problem.objectives, *problem.constraints):
         if each.key not in found:

@@ -164,7 +164,10 @@ def _stiffnesses(
     names: list[str],
     threads: int | None,
 ) -> tuple[Rows, Statuses]:
-    """Compute quantities that also depend on tensions (R, C) [N] and elasticity."""
+    """Compute the quantities that need the cable stiffness, at R postures q with tensions (R, C).
+
+    ``loss`` (R, C) is the largest factor between the tensions along a cable with friction.
+    """
     extreme = [name for name in names if QUANTITIES[name].stage == "principal"]
     needed = [name for name in names if name not in (*extreme, "wire_strain")]
     needed += ["margin", "translational_compliance"] if extreme else ["margin"]

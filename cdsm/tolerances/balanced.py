@@ -6,10 +6,10 @@ r = y_f − Bᵀ μ,
 
     Σ y_c dF_c = r·dBᵀ λ + μ·(dτ − dJ_Lᵀ F).
 
-τ = J_Xᵀ W − g is the torque that the cables balance. Both terms are derivatives of power at
-constant tensions: of Σ r_c L̇_c for the joint velocity λ, and of the residual torque for the joint
-velocity −μ. So the kernel of the stiffness computes them too. The formula holds while the same
-cables stay at their bounds.
+τ = J_Xᵀ W − g is the torque that the cables balance. Both terms are derivatives of a power at
+constant tensions, so the kernel of the stiffness computes them too. The first power is Σ r_c L̇_c
+at the joint velocity λ. The second is that of the residual torque J_Lᵀ F − τ at the joint velocity
+−μ. The formula holds while the same cables stay at their bounds.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _DETERMINED = 1e-12
 
 
 class Balance(NamedTuple):
-    """Free cables of a tension distribution, and (B Bᵀ)⁻¹ of their B."""
+    """Free cables of a tension distribution, and (B Bᵀ)⁻¹ with B = J_Lᵀ of these cables."""
 
     tension: Tension
     free: NDArray[np.bool_]
@@ -69,7 +69,7 @@ class Balance(NamedTuple):
         return float(weights[held].sum() - self.multipliers(weights) @ J[held].sum(axis=0))
 
     def gradient(self, inputs: Inputs, weights: Array) -> dict[str, Array]:
-        """Compute the derivatives of Σ y_c F_c by source; 0 for those of wires."""
+        """Compute the derivatives of Σ y_c F_c by source, y ``weights``; 0 for those of wires."""
         F, free = self.tension.values, self.free
         B = self.tension.posture.length_jacobian[free].T
         mu = self.multipliers(weights)
@@ -81,7 +81,10 @@ class Balance(NamedTuple):
         return {name: found[name] + balance[name] for name in found}
 
     def _work(self, inputs: Inputs, motion: Array, pull: Array, loaded: float) -> dict[str, Array]:
-        """Compute the derivatives of Σ p_c L̇_c, plus gravity and load if wanted, by source."""
+        """Compute the derivatives of the power Σ p_c L̇_c by source, at the velocity ``motion``.
+
+        p is ``pull`` (C,) [N]. ``loaded`` 1 adds the power of gravity and load, 0 leaves it out.
+        """
         pose, none = self.tension.posture, np.zeros_like(pull)
         arguments: tuple[Any, ...] = (
             *pose.arm._model.arrays,

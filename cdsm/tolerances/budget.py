@@ -71,10 +71,10 @@ class Uncertainty(ReadOnlyState):
 
     @cached_property
     def nonlinearity(self) -> float:
-        """Error of the first order over u_c [-]: root mean square over 100 drawn arms.
+        """Error of the linear approximation, relative to u_c [-]: RMS over 100 drawn arms.
 
-        The standard uncertainty of Monte Carlo differs from u_c by this part at most. It is inf if
-        the reading does not exist for one of the arms.
+        The standard uncertainty of Monte Carlo differs from u_c at most by this fraction. It is inf
+        if the reading does not exist for one of the arms.
         """
         question, rng = self.question, np.random.default_rng(0)
         labels = question.labels

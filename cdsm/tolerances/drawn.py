@@ -26,7 +26,10 @@ _LONGEST = 0.2
 
 
 class Drawn(NamedTuple):
-    """K_θ (N, nv, nv), J_v (N, 3, nv), tip (N, 3), J_L (N, C, nv) and J_Xᵀ W − g (N, nv)."""
+    """Arrays of N drawn arms, in the order of the fields.
+
+    K_θ (N, nv, nv), J_v (N, 3, nv), tip (N, 3) [m], J_L (N, C, nv) and J_Xᵀ W − g (N, nv).
+    """
 
     joint: Array
     tip_rows: Array
@@ -36,7 +39,7 @@ class Drawn(NamedTuple):
 
 
 class DrawnArms:
-    """N arms that differ from the arm of a stiffness by errors (N, inputs) of each source."""
+    """N drawn arms: the arm of a stiffness, plus errors (N, inputs) of each source."""
 
     def __init__(self, K: Stiffness, errors: Mapping[str, Array]) -> None:
         pose, model, inputs = K.posture, K.posture.arm._model, inputs_of(K.posture.arm)
@@ -91,7 +94,9 @@ class DrawnArms:
         return found
 
     def distributed(self, minimum: Array | None = None, drawn: Drawn | None = None) -> Array:
-        """Distribute tensions (N, C) [N] of all arms, with lower bounds (N,) or the given ones.
+        """Distribute tensions (N, C) [N] of all arms.
+
+        The lower bounds are ``minimum`` (N,) [N]; None: those of the tensions of the stiffness.
 
         Raises:
             InvalidInput: No tensions balance one of the arms.

@@ -32,7 +32,10 @@ class Part(NamedTuple):
     tolerance: Tolerance
 
     def variance(self, sensitivity: Array) -> float:
-        """Compute gᵀ σ R σ g of partial derivatives g (k,) and correlations R (JCGM 100, 13)."""
+        """Compute the variance gᵀ σ R σ g that the inputs cause (JCGM 100, Eq. 13).
+
+        g (k,) are the partial derivatives, σ the standard uncertainties, R the correlations.
+        """
         return self.tolerance.variance(self.standard * sensitivity)
 
     def draw(self, rng: np.random.Generator, errors: Array) -> None:

@@ -39,7 +39,8 @@ class Question(ReadOnlyState):
             ``stuck`` that of the equivalent arm (:mod:`cdsm.tolerances.stuck`).
         direction: The unit direction (3,) of ``along``, ``stuck`` and ``tip``; else None.
         cable: Index of the cable of ``tension``; else None.
-        ties: For ``stuck``, which inputs of the equivalent arm are the same input; else None.
+        ties: For ``stuck``, which inputs of the equivalent arm belong to which input of the arm;
+            else None.
     """
 
     of: Reading
@@ -103,7 +104,7 @@ class Question(ReadOnlyState):
         return float(self.direction @ K.posture.tip[:3, 3])
 
     def gradient(self) -> dict[str, Array]:
-        """Compute the derivatives of the reading for the inputs of each source (inputs,)."""
+        """Compute the derivatives (inputs,) of the reading with respect to each source's inputs."""
         K, inputs = self.stiffness, inputs_of(self.stiffness.posture.arm)
         if self.of in ("along", "stuck"):
             assert self.direction is not None
@@ -162,7 +163,10 @@ def _along_gradient(
 
 
 def _gradient(K: Stiffness, inputs: Inputs, motion: Array, direction: Array) -> dict[str, Array]:
-    """Compute the derivatives of zᵀ K_θ z − 2 u·J_v z by source; motion z, direction u fixed."""
+    """Compute the derivatives of zᵀ K_θ z − 2 u·J_v z by source, for constant z and u.
+
+    z is ``motion``, u is ``direction``. For z = K_θ⁻¹ J_vᵀ u they are those of −uᵀ C_vv u.
+    """
     pose, F, k = K.posture, K.tension, K.cable_stiffness
     laws = pose.arm._model.laws
     rigidity, strain = laws_at(K, F)
@@ -191,10 +195,11 @@ def _gradient(K: Stiffness, inputs: Inputs, motion: Array, direction: Array) -> 
 
 
 def _skew_gradient(K: Stiffness, left: Array, right: Array) -> Array:
-    """Compute ∂/∂q of −m·(ω_r × ω_l)/2 (nv,), the skew part of the load term between two motions.
+    """Compute ∂/∂q (nv,) of −m·(ω_r × ω_l)/2, the bilinear form of the skew part of K_θ.
 
-    m is the moment at the tip, ω = J_ω z its angular velocity for a joint motion z: ω_l and ω_r for
-    ``left`` and ``right``. Joint i turns the part of ω that is due to the joints from i on.
+    K_θ has a skew part if the load has a moment m. ω_l and ω_r are the angular velocities of the
+    tip for the joint motions ``left`` and ``right``. Joint i turns the part of ω that comes from
+    joint i and the joints after it.
     """
     turns, chain = K.posture.jacobian[3:], K.posture.arm._model.masses.tip_joints
     moment, found = K.wrench[3:], np.zeros(left.size)
