@@ -67,7 +67,10 @@ def stiffness(
 
 
 def _breakaways(tension: cdsm.Tension) -> dict[str, cdsm.Breakaway]:
-    """Compute the breakaway load along each axis along which some load makes a cable slide."""
+    """Compute the breakaway load along x, y and z.
+
+    An axis is left out if no load along it makes a cable slide, or if the arm buckles first.
+    """
     found = {}
     if tension.posture.arm.has_friction:
         for axis in ("x", "y", "z"):
@@ -79,7 +82,7 @@ def _breakaways(tension: cdsm.Tension) -> dict[str, cdsm.Breakaway]:
 
 
 def _sticking(held: dict[str, cdsm.Breakaway]) -> str:
-    """Write the stiffness that small loads measure, a line per axis."""
+    """Write the stuck stiffness and the breakaway load, one line for each axis."""
     from cdsm.stiffness_matrix.prints import model_of
 
     K = next(iter(held.values())).stiffness

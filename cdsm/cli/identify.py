@@ -113,7 +113,7 @@ def _ranges(free: list[str]) -> dict[str, Range | None]:
 
 
 class _Shown:
-    """Parameters of an arm in units for people, which their labels contain."""
+    """Parameters of an arm in people's units; the label of a parameter contains its unit."""
 
     def __init__(self, parameters: ArmParameters) -> None:
         self._parameters = parameters

@@ -167,7 +167,7 @@ def track(
 
 
 def _require_ending(option: str, path: Path | None, *endings: str) -> None:
-    """Refuse a file that could not be written, before minutes are spent on its content."""
+    """Refuse a file with another ending before the simulation, which takes minutes."""
     if path is not None and path.suffix.lower() not in endings:
         raise typer.BadParameter(f"{path} ends in none of {', '.join(endings)}.", param_hint=option)
 

@@ -67,13 +67,13 @@ OLDER: Final[dict[str, dict[str, str]]] = {
 
 
 def in_options(message: str) -> str:
-    """Return a message of the library in words of the command line: ``--min-tension``."""
+    """Replace arguments in a message of the library by options: ``minimum`` by --min-tension."""
     for remedy, left in _PYTHON:
         message = message.replace(remedy, left)
     return _ARGUMENT.sub(lambda found: _OPTIONS[found[1] or found[2]], message)
 
 
 def newer(command: str, word: str) -> str:
-    """Return an argument of a command with an older name of an option replaced."""
+    """Replace an older name of an option by the current one in an argument of a command."""
     name, equals, value = word.partition("=")
     return OLDER.get(command, {}).get(name, name) + equals + value

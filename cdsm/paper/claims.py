@@ -96,7 +96,9 @@ SUMMARY = ("number that deviates most", "compared", "deviation", "paper", "compu
 
 
 def to_summary(figures: Sequence[Figure]) -> list[tuple[str, ...]]:
-    """Return a row of text per figure: the number that deviates most; heads: :data:`SUMMARY`.
+    """Return a row of text per figure, with the number that deviates most from the paper.
+
+    :data:`SUMMARY` names the columns.
 
     A deviation is relative to the largest number of the paper in the same claim.
     """
@@ -115,7 +117,7 @@ def to_summary(figures: Sequence[Figure]) -> list[tuple[str, ...]]:
 
 
 def _deviation(claim: Claim) -> float:
-    """Return the largest difference of a claim over the largest of the paper's numbers."""
+    """Return the largest difference of a claim, divided by the largest of the paper's numbers."""
     assert claim.difference is not None
     assert claim.paper is not None
     return max(map(abs, claim.difference)) / max(map(abs, claim.paper))

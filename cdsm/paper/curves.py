@@ -109,7 +109,10 @@ class Pair(NamedTuple):
     def claim(
         self, measure: Callable[[Array, Array], Array], searched: str = KEPT, **texts: Any
     ) -> Claim:
-        """Build a claim from a function of total stiffness and part, for the three readings."""
+        """Build a claim; ``measure`` computes its numbers, once for each of the three readings.
+
+        ``measure`` takes the stiffness (N, 3) and the share of the figure's part in it (N, 3).
+        """
         paper, original = self.stretched, self.original
         return Claim(
             computed=floats(measure(paper.pseudoinverse, paper.pseudoinverse_part)),

@@ -83,7 +83,8 @@ def figure_10() -> ExperimentFigure:
     Three prototypes are shown. The first is fitted to Section V as printed. The second takes Table
     II with x and y exchanged in rows 2 to 4 (evidence:
     :data:`~cdsm.paper.section_v.TABLE_II_SWAPPED`). The third is fitted to the exchanged Table II
-    alone, with uneven tensions and finite weights: 14 parameters for 15 numbers. No fit is a proof.
+    alone, with unevenly spaced tensions and finite weights: 14 parameters for 15 numbers. No fit is
+    a proof.
     """
     fits = [identified(step) for step in (STEPS[0], STEPS[1], STEPS[-1])]
     return ExperimentFigure(

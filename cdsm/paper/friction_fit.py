@@ -107,7 +107,7 @@ class RoughPrototype:
         return arm.with_cables([*arm.cables, *springs])
 
     def weigh(self) -> list[LoadingPath]:
-        """Load the arm with the weights of Table II, entry by entry; CdsmError on failure."""
+        """Load the arm slowly with the weight of each entry of Table II; CdsmError on failure."""
         pose = self.arm().at(POSTURE)
         return [
             LoadingPath.of(pose, F, np.zeros(6), weight[None], _PARTS)
@@ -116,7 +116,10 @@ class RoughPrototype:
         ]
 
     def weigh_beside(self, paths: Sequence[LoadingPath]) -> Array:
-        """Compute the tips (15, 3) [m] to first order from the paths of a similar prototype."""
+        """Compute the tips (15, 3) [m] under the weights, to first order.
+
+        ``paths`` are the answer of :meth:`weigh` for a prototype with similar parameters.
+        """
         pose = self.arm().at(POSTURE)
         tensions = np.repeat(self._tensions(pose), 3, axis=0)
         pairs = zip(paths, tensions, strict=True)
@@ -172,7 +175,7 @@ def identify_rough_prototype(added: Sequence[str] = tuple(ADDED)) -> RoughFit:
 
     The search varies the 11 parameters on which Table II depends (dimensions, weights, tension
     offset), within :data:`~cdsm.paper.BOUNDS`, and the named parameters of :data:`ADDED`. The
-    tensions of the rows are even. With all three, 14 parameters are fitted to 15 numbers.
+    tensions of the rows are evenly spaced. With all three, 14 parameters are fitted to 15 numbers.
 
     Raises:
         UnknownName: A name is not in :data:`ADDED`.

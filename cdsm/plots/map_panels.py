@@ -32,7 +32,15 @@ _ROOM = 0.05
 
 
 class Slice(NamedTuple):
-    """A slab of tips, and the two axes in which it is seen."""
+    """A slab of tips, seen along its normal.
+
+    Attributes:
+        title: Title of the panel.
+        normal: Index of the axis normal to the slab.
+        place: Position of the middle of the slab on this axis [mm].
+        half: Half the thickness of the slab [mm].
+        plane: Indices of the two other axes, which the panel shows.
+    """
 
     title: str
     normal: int
@@ -46,7 +54,7 @@ class Slice(NamedTuple):
 
 
 class Map(NamedTuple):
-    """Tips (N, 2) [mm] of one panel, their values (NaN if missing), their status, and the axes."""
+    """A panel: tips (N, 2) [mm] in its ``plane`` of two axes, their values and their status."""
 
     title: str
     points: Array
@@ -67,7 +75,7 @@ class Map(NamedTuple):
 
 
 class Case(NamedTuple):
-    """One map: values of all tips (NaN if missing) and their status."""
+    """Values of all tips for one combination of cases (NaN if missing), and their status."""
 
     title: str
     values: Array

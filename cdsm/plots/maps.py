@@ -175,7 +175,7 @@ def plot_map(
 
 
 def _colors(values: Array) -> tuple[ScalarMappable, str]:
-    """Return the colour scale of finite values without outliers, and where values exceed it."""
+    """Return the colour scale of the values without outliers, and at which ends some exceed it."""
     finite = values[np.isfinite(values)] if np.isfinite(values).any() else np.array([0.0, 1.0])
     low, high = float(finite.min()), float(finite.max())
     wide = low > 0.0 and high > _WIDE * low

@@ -33,7 +33,10 @@ def clicked_cable(paths: Sequence[Array], origin: Array, direction: Array) -> in
 
 
 def _angle(start: Array, way: Array, u: Array) -> float:
-    """Return the smallest angle [rad] between a ray u from 0 and a short line from ``start``."""
+    """Return the smallest angle [rad] between the ray u from 0 and points of a line segment.
+
+    The segment begins at ``start`` (3,) and has the vector ``way`` (3,) [m].
+    """
     across, off = way - (way @ u) * u, start - (start @ u) * u
     part = float(np.clip(-(off @ across) / max(float(across @ across), 1e-300), 0.0, 1.0))
     point = start + part * way

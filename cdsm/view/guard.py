@@ -66,7 +66,7 @@ Control = (
 
 
 class _Address(str):
-    """Listening address of one guard; its identity distinguishes it from equal strings."""
+    """Address of one guard; compared by identity, so that views at equal addresses are distinct."""
 
     __slots__ = ()
 

@@ -71,7 +71,7 @@ class TipHandle:
         return found.angles
 
     def moved_to(self, q: Array) -> None:
-        """Store the angles (nv,) to which the sliders were moved, rounded as they round."""
+        """Store the angles (nv,) to which the sliders were moved, as the sliders rounded them."""
         self._q = q
 
     def remark(self, q: Array) -> str:
