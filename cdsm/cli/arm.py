@@ -168,14 +168,15 @@ def export(
     angles: Angles = "0",
     actuators: Annotated[
         Literal["length", "tension", "none"],
-        typer.Option(help="Motors of the MuJoCo model control length, tension, or there are none."),
+        typer.Option(help="What the motors of the MuJoCo model control; none: no motors."),
     ] = "length",
     damping_ratio: Annotated[
         float | None,
-        typer.Option(help="Damping ratio of the least damped mode, by the cables; default 0.05."),
+        typer.Option(help="Cables damp; damping ratio of the least damped mode. Default 0.05."),
     ] = None,
     damping: Annotated[
-        float | None, typer.Option(help="Damping of each joint instead [N m s/rad].")
+        float | None,
+        typer.Option(help="Damping of each joint [N m s/rad], instead of damping by the cables."),
     ] = None,
     as_json: AsJson = False,
 ) -> None:

@@ -90,8 +90,8 @@ class MeasureOptions:
         bool,
         typer.Option(
             "--worst-friction",
-            help="Keep all segments of the cables within the bounds, whatever loads came before; "
-            "wires are then under their largest tension.",
+            help="Keep the tension of each segment of each cable within the bounds, whatever loads "
+            "came before; wires are then under their largest tension.",
         ),
     ] = False
     diameter: Annotated[

@@ -53,10 +53,10 @@ def track(
         float, typer.Option(help="Mass [kg] that the controller does not know of.")
     ] = 0.0,
     payload_from: Annotated[
-        float, typer.Option(help="Part of the path [0 to 1] after which the payload hangs.")
+        float, typer.Option(help="Fraction of the path [0 to 1] after which the payload hangs.")
     ] = 0.5,
     true_rigidity: Annotated[
-        float, typer.Option(help="True rigidity of the wires over that of the model.")
+        float, typer.Option(help="True rigidity of the wires, divided by that of the model.")
     ] = 1.0,
     true_friction: Annotated[
         float | None, typer.Option(help="True friction coefficient; default: that of the model.")
@@ -72,12 +72,13 @@ def track(
     steps: Annotated[int, typer.Option(help="Control steps from sample to sample.")] = 5,
     period: Annotated[float, typer.Option(help="Time between two control steps [s].")] = 0.05,
     rate: Annotated[
-        float, typer.Option(help="Largest change of a tension per step, stiffness loop [N].")
+        float, typer.Option(help="Largest change of a tension per step by the stiffness loop [N].")
     ] = 10.0,
     bands: Annotated[
         int,
         typer.Option(
-            help="Steps between two computations of where friction lets the arm rest; 0: none."
+            help="Steps between two computations of the band in which friction lets the tip rest; "
+            "0: none."
         ),
     ] = 1,
     felt: Annotated[
