@@ -1,14 +1,15 @@
 """Numba kernel of breakaway, for blocks of postures: the load at which the first hole slides.
 
-A force W e at the tip of a stuck arm, e a unit vector, moves the joints by θ̇ = K_θ⁻¹ J_vᵀ e per
-newton; a dot is a derivative with respect to W. A block is the segments of a cable between two
-holes where it sticks. Its tension is T, before the load F; its length l, its stiffness k. Per
-newton the tension changes by Ṫ = k l̇ before a hole, and by Ṫ′ = k′ l̇′ after it. With friction μ and
-wrap angle φ the hole begins to slide, to first order in the load, at
+A force f e at the tip of a stuck arm, e a unit vector, moves the joints by θ̇ = K_θ⁻¹ J_vᵀ e per
+newton; a dot is a derivative with respect to f. A section is the part of a cable between two holes
+where it sticks, with tension T, length l and stiffness k. Without the force, all sections of a
+cable have the tension F. Per newton of f, the tension changes by Ṫ = k l̇ before a hole, and by
+Ṫ′ = k′ l̇′ after it. With friction μ and wrap angle φ, the hole begins to slide, to first order, at
 
-    W = μ φ/(|Ṫ′ − Ṫ|/F − μ φ̇),   φ̇ = −(u̇·v + u·v̇)/sin φ,
+    f = μ φ/(|Ṫ′ − Ṫ|/F − μ φ̇),   φ̇ = −(u̇·v + u·v̇)/sin φ,
 
-with the directions u and v of the cable before and after it. Breakaway is the least W of all holes.
+with the directions u and v of the cable before and after it. The breakaway load is the least f of
+all holes.
 """
 
 from __future__ import annotations
@@ -24,8 +25,8 @@ from cdsm.kernels.segments import Segments, segment_scratch, set_direction
 from cdsm.kernels.stuck import (
     Holes,
     Sticking,
-    open_blocks,
-    open_next,
+    open_first_section,
+    open_next_section,
     set_holding,
     set_lead,
     set_stiffness,
@@ -39,10 +40,10 @@ ROUNDING = 1e-12
 
 
 class Velocities(NamedTuple):
-    """Derivatives with respect to the load W.
+    """Derivatives with respect to the force f.
 
     Angular velocity and velocity of the origin of each joint (nv+1, 3, W); velocities of the sites
-    (P, 3, W); u̇ and v̇ (3, W) at the present hole; l̇ (W,) of the open block up to this hole.
+    (P, 3, W); u̇ and v̇ (3, W) at the present hole; l̇ (W,) of the section up to this hole.
     """
 
     turn: Array
@@ -53,16 +54,16 @@ class Velocities(NamedTuple):
     longer: Array
 
 
-class Pulls(NamedTuple):
-    """|Ṫ′ − Ṫ|/F, μ φ̇ and μ φ of each hole (P, W), stored where the block after it ends.
+class SlipRates(NamedTuple):
+    """|Ṫ′ − Ṫ|/F, μ φ̇ and μ φ of each hole (P, W), in the row of the next hole that holds.
 
-    μ φ is −1 where no block ends. ``last`` (3, W) are Ṫ/F of the block before the open one, and μ φ̇
-    and μ φ of the hole between the two.
+    μ φ is −1 in the other rows. ``last`` (3, W) belongs to the last hole passed: Ṫ/F of the section
+    before it, its μ φ̇ and its μ φ.
     """
 
-    pull: Array
+    jump: Array
     turning: Array
-    grip: Array
+    limit: Array
     last: Array
 
 
@@ -80,7 +81,7 @@ def set_breakaway(
     width: int,
     out: Array,
 ) -> None:
-    """Fill the breakaway loads (b, D) [N] of b postures in D directions.
+    """Fill the breakaway loads (b, D) [N] of b postures in D directions e.
 
     Args:
         tree: Joints of the arm.
@@ -92,14 +93,14 @@ def set_breakaway(
         tension: F (b, C) [N].
         wire: EA (1 + ε) of the wires at F (b, C) [N].
         motion: θ̇ of the stuck arm in B blocks of W postures (B, nv, D, W) [rad/N].
-        width: W.
+        width: W, the number of postures in a block.
         out: The loads; inf where no hole ever slides, 0 where no cable sticks.
     """
     nv, cables = motion.shape[1], series.shape[0]
     rows, sites = tree.parent.shape[0], routing.row.shape[0]
     angles, F, EA = np.empty((nv, width)), np.empty((cables, width)), np.empty((cables, width))
     frames, scratch = empty_frames(tree, routing, width), segment_scratch(nv, width)
-    rotation, block = np.empty((rows, 3, 3, width)), sticking_scratch(nv, width)
+    rotation, section = np.empty((rows, 3, 3, width)), sticking_scratch(nv, width)
     rates = Velocities(
         np.zeros((rows, 3, width)),
         np.zeros((rows, 3, width)),
@@ -108,7 +109,7 @@ def set_breakaway(
         np.empty((3, width)),
         np.empty(width),
     )
-    pulls = Pulls(
+    slips = SlipRates(
         np.empty((sites, width)),
         np.empty((sites, width)),
         np.empty((sites, width)),
@@ -126,11 +127,11 @@ def set_breakaway(
         forward_kinematics(tree, routing, angles, np.empty((2, width)), rotation, frames, width)
         for d in range(motion.shape[2]):
             _set_velocities(tree, routing, frames, motion[b], d, rates, width)
-            _set_pulls(
-                routing, holes, frames, rotation, F, EA, series, rest, scratch, block, rates, pulls,
-                width,
+            _set_slip_rates(
+                routing, holes, frames, rotation, F, EA, series, rest, scratch, section, rates,
+                slips, width,
             )  # fmt: skip
-            _set_loads(pulls, load, width)
+            _set_loads(slips, load, width)
             for w in range(min(width, q.shape[0] - first)):
                 out[first + w, d] = load[w]
 
@@ -145,7 +146,7 @@ def _set_velocities(
     rates: Velocities,
     width: Width,
 ) -> None:
-    """Fill the velocities of joints and sites for θ̇ of one direction."""
+    """Fill the velocities of joints and sites for θ̇ of one direction e."""
     turn, moved, d = rates.turn, rates.origin, np.uint64(direction)
     for k in range(tree.order.shape[0]):
         i = np.uint64(tree.order[k])
@@ -175,7 +176,7 @@ def _set_velocities(
 
 
 @inner
-def _set_pulls(
+def _set_slip_rates(
     routing: Routing,
     holes: Holes,
     frames: Frames,
@@ -185,31 +186,31 @@ def _set_pulls(
     series: Array,
     rest: Array,
     scratch: Segments,
-    block: Sticking,
+    section: Sticking,
     rates: Velocities,
-    pulls: Pulls,
+    slips: SlipRates,
     width: Width,
 ) -> None:
     u, length, _, _, along, _ = scratch
-    for p in upwards(0, pulls.grip.shape[0]):
+    for p in upwards(0, slips.limit.shape[0]):
         for w in lanes(width):
-            pulls.pull[p, w] = 0.0
+            slips.jump[p, w] = 0.0
         for w in lanes(width):
-            pulls.grip[p, w] = -1.0
+            slips.limit[p, w] = -1.0
     for c in upwards(0, holes.lead.shape[0]):
-        open_blocks(holes, c, tension, series, rest, block, width)
-        set_lead(routing, holes, c, rotation, block.before, width)
+        open_first_section(holes, c, tension, series, rest, section, width)
+        set_lead(routing, holes, c, rotation, section.before, width)
         # the lead turns with the link of the first site, and keeps its length
         i = np.uint64(routing.row[holes.first[c]])
         for a in range(3):
             m, n = (a + 1) % 3, (a + 2) % 3
             for w in lanes(width):
                 rates.before[a, w] = (
-                    rates.turn[i, m, w] * block.before[n, w]
-                    - rates.turn[i, n, w] * block.before[m, w]
+                    rates.turn[i, m, w] * section.before[n, w]
+                    - rates.turn[i, n, w] * section.before[m, w]
                 )
         for w in lanes(width):
-            rates.longer[w], pulls.last[2, w] = 0.0, -1.0
+            rates.longer[w], slips.last[2, w] = 0.0, -1.0
         end = np.uint64(holes.first[c + np.uint64(1)]) - np.uint64(1)
         for p in upwards(np.uint64(holes.first[c]), end):
             far = p + np.uint64(1)
@@ -223,48 +224,52 @@ def _set_pulls(
                 for w in lanes(width):
                     apart = rates.site[far, r, w] - rates.site[p, r, w]
                     rates.after[r, w] = (apart - along[w] * u[r, w]) / length[w]
-            if holes.friction[p] > 0.0:  # where the cable bends, a block ends
-                set_holding(holes.wrap[p], block.before, u, block.holds, width)
-                _note_hole(holes, p, tension, wire, c, u, block, rates, pulls, width)
+            if holes.friction[p] > 0.0:  # where the cable bends, a section ends
+                set_holding(holes.wrap[p], section.before, u, section.holds, width)
+                _store_hole(holes, p, tension, wire, c, u, section, rates, slips, width)
             for r in upwards(0, u.shape[0]):
                 for w in lanes(width):
-                    block.before[r, w] = u[r, w]
+                    section.before[r, w] = u[r, w]
                 for w in lanes(width):
                     rates.before[r, w] = rates.after[r, w]
             for w in lanes(width):
-                block.length[w] += length[w]
+                section.length[w] += length[w]
             for w in lanes(width):
                 rates.longer[w] += along[w]
         for w in lanes(width):
-            block.holds[w] = 1.0
-        _note_hole(holes, end, tension, wire, c, u, block, rates, pulls, width)
+            section.holds[w] = 1.0
+        _store_hole(holes, end, tension, wire, c, u, section, rates, slips, width)
 
 
 @inner
-def _note_hole(
+def _store_hole(
     holes: Holes,
     p: Index,
     tension: Array,
     wire: Array,
     c: Index,
     v: Array,
-    block: Sticking,
+    section: Sticking,
     rates: Velocities,
-    pulls: Pulls,
+    slips: SlipRates,
     width: Width,
 ) -> None:
-    """Store the pull of the hole before the block that ends at p; start the next block there."""
-    set_stiffness(wire, c, block, width)
-    u, mu, own = block.before, holes.friction[p], holes.wrap[p]
+    """Store the slip rates of the last hole, now that the section after it ends at hole p.
+
+    Hole p becomes the last hole, and the next section starts there. v (3, W) is the direction of
+    the cable after p.
+    """
+    set_stiffness(wire, c, section, width)
+    u, mu, own = section.before, holes.friction[p], holes.wrap[p]
     for w in lanes(width):
-        if block.holds[w] == 0.0:
+        if section.holds[w] == 0.0:
             continue
         F = tension[c, w]
-        rate = block.stiffness[w] * rates.longer[w] / (F if F > 0.0 else 1.0)
-        if pulls.last[2, w] >= 0.0:
-            pulls.pull[p, w] = abs(rate - pulls.last[0, w])
-            pulls.turning[p, w] = pulls.last[1, w]
-            pulls.grip[p, w] = pulls.last[2, w]
+        rate = section.stiffness[w] * rates.longer[w] / (F if F > 0.0 else 1.0)
+        if slips.last[2, w] >= 0.0:
+            slips.jump[p, w] = abs(rate - slips.last[0, w])
+            slips.turning[p, w] = slips.last[1, w]
+            slips.limit[p, w] = slips.last[2, w]
         x = u[1, w] * v[2, w] - u[2, w] * v[1, w]
         y = u[2, w] * v[0, w] - u[0, w] * v[2, w]
         z = u[0, w] * v[1, w] - u[1, w] * v[0, w]
@@ -273,24 +278,24 @@ def _note_hole(
             cosine += u[r, w] * v[r, w]
             change -= rates.before[r, w] * v[r, w] + u[r, w] * rates.after[r, w]
         # a slack cable has no friction: any change of the load makes it slide
-        grip = mu * (math.atan2(sine, cosine) + own) if F > 0.0 else 0.0
-        pulls.last[0, w], pulls.last[2, w] = rate, grip
-        pulls.last[1, w] = mu * change / sine if sine > STRAIGHT else 0.0
+        limit = mu * (math.atan2(sine, cosine) + own) if F > 0.0 else 0.0
+        slips.last[0, w], slips.last[2, w] = rate, limit
+        slips.last[1, w] = mu * change / sine if sine > STRAIGHT else 0.0
         rates.longer[w] = 0.0
-    open_next(block, width)
+    open_next_section(section, width)
 
 
 @inlined
-def _set_loads(pulls: Pulls, load: Array, width: Width) -> None:
-    """Fill the least load (W,) of all holes; inf if none ever slides, 0 if no cable sticks."""
+def _set_loads(slips: SlipRates, load: Array, width: Width) -> None:
+    """Fill the least f (W,) of all holes; inf if none ever slides, 0 if no cable sticks."""
     for w in lanes(width):
         most, found, held = 0.0, math.inf, False
-        for p in range(pulls.grip.shape[0]):
-            most = max(most, pulls.pull[p, w])
-        for p in range(pulls.grip.shape[0]):
-            grip, rate = pulls.grip[p, w], pulls.pull[p, w] - pulls.turning[p, w]
-            if grip >= 0.0:
+        for p in range(slips.limit.shape[0]):
+            most = max(most, slips.jump[p, w])
+        for p in range(slips.limit.shape[0]):
+            limit, rate = slips.limit[p, w], slips.jump[p, w] - slips.turning[p, w]
+            if limit >= 0.0:
                 held = True
                 if rate > ROUNDING * most:
-                    found = min(found, grip / rate)
+                    found = min(found, limit / rate)
         load[w] = found if held else 0.0

@@ -1,13 +1,13 @@
 """Numba kernels of stuck cables, for blocks of postures: their passive stiffness.
 
-A hole holds a cable if it has friction and the cable bends there. While a cable sticks, its
-segments between two such holes are one spring, called a block here, with
+A hole holds a cable if it has friction and the cable bends there. The part of a cable between two
+such holes is called a section. While the cable sticks, a section of length l and original length
+l_0 is a spring with
 
-    k = 1/(l_0/EA + 1/k_series),   passive stiffness Σ_blocks k g gᵀ,   g = ∂l/∂θ,
+    k = 1/(l_0/EA + 1/k_series),   passive stiffness Σ k g gᵀ over all sections,   g = ∂l/∂θ.
 
-its length l and its original length l_0. Only the first block of a cable has the series spring; it
-has no stiffness if the motor controls the force. Which holes hold depends on the posture, so blocks
-of one cable end at other holes in other postures.
+Only the first section of a cable has the series spring; its k is 0 if the motor controls the force.
+Which holes hold depends on the posture, so sections end at other holes in other postures.
 """
 
 from __future__ import annotations
@@ -49,11 +49,11 @@ class Holes(NamedTuple):
 
 
 class Sticking(NamedTuple):
-    """Scratch: the block of a cable that is being added up, in W postures.
+    """Scratch: the section of a cable whose segments are being added up, in W postures.
 
     Its length l without the spring, the compliance of the spring, and 1 unless its motor controls
-    the force, (W,) each; ∂l/∂θ (nv, W); 1 where the present hole holds, the stiffness of the block
-    and a product, (W,) each; the direction of the cable before the hole (3, W).
+    the force, (W,) each; ∂l/∂θ (nv, W); 1 where the present hole holds, the stiffness of the
+    section and a product, (W,) each; the direction of the cable before the hole (3, W).
     """
 
     length: Array
@@ -92,11 +92,11 @@ def add_stuck_stiffness(
     series: Array,
     rest: Array,
     scratch: Segments,
-    block: Sticking,
+    section: Sticking,
     passive: Array,
     width: Width,
 ) -> None:
-    """Add Σ k g gᵀ over the blocks of all cables to a matrix (nv, nv, W), for i ≤ j only.
+    """Add Σ k g gᵀ over the sections of all cables to a matrix (nv, nv, W), for i ≤ j only.
 
     ``wire`` is EA (1 + ε) (C, W) [N], also of cables whose motor controls the force.
     """
@@ -105,24 +105,24 @@ def add_stuck_stiffness(
     nv = np.uint64(passive.shape[0])
     s = 0
     for c in upwards(0, holes.lead.shape[0]):
-        low, high = nv, np.uint64(0)  # joints that move the open block
-        open_blocks(holes, c, tension, series, rest, block, width)
-        set_lead(routing, holes, c, rotation, block.before, width)
+        low, high = nv, np.uint64(0)  # joints that change the section
+        open_first_section(holes, c, tension, series, rest, section, width)
+        set_lead(routing, holes, c, rotation, section.before, width)
         end = np.uint64(holes.first[c + np.uint64(1)]) - np.uint64(1)
         for p in upwards(np.uint64(holes.first[c]), end):
-            set_way(frames.site, p, scratch, width)
+            set_vector(frames.site, p, scratch, width)
             if holes.friction[p] > 0.0:
-                set_holding(holes.wrap[p], block.before, across, block.holds, width)
+                set_holding(holes.wrap[p], section.before, across, section.holds, width)
                 if low < high:
-                    _add_square(wire, c, block, low, high, passive, width)
-                    if _all_hold(block.holds, width):
+                    _add_square(wire, c, section, low, high, passive, width)
+                    if _all_hold(section.holds, width):
                         low, high = nv, np.uint64(0)
-                open_next(block, width)
+                open_next_section(section, width)
             for r in upwards(0, across.shape[0]):
                 for w in lanes(width):
-                    block.before[r, w] = across[r, w]
+                    section.before[r, w] = across[r, w]
             for w in lanes(width):
-                block.length[w] += scratch.length[w]
+                section.length[w] += scratch.length[w]
             # add u·d to g; segments that no joint changes are not in the routing
             if s < segment.shape[0] - 1 and np.uint64(segment[s, 1]) == p:
                 for w in lanes(width):
@@ -137,32 +137,32 @@ def add_stuck_stiffness(
                         )
                     i = j - np.uint64(1)
                     for w in lanes(width):
-                        block.gradient[i, w] += along[w] * inverse[w]
+                        section.gradient[i, w] += along[w] * inverse[w]
                     low, high = min(low, i), max(high, j)
                 s += 1
         if low < high:
             for w in lanes(width):
-                block.holds[w] = 1.0
-            _add_square(wire, c, block, low, high, passive, width)
+                section.holds[w] = 1.0
+            _add_square(wire, c, section, low, high, passive, width)
 
 
 @inner
-def open_blocks(
+def open_first_section(
     holes: Holes,
     c: Index,
     tension: Array,
     series: Array,
     rest: Array,
-    block: Sticking,
+    section: Sticking,
     width: Width,
 ) -> None:
-    """Start the first block of cable c with its lead and its series spring."""
+    """Start the first section of cable c with its lead and its series spring."""
     for w in lanes(width):
-        block.length[w] = holes.lead[c] - series[c] * (tension[c, w] - rest[c])
+        section.length[w] = holes.lead[c] - series[c] * (tension[c, w] - rest[c])
     for w in lanes(width):
-        block.soft[w] = series[c]
+        section.soft[w] = series[c]
     for w in lanes(width):
-        block.locked[w] = holes.locked[c]
+        section.locked[w] = holes.locked[c]
 
 
 @inner
@@ -178,8 +178,11 @@ def set_lead(
 
 
 @inner
-def set_way(site: Array, p: Index, scratch: Segments, width: Width) -> None:
-    """Fill the vector (3, W) from site p to the next one in place of u, and its length (W,)."""
+def set_vector(site: Array, p: Index, scratch: Segments, width: Width) -> None:
+    """Fill ``scratch`` with the vector (3, W) from site p to the next one, and its length (W,).
+
+    The vector replaces u: only its direction matters, and a division is saved.
+    """
     across, length = scratch.direction, scratch.length
     far = p + np.uint64(1)
     for r in upwards(0, across.shape[0]):
@@ -194,7 +197,11 @@ def set_way(site: Array, p: Index, scratch: Segments, width: Width) -> None:
 
 @inner
 def set_holding(own: float, a: Array, b: Array, holds: Array, width: Width) -> None:
-    """Fill ``holds`` (W,): 1 where a hole holds a cable that bends from a to b (3, W), else 0."""
+    """Fill ``holds`` (W,): 1 where the cable bends at the hole, so that friction acts, else 0.
+
+    a and b (3, W) are vectors along the cable before and after the hole; ``own`` is the constant
+    angle added to the wrap angle [rad].
+    """
     more = own - STRAIGHT
     for w in lanes(width):
         x = a[1, w] * b[2, w] - a[2, w] * b[1, w]
@@ -211,17 +218,17 @@ def set_holding(own: float, a: Array, b: Array, holds: Array, width: Width) -> N
 
 
 @inner
-def set_stiffness(wire: Array, c: Index, block: Sticking, width: Width) -> None:
-    """Fill the stiffness (W,) of blocks that end at a hole that holds, 0 else."""
-    length, soft, locked, holds = block.length, block.soft, block.locked, block.holds
+def set_stiffness(wire: Array, c: Index, section: Sticking, width: Width) -> None:
+    """Fill the stiffness k (W,) of sections that end at the present hole, 0 where it slides."""
+    length, soft, locked, holds = section.length, section.soft, section.locked, section.holds
     for w in lanes(width):
-        block.stiffness[w] = holds[w] * locked[w] / (length[w] / wire[c, w] + soft[w])
+        section.stiffness[w] = holds[w] * locked[w] / (length[w] / wire[c, w] + soft[w])
 
 
 @inner
-def open_next(block: Sticking, width: Width) -> None:
-    """Start the next block, with no series spring and no motor, where a hole holds."""
-    length, soft, locked, holds = block.length, block.soft, block.locked, block.holds
+def open_next_section(section: Sticking, width: Width) -> None:
+    """Where the present hole holds, start the next section, with no series spring and no motor."""
+    length, soft, locked, holds = section.length, section.soft, section.locked, section.holds
     for w in lanes(width):
         length[w] = 0.0 if holds[w] > 0.0 else length[w]
     for w in lanes(width):
@@ -232,11 +239,11 @@ def open_next(block: Sticking, width: Width) -> None:
 
 @inner
 def _add_square(
-    wire: Array, c: Index, block: Sticking, low: Index, high: Index, passive: Array, width: Width
+    wire: Array, c: Index, section: Sticking, low: Index, high: Index, passive: Array, width: Width
 ) -> None:
-    """Add k g gᵀ of the blocks that end at a hole that holds, and clear their g."""
-    g, k, product, holds = block.gradient, block.stiffness, block.product, block.holds
-    set_stiffness(wire, c, block, width)
+    """Add k g gᵀ of the sections that end at the present hole, and set their g to zero."""
+    g, k, product, holds = section.gradient, section.stiffness, section.product, section.holds
+    set_stiffness(wire, c, section, width)
     for i in upwards(low, high):
         for w in lanes(width):
             product[w] = k[w] * g[i, w]
