@@ -56,11 +56,11 @@ class Breakaway(ReadOnlyState):
     Attributes:
         stiffness: K of :func:`stuck_stiffness`, which smaller loads measure.
         direction: Unit direction u (3,) of the force, base axes.
-        load: The breakaway load [N], more than the wrench of ``stiffness``; inf if no cable ever
-            slides, as the force moves no joint; 0 without friction.
+        load: The breakaway load [N], in addition to the wrench of ``stiffness``; inf if no cable
+            ever slides, as the force moves no joint; 0 without friction.
         first_order: The breakaway load in closed form [N], to first order in the load.
         hole_loads: First-order load at which each hole begins to slide (P,) [N]; inf where it never
-            begins to, also because the hole cannot stick.
+            does, or where the hole cannot stick.
         cable: Name of the cable that slides first; None if the load is 0 or inf.
         site: Number of the hole among the sites of ``cable``, from 1; None if ``cable`` is.
         link: Name of the link of the hole; None if ``cable`` is.
@@ -191,7 +191,10 @@ def _reached(K: Stiffness, u: Array, motion: Array) -> tuple[float, int]:
 
 
 def _first(pose: Posture, T: Array, growth: Array, motion: Array) -> tuple[float, int]:
-    """Find the least load [N], and the hole, at which T + load·growth has the ratio exp(μ φ)."""
+    """Find the least load [N] at which the tensions T + load · growth reach a friction bound.
+
+    Returns the load and its hole, where the ratio of the two tensions is exp(μ φ).
+    """
     chains, wrap = pose.segments.chains, pose.segments.wrap
     ratio = np.exp(chains.friction * wrap)
     turning = T[chains.hole] * chains.friction * (pose.segments.wrap_jacobian @ motion)

@@ -141,7 +141,10 @@ class ChainProblem:
         )
 
     def stored(self, natural: Array, tension: Array) -> float:
-        """Compute the energy [J] of segments and series springs from the lower bounds of laws."""
+        """Compute the stored energy [J] of segments and series springs.
+
+        It is zero where each wire is at the lower bound of its law and each spring at rest.
+        """
         spring = self._spring @ (tension**2 - self._rest**2) / 2.0
         return float(natural @ self._energy(tension) + spring)
 

@@ -17,11 +17,12 @@ _NEAR = 1e-9
 class Neighbourhood:
     """States near a reference: ``room`` times the set of those at rest to first order.
 
-    With the relative changes y_j = ΔT_j/F − ȳ of a cable about their mean over its wire, the wire
-    gives F ȳ = k Σ_j g_j·δ, with k the stiffness of the whole cable. δ is the change of the joint
-    angles and g_j the gradient of the length of segment j. Equilibrium becomes K_θ δ = −Σ_j F y_j
-    g_j with the frictionless K_θ. At each hole y changes by any amount within ±μ φ, so a linear
-    form in y is largest with +μ φ or −μ φ at each hole: a closed form.
+    δ is the change of the joint angles, ΔT_j that of the tension of segment j, and g_j the gradient
+    of its length. In a cable of tension F, write ΔT_j = F (y_j + ȳ), with ȳ the mean of ΔT_j/F,
+    weighted with the compliances of the segments. If the motor is locked, F ȳ = k Σ_j g_j·δ, with k
+    the stiffness of the whole cable. Equilibrium becomes K_θ δ = −Σ_j F y_j g_j with the
+    frictionless K_θ. From segment to segment, y changes by any amount within ±μ φ of the hole. A
+    linear function of y is therefore largest with +μ φ or −μ φ at each hole: a closed form.
 
     Attributes:
         joints: Largest |δ| (nv,) [rad].
@@ -51,12 +52,12 @@ class Neighbourhood:
         self._set_tensions(apart, F[cable])
 
     def _set_tensions(self, apart: Array, F: Array) -> None:
-        """Set the bounds of tensions from bounds ``apart`` (S,) of |ln T/F|; rises exceed falls."""
+        """Set the largest rises and falls of tensions from bounds ``apart`` (S,) of |ln T/F|."""
         self.tensions = np.maximum(np.expm1(apart) * F, _NEAR)
         self.falls = np.minimum(np.maximum(apart * F, _NEAR), F)
 
     def still(self, K: Stiffness) -> Self:
-        """Return the states with exactly the angles of the reference: |ln T/F| ≤ Σ μ φ."""
+        """Return the states with exactly the joint angles of the reference: |ln T/F| ≤ Σ μ φ."""
         segments = K.posture.segments
         chains, grip = segments.chains, np.zeros(len(segments.lengths))
         grip[chains.hole] = chains.friction * segments.wrap

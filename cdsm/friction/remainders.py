@@ -31,15 +31,16 @@ _ITERATIONS = 30
 class Remainders:
     """Bounds of the remainders of Taylor expansions in the neighbourhood |δ| ≤ ρ.
 
-    A prismatic joint counts as a rotation by ρ/r with the lever r, which moves points as far.
+    A prismatic joint counts as a rotation by ρ/r with the lever r, which moves points as far. Each
+    bound is the largest difference between a quantity and its expansion.
 
     Attributes:
-        length: Of the length of each segment, from its second-order expansion (S,) [m].
-        gradient: Of the gradient ∂l/∂θ of each length, from its tangent (S, nv) [m/rad].
-        turn: Of each wrap angle, from a constant (P,) [rad].
-        wrap: Of each wrap angle, from its tangent (P,) [rad]; inf where the angle may be zero.
-        tip: Of the displacement of the tip, from its third-order expansion [m].
-        body: Of the torques of weight and wrench, from their second-order expansions (nv,) [N m].
+        length: Length of each segment, expanded to second order (S,) [m].
+        gradient: Gradient ∂l/∂θ of each length, expanded to first order (S, nv) [m/rad].
+        turn: Each wrap angle, taken as constant (P,) [rad].
+        wrap: Each wrap angle, expanded to first order (P,) [rad]; inf where it may be zero.
+        tip: Displacement of the tip, expanded to third order [m].
+        body: Torques of weight and wrench, expanded to second order (nv,) [N m].
     """
 
     def __init__(self, K: Stiffness, within: Array) -> None:

@@ -49,7 +49,11 @@ _CELLS = 8192
 
 
 class End(NamedTuple):
-    """Largest value over the polyhedron, solved and proved; largest |variable| over its bound."""
+    """Maximum of a linear program over the polyhedron.
+
+    ``value`` is the solver's answer, ``bound`` the proved upper bound, and ``reach`` the largest
+    |variable| of the solution, where 1 is the border of the neighbourhood.
+    """
 
     value: float
     bound: float

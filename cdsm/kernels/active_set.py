@@ -4,17 +4,20 @@
 
 It runs where the guess of :mod:`cdsm.kernels.serpentine_guess` fails. It starts at the optimum
 without bounds. It adds one violated bound after the other, and drops a bound whose multiplier would
-change its sign. It ends at the optimum, or at a proof of infeasibility. Each step builds and solves
-a new system, so that errors do not accumulate, with the matrix
+change its sign. It ends at the optimum, or at a proof of infeasibility. A cable is free if it is at
+no bound. Each step builds and solves a new system, so that errors do not accumulate. Its matrix is
 
-    S = Σ J_cᵀ J_c  over the free cables, which are at no bound; J_c is row c of J_L.
+    S = Σ J_cᵀ J_c over the free cables c, with J_c row c of J_L.
 
 The caller verifies the optimum or the proof.
 
 The alternative is the solver DAQP, with one Python call per posture and a linear program to prove
-infeasibility. Time per posture with this search and without it: 7 and 75 µs if 18 of 400 postures
-need the search (virtual prototype up to nine tenths of its joint limits); 16 and 138 µs, 10 and
-518 µs if all postures need it (cables from any link to any link; 14 cables, 6 joints).
+infeasibility. Mean time per posture of batches, with this search and with DAQP in its place:
+
+    virtual prototype up to nine tenths of its joint limits,
+    18 of 400 postures need the search                              7 µs,  75 µs
+    arms whose cables join any two links, all postures need it     16 µs, 138 µs
+    14 cables, 6 joints, all postures need it                      10 µs, 518 µs
 """
 
 from __future__ import annotations
@@ -89,7 +92,8 @@ def search(J: Array, b: Array, low: Array, high: Array, state: State) -> int:
     J is J_L (C, nv), b the torque to balance (nv,), ``low`` and ``high`` are the bounds (C,).
 
     Returns:
-        FOUND, IMPOSSIBLE or LOST.
+        FOUND, IMPOSSIBLE, or LOST if rounding or too many steps end the search. If IMPOSSIBLE, y
+        (nv,) of the state is the proof of infeasibility.
     """
     F, y, side, multiplier, _, _, w = state
     for c in range(F.shape[0]):
@@ -138,7 +142,7 @@ def search(J: Array, b: Array, low: Array, high: Array, state: State) -> int:
 
 @inner
 def _most_violated(F: Array, low: Array, high: Array, side: Indices) -> tuple[int, float]:
-    """Find the free cable farthest outside its bounds or −1; 1 if it is below them, else −1."""
+    """Return the free cable farthest outside its bounds, or −1; and 1 if below them, else −1."""
     p, sign, worst = -1, 0.0, 0.0
     for c in range(F.shape[0]):
         worst = max(worst, _ROUNDING * abs(F[c]))
@@ -152,7 +156,10 @@ def _most_violated(F: Array, low: Array, high: Array, side: Indices) -> tuple[in
 
 @inner
 def _solve_for_sides(J: Array, b: Array, low: Array, high: Array, state: State) -> bool:
-    """Fill F (bounds, and the least free tensions that balance) and y; False if S is singular."""
+    """Fill F and y: cables with a side get that bound, free ones the least tensions that balance.
+
+    Returns False if S is singular.
+    """
     F, y, side, _, _, _, w = state
     for i in range(b.shape[0]):
         w[i] = b[i]

@@ -79,7 +79,10 @@ def _surplus(wire: Wire, j: int, T: float) -> tuple[float, float]:
 
 @inner
 def _next(T: float, ratio: float, best: float) -> float:
-    """Return the tension nearest to ``best`` that friction allows in the segment after T."""
+    """Return the tension nearest to ``best`` that friction allows: T/ratio to T · ratio.
+
+    T is the tension of the segment before, and ``ratio`` ρ of the hole between the two.
+    """
     return min(max(best, T / ratio), T * ratio)
 
 
@@ -87,7 +90,11 @@ def _next(T: float, ratio: float, best: float) -> float:
 def _slope(
     wire: Wire, best: Array, j: int, last: int, tension: float
 ) -> tuple[float, float, float]:
-    """Compute V_j′ [m] at a tension, ∂V_j′/∂T [m/N], and the natural length of its segments [m]."""
+    """Compute V_j′ [m] at a tension of segment j, ∂V_j′/∂T [m/N], and a sum of natural lengths [m].
+
+    ``best`` (S,) has exp(y*_i) of the segments i after j [N]; ``last`` is the cable's last segment.
+    The sum is over the segments up to the next hole that sticks; rounding is judged by it.
+    """
     total, rise = _surplus(wire, j, tension)
     T, size = tension, abs(wire.natural[j])
     for i in range(j + 1, last + 1):
@@ -103,7 +110,10 @@ def _slope(
 
 @inner
 def _root(wire: Wire, best: Array, j: int, last: int, near: float) -> float:
-    """Find the tension exp(y*_j), starting at ``near``; zero if V_j′ ≥ 0 at all tensions."""
+    """Find the tension exp(y*_j) [N], starting at ``near``; zero if V_j′ ≥ 0 at all tensions.
+
+    ``best`` and ``last`` are those of :func:`_slope`.
+    """
     if _slope(wire, best, j, last, 0.0)[0] >= 0.0:
         return 0.0
     low, high, T = 0.0, math.inf, near if near > 0.0 else 1.0

@@ -209,7 +209,10 @@ def single_tension_stiffness(
     slot: Indices,
     slots: int,
 ) -> Array:
-    """Compute Σ T_j ∂²l_j/∂θ² (slots, nv, nv) over the segments j of each cable, at one posture."""
+    """Compute Σ T_j ∂²l_j/∂θ² (slots, nv, nv) [N m/rad] of one posture over the segments of a slot.
+
+    ``slot`` (S,) is the slot of each segment, such as its cable. Arrays have no axis of postures.
+    """
     nv = origin.shape[0] - 1
     total, weight = np.zeros((slots, nv, nv, 1)), tension.reshape(tension.shape[0], 1)
     frames = one_frames(origin, axis, slide, site)

@@ -90,7 +90,10 @@ def _radius(p: Array, q: Array, centre: Array, axis: Array, t: float) -> float:
 def _off(
     p: Array, q: Array, centre: Array, axis: Array, radius: float, z0: float, z1: float, t: float
 ) -> float:
-    """Compute the squared distance from the point p + t (q − p) to a disk."""
+    """Compute the squared distance [m²] from the point p + t (q − p) to a disk.
+
+    z0 and z1 are the heights of p and q above the plane of the disk [m].
+    """
     z = z0 + t * (z1 - z0)
     out = max(_radius(p, q, centre, axis, t) - radius, 0.0)
     return float(z * z + out * out)
@@ -98,7 +101,10 @@ def _off(
 
 @inner
 def _sphere_distance(p: Array, q: Array, r: Array, s: Array) -> float:
-    """Return the distance between spheres around two segments, a lower bound of theirs."""
+    """Return the distance of the spheres whose diameters are the segments pq and rs [m].
+
+    It is a lower bound of the distance of the segments, and negative where the spheres overlap.
+    """
     first = second = between = 0.0
     for i in range(3):
         x, y, way = q[i] - p[i], s[i] - r[i], p[i] + q[i] - r[i] - s[i]

@@ -31,10 +31,10 @@ _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 
 class _Disjoint(Compiler):
-    """Compile kernels whose array arguments do not overlap where they are written.
+    """Compile kernels that never write to an array which overlaps another argument.
 
-    LLVM then needs no loop for the case that they do: kernels compile in two thirds of the time,
-    and take three quarters of it to run.
+    LLVM then omits the loops for overlapping arrays. Kernels compile in two thirds of the time and
+    run in three quarters of it.
     """
 
     def define_pipelines(self) -> Any:
@@ -159,7 +159,10 @@ def _patient(function: _Function) -> _Function:
             spent += time.thread_time() - start
 
     def choose(*arguments: Any) -> Callable[..., Any]:
-        """Return what numba calls when no kernel is compiled for these types of arguments."""
+        """Return the function that runs this call: Python, or the kernel once loaded or compiled.
+
+        numba asks for it when no kernel is compiled for these types of arguments.
+        """
         start = time.thread_time()
         wide = (dict(zip(names, arguments, strict=False)).get("width") or 1) > WIDTH
         seconds, numbers = _KEPT if is_kept() else _NEW

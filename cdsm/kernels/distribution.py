@@ -62,10 +62,11 @@ def distribute(
     tension: Array,
     width: Width,
 ) -> None:
-    """Guess the least tensions (C, W); right where ``certificate`` is optimal and no block failed.
+    """Fill the tensions (C, W) with a guess of the least ones, and verify it.
 
-    J is J_L (C, nv, W), with moment arms of rounding set to zero; b is the torque to balance (nv,
-    W); ``low`` and ``high`` are the bounds (C, W).
+    The guess is the optimum where ``certificate.optimal`` is 1 and ``guess.failed`` is −1. J is J_L
+    (C, nv, W), with moment arms of rounding set to zero; b is the torque to balance (nv, W);
+    ``low`` and ``high`` are the bounds (C, W).
     """
     guess_tensions(blocks, J, b, low, high, guess, width)
     set_multipliers(blocks, J, guess.F, guess, np.intp(0), width)
@@ -137,7 +138,7 @@ def search_tensions(
 def _search_one(
     blocks: Blocks, rows: Array, torque: Array, lowest: Array, highest: Array, tension: Array
 ) -> int:
-    """Fill the tensions (C,) of one posture and return the outcome."""
+    """Fill the tensions (C,) of one posture and return the outcome; ``rows`` is J_L (C, nv)."""
     count, nv = rows.shape
     J, b = rows.reshape(count, nv, 1), torque.reshape(nv, 1)
     low, high = lowest.reshape(count, 1), highest.reshape(count, 1)

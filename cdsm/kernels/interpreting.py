@@ -27,14 +27,14 @@ from numba.core.dispatcher import Dispatcher
 
 
 def python_kernel(function: FunctionType, wide: bool) -> Callable[..., Any]:
-    """Return a kernel for Python, of one posture or of a wide block; it calls others likewise."""
+    """Return a kernel that Python runs, also those it calls, for one posture or a wide block."""
     kernel: Callable[..., Any] = _names(function.__module__, wide)[function.__name__]
     return kernel
 
 
 @cache
 def _names(module: str, wide: bool) -> dict[str, Any]:
-    """Return the names of a module with kernels for Python; no square root raises an error."""
+    """Return the names that a module defines, with its kernels as functions that Python runs."""
     home = sys.modules[module]
     names: dict[str, Any] = {**vars(home), **_OPERATIONS}
     own = set()
@@ -99,7 +99,7 @@ def _found(node: ast.AST) -> set[str]:
 
 
 class _Loops(ast.NodeTransformer):
-    """Replaces each loop over postures, unless it must run for one after the other."""
+    """Replaces each loop over postures by operations on arrays, unless its order matters."""
 
     def visit_FunctionDef(self, node: ast.FunctionDef) -> ast.AST:
         node.decorator_list = []
@@ -133,7 +133,7 @@ class _Operations(ast.NodeTransformer):
         self.arrays = arrays
 
     def line(self, node: ast.stmt) -> ast.stmt | None:
-        """Return a line of a loop for all postures; None if that needs one after the other."""
+        """Return a line of a loop for all postures at once; None if it must run one by one."""
         arrays = self.arrays or set()
         match node:
             case ast.AugAssign(target=ast.Subscript()):
@@ -160,7 +160,7 @@ class _Operations(ast.NodeTransformer):
         return node
 
     def visit_Assign(self, node: ast.Assign) -> ast.AST:
-        """Copy what gets a name: numpy would return a part of an array, which may change later."""
+        """Copy an array that is assigned to a name: numpy's view would change with the array."""
         self.generic_visit(node)
         if not isinstance(node.targets[0], ast.Subscript):
             copies = [

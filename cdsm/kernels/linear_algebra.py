@@ -139,10 +139,10 @@ def smallest_eigenvalue(A: Array, scratch: Array, x: Array, width: Width) -> Non
 def _set_derivatives(
     d: Array, e: Array, x: Array, sums: Array, scratch: Array, width: Width
 ) -> None:
-    """Fill the smallest ratio g of the leading minors of T − x, and the sums G and H, (W,) each.
+    """Fill the rows of ``sums`` (3, W): the least ratio g of leading minors of T − x, and G and H.
 
-    With the eigenvalues λ of T, G = Σ 1/(λ − x) and H = Σ 1/(λ − x)²: logarithmic derivatives of
-    the last minor. T has the diagonal d and the off-diagonal e, (n, W) each.
+    Each g is a leading minor over the minor before it. With the eigenvalues λ of T, G = Σ 1/(λ − x)
+    and H = Σ 1/(λ − x)². T has the diagonal d and the off-diagonal e, (n, W) each.
     """
     least, G, H = sums[0], sums[1], sums[2]
     # inverse, slope and bend are 1/g, g′/g and g″/g of the row above

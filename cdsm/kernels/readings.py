@@ -136,9 +136,10 @@ def _set_product(K: Array, right: Array, image: Array, width: Width) -> None:
 def solve(
     K: Array, parts: Array, system: Array, status: Indices, scale: Array, peak: Array, width: Width
 ) -> int:
-    """Replace the columns B behind the first nv + 1 of the system by K_θ⁻¹ B.
+    """Replace the columns B of the system by K_θ⁻¹ B.
 
-    K is K_θ and ``parts`` is P, (B, nv, nv, W). ``scale`` becomes D^-½ (B, nv, W). ``peak`` (B, W)
+    The system is (B, nv, nv + 1 + n, W): scratch for K_θ, a probe torque, then the n columns B. K
+    is K_θ and ``parts`` is P, (B, nv, nv, W). ``scale`` becomes D^-½ (B, nv, W). ``peak`` (B, W)
     becomes the largest entry of D^-½ P D^-½ where K_θ may be singular, else 0. Returns the number
     of such postures.
     """
@@ -158,7 +159,7 @@ def solve(
 
 @inner
 def _set_probe(system: Array, width: Width) -> None:
-    """Fill column nv with an irregular torque from 1 to 2 that excites almost every motion."""
+    """Fill column nv with an irregular torque, from 1 to 2, that excites almost every motion."""
     nv = np.uint64(system.shape[0])
     for i in upwards(0, nv):
         probe = 1.0 + (0.6180339887498949 * np.intp(i)) % 1.0
@@ -192,7 +193,7 @@ def _equilibrate(
 
 @inner
 def _rescale(scale: Array, system: Array, moved: Array, width: Width) -> None:
-    """Scale the solutions back to K_θ⁻¹ B; fill the largest motion (W,) under the probe."""
+    """Scale the solutions back to K_θ⁻¹ B; fill ``moved`` (W,), the largest motion by the probe."""
     nv = np.uint64(system.shape[0])
     for w in lanes(width):
         moved[w] = 0.0
@@ -206,9 +207,9 @@ def _rescale(scale: Array, system: Array, moved: Array, width: Width) -> None:
 
 @threaded
 def set_torques(JX: Array, directions: Array, system: Array, along: Array, width: Width) -> None:
-    """Fill the columns of J_vᵀu from nv + 1 on; ``along`` (B, D, W) is inf if u moves no joint.
+    """Fill the columns of the system from nv + 1 on with J_vᵀ u; ``directions`` are unit u (D, 3).
 
-    Elsewhere it is NaN. ``directions`` are unit vectors u (D, 3).
+    ``along`` (B, D, W) becomes inf where a force along u has no torque at any joint, NaN elsewhere.
     """
     scratch = np.empty((2, JX.shape[3]))
     for b in range(JX.shape[0]):
@@ -271,7 +272,10 @@ def _set_compliance(
 
 @threaded
 def set_compliances(JX: Array, system: Array, first: int, out: Array, width: Width) -> None:
-    """Fill J_X K_θ⁻¹ J_Xᵀ (B, 6, 6, W); K_θ⁻¹ J_Xᵀ are six columns of the system."""
+    """Fill J_X K_θ⁻¹ J_Xᵀ (B, 6, 6, W).
+
+    Six columns of the system, from ``first`` on, are K_θ⁻¹ J_Xᵀ.
+    """
     for b in range(JX.shape[0]):
         _project(JX[b], system[b], first, out[b], width)
 
@@ -326,7 +330,7 @@ def _congruence(
 ) -> None:
     """Fill out (3, 3, W) with O X Oᵀ, or NaN where the tip is immobile.
 
-    X is three columns of the middle, and O is the factor.
+    O is ``factor``; X are the three columns of ``middle`` from ``first`` on.
     """
     for i in upwards(0, factor.shape[0]):
         for j in upwards(0, factor.shape[0]):

@@ -111,8 +111,8 @@ def _add_cable(
 ) -> tuple[float, float]:
     """Add the derivatives of F L̈ + k L̇² + p L̇ of one cable; return L̈ and L̇.
 
-    ``point`` (N, 3, 3) are x, ẋ and ẍ of each site, ``weight`` (N, 3, 3) X, V and A. ``slope`` is
-    ∂k/∂L.
+    ``pull`` is the p of :func:`single_gradient`, and ``slope`` is ∂k/∂L. ``point`` (N, 3, 3) are x,
+    ẋ and ẍ of each site, ``weight`` (N, 3, 3) X, V and A.
     """
     rate = bend = 0.0
     u, v, w = np.empty(3), np.empty(3), np.empty(3)
@@ -176,10 +176,12 @@ def _by_joint(
     tip: Index,
     placement: Array,
 ) -> float:
-    """Fill ∂Ψ/∂(origin of joint i) (3,) in base axes; return ∂Ψ/∂q_i.
+    """Fill ``placement`` (3,) with ∂Ψ/∂(origin of joint i) in base axes; return ∂Ψ/∂q_i.
 
-    ``beyond`` (nv+1,) marks the rows that joint i moves. ``spin`` and ``spin_rate`` (3,) are the
-    derivatives with respect to ω and ω̇ of the tip.
+    ``before`` is the row of its parent, ``beyond`` (nv+1,) marks the rows that joint i moves.
+    ``frames`` are origin, axis and slide of all joints; ``row``, ``point`` and ``weight`` the row,
+    motion, and X, V and A of all points. ``spin`` and ``spin_rate`` (3,) are the derivatives with
+    respect to ω and ω̇ of the tip.
     """
     origin, axis, slide = frames
     turning, rate, velocity, acceleration = motion

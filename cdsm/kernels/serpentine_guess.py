@@ -1,12 +1,13 @@
 """Guess of the tensions of a serpentine arm, or a proof that no tensions balance it.
 
 The cables that end at a joint turn this joint and the joints before it, but no joint behind it. So
-J_Lᵀ is block triangular. From the last joint to the first, one cable per axis (at most two) is
-raised above its lower bound to balance the joint. From the first joint to the last, the multipliers
-follow from these cables. Mostly this guess is the optimum. With three cables for each universal
-joint, it was the optimum in all of 9000 random postures up to half the joint limits, and in three
-of four postures up to nine tenths of the limits. A guess takes 0.3 to 1.5 µs, a search by
-:mod:`cdsm.kernels.active_set` 9 to 16 µs.
+J_Lᵀ is block triangular; a block is the axes of one joint (at most two) and the cables that end
+there. From the last joint to the first, one cable per axis is raised above its lower bound to
+balance the joint. From the first joint to the last, the multipliers follow from these cables.
+Mostly this guess is the optimum. With three cables for each universal joint, it was the optimum in
+all of 9000 random postures up to half the joint limits, and in three of four postures up to nine
+tenths of the limits. A guess takes 0.3 to 1.5 µs, a search by :mod:`cdsm.kernels.active_set` 9 to
+16 µs.
 """
 
 from __future__ import annotations
@@ -43,7 +44,7 @@ class Blocks(NamedTuple):
 
 
 def find_blocks(routing: Routing, nv: int) -> Blocks:
-    """Find the blocks of an arm with nv joint coordinates."""
+    """Find the blocks of an arm with nv joint coordinates; none if J_Lᵀ is not block triangular."""
     turned: list[set[int]] = [set() for _ in routing.fixed]
     ends = routing.segment[1:, 3]
     for (cable, _, _, first, _), end in zip(routing.segment[:-1], ends, strict=True):

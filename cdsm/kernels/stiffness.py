@@ -79,9 +79,10 @@ def set_load_stiffness(
 ) -> None:
     """Fill −∂(J_Xᵀ W)/∂θ (nv, nv, W) of constant wrenches W (6, W): row torque, column angle.
 
-    ``tip_joints`` are the joints that move the tip, base first. Of two joints, a is the earlier and
-    b the later: ∂v_i/∂θ_j = z_a × v_b. ∂z_i/∂θ_j = z_j × z_i if joint j is before joint i, else 0.
-    Entries of other joints stay as they are. ``scratch`` is (6, W).
+    Column i of J_X is v_i above z_i. ∂v_i/∂θ_j = z_a × v_b, where a is the earlier and b the later
+    of the joints i and j. ∂z_i/∂θ_j = z_j × z_i if joint j is before joint i, else 0.
+    ``tip_joints`` are the joints that move the tip, base first. Entries of other joints stay as
+    they are. ``scratch`` is (6, W).
     """
     J = jacobian
     for s in upwards(0, tip_joints.shape[0]):

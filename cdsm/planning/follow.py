@@ -48,8 +48,8 @@ class Follower:
         that they lead to the other tensions.
 
         Raises:
-            UnreachableStiffness: No tensions hit the single target at any rate.
-            SingularStiffness: No admissible tensions make the arm stable, at any rate.
+            UnreachableStiffness: No tensions hit the single target, even with an unlimited rate.
+            SingularStiffness: No admissible tensions make the arm stable, even with that.
         """
         region = sample.model.region
         last = self.planned[-1] if self.planned else None
@@ -88,7 +88,11 @@ class Follower:
         return replace(sample, F=region.tension(found[1].evaluation.F).values)
 
     def _from_scratch(self, sample: Sample) -> Sample | None:
-        """Find the least tensions at any rate; return None if several targets are not hit."""
+        """Find the least tensions with an unlimited rate.
+
+        Returns None if several targets cannot be hit together; one target raises
+        UnreachableStiffness.
+        """
         found = Planner(sample.model, sample.constraints, self.starts, self.seed).least()
         if found is None:
             return None

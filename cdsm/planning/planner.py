@@ -53,7 +53,11 @@ class Planner:
         self._ends: list[ConstraintValues] = []
 
     def least(self) -> ConstraintValues | None:
-        """Return the least tensions that hit all targets; None, or for one UnreachableStiffness."""
+        """Return the least tensions that hit all targets.
+
+        If there are none, returns None for several targets, and raises UnreachableStiffness for
+        one.
+        """
         found = self._best(self._starts())
         if found is None and self.constraints.single is not None:
             return self._within_range(*self.constraints.single)
@@ -143,7 +147,10 @@ class Planner:
     def _crossings(
         self, hub: Evaluation, others: list[Evaluation], precision: float = 1e-2
     ) -> list[Evaluation]:
-        """Find stable points between a hub and others that hit the single target, least first."""
+        """Find stable points that hit the single target, on lines from ``hub`` to the other points.
+
+        The points are sorted by effort. ``precision`` is that of the position on the line.
+        """
         at_hub, guesses = self._miss(hub), []
         for other in others:
             at_other, way = self._miss(other), other.F - hub.F
@@ -163,7 +170,7 @@ class Planner:
         return sorted(stable, key=lambda point: float(point.F @ point.F))
 
     def _bridges(self, seen: list[ConstraintValues]) -> list[Evaluation]:
-        """Find such points between the points nearest to the target, below and above it."""
+        """Find stable points that hit the target, between the nearest points below and above it."""
         order = sorted(seen, key=lambda place: float(abs(place.values[0])))
         below = [place.evaluation for place in order if place.values[0] < 0.0][:_SIDES]
         above = [place.evaluation for place in order if place.values[0] > 0.0][:_SIDES]

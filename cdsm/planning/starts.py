@@ -65,7 +65,7 @@ class StartPoints:
         self.points = [*self._known, *(point for point in drawn[known:] if point is not None)]
 
     def between(self, count: int) -> Iterator[Evaluation]:
-        """Return up to ``count`` random stable points between the corners of the cables."""
+        """Return up to ``count`` random stable points between the corners found for the cables."""
         shares = np.random.default_rng(self._seed).dirichlet(np.ones(len(self._known)), count)
         for F in shares @ np.array([point.F for point in self._known]):
             point = self.anchor.backtracked(F)

@@ -121,7 +121,7 @@ def saturation(
 
 
 def _stable(at: StiffnessAt, low: float, high: float) -> tuple[float, float]:
-    """Return the first stable range (low, high) of lower bounds [N], without its bounds."""
+    """Return the first stable range (low, high) of lower bounds [N], just inside where it buckles."""
     places, margins, stable = stable_ranges(at, low, high)
     if not stable:
         best = at(float(places[int(margins.argmax())]))
@@ -137,7 +137,7 @@ def _stable(at: StiffnessAt, low: float, high: float) -> tuple[float, float]:
 
 
 def _kinks(at: StiffnessAt, places: Array) -> Array:
-    """Find the bounds [N], rising, between ``places`` [N] at which the slope is discontinuous.
+    """Find the lower bounds [N], rising, within ``places`` at which the slope is discontinuous.
 
     There a cable reaches or leaves a bound, or passes a kink of its rigidity. If the same cables
     are at their bounds at both ends of an interval, F*(b) is linear in the interval.

@@ -34,7 +34,7 @@ StiffnessAt = Callable[[float], Stiffness]
 
 
 def failure_at(at: StiffnessAt, place: float) -> Limit:
-    """Return why the arm fails at a place; ``"none"`` if it is balanced and stable."""
+    """Return why the arm fails at a lower bound [N] or load factor; ``"none"`` if it does not."""
     try:
         return "none" if at(place).is_stable else "buckling"
     except (InfeasibleTension, SolverError):  # a solver may fail on the very edge
@@ -44,12 +44,12 @@ def failure_at(at: StiffnessAt, place: float) -> Limit:
 
 
 def _balances(at: StiffnessAt, place: float) -> bool:
-    """Check that some tensions balance the arm within the domains of the elasticities."""
+    """Check whether tensions within all laws balance the arm, at a lower bound [N] or load factor."""
     return failure_at(at, place) in ("none", "buckling")
 
 
 def tension_domain(arm: Manipulator) -> tuple[float, float]:
-    """Return the range [N] within all maxima and the domains of position-controlled cables."""
+    """Return the tensions (low, high) [N] that all maxima and all position-controlled cables allow."""
     domains = [each.elasticity.domain for each in arm.cables if each.control == "position"]
     low = max((each.low for each in domains), default=0.0) * _ABOVE
     ends = [*(each.high for each in domains), *(each.maximum for each in arm.cables)]
@@ -100,7 +100,10 @@ def scan_end(at: StiffnessAt, low: float, highest: float) -> float:
 
 
 def log_samples(low: float, high: float) -> Array:
-    """Return bounds (N,) [N] from low to high, evenly spaced on a log scale of four decades."""
+    """Return bounds (N,) [N] from low to high, evenly spaced on a log scale.
+
+    The scale has at most four decades; below it there is only ``low``.
+    """
     if high <= low:
         return np.array([low])
     return np.unique([low, *np.geomspace(max(low, 1e-4 * high), high, SAMPLES)])
@@ -127,7 +130,7 @@ def stable_ranges(
 
 
 def sign_change(f: Callable[[float], float], a: float, b: float) -> float:
-    """Find the place between a and b where a function changes its sign."""
+    """Find the lower bound or load factor between a and b at which a function changes its sign."""
     from scipy.optimize import brentq  # slow to import
 
     root: float = brentq(lambda x: f(float(x)), a, b, xtol=1e-300, rtol=PRECISION)

@@ -104,7 +104,10 @@ class LoadingPath:
         return np.array([self.rests[i].state.pose.tip[:3, 3] for i in self.last])
 
     def motion(self, i: int, load: int, part: float) -> Array | None:
-        """Return the motion (nv,) [rad] to rest i; None if it is at another part of the loads."""
+        """Return the joint motion (nv,) [rad] that led to rest i.
+
+        Returns None if rest i is not at this load and this part of the way to it.
+        """
         if i < len(self.rests) and self.rests[i][1:] == (load, part):
             return self.rests[i].state.motion
         return None

@@ -121,7 +121,10 @@ def require_domains(
     tension: Array,
     where: str = "at the equilibrium",
 ) -> None:
-    """Raise ElasticityRangeError if tensions (C,) [N] are outside the law of their group."""
+    """Raise ElasticityRangeError if tensions (C,) [N] are outside the domains of their laws.
+
+    ``groups`` are the laws, each with the indices of its cables; ``where`` begins the message.
+    """
     for law, of in groups:
         F = tension[of]
         outside = (law.domain.low * (1.0 - _BEYOND) > F) | (law.domain.high * (1.0 + _BEYOND) < F)

@@ -221,7 +221,11 @@ def _work(force: list[Array], way: list[Array]) -> float:
 
 
 def _dissipated(jump: list[Array], half: Array, other: Array) -> float:
-    """Integrate the differences of P at holes over the slips of both halves: terms ≥ 0 [J]."""
+    """Compute the dissipation [J] of a sub-step: the integral of P_{j+1} − P_j over the slip s_j.
+
+    ``jump`` are the differences of P at start, middle and end; ``half`` and ``other`` are the slips
+    in the two halves. Every term is ≥ 0.
+    """
     start, middle, end = jump
     whole, again = half + other, half * other > 0.0
     simpson = start * (4.0 * half - whole) + 4.0 * middle * whole + end * (3.0 * whole - 4.0 * half)

@@ -189,7 +189,10 @@ def _descend(
     radius: float,
     sign: float,
 ) -> Array:
-    """Return joint angles (nv,) that decrease the quadratic model; a joint stays at its stop."""
+    """Return joint angles (nv,) that decrease the quadratic model; a joint stays at its stop.
+
+    ``sign`` is that of :func:`_step`.
+    """
     (lower, upper), q, indices, spectrum = stops, state.q.copy(), free.indices, free.spectrum
     while indices.size and radius > 0.0:
         r = torque + state.stiffness @ (q - state.q)
@@ -211,7 +214,10 @@ def _descend(
 def _step(
     torque: Array, stiffness: Array, values: Array, vectors: Array, radius: float, sign: float
 ) -> Array:
-    """Minimize r·p + ½ pᵀKp with |p| ≤ radius; if r = 0, ``sign`` chooses between p and −p."""
+    """Minimize r·p + ½ pᵀKp with |p| ≤ radius, given the eigenvalues and eigenvectors of K.
+
+    If r = 0, both p and −p are minima, and ``sign`` chooses one.
+    """
     along = vectors.T @ torque
     size, largest = float(np.linalg.norm(along)), float(abs(values).max())
     if size == 0.0 and values[0] >= 0.0:

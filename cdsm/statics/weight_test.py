@@ -264,7 +264,7 @@ def weight_test(
 
 
 def _with_friction(test: WeightTest, tension: Tension | ArrayLike) -> WeightTest:
-    """Return the test with friction, hung in the same steps."""
+    """Return the test with the states under friction added, loaded in the same steps."""
     before, parts = test.without, test.loads / np.linalg.norm(test.force)
     added = np.append(test.force, np.zeros(3))
     path = before.wrench + np.append(0.0, parts)[:, None] * added
