@@ -44,12 +44,12 @@ def failure_at(at: StiffnessAt, place: float) -> Limit:
 
 
 def _balances(at: StiffnessAt, place: float) -> bool:
-    """Check whether tensions within all laws balance the arm, at a lower bound [N] or load factor."""
+    """Check whether some tensions within all laws balance the arm at a bound [N] or load factor."""
     return failure_at(at, place) in ("none", "buckling")
 
 
 def tension_domain(arm: Manipulator) -> tuple[float, float]:
-    """Return the tensions (low, high) [N] that all maxima and all position-controlled cables allow."""
+    """Return the range of tension [N] that all maxima and position-controlled cables allow."""
     domains = [each.elasticity.domain for each in arm.cables if each.control == "position"]
     low = max((each.low for each in domains), default=0.0) * _ABOVE
     ends = [*(each.high for each in domains), *(each.maximum for each in arm.cables)]
