@@ -188,7 +188,11 @@ class Evaluator:
         out: Array,
         blocks: int,
     ) -> Kept:
-        """Fill all quantities but the readings; return the arrays that the readings need."""
+        """Fill all quantities up to K_θ; return the arrays from which the readings follow.
+
+        Readings are the quantities that are derived from K_θ, such as the margin and the
+        compliance.
+        """
         given = low = high = rigidity = wire = self._nothing
         model = self._arm._model
         if tension is not None:
@@ -232,7 +236,10 @@ class Evaluator:
         return Kept(K, parts, JX, stuck_K, stuck_parts, wire)
 
     def _read(self, kept: Kept, rows: Indices, wanted: Indices, found: Codes, out: Array) -> None:
-        """Fill the wanted readings, and the status of postures in which one does not exist."""
+        """Fill the wanted readings, which are the quantities derived from K_θ.
+
+        Where one does not exist, also set the status of the posture.
+        """
         status = np.full(kept.jacobian.shape[0] * self._block, UNREAD)
         status[: found.size][found == OK] = READ
         stuck = np.isin(wanted, STUCK)

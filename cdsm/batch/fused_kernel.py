@@ -283,7 +283,7 @@ def _set_rigidity(constant: Array, linear: Array, F: Array, rigidity: Array, wid
 
 @inlined
 def _note(code: Indices, number: int, known: Indices, width: Width) -> None:
-    """Set ``known`` to number + 1 for postures that are OK: so many quantities are known."""
+    """Set ``known`` to number + 1 where the code is OK: quantities 0 to ``number`` are computed."""
     for w in lanes(width):
         if code[w] == OK:
             known[w] = number + 1

@@ -21,7 +21,10 @@ _MOST = 4096
 
 
 def kernel_arm(arm: Manipulator, check_limits: bool) -> tuple[Any, ...]:
-    """Return the first arguments of the kernel; without limits if they are not checked."""
+    """Return the arguments of :func:`evaluate_rows` that describe an arm.
+
+    The joint limits are infinite if they are not checked.
+    """
     model = arm._model
     lowest, highest = model.lowest, model.highest
     if not flag("check_limits", check_limits):

@@ -19,9 +19,9 @@ class Determination:
     """Linear analysis of which parameters measurements determine.
 
     Attributes:
-        names: Names of the parameters (P,).
-        jacobian: J = ∂r/∂p (n, P), r in standard deviations.
-        ranges: Range of each parameter (P,) that is of interest.
+        names: Names of the parameters p (P,).
+        jacobian: J = ∂r/∂p (n, P) with the residuals r in standard deviations.
+        ranges: Width of the range in which each parameter is sought (P,), such as its bounds.
     """
 
     names: tuple[str, ...]

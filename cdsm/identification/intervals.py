@@ -141,7 +141,7 @@ class Profiler:
         )
 
     def _follow(self, side: Side) -> tuple[list[_Knot], str]:
-        """Compute the knots on one side, from the optimum outward, and the reason why they end."""
+        """Compute the knots on one side, from the optimum outward; also return why they end."""
         knots = [self._knot(self.best, self.jacobian[:, self.i], self.jacobian[:, self.others])]
         for goal in (*self.exact, self.far):
             while knots[-1].rise < goal:
@@ -154,7 +154,7 @@ class Profiler:
         return knots, ""
 
     def _next(self, here: _Knot, side: Side, goal: float) -> _Knot | str:
-        """Compute a knot farther out, near where Δχ² reaches a goal; without one, the reason."""
+        """Compute a knot farther out, near where Δχ² reaches ``goal``, or why none exists."""
         u = float(here.point[self.i])
         room = 1.0 - u if side > 0 else u
         if room == 0.0:

@@ -70,8 +70,9 @@ class LeastSquares:
         residuals_of: Function from parameters by name to r (n,). May raise :class:`NoModelError`.
         count: Number n of residuals.
         bounds: (low, high) of each parameter.
-        beside: Faster function for differences, or None: from two near sets of parameters to r (n,)
-            at the second, exact to first order in their distance.
+        beside: Function (here, moved) → r (n,) at the parameters ``moved``, to first order in their
+            distance from ``here``. It is faster, and serves for differences. None: ``residuals_of``
+            serves.
     """
 
     def __init__(
@@ -89,7 +90,7 @@ class LeastSquares:
 
     @property
     def followed(self) -> bool:
-        """Whether residuals near a point come from ``beside``, exact to first order only."""
+        """Whether differences use ``beside``, whose residuals are exact to first order only."""
         return self._beside is not None
 
     def parameters(self, point: Array) -> dict[str, float]:

@@ -164,7 +164,11 @@ class Weights:
     def __init__(
         self, loop: WeightLoop, by_forces: Array | None = None, by_tensions: Array | None = None
     ) -> None:
-        """Weigh the errors of the readings, and of forces and tensions by the derivatives given."""
+        """Compute the weights from the standard deviations that the loop gives.
+
+        ``by_forces`` (m, n) and ``by_tensions`` (m, C) are the derivatives of the readings. Without
+        them, errors of the forces and tensions do not count.
+        """
         axes = len(loop.axes)
         covariance = loop.displacement_std**2 * np.eye(len(loop.forces) * axes)
         for slope, std in (by_forces, loop.force_std), (by_tensions, loop.tension_std):

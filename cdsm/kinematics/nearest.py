@@ -141,7 +141,10 @@ class _Search:
         return float(np.linalg.norm(self.residual.evaluate(q)[0]))
 
     def _nearest_step(self, q: Array, free: NDArray[np.bool_]) -> _NewtonStep:
-        """Compute a Newton step for min ½‖q − guess‖² with r = 0: to r = 0, then along it."""
+        """Compute a Newton step for min ½‖q − guess‖² subject to r = 0.
+
+        It has a part towards r = 0, and a part along it towards the guess.
+        """
         r, J = self.residual.evaluate(q)
         away = q - self.guess
         left, values, right = np.linalg.svd(J[:, free])
@@ -201,7 +204,10 @@ class _Search:
 
 
 def _downhill(H: Array, gradient: Array) -> tuple[Array, bool]:
-    """Return the step −|H|⁻¹ gradient, zero where H is flat, and whether H has no negative part."""
+    """Return the step −|H|⁻¹ gradient, and whether H has no negative eigenvalue.
+
+    The step is zero along eigenvectors whose eigenvalue is zero to rounding.
+    """
     values, vectors = np.linalg.eigh((H + H.T) / 2.0)
     flat = abs(values) <= _FLAT * abs(values).max(initial=0.0)
     rate = np.where(flat, math.inf, abs(values))

@@ -76,7 +76,7 @@ class TipResidual(Residual):
         return np.concatenate([offset, turn]), np.vstack([linear, turn_jacobian @ angular])
 
     def curvature(self, q: Array, weight: Array) -> Array:
-        """As in :class:`Residual`: ∂(J_Xᵀ W)/∂θ of a dead wrench W, from weight."""
+        """As in :class:`Residual`: ∂(J_Xᵀ W)/∂θ, with the wrench W made of the weights."""
         # at r = 0, ∂r/∂q is J_X up to the length
         wrench = np.zeros(6)
         wrench[: weight.size] = weight

@@ -72,7 +72,7 @@ def hull_of(loads: Loads) -> Hull | None:
 
 
 def _span(farthest: _Farthest, k: int) -> tuple[list[Array], list[Array], list[float]]:
-    """Return points that span the polytope, and facets in pairs where its width is zero."""
+    """Return points that span the polytope, and pairs of facets where its width is zero."""
     found: list[Array] = []
     normals: list[Array] = []
     offsets: list[float] = []

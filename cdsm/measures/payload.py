@@ -151,7 +151,10 @@ def _along(
     compliance: Array,
     allowed: float,
 ) -> dict[str, float]:
-    """Return the largest force [N] along u by tensions, and by an ``allowed`` deflection [m]."""
+    """Return the largest forces [N] along u: that of the tensions, and that of the deflection.
+
+    ``compliance`` is C_vv [m/N], and ``allowed`` the largest deflection [m].
+    """
     low, high = bounds_at(pose, minimum, maximum, worst_friction)
     return {
         "tension": largest_force(Loads.of(pose, low, high, W, u[:, None])),
@@ -192,9 +195,10 @@ def _ratio(allowed: float, compliance: float) -> float:
 def _until_unstable(
     K: Stiffness, u: Array, most: float, low: Array, high: Array, *, worst: bool
 ) -> tuple[Array, float, str]:
-    """Return the direction, and the force at which K_θ fails, and why; inf if none up to ``most``.
+    """Return the direction, force and reason at which K_θ is not positive definite or not defined.
 
-    With ``worst``, neighbouring directions are searched too, and the worst one is returned.
+    The force is inf if neither happens up to ``most`` [N]. With ``worst``, neighbouring directions
+    are searched too, and the one with the least force is returned.
     """
     if not K.is_stable:
         return u, 0.0, "buckling"

@@ -1,7 +1,7 @@
 """Kernels of small linear programs: the simplex method with bounds (Dantzig, 1963), and its proof.
 
 Programs here have some ten equations and some twenty variables, so a dense inverse of the basis is
-fastest: tens of microseconds, of which a general solver needs a millisecond to begin.
+fastest. A program takes tens of microseconds; a general solver takes a millisecond to begin.
 """
 
 from __future__ import annotations
@@ -138,7 +138,7 @@ def _proved(
     inverse: Array,
     price: Array,
 ) -> bool:
-    """Correct x by its residual; return whether it meets the conditions of a maximum."""
+    """Correct x by its residual; return whether it then meets the conditions of a maximum."""
     m, n = A.shape
     left, size = b.copy(), np.abs(b)
     for i in range(m):

@@ -41,7 +41,8 @@ the second differences has four times the noise of f.
 def gradients(f: Sampled, size: int, first: float, noise: Noise) -> Estimates:
     """Compute first derivatives (T, ..., n) of T functions at zero, and their error bounds (T,).
 
-    The functions have n = ``size`` variables; ``first`` is the largest step.
+    The functions have n = ``size`` variables. ``first`` is the largest step, and ``noise`` returns
+    the rounding errors (T,) of the functions for a step.
     """
     corners = np.vstack([np.eye(size), -np.eye(size)])
 
@@ -53,7 +54,10 @@ def gradients(f: Sampled, size: int, first: float, noise: Noise) -> Estimates:
 
 
 def hessians(f: Sampled, size: int, first: float, noise: Noise) -> Estimates:
-    """Compute Hessians (T, n, n) of T functions (P, n) → (P, T) at zero, and error bounds (T,)."""
+    """Compute Hessians (T, n, n) of T functions (P, n) → (P, T) at zero, and error bounds (T,).
+
+    ``size``, ``first`` and ``noise`` are those of :func:`gradients`.
+    """
     unit = np.eye(size)
     i, j = np.triu_indices(size, 1)
     pairs = (s * unit[i] + t * unit[j] for s in (1.0, -1.0) for t in (1.0, -1.0))

@@ -196,7 +196,10 @@ def _differentiated(
     noise: Noise,
     step: float,
 ) -> list[_Recomputed]:
-    """Compute derivatives of three kinematic parts or one elastic part; errors become reasons."""
+    """Compute derivatives of three kinematic parts or one elastic part.
+
+    If ``derive`` raises an error, its text is the reason why there is no value.
+    """
     try:
         values, errors = derive(f, near.unit.size, step, noise)
     except CdsmError as error:

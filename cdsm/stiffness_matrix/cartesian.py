@@ -178,7 +178,10 @@ class CartesianReadings(ReadOnlyState):
         return int(status[0, 0]), found
 
     def _refuse(self, status: int, what: str = "") -> None:
-        """Raise SingularStiffness unless the status is READ; ``what`` also needs a mobile tip."""
+        """Raise SingularStiffness unless ``status`` is READ; the error gives the reason.
+
+        ``what`` names a quantity that does not exist where the tip is immobile in one direction.
+        """
         if status == readings.READ:
             return
         if what and self._read(self.joint, "pseudoinverse")[0] == readings.IMMOBILE:

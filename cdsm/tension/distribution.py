@@ -114,7 +114,7 @@ def bounds_at(
 
 
 def grip(pose: Posture) -> Array:
-    """Compute Σ μ φ (C,) [-] over the holes of each cable: friction coefficient, wrap angle."""
+    """Compute Σ μ φ (C,) [-] over the holes of each cable, with friction μ and wrap angle φ."""
     segments = pose.segments
     chains = segments.chains
     of_holes = chains.friction * segments.wrap
