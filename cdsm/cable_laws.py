@@ -213,7 +213,7 @@ class CableLaws:
     def naming(
         self, error: ElasticityRangeError, held: slice | NDArray[np.intp]
     ) -> ElasticityRangeError:
-        """Return the error with names and indices of cables; ``held`` are the cables of the law."""
+        """Return the error with names and indices of cables; ``held`` selects those of the law."""
         outside = np.arange(len(self._cables))[held][list(error.indices)].tolist()
         names = [self._cables[c].name for c in outside]
         return ElasticityRangeError(error.problem, error.tension, outside, names)

@@ -19,7 +19,7 @@ class Command(typer.core.TyperCommand):
     """Command whose options may have older names, and whose errors of usage are JSON if asked."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Parse the arguments of the command."""
+        """Parse the arguments of the command, after its older names of options are replaced."""
         known = [newer(str(self.name), word) for word in args]
         with misuse_reported("--json" in known):
             return super().parse_args(ctx, known)

@@ -114,7 +114,7 @@ class SlowPlant:
 
 
 def require_unstrained(name: str, arm: Manipulator) -> None:
-    """Raise InvalidInput about ``name`` unless original lengths of the arm are unstrained ones."""
+    """Raise InvalidInput about ``name`` if ``original_length`` of the arm is "stretched"."""
     if arm.original_length != "unstrained":
         raise InvalidInput(
             name, 'has original_length = "stretched"; motors pay out unstrained lengths.'

@@ -63,7 +63,7 @@ class StiffnessLoop:
     def next(
         self, wanted: Reference, target: Array, estimate: Estimate, before: Array
     ) -> Replanned:
-        """Plan a step.
+        """Plan the tensions of the next step.
 
         Args:
             wanted: The reference of the plan at this step; its angles are kept.

@@ -37,7 +37,7 @@ MeasureName = Literal[
 
 
 class Kind(NamedTuple):
-    """How a quantity is computed, compared and shown.
+    """How a quantity is named, compared and shown.
 
     Attributes:
         words: Name in words.

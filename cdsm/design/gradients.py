@@ -203,7 +203,7 @@ def _column(arm: Manipulator, inputs: Inputs, variable: Variable) -> dict[str, A
 
 
 def _disk_labels(arm: Manipulator) -> list[str]:
-    """Return the names that inputs give to the disks, in the order of the disks."""
+    """Return the name of each disk in the labels of the inputs, base to tip."""
     count: dict[str, int] = {}
     names = []
     for disk in arm.geometry.disks:

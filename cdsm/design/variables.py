@@ -132,7 +132,7 @@ def _whole(name: str, value: float) -> int:
 
 
 class Changed(NamedTuple):
-    """An arm with the values of all variables."""
+    """Parts of an arm after a change of variables; None for a part that no variable changes."""
 
     geometry: Geometry
     wire: Wire | None
@@ -194,7 +194,7 @@ def _change(
 
 
 def _even(geometry: Geometry, count: int) -> list[CableRoute]:
-    """Return ``count`` evenly spaced cables per joint, like the first cable of each joint now."""
+    """Return ``count`` evenly spaced cables per joint, otherwise like the joint's first cable."""
     n = len(geometry.joints)
     if all(len(joint.axes) == 2 for joint in geometry.joints):
         angles = evenly_spaced(n, count)

@@ -133,7 +133,10 @@ def _read_cables(
 
 
 def _unique(name: str, used: dict[str, int]) -> str:
-    """Return the name, numbered if it is in ``used`` (highest number of each name); update it."""
+    """Return the name, with a number if it is already in ``used``, and add it to ``used``.
+
+    ``used`` has the highest number of each name.
+    """
     label, count = name, used.get(name, 1)
     while label in used:
         count += 1

@@ -160,7 +160,7 @@ def _sticks(
 
 
 def _placed(element: etree._Element, kind: str | None = None, start: float = 0.0) -> dict[str, str]:
-    """Return pos and quat of a body, whose joint of this ``kind``, if any, is at ``start``."""
+    """Return MJCF's pos and quat of a body; its joint, if any, has the coordinate ``start``."""
     place, turn = _origin(element)
     if kind is not None and start:
         axis = _axis(element) / np.linalg.norm(_axis(element))

@@ -87,7 +87,7 @@ def plot_arm(
 
 
 def picture_legend(figure: Figure, axes: Any) -> None:
-    """Draw the legend of a 3D picture at the bottom of its figure, if it names anything."""
+    """Draw the legend of a 3D picture at the bottom of its figure, if it has any entry."""
     handles, labels = axes.get_legend_handles_labels()
     if handles:
         figure.legend(handles, labels, loc="lower center", ncols=3, fontsize=SMALL, frameon=False)

@@ -87,10 +87,10 @@ def plot_map(
     Tips in a plane and sections are dots, or cells if a statistic is given. A cloud of tips is
     shown in three slices through its middle, as cells. Many postures may put the tip into one cell;
     the statistic determines which value it shows. Entries without the quantity are marked by their
-    status, in maps of cells only outside cells with a value. Unstable entries are marked too,
-    because their stiffness has no meaning, except in a map of the margin. Outliers, far from the
-    middle 90 % of the values, and infinite values have a colour of their own, at the ends of the
-    colour bar.
+    status; in maps of cells, a mark in a cell with a value is left out. Unstable entries are marked
+    too, because their stiffness has no meaning, except in a map of the margin. Outliers, far from
+    the middle 90 % of the values, and infinite values have a colour of their own, at the ends of
+    the colour bar.
 
     Args:
         dataset: Result of :func:`~cdsm.sweeps.run.sweep` with the output ``tip_position``. Use
@@ -240,7 +240,7 @@ def _draw(
 def _legend(
     figure: Figure, counted: Sequence[Case | Map], maps: Sequence[Map], words: Mapping[int, str]
 ) -> None:
-    """Draw the legend of ``maps``: marker, word and share of ``counted`` of each status."""
+    """Draw the legend of ``maps``: marker and word of each status, and its share in ``counted``."""
     status = np.concatenate([each.status[np.isnan(each.values)] for each in counted])
     total = sum(each.status.size for each in counted)
     handles = []

@@ -127,7 +127,7 @@ def styled(axes: Any) -> Any:
 
 
 def heading(figure: Figure, text: str) -> None:
-    """Write a title over a figure, broken to its width."""
+    """Write a title over a figure, with line breaks where the figure ends."""
     figure.suptitle(textwrap.fill(text, round(16 * figure.get_figwidth())), fontsize=TEXT)
 
 

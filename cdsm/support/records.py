@@ -74,7 +74,7 @@ ONE, EACH = "(one)", "(each)"
 
 
 def one_or_each(value: object) -> str:
-    """Return the tag of a value for all joints, or of a list with one for each."""
+    """Return the pydantic tag of a value: one for all joints, or a list with one for each."""
     return EACH if isinstance(value, (list, tuple)) or getattr(value, "ndim", False) else ONE
 
 

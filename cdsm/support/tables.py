@@ -122,9 +122,10 @@ def column_in(
     found: dict[str, tuple[int, str]],
     refuse: Callable[[str], NoReturn],
 ) -> tuple[int, float]:
-    """Return the index of a column in one of the known units, and that unit in SI.
+    """Return the index of the column ``name``, and its unit in SI.
 
-    A missing column, or one without a known unit, calls ``refuse``.
+    ``known`` has the SI value of each allowed unit. A missing column, or one without an allowed
+    unit, calls ``refuse``.
     """
     at, unit = found.get(name, (-1, ""))
     if unit not in known:

@@ -22,7 +22,7 @@ Label = tuple[tuple[str, ...], Any, dict[str, str]]
 
 
 def label(dims: tuple[str, ...], values: object, long_name: str, units: str = "") -> Label:
-    """Build a coordinate; numbers have SI units in the notation of UDUNITS."""
+    """Build a coordinate of a Dataset along ``dims``; ``units`` are SI in UDUNITS notation."""
     return dims, values, {"long_name": long_name} | ({"units": units} if units else {})
 
 
@@ -111,7 +111,7 @@ def vectors_of(
     value: Direction | Sequence[Direction] | Mapping[str, Direction],
     checked: Callable[[str, ArrayLike], Array],
 ) -> Choice[Array]:
-    """Check one or more vectors, such as wrenches (W, 6), each by a function."""
+    """Check one or more vectors, such as wrenches (W, 6), each by the function ``checked``."""
     if isinstance(value, str):
         return Choice(name, frozen(checked(name, value)[None]), None)
     if isinstance(value, (list, tuple)) and all(isinstance(each, str) for each in value):

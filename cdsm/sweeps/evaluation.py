@@ -55,7 +55,7 @@ class SweepTask(ReadOnlyState):
 
     Attributes:
         arm: The given arm.
-        laws: Elasticities; each is used for all cables in turn, None keeps those of the arm.
+        laws: Elasticities to compare, each for all cables; None keeps those of the arm.
         wrenches: Wrenches (W, 6): force [N], then moment [N m].
         minima: Lower bounds of tension (M,) [N].
         maximum: Upper bound [N].

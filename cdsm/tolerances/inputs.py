@@ -144,7 +144,7 @@ class Inputs:
                 raise InvalidInput(name, f"{arm.name} {lacks.get(name, otherwise)}")
 
     def _disks(self, arm: Manipulator, sites: list[str]) -> dict[str, csr_matrix]:
-        """Label the inputs of holes, disks and links; return the sites that they move."""
+        """Label the inputs of holes, disks and links; return their parts of :attr:`map`."""
         body, (P, rows) = arm._model.body, (len(sites), arm.nv + 1)
         end, origin, centre = 3 * P + 6 * rows, 3 * P, 3 * P + 3 * rows
         found: dict[str, dict[str, list[tuple[int, float]]]] = {name: {} for name in _ON_DISKS}

@@ -127,8 +127,7 @@ class Question(ReadOnlyState):
 
         Raises:
             ElasticityRangeError: A tension leaves the domain of its cable's law.
-            InvalidInput: No tensions balance an arm, or it does not buckle, if the reading needs
-                that.
+            InvalidInput: No tensions balance an arm, or it does not buckle (critical tension only).
         """
         arms = DrawnArms(self.stiffness, self.ties.scatter(errors) if self.ties else errors)
         if self.of == "tension":

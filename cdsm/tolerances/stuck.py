@@ -41,7 +41,7 @@ class Ties(NamedTuple):
     inputs: Mapping[str, Indices]
 
     def gather(self, gradient: Mapping[str, Array]) -> dict[str, Array]:
-        """Return derivatives for the inputs of the arm: the sums of those for the arm of blocks."""
+        """Convert derivatives with respect to inputs of the arm of blocks to inputs of the arm."""
         found = {source: np.zeros(len(names)) for source, names in self.labels.items()}
         for source, at in self.inputs.items():
             np.add.at(found[source], at[at >= 0], gradient[source][at >= 0])
@@ -101,7 +101,7 @@ def _matching_inputs(
     names: Mapping[str, str],
     behind: Sequence[bool],
 ) -> dict[str, Indices]:
-    """Find the input of the arm for each input of the arm of blocks."""
+    """Find the input of the arm for each input of the arm of blocks, ``stuck``, by its name."""
     theirs, found = inputs_of(arm).labels, {}
     for source, labels in inputs_of(stuck).labels.items():
         at = {name: i for i, name in enumerate(theirs[source])}

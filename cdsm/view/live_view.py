@@ -114,7 +114,10 @@ class View:
         return f"<View of {self.arm.name} at {self.url}>"
 
     def _add_path(self, path: Array, tips: Array) -> None:
-        """Add the controls that play a path of joint angles (S, nv), or of its tips (S, 3) [m]."""
+        """Draw the tips (S, 3) [m] of a path, and add controls that play it.
+
+        ``path`` has the joint angles (S, nv); it is ``tips`` itself if only tips are given.
+        """
         self._scene.draw_path(tips)
         go = self._handle.aim if path is tips else self._controls.move
 

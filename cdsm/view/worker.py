@@ -33,7 +33,7 @@ class Worker:
         futures.wait([self._last] if self._last else [])
 
     def is_left_alone(self, seconds: float) -> bool:
-        """Wait some seconds, inside the job; return whether no run was requested meanwhile."""
+        """Let the job wait some seconds; return whether no further run was requested meanwhile."""
         return not self._asked.wait(seconds)
 
     def close(self) -> None:

@@ -23,7 +23,8 @@ class SlackBelow(Elasticity):
     """A law continued to 0 N with the rigidity of its low end; see :meth:`Elasticity.slack_below`.
 
     Attributes:
-        law: The law. Within its domain, rigidity, strain and energy are the law's own, to the bit.
+        law: The law. Within its domain, rigidity, strain and energy are those of the law, bit for
+            bit.
 
     Raises:
         InvalidInput: The wire would be shorter than half its length when it is slack.
@@ -59,15 +60,15 @@ class SlackBelow(Elasticity):
         return float(self.law.rigidity(self.law.domain.first))
 
     def scaled(self, factor: float) -> SlackBelow:
-        """Return the scaled law, continued below; see :meth:`Elasticity.scaled`."""
+        """Return the scaled law with its slack branch; see :meth:`Elasticity.scaled`."""
         return SlackBelow(self.law.scaled(factor))
 
     def rigidity(self, tension: ArrayLike) -> Array:
-        """Compute EA(F) [N], constant below the law; see :meth:`Elasticity.rigidity`."""
+        """Compute EA(F) [N], constant on the slack branch; see :meth:`Elasticity.rigidity`."""
         return np.asarray(self.law.rigidity(self._split(tension)[0]))
 
     def rigidity_slope(self, tension: ArrayLike) -> Array:
-        """Compute dEA/dF [-], zero below the law; see :meth:`Elasticity.rigidity_slope`."""
+        """Compute dEA/dF [-], zero on the slack branch; see :meth:`Elasticity.rigidity_slope`."""
         inside, below = self._split(tension)
         return np.where(below < 0.0, 0.0, self.law.rigidity_slope(inside))
 

@@ -119,7 +119,7 @@ def _is_data(table: Table, k: int) -> bool:
 
 
 def _rows_of_data(table: Table, first: int) -> int:
-    """Count the rows of numbers from a row on."""
+    """Count the rows of numbers that follow each other, beginning with row ``first``."""
     rows = range(first, len(table.rows))
     return next((k for k in rows if not _is_data(table, k)), len(table.rows)) - first
 

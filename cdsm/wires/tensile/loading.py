@@ -170,7 +170,7 @@ def _slack(points: Points, noise: float, least: float) -> int:
 
 
 def _trends(points: Points, noise: float, least: float) -> tuple[Array, Array]:
-    """Compute the slope [N per point] of the first n points, for each n, and its deviation."""
+    """Compute the slope [N per point] of the first n points, for each n, and its standard error."""
     w, x, y = points.count, np.arange(len(points.force)), points.force - points.force[0]
     total = np.cumsum(w)
     xx, xy, yy = (
