@@ -78,10 +78,10 @@ def clearance(pose: Posture, diameter: float = 0.0) -> Clearance:
     """Compute the smallest signed distances of the cables at a posture.
 
     Cables are straight between their sites, with round sections; leads are left out. Links are
-    bars from joint to joint, as the URDF draws them: their radius is a fifth of the hole radius; in
-    an arm from a URDF they are lines. Disks are plates without thickness. For a cable in its own hole
-    the distance is that from the cable's surface to the edge of the disk. For a cable that pierces
-    a disk elsewhere it is negative.
+    bars from joint to joint, as the URDF draws them: their radius is a fifth of the hole radius. In
+    an arm from a URDF they are lines. Disks are plates without thickness. For a cable in its own
+    hole the distance is that from the cable's surface to the edge of the disk. For a cable that
+    pierces a disk elsewhere it is negative.
 
     Args:
         pose: The posture.
