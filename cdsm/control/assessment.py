@@ -84,9 +84,9 @@ def slid_out(arm: Manipulator, state: PlantState, wrench: Array) -> Stiffness:
 
 
 def hung_weight(plant: SlowPlant, state: SlowState, u: Array) -> float:
-    """Hang a weight on a plant with its motors stopped, and shake it; return N/m along u (3,).
+    """Hang a weight on a plant with its motors stopped; return the stiffness [N/m] along u (3,).
 
-    First without the weight and then with it, the load is shaken along u: its amplitude is three
+    The load is shaken along u, first without the weight and then with it: its amplitude is three
     breakaway loads and fades in four cycles. The weight moves the tip by about 0.1 % of the arm's
     length. NaN if no equilibrium is found on the way.
     """

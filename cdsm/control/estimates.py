@@ -170,7 +170,7 @@ class Observer:
         return np.asarray(total / pose.cable_lengths)
 
     def _compliance(self, wire: Array, F: Array) -> Array:
-        """Compute dL/dF (C,) [m/N] at constant wire."""
+        """Compute dL/dF (C,) [m/N] at constant ``wire``, the length l_0 (C,) [m] paid out."""
         soft = np.array(self._series)
         for law, of in self._problem.laws:
             soft[of] += wire[of] / law.rigidity(F[of])

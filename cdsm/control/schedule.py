@@ -80,8 +80,8 @@ def checked_plan(plan: PathPlan) -> Manipulator:
 def tension_controlled(plan: PathPlan, names: Sequence[str] | None) -> NDArray[np.bool_]:
     """Return which cables (C,) a mixed law controls by tension.
 
-    The lengths of the other cables, as many as there are joints, give the posture. By default those
-    are chosen that do so best at the first sample, by a pivoted QR decomposition of J_Lᵀ.
+    The lengths of the other cables, as many as there are joints, give the posture. By default, a
+    pivoted QR decomposition of J_Lᵀ chooses those whose lengths give it best at the first sample.
     """
     cables = plan.arm.cables.names
     forced = np.ones(len(cables), dtype=np.bool_)

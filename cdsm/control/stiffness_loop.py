@@ -39,7 +39,7 @@ class Replanned(NamedTuple):
 class StiffnessLoop:
     """Planner of the next tensions: the nearest to the previous ones with the target stiffness.
 
-    If the rate does not allow these, it goes towards them.
+    If the rate does not allow these tensions, the next ones lie on the way to them.
 
     Attributes:
         arm: The arm of the controller.

@@ -171,7 +171,7 @@ class Objective(Measure):
 
     @property
     def sign(self) -> float:
-        """−1 if the most is wanted, else 1: searches minimise sign · value."""
+        """−1 if the quantity is maximised, else 1: searches minimise sign · value."""
         return -1.0 if self.goal == "most" else 1.0
 
 
@@ -205,7 +205,7 @@ class Constraint(Measure):
 
     @property
     def limit(self) -> float:
-        """The limit."""
+        """``at_least`` or ``at_most``, the one that is given, in SI."""
         limit = self.at_most if self.at_least is None else self.at_least
         assert limit is not None
         return limit
@@ -217,7 +217,7 @@ class Constraint(Measure):
         return f"{which} {self.shown(self.limit)}"
 
     def violation(self, value: float) -> float:
-        """Return by how much a value violates the limit, over the limit [-]; 0 if it does not."""
+        """Return how far a value violates the limit, divided by the limit [-]; 0 if it does not."""
         short = self.limit - value if self.at_least is not None else value - self.limit
         size = abs(self.limit) or KINDS[self.of].shown[1]
         return max(short / size, 0.0) if short == short else float("inf")

@@ -47,7 +47,11 @@ class Chain:
         self._bound = np.array([each.of == "minimum" for each in problem.variables])
 
     def apply(self, by_input: dict[str, Array], by_bound: float = 0.0) -> Array:
-        """Convert derivatives with respect to the inputs of each source to the variables (n,)."""
+        """Compute the derivatives (n,) with respect to the variables.
+
+        ``by_input`` has those with respect to the inputs of each source, ``by_bound`` the one with
+        respect to the lower bound of the tensions.
+        """
         found = np.array(
             [
                 sum(float(weights @ by_input[source]) for source, weights in column.items())

@@ -78,7 +78,7 @@ def page_of(found: DesignSearch) -> Document:
 
 
 def _pictures(found: DesignSearch, shown: list[int]) -> list[str]:
-    """Draw arms of the front at the first posture, to one scale; return data URLs."""
+    """Draw designs of the front at the first posture, all to the same scale; return data URLs."""
     poses = []
     for number in shown:
         arm = found.arm(number)

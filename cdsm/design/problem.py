@@ -136,7 +136,10 @@ class DesignProblem(ReadOnlyState):
         return tuple(Measure(each.of, each.direction) for each in asked.values())
 
     def in_full(self) -> DesignProblem:
-        """Return the problem with every quantity for which it has the data as an objective."""
+        """Return the problem with all other quantities as objectives too.
+
+        Quantities with a direction, or for which data are missing, are left out.
+        """
         full, asked = self, {each.of for each in self.measures}
         for of in get_args(MeasureName):
             if of not in asked and not KINDS[of].directed:

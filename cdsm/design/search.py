@@ -115,7 +115,7 @@ def search_designs(
 
 
 def pareto(designs: Designs) -> Indices:
-    """Return the feasible designs that no other beats in all objectives, as rows (m,).
+    """Return the rows (m,) of the feasible designs that no other feasible design dominates.
 
     They are sorted by the first objective, the best first; equal designs count once.
     """
@@ -139,7 +139,7 @@ def _unknown(kept: Store, designs: Array) -> Array:
 
 
 def progress_of(problem: DesignProblem, generation: int, values: Array) -> DesignProgress:
-    """Return the state of a search after designs with these quantities (D, m)."""
+    """Return the state of a search that has evaluated designs with these quantities (D, m)."""
     missed = violations(problem, values).sum(axis=1)
     feasible = missed == 0.0
     first = problem.objectives[0]

@@ -128,8 +128,8 @@ class Ellipsoid(NamedTuple):
 def ellipsoid(compliance: Array, tip: Array, length: float) -> Ellipsoid | None:
     """Compute the ellipsoid of C_vv (3, 3) [m/N] at a tip (3,) of an arm of a length [m].
 
-    The scale is the power of ten with a half axis of 3 to 30 % of the length, so the size shows the
-    magnitude. None if no force moves the tip.
+    The scale is the power of ten that draws the longest half axis with 3 to 30 % of the length. The
+    size of the ellipsoid thus shows the magnitude. None if no force moves the tip.
     """
     longest = float(np.linalg.norm(compliance, 2))
     if longest == 0.0:
@@ -166,7 +166,10 @@ def draw_arm(axes: Any, pose: Posture, colors: Array | None = None) -> None:
 
 
 def frame_arms(axes: Any, limits: Array | None, label: str = "{} [mm]") -> None:
-    """Set labels, and limits (3, 2) with equal scales; None: around all that is drawn."""
+    """Set the labels and the limits (3, 2) of 3D axes, with equal scales.
+
+    Without limits, the axes contain all that is drawn.
+    """
     axes.tick_params(labelsize=SMALL, pad=-3)
     if limits is None:
         limits = np.array([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()])

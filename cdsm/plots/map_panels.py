@@ -85,7 +85,7 @@ class Case(NamedTuple):
 def cases_of(
     dataset: xarray.Dataset, quantity: str, poses: list[str], words: Mapping[int, str]
 ) -> Iterator[Case]:
-    """Build a panel for each combination of the dimensions that do not belong to the postures."""
+    """Yield a map for each combination of cases: of the dimensions other than ``poses``."""
     status = dataset["status"]
     allowed = {*map(str, status.dims), "direction"}
     dims = [str(dim) for dim in dataset[quantity].dims]

@@ -175,7 +175,7 @@ def plot_path_plan(plan: PathPlan) -> Figure:
 
 
 def _stepped(values: Array) -> tuple[Array, Array]:
-    """Build a line through the samples (S,); large changes are steps half-way between samples."""
+    """Build a line through samples (S,); a large change becomes a step between two samples."""
     changes = np.diff(values)
     around = np.pad(changes, 1)
     # only neighbouring changes of equal sign make a ramp; up and back down is two steps

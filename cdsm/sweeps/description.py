@@ -61,7 +61,10 @@ def law_text(law: Elasticity) -> str:
 
 
 def changed_laws(one: str, other: str) -> tuple[str, ...]:
-    """Return the classes of laws of which only the digest changed; empty if more differs."""
+    """Return the classes of laws whose digest alone differs in two texts of an arm.
+
+    The tuple is empty if anything else differs.
+    """
     if _SAMPLED.sub(r"\1 \2", one) != _SAMPLED.sub(r"\1 \2", other):
         return ()
     pairs = zip(_SAMPLED.findall(one), _SAMPLED.findall(other), strict=True)

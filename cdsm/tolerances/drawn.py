@@ -96,7 +96,7 @@ class DrawnArms:
     def distributed(self, minimum: Array | None = None, drawn: Drawn | None = None) -> Array:
         """Distribute tensions (N, C) [N] of all arms.
 
-        The lower bounds are ``minimum`` (N,) [N]; None: those of the tensions of the stiffness.
+        The lower bounds are ``minimum`` (N,) [N]; None: those of the nominal arm's tensions.
 
         Raises:
             InvalidInput: No tensions balance one of the arms.

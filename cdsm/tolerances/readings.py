@@ -90,7 +90,7 @@ class Question(ReadOnlyState):
         return self.stiffness._along(self.direction)
 
     def value(self) -> float:
-        """Return the reading itself."""
+        """Return the value of the reading for the nominal arm, in SI."""
         K = self.stiffness
         if self.of == "tension":
             return float(K.tension[self.cable])

@@ -74,7 +74,10 @@ def python_lines(arm: Manipulator, setting: Setting) -> str:
 
 
 def command_text(arm: Manipulator, setting: Setting, arm_arguments: Sequence[str] | None) -> str:
-    """Return the end of the page: command and buttons; Python if ``arm_arguments`` is None."""
+    """Return the HTML at the end of the page: the command of the shell, and two buttons.
+
+    Without ``arm_arguments``, lines of Python take the place of the command.
+    """
     if arm_arguments is None:
         where, command = "in Python", python_lines(arm, setting)
     else:

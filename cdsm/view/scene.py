@@ -145,7 +145,7 @@ class Scene:
         )
 
     def _draw_lines(self, shown: Shown) -> None:
-        """Draw links without shapes as sticks, the reference of an arm that sags, and holes."""
+        """Draw sticks for links without shapes, the posture before an arm sags, and holes."""
         pose, reference = shown.posture, shown.reference
         shaped = frozenset() if self._shapes is None else self._shapes.rows
         bones, brackets = ([], []) if pose is None else pose._stick_figure(shaped)

@@ -22,7 +22,7 @@ class Worker:
         self._last: futures.Future[None] | None = None
 
     def request(self) -> None:
-        """Request a run of the job. Any thread may call this; after the end nothing happens."""
+        """Request a run of the job, from any thread; does nothing after :meth:`close`."""
         self._asked.set()
         with self._lock, contextlib.suppress(RuntimeError):  # the thread has ended
             if self._last is None or self._last.running() or self._last.done():
