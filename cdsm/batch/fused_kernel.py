@@ -323,13 +323,13 @@ def _clear(matrix: Array, width: Width) -> None:
 
 @inlined
 def _vector(record: Array, start: Indices, quantity: int) -> Array:
-    """Return a quantity of the record as vectors of W postures, (size, W)."""
+    """Return a quantity of the record (one block, layout of ``layout.py``) as vectors (size, W)."""
     return record[start[quantity] : start[quantity + 1]]
 
 
 @inlined
 def _matrix(record: Array, start: Indices, quantity: int, rows: int, width: int) -> Array:
-    """Return a quantity of the record as matrices of W postures, (rows, columns, W)."""
+    """Return a quantity of the record (see :func:`_vector`) as matrices (rows, columns, W)."""
     part = record[start[quantity] : start[quantity + 1]]
     return part.reshape((rows, part.shape[0] // rows, width))
 

@@ -68,11 +68,11 @@ class Neighbourhood:
         return same
 
     def largest(self, rows: Array) -> Array:
-        """Compute the largest |a·δ| of rows a (…, nv)."""
+        """Compute the largest |a·δ| over the joint motions δ, for rows a (…, nv)."""
         return np.asarray(abs(rows @ self._steps).sum(axis=-1))
 
     def curved(self, forms: Array) -> Array:
-        """Compute a bound of |δᵀ A δ|/2 for quadratic forms A (…, nv, nv).
+        """Compute a bound of |δᵀ A δ|/2 over the joint motions δ, for forms A (…, nv, nv).
 
         It is a sum over pairs of holes; in each pair, opposite joint motions cancel.
         """
@@ -80,6 +80,6 @@ class Neighbourhood:
         return np.asarray(abs(both).sum(axis=(-2, -1)) / 2.0)
 
     def cubed(self, form: Array) -> float:
-        """Compute a bound of |Σ A_ijk δ_i δ_j δ_k|/6 of a cubic form A (nv, nv, nv)."""
+        """Compute a bound of |Σ A_ijk δ_i δ_j δ_k|/6 over the joint motions δ; A (nv, nv, nv)."""
         first = np.tensordot(self._steps, form, (0, 0))
         return float(abs(self._steps.T @ first @ self._steps).sum()) / 6.0

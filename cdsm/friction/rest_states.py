@@ -61,10 +61,10 @@ class End(NamedTuple):
 
 
 class RestStates:
-    """Polyhedron of states of rest with |δ| ≤ ρ and |ΔT| ≤ ρ_T; ``near`` contains ρ and ρ_T.
+    """Polyhedron of states of rest with joint changes |δ| ≤ ρ and tension changes |ΔT| ≤ ρ_T.
 
-    The variables are δ/ρ, ΔT/ρ_T, and one slack per equation, whose bounds are the outer
-    correction.
+    ``near`` contains ρ and ρ_T. The variables are δ/ρ, ΔT/ρ_T, and one slack per equation, whose
+    bounds are the outer correction.
     """
 
     def __init__(self, K: Stiffness, near: Neighbourhood, bends: Bends) -> None:
@@ -149,7 +149,10 @@ class RestStates:
         return frozen(np.maximum(np.array(bounds), 0.0))
 
     def load(self, u: Array) -> float:
-        """Compute the largest force [N] along u (3,) that some tensions balance; requires ρ = 0."""
+        """Compute the largest force [N] along u (3,) that some tensions balance.
+
+        It requires ρ = 0: no joint moves.
+        """
         from scipy.sparse import csc_array, hstack
 
         nv = self._near.joints.size
@@ -199,10 +202,10 @@ class RestStates:
 
 
 def _cone(K: Stiffness, near: Neighbourhood, far: Remainders, size: int) -> tuple[Any, Array]:
-    """Return the friction cone A x ≤ b: T_{j+1} ≤ e^{μφ} T_j and T_j ≤ e^{μφ} T_{j+1}.
+    """Return A and b of the friction cone A x ≤ b: T_{j+1} ≤ e^{μφ} T_j and T_j ≤ e^{μφ} T_{j+1}.
 
-    With ψ = μ (φ(θ) − φ_0), e^ψ ≤ 1 + ψ + ψ²/2 e^|ψ|. The linear part of ψ is in A if φ is
-    differentiable; otherwise b bounds it.
+    x are the variables of :class:`RestStates`, ``size`` in number. With ψ = μ (φ(θ) − φ_0), e^ψ ≤ 1
+    + ψ + ψ²/2 e^|ψ|. The linear part of ψ is in A if φ is differentiable; otherwise b bounds it.
     """
     from scipy.sparse import csc_array
 

@@ -115,7 +115,7 @@ def assemble_segments(
     friction: Friction,
     distribution: Tension | None = None,
 ) -> Stiffness:
-    """Compute K_θ from checked tensions of the segments T (S,) and signs σ (P,) of the holes."""
+    """Compute K_θ from checked tensions T (S,) of the segments and the holes that slide (P,)."""
     model, segments = pose.arm._model, pose.segments
     gradient = tension_gradient(pose, tension, sliding)
     active = segments.tension_stiffness(tension).sum(axis=0)

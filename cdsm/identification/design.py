@@ -66,7 +66,11 @@ class Design(NamedTuple):
         return np.asarray(self.known + np.tensordot(counts, self.information, 1))
 
     def sensitivities(self, M: Array) -> tuple[Array, float]:
-        """Compute tr M_i G (n,) and the proved efficiency f/f_best of a design, in 0…1."""
+        """Compute tr M_i G (n,), and the proved efficiency f/f_best of a design, in 0…1.
+
+        The gain of one more test i is proportional to tr M_i G. G is that of the module's docstring
+        for the information M of the design.
+        """
         C = np.linalg.inv(M)
         right = C @ self.wanted.T
         if self.criterion == "D":

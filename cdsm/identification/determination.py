@@ -63,7 +63,7 @@ class Determination:
 
     @property
     def coordinates(self) -> Array:
-        """Matrix (P, rank) from coordinates of the determined combinations to the parameters."""
+        """Matrix A (P, rank) with p = A c, c the coordinates of the determined combinations."""
         scaled = self._svd[1][self.determined].T
         return np.asarray(scaled / self._column_norms[:, None])
 

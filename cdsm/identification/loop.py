@@ -102,7 +102,7 @@ class WeightLoop:
 
     @property
     def informative(self) -> int:
-        """Number of readings minus one for the unknown offset of each axis."""
+        """Number of independent readings: one less per axis, since its offset is unknown."""
         return (len(self.forces) - 1) * len(self.axes)
 
     @property

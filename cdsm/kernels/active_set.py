@@ -57,7 +57,7 @@ class State(NamedTuple):
         y: Multipliers of balance (nv,).
         side: Of each cable: 1 at its lower bound, −1 at its upper bound, 0 free (C,).
         multiplier: Multipliers of the bounds (C,).
-        system: S and a right-hand side (nv, nv + 1, 1).
+        system: S = Σ J_cᵀ J_c over the free cables, and a right-hand side (nv, nv + 1, 1).
         pivots: Scratch of the elimination (4, 1).
         w: Right-hand side, then solution, of a system with S (nv,).
     """
@@ -158,7 +158,7 @@ def _most_violated(F: Array, low: Array, high: Array, side: Indices) -> tuple[in
 def _solve_for_sides(J: Array, b: Array, low: Array, high: Array, state: State) -> bool:
     """Fill F and y: cables with a side get that bound, free ones the least tensions that balance.
 
-    Returns False if S is singular.
+    Returns False if the free cables cannot balance every torque.
     """
     F, y, side, _, _, _, w = state
     for i in range(b.shape[0]):
@@ -180,7 +180,7 @@ def _solve_for_sides(J: Array, b: Array, low: Array, high: Array, state: State) 
 
 @inner
 def _solve_free(J: Array, state: State) -> bool:
-    """Replace w (nv,) by S⁻¹ w; return False if S is singular."""
+    """Replace w (nv,) by S⁻¹ w, S = Σ J_cᵀ J_c over the free cables; False if S is singular."""
     _, _, side, _, system, pivots, w = state
     nv = w.shape[0]
     for i in range(nv):

@@ -95,7 +95,10 @@ def gravity_torque(
     torque: Array,
     width: Width,
 ) -> None:
-    """Fill g (nv, W), and ``carried`` (nv+1, 7, W) with γ × z, z × r and M of each joint."""
+    """Fill g (nv, W), and ``carried`` (nv+1, 7, W) with γ × z, z × r and M of each joint.
+
+    The symbols are those of the module's docstring.
+    """
     parent, order = tree.parent, tree.order
     origin, axis, slide, _ = frames
     gravity = masses.gravity
@@ -139,7 +142,7 @@ def gravity_torque(
 
 @inner
 def set_gravity_stiffness(parent: Indices, carried: Array, gravity: Array, width: Width) -> None:
-    """Fill ∂g/∂θ (nv, nv, W) for i ≤ j only; :func:`gravity_torque` fills ``carried``."""
+    """Fill ∂g/∂θ (nv, nv, W) for i ≤ j only, from ``carried`` of :func:`gravity_torque`."""
     for j in range(parent.shape[0] - 1, 0, -1):
         last = np.uint64(j)
         i = last

@@ -43,7 +43,8 @@ class Velocities(NamedTuple):
     """Derivatives with respect to the force f.
 
     Angular velocity and velocity of the origin of each joint (nv+1, 3, W); velocities of the sites
-    (P, 3, W); u̇ and v̇ (3, W) at the present hole; l̇ (W,) of the section up to this hole.
+    (P, 3, W); derivatives (3, W) of the directions u and v of the cable before and after the
+    present hole; l̇ (W,) of the section up to this hole.
     """
 
     turn: Array
@@ -58,7 +59,7 @@ class SlipRates(NamedTuple):
     """|Ṫ′ − Ṫ|/F, μ φ̇ and μ φ of each hole (P, W), in the row of the next hole that holds.
 
     μ φ is −1 in the other rows. ``last`` (3, W) belongs to the last hole passed: Ṫ/F of the section
-    before it, its μ φ̇ and its μ φ.
+    before it, its μ φ̇ and its μ φ. The symbols are those of the module's docstring.
     """
 
     jump: Array
@@ -287,7 +288,10 @@ def _store_hole(
 
 @inlined
 def _set_loads(slips: SlipRates, load: Array, width: Width) -> None:
-    """Fill the least f (W,) of all holes; inf if none ever slides, 0 if no cable sticks."""
+    """Fill the breakaway load (W,), the least of all holes.
+
+    It is inf if no hole ever slides, and 0 if no cable sticks.
+    """
     for w in lanes(width):
         most, found, held = 0.0, math.inf, False
         for p in range(slips.limit.shape[0]):

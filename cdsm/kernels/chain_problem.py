@@ -71,7 +71,10 @@ class Wire(NamedTuple):
 
 @inner
 def _surplus(wire: Wire, j: int, T: float) -> tuple[float, float]:
-    """Compute D_j′ = a_j − A_j(T) [m] and its derivative with respect to T [m/N]."""
+    """Compute D_j′ = a_j − A_j(T) [m] and its derivative with respect to T [m/N].
+
+    A_j(T) is the natural length that segment j has under T, and a_j the one that it has to keep.
+    """
     stretch = wire.base[j] + wire.softness[j] * T
     natural = (wire.length[j] - wire.spring[j] * (T - wire.rest[j])) / stretch
     return wire.natural[j] - natural, (wire.spring[j] + natural * wire.softness[j]) / stretch
@@ -92,8 +95,9 @@ def _slope(
 ) -> tuple[float, float, float]:
     """Compute V_j′ [m] at a tension of segment j, ∂V_j′/∂T [m/N], and a sum of natural lengths [m].
 
-    ``best`` (S,) has exp(y*_i) of the segments i after j [N]; ``last`` is the cable's last segment.
-    The sum is over the segments up to the next hole that sticks; rounding is judged by it.
+    V_j and y*_i are those of the module's docstring. ``best`` (S,) has exp(y*_i) of the segments i
+    after j [N]; ``last`` is the cable's last segment. The sum is over the segments up to the next
+    hole that sticks; rounding is judged by it.
     """
     total, rise = _surplus(wire, j, tension)
     T, size = tension, abs(wire.natural[j])

@@ -77,9 +77,10 @@ def _set_symmetric(K: Array, symmetric: Array, width: Width) -> None:
 
 @threaded
 def decompose(JX: Array, left: Array, right: Array, status: Indices, width: Width) -> None:
-    """Fill O (B, 3, 3, W) and V (B, 3, nv, W) of J_v; set the status where the tip is immobile.
+    """Fill O = U S⁻¹ (B, 3, 3, W) and V (B, 3, nv, W) of J_v = U S V (singular values S).
 
-    JX is J_X (B, 6, nv, W). The status (B, W) changes only where it is READ.
+    JX is J_X (B, 6, nv, W), its first rows are J_v. Where the tip is immobile, the status (B, W)
+    changes from READ to IMMOBILE.
     """
     scratch, S = np.empty((5, JX.shape[3])), np.empty((3, JX.shape[3]))
     for b in range(JX.shape[0]):
@@ -109,7 +110,10 @@ def _copy(JX: Array, right: Array, width: Width) -> None:
 def set_pseudoinverses(
     K: Array, left: Array, right: Array, status: Indices, out: Array, width: Width
 ) -> None:
-    """Fill O (V K Vᵀ) Oᵀ (B, 3, 3, W), or NaN where the tip is immobile."""
+    """Fill J_v⁺ᵀ K J_v⁺ = O (V K Vᵀ) Oᵀ (B, 3, 3, W), or NaN where the tip is immobile.
+
+    ``left`` is O and ``right`` is V of :func:`decompose`.
+    """
     image, middle = np.empty((K.shape[1], 3, K.shape[3])), np.empty((3, 3, K.shape[3]))
     for b in range(K.shape[0]):
         _set_product(K[b], right[b], image, width)
@@ -119,7 +123,7 @@ def set_pseudoinverses(
 
 @inner
 def _set_product(K: Array, right: Array, image: Array, width: Width) -> None:
-    """Fill image (nv, 3, W) with K Vᵀ."""
+    """Fill image (nv, 3, W) with K Vᵀ; ``right`` is V (3, nv, W)."""
     for i in upwards(0, K.shape[0]):
         for c in upwards(0, right.shape[0]):
             for w in lanes(width):
@@ -171,7 +175,10 @@ def _set_probe(system: Array, width: Width) -> None:
 def _equilibrate(
     K: Array, parts: Array, scale: Array, largest: Array, system: Array, width: Width
 ) -> None:
-    """Fill D^-½, the largest entry of D^-½ P D^-½ (inf if D is singular), and scale the system."""
+    """Scale the system by D^-½, where D is the diagonal of ``parts`` = P.
+
+    Fills D^-½, and the largest entry of D^-½ P D^-½ (inf if D is singular).
+    """
     nv = np.uint64(K.shape[0])
     for w in lanes(width):
         largest[w] = 0.0
@@ -284,10 +291,10 @@ def set_compliances(JX: Array, system: Array, first: int, out: Array, width: Wid
 def set_cartesians(
     left: Array, right: Array, system: Array, status: Indices, out: Array, width: Width
 ) -> None:
-    """Fill O (V K_θ⁻¹ Vᵀ)⁻¹ Oᵀ (B, 3, 3, W), or NaN where the tip is immobile.
+    """Fill (C_vv)⁻¹ = O (V K_θ⁻¹ Vᵀ)⁻¹ Oᵀ (B, 3, 3, W), or NaN where the tip is immobile.
 
-    K_θ⁻¹ Vᵀ are the last three columns of the system. Where V K_θ⁻¹ Vᵀ is singular, K_θ counts as
-    singular.
+    ``left`` is O and ``right`` is V of :func:`decompose`. K_θ⁻¹ Vᵀ are the last three columns of
+    the system. Where V K_θ⁻¹ Vᵀ is singular, K_θ counts as singular.
     """
     both, pivots = np.empty((3, 6, right.shape[3])), np.empty((4, right.shape[3]))
     for b in range(right.shape[0]):

@@ -34,7 +34,11 @@ SHORTEST_SEGMENT = 1e-9
 
 
 class Segments(NamedTuple):
-    """Scratch of one segment in a block of W postures: u (3, W), ℓ and 1/ℓ (W,), d, u·d, c."""
+    """Scratch of one segment in a block of W postures.
+
+    Direction u (3, W), length ℓ and 1/ℓ (W,), derivative d (3, W) of the vector ℓ u with respect to
+    a joint angle, u·d (W,), left factor c (3, W).
+    """
 
     direction: Array
     length: Array
@@ -86,7 +90,10 @@ def _set_direction(
 def set_derivative(
     frames: Frames, sign: float, site: Index, j: Index, d: Array, width: Width
 ) -> None:
-    """Fill d_j (3, W) = ±z × (x − o), or ± the slide, at the end x of a segment."""
+    """Fill d (3, W) = ∂(b − a)/∂θ_j of a segment from a to b: ±z × (x − o), or ± the slide.
+
+    x is the end that joint j moves, at ``site``; ``sign`` is 1 for b and −1 for a.
+    """
     point, origin, axis = frames.site[site], frames.origin[j], frames.axis[j]
     _set_derivative(point, origin, axis, sign, d[0], d[1], d[2], width)
     if frames.slide.shape[0]:
@@ -123,7 +130,7 @@ def _add_slide(slide: Array, sign: float, d: Array, width: Width) -> None:
 def _add_rate(
     u: Array, point: Array, origin: Array, axis: Array, sign: float, rate: Array, width: Width
 ) -> None:
-    """Add u·d (W,) with d = ±z × (x − o)."""
+    """Add u·d (W,) with d = ±z × (x − o): axis z through o, end x of a segment with direction u."""
     for w in lanes(width):
         x, y = sign * (point[0, w] - origin[0, w]), sign * (point[1, w] - origin[1, w])
         z = sign * (point[2, w] - origin[2, w])
@@ -265,7 +272,7 @@ def add_length_hessian(
 
 @inlined
 def one_frames(origin: Array, axis: Array, slide: Array, site: Array) -> Frames:
-    """Return the frames of one posture, given without the last axis."""
+    """Return the :class:`Frames` of one posture from arrays without an axis of postures."""
     return Frames(
         origin.reshape(origin.shape[0], 3, 1),
         axis.reshape(axis.shape[0], 3, 1),

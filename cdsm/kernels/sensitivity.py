@@ -152,7 +152,11 @@ def _add_cable(
 
 @inner
 def _pull_back(turning: Array, rate: Array, weight: Array, scratch: Array, pulled: Array) -> None:
-    """Fill X + V × ω + A × ω̇ + (A × ω) × ω (3,), ∂Ψ/∂δ for a displacement δ in a moving frame."""
+    """Fill ∂Ψ/∂δ (3,) = X + V × ω + A × ω̇ + (A × ω) × ω for a displacement δ of a point.
+
+    δ is in a frame that moves with ω and ω̇. ``weight`` (3, 3) are X, V and A, the derivatives of Ψ
+    with respect to the point's position, velocity and acceleration.
+    """
     X, V, A = weight[0], weight[1], weight[2]
     _cross(A, turning, scratch)
     w, e, s = turning, rate, scratch

@@ -98,7 +98,8 @@ def add_stuck_stiffness(
 ) -> None:
     """Add Σ k g gᵀ over the sections of all cables to a matrix (nv, nv, W), for i ≤ j only.
 
-    ``wire`` is EA (1 + ε) (C, W) [N], also of cables whose motor controls the force.
+    k is the stiffness of a section, and g the gradient of its length. ``wire`` is EA (1 + ε) (C, W)
+    [N], also of cables whose motor controls the force.
     """
     segment, joint, across = routing.segment, routing.joint, scratch.direction
     d, along, inverse = scratch.derivative, scratch.along, scratch.inverse
@@ -241,7 +242,10 @@ def open_next_section(section: Sticking, width: Width) -> None:
 def _add_square(
     wire: Array, c: Index, section: Sticking, low: Index, high: Index, passive: Array, width: Width
 ) -> None:
-    """Add k g gᵀ of the sections that end at the present hole, and set their g to zero."""
+    """Add k g gᵀ of the sections that end at the present hole, and set their g to zero.
+
+    k is the stiffness of a section, and g the gradient of its length.
+    """
     g, k, product, holds = section.gradient, section.stiffness, section.product, section.holds
     set_stiffness(wire, c, section, width)
     for i in upwards(low, high):

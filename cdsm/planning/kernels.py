@@ -34,7 +34,10 @@ def stiffness_at(
 
 @compiled
 def _inverse(A: Array) -> Array:
-    """Return A⁻¹ of a regular matrix; ``np.linalg.inv`` differs from numba's in the last bits."""
+    """Return A⁻¹ of a regular matrix, with the same bits whether numba or Python runs this.
+
+    With ``np.linalg.inv`` the last bits would differ.
+    """
     n = len(A)
     M = np.zeros((n, 2 * n, 1))
     for i in range(n):
@@ -47,7 +50,10 @@ def _inverse(A: Array) -> Array:
 
 @compiled
 def tip_stiffness(K: Array, rows: Array) -> tuple[Array, Array, Array, Array]:
-    """Return X = (R K_θ⁻¹ Rᵀ)⁻¹, K_θ⁻¹ Rᵀ X, K_θ⁻ᵀ Rᵀ Xᵀ and K_θ⁻¹ of a regular K_θ."""
+    """Return X = (R K_θ⁻¹ Rᵀ)⁻¹, K_θ⁻¹ Rᵀ X, K_θ⁻ᵀ Rᵀ Xᵀ and K_θ⁻¹ of a regular K_θ.
+
+    R is ``rows`` (r, nv), rows of the tip Jacobian.
+    """
     inverse = _inverse(K)
     soft = np.dot(inverse, rows.T)
     X = _inverse(np.dot(rows, soft))
@@ -98,7 +104,10 @@ def form_by_tension(
 def constraint_jacobian(
     hessian: Array, length_jacobian: Array, slope: Array, weights: Array, left: Array, right: Array
 ) -> Array:
-    """Return E_j : leftᵀ (∂K_θ/∂F_c) right (n, C) for weights E (n, r, r)."""
+    """Return E_j : leftᵀ (∂K_θ/∂F_c) right (n, C) for weights E (n, r, r).
+
+    A : B is the sum of A_ab B_ab.
+    """
     rates = form_by_tension(hessian, length_jacobian, slope, left, right)
     result = np.zeros((weights.shape[0], rates.shape[0]))
     for n in range(weights.shape[0]):

@@ -184,7 +184,10 @@ def _search(program: Program, start: Evaluation, *, in_piece: bool) -> Constrain
 
 
 class _Step(NamedTuple):
-    """Step d, multipliers of c and of the reserve, predicted fall of the merit, price of c."""
+    """Step d, with multipliers of c and of the reserve λ_min − floor.
+
+    ``predicted`` is the fall of the merit, and ``price`` the weight of the violation of c in it.
+    """
 
     d: Array
     y: Array

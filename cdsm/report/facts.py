@@ -213,7 +213,10 @@ class Sticking(ReadOnlyState):
 
 
 def sticking(K: Stiffness, readings: Readings | None) -> Sticking | None:
-    """Compute the tip stiffnesses while cables stick; None if no cable sticks, or if unknown."""
+    """Compute the tip stiffnesses while cables stick.
+
+    None if no cable sticks, if K_θ is singular, or if a tension is outside the domain of its law.
+    """
     pose, held = K.posture, holding(K.posture)
     T, J = K.tension[pose.segments.chains.cable], pose.jacobian[:3]
     if readings is None or not held.any():

@@ -147,7 +147,10 @@ class Neighbourhood:
     # --- potentials ---------------------------------------------------------------------------
 
     def kinematic(self, places: Array) -> Array:
-        """Compute active, gravity and load part of U (P, 3) [N m]; the load is only the force."""
+        """Compute active, gravity and load part of the potential U (P, 3) [N m].
+
+        The load part is that of the force only, since a moment has no potential.
+        """
         return self._kinematic(places, np.zeros(3))
 
     def work(self, places: Array) -> Array:
@@ -170,7 +173,7 @@ class Neighbourhood:
         return np.array(rows)
 
     def elastic(self, places: Array) -> Array:
-        """Compute the passive part of U (P, 1) [N m]."""
+        """Compute the passive part of the potential U (P, 1) [N m]."""
         arm = self._pose.arm
         lengths = [arm.cable_lengths(q, check_limits=False) for q in self._angles(places)]
         longer = np.array(lengths) - self._pose.cable_lengths
@@ -255,7 +258,7 @@ class Neighbourhood:
         return np.asarray(_ULPS * (self._pose.cable_lengths + self._pose.arm.length))
 
     def kinematic_noise(self, step: float) -> Array:
-        """Return the rounding error of the kinematic parts of U (3,) [N m], equal for all steps."""
+        """Return the rounding error of :meth:`kinematic` (3,) [N m], the same for all steps."""
         pose, arm = self._pose, self._pose.arm
         far = arm.length + float(np.linalg.norm(pose.tip[:3, 3]))
         weight = float(arm._model.masses.mass.sum() * np.linalg.norm(arm.gravity)) * far
@@ -263,19 +266,22 @@ class Neighbourhood:
         return np.array([self._tension @ self.length_noise, _ULPS * weight, _ULPS * load])
 
     def elastic_noise(self, step: float) -> Array:
-        """Return the rounding error of the elastic part of U (1,) [N m]."""
+        """Return the rounding error of :meth:`elastic` (1,) [N m]."""
         k, F = self._k, self._tension
         stored = np.divide(F * F, k, out=np.zeros_like(k), where=k > 0.0).sum()
         return np.array([_ROOT * stored + 2.0 * step * (k * self._arms) @ self.length_noise])
 
     def kinematic_torque_noise(self, step: float) -> Array:
-        """Return the rounding error of kinematic torques (3,) [N m]; large at short segments."""
+        """Return the rounding error of :meth:`kinematic_torques` (3,) [N m].
+
+        It is large at short segments.
+        """
         noise = self.kinematic_noise(step)
         noise[0] *= 1.0 + 1.0 / self._closing_motion
         return noise
 
     def elastic_torque_noise(self, step: float) -> Array:
-        """Return the rounding error of the elastic torques (1,) [N m]."""
+        """Return the rounding error of :meth:`elastic_torques` (1,) [N m]."""
         k = self._k
         errors = k * self.length_noise + _ROOT * self._tension * (k > 0.0)
         tilted = 2.0 * step * (k * self._arms) @ self.length_noise

@@ -117,7 +117,10 @@ def settled(loaded: LoadedArm, search: RestSearch[Iterate], iterations: int) -> 
 def no_rest(
     reference: Posture, pose: Posture, residual: Array, reached: float, load: str = "the load"
 ) -> EquilibriumError:
-    """Return the error of a search that ended with ``residual`` (nv,) at a part of the load."""
+    """Return the error of a search that found no equilibrium beyond a part ``reached`` of the load.
+
+    ``residual`` (nv,) is that of the last iterate, at ``pose``.
+    """
     frozen(residual)
     worst = int(abs(residual).argmax())
     joint = pose.arm.joint_names[worst]
