@@ -53,7 +53,7 @@ def assess(
 ) -> Assessment:
     """Find the frictionless equilibrium near a state, and the proved band about it along u (3,)."""
     try:
-        K = slid_out(arm, state, wrench)
+        K = frictionless_stiffness(arm, state, wrench)
     except CdsmError:
         return Assessment(None, None)
     if not (banded and K.is_stable):
@@ -62,7 +62,7 @@ def assess(
     return Assessment(K, band if band.proved else None)
 
 
-def slid_out(arm: Manipulator, state: PlantState, wrench: Array) -> Stiffness:
+def frictionless_stiffness(arm: Manipulator, state: PlantState, wrench: Array) -> Stiffness:
     """Return K_θ at the equilibrium without friction, with the wire and load of a state.
 
     Raises:
@@ -92,7 +92,7 @@ def hung_weight(plant: SlowPlant, state: SlowState, u: Array) -> float:
     """
     arm, load = plant.arm, state.state.load
     try:
-        near = slid_out(arm, state, load.wrench)
+        near = frictionless_stiffness(arm, state, load.wrench)
     except CdsmError:
         return math.nan
     weight = near.along(u) * _DISPLACED * arm.length

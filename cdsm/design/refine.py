@@ -110,7 +110,7 @@ def refine_design(
     inside = [(0.0, 1.0)] * len(size)
     up = np.append(np.zeros(len(size)), 1.0)
     # a step may lead where no tensions balance; the best before counts
-    with suppress(_LeftTheArm):
+    with suppress(_PostureNotHeld):
         for _ in range(_ROUNDS):
             worst = float((objective.sign * at(np.append(y, 0.0))[objective.key].values).max())
             found = minimize(
@@ -139,7 +139,7 @@ def refine_design(
     return _finished(problem, visited)
 
 
-class _LeftTheArm(Exception):
+class _PostureNotHeld(Exception):
     """Raised if SLSQP tries a design that does not hold all postures."""
 
 
@@ -151,7 +151,7 @@ def _all_rows(problem: DesignProblem, x: Array, size: Array) -> dict[str, _Rows]
             try:
                 values, slopes = rows_and_gradients(problem, x, Measure(each.of, each.direction))
             except CdsmError as error:
-                raise _LeftTheArm from error
+                raise _PostureNotHeld from error
             found[each.key] = _Rows(values, slopes * size)
     return found
 
