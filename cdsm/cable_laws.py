@@ -44,8 +44,9 @@ class CableLaws:
         rest: Tension (C,) [N] at which wire strain and spring elongation are zero.
         constant: EA of linear laws (C,) [N]; 0 for other laws and force-controlled cables.
         linear: 1 where EA (1 + ε) = EA + F (C,): a linear law with unstrained l_0; else 0.
-        asked: The entries of ``held`` whose law is not linear: its EA is computed at each tension.
-        own: The laws of ``asked`` that no compiled kernel can evaluate.
+        nonlinear: The entries of ``held`` whose law is not linear; their EA is computed at each
+            tension.
+        without_kernel: The laws of ``nonlinear`` that no compiled kernel can evaluate.
     """
 
     def __init__(self, cables: tuple[Cable, ...], original_length: OriginalLength) -> None:
@@ -70,14 +71,15 @@ class CableLaws:
         self.series = frozen(1.0 / series)
         self.rest = frozen(np.array([cable.elasticity.rest for cable in self._cables]))
         # constant EA of linear laws; all other laws are evaluated at each tension
-        constant, linear, self.asked = np.zeros(len(self._cables)), np.zeros(len(self._cables)), []
+        count, self.nonlinear = len(self._cables), []
+        constant, linear = np.zeros(count), np.zeros(count)
         for law, of in self.held:
             if isinstance(law, LinearElasticity):
                 constant[of], linear[of] = law.rigidity(0.0), float(self._unstrained)
             else:
-                self.asked.append((law, of))
+                self.nonlinear.append((law, of))
         self.constant, self.linear = frozen(constant), frozen(linear)
-        self.own = [law for law, _ in self.asked if _polynomials(law) is None]
+        self.without_kernel = [law for law, _ in self.nonlinear if _polynomials(law) is None]
 
     def require_continuity(self) -> None:
         """Raise InvalidInput if the rigidity of a law is discontinuous."""
@@ -98,7 +100,7 @@ class CableLaws:
         count = len(self._cables)
         panels, ends = np.tile([0, -1], (count, 1)), np.zeros((count, 6))
         tables: list[Panels] = []
-        for law, held in self.asked:
+        for law, held in self.nonlinear:
             strand = _polynomials(law)
             if strand is None:
                 continue
@@ -135,9 +137,9 @@ class CableLaws:
         F (C,) [N], both checked and not negative.
         """
         rigidity = self.constant
-        if self.asked:
+        if self.nonlinear:
             rigidity = rigidity.copy()
-            for law, held in self.asked:
+            for law, held in self.nonlinear:
                 try:
                     rigidity[held] = self.stretched_rigidity(law, tension[held])
                 except ElasticityRangeError as error:

@@ -22,7 +22,7 @@ from cdsm.errors import CdsmError, GeometryError
 from cdsm.geometry.cables import serpentine_cables
 from cdsm.kernels.read import read_margin
 from cdsm.posture import Posture
-from cdsm.support.format import enough, span
+from cdsm.support.format import rounded, span
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import distribute_tension
 
@@ -76,9 +76,9 @@ class Remedy(ReadOnlyState):
         form, unit = _SAID[self.change]
         up = self.factor > 1.0
         return form.format(
-            times=enough(self.factor, up=up),
+            times=rounded(self.factor, up=up),
             bound=" or more" if up else " or less",
-            new=span(self.now * self.factor / unit, partial(enough, up=up)),
+            new=span(self.now * self.factor / unit, partial(rounded, up=up)),
             old=span(self.now / unit),
         )
 

@@ -86,7 +86,7 @@ class Evaluator:
         # whether the kernel needs rigidities that only Python computes
         needs_springs = bool(self._wanted.size) and self._wanted[-1] > layout.LOAD
         laws = arm._model.wire_laws if self._sticks else arm._model.laws
-        self._asks = needs_springs and bool(laws.asked if self._sticks else laws.own)
+        self._asks = needs_springs and bool(laws.nonlinear if self._sticks else laws.without_kernel)
         record = int(self._start[-1])
         widest = WIDTH if record < _LONG else WIDTH // 2
         if len(q) * record <= _BATCH and is_new(evaluate_rows):

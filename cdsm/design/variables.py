@@ -9,7 +9,7 @@ from typing import Final, Literal, NamedTuple, final, get_args
 
 from cdsm.errors import InvalidInput
 from cdsm.geometry import CableRoute, Geometry, Joint, Link
-from cdsm.geometry.holes import beside_the_hinges, evenly_spaced
+from cdsm.geometry.holes import evenly_spaced, hinge_hole_angles
 from cdsm.support.validation import one_of, scalar, whole_number
 from cdsm.wires.catalogue import Wire, as_wire
 
@@ -200,7 +200,7 @@ def _even(geometry: Geometry, count: int) -> list[CableRoute]:
         angles = evenly_spaced(n, count)
     else:
         rolls = [math.atan2(joint.axes[0][2], joint.axes[0][1]) for joint in geometry.joints]
-        angles = beside_the_hinges(rolls, count)
+        angles = hinge_hole_angles(rolls, count)
     cables = []
     for k in range(n):
         like = [cable for cable in geometry.cables if cable.joint == k + 1] or [geometry.cables[0]]

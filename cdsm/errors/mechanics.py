@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from cdsm.errors.base import CdsmError, named
-from cdsm.support.format import coordinates, enough, told_apart
+from cdsm.support.format import coordinates, distinct_texts, rounded
 
 if TYPE_CHECKING:
     import numpy as np
@@ -35,7 +35,7 @@ class ElasticityRangeError(CdsmError, ValueError):
         self.indices = tuple(int(index) for index in indices)
         self.cables = tuple(cables)
         names = f" (cable {named(self.cables)})" if self.cables else ""
-        values = named(told_apart(self.tension))
+        values = named(distinct_texts(self.tension))
         super().__init__(f"tension {values} N{names}: {problem}")
 
 
@@ -84,7 +84,7 @@ class InfeasibleTension(CdsmError):
             )
         else:
             message += (
-                f"Widening every bound by {enough(relaxation, up=True)} N would be enough "
+                f"Widening every bound by {rounded(relaxation, up=True)} N would be enough "
                 f"(cables at a bound: {', '.join(self.binding) or 'none'}). Lower minimum=, raise "
                 "maximum=, or reduce the load."
             )
@@ -176,7 +176,7 @@ class UnreachableStiffness(CdsmError):
         self.low = low
         self.high = high
         self.nearest = tuple(float(value) for value in nearest)
-        wanted, least, most, *near = told_apart(
+        wanted, least, most, *near = distinct_texts(
             [value / 1e3 for value in (target, low, high, *self.nearest)]
         )
         message = (

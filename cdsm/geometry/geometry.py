@@ -12,7 +12,7 @@ from typing import Any, Self
 from cdsm.errors import GeometryError
 from cdsm.geometry import tables
 from cdsm.geometry.description import Description
-from cdsm.geometry.holes import beside_the_hinges, evenly_spaced, spread_out
+from cdsm.geometry.holes import evenly_spaced, hinge_hole_angles, spread_out
 from cdsm.geometry.parts import UNIVERSAL_AXES, CableRoute, Joint, Limit, Link
 from cdsm.geometry.uniform import CablesPerJoint, HoleAngles, JointCount, uniform
 from cdsm.support.files import read_text, write_text
@@ -158,7 +158,7 @@ class Geometry(Description):
             keywords["cables_per_joint"] = 2
         rolls = [k * twist for k in range(joints)]
         axes = [((0.0, math.cos(roll), math.sin(roll)),) for roll in rolls]
-        return cls(**uniform(axes, lambda m: beside_the_hinges(rolls, m), keywords))
+        return cls(**uniform(axes, lambda m: hinge_hole_angles(rolls, m), keywords))
 
     @classmethod
     def sections(

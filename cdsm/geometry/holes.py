@@ -19,7 +19,7 @@ def evenly_spaced(joints: int, cables: int) -> list[list[float]]:
     return [[2.0 * math.pi * (k + n * j) / (n * m) for j in range(m)] for k in range(n)]
 
 
-def beside_the_hinges(rolls: Sequence[float], cables: int) -> list[list[float]]:
+def hinge_hole_angles(rolls: Sequence[float], cables: int) -> list[list[float]]:
     """Return the hole angles φ = ψ + 90° + 2πj/m of cables j < m of each hinge [rad].
 
     ``rolls`` has ψ of each hinge [rad]; its axis is cos ψ y + sin ψ z.

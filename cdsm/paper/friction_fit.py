@@ -115,7 +115,7 @@ class RoughPrototype:
             for weight in self.prototype.weights
         ]
 
-    def weigh_beside(self, paths: Sequence[LoadingPath]) -> Array:
+    def tips_to_first_order(self, paths: Sequence[LoadingPath]) -> Array:
         """Compute the tips (15, 3) [m] under the weights, to first order.
 
         ``paths`` are the answer of :meth:`weigh` for a prototype with similar parameters.
@@ -208,7 +208,7 @@ def identify_rough_prototype(added: Sequence[str] = tuple(ADDED)) -> RoughFit:
 
     def beside(here: dict[str, float], moved: dict[str, float]) -> Array:
         try:
-            tips = rough(moved).weigh_beside(weighed(tuple(here.values())))
+            tips = rough(moved).tips_to_first_order(weighed(tuple(here.values())))
             return np.asarray(np.log(rough(moved).table(tips) / TABLE_II).ravel())
         except CdsmError as error:
             raise NoModelError(str(error)) from error

@@ -20,7 +20,7 @@ def coordinates(values: Iterable[float], form: str = ".4g") -> str:
     return f"({', '.join(format(x, form) for x in values)})"
 
 
-def enough(value: float, *, up: bool) -> str:
+def rounded(value: float, *, up: bool) -> str:
     """Return a bound with four digits, rounded to the safe side: ``up`` or down."""
     step = 10.0 ** (math.floor(math.log10(value)) - 3) if value > 0.0 else 1.0
     return f"{(math.ceil if up else math.floor)(value / step) * step:.4g}"
@@ -68,7 +68,7 @@ def beyond(joint: str, value: float, low: float, high: float, unit: str) -> str:
     return f"{said} ({value:.4g} {unit} of {low:.4g} to {high:.4g} {unit})"
 
 
-def told_apart(values: Sequence[float]) -> list[str]:
+def distinct_texts(values: Sequence[float]) -> list[str]:
     """Return numbers as text with four digits, or more if different numbers would look the same."""
     for digits in (4, 6, 8, 12):
         texts = [f"{value:.{digits}g}" for value in values]

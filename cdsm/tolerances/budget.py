@@ -19,7 +19,7 @@ from cdsm.tension import Tension
 from cdsm.tolerance import Tolerances
 from cdsm.tolerances.inputs import inputs_of
 from cdsm.tolerances.parts import Part, draw_errors, standards, variance
-from cdsm.tolerances.question import asked, chosen
+from cdsm.tolerances.question import checked_question, chosen_tolerances
 from cdsm.tolerances.readings import Question, Reading
 
 if TYPE_CHECKING:
@@ -226,8 +226,8 @@ def uncertainty(
         ElasticityRangeError: A tension is outside the domain of its cable's law.
         SingularStiffness: The reading does not exist.
     """
-    tolerances = chosen(pose, tolerances)
-    question = asked(pose, tension, direction, of, cable, wrench)
+    tolerances = chosen_tolerances(pose, tolerances)
+    question = checked_question(pose, tension, direction, of, cable, wrench)
     inputs_of(pose.arm).require(tolerances, pose.arm)
     value = question.value()
     if not math.isfinite(value):  # the stiffness along a direction

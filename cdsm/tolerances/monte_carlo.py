@@ -27,7 +27,7 @@ from cdsm.tension import Tension
 from cdsm.tolerance import Tolerances
 from cdsm.tolerances.budget import Uncertainty, decimals, uncertainty
 from cdsm.tolerances.parts import draw_errors
-from cdsm.tolerances.question import chosen
+from cdsm.tolerances.question import chosen_tolerances
 from cdsm.tolerances.readings import Question, Reading
 
 if TYPE_CHECKING:
@@ -188,7 +188,7 @@ def monte_carlo(
     count = whole_number("draws", draws, 100, 10**8)
     start = whole_number("seed", seed, 0)
     wanted = flag("progress", progress)
-    tolerances = chosen(pose, tolerances)
+    tolerances = chosen_tolerances(pose, tolerances)
     if not tolerances.given:
         raise InvalidInput("tolerances", "are all zero, so all draws are the same; give one.")
     budget = uncertainty(

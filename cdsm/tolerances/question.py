@@ -21,7 +21,7 @@ READINGS = get_args(Reading)
 """Names of all readings."""
 
 
-def chosen(pose: Posture, tolerances: Tolerances | None) -> Tolerances:
+def chosen_tolerances(pose: Posture, tolerances: Tolerances | None) -> Tolerances:
     """Return the tolerances, or those of the arm; raise InvalidInput if there are none."""
     if tolerances is not None:
         return instance("tolerances", tolerances, Tolerances)
@@ -35,7 +35,7 @@ def chosen(pose: Posture, tolerances: Tolerances | None) -> Tolerances:
     return own
 
 
-def asked(
+def checked_question(
     pose: Posture,
     tension: Tension | ArrayLike,
     direction: ArrayLike | None,

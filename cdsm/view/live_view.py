@@ -16,7 +16,7 @@ from cdsm.support.values import Array
 from cdsm.view.controls import Controls
 from cdsm.view.path_player import PathPlayer
 from cdsm.view.scene import Scene
-from cdsm.view.state import Condition, Setting, Shown, advised, show
+from cdsm.view.state import Condition, Setting, Shown, remedies_of, show
 from cdsm.view.tip_handle import TipHandle
 from cdsm.view.worker import Worker
 
@@ -143,8 +143,8 @@ class View:
         try:
             shown = show(self.arm, setting)
             self._put(shown)
-            if shown.condition is Condition.UNSTABLE and self._worker.is_left_alone(_SETTLED):
-                self._put(replace(shown, problem="\n".join([shown.problem, *advised(shown)])))
+            if shown.condition is Condition.UNSTABLE and self._worker.no_request_within(_SETTLED):
+                self._put(replace(shown, problem="\n".join([shown.problem, *remedies_of(shown)])))
         except Exception as error:  # a bug must not leave outdated numbers on the page
             _LOG.exception("the view cannot show %s", setting)
             problem = f"{type(error).__name__}: {error}"

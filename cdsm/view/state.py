@@ -200,7 +200,7 @@ class Shown(ReadOnlyState):
         return ellipsoid(self.compliance, pose.tip[:3, 3], pose.arm.length)
 
 
-def advised(shown: Shown) -> tuple[str, ...]:
+def remedies_of(shown: Shown) -> tuple[str, ...]:
     """Return the remedies of an unstable arm; it takes some tenths of a second."""
     return () if shown.stiffness is None else advice(shown.stiffness)
 

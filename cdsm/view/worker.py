@@ -32,7 +32,7 @@ class Worker:
         """Wait until all requests made before are done."""
         futures.wait([self._last] if self._last else [])
 
-    def is_left_alone(self, seconds: float) -> bool:
+    def no_request_within(self, seconds: float) -> bool:
         """Let the job wait some seconds; return whether no further run was requested meanwhile."""
         return not self._asked.wait(seconds)
 

@@ -34,7 +34,7 @@ def test_rigidity_in_a_block_has_the_bits_of_the_law(
     laws = [(law, SLACK, cdsm.LinearElasticity(1e5))[c % 3] for c in range(COUNT)]
     cables = [replace(cable, elasticity=one) for cable, one in zip(ARM.cables, laws, strict=True)]
     arm = replace_cables(cables, original_length)
-    assert not arm._model.laws.own
+    assert not arm._model.laws.without_kernel
     F = tensions(law)
     given = np.full((F.size, COUNT), 50.0)
     given[:, 0] = F
@@ -55,7 +55,7 @@ def replace_cables(cables: list[cdsm.Cable], original_length: OriginalLength) ->
 def test_law_that_a_kernel_does_not_know_is_asked() -> None:
     table = cdsm.TabulatedElasticity((0.0, 20.0, 900.0), (0.0, 0.001, 0.004))
     arm = ARM.with_cables([replace(cable, elasticity=table) for cable in ARM.cables])
-    assert arm._model.laws.own == [table]
+    assert arm._model.laws.without_kernel == [table]
     K = cdsm.evaluate(arm, np.zeros((2, arm.nv)), np.full(COUNT, 30.0), outputs=("joint",))["joint"]
     one = cdsm.stiffness(arm.at(np.zeros(arm.nv)), np.full(COUNT, 30.0)).joint
     np.testing.assert_allclose(K[1], one, rtol=0.0, atol=1e-13 * abs(one).max())

@@ -11,7 +11,7 @@ import cdsm
 from cdsm.support.values import Array
 from cdsm.tolerance import SOURCES
 from cdsm.tolerances.drawn import DrawnArms
-from cdsm.tolerances.question import asked
+from cdsm.tolerances.question import checked_question
 from cdsm.tolerances.readings import Question, Reading
 from tests.support import arms
 from tests.support.differences import assert_second_order
@@ -57,7 +57,7 @@ def _question(kind: str, of: str, moment: bool) -> Question:
     pose, F = arms.random_posture(arm, 11), arms.random_tension(arm, 5)
     given = of in ("tension", "critical_tension")
     tension = cdsm.distribute_tension(pose, 20.0, wrench=wrench) if given else F
-    return asked(
+    return checked_question(
         pose,
         tension,
         U if of in ("along", "stuck", "tip") else None,

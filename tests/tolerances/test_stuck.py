@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import cdsm
-from cdsm.tolerances.question import asked
+from cdsm.tolerances.question import checked_question
 from tests.support import arms
 from tests.tolerances.test_budget import WORKSHOP, posture, readme_arm
 
@@ -39,7 +39,7 @@ def test_the_arm_of_blocks_has_the_stuck_stiffness(kind: str, moment: bool) -> N
     arm = rough(kind)
     pose, F = arms.random_posture(arm, 11), arms.random_tension(arm, 5)
     W = arms.random_wrench(4, moment)
-    question = asked(pose, F, "z", "stuck", None, W)
+    question = checked_question(pose, F, "z", "stuck", None, W)
     expected = cdsm.stuck_stiffness(pose, F, W)
     scale = abs(expected.joint).max()
     np.testing.assert_allclose(question.stiffness.joint, expected.joint, rtol=0, atol=1e-12 * scale)
@@ -51,7 +51,7 @@ def test_its_gradient_is_that_of_arms_with_other_tensions_angles_and_leads(kind:
     """Central differences of :func:`stuck_stiffness` itself, extrapolated."""
     arm = rough(kind)
     pose, F = arms.random_posture(arm, 11), arms.random_tension(arm, 5)
-    gradient = asked(pose, F, "z", "stuck", None, None).gradient()
+    gradient = checked_question(pose, F, "z", "stuck", None, None).gradient()
     rng = np.random.default_rng(2)
 
     def value(source: str, error: np.ndarray) -> float:
