@@ -28,7 +28,7 @@ _ROUNDS = 2
 
 
 class _Rows(NamedTuple):
-    """Values (R,) of a measure, and derivatives (R, n) for variables divided by their range."""
+    """Values (R,) of a measure, and derivatives (R, n) by variables divided by their ranges."""
 
     values: Array
     slopes: Array

@@ -147,7 +147,7 @@ class Elasticity(ABC):
     def secant_rigidity(self, tension: ArrayLike) -> Array:
         """Compute the secant rigidity ΔF/(Δl/l_0) [N] of Eq. 18 from :attr:`rest`.
 
-        At :attr:`rest` it equals :meth:`rigidity`; if EA is constant, everywhere. Argument and
+        It equals :meth:`rigidity` at :attr:`rest`, and everywhere if EA is constant. Argument and
         errors are those of :meth:`rigidity`.
         """
         values = self.domain.check(tension)

@@ -87,7 +87,7 @@ class Figure(ABC):
 
 
 def floats(values: Iterable[float]) -> tuple[float, ...]:
-    """Convert values to the tuple of floats of a claim."""
+    """Convert values to a tuple of floats, as a :class:`Claim` stores them."""
     return tuple(float(value) for value in values)
 
 

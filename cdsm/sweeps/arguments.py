@@ -43,7 +43,7 @@ class Choice(Generic[_Values]):
 
     @property
     def labels(self) -> dict[str, Label]:
-        """Return the coordinate of the dimension by its name; empty if there is a single value."""
+        """Return the coordinate of the dimension under its name; empty for a single value."""
         if self.names is None:
             return {}
         kind, units = ("name", "") if self.names.dtype.kind == "U" else ("number", "1")

@@ -122,7 +122,7 @@ class DrawnArms:
         return tension
 
     def critical(self, start: float) -> Array:
-        """Find the lower bounds (N,) [N] at which the arms buckle, near that of the nominal arm.
+        """Find the lower bounds (N,) [N] at which the arms buckle; ``start`` is the nominal one.
 
         Raises:
             InvalidInput: An arm does not buckle near the nominal critical tension.

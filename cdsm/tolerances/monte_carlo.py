@@ -80,7 +80,7 @@ class MonteCarlo(ReadOnlyState):
 
     @property
     def agrees(self) -> bool:
-        """Whether first order is validated: see :data:`AGREES` (JCGM 101, clause 8)."""
+        """Whether first order and Monte Carlo agree: see :data:`AGREES` (JCGM 101, clause 8)."""
         both = zip(self.interval(), self.budget.interval(), strict=True)
         return all(abs(a - b) <= AGREES * self.standard_uncertainty for a, b in both)
 

@@ -99,9 +99,9 @@ class RisingCurve:
 def slopes_at_points(chords: Array, rise: Array) -> Array:
     """Compute slopes (n,) at n points from the slopes and rises (n − 1,) of the chords.
 
-    Their logarithms are interpolated as :class:`~cdsm.TabulatedElasticity` says. Inside, a value is
-    the mean of two parabolas through three chords each, clipped to the neighbouring chords. At an
-    end it follows one parabola, and the change is clipped.
+    Their logarithms are interpolated as :class:`~cdsm.TabulatedElasticity` says. At an
+    inner point, the value is the mean of two parabolas through three chords each, clipped to the
+    neighbouring chords. At an end it follows one parabola, and the change is clipped.
     """
     if len(chords) == 1:
         return np.repeat(chords, 2)

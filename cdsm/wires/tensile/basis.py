@@ -15,7 +15,7 @@ _GRID = 1200  # tensions: strain error below 1e-4 where EA varies thousandfold
 
 
 class Basis(NamedTuple):
-    """B-splines (g, k) over a grid of tensions (g,) [N], and their roughness (k, k)."""
+    """k B-splines at g tensions [N] (g, k), and the matrix (k, k) of their roughness penalty."""
 
     tensions: Array
     splines: Array
