@@ -133,7 +133,10 @@ class Posture(ReadOnlyState):
         return tuple(lines)
 
     def _stick_figure(self, without: Collection[int]) -> tuple[list[Array], list[Array]]:
-        """Return bones and brackets, but not of the joints in rows ``without``; 0: the base."""
+        """Return bones and brackets, without those of some joints.
+
+        ``without`` are the rows of these joints, from 1 on; 0 is the base.
+        """
         rows = self.arm._model.routing.row.tolist()
         brackets = zip(rows, self.brackets, strict=True)
         return (
@@ -143,7 +146,7 @@ class Posture(ReadOnlyState):
 
     @cached_property
     def _bones(self) -> tuple[tuple[Array, ...], ...]:
-        """Bones that start at each joint, base first."""
+        """Bones (lines) from the base and from each joint to the next joints or the tip."""
         origin, parent = self._frames.origin, self.arm._model.tree.parent
         ends = [*zip(parent[1:], origin[1:], strict=True)]
         bones: list[list[Array]] = [[] for _ in origin]
@@ -235,7 +238,10 @@ class MomentArms(ReadOnlyState):
     slides: NDArray[np.bool_]
 
     def __getitem__(self, names: tuple[str, str]) -> float:
-        """Return an arm [m], [-] where the joint slides; UnknownName for an unknown name."""
+        """Return the moment arm of a cable about a joint [m], or [-] where the joint slides.
+
+        Raises UnknownName for an unknown name.
+        """
         cable, joint = names
         row = self.cables.index(one_of("cable", cable, self.cables))
         return float(self.values[row, self.joints.index(one_of("joint", joint, self.joints))])

@@ -110,6 +110,9 @@ def shapes(nv: int, cables: int, directions: int) -> tuple[tuple[int, ...], ...]
 
 
 def starts(nv: int, cables: int, directions: int) -> Indices:
-    """Return the index at which each quantity begins in the record, and the record's length."""
+    """Return the index at which each quantity begins in a record, and the record's length.
+
+    A record is the row of all quantities of a posture.
+    """
     sizes = [math.prod(shape) for shape in shapes(nv, cables, directions)]
     return np.array([0, *np.cumsum(sizes)], dtype=np.intp)

@@ -138,10 +138,10 @@ def hole_loads(K: Stiffness, u: Array) -> tuple[Array, Array]:
 
 
 def _reached(K: Stiffness, u: Array, motion: Array) -> tuple[float, int]:
-    """Find the load [N] at which the first hole of the stuck, loaded arm reaches its bound.
+    """Find the load [N] at which the first hole of the stuck arm reaches its friction bound.
 
     Newton's method for joints and load starts at the first-order result. If another hole is beyond
-    its bound at the solution, the search is repeated for that hole.
+    its friction bound at the solution, the search is repeated for that hole.
     """
     pose, arm = K.posture, K.posture.arm
     chains, held = pose.segments.chains, holding(pose)

@@ -149,10 +149,10 @@ class ChainProblem:
         return float(natural @ self._energy(tension) + spring)
 
     def potential(self, tension: Array) -> Array:
-        """Compute T (1 + ε) − ∫ T dε (S,) [N]: the work per length that puts wire under tension T.
+        """Compute P = T (1 + ε) − ∫ T dε (S,) [N], the work per length to put wire under tension T.
 
-        Wire that moves from one segment to another dissipates the difference. To first order in the
-        strain this is the difference of the tensions.
+        Wire that moves from one segment to another dissipates the difference of their P per length.
+        To first order in the strain this is the difference of the tensions.
         """
         base, softness = self._strain(tension)
         return np.asarray(tension * (base + softness * tension) - self._energy(tension))

@@ -112,7 +112,10 @@ class Bends:
 
 
 def _body_remainders(K: Stiffness, within: Array, slides: NDArray[np.bool_]) -> tuple[float, Array]:
-    """Bound the remainders of the tip displacement [m] and of the body torques (nv,) [N m]."""
+    """Bound the remainders of the tip displacement [m] and of the torques of weight and wrench.
+
+    The latter are (nv,) [N m].
+    """
     model, pose = K.posture.arm._model, K.posture
     masses, tree = model.masses, model.tree
     reach = float(np.linalg.norm(tree.translation, axis=1).sum()) + float(abs(pose.q) @ slides)

@@ -51,7 +51,10 @@ class Design(NamedTuple):
     tests: int
 
     def value(self, M: Array) -> Array:
-        """Compute ln f (…) of information matrices (…, r, r); −inf where one is singular."""
+        """Compute ln f (…), with f the criterion, of information matrices (…, r, r).
+
+        It is −inf where a matrix is singular.
+        """
         regular = np.linalg.cond(M) < 1e14
         C = np.linalg.inv(np.where(regular[..., None, None], M, np.eye(M.shape[-1])))
         covariance = self.wanted @ C @ self.wanted.T
@@ -62,7 +65,7 @@ class Design(NamedTuple):
         return np.where(regular, found, -np.inf)
 
     def total(self, counts: Array) -> Array:
-        """Compute M_0 + Σ n_i M_i (r, r)."""
+        """Compute the information M_0 + Σ n_i M_i (r, r) of n_i tests of each candidate (n,)."""
         return np.asarray(self.known + np.tensordot(counts, self.information, 1))
 
     def sensitivities(self, M: Array) -> tuple[Array, float]:

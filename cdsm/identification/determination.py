@@ -94,7 +94,7 @@ class Determination:
 
     @cached_property
     def _svd(self) -> tuple[Array, Array]:
-        """Singular values of J and right vectors. Its columns are scaled to unit length or zero."""
+        """Singular values and right vectors of J, its columns scaled to unit length (or zero)."""
         _, values, right = np.linalg.svd(self.jacobian / self._column_norms, full_matrices=False)
         return values, right
 

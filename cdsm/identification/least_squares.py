@@ -127,8 +127,9 @@ class LeastSquares:
     ) -> Array:
         """Compute ∂r/∂point (n, P) by one-sided or central differences.
 
-        If ``over`` is given, only its columns are computed. Near a bound, or where the model ceases
-        to exist, central differences become one-sided differences of second order.
+        If ``over`` is given, only the columns of these parameters are computed. Near a bound, or
+        where the model ceases to exist, central differences become one-sided differences of second
+        order.
         """
         chosen = range(len(self.names)) if over is None else over
         return np.column_stack([self._column(point, i, central) for i in chosen])

@@ -81,12 +81,12 @@ class Model:
         return any(loop.force_std or loop.tension_std for loop in self.loops)
 
     def weighted(self, parameters: Parameters) -> Model:
-        """Return the same model with all errors of loops in its weights, as at some parameters.
+        """Return the same model, whose weights contain all errors of the loops.
 
         The covariance of the readings is V = σ² 1 + σ_f² A Aᵀ + σ_F² B Bᵀ. A and B are their
-        derivatives with respect to the forces and tensions; σ, σ_f and σ_F are the standard
-        deviations of readings, forces and tensions. With friction, a force also changes all later
-        readings.
+        derivatives with respect to the forces and tensions, at ``parameters``; σ, σ_f and σ_F are
+        the standard deviations of readings, forces and tensions. With friction, a force also
+        changes all later readings.
         """
         arm = self.arm(parameters)
         paths = self._paths_at(parameters, arm)
@@ -103,7 +103,10 @@ class Model:
         return self.weigh(self.predict(parameters)[1])
 
     def predict(self, parameters: Parameters) -> tuple[Manipulator, list[Array]]:
-        """Build the arm; predict each stiffness (1,) [N/m] or loop (m,) [m] (0 at the start)."""
+        """Build the arm; predict each stiffness (1,) [N/m] or loop (m,) [m].
+
+        The tip displacements of a loop are those from the arm without the forces.
+        """
         arm = self.arm(parameters)
         paths = self._paths_at(parameters, arm)
         predicted = []

@@ -217,7 +217,7 @@ class Identification(ReadOnlyState):
 
     @cached_property
     def _rows(self) -> list[Measurement | WeightLoop]:
-        """Measurement of each row (n,)."""
+        """Measurement to which each of the n measured numbers belongs."""
         return [each for each in self.measurements for _ in measured(each)]
 
     @property

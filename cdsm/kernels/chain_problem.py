@@ -114,9 +114,9 @@ def _slope(
 
 @inner
 def _root(wire: Wire, best: Array, j: int, last: int, near: float) -> float:
-    """Find the tension exp(y*_j) [N], starting at ``near``; zero if V_j′ ≥ 0 at all tensions.
+    """Find the tension exp(y*_j) [N] at which V_j′ is zero, or 0 if V_j′ ≥ 0 at all tensions.
 
-    ``best`` and ``last`` are those of :func:`_slope`.
+    The search starts at ``near``. The arguments are those of :func:`_slope`.
     """
     if _slope(wire, best, j, last, 0.0)[0] >= 0.0:
         return 0.0

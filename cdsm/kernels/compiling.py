@@ -94,7 +94,7 @@ def _compile(function: _Function, **options: Any) -> _Function:
 
 @cache
 def _sources() -> str:
-    """Return a digest of the sources of all kernels that others call."""
+    """Return a digest of the sources of all kernels, by which the cache notices every change."""
     digest = hashlib.sha256()
     for path in sorted(Path(__file__).parent.glob("*.py")):
         digest.update(path.read_bytes())
@@ -228,10 +228,11 @@ def lanes(width: Width) -> Iterable[Index]:
 
 @inner
 def axes(count: int, width: Width) -> Iterable[Index]:
-    """Return the range of three axes; ``count`` is 3, which LLVM may know only for one posture.
+    """Return range(3), whose length LLVM knows for one posture but not for a block.
 
     LLVM unrolls loops of a known length. For one posture they then run two or three times as fast;
-    for a block they would take half as long again to compile, and run no faster.
+    for a block they would take half as long again to compile, and run no faster. ``count`` is 3, a
+    number that LLVM does not know.
     """
     return range(np.uint64(3)) if width is None else range(np.uint64(count))
 

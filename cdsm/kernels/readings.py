@@ -143,9 +143,9 @@ def solve(
     """Replace the columns B of the system by K_θ⁻¹ B.
 
     The system is (B, nv, nv + 1 + n, W): scratch for K_θ, a probe torque, then the n columns B. K
-    is K_θ and ``parts`` is P, (B, nv, nv, W). ``scale`` becomes D^-½ (B, nv, W). ``peak`` (B, W)
-    becomes the largest entry of D^-½ P D^-½ where K_θ may be singular, else 0. Returns the number
-    of such postures.
+    is K_θ, and ``parts`` is P, the sum of the magnitudes of its terms, (B, nv, nv, W). With the
+    diagonal D of P, ``scale`` becomes D^-½ (B, nv, W). ``peak`` (B, W) becomes the largest entry of
+    D^-½ P D^-½ where K_θ may be singular, else 0. Returns the number of such postures.
     """
     rows, largest, doubtful = np.empty((4, K.shape[3])), np.empty(K.shape[3]), 0
     moved = np.empty(K.shape[3])

@@ -291,7 +291,10 @@ def single_length_hessian(
     site: Array,
     cables: int,
 ) -> Array:
-    """Compute ∂²L_c/∂θ_i∂θ_j (C, nv, nv) [m] of one posture; arrays have no axis of postures."""
+    """Compute ∂²L_c/∂θ_i∂θ_j (C, nv, nv) [m/rad²] of one posture.
+
+    The arrays have no axis of postures.
+    """
     nv = origin.shape[0] - 1
     hessian, weight, slot = np.zeros((cables, nv, nv, 1)), np.ones((cables, 1)), np.arange(cables)
     frames = one_frames(origin, axis, slide, site)

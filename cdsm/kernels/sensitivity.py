@@ -112,7 +112,7 @@ def _add_cable(
     """Add the derivatives of F L̈ + k L̇² + p L̇ of one cable; return L̈ and L̇.
 
     ``pull`` is the p of :func:`single_gradient`, and ``slope`` is ∂k/∂L. ``point`` (N, 3, 3) are x,
-    ẋ and ẍ of each site, ``weight`` (N, 3, 3) X, V and A.
+    ẋ and ẍ of each site, ``weight`` (N, 3, 3) the derivatives X, V and A with respect to them.
     """
     rate = bend = 0.0
     u, v, w = np.empty(3), np.empty(3), np.empty(3)

@@ -161,7 +161,10 @@ def guess_tensions(
 def _set_best(
     J: Array, low: Array, high: Array, own: Indices, i: Index, j: Index, guess: Guess, width: Width
 ) -> None:
-    """Find the two cables that give the missing torque at the least ‖F‖²; one cable if i is j."""
+    """Find the two cables that give the missing torque about axes i and j at the least ‖F‖².
+
+    If i is j, it is one cable. ``own`` are the cables of the block.
+    """
     lacking, best, pair = guess.lacking, guess.best, guess.pair
     for r in range(5):
         for w in lanes(width):

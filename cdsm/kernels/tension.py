@@ -71,7 +71,7 @@ class Certificate(NamedTuple):
 
 @inner
 def certificate(nv: int, cables: int, width: int) -> Certificate:
-    """Allocate the scratch for a block."""
+    """Allocate a :class:`Certificate` for a block of postures."""
     return Certificate(
         np.empty((nv, width)),
         np.empty((cables, width)),

@@ -109,7 +109,7 @@ def inverse_kinematics(
 
 
 def _solve(residual: Residual, guess: Array, tolerance: float) -> dict[str, Any]:
-    """Find the solution; return the fields that both classes of solutions have."""
+    """Solve an inverse problem; return the fields that both classes of solutions have."""
     tolerance = scalar("tolerance", tolerance)
     if not _SMALLEST_TOLERANCE <= tolerance < 1.0:
         raise InvalidInput(

@@ -120,7 +120,7 @@ class _Search:
         return best, self._size(best)
 
     def fit(self, start: Array, weight: float, tolerance: float) -> tuple[Array, Limits]:
-        """Solve the problem for ε = ``weight``. Return the joint angles and their active limits."""
+        """Minimise ½‖r‖² + ½ weight ‖q − guess‖² within the limits; return q and active limits."""
         root = math.sqrt(weight)
         regularisation = root * np.eye(start.size)
         found = least_squares(
@@ -167,7 +167,10 @@ class _Search:
         return _NewtonStep(move, gradient, error, convex)
 
     def _active_set(self, newton: _Newton, q: Array, held: Limits) -> tuple[Array | None, Limits]:
-        """Solve with an active set of limits; return angles (None: failed) and limits."""
+        """Find the optimum by Newton's method with an active set of limits, at first ``held``.
+
+        Returns the joint angles (None if it fails) and the active limits.
+        """
         held = held.copy()
         for _ in range(2 * q.size + 5):
             q = np.where(held < 0, self.lower, np.where(held > 0, self.upper, q))

@@ -33,29 +33,32 @@ class Residual(ABC):
 
     @abstractmethod
     def evaluate(self, q: Array) -> tuple[Array, Array]:
-        """Compute r (m,) and ∂r/∂q (m, nv)."""
+        """Compute the residual r (m,) at joint angles q (nv,), and its Jacobian ∂r/∂q (m, nv)."""
 
     @abstractmethod
     def curvature(self, q: Array, weight: Array) -> Array:
-        """Compute the Hessian of weight · r (nv, nv); it is exact where r = 0."""
+        """Compute the Hessian (nv, nv) of weight · r with respect to q, for constant weights (m,).
+
+        It may be exact only where r = 0.
+        """
 
     def hessian(self, q: Array) -> Array:
-        """Compute the Hessian of ½‖r‖² (nv, nv); it is exact for all r."""
+        """Compute the Hessian of ½‖r‖² (nv, nv) with respect to q; it is exact for all r."""
         r, J = self.evaluate(q)
         return self.curvature(q, r) + J.T @ J
 
 
 @final
 class LengthResidual(Residual):
-    """(L(q) − wanted lengths)/arm length (C,)."""
+    """Residual (L(q) − wanted lengths)/arm length (C,) of the cable lengths."""
 
     def evaluate(self, q: Array) -> tuple[Array, Array]:
-        """As in :class:`Residual`."""
+        """Compute the residual r (C,) and ∂r/∂q = J_L/arm length (C, nv) at q (nv,)."""
         pose, length = self.arm.at(q, check_limits=False), self.arm.length
         return (pose.cable_lengths - self.target) / length, pose.length_jacobian / length
 
     def curvature(self, q: Array, weight: Array) -> Array:
-        """As in :class:`Residual`: H_L·F with F = weight/arm length."""
+        """Compute the Hessian (nv, nv) of weight · r: H_L·F with F = weight/arm length."""
         tension = frozen(weight / self.arm.length)
         pose = self.arm.at(q, check_limits=False)
         return pose._joint_stiffness(tension, frozen(np.zeros(weight.size)), _NO_WRENCH)[0]
@@ -63,10 +66,13 @@ class LengthResidual(Residual):
 
 @final
 class TipResidual(Residual):
-    """Position error/arm length (3,); for a target pose, then the rotation vector [rad] (6,)."""
+    """Residual of the tip: position error/arm length (3,).
+
+    For a target pose it is (6,): the rotation vector of the orientation error [rad] follows.
+    """
 
     def evaluate(self, q: Array) -> tuple[Array, Array]:
-        """As in :class:`Residual`."""
+        """Compute the residual r (3,) or (6,) and ∂r/∂q at q (nv,)."""
         state, length = self.arm._model.body.state(q), self.arm.length
         linear, angular = state.jacobian[:3] / length, state.jacobian[3:]
         if self.target.ndim == 1:
@@ -76,7 +82,10 @@ class TipResidual(Residual):
         return np.concatenate([offset, turn]), np.vstack([linear, turn_jacobian @ angular])
 
     def curvature(self, q: Array, weight: Array) -> Array:
-        """As in :class:`Residual`: ∂(J_Xᵀ W)/∂θ, with the wrench W made of the weights."""
+        """Compute the Hessian (nv, nv) of weight · r, exact where r = 0: ∂(J_Xᵀ W)/∂θ.
+
+        The wrench W has the weights, those of the position divided by the arm length.
+        """
         # at r = 0, ∂r/∂q is J_X up to the length
         wrench = np.zeros(6)
         wrench[: weight.size] = weight
@@ -85,7 +94,7 @@ class TipResidual(Residual):
         return -single_load_stiffness(frozen(jacobian), frozen(wrench), way)
 
     def hessian(self, q: Array) -> Array:
-        """As in :class:`Residual`."""
+        """Compute the Hessian of ½‖r‖² (nv, nv) with respect to q; it is exact for all r."""
         # ∂(½φ²) = φ·ω exactly, so the second derivative contains that of φ only once
         r, J = self.evaluate(q)
         angular = self.arm._model.body.state(q).jacobian[3 : r.size]

@@ -97,8 +97,9 @@ def narrowed_bounds(
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Narrow bounds (), (B,) or (B, C) [N] by :func:`friction_losses`.
 
-    Every segment of a cable is then within the bounds. Return the lower and upper bounds (B, C),
-    and which postures have any (B,); the others keep the given bounds.
+    Every segment of a cable is then within the given bounds. Return the lower and upper bounds (B,
+    C), and in which postures no lower bound is above the upper one (B,); the other postures keep
+    the given bounds.
     """
     given = _each_bound(arm, minimum, maximum, loss.shape)
     low, high = given[0] * loss, given[1] / loss
@@ -116,10 +117,10 @@ def payloads(
     directions: Array,
     threads: int | None = None,
 ) -> Array:
-    """Compute the largest forces (B, D) [N] within the limits of the tensions.
+    """Compute the largest forces (B, D) [N] that the bounds of the tensions allow.
 
-    Postures q (B, nv) have a wrench (B, 6) and bounds each, (B,) or (B, C); the unit directions are
-    (D, 3).
+    Each of the postures q (B, nv) has a wrench (B, 6) and bounds, (B,) or (B, C). The unit
+    directions of the forces are (D, 3).
     """
     JX, J, torque, low, high = _balances(arm, q, wrench, minimum, maximum, threads)
     motion = np.einsum("nij,di->ndj", JX[:, :3], directions)

@@ -180,9 +180,10 @@ def payload_rows(
     reach: float,
     force: Array,
 ) -> None:
-    """Compute the largest forces (B, D) [N] of rows; NaN where the method proves none.
+    """Compute the largest forces (B, D) [N] of B postures along D directions u.
 
-    J_L (B, C, nv), the torque J_Xᵀ W − g (B, nv), J_vᵀ u (B, D, nv), the bounds (B, C).
+    J is J_L (B, C, nv), ``torque`` J_Xᵀ W − g (B, nv), ``motion`` J_vᵀ u (B, D, nv); ``low`` and
+    ``high`` are the bounds (B, C). The force is NaN where the method proves none.
     """
     rows, count, nv = J.shape
     columns, x = np.empty((nv, count + 1)), np.empty(count + 1)

@@ -130,7 +130,10 @@ def constraint_hessian(
     left: Array,
     right: Array,
 ) -> Array:
-    """Return ∂²(Σ Y_ij X_ij)/∂F² (C, C), with X of :func:`tip_stiffness` and weights Y (r, r)."""
+    """Return ∂²(Σ Y_ij X_ij)/∂F² (C, C) for weights Y (r, r).
+
+    X, ``right``, ``left`` and ``inverse`` are the results of :func:`tip_stiffness` for ``rows``.
+    """
     left_torques = _torques_by_tension(hessian, length_jacobian, slope, left)
     right_torques = _torques_by_tension(hessian, length_jacobian, slope, right)
     count, nv, r = right_torques.shape

@@ -48,7 +48,10 @@ def along_constraints(model: StiffnessModel, directions: Array, targets: Array) 
 
 
 def cartesian_constraints(model: StiffnessModel, target: Array) -> Constraints:
-    """Build (cartesian − target)/‖target‖ as 6 constraints (symmetric part) of the same norm."""
+    """Build the constraints (cartesian − target)/‖target‖ of the symmetric part.
+
+    They are 6 values, whose norm is that of the matrix (3, 3).
+    """
     weights = []
     for i in range(3):
         for j in range(i, 3):

@@ -63,7 +63,10 @@ _AT_KINK = 1e-6  # relative distance from a kink that counts as zero
 
 
 class Objective(NamedTuple):
-    """f = linear·Σc + square·½‖c‖²; or the effort ½‖(F − centre)/unit‖², which needs c = 0."""
+    """Objective f of the constraint values c: linear·Σc + square·½‖c‖².
+
+    Or, if ``effort``, f = ½‖(F − centre)/unit‖² subject to c = 0.
+    """
 
     linear: float = 0.0
     square: float = 0.0

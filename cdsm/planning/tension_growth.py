@@ -140,7 +140,7 @@ def _kinks(at: StiffnessAt, places: Array) -> Array:
     """Find the lower bounds [N], rising, within ``places`` at which the slope is discontinuous.
 
     There a cable reaches or leaves a bound, or passes a kink of its rigidity. If the same cables
-    are at their bounds at both ends of an interval, F*(b) is linear in the interval.
+    are at their bounds at both ends of an interval, the least tensions are linear in the bound.
     """
     found: list[float] = []
     todo = list(pairwise(places.tolist()))

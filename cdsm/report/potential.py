@@ -57,7 +57,7 @@ class LockedCable(NamedTuple):
         )
 
     def stored(self, longer: Array) -> Array:
-        """Compute E(longer cable) − E(posture) − F·ΔL (P,) [J] for elongations ΔL (P, C) [m]."""
+        """Compute the energy (P,) [J] stored by elongations ΔL (P, C) [m], minus the work F·ΔL."""
         cable, F, start = self.cable, self.tension, self.free_length
         pulls = self.pulls(longer)
         more = evaluate_law(cable, lambda: cable.energy(pulls, start) - cable.energy(F, start))
@@ -154,7 +154,10 @@ class Neighbourhood:
         return self._kinematic(places, np.zeros(3))
 
     def work(self, places: Array) -> Array:
-        """Compute :meth:`kinematic` (P, 3) [N m] with the work of the moment, to first order."""
+        """Compute :meth:`kinematic` (P, 3) [N m]; the load part includes the work of the moment.
+
+        That work is exact to first order.
+        """
         return self._kinematic(places, self._wrench[3:])
 
     def _kinematic(self, places: Array, moment: Array) -> Array:

@@ -67,7 +67,7 @@ class FrictionalArm(NamedTuple):
         return self.problem.settle(segments.lengths, self.natural, ratio, self.forced, near)
 
     def residual(self, pose: Posture, tension: Array) -> Array:
-        """Compute r (nv,) [N m] of segment tensions (S,) [N]."""
+        """Compute the residual torque r (nv,) [N m] under segment tensions (S,) [N]."""
         pull = tension @ pose.segments.length_jacobian
         return np.asarray(pull + pose.gravity_torque - self.wrench @ pose.jacobian)
 

@@ -116,7 +116,7 @@ def slow_loading(pose: Posture, tension: Array, wrench: Array, accuracy: float) 
 
 
 def _commands(motors: ArrayLike, forced: NDArray[np.bool_]) -> Array:
-    """Check commands of the motors, except their shape."""
+    """Check and return the commands of the motors (n, C); their shape is checked elsewhere."""
     commands = number_array("motors", motors)
     if commands.ndim == 2 and commands.shape[1] == forced.size:
         pulled = commands[:, forced]

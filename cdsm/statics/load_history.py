@@ -101,11 +101,17 @@ class LoadHistory(ReadOnlyState):
         return tuple(f"{cables[c].name} site {site + 1}" for c, site in pairs)
 
     def pose(self, load: int) -> Posture:
-        """Return the posture at load number ``load``; negative: from the last. Or InvalidInput."""
+        """Return the posture at load number ``load``; a negative number counts from the last load.
+
+        Raises InvalidInput if there is no such load.
+        """
         return self.reference.arm.at(self.angles[self._index(load)], check_limits=False)
 
     def stiffness(self, load: int) -> Stiffness:
-        """Compute the tangent stiffness at load number ``load``, while sliding holes slide on."""
+        """Compute the tangent stiffness at load number ``load``.
+
+        It holds as long as the sliding holes continue to slide.
+        """
         k = self._index(load)
         signs = self.sliding[k]
         friction: Friction = "sliding" if signs.any() else "stuck"

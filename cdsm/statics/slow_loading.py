@@ -114,7 +114,10 @@ class SlowLoading(NamedTuple):
         return State(Load(wrench, settled.residual, motors), settled, none, none)
 
     def carry(self, before: State, load: Load, what: str) -> tuple[State, Passage]:
-        """Change the load of an arm in equilibrium; ``what`` names the load in an error message."""
+        """Change the load of an arm in equilibrium; return its new state, and energies and slips.
+
+        ``what`` names the load in an error message.
+        """
         first, state = before.load, before
         total = Passage(0.0, 0.0, 0.0, 0.0, np.zeros(before.settled.chain.slip.size))
         reached, part, turnover = 0.0, 1.0, 0.0
@@ -214,7 +217,10 @@ def _newton_step(arm: FrictionalArm, old: Settled, start: Settled, held: Array) 
 
 
 def _work(force: list[Array], way: list[Array]) -> float:
-    """Integrate force over displacement from start, middle and end; exact for quadratics."""
+    """Integrate force over displacement from their values at start, middle and end.
+
+    It is exact for quadratic functions.
+    """
     half, whole = way[1] - way[0], way[2] - way[0]
     ends = force[0] @ (4.0 * half - whole) + force[2] @ (3.0 * whole - 4.0 * half)
     return float(ends + 4.0 * (force[1] @ whole)) / 6.0

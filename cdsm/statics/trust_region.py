@@ -49,15 +49,15 @@ class Iterate(Protocol):
 
     @property
     def torque(self) -> Array:
-        """Residual r minus the torque of :meth:`holding_back` (nv,) [N m]."""
+        """Residual torque r minus the torque of :meth:`holding_back` (nv,) [N m]."""
 
     @property
     def rounding(self) -> Array:
-        """Rounding error of the residual (nv,) [N m]."""
+        """Rounding error of the residual torque r (nv,) [N m]."""
 
     @property
     def stiffness(self) -> Array:
-        """∂r/∂q (nv, nv) [N m/rad]."""
+        """Derivative ∂r/∂q of the residual torque r (nv, nv) [N m/rad]."""
 
     def holding_back(self, torque: Array | float) -> Self:
         """Return this state with a torque (nv,) [N m] that is subtracted from its residual."""
@@ -120,7 +120,10 @@ class _Free(NamedTuple):
 def find_rest(
     loaded: Loaded[State], start: State, held_back: Array | float = 0.0
 ) -> RestSearch[State]:
-    """Find the equilibrium r = ``held_back`` (nv,) [N m] from an iterate."""
+    """Find from an iterate the equilibrium, where the residual torque r is ``held_back``.
+
+    ``held_back`` is (nv,) [N m], by default zero.
+    """
     stops = loaded.stops()
     state, radius = start.holding_back(held_back), _FIRST
     free = _Free.of(state, *stops)
@@ -152,7 +155,7 @@ def find_rest(
 
 
 def work(before: Iterate, after: Iterate) -> float:
-    """Compute ∫ r·dq on the straight line between two iterates."""
+    """Compute the work ∫ r·dq [J] of the residual torque on the line between two iterates."""
     step = after.q - before.q
     change = step @ before.stiffness @ step - step @ after.stiffness @ step
     return float((before.torque + after.torque) @ step / 2.0 + change / 12.0)
@@ -175,7 +178,7 @@ def _trial(
 
 
 def _spectrum(stiffness: Array, free: NDArray[np.intp]) -> tuple[Array, Array]:
-    """Return eigenvalues (rising) and eigenvectors of K (symmetric part) for some joints."""
+    """Return eigenvalues, rising, and eigenvectors of K (symmetric part), for some joints."""
     K = stiffness[np.ix_(free, free)]
     values, vectors = np.linalg.eigh((K + K.T) / 2.0)
     return values, vectors

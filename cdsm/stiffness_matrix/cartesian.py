@@ -207,5 +207,5 @@ class CartesianReadings(ReadOnlyState):
 
 
 def axis_of(u: Array) -> str:
-    """Format a direction (3,) whose sign does not matter: its largest entry is positive."""
+    """Write a direction (3,) as text, with the sign that makes its largest entry positive."""
     return coordinates(np.round(u * np.sign(u[abs(u).argmax()]), 9), "z.3g")

@@ -52,7 +52,7 @@ def installed_solver(solver: str) -> str:
 
 
 def solve(problem: tension_kernels.Scaled, solver: str) -> Array | str:
-    """Return the verified optimum; or a text, if there is no solution or not the optimum."""
+    """Return the verified optimum, or a text that says why there is none."""
     import qpsolvers
     from scipy.sparse import csc_matrix
 
