@@ -15,7 +15,7 @@ _NO_ANGLE = 1e-15
 """A smaller joint coordinate [rad or m] of a path is rounding."""
 
 
-def held_cables(arm: Manipulator) -> list[int]:
+def position_controlled(arm: Manipulator) -> list[int]:
     """Return the indices of the position-controlled cables."""
     return [c for c, each in enumerate(arm.cables) if each.control == "position"]
 
@@ -29,7 +29,7 @@ def path_table(plan: PathPlan) -> tuple[list[str], list[list[Any]]]:
         *(f"{name} [{unit}]" for name, unit in zip(arm.joint_names, arm.joint_units, strict=True)),
         *(f"{name} tension [N]" for name in names),
         *(f"{name} length [m]" for name in names),
-        *(f"{names[c]} unstrained length [m]" for c in held_cables(arm)),
+        *(f"{names[c]} unstrained length [m]" for c in position_controlled(arm)),
         *("tip x [m]", "tip y [m]", "tip z [m]"),
         *(f"stiffness{number} [N/m]" for number in numbered),
     ]
