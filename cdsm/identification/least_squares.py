@@ -102,7 +102,7 @@ class LeastSquares:
         return ", ".join(f"{name} = {x:.6g}" for name, x in self.parameters(point).items())
 
     def residuals(self, point: Array) -> Array:
-        """Compute the residuals r (n,). They are inf where the model does not exist."""
+        """Compute the residuals r (n,) at a point; they are inf where the model does not exist."""
         found = self._cached(point.tobytes())
         return np.full(self.count, math.inf) if isinstance(found, NoModelError) else found.copy()
 
@@ -118,7 +118,7 @@ class LeastSquares:
             return error
 
     def cost(self, point: Array) -> float:
-        """Compute Σ r²."""
+        """Compute Σ r² at a point of the unit cube."""
         r = self.residuals(point)
         return float(r @ r)
 

@@ -94,7 +94,7 @@ class _Reader:
         self._tensions = self._tension_columns()
 
     def _tension_columns(self) -> list[_Column]:
-        """Find the columns of the tensions, or that of their bound."""
+        """Find the columns of the tensions, or the column of their lower bound."""
         cables = [name for name in self._arm.cables.names if name in self._header]
         if "minimum" in self._header:
             if cables:

@@ -103,7 +103,7 @@ class Conditions(Protocol):
 
     @property
     def wrench(self) -> tuple[float, ...]:
-        """W (6,) at ``tool0``."""
+        """W (6,) at ``tool0`` without the measuring force: force [N], then moment [N m]."""
 
     @property
     def label(self) -> str:

@@ -147,7 +147,7 @@ def _set_velocities(
     rates: Velocities,
     width: Width,
 ) -> None:
-    """Fill the velocities of joints and sites for θ̇ of one direction e."""
+    """Fill the velocities of joints and sites for the joint motion θ̇ of one direction e."""
     turn, moved, d = rates.turn, rates.origin, np.uint64(direction)
     for k in range(tree.order.shape[0]):
         i = np.uint64(tree.order[k])

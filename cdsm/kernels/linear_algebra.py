@@ -42,7 +42,7 @@ K_θ of a stable arm needs no exchange, and exchanges are made posture by postur
 
 @inner
 def eliminate(M: Array, pivots: Array, width: Width) -> None:
-    """Solve A X = B: replace the columns B, right of A (n, n) in M (n, n + …, W), by A⁻¹ B.
+    """Solve A X = B: replace the columns B, right of A (n, n) in M (n, n + k, W), by A⁻¹ B.
 
     ``pivots`` (4, W) returns the smallest and the largest pivot in its first rows; the others are
     scratch. If a pivot is zero, B is meaningless.
@@ -287,7 +287,7 @@ def singular_values(rows: Array, left: Array, values: Array, scratch: Array, wid
 
 @inner
 def _set_product(rows: Array, a: Index, b: Index, product: Array, width: Width) -> None:
-    """Fill product (W,) with row a times row b."""
+    """Fill product (W,) with the dot product of rows a and b of ``rows`` (3, n, W)."""
     for w in lanes(width):
         product[w] = 0.0
     for j in upwards(0, rows.shape[1]):

@@ -200,7 +200,10 @@ def _equilibrate(
 
 @inner
 def _rescale(scale: Array, system: Array, moved: Array, width: Width) -> None:
-    """Scale the solutions back to K_θ⁻¹ B; fill ``moved`` (W,), the largest motion by the probe."""
+    """Scale the solutions back to K_θ⁻¹ B.
+
+    Fills ``moved`` (W,), the largest scaled joint motion that the probe torque causes.
+    """
     nv = np.uint64(system.shape[0])
     for w in lanes(width):
         moved[w] = 0.0
@@ -252,7 +255,10 @@ def _set_torques(
 def set_along(
     JX: Array, directions: Array, system: Array, status: Indices, along: Array, width: Width
 ) -> None:
-    """Fill the stiffness along each direction where it is NaN and K_θ is not singular."""
+    """Fill ``along`` = 1/(uᵀ C_vv u) (B, D, W) where it is NaN, unless K_θ is singular there.
+
+    Columns nv + 1 on of the system are K_θ⁻¹ J_vᵀ u for the unit directions u (D, 3).
+    """
     compliance, first = np.empty(JX.shape[3]), np.uint64(JX.shape[2] + 1)
     for b in range(JX.shape[0]):
         for u in upwards(0, directions.shape[0]):

@@ -38,7 +38,10 @@ from cdsm.support.values import Array
 
 
 class _Motion(NamedTuple):
-    """Motion of all joint frames along q̇ = z: ω, ω̇, and ȯ and ö of the origins, (nv+1, 3) each."""
+    """Motion of all joint frames along q̇ = z, (nv+1, 3) each.
+
+    Angular velocity ω and ω̇, velocity and acceleration of the origins.
+    """
 
     turning: Array
     turning_rate: Array

@@ -213,7 +213,10 @@ def _keep_better(
     best_q: Array,
     width: Width,
 ) -> None:
-    """Keep the tensions added to cables p and q (W,) if they are admissible and cost least."""
+    """Keep the tensions x and y (W,) added to cables p and q, if they cost less than the best.
+
+    They must not be negative, and the sums must not exceed the upper bounds (``most``).
+    """
     for w in lanes(width):
         # cables that cannot give the torque have infinite x and y, or NaN
         within = 0.0 <= x[w] < math.inf and 0.0 <= y[w] < math.inf

@@ -85,7 +85,10 @@ def certificate(nv: int, cables: int, width: int) -> Certificate:
 def scaled_balance(
     length_jacobian: Array, torque: Array, low: Array, high: Array, reach: float
 ) -> tuple[Array, Array, Array, Array, float, float]:
-    """Compute the fields of :class:`Scaled`; moment arms below NO_ARM times ``reach`` are zero."""
+    """Compute the fields of :class:`Scaled`; moment arms below NO_ARM · ``reach`` become zero.
+
+    ``reach`` is the length of the arm [m].
+    """
     count, nv = length_jacobian.shape
     largest = 0.0
     A = np.empty((nv, count))

@@ -172,7 +172,7 @@ def _balances(
 def _each_bound(
     arm: Manipulator, minimum: ArrayLike, maximum: ArrayLike, shape: tuple[int, int]
 ) -> tuple[Array, Array]:
-    """Return checked bounds of tension (B, C) [N] from one for all, for B postures, or (B, C)."""
+    """Return checked bounds (B, C) [N] from bounds (), (B,), one per posture, or (B, C)."""
     bounds = (np.asarray(bound, dtype=np.float64) for bound in (minimum, maximum))
     low, high = (np.broadcast_to(b[:, None] if b.ndim == 1 else b, shape) for b in bounds)
     return checked_bounds(arm, low, high, shape[0])

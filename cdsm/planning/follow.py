@@ -71,7 +71,10 @@ class Follower:
     def _near(
         self, region: Admissible | None, sample: Sample, other: Sample | None
     ) -> Admissible | None:
-        """Return the part of a sample's region that is within the rate of another sample."""
+        """Return the tensions of ``region`` that are within the rate of another sample.
+
+        The rate is multiplied by the number of steps between the two samples.
+        """
         if region is None or other is None:
             return region
         return region.within(self.rate * abs(other.index - sample.index), other.F)

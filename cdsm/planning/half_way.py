@@ -66,7 +66,10 @@ def half_way(
 
 
 def _at_rest(ends: tuple[Stiffness, Stiffness], unstrained: Array) -> Stiffness:
-    """Compute K_θ at the equilibrium near the mean posture."""
+    """Compute K_θ at the equilibrium near the mean posture of ``ends``.
+
+    ``unstrained`` (H,) [m] are the unstretched lengths l_0 of the position-controlled cables.
+    """
     one, other = ends
     q = (one.posture.q + other.posture.q) / 2.0
     F = frozen((one.tension + other.tension) / 2.0)

@@ -161,7 +161,7 @@ def plan_path(
 
 
 def checked_path(arm: Manipulator, angles: ArrayLike | None, tips: ArrayLike | None) -> Array:
-    """Check the path: joint angles (S, nv) [rad] or tip positions (S, 3) [m]."""
+    """Check and return the path: joint angles (S, nv) [rad] or tip positions (S, 3) [m]."""
     if (angles is None) == (tips is None):
         raise InvalidInput(
             "angles",

@@ -124,7 +124,7 @@ class Planner:
         return hits[0]
 
     def _nearly_hit(self, seen: list[ConstraintValues]) -> ConstraintValues | None:
-        """Return the least of some tensions that hit the single target within 1e-6, or None."""
+        """Return the least tensions ``seen`` that hit the single target within 1e-6, or None."""
         least = min(float(abs(place.values[0])) for place in seen)
         if least > REACHED:
             return None

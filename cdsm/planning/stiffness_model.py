@@ -95,7 +95,7 @@ class Evaluation:
 
     @cached_property
     def spring_slopes(self) -> tuple[Array, Array]:
-        """dk/dF (C,) [1/m] and d²k/dF² (C,) [1/(N m)]."""
+        """Derivatives dk/dF (C,) [1/m] and d²k/dF² (C,) [1/(N m)] of the cable stiffnesses k."""
         return self.model.pose.arm._model.laws.slopes(self.F, self._springs)
 
     @property
@@ -203,7 +203,7 @@ class ConstraintValues:
 
     @cached_property
     def jacobian(self) -> Array:
-        """∂c/∂F (n, C) [1/N]."""
+        """Jacobian ∂c/∂F (n, C) [1/N] of the constraint values c."""
         slopes = *self.evaluation.model.geometry, self.evaluation.spring_slopes[0]
         return np.concatenate(
             [
@@ -213,7 +213,7 @@ class ConstraintValues:
         )
 
     def hessian(self, y: Array) -> Array:
-        """Return ∂²(y · c)/∂F² (C, C) [1/N²] for y (n,)."""
+        """Return the Hessian ∂²(y · c)/∂F² (C, C) [1/N²] of the values c, with weights y (n,)."""
         slopes = *self.evaluation.model.geometry, *self.evaluation.spring_slopes
         total, first = np.zeros((self.evaluation.F.size,) * 2), 0
         each = zip(self._parts, self._tips, strict=True)

@@ -121,7 +121,10 @@ def saturation(
 
 
 def _stable(at: StiffnessAt, low: float, high: float) -> tuple[float, float]:
-    """Return the first range (low, high) of lower bounds [N] in which the arm is safely stable."""
+    """Return the first range (low, high) of lower bounds [N] in which the arm is stable.
+
+    An end at which K_θ is singular is moved a little inwards.
+    """
     places, margins, stable = stable_ranges(at, low, high)
     if not stable:
         best = at(float(places[int(margins.argmax())]))

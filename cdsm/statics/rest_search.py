@@ -2,7 +2,7 @@
 
     r(q) = J_Lᵀ F(q) + g − J_Xᵀ W = 0,    ∂r/∂q = K_θ                       (Eqs. 13 and 16)
 
-The cables are pulled at a reference posture, and their motors are locked there. Under another load
+The cables have tensions at a reference posture, where the motors are locked. Under another load
 the arm moves. The tension F(q) of every position-controlled cable follows from its elongation,
 nonlinear elasticity and series springs included.
 """

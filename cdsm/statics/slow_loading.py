@@ -206,7 +206,10 @@ def _guess(arm: FrictionalArm, old: Settled, motion: Array, held: Array) -> Sett
 
 
 def _newton_step(arm: FrictionalArm, old: Settled, start: Settled, held: Array) -> Settled:
-    """Return the arm after a Newton step with the last tangent; ``start`` if that is not better."""
+    """Return the arm after a Newton step with the tangent of ``old`` and the torque of ``start``.
+
+    Returns ``start`` if the step does not reduce the torque.
+    """
     try:
         step = np.linalg.solve(old.stiffness, -start.torque)
         near = start._replace(slope=old.slope)

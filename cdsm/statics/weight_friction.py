@@ -121,7 +121,7 @@ class WeightFriction(ReadOnlyState):
 
     @cached_property
     def _dither(self) -> tuple[int, float]:
-        """Search for the number of cycles and the stiffness [N/m] after them."""
+        """Number of dither cycles, found by search, and the stiffness [N/m] after them."""
         size = self.sliding_load
         if not 0.0 < size < math.inf:
             return 0, self.secant if size == 0.0 else math.nan

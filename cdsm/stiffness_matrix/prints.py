@@ -45,7 +45,11 @@ def table(K: Stiffness) -> list[tuple[str, ...]]:
 
 
 def _cartesian_entry(K: Stiffness, i: int) -> float:
-    """Return a diagonal entry of ``cartesian``, or of the matrix for the mobile axes [N/m]."""
+    """Return the diagonal entry i of ``cartesian`` [N/m].
+
+    Where ``cartesian`` does not exist, it is that of ``cartesian_in`` the axes along which the tip
+    can move.
+    """
     try:
         return float(K.cartesian[i, i])
     except SingularStiffness:
