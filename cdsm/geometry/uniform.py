@@ -45,7 +45,7 @@ def uniform(
     usual_angles: Callable[[int], list[list[float]]],
     keywords: Mapping[str, Any],
 ) -> dict[str, Any]:
-    """Return the attributes of a Geometry; raise GeometryError.
+    """Return the attributes of the Geometry of a uniform arm; GeometryError if one is invalid.
 
     ``axes`` has the axes of each joint. ``usual_angles`` returns the hole angles of each joint for
     a number of cables per joint, if no ``hole_angles`` are given. ``keywords`` are those of

@@ -35,7 +35,10 @@ def yield_onset(tensions: Array, rigidity: Array, deviation: Array) -> float | N
 
 
 def pretension_end(tensions: Array, rigidity: Array, deviation: Array) -> float | None:
-    """Find the tension [N] from which EA grows slower than √F. None if no faster growth is sure."""
+    """Find the tension [N] from which EA grows slower than √F.
+
+    None if EA does not grow faster than √F at any tension, beyond its uncertainty.
+    """
     level = np.log(rigidity)
     inner = (tensions > _STEP * tensions[0]) & (tensions < tensions[-1] / _STEP) & (tensions > 0)
     if not inner.any():
