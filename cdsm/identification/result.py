@@ -250,7 +250,7 @@ class Identification(ReadOnlyState):
         )
 
     def _rise(self, level: float, *, scaled: bool) -> float:
-        """Compute Δχ² [-] at the limits of an interval."""
+        """Compute the Δχ² [-] at the limits of a confidence interval of this level."""
         half = (1.0 + level) / 2.0
         if not scaled:
             return float(ndtri(half) ** 2)

@@ -171,7 +171,10 @@ def largest_force(loads: Loads) -> float:
 def _worst(
     polytope: ForcePolytope, compliance: Array, allowed: float
 ) -> tuple[Array, dict[str, float]]:
-    """Return the worst direction of tensions and deflection, and both largest forces there [N]."""
+    """Return the direction in which tensions or deflection allow the least force.
+
+    Also return the largest forces there [N]: that of the tensions, and that of the deflection.
+    """
     tension = polytope.margin()
     values, vectors = np.linalg.eigh(compliance.T @ compliance)
     softest = _ratio(allowed, math.sqrt(max(float(values[-1]), 0.0)))

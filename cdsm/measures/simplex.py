@@ -138,7 +138,10 @@ def _proved(
     inverse: Array,
     price: Array,
 ) -> bool:
-    """Correct x by its residual; return whether it then meets the conditions of a maximum."""
+    """Correct x by its residual; return whether it then meets the conditions of a maximum.
+
+    ``state``, ``basis``, ``inverse`` and ``price`` are those of the simplex method at x.
+    """
     m, n = A.shape
     left, size = b.copy(), np.abs(b)
     for i in range(m):

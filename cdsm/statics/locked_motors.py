@@ -166,9 +166,9 @@ def rounding(K: Stiffness) -> Array:
 def tilt_torque(pose: Posture, tension: Array) -> Array:
     """Compute the error of the torques (nv,) [N m] per relative rounding error of the sites.
 
-    This error rotates the segments, short ones most. Between disks that nearly touch it is the
-    largest part of the rounding. ``tension`` [N] has an entry for each segment that joints can
-    change.
+    Errors of the sites rotate the segments, short ones most. Between disks that nearly touch this
+    is the largest part of the rounding. ``tension`` [N] has an entry for each segment that joints
+    can change.
     """
     start, end, over, joint = pose.arm._model.moving
     site, origin = pose._frames.site, pose._frames.origin
@@ -230,12 +230,12 @@ class _LockedLaw:
         self._start = lengths - elongation  # L where the law begins [m]
 
     def _elongation(self, F: Array) -> Array:
-        """Compute Δl = l_0 Δε + ΔF/k_series [m] relative to the lower bound of the law."""
+        """Compute the elongation Δl = l_0 Δε + ΔF/k_series [m] from the law's lower bound to F."""
         wire = self._free_length * (self.law.strain(F) - self._least_strain)
         return np.asarray(wire + (F - self.law.domain.low) * self._series)
 
     def _compliance(self, F: Array) -> Array:
-        """Compute dΔl/dF = l_0/EA(F) + 1/k_series [m/N]."""
+        """Compute the derivative dΔl/dF = l_0/EA(F) + 1/k_series [m/N] of the elongation Δl."""
         return np.asarray(self._free_length / self.law.rigidity(F) + self._series)
 
     def tension(self, lengths: Array, near: Array) -> tuple[Array, Array]:

@@ -94,7 +94,7 @@ class Passage(NamedTuple):
 
 
 class SlowLoading(NamedTuple):
-    """An arm with friction that is loaded slowly."""
+    """An arm with friction that is loaded slowly: what stays the same from load to load."""
 
     problem: ChainProblem
     start: Indices  # first segment of each cable, and the number of segments (C+1,)
