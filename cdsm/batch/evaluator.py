@@ -20,7 +20,7 @@ from cdsm.kernels.compiling import WIDTH, is_new
 from cdsm.kernels.distribution import search_tensions
 from cdsm.kernels.read import read
 from cdsm.kernels.readings import IMMOBILE, READ, SINGULAR, UNREAD
-from cdsm.kernels.tension import NO_ARM
+from cdsm.kernels.tension import Balance
 from cdsm.kernels.tree import Indices
 from cdsm.manipulator import Manipulator
 from cdsm.support.status import Status
@@ -66,6 +66,7 @@ class Evaluator:
         self._tension, self._bounds = tension, bounds
         nv, cables = arm.nv, len(arm.cables)
         self._nothing = frozen(np.empty((0, cables)))
+        self._no_balance = Balance(np.empty((0, cables, nv)), np.empty((0, nv)))
         self._directions = frozen(
             np.zeros((0, 3)) if direction is None else direction.reshape(-1, 3)
         )
@@ -114,61 +115,60 @@ class Evaluator:
         if self._bounds is None:
             tension = self._nothing if self._tension is None else self._of(self._tension, rows)
             self._evaluate(rows, tension, self._wanted, found, out)
-        elif self._asks:
-            self._distribute_first(rows, found, out)
         else:
-            self._evaluate(rows, None, self._wanted, found, out)
-            left = found == UNDECIDED
-            if left.any():
-                codes, values = np.zeros_like(found[left]), out[left]
-                self._distribute_first(rows[left], codes, values)
-                found[left], out[left] = codes, values
+            self._distribute(rows, found, out)
         if self._tension is not None and "tension" in self._place:
             out[:, self._place["tension"]] = self._of(self._tension, rows)
 
-    def _distribute_first(self, rows: Indices, found: Codes, out: Array) -> None:
-        """Find the tensions of some postures, and then fill their status and output."""
-        tension = np.empty((rows.size, len(self._arm.cables)))
-        self._evaluate(rows, None, np.array([layout.TENSION]), found, tension)
+    def _distribute(self, rows: Indices, found: Codes, out: Array) -> None:
+        """Distribute the tensions of some postures; fill their status and output."""
+        nv, cables = self._arm.nv, len(self._arm.cables)
+        balance = Balance(np.empty((rows.size, cables, nv)), np.empty((rows.size, nv)))
+        tension = np.empty((rows.size, cables))
+        if self._asks:  # rigidities that only Python computes need the tensions first
+            self._evaluate(rows, None, np.array([layout.TENSION]), found, tension, balance)
+        else:
+            self._evaluate(rows, None, self._wanted, found, out, balance)
         left = np.flatnonzero(found == UNDECIDED)
         if left.size:
-            tension[left], found[left] = self._search(rows[left])
-        for r in np.flatnonzero(found == UNDECIDED):
-            row = rows[r : r + 1]
-            low, high, wrench = (
-                self._of(each, row)[0] for each in (*(self._bounds or ()), self._wrench)
-            )
-            pose = self._arm.at(self._q[row[0]], check_limits=False)
-            try:
-                tension[r] = distribute_tension(pose, low, high, wrench).values
-                found[r] = OK
-            except (InfeasibleTension, SolverError) as error:
-                found[r] = Status.of(error) or Status.SOLVER_FAILED
-        self._evaluate(rows, frozen(tension), self._wanted, found, out)
+            kept = Balance(*(each[left] for each in balance))
+            tension[left], found[left] = self._search(rows[left], kept)
+        again = slice(None) if self._asks else left[found[left] == OK]
+        codes, values = found[again], out[again]
+        if codes.size:
+            self._evaluate(rows[again], frozen(tension[again]), self._wanted, codes, values)
+            found[again], out[again] = codes, values
 
-    def _search(self, rows: Indices) -> tuple[Array, Codes]:
+    def _search(self, rows: Indices, balance: Balance) -> tuple[Array, Codes]:
         """Search for tensions of postures whose guess is not optimal; also return status codes."""
-        nv, cables = self._arm.nv, len(self._arm.cables)
-        needed = np.array([layout.JACOBIAN, layout.LENGTH_JACOBIAN, layout.GRAVITY_TORQUE])
-        out, found = np.empty((rows.size, (7 + cables) * nv)), np.zeros(rows.size, dtype=np.uint8)
-        self._evaluate(rows, self._nothing, needed, found, out)
-        JX, arms, g = np.split(out, [6 * nv, (6 + cables) * nv], axis=1)
-        torque, wrench = -g, self._of(self._wrench, rows)
-        for a in range(6):  # in the order of the kernel, for the same bits
-            torque += wrench[:, a : a + 1] * JX[:, a * nv : (a + 1) * nv]
-        J = np.where(abs(arms) >= NO_ARM * self._arm.length, arms, 0.0).reshape(-1, cables, nv)
         low, high = (self._of(each, rows).copy() for each in self._bounds or ())
-        tension, outcome = np.empty((rows.size, cables)), np.empty(rows.size, dtype=np.intp)
-        search_tensions(self._arm._model.blocks, J, torque, low, high, tension, outcome)
-        return tension, _CODES[outcome]
+        tension, outcome = np.empty_like(low), np.empty(rows.size, dtype=np.intp)
+        search_tensions(self._arm._model.blocks, *balance, low, high, tension, outcome)
+        codes = _CODES[outcome]
+        for r in np.flatnonzero(codes == UNDECIDED):
+            wrench = self._of(self._wrench, rows[r : r + 1])[0]
+            pose = self._arm.at(self._q[rows[r]], check_limits=False)
+            try:
+                tension[r] = distribute_tension(pose, low[r], high[r], wrench).values
+                codes[r] = OK
+            except (InfeasibleTension, SolverError) as error:
+                codes[r] = Status.of(error) or Status.SOLVER_FAILED
+        return tension, codes
 
     def _evaluate(
-        self, rows: Indices, tension: Array | None, wanted: Indices, found: Codes, out: Array
+        self,
+        rows: Indices,
+        tension: Array | None,
+        wanted: Indices,
+        found: Codes,
+        out: Array,
+        balance: Balance | None = None,
     ) -> None:
-        """Fill status and output of some postures; without tensions (b, C), distribute them."""
+        """Fill status and output of some postures; without tensions (b, C), guess them."""
+        balance = balance or self._no_balance
         read = wanted[wanted > layout.STUCK_JOINT]
         if not read.size:
-            self._evaluate_blocks(rows, tension, wanted, found, out, 0)
+            self._evaluate_blocks(rows, tension, wanted, found, out, balance, 0)
             return
         # readings keep K_θ of several blocks: few enough for the cache, enough for few calls
         size = self._block * max(_FEWEST, _CACHE // (2 * self._block * self._arm.nv**2))
@@ -176,7 +176,10 @@ class Evaluator:
             part = slice(first, min(first + size, rows.size))
             given = None if tension is None else tension[part]
             blocks = -(-(part.stop - first) // self._block)
-            kept = self._evaluate_blocks(rows[part], given, wanted, found[part], out[part], blocks)
+            parts = Balance(*(each[part] for each in balance))
+            kept = self._evaluate_blocks(
+                rows[part], given, wanted, found[part], out[part], parts, blocks
+            )
             self._read(kept, rows[part], read, found[part], out[part])
 
     def _evaluate_blocks(
@@ -186,6 +189,7 @@ class Evaluator:
         wanted: Indices,
         found: Codes,
         out: Array,
+        balance: Balance,
         blocks: int,
     ) -> Kept:
         """Fill all quantities up to K_θ; return the arrays from which the readings follow.
@@ -229,6 +233,7 @@ class Evaluator:
             JX,
             stuck_K,
             stuck_parts,
+            balance,
             out,
             found,
         )

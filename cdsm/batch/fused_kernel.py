@@ -49,7 +49,7 @@ from cdsm.kernels.stiffness import (
     sum_terms,
 )
 from cdsm.kernels.stuck import Holes, add_stuck_stiffness, sticking_scratch
-from cdsm.kernels.tension import certificate
+from cdsm.kernels.tension import Balance, certificate
 from cdsm.kernels.tree import Indices, Routing, Tree, empty_frames, forward_kinematics
 from cdsm.kernels.wires import Wires, set_wire_rigidity, wire_scratch
 from cdsm.support.values import Array
@@ -88,6 +88,7 @@ def evaluate_rows(
     jacobian: Array,
     stuck: Array,
     stuck_parts: Array,
+    balance: Balance,
     out: Array,
     status: Codes,
 ) -> None:
@@ -126,6 +127,8 @@ def evaluate_rows(
         jacobian: J_X (B, 6, nv, W) for the readings, or no blocks.
         stuck: K_θ while the cables stick, with the shape of ``joint``.
         stuck_parts: Sum of the magnitudes of the four terms of ``stuck``, with its shape.
+        balance: What the tensions must balance, filled for UNDECIDED postures (b, …); no rows if no
+            tensions are distributed.
         out: The requested quantities in one row per posture; NaN where they do not exist.
         status: On entry OK, or why no tensions were found; on return the status of the posture.
             UNDECIDED: the guess of its tensions is not the optimum.
@@ -199,6 +202,9 @@ def evaluate_rows(
                 for w in lanes(width):
                     if code[w] == OK and not (check.optimal[w] == 1.0 and guess.failed[w] < 0.0):
                         code[w] = UNDECIDED
+                for w in lanes(width):
+                    if code[w] == UNDECIDED and first + np.intp(w) < rows:
+                        _keep(arms, torque, balance, first, w)
             _note(code, LOAD, known, width)
         if last > TENSION:
             _set_residual(F, J, torque, residual, width)
@@ -260,6 +266,17 @@ def _load(rows: Array, first: int, block: Array, width: Width) -> None:
         for i in upwards(0, rows.shape[1]):
             for w in lanes(width):
                 block[i, w] = rows[min(first + np.intp(w), rows.shape[0] - 1), i]
+
+
+@inner
+def _keep(arms: Array, torque: Array, balance: Balance, first: int, w: Index) -> None:
+    """Copy moment arms (C, nv, W) and torque (nv, W) of posture w of the block to its row."""
+    row = first + np.intp(w)
+    for i in upwards(0, torque.shape[0]):
+        balance.torque[row, i] = torque[i, w]
+    for c in upwards(0, arms.shape[0]):
+        for i in upwards(0, arms.shape[1]):
+            balance.arms[row, c, i] = arms[c, i, w]
 
 
 @inner

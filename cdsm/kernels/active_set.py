@@ -158,23 +158,27 @@ def _most_violated(F: Array, low: Array, high: Array, side: Indices) -> tuple[in
 def _solve_for_sides(J: Array, b: Array, low: Array, high: Array, state: State) -> bool:
     """Fill F and y: cables with a side get that bound, free ones the least tensions that balance.
 
+    The torque that rounding leaves is balanced a second time: S squares the condition of J_L.
     Returns False if the free cables cannot balance every torque.
     """
     F, y, side, _, _, _, w = state
-    for i in range(b.shape[0]):
-        w[i] = b[i]
     for c in range(F.shape[0]):
-        if side[c] != 0:
-            F[c] = low[c] if side[c] > 0 else high[c]
+        F[c] = 0.0 if side[c] == 0 else (low[c] if side[c] > 0 else high[c])
+    for i in range(b.shape[0]):
+        y[i] = 0.0
+    for _ in range(2):
+        for i in range(b.shape[0]):
+            w[i] = b[i]
+        for c in range(F.shape[0]):
             for i in range(b.shape[0]):
                 w[i] -= J[c, i] * F[c]
-    if not _solve_free(J, state):
-        return False
-    for i in range(b.shape[0]):
-        y[i] = w[i]
-    for c in range(F.shape[0]):
-        if side[c] == 0:
-            F[c] = row_product(J, c, y)
+        if not _solve_free(J, state):
+            return False
+        for i in range(b.shape[0]):
+            y[i] += w[i]
+        for c in range(F.shape[0]):
+            if side[c] == 0:
+                F[c] = row_product(J, c, y)
     return True
 
 

@@ -56,6 +56,13 @@ class Scaled(NamedTuple):
     force: float
 
 
+class Balance(NamedTuple):
+    """J_L (r, C, nv) of r postures, moment arms of rounding set to zero, and τ (r, nv)."""
+
+    arms: Array
+    torque: Array
+
+
 class Certificate(NamedTuple):
     """Scratch and result of :func:`set_optimal`.
 
