@@ -114,11 +114,21 @@ def _show_as_shell(app: Sphinx, page: nodes.document) -> None:
             block["language"] = "sh"
 
 
+def _describe(app: Sphinx, page: nodes.document) -> None:
+    """Give figures without a text the title of their section, for who cannot see them."""
+    for image in page.findall(lambda node: isinstance(node, nodes.image) and "alt" not in node):
+        section = image.parent
+        while not isinstance(section, nodes.section):
+            section = section.parent
+        image["alt"] = f"Figure: {section[0].astext()}"
+
+
 def setup(app: Sphinx) -> None:
     """Write the generated pages before Sphinx looks for pages."""
     directives.setup(app)
     app.connect("config-inited", lambda *_: generate.all_pages())
     app.connect("doctree-read", _show_as_shell)
+    app.connect("doctree-read", _describe)
     app.connect("autodoc-process-docstring", _keep_colon, priority=400)  # before napoleon
     app.connect("autodoc-process-docstring", _escape)
     app.connect("autodoc-process-signature", _shorten)
