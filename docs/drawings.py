@@ -177,8 +177,8 @@ def contributions() -> Any:
     ):
         pose = arm.at(np.deg2rad([12, 18, 18]))
         least = np.linspace(10.0, 0.9 * min(170.0, cdsm.critical_tension(pose).minimum), 30)
-        pulls = [cdsm.distribute_tension(pose, minimum=F) for F in least]
-        shares = [cdsm.stiffness(pose, pull).shares("z") for pull in pulls]
+        tensions = [cdsm.distribute_tension(pose, minimum=F) for F in least]
+        shares = [cdsm.stiffness(pose, each).shares("z") for each in tensions]
         terms = {
             "sum": [each.total for each in shares],
             "passive": [each.passive.sum() for each in shares],
@@ -225,16 +225,16 @@ def hole() -> Any:
 def weights(friction: float = 0.1) -> Any:
     """Draw the weight over the displacement of its tip, over the weight, with friction."""
     pose = flat_arm(friction).at(np.deg2rad([12, 18, 18]))
-    pull = cdsm.distribute_tension(pose, minimum=50.0)
+    tension = cdsm.distribute_tension(pose, minimum=50.0)
     forces = np.geomspace(0.05, 8.0, 20)
     wrenches = np.zeros((len(forces), 6))
     wrenches[:, 2] = forces
-    history = cdsm.load_cycle(pose, pull, wrenches)
+    history = cdsm.load_cycle(pose, tension, wrenches)
     figure, axes = plt.subplots(figsize=(5.5, 3.0), layout="constrained", dpi=110)
     axes.semilogx(forces, forces / history.displacement[:, 2] / 1e3, label="measured")
     for name, value, style in (
-        ("stuck", cdsm.stuck_stiffness(pose, pull).along("z"), ":"),
-        ("frictionless", cdsm.stiffness(pose, pull).along("z"), "--"),
+        ("stuck", cdsm.stuck_stiffness(pose, tension).along("z"), ":"),
+        ("frictionless", cdsm.stiffness(pose, tension).along("z"), "--"),
     ):
         axes.axhline(value / 1e3, color="0.3", linestyle=style, label=name)
     axes.set(xlabel="weight [N]", ylabel="weight over displacement [N/mm]", ylim=(0, None))

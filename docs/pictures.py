@@ -31,8 +31,8 @@ arm = cdsm.Manipulator(geometry, elasticity=cdsm.presets.STRAND_1X19)
 def picture() -> None:
     """Draw README's arm at README's posture, with tensions and compliance."""
     pose = arm.at([0.17, 0.09, 0.17, 0.09, -0.14, 0, -0.14, 0])
-    pull = cdsm.distribute_tension(pose, minimum=50.0)
-    figure = cdsm.stiffness(pose, pull).plot()
+    tension = cdsm.distribute_tension(pose, minimum=50.0)
+    figure = cdsm.stiffness(pose, tension).plot()
     figure.savefig(FOLDER / "arm.png", dpi=200)
 
 

@@ -189,8 +189,8 @@ def tendons() -> Iterator[Row]:
 
     arm = cdsm.presets.virtual_prototype(cdsm.LinearElasticity(48e3))
     pose = arm.at(np.full(arm.nv, math.radians(10.0)))
-    pull = cdsm.distribute_tension(pose, minimum=50.0)
-    model = mujoco.MjModel.from_xml_string(cdsm.to_mjcf(arm, pose, pull))
+    tension = cdsm.distribute_tension(pose, minimum=50.0)
+    model = mujoco.MjModel.from_xml_string(cdsm.to_mjcf(arm, pose, tension))
     data, step = mujoco.MjData(model), 1e-5
 
     def torque(q: Array) -> Array:
@@ -205,7 +205,7 @@ def tendons() -> Iterator[Row]:
     linear, angular = np.zeros((3, model.nv)), np.zeros((3, model.nv))
     mujoco.mj_jacSite(model, data, linear, angular, site)
     compliance = linear @ np.linalg.solve(joint, linear.T)
-    K = cdsm.stiffness(pose, pull)
+    K = cdsm.stiffness(pose, tension)
     for axis, u in zip("xyz", np.eye(3), strict=True):
         theirs = 1e-3 / float(u @ compliance @ u)
         what = f"virtual prototype, 50 N: stiffness along {axis}"

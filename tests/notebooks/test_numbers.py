@@ -26,9 +26,9 @@ def start(nb: Shown) -> None:
 def first_arm(nb: Shown) -> None:
     assert nb.text == cdsm.to_urdf(nb.geometry)  # the same geometry always gives the same bytes
     np.testing.assert_allclose(nb.pose.tip[:3, 3], [0.3026, 0.0503, -0.0983], atol=1e-4)
-    assert abs(nb.pull.residual).max() < 1e-12
-    assert len(nb.pull.at_minimum) == 6
-    np.testing.assert_allclose(nb.pull.values.max(), 91.06, atol=0.01)
+    assert abs(nb.tension.residual).max() < 1e-12
+    assert len(nb.tension.at_minimum) == 6
+    np.testing.assert_allclose(nb.tension.values.max(), 91.06, atol=0.01)
     with pytest.raises(cdsm.InfeasibleTension) as caught:
         cdsm.distribute_tension(nb.pose, minimum=40.0, maximum=150.0, wrench=[0, 0, -25, 0, 0, 0])
     assert caught.value.joint == "joint3_1"
