@@ -40,19 +40,31 @@ def design(
             min=0,
         ),
     ] = None,
+    refine: Annotated[
+        bool,
+        typer.Option(
+            "--refine",
+            help="Improve the design that the search chose by exact derivatives: one objective, "
+            "continuous variables.",
+        ),
+    ] = False,
     jobs: Annotated[int | None, typer.Option(help="Processes; default: all cores.", min=1)] = None,
     as_json: AsJson = False,
 ) -> None:
     """Find the best designs of an arm; write the front, a figure, and the chosen arm with tables.
 
-    A stopped search resumes from the files in --out.
+    A stopped search resumes from the files in --out. With --refine, designs.csv has the designs of
+    the search, all other files have the refined one.
     """
     from cdsm.design.problem_file import read_problem
+    from cdsm.design.refine import require_smooth
     from cdsm.support.files import make_folder, write_text
 
     file = read_problem(problem)
     folder = make_folder(out)
     task = file.problem
+    if refine:
+        require_smooth(task)
 
     def tell(step: cdsm.DesignProgress) -> None:
         if not console().is_terminal:
@@ -81,8 +93,11 @@ def design(
         report=tell,
     )
     number = found.compromise if choose is None else choose
+    every = found.evaluated.to_csv()
+    if refine:
+        found, number = cdsm.refine_design(task, found.design(number)), 0
     paths = [
-        write_text(folder / "designs.csv", found.evaluated.to_csv()),
+        write_text(folder / "designs.csv", every),
         write_text(folder / "front.csv", found.measured(jobs=processes).to_csv()),
         cdsm.plots.save_figure(found.plot(), folder / "front.pdf"),
         write_text(folder / "front.html", found.to_html()),

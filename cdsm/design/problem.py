@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -12,6 +13,7 @@ from typing import final, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cdsm.cable import Cable, Site
 from cdsm.design.goals import KINDS, Constraint, Measure, MeasureName, Objective
 from cdsm.design.variables import WHOLE, Value, Variable, changed, check, present
 from cdsm.errors import InvalidInput
@@ -204,13 +206,17 @@ class DesignProblem(ReadOnlyState):
         old = self.arm.cables
         law = None if new.wire is None else as_wire(new.wire)
         routed = serpentine_cables(new.geometry, law or old[0].elasticity)
-        like = old if len(routed) == len(old) else (old[0],) * len(routed)
+        like: Sequence[Cable] = old
+        if len(routed) != len(old):
+            joints = [route.joint for route in self.arm.geometry.cables]
+            at = [route.joint for route in new.geometry.cables]
+            like = tuple(old[joints.index(joint) if joint in joints else 0] for joint in at)
         minimum = self.minimum_of(design)
         cables = [
             replace(
                 kept,
                 name=cable.name,
-                sites=cable.sites,
+                sites=_with_holes_like(cable, kept),
                 lead=cable.lead,
                 elasticity=law or kept.elasticity,
                 minimum=max(kept.minimum, minimum),
@@ -270,3 +276,18 @@ class DesignProblem(ReadOnlyState):
         lines += [f"  {each.goal}: {each.words}" for each in self.objectives]
         lines += [f"  {each.words}: {each.asked}" for each in self.constraints]
         return "\n".join(lines)
+
+
+def _with_holes_like(cable: Cable, other: Cable) -> tuple[Site, ...]:
+    """Return the sites of a cable; its holes have the friction and the wrap of those of another.
+
+    A hole that the other cable does not pass has the friction of its nearest hole.
+    """
+    sites, known = list(cable.sites), other._holes
+    for i in cable._holes if known else ():
+        near = min(max(i, known[0]), known[-1])
+        like = other.sites[near]
+        if like.friction != sites[i].friction or like.wrap:
+            wrap = like.wrap if i == near else 0.0
+            sites[i] = replace(sites[i], friction=like.friction, wrap=wrap)
+    return tuple(sites)

@@ -25,7 +25,7 @@ from cdsm.measures.rows import (
 from cdsm.measures.wire_use import life_margin, safety, strains
 from cdsm.support.status import Status
 from cdsm.support.values import Array
-from cdsm.tension import distribute_tension
+from cdsm.tension import Tension, distribute_tension
 from cdsm.tolerances.budget import uncertainty
 from cdsm.tolerances.readings import Reading
 
@@ -150,25 +150,42 @@ class _Arm:
     def _margin(self, each: Measure, worst: int) -> float:
         """Return ± coverage · u, u the standard uncertainty of a quantity at its worst posture.
 
-        It is 0 without tolerances or without a constraint on the quantity. ``worst`` is the index
-        of the posture and load in :meth:`rows`.
+        It is 0 if the quantity has no margin. ``worst`` is the index of the posture and load in
+        :meth:`rows`.
         """
-        problem = self.problem
-        bounded = any(constraint.key == each.key for constraint in problem.constraints)
-        if problem.tolerances is None or each.of not in _SURE or not bounded:
+        if not has_margin(self.problem, each):
             return 0.0
         n = int(np.flatnonzero(self.held)[worst])
-        of, sign = _SURE[each.of]
         pose = self.arm.at(self.q[n])
         F = distribute_tension(pose, self.low[n], self.high[n], self.loads[n])
-        cable, factor = None, 1.0
-        if of == "tension":
-            c = int((F.values * self.loss[n]).argmax())
-            cable, factor = self.arm.cables.names[c], float(self.loss[n, c])
-        found = uncertainty(
-            pose, F, problem.tolerances, of=of, cable=cable, direction=each.direction
-        )
-        return sign * problem.coverage * factor * found.standard_uncertainty
+        c = int((F.values * self.loss[n]).argmax()) if each.of == "motor_force" else None
+        return margin(self.problem, each, F, self.loss[n], c)
+
+
+def has_margin(problem: DesignProblem, each: Measure) -> bool:
+    """Whether a quantity has a margin: it is constrained, and there are tolerances of it."""
+    bounded = any(constraint.key == each.key for constraint in problem.constraints)
+    return bounded and problem.tolerances is not None and each.of in _SURE
+
+
+def margin(
+    problem: DesignProblem, each: Measure, tension: Tension, loss: Array, cable: int | None
+) -> float:
+    """Compute ± coverage · u of a quantity that :func:`has_margin`, towards its worse side.
+
+    ``motor_force`` is that of one cable: its index. ``loss`` (C,) is exp(Σ μ φ) of the cables.
+    """
+    of, sign = _SURE[each.of]
+    found = uncertainty(
+        tension.posture,
+        tension,
+        problem.tolerances,
+        of=of,
+        cable=None if cable is None else tension.posture.arm.cables.names[cable],
+        direction=each.direction,
+    )
+    factor = 1.0 if cable is None else float(loss[cable])
+    return sign * problem.coverage * factor * found.standard_uncertainty
 
 
 def _volume(tips: Array) -> float:

@@ -1,4 +1,4 @@
-"""Refinement of a design by SLSQP of scipy, with exact derivatives."""
+"""Refinement of a design by SLSQP of scipy, with derivatives of each posture and load."""
 
 from __future__ import annotations
 
@@ -43,6 +43,11 @@ def refine_design(
     smooth problem min t with t ≥ the objective, and with each constraint, at every posture and
     load. The result is a minimum near the start; see :func:`search_designs` for the whole range.
 
+    The derivatives are exact, also those of the bounds that ``worst_friction`` narrows; where a
+    cable goes straight through a hole, its wrap angle has a kink, and the mean of both sides is
+    taken. With ``tolerances``, each posture and load keeps its own margin, coverage · u; its
+    derivative is a central difference of u, which is computed from exact first derivatives.
+
     Args:
         problem: The problem; its variables are continuous, it has one objective, and all quantities
             are of ``stiffness``, ``margin``, ``deflection``, ``motor_force``, ``mass`` and
@@ -59,7 +64,7 @@ def refine_design(
 
     instance("problem", problem, DesignProblem)
     whole_number("iterations", iterations, 1)
-    _check(problem)
+    require_smooth(problem)
     begin = problem.start if start is None else np.asarray(start, dtype=np.float64)
     if begin is None:
         raise InvalidInput("start", "is needed: the given arm is outside the ranges.")
@@ -168,19 +173,13 @@ def _finished(problem: DesignProblem, visited: list[Array]) -> DesignSearch:
     )
 
 
-def _check(problem: DesignProblem) -> None:
+def require_smooth(problem: DesignProblem) -> None:
+    """Raise InvalidInput if a problem cannot be refined."""
     for variable in problem.variables:
         if not variable.is_continuous:
             raise InvalidInput("problem", f"{variable.name} is not continuous; use search_designs.")
     if len(problem.objectives) != 1:
         raise InvalidInput("problem", "has several objectives; leave one, or use search_designs.")
-    for name in ("tolerances", "worst_friction"):
-        if getattr(problem, name):
-            raise InvalidInput(
-                "problem",
-                f"has {name}, of which no exact derivatives are computed; use search_designs, or "
-                "refine without it and check the design by evaluate_designs with it.",
-            )
     objective = problem.objectives[0]
     if objective.goal != KINDS[objective.of].best:
         raise InvalidInput("problem", f"{objective.of} at its {objective.goal} is not smooth.")

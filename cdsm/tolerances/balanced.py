@@ -61,12 +61,12 @@ class Balance(NamedTuple):
         B = self.tension.posture.length_jacobian[self.free].T
         return np.asarray(self.inverse @ (B @ weights[self.free]))
 
-    def by_bound(self, weights: Array) -> float:
-        """Compute Σ y_c dF_c/dF_min for a lower bound F_min that is common to all cables."""
-        low = self.tension.values - self.tension.minimum
-        held = ~self.free & (low <= OPTIMALITY * self.tension.values.max(initial=0.0))
-        J = self.tension.posture.length_jacobian
-        return float(weights[held].sum() - self.multipliers(weights) @ J[held].sum(axis=0))
+    def by_bounds(self, weights: Array, low: Array, high: Array) -> Array:
+        """Compute Σ y_c dF_c (n,) for n changes of the lower and of the upper bounds (C, n)."""
+        F, J = self.tension.values, self.tension.posture.length_jacobian
+        at_low = F - self.tension.minimum <= OPTIMALITY * F.max(initial=0.0)
+        moved = np.where(at_low[:, None], low, high)[~self.free]
+        return np.asarray((weights - J @ self.multipliers(weights))[~self.free] @ moved)
 
     def gradient(self, inputs: Inputs, weights: Array) -> dict[str, Array]:
         """Compute the derivatives of Σ y_c F_c by source, y ``weights``; 0 for those of wires."""
@@ -114,7 +114,8 @@ def buckling_gradient(
     dF_c/dF_min). Measured tensions have the derivative 0.
     """
     weights = margin["tension"]
-    moved, slope = balance.gradient(inputs, weights), balance.by_bound(weights)
+    moved, every = balance.gradient(inputs, weights), np.ones((len(weights), 1))
+    slope = float(balance.by_bounds(weights, every, 0.0 * every)[0])
     return {
         name: np.zeros_like(g) if name == "tension" else -(g + moved[name]) / slope
         for name, g in margin.items()

@@ -113,14 +113,14 @@ class Question(ReadOnlyState):
         if self.of == "tip":
             assert self.direction is not None
             return _tip_gradient(K, inputs, self.direction)
+        if self.of == "tension":
+            assert K.distribution is not None
+            return Balance.of(K.distribution).gradient(inputs, np.eye(len(K.tension))[self.cable])
         margin = _gradient(K, inputs, K.critical_direction, _NOWHERE)
         if self.of == "margin":
             return margin
         assert K.distribution is not None
-        balance = Balance.of(K.distribution)
-        if self.of == "critical_tension":
-            return buckling_gradient(balance, inputs, margin)
-        return balance.gradient(inputs, np.eye(len(K.tension))[self.cable])
+        return buckling_gradient(Balance.of(K.distribution), inputs, margin)
 
     def at(self, errors: Mapping[str, Array]) -> Array:
         """Compute the reading for N arms (N,), with errors (N, inputs) by source.

@@ -83,3 +83,50 @@ def test_an_infeasible_problem_ends_with_3_and_says_what_it_misses(tmp_path: Pat
     assert code == 3
     assert "deflection" in output
     assert "at most 0.001 mm is asked" in output
+
+
+REFINED = """
+arm = "arm.toml"
+loads = [[0.0, 0.0, -2.0]]
+maximum = 600.0
+worst_friction = true
+tolerances = "tolerances.toml"
+variables = [
+    {of = "hole_radius", low = 0.015, high = 0.035},
+    {of = "minimum", low = 5.0, high = 150.0},
+]
+objectives = [{of = "motor_force"}]
+constraints = [{of = "stiffness", direction = "z", at_least = 2000.0}]
+
+[postures]
+angles = [
+    [0.1, 0.05, 0.1, 0.05, 0.1, 0.05, 0.1, 0.05],
+    [-0.2, 0.1, -0.2, 0.1, -0.2, 0.1, -0.2, 0.1],
+]
+"""
+
+
+@pytest.mark.slow
+def test_a_design_is_refined_under_friction_and_tolerances(tmp_path: Path) -> None:
+    path = written(tmp_path, REFINED)
+    arm = cdsm.Manipulator.read(tmp_path / "arm.toml").with_friction(0.1)
+    arm.write(tmp_path / "arm.toml")
+    cdsm.Tolerances(rigidity=0.05, hole_radius=1e-4).write(tmp_path / "tolerances.toml")
+    words = [str(path), "--generations", "4", "--population", "8", "--jobs", "1", "--json"]
+    found = []
+    for more in ([], ["--refine"]):
+        code, text = run(*words, "--out", str(tmp_path / f"out{len(more)}"), *more)
+        assert code == 0, text
+        found.append(json.loads(text)["front"])
+    assert found[1]["motor_force [N]"][0] < 0.99 * found[0]["motor_force [N]"][0]
+    assert found[1]["stiffness (0, 0, 1) [N/m]"][0] >= 2000.0
+    made = cdsm.Manipulator.read(tmp_path / "out1" / "arm.toml")
+    assert set(made.cables[-1].friction) == {0.1}
+
+
+def test_what_cannot_be_refined_is_named_before_the_search(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    code, output = run(str(EXAMPLES / "design.toml"), "--out", str(out), "--refine")
+    assert code == 1
+    assert "cables_per_joint is not continuous" in output
+    assert not (out / "designs.jsonl").exists()

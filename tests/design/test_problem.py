@@ -342,10 +342,6 @@ START = 1.5e4
 def test_problems_that_cannot_be_refined_say_why() -> None:
     with pytest.raises(cdsm.InvalidInput, match="end of cable2_1 is not continuous"):
         cdsm.refine_design(problem())
-    with pytest.raises(cdsm.InvalidInput, match=r"has worst_friction, .* refine without it"):
-        cdsm.refine_design(
-            problem(variables=CONTINUOUS, objectives=(cdsm.Objective("mass"),), worst_friction=True)
-        )
     two = problem(variables=CONTINUOUS)
     with pytest.raises(cdsm.InvalidInput, match="several objectives"):
         cdsm.refine_design(two)

@@ -1,0 +1,186 @@
+"""Chain rule from the inputs of an arm to the variables of a design problem.
+
+A variable moves many holes and disks at once. Its column says which inputs, and how far. It may
+also move the postures, if they are random within the joint limits, and the bounds of the tensions.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from cdsm.design.grip import grip_slopes
+from cdsm.design.problem import DesignProblem
+from cdsm.design.variables import Variable
+from cdsm.manipulator import Manipulator
+from cdsm.support.values import Array
+from cdsm.sweeps.poses import RandomPoses
+from cdsm.tension import Tension
+from cdsm.tolerances.balanced import Balance
+from cdsm.tolerances.inputs import Inputs, Places, inputs_of
+
+
+class Chain:
+    """Chain rule for the arm of a design.
+
+    Args:
+        problem: The problem; its variables are continuous.
+        design: The design (n,).
+        arm: Its arm.
+    """
+
+    def __init__(self, problem: DesignProblem, design: Array, arm: Manipulator) -> None:
+        self._problem, self._arm, self.inputs = problem, arm, inputs_of(arm)
+        self._columns = [_column(arm, self.inputs, each) for each in problem.variables]
+        # a cable may have a larger lower bound of its own
+        minimum = problem.minimum_of(design)
+        common = np.array([cable.minimum == minimum for cable in arm.cables], dtype=np.float64)
+        self._bound = np.outer(common, [each.of == "minimum" for each in problem.variables])
+        self._limits = np.zeros((arm.nv, len(self._columns)))
+        if isinstance(problem.postures, RandomPoses):
+            self._limits = np.column_stack([_limit_slopes(arm, each) for each in problem.variables])
+
+    def at(self, tension: Tension, loss: Array) -> Posed:
+        """Return the chain rule for least tensions and exp(Σ μ φ) (C,) of the cables [-]."""
+        pose, inputs = tension.posture, self.inputs
+        turned, grip = pose.q[:, None] * self._limits, np.zeros_like(self._bound)
+        if self._problem.worst_friction:
+            by_variable = {
+                source: np.array(
+                    [each.get(source, np.zeros(len(labels))) for each in self._columns]
+                )
+                for source, labels in inputs.labels.items()
+            }
+            still = Places(*(np.zeros_like(place) for place in inputs.places))
+            grip = grip_slopes(pose, inputs, still.moved(inputs.displaced(by_variable)), turned)
+        return Posed(self, Balance.of(tension), turned, grip, loss[:, None] * self._bound)
+
+    def apply(self, by_input: dict[str, Array]) -> Array:
+        """Compute the derivatives (n,) with respect to the variables at constant tension bounds.
+
+        ``by_input`` has those with respect to the inputs of each source.
+        """
+        return np.array(
+            [
+                sum(float(weights @ by_input[source]) for source, weights in column.items())
+                for column in self._columns
+            ]
+        )
+
+    def of_links(self, of: str) -> Array:
+        """Return the derivatives of the mass [kg] or the length [m] of all links (n,)."""
+        links = self._arm.geometry.links
+        slopes = [link.mass / link.length if of == "mass" else 1.0 for link in links]
+        return np.array(
+            [
+                sum(slopes[k] for k in _joints(self._arm, each)) * (each.of == "link_length")
+                for each in self._problem.variables
+            ]
+        )
+
+
+class Posed(NamedTuple):
+    """Chain rule at a posture under a load, where the least tensions follow the design.
+
+    Attributes:
+        chain: The chain rule of the arm.
+        balance: The tensions.
+        turned: Derivatives (nv, n) of the joint angles.
+        grip: Derivatives (C, n) of Σ μ φ [-] of the cables; 0 without ``worst_friction``.
+        bound: Derivatives (C, n) of the lower bounds at constant φ.
+    """
+
+    chain: Chain
+    balance: Balance
+    turned: Array
+    grip: Array
+    bound: Array
+
+    def slopes(self, by_input: dict[str, Array], by_tension: Array) -> Array:
+        """Return the derivatives (n,) of a quantity.
+
+        ``by_input`` are its derivatives at constant tensions, empty if it depends on the tensions
+        alone; ``by_tension`` (C,) those with respect to the tensions.
+        """
+        followed = self.balance.gradient(self.chain.inputs, by_tension)
+        total = {name: by_input.get(name, 0.0) + g for name, g in followed.items()}
+        # friction raises the lower bound by exp(Σ μ φ), and lowers the upper one
+        by_grip = self.balance.tension.values[:, None] * self.grip
+        bounds = self.balance.by_bounds(by_tension, self.bound + by_grip, -by_grip)
+        return self.chain.apply(total) + bounds + np.asarray(total["joint_angle"] @ self.turned)
+
+
+def _joints(arm: Manipulator, variable: Variable) -> list[int]:
+    """Return the joints (from 0) that a variable belongs to."""
+    if isinstance(variable.at, int):
+        return [variable.at - 1]
+    return [*range(len(arm.geometry.joints))]
+
+
+def _limit_slopes(arm: Manipulator, variable: Variable) -> Array:
+    """Return the relative derivatives (nv,) of the joint limits: λ = 2 atan(h/R) unless given."""
+    geometry, joints = arm.geometry, _joints(arm, variable)
+    found = []
+    for k, (joint, limit) in enumerate(zip(geometry.joints, geometry.joint_limits, strict=True)):
+        radius = joint.disk_radius or geometry.hole_radii[k]
+        by, touching = 0.0, limit == 2.0 * math.atan(joint.disk_offset / radius)
+        if k in joints and joint.limit is None and touching:
+            if variable.of == "disk_offset":
+                by = math.sin(limit) / joint.disk_offset
+            elif variable.of == "hole_radius" and joint.disk_radius is None:
+                by = -math.sin(limit) / radius
+        found += [by / limit] * len(joint.axes)
+    return np.array(found)
+
+
+def _column(arm: Manipulator, inputs: Inputs, variable: Variable) -> dict[str, Array]:
+    """Return the derivatives of the inputs of each source with respect to a variable."""
+    geometry, of, joints = arm.geometry, variable.of, _joints(arm, variable)
+    labels = inputs.labels
+    disks = [disk.joint - 1 for disk in geometry.disks]
+    sites = [(c, i) for c, cable in enumerate(arm.cables) for i in range(len(cable.sites))]
+    routes = geometry.cables
+    if of == "minimum":
+        return {}
+    if of == "hole_radius":
+        moves = [disks[i] in joints and routes[c].radius is None for c, i in sites]
+    elif of in ("hole_angle", "phase"):
+        of = "hole_angle"
+        names = geometry.cable_names
+        moves = [
+            names[c] == variable.at
+            if variable.of == "hole_angle"
+            else routes[c].joint - 1 in joints
+            for c, _ in sites
+        ]
+    elif of == "disk_offset":
+        # in the order of the disks, which sites name first
+        number = {name: d for d, name in enumerate(_disk_labels(arm))}
+        moves = [disks[number[name]] in joints for name in labels["disk_offset"]]
+    elif of == "lead":
+        moves = [route.joint - 1 in joints for route in routes]
+    else:  # link_length: the mass grows with it
+        links = [f"link{k + 1}" for k in joints]
+        moves = [name in links for name in labels["link_length"]]
+        rows = {
+            arm._model.body.locate(name)[0]: geometry.links[k]
+            for k, name in zip(joints, links, strict=True)
+        }
+        heavier = [
+            rows[row].mass / rows[row].length if row in rows else 0.0
+            for row in inputs.link_rows.tolist()
+        ]
+        return {"link_length": np.array(moves, float), "link_mass": np.array(heavier)}
+    return {of: np.array(moves, dtype=np.float64)}
+
+
+def _disk_labels(arm: Manipulator) -> list[str]:
+    """Return the name of each disk in the labels of the inputs, base to tip."""
+    count: dict[str, int] = {}
+    names = []
+    for disk in arm.geometry.disks:
+        count[disk.link] = count.get(disk.link, 0) + 1
+        names.append(f"disk {count[disk.link]} of {disk.link}")
+    return names

@@ -1,0 +1,66 @@
+"""Derivatives of Σ μ φ of each cable, by which friction narrows its tension bounds.
+
+Between the points a and b before a hole and c behind it, the cable has the unit directions u and v.
+If the points move, the wrap angle φ changes by the formula of :mod:`cdsm.kernels.chains`,
+
+    dφ = −(p·(db − da)/ℓ_u + q·(dc − db)/ℓ_v),
+
+with p = ((u × v) × u)/|u × v| and q = (v × (u × v))/|u × v|.
+
+Where the cable goes straight through, φ = 0 has a kink, and dφ = 0: the mean of both sides.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cdsm.kernels.chains import STRAIGHT
+from cdsm.posture import Posture
+from cdsm.support.values import Array
+from cdsm.tolerances.inputs import Inputs, Places
+
+
+def grip_slopes(pose: Posture, inputs: Inputs, moved: Places, turned: Array) -> Array:
+    """Compute the derivatives (C, n) of Σ μ φ [-] over the holes of each cable.
+
+    Args:
+        pose: The posture.
+        inputs: The inputs of its arm.
+        moved: Derivatives (n, …, 3) of all points in the frames of their joints.
+        turned: Derivatives (nv, n) of the joint angles.
+    """
+    segments, first = pose.segments, inputs.first
+    chains, site = segments.chains, segments._frames.site
+    along = site[1::2] - site[::2]
+    length = np.linalg.norm(along, axis=1)
+    u, v = (along[s] / length[s, None] for s in (chains.hole, chains.hole + 1))
+    normal = np.cross(u, v)
+    sine = np.linalg.norm(normal, axis=1)
+    normal /= np.where(sine > STRAIGHT, sine, np.inf)[:, None]
+    p, q = np.cross(normal, u), np.cross(v, normal)
+    motion = _motion(pose, moved)
+    at = first[chains.cable[chains.hole]] + chains.site
+    # a lead moves along with the first site, so its direction stays
+    before = motion[:, at] - motion[:, np.where(chains.site > 0, at - 1, at)]
+    after = motion[:, at + 1] - motion[:, at]
+    slopes = -(
+        np.einsum("hr,nhr->hn", p / length[chains.hole, None], before)
+        + np.einsum("hr,nhr->hn", q / length[chains.hole + 1, None], after)
+    )
+    slopes += segments.wrap_jacobian @ turned
+    total = np.zeros((len(pose.arm.cables), slopes.shape[1]))
+    np.add.at(total, chains.cable[chains.hole], chains.friction[:, None] * slopes)
+    return total
+
+
+def _motion(pose: Posture, moved: Places) -> Array:
+    """Return the derivatives (n, P, 3) of the cable sites in base axes, at constant angles."""
+    tree, row = pose.arm._model.tree, pose.arm._model.routing.row
+    rotation = np.tile(np.eye(3), (len(tree.parent), 1, 1))
+    origin = np.zeros_like(moved.origin)
+    for i in tree.order.tolist():
+        before, angle = tree.parent[i], pose.q[i - 1]
+        start, cosine, sine = tree.turn[i]
+        rotation[i] = rotation[before] @ (start + np.cos(angle) * cosine + np.sin(angle) * sine)
+        origin[:, i] = origin[:, before] + moved.origin[:, i] @ rotation[before].T
+    return np.asarray(origin[:, row] + np.einsum("prs,nps->npr", rotation[row], moved.site))
