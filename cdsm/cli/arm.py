@@ -67,7 +67,7 @@ def stiffness(
 
 
 def _breakaways(tension: cdsm.Tension) -> dict[str, cdsm.Breakaway]:
-    """Compute the breakaway load along x, y and z.
+    """Compute the breakaway load along x, y and z from ``tension``.
 
     An axis is left out if no load along it makes a cable slide, or if the arm buckles first.
     """
@@ -82,7 +82,7 @@ def _breakaways(tension: cdsm.Tension) -> dict[str, cdsm.Breakaway]:
 
 
 def _sticking(held: dict[str, cdsm.Breakaway]) -> str:
-    """Write the stuck stiffness and the breakaway load, one line for each axis."""
+    """Write the stuck stiffness and the breakaway load of ``held``, one line for each axis."""
     from cdsm.stiffness_matrix.prints import model_of
 
     K = next(iter(held.values())).stiffness
@@ -94,7 +94,7 @@ def _sticking(held: dict[str, cdsm.Breakaway]) -> str:
 
 
 def _budgets(tension: cdsm.Tension, tolerances: cdsm.Tolerances) -> dict[str, cdsm.Uncertainty]:
-    """Compute the budget of the stiffness along each axis along which the tip can move."""
+    """Compute the uncertainty budget along x, y and z, except where the tip cannot move."""
     found = {}
     for axis in ("x", "y", "z"):
         with contextlib.suppress(cdsm.SingularStiffness):
@@ -103,7 +103,7 @@ def _budgets(tension: cdsm.Tension, tolerances: cdsm.Tolerances) -> dict[str, cd
 
 
 def _table(budgets: dict[str, cdsm.Uncertainty]) -> str:
-    """Write values with uncertainties and their sources [%], one column per axis."""
+    """Write a table of ``budgets``: stiffness ± uncertainty, and sources [%]; a column per axis."""
     from cdsm.support.format import aligned
 
     def percent(source: str) -> list[float]:

@@ -19,13 +19,13 @@ class Command(typer.core.TyperCommand):
     """Command whose options may have older names, and whose errors of usage are JSON if asked."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Parse the arguments of the command, after its older names of options are replaced."""
+        """Replace older names of options in ``args``, then parse them."""
         known = [newer(str(self.name), word) for word in args]
         with misuse_reported("--json" in known):
             return super().parse_args(ctx, known)
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
-        """Write the help page; a unit such as [deg] is not taken for markup."""
+        """Write the help page of ``ctx``; a unit such as [deg] is not taken for markup."""
         for option in self.params:
             text = getattr(option, "help", None)
             if text:

@@ -1,4 +1,4 @@
-"""Conditions of an answer: wire, gravity, least tension, friction."""
+"""Print the assumptions of a result: wire, gravity, lower bound of the tensions, friction."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Conditions:
-    """First lines of an answer: its conditions, and the arm.
+    """First lines of an answer: the assumptions of its results, and the arm.
 
     Attributes:
         arm: The arm.
-        minimum: Given lower bounds of all tensions [N].
-        friction: Whether the answer takes the friction of the arm into account.
+        minimum: Given lower bounds of all tensions [N], one per case.
+        friction: Whether the results include the friction of the arm.
     """
 
     arm: cdsm.Manipulator
@@ -55,7 +55,7 @@ class Conditions:
         return wires_text(self.arm.cables)
 
     def to_dict(self) -> Json:
-        """Return the conditions for JSON, in SI units."""
+        """Return the assumptions for JSON, in SI units."""
         return {
             "computed_with": {
                 "wire": self.wire,

@@ -93,7 +93,10 @@ def identify(
 
 
 def _ranges(free: list[str]) -> dict[str, Range | None]:
-    """Return the bounds of each parameter in people's units; None where they are not given."""
+    """Return the bounds of each parameter in ``free``, texts NAME or NAME=LOW:HIGH.
+
+    Bounds are in units shown to the user; None where they are not given.
+    """
     ranges: dict[str, Range | None] = {}
     for each in free:
         name, _, given = each.partition("=")
@@ -113,7 +116,7 @@ def _ranges(free: list[str]) -> dict[str, Range | None]:
 
 
 class _Shown:
-    """Parameters of an arm in people's units; the label of a parameter contains its unit."""
+    """Parameters of an arm in units shown to the user; the label of a parameter has its unit."""
 
     def __init__(self, parameters: ArmParameters) -> None:
         self._parameters = parameters
@@ -139,7 +142,10 @@ class _Shown:
         }
 
     def bounds(self, name: str, given: Range | None) -> Range:
-        """Return the bounds of a parameter: the given ones, or half to twice its present value."""
+        """Return the bounds of a parameter in the units of its label.
+
+        They are ``given``, or 0 to 1 for friction, or half to twice the present value.
+        """
         if given is not None:
             return given
         if name.partition("@")[0] == "friction":

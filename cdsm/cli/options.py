@@ -188,12 +188,12 @@ class ArmOptions:
         return cdsm.Manipulator.read(self.arm, cables[0].elasticity).with_cables(cables)
 
     def at(self, angles: str) -> cdsm.Posture:
-        """Return the posture at joint coordinates [degrees, or mm if a joint slides]."""
+        """Return the posture at joint coordinates ``angles`` [degrees, or mm if a joint slides]."""
         arm = self.read()
         return arm.at(coordinates(angles, arm) * joint_scales(arm))
 
     def _refuse(self, why: str, *names: str) -> None:
-        """Raise BadParameter for options that this kind of arm would ignore."""
+        """Raise BadParameter if one of the options ``names`` is given; ``why`` it has no effect."""
         for field in fields(self):
             if field.name in names and getattr(self, field.name) != field.default:
                 raise typer.BadParameter(f"{why}; leave it out.", param_hint=f"--{field.name}")
@@ -222,7 +222,7 @@ class TensionOptions:
     solver: Solver = DEFAULT_SOLVER
 
     def conditions(self, arm: cdsm.Manipulator) -> Conditions:
-        """Return the conditions of an answer with these options."""
+        """Return the assumptions of a result for ``arm`` with these options."""
         return Conditions(arm, (self.min_tension,))
 
     def distribute(self, pose: cdsm.Posture, wrench: Array) -> cdsm.Tension:
@@ -250,7 +250,7 @@ class WeightOptions:
         return self.force is not None or self.mass is not None
 
     def vector(self, arm: cdsm.Manipulator) -> Array:
-        """Return the sum of both forces (3,) [N]."""
+        """Return --force plus the weight of --mass (3,) [N]."""
         import numpy as np
 
         force = np.zeros(3)

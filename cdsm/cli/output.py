@@ -51,9 +51,9 @@ def console() -> Console:
 def answer(
     as_json: bool, as_dict: Callable[[], Json], *parts: object, warnings: Sequence[str] = ()
 ) -> None:
-    """Print an answer, its warnings first: its parts as text, or its numbers as strict JSON.
+    """Print an answer, its warnings first: ``parts`` as text, or ``as_dict()`` as strict JSON.
 
-    Warnings end the command with exit code 3, so files are written before.
+    Warnings end the command with exit code 3. So files are written before this call.
     """
     if as_json:
         numbers: Json = {"warnings": warnings}
@@ -78,25 +78,25 @@ def _print_json(numbers: Json) -> None:
 
 
 def by_cable(arm: cdsm.Manipulator, values: Array) -> Json:
-    """Return one number per cable (C,) by the name of the cable, for JSON."""
+    """Return ``values``, one per cable (C,), by the name of the cable, for JSON."""
     return dict(zip((cable.name for cable in arm.cables), values.tolist(), strict=True))
 
 
 def write_picture(path: Path | None, draw: Callable[[], Figure]) -> None:
-    """Draw a figure and write it, if a path is given."""
+    """Write the figure that ``draw`` returns, if a path is given."""
     if path is not None:
         written(cdsm.plots.save_figure(draw(), path))
 
 
 def written(path: Path) -> None:
-    """Print to standard error that a file is written."""
+    """Print to standard error that the file ``path`` is written."""
     typer.echo(f"written: {path}", err=True)
 
 
 def _show(
     usual: Callable[..., None], message: Warning, category: type[Warning], *where: Any
 ) -> None:
-    """Show a warning of cdsm in one line, and any other in the usual manner."""
+    """Show a ``message`` in one line if its category is a warning of cdsm; else call ``usual``."""
     if not issubclass(category, cdsm.CdsmWarning):
         return usual(message, category, *where)
     text = f"warning: {message}"
@@ -105,7 +105,7 @@ def _show(
 
 @contextmanager
 def misuse_reported(as_json: bool) -> Iterator[None]:
-    """Turn an error of usage into JSON, if wanted, and exit code 2; else typer reports it."""
+    """With ``as_json``, print an error of usage as JSON and exit with 2; else typer reports it."""
     try:
         yield
     except _UsageError as error:
@@ -117,9 +117,9 @@ def misuse_reported(as_json: bool) -> Iterator[None]:
 
 @contextmanager
 def reported(as_json: bool) -> Iterator[None]:
-    """Turn an error into a message, or into JSON, and an exit code; --debug raises it.
+    """Turn an error into a message, or JSON if ``as_json``, and an exit code; --debug raises it.
 
-    A warning of cdsm becomes one line, too.
+    A warning of cdsm is printed in one line.
     """
     try:
         with misuse_reported(as_json), warnings.catch_warnings():

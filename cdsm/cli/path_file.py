@@ -48,9 +48,10 @@ def read_path(path: Path, arm: Manipulator) -> PathFile:
     found = named_columns(table, refuse)
 
     def columns(wanted: dict[str, dict[str, float]], *, some: bool = False) -> Array | None:
-        """Read the columns of these names in SI; None if the file has none of them.
+        """Return the columns ``wanted`` (S, n) in SI; None if the file has none of them.
 
-        With ``some`` a missing column is zero.
+        ``wanted`` gives the allowed units of each name. If only a part of the columns is there,
+        the others are zero with ``some``; otherwise this is an error.
         """
         if not wanted.keys() & found.keys():
             return None
@@ -76,7 +77,10 @@ def read_path(path: Path, arm: Manipulator) -> PathFile:
 
 
 def one_target(given: float | None, of_file: Array | None, option: str) -> float | Array:
-    """Return the target [N/m] of an option, or the targets of the file; exactly one is given."""
+    """Return the target ``given`` by an option, or the targets ``of_file`` [N/m]; one must exist.
+
+    Raises BadParameter if neither or both are given.
+    """
     if given is not None and of_file is None:
         return given
     if given is None and of_file is not None:

@@ -168,13 +168,13 @@ def track(
 
 
 def _require_ending(option: str, path: Path | None, *endings: str) -> None:
-    """Refuse a file with another ending before the simulation, which takes minutes."""
+    """Check that ``path`` of ``option`` has one of ``endings``, before a simulation of minutes."""
     if path is not None and path.suffix.lower() not in endings:
         raise typer.BadParameter(f"{path} ends in none of {', '.join(endings)}.", param_hint=option)
 
 
 def _wanted(text: str) -> tuple[Sequence[float], float | None]:
-    """Return the direction of --stiffness, and the stiffness [N/m] if it is given."""
+    """Return the direction (3,) in the text of --stiffness, and the stiffness [N/m] if given."""
     name, given, value = text.partition("=")
     u = axis(name) or numbers("--stiffness", name, 3, "AXIS=N/mm, or X,Y,Z=N/mm")
     if not given:

@@ -53,13 +53,16 @@ def axis(text: str) -> tuple[float, float, float] | None:
 
 
 def gravity_of(text: str) -> list[float] | str:
-    """Return gravity (3,) [m/s²], or the axis along which it has 9.81 m/s²."""
+    """Return gravity (3,) [m/s²], or the name of the axis along which it is 9.81 m/s²."""
     word = text.strip()
     return word if axis(word) else numbers("--gravity", text, 3, "an axis, or GX,GY,GZ")
 
 
 def numbers(option: str, text: str, count: int | None = None, form: str = "numbers") -> list[float]:
-    """Read numbers separated by commas or spaces, and check their count."""
+    """Return the numbers in the text of ``option``, separated by commas or spaces.
+
+    Raises BadParameter unless there are ``count`` of them; ``form`` says what is expected.
+    """
     from cdsm.support.format import plural
 
     try:

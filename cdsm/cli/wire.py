@@ -79,7 +79,7 @@ def fit(
 
 
 def _pair(option: str, text: str | None) -> list[str] | None:
-    """Read two entries separated by a comma; a name with a comma stands in quotes."""
+    """Return the two entries of an option's text; an entry with a comma needs quotes."""
     if text is None:
         return None
     entries = [entry.strip() for entry in next(csv.reader([text], skipinitialspace=True), [])]

@@ -74,6 +74,6 @@ def in_options(message: str) -> str:
 
 
 def newer(command: str, word: str) -> str:
-    """Replace an older name of an option by the current one in an argument of a command."""
+    """Return ``word``, an argument of a command, with the current name of its option."""
     name, equals, value = word.partition("=")
     return OLDER.get(command, {}).get(name, name) + equals + value

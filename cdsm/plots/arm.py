@@ -94,7 +94,7 @@ def picture_legend(figure: Figure, axes: Any) -> None:
 
 
 def tension_bar(figure: Figure, colors: ScalarMappable) -> None:
-    """Draw the scale of the tensions at the right edge of a figure."""
+    """Draw the colour scale of the tensions at the right edge of a figure."""
     bar = figure.colorbar(colors, cax=figure.add_axes((BESIDE_BAR + 0.01, 0.15, 0.025, 0.6)))
     bar.set_label("cable tension [N]", fontsize=TEXT)
     bar.ax.tick_params(labelsize=SMALL)
@@ -153,7 +153,7 @@ def _draw_ellipsoid(axes: Any, stiffness: Stiffness) -> None:
 
 
 def draw_arm(axes: Any, pose: Posture, colors: Array | None = None) -> None:
-    """Draw an arm on existing 3D axes; colours of its cables (C, 4) are optional."""
+    """Draw an arm on existing 3D axes; ``colors`` are RGBA of its cables (C, 4), if given."""
     if pose.arm.is_serpentine:
         _draw_disks(axes, pose)
     else:
@@ -166,7 +166,7 @@ def draw_arm(axes: Any, pose: Posture, colors: Array | None = None) -> None:
 
 
 def frame_arms(axes: Any, limits: Array | None, label: str = "{} [mm]") -> None:
-    """Set the labels and the limits (3, 2) of 3D axes, with equal scales.
+    """Set the limits (3, 2) of 3D axes with equal scales, and ``label`` with the name of each axis.
 
     Without limits, the axes contain all that is drawn.
     """
@@ -204,6 +204,6 @@ def _draw_disks(axes: Any, pose: Posture) -> None:
 
 
 def color_scale(tensions: Array) -> ScalarMappable:
-    """Build the colour scale from the smallest to the largest of some tensions."""
+    """Build the colour scale from the smallest to the largest of ``tensions`` [N]."""
     low, high = tensions.min(), tensions.max()
     return ScalarMappable(Normalize(low, max(high, low + 1e-9)), "viridis")

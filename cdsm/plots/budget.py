@@ -37,7 +37,9 @@ def plot_uncertainty(budget: Uncertainty) -> Figure:
 
 
 def plot_monte_carlo(run: MonteCarlo) -> Figure:
-    """Plot the distribution of the drawn values, and the normal distribution of first order.
+    """Plot the values of a Monte Carlo run as a histogram, beside the normal distribution.
+
+    The normal distribution is that of first-order error propagation. Dashed: 95 % intervals.
 
     InvalidInput if ``run`` is no result of :func:`~cdsm.monte_carlo`.
     """

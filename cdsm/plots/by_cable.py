@@ -70,12 +70,12 @@ def plot_shares(shares: Shares) -> Figure:
 
 
 def plot_stiffness_plan(plan: StiffnessPlan, attainable: StiffnessRange | None = None) -> Figure:
-    """Plot the planned tension of each cable, with those of the softest and the stiffest arm.
+    """Plot the planned tension of each cable, and those of the softest and the stiffest arm.
 
     Args:
         plan: Result of :func:`~cdsm.plan_stiffness`.
-        attainable: Range of stiffness along the single direction of the plan, at its posture. If
-            given, the tensions of the softest and the stiffest arm are drawn too.
+        attainable: Result of :func:`~cdsm.stiffness_range` at the posture of the plan, along its
+            single direction. If given, its softest and stiffest tensions are drawn too.
 
     Raises:
         InvalidInput: The arguments are not a plan and a range, or differ in posture or direction.
@@ -136,7 +136,7 @@ def _name_cables(axes: Any) -> None:
 
 
 def _ends(attainable: StiffnessRange) -> tuple[tuple[Tension, str, str], ...]:
-    """Return tensions, label and marker of the softest and of the stiffest arm."""
+    """Return tensions, label and marker for the softest and the stiffest arm of ``attainable``."""
     return (
         (attainable.low_tension, f"softest: {N_PER_MM * attainable.low:.4g} N/mm", "v"),
         (attainable.high_tension, f"stiffest: {N_PER_MM * attainable.high:.4g} N/mm", "^"),
@@ -148,7 +148,7 @@ def _along(attainable: StiffnessRange) -> str:
 
 
 def _plot_tensions(shown: Sequence[tuple[Tension, str, str]], title: str) -> Figure:
-    """Plot several tensions of the same cables, each with a label and a marker."""
+    """Plot the tensions of the same cables in several cases (tensions, label, marker)."""
     names = shown[0][0].keys()
     figure, ((axes,),) = panels(_width(names), 2.8, 1)
     colors = {"v": GREEN, "o": BLUE, "^": VERMILLION}

@@ -14,7 +14,10 @@ if TYPE_CHECKING:
 
 
 def plot_experiment_plan(plan: ExperimentPlan) -> Figure:
-    """Plot the expected 95 % intervals, and the gain from one more test of each candidate."""
+    """Plot the 95 % intervals that ``plan`` expects, and the gain by one more test, per candidate.
+
+    The intervals are those of the parameters, of the planned tests and of evenly spaced ones.
+    """
     figure, ((left, right),) = panels(TWO_COLUMNS, 3.2, 2)
     place, width = np.arange(len(plan.names)), 0.38
     for shift, std, colour, label in (

@@ -27,10 +27,10 @@ if TYPE_CHECKING:
 
 
 def plot_load_history(history: LoadHistory) -> Figure:
-    """Plot the force over the displacement along it, and the tensions along one cable.
+    """Plot the force over the displacement of the tip, and the tensions of one cable's segments.
 
-    The direction is that of the largest force. Where no force acts, the displacement is plotted
-    load by load. The cable is the one in which the tensions differ most. InvalidInput if
+    Both are along the largest force of the history. Without any force, the displacement is plotted
+    load by load. The cable is the one whose segments differ most in tension. InvalidInput if
     ``history`` is no result of :func:`~cdsm.load_cycle`.
     """
     expect("history", history, "LoadHistory")

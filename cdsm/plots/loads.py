@@ -62,7 +62,7 @@ def plot_weight_test(test: WeightTest) -> Figure:
 
 
 def plot_critical_tension(critical: CriticalTension) -> Figure:
-    """Plot the stability margin over the lower bound of tension; unstable ranges are shaded.
+    """Plot the stability margin over the lower bound of all tensions, unstable ranges shaded.
 
     InvalidInput if ``critical`` is no result of :func:`~cdsm.critical_tension`.
     """
@@ -127,7 +127,7 @@ def plot_critical_load(critical: CriticalLoad) -> Figure:
 
 
 def plot_bifurcation(found: Bifurcation) -> Figure:
-    """Plot how far a slight push moves the tip, over the lower bound of tension.
+    """Plot how far a slight push moves the tip, over the lower bound of all tensions.
 
     InvalidInput if ``found`` is no result of :func:`~cdsm.bifurcation`.
     """

@@ -54,7 +54,7 @@ class Slice(NamedTuple):
 
 
 class Map(NamedTuple):
-    """A panel: tips (N, 2) [mm] in its ``plane`` of two axes, their values and their status."""
+    """A panel: tips (N, 2) [mm] in its ``plane`` of two axes, with quantity and status of each."""
 
     title: str
     points: Array
@@ -75,7 +75,7 @@ class Map(NamedTuple):
 
 
 class Case(NamedTuple):
-    """Values of all tips for one combination of cases (NaN if missing), and their status."""
+    """The plotted quantity at all tips (NaN if missing), and their status, for one case."""
 
     title: str
     values: Array
@@ -85,7 +85,11 @@ class Case(NamedTuple):
 def cases_of(
     dataset: xarray.Dataset, quantity: str, poses: list[str], words: Mapping[int, str]
 ) -> Iterator[Case]:
-    """Yield a map for each combination of cases: of the dimensions other than ``poses``."""
+    """Yield the values of ``quantity`` for each case: each place in the dimensions but ``poses``.
+
+    ``words`` are the words for the values of the status. Unstable entries become NaN, except in
+    the margin.
+    """
     status = dataset["status"]
     allowed = {*map(str, status.dims), "direction"}
     dims = [str(dim) for dim in dataset[quantity].dims]
@@ -126,7 +130,10 @@ def _title(dataset: xarray.Dataset, dim: str, place: int) -> str:
 
 
 def slices_of(points: Array, section: tuple[str, float, float] | None) -> tuple[list[Slice], bool]:
-    """Return the slabs to show, and whether they are slices of a cloud of tips."""
+    """Return the slabs to show of tips (N, 3) [m], and whether they are slices of a cloud.
+
+    ``section`` is one slab: axis, position and half thickness [m].
+    """
     if section is not None:
         return [_slab(section)], False
     if not len(points):

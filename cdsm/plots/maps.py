@@ -175,7 +175,7 @@ def plot_map(
 
 
 def _colors(values: Array) -> tuple[ScalarMappable, str]:
-    """Return the colour scale of the values without outliers, and at which ends some exceed it."""
+    """Return the colour scale of the values without outliers, and the ends that outliers exceed."""
     finite = values[np.isfinite(values)] if np.isfinite(values).any() else np.array([0.0, 1.0])
     low, high = float(finite.min()), float(finite.max())
     wide = low > 0.0 and high > _WIDE * low
@@ -240,7 +240,10 @@ def _draw(
 def _legend(
     figure: Figure, counted: Sequence[Case | Map], maps: Sequence[Map], words: Mapping[int, str]
 ) -> None:
-    """Draw the legend of ``maps``: marker and word of each status, and its share in ``counted``."""
+    """Draw the legend of ``maps``: marker and word of each status, and its share of ``counted``.
+
+    ``words`` are the words for the values of the status.
+    """
     status = np.concatenate([each.status[np.isnan(each.values)] for each in counted])
     total = sum(each.status.size for each in counted)
     handles = []

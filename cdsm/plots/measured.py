@@ -64,7 +64,7 @@ def plot_tensile_fit(fit: TensileFit) -> Figure:
 
 
 def shade_stages(axes: Any, stages: Sequence[tuple[str, float, float]], along: str = "x") -> None:
-    """Shade stages (name, low, high) of the tension [N], which the axis ``along`` shows."""
+    """Shade stages of the tension: name, lower and upper end [N]. Axis ``along`` shows tension."""
     whole = stages[-1][2] - stages[0][1]
     for (name, low, high), shade in zip(stages, cycle(("0.93", "0.98", "0.88")), strict=False):
         middle, shown = (low + high) / 2.0, {"fontsize": SMALL, "color": "0.3"}
@@ -80,7 +80,10 @@ def shade_stages(axes: Any, stages: Sequence[tuple[str, float, float]], along: s
 
 
 def plot_identification(fit: Identification, labels: Sequence[str], title: str) -> Figure:
-    """Plot stiffnesses and loops, predicted and measured, and each residual in σ."""
+    """Plot the stiffnesses and loops of ``fit``, predicted and measured, and residuals in σ.
+
+    ``labels`` are the names of the residuals, ``title`` is that of the figure.
+    """
     rows = fit._rows
     loops: list[Any] = [each for each in fit.measurements if hasattr(each, "forces")]
     stiff = [k for k, each in enumerate(rows) if not hasattr(each, "forces")]
@@ -125,7 +128,10 @@ def _plot_stiffnesses(axes: Any, fit: Identification, rows: Sequence[int]) -> No
 def _plot_loop(
     axes: Any, fit: Identification, loop: WeightLoop, rows: Sequence[int], colour: Any
 ) -> None:
-    """Plot the displacement along the force of a loop, from its first reading."""
+    """Plot the displacement along the force of ``loop``, relative to its first measured reading.
+
+    ``rows`` are the rows of the loop in ``fit``.
+    """
     u = np.array(loop.direction) / np.linalg.norm(loop.direction)
     along = loop.axes @ u
     read, model = (

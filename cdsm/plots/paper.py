@@ -76,7 +76,7 @@ def plot_paper(result: paper.Figure) -> Figure:
 def _grid(
     result: paper.StiffnessFigure, height: float, rows: int, **options: Any
 ) -> tuple[Figure, Any]:
-    """Build a figure of two columns with a panel for each direction in each row."""
+    """Build a figure as wide as two columns: panels for x, y and z in each row; height [inch]."""
     figure, grid = panels(TWO_COLUMNS, height, 3, rows, sharex=True, **options)
     for axes, axis in zip(grid[0], AXES, strict=True):
         caption(axes, axis)
@@ -86,7 +86,7 @@ def _grid(
 
 
 def _plot_moduli(result: paper.StiffnessFigure) -> Figure:
-    """Plot both readings over Young's modulus, and how far the passive part is from the total."""
+    """Plot both readings of Fig. 3 over Young's modulus, and passive part minus total [%]."""
     figure, grid = _grid(result, 5.4, 3)
     ratio, limit = (result.claims[k].paper or () for k in (0, 1))
     looks: tuple[dict[str, Any], ...] = (
@@ -124,7 +124,7 @@ def _plot_moduli(result: paper.StiffnessFigure) -> Figure:
 
 
 def _plot_directions(result: paper.StiffnessFigure) -> Figure:
-    """Plot both readings over the tension, and the paper's increment."""
+    """Plot both readings of a figure over the tension, and the increment that the paper states."""
     figure, grid = _grid(result, 4.4, 2)
     increments = result.claims[0].paper or ()
     for row, (name, reading) in zip(grid, _READINGS.items(), strict=True):
@@ -180,7 +180,7 @@ def _plot_changes(result: paper.StiffnessFigure) -> Figure:
 
 
 def _plot_lead(result: paper.LeadFigure) -> Figure:
-    """Plot a panel for each reading, a colour for each direction."""
+    """Plot the change of stiffness over the lead: a panel per reading, a colour per direction."""
     figure, (pair,) = panels(TWO_COLUMNS, 3.4, 2, sharey=True)
     for axes, (name, reading) in zip(pair, _READINGS.items(), strict=True):
         for i, (axis, color) in enumerate(zip(AXES, COLORS, strict=True)):

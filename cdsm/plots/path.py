@@ -68,7 +68,8 @@ def plot_path(
         path: Postures of one arm, in order; or a plan, of which the planned samples are drawn.
         animate: A ``.gif`` to write too: the arm follows the path, its cables coloured by their
             tensions.
-        tensions: Tensions (n, C) [N] for the colours. Default: those of a plan.
+        tensions: Tensions (n, C) [N] for the colours, one row per posture. Default: those of the
+            plan, if ``path`` is one.
 
     Raises:
         InvalidInput: ``path`` is not postures of one arm or is empty, or ``animate`` does not
@@ -125,7 +126,7 @@ def plot_modes(modes: Modes) -> Figure:
 
 
 def _postures(path: PathPlan | Sequence[Posture]) -> tuple[list[Posture], Array | None]:
-    """Return the postures of a path, and the tensions (P, C) [N] if it is a plan."""
+    """Return the P postures of a path, and their tensions (P, C) [N] if it is a plan."""
     tensions = None
     if isinstance(path, Sequence):
         poses = list(path)
@@ -158,7 +159,10 @@ def _draw_skeleton(axes: Any, pose: Posture, shade: str) -> None:
 def _animate(
     path: str | os.PathLike[str], poses: Sequence[Posture], tensions: Array | None, limits: Array
 ) -> None:
-    """Write a GIF; a frame for each posture, or for 150 of them."""
+    """Write a GIF with a frame per posture, or 150 frames of evenly spaced postures.
+
+    ``tensions`` (P, C) [N] colour the cables. ``limits`` (3, 2) [mm] are those of the axes.
+    """
     if as_path(path).suffix.lower() != ".gif":
         raise InvalidInput("animate", f"{str(path)!r} given; it must end in .gif.")
     figure, axes = picture_axes()

@@ -49,7 +49,7 @@ this factor."""
 
 
 def plot_stiffness_ranges(ranges: Mapping[str, Sequence[StiffnessRange]]) -> Figure:
-    """Plot attainable stiffness over the direction, as a polar diagram in N/mm.
+    """Plot the attainable stiffness [N/mm] over the direction, as a polar diagram.
 
     Each entry gives a curve of its largest stiffness. The smallest stiffness of the last entry is
     shaded. Both halves of the circle are equal, since ``along(-u)`` is ``along(u)``.

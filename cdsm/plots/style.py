@@ -92,7 +92,7 @@ def save_figure(figure: Figure, path: str | os.PathLike[str]) -> Path:
 
 
 def expect(name: str, value: object, kind: str) -> None:
-    """Raise :class:`InvalidInput` unless the value is an instance of the class named ``kind``.
+    """Raise :class:`InvalidInput` for the argument ``name`` unless its class is called ``kind``.
 
     The class is not imported, because results import this package for their ``plot`` methods.
     """
@@ -101,14 +101,14 @@ def expect(name: str, value: object, kind: str) -> None:
 
 
 def direction_name(u: Array) -> str:
-    """Format a direction; rounding errors become zero."""
+    """Format a direction (3,) as text; rounding errors become zero."""
     return coordinates(np.round(u, 9), "z.3g")
 
 
 def panels(
     width: float, height: float, columns: int, rows: int = 1, **options: Any
 ) -> tuple[Figure, Any]:
-    """Build a figure and its panels (rows, columns), each with grid lines; sizes in inches."""
+    """Build a figure of a size [inch], and its panels (rows, columns), each with grid lines."""
     figure = Figure(figsize=(width, height), dpi=SCREEN, layout="constrained")
     axes = figure.subplots(rows, columns, squeeze=False, **options)
     for panel in axes.flat:
@@ -127,7 +127,7 @@ def styled(axes: Any) -> Any:
 
 
 def heading(figure: Figure, text: str) -> None:
-    """Write a title over a figure, with line breaks where the figure ends."""
+    """Write a title over a figure, with lines no wider than the figure."""
     figure.suptitle(textwrap.fill(text, round(16 * figure.get_figwidth())), fontsize=TEXT)
 
 
@@ -150,7 +150,10 @@ def legend(axes: Any, **options: Any) -> Any:
 
 
 def legend_below(figure: Figure, axes: Any, columns: int, **options: Any) -> None:
-    """Draw one legend below all panels, from the lines of one panel or of several, each once."""
+    """Draw a legend below all panels, of the labels of one panel or several, in ``columns``.
+
+    A label that several panels have appears once.
+    """
     found: dict[str, Any] = {}
     for panel in np.ravel(axes):
         for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
@@ -165,7 +168,7 @@ def legend_below(figure: Figure, axes: Any, columns: int, **options: Any) -> Non
 
 
 def cable_lines(axes: Any, x: Array, values: Array, names: Sequence[str], **line: Any) -> None:
-    """Draw values (N, C) over x (N,), a line for each cable; name up to 24 beside the panel."""
+    """Draw values (N, C) over x (N,), a line per cable; beside it the ``names``, if at most 24."""
     named = len(names) <= NAMED
     for c, name in enumerate(names):
         color = _CABLES[c % len(_CABLES)] if named else BLUE
@@ -177,7 +180,7 @@ def cable_lines(axes: Any, x: Array, values: Array, names: Sequence[str], **line
 
 
 def equal_axes(axes: Any, zoom: float = 0.75) -> None:
-    """Give 3D axes equal scales, with space for their labels."""
+    """Give 3D axes equal scales; ``zoom`` < 1 leaves space for their labels."""
     ranges = np.ptp([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()], axis=1)
     axes.set_box_aspect(ranges, zoom=zoom)
     for letter, part in zip(AXES, ranges / ranges.max(), strict=True):

@@ -1,4 +1,4 @@
-"""Plot a closed loop over time: tip, stiffness, tensions, and where the tip may rest."""
+"""Plot a closed loop over time: tip, stiffness, tensions, and the band of rest of the tip."""
 
 from __future__ import annotations
 

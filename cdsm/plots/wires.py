@@ -56,7 +56,7 @@ def plot_cables(cables: Mapping[str, Cable] | Sequence[Cable], free_length: floa
 
     Args:
         cables: Cables, with labels if they come as a mapping.
-        free_length: Original length of all wires [m].
+        free_length: Original length of every wire [m].
 
     Raises:
         InvalidInput: No cables are given, or ``free_length`` is not a positive number.

@@ -21,7 +21,8 @@ _NEAR: Final = 0.012
 def clicked_cable(paths: Sequence[Array], origin: Array, direction: Array) -> int | None:
     """Return the index of the cable nearest to a ray from a camera; None if no cable is near.
 
-    ``paths`` are as ``cable_paths`` of a posture; origin (3,) and direction (3,) are of the ray.
+    ``paths`` are the ``cable_paths`` of a posture. The ray has an origin (3,) [m] and a direction
+    (3,).
     """
     u = direction / np.linalg.norm(direction)
     angles = [
@@ -53,12 +54,15 @@ class CableNames:
         self.chosen: int | None = None
 
     def choose(self, shown: Shown, origin: Array, direction: Array) -> None:
-        """Label only the cable at a clicked ray; no cable if none is near."""
+        """Choose the cable of ``shown`` nearest to the ray of a click (origin and direction (3,)).
+
+        No cable is chosen if none is near.
+        """
         if shown.posture is not None:
             self.chosen = clicked_cable(shown.posture.cable_paths, origin, direction)
 
     def update(self, shown: Shown) -> None:
-        """Write and move the labels that are wanted, and hide the others."""
+        """Label all cables of ``shown``, or the chosen one; hide the other labels."""
         pose, tensions = shown.posture, shown.tensions
         wanted: set[int] = set()
         if pose is not None:

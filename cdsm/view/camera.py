@@ -100,7 +100,7 @@ class Cameras:
         server.on_client_disconnect(self._on_disconnect)
 
     def follow(self, ball: Ball) -> None:
-        """Fit all cameras if the arm has left the picture or has become small in it."""
+        """Fit all cameras to the new ball, if it is outside the picture or small in it."""
         if not self._ball.fits(ball):
             self._ball = ball
             self._set_first()
@@ -108,7 +108,7 @@ class Cameras:
                 self.fit(client)
 
     def fit(self, client: viser.ClientHandle) -> None:
-        """Move one camera so that it sees the whole ball; it looks in the same direction."""
+        """Move the camera of ``client`` to see the whole ball; its direction of view stays."""
         self._place(client, client.camera.position - client.camera.look_at)
 
     def _place(self, client: viser.ClientHandle, direction: Array) -> None:

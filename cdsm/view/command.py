@@ -1,4 +1,4 @@
-"""Write the command of the shell, or the lines of Python, that compute the page."""
+"""Write the ``cdsm`` command, or lines of Python, that compute the numbers of the page."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _CODE: Final = "display:block;white-space:pre-wrap;overflow-wrap:anywhere;margin
 
 
 def command_line(arm: Manipulator, setting: Setting, arm_arguments: Sequence[str]) -> str:
-    """Write the command of the shell that prints the numbers of a setting.
+    """Write the command, ``cdsm stiffness`` or ``cdsm weigh``, that prints numbers of a setting.
 
     ``arm_arguments`` describe the arm: its file, and options such as ``--rigidity``.
     """
@@ -74,9 +74,10 @@ def python_lines(arm: Manipulator, setting: Setting) -> str:
 
 
 def command_text(arm: Manipulator, setting: Setting, arm_arguments: Sequence[str] | None) -> str:
-    """Return the HTML at the end of the page: the command of the shell, and two buttons.
+    """Return the HTML at the end of the page: how to compute ``setting`` without the page.
 
-    Without ``arm_arguments``, lines of Python take the place of the command.
+    It shows :func:`command_line`, or :func:`python_lines` without ``arm_arguments``, and the
+    buttons to copy it and to save the picture.
     """
     if arm_arguments is None:
         where, command = "in Python", python_lines(arm, setting)

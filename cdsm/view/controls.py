@@ -39,9 +39,10 @@ class Controls:
     """Controls and text of an arm in the empty panel of a viser server.
 
     ``arm_arguments`` describe the arm in a shell, see :func:`command_text`. ``limits`` [N] are the
-    largest lower bound of tension and the largest force of the sliders. ``force_scale`` [m/N] is
-    the length of the arrow of the force. A moved control calls ``changed`` from any thread.
-    ``fit`` fits the camera of a browser. ``admit`` receives every control that browsers may use.
+    ends of the sliders: of the lower bound of all tensions, and of each force component (±).
+    ``force_scale`` [m/N] is the length of the force arrow per newton. A moved control calls
+    ``changed`` from any thread. ``fit`` fits the camera of a browser. ``admit`` receives every
+    control that browsers may use.
     """
 
     def __init__(
@@ -99,7 +100,7 @@ class Controls:
         )
 
     def update(self, shown: Shown, remark: str) -> None:
-        """Write the text about these results, and a remark."""
+        """Write the text about the results ``shown``, and a remark."""
         self._text.content = page_text(shown, self._force_scale, remark)
         self._tensions.content = tensions_text(shown)
         self._command.content = command_text(self._arm, shown.setting, self._arm_arguments)
@@ -110,7 +111,7 @@ class Controls:
             joint.move(angle)
 
     def add_switch(self, label: str, hint: str, on: bool) -> viser.GuiCheckboxHandle:
-        """Add a checkbox that calls ``changed``."""
+        """Add a checkbox with a label, a hint and a first state; it calls ``changed``."""
         switch = self._gui.add_checkbox(label, on, hint=hint)
         switch.on_update(lambda _: self._changed())
         self._admit(switch)

@@ -134,7 +134,7 @@ class Guard:
     def _answer(
         self, reply: _Reply, connection: ServerConnection, request: Request
     ) -> Response | None:
-        """Return the refusal of a request for a page or a websocket, or what viser answers."""
+        """Answer a request for a page or a websocket: a refusal, or viser's ``reply``."""
         hosts = request.headers.get_all("Host")
         _, first, rest = [*request.path.partition("?")[0].split("/", 2), "", ""][:3]
         fault = self._fault(hosts, request.headers.get_all("Origin"), first)
@@ -151,7 +151,10 @@ class Guard:
         return response
 
     def _fault(self, hosts: list[str], origins: list[str], first: str) -> str:
-        """Return the fault of a request (hosts, origins, first part of its path), empty if none."""
+        """Return the reason to refuse a request, empty if there is none.
+
+        ``hosts`` and ``origins`` are its headers, ``first`` is the first part of its path.
+        """
         if len(hosts) != 1:
             return f"a request for {len(hosts)} hosts"
         host = hosts[0]
@@ -166,7 +169,7 @@ class Guard:
         return ""
 
     def _permitted(self, raw: bytes) -> bytes | None:
-        """Return a message of a client, packed again for viser, or None if it is refused."""
+        """Return ``raw``, a message of a client, packed again for viser; None if it is refused."""
         try:
             # packed again: of two fields with one name, viser may read the one not checked here
             message = msgspec.msgpack.decode(raw)
@@ -185,7 +188,7 @@ class Guard:
         return None
 
     def _allowed(self, uuid: str, value: object) -> bool | float | str | None:
-        """Return the value that a control may take, or None if control or value is not allowed."""
+        """Return a value for the control ``uuid``; None if this control or value is not allowed."""
         control = self._controls.get(uuid)
         if isinstance(control, viser.GuiButtonHandle):
             return True if value is True else None
@@ -205,7 +208,7 @@ class Guard:
         return within
 
     def _refuse(self, what: str) -> None:
-        """Count the refusals, and log the count each time it has doubled."""
+        """Count the refusal of ``what``, and log the count each time it has doubled."""
         self.refused += 1
         if self.refused & (self.refused - 1) == 0:
             _LOG.warning("Refused from clients so far: %d; the last: %s.", self.refused, what)

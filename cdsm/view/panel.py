@@ -47,10 +47,10 @@ class _Row(NamedTuple):
 
 
 def page_text(shown: Shown, force_scale: float, remark: str = "") -> str:
-    """Write the panel of one setting. Each number is in an element with ``data-cdsm="name"``.
+    """Write the panel of results. Each number is in an element with ``data-cdsm="name"``.
 
-    ``force_scale`` [m/N] is the length of the arrow of the force. ``remark`` is shown above the
-    numbers.
+    ``force_scale`` [m/N] is the length of the force arrow per newton. ``remark`` is shown above
+    the numbers.
     """
     color = _COLORS.get(shown.condition, _GREY)
     badge = f"background:{color};color:white;font-weight:bold;text-align:center;padding:0.2em"
@@ -79,7 +79,7 @@ def basis_text(arm: Manipulator) -> str:
 
 
 def tensions_text(shown: Shown) -> str:
-    """Write the list of cables with their tensions; those at a bound or slack are marked."""
+    """Write the list of cables with their tensions; cables at a bound or slack are marked."""
     if shown.tensions is None or shown.posture is None or shown.cable_colors is None:
         return str(element("div", "unknown", style=_LIST))
     marks: dict[str, str] = {}
@@ -104,7 +104,7 @@ def tensions_text(shown: Shown) -> str:
 
 
 def _remarks(shown: Shown, remark: str) -> Iterator[tuple[str, str]]:
-    """Yield names and texts of the remarks above the numbers."""
+    """Yield names and texts of the remarks above the numbers: on ``shown``, and ``remark``."""
     if remark:
         yield "remark", remark
     if shown.problem:
@@ -147,7 +147,7 @@ def _row(row: _Row) -> Markup:
 
 
 def _legend(shown: Shown, force_scale: float) -> Iterator[Markup]:
-    """Yield the meaning and the scale of the ellipsoid and of the arrow."""
+    """Yield the meaning and the scale of the ellipsoid and the arrow (``force_scale`` [m/N])."""
     if shown.ellipsoid is not None:
         yield _key(ELLIPSOID, "ellipsoid", f"ellipsoid: {shown.ellipsoid}")
     if shown.posture is not None and shown.setting.force.any():

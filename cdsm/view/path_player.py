@@ -24,7 +24,7 @@ class PathPlayer:
 
     Args:
         server: Where to add the controls.
-        path: One row per sample (S, …).
+        path: Joint angles (S, nv) or tip positions (S, 3), a row per sample.
         go: Moves the arm to a row of ``path``, and returns when it is shown.
         admit: Receives every control that browsers may use.
     """

@@ -36,7 +36,7 @@ class Scene:
 
     Pinocchio's visualiser draws the links from the shapes in the URDF. Sticks join the joints of
     links without shapes, or of all links if a mesh cannot be read. ``force_scale`` [m/N] is the
-    length of the arrow of the force.
+    length of the force arrow per newton.
     """
 
     def __init__(self, server: viser.ViserServer, arm: Manipulator, force_scale: float) -> None:
@@ -102,7 +102,7 @@ class Scene:
         self.cameras = Cameras(server, self._ball(_straight(arm)))
 
     def update(self, shown: Shown, follow: bool) -> None:
-        """Draw these results, and hide the objects that have none.
+        """Draw the results ``shown``, and hide the objects without a result.
 
         ``follow`` allows the cameras to be fitted again.
         """
@@ -178,7 +178,7 @@ def _straight(arm: Manipulator) -> Posture | None:
 
 
 def _faces(rows: int, columns: int) -> NDArray[np.uint32]:
-    """Build two triangles for each cell of a grid of points, numbered row by row."""
+    """Build two triangles (n, 3) per cell of a grid of points (rows, columns), as point indices."""
     points = np.arange(rows * columns, dtype=np.uint32).reshape(rows, columns)
     a, b, c, d = points[:-1, :-1], points[1:, :-1], points[:-1, 1:], points[1:, 1:]
     return np.stack([a, b, c, c, b, d], axis=-1).reshape(-1, 3)

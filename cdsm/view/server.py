@@ -100,7 +100,7 @@ def serve(
 
 
 def _tips(arm: Manipulator, path: Array, of_tips: bool) -> Array:
-    """Return the tips (S, 3) [m] of a path of tips or of joint angles; check the angles."""
+    """Return the tips (S, 3) [m] of ``path``: tips if ``of_tips``, else joint angles, checked."""
     if of_tips:
         return path
     tips = []
@@ -113,7 +113,7 @@ def _tips(arm: Manipulator, path: Array, of_tips: bool) -> Array:
 
 
 def _server(host: object, port: object, name: str) -> tuple[Guard, viser.ViserServer]:
-    """Start a guarded viser server at exactly this address, and set up its page."""
+    """Start a guarded viser server at exactly ``host`` and ``port``; ``name`` titles its page."""
     from viser._messages import RunJavascriptMessage
 
     from cdsm.view.guard import Guard
@@ -136,7 +136,7 @@ def _server(host: object, port: object, name: str) -> tuple[Guard, viser.ViserSe
 
 
 def _check_free(host: str, port: int) -> None:
-    """Check that the address is free; viser would use the next port, or wait for ever."""
+    """Check that ``port`` of ``host`` is free; viser would use the next port, or wait for ever."""
     try:
         for family, *_, address in socket.getaddrinfo(
             host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE

@@ -47,9 +47,10 @@ class Range:
 
 
 def slider_range(label: str, low: float, high: float, initial: float, unit: float = 1.0) -> Range:
-    """Return the range of a slider between two SI values; its ends and its step are round numbers.
+    """Return the range of a slider from ``low`` to ``high`` [SI], with round ends and round steps.
 
-    The ends lie within the two values, but they always include the unrounded ``initial``.
+    The ends are rounded inwards. The range always contains the first position ``initial`` [SI],
+    which is not rounded. ``unit`` is the unit shown to the user, in SI.
     """
     low, high, initial = (value / unit for value in (low, high, initial))
     if not high > low:
@@ -67,7 +68,10 @@ def slider_range(label: str, low: float, high: float, initial: float, unit: floa
 
 
 def joint_ranges(arm: Manipulator, q: Array) -> tuple[Range, ...]:
-    """Return the slider range of each joint within its limits, in degrees, or mm if it slides."""
+    """Return the slider range of each joint within its limits [degrees, or mm if it slides].
+
+    ``q`` (nv,) are the first positions.
+    """
     most = np.where(arm.slides, _LENGTHS * arm.length, _TURN)
     low, high = np.maximum(arm.lower, -most), np.minimum(arm.upper, most)
     units = JointUnits(arm.slides).shown

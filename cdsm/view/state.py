@@ -201,7 +201,7 @@ class Shown(ReadOnlyState):
 
 
 def remedies_of(shown: Shown) -> tuple[str, ...]:
-    """Return the remedies of an unstable arm; it takes some tenths of a second."""
+    """Return the remedies for the unstable arm of ``shown``; this takes some tenths of a second."""
     return () if shown.stiffness is None else advice(shown.stiffness)
 
 
@@ -253,7 +253,7 @@ def show(arm: Manipulator, setting: Setting) -> Shown:
 
 
 def _rest(history: LoadHistory) -> Equilibrium:
-    """Return the last state of an arm with friction as an equilibrium, with its tangent K_θ."""
+    """Return the last state of ``history`` as an equilibrium, with its tangent K_θ."""
     K, reaction = history.stiffness(-1), history.reaction[-1].copy()
     return Equilibrium(
         reference=history.reference,

@@ -21,7 +21,7 @@ _ROUNDING = 1e-9
 
 
 def draw_surroundings(server: viser.ViserServer, length: float) -> None:
-    """Draw light, base axes, and a grid below the base for an arm of a length [m]."""
+    """Draw light, base axes, and a grid below the base, for an arm of ``length`` [m]."""
     scene = server.scene
     # an environment map and shadows take seconds without a GPU
     scene.configure_environment_map(hdri=None)
@@ -57,7 +57,7 @@ def draw_surroundings(server: viser.ViserServer, length: float) -> None:
 def section(length: float) -> float:
     """Compute the distance [m] of labelled grid lines: 1, 2 or 5 times a power of ten.
 
-    It is the largest such distance up to a third of the length of the arm.
+    It is the largest such distance up to a third of ``length`` [m], that of the arm.
     """
     power = math.log10(length / 3.0)
     decade = math.floor(power + _ROUNDING)

@@ -52,7 +52,10 @@ class TipHandle:
         self._changed()
 
     def solve(self, q: Array) -> Array | None:
-        """Return joint angles (nv,) near ``q`` for a new target; None if there are none."""
+        """Return joint angles (nv,) near ``q`` that bring the tip to a new target.
+
+        None if there is no new target, or inverse kinematics fails.
+        """
         target, self._target = self._target, None
         if target is None:
             return None
@@ -75,11 +78,11 @@ class TipHandle:
         self._q = q
 
     def remark(self, q: Array) -> str:
-        """Return why the handle is not at the tip; empty if the sliders have moved since."""
+        """Return why the tip did not reach the handle; empty if ``q`` has changed since."""
         return self._remark if np.array_equal(q, self._q) else ""
 
     def update(self, shown: Shown) -> None:
-        """Bring the handle to the tip, unless it is being dragged."""
+        """Move the handle to the tip of ``shown``, unless it is being dragged."""
         self._node.visible = shown.reference is not None
         if shown.reference is not None and not self.dragged:
             self._node.position = shown.reference.tip[:3, 3]

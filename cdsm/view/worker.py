@@ -1,4 +1,4 @@
-"""Run a job in a thread on request, and only once for many requests."""
+"""Run a job in a thread on request; requests that arrive while it runs cause one further run."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from concurrent import futures
 class Worker:
     """A thread that runs a job on request. All requests during a run cause one further run.
 
-    Many threads request runs, faster than the job runs. Each run uses the newest state.
+    Requests come from many threads, more often than the job can run. Each run uses the newest
+    state.
     """
 
     def __init__(self, job: Callable[[], None]) -> None:
@@ -33,7 +34,7 @@ class Worker:
         futures.wait([self._last] if self._last else [])
 
     def no_request_within(self, seconds: float) -> bool:
-        """Let the job wait some seconds; return whether no further run was requested meanwhile."""
+        """Wait in the job for up to ``seconds`` [s]; return whether no request came meanwhile."""
         return not self._asked.wait(seconds)
 
     def close(self) -> None:
