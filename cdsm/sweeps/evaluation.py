@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import Any, final
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from cdsm import batch
 from cdsm.elasticity import Elasticity
@@ -44,8 +44,6 @@ _BATCH_NAMES = {
     "stuck_joint_stiffness": "stuck_joint",
 }
 """Names of quantities in a batch, where the name in a sweep is different."""
-
-_Place = tuple[NDArray[np.intp], ...] | tuple[NDArray[np.bool_]]
 
 
 @final
@@ -105,112 +103,157 @@ def evaluate(task: SweepTask, q: Array, threads: int | None = None) -> BlockResu
     shape = len(q), len(task.wrenches), len(task.minima)
     stages = {name: QUANTITIES[name].stage for name in task.outputs}
     of_pose = [name for name, stage in stages.items() if stage == "pose"]
-    of_law = [name for name, stage in stages.items() if stage not in ("pose", "tension")]
+    of_tension = [name for name, stage in stages.items() if stage == "tension"]
+    of_law = [name for name in stages if name not in (*of_pose, *of_tension)]
+    needed = _needed(of_law)
 
-    computed = [name for name in of_pose if name not in MEASURED]
-    rows, status_of_pose = _rows(computed, task.arm, q, threads=threads)
-    exist = status_of_pose == SweepStatus.OK
+    # a row for each posture, wrench and minimum
+    cases = shape[1] * shape[2]
+    at = np.repeat(q, cases, axis=0)
+    wrench = np.tile(np.repeat(task.wrenches, shape[2], axis=0), (shape[0], 1))
+    low, high, loss, bounded = _bounds(task, at, threads)
+    one = shape[2] == 1 and not task.worst_friction  # a bound for all rows
+    together = [*(name for name in of_pose if name not in MEASURED), *needed]
+    rows, status = _rows(
+        task,
+        task.arms[0],
+        together + ["tension"] * bool(of_tension or of_law),
+        at,
+        wrench,
+        minimum=low[0, 0] if one else low,
+        maximum=high[0, 0] if one else high,
+        bounded=bounded,
+        threads=threads,
+    )
+    answer: BlockResult = {name: rows[name][::cases] for name in of_pose if name in rows}
+    exist = _exists("pose", status[::cases])
     wanted = [name for name in of_pose if name in MEASURED]
     for name, values in measured(task.arm, q[exist], wanted, task.diameter, threads).items():
-        rows[name] = _over_all_cases(values, (exist,), exist.shape)
-    answer: BlockResult = {**rows}
-    status = np.tile(status_of_pose[:, None, None], (1, *shape[1:]))
-    if len(stages) > len(of_pose):
-        # along a cable the tensions differ by this factor at most
-        loss = np.ones((len(q), len(task.arm.cables)))
-        if task.worst_friction:
-            loss[exist] = friction_losses(task.arm, q[exist], threads)
-        p, _, m = place = np.nonzero(status == SweepStatus.OK)
-        low, high, bounded = narrowed_bounds(task.arm, task.minima[m], task.maximum, loss[p])
-        pull = batch.distribute_tensions(
-            task.arm, q[p], low, high, task.wrenches[place[1]], threads=threads
-        )
-        status[place] = np.where(bounded, pull.status, SweepStatus.INFEASIBLE)
-        held = status[place] == SweepStatus.OK
-        p, w, _ = place = tuple(each[held] for each in place)
-        F = pull.values[held]
-        bounds = task.arm, q[p], task.wrenches[w], low[held], high[held]
-        of_tension: dict[str, Callable[[], Array]] = {
+        answer[name] = _spread(values, exist)
+
+    held = _exists("tension", status)
+    if of_tension:
+        F, bounds = rows["tension"][held], (task.arm, at[held], wrench[held], low[held], high[held])
+        compute: dict[str, Callable[[], Array]] = {
             "tension": lambda: F,
             "payload": lambda: payloads(*bounds, task.directions, threads),
             "capacity_margin": lambda: capacity_margins(*bounds),
-            "wire_safety": lambda: safety(F * loss[p], task.breaking_load),
-            "wire_life": lambda: life_margin(F * loss[p], task.diameter, task.bend_diameter),
+            "wire_safety": lambda: safety(F * loss[held], task.breaking_load),
+            "wire_life": lambda: life_margin(F * loss[held], task.diameter, task.bend_diameter),
         }
-        for name, stage in stages.items():
-            if stage == "tension":
-                answer[name] = _over_all_cases(of_tension[name](), place, shape)
-    if not of_law:
-        return answer | {"status": np.stack([status] * len(task.laws), axis=1)}
+        for name in of_tension:
+            answer[name] = _spread(compute[name](), held)
 
     by_law: list[BlockResult] = []
     for arm in task.arms:
-        rows, status_of_law = _stiffnesses(
-            task, arm, q[p], F, loss[p], task.wrenches[w], of_law, threads
-        )
-        by_law.append({name: _over_all_cases(rows[name], place, shape) for name in of_law})
-        by_law[-1]["status"] = status.copy()
-        by_law[-1]["status"][place] = status_of_law
-    return answer | {name: np.stack([each[name] for each in by_law], axis=1) for name in by_law[0]}
+        found, status_of_law = {name: rows[name] for name in needed}, status.copy()
+        if of_law and by_law:
+            some, status_of_law[held] = _rows(
+                task, arm, needed, at[held], wrench[held], rows["tension"][held], threads=threads
+            )
+            found = {name: _spread(values, held) for name, values in some.items()}
+        if of_law:
+            _finish(arm, found, status_of_law, rows["tension"], loss, of_law)
+        by_law.append({name: found[name] for name in of_law} | {"status": status_of_law})
+    for name in of_tension:
+        answer[name] = answer[name].reshape(*shape, *answer[name].shape[1:])
+    for name in (*of_law, "status"):
+        several = [each[name].reshape(*shape, *each[name].shape[1:]) for each in by_law]
+        answer[name] = np.stack(several, axis=1)
+    return answer
 
 
-def _stiffnesses(
-    task: SweepTask,
-    arm: Manipulator,
-    q: Array,
-    tension: Array,
-    loss: Array,
-    wrench: Array,
-    names: list[str],
-    threads: int | None,
-) -> tuple[Rows, Statuses]:
-    """Compute the quantities that need the cable stiffness, at R postures q with tensions (R, C).
+def _bounds(
+    task: SweepTask, q: Array, threads: int | None
+) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
+    """Return bounds of tension (R, C) [N] of rows q; factors of friction; which rows have bounds.
 
-    ``loss`` (R, C) is the largest factor between the tensions along a cable with friction.
+    The factor (R, C) is the largest between two tensions along a cable, with ``worst_friction``.
     """
+    minima = np.tile(task.minima, len(q) // len(task.minima))
+    shape = len(q), len(task.arm.cables)
+    loss = np.ones(shape) if task.worst_friction else np.broadcast_to(1.0, shape)
+    if not task.worst_friction:
+        low, high = np.broadcast_to(minima[:, None], shape), np.broadcast_to(task.maximum, shape)
+        return low, high, loss, np.broadcast_to(True, len(q))
+    exist = batch.evaluate(task.arm, q, outputs=[], threads=threads).ok
+    loss[exist] = friction_losses(task.arm, q[exist], threads)
+    low, high, bounded = narrowed_bounds(task.arm, minima, task.maximum, loss)
+    return low, high, loss, bounded
+
+
+def _needed(names: list[str]) -> list[str]:
+    """Return what a batch computes for quantities of a law: with the margin, for the status."""
+    if not names:
+        return []
     extreme = [name for name in names if QUANTITIES[name].stage == "principal"]
     needed = [name for name in names if name not in (*extreme, "wire_strain")]
     needed += ["margin", "translational_compliance"] if extreme else ["margin"]
-    rows, status = _rows(
-        list(dict.fromkeys(needed)),
-        arm,
-        q,
-        tension,
-        wrench,
-        direction=None if DIRECTIONAL.isdisjoint(names) else task.directions,
-        threads=threads,
-    )
+    return list(dict.fromkeys(needed))
+
+
+def _finish(
+    arm: Manipulator,
+    rows: Rows,
+    status: Statuses,
+    tension: Array,
+    loss: Array,
+    names: list[str],
+) -> None:
+    """Add the quantities that a batch does not compute to rows of one law; complete the status.
+
+    F (R, C) is ``tension``; ``loss`` (R, C) is the largest factor between tensions along a cable.
+    """
     if "wire_strain" in names:
         # friction may take a tension along a cable out of the domain of its law
-        strain = strains(arm, tension * loss)
-        status[np.isnan(strain).any(axis=1)] = SweepStatus.OUTSIDE_ELASTICITY
+        held = _exists("tension", status)
+        strain = _spread(strains(arm, (tension * loss)[held]), held)
+        status[held & np.isnan(strain).any(axis=1)] = SweepStatus.OUTSIDE_ELASTICITY
         rows["wire_strain"] = strain
         for values in rows.values():
             values[status == SweepStatus.OUTSIDE_ELASTICITY] = np.nan
+    extreme = [name for name in names if QUANTITIES[name].stage == "principal"]
     if extreme:
         # extreme stiffnesses exist in stable rows; a margin may be NaN
         exist = (rows["margin"] > 0.0) & (status != SweepStatus.SINGULAR)
         found = principal_stiffness(rows["translational_compliance"][exist])
-        rows |= {name: _over_all_cases(found[name], (exist,), exist.shape) for name in extreme}
+        rows |= {name: _spread(found[name], exist) for name in extreme}
     buckles = (rows["margin"] <= 0.0) & np.isin(status, (SweepStatus.OK, SweepStatus.IMMOBILE))
     status[buckles] = SweepStatus.UNSTABLE
-    return rows, status
 
 
 def _rows(
-    names: list[str],
+    task: SweepTask,
     arm: Manipulator,
+    names: list[str],
     q: Array,
+    wrench: Array,
     tension: Array | None = None,
-    wrench: Array | None = None,
     *,
-    direction: Array | None = None,
+    minimum: ArrayLike | None = None,
+    maximum: ArrayLike | None = None,
+    bounded: NDArray[np.bool_] | None = None,
     threads: int | None,
 ) -> tuple[Rows, Statuses]:
-    """Compute sweep quantities for a batch of postures; NaN where the status forbids them."""
+    """Compute sweep quantities for a batch of rows; NaN where the status forbids them.
+
+    Rows that are not ``bounded`` are infeasible.
+    """
     outputs = [_BATCH_NAMES.get(name, name) for name in names]
-    found = batch.evaluate(arm, q, tension, wrench, outputs, direction=direction, threads=threads)
+    found = batch.evaluate(
+        arm,
+        q,
+        tension,
+        wrench,
+        outputs,
+        direction=None if DIRECTIONAL.isdisjoint(outputs) else task.directions,
+        minimum=minimum,
+        maximum=maximum,
+        threads=threads,
+    )
     status = found.status.astype(np.int8)
+    if bounded is not None:
+        status[~bounded] = SweepStatus.INFEASIBLE
     rows = {}
     for name, output in zip(names, outputs, strict=True):
         values = found[output]
@@ -219,14 +262,18 @@ def _rows(
         elif name == "translational_compliance":
             values = values[:, :3, :3]
         # a batch holds the pseudoinverse even where K_θ is singular; a sweep does not
-        lost = [kind for kind in SweepStatus if QUANTITIES[name].stage in LOST[kind]]
         rows[name] = values.copy()
-        rows[name][np.isin(status, lost)] = np.nan
+        rows[name][~_exists(QUANTITIES[name].stage, status)] = np.nan
     return rows, status
 
 
-def _over_all_cases(rows: Array, place: _Place, shape: tuple[int, ...]) -> Array:
-    """Build an array of all cases from rows of some cases; NaN in all other cases."""
-    full = np.full((*shape, *rows.shape[1:]), np.nan)
-    full[place] = rows
+def _exists(stage: str, status: Statuses) -> NDArray[np.bool_]:
+    """Check for each status whether the quantities of a stage exist."""
+    return ~np.isin(status, [kind for kind in SweepStatus if stage in LOST[kind]])
+
+
+def _spread(values: Array, place: NDArray[np.bool_]) -> Array:
+    """Spread values of some rows over all rows; NaN in the others."""
+    full = np.full((len(place), *values.shape[1:]), np.nan)
+    full[place] = values
     return full

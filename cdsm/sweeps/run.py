@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import logging
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections import deque
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cdsm.batch.inputs import checked_threads
 from cdsm.elasticity import Elasticity
 from cdsm.errors import FileError
 from cdsm.manipulator import Manipulator
@@ -158,7 +161,7 @@ def _run(
     _log.info("sweep of %s: %d of %d entries to compute", task.arm.name, left, total)
     answers: Iterable[tuple[Block, BlockResult | None]]
     if client is None:
-        answers = ((block, evaluate(task, poses.angles(block))) for block in todo)
+        answers = _side_by_side(specification, todo)
     else:
         answers = on_cluster(client, specification, todo)
     with progress_bar("sweep", total, total - left, wanted=progress, rate=True) as advance:
@@ -168,6 +171,28 @@ def _run(
             except OSError as error:
                 raise FileError(path, f"cannot be written: {error}.") from error
             advance(postures(block) * task.cases)
+
+
+def _side_by_side(
+    specification: Specification, blocks: Sequence[Block]
+) -> Iterator[tuple[Block, BlockResult]]:
+    """Yield each block and its result in order; others are computed meanwhile.
+
+    Each block has one thread, so that also what numpy does runs side by side, and the writing of
+    results. The threads of the machine are divided among blocks if there are fewer of these.
+    """
+    task, poses, cores = specification.task, specification.poses, checked_threads(None)
+    workers = max(1, min(cores, len(blocks)))
+    waiting: deque[tuple[Block, Future[BlockResult]]] = deque()
+    with ThreadPoolExecutor(workers) as pool:
+        for block in blocks:
+            running = pool.submit(evaluate, task, poses.angles(block), cores // workers)
+            waiting.append((block, running))
+            if len(waiting) > workers:
+                first, done = waiting.popleft()
+                yield first, done.result()
+        for first, done in waiting:
+            yield first, done.result()
 
 
 def _is_pending(specification: Specification, status: Any, block: Block) -> bool:

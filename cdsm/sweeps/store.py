@@ -40,8 +40,7 @@ def opened(
     """
     import zarr
 
-    if not path.exists():
-        _make(path, specification, extent)
+    made = not path.exists() and _make(path, specification, extent)
     try:
         folder = os.open(path, os.O_RDONLY | os.O_DIRECTORY)
     except OSError as error:
@@ -53,7 +52,8 @@ def opened(
             raise StoreError(path, "another run is writing to it; wait for it to end.") from None
         except OSError as error:
             raise FileError(path, f"cannot be locked: {error.strerror}.") from None
-        _check(path, specification)
+        if not made:
+            _check(path, specification)
         group = zarr.open_group(path, mode="r+", use_consolidated=False)
         yield {name: group[name] for name in specification.variables}
     finally:
@@ -80,8 +80,11 @@ def read(path: Path) -> xarray.Dataset:
     return found[order]
 
 
-def _make(path: Path, specification: Specification, extent: Mapping[str, int]) -> None:
-    """Write an empty store to a temporary folder, then rename this folder to ``path``."""
+def _make(path: Path, specification: Specification, extent: Mapping[str, int]) -> bool:
+    """Write an empty store to a temporary folder, then rename this folder to ``path``.
+
+    Returns False if another run has made a store there in the meantime.
+    """
     import zarr
 
     if not path.parent.is_dir():  # zarr would create the missing folder
@@ -110,12 +113,14 @@ def _make(path: Path, specification: Specification, extent: Mapping[str, int]) -
         try:
             aside.rename(path)
         except OSError:
-            if not path.exists():  # else another run was faster; its store is checked later
+            if not path.exists():
                 raise
+            return False
     except (OSError, ValueError) as error:
         raise FileError(path, f"cannot be created as a store: {error}.") from None
     finally:
         shutil.rmtree(aside, ignore_errors=True)
+    return True
 
 
 def _check(path: Path, specification: Specification) -> None:
