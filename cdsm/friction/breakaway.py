@@ -131,15 +131,19 @@ def breakaway(
 
 
 def hole_loads(K: Stiffness, u: Array) -> tuple[Array, Array]:
-    """Compute the first-order loads W_i (P,) [N] of all holes, and dθ/dW (nv,) [rad/N]."""
+    """Compute the first-order loads W_i (P,) [N] of all holes, and dθ/dW (nv,) [rad/N].
+
+    ``K`` is the stuck stiffness, ``u`` (3,) the unit direction of the force.
+    """
     T, gradient = segment_state(K)
     motion = K._along(u)[1]
     return first_order_loads(K.posture, T, gradient, motion), motion
 
 
 def _reached(K: Stiffness, u: Array, motion: Array) -> tuple[float, int]:
-    """Find the load [N] at which the first hole of the stuck arm reaches its friction bound.
+    """Find the load [N] at which the first hole of the stuck arm reaches its bound; return both.
 
+    ``motion`` (nv,) is dθ/dW [rad/N] for a force along ``u`` (3,).
     Newton's method for joints and load starts at the first-order result. If another hole is beyond
     its friction bound at the solution, the search is repeated for that hole.
     """
@@ -193,7 +197,8 @@ def _reached(K: Stiffness, u: Array, motion: Array) -> tuple[float, int]:
 def _first(pose: Posture, T: Array, growth: Array, motion: Array) -> tuple[float, int]:
     """Find the least load [N] at which the tensions T + load · growth reach a friction bound.
 
-    Returns the load and its hole, where the ratio of the two tensions is exp(μ φ).
+    ``growth`` (S,) is dT/dW [-] and ``motion`` (nv,) dθ/dW [rad/N]. Returns the load and its hole,
+    where the ratio of the two tensions is exp(μ φ).
     """
     chains, wrap = pose.segments.chains, pose.segments.wrap
     ratio = np.exp(chains.friction * wrap)
@@ -207,7 +212,7 @@ def _first(pose: Posture, T: Array, growth: Array, motion: Array) -> tuple[float
 
 
 def segment_state(K: Stiffness) -> tuple[Array, Array]:
-    """Return T (S,) [N] and ∂T/∂θ (S, nv) [N/rad] of a stiffness with friction."""
+    """Return T (S,) [N] and ∂T/∂θ (S, nv) [N/rad] of ``K``; InvalidInput if K is frictionless."""
     if K.segment_tension is None or K.tension_gradient is None:
         raise InvalidInput("stiffness", "is frictionless; give one of stuck_stiffness.")
     return K.segment_tension, K.tension_gradient

@@ -82,10 +82,11 @@ class ChainProblem:
     def settle(
         self, length: Array, natural: Array, ratio: Array, forced: Array, near: Array
     ) -> Chain:
-        """Solve for the tensions from lengths l, old natural lengths a and ρ = exp(μ φ), all (S,).
+        """Solve for the tensions of segments of ``length`` l (S,) [m] with friction in their holes.
 
-        ``forced`` (C,) [N] is the tension of force-controlled motors, NaN for others. The search
-        starts at the tensions ``near`` (S,) [N].
+        ``natural`` (S,) [m] are the natural lengths before wire slips. ``ratio`` (S,) is exp(μ φ)
+        of the hole to the next segment, 1 if there is none. ``forced`` (C,) [N] is the tension of
+        force-controlled motors, NaN for others. The search starts at ``near`` (S,) [N].
         """
         T = near
         for attempt in range(_ITERATIONS):
@@ -128,7 +129,12 @@ class ChainProblem:
     def tangent(
         self, chain: Chain, forced: Array, gradient: Array, friction_gradient: Array
     ) -> Array:
-        """Compute ∂T/∂θ (S, nv) [N/rad]; see :func:`~cdsm.kernels.chain_problem.chain_tangent`."""
+        """Compute ∂T/∂θ (S, nv) [N/rad] of the cables in the state ``chain``.
+
+        ``forced`` is that of :meth:`settle`. ``gradient`` (S, nv) [m/rad] is ∂l/∂θ of the lengths,
+        ``friction_gradient`` (S, nv) [1/rad] is μ ∂φ/∂θ of the hole to the next segment. See
+        :func:`~cdsm.kernels.chain_problem.chain_tangent`.
+        """
         return chain_tangent(
             self._start,
             forced,
@@ -143,22 +149,27 @@ class ChainProblem:
     def stored(self, natural: Array, tension: Array) -> float:
         """Compute the stored energy [J] of segments and series springs.
 
+        ``natural`` (S,) [m] are natural lengths, ``tension`` (S,) [N] the tensions of the segments.
         It is zero where each wire is at the lower bound of its law and each spring at rest.
         """
         spring = self._spring @ (tension**2 - self._rest**2) / 2.0
         return float(natural @ self._energy(tension) + spring)
 
     def potential(self, tension: Array) -> Array:
-        """Compute P = T (1 + ε) − ∫ T dε (S,) [N], the work per length to put wire under tension T.
+        """Compute P = T (1 + ε) − ∫ T dε (S,) [N] at ``tension`` T.
 
-        Wire that moves from one segment to another dissipates the difference of their P per length.
+        P is the work per natural length of wire that a motor takes in. Wire that moves from one
+        segment to another dissipates the difference of their P per natural length.
         To first order in the strain this is the difference of the tensions.
         """
         base, softness = self._strain(tension)
         return np.asarray(tension * (base + softness * tension) - self._energy(tension))
 
     def _strain(self, tension: Array) -> tuple[Array, Array]:
-        """Return base and softness (S,) of the tangents 1 + ε ≈ base + softness · T at T (S,)."""
+        """Return base and softness (S,) of the tangent 1 + ε ≈ base + softness · T at ``tension``.
+
+        ``tension`` is T (S,) [N]; base is [-], softness [1/N].
+        """
         if not self._curved:
             return self._base, self._softness
         base, softness = self._base.copy(), self._softness.copy()
@@ -178,6 +189,6 @@ class ChainProblem:
 
 
 def _within(law: Elasticity, tension: Array) -> tuple[Array, Array]:
-    """Return the tensions clipped to the domain of a law, and its rigidities there [N]."""
+    """Return ``tension`` clipped to the domain of ``law``, and the rigidities EA there [N]."""
     inside = np.clip(tension, law.domain.first, law.domain.high)
     return inside, np.asarray(law.rigidity(inside))

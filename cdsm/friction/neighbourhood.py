@@ -52,12 +52,12 @@ class Neighbourhood:
         self._set_tensions(apart, F[cable])
 
     def _set_tensions(self, apart: Array, F: Array) -> None:
-        """Set the largest rises and falls of tensions from bounds ``apart`` (S,) of |ln T/F|."""
+        """Set :attr:`tensions` and :attr:`falls` from bounds ``apart`` (S,) of |ln T/F|."""
         self.tensions = np.maximum(np.expm1(apart) * F, _NEAR)
         self.falls = np.minimum(np.maximum(apart * F, _NEAR), F)
 
     def still(self, K: Stiffness) -> Self:
-        """Return the states with exactly the joint angles of the reference: |ln T/F| ≤ Σ μ φ."""
+        """Return the states with the joint angles of the reference, ``K``: |ln T/F| ≤ Σ μ φ."""
         segments = K.posture.segments
         chains, grip = segments.chains, np.zeros(len(segments.lengths))
         grip[chains.hole] = chains.friction * segments.wrap
@@ -68,11 +68,11 @@ class Neighbourhood:
         return same
 
     def largest(self, rows: Array) -> Array:
-        """Compute the largest |a·δ| over the joint motions δ, for rows a (…, nv)."""
+        """Compute the largest |a·δ| (…,) over the joint motions δ, for ``rows`` a (…, nv)."""
         return np.asarray(abs(rows @ self._steps).sum(axis=-1))
 
     def curved(self, forms: Array) -> Array:
-        """Compute a bound of |δᵀ A δ|/2 over the joint motions δ, for forms A (…, nv, nv).
+        """Compute a bound (…,) of |δᵀ A δ|/2 over the joint motions δ, for ``forms`` A (…, nv, nv).
 
         It is a sum over pairs of holes; in each pair, opposite joint motions cancel.
         """
@@ -80,6 +80,6 @@ class Neighbourhood:
         return np.asarray(abs(both).sum(axis=(-2, -1)) / 2.0)
 
     def cubed(self, form: Array) -> float:
-        """Compute a bound of |Σ A_ijk δ_i δ_j δ_k|/6 over the joint motions δ; A (nv, nv, nv)."""
+        """Compute a bound of |Σ A_ijk δ_i δ_j δ_k|/6 for joint motions δ, A ``form`` (nv,)*3."""
         first = np.tensordot(self._steps, form, (0, 0))
         return float(abs(self._steps.T @ first @ self._steps).sum()) / 6.0

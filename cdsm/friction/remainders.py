@@ -85,7 +85,7 @@ class Remainders:
 
 
 class Bends:
-    """Second derivatives of the torques at a posture, by differences with a bounded error.
+    """Second derivatives of the torques at a posture, by finite differences with a bounded error.
 
     Attributes:
         body: ∂²τ_i/∂θ_j∂θ_k (nv, nv, nv) [N m/rad²] of the torques τ of weight and wrench.
@@ -114,7 +114,8 @@ class Bends:
 def _body_remainders(K: Stiffness, within: Array, slides: NDArray[np.bool_]) -> tuple[float, Array]:
     """Bound the remainders of the tip displacement [m] and of the torques of weight and wrench.
 
-    The latter are (nv,) [N m].
+    Joint motions are ``within`` |δ| ≤ ρ (nv,); ``slides`` marks prismatic joints. The bounds of the
+    torques are (nv,) [N m].
     """
     model, pose = K.posture.arm._model, K.posture
     masses, tree = model.masses, model.tree

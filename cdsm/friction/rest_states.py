@@ -139,7 +139,7 @@ class RestStates:
         return found._replace(bound=found.bound + more)
 
     def tensions(self, chosen: Iterable[int]) -> Array:
-        """Compute the least and the largest tensions (n, 2) [N] of some segments."""
+        """Compute the least and the largest tension (n, 2) [N] of each ``chosen`` segment."""
         bounds = []
         for j in chosen:
             cost = np.zeros(self._low.size)
@@ -176,7 +176,7 @@ class RestStates:
         return widened._largest(np.append(np.zeros(self._low.size), 1.0)).bound
 
     def _largest(self, cost: Array) -> End:
-        """Maximize cost · x; the multipliers give the proved bound (weak duality)."""
+        """Maximize cost · x over the polyhedron; the multipliers give the proved bound."""
         from scipy.optimize import linprog
 
         scale = float(abs(cost).max())
@@ -204,8 +204,9 @@ class RestStates:
 def _cone(K: Stiffness, near: Neighbourhood, far: Remainders, size: int) -> tuple[Any, Array]:
     """Return A and b of the friction cone A x ≤ b: T_{j+1} ≤ e^{μφ} T_j and T_j ≤ e^{μφ} T_{j+1}.
 
-    x are the variables of :class:`RestStates`, ``size`` in number. With ψ = μ (φ(θ) − φ_0), e^ψ ≤ 1
-    + ψ + ψ²/2 e^|ψ|. The linear part of ψ is in A if φ is differentiable; otherwise b bounds it.
+    x are the variables of :class:`RestStates`, ``size`` in number. ``far`` bounds the remainders of
+    the wrap angles φ. With ψ = μ (φ(θ) − φ_0), e^ψ ≤ 1 + ψ + ψ²/2 e^|ψ|. The linear part of ψ is in
+    A if φ is differentiable; otherwise b bounds it.
     """
     from scipy.sparse import csc_array
 
@@ -251,7 +252,10 @@ class _Wire(NamedTuple):
 
     @classmethod
     def of(cls, cable: Cable, F: float, fall: float, rise: float, unstrained: bool) -> _Wire:
-        """Bound b for tensions of a locked cable from F − fall to F + rise [N]."""
+        """Bound b for tensions of a locked cable from F − fall to F + rise [N].
+
+        If not ``unstrained``, ε is the strain beyond that under F.
+        """
         law = cable.elasticity
         strain = float(law.strain(F))
         offset = 0.0 if unstrained else strain

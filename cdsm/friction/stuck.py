@@ -91,7 +91,10 @@ def sliding_stiffness(
 
 
 def _require_friction(pose: Posture, tension: Array, signs: Array) -> None:
-    """Check that the tensions (S,) beside each hole have the ratio that friction allows."""
+    """Raise InvalidInput unless friction allows the ratio of the tensions beside each hole.
+
+    ``tension`` is (S,) [N]; ``signs`` (P,) are those of :func:`sliding_stiffness`.
+    """
     chains = pose.segments.chains
     before, after = tension[chains.hole], tension[chains.hole + 1]
     grip = np.exp(chains.friction * pose.segments.wrap)
@@ -115,7 +118,11 @@ def assemble_segments(
     friction: Friction,
     distribution: Tension | None = None,
 ) -> Stiffness:
-    """Compute K_θ from checked tensions T (S,) of the segments and the holes that slide (P,)."""
+    """Compute the stiffness from checked tensions T (S,) [N] of the segments.
+
+    ``sliding`` (P,) marks the holes in which cables slide. ``friction`` and ``distribution`` are
+    stored in the result.
+    """
     model, segments = pose.arm._model, pose.segments
     gradient = tension_gradient(pose, tension, sliding)
     active = segments.tension_stiffness(tension).sum(axis=0)

@@ -79,7 +79,10 @@ class Admissible:
         return np.asarray(self.rows @ (self.least.values - F))
 
     def nearest(self, wanted: Array, low: Array, high: Array) -> Array | None:
-        """Return the balancing tensions (C,) [N] within bounds nearest to ``wanted``, or None."""
+        """Return the balancing tensions (C,) [N] from ``low`` to ``high`` nearest to ``wanted``.
+
+        Returns None if no tensions in these bounds (C,) [N] balance the arm.
+        """
         size = max(self.scale, float(abs(wanted).max()))
         found = solve(
             np.eye(wanted.size),
@@ -111,7 +114,7 @@ class Admissible:
 def admissible(
     pose: Posture, minimum: ArrayLike, maximum: ArrayLike, wrench: ArrayLike
 ) -> Admissible:
-    """Find the admissible tensions of an arm at a posture.
+    """Find the admissible tensions at a posture; arguments as for :func:`~cdsm.distribute_tension`.
 
     Raises:
         InfeasibleTension: No tensions within the bounds and domains balance the arm.
@@ -153,8 +156,8 @@ def solve(
 ) -> Optimum | None:
     """Solve min ½xᵀPx + qᵀx with A x = b, low ≤ x ≤ high and G x ≤ h; return None on failure.
 
-    ``P`` is positive definite, ``equations`` are A and b, ``cuts`` are G and h. DAQP is called
-    directly: through qpsolvers a plan takes a quarter longer.
+    ``P`` is positive definite, ``equations`` are A and b, ``bounds`` low and high, ``cuts`` G and
+    h. DAQP is called directly: through qpsolvers a plan takes a quarter longer.
     """
     (A, b), (low, high) = equations, bounds
     G, h = cuts if cuts is not None else (A[:0], b[:0])

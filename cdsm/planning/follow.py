@@ -71,9 +71,10 @@ class Follower:
     def _near(
         self, region: Admissible | None, sample: Sample, other: Sample | None
     ) -> Admissible | None:
-        """Return the tensions of ``region`` that are within the rate of another sample.
+        """Return the tensions of ``region`` that are within the rate of the ``other`` sample.
 
-        The rate is multiplied by the number of steps between the two samples.
+        The rate is multiplied by the number of steps between the two samples. None means no region
+        or no limit.
         """
         if region is None or other is None:
             return region
@@ -82,7 +83,11 @@ class Follower:
     def _search(
         self, sample: Sample, region: Admissible | None, start: Array, centre: Array | float = 0.0
     ) -> Sample | None:
-        """Search once for the tensions nearest to ``centre`` (C,) [N]; None if they miss."""
+        """Plan a sample by one search in ``region`` for the tensions nearest to ``centre``.
+
+        The search begins at ``start`` (C,) [N]; ``centre`` is (C,) [N] or 0. Returns None if the
+        result misses the target.
+        """
         if region is None:
             return None
         found = _search(sample.model, region, sample.constraints, start, centre)
@@ -91,7 +96,7 @@ class Follower:
         return replace(sample, F=region.tension(found[1].evaluation.F).values)
 
     def _from_scratch(self, sample: Sample) -> Sample | None:
-        """Find the least tensions with an unlimited rate.
+        """Plan ``sample`` with the least tensions that hit its target, with an unlimited rate.
 
         Returns None if several targets cannot be hit together; one target raises
         UnreachableStiffness.
@@ -102,7 +107,7 @@ class Follower:
         return replace(sample, F=sample.model.region.tension(found.evaluation.F).values)
 
     def _replan_towards(self, goal: Sample) -> bool:
-        """Plan the last samples again so that they lead to a goal within the rate; return success.
+        """Plan the last samples again to lead to ``goal`` within the rate; return success.
 
         The loop goes backwards from the last sample. Each sample stays within the rate of its
         successor and comes as near as possible to its predecessor. The loop ends when a sample is
@@ -139,10 +144,11 @@ class Follower:
 def least_change(
     model: StiffnessModel, constraints: Constraints, before: Array, rate: Array
 ) -> Array | None:
-    """Return tensions (C,) [N] that hit the targets, nearest to ``before`` and within a rate.
+    """Return tensions (C,) [N] that meet ``constraints``, nearest to ``before`` (C,) [N].
 
-    If none hit the targets, return the tensions of least miss that one search finds. Return None if
-    no tensions within the rate make the arm stable.
+    They differ from ``before`` at most by ``rate`` (C,) [N]. If none meet the constraints, return
+    the tensions of least miss that one search finds. Return None if the search has no stable
+    tensions within the rate to begin with.
     """
     region = model.region.within(rate, before)
     found = None if region is None else _search(model, region, constraints, before, before)
@@ -158,8 +164,9 @@ def _search(
     start: Array,
     centre: Array | float,
 ) -> tuple[Program, ConstraintValues] | None:
-    """Search once for the tensions nearest to a centre; begin in the region, nearest to a start.
+    """Search ``region`` once for the tensions nearest to ``centre`` that meet ``constraints``.
 
+    The search begins at the tensions of ``region`` nearest to ``start`` (C,) [N].
     Return the program and the result; None if no stable tensions to begin with are found.
     """
     F = region.nearest(start, region.low, region.high)

@@ -52,7 +52,12 @@ def half_way(
     target: Array,
     directions: Array | None,
 ) -> HalfWay:
-    """Compute the arm half-way between two samples, from the means of l_0 (H,) [m] and target."""
+    """Compute the arm half-way between sample number ``index`` and the next sample.
+
+    ``ends`` are the stiffnesses of both samples. ``unstrained`` (H,) [m] and ``target`` [N/m] are
+    the means of their l_0 and their targets. ``directions`` are (3,) or (n, 3), None for
+    ``cartesian``.
+    """
     K, value, off, reason = None, None, math.inf, ""
     try:
         rest = _at_rest(ends, unstrained)

@@ -1,8 +1,9 @@
 """Numba kernels of the searches. In numpy a plan would take 1.4 times as long (5 joints).
 
 Shapes: C cables, nv joint angles, r rows of the tip Jacobian, n constraints. J_c and H_c are the
-gradient and the Hessian of the length of cable c, k_c is its stiffness, k′_c = dk_c/dF_c
-(``slope``) and k″_c = d²k_c/dF_c² (``bend``).
+gradient (row c of ``length_jacobian``) and the Hessian (entry c of ``hessian``) of the length of
+cable c. k_c is its stiffness (``springs``), k′_c = dk_c/dF_c (``slope``) and k″_c = d²k_c/dF_c²
+(``bend``).
 """
 
 from __future__ import annotations
@@ -20,7 +21,11 @@ _CURVATURE = 1e-6  # curvatures below this part of the largest are raised to it
 def stiffness_at(
     constant: Array, hessian: Array, length_jacobian: Array, tension: Array, springs: Array
 ) -> tuple[Array, Array, Array]:
-    """Return K_θ = constant + Σ (F_c H_c + k_c J_c J_cᵀ), and eigenpairs of its symmetric part."""
+    """Return K_θ = constant + Σ (F_c H_c + k_c J_c J_cᵀ), F ``tension``, k ``springs``, both (C,).
+
+    ``constant`` (nv, nv) are the terms of gravity and load. Also return the eigenvalues and the
+    eigenvectors (columns) of the symmetric part.
+    """
     K = constant.copy()
     count, nv = length_jacobian.shape
     for c in range(count):

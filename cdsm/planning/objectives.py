@@ -19,14 +19,17 @@ _SYMMETRIC = 1e-9  # a skew part of a matrix below this part of its largest entr
 
 
 def checked_starts(starts: object, seed: object) -> tuple[int, int]:
-    """Check the number of starting tensions and the seed of the random ones."""
+    """Check and return the number of starting tensions and the seed of the random ones."""
     return whole_number("starts", starts, 1, _MOST_STARTS), whole_number("seed", seed, 0)
 
 
 def target_constraints(
     model: StiffnessModel, directions: Array | None, target: Array
 ) -> Constraints:
-    """Build constraints for a target [N/m] of ``along``; of ``cartesian`` if directions is None."""
+    """Build constraints of the tensions of ``model``: a target [N/m] of ``along`` or ``cartesian``.
+
+    It is of ``along`` for ``directions`` (3,) or (n, 3), of ``cartesian`` if they are None.
+    """
     K = stiffness(model.pose, model.region.least)
     if directions is None:
         _ = K.cartesian  # raises if it does not exist
@@ -48,9 +51,9 @@ def along_constraints(model: StiffnessModel, directions: Array, targets: Array) 
 
 
 def cartesian_constraints(model: StiffnessModel, target: Array) -> Constraints:
-    """Build the constraints (cartesian − target)/‖target‖ of the symmetric part.
+    """Build the constraints (cartesian − target)/‖target‖ for a target (3, 3) [N/m].
 
-    They are 6 values, whose norm is that of the matrix (3, 3).
+    They are 6 values, whose norm is that of the symmetric part of the matrix (3, 3).
     """
     weights = []
     for i in range(3):
@@ -64,7 +67,7 @@ def cartesian_constraints(model: StiffnessModel, target: Array) -> Constraints:
 
 
 def achieved(K: Stiffness, directions: Array | None) -> Array:
-    """Return ``along`` of the directions () or (n,), else ``cartesian`` (3, 3) [N/m]."""
+    """Return ``along`` [N/m], () or (n,), for ``directions``; ``cartesian`` (3, 3) if None."""
     if directions is None:
         return K.cartesian
     along = [K.along(u) for u in directions.reshape(-1, 3)]
@@ -72,7 +75,10 @@ def achieved(K: Stiffness, directions: Array | None) -> Array:
 
 
 def misfit(achieved: Array, target: Array, directions: Array | None) -> float:
-    """Return the misfit of a plan [-], as in :class:`~cdsm.StiffnessPlan`."""
+    """Return how far ``achieved`` is from ``target`` [-]; see :attr:`cdsm.StiffnessPlan.misfit`.
+
+    Both are ``cartesian`` [N/m] if ``directions`` is None, else ``along``.
+    """
     if directions is None:
         off = (achieved + achieved.T) / 2.0 - target
         return float(np.linalg.norm(off) / np.linalg.norm(target))
@@ -80,7 +86,10 @@ def misfit(achieved: Array, target: Array, directions: Array | None) -> float:
 
 
 def unstable(arm: Manipulator, problem: str, mode: Array) -> SingularStiffness:
-    """Build the error of an arm that no tensions make stable; mode (nv,) is its softest motion."""
+    """Build the error of an arm that no tensions make stable; it begins with ``problem``.
+
+    ``mode`` (nv,) is the softest joint motion.
+    """
     mode = mode * np.sign(mode[abs(mode).argmax()])
     remedy = "Change the bounds, the posture or the load, take stiffer cables, or lower margin."
     if all(cable.control == "force" for cable in arm.cables):
@@ -91,7 +100,7 @@ def unstable(arm: Manipulator, problem: str, mode: Array) -> SingularStiffness:
 
 
 def checked_targets(directions: Array | None, target: ArrayLike) -> Array:
-    """Check and return the wanted stiffness at one posture [N/m].
+    """Check and return ``target``, the wanted stiffness at one posture [N/m].
 
     It is one value for each direction, () or (m,), or a (3, 3) matrix if no direction is given.
     """

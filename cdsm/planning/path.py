@@ -179,7 +179,7 @@ def checked_path(arm: Manipulator, angles: ArrayLike | None, tips: ArrayLike | N
 
 
 def checked_rate(arm: Manipulator, rate: ArrayLike) -> Array:
-    """Check the largest changes of the tensions per step; return them (C,) [N]."""
+    """Check ``rate``, the largest change of each tension per step; return it as (C,) [N]."""
     limit = bound("rate", rate, len(arm.cables))
     if not (limit > 0.0).all():
         raise InvalidInput("rate", f"{limit.min():g} N given; it must be positive, or inf for any.")
@@ -187,7 +187,10 @@ def checked_rate(arm: Manipulator, rate: ArrayLike) -> Array:
 
 
 def _per_sample(name: str, value: ArrayLike, tail: tuple[int, ...], size: int) -> Array:
-    """Return one value per sample (S, …) from one value for all samples or one for each."""
+    """Return one value per sample (S, …) from a value for all samples or one for each.
+
+    A value has the shape ``tail``; there are ``size`` = S samples.
+    """
     given = number_array(name, value)
     if given.shape not in (tail, (size, *tail)):
         raise InvalidInput(

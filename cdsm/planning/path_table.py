@@ -21,7 +21,7 @@ def position_controlled(arm: Manipulator) -> list[int]:
 
 
 def path_table(plan: PathPlan) -> tuple[list[str], list[list[Any]]]:
-    """Return header and rows in SI; cells without a value are empty."""
+    """Return the header and a row for each sample of ``plan``, in SI; empty cells have no value."""
     arm, names = plan.arm, plan.arm.cables.names
     targets = plan.target.reshape(len(plan.target), -1)
     numbered = _numbered(plan, targets.shape[1])
@@ -52,7 +52,7 @@ def path_table(plan: PathPlan) -> tuple[list[str], list[list[Any]]]:
 
 
 def _numbered(plan: PathPlan, count: int) -> list[str]:
-    """Return suffixes for the column names of several target stiffnesses; ``[""]`` for one."""
+    """Return suffixes of the column names of ``count`` targets per sample; ``[""]`` for one."""
     if plan.direction is None:
         return [f" {a}{b}" for a in "xyz" for b in "xyz"]
     return [""] if count == 1 else [f" {k}" for k in range(1, count + 1)]

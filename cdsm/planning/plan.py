@@ -71,7 +71,10 @@ class StiffnessPlan(ReadOnlyState):
 
     @property
     def reached(self) -> bool:
-        """Whether the target is hit within 1e-6. With one direction, a miss raises an error."""
+        """Whether :attr:`misfit` is at most 1e-6, relative to the target.
+
+        With one direction, :func:`plan_stiffness` raises an error instead.
+        """
         return self.misfit <= REACHED
 
     @property
@@ -140,9 +143,10 @@ def plan_stiffness(
     """Plan least tensions for a wanted stiffness: min ‖F‖², along(u) = target (Eqs. 13, 17, 20).
 
     The constraints on F are J_Lᵀ F = J_Xᵀ W − g, the bounds, the domains of the elasticities of
-    position-controlled cables, and λ_min(K_θ), symmetric part, not below ``margin``. One direction
-    is hit within 1e-6; otherwise an error is raised. Several directions or ``cartesian`` are hit if
-    possible. If not, the sum of their squared relative misses is least, and ``reached`` is false.
+    position-controlled cables, and λ_min(K_θ), symmetric part, not below ``margin``. The target of
+    one direction is hit within 1e-6 of its value; otherwise an error is raised. Several directions
+    or ``cartesian`` are hit if possible. If not, the sum of their squared relative misses is least,
+    and ``reached`` is false.
 
     The searches are local. With the laws of this library they mostly end at the same effort ‖F‖.
     With one user-defined law, the effort found was 3.6 % above the least. A ``spread`` above zero

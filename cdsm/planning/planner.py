@@ -34,7 +34,7 @@ _AS_NEAR = 1e-8  # misses up to this count as zero: next to buckling a search ma
 
 
 class Planner:
-    """Search, from several starts, for the least tensions F with constraints c(F) = 0.
+    """Search, from several starts, for the tensions F of least ‖F‖ with constraints c(F) = 0.
 
     Attributes:
         efforts: ‖F‖ [N] at the end of each search that hit the target, rising.
@@ -53,7 +53,7 @@ class Planner:
         self._ends: list[ConstraintValues] = []
 
     def least(self) -> ConstraintValues | None:
-        """Return the least tensions that hit all targets.
+        """Return the constraint values at the tensions of least ‖F‖ that hit all targets.
 
         If there are none, returns None for several targets, and raises UnreachableStiffness for
         one.
@@ -64,7 +64,10 @@ class Planner:
         return found
 
     def nearest(self) -> ConstraintValues:
-        """Return the tensions with the least sum of squared misses; of several, the least."""
+        """Return the constraint values at the tensions with the least sum of squared misses.
+
+        If several tensions have it, these are the tensions of least ‖F‖.
+        """
         program = replace(self.program, objective=NEAREST)
 
         def misses(place: ConstraintValues) -> float:
@@ -79,7 +82,11 @@ class Planner:
         return least if kept else best
 
     def _within_range(self, u: Array, target: float) -> ConstraintValues:
-        """Return the least tensions for a target [N/m] along u (3,); raise if out of range."""
+        """Return the constraint values at the least tensions, by ‖F‖, that hit ``target`` [N/m].
+
+        The target is along ``u`` (3,). Raises UnreachableStiffness if it is beyond the range that
+        searches find, or if no tensions that they find hit it.
+        """
         softest, stiffest = range_ends(self.model, u, _RANGE_STARTS, self.seed)
         low = 0.0 if softest.open else softest.value
         high = math.inf if stiffest.open else stiffest.value
@@ -106,7 +113,7 @@ class Planner:
         return found
 
     def _best(self, points: Iterable[Evaluation]) -> ConstraintValues | None:
-        """Search from all ``points``; return the least tensions that hit the target, or None."""
+        """Search from all ``points``; return the hit of least ‖F‖, or None if all searches miss."""
         begin = list(points)
         near = [
             float(point.F.max())
@@ -124,7 +131,7 @@ class Planner:
         return hits[0]
 
     def _nearly_hit(self, seen: list[ConstraintValues]) -> ConstraintValues | None:
-        """Return the least tensions ``seen`` that hit the single target within 1e-6, or None."""
+        """Return the point of least ‖F‖ in ``seen`` with a relative miss up to 1e-6, or None."""
         least = min(float(abs(place.values[0])) for place in seen)
         if least > REACHED:
             return None
@@ -170,14 +177,17 @@ class Planner:
         return sorted(stable, key=lambda point: float(point.F @ point.F))
 
     def _bridges(self, seen: list[ConstraintValues]) -> list[Evaluation]:
-        """Find stable points that hit the target, between the nearest points below and above it."""
+        """Find stable points that hit the target, on lines between the nearest of ``seen``.
+
+        One end of each line is below the target, the other above it.
+        """
         order = sorted(seen, key=lambda place: float(abs(place.values[0])))
         below = [place.evaluation for place in order if place.values[0] < 0.0][:_SIDES]
         above = [place.evaluation for place in order if place.values[0] > 0.0][:_SIDES]
         return [place for one in below for place in self._crossings(one, above, 1e-15)]
 
     def _miss(self, point: Evaluation) -> float:
-        """Return the relative miss of the single target [-]; -1 (zero stiffness) if unstable."""
+        """Return along/target − 1 [-] of the single target; −1 (zero stiffness) if unstable."""
         return float(self.constraints.at(point).values[0]) if point.reserve >= 0.0 else -1.0
 
     def _search(self, program: Program, point: Evaluation) -> ConstraintValues:

@@ -191,7 +191,11 @@ class RangeEnd(NamedTuple):
 def range_ends(
     model: StiffnessModel, u: Array, starts: int, seed: int
 ) -> tuple[RangeEnd, RangeEnd]:
-    """Find the lowest and the highest stiffness along a unit direction (3,)."""
+    """Find the lowest and the highest stiffness along a unit direction ``u`` (3,).
+
+    Each is the best of searches from ``starts`` random points and some others; random numbers come
+    from ``seed``. If tensions are unbounded, a cap on them rises until both ends lie below it.
+    """
     region = model.region
     if np.isfinite(region.high).all():
         return _bounded_ends(model, region, u, starts, seed)
@@ -242,7 +246,10 @@ def _bounded_ends(
 
 
 def _rigidities_rise(region: Admissible) -> bool:
-    """Check that the rigidity of every cable is known not to fall as the tension rises."""
+    """Return whether the rigidity of every cable never falls between its bounds in ``region``.
+
+    False for user-defined laws, which cannot be checked between samples.
+    """
     cables = region.least.posture.arm.cables
     for cable, low, high in zip(cables, region.low, region.high, strict=True):
         law = cable.elasticity

@@ -86,8 +86,8 @@ class Program:
     Attributes:
         region: The admissible tensions.
         anchor: Stable point well inside, towards which steps are moved back.
-        constraints: c.
-        objective: f.
+        constraints: The constraints c(F) = 0.
+        objective: The objective f(F).
         unit: Unit of the effort [N], of the order of the tensions in the solution.
         centre: Tensions (C,) [N] at which the effort is zero, or 0.
     """
@@ -108,7 +108,10 @@ class Program:
         return self.objective.linear * float(c.sum()) + 0.5 * self.objective.square * float(c @ c)
 
     def met(self, at: ConstraintValues) -> bool:
-        """Return whether abs(c) ≤ MET; always True for objectives other than the effort."""
+        """Return whether all values c at the point ``at`` have |c| ≤ 1e-9 [-].
+
+        Always True for objectives other than the effort.
+        """
         return not self.objective.effort or bool((abs(at.values) <= MET).all())
 
     def better(self, one: ConstraintValues, other: ConstraintValues) -> bool:
@@ -121,7 +124,10 @@ class Program:
 
 
 def search(program: Program, start: Evaluation) -> ConstraintValues:
-    """Find a local optimum from stable tensions; cross kinks of rigidities if that is better."""
+    """Find a local optimum of ``program`` from the stable tensions ``start``.
+
+    Kinks of rigidities are crossed if that is better.
+    """
     best = _search(program, start, in_piece=False)
     for _ in range(_CROSSINGS):
         for F in _beyond_kinks(program.region, best.evaluation.F):
@@ -138,7 +144,7 @@ def search(program: Program, start: Evaluation) -> ConstraintValues:
 
 
 def _beyond_kinks(region: Admissible, F: Array) -> Iterator[Array]:
-    """Yield tensions (C,) [N] moved across the kinks they are at: first all, then one at a time."""
+    """Yield tensions (C,) [N] moved across the kinks at which ``F`` is: all, then one at a time."""
     at = [(c, kink) for c, kink in region.kinks if abs(F[c] - kink) <= _AT_KINK * kink]
     for group in ([at] if len(at) > 1 else []) + [[pair] for pair in at]:
         beyond = F.copy()
@@ -148,7 +154,7 @@ def _beyond_kinks(region: Admissible, F: Array) -> Iterator[Array]:
 
 
 def _search(program: Program, start: Evaluation, *, in_piece: bool) -> ConstraintValues:
-    """Find a local optimum; with ``in_piece`` only between the kinks around the start."""
+    """Find a local optimum of ``program``; with ``in_piece`` only between the kinks around it."""
     region, iterate = program.region, program.constraints.at(start)
     y, z = np.zeros(iterate.values.size if program.objective.effort else 0), 0.0
     price, radius = _FIRST_PRICE, _FIRST_RADIUS

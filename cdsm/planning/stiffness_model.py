@@ -172,23 +172,26 @@ class Constraints:
     single: tuple[Array, float] | None = None
 
     def at(self, evaluation: Evaluation) -> ConstraintValues:
-        """Return the constraint values c at stable tensions."""
+        """Return the constraint values c at the stable tensions of ``evaluation``."""
         return ConstraintValues(self, evaluation)
 
 
 class ConstraintValues:
-    """c(F) at stable tensions, with its first and second derivatives.
+    """Constraint values at stable tensions F, with their first and second derivatives.
 
-    R are rows of the tip Jacobian and X = (R K_θ⁻¹ Rᵀ)⁻¹. M = K_θ⁻¹ Rᵀ X is the joint motion per
-    motion of the tip. P = K_θ⁻¹ − M R K_θ⁻¹ is the joint motion per torque with the tip fixed. Here
-    ∂_c means ∂/∂F_c; δ_cd is 1 for c = d, else 0.
+    A value is a weighted sum of the entries of a tip stiffness X = (R K_θ⁻¹ Rᵀ)⁻¹, minus a target.
+    R are rows of the tip Jacobian. M = K_θ⁻¹ Rᵀ X is the joint motion per motion of the tip.
+    P = K_θ⁻¹ − M R K_θ⁻¹ is the joint motion per torque with the tip fixed. With ∂_i = ∂/∂F_i for
+    cable i, and δ_ij = 1 for i = j, else 0,
 
-        ∂X/∂F_c = Mᵀ ∂_c K_θ M,
-        ∂²X/∂F_c∂F_d = −Mᵀ (∂_c K_θ P ∂_d K_θ + ∂_d K_θ P ∂_c K_θ) M + δ_cd Mᵀ J_c k″_c J_cᵀ M.
+        ∂_i X = Mᵀ ∂_i K_θ M,
+        ∂_i ∂_j X = −Mᵀ (∂_i K_θ P ∂_j K_θ + ∂_j K_θ P ∂_i K_θ) M + δ_ij Mᵀ J_i k″_i J_iᵀ M.
+
+    J_i is the gradient of the length of cable i, and k″_i the second derivative of its stiffness.
 
     Attributes:
         evaluation: K_θ at these tensions.
-        values: c (n,) [-].
+        values: The values c (n,) [-] of :class:`Constraints`.
     """
 
     def __init__(self, constraints: Constraints, evaluation: Evaluation) -> None:
@@ -203,7 +206,7 @@ class ConstraintValues:
 
     @cached_property
     def jacobian(self) -> Array:
-        """Jacobian ∂c/∂F (n, C) [1/N] of the constraint values c."""
+        """Derivatives (n, C) [1/N] of the constraint values with respect to the tensions."""
         slopes = *self.evaluation.model.geometry, self.evaluation.spring_slopes[0]
         return np.concatenate(
             [
@@ -213,7 +216,7 @@ class ConstraintValues:
         )
 
     def hessian(self, y: Array) -> Array:
-        """Return the Hessian ∂²(y · c)/∂F² (C, C) [1/N²] of the values c, with weights y (n,)."""
+        """Return the Hessian (C, C) [1/N²] of the sum of the values with weights ``y`` (n,)."""
         slopes = *self.evaluation.model.geometry, *self.evaluation.spring_slopes
         total, first = np.zeros((self.evaluation.F.size,) * 2), 0
         each = zip(self._parts, self._tips, strict=True)

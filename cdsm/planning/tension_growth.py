@@ -188,7 +188,10 @@ def _slope(K: Stiffness, u: Array) -> float:
 
 
 def _steepest(curve: Array, slope: Callable[[float], float]) -> tuple[float, float]:
-    """Return the lower bound [N] with the largest slope, and this slope [1/m]."""
+    """Return the lower bound [N] with the largest slope, and this slope [1/m].
+
+    ``curve`` (n, 3) is that of :class:`Saturation`.
+    """
     best = int(curve[:, 2].argmax())
     around = curve[max(best - 1, 0) : best + 2, 0]
     place, value = float(curve[best, 0]), float(curve[best, 2])
@@ -203,7 +206,10 @@ def _steepest(curve: Array, slope: Callable[[float], float]) -> tuple[float, flo
 
 
 def _falls(curve: Array, slope: Callable[[float], float], start: float, level: float) -> float:
-    """Return the first lower bound [N] after a start with a slope [1/m] below a level, or inf."""
+    """Return the first lower bound [N] beyond ``start`` with a slope below ``level`` [1/m], or inf.
+
+    ``curve`` (n, 3) is that of :class:`Saturation`.
+    """
     for place, _, value in curve[curve[:, 0] > start].tolist():
         if value < level:
             return sign_change(lambda x: slope(x) - level, start, place)

@@ -1,7 +1,7 @@
 """Scan a fixed posture over the lower bound of the tensions, or over a load factor.
 
 A ``place`` is one lower bound [N] or one load factor [-]. The stiffness at a place is that of the
-least tensions there.
+least tensions there; the functions below get it from their argument ``at``.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ StiffnessAt = Callable[[float], Stiffness]
 
 
 def failure_at(at: StiffnessAt, place: float) -> Limit:
-    """Return why the arm fails at a lower bound [N] or load factor; ``"none"`` if it does not."""
+    """Return why the arm fails at ``place``, a bound [N] or factor; ``"none"`` if it does not."""
     try:
         return "none" if at(place).is_stable else "buckling"
     except (InfeasibleTension, SolverError):  # a solver may fail on the very edge
@@ -44,12 +44,12 @@ def failure_at(at: StiffnessAt, place: float) -> Limit:
 
 
 def _balances(at: StiffnessAt, place: float) -> bool:
-    """Check whether some tensions within all laws balance the arm at a bound [N] or load factor."""
+    """Check whether some tensions within all laws balance the arm at ``place``, bound or factor."""
     return failure_at(at, place) in ("none", "buckling")
 
 
 def tension_domain(arm: Manipulator) -> tuple[float, float]:
-    """Return the range of tension [N] that all maxima and position-controlled cables allow."""
+    """Return the range [N] within all maxima and within the laws of position-controlled cables."""
     domains = [each.elasticity.domain for each in arm.cables if each.control == "position"]
     low = max((each.low for each in domains), default=0.0) * _ABOVE
     ends = [*(each.high for each in domains), *(each.maximum for each in arm.cables)]
@@ -57,7 +57,10 @@ def tension_domain(arm: Manipulator) -> tuple[float, float]:
 
 
 def last_true(true: Callable[[float], bool], a: float, b: float) -> tuple[float, float]:
-    """Bisect from a (condition true) to b (false); return the last true and the next number."""
+    """Bisect between a, where ``true`` holds, and b, where it does not.
+
+    Returns the last number at which it holds, and the next one, at relative precision 1e-12.
+    """
     nothing = PRECISION**2 * b  # a may be zero, and the condition false right above it
     while b - a > max(PRECISION * b, nothing):
         middle = (a + b) / 2.0
@@ -100,7 +103,7 @@ def scan_end(at: StiffnessAt, low: float, highest: float) -> float:
 
 
 def log_samples(low: float, high: float) -> Array:
-    """Return bounds (N,) [N] from low to high, evenly spaced on a log scale.
+    """Return bounds (N,) [N] from ``low`` to ``high``, evenly spaced on a log scale.
 
     The scale has at most four decades; below it there is only ``low``.
     """
@@ -112,7 +115,11 @@ def log_samples(low: float, high: float) -> Array:
 def stable_ranges(
     at: StiffnessAt, low: float, high: float
 ) -> tuple[Array, Array, tuple[tuple[float, float], ...]]:
-    """Return the bounds (N,) [N] of a scan, their margins (N,) [N m/rad], and the stable ranges."""
+    """Scan lower bounds from ``low`` to ``high`` [N]; return bounds, margins and stable ranges.
+
+    Bounds (N,) [N], the smallest eigenvalue of K_θ at each (N,) [N m/rad], and the ranges (low,
+    high) [N] in which the arm is stable.
+    """
 
     def margin(place: float) -> float:
         return at(place).margin
@@ -130,7 +137,7 @@ def stable_ranges(
 
 
 def sign_change(f: Callable[[float], float], a: float, b: float) -> float:
-    """Find the lower bound or load factor between a and b at which a function changes its sign."""
+    """Find the lower bound or load factor between a and b at which ``f`` changes its sign."""
     from scipy.optimize import brentq  # slow to import
 
     root: float = brentq(lambda x: f(float(x)), a, b, xtol=1e-300, rtol=PRECISION)

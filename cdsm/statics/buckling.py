@@ -156,6 +156,6 @@ def critical_load(
 
 
 def _mode(K: Stiffness) -> Array:
-    """Return the softest joint motion (nv,), signed so that its largest entry is positive."""
+    """Return the unit joint motion (nv,) of the smallest eigenvalue, its largest entry positive."""
     mode = K.critical_direction
     return frozen(mode * np.sign(mode[abs(mode).argmax()]))

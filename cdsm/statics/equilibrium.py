@@ -209,6 +209,6 @@ class Equilibrium(ReadOnlyState):
 
 
 def eigenvalues(K: Array, free: NDArray[np.intp]) -> Array:
-    """Return the eigenvalues of the symmetric part of K for the joints ``free``."""
+    """Return the eigenvalues of the symmetric part of K (nv, nv) for the joints ``free`` (n,)."""
     K = K[np.ix_(free, free)]
     return np.asarray(np.linalg.eigvalsh((K + K.T) / 2.0), dtype=np.float64)

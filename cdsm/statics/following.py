@@ -29,7 +29,10 @@ _SLIGHT = 1e-9
 def follow_load(
     before: Equilibrium, wrench: Array, added: Array, reached: float, goal: float
 ) -> Equilibrium:
-    """Follow stable equilibria under wrench + λ · added from λ = ``reached`` to λ = ``goal``."""
+    """Follow stable equilibria under wrench + λ · added from λ = ``reached`` to λ = ``goal``.
+
+    ``before`` is the equilibrium at ``reached``. Raises EquilibriumError if the arm buckles.
+    """
     step = goal - reached
     while reached < goal:
         part = min(goal, reached + step)
@@ -52,7 +55,7 @@ def follow_load(
 
 
 def follow(before: Equilibrium, wrench: Array, start: Array | None = None) -> Equilibrium | None:
-    """Find the equilibrium that continues an earlier one under another wrench (6,), or None.
+    """Find the equilibrium that continues ``before`` under another ``wrench`` (6,), or None.
 
     The search starts at the joint angles ``start`` (nv,) [rad], by default those of ``before``. It
     returns None if no path of stable postures leads to an equilibrium: the arm buckles, or the step
@@ -72,8 +75,10 @@ def follow(before: Equilibrium, wrench: Array, start: Array | None = None) -> Eq
 
 
 def _is_stable_between(loaded: LoadedArm, start: Iterate, search: RestSearch[Iterate]) -> bool:
-    """Return whether the straight path to the equilibrium is short and K_θ > 0 along it.
+    """Return whether the straight path from ``start`` to the equilibrium is short and stable.
 
+    The equilibrium is the result of ``search``. K_θ of the joints off their stops is checked at
+    points along the path.
     An arm that snaps through has an unstable posture on this path. The search may have stepped over
     it.
     """

@@ -56,7 +56,11 @@ class FrictionalArm(NamedTuple):
         return self.limits
 
     def moved(self, q: Array, near: Settled) -> Settled:
-        """Compute the arm at joint angles (nv,) [rad]; raise CableError if two sites coincide."""
+        """Compute the arm at joint angles ``q`` (nv,) [rad].
+
+        The search for tensions starts from those of ``near``, a state at similar angles. Raises
+        CableError if two sites coincide.
+        """
         pose = near.pose.arm.at(q, check_limits=False)
         return self.at(pose, np.maximum(near.chain.tension + near.slope @ (q - near.q), 0.0))
 

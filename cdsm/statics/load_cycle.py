@@ -105,7 +105,11 @@ def load_cycle(
 
 
 def slow_loading(pose: Posture, tension: Array, wrench: Array, accuracy: float) -> SlowLoading:
-    """Return an arm that is ready to be loaded, from checked arguments."""
+    """Return an arm that is ready to be loaded, from checked arguments.
+
+    ``accuracy`` [-] is that of :func:`load_cycle`. Raises InvalidInput if ``pose`` is beyond a
+    joint limit.
+    """
     require_between_stops(pose)
     LoadedArm(pose, tension, wrench)  # refuses a spring that leaves no wire
     arm = pose.arm
@@ -116,7 +120,10 @@ def slow_loading(pose: Posture, tension: Array, wrench: Array, accuracy: float) 
 
 
 def _commands(motors: ArrayLike, forced: NDArray[np.bool_]) -> Array:
-    """Check and return the commands of the motors (n, C); their shape is checked elsewhere."""
+    """Check and return the commands ``motors`` (n, C); their shape is checked elsewhere.
+
+    ``forced`` (C,) marks force-controlled cables, whose tension must not be negative.
+    """
     commands = number_array("motors", motors)
     if commands.ndim == 2 and commands.shape[1] == forced.size:
         pulled = commands[:, forced]

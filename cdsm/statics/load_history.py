@@ -202,7 +202,10 @@ class LoadHistory(ReadOnlyState):
         return write_labelled(path, self.to_pandas, self.to_xarray)
 
     def plot(self) -> Figure:
-        """Plot force over displacement, and the tensions along the cable that changes most."""
+        """Plot force over displacement, and the segment tensions where they differ most.
+
+        They are those of one cable: the cable whose segments have the largest difference.
+        """
         from cdsm.plots import plot_load_history  # matplotlib imports slowly
 
         return plot_load_history(self)

@@ -104,9 +104,9 @@ class LoadingPath:
         return np.array([self.rests[i].state.pose.tip[:3, 3] for i in self.last])
 
     def motion(self, i: int, load: int, part: float) -> Array | None:
-        """Return the joint motion (nv,) [rad] that led to rest i.
+        """Return the joint motion (nv,) [rad] that led to rest ``i``.
 
-        Returns None if rest i is not at this load and this part of the way to it.
+        Returns None unless rest i is at the fraction ``part`` of the step to load number ``load``.
         """
         if i < len(self.rests) and self.rests[i][1:] == (load, part):
             return self.rests[i].state.motion
@@ -175,5 +175,5 @@ class LoadingPath:
 
 
 def same_segments(one: Posture, other: Posture) -> bool:
-    """Return whether each cable has the same number of segments in both arms."""
+    """Return whether each cable has as many segments in the posture ``one`` as in ``other``."""
     return np.array_equal(one.segments.chains.start, other.segments.chains.start)

@@ -96,7 +96,11 @@ class LoadedArm:
         return Iterate(K, K.residual, rounding(K))
 
     def moved(self, q: Array, near: Iterate) -> Iterate:
-        """Compute the arm at joint angles (nv,) [rad]; raise CableError if two sites coincide."""
+        """Compute the arm at joint angles ``q`` (nv,) [rad].
+
+        The search for tensions starts from those of ``near``, a state at similar angles. Raises
+        CableError if two sites coincide.
+        """
         before = near.K
         pose = self.reference.arm.at(q, check_limits=False)
         longer = pose.cable_lengths - before.posture.cable_lengths
@@ -141,7 +145,7 @@ def require_domains(
 
 
 def stops(reference: Posture) -> tuple[Array, Array]:
-    """Return lowest and highest angles (nv,) [rad] of the stops; the reference is between them."""
+    """Return lowest and highest angles (nv,) [rad] of the stops; ``reference`` is between them."""
     arm, q = reference.arm, reference.q
     touching = np.zeros(arm.nv, dtype=np.bool_)  # joints that their disks stop
     if arm.is_serpentine:
@@ -153,7 +157,7 @@ def stops(reference: Posture) -> tuple[Array, Array]:
 
 
 def rounding(K: Stiffness) -> Array:
-    """Estimate the rounding (nv,) [N m] of :attr:`~cdsm.Stiffness.residual`."""
+    """Estimate the rounding error (nv,) [N m] of :attr:`~cdsm.Stiffness.residual`."""
     pose = K.posture
     force = K.tension + K.cable_stiffness * pose.cable_lengths
     terms = force @ abs(pose.length_jacobian) + abs(K.wrench) @ abs(pose.jacobian)
@@ -164,7 +168,7 @@ def rounding(K: Stiffness) -> Array:
 
 
 def tilt_torque(pose: Posture, tension: Array) -> Array:
-    """Compute the error of the torques (nv,) [N m] per relative rounding error of the sites.
+    """Compute the error of joint torques (nv,) [N m] per relative rounding error of the sites.
 
     Errors of the sites rotate the segments, short ones most. Between disks that nearly touch this
     is the largest part of the rounding. ``tension`` [N] has an entry for each segment that joints
@@ -239,7 +243,7 @@ class _LockedLaw:
         return np.asarray(self._free_length / self.law.rigidity(F) + self._series)
 
     def tension(self, lengths: Array, near: Array) -> tuple[Array, Array]:
-        """Compute F [N] and dF/dL [N/m] at L [m]; the search starts at F = ``near``."""
+        """Compute F [N] and dF/dL [N/m] at ``lengths`` L [m]; the search starts at F = ``near``."""
         elongation = lengths - self._start
         inside = np.minimum(np.maximum(elongation, 0.0), self._span)
         F, compliance = rising_root(

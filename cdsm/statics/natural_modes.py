@@ -176,7 +176,10 @@ def _stand_in_mass(pose: Posture) -> Array:
 
 
 def motions(stiffness: Stiffness, M: Array) -> tuple[Array, Array]:
-    """Return ω² (nv,) [1/s²], rising, and φ (nv, nv), φᵀMφ = 1, or raise SingularMass."""
+    """Return ω² (nv,) [1/s²], rising, and φ (nv, nv) with φᵀMφ = 1, of ``stiffness`` and mass M.
+
+    Raises SingularMass if M is not positive definite.
+    """
     # scaled by joint: the mass of the last link may be rounding beside that of the arm
     unit = 1.0 / np.sqrt(M.diagonal())
     K, M = (matrix * unit * unit[:, None] for matrix in (stiffness.joint, M))
@@ -206,7 +209,7 @@ class Carried(NamedTuple):
 
 
 def mass_matrix(pose: Posture, carried: Iterable[Carried]) -> Array:
-    """Compute the joint-space mass matrix (nv, nv) [kg m²] of the bodies on the links.
+    """Compute the joint-space mass matrix (nv, nv) [kg m²] of the bodies ``carried`` by links.
 
     M = Σ (m J_vᵀ J_v + J_ωᵀ I J_ω), with the Jacobians J_v of the centre of mass and J_ω of the
     rotation, and the inertia I about the centre of mass.

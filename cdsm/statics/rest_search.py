@@ -98,7 +98,10 @@ def require_between_stops(pose: Posture) -> None:
 
 
 def settled(loaded: LoadedArm, search: RestSearch[Iterate], iterations: int) -> Equilibrium:
-    """Return the equilibrium that a search has found; check that tensions are in their domains."""
+    """Return the equilibrium of ``loaded`` that ``search`` found after ``iterations`` in total.
+
+    Raises ElasticityRangeError if a tension is outside the domain of its law.
+    """
     K = search.state.K
     loaded.require_domains(K.tension)
     reaction = np.where(search.at_stop, K.residual, 0.0)
@@ -119,7 +122,8 @@ def no_rest(
 ) -> EquilibriumError:
     """Return the error of a search that found no equilibrium beyond a part ``reached`` of the load.
 
-    ``residual`` (nv,) is that of the last iterate, at ``pose``.
+    ``residual`` (nv,) is that of the last iterate, at ``pose``. The error names a cable whose
+    sites meet there, compared with ``reference``.
     """
     frozen(residual)
     worst = int(abs(residual).argmax())

@@ -94,7 +94,7 @@ class Passage(NamedTuple):
 
 
 class SlowLoading(NamedTuple):
-    """An arm with friction that is loaded slowly: what stays the same from load to load."""
+    """Arm with friction that is loaded slowly; these values are the same for all loads."""
 
     problem: ChainProblem
     start: Indices  # first segment of each cable, and the number of segments (C+1,)
@@ -114,9 +114,13 @@ class SlowLoading(NamedTuple):
         return State(Load(wrench, settled.residual, motors), settled, none, none)
 
     def carry(self, before: State, load: Load, what: str) -> tuple[State, Passage]:
-        """Change the load of an arm in equilibrium; return its new state, and energies and slips.
+        """Change the load of the equilibrium ``before`` to ``load`` in sub-steps.
 
-        ``what`` names the load in an error message.
+        Returns the new state, and the energies and slips on the way. ``what`` names the load in an
+        error message.
+
+        Raises:
+            EquilibriumError: No equilibrium was found on the way.
         """
         first, state = before.load, before
         total = Passage(0.0, 0.0, 0.0, 0.0, np.zeros(before.settled.chain.slip.size))
@@ -143,16 +147,19 @@ class SlowLoading(NamedTuple):
         return state, total
 
     def arm(self, natural: Array, wrench: Array, motors: Array) -> FrictionalArm:
-        """Return the arm under a load, with natural lengths (S,) [m] before wire slips."""
+        """Return the arm under a wrench (6,), with natural lengths (S,) [m] before wire slips.
+
+        ``motors`` (C,) are the commands of :class:`Load`.
+        """
         forced = np.where(self.forced, motors, np.nan)
         return FrictionalArm(self.problem, self.limits, natural, wrench, forced)
 
     def rest(
         self, before: State, load: Load, motion: Array | None = None
     ) -> tuple[State | None, RestSearch[Settled]]:
-        """Find the equilibrium under a new load, or None; also return the search.
+        """Find the equilibrium after ``before`` under a new load, or None; also return the search.
 
-        The search starts after the ``motion`` (nv,) [rad], an estimate, if it is given.
+        The search starts at the angles of ``before``, plus ``motion`` (nv,) [rad] if it is given.
         """
         old, natural = before.settled, before.settled.chain.natural.copy()
         taken = np.where(self.forced, 0.0, load.motors - before.load.motors)
@@ -170,7 +177,10 @@ class SlowLoading(NamedTuple):
         return State(load, search.state, reaction, search.state.q - old.q), search
 
     def _energies(self, start: State, middle: State, end: State) -> tuple[Passage, float]:
-        """Compute the energies of a sub-step from start, middle and end, and their rounding [J]."""
+        """Compute the energies of a sub-step, and their rounding error [J].
+
+        ``start``, ``middle`` and ``end`` are the equilibria of the sub-step.
+        """
         states = (start, middle, end)
         torque = [s.load.wrench @ s.pose.jacobian + s.load.held for s in states]
         P = [self.problem.potential(s.settled.chain.tension) for s in states]
@@ -198,7 +208,10 @@ class SlowLoading(NamedTuple):
 
 
 def _guess(arm: FrictionalArm, old: Settled, motion: Array, held: Array) -> Settled | None:
-    """Return the arm after a motion (nv,) [rad], or None if sites meet there."""
+    """Return the arm after a joint motion (nv,) [rad] from ``old``, or None if sites meet there.
+
+    ``held`` (nv,) [N m] is the torque of :class:`Load` that is subtracted from the residual.
+    """
     try:
         return arm.moved(np.clip(old.q + motion, *arm.limits), old).holding_back(held)
     except CdsmError:
@@ -208,7 +221,8 @@ def _guess(arm: FrictionalArm, old: Settled, motion: Array, held: Array) -> Sett
 def _newton_step(arm: FrictionalArm, old: Settled, start: Settled, held: Array) -> Settled:
     """Return the arm after a Newton step with the tangent of ``old`` and the torque of ``start``.
 
-    Returns ``start`` if the step does not reduce the torque.
+    ``held`` (nv,) [N m] is the torque of :class:`Load`. Returns ``start`` if the step does not
+    reduce the torque.
     """
     try:
         step = np.linalg.solve(old.stiffness, -start.torque)
@@ -220,9 +234,9 @@ def _newton_step(arm: FrictionalArm, old: Settled, start: Settled, held: Array) 
 
 
 def _work(force: list[Array], way: list[Array]) -> float:
-    """Integrate force over displacement from their values at start, middle and end.
+    """Integrate ``force`` over the path ``way``; each has its values at start, middle and end.
 
-    It is exact for quadratic functions.
+    The result [J] is exact if both are quadratic functions of the path parameter.
     """
     half, whole = way[1] - way[0], way[2] - way[0]
     ends = force[0] @ (4.0 * half - whole) + force[2] @ (3.0 * whole - 4.0 * half)

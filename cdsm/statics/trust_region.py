@@ -70,7 +70,11 @@ class Loaded(Protocol[State]):
     """Arm under a load."""
 
     def moved(self, q: Array, near: State) -> State:
-        """Compute the arm at joint angles (nv,) [rad]; raise CableError if two sites coincide."""
+        """Compute the arm at joint angles ``q`` (nv,) [rad].
+
+        ``near`` is a state at similar angles, from which a search for tensions may start. Raises
+        CableError if two sites coincide.
+        """
 
     def stops(self) -> tuple[Array, Array]:
         """Return the lowest and highest angles (nv,) [rad]."""
@@ -120,9 +124,9 @@ class _Free(NamedTuple):
 def find_rest(
     loaded: Loaded[State], start: State, held_back: Array | float = 0.0
 ) -> RestSearch[State]:
-    """Find from an iterate the equilibrium, where the residual torque r is ``held_back``.
+    """Find the equilibrium of ``loaded``, where the residual torque r is ``held_back``.
 
-    ``held_back`` is (nv,) [N m], by default zero.
+    The search begins at ``start``. ``held_back`` is (nv,) [N m], by default zero.
     """
     stops = loaded.stops()
     state, radius = start.holding_back(held_back), _FIRST
@@ -155,7 +159,7 @@ def find_rest(
 
 
 def work(before: Iterate, after: Iterate) -> float:
-    """Compute the work ∫ r·dq [J] of the residual torque on the line between two iterates."""
+    """Compute the work ∫ r·dq [J] of the residual torque from ``before`` straight to ``after``."""
     step = after.q - before.q
     change = step @ before.stiffness @ step - step @ after.stiffness @ step
     return float((before.torque + after.torque) @ step / 2.0 + change / 12.0)
@@ -164,7 +168,11 @@ def work(before: Iterate, after: Iterate) -> float:
 def _trial(
     state: Iterate, free: _Free, stops: tuple[Array, Array], radius: float
 ) -> tuple[Array, float]:
-    """Return the next joint angles (nv,) and the predicted work [J]: 0 if no step is downhill."""
+    """Return joint angles (nv,) at most ``radius`` from ``state``, and the predicted work [J].
+
+    The work is 0 if no step between the stops decreases the quadratic model. ``free`` are the
+    joints of ``state`` that are not at a stop.
+    """
     # at a saddle r is rounding and must not decide the way to leave it
     torque, signs = (0.0 * state.torque, (1.0, -1.0)) if free.balanced else (state.torque, (1.0,))
     q, expected = state.q, 0.0
@@ -178,7 +186,7 @@ def _trial(
 
 
 def _spectrum(stiffness: Array, free: NDArray[np.intp]) -> tuple[Array, Array]:
-    """Return eigenvalues, rising, and eigenvectors of K (symmetric part), for some joints."""
+    """Return eigenvalues, rising, and eigenvectors of K (symmetric part), ``free`` joints only."""
     K = stiffness[np.ix_(free, free)]
     values, vectors = np.linalg.eigh((K + K.T) / 2.0)
     return values, vectors
@@ -194,7 +202,8 @@ def _descend(
 ) -> Array:
     """Return joint angles (nv,) that decrease the quadratic model; a joint stays at its stop.
 
-    ``sign`` is that of :func:`_step`.
+    The model is that at ``state``, with the residual ``torque``. The path from there is at most
+    ``radius`` [rad] long. ``sign`` is that of :func:`_step`.
     """
     (lower, upper), q, indices, spectrum = stops, state.q.copy(), free.indices, free.spectrum
     while indices.size and radius > 0.0:
@@ -217,9 +226,10 @@ def _descend(
 def _step(
     torque: Array, stiffness: Array, values: Array, vectors: Array, radius: float, sign: float
 ) -> Array:
-    """Minimize r·p + ½ pᵀKp with |p| ≤ radius, given the eigenvalues and eigenvectors of K.
+    """Return the p of least r·p + ½ pᵀKp with |p| ≤ ``radius``; r ``torque``, K ``stiffness``.
 
-    If r = 0, both p and −p are minima, and ``sign`` chooses one.
+    ``values`` and ``vectors`` are the eigenvalues and eigenvectors of K. If r = 0, both p and −p
+    are minima, and ``sign`` chooses one.
     """
     along = vectors.T @ torque
     size, largest = float(np.linalg.norm(along)), float(abs(values).max())

@@ -105,7 +105,10 @@ def distribute_tension(
 def bounds_at(
     pose: Posture, minimum: ArrayLike, maximum: ArrayLike, worst_friction: bool
 ) -> tuple[Array, Array]:
-    """Return checked bounds (C,) [N] at a posture, narrowed if ``worst_friction`` is True."""
+    """Return checked bounds ``minimum`` and ``maximum``, each (C,) [N], at a posture.
+
+    They are narrowed for friction if ``worst_friction`` is True.
+    """
     low, high = checked_bounds(pose.arm, minimum, maximum)
     if flag("worst_friction", worst_friction):
         loss = np.exp(grip(pose))
@@ -125,7 +128,7 @@ def grip(pose: Posture) -> Array:
 def checked_bounds(
     arm: Manipulator, minimum: ArrayLike, maximum: ArrayLike, rows: int | None = None
 ) -> tuple[Array, Array]:
-    """Return checked bounds (C,) [N] of the tensions, narrowed by the bounds that cables define.
+    """Return ``minimum`` and ``maximum``, checked, each (C,) [N], within the bounds of the cables.
 
     With ``rows`` a bound may also have the shape (rows, C): one row per posture. Invalid bounds
     raise InvalidInput.
@@ -164,7 +167,7 @@ def _named(cable: Cable, row: Sequence[int]) -> str:
 def _with_fixed(
     pose: Posture, low: Array, high: Array, fixed: Mapping[str, float]
 ) -> tuple[Array, Array]:
-    """Return the bounds; for each fixed cable, minimum and maximum equal its fixed tension."""
+    """Return the bounds ``low`` and ``high`` (C,) [N], both equal to ``fixed`` for fixed cables."""
     if not isinstance(fixed, Mapping):
         raise InvalidInput("fixed", f"{fixed!r} given; give a dict of tensions [N] by cable.")
     names = [cable.name for cable in pose.arm.cables]

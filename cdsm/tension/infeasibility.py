@@ -18,10 +18,14 @@ from cdsm.support.values import frozen
 def explain(
     pose: Posture, problem: Scaled, solver: str, fault: str, free: NDArray[np.bool_]
 ) -> NoReturn:
-    """Find by linear programs why a solver found no tensions, and raise an error that says it.
+    """Find by linear programs why ``solver`` did not solve ``problem``; raise the error.
 
     Only bounds of ``free`` cables (C,) may widen: those without a fixed tension. ``fault`` is the
     solver's result, as text.
+
+    Raises:
+        InfeasibleTension: No tensions within the bounds balance the arm.
+        SolverError: Tensions exist, though the solver found none.
     """
     A, b, lower, upper, arm_scale, force_scale = problem
     nv, count = A.shape
@@ -64,7 +68,7 @@ def explain(
 
 
 def _widening(problem: Scaled, free: NDArray[np.bool_]) -> float:
-    """Compute how far the bounds of free cables (C,) must widen [N]; inf if no widening helps."""
+    """Compute how far the bounds of ``free`` cables must widen [N]; inf if that does not help."""
     A, b, lower, upper, _, force_scale = problem
     nv, count = A.shape
     # variables: F, then the widening t: low − t <= F <= high + t, and F >= 0; a fixed

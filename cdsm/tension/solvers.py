@@ -47,12 +47,15 @@ def installed_solvers() -> list[str]:
 
 
 def installed_solver(solver: str) -> str:
-    """Return the name of a solver; UnknownName if it is not installed."""
+    """Return the name ``solver``; raise UnknownName if it is not installed."""
     return one_of("installed solver", solver, installed_solvers())
 
 
 def solve(problem: tension_kernels.Scaled, solver: str) -> Array | str:
-    """Return the verified optimum, or a text that says why there is none."""
+    """Return the verified optimum x (C,) [-] of a dimensionless ``problem``, or why there is none.
+
+    The reason is a text. Raises SolverError if the solver fails or gives no multipliers.
+    """
     import qpsolvers
     from scipy.sparse import csc_matrix
 
@@ -90,7 +93,10 @@ def solve(problem: tension_kernels.Scaled, solver: str) -> Array | str:
 
 
 def _shortfall(problem: tension_kernels.Scaled, point: tuple[Array, ...]) -> str:
-    """Return why a point and its multipliers are not the optimum, as text; empty if they are."""
+    """Return why ``point`` is not the optimum of ``problem``, as text; empty if it is.
+
+    ``point`` is x with the multipliers y of the balance and z of the bounds.
+    """
     # equal to qpsolvers' primal_residual, dual_residual and duality_gap, ten times faster
     primal, dual, gap = tension_kernels.single_optimality(*problem[:4], *point)
     size = max(1.0, float(abs(point[0]).max()))
@@ -105,7 +111,10 @@ def _shortfall(problem: tension_kernels.Scaled, point: tuple[Array, ...]) -> str
 
 
 def _polished(problem: tension_kernels.Scaled, point: tuple[Array, ...]) -> tuple[Array, ...]:
-    """Return the exact solution for the active bounds of a point near the optimum."""
+    """Return x, y and z that are exact if the bounds active at ``point`` are those of the optimum.
+
+    ``point`` is (x, y, z) as in :func:`_shortfall`, near the optimum.
+    """
     A, b, low, high, *_ = problem
     x, _, z = point
     at_low, at_high = x - low < -z, high - x < z

@@ -1,15 +1,17 @@
 """Gradients of distributed tensions: of the tension of a cable, and of the critical tension.
 
-The tensions of free cables are F_f = Bᵀ λ with B F_f = τ − B_b F_b (Eqs. 13, 17), B = J_Lᵀ of the
-free cables, b the cables at a bound. For weights y of the tensions, μ = (B Bᵀ)⁻¹ B y_f and
-r = y_f − Bᵀ μ,
+The aim is the change Σ y_c dF_c of a weighted sum of the least tensions F (Eq. 17), with constant
+weights y, for small changes of the arm. The cables balance the torque τ = J_Xᵀ W − g (Eq. 13). Free
+cables (index f) are between their bounds, the others (index b) at a bound. B and B_b are the
+columns of J_Lᵀ of free and other cables. The tensions of the free cables are F_f = Bᵀ λ, where λ
+(nv,) solves B Bᵀ λ = τ − B_b F_b. With μ = (B Bᵀ)⁻¹ B y_f and r = y_f − Bᵀ μ,
 
     Σ y_c dF_c = r·dBᵀ λ + μ·(dτ − dJ_Lᵀ F).
 
-τ = J_Xᵀ W − g is the torque that the cables balance. Both terms are derivatives of a power at
-constant tensions, so the kernel of the stiffness computes them too. The first power is Σ r_c L̇_c
-at the joint velocity λ. The second is that of the residual torque J_Lᵀ F − τ at the joint velocity
-−μ. The formula holds while the same cables stay at their bounds.
+Both terms are derivatives of a power at constant tensions, so the kernel of the stiffness computes
+them too. The first power is Σ r_c L̇_c at the joint velocity λ. The second is that of the residual
+torque J_Lᵀ F − τ at the joint velocity −μ. The formula holds while the same cables stay at their
+bounds.
 """
 
 from __future__ import annotations
@@ -34,7 +36,7 @@ _DETERMINED = 1e-12
 
 
 class Balance(NamedTuple):
-    """Free cables of a tension distribution, and (B Bᵀ)⁻¹ with B = J_Lᵀ of these cables."""
+    """Free cables of a tension distribution, and (B Bᵀ)⁻¹ with B (nv, n) = J_Lᵀ of these cables."""
 
     tension: Tension
     free: NDArray[np.bool_]
@@ -42,7 +44,10 @@ class Balance(NamedTuple):
 
     @classmethod
     def of(cls, tension: Tension) -> Balance:
-        """Find the free cables; raise InvalidInput if they alone do not determine the balance."""
+        """Find the free cables of ``tension``.
+
+        Raises InvalidInput if ``tension`` is not the least, or B Bᵀ is singular.
+        """
         F = tension.values
         near = OPTIMALITY * F.max(initial=0.0)
         free = (F - tension.minimum > near) & (tension.maximum - F > near)
@@ -62,14 +67,20 @@ class Balance(NamedTuple):
         return np.asarray(self.inverse @ (B @ weights[self.free]))
 
     def by_bounds(self, weights: Array, low: Array, high: Array) -> Array:
-        """Compute Σ y_c dF_c (n,) for n changes of the lower and of the upper bounds (C, n)."""
+        """Compute Σ y_c dF_c (n,), y ``weights``, for n changes of the bounds.
+
+        ``low`` and ``high`` (C, n) are the changes of the lower and upper bounds.
+        """
         F, J = self.tension.values, self.tension.posture.length_jacobian
         at_low = F - self.tension.minimum <= OPTIMALITY * F.max(initial=0.0)
         moved = np.where(at_low[:, None], low, high)[~self.free]
         return np.asarray((weights - J @ self.multipliers(weights))[~self.free] @ moved)
 
     def gradient(self, inputs: Inputs, weights: Array) -> dict[str, Array]:
-        """Compute the derivatives of Σ y_c F_c by source, y ``weights``; 0 for those of wires."""
+        """Compute the derivatives of Σ y_c F_c, y ``weights``, by ``inputs`` of each source.
+
+        They are 0 for the sources of wires, such as rigidity and lead.
+        """
         F, free = self.tension.values, self.free
         B = self.tension.posture.length_jacobian[free].T
         mu = self.multipliers(weights)
@@ -81,9 +92,10 @@ class Balance(NamedTuple):
         return {name: found[name] + balance[name] for name in found}
 
     def _work(self, inputs: Inputs, motion: Array, pull: Array, loaded: float) -> dict[str, Array]:
-        """Compute the derivatives of the power Σ p_c L̇_c by source, at the velocity ``motion``.
+        """Compute the derivatives of the power Σ p_c L̇_c with respect to ``inputs``, by source.
 
-        p is ``pull`` (C,) [N]. ``loaded`` 1 adds the power of gravity and load, 0 leaves it out.
+        p is ``pull`` (C,) [N], ``motion`` (nv,) the joint velocity. With ``loaded`` = 1 the power
+        includes that of gravity and load, with 0 it does not.
         """
         pose, none = self.tension.posture, np.zeros_like(pull)
         arguments: tuple[Any, ...] = (
@@ -109,9 +121,10 @@ def buckling_gradient(
 ) -> dict[str, Array]:
     """Compute the derivatives of the critical tension F_min, at which λ_min(K_θ) = 0, by source.
 
-    ``margin`` are the derivatives of λ_min at constant tensions: ∂λ with respect to the inputs of
-    each source, and y = ∂λ/∂F under the key ``tension``. Then dF_min = −(∂λ + Σ y_c dF_c)/(Σ y_c
-    dF_c/dF_min). Measured tensions have the derivative 0.
+    ``balance`` is that of the critical tensions. ``margin`` are the derivatives of λ_min at
+    constant tensions: ∂λ with respect to ``inputs``, by source, and y = ∂λ/∂F under the key
+    ``tension``. Then dF_min = −(∂λ + Σ y_c dF_c)/(Σ y_c dF_c/dF_min). The derivative with respect
+    to measured tensions is 0.
     """
     weights = margin["tension"]
     moved, every = balance.gradient(inputs, weights), np.ones((len(weights), 1))

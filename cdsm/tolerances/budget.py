@@ -71,7 +71,7 @@ class Uncertainty(ReadOnlyState):
 
     @cached_property
     def nonlinearity(self) -> float:
-        """Error of the linear approximation, relative to u_c [-]: RMS over 100 drawn arms.
+        """RMS error of the linear approximation over 100 drawn arms, relative to u_c [-].
 
         The standard uncertainty of Monte Carlo differs from u_c at most by this fraction. It is inf
         if the reading does not exist for one of the arms.
@@ -92,7 +92,7 @@ class Uncertainty(ReadOnlyState):
 
     @property
     def is_linear(self) -> bool:
-        """Whether first order is sufficient: its error is at most 5 % of the uncertainty.
+        """Whether :attr:`nonlinearity` is at most 5 %: first-order error propagation is sufficient.
 
         If not, see :func:`~cdsm.monte_carlo`.
         """
@@ -122,7 +122,7 @@ class Uncertainty(ReadOnlyState):
         return tuple(sorted(each, key=lambda entry: -entry[2])[:count])
 
     def to_dict(self) -> dict[str, object]:
-        """Return all numbers in SI, with the unit of the value beside them."""
+        """Return value, standard uncertainty, interval and contributions in SI, with the unit."""
         low, high = self.interval()
         return {
             "quantity": self.question.name,
@@ -173,7 +173,7 @@ class Uncertainty(ReadOnlyState):
 
     @property
     def shown(self) -> str:
-        """Value and standard uncertainty in people's units; the uncertainty has two digits."""
+        """Value and standard uncertainty, with two digits, in the unit shown to the user."""
         _, size = self.question.unit
         u = self.standard_uncertainty / size
         places = decimals(u)
@@ -283,7 +283,7 @@ _SHOWN = {
 
 
 def shown(source: str, standards: Array) -> str:
-    """Return the standard uncertainties of a source in people's units."""
+    """Return the smallest and largest of ``standards`` (n,) in the unit shown to the user."""
     size, unit = _SHOWN.get(source, (1e-3, " mm"))
     low, high = (f"{each / size:.3g}" for each in (standards.min(), standards.max()))
     return f"{low}{unit}" if low == high else f"{low} to {high}{unit}"

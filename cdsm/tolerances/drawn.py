@@ -96,7 +96,8 @@ class DrawnArms:
     def distributed(self, minimum: Array | None = None, drawn: Drawn | None = None) -> Array:
         """Distribute tensions (N, C) [N] of all arms.
 
-        The lower bounds are ``minimum`` (N,) [N]; None: those of the nominal arm's tensions.
+        ``minimum`` (N,) [N] is the lower bound of all cables of each arm; None: the bounds of the
+        nominal arm's tensions. ``drawn`` are the arrays of :meth:`evaluate`; None: computed here.
 
         Raises:
             InvalidInput: No tensions balance one of the arms.
@@ -152,12 +153,15 @@ class DrawnArms:
 
 
 def margins(joint: Array) -> Array:
-    """Compute the smallest eigenvalue (N,) of the symmetric parts of K_θ (N, nv, nv)."""
+    """Compute λ_min (N,) [N m/rad] of the symmetric part of each K_θ, ``joint`` (N, nv, nv)."""
     return np.asarray(np.linalg.eigvalsh((joint + joint.transpose(0, 2, 1)) / 2.0)[:, 0])
 
 
 def laws_at(K: Stiffness, tension: Array) -> tuple[Array, Array]:
-    """Compute EA [N] and ε at tensions (…, C); ε is 0 if l_0 is the stretched length."""
+    """Return EA [N] and ε of each cable at ``tension`` (…, C) [N], by the laws of the arm of ``K``.
+
+    ε is 0 if l_0 is the stretched length.
+    """
     arm = K.posture.arm
     laws = arm._model.laws
     rigidity, strain = np.ones_like(tension), np.zeros_like(tension)

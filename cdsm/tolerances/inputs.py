@@ -48,7 +48,10 @@ class Places(NamedTuple):
         return np.concatenate([place.ravel() for place in self])
 
     def moved(self, by: Array) -> Places:
-        """Return the points of N arms, displaced by (N, n) [m]; the arrays get a first axis N."""
+        """Return the points of N arms, displaced ``by`` (N, n) [m]; each array gets a first axis N.
+
+        The n coordinates are in the order of :meth:`stacked`.
+        """
         ends = np.cumsum([place.size for place in self])[:-1]
         parts = np.split(by, ends, axis=1)
         return Places(
@@ -116,12 +119,18 @@ class Inputs:
         self._transposed = csr_matrix(self.map.T)
 
     def by_source(self, by_place: Places) -> dict[str, Array]:
-        """Convert derivatives with respect to points to those with respect to inputs (inputs,)."""
+        """Convert ``by_place``, derivatives with respect to points, to derivatives by source.
+
+        Each array (inputs,) holds the derivatives with respect to the inputs of one source.
+        """
         by_input = self._transposed @ by_place.stacked()
         return {source: by_input[columns] for source, columns in self.columns.items()}
 
     def displaced(self, errors: Mapping[str, Array]) -> Array:
-        """Return the displacements (N, n) of all points for errors (N, inputs) of some sources."""
+        """Return the displacements (N, n) [m] of all points of N arms, as in :meth:`Places.moved`.
+
+        ``errors`` (N, inputs) has the name of the source as its key; missing sources have none.
+        """
         count = len(next(iter(errors.values())))
         every = np.zeros((count, self.map.shape[1]))
         for source, columns in self.columns.items():
@@ -130,7 +139,7 @@ class Inputs:
         return np.asarray((self.map @ every.T).T)
 
     def require(self, tolerances: Tolerances, arm: Manipulator) -> None:
-        """Raise InvalidInput for a source that the arm does not have."""
+        """Raise InvalidInput if ``tolerances`` have a source that the arm does not have."""
         for name in tolerances.given:
             if not self.labels.get(name):
                 lacks = {
@@ -144,7 +153,10 @@ class Inputs:
                 raise InvalidInput(name, f"{arm.name} {lacks.get(name, otherwise)}")
 
     def _disks(self, arm: Manipulator, sites: list[str]) -> dict[str, csr_matrix]:
-        """Label the inputs of holes, disks and links; return their parts of :attr:`map`."""
+        """Label the inputs of holes, disks and links; return their parts of :attr:`map`.
+
+        ``sites`` has an entry for each cable site of the arm.
+        """
         body, (P, rows) = arm._model.body, (len(sites), arm.nv + 1)
         end, origin, centre = 3 * P + 6 * rows, 3 * P, 3 * P + 3 * rows
         found: dict[str, dict[str, list[tuple[int, float]]]] = {name: {} for name in _ON_DISKS}

@@ -32,14 +32,15 @@ class Part(NamedTuple):
     tolerance: Tolerance
 
     def variance(self, sensitivity: Array) -> float:
-        """Compute the variance gᵀ σ R σ g that the inputs cause (JCGM 100, Eq. 13).
+        """Compute the variance gᵀ σ R σ g of a reading that the inputs cause (JCGM 100, Eq. 13).
 
-        g (k,) are the partial derivatives, σ the standard uncertainties, R the correlations.
+        g (k,) is ``sensitivity``, the partial derivatives of the reading with respect to the k
+        inputs; σ are the standard uncertainties, R the correlations.
         """
         return self.tolerance.variance(self.standard * sensitivity)
 
     def draw(self, rng: np.random.Generator, errors: Array) -> None:
-        """Draw the errors (draws, n) of the inputs.
+        """Draw the errors of the inputs and write them to their columns of ``errors`` (draws, n).
 
         Correlated errors that are not normal are sums of independent ones: each input has its exact
         standard uncertainty and correlations; for 0 < ρ < 1 its distribution is only approximate.
@@ -62,7 +63,9 @@ class Part(NamedTuple):
 def parts_of(
     tolerances: Tolerances, labels: Mapping[str, Sequence[str]], tension: Array
 ) -> dict[str, tuple[Part, ...]]:
-    """Find the inputs of each tolerance by their names, and their standards at tensions (C,).
+    """Find the inputs of each tolerance by name, and their standard uncertainties at ``tension``.
+
+    ``labels`` are the names of the inputs of each source; ``tension`` is (C,) [N].
 
     Raises:
         InvalidInput: No input has such a name, two tolerances are of one input, or a tension is
@@ -97,12 +100,15 @@ def parts_of(
 
 
 def variance(parts: Sequence[Part], sensitivity: Array) -> float:
-    """Compute the part of the variance of a reading that the inputs of a source cause."""
+    """Compute the variance of a reading that the inputs of one source cause.
+
+    ``sensitivity`` (n,) are its partial derivatives with respect to these inputs.
+    """
     return sum(part.variance(sensitivity[part.inputs]) for part in parts)
 
 
 def standards(parts: Sequence[Part], count: int) -> Array:
-    """Return the standard uncertainty (n,) of each input of a source."""
+    """Return the standard uncertainty (count,) of each of ``count`` inputs of a source."""
     found = np.zeros(count)
     for part in parts:
         found[part.inputs] = part.standard
@@ -110,7 +116,7 @@ def standards(parts: Sequence[Part], count: int) -> Array:
 
 
 def draw(parts: Sequence[Part], rng: np.random.Generator, draws: int, count: int) -> Array:
-    """Draw errors (draws, n) of all inputs of a source."""
+    """Draw errors (draws, count) of all ``count`` inputs of a source."""
     errors = np.zeros((draws, count))
     for part in parts:
         part.draw(rng, errors)
@@ -123,12 +129,15 @@ def draw_errors(
     rng: np.random.Generator,
     draws: int,
 ) -> dict[str, Array]:
-    """Draw errors (draws, n) of the inputs of each source."""
+    """Draw errors (draws, n) of the n inputs of each source, whose names are ``labels``."""
     return {source: draw(own, rng, draws, len(labels[source])) for source, own in parts.items()}
 
 
 def _matching(source: str, pattern: str, names: Sequence[str]) -> Indices:
-    """Return the indices of the names that match a pattern."""
+    """Return the indices of ``names`` that match ``pattern``.
+
+    Raises InvalidInput, which names ``source``, if no name matches.
+    """
     found = np.flatnonzero([fnmatchcase(name, pattern) for name in names])
     if not found.size:
         raise InvalidInput(
@@ -144,7 +153,7 @@ def _mask(inputs: slice | Indices, count: int) -> NDArray[np.bool_]:
 
 
 def _standardised(tolerance: Tolerance, rng: np.random.Generator, shape: tuple[int, int]) -> Array:
-    """Draw errors of standard deviation one."""
+    """Draw errors (``shape``) with the distribution of ``tolerance`` and standard deviation one."""
     if tolerance.distribution == "normal":
         return rng.standard_normal(shape)
     width = WIDTH[tolerance.distribution]

@@ -22,7 +22,7 @@ READINGS = get_args(Reading)
 
 
 def chosen_tolerances(pose: Posture, tolerances: Tolerances | None) -> Tolerances:
-    """Return the tolerances, or those of the arm; raise InvalidInput if there are none."""
+    """Return ``tolerances``, or those of the arm if None; raise InvalidInput if it has none."""
     if tolerances is not None:
         return instance("tolerances", tolerances, Tolerances)
     own = instance("pose", pose, Posture).arm.tolerances

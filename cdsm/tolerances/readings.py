@@ -56,7 +56,7 @@ class Question(ReadOnlyState):
 
     @property
     def unit(self) -> tuple[str, float]:
-        """Unit in which people read the value, and its size in SI."""
+        """Unit in which the value is shown to the user, and its size in SI."""
         if self.of == "margin":
             return self.stiffness.posture.arm.stiffness_unit(), 1.0
         force = ("N/mm", 1e3)
@@ -148,7 +148,10 @@ class Question(ReadOnlyState):
 def _along_gradient(
     K: Stiffness, inputs: Inputs, u: Array, along: float, motion: Array
 ) -> dict[str, Array]:
-    """Compute the derivatives of ``along`` = 1/(uᵀ C_vv u) by source; motion = K_θ⁻¹ J_vᵀ u."""
+    """Compute the derivatives of ``along`` = 1/(uᵀ C_vv u) with respect to ``inputs``, by source.
+
+    ``motion`` (nv,) is K_θ⁻¹ J_vᵀ u.
+    """
     right, towards = along * motion, along * u  # squared, the derivative of 1/(uᵀ C_vv u)
     if not K.wrench[3:].any():
         return _gradient(K, inputs, right, towards)
@@ -162,9 +165,10 @@ def _along_gradient(
 
 
 def _gradient(K: Stiffness, inputs: Inputs, motion: Array, direction: Array) -> dict[str, Array]:
-    """Compute the derivatives of zᵀ K_θ z − 2 u·J_v z by source, for constant z and u.
+    """Compute the derivatives of zᵀ K_θ z − 2 u·J_v z with respect to ``inputs``, by source.
 
-    z is ``motion``, u is ``direction``. For z = K_θ⁻¹ J_vᵀ u they are those of −uᵀ C_vv u.
+    z is ``motion`` (nv,), u is ``direction`` (3,); both are constant. For z = K_θ⁻¹ J_vᵀ u the
+    derivatives are those of −uᵀ C_vv u.
     """
     pose, F, k = K.posture, K.tension, K.cable_stiffness
     laws = pose.arm._model.laws
@@ -213,7 +217,7 @@ def _skew_gradient(K: Stiffness, left: Array, right: Array) -> Array:
 
 
 def _tip_gradient(K: Stiffness, inputs: Inputs, direction: Array) -> dict[str, Array]:
-    """Compute the derivatives of the tip's coordinate along u, by source."""
+    """Compute the derivatives of the tip's coordinate along ``direction`` (3,), by source."""
     pose, tree, masses = K.posture, K.posture.arm._model.tree, K.posture.arm._model.masses
     none = {name: np.zeros(len(labels)) for name, labels in inputs.labels.items()}
     origin, rotation = np.zeros_like(tree.translation), np.eye(3)
@@ -229,7 +233,10 @@ def _tip_gradient(K: Stiffness, inputs: Inputs, direction: Array) -> dict[str, A
 
 
 def _stretched_slope(K: Stiffness, strain: Array) -> Array:
-    """Compute d(EA (1 + ε))/dF (C,) [-]: EA′ (1 + ε) + 1; EA′ if l_0 is the stretched length."""
+    """Compute d(EA (1 + ε))/dF = EA′ (1 + ε) + 1 (C,) [-], ε ``strain`` (C,), at the tensions of K.
+
+    It is EA′ if l_0 is the stretched length.
+    """
     arm = K.posture.arm
     slope = np.zeros_like(strain)
     for law, held in arm._model.laws.held:

@@ -41,14 +41,14 @@ class Ties(NamedTuple):
     inputs: Mapping[str, Indices]
 
     def gather(self, gradient: Mapping[str, Array]) -> dict[str, Array]:
-        """Convert derivatives with respect to inputs of the arm of blocks to inputs of the arm."""
+        """Convert ``gradient`` by inputs of the arm of blocks to that by inputs of the arm."""
         found = {source: np.zeros(len(names)) for source, names in self.labels.items()}
         for source, at in self.inputs.items():
             np.add.at(found[source], at[at >= 0], gradient[source][at >= 0])
         return found
 
     def scatter(self, errors: Mapping[str, Array]) -> dict[str, Array]:
-        """Return errors (N, inputs) for the arm as errors for the inputs of the arm of blocks."""
+        """Convert ``errors`` (N, inputs) of the arm's inputs to those of the arm of blocks."""
         found = {}
         for source, drawn in errors.items():
             at = self.inputs.get(source, _NONE)
@@ -101,7 +101,11 @@ def _matching_inputs(
     names: Mapping[str, str],
     behind: Sequence[bool],
 ) -> dict[str, Indices]:
-    """Find the input of the arm for each input of the arm of blocks, ``stuck``, by its name."""
+    """Find the input of the arm for each input of the arm of blocks, ``stuck``, by its name.
+
+    ``cable_of`` is the cable of each block. ``names`` maps site names of the arm of blocks to those
+    of the arm. ``behind`` says which blocks begin at a sticking hole, and so have no lead.
+    """
     theirs, found = inputs_of(arm).labels, {}
     for source, labels in inputs_of(stuck).labels.items():
         at = {name: i for i, name in enumerate(theirs[source])}
