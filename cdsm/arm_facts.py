@@ -160,7 +160,10 @@ class ArmFacts(Printed):
         joint_names: Sequence[str] | None = None,
         tolerances: Tolerances = Tolerances(),  # noqa: B008  # frozen
     ) -> None:
-        """Set all attributes; ``urdf`` is a text that has been checked."""
+        """Check the arguments of :class:`Manipulator`, and set all attributes from them.
+
+        ``urdf`` is a text that has been checked. ``tip`` is the link whose frame is the tip.
+        """
         self._cables = cables = _checked_cables(cables)
         self._gravity = gravity_vector("gravity", gravity)
         one_of("original_length", original_length, get_args(OriginalLength))

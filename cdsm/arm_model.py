@@ -111,10 +111,10 @@ class ArmModel:
 
     @cached_property
     def moving(self) -> tuple[Indices, Indices, Indices, Indices]:
-        """Which joints move which segment, as (a, b, segment, joint).
+        """Cable segments, and joints that change their length, as (a, b, segment, joint).
 
-        ``a`` and ``b`` are the two sites of each segment. ``segment`` and ``joint`` list each pair
-        of a segment and a joint that moves it.
+        ``a`` and ``b`` (n,) are the indices of the two sites of each of n segments. ``segment`` and
+        ``joint`` (m,) are m pairs: a segment, and a joint between the links of its two sites.
         """
         segment, joint = self.routing.segment, self.routing.joint
         over = np.repeat(np.arange(len(segment) - 1), np.diff(segment[:, 3]))
@@ -160,7 +160,10 @@ class ArmModel:
 
 
 def route(body: RigidBody, tree: Tree, cables: Sequence[Cable]) -> Routing:
-    """Return the routing: sites in the frames of their joints, joints that move each segment."""
+    """Return the routing of cables: sites in the frames of their joints, and cable segments.
+
+    Each segment has the joints that change its length. ``tree`` is the kinematic tree of ``body``.
+    """
     row, point, fixed = [], [], np.array([cable.lead for cable in cables])
     parts: list[tuple[int, int, int, int, int]] = []
     joints: list[int] = []
@@ -197,7 +200,7 @@ def route(body: RigidBody, tree: Tree, cables: Sequence[Cable]) -> Routing:
 
 
 def joints_to(tree: Tree, row: int) -> list[int]:
-    """Return the rows of the joints from the base to joint ``row``, base first, ``row`` last."""
+    """Return the rows in ``tree`` of the joints from the base to joint ``row``, ``row`` last."""
     rows: list[int] = []
     while row:
         rows.insert(0, row)

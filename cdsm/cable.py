@@ -178,7 +178,7 @@ class Cable:
     def tangent_stiffness(self, tension: ArrayLike, free_length: float) -> Array:
         """Compute dF/dΔl = 1/(l_0/EA(F) + 1/k_series) [N/m] for any type of motor control.
 
-        Arguments, shapes and errors are those of :meth:`elongation`.
+        Arguments (F, l_0), shapes and errors are those of :meth:`elongation`.
         """
         rigidity = self.elasticity.rigidity(tension)
         return np.asarray(1.0 / (_length(free_length) / rigidity + 1.0 / self.series_stiffness))
@@ -186,7 +186,7 @@ class Cable:
     def energy(self, tension: ArrayLike, free_length: float) -> Array:
         """Compute the energy l_0 ∫ F dε + (F² − F_0²)/(2 k_series) [J]; it is 0 at F_0 = ``rest``.
 
-        Arguments, shapes and errors are those of :meth:`elongation`.
+        Arguments (F, l_0), shapes and errors are those of :meth:`elongation`.
         """
         values = self.elasticity.domain.check(tension)
         spring = (values**2 - self.elasticity.rest**2) / (2.0 * self.series_stiffness)

@@ -125,7 +125,7 @@ class CableLaws:
         )
 
     def narrowed(self, low: Array, high: Array) -> tuple[Array, Array]:
-        """Return tension bounds (…, C) [N], narrowed to the bounds that each cable defines."""
+        """Return tension bounds ``low``, ``high`` (…, C) [N], narrowed to those of each cable."""
         if not self._bounded:
             return low, high
         return frozen(np.maximum(low, self._least)), frozen(np.minimum(high, self._most))
@@ -215,7 +215,10 @@ class CableLaws:
     def naming(
         self, error: ElasticityRangeError, held: slice | NDArray[np.intp]
     ) -> ElasticityRangeError:
-        """Return the error with names and indices of cables; ``held`` selects those of the law."""
+        """Return an error of one law with the names and indices of the cables that it concerns.
+
+        ``held`` selects the cables of this law.
+        """
         outside = np.arange(len(self._cables))[held][list(error.indices)].tolist()
         names = [self._cables[c].name for c in outside]
         return ElasticityRangeError(error.problem, error.tension, outside, names)

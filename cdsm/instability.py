@@ -111,7 +111,7 @@ def _remedies(K: Stiffness) -> Iterator[Remedy]:
     held = [cable for cable in arm.cables if cable.control == "position"]
 
     def margin(changed: Posture, tension: Array) -> float:
-        """Compute the smallest eigenvalue of K_θ at a posture under tensions (C,) [N]."""
+        """Compute the smallest eigenvalue of K_θ of a changed arm under tensions (C,) [N]."""
         k = changed.arm._model.laws.stiffness(changed.cable_lengths, tension)
         return read_margin(changed._joint_stiffness(tension, k, K.wrench)[-1])
 

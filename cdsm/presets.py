@@ -54,8 +54,9 @@ def virtual_prototype_geometry(
 ) -> Geometry:
     """Build the geometry of Section IV: five universal joints, R = 30 mm, disks every 20 mm.
 
-    The paper gives the joints, the hole radius and the disk spacing. Assumptions: three cables per
-    joint that end as in :class:`~cdsm.CableRoute`, no lead, 0.5 kg per link.
+    R is the distance of the holes from the axis. The paper gives the joints, R and the spacing of
+    the disks. Assumptions: three cables per joint that end as in :class:`~cdsm.CableRoute`, no
+    lead, 0.5 kg per link.
 
     Args:
         link_mass: Mass of every link [kg].
@@ -85,10 +86,11 @@ def virtual_prototype(
     gravity: ArrayLike = (0.0, -9.81, 0.0),
     original_length: OriginalLength = "unstrained",
 ) -> Manipulator:
-    """Build the virtual prototype of Section IV.
+    """Build the virtual prototype of Section IV; see :func:`virtual_prototype_geometry`.
 
     Args:
-        elasticity: Elasticity of all cables; the repaired Eq. 19 by default.
+        elasticity: Elasticity of all cables. Default: Eq. 19 with the missing digits filled in, see
+            :meth:`StrandElasticity.eq19_repaired <cdsm.StrandElasticity.eq19_repaired>`.
         link_mass: Mass of every link [kg]; assumed.
         lead: Straight cable between each actuator and the base disk [m]; assumed.
         friction: Friction coefficient in all holes; the paper has none.
@@ -162,7 +164,7 @@ def experimental_prototype(
     this tension to :func:`~cdsm.distribute_tension` as ``fixed``.
 
     Args:
-        elasticity: Elasticity of all cables; the repaired Eq. 19 by default.
+        elasticity: Elasticity of all cables; default as for :func:`virtual_prototype`.
         series_stiffness: Stiffness of the springs of hybrid cables (Fig. 11), or of the drives
             [N/m].
         gravity: Gravity in base axes (3,) [m/s²]; the direction −z is assumed.

@@ -78,7 +78,7 @@ def to_urdf(geometry: Geometry) -> str:
 
 
 def urdf_text(name: str, parts: Iterable[etree._Element], comment: str) -> str:
-    """Return the indented URDF text of a robot, with a comment at the top."""
+    """Return the indented URDF text of a robot with these links and joints, below a comment."""
     robot = E.robot(etree.Comment(comment), *parts, name=name)
     etree.indent(robot, space="  ")
     text: str = etree.tostring(robot, xml_declaration=True, encoding="UTF-8").decode() + "\n"
@@ -86,12 +86,15 @@ def urdf_text(name: str, parts: Iterable[etree._Element], comment: str) -> str:
 
 
 def joint(kind: str, name: str, parent: str, child: str, *parts: etree._Element) -> etree._Element:
-    """Build a joint of type ``kind``; ``parts`` are its origin, axis and limit."""
+    """Build a joint of type ``kind`` from link ``parent`` to link ``child``.
+
+    ``parts`` are its origin, axis and limit.
+    """
     return E.joint(E.parent(link=parent), E.child(link=child), *parts, name=name, type=kind)
 
 
 def origin(xyz: Iterable[float], rpy: str = "0.0 -0.0 0.0") -> etree._Element:
-    """Build the origin of a joint, a body or a shape."""
+    """Build the origin of a joint, a body or a shape: position [m], and angles [rad] as text."""
     return E.origin(xyz=tuple(map(float, xyz)), rpy=rpy)
 
 
@@ -172,7 +175,7 @@ def _cross(name: str, radius: float) -> etree._Element:
 
 
 def _cylinder(material: str, x: float, radius: float, length: float) -> etree._Element:
-    """Build a cylinder along x, centred at x."""
+    """Build a cylinder of a radius and a length [m] along x, centred at x [m]."""
     shape = E.geometry(E.cylinder(radius=radius, length=length))
     place = origin((x, 0.0, 0.0), f"-0.0 {math.pi / 2.0} 0.0")
     return E.visual(shape, place, E.material(name=material))

@@ -160,7 +160,10 @@ def _check_origin(faults: list[str], where: str, element: etree._Element) -> Non
 
 
 def _read(faults: list[str], where: str, text: str | None, count: int) -> tuple[float, ...] | None:
-    """Read the numbers of an attribute; if they are invalid, add a fault and return None."""
+    """Return the ``count`` numbers of an attribute's text; on failure add a fault, return None.
+
+    The fault begins with ``where``.
+    """
     try:
         return numbers(where, text, count)
     except XmlFault as error:
@@ -169,7 +172,10 @@ def _read(faults: list[str], where: str, text: str | None, count: int) -> tuple[
 
 
 def _tree_faults(links: list[str], joints: list[etree._Element]) -> list[str]:
-    """Return faults of the tree: each link but one root must have one parent, without cycles."""
+    """Return faults of the tree of links and joints: each link but the root needs one parent.
+
+    Cycles are faults too.
+    """
     faults: list[str] = []
     known = set(links)
     parents: dict[str, tuple[str, str]] = {}

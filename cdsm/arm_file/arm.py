@@ -126,7 +126,7 @@ def read_arm(path: str | os.PathLike[str], wire: Wire | None) -> ArmParts:
 
 
 def _tolerances(given: object) -> Tolerances:
-    """Read the table [tolerances]; raise GeometryError with every fault."""
+    """Build tolerances from the parsed table [tolerances]; raise GeometryError with every fault."""
     if not isinstance(given, dict):
         raise GeometryError([f"tolerances: is {given!r}; give a table [tolerances]"])
     try:
@@ -161,7 +161,7 @@ def _routed(cables: object, geometry: Geometry | None) -> list[Routed]:
 
 
 def arm_text(parts: ArmParts) -> str:
-    """Return the text of an ARM.toml; InvalidInput if an elasticity cannot be written."""
+    """Return the ARM.toml of an arm's parts; InvalidInput if an elasticity cannot be written."""
     geometry, cables = parts.geometry, parts.cables
     wires, tables = wire_entries(cables)
     settings = [setting_lines(cable) for cable in cables]

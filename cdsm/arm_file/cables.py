@@ -161,7 +161,7 @@ def read_routed(cables: object) -> list[Routed]:
 
 
 def _sites(entry: _Entry) -> tuple[Site, ...]:
-    """Build the sites of a cable; the friction of the cable is the default for its holes."""
+    """Build the sites of the cable in ``entry``; its friction is the default for its holes."""
     passed = range(0 if entry.lead > 0.0 else 1, len(entry.sites) - 1)
     sites = []
     for i, site in enumerate(entry.sites):
@@ -174,7 +174,9 @@ def _sites(entry: _Entry) -> tuple[Site, ...]:
 def build_cables(
     routed: Iterable[Routed], settings: CableSettings, wires: Wires, path: str | os.PathLike[str]
 ) -> tuple[Cable, ...]:
-    """Build the cables. ``settings`` apply to every cable that does not have its own.
+    """Build the routed cables. ``settings`` apply to every cable that does not have its own.
+
+    ``wires`` are the laws of the file ``path``.
 
     Raises:
         GeometryError: Some settings are faulty; lists every fault.
@@ -217,7 +219,10 @@ def setting_lines(cable: Cable) -> list[str]:
 def cable_lines(
     cables: Sequence[Cable], wires: Sequence[str], settings: Sequence[Sequence[str]]
 ) -> list[str]:
-    """Return the lines of the tables ``[[cables]]``; an empty wire is left out."""
+    """Return the lines of the tables ``[[cables]]``; ``wires`` and ``settings`` are for each cable.
+
+    An empty wire is left out.
+    """
     lines = []
     for cable, wire, given in zip(cables, wires, settings, strict=True):
         lines += ["[[cables]]", f"name = {toml_value(cable.name)}"]

@@ -65,7 +65,7 @@ def _tolerance(name: str, value: object) -> Tolerance:
 
 
 def tolerance_lines(tolerances: Tolerances) -> list[str]:
-    """Return one TOML line for each source of uncertainty that is not zero."""
+    """Return one TOML line for each source of ``tolerances`` that is not zero."""
     every, none = ((name, getattr(tolerances, name)) for name in SOURCES), Tolerances()
     return [f"{name} = {_value(value)}" for name, value in every if value != getattr(none, name)]
 

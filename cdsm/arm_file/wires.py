@@ -53,7 +53,10 @@ class Wires(NamedTuple):
 
 
 def read_wires(keys: CableKeys, forced: Elasticity | None) -> Wires:
-    """Read the tables ``[wires.NAME]`` and the wire of all cables; raise GeometryError."""
+    """Read the tables ``[wires.NAME]`` and the wire of all cables from the keys of a file.
+
+    ``forced`` replaces all wires, if given. Raises GeometryError.
+    """
     if not isinstance(keys.wires, dict):
         raise GeometryError([f"wires: is {keys.wires!r}; give tables [wires.NAME]"])
     named, usual, faults = {}, None, []
@@ -74,7 +77,10 @@ def read_wires(keys: CableKeys, forced: Elasticity | None) -> Wires:
 
 
 def read_wire(given: object, named: Mapping[str, Elasticity], key: str = "wire") -> Elasticity:
-    """Return the law for a name, EA [N] or a table; GeometryError names its faults and ``key``."""
+    """Return the law ``given`` as a name (also one of ``named``), as EA [N], or as a table.
+
+    GeometryError names its faults, at ``key``.
+    """
     try:
         if isinstance(given, dict):
             return from_table(given)

@@ -51,7 +51,10 @@ class Assessment(NamedTuple):
 def assess(
     arm: Manipulator, state: PlantState, wrench: Array, u: Array, *, banded: bool
 ) -> Assessment:
-    """Find the frictionless equilibrium near a state, and the proved band about it along u (3,)."""
+    """Find the frictionless equilibrium near a state under ``wrench`` (6,), and K_θ there.
+
+    With ``banded``, also find the proved band of rest about it along u (3,).
+    """
     try:
         K = frictionless_stiffness(arm, state, wrench)
     except CdsmError:
@@ -63,7 +66,7 @@ def assess(
 
 
 def frictionless_stiffness(arm: Manipulator, state: PlantState, wrench: Array) -> Stiffness:
-    """Return K_θ at the equilibrium without friction, with the wire and load of a state.
+    """Return K_θ at the equilibrium without friction, with the wire of a state and a load (6,).
 
     Raises:
         EquilibriumError: There is no equilibrium: the arm buckles.
@@ -85,6 +88,8 @@ def frictionless_stiffness(arm: Manipulator, state: PlantState, wrench: Array) -
 
 def hung_weight(plant: SlowPlant, state: SlowState, u: Array) -> float:
     """Hang a weight on a plant with its motors stopped; return the stiffness [N/m] along u (3,).
+
+    ``state`` is the state of the plant before.
 
     The load is shaken along u, first without the weight and then with it: its amplitude is three
     breakaway loads and fades in four cycles. The weight moves the tip by about 0.1 % of the arm's

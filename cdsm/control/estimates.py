@@ -72,13 +72,19 @@ class Estimate(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Observer:
-    """Estimator of joint angles, rigidity factor and tip force from readings of the motors."""
+    """Estimator of joint angles, rigidity factor s and tip force from :class:`Reading` values.
+
+    ``arm`` is the controller's model. ``sensors`` give the errors of the readings.
+    """
 
     arm: Manipulator
     sensors: Sensors
 
     def begin(self, q: Array, reading: Reading) -> Estimate:
-        """Return the estimate at known joint angles (nv,), with equal tension along each cable."""
+        """Return the first estimate, at known joint angles (nv,) and a reading there.
+
+        The tension is equal along each cable.
+        """
         pose = self.arm.at(q)
         cable = pose.segments.chains.cable
         F = np.maximum(reading.tension, self._least)
@@ -88,7 +94,7 @@ class Observer:
         return Estimate(pose, F, one, force, 1.0, UNSURE**2, natural, shares)
 
     def update(self, before: Estimate, reading: Reading) -> Estimate:
-        """Return the estimate after one more reading."""
+        """Return the estimate after one more reading; ``before`` is the previous estimate."""
         held = self._position_controlled
         F, wire = np.maximum(reading.tension, self._least), reading.wire
         pose, x, variance = before.pose, before.softness, before.variance
@@ -118,7 +124,10 @@ class Observer:
         return self._after_sliding(before, pose, F, x, variance)
 
     def gain(self, estimate: Estimate, reading: Reading) -> Array:
-        """Compute κ = −∂F/∂l_0 (C,) [N/m] at constant lengths; 0 for force-controlled motors."""
+        """Compute κ = −∂F/∂l_0 (C,) [N/m] at the estimated posture and the tensions of a reading.
+
+        The cable lengths are constant. κ is 0 for force-controlled motors.
+        """
         F = np.maximum(reading.tension, self._least)
         stretch = 1.0 + estimate.softness * self._mean_strain(estimate.pose, estimate.shares, F)
         soft = self._compliance(reading.wire, F) * estimate.softness
@@ -127,7 +136,10 @@ class Observer:
     def _after_sliding(
         self, before: Estimate, pose: Posture, F: Array, softness: float, variance: float
     ) -> Estimate:
-        """Move the wire of the model through its holes to a new posture."""
+        """Return the estimate at a new posture, after the wire has slid through the holes.
+
+        ``F`` (C,) [N] are tensions at the motors; ``softness`` and ``variance`` are new too.
+        """
         segments = pose.segments
         chains = segments.chains
         ratio = np.ones(segments.lengths.size)
@@ -158,7 +170,7 @@ class Observer:
         return np.asarray(np.linalg.lstsq(rows, wanted, rcond=None)[0])
 
     def _mean_strain(self, pose: Posture, shares: Array, F: Array) -> Array:
-        """Compute ε̄ (C,) [-] of the law, over the segments of each cable."""
+        """Compute ε̄ (C,) [-] of the law over each cable; ``shares`` are ρ of its segments (S,)."""
         segments = pose.segments
         chains = segments.chains
         strain = np.zeros(segments.lengths.size)

@@ -24,7 +24,7 @@ _LISTED = 3
 
 
 def labelled(run: TrackingRun) -> xarray.Dataset:
-    """Return a Dataset over time, in SI units."""
+    """Return the run as a Dataset over time, in SI units."""
     arm, names = run.plan.arm, "xyz"
     labels: dict[str, Sequence[object] | NDArray[Any]] = {
         "time": run.time,
@@ -67,7 +67,7 @@ def labelled(run: TrackingRun) -> xarray.Dataset:
 
 
 def table(run: TrackingRun) -> pandas.DataFrame:
-    """Return a table over time, in SI units."""
+    """Return the run as a table over time: angles, tip, tensions and stiffness, in SI units."""
     arm = run.plan.arm
     joints = [
         f"{name} [{unit}]" for name, unit in zip(arm.joint_names, arm.joint_units, strict=True)
@@ -83,7 +83,7 @@ def table(run: TrackingRun) -> pandas.DataFrame:
 
 
 def numbers(run: TrackingRun) -> dict[str, Any]:
-    """Return the numbers of the printed table, in SI with units in the keys."""
+    """Return the numbers of the run's printed table, in SI with units in the keys."""
     off = abs(run.stiffness_error)
     felt = abs(run.felt / run.stiffness - 1.0)
     felt = felt[np.isfinite(felt).all(axis=1)].max(axis=1)
@@ -114,7 +114,7 @@ def numbers(run: TrackingRun) -> dict[str, Any]:
 
 
 def rows(run: TrackingRun) -> list[tuple[str, str]]:
-    """Return the lines of the printed table: name and value."""
+    """Return the lines of the run's printed table: name and value."""
     n = numbers(run)
     low, high = n["least_tension_N"], n["largest_tension_N"]
     lines = [

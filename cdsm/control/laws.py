@@ -135,7 +135,7 @@ LAWS: Final[dict[str, Law]] = {
 
 
 def _regulated(moment: Moment) -> Array:
-    """Return the wire (C,) [m] of a PI control of all tensions, in its incremental form."""
+    """Return the wire (C,) [m] to pay out by a PI control of all tensions, in incremental form."""
     now, before, k = moment.reference, moment.reference_before, moment.reference.stiffness
     error = now.tension - moment.reading.tension
     last = before.tension - moment.reading_before.tension

@@ -1,8 +1,8 @@
 """Plant with inertia and damping: MuJoCo simulates the exported model of the arm.
 
-The exported motors have constant stiffness, since MuJoCo knows no other. Here their stiffness and
-force are set to the tangent of their wire's law ten times per step of control, so that the arm has
-the same equilibria as in cdsm. Cables slide freely in their holes.
+Each cable of the exported model is an actuator of constant stiffness, since MuJoCo has no other.
+Here the stiffness and force of each actuator are set to the tangent of the cable's law ten times
+per step of control. So the arm has the same equilibria as in cdsm. Cables slide freely in holes.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ class MuJoCoPlant:
             )
 
     def begin(self, q: Array, tension: Array, wrench: Array) -> MuJoCoState:
-        """Return the arm at rest at joint angles (nv,) with tensions (C,) [N]."""
+        """Return the arm at rest at angles (nv,), with tensions (C,) [N] and a wrench (6,)."""
         import mujoco
 
         pose = self.arm.at(q)
@@ -80,7 +80,7 @@ class MuJoCoPlant:
         return MuJoCoState(model, pose, Reading(wire, tension), frozen(np.zeros(q.size)))
 
     def move(self, state: MuJoCoState, command: Command, wrench: Array) -> MuJoCoState:
-        """Return the arm a period later, under a command and a wrench (6,).
+        """Return the arm one period after ``state``, under a command and a wrench (6,).
 
         Raises:
             SolverError: The simulation diverges.
@@ -110,9 +110,10 @@ class MuJoCoPlant:
         return MuJoCoState(model, pose, Reading(command.wire, frozen(F)), data.qvel.copy())
 
     def _pull(self, model: Any, lengths: Array, command: Command) -> None:
-        """Set each motor to the force F + k (L' − L) when MuJoCo's tendon has the length L'.
+        """Set each actuator of ``model`` to the force F + k (L' − L) at a tendon length L'.
 
-        L (C,) is ``lengths`` [m] without the leads, F the tension there, k the tangent stiffness.
+        L (C,) is ``lengths`` [m], without the leads. F is the tension at L with the commanded wire,
+        and k is the tangent stiffness of the cable.
         """
         cables = self.arm.cables
         L = lengths + [cable.lead for cable in cables]

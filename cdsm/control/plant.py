@@ -40,10 +40,12 @@ class Plant(Protocol[AnyState]):
         """The true arm."""
 
     def begin(self, q: Array, tension: Array, wrench: Array) -> AnyState:
-        """Return the arm at rest at joint angles (nv,) with tensions (C,) [N] along the cables."""
+        """Return the arm at rest at angles (nv,), with tensions (C,) [N] and a wrench (6,)."""
 
     def move(self, state: AnyState, command: Command, wrench: Array) -> AnyState:
-        """Return the arm after its motors followed a command under a wrench (6,).
+        """Return the arm that was in ``state`` after its motors followed a command.
+
+        The load is a wrench (6,).
 
         Raises:
             CdsmError: No equilibrium was found, or a tension leaves the domain of its law.
@@ -93,7 +95,7 @@ class SlowPlant:
         require_unstrained("arm", self.arm)
 
     def begin(self, q: Array, tension: Array, wrench: Array) -> SlowState:
-        """Return the arm at rest at joint angles (nv,) with tensions (C,) [N] along the cables."""
+        """Return the arm at rest at angles (nv,), with tensions (C,) [N] and a wrench (6,)."""
         pose = self.arm.at(q)
         loading = slow_loading(pose, tension, wrench, self.accuracy)
         wire = CableLaws(self.arm.cables, "unstrained").original_lengths(
@@ -109,7 +111,7 @@ class SlowPlant:
         return self.load(state, Load(wrench, np.zeros(self.arm.nv), motors))
 
     def load(self, state: SlowState, load: Load) -> SlowState:
-        """Return the arm under another load and other motors."""
+        """Return the arm that was in ``state`` under another load, which sets the motors too."""
         return state._replace(state=state.loading.carry(state.state, load, "the step")[0])
 
 

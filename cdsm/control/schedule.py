@@ -78,7 +78,7 @@ def checked_plan(plan: PathPlan) -> Manipulator:
 
 
 def tension_controlled(plan: PathPlan, names: Sequence[str] | None) -> NDArray[np.bool_]:
-    """Return which cables (C,) a mixed law controls by tension.
+    """Return which cables (C,) a mixed law controls by tension: ``names``, or a default choice.
 
     The lengths of the other cables, as many as there are joints, give the posture. By default, a
     pivoted QR decomposition of J_Lᵀ chooses those whose lengths give it best at the first sample.

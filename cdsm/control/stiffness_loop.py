@@ -94,7 +94,7 @@ class StiffnessLoop:
         return Replanned(reference, mean, refused)
 
     def _with_softness(self, softness: float) -> Manipulator:
-        """Return the arm with the estimated rigidity of its wire."""
+        """Return the arm with the rigidity of its wires divided by the estimated ``softness``."""
         if abs(softness - self._softness) > _SOFTER:
             self._softness = softness
             self._calibrated = with_rigidity(self.arm, 1.0 / softness)

@@ -149,7 +149,7 @@ def evaluate_designs(
 
 
 def gathered(problem: DesignProblem, rows: Array, found: Sequence[Found]) -> Designs:
-    """Build the :class:`Designs` from the evaluation of each row."""
+    """Build the :class:`Designs` from designs ``rows`` (D, n) and the evaluation of each."""
     width = len(problem.measures)
     return Designs(
         problem=problem,
@@ -164,7 +164,7 @@ _Compute = Callable[[Array], Iterable[Found]]
 
 @contextmanager
 def workers(problem: DesignProblem, jobs: int, client: Client | None) -> Iterator[_Compute]:
-    """Yield a function of designs (D, n) that returns their evaluations, in order."""
+    """Yield a function that evaluates designs (D, n) in order, in processes or on a cluster."""
     whole_number("jobs", jobs, 1)
     if client is not None:
         yield _on_cluster(problem, client)

@@ -42,7 +42,7 @@ class Kind(NamedTuple):
     Attributes:
         words: Name in words.
         unit: SI unit.
-        shown: Unit for people, and its size in SI.
+        shown: Unit shown to the user, and its size in SI.
         best: Whether the largest or the smallest value is best.
         directed: Whether it has a direction.
     """
@@ -127,11 +127,11 @@ class Measure:
 
     @property
     def unit(self) -> tuple[str, float]:
-        """Unit for people, and its size in SI."""
+        """Unit shown to the user, and its size in SI."""
         return KINDS[self.of].shown
 
     def shown(self, value: float) -> str:
-        """Return a value in people's units."""
+        """Return a value [SI] as text, in the unit shown to the user."""
         unit, size = self.unit
         return f"{value / size:.4g} {unit}".rstrip()
 

@@ -47,7 +47,9 @@ leaves out the end of the range, where a design may be special: without lead, no
 def rows_and_gradients(
     problem: DesignProblem, design: Array, measure: Measure
 ) -> tuple[Array, Array]:
-    """Compute a quantity at each posture and load (R,), and its derivatives (R, n).
+    """Compute the quantity ``measure`` of a design (n,) in R cases, and its derivatives (R, n).
+
+    The cases are all combinations of postures and loads of the problem.
 
     ``motor_force`` has a row for each cable too. A constrained quantity includes its margin for
     tolerances. The derivatives are exact but for that of this margin, ± coverage · u: u² is a
@@ -139,7 +141,7 @@ def _margin_slopes(problem: DesignProblem, design: Array, measure: Measure) -> A
 
 
 def _reading(K: Stiffness, measure: Measure, posed: Posed) -> tuple[float, Array]:
-    """Return a reading of a stiffness and its derivatives with respect to the variables (n,)."""
+    """Return the quantity ``measure`` of a stiffness, and its derivatives by the variables (n,)."""
     if measure.of == "deflection":
         force = K.wrench[:3]
         value, partial = _displacement(K, force)

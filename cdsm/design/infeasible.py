@@ -57,7 +57,7 @@ def explain(designs: Designs) -> NoReturn:
 
 
 def _first_reason(designs: Designs, best: int) -> str:
-    """Return why the arm is not balanced, or not stable, at the first posture not held."""
+    """Return why the arm of design ``best`` is not balanced or stable at the first such posture."""
     problem, row = designs.problem, designs.designs[best]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", CdsmWarning)

@@ -46,7 +46,7 @@ choose(document.body.dataset.compromise);
 
 
 def page_of(found: DesignSearch) -> Document:
-    """Return a page in HTML that needs no other file and no network."""
+    """Return the page of a search in HTML; it needs no other file and no network."""
     arms, count = [], len(found.front)
     chosen = np.linspace(0, count - 1, min(count, _SHOWN)).round()
     shown = np.unique(np.append(chosen, found.compromise)).astype(int).tolist()
@@ -78,7 +78,7 @@ def page_of(found: DesignSearch) -> Document:
 
 
 def _pictures(found: DesignSearch, shown: list[int]) -> list[str]:
-    """Draw designs of the front at the first posture, all to the same scale; return data URLs."""
+    """Draw the designs ``shown`` of the front at the first posture, to one scale, as data URLs."""
     poses = []
     for number in shown:
         arm = found.arm(number)

@@ -45,7 +45,7 @@ class Found(NamedTuple):
 
 
 def measure(problem: DesignProblem, row: Array) -> Found:
-    """Compute the quantities of one design (n,)."""
+    """Compute the quantities of one design ``row`` (n,)."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", CdsmWarning)  # cables may share a hole
@@ -92,7 +92,7 @@ class _Arm:
         return np.array([self._value(each) for each in self.problem.measures])
 
     def rows(self, each: Measure) -> Array:
-        """Return a quantity that depends on tensions at all postures and loads that are held."""
+        """Return a quantity that depends on tensions, at all postures and loads that are held."""
         held, problem = self.held, self.problem
         C = self.found["compliance"][held][:, :3, :3]
         if each.of == "stiffness":
@@ -189,7 +189,7 @@ def margin(
 
 
 def _volume(tips: Array) -> float:
-    """Return the volume [m³] of the convex hull of points (n, 3) [m]; 0 if they are coplanar."""
+    """Return the volume [m³] of the convex hull of tips (n, 3) [m]; 0 if they are coplanar."""
     from scipy.spatial import ConvexHull, QhullError
 
     try:

@@ -149,7 +149,7 @@ class _PostureNotHeld(Exception):
 
 
 def _all_rows(problem: DesignProblem, x: Array, size: Array) -> dict[str, _Rows]:
-    """Compute all quantities of the design x (n,); ``size`` is the range of each variable (n,)."""
+    """Compute all quantities of the problem for a design x (n,); ``size`` (n,) are the ranges."""
     found: dict[str, _Rows] = {}
     for each in (*problem.objectives, *problem.constraints):
         if each.key not in found:

@@ -162,7 +162,7 @@ class DesignSearch(ReadOnlyState):
 
     @property
     def _front(self) -> Designs:
-        """The designs of the front, with their quantities."""
+        """The designs of the Pareto front, with their quantities."""
         whole = self.evaluated
         return replace(
             whole,
@@ -219,7 +219,7 @@ class DesignSearch(ReadOnlyState):
         return "\n".join([head, *aligned(self._table()[: _PRINTED + 1])])
 
     def _table(self) -> list[list[str]]:
-        """Return head and rows of the front in people's units."""
+        """Return head and rows of the front in units shown to the user."""
         problem = self.problem
         head = ["design", *(v.name for v in problem.variables), *(m.key for m in problem.measures)]
         rows = [head]

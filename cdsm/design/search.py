@@ -133,13 +133,13 @@ def pareto(designs: Designs) -> Indices:
 
 
 def _unknown(kept: Store, designs: Array) -> Array:
-    """Return the designs that are not evaluated yet, each once."""
+    """Return those of ``designs`` (D, n) that are not in the store yet, each once."""
     new = {row.tobytes(): row for row in designs if kept.get(row) is None}
     return np.array([*new.values()]).reshape(-1, designs.shape[1])
 
 
 def progress_of(problem: DesignProblem, generation: int, values: Array) -> DesignProgress:
-    """Return the state of a search that has evaluated designs with these quantities (D, m)."""
+    """Return the state of a search after a generation, from quantities (D, m) of all designs."""
     missed = violations(problem, values).sum(axis=1)
     feasible = missed == 0.0
     first = problem.objectives[0]
@@ -151,7 +151,7 @@ def progress_of(problem: DesignProblem, generation: int, values: Array) -> Desig
 
 
 def _algorithm(problem: DesignProblem, population: int, generations: int, seed: int) -> Any:
-    """Build pymoo's algorithm, ready for its first ``ask``."""
+    """Build pymoo's NSGA-II for a problem, ready for its first ``ask``."""
     from pymoo.algorithms.moo.nsga2 import NSGA2
     from pymoo.core.mixed import (
         MixedVariableDuplicateElimination,
@@ -200,7 +200,7 @@ def _numbers(problem: DesignProblem, chosen: dict[str, Any]) -> Array:
 def _tell(
     problem: DesignProblem, algorithm: Any, asked: Any, designs: Array, evaluated: list[Found]
 ) -> None:
-    """Give pymoo the objectives and violations of the designs that it asked for."""
+    """Give pymoo's algorithm the objectives and violations of the designs that it ``asked`` for."""
     whole = gathered(problem, designs, evaluated)
     goals = np.column_stack([each.sign * whole[each.key] for each in problem.objectives])
     missed = np.nan_to_num(whole.violations, nan=_FAR, posinf=_FAR)

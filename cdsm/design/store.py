@@ -70,11 +70,11 @@ class Store:
             self._path.write_text(whole, encoding="utf-8")
 
     def get(self, row: Array) -> Found | None:
-        """Return the recorded evaluation of a design (n,), or None."""
+        """Return the recorded evaluation of a design ``row`` (n,), or None."""
         return self._found.get(row.tobytes())
 
     def add(self, rows: Iterable[Array], found: Iterable[Found]) -> None:
-        """Record the evaluations of some designs."""
+        """Record the evaluations ``found`` of designs ``rows``, (n,) each."""
         lines = []
         for row, each in zip(rows, found, strict=True):
             self._found[row.tobytes()] = each

@@ -117,7 +117,7 @@ class Variable:
         return not self.choices and self.of not in WHOLE
 
     def shown(self, value: Value) -> str:
-        """Return a value in people's units: mm, degrees, N."""
+        """Return a value [SI] as text, in the unit shown to the user: mm, degrees, N."""
         unit = UNITS.get(self.of)
         if unit is None or isinstance(value, str):
             return f"{value}" if isinstance(value, (str, int)) else f"{value:g}"
@@ -140,7 +140,10 @@ class Changed(NamedTuple):
 
 
 def changed(geometry: Geometry, variables: Sequence[Variable], values: Iterable[Value]) -> Changed:
-    """Return the parts of the arm with these values; GeometryError if they make no arm."""
+    """Return the parts of the arm in which ``variables`` have ``values`` [SI].
+
+    GeometryError if the values make no arm.
+    """
     wire: Wire | None = None
     minimum = None
     joints, links, cables = [*geometry.joints], [*geometry.links], [*geometry.cables]
@@ -209,7 +212,11 @@ def _even(geometry: Geometry, count: int) -> list[CableRoute]:
 
 
 def present(variable: Variable, geometry: Geometry, minimum: float) -> float | None:
-    """Return the value of a variable in an arm; None if joints or cables have different values."""
+    """Return the present value of a variable in an arm [SI].
+
+    ``minimum`` is the present lower bound of all tensions [N]. None if joints or cables have
+    different values, or for a wire.
+    """
     k = variable.at - 1 if isinstance(variable.at, int) else None
     of: dict[str, Callable[[], list[float]]] = {
         "hole_radius": lambda: [*geometry.hole_radii],

@@ -12,13 +12,13 @@ def listed(faults: Sequence[str], most: int | None = None) -> str:
 
 
 def counted(faults: Sequence[str], most: int | None = None) -> str:
-    """Return the number of faults, with :func:`listed` below it."""
+    """Return the number of faults, and below it :func:`listed`, with at most ``most`` of them."""
     count = "1 fault" if len(faults) == 1 else f"{len(faults)} faults"
     return f"{count}:{listed(faults, most)}"
 
 
 def first_of(said: Sequence[str], most: int, what: str) -> str:
-    """Return the first ``most`` texts and the number of the others: ``…; and 3 joints more``."""
+    """Return the first ``most`` texts, and how many ``what`` follow: ``…; and 3 joints more``."""
     more = len(said) - most
     return "; ".join(said[:most]) + (f"; and {more} {what} more" if more > 0 else "")
 

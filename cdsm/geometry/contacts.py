@@ -50,7 +50,8 @@ def overlapping(disks: Sequence[Disk], poses: dict[str, Array]) -> list[tuple[st
 def _projected(points: Array, centre: Array, axis: Array, half: Array, radius: Array) -> Array:
     """Project one point onto each of n solid cylinders: return the nearest points (n, 3).
 
-    ``axis`` (n, 3) are unit vectors; ``half`` (n,) is half the length of each cylinder.
+    ``points`` and the centres are (n, 3) [m], ``axis`` (n, 3) are unit vectors. ``half`` (n,) is
+    half the length of each cylinder, ``radius`` (n,) its radius [m].
     """
     offset = points - centre
     along = np.einsum("ni,ni->n", offset, axis)

@@ -128,10 +128,10 @@ class Disk(NamedTuple):
     radius: float
 
     def radius_of(self, route: CableRoute) -> float:
-        """Return the distance of the hole of a cable from the axis of the disk [m]."""
+        """Return the distance of the hole of a cable ``route`` from the axis of the disk [m]."""
         return self.hole_radius if route.radius is None else route.radius
 
     def hole(self, route: CableRoute) -> tuple[float, float, float]:
-        """Return the hole (x, R cos φ, R sin φ) of a cable, in the frame of the link [m]."""
+        """Return the hole (x, R cos φ, R sin φ) of a cable ``route``, in the link's frame [m]."""
         radius = self.radius_of(route)
         return self.x, radius * math.cos(route.angle), radius * math.sin(route.angle)

@@ -185,7 +185,7 @@ def _cable(
 
 
 def _urdf(name: str, bodies: Sequence[Body]) -> str:
-    """Return the URDF text. ``tool0`` is at the end of the last link."""
+    """Return the URDF text of a robot with these bodies. ``tool0`` is at the end of the last."""
     links, joints = [E.link(name=BASE)], []
     names = [BASE, *(body.name for body in bodies)]
     for body in bodies:

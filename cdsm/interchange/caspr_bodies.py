@@ -144,7 +144,10 @@ def _body(element: etree._Element, name: str) -> Body:
 
 
 def _single_joints(name: str, kind: str, joint: etree._Element) -> tuple[SingleJoint, ...]:
-    """Read the single joints, in the order of CASPR's coordinates."""
+    """Split a CASPR joint of type ``kind`` into single joints, in the order of its coordinates.
+
+    ``name`` is that of the link.
+    """
     if kind in _JOINTS:
         parts: list[tuple[str, str, tuple[float, ...]]] = [
             (axis, "revolute", _AXES[axis])

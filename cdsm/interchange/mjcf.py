@@ -57,7 +57,7 @@ class MuJoCoModel:
     motion: Motion
     actuators: str
     unstable: str | None  # the warning for an unstable arm
-    remarks: tuple[str, ...]  # lines for people on what was chosen
+    remarks: tuple[str, ...]  # lines shown to the user on what was chosen
 
 
 def to_mjcf(
@@ -160,7 +160,7 @@ def mujoco_model(
     damping_ratio: float | None = None,
     damping: float | None = None,
 ) -> MuJoCoModel:
-    """Build the model of :func:`to_mjcf`, with the settings that were chosen for it."""
+    """Build the model of :func:`to_mjcf`, with its settings; the arguments are the same."""
     instance("arm", arm, Manipulator)
     if (pose is None) != (tension is None):
         raise InvalidInput("tension", "give pose and tension, or neither.")
@@ -213,7 +213,7 @@ def mujoco_model(
 
 
 def _checked(name: str, value: float | None) -> float | None:
-    """Return a damping as a float; it must not be negative."""
+    """Return the damping ``name`` as a float; it must not be negative."""
     if value is None:
         return None
     if (number := scalar(name, value)) < 0.0:
@@ -244,7 +244,10 @@ def _without_motors(K: Stiffness) -> Stiffness:
 def _cables(
     root: etree._Element, arm: Manipulator, K: Stiffness | None, actuators: str, damping: Array
 ) -> list[float]:
-    """Add the tendons and their actuators. Return ``ctrl`` of the motors at the posture."""
+    """Add the tendons with their damping (C,) [N s/m], and their actuators, to ``root``.
+
+    Return ``ctrl`` of the motors at the posture.
+    """
     tendon, motors = etree.SubElement(root, "tendon"), etree.Element("actuator")
     at_start = []
     for c, cable in enumerate(arm.cables):

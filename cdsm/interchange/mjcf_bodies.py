@@ -31,7 +31,7 @@ _GHOST = {"contype": "0", "conaffinity": "0", "mass": "0"}  # drawn, without mas
 
 
 def add_bodies(root: etree._Element, arm: Manipulator, start: Mapping[str, float]) -> list[Carried]:
-    """Add the tree of links, its joints at the coordinates ``start`` [rad, m]; return its masses.
+    """Add the tree of links to ``root``, joints at ``start`` [rad, m]; return the masses.
 
     MuJoCo's ``ref`` is the coordinate of a joint in the configuration in which the file places the
     bodies: a joint is moved by qpos − ref. So a new ``mjData`` starts there.
@@ -130,7 +130,10 @@ def _inertia(inertia: etree._Element, R: Array) -> Array:
 
 
 def _shape(body: etree._Element, visual: etree._Element) -> bool:
-    """Draw a cylinder, box or sphere; return False for other shapes. Meshes are separate files."""
+    """Add a ``visual`` of a URDF to a body; return False unless it is a cylinder, box or sphere.
+
+    Meshes are left out, since they are separate files.
+    """
     shape = visual.find("geometry/*")
     if shape is None or shape.tag not in ("cylinder", "box", "sphere"):
         return False
@@ -147,7 +150,10 @@ def _shape(body: etree._Element, visual: etree._Element) -> bool:
 def _sticks(
     body: etree._Element, ends: list[Array], sites: list[tuple[float, ...]], radius: float
 ) -> None:
-    """Draw a link as sticks from its frame to the next joints, and thin ones to its sites."""
+    """Draw a body as sticks of a radius [m] from its frame to the next joints, at ``ends``.
+
+    Thin sticks join them to its sites.
+    """
     lines = [np.array([np.zeros(3), end]) for end in ends if np.linalg.norm(end) > radius]
     bones = [(line, radius) for line in lines]
     for site in map(np.asarray, dict.fromkeys(sites)):
@@ -160,7 +166,10 @@ def _sticks(
 
 
 def _placed(element: etree._Element, kind: str | None = None, start: float = 0.0) -> dict[str, str]:
-    """Return MJCF's pos and quat of a body; its joint, if any, has the coordinate ``start``."""
+    """Return MJCF's pos and quat for the origin of a URDF element.
+
+    For a joint of type ``kind``, the body is moved to its coordinate ``start``.
+    """
     place, turn = _origin(element)
     if kind is not None and start:
         axis = _axis(element) / np.linalg.norm(_axis(element))

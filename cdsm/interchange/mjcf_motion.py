@@ -32,7 +32,7 @@ class Motion(NamedTuple):
     time_step: float  # [s]
     wires: Array  # damping of the cables (C,) [N s/m]
     joints: float  # damping of every joint [N m s/rad], [N s/m] where it slides
-    said: tuple[str, str]  # lines for people
+    said: tuple[str, str]  # lines shown to the user
 
 
 def choose_motion(
@@ -42,7 +42,7 @@ def choose_motion(
     ratio: float | None,
     damping: float | None,
 ) -> Motion:
-    """Choose the time step for the highest natural frequency, and the damping.
+    """Choose the time step for the highest natural frequency of K and ``masses``, and the damping.
 
     If ``damping`` of the joints is None, the cables damp with c = β k; β gives the least damped
     mode the ``ratio``. Joint dampers that damp this mode as much would slow down the slow motions
@@ -73,7 +73,10 @@ def choose_motion(
 
 
 def _time_step(omega: float) -> float:
-    """Choose a time step [s] for the fastest motion [1/s]: 1, 2 or 5 times a power of ten."""
+    """Choose a time step [s] for the natural frequency ``omega`` [rad/s] of the fastest mode.
+
+    It is 1, 2 or 5 times a power of ten.
+    """
     if omega * _DEFAULT_STEP <= _PHASE:
         return _DEFAULT_STEP
     power = math.floor(math.log10(_PHASE / omega))

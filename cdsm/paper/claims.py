@@ -124,7 +124,7 @@ def _deviation(claim: Claim) -> float:
 
 
 def to_rows(figures: Sequence[Figure]) -> list[tuple[str, ...]]:
-    """Return one row of text per claim; :data:`HEADER` names the columns."""
+    """Return one row of text per claim of ``figures``; :data:`HEADER` names the columns."""
     return [
         (
             claim.figure,
@@ -143,19 +143,19 @@ def to_rows(figures: Sequence[Figure]) -> list[tuple[str, ...]]:
 
 
 def to_markdown(figures: Sequence[Figure]) -> str:
-    """Return a Markdown table of the claims with their assumptions, and further tables."""
+    """Return a Markdown table of all claims of ``figures`` with assumptions, and further tables."""
     further = [table for figure in figures for table in figure.tables()]
     return "\n\n".join([markdown_table(HEADER, to_rows(figures)), EXPLANATION, *further]) + "\n"
 
 
 def markdown_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Return a table in Markdown."""
+    """Return a table in Markdown, with ``header`` above ``rows``."""
     lines = [header, ("---",) * len(header), *rows]
     return "\n".join(f"| {' | '.join(cells)} |" for cells in lines)
 
 
 def to_dict(figures: Sequence[Figure]) -> dict[str, object]:
-    """Return all curves (plain SI numbers) and claims, ready for JSON."""
+    """Return all curves (plain SI numbers) and claims of ``figures``, ready for JSON."""
     return {
         figure.name: {
             "title": figure.title,

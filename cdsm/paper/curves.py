@@ -112,6 +112,7 @@ class Pair(NamedTuple):
         """Build a claim; ``measure`` computes its numbers, once for each of the three readings.
 
         ``measure`` takes the stiffness (N, 3) and the share of the figure's part in it (N, 3).
+        ``searched`` and ``texts`` are fields of the claim.
         """
         paper, original = self.stretched, self.original
         return Claim(
@@ -126,7 +127,10 @@ class Pair(NamedTuple):
 def over_cases(
     label: str, q: Array, cases: Sequence[tuple[Elasticity, float]], swept: Array, part: Part
 ) -> Pair:
-    """Compute curves over cases (law, lower bound of tension [N]) at one posture q (nv,) [rad]."""
+    """Compute curves over N cases (law, lower bound of tension [N]) at one posture q (nv,) [rad].
+
+    ``label`` names the curves, ``swept`` (N,) is their abscissa, ``part`` a term of K_θ.
+    """
 
     def curve(length: OriginalLength) -> Curve:
         arm = cache(partial(presets.virtual_prototype, original_length=length))
@@ -149,12 +153,12 @@ def over_cases(
 
 
 def over_minimum(label: str, law: Elasticity, q: Array, minima: Array) -> Pair:
-    """Compute curves over the lower bound of tension (N,) [N], with the active part."""
+    """Compute curves over lower bounds of tension ``minima`` (N,) [N], with the active part."""
     return over_cases(label, q, [(law, minimum) for minimum in minima], minima, "active")
 
 
 def at_minimum(arm: Manipulator, q: Array, minimum: float) -> Stiffness:
-    """Compute the stiffness at a posture, with the least tensions above a lower bound [N]."""
+    """Compute the stiffness at a posture, with the least tensions not below ``minimum`` [N]."""
     pose = arm.at(q)
     return stiffness(pose, distribute_tension(pose, minimum))
 

@@ -71,7 +71,7 @@ def band(tension: ArrayLike) -> tuple[Array, Array]:
 
 
 def powers(tension: ArrayLike, slope: bool = False) -> Array:
-    """Return a row of powers Fⁱ, i = 0 to 6, for each tension, or of derivatives i Fⁱ⁻¹."""
+    """Return powers Fⁱ (N, 7), i = 0 to 6, of N tensions F; with ``slope`` derivatives i Fⁱ⁻¹."""
     F, i = np.atleast_1d(np.asarray(tension, dtype=np.float64))[:, None], np.arange(7)
     return np.asarray(i * F ** np.maximum(i - 1, 0) if slope else F**i)
 

@@ -178,7 +178,10 @@ def _over_tension(fit: PrototypeFit) -> list[Trace]:
 def _configurations(
     fit: PrototypeFit, swept: Array, curves: Sequence[Array], paper: Sequence[float]
 ) -> tuple[Trace, ...]:
-    """Build a trace per configuration, relative to its first value; the paper gives the last."""
+    """Build a trace per configuration of the fitted prototype: a curve relative to its first value.
+
+    ``curves`` have the computed stiffness over ``swept`` (N,), ``paper`` the paper's last value.
+    """
     named = zip(("first", "second"), fit.prototype.configurations, strict=True)
     labels = [f"{which}: {', '.join(f'{x:.0f}°' for x in np.rad2deg(q))}" for which, q in named]
     return tuple(

@@ -83,7 +83,11 @@ def figure_lead() -> LeadFigure:
 
 
 def _changes(lead: float, length: OriginalLength) -> Array:
-    """Compute the change of K_R and of the stiffness for a weight, in x, y and z (2, 3) [%]."""
+    """Compute the change of K_R and of the stiffness for a weight, in x, y and z (2, 3) [%].
+
+    The change is from the first to the last tension of :data:`MINIMA`, at a lead [m] and an
+    ``original_length``.
+    """
     arm = presets.virtual_prototype(presets.ELASTIC_STAGE, lead=lead, original_length=length)
     q = np.full(arm.nv, presets.TEN_DEGREES)
     first, last = (readings(at_minimum(arm, q, F)) for F in MINIMA)
@@ -91,7 +95,11 @@ def _changes(lead: float, length: OriginalLength) -> Array:
 
 
 def _first_fall(changes: Array, length: OriginalLength, reading: int) -> tuple[float, ...]:
-    """Find the lead [mm] above which stiffness falls, for x, y and z; 0 if it always falls."""
+    """Find the lead [mm] above which stiffness falls, for x, y and z; 0 if it always falls.
+
+    ``changes`` (N, 3) [%] are the changes at :data:`LEADS` for one original length; ``reading`` is
+    their row in :func:`_changes`.
+    """
 
     def crossing(axis: int) -> float:
         if changes[0, axis] < 0.0:

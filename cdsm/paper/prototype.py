@@ -50,9 +50,9 @@ class Prototype:
         level_2: Tension of row 2 of Table II [N]. Row 1 is at 3 N, row 5 at 86 N.
         level_3: Tension of row 3 of Table II [N].
         level_4: Tension of row 4 of Table II [N].
-        weight_x: Weight along x that measured Table II [N]; 0 means an infinitesimal weight.
-        weight_y: Weight along y [N].
-        weight_z: Weight along −z, as it hangs [N].
+        weight_x: Force of the weight in tests along x of Table II [N]; 0: an infinitesimal weight.
+        weight_y: Force of the weight in tests along y [N].
+        weight_z: Force of the weight in tests along z, which acts along −z [N].
     """
 
     link_length: float
@@ -83,7 +83,7 @@ class Prototype:
 
     @property
     def weights(self) -> Array:
-        """Forces that measured Table II (3, 3) [N], one per row."""
+        """Forces of the weights in the tests of Table II (3, 3) [N]: rows for tests in x, y, z."""
         return np.diag([self.weight_x, self.weight_y, -self.weight_z])
 
     @property
@@ -92,7 +92,10 @@ class Prototype:
         return POSTURE, np.array([self.angle_1, self.angle_2, self.angle_3])
 
     def arm(self, cable_stiffness: float | None = None) -> Manipulator:
-        """Build the arm with the strand or with hybrid cables [N/m]; GeometryError if invalid."""
+        """Build the arm with the strand, or with hybrid cables of ``cable_stiffness`` [N/m].
+
+        GeometryError if the dimensions are invalid.
+        """
         return presets.experimental_prototype(
             presets.STRAND_1X19 if cable_stiffness is None else _RIGID,
             series_stiffness=self.drive_stiffness if cable_stiffness is None else cable_stiffness,
@@ -114,11 +117,17 @@ class Prototype:
         return self._measured(pose, tensions, np.zeros((3, 3)))
 
     def weigh(self, pose: Posture, tensions: ArrayLike) -> Array:
-        """Compute weight over displacement (N, 3) [N/m]; errors as for :meth:`measure`."""
+        """Compute weight over displacement (N, 3) [N/m] at N reported tensions [N].
+
+        Errors are those of :meth:`measure`.
+        """
         return self._measured(pose, tensions, self.weights)
 
     def _measured(self, pose: Posture, tensions: ArrayLike, weights: Array) -> Array:
-        """Compute the stiffness along x, y and z: secant with a weight, tangent without."""
+        """Compute the stiffness (N, 3) [N/m] along x, y and z at N reported tensions [N].
+
+        It is the secant under a row of ``weights`` (3, 3) [N], the tangent where a row is zero.
+        """
         forced = [cable.name for cable in pose.arm.cables if cable.control == "force"]
         rows = []
         for tension in np.atleast_1d(np.asarray(tensions, dtype=np.float64)).tolist():

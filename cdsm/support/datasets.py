@@ -25,7 +25,7 @@ def check_sweep(dataset: object) -> None:
 
 
 def status_names(dataset: xarray.Dataset) -> dict[int, str]:
-    """Return the word for each value of ``status``, or raise :class:`~cdsm.InvalidInput`."""
+    """Return the word for each value of a sweep's ``status``; InvalidInput if there are none."""
     flags = dataset["status"].attrs
     try:
         values = np.atleast_1d(flags["flag_values"]).tolist()

@@ -16,7 +16,7 @@ MODEL: Final = "frictionless, rigid links, tangent"
 
 
 def coordinates(values: Iterable[float], form: str = ".4g") -> str:
-    """Return a vector as text: ``(0, 0.5, 1)``."""
+    """Return a vector as text, such as ``(0, 0.5, 1)``; ``form`` is the format of each number."""
     return f"({', '.join(format(x, form) for x in values)})"
 
 
@@ -27,7 +27,10 @@ def rounded(value: float, *, up: bool) -> str:
 
 
 def span(values: Array, form: Callable[[float], str] = "{:.4g}".format) -> str:
-    """Return the range of some numbers as text: ``2 to 5``, or ``2`` if all are printed alike."""
+    """Return the range of ``values`` as text, such as ``2 to 5``, or ``2`` if both ends look alike.
+
+    ``form`` writes one number.
+    """
     low, high = form(float(values.min())), form(float(values.max()))
     return low if low == high else f"{low} to {high}"
 
@@ -58,12 +61,15 @@ def plural(count: int, noun: str) -> str:
 
 
 def place(value: float, unit: str) -> str:
-    """Return a joint coordinate [rad or m] as people read it: ``12.5°`` or ``30 mm``."""
+    """Return a joint coordinate [rad or m] in units shown to the user: ``12.5°`` or ``30 mm``."""
     return f"{math.degrees(value):.4g}°" if unit == "rad" else f"{1e3 * value:.4g} mm"
 
 
 def beyond(joint: str, value: float, low: float, high: float, unit: str) -> str:
-    """Return a sentence which says that a joint coordinate [rad or m] is beyond its limits."""
+    """Return a sentence: the coordinate of a joint is beyond its limits ``low`` and ``high``.
+
+    ``unit`` of the numbers is rad or m.
+    """
     said = f"{joint} = {place(value, unit)} is outside {place(low, unit)} to {place(high, unit)}"
     return f"{said} ({value:.4g} {unit} of {low:.4g} to {high:.4g} {unit})"
 

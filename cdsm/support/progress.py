@@ -29,7 +29,10 @@ class _Items(Sized, Iterable[_Item], Protocol[_Item]):
 
 
 def track(items: _Items[_Item], what: str, *, wanted: bool = True) -> Iterator[_Item]:
-    """Yield the items, and show a bar with the number of finished items."""
+    """Yield the items, and show a bar called ``what`` with the number of finished items.
+
+    The bar is not shown unless ``wanted``.
+    """
     with progress_bar(what, len(items), wanted=wanted) as advance:
         for item in items:
             yield item
@@ -40,8 +43,9 @@ def track(items: _Items[_Item], what: str, *, wanted: bool = True) -> Iterator[_
 def progress_bar(
     what: str, total: int | None = None, done: int = 0, *, wanted: bool = True, rate: bool = False
 ) -> Iterator[Callable[[int], None]]:
-    """Show a bar, and yield a function that advances it; ``total`` None: the end is unknown.
+    """Show a bar called ``what``, and yield a function that advances it by a number of items.
 
+    ``total`` is the number of all items; None: unknown. ``done`` of them are finished already.
     ``rate`` adds the number of items per second, without those that were ``done`` before. If the
     bar is not ``wanted``, bars opened inside it are not shown either.
     """

@@ -41,7 +41,7 @@ def _plain(value: object) -> object:
 
 
 def _in_range(kind: str, zero: bool = False) -> Callable[[float], float]:
-    """Return a validator that checks a value against its range in ``RANGES``."""
+    """Return a validator that checks a value against the range ``kind`` of ``RANGES``, or zero."""
 
     def check(value: float) -> float:
         problem = within(kind, value, zero=zero)
@@ -74,7 +74,7 @@ ONE, EACH = "(one)", "(each)"
 
 
 def one_or_each(value: object) -> str:
-    """Return the pydantic tag of a value: one for all joints, or a list with one for each."""
+    """Return the pydantic tag of a value: whether it is one for all joints, or one for each."""
     return EACH if isinstance(value, (list, tuple)) or getattr(value, "ndim", False) else ONE
 
 
@@ -119,7 +119,10 @@ def checked_keywords(function: _Function) -> _Function:
 
 
 def _reporting(validated: _Function, kind: Callable[..., Any]) -> _Function:
-    """Return the function such that it raises one :class:`GeometryError`, not pydantic's error."""
+    """Return ``validated`` such that it raises one :class:`GeometryError`, not pydantic's error.
+
+    ``kind`` is the record or function whose keywords the error names.
+    """
 
     @wraps(validated)
     def call(*args: object, **values: object) -> object:
@@ -148,14 +151,14 @@ def read_toml(text: str) -> dict[str, Any]:
 
 
 def parse(kind: type[_Record], data: object) -> _Record:
-    """Build a record from parsed TOML; raise one :class:`GeometryError` that lists all faults."""
+    """Build a record of class ``kind`` from parsed TOML; a GeometryError lists all faults."""
     # only from JSON does pydantic's strict mode accept a table as a record and an array as a tuple;
     # JSON has no dates, so they become strings, which only names accept
     return _reporting(TypeAdapter(kind).validate_json, kind)(json.dumps(data, default=str))
 
 
 def toml_lines(record: object, keys: Iterable[str] | None = None) -> list[str]:
-    """Return one TOML line for each field that is not None."""
+    """Return one TOML line for each field of a record that is not None; ``keys``: only these."""
     names = keys or [field.name for field in fields(record)]  # type: ignore[arg-type]
     values = ((name, getattr(record, name)) for name in names)
     return [f"{name} = {toml_value(value)}" for name, value in values if value is not None]

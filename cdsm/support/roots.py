@@ -18,11 +18,12 @@ def rising_root(
     stretch: Callable[[Array], Array],
     slope: Callable[[Array], Array],
 ) -> tuple[Array, Array]:
-    """Solve stretch(F) = wanted for tensions F [N] between bounds; stretch must rise with F.
+    """Solve stretch(F) = wanted for tensions F [N]; stretch must rise with F.
 
-    Return the tensions and the slopes of stretch there. All arrays have the same shape; an upper
-    bound may be infinite. Newton's method runs inside a shrinking bracket, so it converges for
-    every rising function. scipy's ``find_root`` and ``brentq`` take ten times as long.
+    The search begins at ``guess`` and stays between ``lower`` and ``upper``; ``upper`` may be inf.
+    Return the tensions, and the values of ``slope``, the derivative of stretch, there. All arrays
+    have the same shape. Newton's method runs inside a shrinking bracket, so it converges for every
+    rising function. scipy's ``find_root`` and ``brentq`` take ten times as long.
     """
     first, last, previous = lower, upper, np.full(np.shape(wanted), math.inf)
     guess = np.minimum(np.maximum(guess, first), last)

@@ -92,21 +92,21 @@ def read_table(
 
 
 def _rows_of_numbers(lines: list[tuple[int, str]], delimiter: str) -> int:
-    """Count the lines with two numbers or more, if this is the delimiter."""
+    """Count the lines that have two numbers or more with this delimiter."""
     table = Table([], [], delimiter)
     cells = ([cell.strip(' "') for cell in line.split(delimiter)] for _, line in lines)
     return sum(sum(not math.isnan(table.number(cell)) for cell in row) > 1 for row in cells)
 
 
 def name_and_unit(cell: str) -> tuple[str, str]:
-    """Split a header such as ``joint1 [deg]``; without brackets the unit is empty."""
+    """Split a header cell such as ``joint1 [deg]``; without brackets the unit is empty."""
     found = re.fullmatch(r"(.*?)\s*(?:\[(.*)\])?", cell, re.DOTALL)
     assert found is not None
     return found[1], found[2] or ""
 
 
 def named_columns(table: Table, refuse: Callable[[str], NoReturn]) -> dict[str, tuple[int, str]]:
-    """Return index and unit of each column by its name; a name given twice calls ``refuse``."""
+    """Return index and unit of each column of a table, by name; ``refuse`` reports double names."""
     found: dict[str, tuple[int, str]] = {}
     for at, cell in enumerate(table.header):
         name, unit = name_and_unit(cell)
@@ -122,10 +122,10 @@ def column_in(
     found: dict[str, tuple[int, str]],
     refuse: Callable[[str], NoReturn],
 ) -> tuple[int, float]:
-    """Return the index of the column ``name``, and its unit in SI.
+    """Return the index of the column ``name``, and the factor that converts it to SI.
 
-    ``known`` has the SI value of each allowed unit. A missing column, or one without an allowed
-    unit, calls ``refuse``.
+    ``found`` are the columns of the table, from :func:`named_columns`. ``known`` has the factor of
+    each allowed unit. A missing column, or one without an allowed unit, calls ``refuse``.
     """
     at, unit = found.get(name, (-1, ""))
     if unit not in known:

@@ -58,7 +58,7 @@ def write_labelled(
     table: Callable[[], pandas.DataFrame],
     labelled: Callable[[], xarray.Dataset],
 ) -> Path:
-    """Write a table (``.csv``) or a Dataset (``.nc``), which is built only if needed."""
+    """Write ``table()`` to a ``.csv``, or ``labelled()`` to a ``.nc``; only this one is built."""
     suffix = checked_suffix(path)
     if suffix == ".csv":
         return write_file(path, table().to_csv)
@@ -77,7 +77,10 @@ def checked_suffix(path: str | os.PathLike[str]) -> str:
 
 
 def tidy(dataset: xarray.Dataset) -> pandas.DataFrame:
-    """Build a pandas table: a row per entry of ``status``, a column per component, with units."""
+    """Build a pandas table of a sweep's Dataset, with units in the names of the columns.
+
+    It has a row per entry of ``status``, and a column per component.
+    """
     import pandas
 
     status = dataset["status"]

@@ -70,7 +70,7 @@ AXES: Final[dict[str, tuple[float, float, float]]] = {
 
 
 def within(quantity: str, value: float, *, zero: bool = False, infinite: bool = False) -> str:
-    """Return a text that says why a quantity is outside its range; empty if it is inside."""
+    """Return why a value is outside the range of a quantity (or not 0, inf); empty if it is in."""
     unit, low, high = RANGES[quantity]
     if low <= value <= high or (zero and value == 0.0) or (infinite and value == math.inf):
         return ""
@@ -84,7 +84,7 @@ def within(quantity: str, value: float, *, zero: bool = False, infinite: bool = 
 def quantity(
     name: str, value: object, kind: str, *, zero: bool = False, infinite: bool = False
 ) -> float:
-    """Check a positive number against a range of :data:`RANGES`; return it as a float.
+    """Check a positive number against the range ``kind`` of :data:`RANGES`; return a float.
 
     ``zero`` and ``infinite`` also allow 0 and inf. Other values raise :class:`InvalidInput`.
     """
@@ -271,7 +271,7 @@ def text(name: str, value: object) -> str:
 
 
 def one_of(kind: str, name: object, known: Iterable[str]) -> str:
-    """Return the name if it is known, else raise :class:`UnknownName` with similar names."""
+    """Return ``name`` if ``known``; else raise UnknownName, which calls it a ``kind``."""
     known = tuple(known)
     if not isinstance(name, str) or name not in known:
         raise UnknownName(kind, name, known)

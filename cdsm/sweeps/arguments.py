@@ -22,7 +22,10 @@ Label = tuple[tuple[str, ...], Any, dict[str, str]]
 
 
 def label(dims: tuple[str, ...], values: object, long_name: str, units: str = "") -> Label:
-    """Build a coordinate of a Dataset along ``dims``; ``units`` are SI in UDUNITS notation."""
+    """Build a coordinate of a Dataset along ``dims``; ``long_name`` and ``units`` describe it.
+
+    Units are SI in UDUNITS notation.
+    """
     return dims, values, {"long_name": long_name} | ({"units": units} if units else {})
 
 
@@ -50,7 +53,10 @@ class Choice(Generic[_Values]):
         return {self.name: label((self.name,), self.names, f"{kind} of the {self.name}", units)}
 
     def label(self, values: Array, dims: tuple[str, ...], long_name: str, units: str) -> Label:
-        """Build a coordinate with one entry for each value, such as its force."""
+        """Build a coordinate with one entry for each value, such as the force of each wrench.
+
+        ``dims`` are its further dimensions; ``long_name`` and ``units`` as for :func:`label`.
+        """
         if self.names is None:
             return label(dims, values[0], long_name, units)
         return label((self.name, *dims), values, long_name, units)
@@ -59,7 +65,10 @@ class Choice(Generic[_Values]):
 def laws_of(
     elasticity: Elasticity | Mapping[str, Elasticity] | None,
 ) -> Choice[tuple[Elasticity | None, ...]]:
-    """Check the elasticities; each is used for all cables; None keeps the arm's own laws."""
+    """Return one elasticity, or several by name, checked; None keeps the arm's own laws.
+
+    Each elasticity is used for all cables.
+    """
     if elasticity is None or isinstance(elasticity, Elasticity):
         return Choice("elasticity", (elasticity,), None)
     if not isinstance(elasticity, Mapping) or not all(
@@ -75,7 +84,7 @@ def laws_of(
 
 
 def bounds_of(minimum: ArrayLike, maximum: float) -> tuple[Choice[Array], float]:
-    """Check the lower bounds of tension (M,) [N] and the upper bound [N]."""
+    """Return lower bounds of all tensions ``minimum`` (M,) [N], and the upper bound, checked."""
     lows = distinct("minimum", minimum)
     if lows.min() < 0.0:
         raise InvalidInput(

@@ -11,7 +11,9 @@ Block = Mapping[str, slice]
 
 
 def extents(poses: Mapping[str, int], most: int) -> dict[str, int]:
-    """Return the size of a block along each dimension: at most ``most`` postures, at least one.
+    """Return the size of a block along each dimension; a block has at most ``most`` postures.
+
+    ``poses`` are the dimensions of a pose set with their lengths.
 
     A block takes the last dimensions completely, a part of the dimension in front of them, and one
     entry of all others. So the blocks cover all postures in order without gaps.
@@ -24,7 +26,7 @@ def extents(poses: Mapping[str, int], most: int) -> dict[str, int]:
 
 
 def blocks(poses: Mapping[str, int], extent: Mapping[str, int]) -> list[Block]:
-    """Return all blocks of a pose set, in order."""
+    """Return all blocks of a pose set in order; ``extent`` is the size of a block per dimension."""
     cuts = [
         [slice(start, min(start + extent[dim], size)) for start in range(0, size, extent[dim])]
         for dim, size in poses.items()

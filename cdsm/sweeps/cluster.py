@@ -37,7 +37,9 @@ def checked_client(client: object) -> None:
 def on_cluster(
     client: Client, specification: Specification, blocks: Iterable[Block]
 ) -> Iterator[tuple[Block, BlockResult | None]]:
-    """Yield each block and its result as soon as it is computed; None if its workers died.
+    """Compute ``blocks`` on a dask cluster; yield each with its result as soon as it is computed.
+
+    The result is None if the workers of the block died.
 
     If a worker dies, dask gives its blocks to other workers, at most ``allowed-failures`` times.
     Then dask gives up, also for blocks that only waited on the worker. So each of these blocks is
@@ -114,7 +116,7 @@ def _on_worker(payload: bytes, client_version: str, q: Array) -> BlockResult:
 
 @lru_cache(maxsize=4)
 def _task(payload: bytes) -> SweepTask:
-    """Unpickle the task once in each worker, since building an arm takes milliseconds."""
+    """Unpickle ``payload``, the task, once in each worker; building an arm takes milliseconds."""
     from distributed.protocol.pickle import loads
 
     task: SweepTask = loads(payload)

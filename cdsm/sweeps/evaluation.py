@@ -94,7 +94,7 @@ class SweepTask(ReadOnlyState):
 
 
 def evaluate(task: SweepTask, q: Array, threads: int | None = None) -> BlockResult:
-    """Compute all cases at joint angles q (P, nv) [rad]; a failure sets the status of the case.
+    """Compute all cases of ``task`` at joint angles q (P, nv) [rad]; a failure sets the status.
 
     Returns:
         ``status`` (P, E, W, M), for E elasticities, W wrenches and M minima, and all outputs; an
@@ -235,7 +235,7 @@ def _rows(
     bounded: NDArray[np.bool_] | None = None,
     threads: int | None,
 ) -> tuple[Rows, Statuses]:
-    """Compute sweep quantities for a batch of rows; NaN where the status forbids them.
+    """Compute the quantities ``names`` for a batch of rows; NaN where the status forbids them.
 
     Rows that are not ``bounded`` are infeasible.
     """

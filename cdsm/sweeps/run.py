@@ -153,7 +153,11 @@ def _run(
     progress: bool,
     path: Path | None = None,
 ) -> None:
-    """Compute all pending blocks; write them to numpy arrays, or to zarr arrays at ``path``."""
+    """Compute all pending blocks, and write the results into ``arrays``, in place.
+
+    ``arrays`` has a numpy array, or a zarr array of the store at ``path``, for each output and for
+    ``status``. ``extent`` is the size of a block along each dimension.
+    """
     task, poses = specification.task, specification.poses
     every = blocks(poses.sizes, extent)
     todo = [block for block in every if _is_pending(specification, arrays["status"], block)]

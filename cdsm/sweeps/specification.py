@@ -142,7 +142,7 @@ def specify(
     breaking_load: float | None,
     bend_diameter: float | None,
 ) -> Specification:
-    """Check the arguments of a sweep, and label all dimensions and coordinates."""
+    """Check the arguments of :func:`~cdsm.sweeps.run.sweep`, and label all dimensions."""
     import xarray
 
     poses = poses_of(instance("arm", arm, Manipulator), q)

@@ -158,7 +158,7 @@ def _check(path: Path, specification: Specification) -> None:
 
 
 def _difference(name: str, stored: NDArray[Any], wanted: NDArray[Any]) -> list[str]:
-    """Return a list with the first difference of two arrays as text; empty if they are equal."""
+    """Return a list with the first difference of ``stored`` and ``wanted``; empty if equal."""
     if stored.shape == wanted.shape:
         places = np.argwhere(stored != wanted)
         if not len(places):

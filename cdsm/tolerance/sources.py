@@ -136,7 +136,10 @@ SOURCES = tuple(field.name for field in fields(Tolerances))
 
 
 def _require_size(source: str, tolerance: Tolerance) -> None:
-    """Raise InvalidInput if a tolerance is too large, or not of rigidity but has ``tensions``."""
+    """Raise InvalidInput if the tolerance of ``source`` is too large.
+
+    Also raise it if the source is not rigidity but the tolerance has ``tensions``.
+    """
     if tolerance.tensions is not None and source != "rigidity":
         raise InvalidInput(source, "does not depend on tensions; give one standard.")
     largest = LARGEST.get(source, math.inf)

@@ -37,7 +37,7 @@ _NARROWEST = 4  # width of a panel in units in the last place; panels shrink tow
 
 
 def coefficient_table(rows: Sequence[Sequence[float]]) -> Array:
-    """Stack the coefficients of polynomials, lowest power first, (powers, polynomials)."""
+    """Stack the coefficients of polynomials ``rows``, lowest power first; (powers, polynomials)."""
     return np.array(list(zip_longest(*rows, fillvalue=0.0)))
 
 
@@ -64,7 +64,10 @@ def _horner(table: Array, column: int, F: float) -> float:
 
 @compiled
 def _integrals(edges: Array, table: Array, before: Array, power: int, F: Array) -> Array:
-    """Integrate Fⁿ dF/p from the low end to each F (N,); see :class:`Panels`."""
+    """Integrate Fⁿ dF/p, n = ``power``, from the low end to each F (N,).
+
+    ``edges``, ``table`` (``coefficients``) and ``before`` are those of :class:`Panels`.
+    """
     result = np.empty(F.shape[0])
     for i in range(F.shape[0]):
         panel = np.searchsorted(edges[1:-1], F[i])  # an edge belongs to the panel below it
@@ -94,13 +97,16 @@ class Panels(NamedTuple):
     end: float
 
     def integral(self, F: Array, power: int) -> Array:
-        """Integrate Fⁿ dF/p from the low end to each F of any shape, at most :attr:`end`."""
+        """Integrate Fⁿ dF/p, n = ``power`` = 0 or 1, from the low end to each F, any shape.
+
+        F is at most :attr:`end`.
+        """
         found = _integrals(self.edges, self.coefficients, self.before, power, F.ravel())
         return np.asarray(found.reshape(F.shape))
 
 
 def panels(rows: Sequence[Sequence[float]], edges: Sequence[float]) -> Panels:
-    """Divide piecewise polynomials, lowest powers first, into panels.
+    """Divide piecewise polynomials into panels; ``rows`` are coefficients, lowest power first.
 
     ``edges`` are the start of the first range, then the end of each range. They rise.
     """
@@ -122,14 +128,20 @@ def panels(rows: Sequence[Sequence[float]], edges: Sequence[float]) -> Panels:
 
 
 def _significant(row: Sequence[float], high: float) -> list[float]:
-    """Drop negligible coefficients of the highest powers, because their roots overflow."""
+    """Drop the coefficients of high powers that are negligible up to F = ``high``.
+
+    The roots that they cause would overflow.
+    """
     sizes = abs(np.array(row)) * high ** np.arange(len(row))
     last = np.flatnonzero(sizes > _NEGLIGIBLE * sizes.max()).max(initial=0)
     return list(row[: last + 1])
 
 
 def _panel_ends(roots: NDArray[np.complex128], low: float, high: float) -> list[float]:
-    """Find the ends of panels from low to high on which the Gauss rule is exact to rounding."""
+    """Find the ends of panels from low to high on which the Gauss rule is exact to rounding.
+
+    ``roots`` are those of the polynomial.
+    """
     narrowest = _NARROWEST * np.spacing(high)
     ends: list[float] = []
     intervals = [(low, high)] if low < high else []
@@ -145,7 +157,7 @@ def _panel_ends(roots: NDArray[np.complex128], low: float, high: float) -> list[
 
 
 def _end_of_positive(p: Polynomial, low: float, high: float) -> float:
-    """Return the first F above low with p(F) below its rounding error; inf if there is none."""
+    """Return the first F from low to high with p(F) below its rounding error; inf if none."""
     rounding = Polynomial(_ROUNDING * abs(p.coef))  # high and low are not negative
     turns = np.sort(p.deriv().roots().real)
     before = low

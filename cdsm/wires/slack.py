@@ -60,7 +60,10 @@ class SlackBelow(Elasticity):
         return float(self.law.rigidity(self.law.domain.first))
 
     def scaled(self, factor: float) -> SlackBelow:
-        """Return the scaled law with its slack branch; see :meth:`Elasticity.scaled`."""
+        """Return the law with its rigidity EA multiplied by ``factor``, slack branch included.
+
+        See :meth:`Elasticity.scaled`.
+        """
         return SlackBelow(self.law.scaled(factor))
 
     def rigidity(self, tension: ArrayLike) -> Array:

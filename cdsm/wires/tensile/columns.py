@@ -77,7 +77,9 @@ class Header(NamedTuple):
 
 
 def find_header(table: Table, wanted: Sequence[str | int] | None) -> tuple[Header, Column, Column]:
-    """Find the header, and the columns of displacement (or strain) and force.
+    """Find the header of a table, and its columns of displacement (or strain) and force.
+
+    ``wanted`` are the names or numbers of these two columns; None: by the words of the header.
 
     Of the headers among the first 50 lines that name both, it is the one that most rows of numbers
     follow: machines write tables of results before that of the points.
@@ -114,18 +116,18 @@ def find_header(table: Table, wanted: Sequence[str | int] | None) -> tuple[Heade
 
 
 def _is_data(table: Table, k: int) -> bool:
-    """Return whether a row has two numbers or more."""
+    """Return whether row k of a table has two numbers or more."""
     return sum(math.isfinite(table.number(cell)) for cell in table.rows[k][1]) > 1
 
 
 def _rows_of_data(table: Table, first: int) -> int:
-    """Count the rows of numbers that follow each other, beginning with row ``first``."""
+    """Count the rows of numbers of a table that follow each other, from row ``first`` on."""
     rows = range(first, len(table.rows))
     return next((k for k in rows if not _is_data(table, k)), len(table.rows)) - first
 
 
 def _header(table: Table, k: int) -> Header:
-    """Read row k as a header, with the units of the row below it, if it has units."""
+    """Read row k of a table as a header, with the units of the row below it, if it has units."""
     below = table.rows[k + 1][1] if k + 1 < len(table.rows) else []
     units = [cell.strip("[]() ") for cell in below]
     has_units = not _KNOWN.isdisjoint(units)
@@ -146,7 +148,7 @@ def _numbered(table: Table) -> Header:
 
 
 def _column(at: int, cell: str, below: str) -> Column:
-    """Read a cell of a header. Its unit is in brackets, its last word, or in the row below."""
+    """Read cell ``at`` of a header. Its unit is in brackets, its last word, or the cell below."""
     groups = [each.strip() for each in re.findall(r"[\[(]([^\])]*)[\])]", cell)]
     name = re.sub(r"\s*[\[(][^\])]*[\])]", "", cell).strip()
     known = [each for each in groups if each in _KNOWN]
@@ -164,7 +166,10 @@ def _column(at: int, cell: str, below: str) -> Column:
 
 
 def _candidates(header: Header, wanted: Sequence[str | int] | None) -> list[list[Column]]:
-    """Return the columns that may be the displacement, and those that may be the force."""
+    """Return the columns of a header that may be the displacement, and those that may be the force.
+
+    ``wanted`` is as for :func:`find_header`.
+    """
     if wanted is not None:
         return [_wanted(header, name, kind) for name, kind in zip(wanted, _BOTH, strict=True)]
 
@@ -176,7 +181,10 @@ def _candidates(header: Header, wanted: Sequence[str | int] | None) -> list[list
 
 
 def _wanted(header: Header, name: str | int, kind: str) -> list[Column]:
-    """Return the column of a number, counted from 1, or of a name with or without its unit."""
+    """Return the columns called ``name`` (a number from 1 on, or a name) as columns of a kind.
+
+    A name may have its unit.
+    """
     if str(name).isdigit():
         found = [column for column in header.columns if column.at == int(name) - 1]
     else:

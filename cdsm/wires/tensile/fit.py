@@ -168,7 +168,8 @@ def fit_tensile_test(
     points far from the curve, falls of the force (a grip slips) and correlated residuals (drift).
 
     The domain ends where plasticity begins: from there on, EA stays below 0.8 of its largest value,
-    beyond its uncertainty. Pre-tensioning ends where EA grows slower than √F.
+    beyond its uncertainty. The first of the ``stages``, pre-tensioning, in which EA rises steeply,
+    ends where EA begins to grow slower than √F.
 
     Wrong units are found only if the strain is above 1 or the rigidity is outside 1 N to 1e9 N. A
     force in kN passes for a thin thread. Read the report.
@@ -273,6 +274,6 @@ def _band(tensions: Array, curve: Curve, points: Points) -> Band:
 
 
 def _grid(low: float, high: float, grid: Array) -> Array:
-    """Thin out a grid to tensions (n,) [N] from low to high, about 200 over the whole grid."""
+    """Thin out a grid of tensions [N] to (n,) from low to high, about 200 over the whole grid."""
     inside = grid[(grid > low) & (grid < high)][5 :: len(grid) // _KNOTS]
     return np.array([low, *inside[:-1], high])

@@ -41,11 +41,11 @@ class Points:
     count: Array
 
     def part(self, kept: NDArray[np.bool_] | slice) -> Points:
-        """Select points by mask or slice."""
+        """Return the points that the mask or slice ``kept`` selects."""
         return Points(self.strain[kept], self.force[kept], self.count[kept])
 
     def means(self, group: NDArray[np.intp]) -> Points:
-        """Replace the points of each group 0, 1, … by their mean."""
+        """Return the mean point of each group 0, 1, …; ``group`` (n,) has that of a point."""
         count = np.asarray(np.bincount(group, self.count), np.float64)
         strain, force = (
             np.bincount(group, self.count * each) / count for each in (self.strain, self.force)
@@ -54,7 +54,7 @@ class Points:
 
 
 def loading(test: TensileTest) -> tuple[Points, float, tuple[str, ...]]:
-    """Return the points to fit, the noise of one point [N], and notes on points left out."""
+    """Return the points of a test to fit, the noise of one [N], and notes on points left out."""
     notes: list[str] = []
     _require(test.force.size, "points are given")
     outlier = _outliers(test.force)
@@ -115,7 +115,7 @@ def loading(test: TensileTest) -> tuple[Points, float, tuple[str, ...]]:
 
 
 def _outliers(values: Array) -> NDArray[np.bool_]:
-    """Find single values far from their neighbours.
+    """Return which values (n,) are single values far from their neighbours.
 
     A real peak stands out by at most the step between the values next to it, so it is no outlier.
     """
@@ -140,7 +140,10 @@ def local_noise(errors: Array) -> Array:
 
 
 def _slips(points: Points, gauge_length: float, least: float) -> list[str]:
-    """Return a note for each place where the force falls while the displacement grows."""
+    """Return a note for each place where the force falls while the displacement grows.
+
+    The force falls by more than ``least`` [N].
+    """
     highest = np.maximum.accumulate(points.force)
     fall = highest - points.force
     notes = []
@@ -156,7 +159,7 @@ def _slips(points: Points, gauge_length: float, least: float) -> list[str]:
 
 
 def _slack(points: Points, noise: float, least: float) -> int:
-    """Count the points before the force begins to rise beyond its noise."""
+    """Count the points before the force begins to rise beyond its noise [N], at least ``least``."""
     slope, error = _trends(points, noise, least)
     flat = np.flatnonzero(slope <= _SURE * error)
     count = int(flat[-1]) + 1 if len(flat) else 0
@@ -170,7 +173,11 @@ def _slack(points: Points, noise: float, least: float) -> int:
 
 
 def _trends(points: Points, noise: float, least: float) -> tuple[Array, Array]:
-    """Compute the slope [N per point] of the first n points, for each n, and its standard error."""
+    """Compute the slope [N per point] of the first n points, for each n, and its standard error.
+
+    The error follows from the ``noise`` [N] of one point, or from the scatter of the points if that
+    is smaller, but from ``least`` [N] at least.
+    """
     w, x, y = points.count, np.arange(len(points.force)), points.force - points.force[0]
     total = np.cumsum(w)
     xx, xy, yy = (
@@ -202,7 +209,7 @@ def _check_span(strain: Array, force: Array, gauge_length: float) -> None:
 
 
 def _check_rigidity(points: Points, gauge_length: float) -> None:
-    """Raise if the rigidity over the upper half of the force range is implausible."""
+    """Raise TensileTestError if the rigidity in the upper half of the forces is implausible."""
     upper = points.force >= (points.force[0] + points.force[-1]) / 2.0
     rise, reach = np.ptp(points.force[upper]), np.ptp(points.strain[upper])
     rigidity = float(rise / max(reach, 1e-30))
@@ -214,7 +221,7 @@ def _check_rigidity(points: Points, gauge_length: float) -> None:
 
 
 def _likely(rigidity: float, reach: float, gauge_length: float) -> str:
-    """Suggest the mistake that explains a rigidity [N] and a largest strain."""
+    """Suggest the mistake that explains a rigidity [N] and a range of strain ``reach`` [-]."""
     found = []
     low, high = _GAUGES
     for mistake, force, displacement, gauge in _MISTAKEN:

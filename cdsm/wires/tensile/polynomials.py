@@ -53,7 +53,10 @@ def polynomials(points: Points, join: float) -> tuple[StrandElasticity, tuple[st
 
 
 def _positive(rows: list[list[float]], edges: tuple[float, ...]) -> list[tuple[float, float]]:
-    """Find the ranges of tension [N] where the polynomials are positive, or one empty range."""
+    """Find the ranges of tension [N] where the polynomials are positive, or one empty range.
+
+    ``rows`` are their coefficients, lowest power first; ``edges`` [N] are the ends of their ranges.
+    """
     tensions = np.linspace(edges[0], edges[-1], 400)
     values = piecewise(np.array(edges[1:-1]), coefficient_table(rows), tensions)
     margin = 1e-6 * float(abs(values).max())  # keeps the strain ∫ dF/EA finite
@@ -85,7 +88,10 @@ def _joins_of(points: Points, join: float) -> tuple[float, ...]:
 
 
 def _coefficients(points: Points, joins: tuple[float, ...]) -> list[list[float]]:
-    """Fit polynomials to the slopes over the force, lowest power first, one per range.
+    """Fit polynomials to the slopes of ``points`` over the force, one per range.
+
+    Return their coefficients, lowest power first.
+
 
     Two ranges share the value v at the join. With y = F − join, the polynomials are v + Σ a_k yᵏ
     and v + Σ b_k yᵏ: one linear least-squares problem in v, a and b.

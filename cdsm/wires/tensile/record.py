@@ -130,7 +130,7 @@ def read_tensile_csv(
 
 
 def _scale(column: Column, given: str | None) -> float:
-    """Return the factor that converts a column to SI."""
+    """Return the factor that converts a column to SI, from its unit or the unit ``given``."""
     kind = column.kind or ""
     known, keyword = UNITS[kind], "force_unit" if kind == "force" else "displacement_unit"
     for each in (column.unit, given):

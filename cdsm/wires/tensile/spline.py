@@ -43,12 +43,12 @@ def _neighbours(values: Array) -> Array:
 
 
 def _least_variance(points: Points) -> float:
-    """Compute the variance [N²] below which a test counts as exact."""
+    """Compute the variance [N²] below which a test with these points counts as exact."""
     return (1e-6 * float(np.ptp(points.force))) ** 2
 
 
 class Spread(NamedTuple):
-    """Uncertainty of a fitted curve.
+    """Uncertainty of a fitted :class:`Curve` with k splines, g tensions on the grid, n points.
 
     Attributes:
         inverse: Inverse of the normal matrix with the penalty (k + 1, k + 1).
@@ -58,7 +58,7 @@ class Spread(NamedTuple):
             average), so that each has the noise of a single point.
         deviation: Standard deviation of log EA on the grid (g,), from scatter and smoothing. The
             scatter is estimated from the neighbouring points, so it may grow with the force. The
-            bias of the smoothing is estimated on average, from the roughness of this curve
+            smoothing causes a bias; its mean square over curves as rough as this one is added
             (Nychka, J. Am. Stat. Assoc. 83, 1988).
     """
 
@@ -71,7 +71,9 @@ class Spread(NamedTuple):
 
 @dataclass(frozen=True)
 class Curve:
-    """Fitted curve, given by log EA and by the strain at one tension (the anchor).
+    """Fitted curve, given by log EA on a grid of tensions and by the strain at one of them.
+
+    This tension is the anchor.
 
     Attributes:
         basis: Splines of log EA.
@@ -107,7 +109,10 @@ class Curve:
         return np.asarray(inside + before + np.maximum(strain - grid[-1], 0.0) * rigidity[-1])
 
     def jacobian(self, strain: Array) -> Array:
-        """Compute derivatives of :meth:`force` w.r.t. coefficients and anchor strain (n, k + 1)."""
+        """Compute derivatives of :meth:`force` at strains (n,) by the unknowns (n, k + 1).
+
+        The columns are those of the k coefficients, then that of the anchor strain.
+        """
         tensions, grid = self.basis.tensions, self.strain
         inside = np.clip(strain, grid[0], grid[-1])
         at = np.clip(np.searchsorted(grid, inside) - 1, 0, len(grid) - 2)
@@ -151,7 +156,7 @@ class Curve:
         return of(found.x)
 
     def spread(self, points: Points) -> Spread:
-        """Compute the uncertainty of the curve from the noise of the points."""
+        """Compute the uncertainty of the curve from its residuals at the points."""
         rows, error = self._linearised(points)
         inverse, leverage = self._inverse(rows)
         freedom = float(max(len(error) - leverage.sum(), 1.0))
@@ -168,6 +173,8 @@ class Curve:
 
     def interval(self, points: Points, probability: float) -> tuple[Array, Array]:
         """Compute a confidence interval of log EA at each tension of the grid: middle, half-width.
+
+        It contains log EA with a ``probability`` from 0 to 1.
 
         The most likely curve is smooth, so it is biased where EA bends. An interval from its
         scatter alone would contain EA too rarely there. The interval therefore belongs to a rougher
@@ -189,7 +196,10 @@ class Curve:
         return np.asarray(splines @ rough.coefficients), np.asarray(half)
 
     def _inverse(self, rows: Array) -> tuple[Array, Array]:
-        """Return the inverse of the penalised normal matrix, and the leverage of each point."""
+        """Return the inverse of the penalised normal matrix, and the leverage of each point.
+
+        ``rows`` (n, k + 1) are as in :meth:`_linearised`.
+        """
         factor, scale = self._factored(rows)
         inverse = cho_solve(factor, np.eye(len(scale))) / np.outer(scale, scale)
         return inverse, np.clip(((rows @ inverse) * rows).sum(axis=1), 0.0, 1.0)
@@ -211,7 +221,10 @@ class Curve:
         return chosen
 
     def _likelihood(self, points: Points) -> float:
-        """Compute −2 log of the restricted likelihood of the smoothing (linearised curve)."""
+        """Compute −2 log of the restricted likelihood of the smoothing, given the points.
+
+        The curve is linearised.
+        """
         rows, error = self._linearised(points)
         unknowns = np.append(self.coefficients, self.anchor_strain)
         factor, scale = self._factored(rows)
@@ -237,7 +250,10 @@ class Curve:
         return weight[:, None] * self.jacobian(points.strain), error
 
     def _factored(self, rows: Array) -> tuple[tuple[Array, bool], Array]:
-        """Scale the normal matrix to a unit diagonal. Return its Cholesky factor and the scale."""
+        """Scale the penalised normal matrix of ``rows`` (n, k + 1) to a unit diagonal.
+
+        Return its Cholesky factor and the scale.
+        """
         normal = rows.T @ rows + self._penalty
         # strain and log EA are orders apart
         scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))

@@ -21,9 +21,9 @@ _STEP = 1.25  # ratio of tensions to compute the exponent; a smaller one takes n
 
 
 def yield_onset(tensions: Array, rigidity: Array, deviation: Array) -> float | None:
-    """Find the tension [N] from which EA stays below its plateau. Return None if uncertain.
+    """Find the tension [N] from which EA stays below 0.8 of its plateau. None if uncertain.
 
-    The arguments are F (g,) [N], EA (g,) [N] and the standard deviation of log EA (g,).
+    The arguments are F (g,) [N], EA (g,) [N] and the standard deviation of log EA (g,) [-].
     """
     level = np.log(rigidity)
     # the plateau is where EA is certain: noise at an uncertain end must not count as plateau
@@ -35,7 +35,7 @@ def yield_onset(tensions: Array, rigidity: Array, deviation: Array) -> float | N
 
 
 def pretension_end(tensions: Array, rigidity: Array, deviation: Array) -> float | None:
-    """Find the tension [N] from which EA grows slower than √F.
+    """Find the tension [N] from which EA grows slower than √F; arguments of :func:`yield_onset`.
 
     None if EA does not grow faster than √F at any tension, beyond its uncertainty.
     """
@@ -57,7 +57,10 @@ def pretension_end(tensions: Array, rigidity: Array, deviation: Array) -> float 
 
 
 def refuse_jumps(curve: Curve, points: Points) -> None:
-    """Raise if the force is discontinuous: EA exceeds ten times EA of every measured chord."""
+    """Raise TensileTestError if the force is discontinuous.
+
+    It is if EA of the curve exceeds ten times EA of every chord between neighbouring points.
+    """
     first, last = curve.force(points.strain[[0, -1]])
     inside = (curve.basis.tensions >= first) & (curve.basis.tensions <= last)
     steepest = int(np.where(inside, curve.rigidity, 0.0).argmax())
@@ -71,7 +74,10 @@ def refuse_jumps(curve: Curve, points: Points) -> None:
 
 
 def doubts(points: Points, spread: Spread, gauge_length: float) -> tuple[str, ...]:
-    """Return one sentence for each reason in the residuals to doubt the fit."""
+    """Return one sentence for each reason to doubt the fit: a far point, correlated residuals.
+
+    ``spread`` has the residuals at ``points``; ``gauge_length`` [m].
+    """
     errors, reach = spread.errors, float(np.ptp(points.force))
     notes = []
     times = abs(errors) / np.maximum(local_noise(errors), _SEEN * reach)
