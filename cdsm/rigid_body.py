@@ -22,7 +22,7 @@ from cdsm.support.values import Array, frozen
 
 
 class BodyState(NamedTuple):
-    """Tip pose, tip Jacobian, gravity torque and its derivative at one posture."""
+    """Tip pose (4, 4), tip Jacobian (6, nv), gravity torque (nv,) and its derivative (nv, nv)."""
 
     tip: Array
     jacobian: Array

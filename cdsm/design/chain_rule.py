@@ -43,7 +43,7 @@ class Chain:
             self._limits = np.column_stack([_limit_slopes(arm, each) for each in problem.variables])
 
     def at(self, tension: Tension, loss: Array) -> Posed:
-        """Return the chain rule for least tensions and exp(Σ μ φ) (C,) of the cables [-]."""
+        """Return the chain rule at the posture of a tension; ``loss`` (C,) is exp(Σ μ φ) [-]."""
         pose, inputs = tension.posture, self.inputs
         turned, grip = pose.q[:, None] * self._limits, np.zeros_like(self._bound)
         if self._problem.worst_friction:
@@ -120,7 +120,7 @@ def _joints(arm: Manipulator, variable: Variable) -> list[int]:
 
 
 def _limit_slopes(arm: Manipulator, variable: Variable) -> Array:
-    """Return the relative derivatives (nv,) of the joint limits: λ = 2 atan(h/R) unless given."""
+    """Return dλ/dx/λ (nv,) of joint limits λ = 2 atan(h/R), x a variable; 0 if λ is given."""
     geometry, joints = arm.geometry, _joints(arm, variable)
     found = []
     for k, (joint, limit) in enumerate(zip(geometry.joints, geometry.joint_limits, strict=True)):

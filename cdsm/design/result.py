@@ -162,7 +162,7 @@ class DesignSearch(ReadOnlyState):
 
     @property
     def _front(self) -> Designs:
-        """The designs of the Pareto front, with their quantities."""
+        """Designs of the Pareto front, with their quantities."""
         whole = self.evaluated
         return replace(
             whole,

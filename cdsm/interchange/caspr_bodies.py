@@ -46,7 +46,7 @@ _OBLIQUE: Final = {"R_AXIS": ("turn", "revolute"), "P_AXIS": ("slide", "prismati
 
 
 class SingleJoint(NamedTuple):
-    """Joint of one coordinate, as in a URDF; limits in rad or m."""
+    """Joint of one coordinate: name, URDF type, axis (3,), limits [rad], or [m] if it slides."""
 
     name: str
     kind: str

@@ -126,7 +126,7 @@ class Ellipsoid(NamedTuple):
 
 
 def ellipsoid(compliance: Array, tip: Array, length: float) -> Ellipsoid | None:
-    """Compute the ellipsoid of C_vv (3, 3) [m/N] at a tip (3,) of an arm of a length [m].
+    """Compute the ellipsoid of C_vv (3, 3) [m/N] at a tip (3,) [m] of an arm of a length [m].
 
     The scale is the power of ten that draws the longest half axis with 3 to 30 % of the length. The
     size of the ellipsoid thus shows the magnitude. None if no force moves the tip.

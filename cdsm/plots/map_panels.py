@@ -64,7 +64,7 @@ class Map(NamedTuple):
 
     @property
     def limits(self) -> Array:
-        """Limits (2, 2) [mm] of the panel."""
+        """Limits (2, 2) [mm] of the two axes of the panel."""
         if not len(self.points):
             return np.array([[-1.0, 1.0], [-1.0, 1.0]])
         low, high = self.points.min(axis=0), self.points.max(axis=0)

@@ -149,7 +149,7 @@ def _plot_directions(result: paper.StiffnessFigure) -> Figure:
 
 
 def _plot_changes(result: paper.StiffnessFigure) -> Figure:
-    """Plot a column for each axis: active part, and change of stiffness since the first tension."""
+    """Plot active part and change of stiffness since the first tension; a column for x, y and z."""
     figure, grid = _grid(result, 5.6, 3, sharey="row")
     first, stated = result.curves[0], result.claims[0].paper or ()
     for i in range(3):
@@ -232,7 +232,7 @@ def _plot_postures(result: paper.StiffnessFigure) -> Figure:
 
 
 def _draw_curve(axes: Any, curve: paper.Curve, values: Array, **line: Any) -> None:
-    """Draw a stiffness [N/m] over the mean tension; bars show the range over the cables."""
+    """Draw a stiffness (N,) [N/m] over the mean tension of a curve; bars: range over the cables."""
     low, mean, high = curve.tension.T
     axes.plot(mean, N_PER_MM * values, **line)
     some = np.linspace(0, len(mean) - 1, _BARS).round().astype(int)

@@ -70,7 +70,7 @@ AXES: Final[dict[str, tuple[float, float, float]]] = {
 
 
 def within(quantity: str, value: float, *, zero: bool = False, infinite: bool = False) -> str:
-    """Return why a value is outside the range of a quantity (or not 0, inf); empty if it is in."""
+    """Return why a value is outside the range of a quantity; empty if it is inside or allowed."""
     unit, low, high = RANGES[quantity]
     if low <= value <= high or (zero and value == 0.0) or (infinite and value == math.inf):
         return ""

@@ -39,7 +39,7 @@ _GRADIENT: Final = ",".join(
 
 
 class _Row(NamedTuple):
-    """A row of the table: its text, its numbers by name, and their unit."""
+    """A row of the page's table: its text, its numbers by name, and their unit."""
 
     what: str
     values: dict[str, str]

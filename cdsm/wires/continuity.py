@@ -17,7 +17,7 @@ _JUMP = 1e-4  # share of EA: a smaller step counts as rounding of the law
 
 
 class Jump(NamedTuple):
-    """Discontinuity of EA: its tension [N], and EA [N] just below and just above it."""
+    """Discontinuity of EA: the tension [N] there, and EA [N] just below and just above it."""
 
     tension: float
     below: float

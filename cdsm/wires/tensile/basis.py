@@ -23,7 +23,7 @@ class Basis(NamedTuple):
 
     @classmethod
     def of(cls, points: Points, noise: float) -> Basis:
-        """Build splines from the first force to the largest.
+        """Build splines over the tensions from the first force of ``points`` to the largest.
 
         The knots are equally spaced in the mean of log(F − F_0 + corner) and F, each scaled to 0…1.
         So they are nearly equally spaced in F below the corner [N], and denser there than above it.

@@ -54,7 +54,7 @@ _FIRST_LINES = 50  # lines among which the header stands
 
 
 class Column(NamedTuple):
-    """Column of a table."""
+    """Column of a table: its index, its name and unit in the header, and what it measures."""
 
     at: int
     name: str
@@ -66,7 +66,7 @@ class Column(NamedTuple):
 
 
 class Header(NamedTuple):
-    """Header of a table: its line, its columns, the first row of numbers."""
+    """Header of a table: its line in the file, its columns, the index of the first data row."""
 
     line: int
     columns: list[Column]

@@ -221,7 +221,10 @@ def _check_rigidity(points: Points, gauge_length: float) -> None:
 
 
 def _likely(rigidity: float, reach: float, gauge_length: float) -> str:
-    """Suggest the mistake that explains a rigidity [N] and a range of strain ``reach`` [-]."""
+    """Suggest the mistake (units, gauge length) that explains a rigidity [N] and a strain range.
+
+    ``reach`` is the range [-], ``gauge_length`` [m] the given one.
+    """
     found = []
     low, high = _GAUGES
     for mistake, force, displacement, gauge in _MISTAKEN:
