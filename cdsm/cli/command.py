@@ -16,7 +16,7 @@ from cdsm.cli.words import newer
 
 
 class Command(typer.core.TyperCommand):
-    """Command whose options may have older names, and whose errors of usage are JSON if asked."""
+    """Command that also takes older names of options; with --json, errors of usage are JSON."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Replace older names of options in ``args``, then parse them."""

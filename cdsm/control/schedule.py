@@ -81,7 +81,7 @@ def tension_controlled(plan: PathPlan, names: Sequence[str] | None) -> NDArray[n
     """Return which cables (C,) a mixed law controls by tension: ``names``, or a default choice.
 
     The lengths of the other cables, as many as there are joints, give the posture. By default, a
-    pivoted QR decomposition of J_Lᵀ chooses those whose lengths give it best at the first sample.
+    pivoted QR decomposition of J_Lᵀ at the first sample chooses these other cables.
     """
     cables = plan.arm.cables.names
     forced = np.ones(len(cables), dtype=np.bool_)

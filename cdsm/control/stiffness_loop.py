@@ -66,7 +66,7 @@ class StiffnessLoop:
         """Plan the tensions of the next step.
 
         Args:
-            wanted: The reference of the plan at this step; its angles are kept.
+            wanted: The reference of the plan at this step; its angles do not change.
             target: Stiffness [N/m], () or (n,).
             estimate: Estimated posture, load, wire and friction.
             before: Mean tensions of the previous step (C,) [N].

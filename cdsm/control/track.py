@@ -86,7 +86,7 @@ def track(
         rate: Largest change of a tension that the outer loop plans per step [N], or (C,).
         replan: Whether the outer loop runs; default: for ``"stiffness"`` only.
         tension_controlled: Names of the cables whose tension a mixed law controls. Default: C − nv
-            cables, chosen so that the lengths of the others give the posture best.
+            cables, chosen so that the lengths of the others determine the posture best.
         bands: Number of steps from one proved band to the next, some 20 ms each; 0: none. An arm
             without friction has no band.
         felt: Number of steps from one measurement of the stiffness with the motors to the next

@@ -279,9 +279,9 @@ class DesignProblem(ReadOnlyState):
 
 
 def _with_holes_like(cable: Cable, other: Cable) -> tuple[Site, ...]:
-    """Return the sites of a cable; its holes have the friction and the wrap of those of another.
+    """Return the sites of ``cable``, its holes with friction and wrap of the holes of ``other``.
 
-    A hole that the other cable does not pass has the friction of its nearest hole.
+    A hole that ``other`` does not pass has the friction of the nearest hole that it passes.
     """
     sites, known = list(cable.sites), other._holes
     for i in cable._holes if known else ():

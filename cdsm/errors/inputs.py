@@ -148,7 +148,7 @@ class JointLimitError(CdsmError, ValueError):
     """A joint angle beyond its limit.
 
     Attributes:
-        problem: The first few angles that are beyond their limits, as text.
+        problem: Text that names the first few angles beyond their limits.
         joints: Names of the joints beyond their limits.
         angles: Angles of these joints [rad]; [m] where a joint slides.
         limits: Limits (lower, upper) of these joints [rad]; [m] where a joint slides.

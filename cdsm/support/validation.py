@@ -271,7 +271,7 @@ def text(name: str, value: object) -> str:
 
 
 def one_of(kind: str, name: object, known: Iterable[str]) -> str:
-    """Return ``name`` if ``known``; else raise UnknownName, which calls it a ``kind``."""
+    """Return ``name`` if it is in ``known``; else raise UnknownName for an unknown ``kind``."""
     known = tuple(known)
     if not isinstance(name, str) or name not in known:
         raise UnknownName(kind, name, known)

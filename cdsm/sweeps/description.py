@@ -61,9 +61,9 @@ def law_text(law: Elasticity) -> str:
 
 
 def changed_laws(one: str, other: str) -> tuple[str, ...]:
-    """Return the classes of laws whose digest alone differs in two texts of an arm.
+    """Return the classes of the laws whose digests differ between two texts of an arm.
 
-    The tuple is empty if anything else differs.
+    The tuple is empty if anything else differs too.
     """
     if _SAMPLED.sub(r"\1 \2", one) != _SAMPLED.sub(r"\1 \2", other):
         return ()

@@ -97,8 +97,8 @@ def evaluate(task: SweepTask, q: Array, threads: int | None = None) -> BlockResu
     """Compute all cases of ``task`` at joint angles q (P, nv) [rad]; a failure sets the status.
 
     Returns:
-        ``status`` (P, E, W, M), for E elasticities, W wrenches and M minima, and all outputs; an
-        output has only those of these axes on which it depends.
+        ``status`` (P, E, W, M), for E elasticities, W wrenches and M minima, and all outputs. An
+        output has the axes among these on which it depends.
     """
     shape = len(q), len(task.wrenches), len(task.minima)
     stages = {name: QUANTITIES[name].stage for name in task.outputs}
@@ -166,9 +166,10 @@ def evaluate(task: SweepTask, q: Array, threads: int | None = None) -> BlockResu
 def _bounds(
     task: SweepTask, q: Array, threads: int | None
 ) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
-    """Return bounds of tension (R, C) [N] of rows q; factors of friction; which rows have bounds.
+    """Return bounds of tension (R, C) [N], factors of friction (R, C), and which rows have bounds.
 
-    The factor (R, C) is the largest between two tensions along a cable, with ``worst_friction``.
+    The R rows have the joint angles q (R, nv). The factor is the largest ratio of two tensions
+    along a cable; 1 without ``worst_friction``.
     """
     minima = np.tile(task.minima, len(q) // len(task.minima))
     shape = len(q), len(task.arm.cables)
@@ -183,7 +184,7 @@ def _bounds(
 
 
 def _needed(names: list[str]) -> list[str]:
-    """Return what a batch computes for quantities of a law: with the margin, for the status."""
+    """Return the outputs of a batch from which ``names`` follow, and the margin for the status."""
     if not names:
         return []
     extreme = [name for name in names if QUANTITIES[name].stage == "principal"]
@@ -200,9 +201,9 @@ def _finish(
     loss: Array,
     names: list[str],
 ) -> None:
-    """Add the quantities that a batch does not compute to rows of one law; complete the status.
+    """Add to ``rows`` of one law the quantities that a batch does not compute; complete ``status``.
 
-    F (R, C) is ``tension``; ``loss`` (R, C) is the largest factor between tensions along a cable.
+    ``tension`` is (R, C) [N]; ``loss`` (R, C) is the largest ratio of two tensions along a cable.
     """
     if "wire_strain" in names:
         # friction may take a tension along a cable out of the domain of its law
@@ -268,12 +269,12 @@ def _rows(
 
 
 def _exists(stage: str, status: Statuses) -> NDArray[np.bool_]:
-    """Check for each status whether the quantities of a stage exist."""
+    """Return for each entry of ``status`` whether the quantities of a stage exist."""
     return ~np.isin(status, [kind for kind in SweepStatus if stage in LOST[kind]])
 
 
 def _spread(values: Array, place: NDArray[np.bool_]) -> Array:
-    """Spread values of some rows over all rows; NaN in the others."""
+    """Return an array of all rows, with ``values`` at the rows ``place`` and NaN at the others."""
     full = np.full((len(place), *values.shape[1:]), np.nan)
     full[place] = values
     return full

@@ -34,9 +34,10 @@ _ORDER = "order"
 def opened(
     path: Path, specification: Specification, extent: Mapping[str, int]
 ) -> Iterator[Mapping[str, Any]]:
-    """Open a store, or create it; yield its arrays, one for each output and ``status``.
+    """Open the store at ``path``, or create it; yield an array for each output and ``status``.
 
-    It is locked against other runs. The system removes the lock when the process ends or crashes.
+    A new store has chunks of the block size ``extent``. The store is locked against other runs. The
+    system removes the lock when the process ends or crashes.
     """
     import zarr
 
@@ -83,7 +84,8 @@ def read(path: Path) -> xarray.Dataset:
 def _make(path: Path, specification: Specification, extent: Mapping[str, int]) -> bool:
     """Write an empty store to a temporary folder, then rename this folder to ``path``.
 
-    Returns False if another run has made a store there in the meantime.
+    Its chunks have the block size ``extent``. Returns False if another run has made a store there
+    in the meantime.
     """
     import zarr
 
