@@ -94,7 +94,7 @@ def joint(kind: str, name: str, parent: str, child: str, *parts: etree._Element)
 
 
 def origin(xyz: Iterable[float], rpy: str = "0.0 -0.0 0.0") -> etree._Element:
-    """Build the origin of a joint, a body or a shape: position [m], and angles [rad] as text."""
+    """Build the origin of a joint, body or shape: position [m]; roll, pitch, yaw [rad] as text."""
     return E.origin(xyz=tuple(map(float, xyz)), rpy=rpy)
 
 

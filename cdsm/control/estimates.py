@@ -50,13 +50,13 @@ class Estimate(NamedTuple):
     """State of the arm as the controller estimates it.
 
     Attributes:
-        pose: The posture, within the arm of the controller.
+        pose: Posture of the controller's arm, within its joint limits.
         tension: Mean tension along each cable (C,) [N].
         ratio: Mean tension along each cable divided by that at the motor (C,) [-].
         force: Force at the tip (3,) [N], base axes.
         softness: 1/s: strain divided by that of the law [-].
         variance: Variance of ``softness`` [-].
-        natural: Natural length of wire in each segment (S,) [m]; it stores the history of friction.
+        natural: Natural length of wire in each segment (S,) [m]; it depends on all past sliding.
         shares: ρ: tension of each segment divided by that at the motor (S,) [-].
     """
 

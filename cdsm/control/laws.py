@@ -74,7 +74,7 @@ class Moment(NamedTuple):
         command: Wire commanded at the previous step (C,) [m].
         minimum: Lower bounds of the tensions (C,) [N].
         maximum: Upper bounds of the tensions (C,) [N].
-        forced: Cables of which a mixed law controls the tension (C,).
+        forced: Whether a mixed law controls the tension of each cable (C,), not its wire.
     """
 
     reference: Reference

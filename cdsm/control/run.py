@@ -208,7 +208,7 @@ class TrackingRun(ReadOnlyState):
         return write_labelled(path, self.to_pandas, self.to_xarray)
 
     def to_dict(self) -> dict[str, object]:
-        """Return the numbers of the table in SI for JSON, with units in the keys."""
+        """Return the numbers of the printed table in SI for JSON, with units in the keys."""
         return dict(plain(numbers(self)))
 
     @property

@@ -25,7 +25,7 @@ class Schedule(NamedTuple):
         directions: Unit directions u (D, 3), base axes.
         targets: Wanted stiffness (n, D) [N/m].
         tips: Tip positions (n, 3) [m].
-        wrenches: Load that the plan knows of (n, 6).
+        wrenches: Load of the plan (n, 6): force [N], then moment [N m].
     """
 
     references: tuple[Reference, ...]

@@ -54,9 +54,9 @@ class Sensors:
         )
 
     def read(self, truth: Sequence[Reading], random: np.random.Generator) -> Reading:
-        """Measure the last true state of ``truth``, or an earlier one if there is a delay.
+        """Measure the newest of the true states ``truth``, or an earlier one if there is a delay.
 
-        Each call draws the same number of random numbers.
+        The noise is drawn from ``random``; each call draws the same number of random numbers.
         """
         now = truth[max(len(truth) - 1 - self.delay, 0)]
         wire = now.wire

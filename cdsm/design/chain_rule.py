@@ -84,9 +84,11 @@ class Chain:
 class Posed(NamedTuple):
     """Chain rule at a posture under a load, where the least tensions follow the design.
 
+    The derivatives are with respect to the n variables.
+
     Attributes:
         chain: The chain rule of the arm.
-        balance: The tensions.
+        balance: The least tensions, and the matrices for their derivatives.
         turned: Derivatives (nv, n) of the joint angles.
         grip: Derivatives (C, n) of Σ μ φ [-] of the cables; 0 without ``worst_friction``.
         bound: Derivatives (C, n) of the lower bounds at constant φ.

@@ -74,7 +74,7 @@ class DesignSearch(ReadOnlyState):
 
     @property
     def compromise(self) -> int:
-        """Number on the front of the design nearest to the best value of every objective.
+        """Index into ``front`` of the design that is nearest to the best value of each objective.
 
         Differences are divided by the range of each objective on the front.
         """
@@ -118,7 +118,7 @@ class DesignSearch(ReadOnlyState):
 
         Args:
             folder: The folder; it is made.
-            number: Its number on the front, from 0; None: the compromise.
+            number: Number of the design on the front, from 0; None: the compromise.
 
         Raises:
             InvalidInput: The front has no such number.

@@ -22,7 +22,7 @@ class ScaledElasticity(Elasticity):
 
     @property
     def domain(self) -> Domain:
-        """Domain of the law."""
+        """Domain of ``law``, which scaling does not change."""
         return self.law.domain
 
     def rigidity(self, tension: ArrayLike) -> Array:

@@ -131,7 +131,7 @@ class EquilibriumError(CdsmError, ArithmeticError):
     """A loaded arm that has no equilibrium, or that buckles before the full load.
 
     Attributes:
-        residual: Torque residual at the last iterate (nv,) [N m].
+        residual: Torque residual at the last iterate (nv,) [N m]; [N] where a joint slides.
         load_factor: Largest fraction of the load [-] at which the arm was in equilibrium.
         joint: Name of the joint with the largest residual, or of the joint that buckles first.
     """

@@ -54,7 +54,10 @@ class LeadFigure(Figure):
 
 
 def figure_lead() -> LeadFigure:
-    """Compute the stiffness change from 100 N to 800 N minimum tension over lead; EA = 48 kN."""
+    """Compute the change of stiffness if the lower bound of tension rises from 100 N to 800 N.
+
+    It is computed over the lead, with EA = 48 kN.
+    """
     unstrained, stretched = (
         frozen(np.array([_changes(lead, length) for lead in LEADS.tolist()]))
         for length in ("unstrained", "stretched")

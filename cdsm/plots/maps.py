@@ -240,9 +240,9 @@ def _draw(
 def _legend(
     figure: Figure, counted: Sequence[Case | Map], maps: Sequence[Map], words: Mapping[int, str]
 ) -> None:
-    """Draw the legend of ``maps``: marker and word of each status, and its share of ``counted``.
+    """Draw the legend of ``maps``: marker and word of each status, and its share of entries.
 
-    ``words`` are the words for the values of the status.
+    ``counted`` are the entries; ``words`` are the words for the values of the status.
     """
     status = np.concatenate([each.status[np.isnan(each.values)] for each in counted])
     total = sum(each.status.size for each in counted)

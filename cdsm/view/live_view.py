@@ -116,7 +116,7 @@ class View:
     def _add_path(self, path: Array, tips: Array) -> None:
         """Draw the tips (S, 3) [m] of a path, and add controls that play it.
 
-        ``path`` holds the joint angles (S, nv). If the path is given as tips, it is ``tips``.
+        ``path`` holds joint angles (S, nv), or is the array ``tips`` itself if only tips are given.
         """
         self._scene.draw_path(tips)
         go = self._handle.aim if path is tips else self._controls.move

@@ -97,7 +97,7 @@ class Curve:
 
     @cached_property
     def strain(self) -> Array:
-        """Strain ε (g,) [-] on the grid, zero where that of the points is zero."""
+        """Strain ε (g,) [-] on the grid, counted from the same zero as the measured strain."""
         stretch = _running_integral(1.0 / self.rigidity, self.basis.tensions)
         return np.asarray(self.anchor_strain + stretch - stretch[self.anchor])
 
