@@ -26,8 +26,8 @@ class Sensors:
 
     Attributes:
         encoder: Length [m] of one count of an encoder; 0: exact.
-        tension_noise: Standard deviation [N] of the Gaussian noise of a load cell, cut off at four
-            of them.
+        tension_noise: Standard deviation [N] of the Gaussian noise of a load cell, which is cut off
+            at ± four standard deviations.
         tension_bias: Constant error of all load cells [N].
         delay: Steps of control by which all readings are late.
 

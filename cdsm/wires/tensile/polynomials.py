@@ -92,7 +92,6 @@ def _coefficients(points: Points, joins: tuple[float, ...]) -> list[list[float]]
 
     Return their coefficients, lowest power first.
 
-
     Two ranges share the value v at the join. With y = F − join, the polynomials are v + Σ a_k yᵏ
     and v + Σ b_k yᵏ: one linear least-squares problem in v, a and b.
     """
