@@ -65,7 +65,7 @@ class Posture(ReadOnlyState):
         return f"<Posture of {self.arm.name}, tip at {coordinates(1e3 * self.tip[:3, 3])} mm>"
 
     def plot(self, tension: Tension | None = None, stiffness: Stiffness | None = None) -> Figure:
-        """Plot the arm in mm, with tensions as colours and the compliance at the tip if given.
+        """Plot the arm in mm, with ``tension`` as colours and the tip compliance of ``stiffness``.
 
         Arguments and errors are those of :func:`cdsm.plots.plot_arm`.
         """
@@ -201,7 +201,10 @@ class Posture(ReadOnlyState):
     def _joint_stiffness(
         self, tension: Array, cable_stiffness: Array, wrench: Array
     ) -> tuple[Array, Array, Array, Array]:
-        """Compute the active, passive and load terms and K_θ (nv, nv) from checked vectors."""
+        """Compute the active, passive and load terms and K_θ (nv, nv) [N m/rad].
+
+        Tensions (C,) [N], cable stiffnesses (C,) [N/m] and wrench (6,) are checked already.
+        """
         model = self.arm._model
         active, passive, load, joint = stiffness_kernels.single_stiffness(
             model.routing.segment,

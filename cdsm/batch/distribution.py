@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Tensions(ReadOnlyState):
-    """Cable tensions that balance an arm at many postures, with loads, bounds and status.
+    """Cable tensions that balance an arm at B postures, with loads, bounds and status.
 
     Attributes:
         arm: The arm.
@@ -85,7 +85,7 @@ def distribute_tensions(
     check_limits: bool = True,
     threads: int | None = None,
 ) -> Tensions:
-    """Compute the least tensions that balance an arm at many postures: min ‖F‖² (Eqs. 13, 17).
+    """Compute the least tensions that balance an arm at B postures: min ‖F‖² (Eqs. 13, 17).
 
     Tensions are accepted only if they meet the optimality conditions of
     :func:`~cdsm.distribute_tension`. A posture is called infeasible only with a proof. Postures for

@@ -39,7 +39,7 @@ DEFAULT_OUTPUTS = ("tip", "compliance", "margin")
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Batch(ReadOnlyState):
-    """Quantities at many postures: ``batch["joint"]`` is K_θ (B, nv, nv).
+    """Quantities at B postures: ``batch["joint"]`` is K_θ (B, nv, nv).
 
     Names, shapes and units are those of :class:`~cdsm.Posture` and :class:`~cdsm.Stiffness`, with
     the posture as first axis. A quantity that does not exist is NaN; :attr:`status` says why.
@@ -123,7 +123,7 @@ def evaluate(
     check_limits: bool = True,
     threads: int | None = None,
 ) -> Batch:
-    """Compute posture and stiffness of an arm at many postures, in microseconds each.
+    """Compute posture and stiffness of an arm at B postures, in microseconds each.
 
     A posture that cannot be evaluated raises no error; its :attr:`Batch.status` says why.
 

@@ -43,6 +43,9 @@ _CODES = np.array([OK, Status.INFEASIBLE, UNDECIDED], dtype=np.uint8)
 class Evaluator:
     """Evaluation of ranges of rows (postures); arguments as in :func:`cdsm.batch.evaluate`.
 
+    ``rows`` (b,) are the indices of postures; ``found`` (b,) and ``out`` (b, n) are their status
+    and outputs, which the methods fill in place. ``wanted`` are the numbers of the requested
+    quantities.
     ``tension`` is F (C,) or (B, C) [N]. ``bounds`` are the lower and the upper bounds of
     distributed tensions, (C,) or (B, C) [N]. If neither is given, no output depends on tensions.
 
@@ -110,7 +113,7 @@ class Evaluator:
         run_slices(lambda part: self._fill(part, status), len(self._q), self._block, count)
 
     def _fill(self, part: slice, status: Codes) -> None:
-        """Fill the values and the status (B,) of one range of rows."""
+        """Fill the values and the status (B,) of the range of rows ``part``."""
         rows, found, out = np.arange(part.start, part.stop), status[part], self._out[part]
         if self._bounds is None:
             tension = self._nothing if self._tension is None else self._of(self._tension, rows)
@@ -121,7 +124,7 @@ class Evaluator:
             out[:, self._place["tension"]] = self._of(self._tension, rows)
 
     def _distribute(self, rows: Indices, found: Codes, out: Array) -> None:
-        """Distribute the tensions of some postures; fill their status and output."""
+        """Distribute the tensions of the postures ``rows``; fill their status and outputs."""
         nv, cables = self._arm.nv, len(self._arm.cables)
         balance = Balance(np.empty((rows.size, cables, nv)), np.empty((rows.size, nv)))
         tension = np.empty((rows.size, cables))
@@ -140,7 +143,10 @@ class Evaluator:
             found[again], out[again] = codes, values
 
     def _search(self, rows: Indices, balance: Balance) -> tuple[Array, Codes]:
-        """Search for tensions of postures whose guess is not optimal; also return status codes."""
+        """Search for the tensions (b, C) [N] of postures whose guess is not optimal.
+
+        ``balance`` is what they must balance. Also return status codes (b,).
+        """
         low, high = (self._of(each, rows).copy() for each in self._bounds or ())
         tension, outcome = np.empty_like(low), np.empty(rows.size, dtype=np.intp)
         search_tensions(self._arm._model.blocks, *balance, low, high, tension, outcome)
@@ -164,7 +170,11 @@ class Evaluator:
         out: Array,
         balance: Balance | None = None,
     ) -> None:
-        """Fill status and output of some postures; without tensions (b, C), guess them."""
+        """Fill status and outputs of the postures ``rows`` at tensions (b, C) [N].
+
+        Without tensions, they are guessed; postures whose guess is not optimal become UNDECIDED,
+        and what their tensions must balance is written to ``balance``.
+        """
         balance = balance or self._no_balance
         read = wanted[wanted > layout.STUCK_JOINT]
         if not read.size:
@@ -195,7 +205,8 @@ class Evaluator:
         """Fill all quantities up to K_θ; return the arrays from which the readings follow.
 
         Readings are the quantities that are derived from K_θ, such as the margin and the
-        compliance.
+        compliance. The arrays have ``blocks`` blocks. Other arguments are those of
+        :meth:`_evaluate`.
         """
         given = low = high = rigidity = wire = self._nothing
         model = self._arm._model
@@ -241,7 +252,7 @@ class Evaluator:
         return Kept(K, parts, JX, stuck_K, stuck_parts, wire)
 
     def _read(self, kept: Kept, rows: Indices, wanted: Indices, found: Codes, out: Array) -> None:
-        """Fill the wanted readings, which are the quantities derived from K_θ.
+        """Fill the wanted readings, which are the quantities derived from the K_θ in ``kept``.
 
         Where one does not exist, also set the status of the posture.
         """
@@ -274,7 +285,7 @@ class Evaluator:
 
 
 def _rigidities(laws: CableLaws, tension: Array, usable: Flags) -> Array:
-    """Return EA (1 + ε) (b, C) [N] at tensions F (b, C) [N] of usable postures (b,).
+    """Return EA (1 + ε) (b, C) [N] by ``laws`` at tensions (b, C) [N] of usable postures (b,).
 
     It is 0 under force control and in postures that are not usable, and −1 outside the domain.
     """

@@ -127,8 +127,8 @@ def evaluate_rows(
         jacobian: J_X (B, 6, nv, W) for the readings, or no blocks.
         stuck: K_θ while the cables stick, with the shape of ``joint``.
         stuck_parts: Sum of the magnitudes of the four terms of ``stuck``, with its shape.
-        balance: What the tensions must balance, filled for UNDECIDED postures (b, …); no rows if no
-            tensions are distributed.
+        balance: Moment arms and torques of the balance, filled for UNDECIDED postures (b, …); no
+            rows if no tensions are distributed.
         out: The requested quantities in one row per posture; NaN where they do not exist.
         status: On entry OK, or why no tensions were found; on return the status of the posture.
             UNDECIDED: the guess of its tensions is not the optimum.
@@ -270,7 +270,10 @@ def _load(rows: Array, first: int, block: Array, width: Width) -> None:
 
 @inner
 def _keep(arms: Array, torque: Array, balance: Balance, first: int, w: Index) -> None:
-    """Copy moment arms (C, nv, W) and torque (nv, W) of posture w of the block to its row."""
+    """Copy moment arms (C, nv, W) and torque (nv, W) of posture w of a block to ``balance``.
+
+    Its row there is ``first`` + w.
+    """
     row = first + np.intp(w)
     for i in upwards(0, torque.shape[0]):
         balance.torque[row, i] = torque[i, w]
@@ -292,7 +295,7 @@ def _set_residual(F: Array, J: Array, torque: Array, residual: Array, width: Wid
 
 @inner
 def _set_rigidity(constant: Array, linear: Array, F: Array, rigidity: Array, width: Width) -> None:
-    """Fill EA (1 + ε) (C, W) of linear laws."""
+    """Fill ``rigidity`` (C, W) with EA (1 + ε) = constant + linear · F [N]."""
     for c in upwards(0, F.shape[0]):
         for w in lanes(width):
             rigidity[c, w] = constant[c] + linear[c] * F[c, w]
@@ -340,7 +343,10 @@ def _clear(matrix: Array, width: Width) -> None:
 
 @inlined
 def _vector(record: Array, start: Indices, quantity: int) -> Array:
-    """Return a quantity of the record (one block, layout of ``layout.py``) as vectors (size, W)."""
+    """Return a quantity of the record (one block, layout of ``layout.py``) as vectors (size, W).
+
+    ``start`` is the index in the record at which each quantity begins.
+    """
     return record[start[quantity] : start[quantity + 1]]
 
 
@@ -362,7 +368,11 @@ def _store(
     out: Array,
     status: Codes,
 ) -> None:
-    """Copy the requested quantities of a block to its rows; NaN where they are not known."""
+    """Copy the quantities ``wanted`` from the record of a block to ``out``, from row ``first`` on.
+
+    Quantities beyond ``known`` (W,), which are not computed, become NaN. ``code`` (W,) is copied to
+    ``status``.
+    """
     count = min(record.shape[1], out.shape[0] - first)
     for w in lanes(count):
         status[first + np.intp(w)] = code[w]

@@ -60,7 +60,10 @@ def postures(arm: Manipulator, q: ArrayLike) -> Array:
 
 
 def per_row(name: str, value: ArrayLike, rows: int, width: int, meaning: str, kind: str) -> Array:
-    """Check an array (width,) for all postures or (rows, width); return it read-only."""
+    """Check ``value``, (width,) for all postures or (rows, width); return it read-only.
+
+    ``name`` and ``meaning`` describe it in an error; ``kind`` gives its range of numbers.
+    """
     array = number_array(name, value, kind)
     if array.shape not in ((width,), (rows, width)):
         raise InvalidInput(

@@ -56,7 +56,11 @@ def to_dataset(
     values: dict[str, Array],
     directions: Array | None = None,
 ) -> xarray.Dataset:
-    """Build a Dataset of quantities (B, …) by name; MissingExtra if xarray is not installed."""
+    """Build a Dataset of quantities (B, …) by name, with joint angles and status (B,).
+
+    ``directions`` (D, 3) label the dimension of several directions. Raises MissingExtra if xarray
+    is not installed.
+    """
     units = {"torque": arm.torque_unit(), "stiffness": arm.stiffness_unit()}
     variables: dict[str, tuple[Sequence[str], Array, str]] = {
         "q": (("pose", "joint"), q, " or ".join(sorted(set(arm.joint_units))[::-1]))

@@ -81,7 +81,7 @@ DIRECTIONAL = ("along", "stuck_along", "breakaway")
 
 
 def shapes(nv: int, cables: int, directions: int) -> tuple[tuple[int, ...], ...]:
-    """Return the shape of each quantity at one posture."""
+    """Return the shape of each quantity at one posture, for nv joint coordinates."""
     matrix = (nv, nv)
     return (
         (4, 4),

@@ -50,6 +50,7 @@ def read_stuck(
 ) -> dict[str, Array]:
     """Compute readings of the stuck arm at postures q (b, nv) under tensions F (b, C) [N].
 
+    ``names`` are those of the wanted readings, ``kept`` the arrays from which they follow.
     ``directions`` (D, 3) are unit vectors, and ``status`` (B, W) is as for
     :func:`~cdsm.kernels.read.read`. The posture is the last axis of all results.
     """

@@ -37,6 +37,7 @@ _INSIDE = 0.999
 class RestBand(ReadOnlyState):
     """Range of tip positions at which an arm with locked motors may rest, after any earlier loads.
 
+    The reference is the posture of ``stiffness``, with one tension in all segments of each cable.
     If ``proved``, ``low`` and ``high`` bound all states of rest in a neighbourhood of the
     reference: ``room`` times the set of all states that are at rest to first order. The same is
     true of ``tensions``, ``end_tensions`` and ``loads``, which raise SolverError or

@@ -19,7 +19,7 @@ class _Kind(NamedTuple):
     """Parameter of an arm.
 
     Attributes:
-        unit: Unit in which people read it.
+        unit: Unit shown to the user.
         size: Size of ``unit`` in SI.
         part: ``joints``, ``links`` or ``cables``: the part of the geometry that has it, if any.
         attribute: Its name in this part.
@@ -86,7 +86,7 @@ class ArmParameters:
         return self.arm.geometry
 
     def _place(self, name: str) -> tuple[str, tuple[int, ...]]:
-        """Return the kind of a parameter, and the numbers of its joints."""
+        """Return the kind of the parameter ``name``, and the numbers of its joints."""
         kind, at, number = name.partition("@")
         one_of("parameter of an arm", kind, KINDS)
         joints = len(self.geometry.joints)
@@ -95,17 +95,17 @@ class ArmParameters:
         return kind, (int(number),) if at else tuple(range(1, joints + 1))
 
     def unit(self, name: str) -> tuple[str, float]:
-        """Return the unit in which people read a parameter, and its size in SI."""
+        """Return the unit of the parameter ``name`` shown to the user, and its size in SI."""
         kind = KINDS[self._place(name)[0]]
         return kind.unit, kind.size
 
     @property
     def present(self) -> dict[str, float]:
-        """Value of each parameter in the arm, in SI: the median where joints differ."""
+        """Value of each parameter in :attr:`arm`, in SI: the median where joints differ."""
         return {name: float(np.median(self._values(name))) for name in self.names}
 
     def __call__(self, **values: float) -> Manipulator:
-        """Build the arm with these values.
+        """Build the arm with these values of parameters, in SI.
 
         Raises:
             GeometryError: The values do not make an arm.
@@ -153,7 +153,7 @@ class ArmParameters:
         )
 
     def _values(self, name: str) -> list[float]:
-        """Return the values of a parameter at its joints in SI."""
+        """Return the values of the parameter ``name`` at its joints, in SI."""
         (kind, where), geometry = self._place(name), self.geometry
         cables = [
             cable
@@ -174,7 +174,7 @@ class ArmParameters:
 
 
 def _joints_of(geometry: Geometry, part: str) -> list[int]:
-    """Return the joint number to which each joint, link or cable of the geometry belongs."""
+    """Return the joint number of each entry of ``part``: ``joints``, ``links`` or ``cables``."""
     if part == "cables":
         return [route.joint for route in geometry.cables]
     return list(range(1, len(geometry.joints) + 1))

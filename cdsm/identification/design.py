@@ -1,11 +1,11 @@
 """Optimal design of experiments: which tests determine parameters best, and how far from best.
 
-Test i has the information M_i = J_iᵀ J_i. J_i are the derivatives of its readings, in standard
-deviations, with respect to the parameters. Tests made n_i times determine the parameters with the
-covariance C = (M_0 + Σ n_i M_i)⁻¹, where M_0 is the prior information. L (s, r) selects the s
-wanted parameters. The criterion of a design is f = det(L C Lᵀ)^(−1/s) (D-optimal) or f = 1/tr(L C
-Lᵀ) (A-optimal). Both are concave and homogeneous in the information, so no design of N tests has a
-larger f than
+Test i has the Fisher information M_i = J_iᵀ J_i (r, r). J_i are the derivatives of its readings, in
+standard deviations, with respect to the r parameters. Tests made n_i times give the information
+M = M_0 + Σ n_i M_i, where M_0 is the prior information, and the covariance C = M⁻¹ of the
+parameters. The matrix L (s, r) selects the s wanted parameters. (Elsewhere L is a cable length.)
+The criterion of a design is f = det(L C Lᵀ)^(−1/s) (D-optimal) or f = 1/tr(L C Lᵀ) (A-optimal).
+Both are concave and homogeneous in the information, so no design of N tests has a larger f than
 
     f · (tr M_0 G + N max_i tr M_i G) / tr M G,   G = C Lᵀ (L C Lᵀ)⁻¹ L C (D) or C Lᵀ L C (A):
 
@@ -37,9 +37,9 @@ class Design(NamedTuple):
     """Design of an experiment: candidates of tests, known information, wanted parameters.
 
     Attributes:
-        information: M_i (n, r, r) of each candidate.
+        information: M_i (n, r, r) of each of n candidates, for r parameters.
         known: M_0 (r, r), the prior information.
-        wanted: L (s, r).
+        wanted: L (s, r), which selects s of the parameters.
         criterion: ``"D"`` or ``"A"``.
         tests: Number N of tests.
     """
@@ -65,14 +65,14 @@ class Design(NamedTuple):
         return np.where(regular, found, -np.inf)
 
     def total(self, counts: Array) -> Array:
-        """Compute the information M_0 + Σ n_i M_i (r, r) of n_i tests of each candidate (n,)."""
+        """Compute the information M_0 + Σ n_i M_i (r, r), with n_i = ``counts`` (n,) tests."""
         return np.asarray(self.known + np.tensordot(counts, self.information, 1))
 
     def sensitivities(self, M: Array) -> tuple[Array, float]:
         """Compute tr M_i G (n,), and the proved efficiency f/f_best of a design, in 0…1.
 
-        The gain of one more test i is proportional to tr M_i G. G is that of the module's docstring
-        for the information M of the design.
+        The gain of one more test i is proportional to tr M_i G. ``M`` (r, r) is the information of
+        the design; G follows from it, see the module's docstring.
         """
         C = np.linalg.inv(M)
         right = C @ self.wanted.T

@@ -94,7 +94,10 @@ class Determination:
 
     @cached_property
     def _svd(self) -> tuple[Array, Array]:
-        """Singular values and right vectors of J, its columns scaled to unit length (or zero)."""
+        """Singular values and right vectors of J, with columns scaled to unit length.
+
+        Columns that are zero to rounding are set to zero.
+        """
         _, values, right = np.linalg.svd(self.jacobian / self._column_norms, full_matrices=False)
         return values, right
 

@@ -64,7 +64,7 @@ def _at_bound(result: Identification, i: int) -> list[str]:
 
 
 def _open_ends(result: Identification, i: int) -> list[str]:
-    """Warn if the measurements do not limit the interval of a parameter."""
+    """Return a warning if the measurements do not limit the interval of parameter ``i``."""
     name, profile, limits = result.names[i], result.profiles[i], result.bounds[i]
     interval = result.confidence()[name]
     ends = [k for k in (0, 1) if math.isinf(interval[k])]
@@ -90,7 +90,11 @@ def _open_ends(result: Identification, i: int) -> list[str]:
 
 
 def unfinished(problem: LeastSquares, point: Array, jacobian: Array) -> list[str]:
-    """Warn if χ² could still fall, for example because the model ends before the optimum."""
+    """Return a warning if χ² can still fall from ``point``, where a search ended.
+
+    For example, the model may not exist beyond it. ``point`` is in the unit cube of ``problem``;
+    ``jacobian`` (n, P) is ∂r/∂point there.
+    """
     r = problem.residuals(point)
     gradient = r @ jacobian
     held = ((point == 0.0) & (gradient >= 0.0)) | ((point == 1.0) & (gradient <= 0.0))

@@ -113,7 +113,10 @@ def plan_tests(
     criterion: Criterion = "D",
     progress: bool = True,
 ) -> ExperimentPlan:
-    """Choose among given loops as :func:`plan_experiment` does; their labels must differ."""
+    """Choose among the loops ``candidates`` as :func:`plan_experiment` does.
+
+    Their labels must differ. The other arguments and errors are those of :func:`plan_experiment`.
+    """
     values = _checked_parameters(parameters)
     check_call("model_of", model_of, 0, tuple(values))
     one_of("criterion", criterion, ("D", "A"))
@@ -247,7 +250,7 @@ def _candidates(
 
 
 def _named(u: Array) -> str:
-    """Write a direction: the name of its axis, or its components."""
+    """Write the direction ``u`` (3,) as text: the name of its axis, or its components."""
     axis = int(abs(u).argmax())
     if abs(u[axis]) == 1.0:
         return ("" if u[axis] > 0.0 else "-") + "xyz"[axis]
@@ -257,7 +260,10 @@ def _named(u: Array) -> str:
 def _rows(
     model_of: Callable[..., Manipulator], values: dict[str, float], loop: WeightLoop
 ) -> Array:
-    """Compute ∂r/∂ln p (m, P) of a loop: residuals r in standard deviations, parameters p."""
+    """Compute ∂r/∂ln p (m, P) of the residuals r, in standard deviations, of a loop.
+
+    p are the parameters ``values`` of ``model_of``. Central differences are used.
+    """
     exact = loop.simulated(Model.of(model_of, None, (loop,)).arm(values))
     model = Model.of(model_of, None, (exact,)).weighted(values)
     columns = []

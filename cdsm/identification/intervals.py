@@ -69,7 +69,7 @@ class Profile(ReadOnlyState):
     bounds: Array
 
     def crossing(self, rise: float, side: Side) -> float | None:
-        """Find the farthest value on one side where Δχ² is at most ``rise``.
+        """Find the farthest value of the parameter on one ``side`` where Δχ² is at most ``rise``.
 
         Between the values, Δχ² is a cubic over the searched parameter (or its logarithm). If Δχ²
         stays below ``rise`` up to the bound or the end of the model, the crossing is infinite.
@@ -87,7 +87,10 @@ class Profile(ReadOnlyState):
 
 
 def _crossing(u: Array, height: Array, slope: Array, rise: float) -> float:
-    """Find u at which the cubic with given values and slopes at u[0] and u[1] equals ``rise``."""
+    """Find where the cubic between u[0] and u[1] equals ``rise``.
+
+    ``height`` and ``slope`` are its values and slopes at both ends (2,).
+    """
     width = u[1] - u[0]
     cubic = CubicHermiteSpline((0.0, 1.0), height - rise, width * slope)
     return float(u[0] + width * brentq(cubic, 0.0, 1.0, xtol=1e-12))
@@ -154,7 +157,10 @@ class Profiler:
         return knots, ""
 
     def _next(self, here: _Knot, side: Side, goal: float) -> _Knot | str:
-        """Compute a knot farther out, near where Δχ² reaches ``goal``, or why none exists."""
+        """Compute a knot beyond ``here`` on one ``side``, near where Δχ² reaches ``goal``.
+
+        Returns the reason as text if there is none.
+        """
         u = float(here.point[self.i])
         room = 1.0 - u if side > 0 else u
         if room == 0.0:
@@ -171,7 +177,7 @@ class Profiler:
         return knot
 
     def _refine(self, knots: list[_Knot], goal: float) -> None:
-        """Add knots until one is so near the goal that the cubic is exact enough."""
+        """Add knots until one is so near Δχ² = ``goal`` that the cubic is exact enough."""
         for _ in range(_REFINEMENTS):
             last = max(k for k, knot in enumerate(knots) if knot.rise < goal)
             pair = knots[last : last + 2]

@@ -47,7 +47,7 @@ class Box:
         return np.asarray(np.log(values, out=values.copy(), where=self._by_log))
 
     def parameters(self, point: Array) -> Array:
-        """Compute the parameters (P,) at a point of the unit cube."""
+        """Compute the parameters (P,) at a ``point`` (P,) of the unit cube."""
         scaled = self._start + point * self._size
         values = np.exp(scaled, out=scaled, where=self._by_log)
         # without rounding at 0 and 1
@@ -59,7 +59,7 @@ class Box:
         return np.asarray(np.clip((self._scaled(values) - self._start) / self._size, 0.0, 1.0))
 
     def derivative(self, point: Array) -> Array:
-        """Compute the derivative of :meth:`parameters` (P,)."""
+        """Compute the derivative (P,) of each parameter by its entry of ``point`` (P,)."""
         return np.where(self._by_log, self.parameters(point) * self._size, self._size)
 
 
@@ -125,11 +125,11 @@ class LeastSquares:
     def jacobian(
         self, point: Array, over: Sequence[int] | None = None, *, central: bool = False
     ) -> Array:
-        """Compute ∂r/∂point (n, P) by one-sided or central differences.
+        """Compute ∂r/∂point (n, P) by one-sided or central finite differences.
 
         If ``over`` is given, only the columns of these parameters are computed. Near a bound, or
-        where the model ceases to exist, central differences become one-sided differences of second
-        order.
+        where the model ceases to exist, central differences become one-sided second-order
+        differences.
         """
         chosen = range(len(self.names)) if over is None else over
         return np.column_stack([self._column(point, i, central) for i in chosen])

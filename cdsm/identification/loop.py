@@ -142,7 +142,7 @@ class WeightLoop:
 
 
 def measured(measurement: Measurement | WeightLoop) -> Array:
-    """Return the measured numbers: the stiffness (1,) [N/m], or the readings (m,) [m]."""
+    """Return the numbers of ``measurement``: a stiffness (1,) [N/m], or readings (m,) [m]."""
     if isinstance(measurement, WeightLoop):
         return np.array(measurement.displacements).ravel()
     return np.array([measurement.value])
@@ -184,5 +184,5 @@ class Weights:
 
 
 def up_and_down(weight: float, steps: int) -> tuple[float, ...]:
-    """Return the forces [N] of a loop: from none to the weight in equal steps, and back."""
+    """Return the forces [N] of a loop: from 0 to ``weight`` in equal ``steps``, and back."""
     return tuple(weight * k / steps for k in (*range(steps + 1), *range(steps - 1, -1, -1)))

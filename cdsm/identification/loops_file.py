@@ -158,7 +158,7 @@ class _Reader:
             raise FileError(self._path, f"test {label}: {error}") from None
 
     def _column(self, name: str, units: dict[str, float] | None = None) -> _Column:
-        """Find a column, with one of these units."""
+        """Find the column ``name``, with one of ``units``; raise FileError if it is missing."""
         if units is not None:
             at, size = column_in(units, name, self._header, self._refuse)
             return _Column(at, name, size)
@@ -170,7 +170,10 @@ class _Reader:
         return row[1][column.at] if column.at < len(row[1]) else ""
 
     def _same(self, rows: list[tuple[int, list[str]]], column: _Column) -> str:
-        """Return the cell of the first row; raise FileError if another row has a different one."""
+        """Return the cell of ``column`` in the first row.
+
+        Raises FileError if a later row has another text in this column; empty cells are allowed.
+        """
         first = self._cell(rows[0], column)
         for row in rows[1:]:
             if self._cell(row, column) not in (first, ""):

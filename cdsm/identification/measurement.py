@@ -111,7 +111,7 @@ class Conditions(Protocol):
 
 
 def checked_conditions(given: Conditions) -> dict[str, object]:
-    """Check the conditions of a measurement; return the fields as tuples of numbers."""
+    """Check the conditions ``given`` for a measurement; return its fields as tuples of numbers."""
     if (given.tension is None) == (given.minimum is None):
         raise InvalidInput(
             "tension",

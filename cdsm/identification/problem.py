@@ -61,7 +61,10 @@ class Model:
         tension_of: Callable[..., Tension | ArrayLike] | None,
         measurements: tuple[Measurement | WeightLoop, ...],
     ) -> Model:
-        """Return the model with weights that count the errors of the readings only."""
+        """Return the model of ``measurements`` with weights for the errors of readings only.
+
+        ``tension_of`` may be None: each measurement then gives its tensions.
+        """
         weights = (Weights(each) if isinstance(each, WeightLoop) else None for each in measurements)
         return cls(model_of, tension_of, measurements, tuple(weights))
 
@@ -99,13 +102,13 @@ class Model:
         return replace(self, weights=tuple(weights))
 
     def residuals(self, parameters: Parameters) -> Array:
-        """Compute all residuals (n,), in standard deviations."""
+        """Compute all residuals (n,) for these ``parameters``, in standard deviations."""
         return self.weigh(self.predict(parameters)[1])
 
     def predict(self, parameters: Parameters) -> tuple[Manipulator, list[Array]]:
-        """Build the arm; predict each stiffness (1,) [N/m] or loop (m,) [m].
+        """Build the arm of ``parameters``; predict each stiffness (1,) [N/m] or loop (m,) [m].
 
-        The tip displacements of a loop are those from the arm without the forces.
+        The predicted displacements of a loop start from the tip of the arm without the forces.
         """
         arm = self.arm(parameters)
         paths = self._paths_at(parameters, arm)
@@ -122,7 +125,8 @@ class Model:
     def residuals_beside(self, here: Parameters, moved: Parameters) -> Array:
         """Compute the residuals (n,) for slightly changed parameters ``moved``, to first order.
 
-        Its loops follow from those at ``here`` without a search, ten times as fast.
+        Predictions of the loops follow from the rest states of the loops at ``here``, without a
+        search for equilibria. That is ten times as fast.
         """
         arm, paths, predicted = self.arm(moved), self._paths_at(here), list[Array]()
         for i, (each, path) in enumerate(zip(self.measurements, paths, strict=True)):
@@ -141,7 +145,7 @@ class Model:
         return self.weigh(predicted)
 
     def weigh(self, predicted: list[Array]) -> Array:
-        """Compute the residuals (n,) of predictions, in standard deviations."""
+        """Compute the residuals (n,), in standard deviations, of the result of :meth:`predict`."""
         rows = []
         for each, weights, found in zip(self.measurements, self.weights, predicted, strict=True):
             if isinstance(each, WeightLoop):
@@ -152,7 +156,7 @@ class Model:
         return np.concatenate(rows)
 
     def as_read(self, predicted: list[Array]) -> Array:
-        """Return predictions with the fitted offsets of the loops added (n,) [N/m or m]."""
+        """Return the result of :meth:`predict` with fitted offsets of the loops (n,) [N/m, m]."""
         rows = []
         for each, weights, found in zip(self.measurements, self.weights, predicted, strict=True):
             if weights is not None:
@@ -162,7 +166,7 @@ class Model:
         return np.concatenate(rows)
 
     def arm(self, parameters: Parameters) -> Manipulator:
-        """Build the arm; raise NoModelError if there is none."""
+        """Build the arm of ``parameters``; raise NoModelError if there is none."""
         try:
             arm = _call_model("model_of", self.model_of, parameters)
         except CdsmError as error:
@@ -174,7 +178,7 @@ class Model:
     def _paths_at(
         self, parameters: Parameters, arm: Manipulator | None = None
     ) -> list[LoadingPath | None]:
-        """Compute the paths of all loops, or return stored ones; None for a stiffness."""
+        """Return the path of each loop for ``parameters``, computed once; None for a stiffness."""
         key = tuple(parameters.values())
         if key not in self._paths:
             arm = arm or self.arm(parameters)
@@ -200,7 +204,7 @@ class Model:
     def _started(
         self, arm: Manipulator, loop: WeightLoop, parameters: Parameters
     ) -> tuple[Posture, Array, Array]:
-        """Return posture, tensions (C,) and wrench (6,) before the first force of a loop."""
+        """Return posture, tensions (C,) [N] and wrench (6,) before the first force of ``loop``."""
         pose = arm.at(loop.angles)
         K = stiffness(pose, *self._tension(pose, loop, parameters))
         return pose, K.tension, K.wrench
@@ -220,7 +224,11 @@ class Model:
         return tension, None if isinstance(tension, Tension) else measurement.wrench
 
     def _slopes(self, arm: Manipulator, loop: WeightLoop, path: LoadingPath) -> tuple[Array, Array]:
-        """Compute derivatives of the readings with respect to forces (m, n) and tensions (m, C)."""
+        """Compute the derivatives of the readings of ``loop``, whose equilibria are ``path``.
+
+        They are with respect to the forces (m, n) [m/N] and the tensions (m, C) [m/N]; without
+        columns if the loop has no errors of forces or of tensions.
+        """
         u, axes, pose = unit_direction("direction", loop.direction), loop.axes, path.start.pose
         by_forces = np.zeros((len(loop.forces) * len(axes), 0))
         by_tensions = by_forces

@@ -250,7 +250,10 @@ class Identification(ReadOnlyState):
         )
 
     def _rise(self, level: float, *, scaled: bool) -> float:
-        """Compute the Δχ² [-] at the limits of a confidence interval of this level."""
+        """Compute the Δχ² [-] at the limits of a confidence interval of this ``level``.
+
+        ``scaled`` is that of :meth:`confidence`.
+        """
         half = (1.0 + level) / 2.0
         if not scaled:
             return float(ndtri(half) ** 2)
@@ -270,6 +273,6 @@ class Identification(ReadOnlyState):
 
 
 def _row(name: str, *cells: object) -> str:
-    """Write a row of a table. Numbers have four digits."""
+    """Write a row of a table: ``name`` and ``cells``. Numbers have four digits."""
     texts = (f"{cell:.4g}" if isinstance(cell, float) else str(cell) for cell in cells)
     return f"{name:<22}" + "".join(f"{text:>12}" for text in texts)

@@ -137,7 +137,10 @@ def identify(
 
 
 def problem_of(model: Model, bounds: Mapping[str, tuple[float, float]]) -> LeastSquares:
-    """Return the least-squares problem of a model; differences of loops are of first order."""
+    """Return the least-squares problem of ``model`` within ``bounds`` (low, high) by name.
+
+    Its finite differences use :meth:`Model.residuals_beside` if there are loops.
+    """
     beside = model.residuals_beside if model.loops else None
     return LeastSquares(model.residuals, model.count, bounds, beside)
 
@@ -184,7 +187,15 @@ def _checked_bounds(free: Mapping[str, tuple[float, float]]) -> dict[str, tuple[
 
 
 def check_call(name: str, function: object, positional: int, names: Sequence[str]) -> None:
-    """Raise before any search if a function cannot be called with these parameters."""
+    """Raise if ``function`` cannot be called with these arguments, before any search.
+
+    They are ``positional`` positional arguments, and one by keyword for each of ``names``. The
+    error calls the function ``name``.
+
+    Raises:
+        UnknownName: It does not take one of ``names``.
+        InvalidInput: It is no function, or needs other arguments.
+    """
     if not callable(function):
         raise InvalidInput(name, f"{function!r} given; a function is needed.")
     try:
@@ -211,7 +222,10 @@ def check_call(name: str, function: object, positional: int, names: Sequence[str
 
 
 def _starts(problem: LeastSquares, start: Mapping[str, float] | None) -> list[Array]:
-    """Choose points of the unit cube to search from, where the model has all stiffnesses."""
+    """Choose points of the unit cube of ``problem`` to search from, where the model exists.
+
+    If ``start`` is given, it is the only one. Raises InvalidInput if the model exists at none.
+    """
     count = len(problem.names)
     if start is None:
         from scipy.stats import qmc  # here, because it imports slowly

@@ -109,7 +109,10 @@ def inverse_kinematics(
 
 
 def _solve(residual: Residual, guess: Array, tolerance: float) -> dict[str, Any]:
-    """Solve an inverse problem; return the fields that both classes of solutions have."""
+    """Find the angles nearest to ``guess`` (nv,) with ‖r‖ ≤ ``tolerance``, r of ``residual``.
+
+    Returns the fields that both classes of solutions have.
+    """
     tolerance = scalar("tolerance", tolerance)
     if not _SMALLEST_TOLERANCE <= tolerance < 1.0:
         raise InvalidInput(

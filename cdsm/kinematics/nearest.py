@@ -75,7 +75,7 @@ _Newton = Callable[[Array, NDArray[np.bool_]], _NewtonStep]
 
 
 def nearest(residual: Residual, guess: Array, tolerance: float) -> tuple[Array, int]:
-    """Find the joint angles nearest to the guess with ‖r‖ within a tolerance, or with least ‖r‖.
+    """Find the joint angles nearest to the guess with ‖r‖ ≤ ``tolerance``, or with least ‖r‖.
 
     They are nearest locally; a differently folded arm may be nearer still. If the search from the
     guess finds no solution, it is repeated from random postures, the same ones in each call.
@@ -109,7 +109,10 @@ class _Search:
         self.iterations = 0
 
     def solve_from(self, start: Array) -> tuple[Array, float]:
-        """Return a solution, exact to rounding if Newton's method converges, and its ‖r‖."""
+        """Search from joint angles ``start`` (nv,); return a solution and its ‖r‖.
+
+        The solution is exact to rounding if Newton's method converges.
+        """
         q, held = self.fit(start, _WEIGHTS[-1], 1e-6)
         best, held = self._active_set(self._least_residual_step, q, held)
         if best is None:  # singular: use least squares only
@@ -120,7 +123,10 @@ class _Search:
         return best, self._size(best)
 
     def fit(self, start: Array, weight: float, tolerance: float) -> tuple[Array, Limits]:
-        """Minimise ½‖r‖² + ½ weight ‖q − guess‖² within the limits; return q and active limits."""
+        """Minimise ½‖r‖² + ½ weight ‖q − guess‖² within the limits; return q and active limits.
+
+        The search begins at ``start`` (nv,); ``tolerance`` is scipy's ftol, xtol and gtol.
+        """
         root = math.sqrt(weight)
         regularisation = root * np.eye(start.size)
         found = least_squares(
@@ -141,7 +147,7 @@ class _Search:
         return float(np.linalg.norm(self.residual.evaluate(q)[0]))
 
     def _nearest_step(self, q: Array, free: NDArray[np.bool_]) -> _NewtonStep:
-        """Compute a Newton step for min ½‖q − guess‖² subject to r = 0.
+        """Compute a Newton step of the joints ``free`` for min ½‖q − guess‖² subject to r = 0.
 
         It has a part towards r = 0, and a part along it towards the guess.
         """

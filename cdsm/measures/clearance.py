@@ -40,7 +40,7 @@ class Clearance(ReadOnlyState):
         diameter: Diameter of all cables [m].
         cables: Between the surfaces of two cables [m].
         links: Between a cable and the backbone of a link [m].
-        disks: Between a cable and a disk through which it does not run, or the edge of one
+        disks: Between a cable and a disk through which it does not run, or the outer rim of one
             through which it runs [m].
         nearest: Names of the two nearest bodies for each of the three distances; empty without a
             pair.
@@ -80,8 +80,8 @@ def clearance(pose: Posture, diameter: float = 0.0) -> Clearance:
     Cables are straight between their sites, with round sections; leads are left out. Links are
     bars from joint to joint, as the URDF draws them: their radius is a fifth of the hole radius. In
     an arm from a URDF they are lines. Disks are plates without thickness. For a cable in its own
-    hole the distance is that from the cable's surface to the edge of the disk. For a cable that
-    pierces a disk elsewhere it is negative.
+    hole the distance is that from the cable's surface to the outer rim of the disk. For a cable
+    that pierces a disk elsewhere it is negative. A distance is inf if the arm has no such pair.
 
     Args:
         pose: The posture.
@@ -117,6 +117,8 @@ def clearances(
     arm: Manipulator, q: ArrayLike, diameter: float = 0.0, *, threads: int | None = None
 ) -> dict[str, Array]:
     """Compute the distances of :func:`clearance` at postures q (B, nv) [rad], (B,) [m] by name.
+
+    ``diameter`` is that of all cables [m].
 
     ``threads`` is the maximum number of threads; by default one for each core. Raises InvalidInput
     as :func:`clearance` does, and if ``q`` is not (B, nv) numbers.

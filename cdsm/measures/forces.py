@@ -176,7 +176,10 @@ def force_polytope(
 
 
 def directions_of(jacobian: Array, length: float) -> tuple[Array, Array]:
-    """Return unit directions in which J_X (6, nv) moves the tip (3, k), and the others (3−k, 3)."""
+    """Return unit directions (3, k) in which the joints move the tip, and the others (3−k, 3).
+
+    ``jacobian`` is J_X (6, nv), and ``length`` [m] that of the arm: much smaller motions are zero.
+    """
     axes, size, _ = np.linalg.svd(jacobian[:3])
     moving = np.zeros(3, dtype=np.bool_)
     moving[: size.size] = size > _NO_MOTION * length

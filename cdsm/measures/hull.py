@@ -72,7 +72,11 @@ def hull_of(loads: Loads) -> Hull | None:
 
 
 def _span(farthest: _Farthest, k: int) -> tuple[list[Array], list[Array], list[float]]:
-    """Return points that span the polytope, and pairs of facets where its width is zero."""
+    """Return points (k,) that span a polytope, and pairs of facets where its width is zero.
+
+    ``farthest(u)`` returns the largest u·x in the polytope and a point x with it. A facet is given
+    by its normal and its offset, in two lists.
+    """
     found: list[Array] = []
     normals: list[Array] = []
     offsets: list[float] = []
@@ -99,7 +103,11 @@ def _span(farthest: _Farthest, k: int) -> tuple[list[Array], list[Array], list[f
 def _polytope(
     farthest: _Farthest, points: Array, spanned: Array
 ) -> tuple[Array, NDArray[np.intp], Array, Array]:
-    """Build corners, triangles, normals and offsets of a polytope of 2 or 3 dimensions."""
+    """Build corners, triangles, normals and offsets of a polytope of 2 or 3 dimensions.
+
+    ``farthest`` is that of :func:`_span`, ``points`` (n, k) are some points of the polytope, and
+    the rows of ``spanned`` an orthonormal basis of the directions that they span.
+    """
     from scipy.spatial import ConvexHull
 
     start = points[0]

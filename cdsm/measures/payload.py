@@ -153,7 +153,8 @@ def _along(
 ) -> dict[str, float]:
     """Return the largest forces [N] along u: that of the tensions, and that of the deflection.
 
-    ``compliance`` is C_vv [m/N], and ``allowed`` the largest deflection [m].
+    ``compliance`` is C_vv [m/N], and ``allowed`` the largest deflection [m]. The tensions are
+    limited as in :func:`payload`.
     """
     low, high = bounds_at(pose, minimum, maximum, worst_friction)
     return {
@@ -163,7 +164,10 @@ def _along(
 
 
 def largest_force(loads: Loads) -> float:
-    """Return the largest force [N] along one direction; 0 if the arm cannot balance any."""
+    """Return the largest force [N] along the one direction of ``loads`` (k = 1).
+
+    It is 0 if the arm cannot balance any.
+    """
     found = loads.largest(np.ones(1), positive=True)
     return 0.0 if found is None else found[0]
 
@@ -171,9 +175,10 @@ def largest_force(loads: Loads) -> float:
 def _worst(
     polytope: ForcePolytope, compliance: Array, allowed: float
 ) -> tuple[Array, dict[str, float]]:
-    """Return the direction in which tensions or deflection allow the least force.
+    """Return the direction in which ``polytope`` or the deflection allows the least force.
 
     Also return the largest forces there [N]: that of the tensions, and that of the deflection.
+    ``compliance`` is C_vv [m/N], and ``allowed`` the largest deflection [m].
     """
     tension = polytope.margin()
     values, vectors = np.linalg.eigh(compliance.T @ compliance)
@@ -198,10 +203,12 @@ def _ratio(allowed: float, compliance: float) -> float:
 def _until_unstable(
     K: Stiffness, u: Array, most: float, low: Array, high: Array, *, worst: bool
 ) -> tuple[Array, float, str]:
-    """Return the direction, force and reason at which K_θ is not positive definite or not defined.
+    """Return direction, force [N] and reason at which an arm becomes unstable under a load along u.
 
-    The force is inf if neither happens up to ``most`` [N]. With ``worst``, neighbouring directions
-    are searched too, and the one with the least force is returned.
+    The reason is ``"buckling"`` (K_θ is not positive definite), or ``"elasticity"`` (K_θ is not
+    defined: one of the least tensions between the bounds ``low`` and ``high`` (C,) [N] leaves the
+    domain of its law). The force is inf if neither happens up to ``most`` [N]. With ``worst``,
+    other directions are searched too, and the one with the least force is returned.
     """
     if not K.is_stable:
         return u, 0.0, "buckling"

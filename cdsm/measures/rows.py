@@ -39,7 +39,10 @@ def require(
     breaking_load: float | None,
     bend_diameter: float | None,
 ) -> None:
-    """Check the arguments of measures; raise InvalidInput if a measure lacks what it needs."""
+    """Raise InvalidInput if the measures ``names`` lack an argument, or an argument is invalid.
+
+    The other arguments are those of :func:`~cdsm.sweep`.
+    """
     if flag("worst_friction", worst_friction) and not arm.has_friction:
         raise InvalidInput(
             "worst_friction",
@@ -66,7 +69,10 @@ def measured(
     diameter: float = 0.0,
     threads: int | None = None,
 ) -> dict[str, Array]:
-    """Compute measures of :data:`MEASURED` at postures q (B, nv); return (B,) for each name."""
+    """Compute measures of :data:`MEASURED` at postures q (B, nv); return (B,) for each name.
+
+    ``diameter`` is that of all cables [m].
+    """
     found: dict[str, Array] = {}
     if any(name in KINDS for name in names):
         found |= clearances(arm, q, diameter, threads=threads)
@@ -95,11 +101,11 @@ def friction_losses(arm: Manipulator, q: Array, threads: int | None = None) -> A
 def narrowed_bounds(
     arm: Manipulator, minimum: ArrayLike, maximum: ArrayLike, loss: Array
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Narrow bounds (), (B,) or (B, C) [N] by :func:`friction_losses`.
+    """Narrow the bounds ``minimum`` and ``maximum`` by :func:`friction_losses`, ``loss`` (B, C).
 
-    Every segment of a cable is then within the given bounds. Return the lower and upper bounds (B,
-    C), and in which postures no lower bound is above the upper one (B,); the other postures keep
-    the given bounds.
+    Each is (), (B,) or (B, C) [N]. Every segment of a cable is then within the given bounds. Return
+    the lower and upper bounds (B, C), and in which postures no lower bound is above the upper one
+    (B,); the other postures keep the given bounds.
     """
     given = _each_bound(arm, minimum, maximum, loss.shape)
     low, high = given[0] * loss, given[1] / loss
@@ -119,8 +125,8 @@ def payloads(
 ) -> Array:
     """Compute the largest forces (B, D) [N] that the bounds of the tensions allow.
 
-    Each of the postures q (B, nv) has a wrench (B, 6) and bounds, (B,) or (B, C). The unit
-    directions of the forces are (D, 3).
+    Each of the postures q (B, nv) has a wrench (B, 6). ``minimum`` and ``maximum`` are (), (B,) or
+    (B, C) [N]. The unit directions of the forces are (D, 3).
     """
     JX, J, torque, low, high = _balances(arm, q, wrench, minimum, maximum, threads)
     motion = np.einsum("nij,di->ndj", JX[:, :3], directions)
@@ -161,7 +167,10 @@ def _balances(
     maximum: ArrayLike,
     threads: int | None,
 ) -> tuple[Array, Array, Array, Array, Array]:
-    """Return J_X, J_L, the torques J_Xᵀ W − g, and the bounds (B, C) of postures."""
+    """Return J_X, J_L, the torques J_Xᵀ W − g, and lower and upper bounds (B, C) [N] of postures.
+
+    Arguments are those of :func:`payloads`.
+    """
     names = ("jacobian", "length_jacobian", "gravity_torque")
     found = evaluate(arm, q, outputs=names, check_limits=False, threads=threads)
     JX, J, g = (found[name] for name in names)
@@ -172,7 +181,10 @@ def _balances(
 def _each_bound(
     arm: Manipulator, minimum: ArrayLike, maximum: ArrayLike, shape: tuple[int, int]
 ) -> tuple[Array, Array]:
-    """Return checked bounds (B, C) [N] from bounds (), (B,), one per posture, or (B, C)."""
+    """Return ``minimum`` and ``maximum``, checked, with the ``shape`` (B, C) [N].
+
+    They may be (), (B,), one for each posture, or (B, C).
+    """
     bounds = (np.asarray(bound, dtype=np.float64) for bound in (minimum, maximum))
     low, high = (np.broadcast_to(b[:, None] if b.ndim == 1 else b, shape) for b in bounds)
     return checked_bounds(arm, low, high, shape[0])

@@ -140,7 +140,8 @@ def _proved(
 ) -> bool:
     """Correct x by its residual; return whether it then meets the conditions of a maximum.
 
-    ``state``, ``basis``, ``inverse`` and ``price`` are those of the simplex method at x.
+    The program is that of :func:`single_largest`. ``state``, ``basis``, ``inverse`` and ``price``
+    are those of the simplex method at x.
     """
     m, n = A.shape
     left, size = b.copy(), np.abs(b)
@@ -183,10 +184,11 @@ def payload_rows(
     reach: float,
     force: Array,
 ) -> None:
-    """Compute the largest forces (B, D) [N] of B postures along D directions u.
+    """Fill ``force`` (B, D) [N] with the largest forces of B postures along D directions u.
 
     J is J_L (B, C, nv), ``torque`` J_Xᵀ W − g (B, nv), ``motion`` J_vᵀ u (B, D, nv); ``low`` and
-    ``high`` are the bounds (B, C). The force is NaN where the method proves none.
+    ``high`` are the bounds (B, C) [N], and ``reach`` is the length of the arm [m]. The force is NaN
+    where the method proves none.
     """
     rows, count, nv = J.shape
     columns, x = np.empty((nv, count + 1)), np.empty(count + 1)

@@ -131,7 +131,7 @@ def wire_use(
 
 
 def safety(tension: Array, breaking_load: float) -> Array:
-    """Return the breaking load [N] over tensions [N]; inf where a cable is slack."""
+    """Return ``breaking_load`` [N] over ``tension`` [N]; inf where a cable is slack."""
     with np.errstate(divide="ignore"):
         return np.where(tension > 0.0, breaking_load / tension, math.inf)
 
@@ -151,7 +151,10 @@ def strains(arm: Manipulator, tension: Array) -> Array:
 def life_margin(
     tension: Array, diameter: float, bend_diameter: float, strength: float = ROPE_WIRE
 ) -> Array:
-    """Return 0.001 S_u/p of tensions F [N], S_u ``strength``, p = 2F/(d D); inf at 0 N."""
+    """Return 0.001 S_u/p of tensions F [N], with the bearing pressure p = 2F/(d D); inf at 0 N.
+
+    S_u is ``strength`` [Pa], d ``diameter`` and D ``bend_diameter`` [m], as in :func:`wire_use`.
+    """
     with np.errstate(divide="ignore"):
         pressure = 2.0 * tension / (diameter * bend_diameter)
         return np.where(tension > 0.0, LONG_LIFE * strength / pressure, math.inf)

@@ -80,6 +80,8 @@ def _extrapolated(
 ) -> Estimates:
     """Halve the step until rounding dominates; keep the best extrapolation of each function.
 
+    ``level(h)`` computes the differences of this ``order`` (1 or 2) with the step h; ``first`` and
+    ``noise`` are those of :func:`gradients`.
     The error bound is twice the error of the *coarser* of two extrapolations. So it is valid even
     if a derivative is discontinuous, where the error falls only in proportion to h.
     """

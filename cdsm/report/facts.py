@@ -82,12 +82,12 @@ class CableState:
 
     @property
     def below(self) -> float:
-        """Return F minus the low end of the domain [N]; negative outside the domain."""
+        """Return F minus the low end of the law's domain [N]; negative if F is lower."""
         return self.tension - self.low
 
     @property
     def above(self) -> float:
-        """Return the high end of the domain minus F [N]; negative outside the domain."""
+        """Return the high end of the law's domain minus F [N]; negative if F is higher."""
         return self.high - self.tension
 
     @property
@@ -191,7 +191,7 @@ def cable_states(K: Stiffness) -> tuple[CableState, ...]:
 
 
 def _number(cable: Cable, answer: Callable[[], Array]) -> float | None:
-    """Evaluate a law; return None if it raises an error of this library."""
+    """Call ``answer``, which evaluates the law of ``cable``; None if it raises a CdsmError."""
     try:
         return float(evaluate_law(cable, answer))
     except CdsmError:
@@ -215,7 +215,8 @@ class Sticking(ReadOnlyState):
 def sticking(K: Stiffness, readings: Readings | None) -> Sticking | None:
     """Compute the tip stiffnesses while cables stick.
 
-    None if no cable sticks, if K_θ is singular, or if a tension is outside the domain of its law.
+    ``readings`` are the frictionless ones of ``K``. Returns None if no cable sticks, if K_θ is
+    singular (no readings), or if a tension is outside the domain of its law.
     """
     pose, held = K.posture, holding(K.posture)
     T, J = K.tension[pose.segments.chains.cable], pose.jacobian[:3]

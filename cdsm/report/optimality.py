@@ -47,7 +47,7 @@ class Optimality:
 
 
 def optimality(K: Stiffness, pull: Tension) -> Optimality:
-    """Evaluate the optimality conditions of distributed tensions."""
+    """Evaluate the optimality conditions of the distributed tensions ``pull`` of ``K``."""
     pose = K.posture
     torque = pose.jacobian.T @ K.wrench - pose.gravity_torque
     problem = tension_kernels.Scaled(

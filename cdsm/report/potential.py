@@ -40,7 +40,8 @@ _BESIDE = 1e-6
 class LockedCable(NamedTuple):
     """A position-controlled cable with locked motor, computed from strain and energy of its law.
 
-    It has the tension F [N] at the posture, and the motor keeps its original length l_0 [m].
+    It is number ``number`` of the arm. It has the tension F [N] at the posture, and the motor keeps
+    its original length l_0 [m].
     """
 
     number: int
@@ -49,7 +50,10 @@ class LockedCable(NamedTuple):
     free_length: float
 
     def pulls(self, longer: Array) -> Array:
-        """Compute the tensions (P,) [N] after elongations ``longer`` (P, C) [m] of all cables."""
+        """Compute the tensions (P,) [N] of this cable at P elongations.
+
+        ``longer`` (P, C) [m] are the changes of length of all cables of the arm.
+        """
         cable, start = self.cable, self.free_length
         more = longer[:, self.number]
         return evaluate_law(
@@ -57,7 +61,10 @@ class LockedCable(NamedTuple):
         )
 
     def stored(self, longer: Array) -> Array:
-        """Compute the energy (P,) [J] stored by elongations ΔL (P, C) [m], minus the work F·ΔL."""
+        """Compute the energy (P,) [J] that this cable stores, minus the work F ΔL.
+
+        ΔL is its column of ``longer`` (P, C) [m], as in :meth:`pulls`.
+        """
         cable, F, start = self.cable, self.tension, self.free_length
         pulls = self.pulls(longer)
         more = evaluate_law(cable, lambda: cable.energy(pulls, start) - cable.energy(F, start))
@@ -92,7 +99,10 @@ class LockedCable(NamedTuple):
 
 
 def evaluate_law(cable: Cable, answer: Callable[[], Array]) -> Array:
-    """Evaluate an elasticity; raise InvalidInput if a user-defined law fails or is not finite."""
+    """Call ``answer``, which evaluates the law of ``cable``, and return its values.
+
+    Raises InvalidInput if a user-defined law fails or its values are not finite.
+    """
     try:
         values = np.asarray(answer(), dtype=np.float64)
     except CdsmError:
@@ -227,7 +237,10 @@ class Neighbourhood:
 
     @property
     def first_step(self) -> float:
-        """Return a first step so small that no cable segment loses more than half its length."""
+        """Return a first step so small that no cable segment loses more than half its length.
+
+        Steps are joint displacements in :attr:`unit`.
+        """
         return min(_FIRST, self._closing_motion / 4.0)
 
     @property
@@ -269,13 +282,13 @@ class Neighbourhood:
         return np.array([self._tension @ self.length_noise, _ULPS * weight, _ULPS * load])
 
     def elastic_noise(self, step: float) -> Array:
-        """Return the rounding error of :meth:`elastic` (1,) [N m]."""
+        """Return the rounding error of :meth:`elastic` (1,) [N m] at ``places`` of size step."""
         k, F = self._k, self._tension
         stored = np.divide(F * F, k, out=np.zeros_like(k), where=k > 0.0).sum()
         return np.array([_ROOT * stored + 2.0 * step * (k * self._arms) @ self.length_noise])
 
     def kinematic_torque_noise(self, step: float) -> Array:
-        """Return the rounding error of :meth:`kinematic_torques` (3,) [N m].
+        """Return the rounding error of :meth:`kinematic_torques` (3,) [N m], for all steps.
 
         It is large at short segments.
         """
@@ -284,7 +297,7 @@ class Neighbourhood:
         return noise
 
     def elastic_torque_noise(self, step: float) -> Array:
-        """Return the rounding error of :meth:`elastic_torques` (1,) [N m]."""
+        """Return the rounding error of :meth:`elastic_torques` (1,) [N m] at this step."""
         k = self._k
         errors = k * self.length_noise + _ROOT * self._tension * (k > 0.0)
         tilted = 2.0 * step * (k * self._arms) @ self.length_noise

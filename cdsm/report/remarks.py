@@ -34,7 +34,7 @@ _LABELS = {"joint": "sum K_θ", "torque": "torque out of balance", "lengths": "l
 
 
 def faults(report: Report) -> Iterator[str]:
-    """Yield the reasons not to trust the stiffness; none if it can be trusted."""
+    """Yield the reasons not to trust the stiffness of ``report``; none if it can be trusted."""
     K = report.stiffness
     unchecked: dict[str, list[str]] = {}
     for each in report.self_check.compared:
@@ -72,7 +72,7 @@ def faults(report: Report) -> Iterator[str]:
 
 
 def notes(report: Report) -> Iterator[str]:
-    """Yield notes for a user of the stiffness; they do not mean that it is wrong."""
+    """Yield notes for a user of the stiffness of ``report``; they do not mean that it is wrong."""
     length = report.stiffness.posture.arm.length
     if length > LONGEST:
         yield f"the arm is {length:.4g} m long: it looks as if its lengths are in mm; give metres."

@@ -1,4 +1,4 @@
-"""Check of K_θ by central differences at the same posture, in two ways.
+"""Check of K_θ by central finite differences at the same posture, in two ways.
 
 First, K_θ is the Hessian of the potential, computed from lengths, poses and energies alone. This
 check shares with Eq. 16 only the positions of cables and links. Second, K_θ is the derivative of
@@ -48,7 +48,7 @@ _SUM = 16.0 * float(np.finfo(np.float64).eps)
 
 
 class _Recomputed(NamedTuple):
-    """Value computed by differences with its error bound, or the reason why there is none."""
+    """Value by finite differences with its error bound, or the reason why there is none."""
 
     value: Array | None
     reason: str = ""
@@ -135,8 +135,10 @@ class SelfCheck(ReadOnlyState):
 
 
 def self_check(K: Stiffness) -> SelfCheck:
-    """Compute K_θ, its terms and the torque residual by differences, and compare.
+    """Compare K_θ, its terms and the torque residual with finite differences.
 
+    K_θ and its terms are compared with second differences of the potential and with first
+    differences of the torque, the residual of Eq. 13 with first differences of the potential.
     Position-controlled cables store energy; force-controlled cables do the work F·L; motors do not
     move. The tensions need not balance the arm. No error is raised: a comparison that is not
     possible names the reason.
@@ -171,7 +173,10 @@ def self_check(K: Stiffness) -> SelfCheck:
 
 
 def _recomputed_terms(near: Neighbourhood) -> tuple[list[_Recomputed], list[_Recomputed]]:
-    """Compute active, passive, gravity and load term from the potential, and from the torque."""
+    """Compute active, passive, gravity and load term by second differences of the potential.
+
+    Also return them by first differences of the torque. ``near`` is the arm near the posture.
+    """
     step = near.first_step
     moved = _differentiated(hessians, near, near.kinematic, near.kinematic_noise, step)
     turned = _differentiated(
@@ -196,9 +201,10 @@ def _differentiated(
     noise: Noise,
     step: float,
 ) -> list[_Recomputed]:
-    """Compute derivatives of three kinematic parts or one elastic part.
+    """Compute derivatives of three kinematic parts or one elastic part ``f`` of ``near``.
 
-    If ``derive`` raises an error, its text is the reason why there is no value.
+    ``derive`` is :func:`gradients` or :func:`hessians`, with first step ``step`` and rounding
+    errors ``noise``. If it raises an error, its text is the reason why there is no value.
     """
     try:
         values, errors = derive(f, near.unit.size, step, noise)
@@ -213,7 +219,7 @@ def _differentiated(
 
 
 def _summed(parts: list[_Recomputed]) -> _Recomputed:
-    """Add values and error bounds; if a value is missing, return the reason."""
+    """Add values and error bounds of ``parts``; if a value is missing, return the reason."""
     values = [each.value for each in parts if each.value is not None]
     if len(values) < len(parts):
         return _Recomputed(None, next(each.reason for each in parts if each.value is None))
@@ -228,7 +234,10 @@ def _compare(
     torque: _Recomputed = _NONE,
     whole: float = 0.0,
 ) -> Agreement:
-    """Compare a matrix with its values by differences; ``whole`` is the largest entry of K_θ."""
+    """Compare ``given`` with its values by differences of the potential and of the torque.
+
+    ``largest`` is that of :class:`Agreement`, and ``whole`` the largest entry of K_θ.
+    """
     unit = _UNITS.get(name, "N m/rad")
     enough = max(RESOLVED * largest, _NEGLIGIBLE * whole)
     differences = [
@@ -261,7 +270,10 @@ def _compare(
 
 
 def _with_sum_checked(found: Agreement, matrix: Array, parts: Array, what: str) -> Agreement:
-    """Change the verdict to DIFFERS if a matrix (nv, nv) is not the sum of parts (n, nv, nv)."""
+    """Change the verdict of ``found`` to DIFFERS if ``matrix`` is not the sum of ``parts``.
+
+    ``matrix`` is (nv, nv), ``parts`` (n, nv, nv); ``what`` names their sum in the reason.
+    """
     off = float(abs(matrix - parts.sum(axis=0)).max())
     if off <= _SUM * float(abs(parts).sum(axis=0).max()) or found.verdict == "DIFFERS":
         return found

@@ -105,10 +105,10 @@ def load_cycle(
 
 
 def slow_loading(pose: Posture, tension: Array, wrench: Array, accuracy: float) -> SlowLoading:
-    """Return an arm that is ready to be loaded, from checked arguments.
+    """Return the :class:`SlowLoading` of an arm at its reference ``pose``, from checked arguments.
 
-    ``accuracy`` [-] is that of :func:`load_cycle`. Raises InvalidInput if ``pose`` is beyond a
-    joint limit.
+    Its cables have tensions (C,) [N] there under ``wrench`` (6,). ``accuracy`` [-] is that of
+    :func:`load_cycle`. Raises InvalidInput if ``pose`` is beyond a joint limit.
     """
     require_between_stops(pose)
     LoadedArm(pose, tension, wrench)  # refuses a spring that leaves no wire

@@ -43,8 +43,11 @@ _DISPLACED = 1e-9
 class LinearPrediction(ReadOnlyState):
     """Prediction of a weight test by the stiffness of the unloaded arm; joints at stops stay there.
 
+    ΔF (3,) [N] is the force of the :class:`WeightTest`, and u = ΔF/|ΔF|.
+
     Attributes:
-        displacement: C_vv ΔF (3,) [m], with C of :attr:`~cdsm.Equilibrium.compliance`.
+        displacement: Displacement of the tip C_vv ΔF (3,) [m], with C of
+            :attr:`~cdsm.Equilibrium.compliance`.
         stiffness: 1/(uᵀ C_vv u) along the force [N/m].
     """
 

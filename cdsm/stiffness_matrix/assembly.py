@@ -70,7 +70,10 @@ def assemble(
     distribution: Tension | None = None,
     free_length: Array | None = None,
 ) -> Stiffness:
-    """Compute K_θ from checked, read-only tensions, wrench and cable stiffnesses (Eq. 16)."""
+    """Compute K_θ from checked, read-only tensions, wrench and cable stiffnesses (Eq. 16).
+
+    ``distribution`` and ``free_length`` are stored in the result; see :class:`Stiffness`.
+    """
     active, passive, load, joint = pose._joint_stiffness(tension, cable_stiffness, wrench)
     return Stiffness(
         posture=pose,

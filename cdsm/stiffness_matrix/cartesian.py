@@ -169,7 +169,10 @@ class CartesianReadings(ReadOnlyState):
     def _read(
         self, matrix: Array, name: str, directions: Array = _NO_DIRECTIONS
     ) -> tuple[int, dict[str, Array]]:
-        """Return the status and the quantity ``name``, computed from K_θ or one of its terms."""
+        """Return the status, and the quantity ``name`` of ``matrix``: K_θ or one of its terms.
+
+        ``directions`` (D, 3) are unit vectors of quantities along directions.
+        """
         status = np.full((1, 1), readings.READ)
         K, parts, JX = (
             each[None, :, :, None] for each in (matrix, self._parts, self.posture.jacobian)

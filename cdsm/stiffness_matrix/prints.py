@@ -79,7 +79,7 @@ def notes(K: Stiffness) -> tuple[str, ...]:
 
 
 def model_of(K: Stiffness) -> str:
-    """Return the assumptions of a stiffness in words."""
+    """Return the assumptions behind the stiffness ``K`` in words, such as locked motors."""
     if K.friction == "frictionless":
         return MODEL
     values = K.posture.segments.chains.friction
@@ -89,7 +89,7 @@ def model_of(K: Stiffness) -> str:
 
 
 def numbers(K: Stiffness) -> dict[str, object]:
-    """Return the numbers of :meth:`Stiffness.to_dict`."""
+    """Return the numbers of ``K`` by name, as in :meth:`Stiffness.to_dict`."""
 
     def read(reading: Callable[[], object]) -> object:
         try:
