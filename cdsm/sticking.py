@@ -51,7 +51,8 @@ def tension_gradient(pose: Posture, tension: Array, sliding: Flags) -> Array:
         pose: The posture.
         tension: T of each segment, within the domain of its law. Where the cable slides, the larger
             tension at the hole is exp(μ φ) times the smaller.
-        sliding: Whether the cable slides in each hole (P,). Where it cannot stick, it always does.
+        sliding: Whether the cable slides in each hole (P,). In holes in which the cable cannot
+            stick, see :func:`holding`, it always slides.
 
     Raises:
         ElasticityRangeError: A tension is outside the domain of its cable's elasticity.

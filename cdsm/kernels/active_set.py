@@ -2,10 +2,11 @@
 
     min ½‖F‖²   subject to   J_Lᵀ F = b   and   low ≤ F ≤ high.
 
-It runs where the guess of :mod:`cdsm.kernels.serpentine_guess` fails. It starts at the optimum
-without bounds. It adds one violated bound after the other, and drops a bound whose multiplier would
-change its sign. It ends at the optimum, or at a proof of infeasibility. A cable is free if it is at
-no bound. Each step builds and solves a new system, so that errors do not accumulate. Its matrix is
+The search runs where the guess of :mod:`cdsm.kernels.serpentine_guess` fails. It starts at the
+optimum without bounds. It adds one violated bound after the other, and drops a bound whose
+multiplier would change its sign. It ends at the optimum, or at a proof of infeasibility. A cable is
+free if it is at no bound. Each step builds and solves a new linear system, so that errors do not
+accumulate. Its matrix is
 
     S = Σ J_cᵀ J_c over the free cables c, with J_c row c of J_L.
 
@@ -142,7 +143,10 @@ def search(J: Array, b: Array, low: Array, high: Array, state: State) -> int:
 
 @inner
 def _most_violated(F: Array, low: Array, high: Array, side: Indices) -> tuple[int, float]:
-    """Return the free cable farthest outside its bounds, or −1; and 1 if below them, else −1."""
+    """Return the free cable farthest outside its bounds ``low`` and ``high``, or −1 if none is.
+
+    Also return 1 if its tension is below the lower bound, else −1. For ``side`` see :class:`State`.
+    """
     p, sign, worst = -1, 0.0, 0.0
     for c in range(F.shape[0]):
         worst = max(worst, _ROUNDING * abs(F[c]))
@@ -156,10 +160,11 @@ def _most_violated(F: Array, low: Array, high: Array, side: Indices) -> tuple[in
 
 @inner
 def _solve_for_sides(J: Array, b: Array, low: Array, high: Array, state: State) -> bool:
-    """Fill F and y: cables with a side get that bound, free ones the least tensions that balance.
+    """Fill F and y of ``state``: cables with a side get their bound, ``low`` or ``high``.
 
-    The torque that rounding leaves is balanced a second time: S squares the condition of J_L.
-    Returns False if the free cables cannot balance every torque.
+    Free cables get the least tensions that balance the torque b (nv,). The torque that rounding
+    leaves is balanced a second time: S squares the condition number of J_L. Returns False if the
+    free cables cannot balance every torque.
     """
     F, y, side, _, _, _, w = state
     for c in range(F.shape[0]):
@@ -184,7 +189,10 @@ def _solve_for_sides(J: Array, b: Array, low: Array, high: Array, state: State) 
 
 @inner
 def _solve_free(J: Array, state: State) -> bool:
-    """Replace w (nv,) by S⁻¹ w, S = Σ J_cᵀ J_c over the free cables; False if S is singular."""
+    """Replace w (nv,) of ``state`` by S⁻¹ w; return False if S = Σ J_cᵀ J_c is singular.
+
+    The sum is over the free cables c.
+    """
     _, _, side, _, system, pivots, w = state
     nv = w.shape[0]
     for i in range(nv):

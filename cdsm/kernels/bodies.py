@@ -53,8 +53,10 @@ def tip_jacobian(
     jacobian: Array,
     width: Width,
 ) -> None:
-    """Fill the tip pose (4, 4, W), and J_X (6, nv, W) in the columns of joints that move the tip.
+    """Fill ``tip`` (4, 4, W) with the tip pose, and ``jacobian`` (6, nv, W) with J_X.
 
+    J_X is filled in the columns of joints that move the tip. ``rotation`` are the rotations of
+    :func:`~cdsm.kernels.tree.forward_kinematics`.
     The caller sets the other columns and the last row of the pose to zero.
     """
     origin, axis, slide, _ = frames
@@ -95,7 +97,7 @@ def gravity_torque(
     torque: Array,
     width: Width,
 ) -> None:
-    """Fill g (nv, W), and ``carried`` (nv+1, 7, W) with γ × z, z × r and M of each joint.
+    """Fill ``torque`` with g (nv, W), ``carried`` (nv+1, 7, W) with γ × z, z × r and M by joint.
 
     The symbols are those of the module's docstring.
     """

@@ -147,7 +147,10 @@ def _set_velocities(
     rates: Velocities,
     width: Width,
 ) -> None:
-    """Fill the velocities of joints and sites for the joint motion θ̇ of one direction e."""
+    """Fill ``rates`` with the velocities of joints and sites for one direction e of the force.
+
+    The joint motion θ̇ is ``motion`` (nv, D, W) for direction number ``direction``.
+    """
     turn, moved, d = rates.turn, rates.origin, np.uint64(direction)
     for k in range(tree.order.shape[0]):
         i = np.uint64(tree.order[k])
@@ -288,7 +291,7 @@ def _store_hole(
 
 @inlined
 def _set_loads(slips: SlipRates, load: Array, width: Width) -> None:
-    """Fill the breakaway load (W,), the least of all holes.
+    """Fill ``load`` (W,) with the breakaway load, the least of all holes in ``slips``.
 
     It is inf if no hole ever slides, and 0 if no cable sticks.
     """

@@ -71,9 +71,9 @@ class Wire(NamedTuple):
 
 @inner
 def _surplus(wire: Wire, j: int, T: float) -> tuple[float, float]:
-    """Compute D_j′ = a_j − A_j(T) [m] and its derivative with respect to T [m/N].
+    """Compute D_j′ = a_j − A_j(T) [m] of segment j, and its derivative with respect to T [m/N].
 
-    A_j(T) is the natural length that segment j has under T, and a_j the one that it has to keep.
+    A_j(T) is the natural length that fits segment j under T; a_j is that before wire slips.
     """
     stretch = wire.base[j] + wire.softness[j] * T
     natural = (wire.length[j] - wire.spring[j] * (T - wire.rest[j])) / stretch
@@ -82,7 +82,7 @@ def _surplus(wire: Wire, j: int, T: float) -> tuple[float, float]:
 
 @inner
 def _next(T: float, ratio: float, best: float) -> float:
-    """Return the tension nearest to ``best`` that friction allows: T/ratio to T · ratio.
+    """Return the tension [N] from T/ratio to T · ratio, as friction allows, nearest to ``best``.
 
     T is the tension of the segment before, and ``ratio`` ρ of the hole between the two.
     """
@@ -116,7 +116,7 @@ def _slope(
 def _root(wire: Wire, best: Array, j: int, last: int, near: float) -> float:
     """Find the tension exp(y*_j) [N] at which V_j′ is zero, or 0 if V_j′ ≥ 0 at all tensions.
 
-    The search starts at ``near``. The arguments are those of :func:`_slope`.
+    The search starts at the tension ``near`` [N]. Other arguments are those of :func:`_slope`.
     """
     if _slope(wire, best, j, last, 0.0)[0] >= 0.0:
         return 0.0
@@ -191,7 +191,7 @@ def chain_tangent(
     gradient: Array,
     friction_gradient: Array,
 ) -> Array:
-    """Compute ∂T/∂θ (S, nv) [N/rad] of the answer of :func:`solve_chains`.
+    """Compute ∂T/∂θ (S, nv) [N/rad] of the result of :func:`solve_chains`.
 
     A block is a run of segments joined by sliding holes. In it T_j = T_a exp(Σ ± μ φ) and its wire
     is conserved. With g = ∂l/∂θ, the sum ψ_j = Σ ± μ ∂φ/∂θ from the first segment of the block to
@@ -201,8 +201,9 @@ def chain_tangent(
         ∂T_j/∂θ = T_j (∂ln T_a/∂θ + ψ_j).
 
     A motor that controls the tension keeps T_a of the first block constant. A slack cable stays
-    slack. ``stretch`` is 1 + ε (S,), ``gradient`` g (S, nv) [m/rad], and ``friction_gradient`` μ
-    ∂φ/∂θ (S, nv) [1/rad] of the hole to the next segment.
+    slack. ``start`` and ``forced`` are those of :func:`solve_chains`, ``tension`` and ``slides``
+    (S,) its result. ``stretch`` is 1 + ε (S,), ``gradient`` g (S, nv) [m/rad], and
+    ``friction_gradient`` μ ∂φ/∂θ (S, nv) [1/rad] of the hole to the next segment.
     """
     size, nv = gradient.shape
     result = np.zeros((size, nv))

@@ -59,7 +59,7 @@ def set_wraps(
     normal: Array,
     width: Width,
 ) -> None:
-    """Fill φ (P, W), and ∂φ/∂θ (P, nv, W), of every hole.
+    """Fill ``wrap`` (P, W) with φ of every hole, and ``gradient`` (P, nv, W) with ∂φ/∂θ.
 
     Segment s is between the sites 2 s and 2 s + 1; ``hole`` (P,) is the segment before each hole.
     ``span`` (S, 3) are places in ``joint``: where the joints of a segment start, where those on the
@@ -173,9 +173,10 @@ def grip_rows(
     q: Array,
     grip: Array,
 ) -> None:
-    """Fill Σ μ φ (B, C) [-] over the holes of each cable at joint angles q (B, nv) [rad].
+    """Fill ``grip`` (B, C) [-] with Σ μ φ over the holes of each cable at angles q (B, nv) [rad].
 
-    ``routing`` is that of the segments; ``cable`` and ``friction`` (P,) are those of the holes.
+    ``routing`` is that of the segments; ``cable`` and ``friction`` (P,) are those of the holes;
+    ``hole`` and ``own`` (P,) are as for :func:`set_wraps`.
     """
     rows, nv = q.shape
     frames, before, after = (

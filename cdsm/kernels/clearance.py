@@ -1,4 +1,4 @@
-"""Numba kernel of the clearances of cables: from each other, from links, from the edges of disks.
+"""Numba kernel of the clearances of cables: from each other, from links, from the rims of disks.
 
 A cable is a chain of straight segments, a link a straight bone, a disk a flat circular plate. The
 distances of two segments, and of a segment and a disk, are minima of convex functions.
@@ -44,7 +44,10 @@ def _between(p: Array, q: Array, r: Array, s: Array) -> float:
 
 @inner
 def _to_disk(p: Array, q: Array, centre: Array, axis: Array, radius: float) -> float:
-    """Compute the distance from segment pq to a disk; if pq pierces it, minus that to the edge."""
+    """Compute the distance [m] from segment pq to a disk; if pq pierces it, minus that to its rim.
+
+    The disk has its ``centre`` (3,) [m], the unit vector ``axis`` (3,) and ``radius`` [m].
+    """
     z0 = z1 = 0.0
     for i in range(3):
         z0 += (p[i] - centre[i]) * axis[i]
@@ -77,7 +80,10 @@ def _to_disk(p: Array, q: Array, centre: Array, axis: Array, radius: float) -> f
 
 @inner
 def _radius(p: Array, q: Array, centre: Array, axis: Array, t: float) -> float:
-    """Compute the distance from the point p + t (q − p) to the axis of a disk."""
+    """Compute the distance [m] of the point p + t (q − p) from the axis of a disk.
+
+    The axis goes through ``centre`` (3,) along the unit vector ``axis`` (3,).
+    """
     square = along = 0.0
     for i in range(3):
         way = p[i] + t * (q[i] - p[i]) - centre[i]
@@ -90,7 +96,7 @@ def _radius(p: Array, q: Array, centre: Array, axis: Array, t: float) -> float:
 def _off(
     p: Array, q: Array, centre: Array, axis: Array, radius: float, z0: float, z1: float, t: float
 ) -> float:
-    """Compute the squared distance [m²] from the point p + t (q − p) to a disk.
+    """Compute the squared distance [m²] from the point p + t (q − p) to a disk of :func:`_to_disk`.
 
     z0 and z1 are the heights of p and q above the plane of the disk [m].
     """
@@ -142,7 +148,7 @@ def clearance_rows(
         own: 1 or 2 if the first or second end of a segment is in a hole of the disk, else 0 (S, D).
         q: Joint angles (B, nv) [rad].
         distance: Between the axes of two cables; between the axis of a cable and the surface of a
-            bone; between the axis of a cable and a disk, or the edge of a disk whose hole it is in.
+            bone; between the axis of a cable and a disk, or the rim of a disk whose hole it is in.
         nearest: Two segments; segment and bone; segment and disk; −1 if there is no pair.
     """
     rows, nv = q.shape

@@ -176,7 +176,7 @@ def _patient(function: _Function) -> _Function:
 
 
 def is_new(kernel: Callable[..., Any]) -> bool:
-    """Check whether Python would run the next call with a block wider than :data:`WIDTH`."""
+    """Check whether Python would run the next call of ``kernel`` with a block wider than WIDTH."""
     new: Callable[[], bool] = getattr(kernel, "is_new", lambda: False)
     return new()
 

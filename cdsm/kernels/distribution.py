@@ -32,7 +32,7 @@ OPTIMAL, INFEASIBLE, UNDECIDED = range(3)
 def set_torque(
     jacobian: Array, gravity_torque: Array, wrench: Array, torque: Array, width: Width
 ) -> None:
-    """Fill the torque J_Xᵀ W − g (nv, W) that the cables must balance."""
+    """Fill ``torque`` (nv, W) with J_Xᵀ W − g, which the cables must balance."""
     for i in upwards(0, torque.shape[0]):
         for w in lanes(width):
             torque[i, w] = -gravity_torque[i, w]
@@ -76,7 +76,10 @@ def distribute(
 
 @inner
 def set_within(F: Array, low: Array, high: Array, tension: Array, width: Width) -> None:
-    """Fill the tensions (C, W) with F, limited to the bounds, which rounding may have crossed."""
+    """Fill ``tension`` (C, W) with F limited to the bounds ``low`` and ``high`` (C, W).
+
+    Rounding may have moved F slightly beyond them.
+    """
     for c in upwards(0, F.shape[0]):
         for w in lanes(width):
             tension[c, w] = min(max(F[c, w], low[c, w]), high[c, w])
@@ -138,7 +141,11 @@ def search_tensions(
 def _search_one(
     blocks: Blocks, rows: Array, torque: Array, lowest: Array, highest: Array, tension: Array
 ) -> int:
-    """Fill the tensions (C,) of one posture and return the outcome; ``rows`` is J_L (C, nv)."""
+    """Fill the tensions (C,) of one posture and return the outcome.
+
+    ``rows`` is J_L (C, nv), ``torque`` (nv,) is to be balanced; ``lowest`` and ``highest`` are the
+    bounds (C,).
+    """
     count, nv = rows.shape
     J, b = rows.reshape(count, nv, 1), torque.reshape(nv, 1)
     low, high = lowest.reshape(count, 1), highest.reshape(count, 1)

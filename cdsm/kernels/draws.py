@@ -46,11 +46,13 @@ def stiffness_of_draws(
     length_jacobian: Array,
     torque: Array,
 ) -> None:
-    """Fill K_θ (N, nv, nv), J_v (N, 3, nv), the tip (N, 3), J_L (N, C, nv) and J_Xᵀ W − g (N, nv).
+    """Fill the last five arrays: K_θ, J_v, the tip, J_L and J_Xᵀ W − g of N arms.
+
+    Their shapes are (N, nv, nv), (N, 3, nv), (N, 3), (N, C, nv) and (N, nv).
 
     The first arguments are those of :func:`~cdsm.kernels.posture.single_pose` that all arms share;
     then ``first`` (C+1,), the first site of each cable, and 1/k_series and the tension at rest of
-    the series springs (C,). Each arm has its own q (N, nv), tensions and EA (1 + ε) (N, C), leads
+    the series springs (C,). Each arm has its own q (N, nv), tensions, EA (1 + ε) (N, C), leads
     (N, C), masses (N, nv+1), and (N, …) sites, joint origins, centres of mass and tip.
     """
     cables, fixed = tension.shape[1], np.empty(tension.shape[1])

@@ -34,7 +34,10 @@ def python_kernel(function: FunctionType, wide: bool) -> Callable[..., Any]:
 
 @cache
 def _names(module: str, wide: bool) -> dict[str, Any]:
-    """Return the names that a module defines, with its kernels as functions that Python runs."""
+    """Return the names that ``module`` defines, with its kernels as functions that Python runs.
+
+    If ``wide``, they run for a block of postures, else for one posture.
+    """
     home = sys.modules[module]
     names: dict[str, Any] = {**vars(home), **_OPERATIONS}
     own = set()
@@ -53,7 +56,7 @@ def _names(module: str, wide: bool) -> dict[str, Any]:
 
 
 def _of_arrays(function: Callable[..., float], count: int) -> Callable[..., Any]:
-    """Return a function of the C library that takes numbers or arrays."""
+    """Return a function of the C library with ``count`` arguments, each a number or an array."""
     universal = np.frompyfunc(function, count, 1)
     return lambda *values: np.asarray(universal(*values), dtype=np.float64)[()]
 
@@ -133,7 +136,10 @@ class _Operations(ast.NodeTransformer):
         self.arrays = arrays
 
     def line(self, node: ast.stmt) -> ast.stmt | None:
-        """Return a line of a loop for all postures at once; None if it must run one by one."""
+        """Return ``node``, a line of a loop over postures, as one operation on all postures.
+
+        Returns None if the loop must run posture by posture.
+        """
         arrays = self.arrays or set()
         match node:
             case ast.AugAssign(target=ast.Subscript()):
@@ -160,7 +166,7 @@ class _Operations(ast.NodeTransformer):
         return node
 
     def visit_Assign(self, node: ast.Assign) -> ast.AST:
-        """Copy an array that is assigned to a name: numpy's view would change with the array."""
+        """Make ``node`` copy an array that it assigns to a name: a view changes with the array."""
         self.generic_visit(node)
         if not isinstance(node.targets[0], ast.Subscript):
             copies = [

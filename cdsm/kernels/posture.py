@@ -39,7 +39,7 @@ def single_pose(
     tip_point: Array,
     q: Array,
 ) -> tuple[Array, Array, Array, Array, Array, Array, Array, Array, Array, Array, float]:
-    """Compute one posture at q (nv,).
+    """Compute everything that depends only on the joint angles q (nv,) of one posture.
 
     The arguments are the fields of :class:`Tree`, :class:`Routing` and :class:`Masses`. Python
     passes and receives plain arrays: named tuples took a third of the total time.

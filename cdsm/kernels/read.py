@@ -89,8 +89,9 @@ def read_margin(K: Array) -> float:
 
 
 def _find_singular(K: Array, scale: Array, peak: Array, status: Indices) -> None:
-    """Set SINGULAR where ``peak`` > 0 and the singular values of K_θ confirm it.
+    """Set ``status`` to SINGULAR where ``peak`` > 0 and the singular values of K_θ confirm it.
 
+    ``scale`` and ``peak`` are those of :func:`~cdsm.kernels.readings.solve`.
     Singular values take ten times as long as all the rest, and are rarely needed.
     """
     for b, w in np.argwhere(peak > 0.0):

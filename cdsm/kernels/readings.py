@@ -55,7 +55,7 @@ READ, SINGULAR, IMMOBILE, UNREAD = range(4)
 
 @threaded
 def set_margins(K: Array, margin: Array, width: Width) -> None:
-    """Fill the smallest eigenvalues (B, W) of the symmetric parts of K (B, nv, nv, W)."""
+    """Fill ``margin`` (B, W) with the smallest eigenvalues of the symmetric parts of K."""
     nv, side = K.shape[1], K.shape[3]
     symmetric, scratch = np.empty((nv, nv, side)), np.empty((4 * nv + 10, side))
     for b in range(K.shape[0]):
@@ -77,8 +77,9 @@ def _set_symmetric(K: Array, symmetric: Array, width: Width) -> None:
 
 @threaded
 def decompose(JX: Array, left: Array, right: Array, status: Indices, width: Width) -> None:
-    """Fill O = U S⁻¹ (B, 3, 3, W) and V (B, 3, nv, W) of J_v = U S V (singular values S).
+    """Decompose J_v = U S V (singular values S); fill ``left`` with O = U S⁻¹ and ``right`` with V.
 
+    Their shapes are (B, 3, 3, W) and (B, 3, nv, W).
     JX is J_X (B, 6, nv, W), its first rows are J_v. Where the tip is immobile, the status (B, W)
     changes from READ to IMMOBILE.
     """
@@ -99,7 +100,7 @@ def decompose(JX: Array, left: Array, right: Array, status: Indices, width: Widt
 
 @inner
 def _copy(JX: Array, right: Array, width: Width) -> None:
-    """Copy J_v (3, nv, W), the first rows of J_X."""
+    """Copy J_v, the first three rows of ``JX`` (6, nv, W), to ``right`` (3, nv, W)."""
     for a in upwards(0, right.shape[0]):
         for i in upwards(0, JX.shape[1]):
             for w in lanes(width):
@@ -110,7 +111,7 @@ def _copy(JX: Array, right: Array, width: Width) -> None:
 def set_pseudoinverses(
     K: Array, left: Array, right: Array, status: Indices, out: Array, width: Width
 ) -> None:
-    """Fill J_v⁺ᵀ K J_v⁺ = O (V K Vᵀ) Oᵀ (B, 3, 3, W), or NaN where the tip is immobile.
+    """Fill ``out`` (B, 3, 3, W) with J_v⁺ᵀ K J_v⁺ = O (V K Vᵀ) Oᵀ, NaN where the tip is immobile.
 
     ``left`` is O and ``right`` is V of :func:`decompose`.
     """
@@ -163,7 +164,10 @@ def solve(
 
 @inner
 def _set_probe(system: Array, width: Width) -> None:
-    """Fill column nv with an irregular torque, from 1 to 2, that excites almost every motion."""
+    """Fill column nv of ``system`` with a probe torque that excites almost every motion.
+
+    Its entries vary irregularly from 1 to 2.
+    """
     nv = np.uint64(system.shape[0])
     for i in upwards(0, nv):
         probe = 1.0 + (0.6180339887498949 * np.intp(i)) % 1.0
@@ -273,7 +277,7 @@ def set_along(
 def _set_compliance(
     JX: Array, u: Array, system: Array, column: Index, compliance: Array, width: Width
 ) -> None:
-    """Fill uᵀ C_vv u (W,) from a column of K_θ⁻¹ J_vᵀu."""
+    """Fill ``compliance`` (W,) with uᵀ C_vv u; ``column`` of ``system`` is K_θ⁻¹ J_vᵀ u."""
     x, y, z = u[0], u[1], u[2]
     for w in lanes(width):
         compliance[w] = 0.0
@@ -285,7 +289,7 @@ def _set_compliance(
 
 @threaded
 def set_compliances(JX: Array, system: Array, first: int, out: Array, width: Width) -> None:
-    """Fill J_X K_θ⁻¹ J_Xᵀ (B, 6, 6, W).
+    """Fill ``out`` (B, 6, 6, W) with the compliance J_X K_θ⁻¹ J_Xᵀ.
 
     Six columns of the system, from ``first`` on, are K_θ⁻¹ J_Xᵀ.
     """
@@ -297,10 +301,10 @@ def set_compliances(JX: Array, system: Array, first: int, out: Array, width: Wid
 def set_cartesians(
     left: Array, right: Array, system: Array, status: Indices, out: Array, width: Width
 ) -> None:
-    """Fill (C_vv)⁻¹ = O (V K_θ⁻¹ Vᵀ)⁻¹ Oᵀ (B, 3, 3, W), or NaN where the tip is immobile.
+    """Fill ``out`` (B, 3, 3, W) with (C_vv)⁻¹ = O (V K_θ⁻¹ Vᵀ)⁻¹ Oᵀ, NaN where the tip is immobile.
 
     ``left`` is O and ``right`` is V of :func:`decompose`. K_θ⁻¹ Vᵀ are the last three columns of
-    the system. Where V K_θ⁻¹ Vᵀ is singular, K_θ counts as singular.
+    the system. Where V K_θ⁻¹ Vᵀ is singular, the ``status`` (B, W) becomes SINGULAR.
     """
     both, pivots = np.empty((3, 6, right.shape[3])), np.empty((4, right.shape[3]))
     for b in range(right.shape[0]):
@@ -315,7 +319,7 @@ def set_cartesians(
 
 @inner
 def _set_unit(both: Array, width: Width) -> None:
-    """Fill the unit matrix right of a matrix (n, 2 n, W)."""
+    """Fill the right half of ``both`` (n, 2 n, W) with the identity matrix."""
     n = np.uint64(both.shape[0])
     for a in upwards(0, n):
         for c in upwards(0, n):

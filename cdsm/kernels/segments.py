@@ -63,7 +63,7 @@ def segment_scratch(nv: int, width: int) -> Segments:
 
 @inlined
 def set_direction(site: Array, a: Index, b: Index, scratch: Segments, width: Width) -> None:
-    """Fill u (3, W) from site a to site b, ℓ and 1/ℓ (W,)."""
+    """Fill ``scratch`` with u (3, W) from site a to site b, ℓ and 1/ℓ (W,)."""
     u = scratch.direction
     _set_direction(site[a], site[b], u[0], u[1], u[2], scratch.length, scratch.inverse, width)
 
@@ -130,7 +130,10 @@ def _add_slide(slide: Array, sign: float, d: Array, width: Width) -> None:
 def _add_rate(
     u: Array, point: Array, origin: Array, axis: Array, sign: float, rate: Array, width: Width
 ) -> None:
-    """Add u·d (W,) with d = ±z × (x − o): axis z through o, end x of a segment with direction u."""
+    """Add u·d to ``rate`` (W,), with d = ±z × (x − o): axis z through o, end x of a segment.
+
+    u is the direction of the segment; ``sign`` is that of :func:`set_derivative`.
+    """
     for w in lanes(width):
         x, y = sign * (point[0, w] - origin[0, w]), sign * (point[1, w] - origin[1, w])
         z = sign * (point[2, w] - origin[2, w])
@@ -143,7 +146,7 @@ def _add_rate(
 
 @inner
 def _add_slide_rate(u: Array, slide: Array, sign: float, rate: Array, width: Width) -> None:
-    """Add u·d (W,) with d = ± the slide."""
+    """Add u·d to ``rate`` (W,), with d = ± the slide; ``sign`` is 1 or −1."""
     for w in lanes(width):
         rate[w] += sign * (u[0, w] * slide[0, w] + u[1, w] * slide[1, w] + u[2, w] * slide[2, w])
 
@@ -160,7 +163,10 @@ def _set_left_factor(
     cz: Array,
     width: Width,
 ) -> None:
-    """Fill a weight times the left factor c = (d − (u·d) u)/ℓ + u × z."""
+    """Fill ``cx``, ``cy``, ``cz`` (W,) with ``weight`` times the left factor c.
+
+    c = (d − (u·d) u)/ℓ + u × z, with 1/ℓ ``inverse`` (W,) and z ``axis`` (3, W).
+    """
     for w in lanes(width):
         along = u[0, w] * d[0, w] + u[1, w] * d[1, w] + u[2, w] * d[2, w]
         cx[w] = weight[w] * (
@@ -176,7 +182,7 @@ def _set_left_factor(
 
 @inner
 def mirror(matrix: Array, width: Width) -> None:
-    """Copy the upper triangle of matrices (nv, nv, W) to the lower triangle."""
+    """Copy the upper triangle of each ``matrix`` (nv, nv, W) to the lower triangle."""
     for i in upwards(0, matrix.shape[0]):
         for j in range(i):
             for w in lanes(width):
@@ -193,7 +199,7 @@ def set_lengths(
     shortest: Array,
     width: Width,
 ) -> None:
-    """Fill L (C, W), J_L (C, nv, W), and the length of the shortest segment (W,).
+    """Fill L (C, W), J_L ``jacobian`` (C, nv, W), and the length of the shortest segment (W,).
 
     Where two sites coincide, L and J_L of the posture are meaningless.
     """

@@ -51,7 +51,7 @@ class _Motion(NamedTuple):
 
 @inner
 def _cross(a: Array, b: Array, product: Array) -> None:
-    """Fill a × b (3,)."""
+    """Fill ``product`` (3,) with a × b."""
     product[0] = a[1] * b[2] - a[2] * b[1]
     product[1] = a[2] * b[0] - a[0] * b[2]
     product[2] = a[0] * b[1] - a[1] * b[0]
@@ -66,7 +66,11 @@ def _dot(a: Array, b: Array) -> float:
 def _move(
     turning: Array, turning_rate: Array, arm: Array, velocity: Array, acceleration: Array
 ) -> None:
-    """Fill ω × r and ω̇ × r + ω × (ω × r) (3,) of a point at r from the origin of a moving frame."""
+    """Fill ``velocity`` (3,) with ω × r, and ``acceleration`` (3,) with ω̇ × r + ω × (ω × r).
+
+    r is ``arm`` (3,), from the origin of a moving frame to a point; ω is ``turning`` (3,), ω̇
+    ``turning_rate`` (3,).
+    """
     _cross(turning, arm, velocity)
     w, e, v, r = turning, turning_rate, velocity, arm
     acceleration[0] = e[1] * r[2] - e[2] * r[1] + w[1] * v[2] - w[2] * v[1]
@@ -78,7 +82,10 @@ def _move(
 def _set_motion(
     tree: Tree, origin: Array, axis: Array, slide: Array, z: Array, motion: _Motion
 ) -> None:
-    """Fill the motion of the joint frames (nv+1, 3), base first."""
+    """Fill ``motion``, that of the joint frames, for the joint velocities z (nv,), base first.
+
+    ``origin``, ``axis`` and ``slide`` (nv+1, 3) are those of :class:`Frames` of one posture.
+    """
     turning, rate, velocity, acceleration = motion
     arm, v, a, way = np.empty(3), np.empty(3), np.empty(3), np.zeros(3)
     for k in range(tree.order.shape[0]):
@@ -114,8 +121,9 @@ def _add_cable(
 ) -> tuple[float, float]:
     """Add the derivatives of F L̈ + k L̇² + p L̇ of one cable; return L̈ and L̇.
 
-    ``pull`` is the p of :func:`single_gradient`, and ``slope`` is ∂k/∂L. ``point`` (N, 3, 3) are x,
-    ẋ and ẍ of each site, ``weight`` (N, 3, 3) the derivatives X, V and A with respect to them.
+    The cable has the sites from ``begin`` to ``end`` − 1 and the stiffness k. ``pull`` is the p of
+    :func:`single_gradient`, and ``slope`` is ∂k/∂L. ``point`` (N, 3, 3) are x, ẋ and ẍ of each
+    site, ``weight`` (N, 3, 3) the derivatives X, V and A with respect to them.
     """
     rate = bend = 0.0
     u, v, w = np.empty(3), np.empty(3), np.empty(3)
@@ -155,10 +163,10 @@ def _add_cable(
 
 @inner
 def _pull_back(turning: Array, rate: Array, weight: Array, scratch: Array, pulled: Array) -> None:
-    """Fill ∂Ψ/∂δ (3,) = X + V × ω + A × ω̇ + (A × ω) × ω for a displacement δ of a point.
+    """Fill ``pulled`` (3,) with ∂Ψ/∂δ = X + V × ω + A × ω̇ + (A × ω) × ω, δ a point's displacement.
 
-    δ is in a frame that moves with ω and ω̇. ``weight`` (3, 3) are X, V and A, the derivatives of Ψ
-    with respect to the point's position, velocity and acceleration.
+    δ is in a frame that moves with ω ``turning`` and ω̇ ``rate``. ``weight`` (3, 3) are X, V and A,
+    the derivatives of Ψ with respect to the point's position, velocity and acceleration.
     """
     X, V, A = weight[0], weight[1], weight[2]
     _cross(A, turning, scratch)
@@ -244,7 +252,10 @@ def _by_joint(
 
 @inner
 def _to_frame(rotation: Array, vector: Array, turned: Array) -> None:
-    """Fill Rᵀ v (3,): a vector in base axes, in the axes of a joint frame."""
+    """Fill ``turned`` (3,) with Rᵀ v: the ``vector`` v in base axes, in the axes of a joint frame.
+
+    R is ``rotation`` (3, 3).
+    """
     for r in range(3):
         turned[r] = (
             rotation[0, r, 0] * vector[0]

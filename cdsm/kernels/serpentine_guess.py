@@ -118,7 +118,7 @@ def empty_guess(blocks: Blocks, nv: int, cables: int, width: int) -> Guess:
 def guess_tensions(
     blocks: Blocks, J: Array, b: Array, low: Array, high: Array, guess: Guess, width: Width
 ) -> None:
-    """Fill tensions that balance the arm with the fewest cables above their lower bounds.
+    """Fill ``guess`` with tensions that balance the arm, the fewest above their lower bounds.
 
     J is J_L (C, nv, W), b the torque to balance (nv, W), ``low`` and ``high`` are the bounds (C,
     W). The search ends early if no posture of the block can be balanced.
@@ -163,7 +163,8 @@ def _set_best(
 ) -> None:
     """Find the two cables that give the missing torque about axes i and j at the least ‖F‖².
 
-    If i is j, it is one cable. ``own`` are the cables of the block.
+    If i is j, it is one cable. ``own`` are the cables of the block, ``low`` and ``high`` the bounds
+    (C, W). The result is ``guess.best``.
     """
     lacking, best, pair = guess.lacking, guess.best, guess.pair
     for r in range(5):
@@ -215,7 +216,8 @@ def _keep_better(
 ) -> None:
     """Keep the tensions x and y (W,) added to cables p and q, if they cost less than the best.
 
-    They must not be negative, and the sums must not exceed the upper bounds (``most``).
+    They must not be negative. Their sums with the lower bounds (``least``) must not exceed the
+    upper bounds (``most``), each (W,).
     """
     for w in lanes(width):
         # cables that cannot give the torque have infinite x and y, or NaN
@@ -234,7 +236,7 @@ def _keep_better(
 def set_multipliers(
     blocks: Blocks, J: Array, F: Array, guess: Guess, first: Index, width: Width
 ) -> None:
-    """Fill y from block ``first`` on so that J_L y = F (C, W) for the chosen cables there."""
+    """Fill y of ``guess`` from block ``first`` on: J_L y = F (C, W) for the chosen cables there."""
     row, row_start, cable, cable_start = blocks
     y, chosen, p, q = guess.y, guess.chosen, guess.best, guess.pair
     for k in range(first, row_start.shape[0] - 1):
@@ -274,7 +276,7 @@ def set_multipliers(
 def is_provably_infeasible(
     blocks: Blocks, J: Array, b: Array, low: Array, high: Array, guess: Guess, zero: Array
 ) -> bool:
-    """Check whether a proof shows that no tensions balance the block where a guess failed.
+    """Check whether a proof shows that no tensions balance the block where ``guess`` failed.
 
     The proof is a vector v. In that block, v is normal to a line that separates the lacking torque
     from the torques of the block's cables; mostly the line is along one of these torques. For the

@@ -20,8 +20,9 @@ def set_cable_stiffness(
     stiffness: Array,
     width: Width,
 ) -> None:
-    """Fill k = 1/(l_0/EA + 1/k_series) (C, W) [N/m]; 0 where EA is 0: the motor controls the force.
+    """Fill ``stiffness`` (C, W) [N/m] with k = 1/(l_0/EA + 1/k_series).
 
+    It is 0 where EA is given as 0: the motor controls the force.
     The length of the wire is the cable length L without the series spring, ℓ = L − (F −
     F_0)/k_series. Therefore l_0/EA = ℓ/(EA (1 + ε)). ``rigidity`` is EA (1 + ε) (C, W) [N],
     ``series`` is 1/k_series (C,) [m/N], and ``rest`` is F_0 (C,) [N], the tension at which the
@@ -38,7 +39,7 @@ def set_cable_stiffness(
 def add_passive_stiffness(
     length_jacobian: Array, cable_stiffness: Array, passive: Array, scratch: Array, width: Width
 ) -> None:
-    """Add J_Lᵀ K_L J_L to a matrix (nv, nv, W), for i ≤ j only; scratch is (3, W)."""
+    """Add J_Lᵀ K_L J_L to ``passive`` (nv, nv, W), for i ≤ j only; scratch is (3, W)."""
     J, k = length_jacobian, cable_stiffness
     count, nv, one = np.uint64(J.shape[0]), np.uint64(J.shape[1]), np.uint64(1)
     for first in range(0, J.shape[0], 3):  # three cables at a time: a third of the memory accesses
@@ -66,7 +67,7 @@ def add_passive_stiffness(
 
 @inner
 def _moves(J: Array, c: Index, d: Index, e: Index, i: Index, width: Width) -> bool:
-    """Check whether joint i changes the length of one of three cables at some posture."""
+    """Check whether joint i changes the length of cable c, d or e at some posture of the block."""
     moved = 0.0
     for w in lanes(width):
         moved = max(moved, abs(J[c, i, w]) + abs(J[d, i, w]) + abs(J[e, i, w]))
@@ -77,7 +78,9 @@ def _moves(J: Array, c: Index, d: Index, e: Index, i: Index, width: Width) -> bo
 def set_load_stiffness(
     jacobian: Array, wrench: Array, tip_joints: Indices, load: Array, scratch: Array, width: Width
 ) -> None:
-    """Fill −∂(J_Xᵀ W)/∂θ (nv, nv, W) of constant wrenches W (6, W): row torque, column angle.
+    """Fill ``load`` (nv, nv, W) with −∂(J_Xᵀ W)/∂θ of constant wrenches W (6, W).
+
+    Its rows are torques, its columns angles.
 
     Column i of J_X is v_i above z_i. ∂v_i/∂θ_j = z_a × v_b, where a is the earlier and b the later
     of the joints i and j. ∂z_i/∂θ_j = z_j × z_i if joint j is before joint i, else 0.
@@ -120,7 +123,10 @@ def sum_terms(
     parts: Array,
     width: Width,
 ) -> None:
-    """Fill K_θ, and P, the sum of the magnitudes of its four terms, (nv, nv, W) each."""
+    """Fill K with the sum of the four terms, ``parts`` with that of their magnitudes.
+
+    All arrays are (nv, nv, W).
+    """
     for i in upwards(0, K.shape[0]):
         for j in upwards(0, K.shape[0]):
             for w in lanes(width):

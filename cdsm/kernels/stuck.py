@@ -96,10 +96,11 @@ def add_stuck_stiffness(
     passive: Array,
     width: Width,
 ) -> None:
-    """Add Σ k g gᵀ over the sections of all cables to a matrix (nv, nv, W), for i ≤ j only.
+    """Add Σ k g gᵀ over the sections of all cables to ``passive`` (nv, nv, W), for i ≤ j only.
 
     k is the stiffness of a section, and g the gradient of its length. ``wire`` is EA (1 + ε) (C, W)
-    [N], also of cables whose motor controls the force.
+    [N], also of cables whose motor controls the force. ``series`` is 1/k_series (C,) [m/N], and
+    ``rest`` (C,) [N] the tension at which the springs are at rest.
     """
     segment, joint, across = routing.segment, routing.joint, scratch.direction
     d, along, inverse = scratch.derivative, scratch.along, scratch.inverse
@@ -170,7 +171,7 @@ def open_first_section(
 def set_lead(
     routing: Routing, holes: Holes, c: Index, rotation: Array, out: Array, width: Width
 ) -> None:
-    """Fill the direction (3, W) of the lead of cable c."""
+    """Fill ``out`` (3, W) with the direction of the lead of cable c in base axes."""
     i = np.uint64(routing.row[holes.first[c]])
     x, y, z = holes.axis[c, 0], holes.axis[c, 1], holes.axis[c, 2]
     for r in upwards(0, out.shape[0]):
@@ -220,7 +221,10 @@ def set_holding(own: float, a: Array, b: Array, holds: Array, width: Width) -> N
 
 @inner
 def set_stiffness(wire: Array, c: Index, section: Sticking, width: Width) -> None:
-    """Fill the stiffness k (W,) of sections that end at the present hole, 0 where it slides."""
+    """Fill the stiffness k (W,) of sections that end at the present hole; 0 where it slides.
+
+    ``wire`` is EA (1 + ε) (C, W) [N].
+    """
     length, soft, locked, holds = section.length, section.soft, section.locked, section.holds
     for w in lanes(width):
         section.stiffness[w] = holds[w] * locked[w] / (length[w] / wire[c, w] + soft[w])
@@ -242,9 +246,10 @@ def open_next_section(section: Sticking, width: Width) -> None:
 def _add_square(
     wire: Array, c: Index, section: Sticking, low: Index, high: Index, passive: Array, width: Width
 ) -> None:
-    """Add k g gᵀ of the sections that end at the present hole, and set their g to zero.
+    """Add k g gᵀ of the sections that end at the present hole to ``passive``; set their g to zero.
 
-    k is the stiffness of a section, and g the gradient of its length.
+    k is the stiffness of a section, and g the gradient of its length, which is zero but for joints
+    from ``low`` to ``high`` − 1. ``wire`` is EA (1 + ε) (C, W) [N].
     """
     g, k, product, holds = section.gradient, section.stiffness, section.product, section.holds
     set_stiffness(wire, c, section, width)

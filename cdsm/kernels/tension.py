@@ -94,7 +94,7 @@ def scaled_balance(
 ) -> tuple[Array, Array, Array, Array, float, float]:
     """Compute the fields of :class:`Scaled`; moment arms below NO_ARM · ``reach`` become zero.
 
-    ``reach`` is the length of the arm [m].
+    ``reach`` is the length of the arm [m]; J_L is (C, nv), the torque (nv,), bounds are (C,).
     """
     count, nv = length_jacobian.shape
     largest = 0.0
@@ -126,7 +126,10 @@ def _power_of_two(value: float) -> float:
 def single_optimality(
     A: Array, b: Array, low: Array, high: Array, x: Array, y: Array, z: Array
 ) -> tuple[float, float, float]:
-    """Measure the violation of optimality of one x (n,) by :func:`set_violations`; A is (m, n)."""
+    """Measure the violation of optimality of one point; arguments as for :func:`set_violations`.
+
+    A is Jᵀ (m, n). The arrays have no last axis. Returns the first three rows of the violations.
+    """
     m, n = A.shape
     J, violations = np.ascontiguousarray(A.T).reshape(n, m, 1), np.empty((5, 1))
     # copies are writable like the blocks of a batch, so one compilation serves both
@@ -211,7 +214,7 @@ def set_optimal(
     scratch: Certificate,
     width: Width,
 ) -> None:
-    """Set ``scratch.optimal`` (W,) to 1 where F (C, W) is the optimum, else to 0.
+    """Set ``scratch.optimal`` (W,) to 1 where F (C, W) is the optimum within the bounds, else to 0.
 
     v (nv, W) satisfies J_L v = F for cables between their bounds. The multipliers are y = −v, and z
     = J_L v − F at a bound, elsewhere 0.
@@ -243,7 +246,7 @@ def set_optimal(
 
 @inner
 def is_infeasible(J: Array, b: Array, low: Array, high: Array, v: Array) -> bool:
-    """Check whether v (nv,) proves infeasibility: vᵀb > vᵀJ_Lᵀ F for all F within the bounds."""
+    """Check whether v (nv,) proves infeasibility: vᵀb > vᵀJ_Lᵀ F for all low ≤ F ≤ high."""
     largest = left = size = steepest = arm = torques = force = 0.0
     for c in range(J.shape[0]):
         largest = max(largest, abs(row_product(J, c, v)))

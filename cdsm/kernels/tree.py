@@ -45,7 +45,10 @@ class Tree(NamedTuple):
         axis: Array,
         slide: Array,
     ) -> Tree:
-        """Build a tree from joint frames at q = 0 in their parents; axes in the joint frames."""
+        """Build a tree from joint frames at q = 0 in their parents; axes in the joint frames.
+
+        ``rotation`` is (nv+1, 3, 3); the other shapes are those of the attributes.
+        """
         along = axis[:, :, None] * axis[:, None, :]
         along[~axis.any(axis=1)] = np.eye(3)  # a sliding joint: the rotation is constant
         cross = np.cross(axis[:, None, :], np.eye(3)).transpose(0, 2, 1)
@@ -114,7 +117,10 @@ def empty_frames(tree: Tree, routing: Routing, width: int) -> Frames:
 
 @inlined
 def turned(rotation: Array, i: Index, r: Index, x: float, y: float, z: float, w: Index) -> float:
-    """Compute component r of a vector in the frame of joint i, turned to base axes."""
+    """Compute component r, in base axes, of the vector (x, y, z) in the frame of joint i.
+
+    w is the posture in the block.
+    """
     turned: float = rotation[i, r, 0, w] * x + rotation[i, r, 1, w] * y + rotation[i, r, 2, w] * z
     return turned
 

@@ -60,9 +60,10 @@ def wire_scratch(wires: Wires, width: int) -> WireScratch:
 def set_wire_rigidity(
     wires: Wires, tension: Array, rigidity: Array, scratch: WireScratch, width: Width
 ) -> None:
-    """Fill EA (1 + ε) (C, W) [N] of cables with polynomials; −1 outside the domain of their law.
+    """Fill ``rigidity`` (C, W) [N] with EA (1 + ε) of cables with polynomials.
 
-    It is EA alone if the original length of a wire is the stretched one.
+    It is −1 outside the domain of the law, and EA alone if the original length of a wire is the
+    stretched one.
     """
     panel, values, coefficients = scratch
     x, begin, before, inside = values[0], values[1], values[2], values[3]
@@ -109,7 +110,7 @@ def set_wire_rigidity(
 
 @inner
 def _set_polynomial(coefficients: Array, x: Array, value: Array, width: Width) -> None:
-    """Fill the polynomials at x (W,) by Horner's rule, four powers at a time."""
+    """Fill ``value`` (W,) with polynomials at x (W,) by Horner's rule, four powers at a time."""
     for w in lanes(width):
         value[w] = 0.0
     for r in range(coefficients.shape[0] - AT_ONCE, -1, -AT_ONCE):
