@@ -144,11 +144,16 @@ def _patient(function: _Function) -> _Function:
     names = kernel.py_func.__code__.co_varnames
 
     @cache
-    def is_kept() -> bool:
-        return stored is not None and bool(stored._load_index())
+    def kept() -> dict[Any, str]:
+        return stored._load_index() if stored is not None else {}
+
+    @cache
+    def is_kept(*types: Any) -> bool:
+        key = kernel._cache._index_key(types, kernel.targetctx.codegen()) if kept() else None
+        return key in kept()
 
     def is_new() -> bool:
-        return not (kernel.signatures or is_kept() or _at_once) and spent < _PATIENCE
+        return not (kernel.signatures or kept() or _at_once) and spent < _PATIENCE
 
     def run(start: float, wide: bool, *arguments: Any) -> Any:
         nonlocal spent
@@ -165,9 +170,11 @@ def _patient(function: _Function) -> _Function:
         """
         start = time.thread_time()
         wide = (dict(zip(names, arguments, strict=False)).get("width") or 1) > WIDTH
-        seconds, numbers = _KEPT if is_kept() else _NEW
+        known = is_kept(*map(kernel.typeof_pyval, arguments))
+        seconds, numbers = _KEPT if known else _NEW
         few = sum(getattr(each, "size", 0) for each in arguments) <= numbers and spent < seconds
-        if is_new() if wide else few and not _at_once:
+        patient = not known and spent < _PATIENCE if wide else few
+        if patient and not _at_once:
             return partial(run, start, wide)
         return cast(Callable[..., Any], load_or_compile(*arguments))
 

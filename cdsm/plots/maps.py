@@ -112,8 +112,9 @@ def plot_map(
         MissingExtra: xarray is not installed.
     """
     check_sweep(dataset)
-    one_of("quantity", quantity, [str(name) for name in dataset.data_vars])
-    one_of("quantity", "tip_position", [str(name) for name in dataset.data_vars])
+    remedy = "tip_position and the quantity must be among outputs= (--quantities) of the sweep."
+    for name in (quantity, "tip_position"):
+        one_of("quantity", name, [str(each) for each in dataset.data_vars], remedy)
     if statistic is not None:
         one_of("statistic", statistic, get_args(Statistic))
     whole_number("bins", bins, 2, 500)

@@ -270,11 +270,11 @@ def text(name: str, value: object) -> str:
     return value
 
 
-def one_of(kind: str, name: object, known: Iterable[str]) -> str:
+def one_of(kind: str, name: object, known: Iterable[str], remedy: str = "") -> str:
     """Return ``name`` if it is in ``known``; else raise UnknownName for an unknown ``kind``."""
     known = tuple(known)
     if not isinstance(name, str) or name not in known:
-        raise UnknownName(kind, name, known)
+        raise UnknownName(kind, name, known, remedy)
     return name
 
 

@@ -14,7 +14,7 @@ from cdsm.elasticity import Elasticity
 from cdsm.errors import InvalidInput
 from cdsm.manipulator import Manipulator
 from cdsm.measures.rows import require
-from cdsm.support.format import JointUnits
+from cdsm.support.format import MODEL, JointUnits
 from cdsm.support.validation import Direction, instance, one_of, unit_direction, wrench_vector
 from cdsm.sweeps.arguments import bounds_of, label, laws_of, vectors_of
 from cdsm.sweeps.blocks import Block
@@ -38,11 +38,11 @@ _WIRE = {
 }
 """Names in words and units of the sizes of the wire."""
 
-_WORST = (
-    "all segments of the cables stay within the bounds, and wires are under their largest tension, "
-    "whatever loads came before"
-)
-"""Meaning of ``worst_friction``, an attribute of the Dataset."""
+_WORST = {
+    "worst_friction": "all segments of the cables stay within the bounds, and wires are under their"
+    " largest tension, whatever loads came before"
+}
+"""Attribute of a Dataset under the worst friction."""
 
 _OF_SLIDES = {"N m": "N", "N m rad-1": "N m-1"}
 """Units of torque and joint stiffness: of revolute joints, and the same of prismatic joints."""
@@ -195,7 +195,7 @@ def specify(
             labels[dim] = label((dim,), np.array(along), long_name)
     attributes = attributes_of(arm) | {"poses": poses.description}
     if worst_friction:
-        attributes["worst_friction"] = _WORST
+        attributes |= {"model": f"stiffness {MODEL}; tensions with friction", **_WORST}
     if laws.values != (None,):
         of = ["all cables"] if laws.names is None else laws.names.tolist()
         texts = [law_text(law) for law in laws.values if law is not None]

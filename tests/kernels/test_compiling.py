@@ -61,6 +61,19 @@ print(len(single_pose.signatures), len(single_stiffness.signatures), file=sys.st
 """
 
 
+WIDE = """
+import sys
+import numpy as np
+from cdsm.kernels.compiling import at_once
+from cdsm.kernels.readings import set_margins
+if sys.argv[1:]:
+    with at_once():
+        set_margins(np.ones((1, 2, 2, 1)), np.empty((1, 1)), None)
+set_margins(np.ones((1, 2, 2, 4000)), np.empty((1, 4000)), 4000)
+print(len(set_margins.signatures))
+"""
+
+
 def run(program: str, *arguments: str, cwd: Path = ROOT, **environment: str) -> tuple[str, str]:
     """What a process prints, and what it writes to its error stream."""
     done = subprocess.run(
@@ -120,3 +133,12 @@ def test_kernels_call_kernels_by_name() -> None:
             for name in kernel.py_func.__code__.co_names:
                 other = used.get(name)
                 assert not (isinstance(other, ModuleType) and other.__name__.startswith("cdsm"))
+
+
+@pytest.mark.slow
+def test_a_kernel_compiled_for_one_posture_is_not_compiled_for_the_first_blocks(
+    tmp_path: Path,
+) -> None:
+    folder = str(tmp_path)
+    assert run(WIDE, "first", NUMBA_CACHE_DIR=folder)[0] == "1"  # that of one posture
+    assert run(WIDE, NUMBA_CACHE_DIR=folder)[0] == "0"  # which is in the cache now

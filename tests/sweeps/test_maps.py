@@ -183,7 +183,8 @@ def test_what_cannot_be_shown_is_named(
 
 
 def test_a_sweep_without_tips_cannot_be_shown() -> None:
-    with pytest.raises(cdsm.UnknownName, match="tip_position"):
+    said = r"tip_position and the quantity must be among outputs= \(--quantities\) of the sweep"
+    with pytest.raises(cdsm.UnknownName, match=said):
         plots.plot_map(cdsm.sweep(short_arm(), PLANAR, minimum=20.0, outputs="margin"), "margin")
     with pytest.raises(cdsm.InvalidInput, match="the Dataset of a sweep is needed"):
         plots.plot_map(3)  # type: ignore[arg-type]

@@ -110,6 +110,7 @@ def test_worst_friction_takes_payload_and_costs_tension() -> None:
     more = (rough.tension**2).sum("cable") > (free.tension**2).sum("cable")
     assert bool((more | ~both).all())
     assert "worst_friction" in rough.attrs
+    assert rough.attrs["model"] == f"stiffness {free.attrs['model']}; tensions with friction"
     assert "worst_friction" not in free.attrs
     assert rough.breaking_load == WIRE["breaking_load"]
     assert rough.breaking_load.attrs["units"] == "N"
