@@ -370,8 +370,8 @@ def _store(
 ) -> None:
     """Copy the quantities ``wanted`` from the record of a block to ``out``, from row ``first`` on.
 
-    Quantities beyond ``known`` (W,), which are not computed, become NaN. ``code`` (W,) is copied to
-    ``status``.
+    Quantities from number ``known`` (W,) on are not computed: they become NaN. ``code`` (W,) is
+    copied to ``status``. ``start`` is as for :func:`_vector`.
     """
     count = min(record.shape[1], out.shape[0] - first)
     for w in lanes(count):

@@ -50,10 +50,10 @@ class RestBand(ReadOnlyState):
         low: Least displacement of the tip from the reference along u [m], not positive.
         high: Largest displacement of the tip from the reference along u [m], not negative.
         first_order: Largest displacement along ±u to first order [m], in closed form.
-        room: Size of the neighbourhood over that of all states at rest to first order [-]; 0 if no
-            cable can stick at the reference: it is then the only state of rest.
+        room: Size of the neighbourhood, divided by that of the set of all states at rest to first
+            order [-]; 0 if no cable can stick at the reference: it is then the only state of rest.
         proved: Whether ``low`` and ``high`` are proved. False if no neighbourhood is large enough,
-            because second-order terms are as large as the band. Then both are only of first order,
+            because second-order terms are as large as the band. Then both hold to first order only,
             and the tip may rest some percent beyond them. The paper's arm with a lead of 0.3 m is
             proved while friction turns no joint by more than 0.7°: with Eq. 19 from 30 to 80 N at μ
             = 0.1 and from 15 to 120 N at μ = 0.05, and with EA = 48 kN up to μ = 0.3 at 50 N.

@@ -54,7 +54,7 @@ class Breakaway(ReadOnlyState):
     """Load at which the first cable of a stuck arm begins to slide, and the hole where it does.
 
     Attributes:
-        stiffness: K of :func:`stuck_stiffness`, which smaller loads measure.
+        stiffness: Stiffness that loads below ``load`` measure; see :func:`stuck_stiffness`.
         direction: Unit direction u (3,) of the force, base axes.
         load: The breakaway load [N], in addition to the wrench of ``stiffness``; inf if no cable
             ever slides, as the force moves no joint; 0 without friction.

@@ -11,7 +11,7 @@ from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.values import Array
 
 _NEAR = 1e-9
-"""Smallest neighbourhood [rad], [m] or [N], used if that of the arm is smaller or zero."""
+"""Smallest change of an angle [rad], a position [m] or a tension [N] in a neighbourhood."""
 
 
 class Neighbourhood:

@@ -19,7 +19,7 @@ from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.values import Array
 
 _STEP = 1e-4
-"""Step of differences [rad], [m]; their truncation is added to the bound."""
+"""Step of finite differences [rad], [m]; their truncation is added to the bound."""
 
 TOO_FAR = "finds no band: friction may keep the arm too far from the reference"
 """Error message if a neighbourhood is so wide that the bounds do not exist."""

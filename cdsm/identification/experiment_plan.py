@@ -94,7 +94,7 @@ class ExperimentPlan(ReadOnlyState):
 
     @property
     def factors(self) -> dict[str, float]:
-        """Interval width with ``even_tests`` over that of the plan [-], by wanted parameter."""
+        """Interval width of ``even_tests`` divided by that of the plan [-], by wanted parameter."""
         found = zip(self.names, self.even_std, self.std, strict=True)
         return {
             name: float(even / std) if math.isfinite(std) else math.nan

@@ -178,7 +178,10 @@ class Model:
     def _paths_at(
         self, parameters: Parameters, arm: Manipulator | None = None
     ) -> list[LoadingPath | None]:
-        """Return the path of each loop for ``parameters``, computed once; None for a stiffness."""
+        """Return the path of each loop for ``parameters``, or None for a stiffness.
+
+        The paths of the last few parameters are stored.
+        """
         key = tuple(parameters.values())
         if key not in self._paths:
             arm = arm or self.arm(parameters)

@@ -74,7 +74,7 @@ class Identification(ReadOnlyState):
 
     @property
     def freedom(self) -> int:
-        """Degrees of freedom: n − :attr:`rank` − 1 for the offset of each axis of each loop."""
+        """Degrees of freedom: n − :attr:`rank`, minus one offset for each axis of each loop."""
         zeros = sum(len(loop.axes) for loop in self._loops)
         return len(self.predicted) - zeros - self.rank
 

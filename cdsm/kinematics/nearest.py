@@ -75,7 +75,7 @@ _Newton = Callable[[Array, NDArray[np.bool_]], _NewtonStep]
 
 
 def nearest(residual: Residual, guess: Array, tolerance: float) -> tuple[Array, int]:
-    """Find the joint angles nearest to the guess with ‖r‖ ≤ ``tolerance``, or with least ‖r‖.
+    """Find the angles nearest to the guess with ‖r‖ ≤ ``tolerance``, or least ‖r‖, of ``residual``.
 
     They are nearest locally; a differently folded arm may be nearer still. If the search from the
     guess finds no solution, it is repeated from random postures, the same ones in each call.

@@ -90,8 +90,8 @@ def payload(
         f = max f  subject to  J_Lᵀ F = J_Xᵀ W + f J_vᵀ u − g,  minimum ≤ F ≤ maximum,
 
     also f |C_vv u| ≤ ``deflection``, and K_θ positive definite under all loads up to f u. K_θ is
-    that of the least tensions under each load. C_vv is that without the load: the motors are locked
-    before the force moves the tip, to first order. The worst direction has the smallest f. It is
+    that of the least tensions under each load. C_vv is the compliance without the force, since the
+    motors are locked before the force acts. The worst direction has the smallest f. It is
     the normal of the nearest facet of the :func:`force_polytope`, or the softest direction of C_vv.
     Loads that buckle the arm are then searched for in 26 directions, 16 loads in each.
 

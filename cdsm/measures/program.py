@@ -43,7 +43,10 @@ class Loads(NamedTuple):
 
     @classmethod
     def of(cls, pose: Posture, low: Array, high: Array, wrench: Array, directions: Array) -> Self:
-        """Build the balance of a posture with checked bounds (C,) [N]; U (3, k) are directions."""
+        """Build the balance of a posture; U (3, k) are directions.
+
+        ``low`` and ``high`` (C,) [N] are checked bounds of the tensions.
+        """
         torque = pose.jacobian.T @ wrench - pose.gravity_torque
         motion = pose.jacobian[:3].T @ directions
         return cls.scaled(pose.length_jacobian, motion, torque, low, high, pose.arm.length)

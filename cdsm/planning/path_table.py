@@ -52,7 +52,7 @@ def path_table(plan: PathPlan) -> tuple[list[str], list[list[Any]]]:
 
 
 def _numbered(plan: PathPlan, count: int) -> list[str]:
-    """Return suffixes of the column names of ``count`` targets per sample; ``[""]`` for one."""
+    """Return suffixes of the column names of ``count`` targets of the plan; ``[""]`` for one."""
     if plan.direction is None:
         return [f" {a}{b}" for a in "xyz" for b in "xyz"]
     return [""] if count == 1 else [f" {k}" for k in range(1, count + 1)]

@@ -191,10 +191,11 @@ class RangeEnd(NamedTuple):
 def range_ends(
     model: StiffnessModel, u: Array, starts: int, seed: int
 ) -> tuple[RangeEnd, RangeEnd]:
-    """Find the lowest and the highest stiffness along a unit direction ``u`` (3,).
+    """Find the lowest and the highest stiffness of ``model`` along a unit direction ``u`` (3,).
 
-    Each is the best of searches from ``starts`` random points and some others; random numbers come
-    from ``seed``. If tensions are unbounded, a cap on them rises until both ends lie below it.
+    Each is the best result of several searches; ``starts`` and ``seed`` are those of
+    :func:`stiffness_range`. If tensions are unbounded, a cap on them rises until both results lie
+    below it, or to its largest value.
     """
     region = model.region
     if np.isfinite(region.high).all():

@@ -85,8 +85,8 @@ class Agreement:
         unit: ``"N m/rad"``; for the torque ``"N m"``, for the lengths ``"m"``.
         largest: Largest magnitude of an entry of the term; for the torque, of its summed parts; for
             the lengths, the longest.
-        potential: Comparison with differences of the potential; None if there is no potential.
-        torque: Comparison with differences of the torque, or None.
+        potential: Comparison with finite differences of the potential; None if there is none.
+        torque: Comparison with finite differences of the torque, or None.
         verdict: ``"DIFFERS"``: a difference is larger than expected. ``"agrees"``: no difference
             is, and at least one comparison resolves :data:`RESOLVED` of the largest entry.
             ``"not possible"``: no comparison resolves it.
@@ -109,7 +109,7 @@ class SelfCheck(ReadOnlyState):
 
     Attributes:
         terms: Active, passive, gravity and load term, and their sum.
-        statics: The torque residual, compared with first differences of the potential.
+        statics: The torque residual, compared with first finite differences of the potential.
         lengths: The cable lengths, compared with distances between sites placed by Pinocchio.
     """
 
@@ -234,7 +234,7 @@ def _compare(
     torque: _Recomputed = _NONE,
     whole: float = 0.0,
 ) -> Agreement:
-    """Compare ``given`` with its values by differences of the potential and of the torque.
+    """Compare ``given`` with its values by finite differences of the potential and of the torque.
 
     ``largest`` is that of :class:`Agreement`, and ``whole`` the largest entry of K_θ.
     """

@@ -53,7 +53,7 @@ class Bifurcation(ReadOnlyState):
 
     @property
     def displacements(self) -> Array:
-        """Displacement of the tip from the posture at each bound (n, 3) [m]."""
+        """Displacement of the tip from its position in ``critical`` at each bound (n, 3) [m]."""
         return frozen(np.array([rest.displacement for rest in self.rests]))
 
     def plot(self) -> Figure:

@@ -105,8 +105,8 @@ class CriticalLoad(ReadOnlyState):
         posture: The fixed posture.
         wrench: W (6,) that is multiplied by the factor: force [N], then moment [N m].
         carried: Constant wrench (6,) that acts in addition: force [N], then moment [N m].
-        factor: Largest factor [-] up to which the arm is balanced and stable; inf if it is under a
-            million times W.
+        factor: Largest factor [-] up to which the arm is balanced and stable; inf if it still is at
+            a factor of one million.
         limit: Reason of the failure: ``"buckling"``, ``"infeasible"`` (no tensions balance the
             load), ``"elasticity"`` (a tension leaves the domain of its cable) or ``"none"``.
         mode: Unit joint motion (nv,) of the smallest eigenvalue of K_θ at ``factor``.

@@ -54,7 +54,7 @@ class WeightFriction(ReadOnlyState):
 
     @property
     def secant(self) -> float:
-        """Weight over displacement in its direction, with friction [N/m]; inf without motion."""
+        """Weight over tip displacement along it, with friction [N/m]; inf without motion."""
         return self._secant(self.history.tip)
 
     @cached_property

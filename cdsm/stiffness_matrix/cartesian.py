@@ -73,7 +73,7 @@ class CartesianReadings(ReadOnlyState):
         less than :meth:`along`, and often several times larger.
 
         Raises:
-            SingularStiffness: K_θ is singular, or the tip hardly moves in one direction. In the
+            SingularStiffness: K_θ is singular, or the tip hardly moves in some direction. In the
                 second case the error names the direction; use :meth:`along` for other directions.
         """
         status, found = self._read(self.joint, "cartesian")
@@ -135,7 +135,7 @@ class CartesianReadings(ReadOnlyState):
 
         Raises:
             UnknownName: ``term`` is unknown.
-            SingularStiffness: The tip hardly moves in one direction, so J⁺ omits this direction.
+            SingularStiffness: The tip hardly moves in some direction, which J⁺ omits.
         """
         matrix: Array = getattr(self, one_of("stiffness term", term, get_args(Term)))
         status, found = self._read(matrix, "pseudoinverse")
@@ -183,7 +183,7 @@ class CartesianReadings(ReadOnlyState):
     def _refuse(self, status: int, what: str = "") -> None:
         """Raise SingularStiffness unless ``status`` is READ; the error gives the reason.
 
-        ``what`` names a quantity that does not exist where the tip is immobile in one direction.
+        ``what`` names a quantity that does not exist if the tip is immobile in some direction.
         """
         if status == readings.READ:
             return

@@ -53,7 +53,7 @@ def distribute_tension(
         solver: ``"daqp"`` (exact), ``"osqp"``, or another solver that qpsolvers finds installed.
             The default is called only if a first guess does not meet the optimality conditions.
         fixed: Tensions [N] by cable name, e.g. of motors that control force. The other tensions are
-            computed. A fixed tension replaces the bounds of its cable and is never widened.
+            computed. A fixed tension replaces the bounds of its cable.
         worst_friction: Keep the tension of each segment of each cable within the bounds, for any
             earlier loads. With the friction coefficients μ and wrap angles φ of the holes of a
             cable, its tensions lie between F exp(−Σ μ φ) and F exp(Σ μ φ). The bounds narrow by

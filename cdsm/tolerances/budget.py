@@ -26,10 +26,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 LINEAR = 0.05
-"""Largest ``nonlinearity`` with which the first order counts as sufficient."""
+"""Largest ``nonlinearity`` with which first-order propagation counts as sufficient."""
 
 _PROBED = 100
-"""Number of drawn arms with which the error of first order is estimated."""
+"""Number of drawn arms with which the error of first-order propagation is estimated."""
 
 _ROUNDING = 1e-9
 """A smaller relative uncertainty is rounding: critical tensions are found to 1e-10 only."""
@@ -279,7 +279,7 @@ _SHOWN = {
     "link_mass": (1e-3, " g"),
     "friction": (1.0, ""),
 }
-"""Size and name of the unit in which people read the inputs of a source; all others in mm."""
+"""Size and name of the unit shown to the user for the inputs of a source; mm for all others."""
 
 
 def shown(source: str, standards: Array) -> str:
