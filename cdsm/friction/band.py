@@ -81,7 +81,7 @@ class RestBand(ReadOnlyState):
 
     @cached_property
     def end_tensions(self) -> Array:
-        """Least and largest tension (C, 2) [N] of each cable at rest where it ends."""
+        """Least and largest tension (C, 2) [N] of the last segment of each cable at rest."""
         start = self.stiffness.posture.segments.chains.start
         return self._tensions((start[1:] - 1).tolist())
 

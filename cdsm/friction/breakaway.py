@@ -141,11 +141,11 @@ def hole_loads(K: Stiffness, u: Array) -> tuple[Array, Array]:
 
 
 def _reached(K: Stiffness, u: Array, motion: Array) -> tuple[float, int]:
-    """Find the load [N] at which the first hole of the stuck arm reaches its bound; return both.
+    """Return the load [N] at which the stuck arm first reaches a friction bound, and the hole.
 
-    ``motion`` (nv,) is dθ/dW [rad/N] for a force along ``u`` (3,).
-    Newton's method for joints and load starts at the first-order result. If another hole is beyond
-    its friction bound at the solution, the search is repeated for that hole.
+    ``motion`` (nv,) is dθ/dW [rad/N] for a force along ``u`` (3,). Newton's method for joints and
+    load starts at the first-order result. If another hole is beyond its friction bound at the
+    solution, the search is repeated for that hole.
     """
     pose, arm = K.posture, K.posture.arm
     chains, held = pose.segments.chains, holding(pose)

@@ -159,8 +159,8 @@ class ChainProblem:
         """Compute P = T (1 + ε) − ∫ T dε (S,) [N] at ``tension`` T.
 
         P is the work per natural length of wire that a motor takes in. Wire that moves from one
-        segment to another dissipates the difference of their P per natural length.
-        To first order in the strain this is the difference of the tensions.
+        segment to another dissipates the difference of their P per natural length. To first order
+        in the strain this is the difference of the tensions.
         """
         base, softness = self._strain(tension)
         return np.asarray(tension * (base + softness * tension) - self._energy(tension))

@@ -69,7 +69,7 @@ class Determination:
 
     @property
     def open_combinations(self) -> list[str]:
-        """Combinations that change no prediction, as text: "a by +1 and b by -0.3"."""
+        """Changes of parameters that change no prediction, as text: "a by +1 and b by -0.3"."""
         if not len(self._null):
             return []
         # easiest to read: one dependent parameter per combination

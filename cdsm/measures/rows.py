@@ -104,8 +104,8 @@ def narrowed_bounds(
     """Narrow the bounds ``minimum`` and ``maximum`` by :func:`friction_losses`, ``loss`` (B, C).
 
     Each is (), (B,) or (B, C) [N]. Every segment of a cable is then within the given bounds. Return
-    the lower and upper bounds (B, C), and in which postures no lower bound is above the upper one
-    (B,); the other postures keep the given bounds.
+    the lower and upper bounds (B, C) [N], and whether the narrowed bounds of each posture are
+    consistent (B,): no lower bound above the upper one. Other postures keep the given bounds.
     """
     given = _each_bound(arm, minimum, maximum, loss.shape)
     low, high = given[0] * loss, given[1] / loss
