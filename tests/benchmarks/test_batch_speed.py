@@ -1,11 +1,13 @@
 """Speed of the batch, as ratios in the same run; each compares the numbers first."""
 
 import ctypes
+import itertools
 import os
 import shutil
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -123,6 +125,29 @@ def test_batched_tension_is_fifteen_times_faster_than_one_by_one(clock: Clock | 
             slow_repeat=50,
             fast_repeat=1,
         )
+
+
+def test_sweep_into_a_store_costs_little_more_than_its_batch(
+    tmp_path: Path, clock: Clock | None
+) -> None:
+    # half of these postures cannot be held: their tensions are searched
+    one, poses = cdsm.presets.virtual_prototype(), cdsm.RandomPoses(20_000 if clock else 200)
+    q = cdsm.sweep(one, poses, outputs="tip_position").q.values
+    stores = (tmp_path / f"{number}.zarr" for number in itertools.count())
+
+    def batch() -> cdsm.Batch:
+        outputs = ("tip", "along", "margin", "compliance")
+        return cdsm.evaluate(one, q, minimum=50.0, outputs=outputs, direction=np.eye(3))
+
+    def sweep() -> Any:
+        return cdsm.sweep(one, poses, minimum=50.0, store=next(stores), progress=False)
+
+    found, stored = batch(), sweep()
+    np.testing.assert_array_equal(stored.along, found["along"])
+    np.testing.assert_array_equal(stored.tip_position, found["tip"][:, :3, 3])
+    if clock:
+        what = "20 000 postures, sweep into a store: cost over the batch"
+        clock.race(what, sweep, batch, most=2.0, fast_repeat=1, rounds=5)
 
 
 @pytest.mark.parametrize(("joints", "most", "least"), [(5, 3.0, 15.0), (20, 2.5, 3.0)])
