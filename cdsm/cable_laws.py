@@ -148,7 +148,10 @@ class CableLaws:
         return frozen(k)
 
     def stretched_rigidity(self, law: Elasticity, tension: Array) -> Array:
-        """Compute EA (1 + ε) [N] of a law, or EA if l_0 is the stretched length."""
+        """Compute EA (1 + ε) [N] of a law at ``tension``, in the shape of ``tension``.
+
+        If the arm takes the stretched length for l_0, as the paper does, it is EA.
+        """
         if isinstance(law, LinearElasticity):
             rigidity = law.rigidity(tension)
             return rigidity + tension if self._unstrained else rigidity

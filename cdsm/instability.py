@@ -170,7 +170,11 @@ def _remedy(
 
 
 def _first_zero(margin: Callable[[float], float], factors: tuple[float, ...]) -> float | None:
-    """Return the first factor from 1 on at which ``margin`` becomes positive, or None."""
+    """Return the factor between 1 and ``factors`` where ``margin`` rises through 0, or None.
+
+    The factors are tried in their order; the root lies between the first one with a positive
+    margin and the one before it.
+    """
     from scipy.optimize import brentq  # slow to import
 
     before = 1.0

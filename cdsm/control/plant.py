@@ -26,7 +26,7 @@ class PlantState(Protocol):
 
     @property
     def true(self) -> Reading:
-        """True wire and tension at each motor, both (C,)."""
+        """True length of the wire paid out [m] and tension [N] at each motor, both (C,)."""
 
 
 AnyState = TypeVar("AnyState", bound=PlantState)
@@ -66,7 +66,7 @@ class SlowState(NamedTuple):
 
     @property
     def true(self) -> Reading:
-        """True wire and tension at each motor, both (C,)."""
+        """True length of the wire paid out [m] and tension [N] at each motor, both (C,)."""
         wire = self.reference_wire - np.where(self.loading.forced, 0.0, self.state.load.motors)
         tension = self.state.settled.chain.tension[self.loading.start[:-1]]
         return Reading(frozen(wire), frozen(tension))

@@ -151,7 +151,10 @@ class DesignProblem(ReadOnlyState):
 
     @property
     def needs_all(self) -> bool:
-        """Whether every posture must be held."""
+        """Whether a design is feasible only if tensions balance the arm at every posture.
+
+        Not if the problem asks how many postures can be balanced: ``held``, ``workspace``.
+        """
         return not any(
             each.of in ("held", "workspace") for each in (*self.objectives, *self.constraints)
         )

@@ -103,7 +103,10 @@ class JointSolution(_Solution):
 
     @cached_property
     def residual(self) -> Array:
-        """``lengths`` − ``cable_lengths``: found minus wanted cable lengths (C,) [m]."""
+        """Cable lengths at the posture found minus those asked for (C,) [m].
+
+        They are ``lengths`` − ``cable_lengths``.
+        """
         return frozen(self.lengths - self.cable_lengths)
 
     @property

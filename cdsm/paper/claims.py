@@ -82,7 +82,7 @@ class Figure(ABC):
         """Return the curves as plain SI numbers, for JSON."""
 
     def tables(self) -> tuple[str, ...]:
-        """Return further tables of the report, in Markdown."""
+        """Return tables of this figure beside its claims in the report, in Markdown; none by default."""
         return ()
 
 

@@ -86,7 +86,7 @@ class Step:
 
     @property
     def count(self) -> str:
-        """Count of free parameters and of numbers, as text."""
+        """How many parameters are free, for how many numbers of the paper, as text."""
         return f"{len(self.free)} free parameters for {len(self.numbers)} numbers"
 
 

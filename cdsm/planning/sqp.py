@@ -100,7 +100,11 @@ class Program:
     centre: Array | float = 0.0
 
     def merit(self, at: ConstraintValues, price: float) -> float:
-        """Return f at a point, plus ``price`` times the penalty of c if f is the effort."""
+        """Return the merit at a point, which a step of the search must decrease.
+
+        For the objective *effort* it is f plus ``price`` times the violation of the constraints.
+        Other objectives are functions of the constraints, so f alone is the merit.
+        """
         c = at.values
         if self.objective.effort:
             x = (at.evaluation.F - self.centre) / self.unit

@@ -37,7 +37,10 @@ _MOST_LABELS = 30
 
 
 def plot_tensile_fit(fit: TensileFit) -> Figure:
-    """Plot force over displacement with the fit, and rigidity with its stages and any band."""
+    """Plot force over displacement with the fit, and the rigidity EA over tension.
+
+    The second panel shows the limits of the stages and, if the fit has one, its confidence band.
+    """
     figure, ((left, right),) = panels(TWO_COLUMNS, 3.0, 2)
     tension, band = fit.tensions, fit.band
     stretch = fit.start + fit.elasticity.strain(tension) * fit.test.gauge_length

@@ -119,9 +119,10 @@ class Inputs:
         self._transposed = csr_matrix(self.map.T)
 
     def by_source(self, by_place: Places) -> dict[str, Array]:
-        """Convert ``by_place``, derivatives with respect to points, to derivatives by source.
+        """Return derivatives with respect to the inputs, as an array for each source of error.
 
-        Each array (inputs,) holds the derivatives with respect to the inputs of one source.
+        ``by_place`` are the derivatives of the same quantity with respect to the coordinates of
+        points of the arm. A source is for example the hole radius; its inputs are all holes.
         """
         by_input = self._transposed @ by_place.stacked()
         return {source: by_input[columns] for source, columns in self.columns.items()}

@@ -74,9 +74,9 @@ def python_lines(arm: Manipulator, setting: Setting) -> str:
 
 
 def command_text(arm: Manipulator, setting: Setting, arm_arguments: Sequence[str] | None) -> str:
-    """Return the HTML at the end of the page: how to compute ``setting`` without the page.
+    """Return the HTML at the end of the page: how to compute the same results without the page.
 
-    It shows :func:`command_line`, or :func:`python_lines` without ``arm_arguments``, and the
+    It shows :func:`command_line`, or :func:`python_lines` if ``arm_arguments`` is None, and the
     buttons to copy it and to save the picture.
     """
     if arm_arguments is None:

@@ -174,8 +174,8 @@ class Shown(ReadOnlyState):
     def holes(self) -> tuple[Array, Array]:
         """Marks of holes, as lines (n, 2, 3) [m]: where cables stick, and where they slide.
 
-        Holes without friction, and holes that a cable passes straight, have no mark. Unless
-        the arm sags, no cable slides.
+        Holes without friction, and holes that a cable passes straight, have no mark. Cables
+        slide only if the force moves the arm (``sag``); else the second array is empty.
         """
         pose = self.posture
         if pose is None or self.tensions is None or not pose.arm.has_friction:

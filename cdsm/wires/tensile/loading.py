@@ -159,7 +159,10 @@ def _slips(points: Points, gauge_length: float, least: float) -> list[str]:
 
 
 def _slack(points: Points, noise: float, least: float) -> int:
-    """Count the points before the force begins to rise beyond its noise [N], at least ``least``."""
+    """Count the points of a slack cable, before the force begins to rise.
+
+    The rise must be significant, with the standard errors of :func:`_trends`.
+    """
     slope, error = _trends(points, noise, least)
     flat = np.flatnonzero(slope <= _SURE * error)
     count = int(flat[-1]) + 1 if len(flat) else 0

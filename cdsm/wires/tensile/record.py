@@ -78,8 +78,8 @@ def read_tensile_csv(
 ) -> TensileTest:
     """Read a tensile test from the text file of a testing machine, or from any CSV.
 
-    The header is the line among the first 50 that names both columns and that most rows of numbers
-    follow; titles and tables of results may stand before it. It names a displacement, extension,
+    The header is one of the first 50 lines and names both columns; of several such lines, it is the
+    one before the most rows of numbers. Titles and tables of results may stand before it. It names a displacement, extension,
     elongation or stroke, and a force or load, in English or another language (Standardweg,
     Standardkraft, Déplacement, Fuerza, 位移, …). Each name has a unit: ``displacement [mm]``,
     ``Load (kN)``, ``force_N``, ``Kraft/N``. The units may also form the next line. A strain in % or
@@ -97,8 +97,9 @@ def read_tensile_csv(
         skip: Number of lines at the top that are not read.
         units: Units of displacement and force, if the header has none.
         displacement_unit: ``m``, ``cm``, ``mm``, ``um`` or ``in``; of a strain ``%`` or ``mm/mm``.
-            The first of ``units``.
-        force_unit: ``mN``, ``N``, ``kN``, ``MN``, ``lbf`` or ``kgf``. The second of ``units``.
+            The same as the first of ``units``; give one or the other.
+        force_unit: ``mN``, ``N``, ``kN``, ``MN``, ``lbf`` or ``kgf``. The same
+            as the second of ``units``.
         gauge_length: l_0 [m], if the file does not give it.
 
     Raises:
