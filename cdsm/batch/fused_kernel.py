@@ -5,8 +5,6 @@ The physics is in :mod:`cdsm.kernels`. This kernel calls it without allocating m
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from cdsm.batch.layout import (
@@ -33,7 +31,8 @@ from cdsm.batch.layout import (
 )
 from cdsm.kernels.bodies import Masses, gravity_torque, set_gravity_stiffness, tip_jacobian
 from cdsm.kernels.compiling import Index, Width, inlined, inner, lanes, threaded, upwards
-from cdsm.kernels.distribution import distribute, set_arms, set_torque
+from cdsm.kernels.distribution import distribute, keep_balance, set_arms, set_torque
+from cdsm.kernels.records import clear, contains, copy, fetch, matrix, store, vector
 from cdsm.kernels.segments import (
     SHORTEST_SEGMENT,
     add_length_hessian,
@@ -46,12 +45,13 @@ from cdsm.kernels.stiffness import (
     add_passive_stiffness,
     set_cable_stiffness,
     set_load_stiffness,
+    sum_magnitudes,
     sum_terms,
 )
 from cdsm.kernels.stuck import Holes, add_stuck_stiffness, sticking_scratch
 from cdsm.kernels.tension import Balance, certificate
 from cdsm.kernels.tree import Indices, Routing, Tree, empty_frames, forward_kinematics
-from cdsm.kernels.wires import Wires, set_wire_rigidity, wire_scratch
+from cdsm.kernels.wires import Wires, set_linear_rigidity, set_wire_rigidity, wire_scratch
 from cdsm.support.values import Array
 
 
@@ -124,7 +124,7 @@ def evaluate_rows(
         width: Number of postures in a block.
         joint: K_θ of B blocks (B, nv, nv, W), for the readings; (0, nv, nv, W) if there are none.
         parts: Sum of the magnitudes of the four terms of K_θ, with the shape of ``joint``.
-        jacobian: J_X (B, 6, nv, W) for the readings, or no blocks.
+        jacobian: J_X (B, 6, nv, W) for the readings, zero on entry, or no blocks.
         stuck: K_θ while the cables stick, with the shape of ``joint``.
         stuck_parts: Sum of the magnitudes of the four terms of ``stuck``, with its shape.
         balance: Moment arms and torques of the balance, filled for UNDECIDED postures (b, …); no
@@ -137,28 +137,25 @@ def evaluate_rows(
 
     # the quantities: views of a record, one after the other; the posture is the last axis of all
     record = np.zeros((start[start.shape[0] - 1], width))
-    tip = _matrix(record, start, TIP, 4, width)
-    JX = _matrix(record, start, JACOBIAN, 6, width)
-    L = _vector(record, start, CABLE_LENGTHS)
-    J = _matrix(record, start, LENGTH_JACOBIAN, cables, width)
-    g = _vector(record, start, GRAVITY_TORQUE)
-    gravity = _matrix(record, start, GRAVITY, nv, width)
-    F = _vector(record, start, TENSION)
-    residual = _vector(record, start, RESIDUAL)
-    active = _matrix(record, start, ACTIVE, nv, width)
-    load = _matrix(record, start, LOAD, nv, width)
-    k = _vector(record, start, CABLE_STIFFNESS)
-    passive = _matrix(record, start, PASSIVE, nv, width)
-    K = _matrix(record, start, JOINT, nv, width)
-    stuck_K = _matrix(record, start, STUCK_JOINT, nv, width)
+    tip = matrix(record, start, TIP, 4, width)
+    own_JX = matrix(record, start, JACOBIAN, 6, width)
+    L = vector(record, start, CABLE_LENGTHS)
+    J = matrix(record, start, LENGTH_JACOBIAN, cables, width)
+    g = vector(record, start, GRAVITY_TORQUE)
+    gravity = matrix(record, start, GRAVITY, nv, width)
+    F = vector(record, start, TENSION)
+    residual = vector(record, start, RESIDUAL)
+    active = matrix(record, start, ACTIVE, nv, width)
+    load = matrix(record, start, LOAD, nv, width)
+    k = vector(record, start, CABLE_STIFFNESS)
+    passive = matrix(record, start, PASSIVE, nv, width)
+    K = matrix(record, start, JOINT, nv, width)
+    stuck_K = matrix(record, start, STUCK_JOINT, nv, width)
 
     # scratch, used again for every block
-    angles, loads, stretched = (
-        np.empty((nv, width)),
-        np.empty((6, width)),
-        np.empty((cables, width)),
-    )
-    least, most = np.empty((cables, width)), np.empty((cables, width))
+    angles, loads = np.empty((nv, width)), np.empty((6, width))
+    stretched, least = np.empty((cables, width)), np.empty((cables, width))
+    most, springs = np.empty((cables, width)), np.empty((nv, nv, width))
     frames, segments = empty_frames(tree, routing, width), segment_scratch(nv, width)
     rotation, carried = np.empty((bodies, 3, 3, width)), np.empty((bodies, 7, width))
     guess, check = empty_guess(blocks, nv, cables, width), certificate(nv, cables, width)
@@ -166,21 +163,24 @@ def evaluate_rows(
     six, shortest = np.empty((6, width)), np.empty(width)
     code, known = np.empty(width, dtype=np.intp), np.empty(width, dtype=np.intp)
     wiring = wire_scratch(wires, width)
-    sticking, springs = sticking_scratch(nv, width), np.empty((nv, nv, width))
-    slot, magnitudes = np.zeros(cables, dtype=np.intp), np.empty((nv, nv, width))
+    sticking, slot = sticking_scratch(nv, width), np.zeros(cables, dtype=np.intp)
 
     for first in range(0, rows, width):
-        _load(q, first, angles, width)
-        _load(wrench, first, loads, width)
-        _load(tension, first, F, width)
-        _load(low, first, least, width)
-        _load(high, first, most, width)
-        _load(rigidity, first, stretched, width)
+        block = first // width
+        JX = jacobian[block] if jacobian.shape[0] else own_JX
+        fetch(q, first, angles, width)
+        fetch(wrench, first, loads, width)
+        fetch(tension, first, F, width)
+        fetch(low, first, least, width)
+        fetch(high, first, most, width)
+        fetch(rigidity, first, stretched, width)
 
         # quantities of the joint angles alone
         forward_kinematics(tree, routing, angles, six, rotation, frames, width)
         set_lengths(routing, frames, segments, L, J, shortest, width)
         tip_jacobian(tree.parent, masses, rotation, frames, tip, JX, width)
+        if jacobian.shape[0] and contains(wanted, JACOBIAN):
+            copy(JX, own_JX, width)
         gravity_torque(tree, masses, rotation, frames, carried, g, width)
         for w in lanes(width):
             code[w] = status[min(first + np.intp(w), rows - 1)]
@@ -191,7 +191,8 @@ def evaluate_rows(
                 code[w], known[w] = BEYOND_LIMITS, 0
         if last >= GRAVITY:
             set_gravity_stiffness(tree.parent, carried, gravity, width)
-            mirror(gravity, width)
+            if contains(wanted, GRAVITY):
+                mirror(gravity, width)
 
         # quantities that need tensions
         if last > GRAVITY:
@@ -204,82 +205,62 @@ def evaluate_rows(
                         code[w] = UNDECIDED
                 for w in lanes(width):
                     if code[w] == UNDECIDED and first + np.intp(w) < rows:
-                        _keep(arms, torque, balance, first, w)
+                        keep_balance(arms, torque, balance, first + np.intp(w), w)
             _note(code, LOAD, known, width)
         if last > TENSION:
-            _set_residual(F, J, torque, residual, width)
-            _clear(active, width)
+            if contains(wanted, RESIDUAL):
+                _set_residual(F, J, torque, residual, width)
+            clear(active, width)
             hessian = active.reshape(1, nv, nv, width)
             add_length_hessian(
                 routing.segment, routing.joint, frames, F, slot, segments, hessian, width
             )
-            mirror(active, width)
+            if contains(wanted, ACTIVE):
+                mirror(active, width)
             set_load_stiffness(JX, loads, masses.tip_joints, load, six, width)
 
         # quantities that need the rigidity of the cables
         if last > LOAD:
             if not rigidity.shape[0]:
-                _set_rigidity(constant, linear, F, stretched, width)
+                set_linear_rigidity(constant, linear, F, stretched, width)
                 set_wire_rigidity(wires, F, stretched, wiring, width)
             for w in lanes(width):
                 if code[w] == OK and _is_negative(stretched, w):
                     code[w] = OUTSIDE_ELASTICITY
             set_cable_stiffness(L, F, stretched, series, rest, k, width)
             if slides:
-                _clear(passive, width)
+                clear(passive, width)
                 add_passive_stiffness(J, k, passive, six, width)
-                mirror(passive, width)
-                sizes = parts[first // width] if parts.shape[0] else magnitudes
-                sum_terms(active, passive, gravity, load, K, sizes, width)
+                if contains(wanted, PASSIVE):
+                    mirror(passive, width)
+                total = joint[block] if joint.shape[0] else K
+                sum_terms(active, passive, gravity, load, total, width)
+                if joint.shape[0]:
+                    sum_magnitudes(active, passive, gravity, load, parts[block], width)
+                    if contains(wanted, JOINT):
+                        copy(total, K, width)
             _note(code, JOINT, known, width)
             if sticks:
-                _load(wire, first, stretched, width)
+                fetch(wire, first, stretched, width)
                 if not wire.shape[0]:
-                    _set_rigidity(holes.constant, holes.linear, F, stretched, width)
+                    set_linear_rigidity(holes.constant, holes.linear, F, stretched, width)
                 for w in lanes(width):
                     if code[w] == OK and _is_negative(stretched, w):
                         code[w] = OUTSIDE_ELASTICITY
-                _clear(springs, width)
+                clear(springs, width)
                 add_stuck_stiffness(
                     routing, holes, frames, rotation, F, stretched, series, rest, segments,
                     sticking, springs, width,
                 )  # fmt: skip
-                mirror(springs, width)
-                sizes = stuck_parts[first // width] if stuck_parts.shape[0] else magnitudes
-                sum_terms(active, springs, gravity, load, stuck_K, sizes, width)
+                total = stuck[block] if stuck.shape[0] else stuck_K
+                sum_terms(active, springs, gravity, load, total, width)
+                if stuck.shape[0]:
+                    sizes = stuck_parts[block]
+                    sum_magnitudes(active, springs, gravity, load, sizes, width)
+                    if contains(wanted, STUCK_JOINT):
+                        copy(total, stuck_K, width)
                 _note(code, STUCK_JOINT, known, width)
-
-        # what the readings of K_θ are computed from
-        if joint.shape[0]:
-            _copy(K, joint[first // width], width)
-        if stuck.shape[0]:
-            _copy(stuck_K, stuck[first // width], width)
-        if jacobian.shape[0]:
-            _copy(JX, jacobian[first // width], width)
-        _store(record, start, wanted, code, known, first, out, status)
-
-
-@inner
-def _load(rows: Array, first: int, block: Array, width: Width) -> None:
-    """Copy W rows of (b, n), from row ``first``, to a block (n, W); repeat the last if needed."""
-    if rows.shape[0]:
-        for i in upwards(0, rows.shape[1]):
-            for w in lanes(width):
-                block[i, w] = rows[min(first + np.intp(w), rows.shape[0] - 1), i]
-
-
-@inner
-def _keep(arms: Array, torque: Array, balance: Balance, first: int, w: Index) -> None:
-    """Copy moment arms (C, nv, W) and torque (nv, W) of posture w of a block to ``balance``.
-
-    Its row there is ``first`` + w.
-    """
-    row = first + np.intp(w)
-    for i in upwards(0, torque.shape[0]):
-        balance.torque[row, i] = torque[i, w]
-    for c in upwards(0, arms.shape[0]):
-        for i in upwards(0, arms.shape[1]):
-            balance.arms[row, c, i] = arms[c, i, w]
+        store(record, start, wanted, code, known, first, out, status)
 
 
 @inner
@@ -291,14 +272,6 @@ def _set_residual(F: Array, J: Array, torque: Array, residual: Array, width: Wid
         for c in upwards(0, F.shape[0]):
             for w in lanes(width):
                 residual[i, w] += F[c, w] * J[c, i, w]
-
-
-@inner
-def _set_rigidity(constant: Array, linear: Array, F: Array, rigidity: Array, width: Width) -> None:
-    """Fill ``rigidity`` (C, W) with EA (1 + ε) = constant + linear · F [N]."""
-    for c in upwards(0, F.shape[0]):
-        for w in lanes(width):
-            rigidity[c, w] = constant[c] + linear[c] * F[c, w]
 
 
 @inlined
@@ -323,62 +296,3 @@ def _is_beyond(q: Array, lowest: Array, highest: Array, w: Index) -> bool:
     for i in range(q.shape[0]):
         beyond = beyond or q[i, w] < lowest[i] or q[i, w] > highest[i]
     return beyond
-
-
-@inner
-def _copy(matrix: Array, block: Array, width: Width) -> None:
-    for i in upwards(0, matrix.shape[0]):
-        for j in upwards(0, matrix.shape[1]):
-            for w in lanes(width):
-                block[i, j, w] = matrix[i, j, w]
-
-
-@inner
-def _clear(matrix: Array, width: Width) -> None:
-    for i in upwards(0, matrix.shape[0]):
-        for j in upwards(0, matrix.shape[1]):
-            for w in lanes(width):
-                matrix[i, j, w] = 0.0
-
-
-@inlined
-def _vector(record: Array, start: Indices, quantity: int) -> Array:
-    """Return a quantity of the record (one block, layout of ``layout.py``) as vectors (size, W).
-
-    ``start`` is the index in the record at which each quantity begins.
-    """
-    return record[start[quantity] : start[quantity + 1]]
-
-
-@inlined
-def _matrix(record: Array, start: Indices, quantity: int, rows: int, width: int) -> Array:
-    """Return a quantity of the record (see :func:`_vector`) as matrices (rows, columns, W)."""
-    part = record[start[quantity] : start[quantity + 1]]
-    return part.reshape((rows, part.shape[0] // rows, width))
-
-
-@inner
-def _store(
-    record: Array,
-    start: Indices,
-    wanted: Indices,
-    code: Indices,
-    known: Indices,
-    first: int,
-    out: Array,
-    status: Codes,
-) -> None:
-    """Copy the quantities ``wanted`` from the record of a block to ``out``, from row ``first`` on.
-
-    Quantities from number ``known`` (W,) on are not computed: they become NaN. ``code`` (W,) is
-    copied to ``status``. ``start`` is as for :func:`_vector`.
-    """
-    count = min(record.shape[1], out.shape[0] - first)
-    for w in lanes(count):
-        status[first + np.intp(w)] = code[w]
-    at = 0
-    for number in wanted:
-        for i in upwards(start[number], start[number + 1]):
-            for w in lanes(count):
-                out[first + np.intp(w), at] = record[i, w] if number < known[w] else math.nan
-            at += 1

@@ -36,13 +36,17 @@ class Kept(NamedTuple):
     jacobian: Array  # J_X (B, 6, nv, W)
     stuck: Array  # K_θ while the cables stick (B, nv, nv, W)
     stuck_parts: Array  # sum of the magnitudes of its terms (B, nv, nv, W)
-    wire: Array  # EA (1 + ε) of the wires (b, C) [N]; (0, C) if all laws are linear
+
+    def first(self, blocks: int) -> Kept:
+        """Return the first blocks."""
+        return Kept(*(each[:blocks] for each in self))
 
 
 def read_stuck(
     arm: Manipulator,
     q: Array,
     tension: Array,
+    wire: Array,
     kept: Kept,
     directions: Array,
     names: Collection[str],
@@ -51,6 +55,7 @@ def read_stuck(
     """Compute readings of the stuck arm at postures q (b, nv) under tensions F (b, C) [N].
 
     ``names`` are those of the wanted readings, ``kept`` the arrays from which they follow.
+    ``wire`` is EA (1 + ε) of the wires, (b, C) or (1, C) [N]; (0, C) if all laws are linear.
     ``directions`` (D, 3) are unit vectors, and ``status`` (B, W) is as for
     :func:`~cdsm.kernels.read.read`. The posture is the last axis of all results.
     """
@@ -63,7 +68,7 @@ def read_stuck(
     values = read(kept.stuck, kept.stuck_parts, kept.jacobian, directions, wanted, status, width)
     if "breakaway" in names:
         holes = model.holes
-        wire = kept.wire if len(kept.wire) else holes.constant + holes.linear * tension
+        rigidity = wire if len(wire) else holes.constant + holes.linear * tension
         arguments: tuple[Any, ...] = (
             model.tree,
             model.routing,
@@ -72,7 +77,7 @@ def read_stuck(
             model.laws.rest,
             q,
             frozen(np.ascontiguousarray(tension)),
-            frozen(wire),
+            frozen(np.broadcast_to(rigidity, tension.shape).copy()),
             np.ascontiguousarray(values["motion"]),
             width,
             load[: len(q)],

@@ -212,8 +212,8 @@ class _Announcement(event.Listener):
 
 event.register("numba:compile", _Announcement())  # type: ignore[no-untyped-call]
 
-WIDTH = 32
-"""Number of postures in a block: some vectors of the processor. More need too much cache."""
+WIDTH = 64
+"""Largest number of postures in a block of a compiled kernel: some vectors of the processor."""
 
 Index = int | np.integer[Any]
 """Index in a loop over postures. If it may be negative, numba does not vectorise the loop."""

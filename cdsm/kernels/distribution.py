@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from cdsm.kernels.active_set import FOUND, IMPOSSIBLE, empty_state, search
-from cdsm.kernels.compiling import Width, compiled, inlined, inner, lanes, threaded, upwards
+from cdsm.kernels.compiling import Index, Width, compiled, inlined, inner, lanes, threaded, upwards
 from cdsm.kernels.serpentine_guess import (
     Blocks,
     Guess,
@@ -20,7 +20,7 @@ from cdsm.kernels.serpentine_guess import (
     is_provably_infeasible,
     set_multipliers,
 )
-from cdsm.kernels.tension import Certificate, certificate, is_infeasible, set_optimal
+from cdsm.kernels.tension import Balance, Certificate, certificate, is_infeasible, set_optimal
 from cdsm.kernels.tree import Indices
 from cdsm.support.values import Array
 
@@ -48,6 +48,16 @@ def set_arms(J: Array, smallest: float, arms: Array, width: Width) -> None:
         for i in upwards(0, J.shape[1]):
             for w in lanes(width):
                 arms[c, i, w] = J[c, i, w] if abs(J[c, i, w]) >= smallest else 0.0
+
+
+@inner
+def keep_balance(arms: Array, torque: Array, balance: Balance, row: Index, w: Index) -> None:
+    """Copy moment arms (C, nv, W) and torque (nv, W) of posture w of a block to a row."""
+    for i in upwards(0, torque.shape[0]):
+        balance.torque[row, i] = torque[i, w]
+    for c in upwards(0, arms.shape[0]):
+        for i in upwards(0, arms.shape[1]):
+            balance.arms[row, c, i] = arms[c, i, w]
 
 
 @inlined

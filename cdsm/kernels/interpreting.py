@@ -6,8 +6,7 @@ them as operations of numpy on the last axis of its arrays:
     for w in lanes(width):                             w = slice(None)
         c[i, w] = a[w] if b[w] > 0.0 else 0.0          c[i, w] = select(b[w] > 0.0, a[w], 0.0)
 
-Both give the bits of the compiled kernel: numpy rounds each operation as the loop does, and calls
-the C library for each angle.
+Both give the bits of the compiled kernel: numpy rounds each operation as the loop does.
 """
 
 from __future__ import annotations
@@ -55,10 +54,9 @@ def _names(module: str, wide: bool) -> dict[str, Any]:
     return names
 
 
-def _of_arrays(function: Callable[..., float], count: int) -> Callable[..., Any]:
-    """Return a function of the C library with ``count`` arguments, each a number or an array."""
-    universal = np.frompyfunc(function, count, 1)
-    return lambda *values: np.asarray(universal(*values), dtype=np.float64)[()]
+def _atan2(y: Any, x: Any) -> Any:
+    """Return angles as the C library does, which numpy need not call."""
+    return np.asarray(np.frompyfunc(math.atan2, 2, 1)(y, x), dtype=np.float64)[()]
 
 
 def _max(*values: Any) -> Any:
@@ -78,8 +76,7 @@ _OPERATIONS = {
     "math": SimpleNamespace(
         **vars(math)
         | {"sqrt": np.sqrt, "isnan": np.isnan, "copysign": np.copysign}
-        | {name: _of_arrays(getattr(math, name), 1) for name in ("sin", "cos")}
-        | {"atan2": _of_arrays(math.atan2, 2)}
+        | {"atan2": _atan2}
     ),
     "_max": _max,
     "_min": _min,

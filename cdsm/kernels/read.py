@@ -8,6 +8,7 @@ from collections.abc import Collection
 import numpy as np
 
 from cdsm.kernels import readings as kernels
+from cdsm.kernels import tip_stiffness
 from cdsm.kernels.compiling import Width
 from cdsm.kernels.readings import REGULAR, SINGULAR
 from cdsm.kernels.tree import Indices
@@ -49,10 +50,10 @@ def read(
         kernels.set_margins(K, margin, width)
     left, right = np.empty((blocks, 3, 3, side)), np.empty((blocks, 3, nv, side))
     if "cartesian" in wanted or "pseudoinverse" in wanted:
-        kernels.decompose(JX, left, right, status, width)
+        tip_stiffness.decompose(JX, left, right, status, width)
     if "pseudoinverse" in wanted:
         found["pseudoinverse"] = matrix = np.empty((blocks, 3, 3, side))
-        kernels.set_pseudoinverses(K, left, right, status, matrix, width)
+        tip_stiffness.set_pseudoinverses(K, left, right, status, matrix, width)
     # columns of the system: K_θ, a probing torque, J_vᵀu, J_Xᵀ, Vᵀ
     first = nv + 1 + ("along" in wanted) * len(directions)
     columns = first + 6 * ("compliance" in wanted) + 3 * ("cartesian" in wanted)
@@ -74,10 +75,10 @@ def read(
         kernels.set_along(JX, directions, system, status, along, width)
     if "compliance" in wanted:
         found["compliance"] = matrix = np.empty((blocks, 6, 6, side))
-        kernels.set_compliances(JX, system, first, matrix, width)
+        tip_stiffness.set_compliances(JX, system, first, matrix, width)
     if "cartesian" in wanted:
         found["cartesian"] = matrix = np.empty((blocks, 3, 3, side))
-        kernels.set_cartesians(left, right, system, status, matrix, width)
+        tip_stiffness.set_cartesians(left, right, system, status, matrix, width)
     return found
 
 

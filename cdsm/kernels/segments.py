@@ -82,8 +82,9 @@ def _set_direction(
     for w in lanes(width):
         dx, dy, dz = end[0, w] - start[0, w], end[1, w] - start[1, w], end[2, w] - start[2, w]
         distance = math.sqrt(dx * dx + dy * dy + dz * dz)
-        x[w], y[w], z[w] = dx / distance, dy / distance, dz / distance
-        length[w], inverse[w] = distance, 1.0 / distance
+        over = 1.0 / distance
+        x[w], y[w], z[w] = dx * over, dy * over, dz * over
+        length[w], inverse[w] = distance, over
 
 
 @inlined

@@ -28,84 +28,13 @@ would take two evaluations of K_θ for each.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
 from cdsm.kernels.compiling import Index, compiled, inner
+from cdsm.kernels.motion import Motion, cross, dot, move, pull_back, set_motion, to_frame
 from cdsm.kernels.tree import Indices, Routing, Tree, empty_frames, forward_kinematics
 from cdsm.support.values import Array
-
-
-class _Motion(NamedTuple):
-    """Motion of all joint frames along q̇ = z, (nv+1, 3) each.
-
-    Angular velocity ω and ω̇, velocity and acceleration of the origins.
-    """
-
-    turning: Array
-    turning_rate: Array
-    velocity: Array
-    acceleration: Array
-
-
-@inner
-def _cross(a: Array, b: Array, product: Array) -> None:
-    """Fill ``product`` (3,) with a × b."""
-    product[0] = a[1] * b[2] - a[2] * b[1]
-    product[1] = a[2] * b[0] - a[0] * b[2]
-    product[2] = a[0] * b[1] - a[1] * b[0]
-
-
-@inner
-def _dot(a: Array, b: Array) -> float:
-    return float(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
-
-
-@inner
-def _move(
-    turning: Array, turning_rate: Array, arm: Array, velocity: Array, acceleration: Array
-) -> None:
-    """Fill ``velocity`` (3,) with ω × r, and ``acceleration`` (3,) with ω̇ × r + ω × (ω × r).
-
-    r is ``arm`` (3,), from the origin of a moving frame to a point; ω is ``turning`` (3,), ω̇
-    ``turning_rate`` (3,).
-    """
-    _cross(turning, arm, velocity)
-    w, e, v, r = turning, turning_rate, velocity, arm
-    acceleration[0] = e[1] * r[2] - e[2] * r[1] + w[1] * v[2] - w[2] * v[1]
-    acceleration[1] = e[2] * r[0] - e[0] * r[2] + w[2] * v[0] - w[0] * v[2]
-    acceleration[2] = e[0] * r[1] - e[1] * r[0] + w[0] * v[1] - w[1] * v[0]
-
-
-@inner
-def _set_motion(
-    tree: Tree, origin: Array, axis: Array, slide: Array, z: Array, motion: _Motion
-) -> None:
-    """Fill ``motion``, that of the joint frames, for the joint velocities z (nv,), base first.
-
-    ``origin``, ``axis`` and ``slide`` (nv+1, 3) are those of :class:`Frames` of one posture.
-    """
-    turning, rate, velocity, acceleration = motion
-    arm, v, a, way = np.empty(3), np.empty(3), np.empty(3), np.zeros(3)
-    for k in range(tree.order.shape[0]):
-        i = tree.order[k]
-        before, speed = tree.parent[i], z[i - 1]
-        for r in range(3):
-            arm[r] = origin[i, r] - origin[before, r]
-            if slide.shape[0]:
-                way[r] = slide[i, r] * speed
-        _move(turning[before], rate[before], arm, v, a)
-        for r in range(3):
-            velocity[i, r] = velocity[before, r] + v[r] + way[r]
-            acceleration[i, r] = acceleration[before, r] + a[r]
-            turning[i, r] = turning[before, r] + axis[i, r] * speed
-        _cross(turning[before], way, v)
-        for r in range(3):
-            acceleration[i, r] += 2.0 * v[r]
-        _cross(turning[before], axis[i], v)
-        for r in range(3):
-            rate[i, r] = rate[before, r] + v[r] * speed
 
 
 @inner
@@ -135,10 +64,10 @@ def _add_cable(
                 u[r] = point[b, 0, r] - point[a, 0, r]
                 v[r] = point[b, 1, r] - point[a, 1, r]
                 w[r] = point[b, 2, r] - point[a, 2, r]
-            length = math.sqrt(_dot(u, u))
+            length = math.sqrt(dot(u, u))
             for r in range(3):
                 u[r] /= length
-            along, square, drift = _dot(u, v), _dot(v, v), _dot(u, w)
+            along, square, drift = dot(u, v), dot(v, v), dot(u, w)
             if turn == 0:
                 rate += along
                 bend += (square - along * along) / length + drift
@@ -162,26 +91,11 @@ def _add_cable(
 
 
 @inner
-def _pull_back(turning: Array, rate: Array, weight: Array, scratch: Array, pulled: Array) -> None:
-    """Fill ``pulled`` (3,) with ∂Ψ/∂δ = X + V × ω + A × ω̇ + (A × ω) × ω, δ a point's displacement.
-
-    δ is in a frame that moves with ω ``turning`` and ω̇ ``rate``. ``weight`` (3, 3) are X, V and A,
-    the derivatives of Ψ with respect to the point's position, velocity and acceleration.
-    """
-    X, V, A = weight[0], weight[1], weight[2]
-    _cross(A, turning, scratch)
-    w, e, s = turning, rate, scratch
-    for r in range(3):
-        p, q = (r + 1) % 3, (r + 2) % 3
-        pulled[r] = X[r] + (V[p] + s[p]) * w[q] - (V[q] + s[q]) * w[p] + A[p] * e[q] - A[q] * e[p]
-
-
-@inner
 def _by_joint(
     i: Index,
     before: Index,
     frames: tuple[Array, Array, Array],
-    motion: _Motion,
+    motion: Motion,
     row: Indices,
     beyond: Array,
     point: Array,
@@ -207,11 +121,11 @@ def _by_joint(
     for n in range(row.shape[0]):
         if beyond[row[n]] == 0.0:
             continue
-        _pull_back(w, e, weight[n], scratch, back)  # leaves A × ω in scratch
+        pull_back(w, e, weight[n], scratch, back)  # leaves A × ω in scratch
         for r in range(3):
             total[r] += back[r]
             arm[r] = point[n, 0, r] - origin[before, r]
-        _move(w, e, arm, v, a)
+        move(w, e, arm, v, a)
         for r in range(3):  # motion relative to the parent link, then Coriolis
             v[r] = point[n, 1, r] - velocity[before, r] - v[r]
         for r in range(3):
@@ -233,7 +147,7 @@ def _by_joint(
                 - a[q] * A[p]
             )
     if beyond[tip] != 0.0:  # ω and ω̇ of the tip
-        _cross(spin_rate, w, scratch)
+        cross(spin_rate, w, scratch)
         for r in range(3):
             v[r] = turning[tip, r] - w[r]
             scratch[r] += spin[r]
@@ -246,22 +160,8 @@ def _by_joint(
             moment[r] += a[p] * spin_rate[q] - a[q] * spin_rate[p]
     for r in range(3):
         placement[r] = total[r]
-    derivative = _dot(axis[i], moment)
-    return derivative + _dot(slide[i], total) if slide.shape[0] else derivative
-
-
-@inner
-def _to_frame(rotation: Array, vector: Array, turned: Array) -> None:
-    """Fill ``turned`` (3,) with Rᵀ v: the ``vector`` v in base axes, in the axes of a joint frame.
-
-    R is ``rotation`` (3, 3).
-    """
-    for r in range(3):
-        turned[r] = (
-            rotation[0, r, 0] * vector[0]
-            + rotation[1, r, 0] * vector[1]
-            + rotation[2, r, 0] * vector[2]
-        )
+    derivative = dot(axis[i], moment)
+    return derivative + dot(slide[i], total) if slide.shape[0] else derivative
 
 
 @compiled
@@ -322,10 +222,10 @@ def single_gradient(
     forward_kinematics(tree, routing, q.reshape(nv, 1), np.empty((2, 1)), rotation, frames, None)
     origin, axis = frames.origin.reshape(rows, 3), frames.axis.reshape(rows, 3)
     slide = frames.slide.reshape(joint_slide.shape[0], 3)
-    motion = _Motion(
+    motion = Motion(
         np.zeros((rows, 3)), np.zeros((rows, 3)), np.zeros((rows, 3)), np.zeros((rows, 3))
     )
-    _set_motion(tree, origin, axis, slide, z, motion)
+    set_motion(tree, origin, axis, slide, z, motion)
     turning, rate, moving, acceleration = motion
     # all points: sites, centres of mass, tip
     count = sites + rows + 1
@@ -345,7 +245,7 @@ def single_gradient(
                     + rotation[i, r, 1, 0] * local[1]
                     + rotation[i, r, 2, 0] * local[2]
                 )
-        _move(turning[i], rate[i], arm, v, a)
+        move(turning[i], rate[i], arm, v, a)
         for r in range(3):
             x[n, 0, r] = origin[i, r] + arm[r]
             x[n, 1, r] = moving[i, r] + v[r]
@@ -361,7 +261,7 @@ def single_gradient(
     by_mass = np.empty(rows)
     for i in range(rows):
         n = sites + i
-        by_mass[i] = -bent * _dot(gravity, x[n, 2]) - turned * _dot(gravity, x[n, 1])
+        by_mass[i] = -bent * dot(gravity, x[n, 2]) - turned * dot(gravity, x[n, 1])
         value += mass[i] * by_mass[i]
         for r in range(3):
             weight[n, 1, r] = -turned * mass[i] * gravity[r]
@@ -373,14 +273,14 @@ def single_gradient(
         spin[r] = -turned * wrench[3 + r]
         spin_rate[r] = -bent * wrench[3 + r]
         value += weight[last, 1, r] * x[last, 1, r] + weight[last, 2, r] * x[last, 2, r]
-    value += _dot(spin, turning[tip]) + _dot(spin_rate, rate[tip])
+    value += dot(spin, turning[tip]) + dot(spin_rate, rate[tip])
     by_q, by_site, by_centre = np.empty(nv), np.empty((sites, 3)), np.empty((rows, 3))
     by_origin, by_tip, back, scratch = np.zeros((rows, 3)), np.empty(3), np.empty(3), np.empty(3)
     for n in range(count):
         i = at[n]
-        _pull_back(turning[i], rate[i], weight[n], scratch, back)
+        pull_back(turning[i], rate[i], weight[n], scratch, back)
         into = by_site[n] if n < sites else by_centre[i] if n < sites + rows else by_tip
-        _to_frame(rotation[i], back, into)
+        to_frame(rotation[i], back, into)
     beyond = np.empty(rows)
     for k in range(rows - 1):
         i = order[k]
@@ -390,18 +290,8 @@ def single_gradient(
         for other in range(k + 1, rows - 1):
             beyond[order[other]] = beyond[parent[order[other]]]
         by_q[i - 1] = _by_joint(
-            i,
-            parent[i],
-            (origin, axis, slide),
-            motion,
-            at,
-            beyond,
-            x,
-            weight,
-            spin,
-            spin_rate,
-            tip,
-            back,
-        )
-        _to_frame(rotation[parent[i]], back, by_origin[i])
+            i, parent[i], (origin, axis, slide), motion, at, beyond, x, weight, spin, spin_rate,
+            tip, back,
+        )  # fmt: skip
+        to_frame(rotation[parent[i]], back, by_origin[i])
     return value, by_q, by_site, by_origin, by_centre, by_tip, by_mass, by_tension, by_stiffness

@@ -115,26 +115,29 @@ def set_load_stiffness(
 
 @inner
 def sum_terms(
-    active: Array,
-    passive: Array,
-    gravity: Array,
-    load: Array,
-    K: Array,
-    parts: Array,
-    width: Width,
+    active: Array, passive: Array, gravity: Array, load: Array, K: Array, width: Width
 ) -> None:
-    """Fill K with the sum of the four terms, ``parts`` with that of their magnitudes.
-
-    All arrays are (nv, nv, W).
-    """
+    """Fill K_θ (nv, nv, W). Of all terms but the load's, only entries with i ≤ j are read."""
     for i in upwards(0, K.shape[0]):
         for j in upwards(0, K.shape[0]):
+            a, b = min(i, j), max(i, j)
             for w in lanes(width):
-                K[i, j, w] = active[i, j, w] + passive[i, j, w] + gravity[i, j, w] + load[i, j, w]
+                K[i, j, w] = active[a, b, w] + passive[a, b, w] + gravity[a, b, w] + load[i, j, w]
+
+
+@inner
+def sum_magnitudes(
+    active: Array, passive: Array, gravity: Array, load: Array, parts: Array, width: Width
+) -> None:
+    """Fill P (nv, nv, W), the sum of the magnitudes of the terms, which are as in sum_terms."""
+    for i in upwards(0, parts.shape[0]):
+        for j in upwards(0, parts.shape[0]):
+            a, b = min(i, j), max(i, j)
+            for w in lanes(width):
                 parts[i, j, w] = (
-                    abs(active[i, j, w])
-                    + abs(passive[i, j, w])
-                    + (abs(gravity[i, j, w]) + abs(load[i, j, w]))
+                    abs(active[a, b, w])
+                    + abs(passive[a, b, w])
+                    + (abs(gravity[a, b, w]) + abs(load[i, j, w]))
                 )
 
 

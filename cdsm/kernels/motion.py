@@ -1,0 +1,112 @@
+"""Numba kernels of velocities and accelerations of one posture, along q̇ = z, q̈ = 0."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from cdsm.kernels.compiling import inner
+from cdsm.kernels.tree import Tree
+from cdsm.support.values import Array
+
+
+class Motion(NamedTuple):
+    """Motion of all joint frames along q̇ = z, (nv+1, 3) each.
+
+    Angular velocity ω and ω̇, velocity and acceleration of the origins.
+    """
+
+    turning: Array
+    turning_rate: Array
+    velocity: Array
+    acceleration: Array
+
+
+@inner
+def cross(a: Array, b: Array, product: Array) -> None:
+    """Fill ``product`` (3,) with a × b."""
+    product[0] = a[1] * b[2] - a[2] * b[1]
+    product[1] = a[2] * b[0] - a[0] * b[2]
+    product[2] = a[0] * b[1] - a[1] * b[0]
+
+
+@inner
+def dot(a: Array, b: Array) -> float:
+    """Compute a·b."""
+    return float(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
+
+
+@inner
+def move(
+    turning: Array, turning_rate: Array, arm: Array, velocity: Array, acceleration: Array
+) -> None:
+    """Fill ``velocity`` (3,) with ω × r, and ``acceleration`` (3,) with ω̇ × r + ω × (ω × r).
+
+    r is ``arm`` (3,), from the origin of a moving frame to a point; ω is ``turning`` (3,), ω̇
+    ``turning_rate`` (3,).
+    """
+    cross(turning, arm, velocity)
+    w, e, v, r = turning, turning_rate, velocity, arm
+    acceleration[0] = e[1] * r[2] - e[2] * r[1] + w[1] * v[2] - w[2] * v[1]
+    acceleration[1] = e[2] * r[0] - e[0] * r[2] + w[2] * v[0] - w[0] * v[2]
+    acceleration[2] = e[0] * r[1] - e[1] * r[0] + w[0] * v[1] - w[1] * v[0]
+
+
+@inner
+def set_motion(
+    tree: Tree, origin: Array, axis: Array, slide: Array, z: Array, motion: Motion
+) -> None:
+    """Fill ``motion``, that of the joint frames, for the joint velocities z (nv,), base first.
+
+    ``origin``, ``axis`` and ``slide`` (nv+1, 3) are those of :class:`Frames` of one posture.
+    """
+    turning, rate, velocity, acceleration = motion
+    arm, v, a, way = np.empty(3), np.empty(3), np.empty(3), np.zeros(3)
+    for k in range(tree.order.shape[0]):
+        i = tree.order[k]
+        before, speed = tree.parent[i], z[i - 1]
+        for r in range(3):
+            arm[r] = origin[i, r] - origin[before, r]
+            if slide.shape[0]:
+                way[r] = slide[i, r] * speed
+        move(turning[before], rate[before], arm, v, a)
+        for r in range(3):
+            velocity[i, r] = velocity[before, r] + v[r] + way[r]
+            acceleration[i, r] = acceleration[before, r] + a[r]
+            turning[i, r] = turning[before, r] + axis[i, r] * speed
+        cross(turning[before], way, v)
+        for r in range(3):
+            acceleration[i, r] += 2.0 * v[r]
+        cross(turning[before], axis[i], v)
+        for r in range(3):
+            rate[i, r] = rate[before, r] + v[r] * speed
+
+
+@inner
+def to_frame(rotation: Array, vector: Array, turned: Array) -> None:
+    """Fill ``turned`` (3,) with Rᵀ v: the ``vector`` v in base axes, in the axes of a joint frame.
+
+    R is ``rotation`` (3, 3).
+    """
+    for r in range(3):
+        turned[r] = (
+            rotation[0, r, 0] * vector[0]
+            + rotation[1, r, 0] * vector[1]
+            + rotation[2, r, 0] * vector[2]
+        )
+
+
+@inner
+def pull_back(turning: Array, rate: Array, weight: Array, scratch: Array, pulled: Array) -> None:
+    """Fill ``pulled`` (3,) with ∂Ψ/∂δ = X + V × ω + A × ω̇ + (A × ω) × ω, δ a point's displacement.
+
+    δ is in a frame that moves with ω ``turning`` and ω̇ ``rate``. ``weight`` (3, 3) are X, V and A,
+    the derivatives of Ψ with respect to the point's position, velocity and acceleration.
+    """
+    X, V, A = weight[0], weight[1], weight[2]
+    cross(A, turning, scratch)
+    w, e, s = turning, rate, scratch
+    for r in range(3):
+        p, q = (r + 1) % 3, (r + 2) % 3
+        pulled[r] = X[r] + (V[p] + s[p]) * w[q] - (V[q] + s[q]) * w[p] + A[p] * e[q] - A[q] * e[p]

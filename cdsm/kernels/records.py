@@ -1,0 +1,88 @@
+"""Kernels that move values between rows of postures, blocks of postures, and their records.
+
+A record holds the quantities of a block of W postures, one after the other: (size, W). Quantity n
+begins at index ``start[n]``. The posture is the last axis of a block, and the first one of rows.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cdsm.kernels.compiling import Width, inlined, inner, lanes, upwards
+from cdsm.kernels.tree import Indices
+from cdsm.support.values import Array
+
+
+@inner
+def fetch(rows: Array, first: int, block: Array, width: Width) -> None:
+    """Copy W rows of (b, n), from row ``first``, to a block (n, W); repeat the last if needed."""
+    if rows.shape[0]:
+        for i in upwards(0, rows.shape[1]):
+            for w in lanes(width):
+                block[i, w] = rows[min(first + np.intp(w), rows.shape[0] - 1), i]
+
+
+@inner
+def copy(matrix: Array, block: Array, width: Width) -> None:
+    """Fill matrices (m, n, W) with the first m rows of others."""
+    for i in upwards(0, block.shape[0]):
+        for j in upwards(0, block.shape[1]):
+            for w in lanes(width):
+                block[i, j, w] = matrix[i, j, w]
+
+
+@inner
+def clear(matrix: Array, width: Width) -> None:
+    """Set the upper triangle of matrices (n, n, W) to zero."""
+    for i in upwards(0, matrix.shape[0]):
+        for j in upwards(i, matrix.shape[1]):
+            for w in lanes(width):
+                matrix[i, j, w] = 0.0
+
+
+@inlined
+def vector(record: Array, start: Indices, quantity: int) -> Array:
+    """Return a quantity of the record as vectors of W postures, (size, W)."""
+    return record[start[quantity] : start[quantity + 1]]
+
+
+@inlined
+def matrix(record: Array, start: Indices, quantity: int, rows: int, width: int) -> Array:
+    """Return a quantity of the record as matrices of W postures, (rows, columns, W)."""
+    part = record[start[quantity] : start[quantity + 1]]
+    return part.reshape((rows, part.shape[0] // rows, width))
+
+
+@inner
+def store(
+    record: Array,
+    start: Indices,
+    wanted: Indices,
+    code: Indices,
+    known: Indices,
+    first: int,
+    out: Array,
+    status: NDArray[np.uint8],
+) -> None:
+    """Copy the requested quantities of a block to its rows; NaN where they are not known."""
+    count = min(record.shape[1], out.shape[0] - first)
+    for w in lanes(count):
+        status[first + np.intp(w)] = code[w]
+    at = 0
+    for number in wanted:
+        for i in upwards(start[number], start[number + 1]):
+            for w in lanes(count):
+                out[first + np.intp(w), at] = record[i, w] if number < known[w] else math.nan
+            at += 1
+
+
+@inner
+def contains(numbers: Indices, number: int) -> bool:
+    """Check whether a number is one of some."""
+    found = False
+    for each in numbers:
+        found = found or each == number
+    return found
