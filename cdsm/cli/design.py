@@ -44,8 +44,8 @@ def design(
         bool,
         typer.Option(
             "--refine",
-            help="Improve the design that the search chose by exact derivatives: one objective, "
-            "continuous variables.",
+            help="Improve the chosen design by exact derivatives: one objective, continuous "
+            "variables. Only designs.csv still has the designs of the search.",
         ),
     ] = False,
     jobs: Annotated[int | None, typer.Option(help="Processes; default: all cores.", min=1)] = None,
@@ -53,8 +53,7 @@ def design(
 ) -> None:
     """Find the best designs of an arm; write the front, a figure, and the chosen arm with tables.
 
-    A stopped search resumes from the files in --out. With --refine, designs.csv has the designs of
-    the search, all other files have the refined one.
+    A stopped search resumes from the files in --out.
     """
     from cdsm.design.problem_file import read_problem
     from cdsm.design.refine import require_smooth

@@ -34,8 +34,8 @@ SMOOTH: Final = ("stiffness", "margin", "deflection", "motor_force", "mass", "le
 _ALIKE = 1e-20
 """Two unit vectors are equal if their squared distance is below this."""
 
-_STEP = 6e-6
-"""Step of the differences of uncertainties, over the range of a variable: cube root of rounding."""
+_STEP = 1e-4
+"""Step of the differences of uncertainties, over the range of a variable: the error is 1e-6."""
 
 _CENTRAL = {-1.0: -0.5, 1.0: 0.5}
 _ONE_SIDED = {1.0: -2.5, 2.0: 4.0, 3.0: -1.5}
@@ -64,6 +64,7 @@ def rows_and_gradients(
         InvalidInput: The quantity has no exact derivatives, or the tensions have none for this
             design.
         InfeasibleTension: A posture is not held.
+        ElasticityRangeError: A tension is outside the domain of its cable's law.
         SingularStiffness: The arm is unstable at a posture.
     """
     if measure.of not in SMOOTH:
@@ -76,16 +77,15 @@ def rows_and_gradients(
         return np.array([value]), chain.of_links(measure.of)[None]
     values, slopes = [], []
     for tension, loss in _balanced(problem, design, arm):
-        posed = chain.at(tension, loss)
+        posed, K = chain.at(tension, loss), stiffness(tension.posture, tension)
+        if not K.is_stable:
+            raise SingularStiffness("the arm is unstable here.", K.critical_direction)
         if measure.of == "motor_force":  # the largest tension along each cable
             for c, weights in enumerate(np.eye(len(tension))):
                 F = float(tension.values[c])
                 values.append(loss[c] * F)
                 slopes.append(loss[c] * (posed.slopes({}, weights) + F * posed.grip[c]))
             continue
-        K = stiffness(tension.posture, tension)
-        if not K.is_stable:
-            raise SingularStiffness("the arm is unstable here.", K.critical_direction)
         value, slope = _reading(K, measure, posed)
         values.append(value)
         slopes.append(slope)

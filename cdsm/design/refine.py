@@ -23,6 +23,12 @@ _SAFE = 1e-7
 """Relative distance of a refined design from each limit, so that rounding violates none."""
 
 
+_FAR = 10.0
+"""Violation of the scaled constraints that stands for a design that does not hold all postures."""
+
+_AT_END = 1e-9
+"""Distance from the end of a range, over the range, that is rounding."""
+
 _ROUNDS = 2
 """Number of times that a design is improved and then moved inside its limits."""
 
@@ -41,7 +47,8 @@ def refine_design(
 
     The objective is the worst value over postures and loads, which has kinks. So SLSQP solves the
     smooth problem min t with t ≥ the objective, and with each constraint, at every posture and
-    load. The result is a minimum near the start; see :func:`search_designs` for the whole range.
+    load. A step to a design that does not hold all postures is shortened. The result is a minimum
+    near the start; see :func:`search_designs` for the whole range.
 
     The derivatives are exact, also those of the bounds that ``worst_friction`` narrows; where a
     cable goes straight through a hole, its wrap angle has a kink, and the mean of both sides is
@@ -74,19 +81,26 @@ def refine_design(
     objective = problem.objectives[0]
     first = rows_and_gradients(problem, begin, objective)[0]
     scale = float(abs(first).max()) or 1.0
-    known: dict[bytes, dict[str, _Rows]] = {}
+    known: dict[bytes, dict[str, _Rows] | None] = {}
     visited: list[Array] = []
 
     def at(z: Array) -> dict[str, _Rows]:
         key = z[:-1].tobytes()
         if key not in known:
-            x = np.clip(low + size * z[:-1], low, high)
+            part = np.where(z[:-1] < _AT_END, 0.0, np.where(z[:-1] > 1.0 - _AT_END, 1.0, z[:-1]))
+            x = np.clip(low + size * part, low, high)
             visited.append(x)
             known[key] = _all_rows(problem, x, size)
-        return known[key]
+        rows = known[key]
+        if rows is None:
+            raise _PostureNotHeld
+        return rows
 
     def slack(z: Array) -> Array:
-        rows = at(z)
+        try:
+            rows = at(z)
+        except _PostureNotHeld:  # the line search then takes a smaller step
+            return np.full(count, -_FAR)
         parts = [z[-1] - objective.sign * rows[objective.key].values / scale]
         for each in problem.constraints:
             sign = 1.0 if each.at_most is None else -1.0
@@ -114,8 +128,11 @@ def refine_design(
     y = (begin - low) / size
     inside = [(0.0, 1.0)] * len(size)
     up = np.append(np.zeros(len(size)), 1.0)
-    # a step may lead where no tensions balance; the best before counts
+    # where smaller steps do not help either, the best before counts
     with suppress(_PostureNotHeld):
+        start_rows = at(np.append(y, 0.0))
+        each_goal = (objective, *problem.constraints)
+        count = sum(len(start_rows[each.key].values) for each in each_goal)
         for _ in range(_ROUNDS):
             worst = float((objective.sign * at(np.append(y, 0.0))[objective.key].values).max())
             found = minimize(
@@ -139,7 +156,7 @@ def refine_design(
                     bounds=inside,
                     constraints={"type": "ineq", "fun": limits, "jac": limit_slopes},
                     method="SLSQP",
-                    options={"maxiter": iterations, "ftol": 1e-16},
+                    options={"maxiter": iterations, "ftol": 1e-12},
                 ).x
     return _finished(problem, visited)
 
@@ -148,15 +165,18 @@ class _PostureNotHeld(Exception):
     """Raised if SLSQP tries a design that does not hold all postures."""
 
 
-def _all_rows(problem: DesignProblem, x: Array, size: Array) -> dict[str, _Rows]:
-    """Compute all quantities of the problem for a design x (n,); ``size`` (n,) are the ranges."""
+def _all_rows(problem: DesignProblem, x: Array, size: Array) -> dict[str, _Rows] | None:
+    """Compute all quantities of the problem for a design x (n,); ``size`` (n,) are the ranges.
+
+    Return None for a design that does not hold all postures, or has no derivatives.
+    """
     found: dict[str, _Rows] = {}
     for each in (*problem.objectives, *problem.constraints):
         if each.key not in found:
             try:
                 values, slopes = rows_and_gradients(problem, x, Measure(each.of, each.direction))
-            except CdsmError as error:
-                raise _PostureNotHeld from error
+            except CdsmError:
+                return None
             found[each.key] = _Rows(values, slopes * size)
     return found
 
