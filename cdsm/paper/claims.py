@@ -82,7 +82,7 @@ class Figure(ABC):
         """Return the curves as plain SI numbers, for JSON."""
 
     def tables(self) -> tuple[str, ...]:
-        """Return tables of this figure beside its claims in the report, in Markdown; none by default."""
+        """Return tables of this figure for the report, in Markdown; by default none."""
         return ()
 
 
