@@ -63,7 +63,7 @@ def test_batch_is_ten_thousand_times_faster_than_differences(clock: Clock | None
     clock.race(what, differences, batch, least=10_000.0, rows=rows, fast_repeat=1)
 
 
-@pytest.mark.parametrize(("joints", "rows", "allowed"), [(5, 4000, 1.0), (40, 200, 2.0)])
+@pytest.mark.parametrize(("joints", "rows", "allowed"), [(5, 4000, 0.85), (40, 200, 1.3)])
 def test_batch_costs_little_more_than_scalar_c(
     joints: int, rows: int, allowed: float, tmp_path: Path, clock: Clock | None
 ) -> None:
@@ -150,7 +150,7 @@ def test_sweep_into_a_store_costs_little_more_than_its_batch(
         clock.race(what, sweep, batch, most=2.0, fast_repeat=1, rounds=5)
 
 
-@pytest.mark.parametrize(("joints", "most", "least"), [(5, 3.0, 15.0), (20, 2.5, 3.0)])
+@pytest.mark.parametrize(("joints", "most", "least"), [(5, 2.5, 25.0), (20, 1.8, 5.5)])
 def test_one_posture_to_its_reading_costs_little_more_than_its_stiffness(
     joints: int, most: float, least: float, clock: Clock | None
 ) -> None:
