@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Literal, SupportsIndex, final, get_args, overload
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from cdsm.elasticity import Elasticity, tension_at
 from cdsm.errors import CableError, CdsmError, InvalidInput
@@ -225,6 +225,11 @@ class Cables(tuple[Cable, ...]):
     def names(self) -> tuple[str, ...]:
         """Names of the cables, in their order."""
         return tuple(cable.name for cable in self)
+
+    @property
+    def position_controlled(self) -> NDArray[np.bool_]:
+        """Whether the motor of each cable controls its length, not its tension (C,)."""
+        return np.array([cable.control == "position" for cable in self])
 
     @overload
     def __getitem__(self, which: SupportsIndex | str, /) -> Cable: ...

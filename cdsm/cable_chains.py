@@ -102,6 +102,18 @@ class Segments(ReadOnlyState):
     _routing: Routing
     _frames: Frames
 
+    @property
+    def grip(self) -> Array:
+        """μ φ (P,) [-]: wire sticks while the tensions beside a hole differ by less than e^μφ."""
+        return self.chains.friction * self.wrap
+
+    @property
+    def ratio(self) -> Array:
+        """Largest ratio of the next tension to that of each segment (S,) [-]: e^μφ, 1 at ends."""
+        found = np.ones(self.lengths.size)
+        found[self.chains.hole] = np.exp(self.grip)
+        return found
+
     def tension_stiffness(self, tension: Array) -> Array:
         """Compute Σ T_j ∂²l_j/∂θ² over each cable's segments j, (C, nv, nv) [N m/rad]; T (S,)."""
         cable, (_, _, segment, joint, _) = self.chains.cable, self._routing

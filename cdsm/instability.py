@@ -90,9 +90,9 @@ def find_remedies(K: Stiffness) -> tuple[Remedy, ...]:
 
 def verdict(K: Stiffness) -> str:
     """Return one line about an unstable arm: the joint that moves most, and the eigenvalue."""
-    arm, way = K.posture.arm, abs(K.critical_direction)
+    arm, motion = K.posture.arm, abs(K.critical_direction)
     return (
-        f"UNSTABLE: the arm buckles, {arm.joint_names[int(way.argmax())]} most; the smallest "
+        f"UNSTABLE: the arm buckles, {arm.joint_names[int(motion.argmax())]} most; the smallest "
         f"eigenvalue of K_θ is {K.margin:.4g} {arm.stiffness_unit()}"
     )
 
@@ -108,7 +108,7 @@ def advice(K: Stiffness) -> tuple[str, ...]:
 
 def _remedies(K: Stiffness) -> Iterator[Remedy]:
     pose, arm = K.posture, K.posture.arm
-    held = [cable for cable in arm.cables if cable.control == "position"]
+    locked = [cable for cable in arm.cables if cable.control == "position"]
 
     def margin(changed: Posture, tension: Array) -> float:
         """Compute the smallest eigenvalue of K_θ of a changed arm under tensions (C,) [N]."""
@@ -129,28 +129,34 @@ def _remedies(K: Stiffness) -> Iterator[Remedy]:
 
     if margin(pose, K.tension) > 0.0:  # K has terms that are not those of this arm
         return
-    if held:
+    if locked:
         pairs = zip(arm.cables, K.tension, strict=True)
         rigidity = [float(c.elasticity.rigidity(F)) for c, F in pairs if c.control == "position"]
         yield _remedy("wire", rigidity, wire, _STIFFER)
-    if sprung := [k for each in held if math.isfinite(k := each.series_stiffness)]:
+    if sprung := [k for each in locked if math.isfinite(k := each.series_stiffness)]:
         yield _remedy("spring", sprung, spring, _STIFFER)
-    pull = K.distribution
-    if pull is None or not pull.least:
+    distributed = K.distribution
+    if distributed is None or not distributed.least:
         return
 
     def tension(factor: float) -> float:
-        low = np.where(pull.minimum < pull.maximum, factor * pull.minimum, pull.minimum)
-        found = distribute_tension(pose, low, pull.maximum, K.wrench, pull.solver)
+        low = np.where(
+            distributed.minimum < distributed.maximum,
+            factor * distributed.minimum,
+            distributed.minimum,
+        )
+        found = distribute_tension(pose, low, distributed.maximum, K.wrench, distributed.solver)
         return margin(pose, found.values)
 
     def offset(factor: float) -> float:
         there = changed(_with_disks(K, factor))
-        found = distribute_tension(there, pull.minimum, pull.maximum, K.wrench, pull.solver)
+        found = distribute_tension(
+            there, distributed.minimum, distributed.maximum, K.wrench, distributed.solver
+        )
         return margin(there, found.values)
 
-    if pull.minimum.any():
-        yield _remedy("tension", pull.minimum, tension, _LESS, _MORE)
+    if distributed.minimum.any():
+        yield _remedy("tension", distributed.minimum, tension, _LESS, _MORE)
     if arm.is_serpentine and _with_disks(K, 1.0) == arm.cables:
         offsets = [joint.disk_offset for joint in arm.geometry.joints]
         yield _remedy("disk offset", offsets, offset, _LESS, _MORE)

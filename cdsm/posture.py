@@ -288,5 +288,5 @@ def site_paths(cables: Sequence[Cable], sites: Array) -> list[Array]:
 
 def foot(point: Array, line: Array) -> Array:
     """Return the point of a line segment (2, 3) that is nearest to a point (3,)."""
-    way = line[1] - line[0]
-    return np.asarray(line[0] + np.clip((point - line[0]) @ way / (way @ way), 0.0, 1.0) * way)
+    span = line[1] - line[0]
+    return np.asarray(line[0] + np.clip((point - line[0]) @ span / (span @ span), 0.0, 1.0) * span)

@@ -119,10 +119,10 @@ class RigidBody:
     def length(self) -> float:
         """Length of the path from the base through the joints to the tip at q = 0 [m]."""
         frame = self._model.frames[self._tip]
-        way = float(np.linalg.norm(frame.placement.translation))
+        length = float(np.linalg.norm(frame.placement.translation))
         for joint in reversed(self._path(frame.parentJoint)):
-            way += float(np.linalg.norm(self._model.jointPlacements[joint].translation))
-        return way
+            length += float(np.linalg.norm(self._model.jointPlacements[joint].translation))
+        return length
 
     def _local_twists(self) -> Array:
         """Compute the unit twist of each joint in its own frame (nv, 6), linear part first."""

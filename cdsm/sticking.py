@@ -88,10 +88,10 @@ def first_order_loads(pose: Posture, tension: Array, gradient: Array, motion: Ar
     segments = pose.segments
     chains, slack = segments.chains, tension == 0.0
     relative = (gradient @ motion) / np.where(slack, 1.0, tension)
-    pull = abs(relative[chains.hole + 1] - relative[chains.hole])
-    rate = pull - chains.friction * (segments.wrap_jacobian @ motion)
+    change = abs(relative[chains.hole + 1] - relative[chains.hole])
+    rate = change - chains.friction * (segments.wrap_jacobian @ motion)
     # a slack cable holds nothing: any pull moves it
-    grip = np.where(slack[chains.hole], 0.0, chains.friction * segments.wrap)
-    least = ROUNDING * float(pull.max(initial=0.0))
+    grip = np.where(slack[chains.hole], 0.0, segments.grip)
+    least = ROUNDING * float(change.max(initial=0.0))
     loads = np.divide(grip, rate, out=np.full(rate.size, math.inf), where=rate > least)
     return np.where(holding(pose), loads, math.inf)

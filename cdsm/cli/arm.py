@@ -54,15 +54,15 @@ def stiffness(
     given = pose.arm.tolerances if tolerances is None else cdsm.Tolerances.read(tolerances)
     budgets = _budgets(tension, given) if given.given else {}
     sure = {"uncertainty": {axis: budget.to_dict() for axis, budget in budgets.items()}}
-    held = _breakaways(tension)
+    breakaways = _breakaways(tension)
     stuck = {
         axis: {"stuck_N_per_m": each.stiffness.along(axis), "breakaway_N": each.load}
-        for axis, each in held.items()
+        for axis, each in breakaways.items()
     }
     parts = [tensions.conditions(pose.arm), tension, K]
-    parts += [_sticking(held)] if held else []
+    parts += [_sticking(breakaways)] if breakaways else []
     parts += [_table(budgets)] if budgets else []
-    more = (sure if budgets else {}) | ({"sticking": stuck} if held else {})
+    more = (sure if budgets else {}) | ({"sticking": stuck} if breakaways else {})
     answer(as_json, lambda: K.to_dict() | more, *parts, warnings=K.warnings[:1])
 
 
@@ -75,20 +75,20 @@ def _breakaways(tension: cdsm.Tension) -> dict[str, cdsm.Breakaway]:
     if tension.posture.arm.has_friction:
         for axis in ("x", "y", "z"):
             with contextlib.suppress(cdsm.CdsmError):  # it buckles before, or leaves the law
-                held = cdsm.breakaway(tension.posture, tension, axis)
-                if 0.0 < held.load < math.inf:
-                    found[axis] = held
+                first = cdsm.breakaway(tension.posture, tension, axis)
+                if 0.0 < first.load < math.inf:
+                    found[axis] = first
     return found
 
 
-def _sticking(held: dict[str, cdsm.Breakaway]) -> str:
-    """Write the stuck stiffness and the breakaway load of ``held``, one line for each axis."""
+def _sticking(breakaways: dict[str, cdsm.Breakaway]) -> str:
+    """Write the stuck stiffness and the breakaway load, one line for each axis."""
     from cdsm.stiffness_matrix.prints import model_of
 
-    K = next(iter(held.values())).stiffness
+    K = next(iter(breakaways.values())).stiffness
     lines = [
         f"along {axis} {each.stiffness.along(axis) / 1000.0:.4g} N/mm below {each.load:.4g} N"
-        for axis, each in held.items()
+        for axis, each in breakaways.items()
     ]
     return "\n".join([f"small loads measure ({model_of(K)}):", *lines])
 

@@ -58,14 +58,14 @@ def cycle(
     tension = tensions.distribute(pose, wrench_of(wrench))
     up = np.arange(1, steps + 1) / steps
     hump = np.concatenate([up, up[-2::-1] if steps > 1 else [], [0.0]])
-    way = hump if one_sided else np.concatenate([hump, -hump])
+    factors = hump if one_sided else np.concatenate([hump, -hump])
     added = np.append(weight.vector(pose.arm), np.zeros(3))
-    wrenches = tension.wrench + np.tile(way, cycles)[:, None] * added
+    wrenches = tension.wrench + np.tile(factors, cycles)[:, None] * added
     history = cdsm.load_cycle(pose, tension, wrenches)
     if out is not None:
         written(history.write(out))
     write_picture(figure, history.plot)
-    lost = float(history.dissipated[-len(way) :].sum())
+    lost = float(history.dissipated[-len(factors) :].sum())
     left = float(np.linalg.norm(history.displacement[-1]))
     note = (
         f"the last cycle loses {1000.0 * lost:.4g} mJ; without load the tip is left "

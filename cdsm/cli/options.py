@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
@@ -137,17 +136,10 @@ class ArmOptions:
         except cdsm.MissingWire as error:
             raise typer.BadParameter(str(error), param_hint="--wire") from None
         if self.spring is not None:
-            springs = [
-                dataclasses.replace(cable, series_stiffness=1000.0 * self.spring)
-                for cable in arm.cables
-            ]
-            arm = arm.with_cables(springs)
+            k = 1000.0 * self.spring
+            arm = arm.with_cables([replace(cable, series_stiffness=k) for cable in arm.cables])
         if self.slack_below:
-            continued = [
-                dataclasses.replace(cable, elasticity=cable.elasticity.slack_below())
-                for cable in arm.cables
-            ]
-            arm = arm.with_cables(continued)
+            arm = arm._with_laws([cable.elasticity.slack_below() for cable in arm.cables])
         if self.friction is not None:
             arm = arm.with_friction(self.friction)
         if self.gravity is not None:

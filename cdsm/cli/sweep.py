@@ -61,9 +61,7 @@ class PoseOptions:
     def read(self, arm: cdsm.Manipulator) -> cdsm.PoseSet:
         """Build the set of postures from its options."""
         if sum(given is not None for given in (self.grid, self.path, self.random)) != 1:
-            raise typer.BadParameter(
-                "give one of --grid, --path and --random.", param_hint="--grid, --path, --random"
-            )
+            raise typer.BadParameter("give one of --grid, --path and --random.", param_hint=_POSES)
         for option, value, needed, of in (
             ("--count", self.count, "--path", self.path),
             ("--seed", self.seed, "--random", self.random),

@@ -5,42 +5,22 @@ from __future__ import annotations
 import re
 from typing import Final
 
-_OPTIONS: Final = {
-    "bands": "--bands",
-    "count": "--count",
-    "damping": "--damping",
-    "damping_ratio": "--damping-ratio",
-    "delay": "--delay",
-    "direction": "--direction",
+# fmt: off
+_ALIKE: Final = (
+    "bands", "count", "damping", "damping_ratio", "delay", "direction", "encoder", "felt", "force",
+    "force_std", "gauge_length", "gravity", "host", "largest_force", "largest_tension", "payload",
+    "payload_from", "period", "port", "rate", "section", "seed", "solver", "steps", "target",
+    "tension_bias", "tension_noise", "tension_std", "wire", "wrench",
+)
+# fmt: on
+"""Arguments of the library whose options have the same name."""
+
+_OPTIONS: Final = {name: f"--{name.replace('_', '-')}" for name in _ALIKE} | {
     "displacement_std": "--reading-std",
-    "encoder": "--encoder",
-    "felt": "--felt",
-    "force": "--force",
-    "force_std": "--force-std",
-    "gauge_length": "--gauge-length",
-    "gravity": "--gravity",
-    "host": "--host",
-    "largest_force": "--largest-force",
-    "largest_tension": "--largest-tension",
     "maximum": "--max-tension",
     "minimum": "--min-tension",
     "outputs": "--quantities",
-    "payload": "--payload",
-    "payload_from": "--payload-from",
-    "period": "--period",
-    "port": "--port",
-    "rate": "--rate",
-    "section": "--section",
-    "seed": "--seed",
-    "solver": "--solver",
-    "steps": "--steps",
     "store": "--resume",
-    "target": "--target",
-    "tension_bias": "--tension-bias",
-    "tension_noise": "--tension-noise",
-    "tension_std": "--tension-std",
-    "wire": "--wire",
-    "wrench": "--wrench",
 }
 """Option for each argument of the library that a message may name."""
 

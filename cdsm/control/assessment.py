@@ -111,7 +111,7 @@ def hung_weight(plant: SlowPlant, state: SlowState, u: Array) -> float:
         for hung in (0.0, weight):
             for force in (*(hung + fading if arm.has_friction else ()), hung):
                 wrench = load.wrench + np.append(force * u, np.zeros(3))
-                carried = plant.load(carried, Load(wrench, load.held, load.motors))
+                carried = plant.load(carried, Load(wrench, load.holding, load.motors))
             tips.append(carried.pose.tip[:3, 3])
     except CdsmError:
         return math.nan

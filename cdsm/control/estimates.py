@@ -23,7 +23,6 @@ from functools import cached_property
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
 from cdsm.control.laws import Reading
@@ -32,6 +31,7 @@ from cdsm.friction.chain_problem import ChainProblem
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.support.values import Array
+from cdsm.tension import grip
 
 UNSURE: Final = 0.3
 """Standard deviation of 1/s before the first measurement."""
@@ -95,19 +95,19 @@ class Observer:
 
     def update(self, before: Estimate, reading: Reading) -> Estimate:
         """Return the estimate after one more reading; ``before`` is the previous estimate."""
-        held = self._position_controlled
+        locked, laws = self.arm.cables.position_controlled, self.arm._model.laws
         F, wire = np.maximum(reading.tension, self._least), reading.wire
         pose, x, variance = before.pose, before.softness, before.variance
         strain = self._mean_strain(pose, before.shares, F)
-        spring = self._series * (F - self._rest)
+        spring = laws.series * (F - laws.rest)
         # an error of the tension stretches the cable; the encoder rounds by half a count at most
         slack = self._tension_spread * (self._compliance(wire, F) * x)
-        spread = np.hypot(slack, self._encoder_spread)[held]
+        spread = np.hypot(slack, self._encoder_spread)[locked]
         q = pose.q
         for _ in range(_STEPS):
             pose = self.arm.at(q, check_limits=False)
-            missing = (wire * (1.0 + x * strain) + spring - pose.cable_lengths)[held] / spread
-            rows = np.c_[pose.length_jacobian[held], -(wire * strain)[held]] / spread[:, None]
+            missing = (wire * (1.0 + x * strain) + spring - pose.cable_lengths)[locked] / spread
+            rows = np.c_[pose.length_jacobian[locked], -(wire * strain)[locked]] / spread[:, None]
             prior = np.append(np.zeros(q.size), 1.0) / np.sqrt(before.variance)
             step = np.linalg.lstsq(
                 np.vstack([rows, prior]),
@@ -131,7 +131,7 @@ class Observer:
         F = np.maximum(reading.tension, self._least)
         stretch = 1.0 + estimate.softness * self._mean_strain(estimate.pose, estimate.shares, F)
         soft = self._compliance(reading.wire, F) * estimate.softness
-        return np.where(self._position_controlled, stretch / soft, 0.0)
+        return np.where(self.arm.cables.position_controlled, stretch / soft, 0.0)
 
     def _after_sliding(
         self, before: Estimate, pose: Posture, F: Array, softness: float, variance: float
@@ -141,11 +141,8 @@ class Observer:
         ``F`` (C,) [N] are tensions at the motors; ``softness`` and ``variance`` are new too.
         """
         segments = pose.segments
-        chains = segments.chains
-        ratio = np.ones(segments.lengths.size)
-        ratio[chains.hole] = np.exp(chains.friction * segments.wrap)
-        near = before.shares * F[chains.cable]
-        chain = self._problem.settle(segments.lengths, before.natural, ratio, F, near)
+        chains, near = segments.chains, before.shares * F[segments.chains.cable]
+        chain = self._problem.settle(segments.lengths, before.natural, segments.ratio, F, near)
         shares = chain.tension / F[chains.cable]
         means = np.add.reduceat(shares * segments.lengths, chains.start[:-1]) / pose.cable_lengths
         force = self._tip_force(pose, chain.tension)
@@ -158,11 +155,9 @@ class Observer:
         Weighted least squares of J_vᵀ f = Σ_j T_j g_j + g, with g_j the gradient of the length of
         segment j. The weights follow from the uncertainty of noise and friction.
         """
-        segments = pose.segments
-        chains, J = segments.chains, pose.length_jacobian
-        F, holes = tension[chains.start[:-1]], chains.cable[chains.hole]
-        grip = np.bincount(holes, chains.friction * segments.wrap, minlength=F.size)
-        spread = np.hypot(max(self._tension_spread, _LEAST_SPREAD), grip * F)
+        segments, J = pose.segments, pose.length_jacobian
+        F = tension[segments.chains.start[:-1]]
+        spread = np.hypot(max(self._tension_spread, _LEAST_SPREAD), grip(pose) * F)
         root = np.linalg.cholesky((J.T * spread**2) @ J)
         torque = tension @ segments.length_jacobian + pose.gravity_torque
         rows = solve_triangular(root, pose.jacobian[:3].T, lower=True)
@@ -183,7 +178,7 @@ class Observer:
 
     def _compliance(self, wire: Array, F: Array) -> Array:
         """Compute dL/dF (C,) [m/N] at constant ``wire``, the length l_0 (C,) [m] paid out."""
-        soft = np.array(self._series)
+        soft = np.array(self.arm._model.laws.series)
         for law, of in self._problem.laws:
             soft[of] += wire[of] / law.rigidity(F[of])
         return soft
@@ -196,20 +191,8 @@ class Observer:
         return ChainProblem(arm.cables, chains.start, even, unstrained=True)
 
     @cached_property
-    def _position_controlled(self) -> NDArray[np.bool_]:
-        return np.array([cable.control == "position" for cable in self.arm.cables])
-
-    @cached_property
     def _least(self) -> Array:
         return np.array([cable.elasticity.domain.first for cable in self.arm.cables])
-
-    @cached_property
-    def _rest(self) -> Array:
-        return np.array([cable.elasticity.rest for cable in self.arm.cables])
-
-    @cached_property
-    def _series(self) -> Array:
-        return np.array([1.0 / cable.series_stiffness for cable in self.arm.cables])
 
     @property
     def _encoder_spread(self) -> float:

@@ -39,10 +39,10 @@ def virtual_force(pose: Posture, gain: Array, force: Array) -> Array:
 
     ``gain`` is κ of each cable (C,) [N/m]; 0 for force-controlled cables.
     """
-    held = gain > 0.0
-    J, wire = pose.length_jacobian[held], np.zeros(gain.size)
+    locked = gain > 0.0
+    J, wire = pose.length_jacobian[locked], np.zeros(gain.size)
     x = np.linalg.lstsq(J.T, -pose.jacobian[:3].T @ force, rcond=None)[0]
-    wire[held] = -x / gain[held]
+    wire[locked] = -x / gain[locked]
     return wire
 
 
@@ -77,8 +77,8 @@ def felt_stiffness(
         if not (K.is_stable and 0.0 < force < math.inf):
             return math.nan
         places = []
-        for pull in (-force, force):
-            command = Command(wire + pull * per_newton, F, np.zeros(F.size, dtype=np.bool_))
+        for part in (-force, force):
+            command = Command(wire + part * per_newton, F, np.zeros(F.size, dtype=np.bool_))
             state = plant.move(state, command, wrench)
             readings = [observer.sensors.read([state.true], random) for _ in range(_READINGS)]
             tension = np.mean([reading.tension for reading in readings], axis=0)

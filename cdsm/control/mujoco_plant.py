@@ -12,7 +12,6 @@ from typing import Any, Final, NamedTuple, final
 
 import numpy as np
 
-from cdsm.cable_laws import CableLaws
 from cdsm.control.laws import Command, Reading
 from cdsm.control.plant import require_unstrained
 from cdsm.errors import InvalidInput, SolverError
@@ -73,9 +72,7 @@ class MuJoCoPlant:
 
         pose = self.arm.at(q)
         text = to_mjcf(self.arm, pose, tension, damping_ratio=self.damping_ratio)
-        wire = CableLaws(self.arm.cables, "unstrained").original_lengths(
-            pose.cable_lengths, tension
-        )
+        wire = self.arm._model.laws.original_lengths(pose.cable_lengths, tension)
         model = mujoco.MjModel.from_xml_string(text)
         return MuJoCoState(model, pose, Reading(wire, tension), frozen(np.zeros(q.size)))
 
@@ -98,7 +95,7 @@ class MuJoCoPlant:
             mujoco.mj_kinematics(model, data)
             mujoco.mj_comPos(model, data)
             mujoco.mj_tendon(model, data)
-            self._pull(model, data.ten_length, command)
+            self._set_motors(model, data.ten_length, command)
             data.qfrc_applied[:] = 0.0
             tip = data.site("tool0").xpos
             mujoco.mj_applyFT(model, data, wrench[:3], wrench[3:], tip, body, data.qfrc_applied)
@@ -109,7 +106,7 @@ class MuJoCoPlant:
         F = self._tensions(pose.cable_lengths, command)
         return MuJoCoState(model, pose, Reading(command.wire, frozen(F)), data.qvel.copy())
 
-    def _pull(self, model: Any, lengths: Array, command: Command) -> None:
+    def _set_motors(self, model: Any, lengths: Array, command: Command) -> None:
         """Set each actuator of ``model`` to the force F + k (L' − L) at a tendon length L'.
 
         L (C,) is ``lengths`` [m], without the leads. F is the tension at L with the commanded wire,
@@ -120,8 +117,8 @@ class MuJoCoPlant:
         F = self._tensions(L, command)
         for c, cable in enumerate(cables):
             motor = model.actuator(cable.name).id
-            held = cable.control == "position" and F[c] > 0.0
-            k = float(cable.tangent_stiffness(F[c], command.wire[c])) if held else 0.0
+            taut = cable.control == "position" and F[c] > 0.0
+            k = float(cable.tangent_stiffness(F[c], command.wire[c])) if taut else 0.0
             model.actuator_gainprm[motor, 0] = 0.0
             model.actuator_biasprm[motor, :3] = k * lengths[c] - F[c], -k, 0.0
 

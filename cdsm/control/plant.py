@@ -7,7 +7,6 @@ from typing import NamedTuple, Protocol, TypeVar, final
 
 import numpy as np
 
-from cdsm.cable_laws import CableLaws
 from cdsm.control.laws import Command, Reading
 from cdsm.errors import InvalidInput
 from cdsm.manipulator import Manipulator
@@ -98,9 +97,7 @@ class SlowPlant:
         """Return the arm at rest at angles (nv,), with tensions (C,) [N] and a wrench (6,)."""
         pose = self.arm.at(q)
         loading = slow_loading(pose, tension, wrench, self.accuracy)
-        wire = CableLaws(self.arm.cables, "unstrained").original_lengths(
-            pose.cable_lengths, tension
-        )
+        wire = self.arm._model.laws.original_lengths(pose.cable_lengths, tension)
         return SlowState(loading, wire, loading.begin(tension, wrench))
 
     def move(self, state: SlowState, command: Command, wrench: Array) -> SlowState:

@@ -47,9 +47,7 @@ class Schedule(NamedTuple):
             return np.asarray(values[before] + part * (values[after] - values[before]))
 
         wire = plan.cable_lengths.copy()
-        wire[:, [cable.control == "position" for cable in plan.arm.cables]] = (
-            plan.unstrained_lengths
-        )
+        wire[:, plan.arm.cables.position_controlled] = plan.unstrained_lengths
         k = np.array([K.cable_stiffness for K in plan.stiffness])
         angles = along(plan.angles)
         parts = angles, along(plan.tensions), along(wire), along(k)

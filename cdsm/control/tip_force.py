@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike
 from cdsm.errors import InvalidInput, SolverError
 from cdsm.posture import Posture
 from cdsm.support.format import coordinates
+from cdsm.support.linear_program import INFEASIBLE, OPTIMAL, proved_largest
 from cdsm.support.validation import Direction, instance, quantity, unit_direction, vector
 from cdsm.support.values import Array, ReadOnlyState
 
@@ -78,8 +79,6 @@ def tip_force(
             tensions, so that posture, tensions or error are wrong.
         SolverError: The linear program is not solved.
     """
-    from scipy.optimize import linprog
-
     segments = instance("pose", pose, Posture).segments
     chains, size = segments.chains, len(segments.lengths)
     F = vector("tension", tension, len(pose.arm.cables), "one tension [N] per cable", "tension")
@@ -90,7 +89,7 @@ def tip_force(
     A = np.hstack([segments.length_jacobian.T, -pose.jacobian[:3].T])
     unit = abs(A).max(axis=1, keepdims=True)
     A, b = A / unit, -pose.gravity_torque / unit[:, 0] / scale
-    ratio = np.exp(chains.friction * segments.wrap)
+    ratio = np.exp(segments.grip)
     cone = np.zeros((2 * len(ratio), size + 3))
     rows = np.arange(len(ratio))
     for side, (here, there) in enumerate(((0, 1), (1, 0))):
@@ -98,29 +97,25 @@ def tip_force(
         cone[rows + side * len(ratio), chains.hole + here] = -ratio
     low, high = np.zeros(size + 3), np.full(size + 3, _WIDEST)
     grip = np.zeros(size)
-    grip[chains.hole] = chains.friction * segments.wrap
+    grip[chains.hole] = segments.grip
     most = np.exp(np.add.reduceat(grip, chains.start[:-1]))
     high[:size] = (most * (F + off) / scale)[chains.cable]
     first = chains.start[:-1]
     low[first], high[first] = np.maximum(F - off, 0.0) / scale, np.maximum(F + off, 0.0) / scale
     low[size:] = -_WIDEST
 
-    def largest(way: Array) -> float:
-        cost = np.append(np.zeros(size), way)
-        found = linprog(-cost, cone, np.zeros(len(cone)), A, b, np.c_[low, high], method="highs-ds")
-        if found.status == 2:
+    def largest(direction: Array) -> float:
+        cost, none = np.append(np.zeros(size), direction), np.zeros(len(cone))
+        found, bound = proved_largest(cost, cone, none, A, b, low, high, _ROUNDING)
+        if found.status == INFEASIBLE:
             raise InvalidInput(
                 "tension",
                 "no force at the tip balances these tensions at this posture, whatever friction "
                 "holds. The posture is wrong, or error= is too small.",
             )
-        if found.status != 0:
+        if found.status != OPTIMAL:
             raise SolverError("highs", f"bounds no force at the tip: {found.message}")
-        dual, pull = -found.eqlin.marginals, np.maximum(-found.ineqlin.marginals, 0.0)
-        left = cost - A.T @ dual - cone.T @ pull
-        left[abs(left) < _ROUNDING] = 0.0
-        bound = dual @ b + np.maximum(left * low, left * high).sum()
-        return scale * float(bound)
+        return scale * bound
 
     ends = -largest(-u), largest(u)
     if not math.isfinite(ends[0] + ends[1]):

@@ -95,8 +95,8 @@ class RestBand(ReadOnlyState):
         if self.room == 0.0:
             return frozen(np.zeros(2))
         near = Neighbourhood(self.stiffness, self.room)
-        held = RestStates(self.stiffness, near.still(self.stiffness), Bends(self.stiffness))
-        return frozen(np.array([-held.load(-self.direction), held.load(self.direction)]))
+        states = RestStates(self.stiffness, near.still(self.stiffness), Bends(self.stiffness))
+        return frozen(np.array([-states.load(-self.direction), states.load(self.direction)]))
 
     def _tensions(self, segments: Sequence[int]) -> Array:
         K = self.stiffness

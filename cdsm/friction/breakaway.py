@@ -31,7 +31,7 @@ from cdsm.support.validation import Direction, unit_direction
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension
 
-_HELD = 1e300
+_UNREACHED = 1e300
 """Ratio of tensions that no hole reaches: with it cables stick under every load."""
 
 _REACHED = 1e-9
@@ -148,13 +148,13 @@ def _reached(K: Stiffness, u: Array, motion: Array) -> tuple[float, int]:
     solution, the search is repeated for that hole.
     """
     pose, arm = K.posture, K.posture.arm
-    chains, held = pose.segments.chains, holding(pose)
+    chains, sticks = pose.segments.chains, holding(pose)
     problem = ChainProblem(arm.cables, chains.start, K.tension, arm.original_length == "unstrained")
     T, gradient = segment_state(K)
     natural = problem.natural(pose.segments.lengths, T)
-    forced = [cable.control == "force" for cable in arm.cables]
-    ratio, none = np.ones(T.size), np.zeros(held.size, dtype=np.bool_)
-    ratio[chains.hole[held]] = _HELD
+    forced = ~arm.cables.position_controlled
+    ratio, none = np.ones(T.size), np.zeros(sticks.size, dtype=np.bool_)
+    ratio[chains.hole[sticks]] = _UNREACHED
     load, hole = _first(pose, T, gradient @ motion, motion)
     if math.isinf(load):
         return load, hole
@@ -167,12 +167,13 @@ def _reached(K: Stiffness, u: Array, motion: Array) -> tuple[float, int]:
         wrench = K.wrench.copy()
         wrench[:3] += load * u
         now = assemble_segments(moved, frozen(T), none, frozen(wrench), "stuck")
-        pull = np.log(T[chains.hole + 1] / T[chains.hole])
-        beyond = np.where(held, abs(pull) - chains.friction * wrap, -1.0)
+        log_ratio = np.log(T[chains.hole + 1] / T[chains.hole])
+        beyond = np.where(sticks, abs(log_ratio) - moved.segments.grip, -1.0)
         _, gradient = segment_state(now)
         relative = gradient / T[:, None]
         slope = (
-            np.sign(pull[hole]) * (relative[chains.hole[hole] + 1] - relative[chains.hole[hole]])
+            np.sign(log_ratio[hole])
+            * (relative[chains.hole[hole] + 1] - relative[chains.hole[hole]])
             - chains.friction[hole] * moved.segments.wrap_jacobian[hole]
         )
         torque = u @ moved.jacobian[:3]
@@ -200,8 +201,7 @@ def _first(pose: Posture, T: Array, growth: Array, motion: Array) -> tuple[float
     ``growth`` (S,) is dT/dW [-] and ``motion`` (nv,) dθ/dW [rad/N]. Returns the load and its hole,
     where the ratio of the two tensions is exp(μ φ).
     """
-    chains, wrap = pose.segments.chains, pose.segments.wrap
-    ratio = np.exp(chains.friction * wrap)
+    chains, ratio = pose.segments.chains, np.exp(pose.segments.grip)
     turning = T[chains.hole] * chains.friction * (pose.segments.wrap_jacobian @ motion)
     before, after = growth[chains.hole], growth[chains.hole + 1]
     rate = np.maximum(after - ratio * before, before - ratio * after) - ratio * turning

@@ -60,7 +60,7 @@ class Neighbourhood:
         """Return the states with the joint angles of the reference, ``K``: |ln T/F| ≤ Σ μ φ."""
         segments = K.posture.segments
         chains, grip = segments.chains, np.zeros(len(segments.lengths))
-        grip[chains.hole] = chains.friction * segments.wrap
+        grip[chains.hole] = segments.grip
         apart = np.add.reduceat(grip, chains.start[:-1])[chains.cable]
         same = copy(self)
         same.joints, same._steps = np.zeros_like(self.joints), np.zeros_like(self._steps)

@@ -41,6 +41,7 @@ from cdsm.friction.remainders import TOO_FAR, Bends, Remainders
 from cdsm.kernels.chains import single_tension_stiffness
 from cdsm.kernels.stiffness import single_load_stiffness
 from cdsm.stiffness_matrix import Stiffness
+from cdsm.support.linear_program import OPTIMAL, proved_largest
 from cdsm.support.validation import LARGEST
 from cdsm.support.values import Array, frozen
 
@@ -163,8 +164,8 @@ class RestStates:
         column = np.zeros(self._equations.shape[0])
         column[:nv] = -torque
         equations, cone = self._equations, self._cone
-        pull = abs(equations[[most], :]) @ np.maximum(-self._low, self._high)
-        bound = 1.01 * float(pull[0]) / abs(torque[most])
+        largest = abs(equations[[most], :]) @ np.maximum(-self._low, self._high)
+        bound = 1.01 * float(largest[0]) / abs(torque[most])
         widened = object.__new__(RestStates)
         widened.__dict__.update(
             self.__dict__,
@@ -177,28 +178,17 @@ class RestStates:
 
     def _largest(self, cost: Array) -> End:
         """Maximize cost · x over the polyhedron; the multipliers give the proved bound."""
-        from scipy.optimize import linprog
-
         scale = float(abs(cost).max())
         if scale == 0.0:
             return End(0.0, 0.0, 0.0)
-        found = linprog(
-            -cost / scale,
-            A_ub=self._cone,
-            b_ub=self._cone_high,
-            A_eq=self._equations,
-            b_eq=np.zeros(self._equations.shape[0]),
-            bounds=np.c_[self._low, self._high],
-            method="highs-ds",
-        )
-        if found.status != 0:
+        none = np.zeros(self._equations.shape[0])
+        program = self._cone, self._cone_high, self._equations, none, self._low, self._high
+        found, bound = proved_largest(cost / scale, *program)
+        if found.status != OPTIMAL:
             raise SolverError("highs", f"finds no state of rest: {found.message}")
-        dual, pull = -found.eqlin.marginals, np.maximum(-found.ineqlin.marginals, 0.0)
-        left = cost / scale - self._equations.T @ dual - self._cone.T @ pull
-        bound = pull @ self._cone_high + np.maximum(left * self._low, left * self._high).sum()
         states = self._near.joints.size + self._near.tensions.size
         reach = float(abs(found.x[:states]).max())
-        return End(-scale * found.fun, scale * float(bound), reach)
+        return End(-scale * found.fun, scale * bound, reach)
 
 
 def _cone(K: Stiffness, near: Neighbourhood, far: Remainders, size: int) -> tuple[Any, Array]:
@@ -213,7 +203,7 @@ def _cone(K: Stiffness, near: Neighbourhood, far: Remainders, size: int) -> tupl
     segments = K.posture.segments
     chains, hole, nv = segments.chains, segments.chains.hole, near.joints.size
     F, apart = K.tension[chains.cable], near.tensions
-    ratio, mu = np.exp(chains.friction * segments.wrap), chains.friction
+    ratio, mu = np.exp(segments.grip), chains.friction
     smooth = np.isfinite(far.wrap)
     slope = np.where(smooth[:, None], mu[:, None] * segments.wrap_jacobian, 0.0)
     linear = near.largest(slope)

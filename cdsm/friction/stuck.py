@@ -97,7 +97,7 @@ def _require_friction(pose: Posture, tension: Array, signs: Array) -> None:
     """
     chains = pose.segments.chains
     before, after = tension[chains.hole], tension[chains.hole + 1]
-    grip = np.exp(chains.friction * pose.segments.wrap)
+    grip = np.exp(pose.segments.grip)
     low, high = np.where(signs > 0.0, grip, 1.0 / grip), np.where(signs < 0.0, 1.0 / grip, grip)
     beyond = (after < before * low * (1.0 - _RATIO)) | (after > before * high * (1.0 + _RATIO))
     if beyond.any():

@@ -90,11 +90,11 @@ def split_geometry(data: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]
 
     ``cables`` belongs to the geometry if there are ``joints`` or ``links``, or no other keys.
     """
-    kept = set(ARM_KEYS)
+    passed_over = set(ARM_KEYS)
     if data.keys() - {"cables"} and not data.keys() & {"joints", "links"}:
-        kept.add("cables")
-    geometry = {key: value for key, value in data.items() if key not in kept}
-    return geometry, {key: value for key, value in data.items() if key in kept}
+        passed_over.add("cables")
+    geometry = {key: value for key, value in data.items() if key not in passed_over}
+    return geometry, {key: value for key, value in data.items() if key in passed_over}
 
 
 def text_of(geometry: Geometry) -> str:

@@ -97,11 +97,11 @@ def unfinished(problem: LeastSquares, point: Array, jacobian: Array) -> list[str
     """
     r = problem.residuals(point)
     gradient = r @ jacobian
-    held = ((point == 0.0) & (gradient >= 0.0)) | ((point == 1.0) & (gradient <= 0.0))
-    if held.all():
+    fixed = ((point == 0.0) & (gradient >= 0.0)) | ((point == 1.0) & (gradient <= 0.0))
+    if fixed.all():
         return []
     step = np.zeros_like(point)
-    step[~held] = np.linalg.lstsq(jacobian[:, ~held], -r, rcond=RANK_TOLERANCE)[0]
+    step[~fixed] = np.linalg.lstsq(jacobian[:, ~fixed], -r, rcond=RANK_TOLERANCE)[0]
     fall = float(np.sum((jacobian @ step) ** 2))
     if fall < (_LEFT if problem.followed else NEGLIGIBLE):
         return []

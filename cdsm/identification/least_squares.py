@@ -9,14 +9,15 @@ model does not exist, the residuals are infinite, and scipy's search shortens it
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import lru_cache
 from typing import Literal
 
 import numpy as np
 from scipy.optimize import least_squares
 
-from cdsm.errors import InvalidInput
+from cdsm.errors import CdsmError, InvalidInput
 from cdsm.support.values import Array
 
 _DECADES = 100.0
@@ -30,6 +31,15 @@ _CACHED = 64  # points whose residuals are kept: a search evaluates some points 
 
 class NoModelError(Exception):
     """The model has no residuals at these parameters. The text gives the reason."""
+
+
+@contextmanager
+def no_model(where: str = "") -> Iterator[None]:
+    """Turn a CdsmError into a NoModelError; its text begins with ``where``."""
+    try:
+        yield
+    except CdsmError as error:
+        raise NoModelError(f"{where}{error}") from error
 
 
 class Box:

@@ -136,11 +136,11 @@ class _Reader:
             for column in self._joints
         ]
         forces = [self._number(row, self._force) for row in rows]
-        pulled = [self._number(first, each, self._same(rows, each)) for each in self._tensions]
+        tensions = [self._number(first, each, self._same(rows, each)) for each in self._tensions]
         given: dict[str, Any] = {"minimum": bound, **std}
         if self._tensions:
             alone = self._tensions[0].name == "minimum"
-            given |= {"minimum": pulled[0]} if alone else {"minimum": None, "tension": pulled}
+            given |= {"minimum": tensions[0]} if alone else {"minimum": None, "tension": tensions}
         read = np.array([[self._number(row, each) for each in self._read] for row in rows])
         if self._read:
             given["displacements"] = read[:, 0] if read.shape[1] == 1 else read

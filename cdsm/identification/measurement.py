@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Protocol, final
+from typing import TYPE_CHECKING, final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,6 +20,9 @@ from cdsm.support.validation import (
     vector,
     wrench_vector,
 )
+
+if TYPE_CHECKING:
+    from cdsm.identification.loop import WeightLoop
 
 
 @final
@@ -82,35 +85,7 @@ class Measurement:
             object.__setattr__(self, name, entry)
 
 
-class Conditions(Protocol):
-    """Conditions of every measurement: the arm before the force, and the direction of the force."""
-
-    @property
-    def direction(self) -> tuple[float, float, float] | Axis:
-        """Direction of the force."""
-
-    @property
-    def angles(self) -> tuple[float, ...]:
-        """Joint angles (nv,) [rad]."""
-
-    @property
-    def tension(self) -> tuple[float, ...] | None:
-        """Cable tensions (C,) [N]."""
-
-    @property
-    def minimum(self) -> float | tuple[float, ...] | None:
-        """Lower bound of the tensions [N]."""
-
-    @property
-    def wrench(self) -> tuple[float, ...]:
-        """W (6,) at ``tool0`` without the measuring force: force [N], then moment [N m]."""
-
-    @property
-    def label(self) -> str:
-        """Name in reports and figures."""
-
-
-def checked_conditions(given: Conditions) -> dict[str, object]:
+def checked_conditions(given: Measurement | WeightLoop) -> dict[str, object]:
     """Check the conditions ``given`` for a measurement; return its fields as tuples of numbers."""
     if (given.tension is None) == (given.minimum is None):
         raise InvalidInput(
@@ -145,6 +120,6 @@ def _numbers(name: str, value: object, meaning: str) -> tuple[float, ...]:
     return tuple(array.tolist())
 
 
-def label(i: int, measurement: Conditions) -> str:
+def label(i: int, measurement: Measurement | WeightLoop) -> str:
     """Return the name of a measurement: its label, or its index in the list."""
     return measurement.label or f"[{i}]"

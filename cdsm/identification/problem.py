@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm.errors import CdsmError, InvalidInput, SingularStiffness
-from cdsm.identification.least_squares import NoModelError
+from cdsm.identification.least_squares import NoModelError, no_model
 from cdsm.identification.loop import WeightLoop, Weights, measured
-from cdsm.identification.measurement import Conditions, Measurement, label
+from cdsm.identification.measurement import Measurement, label
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.statics.following import follow
@@ -29,7 +29,7 @@ Parameters = dict[str, float]
 _STEP = 1e-4
 """Step of a tension [N] for the derivative of a loop with respect to it."""
 
-_KEPT = 8  # sets of parameters whose loops are kept
+_STORED = 8  # sets of parameters whose paths are stored
 
 
 class UserFaultError(Exception):
@@ -134,13 +134,11 @@ class Model:
                 predicted.append(np.array([self._stiffness_of(i, arm, each, moved)]))
                 continue
             assert path is not None
-            try:
+            with no_model(f"measurement {label(i, each)}: "):
                 pose, tension, wrench = self._started(arm, each, moved)
                 if not same_segments(pose, path.start.pose):
                     raise NoModelError("the cables have other segments than beside there.")
                 tips = path.beside(pose, tension, wrench) - pose.tip[:3, 3]
-            except CdsmError as error:
-                raise NoModelError(f"measurement {label(i, each)}: {error}") from error
             predicted.append((tips @ each.axes.T).ravel())
         return self.weigh(predicted)
 
@@ -167,10 +165,8 @@ class Model:
 
     def arm(self, parameters: Parameters) -> Manipulator:
         """Build the arm of ``parameters``; raise NoModelError if there is none."""
-        try:
+        with no_model("model_of: "):
             arm = _call_model("model_of", self.model_of, parameters)
-        except CdsmError as error:
-            raise NoModelError(f"model_of: {error}") from error
         if not isinstance(arm, Manipulator):
             raise InvalidInput("model_of", f"returns {arm!r}; a Manipulator is needed.")
         return arm
@@ -187,7 +183,7 @@ class Model:
             arm = arm or self.arm(parameters)
             near = next(reversed(self._paths.values()), [None] * len(self.measurements))
             found = [self._path(i, arm, parameters, path) for i, path in enumerate(near)]
-            while len(self._paths) >= _KEPT:
+            while len(self._paths) >= _STORED:
                 del self._paths[next(iter(self._paths))]
             self._paths[key] = found
         return self._paths[key]
@@ -198,11 +194,9 @@ class Model:
         loop = self.measurements[i]
         if not isinstance(loop, WeightLoop):
             return None
-        try:
+        with no_model(f"measurement {label(i, loop)}: "):
             pose, tension, wrench = self._started(arm, loop, parameters)
             return LoadingPath.of(pose, tension, wrench, loop.applied, near=near)
-        except CdsmError as error:
-            raise NoModelError(f"measurement {label(i, loop)}: {error}") from error
 
     def _started(
         self, arm: Manipulator, loop: WeightLoop, parameters: Parameters
@@ -213,7 +207,7 @@ class Model:
         return pose, K.tension, K.wrench
 
     def _tension(
-        self, pose: Posture, measurement: Conditions, parameters: Parameters
+        self, pose: Posture, measurement: Measurement | WeightLoop, parameters: Parameters
     ) -> tuple[Tension | ArrayLike, ArrayLike | None]:
         """Return the tensions of a measurement, and its wrench unless a Tension contains it."""
         tension: Tension | ArrayLike
@@ -249,10 +243,8 @@ class Model:
     def _stiffness_of(
         self, i: int, arm: Manipulator, measurement: Measurement, parameters: Parameters
     ) -> float:
-        try:
+        with no_model(f"measurement {label(i, measurement)}: "):
             return self._along(arm, measurement, parameters)
-        except CdsmError as error:
-            raise NoModelError(f"measurement {label(i, measurement)}: {error}") from error
 
     def _along(self, arm: Manipulator, measurement: Measurement, parameters: Parameters) -> float:
         pose = arm.at(measurement.angles)

@@ -146,10 +146,8 @@ def write_mjcf(
     Raises:
         FileError: The file cannot be written.
     """
-    model = mujoco_model(arm, pose, tension, actuators, damping_ratio, damping)
-    if model.unstable is not None:
-        warn(model.unstable)
-    return write_text(path, model.text)
+    options = {"damping_ratio": damping_ratio, "damping": damping}
+    return write_text(path, to_mjcf(arm, pose, tension, actuators=actuators, **options))
 
 
 def mujoco_model(
@@ -189,15 +187,15 @@ def mujoco_model(
     if motion.joints:
         for joint in joints:
             joint.set("damping", repr(motion.joints))
-    pulled = _cables(root, arm, K, actuators, motion.wires) if arm.cables else []
+    tensions = _cables(root, arm, K, actuators, motion.wires) if arm.cables else []
     if K is not None:
         frame = etree.SubElement(etree.SubElement(root, "keyframe"), "key", name="pose")
         frame.set("qpos", row([start[joint.get("name")] for joint in joints]))
-        if pulled:
-            frame.set("ctrl", row(pulled))
+        if tensions:
+            frame.set("ctrl", row(tensions))
 
-    held = K if K is None or actuators != "tension" else _without_motors(K)
-    unstable = None if held is None or held.is_stable else verdict(held)
+    loaded = K if K is None or actuators != "tension" else _without_motors(K)
+    unstable = None if loaded is None or loaded.is_stable else verdict(loaded)
     remarks = (
         *motion.said,
         f"actuators  {actuators}: {_CONTROLS[actuators]}",

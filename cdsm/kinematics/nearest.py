@@ -113,12 +113,12 @@ class _Search:
 
         The solution is exact to rounding if Newton's method converges.
         """
-        q, held = self.fit(start, _WEIGHTS[-1], 1e-6)
-        best, held = self._active_set(self._least_residual_step, q, held)
+        q, at_limit = self.fit(start, _WEIGHTS[-1], 1e-6)
+        best, at_limit = self._active_set(self._least_residual_step, q, at_limit)
         if best is None:  # singular: use least squares only
-            best, held = self.fit(q, 1e-14, 1e-15)
+            best, at_limit = self.fit(q, 1e-14, 1e-15)
         if self._size(best) < _NEAR:
-            closer, _ = self._active_set(self._nearest_step, best, held)
+            closer, _ = self._active_set(self._nearest_step, best, at_limit)
             best = best if closer is None else closer
         return best, self._size(best)
 
@@ -172,27 +172,29 @@ class _Search:
         error = float(abs(gradient[free]).max(initial=0.0)) / max(1.0, float(np.linalg.norm(r)))
         return _NewtonStep(move, gradient, error, convex)
 
-    def _active_set(self, newton: _Newton, q: Array, held: Limits) -> tuple[Array | None, Limits]:
-        """Find the optimum by Newton's method with an active set of limits, at first ``held``.
+    def _active_set(
+        self, newton: _Newton, q: Array, at_limit: Limits
+    ) -> tuple[Array | None, Limits]:
+        """Find the optimum by Newton's method with an active set of limits, at first ``at_limit``.
 
         Returns the joint angles (None if it fails) and the active limits.
         """
-        held = held.copy()
+        at_limit = at_limit.copy()
         for _ in range(2 * q.size + 5):
-            q = np.where(held < 0, self.lower, np.where(held > 0, self.upper, q))
-            q, gradient = self._iterate(newton, q, held == 0)
+            q = np.where(at_limit < 0, self.lower, np.where(at_limit > 0, self.upper, q))
+            q, gradient = self._iterate(newton, q, at_limit == 0)
             if gradient is None:
                 break
             beyond = (q > self.upper).astype(np.int_) - (q < self.lower)
             q = np.clip(q, self.lower, self.upper)
-            multiplier = held * gradient  # positive: the objective falls away from the limit
+            multiplier = at_limit * gradient  # positive: the objective falls away from the limit
             if beyond.any():
-                held = np.where(beyond != 0, beyond, held)
+                at_limit = np.where(beyond != 0, beyond, at_limit)
             elif multiplier.max() > _CONVERGED:
-                held[multiplier.argmax()] = 0
+                at_limit[multiplier.argmax()] = 0
             else:
-                return q, held
-        return None, held
+                return q, at_limit
+        return None, at_limit
 
     def _iterate(
         self, newton: _Newton, q: Array, free: NDArray[np.bool_]

@@ -91,8 +91,8 @@ class TipResidual(Residual):
         wrench = np.zeros(6)
         wrench[: weight.size] = weight
         wrench[:3] /= self.arm.length
-        jacobian, way = self.arm._model.body.state(q).jacobian, self.arm._model.masses.tip_joints
-        return -single_load_stiffness(frozen(jacobian), frozen(wrench), way)
+        jacobian, joints = self.arm._model.body.state(q).jacobian, self.arm._model.masses.tip_joints
+        return -single_load_stiffness(frozen(jacobian), frozen(wrench), joints)
 
     def hessian(self, q: Array) -> Array:
         """Compute the Hessian of ½‖r‖² (nv, nv) with respect to q; it is exact for all r."""

@@ -116,12 +116,10 @@ def _polytope(
     while True:
         inside = (points - start) @ spanned.T
         hull = ConvexHull(inside / size)
-        rest = []
-        for *flat, _ in np.unique(np.round(hull.equations, 9), axis=0):
-            if tuple(flat) not in done:
-                rest.append(tuple(flat))
         farther = []
-        for flat in rest:
+        for *entries, _ in np.unique(np.round(hull.equations, 9), axis=0):
+            if (flat := tuple(entries)) in done:
+                continue
             normal = np.array(flat) @ spanned
             normal /= np.linalg.norm(normal)
             most, x = farthest(normal)

@@ -118,17 +118,20 @@ def payload(
     bare = distribute_tension(pose, minimum, maximum, W, worst_friction=worst_friction)
     K = stiffness(pose, bare)
     compliance = K.compliance[:3, :3] if K.is_stable else np.zeros((3, 3))
+    low, high = bounds_at(pose, minimum, maximum, worst_friction)
     if direction is None:
         polytope = force_polytope(pose, minimum, maximum, W, worst_friction=worst_friction)
         u, limits = _worst(polytope, compliance, allowed)
     else:
         u = unit_direction("direction", direction)
-        limits = _along(pose, u, W, minimum, maximum, worst_friction, compliance, allowed)
+        limits = {
+            "tension": largest_force(Loads.of(pose, low, high, W, u[:, None])),
+            "deflection": _ratio(allowed, float(np.linalg.norm(compliance @ u))),
+        }
     known = min(limits.values())
-    low, high = bounds_at(pose, minimum, maximum, worst_friction)
-    u, held, kind = _until_unstable(K, u, known, low, high, worst=direction is None)
-    limits |= {"stability": held if kind == "buckling" else math.inf}
-    limits |= {"elasticity": held if kind == "elasticity" else math.inf}
+    u, failing, kind = _until_unstable(K, u, known, low, high, worst=direction is None)
+    limits |= {"stability": failing if kind == "buckling" else math.inf}
+    limits |= {"elasticity": failing if kind == "elasticity" else math.inf}
     force = max(min(limits.values()), 0.0)
     reason = min(limits, key=lambda name: limits[name])
     return Payload(
@@ -139,28 +142,6 @@ def payload(
         limit="none" if math.isinf(force) else reason,  # type: ignore[arg-type]
         limits=limits,
     )
-
-
-def _along(
-    pose: Posture,
-    u: Array,
-    W: Array,
-    minimum: ArrayLike,
-    maximum: ArrayLike,
-    worst_friction: bool,
-    compliance: Array,
-    allowed: float,
-) -> dict[str, float]:
-    """Return the largest forces [N] along u: that of the tensions, and that of the deflection.
-
-    ``compliance`` is C_vv [m/N], and ``allowed`` the largest deflection [m]. The tensions are
-    limited as in :func:`payload`.
-    """
-    low, high = bounds_at(pose, minimum, maximum, worst_friction)
-    return {
-        "tension": largest_force(Loads.of(pose, low, high, W, u[:, None])),
-        "deflection": _ratio(allowed, float(np.linalg.norm(compliance @ u))),
-    }
 
 
 def largest_force(loads: Loads) -> float:

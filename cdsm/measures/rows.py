@@ -110,8 +110,8 @@ def narrowed_bounds(
     given = _each_bound(arm, minimum, maximum, loss.shape)
     low, high = given[0] * loss, given[1] / loss
     exist = np.asarray((low <= high).all(axis=1))
-    keep = exist[:, None]
-    return np.where(keep, low, given[0]), np.where(keep, high, given[1]), exist
+    narrow = exist[:, None]
+    return np.where(narrow, low, given[0]), np.where(narrow, high, given[1]), exist
 
 
 def payloads(

@@ -27,7 +27,7 @@ from cdsm.tension import distribute_tension
 Part = Literal["active", "passive"]
 Swept = Literal["young_modulus", "tension"]
 
-KEPT: Final = "prototype searched for Fig. 6"
+FROM_FIG_6: Final = "prototype searched for Fig. 6"
 """Text of ``Claim.searched`` for all figures but Fig. 6."""
 
 
@@ -107,7 +107,7 @@ class Pair(NamedTuple):
     posture: Posture
 
     def claim(
-        self, measure: Callable[[Array, Array], Array], searched: str = KEPT, **texts: Any
+        self, measure: Callable[[Array, Array], Array], searched: str = FROM_FIG_6, **texts: Any
     ) -> Claim:
         """Build a claim; ``measure`` computes its numbers, once for each of the three readings.
 

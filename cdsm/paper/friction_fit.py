@@ -19,8 +19,8 @@ from cdsm import presets
 from cdsm.cable import Cable
 from cdsm.elasticity import LinearElasticity
 from cdsm.elasticity.scaled import ScaledElasticity
-from cdsm.errors import CdsmError, EquilibriumError
-from cdsm.identification.least_squares import LeastSquares, NoModelError
+from cdsm.errors import EquilibriumError
+from cdsm.identification.least_squares import LeastSquares, no_model
 from cdsm.manipulator import Manipulator
 from cdsm.paper.prototype import Prototype
 from cdsm.paper.prototype_fit import BOUNDS, TABLE_START
@@ -54,7 +54,7 @@ _SEARCHED: Final = {
 
 _LEAST_WEIGHT = 0.2  # [N]: no weight moves nothing
 _PARTS = 2  # rests on the way to a weight
-_PULLED = 1e-3  # elongation of the springs of a bearing [m]
+_STRETCHED = 1e-3  # elongation of the springs of a bearing [m]
 
 
 @final
@@ -142,7 +142,7 @@ class RoughPrototype:
         fixed = dict[str, float]()
         for pair in zip(springs[::2], springs[1::2], strict=True):
             arms = abs(pose.length_jacobian[list(pair)].sum(axis=1))
-            both = self.spring * _PULLED * arms[::-1] / arms.mean()
+            both = self.spring * _STRETCHED * arms[::-1] / arms.mean()
             fixed |= dict(zip((names[c] for c in pair), both.tolist(), strict=True))
         forced = [cable.name for cable in pose.arm.cables if cable.control == "force"]
         levels = (self.prototype.levels + self.prototype.tension_offset).tolist()
@@ -200,18 +200,14 @@ def identify_rough_prototype(added: Sequence[str] = tuple(ADDED)) -> RoughFit:
         return rough(dict(zip(free, values, strict=True))).weigh()
 
     def residuals(values: dict[str, float]) -> Array:
-        try:
+        with no_model():
             tips = [path.tips[0] for path in weighed(tuple(values.values()))]
             return np.asarray(np.log(rough(values).table(tips) / TABLE_II).ravel())
-        except CdsmError as error:
-            raise NoModelError(str(error)) from error
 
     def beside(here: dict[str, float], moved: dict[str, float]) -> Array:
-        try:
+        with no_model():
             tips = rough(moved).tips_to_first_order(weighed(tuple(here.values())))
             return np.asarray(np.log(rough(moved).table(tips) / TABLE_II).ravel())
-        except CdsmError as error:
-            raise NoModelError(str(error)) from error
 
     problem = LeastSquares(residuals, TABLE_II.size, bounds, beside)
     point = problem.search(

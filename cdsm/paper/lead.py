@@ -17,7 +17,7 @@ from scipy.optimize import brentq
 from cdsm import presets
 from cdsm.cable_laws import OriginalLength
 from cdsm.paper.claims import Claim, Figure
-from cdsm.paper.curves import KEPT, at_minimum, readings
+from cdsm.paper.curves import FROM_FIG_6, at_minimum, readings
 from cdsm.support.values import Array, frozen
 
 LEADS: Final = frozen(np.concatenate([[0.0], np.geomspace(0.003, 0.3, 30)]))
@@ -79,7 +79,7 @@ def figure_lead() -> LeadFigure:
                 original=_first_fall(unstrained[:, 0], "unstrained", 0),
                 along=_first_fall(unstrained[:, 1], "unstrained", 1),
                 assumption="as Fig. 4, EA = 48 kN",
-                searched=KEPT,
+                searched=FROM_FIG_6,
             ),
         ),
     )

@@ -16,8 +16,8 @@ from typing import Final, final
 import numpy as np
 from scipy.optimize import least_squares
 
-from cdsm.errors import CdsmError, InvalidInput
-from cdsm.identification.least_squares import LeastSquares, NoModelError
+from cdsm.errors import InvalidInput
+from cdsm.identification.least_squares import LeastSquares, no_model
 from cdsm.paper.claims import Claim, Figure, floats, markdown_table
 from cdsm.paper.prototype import Predicted, Prototype
 from cdsm.paper.section_v import CHECK, MEASURED, NAMES, TABLE_II, TABLE_II_SWAPPED, TENSIONS
@@ -163,10 +163,8 @@ def identify_prototype(step: Step) -> PrototypeFit:
     bounds = {name: BOUNDS[name] for name in step.free}
 
     def residuals(values: dict[str, float]) -> Array:
-        try:
+        with no_model():
             return replace(step.start, **values).predict(step.table_alone).residuals(step.table)
-        except CdsmError as error:
-            raise NoModelError(str(error)) from error
 
     problem = LeastSquares(residuals, len(step.numbers), bounds)
     start = np.array([getattr(step.start, name) for name in bounds])

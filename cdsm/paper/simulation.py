@@ -15,7 +15,15 @@ from scipy.optimize import brentq
 from cdsm import presets
 from cdsm.elasticity import LinearElasticity
 from cdsm.paper.claims import Claim
-from cdsm.paper.curves import KEPT, Pair, Part, StiffnessFigure, Swept, over_cases, over_minimum
+from cdsm.paper.curves import (
+    FROM_FIG_6,
+    Pair,
+    Part,
+    StiffnessFigure,
+    Swept,
+    over_cases,
+    over_minimum,
+)
 from cdsm.paper.digits import LEVEL
 from cdsm.posture import Posture
 from cdsm.support.values import Array
@@ -92,8 +100,8 @@ def figure_4() -> StiffnessFigure:
             searched=searched,
         )
         for pair, searched in (
-            (strand, f"EA, range of tension; {KEPT}"),
-            (wire, f"range of tension; {KEPT}"),
+            (strand, f"EA, range of tension; {FROM_FIG_6}"),
+            (wire, f"range of tension; {FROM_FIG_6}"),
         )
     ]
     title = "Fig. 4: stiffness over cable tension, cable elasticity constant"
@@ -131,7 +139,7 @@ def figure_7() -> StiffnessFigure:
         paper=(-1.5, -0.6, -1.6),
         assumption=f"EA = 48 kN, tensions from 120 N to {STRAND_END:g} N "
         f"(lower bound to {highest:.0f} N)",
-        searched=f"EA, for Fig. 4; {KEPT}",
+        searched=f"EA, for Fig. 4; {FROM_FIG_6}",
     )
     title = "Fig. 7: stiffness over cable tension in the elastic stage, EA constant"
     return _figure("fig7", title, [pair], [claim])

@@ -18,7 +18,7 @@ from cdsm.tension import Tension, distribute_tension
 
 _TOLERANCE = 1e-12  # primal tolerance of the solver; all its variables are of order one
 _INFINITE, _EQUATION = 1e30, 5  # DAQP's infinity, and its flag for equations
-_KEPT = 1e-9  # largest residual of an equation: the solver may report success with a larger one
+_SOLVED = 1e-9  # largest residual of an equation: the solver may report success with a larger one
 _FLAT = 1e-10  # singular values of J_Lᵀ below this part of the largest count as zero
 
 
@@ -123,11 +123,10 @@ def admissible(
     least = distribute_tension(pose, minimum, maximum, wrench)
     minimum, maximum, cables = least.minimum, least.maximum, pose.arm.cables
     # a force-controlled cable does not use its elasticity, so its domain does not matter
-    held = np.array([cable.control == "position" for cable in cables])
     first = np.array([cable.elasticity.domain.first for cable in cables])
     last = np.array([cable.elasticity.domain.high for cable in cables])
-    low = np.where(held, np.maximum(minimum, first), minimum)
-    high = np.where(held, np.minimum(maximum, last), maximum)
+    low = np.where(cables.position_controlled, np.maximum(minimum, first), minimum)
+    high = np.where(cables.position_controlled, np.minimum(maximum, last), maximum)
     outside = np.flatnonzero(low > high)
     if outside.size:
         raise ElasticityRangeError(
@@ -175,6 +174,6 @@ def solve(
     )
     if flag <= 0 or not np.isfinite(x).all():
         return None
-    if abs(A @ x - b).max(initial=0.0) > _KEPT:  # the solver does not always notice
+    if abs(A @ x - b).max(initial=0.0) > _SOLVED:  # the solver does not always notice
         return None
     return Optimum(x, info["lam"][last:], info["lam"][first:last])

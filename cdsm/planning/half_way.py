@@ -6,6 +6,8 @@ import math
 from dataclasses import dataclass
 from typing import final
 
+import numpy as np
+
 from cdsm.errors import CdsmError, EquilibriumError
 from cdsm.planning.objectives import achieved, misfit
 from cdsm.statics.locked_motors import LoadedArm
@@ -83,8 +85,8 @@ def _at_rest(ends: tuple[Stiffness, Stiffness], unstrained: Array) -> Stiffness:
     mean = arm.at(q)
     # lock the cables at their mean tension, inside every domain; no posture has these lengths
     lengths = mean.cable_lengths.copy()
-    held = [c for c, cable in enumerate(arm.cables) if cable.control == "position"]
-    for c, l_0 in zip(held, unstrained.tolist(), strict=True):
+    locked = np.flatnonzero(arm.cables.position_controlled)
+    for c, l_0 in zip(locked, unstrained.tolist(), strict=True):
         lengths[c] = l_0 + arm.cables[c].elongation(F[c], l_0)
     loaded = LoadedArm(mean, F, W, lengths)
     search = find_rest(loaded, loaded.at(mean, F))

@@ -142,7 +142,7 @@ def constraint_hessian(
     left_torques = _torques_by_tension(hessian, length_jacobian, slope, left)
     right_torques = _torques_by_tension(hessian, length_jacobian, slope, right)
     count, nv, r = right_torques.shape
-    held = inverse - np.dot(right, np.dot(rows, inverse))
+    projected = inverse - np.dot(right, np.dot(rows, inverse))
     one = np.zeros((count, nv, r))
     other = np.zeros((count, nv, r))
     for c in range(count):
@@ -151,7 +151,7 @@ def constraint_hessian(
                 for a in range(r):
                     one[c, i, b] += left_torques[c, i, a] * Y[a, b]
                 for j in range(nv):
-                    other[c, i, b] += held[i, j] * right_torques[c, j, b]
+                    other[c, i, b] += projected[i, j] * right_torques[c, j, b]
     half = np.dot(one.reshape(count, nv * r), other.reshape(count, nv * r).T)
     result: Array = -(half + half.T)
     for c in range(count):
@@ -166,7 +166,7 @@ def constraint_hessian(
 
 
 @compiled
-def convex(W: Array, null: Array, held: Array) -> Array:
+def convex(W: Array, null: Array, normals: Array) -> Array:
     """Return a positive definite matrix that equals W on the admissible steps if W is convex there.
 
     Admissible steps keep the balance (columns of ``null`` (C, p) are an orthonormal basis) and do
@@ -175,8 +175,10 @@ def convex(W: Array, null: Array, held: Array) -> Array:
     count, p = null.shape
     inner = np.dot(np.ascontiguousarray(null.T), np.dot(W, null))
     fixed = np.zeros((p, p))
-    if held.shape[0] > 0 and p > 0:
-        normal = np.ascontiguousarray(np.linalg.qr(np.ascontiguousarray(np.dot(held, null).T))[0])
+    if normals.shape[0] > 0 and p > 0:
+        normal = np.ascontiguousarray(
+            np.linalg.qr(np.ascontiguousarray(np.dot(normals, null).T))[0]
+        )
         fixed = np.dot(normal, normal.T)
         free = np.eye(p) - fixed
         inner = np.dot(free, np.dot(inner, free))

@@ -17,7 +17,7 @@ from cdsm.cable_laws import CableLaws
 from cdsm.errors import CdsmError
 from cdsm.manipulator import Manipulator
 from cdsm.planning.half_way import HalfWay, half_way
-from cdsm.planning.path_table import path_table, position_controlled
+from cdsm.planning.path_table import path_table
 from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.files import write_text
 from cdsm.support.format import JointUnits, plain
@@ -117,7 +117,7 @@ class PathPlan(ReadOnlyState):
         motors = CableLaws(self.arm.cables, "unstrained")
         pairs = zip(self.cable_lengths, self.tensions, strict=True)
         rows = np.array([motors.original_lengths(L, F) for L, F in pairs])
-        return frozen(rows.reshape(self.tensions.shape)[:, position_controlled(self.arm)])
+        return frozen(rows.reshape(self.tensions.shape)[:, self.arm.cables.position_controlled])
 
     @cached_property
     def between(self) -> tuple[HalfWay, ...]:

@@ -6,8 +6,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cdsm.manipulator import Manipulator
-
 if TYPE_CHECKING:
     from cdsm.planning.path_plan import PathPlan
 
@@ -15,21 +13,16 @@ _NO_ANGLE = 1e-15
 """A smaller joint coordinate [rad or m] of a path is rounding."""
 
 
-def position_controlled(arm: Manipulator) -> list[int]:
-    """Return the indices of the position-controlled cables."""
-    return [c for c, each in enumerate(arm.cables) if each.control == "position"]
-
-
 def path_table(plan: PathPlan) -> tuple[list[str], list[list[Any]]]:
     """Return the header and a row for each sample of ``plan``, in SI; empty cells have no value."""
-    arm, names = plan.arm, plan.arm.cables.names
+    arm, names, locked = plan.arm, plan.arm.cables.names, plan.arm.cables.position_controlled
     targets = plan.target.reshape(len(plan.target), -1)
     numbered = _numbered(plan, targets.shape[1])
     columns = [
         *(f"{name} [{unit}]" for name, unit in zip(arm.joint_names, arm.joint_units, strict=True)),
         *(f"{name} tension [N]" for name in names),
         *(f"{name} length [m]" for name in names),
-        *(f"{names[c]} unstrained length [m]" for c in position_controlled(arm)),
+        *(f"{names[c]} unstrained length [m]" for c in np.flatnonzero(locked)),
         *("tip x [m]", "tip y [m]", "tip z [m]"),
         *(f"stiffness{number} [N/m]" for number in numbered),
     ]

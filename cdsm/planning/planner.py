@@ -78,8 +78,8 @@ class Planner:
         best = min((self._search(program, point) for point in points), key=misses)
         as_near = replace(self.constraints, targets=self.constraints.targets + best.values)
         least = self._search(replace(self.program, constraints=as_near), best.evaluation)
-        kept = misses(self.constraints.at(least.evaluation)) <= misses(best) + MET**2
-        return least if kept else best
+        smaller = misses(self.constraints.at(least.evaluation)) <= misses(best) + MET**2
+        return least if smaller else best
 
     def _within_range(self, u: Array, target: float) -> ConstraintValues:
         """Return the constraint values at the least tensions, by ‖F‖, that hit ``target`` [N/m].
@@ -160,19 +160,19 @@ class Planner:
         """
         at_hub, guesses = self._miss(hub), []
         for other in others:
-            at_other, way = self._miss(other), other.F - hub.F
+            at_other, step = self._miss(other), other.F - hub.F
             if at_hub * at_other < 0.0:
-                guess = hub.F + at_hub / (at_hub - at_other) * way
+                guess = hub.F + at_hub / (at_hub - at_other) * step
                 # reuse the values at the ends: rounding of F there could change the sign
-                guesses.append((float(guess @ guess), way, {0.0: at_hub, 1.0: at_other}))
+                guesses.append((float(guess @ guess), step, {0.0: at_hub, 1.0: at_other}))
 
-        def miss(part: float, way: Array, known: dict[float, float]) -> float:
-            return known[part] if part in known else self._miss(self.model.at(hub.F + part * way))
+        def miss(part: float, step: Array, known: dict[float, float]) -> float:
+            return known[part] if part in known else self._miss(self.model.at(hub.F + part * step))
 
         found = []
-        for _, way, known in sorted(guesses, key=lambda guess: guess[0])[: self.starts]:
-            part = brentq(miss, 0.0, 1.0, args=(way, known), xtol=1e-15, rtol=precision)
-            found.append(self.model.at(hub.F + part * way))
+        for _, step, known in sorted(guesses, key=lambda guess: guess[0])[: self.starts]:
+            part = brentq(miss, 0.0, 1.0, args=(step, known), xtol=1e-15, rtol=precision)
+            found.append(self.model.at(hub.F + part * step))
         stable = (point for point in found if point.reserve >= 0.0)
         return sorted(stable, key=lambda point: float(point.F @ point.F))
 

@@ -3,9 +3,8 @@ r"""Sequential quadratic programming over the admissible tensions of a stable ar
     min f(F)   subject to   c(F) = 0,  J_Lᵀ F = τ,  low ≤ F ≤ high,  λ_min(K_θ(F)) ≥ floor.
 
 Only c and the last condition are nonlinear. Every iterate balances the arm and is stable, so K_θ
-can be inverted there.
-
-scipy's SLSQP with differences is three times as slow (tests/benchmarks/test_planning_speed.py).
+can be inverted there. scipy's SLSQP with differences is three times as slow
+(tests/benchmarks/test_planning_speed.py).
 
 **The quadratic program of a step.** Let d = ΔF/size, g = ∂f/∂d and G = ∂c/∂d. The Lagrangian is
 L = f + y·c − z·reserve, with the multipliers y and z of the step before. Solve
@@ -136,10 +135,8 @@ def search(program: Program, start: Evaluation) -> ConstraintValues:
     for _ in range(_CROSSINGS):
         for F in _beyond_kinks(program.region, best.evaluation.F):
             place = program.anchor.backtracked(F)
-            if place is None:
-                continue
-            other = _search(program, place, in_piece=True)
-            if program.better(other, best):
+            other = None if place is None else _search(program, place, in_piece=True)
+            if other is not None and program.better(other, best):
                 best = other
                 break
         else:
@@ -240,12 +237,12 @@ class _LocalModel:
             g = weights @ G
             W = iterate.hessian(weights) * size**2 + objective.square * G.T @ G
             c, G = np.zeros(0), np.zeros((0, g.size))
-        held = G
+        normals = G
         if z > 0.0:  # stability was active: its curvature counts, on steps that keep the reserve
             W -= z * size**2 / evaluation.model.scale * evaluation.reserve_hessian()
-            held = np.vstack([G, evaluation.reserve_gradient])
+            normals = np.vstack([G, evaluation.reserve_gradient])
         self.g, self.c, self.G = g, c, G
-        self.W = kernels.convex(W, program.region.null, held)
+        self.W = kernels.convex(W, program.region.null, normals)
 
     def step(self, price: float, c: Array) -> _Step:
         """Solve the quadratic program for a value of c; raise the price until it is enough."""

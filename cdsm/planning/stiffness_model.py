@@ -135,18 +135,18 @@ class Evaluation:
         if start.reserve >= 0.0:
             return start
 
-        def on_the_way(part: float) -> Evaluation:
+        def between(part: float) -> Evaluation:
             return self.model.at(F + part * (self.F - F))
 
         # a concave reserve is above its chord, so it is zero before its chord
         far = start.reserve / (start.reserve - self.reserve) if self.reserve > 0.0 else 1.0
-        while on_the_way(far).reserve < 0.0:
+        while between(far).reserve < 0.0:
             if far >= 1.0:
                 return None
             far = min(2.0 * far, 1.0)
-        part = brentq(lambda part: on_the_way(part).reserve, 0.0, far, xtol=1e-15, rtol=1e-13)
+        part = brentq(lambda part: between(part).reserve, 0.0, far, xtol=1e-15, rtol=1e-13)
         # rounding may put the root on the unstable side
-        ends = (on_the_way(min(part + back, 1.0)) for back in (0.0, 1e-14, 1e-12, 1e-10))
+        ends = (between(min(part + back, 1.0)) for back in (0.0, 1e-14, 1e-12, 1e-10))
         return next((end for end in ends if end.reserve >= 0.0), None)
 
 

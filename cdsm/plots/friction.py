@@ -45,8 +45,8 @@ def plot_load_history(history: LoadHistory) -> Figure:
         left.set(xlabel="displacement along the force [mm]", ylabel="force [N]")
     else:
         loads = np.arange(1, len(moved) + 1)
-        for axis, color, way in zip(AXES, COLORS, moved.T, strict=True):
-            left.plot(loads, way, color=color, label=axis, **line)
+        for axis, color, part in zip(AXES, COLORS, moved.T, strict=True):
+            left.plot(loads, part, color=color, label=axis, **line)
         left.set(xlabel="load", ylabel="displacement of the tip [mm]")
         legend(left)
     spread = [float(np.ptp(T, axis=1).max()) for T in history.tensions]

@@ -48,7 +48,7 @@ class Slice(NamedTuple):
     half: float
     plane: tuple[int, int]
 
-    def holds(self, points: Array) -> NDArray[np.bool_]:
+    def contains(self, points: Array) -> NDArray[np.bool_]:
         """Return which points (N, 3) [mm] are in the slab."""
         return np.asarray(abs(points[:, self.normal] - self.place) <= self.half)
 

@@ -136,7 +136,7 @@ def plot_map(
         )
         for case in cases
         for part in slices
-        for inside in [known & part.holds(points)]
+        for inside in [known & part.contains(points)]
     ]
     if not any(len(each.points) for each in maps):
         raise InvalidInput(

@@ -147,8 +147,7 @@ def _limits(poses: Sequence[Posture]) -> Array:
     points = MM * np.concatenate(
         [each for pose in poses for each in (*pose.cable_paths, *pose.bones)]
     )
-    low, high = points.min(axis=0), points.max(axis=0)
-    return np.array([low, high]).T
+    return np.array([points.min(axis=0), points.max(axis=0)]).T
 
 
 def _draw_skeleton(axes: Any, pose: Posture, shade: str) -> None:

@@ -218,12 +218,12 @@ def sticking(K: Stiffness, readings: Readings | None) -> Sticking | None:
     ``readings`` are the frictionless ones of ``K``. Returns None if no cable sticks, if K_θ is
     singular (no readings), or if a tension is outside the domain of its law.
     """
-    pose, held = K.posture, holding(K.posture)
+    pose, sticks = K.posture, holding(K.posture)
     T, J = K.tension[pose.segments.chains.cable], pose.jacobian[:3]
-    if readings is None or not held.any():
+    if readings is None or not sticks.any():
         return None
     try:
-        gradient = tension_gradient(pose, T, np.zeros_like(held))
+        gradient = tension_gradient(pose, T, np.zeros_like(sticks))
     except ElasticityRangeError:  # a motor holds a force outside the domain
         return None
     stuck = K.joint - K.passive + pose.segments.length_jacobian.T @ gradient

@@ -46,13 +46,13 @@ class Optimality:
         return max(self.feasibility, self.stationarity or 0.0) <= DISTANCE
 
 
-def optimality(K: Stiffness, pull: Tension) -> Optimality:
-    """Evaluate the optimality conditions of the distributed tensions ``pull`` of ``K``."""
+def optimality(K: Stiffness, tension: Tension) -> Optimality:
+    """Evaluate the optimality conditions of the distributed tensions ``tension`` of ``K``."""
     pose = K.posture
     torque = pose.jacobian.T @ K.wrench - pose.gravity_torque
     problem = tension_kernels.Scaled(
         *tension_kernels.scaled_balance(
-            pose.length_jacobian, torque, pull.minimum, pull.maximum, pose.arm.length
+            pose.length_jacobian, torque, tension.minimum, tension.maximum, pose.arm.length
         )
     )
     x = K.tension / problem.force
@@ -69,9 +69,9 @@ def optimality(K: Stiffness, pull: Tension) -> Optimality:
     y = np.asarray(np.linalg.lstsq(problem.A.T, -x - z, rcond=None)[0])
     primal, dual, _ = tension_kernels.single_optimality(*problem[:4], x, y, z)
     return Optimality(
-        solver=pull.solver,
-        at_minimum=pull.at_minimum,
-        at_maximum=pull.at_maximum,
+        solver=tension.solver,
+        at_minimum=tension.at_minimum,
+        at_maximum=tension.at_maximum,
         feasibility=primal / size,
-        stationarity=dual / size if pull.least else None,
+        stationarity=dual / size if tension.least else None,
     )

@@ -11,7 +11,7 @@ import numpy as np
 
 from cdsm.report.facts import RANK
 from cdsm.report.self_check import Agreement, Difference
-from cdsm.support.format import MODEL, coordinates
+from cdsm.support.format import MODEL, aligned, coordinates
 from cdsm.support.markup import element, row
 
 if TYPE_CHECKING:
@@ -44,11 +44,7 @@ def to_text(report: Report) -> str:
     lines += [_wrapped(remark, "! ") for remark in report.faults]
     lines += [_wrapped(remark, "- ") for remark in report.notes]
     for title, rows, sentences in _sections(report):
-        lines += ["", title]
-        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-        for name, *cells in rows:
-            padded = (cell.rjust(width + 2) for cell, width in zip(cells, widths[1:], strict=True))
-            lines.append(f"  {name.ljust(widths[0])}{''.join(padded)}".rstrip())
+        lines += ["", title, *(f"  {line}" for line in aligned(rows))]
         lines += [_wrapped(sentence, "  ") for sentence in sentences]
     return "\n".join(lines)
 
@@ -161,10 +157,9 @@ def _statics(report: Report) -> Section:
 def _stability(report: Report) -> Section:
     K = report.stiffness
     names = K.posture.arm.joint_names
-    rows = [("softest joint motion", "share")]
-    way = report.critical_direction
-    order = np.argsort(-abs(way), kind="stable")[:4]
-    rows += [(names[i], f"{way[i]:+.3f}") for i in order]
+    motion = report.critical_direction
+    order = np.argsort(-abs(motion), kind="stable")[:4]
+    rows = [("softest joint motion", "share"), *((names[i], f"{motion[i]:+.3f}") for i in order)]
     state = "stable" if K.is_stable else "UNSTABLE"
     sentence = (
         f"Smallest eigenvalue of the symmetric part of K_θ: {K.margin:.4g} "

@@ -49,7 +49,7 @@ class LockedCable(NamedTuple):
     tension: float
     free_length: float
 
-    def pulls(self, longer: Array) -> Array:
+    def tensions(self, longer: Array) -> Array:
         """Compute the tensions (P,) [N] of this cable at P elongations.
 
         ``longer`` (P, C) [m] are the changes of length of all cables of the arm.
@@ -63,11 +63,11 @@ class LockedCable(NamedTuple):
     def stored(self, longer: Array) -> Array:
         """Compute the energy (P,) [J] that this cable stores, minus the work F ΔL.
 
-        ΔL is its column of ``longer`` (P, C) [m], as in :meth:`pulls`.
+        ΔL is its column of ``longer`` (P, C) [m], as in :meth:`tensions`.
         """
         cable, F, start = self.cable, self.tension, self.free_length
-        pulls = self.pulls(longer)
-        more = evaluate_law(cable, lambda: cable.energy(pulls, start) - cable.energy(F, start))
+        tensions = self.tensions(longer)
+        more = evaluate_law(cable, lambda: cable.energy(tensions, start) - cable.energy(F, start))
         return np.asarray(more - F * longer[:, self.number])
 
     def room(self) -> float:
@@ -136,7 +136,7 @@ class Neighbourhood:
     :attr:`unit`. So all derivatives with respect to ``places`` are in N m.
 
     Attributes:
-        held: The position-controlled cables. Slack cables without stiffness (at some equilibria)
+        locked: The position-controlled cables. Slack cables without stiffness (at some equilibria)
             are left out: a small motion does not tension them.
         unit: 1 rad for each joint that turns, the arm's length for each joint that slides (nv,).
     """
@@ -148,7 +148,7 @@ class Neighbourhood:
         self._k = abs(K.cable_stiffness)
         self._arms = abs(K.posture.length_jacobian * self.unit).max(axis=1)
         states = zip(K.posture.arm.cables, K.tension.tolist(), K.free_lengths.tolist(), strict=True)
-        self.held = [
+        self.locked = [
             LockedCable(c, cable, F, free_length)
             for c, (cable, F, free_length) in enumerate(states)
             if cable.control == "position" and (F > 0.0 or self._k[c] > 0.0)
@@ -191,7 +191,7 @@ class Neighbourhood:
         lengths = [arm.cable_lengths(q, check_limits=False) for q in self._angles(places)]
         longer = np.array(lengths) - self._pose.cable_lengths
         total = np.zeros(len(places))
-        for each in self.held:
+        for each in self.locked:
             total += each.stored(longer)
         return total[:, None]
 
@@ -211,8 +211,8 @@ class Neighbourhood:
         poses = [self._pose.arm.at(q, check_limits=False) for q in self._angles(places)]
         longer = np.array([pose.cable_lengths for pose in poses]) - self._pose.cable_lengths
         more = np.zeros_like(longer)
-        for each in self.held:
-            more[:, each.number] = each.pulls(longer) - each.tension
+        for each in self.locked:
+            more[:, each.number] = each.tensions(longer) - each.tension
         torques = [more[p] @ pose.length_jacobian for p, pose in enumerate(poses)]
         return np.array(torques)[:, None] * self.unit
 
@@ -224,11 +224,11 @@ class Neighbourhood:
         pose = self._pose
         links = {site.link for cable in pose.arm.cables for site in cable.sites}
         frames = {link: pose.link_pose(link) for link in links}
-        ways = []
+        lengths = []
         for cable in pose.arm.cables:
             sites = [frames[site.link][:3] @ (*site.position, 1.0) for site in cable.sites]
-            ways.append(cable.lead + np.linalg.norm(np.diff(sites, axis=0), axis=1).sum())
-        return np.array(ways)
+            lengths.append(cable.lead + np.linalg.norm(np.diff(sites, axis=0), axis=1).sum())
+        return np.array(lengths)
 
     def _angles(self, places: Array) -> Array:
         return self._pose.q + places * self.unit
@@ -247,7 +247,7 @@ class Neighbourhood:
     def first_elastic_step(self) -> float:
         """Return a step ≤ :attr:`first_step` that keeps tensions between bounds and kinks."""
         step = self.first_step
-        for each in self.held:
+        for each in self.locked:
             rise = self._k[each.number] * self._arms[each.number]
             step = min(step, each.room() / (4.0 * rise) if rise > 0.0 else np.inf)
         return float(step)

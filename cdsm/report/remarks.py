@@ -54,8 +54,8 @@ def faults(report: Report) -> Iterator[str]:
         )
     arm = K.posture.arm
     if not K.is_stable:
-        what, how, *ways = K.warnings
-        yield f"{what}; {how} {'; '.join(map(str.strip, ways))}".rstrip()
+        what, how, *remedies = K.warnings
+        yield f"{what}; {how} {'; '.join(map(str.strip, remedies))}".rstrip()
     elif K.margin <= _SINGULAR * np.linalg.norm(K.joint, 2):
         yield (
             f"the arm is about to buckle: the smallest eigenvalue of K_θ, {K.margin:.2g} "
@@ -112,14 +112,14 @@ def _of_tensions(report: Report) -> Iterator[str]:
         yield f"the tensions {came}, not distributed: they need not be the least."
     elif report.optimality.stationarity is None:
         yield "the tensions were chosen for a stiffness: they are not the least."
-    held = [each for each in report.cables if each.control == "position"]
-    pulled = [each for each in held if not each.is_slack]
-    if slack := [each.name for each in held if each.is_slack]:
+    locked = [each for each in report.cables if each.control == "position"]
+    taut = [each for each in locked if not each.is_slack]
+    if slack := [each.name for each in locked if each.is_slack]:
         yield f"slack cables, 0 N: {_listed(slack)}. They stiffen one direction; raise minimum=."
     if forced := [each.name for each in report.cables if each.control == "force"]:
         yield f"force-controlled, no passive stiffness: {_listed(forced)}."
-    low = [each.name for each in pulled if each.below <= CLOSE * each.tension]
-    high = [each.name for each in pulled if each.above <= CLOSE * each.tension]
+    low = [each.name for each in taut if each.below <= CLOSE * each.tension]
+    high = [each.name for each in taut if each.above <= CLOSE * each.tension]
     for names, end in ((low, "low"), (high, "high")):
         if names:
             yield (

@@ -170,14 +170,14 @@ def report_on(K: Stiffness) -> Report:
     """Compute the report on a stiffness."""
     residual, joint, imbalance = facts.balance_error(K)
     tip, translation, cables = facts.ranks(K)
-    pull, readings = K.distribution, facts.readings(K)
+    tension, readings = K.distribution, facts.readings(K)
     return Report(
         stiffness=K,
         self_check=self_check(K),
         residual=residual,
         residual_joint=joint,
         imbalance=imbalance,
-        optimality=None if pull is None else optimality(K, pull),
+        optimality=None if tension is None else optimality(K, tension),
         cables=facts.cable_states(K),
         jacobian_rank=tip,
         translation_rank=translation,

@@ -182,16 +182,16 @@ def _recomputed_terms(near: Neighbourhood) -> tuple[list[_Recomputed], list[_Rec
     turned = _differentiated(
         gradients, near, near.kinematic_torques, near.kinematic_torque_noise, step
     )
-    if one_sided := [reason for cable in near.held for reason in cable.one_sided()]:
+    if one_sided := [reason for cable in near.locked for reason in cable.one_sided()]:
         named = first_of(one_sided, _NAMED, "cables")
-        stored = pulled = [_Recomputed(None, f"K_θ has another value on either side: {named}.")]
+        stored = stretched = [_Recomputed(None, f"K_θ has another value on either side: {named}.")]
     else:
         step = near.first_elastic_step
         stored = _differentiated(hessians, near, near.elastic, near.elastic_noise, step)
-        pulled = _differentiated(
+        stretched = _differentiated(
             gradients, near, near.elastic_torques, near.elastic_torque_noise, step
         )
-    return [moved[0], stored[0], *moved[1:]], [turned[0], pulled[0], *turned[1:]]
+    return [moved[0], stored[0], *moved[1:]], [turned[0], stretched[0], *turned[1:]]
 
 
 def _differentiated(

@@ -124,24 +124,24 @@ def critical_load(
 
     factor, limit = 0.0, failure_at(at, 0.0)
     at(factor)  # raises the reason if no tensions balance the arm
-    held = [0.0]
+    stable = [0.0]
     if limit == "none":
         end = 1e-3
         while end < _NOWHERE and failure_at(at, end) == "none":
-            held.append(end)
+            stable.append(end)
             end *= 2.0
         if end < _NOWHERE:
             # the doubling may have stepped over the first failure
             places = np.linspace(0.0, end, SAMPLES).tolist()
             first = next(i for i, place in enumerate(places) if failure_at(at, place) != "none")
-            holds, fails = places[first - 1], places[first]
-            factor, beyond = last_true(lambda x: failure_at(at, x) == "none", holds, fails)
-            held = [*places[:first], factor]
+            ends = places[first - 1], places[first]
+            factor, beyond = last_true(lambda x: failure_at(at, x) == "none", *ends)
+            stable = [*places[:first], factor]
             limit = failure_at(at, beyond)
         else:
             factor = math.inf
     K = at(min(factor, _NOWHERE / 2.0))
-    factors = [each for each in held if each < _SHOWN or math.isfinite(factor)]
+    factors = [each for each in stable if each < _SHOWN or math.isfinite(factor)]
     return CriticalLoad(
         posture=pose,
         wrench=W,

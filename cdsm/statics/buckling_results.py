@@ -166,8 +166,8 @@ class CriticalLoad(ReadOnlyState):
             "none": "nothing happens that far",
         }[self.limit]
         mode = _describe_mode(self.posture.arm.joint_names, self.mode)
-        held = f"the load up to a factor of {self.factor:.4g}"
-        return f"holds {held if self.factor else 'no part of the load'}; {reason}\n{mode}"
+        part = f"the load up to a factor of {self.factor:.4g}"
+        return f"holds {part if self.factor else 'no part of the load'}; {reason}\n{mode}"
 
 
 def _describe_mode(names: tuple[str, ...], mode: Array) -> str:

@@ -142,11 +142,11 @@ class Equilibrium(ReadOnlyState):
     @property
     def slack(self) -> tuple[str, ...]:
         """Names of the position-controlled cables that are slack."""
-        pulled = zip(
+        states = zip(
             self.pose.arm.cables, self.tension, self.stiffness.cable_stiffness, strict=True
         )
         return tuple(
-            cable.name for cable, F, k in pulled if cable.control == "position" and F == k == 0.0
+            cable.name for cable, F, k in states if cable.control == "position" and F == k == 0.0
         )
 
     @property

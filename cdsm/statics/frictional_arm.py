@@ -66,14 +66,13 @@ class FrictionalArm(NamedTuple):
 
     def settled(self, pose: Posture, near: Array) -> Chain:
         """Compute the cables at a posture. The search for tensions starts at ``near`` (S,) [N]."""
-        segments, ratio = pose.segments, np.ones(near.size)
-        ratio[segments.chains.hole] = np.exp(segments.chains.friction * segments.wrap)
-        return self.problem.settle(segments.lengths, self.natural, ratio, self.forced, near)
+        lengths, ratio = pose.segments.lengths, pose.segments.ratio
+        return self.problem.settle(lengths, self.natural, ratio, self.forced, near)
 
     def residual(self, pose: Posture, tension: Array) -> Array:
         """Compute the residual torque r (nv,) [N m] under segment tensions (S,) [N]."""
-        pull = tension @ pose.segments.length_jacobian
-        return np.asarray(pull + pose.gravity_torque - self.wrench @ pose.jacobian)
+        torque = tension @ pose.segments.length_jacobian
+        return np.asarray(torque + pose.gravity_torque - self.wrench @ pose.jacobian)
 
     def at(self, pose: Posture, near: Array) -> Settled:
         """Compute the arm at a posture. The search for its tensions starts at ``near`` (S,) [N]."""

@@ -114,7 +114,7 @@ def slow_loading(pose: Posture, tension: Array, wrench: Array, accuracy: float) 
     LoadedArm(pose, tension, wrench)  # refuses a spring that leaves no wire
     arm = pose.arm
     start = np.searchsorted(pose.segments.chains.cable, np.arange(len(arm.cables) + 1))
-    forced = np.array([cable.control == "force" for cable in arm.cables])
+    forced = ~arm.cables.position_controlled
     problem = ChainProblem(arm.cables, start, tension, arm.original_length == "unstrained")
     return SlowLoading(problem, start, stops(pose), forced, pose, accuracy)
 
@@ -126,11 +126,11 @@ def _commands(motors: ArrayLike, forced: NDArray[np.bool_]) -> Array:
     """
     commands = number_array("motors", motors)
     if commands.ndim == 2 and commands.shape[1] == forced.size:
-        pulled = commands[:, forced]
-        if pulled.size and pulled.min() < 0.0:
-            raise InvalidInput("motors", f"{pulled.min():g} N given; cables only pull.")
+        tensions = commands[:, forced]
+        if tensions.size and tensions.min() < 0.0:
+            raise InvalidInput("motors", f"{tensions.min():g} N given; cables only pull.")
         number_array("motors", commands[:, ~forced], "length")
-        number_array("motors", pulled, "tension")
+        number_array("motors", tensions, "tension")
     return commands
 
 
@@ -155,12 +155,12 @@ def _labelled(
     history: Sequence[tuple[State, Passage]],
 ) -> LoadHistory:
     chains = pose.segments.chains
-    states, ways = zip(*history, strict=True)
+    states, passages = zip(*history, strict=True)
     hole = chains.hole
-    slips = np.array([way.slip[hole] for way in ways])
+    slips = np.array([passage.slip[hole] for passage in passages])
     last = np.array([state.settled.chain.slip[hole] for state in states])
-    holds = chains.friction > 0.0
-    energies = np.array([way[:4] for way in ways]).T
+    rough = chains.friction > 0.0
+    energies = np.array([passage[:4] for passage in passages]).T
     load_work, motor_work, stored, dissipated = (frozen(each.copy()) for each in energies)
     return LoadHistory(
         reference=pose,
@@ -171,7 +171,7 @@ def _labelled(
         tip=frozen(np.array([state.pose.tip[:3, 3] for state in states])),
         segment_tensions=frozen(np.array([state.settled.chain.tension for state in states])),
         slip=frozen(slips),
-        sliding=frozen(np.where(holds, np.sign(last), 0.0).astype(np.int8)),
+        sliding=frozen(np.where(rough, np.sign(last), 0.0).astype(np.int8)),
         reaction=frozen(np.array([state.reaction for state in states])),
         load_work=load_work,
         motor_work=motor_work,

@@ -166,7 +166,7 @@ class LoadHistory(ReadOnlyState):
         columns: dict[str, NDArray[Any]] = {
             **{f"force {axis} [N]": force for axis, force in zip("xyz", loads[:3], strict=True)},
             **{f"moment {axis} [N m]": part for axis, part in zip("xyz", loads[3:], strict=True)},
-            **{f"displacement {axis} [m]": way for axis, way in zip("xyz", moved, strict=True)},
+            **{f"displacement {axis} [m]": part for axis, part in zip("xyz", moved, strict=True)},
             "sliding holes": np.count_nonzero(self.sliding, axis=1),
             "load work [J]": self.load_work,
             "motor work [J]": self.motor_work,

@@ -137,14 +137,14 @@ class LoadingPath:
         loading = slow_loading(pose, tension, wrench, 1.0)
         start = loading.begin(tension, wrench)
         natural, motors = start.settled.chain.natural, start.load.motors
-        held, tips = self.start.load.held, list[Array]()
+        holding, tips = self.start.load.holding, list[Array]()
         for (state, _, _), (give, left) in zip(self.rests, self._responses, strict=True):
             near = state.settled
-            share = (held @ state.load.held) / (held @ held) if held.any() else 0.0
+            share = (holding @ state.load.holding) / (holding @ holding) if holding.any() else 0.0
             arm = loading.arm(natural, state.load.wrench, motors)
             beside = pose.arm.at(near.q, check_limits=False)
             chain = arm.settled(beside, near.chain.tension)
-            moved = give @ (arm.residual(beside, chain.tension) - share * start.load.held)
+            moved = give @ (arm.residual(beside, chain.tension) - share * start.load.holding)
             natural = chain.natural + left @ moved
             tips.append(beside.tip[:3, 3] + beside.jacobian[:3] @ moved)
         return np.array([tips[i] for i in self.last])
@@ -160,15 +160,17 @@ class LoadingPath:
             added = part * each[k] + (1.0 - part) * (each[k - 1] if k else none)
             forced = np.where(self.loading.forced, state.load.motors, np.nan)
             grip = np.zeros_like(natural)
-            pulled = problem.tangent(chain, forced, -chain.stretch[:, None] * natural, grip)
+            by_tension = problem.tangent(chain, forced, -chain.stretch[:, None] * natural, grip)
             J = pose.jacobian[:3]
-            imbalance = pose.segments.length_jacobian.T @ pulled - np.outer(direction @ J, added)
+            imbalance = pose.segments.length_jacobian.T @ by_tension - np.outer(
+                direction @ J, added
+            )
             moved = give @ imbalance
             # a slack cable keeps its wire, spread evenly
             wire = np.add.reduceat(chain.natural, first)
             share = np.add.reduceat(natural, first) / wire[:, None]
             spread = chain.natural[:, None] * share[pose.segments.chains.cable]
-            taut = left @ moved - chain.compliance[:, None] * pulled
+            taut = left @ moved - chain.compliance[:, None] * by_tension
             natural = np.where((chain.tension == 0.0)[:, None], spread, taut)
             tips.append(J @ moved)
         return np.array([tips[i] for i in self.last])

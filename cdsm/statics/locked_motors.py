@@ -79,19 +79,19 @@ class LoadedArm:
         laws, L = reference.arm._model.laws, reference.cable_lengths if lengths is None else lengths
         self._free_length = laws.original_lengths(L, tension)
         self._laws = []
-        for law, held in laws.held:
-            parts = (self._free_length[held], laws.series[held], L[held], tension[held])
+        for law, cables in laws.held:
+            parts = (self._free_length[cables], laws.series[cables], L[cables], tension[cables])
             try:
-                self._laws.append(_LockedLaw(law, held, *parts))
+                self._laws.append(_LockedLaw(law, cables, *parts))
             except ElasticityRangeError as error:
-                raise laws.naming(error, held) from None
+                raise laws.naming(error, cables) from None
 
     def at(self, pose: Posture, near: Array) -> Iterate:
         """Compute the arm at a posture. The search for its tensions starts at ``near`` (C,) [N]."""
         F, k = self.tension.copy(), np.zeros(near.size)
         for law in self._laws:
-            held = law.held
-            F[held], k[held] = law.tension(pose.cable_lengths[held], near[held])
+            cables = law.cables
+            F[cables], k[cables] = law.tension(pose.cable_lengths[cables], near[cables])
         K = assemble(pose, frozen(F), self.wrench, frozen(k), free_length=self._free_length)
         return Iterate(K, K.residual, rounding(K))
 
@@ -115,7 +115,7 @@ class LoadedArm:
 
         Zero is allowed if the law begins at zero: the cable is slack.
         """
-        groups = [(each.law, each.held) for each in self._laws]
+        groups = [(each.law, each.cables) for each in self._laws]
         require_domains(self.reference.arm.cables, groups, tension)
 
 
@@ -198,13 +198,13 @@ class _LockedLaw:
     def __init__(
         self,
         law: Elasticity,
-        held: slice | NDArray[np.intp],
+        cables: slice | NDArray[np.intp],
         free_length: Array,
         series: Array,
         lengths: Array,
         tension: Array,
     ) -> None:
-        self.law, self.held = law, held
+        self.law, self.cables = law, cables
         self._free_length, self._series = free_length, series
         domain, size = law.domain, tension.shape
         self._low, self._high = np.full(size, domain.first), np.full(size, domain.high)

@@ -44,7 +44,7 @@ class Load(NamedTuple):
     """Load and motor commands that act on an arm."""
 
     wrench: Array  # W (6,): force [N], then moment [N m]
-    held: Array  # torque that holds an unbalanced arm at its reference (nv,) [N m]
+    holding: Array  # torque that holds an unbalanced arm at its reference (nv,) [N m]
     motors: Array  # per cable (C,): natural length taken in [m]; or tension [N] of a force motor
 
     def towards(self, other: Load, part: float) -> Load:
@@ -165,12 +165,12 @@ class SlowLoading(NamedTuple):
         taken = np.where(self.forced, 0.0, load.motors - before.load.motors)
         natural[self.start[:-1]] -= taken
         arm = self.arm(natural, load.wrench, load.motors)
-        start = None if motion is None else _guess(arm, old, motion, load.held)
+        start = None if motion is None else _guess(arm, old, motion, load.holding)
         if start is None:
-            start = arm.at(old.pose, old.chain.tension).holding_back(load.held)
+            start = arm.at(old.pose, old.chain.tension).holding_back(load.holding)
             if before.motion @ start.torque < 0.0:  # it moves on the same way: what slid slides on
-                start = _newton_step(arm, old, start, load.held)
-        search = find_rest(arm, start, load.held)
+                start = _newton_step(arm, old, start, load.holding)
+        search = find_rest(arm, start, load.holding)
         if not search.converged:
             return None, search
         reaction = np.where(search.at_stop, search.state.torque, 0.0)
@@ -182,7 +182,7 @@ class SlowLoading(NamedTuple):
         ``start``, ``middle`` and ``end`` are the equilibria of the sub-step.
         """
         states = (start, middle, end)
-        torque = [s.load.wrench @ s.pose.jacobian + s.load.held for s in states]
+        torque = [s.load.wrench @ s.pose.jacobian + s.load.holding for s in states]
         P = [self.problem.potential(s.settled.chain.tension) for s in states]
         first = self.start[:-1]
         wire = [-np.add.reduceat(s.settled.chain.natural, first) for s in states]
@@ -207,38 +207,38 @@ class SlowLoading(NamedTuple):
         return weight + self.problem.stored(chain.natural, chain.tension)
 
 
-def _guess(arm: FrictionalArm, old: Settled, motion: Array, held: Array) -> Settled | None:
+def _guess(arm: FrictionalArm, old: Settled, motion: Array, holding: Array) -> Settled | None:
     """Return the arm after a joint motion (nv,) [rad] from ``old``, or None if sites meet there.
 
-    ``held`` (nv,) [N m] is the torque of :class:`Load` that is subtracted from the residual.
+    ``holding`` (nv,) [N m] is the torque of :class:`Load` that is subtracted from the residual.
     """
     try:
-        return arm.moved(np.clip(old.q + motion, *arm.limits), old).holding_back(held)
+        return arm.moved(np.clip(old.q + motion, *arm.limits), old).holding_back(holding)
     except CdsmError:
         return None
 
 
-def _newton_step(arm: FrictionalArm, old: Settled, start: Settled, held: Array) -> Settled:
+def _newton_step(arm: FrictionalArm, old: Settled, start: Settled, holding: Array) -> Settled:
     """Return the arm after a Newton step with the tangent of ``old`` and the torque of ``start``.
 
-    ``held`` (nv,) [N m] is the torque of :class:`Load`. Returns ``start`` if the step does not
+    ``holding`` (nv,) [N m] is the torque of :class:`Load`. Returns ``start`` if the step does not
     reduce the torque.
     """
     try:
         step = np.linalg.solve(old.stiffness, -start.torque)
         near = start._replace(slope=old.slope)
-        guess = arm.moved(np.clip(old.q + step, *arm.limits), near).holding_back(held)
+        guess = arm.moved(np.clip(old.q + step, *arm.limits), near).holding_back(holding)
     except (CdsmError, np.linalg.LinAlgError):  # sites meet, or about to buckle
         return start
     return guess if np.linalg.norm(guess.torque) < np.linalg.norm(start.torque) else start
 
 
-def _work(force: list[Array], way: list[Array]) -> float:
-    """Integrate ``force`` over the path ``way``; each has its values at start, middle and end.
+def _work(force: list[Array], place: list[Array]) -> float:
+    """Integrate ``force`` over the path ``place``; each has its values at start, middle and end.
 
     The result [J] is exact if both are quadratic functions of the path parameter.
     """
-    half, whole = way[1] - way[0], way[2] - way[0]
+    half, whole = place[1] - place[0], place[2] - place[0]
     ends = force[0] @ (4.0 * half - whole) + force[2] @ (3.0 * whole - 4.0 * half)
     return float(ends + 4.0 * (force[1] @ whole)) / 6.0
 

@@ -122,14 +122,14 @@ class _Free(NamedTuple):
 
 
 def find_rest(
-    loaded: Loaded[State], start: State, held_back: Array | float = 0.0
+    loaded: Loaded[State], start: State, holding: Array | float = 0.0
 ) -> RestSearch[State]:
-    """Find the equilibrium of ``loaded``, where the residual torque r is ``held_back``.
+    """Find the equilibrium of ``loaded``, where the residual torque r is ``holding``.
 
-    The search begins at ``start``. ``held_back`` is (nv,) [N m], by default zero.
+    The search begins at ``start``. ``holding`` is (nv,) [N m], by default zero.
     """
     stops = loaded.stops()
-    state, radius = start.holding_back(held_back), _FIRST
+    state, radius = start.holding_back(holding), _FIRST
     free = _Free.of(state, *stops)
     history, convex = [free.imbalance], free.lowest > free.flat
     for iteration in range(_ATTEMPTS):
@@ -142,7 +142,7 @@ def find_rest(
             radius /= 4.0
             continue
         try:
-            trial = loaded.moved(q, state).holding_back(held_back)
+            trial = loaded.moved(q, state).holding_back(holding)
             quality = work(state, trial) / expected
         except CdsmError:  # for example, two sites of a cable coincide
             quality = -math.inf

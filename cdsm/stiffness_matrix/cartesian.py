@@ -194,11 +194,11 @@ class CartesianReadings(ReadOnlyState):
                 "stiffness is infinite or nearly so. Use along(direction), or bend the arm.",
                 u,
             )
-        held = self._parts.diagonal()
-        if not held.min() > 0.0:
-            why, motion = "next to nothing holds the arm", np.eye(held.size)[held.argmin()]
+        diagonal = self._parts.diagonal()
+        if not diagonal.min() > 0.0:
+            why, motion = "next to nothing holds the arm", np.eye(diagonal.size)[diagonal.argmin()]
         else:
-            unit = np.sqrt(held)
+            unit = np.sqrt(diagonal)
             why = "the arm is just about to buckle"
             motion = np.linalg.svd(self.joint / unit / unit[:, None])[2][-1] / unit
         motion = frozen(motion / np.linalg.norm(motion))

@@ -133,7 +133,9 @@ def _reporting(validated: _Function, kind: Callable[..., Any]) -> _Function:
         try:
             return validated(*args, **values)
         except ValidationError as error:
-            raise GeometryError(_faults(error, kind)) from None
+            faults = _faults(error, kind)
+        # not inside except: the context, pydantic's error, cannot be pickled, as a cluster does
+        raise GeometryError(faults)
 
     return cast(_Function, call)
 

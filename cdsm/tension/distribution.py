@@ -118,10 +118,8 @@ def bounds_at(
 
 def grip(pose: Posture) -> Array:
     """Compute Σ μ φ (C,) [-] over the holes of each cable, with friction μ and wrap angle φ."""
-    segments = pose.segments
-    chains = segments.chains
-    of_holes = chains.friction * segments.wrap
-    total = np.bincount(chains.cable[chains.hole], of_holes, minlength=len(pose.arm.cables))
+    chains, count = pose.segments.chains, len(pose.arm.cables)
+    total = np.bincount(chains.cable[chains.hole], pose.segments.grip, minlength=count)
     return np.asarray(total, dtype=np.float64)
 
 

@@ -91,17 +91,19 @@ class Balance(NamedTuple):
         balance = self._work(inputs, -mu, F, 1.0)
         return {name: found[name] + balance[name] for name in found}
 
-    def _work(self, inputs: Inputs, motion: Array, pull: Array, loaded: float) -> dict[str, Array]:
+    def _work(
+        self, inputs: Inputs, motion: Array, weights: Array, loaded: float
+    ) -> dict[str, Array]:
         """Compute the derivatives of the power Σ p_c L̇_c with respect to ``inputs``, by source.
 
-        p is ``pull`` (C,) [N], ``motion`` (nv,) the joint velocity. With ``loaded`` = 1 the power
-        includes that of gravity and load, with 0 it does not.
+        p is ``weights`` (C,) [N], ``motion`` (nv,) the joint velocity. With ``loaded`` = 1 the
+        power includes that of gravity and load, with 0 it does not.
         """
-        pose, none = self.tension.posture, np.zeros_like(pull)
+        pose, none = self.tension.posture, np.zeros_like(weights)
         arguments: tuple[Any, ...] = (
             *pose.arm._model.arrays,
             *(pose.q, inputs.first, motion, _NO_VELOCITY),
-            *(none, none, none, pull, self.tension.wrench, 0.0, loaded),
+            *(none, none, none, weights, self.tension.wrench, 0.0, loaded),
         )
         _, by_q, *by_places, by_mass, _, _ = single_gradient(*arguments)
         return {

@@ -174,10 +174,7 @@ class Uncertainty(ReadOnlyState):
     @property
     def shown(self) -> str:
         """Value and standard uncertainty, with two digits, in the unit shown to the user."""
-        _, size = self.question.unit
-        u = self.standard_uncertainty / size
-        places = decimals(u)
-        return f"{self.value / size:.{places}f} ± {u:.{places}f}"
+        return with_uncertainty(self.value, self.standard_uncertainty, self.question.unit[1])
 
     @property
     def _headline(self) -> str:
@@ -257,17 +254,23 @@ def coverage_factor(probability: float) -> float:
     """Return k with which value ± k u covers a normal distribution with this probability."""
     from scipy.special import ndtri
 
+    return float(ndtri((1.0 + checked_probability(probability)) / 2.0))
+
+
+def checked_probability(probability: float) -> float:
+    """Check that a probability is between 0 and 1, and return it."""
     p = scalar("probability", probability)
     if not 0.0 < p < 1.0:
         raise InvalidInput("probability", f"{p:g} given; a number between 0 and 1 is needed.")
-    return float(ndtri((1.0 + p) / 2.0))
+    return p
 
 
-def decimals(uncertainty: float) -> int:
-    """Return how many decimals (0 to 12) show two significant digits of an uncertainty."""
-    if not 0.0 < uncertainty < math.inf:
-        return 4
-    return min(max(1 - math.floor(math.log10(uncertainty)), 0), 12)
+def with_uncertainty(value: float, uncertainty: float, size: float) -> str:
+    """Write ``value ± uncertainty`` in a unit of this size; two digits of the uncertainty."""
+    u, places = uncertainty / size, 4
+    if 0.0 < u < math.inf:
+        places = min(max(1 - math.floor(math.log10(u)), 0), 12)
+    return f"{value / size:.{places}f} ± {u:.{places}f}"
 
 
 _SHOWN = {

@@ -76,8 +76,8 @@ class DrawnArms:
         """Compute all arms at tensions (N, C) [N]; by default the drawn measured tensions."""
         F = self._tension if tension is None else tension
         rigidity, strain = laws_at(self._K, F)
-        held = self._K.cable_stiffness > 0.0
-        stretched = np.where(held, rigidity * (self._scale + strain), 0.0)  # ε falls as EA rises
+        locked = self._K.cable_stiffness > 0.0
+        stretched = np.where(locked, rigidity * (self._scale + strain), 0.0)  # ε falls as EA rises
         # a spring softer by c is in k = 1/(l_0/EA + 1/k_series) like a wire longer by c·EA
         laws, (lead, *own) = self._K.posture.arm._model.laws, self._own
         lead = lead + self._softer * (stretched - (F - laws.rest))
@@ -165,12 +165,12 @@ def laws_at(K: Stiffness, tension: Array) -> tuple[Array, Array]:
     arm = K.posture.arm
     laws = arm._model.laws
     rigidity, strain = np.ones_like(tension), np.zeros_like(tension)
-    for law, held in laws.held:
-        F = tension[..., held]
+    for law, of in laws.held:
+        F = tension[..., of]
         try:
-            rigidity[..., held] = law.rigidity(F)
+            rigidity[..., of] = law.rigidity(F)
             if arm.original_length == "unstrained":
-                strain[..., held] = law.strain(F)
+                strain[..., of] = law.strain(F)
         except ElasticityRangeError as error:
             low, high = float(F.min()), float(F.max())
             raise ElasticityRangeError(

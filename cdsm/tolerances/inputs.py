@@ -162,9 +162,9 @@ class Inputs:
         end, origin, centre = 3 * P + 6 * rows, 3 * P, 3 * P + 3 * rows
         found: dict[str, dict[str, list[tuple[int, float]]]] = {name: {} for name in _ON_DISKS}
 
-        def add(source: str, label: str, at: int, way: Iterable[float]) -> None:
+        def add(source: str, label: str, at: int, motion: Iterable[float]) -> None:
             entries = found[source].setdefault(label, [])
-            entries += [(at + r, x) for r, x in enumerate(way) if x]
+            entries += [(at + r, x) for r, x in enumerate(motion) if x]
 
         disks = arm.geometry.disks
         offsets = {name: [disk.x for disk in disks if disk.link == name] for name, *_ in disks}
@@ -202,7 +202,7 @@ class Inputs:
             self.labels[source] = tuple(inputs)
             at = [(i, n, x) for n, entries in enumerate(inputs.values()) for i, x in entries]
             matrix = np.zeros((end + 3, len(inputs)))
-            for place, n, way in at:
-                matrix[place, n] = way
+            for place, n, motion in at:
+                matrix[place, n] = motion
             maps[source] = csr_matrix(matrix)
         return maps

@@ -21,11 +21,11 @@ from cdsm.posture import Posture
 from cdsm.support.extras import need
 from cdsm.support.files import make_folder, read_text, write_file, write_text
 from cdsm.support.progress import progress_bar
-from cdsm.support.validation import flag, scalar, whole_number
+from cdsm.support.validation import flag, whole_number
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension
 from cdsm.tolerance import Tolerances
-from cdsm.tolerances.budget import Uncertainty, decimals, uncertainty
+from cdsm.tolerances.budget import Uncertainty, checked_probability, uncertainty, with_uncertainty
 from cdsm.tolerances.parts import draw_errors
 from cdsm.tolerances.question import chosen_tolerances
 from cdsm.tolerances.readings import Question, Reading
@@ -73,9 +73,7 @@ class MonteCarlo(ReadOnlyState):
         It is the probabilistically symmetric coverage interval (JCGM 101, 7.7). Raises InvalidInput
         if the probability is not between 0 and 1.
         """
-        p = scalar("probability", probability)
-        if not 0.0 < p < 1.0:
-            raise InvalidInput("probability", f"{p:g} given; a number between 0 and 1 is needed.")
+        p = checked_probability(probability)
         low, high = np.quantile(self.values, [(1.0 - p) / 2.0, (1.0 + p) / 2.0])
         return float(low), float(high)
 
@@ -144,9 +142,7 @@ class MonteCarlo(ReadOnlyState):
     @property
     def _headline(self) -> str:
         unit, size = self.budget.question.unit
-        u = self.standard_uncertainty / size
-        places = decimals(u)
-        return f"{self.mean / size:.{places}f} ± {u:.{places}f} {unit}"
+        return f"{with_uncertainty(self.mean, self.standard_uncertainty, size)} {unit}"
 
 
 def monte_carlo(
@@ -241,9 +237,9 @@ def _block(
     """Compute the readings (count,) of a block's first ``count`` arms, or read its file."""
     path = None if folder is None else folder / f"{block:06d}.npy"
     if path is not None and path.exists():
-        kept = np.load(path)
-        if kept.size >= count:
-            return np.asarray(kept[:count])
+        stored = np.load(path)
+        if stored.size >= count:
+            return np.asarray(stored[:count])
     values = question.at(_errors(question, tolerances, seed, block, count))
     if path is not None:
         write_file(path, lambda aside: np.save(aside, values))

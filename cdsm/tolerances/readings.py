@@ -239,6 +239,6 @@ def _stretched_slope(K: Stiffness, strain: Array) -> Array:
     """
     arm = K.posture.arm
     slope = np.zeros_like(strain)
-    for law, held in arm._model.laws.held:
-        slope[held] = law.rigidity_slope(K.tension[held])
+    for law, of in arm._model.laws.held:
+        slope[of] = law.rigidity_slope(K.tension[of])
     return slope * (1.0 + strain) + float(arm.original_length == "unstrained")

@@ -59,8 +59,10 @@ class Ties(NamedTuple):
 def blocks_of(pose: Posture, tension: Array) -> tuple[Posture, Array, Ties]:
     """Return the arm of blocks at a posture, its tensions, and its ties to the arm."""
     arm, chains = pose.arm, pose.segments.chains
-    held = holding(pose)
-    where = zip(chains.cable[chains.hole[held]].tolist(), chains.site[held].tolist(), strict=True)
+    sticks = holding(pose)
+    where = zip(
+        chains.cable[chains.hole[sticks]].tolist(), chains.site[sticks].tolist(), strict=True
+    )
     cuts: dict[int, list[int]] = {}
     for c, site in where:
         cuts.setdefault(c, []).append(site)

@@ -33,14 +33,14 @@ def clicked_cable(paths: Sequence[Array], origin: Array, direction: Array) -> in
     return nearest if angles[nearest] < _NEAR else None
 
 
-def _angle(start: Array, way: Array, u: Array) -> float:
+def _angle(start: Array, span: Array, u: Array) -> float:
     """Return the smallest angle [rad] between the ray u from 0 and points of a line segment.
 
-    The segment begins at ``start`` (3,) and has the vector ``way`` (3,) [m].
+    The segment begins at ``start`` (3,) and has the vector ``span`` (3,) [m].
     """
-    across, off = way - (way @ u) * u, start - (start @ u) * u
+    across, off = span - (span @ u) * u, start - (start @ u) * u
     part = float(np.clip(-(off @ across) / max(float(across @ across), 1e-300), 0.0, 1.0))
-    point = start + part * way
+    point = start + part * span
     return float(np.arctan2(np.linalg.norm(np.cross(u, point)), u @ point))
 
 

@@ -56,7 +56,7 @@ def python_lines(arm: Manipulator, setting: Setting) -> str:
     wrench = f"[{_joined(_wrench(setting), ', ')}]"
     bounds = [f"{setting.minimum:.12g}"]
     bounds += [f"{setting.maximum:.12g}"] if math.isfinite(setting.maximum) else []
-    held = [] if setting.sag or not setting.force.any() else [f"wrench={wrench}"]
+    load = [] if setting.sag or not setting.force.any() else [f"wrench={wrench}"]
     solver = [] if setting.solver == DEFAULT_SOLVER else [f"solver={setting.solver!r}"]
     if not setting.sag:
         last = "K = cdsm.stiffness(pose, tension)"
@@ -67,7 +67,7 @@ def python_lines(arm: Manipulator, setting: Setting) -> str:
     return "\n".join(
         [
             f"pose = arm.at([{_joined(setting.q.tolist(), ', ')}])",
-            f"tension = cdsm.distribute_tension({', '.join(['pose', *bounds, *held, *solver])})",
+            f"tension = cdsm.distribute_tension({', '.join(['pose', *bounds, *load, *solver])})",
             last,
         ]
     )

@@ -222,9 +222,9 @@ class _Connection(ServerConnection):
         self._guard = guard
 
     async def recv(self, decode: bool | None = None) -> Any:
-        while (kept := self._guard._permitted(await super().recv(decode=False))) is None:
+        while (message := self._guard._permitted(await super().recv(decode=False))) is None:
             pass
-        return kept
+        return message
 
 
 def _is_loopback(name: str) -> bool:

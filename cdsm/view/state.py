@@ -185,10 +185,10 @@ class Shown(ReadOnlyState):
         if self.history is not None:
             slides = self.history.sliding[-1] != 0
         where = zip(chains.cable[chains.hole], chains.site, strict=True)
-        ways = np.array([pose.cable_paths[c][i : i + 2] for c, i in where])
-        along = ways[:, 1] - ways[:, 0]
+        spans = np.array([pose.cable_paths[c][i : i + 2] for c, i in where])
+        along = spans[:, 1] - spans[:, 0]
         along *= _BEAD * pose.arm.length / np.linalg.norm(along, axis=1, keepdims=True)
-        lines = ways[:, :1] + np.stack([-along, along], axis=1)
+        lines = spans[:, :1] + np.stack([-along, along], axis=1)
         return frozen(lines[holding(pose) & ~slides]), frozen(lines[slides])
 
     @cached_property
@@ -212,8 +212,8 @@ def show(arm: Manipulator, setting: Setting) -> Shown:
     try:
         pose = arm.at(setting.q)
         force, none = np.concatenate([setting.force, np.zeros(3)]), np.zeros(6)
-        held = none if setting.sag else force
-        tension = distribute_tension(pose, setting.minimum, setting.maximum, held, setting.solver)
+        wrench = none if setting.sag else force
+        tension = distribute_tension(pose, setting.minimum, setting.maximum, wrench, setting.solver)
         K = stiffness(pose, tension)
         if setting.sag:
             if arm.has_friction:

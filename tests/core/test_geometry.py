@@ -251,6 +251,7 @@ def test_fault_names_key_value_and_what_is_allowed(case: str) -> None:
         cdsm.Geometry.universal(**{**UNIVERSAL, **changes})
     for part in expected:
         assert part in str(caught.value)
+    assert caught.value.__context__ is None  # a cluster pickles it too; pydantic's error cannot be
 
 
 GENERAL_FAULTS: dict[str, tuple[dict[str, Any], list[str]]] = {

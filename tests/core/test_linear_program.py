@@ -8,7 +8,13 @@ import scipy.optimize
 
 import cdsm
 from cdsm.measures import program
-from cdsm.support.linear_program import INFEASIBLE, OPTIMAL, UNBOUNDED, least
+from cdsm.support.linear_program import (
+    INFEASIBLE,
+    OPTIMAL,
+    UNBOUNDED,
+    least,
+    proved_largest,
+)
 from tests.support.arms import mixed_arm, random_posture
 
 
@@ -34,6 +40,17 @@ def test_interior_points_decide_what_the_simplex_method_does_not(undecided: list
     assert least(np.array([1.0, 1.0]), **rows, bounds=(2.0, None)).status == INFEASIBLE
     assert least(np.array([1.0, 1.0]), **rows, bounds=(None, 0.0)).status == UNBOUNDED
     assert undecided == ["highs", "highs-ipm"] * 3
+
+
+def test_bound_by_weak_duality_is_the_maximum_and_infeasible_programs_have_none() -> None:
+    # max 3 x + y with x + 2 y ≤ 4, x − y = 1 and 0 ≤ x, y ≤ 10: at x = 2, y = 1
+    G, h, A, b = np.array([[1.0, 2.0]]), np.array([4.0]), np.array([[1.0, -1.0]]), np.array([1.0])
+    ends = np.zeros(2), np.full(2, 10.0)
+    found, bound = proved_largest(np.array([3.0, 1.0]), G, h, A, b, *ends)
+    np.testing.assert_allclose([-found.fun, bound], 7.0, rtol=1e-12)
+    found, bound = proved_largest(np.array([3.0, 1.0]), G, -h, A, b, *ends)
+    assert found.status == INFEASIBLE
+    assert np.isnan(bound)
 
 
 def test_a_polytope_is_the_same_by_every_method(
