@@ -12,7 +12,7 @@ are computed as differences of exact first derivatives.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Final
 
 import numpy as np
@@ -75,8 +75,9 @@ def rows_and_gradients(
         links = arm.geometry.links
         value = sum(link.mass for link in links) if measure.of == "mass" else arm.geometry.length
         return np.array([value]), chain.of_links(measure.of)[None]
-    values, slopes = [], []
+    values, slopes, balanced = [], [], []
     for tension, loss in _balanced(problem, design, arm):
+        balanced.append((tension, loss))
         posed, K = chain.at(tension, loss), stiffness(tension.posture, tension)
         if not K.is_stable:
             raise SingularStiffness("the arm is unstable here.", K.critical_direction)
@@ -92,7 +93,7 @@ def rows_and_gradients(
     if not has_margin(problem, measure):
         return np.array(values), np.array(slopes)
     return (
-        np.array(values) + _margins(problem, design, measure),
+        np.array(values) + _margins(problem, measure, balanced),
         np.array(slopes) + _margin_slopes(problem, design, measure),
     )
 
@@ -115,10 +116,12 @@ def _balanced(
             yield distribute_tension(pose, *bounds, load, worst_friction=worst), loss
 
 
-def _margins(problem: DesignProblem, design: Array, measure: Measure) -> Array:
-    """Compute the margin for tolerances of each row (R,)."""
+def _margins(
+    problem: DesignProblem, measure: Measure, balanced: Iterable[tuple[Tension, Array]]
+) -> Array:
+    """Compute the margin for tolerances of each row (R,) of what :func:`_balanced` yields."""
     found = []
-    for tension, loss in _balanced(problem, design, _arm(problem, design)):
+    for tension, loss in balanced:
         cables = range(len(tension)) if measure.of == "motor_force" else (None,)
         found += [margin(problem, measure, tension, loss, c) for c in cables]
     return np.array(found)
@@ -135,7 +138,8 @@ def _margin_slopes(problem: DesignProblem, design: Array, measure: Measure) -> A
         for count, weight in weights.items():
             moved = design.copy()
             moved[n] += count * step
-            slope = slope + weight / step * _margins(problem, moved, measure)
+            balanced = _balanced(problem, moved, _arm(problem, moved))
+            slope = slope + weight / step * _margins(problem, measure, balanced)
         found.append(slope)
     return np.array(found).T
 

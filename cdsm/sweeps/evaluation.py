@@ -173,10 +173,10 @@ def _bounds(
     """
     minima = np.tile(task.minima, len(q) // len(task.minima))
     shape = len(q), len(task.arm.cables)
-    loss = np.ones(shape) if task.worst_friction else np.broadcast_to(1.0, shape)
     if not task.worst_friction:
-        low, high = np.broadcast_to(minima[:, None], shape), np.broadcast_to(task.maximum, shape)
+        low, high, loss = (np.broadcast_to(x, shape) for x in (minima[:, None], task.maximum, 1.0))
         return low, high, loss, np.broadcast_to(True, len(q))
+    loss = np.ones(shape)
     exist = batch.evaluate(task.arm, q, outputs=[], threads=threads).ok
     loss[exist] = friction_losses(task.arm, q[exist], threads)
     low, high, bounded = narrowed_bounds(task.arm, minima, task.maximum, loss)
