@@ -13,7 +13,6 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import LogLocator
 
 from cdsm.errors import InvalidInput
 from cdsm.plots.map_panels import Case, Map, cases_of, slices_of
@@ -32,6 +31,7 @@ from cdsm.plots.style import (
     caption,
     heading,
     panels,
+    plain_log_ticks,
 )
 from cdsm.support.datasets import check_sweep, status_names
 from cdsm.support.validation import one_of, whole_number
@@ -165,9 +165,7 @@ def plot_map(
     of = f"{shown} of a cell: " if shown else ""
     bar.set_label(textwrap.fill(f"{of}{name} [{unit}]{sign}", 45), fontsize=TEXT)
     if isinstance(colors.norm, LogNorm):
-        bar.ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        bar.minorticks_off()
-    bar.ax.yaxis.set_major_formatter(lambda x, _: f"{x:.4g}")
+        plain_log_ticks(bar.ax.yaxis)
     bar.ax.tick_params(which="both", labelsize=SMALL)
     # of a cloud, the slices show a part of the entries
     _legend(figure, cases if cloud else maps, maps, words)

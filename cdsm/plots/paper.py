@@ -31,6 +31,7 @@ from cdsm.plots.style import (
     heading,
     legend_below,
     panels,
+    plain_log_ticks,
     styled,
 )
 from cdsm.support.values import Array
@@ -223,6 +224,7 @@ def _plot_postures(result: paper.StiffnessFigure) -> Figure:
                     label = f"{axis}, {_LENGTHS[each.original_length]}"
                     axes.plot(_abscissa(result, each), values, color=color, label=label, **look)
             axes.set_yscale("log")
+            plain_log_ticks(axes.yaxis)
             if column == 0:
                 axes.set_ylabel(f"{reading} [N/mm]")
         axes.set_xlabel(_SWEPT[result.swept])

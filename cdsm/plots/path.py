@@ -85,7 +85,7 @@ def plot_path(
         _draw_skeleton(axes, poses[k], f"{shade:.2f}")
     draw_arm(axes, poses[-1])
     tips = MM * np.array([pose.tip[:3, 3] for pose in poses])
-    axes.plot(*tips.T, color=VERMILLION, linewidth=1.2, label="way of the tip")
+    axes.plot(*tips.T, color=VERMILLION, linewidth=1.2, label="path of the tip")
     axes.plot(*tips[-1:].T, "o", color=VERMILLION, markersize=3, label="its end")
     frame_arms(axes, limits)
     heading(figure, f"{poses[0].arm.name}: the last of {len(poses)} postures, others pale")

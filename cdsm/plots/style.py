@@ -17,7 +17,7 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 from matplotlib.transforms import Bbox
 from mpl_toolkits.mplot3d import Axes3D, proj3d  # type: ignore[import-untyped]
 
@@ -140,6 +140,13 @@ def from_zero(axes: Any, *values: Array) -> None:
     """Set the range of the y-axis of a panel: from zero to above the largest of all values."""
     highest = max((float(np.nanmax(each, initial=0.0)) for each in values), default=0.0)
     axes.set_ylim(0.0, ROOM * highest or 1.0)
+
+
+def plain_log_ticks(axis: Any) -> None:
+    """Put ticks of a logarithmic axis at 1, 2 and 5 of each decade, as plain numbers."""
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter(lambda x, _: f"{x:.4g}")
+    axis.set_minor_locator(NullLocator())
 
 
 def legend(axes: Any, **options: Any) -> Any:
