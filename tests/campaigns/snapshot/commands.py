@@ -30,6 +30,7 @@ from tests.campaigns.snapshot.models import (
 
 COMMANDS: tuple[str, ...] = ("urdf", "stiffness", "check", "weigh", "buckle", "plan", "sweep")
 COMMANDS += ("map", "view", "fit", "export", "reproduce")
+COMMANDS += ("new", "cycle", "design", "track", "identify", "warm")
 
 
 def command(*words: Any) -> str:
@@ -116,12 +117,21 @@ plan probe.toml --path bad.csv --direction 0,0,1 --target 20
 sweep probe.toml --random 20 -o sweep.nc
 sweep probe.toml --grid joint1_1=-20:20:3,joint2_1=5 --min-tension 10,40 -o sweep.csv
 sweep probe.toml --grid nothing=1:2:3 -o other.nc
+sweep probe.toml --grid joint1_1=-20:20:3 --quantities wire_safety --breaking-load 900 -o wire.csv
 map sweep.nc -o map.png --json
 map sweep.nc -o map.png --quantity nonsense
 fit test.csv --gauge-length 500 -o fitted.toml
 fit test.csv --gauge-length 500 --json
 fit test.csv --method polynomial
 fit bad.csv
+new fresh.toml --universal 3
+new fresh.toml --sections 2,3 --wire 48e3 --overwrite --json
+new probe.toml --hinged 2
+check fresh.toml --angles 5 --min-tension 30
+stiffness probe.toml --angles 5 --friction 0.1 --min-tension 30 --tolerances sure.toml
+stiffness probe.toml --angles 5 --friction 0.1 --min-tension 30 --tolerances sure.toml --json
+cycle probe.toml --angles 5 --friction 0.1 --force 0,0,-2 --min-tension 30 --steps 3 -o cycle.csv
+cycle probe.toml --angles 5 --force 0,0,-2 --min-tension 30 --steps 3 --figure cycle.txt
 view absent.toml
 view probe.toml --port nowhere
 reproduce --out probe.toml
@@ -137,6 +147,7 @@ def cli() -> Named:
     Path("tips.csv").write_text(
         "x [mm], y [mm], z [mm], target [N/m]\n160,10,-20,20e3\n160,10,-21,21e3\n"
     )
+    Path("sure.toml").write_text("rigidity = 0.05\nlead = 1e-3\n")
     Path("bad.csv").write_text("x [mm],y [mm],z [mm]\n1,2,3\n\n1,two,3\n")
     rows = "".join(f"{F / 96.0!r},{float(F)!r}\n" for F in range(2, 400, 7))
     Path("test.csv").write_text("displacement [mm],force [N]\n" + rows)

@@ -154,8 +154,9 @@ def tests_of_wires() -> Named:
 def sweeps() -> Named:
     arm, strand = probe(3, "strand", seed=3), probe(3, "linear", seed=3)
     known = attempt(cdsm.sweep, arm, np.zeros((1, arm.nv)), outputs=("?",)).known
-    asks_for_more = ("capacity_margin", "wire_strain", "wire_safety", "wire_life")  # bounds, wires
-    everything = [name for name in known if name not in asks_for_more]
+    of_wires = ("wire_strain", "wire_safety", "wire_life")
+    everything = [name for name in known if name not in ("capacity_margin", *of_wires)]
+    wire = {"diameter": 1.2e-3, "bend_diameter": 2e-2, "breaking_load": 900.0}
     first, second = arm.joint_names[0], arm.joint_names[-1]
     grid = cdsm.GridPoses({first: [-0.2, 0.1, 2.0], second: np.linspace(-0.2, 0.2, 3)})
     path = cdsm.PathPoses(np.outer([0.0, 0.4, -0.3], arm.upper), 5)
@@ -170,6 +171,12 @@ def sweeps() -> Named:
         "path": (arm, path, {"minimum": 30.0, "direction": (0.0, 1.0, 1.0)}),
         "random": (strand, cdsm.RandomPoses(20, seed=4), {"minimum": 10.0, "maximum": 300.0}),
         "bounded": (strand, grid, {"maximum": 300.0, "outputs": ("capacity_margin",)}),
+        "wires": (strand, grid, {"minimum": 20.0, "outputs": of_wires, **wire}),
+        "worst": (
+            strand.with_friction(0.1),
+            grid,
+            {"minimum": 20.0, "outputs": of_wires, "worst_friction": True, **wire},
+        ),
         "crab": (arms()["crab"](), cdsm.RandomPoses(10), {"outputs": everything}),
         "stored": (strand, grid, {"minimum": [5.0, 50.0], "store": "a.zarr", "chunk": 4}),
         "resumed": (strand, grid, {"minimum": [5.0, 50.0], "store": "a.zarr"}),
