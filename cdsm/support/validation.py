@@ -68,6 +68,9 @@ AXES: Final[dict[str, tuple[float, float, float]]] = {
 }
 """Directions that have a name, in base axes."""
 
+XYZ: Final = ("x", "y", "z")
+"""Names of the base axes."""
+
 
 def within(quantity: str, value: float, *, zero: bool = False, infinite: bool = False) -> str:
     """Return why a value is outside the range of a quantity; empty if it is inside or allowed."""

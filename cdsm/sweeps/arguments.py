@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar, final
 
@@ -12,8 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from cdsm.elasticity import Elasticity
 from cdsm.errors import InvalidInput
-from cdsm.support.validation import Direction, number_array, scalar, text, vector
-from cdsm.support.values import Array, frozen
+from cdsm.support.validation import Direction, number_array, one_of, scalar, text, vector
+from cdsm.support.values import Array, ReadOnlyState, frozen
+from cdsm.sweeps.quantities import QUANTITIES
 
 _Values = TypeVar("_Values")
 
@@ -31,7 +32,7 @@ def label(dims: tuple[str, ...], values: object, long_name: str, units: str = ""
 
 @final
 @dataclass(frozen=True, eq=False)
-class Choice(Generic[_Values]):
+class Choice(ReadOnlyState, Generic[_Values]):
     """Value or values of an argument. Several values become a dimension named after the argument.
 
     Attributes:
@@ -136,6 +137,20 @@ def vectors_of(
         raise InvalidInput(name, "is empty; give at least one.")
     names = _names(name, value) if isinstance(value, Mapping) else np.arange(len(rows))
     return Choice(name, frozen(np.array(rows)), names)
+
+
+def outputs_of(outputs: Iterable[str]) -> tuple[str, ...]:
+    """Check names of quantities: one or more, each once."""
+    if not isinstance(outputs, Iterable):
+        raise InvalidInput("outputs", f"{outputs!r} given; names are needed.")
+    names = (outputs,) if isinstance(outputs, str) else tuple(outputs)
+    if not names:
+        raise InvalidInput("outputs", f"is empty; name some of {', '.join(QUANTITIES)}.")
+    for name in names:
+        one_of("output", name, QUANTITIES)
+        if names.count(name) > 1:
+            raise InvalidInput("outputs", f"holds {name!r} twice; name it once.")
+    return names
 
 
 def _names(name: str, values: Mapping[str, object]) -> NDArray[np.str_]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -21,9 +22,11 @@ from cdsm.measures.rows import (
     measured,
     narrowed_bounds,
     payloads,
+    require,
 )
 from cdsm.measures.wire_use import life_margin, safety, strains
 from cdsm.support.values import Array, ReadOnlyState
+from cdsm.sweeps.arguments import Choice
 from cdsm.sweeps.quantities import DIRECTIONAL, QUANTITIES
 from cdsm.sweeps.status import LOST, SweepStatus
 
@@ -61,26 +64,41 @@ class SweepTask(ReadOnlyState):
         outputs: Names from :data:`~cdsm.sweeps.quantities.QUANTITIES`.
         worst_friction: Whether all segments of the cables stay within the bounds.
         diameter: Diameter of the cables [m].
-        breaking_load: Breaking load of the wire [N].
-        bend_diameter: Diameter of the bend in the holes [m].
+        breaking_load: Breaking load of the wire [N], or None.
+        bend_diameter: Diameter of the bend in the holes [m], or None.
+
+    Raises:
+        InvalidInput: An output needs an argument that is missing, or an argument is invalid.
     """
 
     arm: Manipulator
-    laws: tuple[Elasticity | None, ...]
-    wrenches: Array
-    minima: Array
+    laws: Choice[tuple[Elasticity | None, ...]]
+    wrenches: Choice[Array]
+    minima: Choice[Array]
     maximum: float
-    directions: Array
+    directions: Choice[Array]
     outputs: tuple[str, ...]
     worst_friction: bool
     diameter: float
-    breaking_load: float
-    bend_diameter: float
+    breaking_load: float | None
+    bend_diameter: float | None
+
+    def __post_init__(self) -> None:
+        require(
+            self.outputs,
+            self.arm,
+            self.maximum,
+            worst_friction=self.worst_friction,
+            diameter=self.diameter,
+            breaking_load=self.breaking_load,
+            bend_diameter=self.bend_diameter,
+        )
 
     @property
     def cases(self) -> int:
         """Return the number of cases (stiffness matrices) at each posture."""
-        return len(self.laws) * len(self.wrenches) * len(self.minima)
+        choices = self.laws.values, self.wrenches.values, self.minima.values
+        return math.prod(map(len, choices))
 
     @cached_property
     def arms(self) -> tuple[Manipulator, ...]:
@@ -89,7 +107,7 @@ class SweepTask(ReadOnlyState):
             self.arm
             if law is None
             else self.arm.with_cables([replace(each, elasticity=law) for each in self.arm.cables])
-            for law in self.laws
+            for law in self.laws.values
         )
 
 
@@ -100,7 +118,8 @@ def evaluate(task: SweepTask, q: Array, threads: int | None = None) -> BlockResu
         ``status`` (P, E, W, M), for E elasticities, W wrenches and M minima, and all outputs. An
         output has the axes among these on which it depends.
     """
-    shape = len(q), len(task.wrenches), len(task.minima)
+    wrenches = task.wrenches.values
+    shape = len(q), len(wrenches), len(task.minima.values)
     stages = {name: QUANTITIES[name].stage for name in task.outputs}
     of_pose = [name for name, stage in stages.items() if stage == "pose"]
     of_tension = [name for name, stage in stages.items() if stage == "tension"]
@@ -110,7 +129,7 @@ def evaluate(task: SweepTask, q: Array, threads: int | None = None) -> BlockResu
     # a row for each posture, wrench and minimum
     cases = shape[1] * shape[2]
     at = np.repeat(q, cases, axis=0)
-    wrench = np.tile(np.repeat(task.wrenches, shape[2], axis=0), (shape[0], 1))
+    wrench = np.tile(np.repeat(wrenches, shape[2], axis=0), (shape[0], 1))
     low, high, loss, bounded = _bounds(task, at, threads)
     one = shape[2] == 1 and not task.worst_friction  # a bound for all rows
     together = [*(name for name in of_pose if name not in MEASURED), *needed]
@@ -133,13 +152,14 @@ def evaluate(task: SweepTask, q: Array, threads: int | None = None) -> BlockResu
 
     held = _exists("tension", status)
     if of_tension:
+        load, bend = task.breaking_load or math.nan, task.bend_diameter or math.nan
         F, bounds = rows["tension"][held], (task.arm, at[held], wrench[held], low[held], high[held])
         compute: dict[str, Callable[[], Array]] = {
             "tension": lambda: F,
-            "payload": lambda: payloads(*bounds, task.directions, threads),
+            "payload": lambda: payloads(*bounds, task.directions.values, threads),
             "capacity_margin": lambda: capacity_margins(*bounds),
-            "wire_safety": lambda: safety(F * loss[held], task.breaking_load),
-            "wire_life": lambda: life_margin(F * loss[held], task.diameter, task.bend_diameter),
+            "wire_safety": lambda: safety(F * loss[held], load),
+            "wire_life": lambda: life_margin(F * loss[held], task.diameter, bend),
         }
         for name in of_tension:
             answer[name] = _spread(compute[name](), held)
@@ -171,7 +191,8 @@ def _bounds(
     The R rows have the joint angles q (R, nv). The factor is the largest ratio of two tensions
     along a cable; 1 without ``worst_friction``.
     """
-    minima = np.tile(task.minima, len(q) // len(task.minima))
+    lows = task.minima.values
+    minima = np.tile(lows, len(q) // len(lows))
     shape = len(q), len(task.arm.cables)
     if not task.worst_friction:
         low, high, loss = (np.broadcast_to(x, shape) for x in (minima[:, None], task.maximum, 1.0))
@@ -247,7 +268,7 @@ def _rows(
         tension,
         wrench,
         outputs,
-        direction=None if DIRECTIONAL.isdisjoint(outputs) else task.directions,
+        direction=None if DIRECTIONAL.isdisjoint(outputs) else task.directions.values,
         minimum=minimum,
         maximum=maximum,
         threads=threads,

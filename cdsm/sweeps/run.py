@@ -20,13 +20,22 @@ from cdsm.manipulator import Manipulator
 from cdsm.support.extras import need
 from cdsm.support.files import as_path
 from cdsm.support.progress import progress_bar
-from cdsm.support.validation import Direction, flag, whole_number
+from cdsm.support.validation import (
+    XYZ,
+    Direction,
+    flag,
+    instance,
+    unit_direction,
+    whole_number,
+    wrench_vector,
+)
+from cdsm.sweeps.arguments import bounds_of, laws_of, outputs_of, vectors_of
 from cdsm.sweeps.blocks import Block, blocks, extents, postures
 from cdsm.sweeps.cluster import checked_client, on_cluster
-from cdsm.sweeps.evaluation import BlockResult, evaluate
-from cdsm.sweeps.poses import PoseSet
+from cdsm.sweeps.evaluation import BlockResult, SweepTask, evaluate
+from cdsm.sweeps.poses import PoseSet, poses_of
 from cdsm.sweeps.quantities import DEFAULT
-from cdsm.sweeps.specification import Specification, specify
+from cdsm.sweeps.specification import Specification
 from cdsm.sweeps.status import SweepStatus
 
 if TYPE_CHECKING:
@@ -38,7 +47,6 @@ _log = logging.getLogger("cdsm")
 _NUMBERS = 2**18
 """Default number of joint angles in a block: some tenths of a second of work."""
 
-_AXES = ("x", "y", "z")
 _NO_WRENCH = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
@@ -50,7 +58,7 @@ def sweep(
     maximum: float = np.inf,
     elasticity: Elasticity | Mapping[str, Elasticity] | None = None,
     wrench: ArrayLike | Mapping[str, ArrayLike] = _NO_WRENCH,
-    direction: Direction | Sequence[Direction] | Mapping[str, Direction] = _AXES,
+    direction: Direction | Sequence[Direction] | Mapping[str, Direction] = XYZ,
     outputs: Iterable[str] = DEFAULT,
     worst_friction: bool = False,
     diameter: float = 0.0,
@@ -114,23 +122,24 @@ def sweep(
     flag("progress", progress)
     if client is not None:
         checked_client(client)
-    specification = specify(
-        arm,
-        q,
-        minimum=minimum,
+    poses = poses_of(instance("arm", arm, Manipulator), q)
+    minima, maximum = bounds_of(minimum, maximum)
+    task = SweepTask(
+        arm=arm,
+        laws=laws_of(elasticity),
+        wrenches=vectors_of("wrench", wrench, wrench_vector),
+        minima=minima,
         maximum=maximum,
-        elasticity=elasticity,
-        wrench=wrench,
-        direction=direction,
-        outputs=outputs,
+        directions=vectors_of("direction", direction, unit_direction),
+        outputs=outputs_of(outputs),
         worst_friction=worst_friction,
         diameter=diameter,
         breaking_load=breaking_load,
         bend_diameter=bend_diameter,
     )
-    cases = specification.task.cases
+    specification = Specification(task, poses)
     most = _NUMBERS // arm.nv if chunk is None else whole_number("chunk", chunk, 1)
-    extent = extents(specification.poses.sizes, most // cases)
+    extent = extents(poses.sizes, most // task.cases)
     if store is None:
         values = {name: specification.empty(name) for name in specification.variables}
         _run(specification, values, extent, client, progress)
@@ -140,7 +149,7 @@ def sweep(
 
     path = as_path(store)
     with stores.opened(path, specification, extent) as arrays:
-        kept = dict(zip(specification.poses.sizes, arrays["status"].chunks, strict=False))
+        kept = dict(zip(poses.sizes, arrays["status"].chunks, strict=False))
         _run(specification, arrays, kept, client, progress, path)
     return stores.read(path)
 

@@ -3,31 +3,27 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from cdsm.elasticity import Elasticity
 from cdsm.errors import InvalidInput
-from cdsm.manipulator import Manipulator
-from cdsm.measures.rows import require
 from cdsm.support.format import MODEL, JointUnits
-from cdsm.support.validation import Direction, instance, one_of, unit_direction, wrench_vector
-from cdsm.sweeps.arguments import bounds_of, label, laws_of, vectors_of
+from cdsm.support.validation import XYZ
+from cdsm.sweeps.arguments import Label, label
 from cdsm.sweeps.blocks import Block
 from cdsm.sweeps.description import attributes_of, law_text
 from cdsm.sweeps.evaluation import SweepTask
-from cdsm.sweeps.poses import Poses, PoseSet, poses_of
+from cdsm.sweeps.poses import Poses
 from cdsm.sweeps.quantities import QUANTITIES, Quantity
 from cdsm.sweeps.status import LOST, SweepStatus
 
 if TYPE_CHECKING:
     import xarray
-
-_AXES = ("x", "y", "z")
 
 _STATUS = Quantity("what became of the entry", "1", "joint")
 
@@ -52,19 +48,32 @@ EMPTY = {"status": np.int8(SweepStatus.PENDING)}
 
 
 @final
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False)
 class Specification:
     """Specification of a sweep.
 
     Attributes:
         task: Quantities and cases to compute at each posture.
         poses: The postures.
-        frame: Dataset of all coordinates and attributes, without variables.
     """
 
     task: SweepTask
     poses: Poses
-    frame: xarray.Dataset
+
+    @cached_property
+    def frame(self) -> xarray.Dataset:
+        """Dataset of all coordinates and attributes, without variables."""
+        import xarray
+
+        attributes = attributes_of(self.task.arm) | {"poses": self.poses.description}
+        if self.task.worst_friction:
+            attributes |= {"model": f"stiffness {MODEL}; tensions with friction", **_WORST}
+        laws = self.task.laws
+        if laws.values != (None,):
+            of = ["all cables"] if laws.names is None else laws.names.tolist()
+            texts = [law_text(law) for law in laws.values if law is not None]
+            attributes["elasticity"] = json.dumps(dict(zip(of, texts, strict=True)), indent=1)
+        return xarray.Dataset(coords=_labels(self.task, self.poses), attrs=attributes)
 
     @property
     def variables(self) -> tuple[str, ...]:
@@ -127,102 +136,36 @@ class Specification:
         )
 
 
-def specify(
-    arm: Manipulator,
-    q: PoseSet | ArrayLike,
-    *,
-    minimum: ArrayLike,
-    maximum: float,
-    elasticity: Elasticity | Mapping[str, Elasticity] | None,
-    wrench: ArrayLike | Mapping[str, ArrayLike],
-    direction: Direction | Sequence[Direction] | Mapping[str, Direction],
-    outputs: Iterable[str],
-    worst_friction: bool,
-    diameter: float,
-    breaking_load: float | None,
-    bend_diameter: float | None,
-) -> Specification:
-    """Check the arguments of :func:`~cdsm.sweeps.run.sweep`, and label all dimensions."""
-    import xarray
-
-    poses = poses_of(instance("arm", arm, Manipulator), q)
-    lows, maximum = bounds_of(minimum, maximum)
-    laws, wrenches = laws_of(elasticity), vectors_of("wrench", wrench, wrench_vector)
-    directions = vectors_of("direction", direction, unit_direction)
+def _labels(task: SweepTask, poses: Poses) -> dict[str, Label]:
+    """Return all coordinates of the Dataset: of poses, of cases, of the quantities."""
+    arm, wrenches, lows, directions = task.arm, task.wrenches, task.minima, task.directions
     force, moment = wrenches.values[:, :3], wrenches.values[:, 3:]
     labels = {
         **poses.labels,
-        **laws.labels,
+        **task.laws.labels,
         **wrenches.labels,
         "force": wrenches.label(force, ("axis",), "force on the tip, base axes", "N"),
         "moment": wrenches.label(moment, ("axis",), "moment on the tip, base axes", "N m"),
         "minimum": lows.label(lows.values, (), "lower bound of all tensions", "N"),
-        "maximum": label((), maximum, "upper bound of all tensions", "N"),
+        "maximum": label((), task.maximum, "upper bound of all tensions", "N"),
     }
-    names = _outputs(outputs)
-    wire = {
-        "diameter": diameter,
-        "breaking_load": breaking_load or 0.0,
-        "bend_diameter": bend_diameter or 0.0,
-    }
-    require(
-        names,
-        arm,
-        maximum,
-        worst_friction=worst_friction,
-        diameter=diameter,
-        breaking_load=breaking_load,
-        bend_diameter=bend_diameter,
-    )
-    labels |= {name: label((), wire[name], *_WIRE[name]) for name in _WIRE if wire[name]}
-    if any("direction" in QUANTITIES[name].dims for name in names):
-        u = directions.values
+    wire = {name: getattr(task, name) for name in _WIRE}
+    labels |= {name: label((), size, *_WIRE[name]) for name, size in wire.items() if size}
+    own = {dim for name in task.outputs for dim in QUANTITIES[name].dims}
+    if "direction" in own:
         labels |= directions.labels
         labels["direction_vector"] = directions.label(
-            u, ("axis",), "unit vector of the direction, base axes", "1"
+            directions.values, ("axis",), "unit vector of the direction, base axes", "1"
         )
     labels["gravity"] = label(("axis",), arm.gravity, "gravity, base axes", "m s-2")
-    used = {dim for dims, _, _ in labels.values() for dim in dims}
-    used |= {dim for name in names for dim in QUANTITIES[name].dims}
+    used = own | {dim for dims, _, _ in labels.values() for dim in dims}
     for dim, along, long_name in (
-        ("axis", _AXES, "axis of the base frame"),
-        ("axis_column", _AXES, "axis of the base frame, of the columns"),
-        ("cable", [cable.name for cable in arm.cables], "name of the cable"),
+        ("axis", XYZ, "axis of the base frame"),
+        ("axis_column", XYZ, "axis of the base frame, of the columns"),
+        ("cable", arm.cables.names, "name of the cable"),
         ("joint", arm.joint_names, "name of the joint"),
         ("joint_column", arm.joint_names, "joint that turns, of the columns"),
     ):
         if dim in used:
             labels[dim] = label((dim,), np.array(along), long_name)
-    attributes = attributes_of(arm) | {"poses": poses.description}
-    if worst_friction:
-        attributes |= {"model": f"stiffness {MODEL}; tensions with friction", **_WORST}
-    if laws.values != (None,):
-        of = ["all cables"] if laws.names is None else laws.names.tolist()
-        texts = [law_text(law) for law in laws.values if law is not None]
-        attributes["elasticity"] = json.dumps(dict(zip(of, texts, strict=True)), indent=1)
-    task = SweepTask(
-        arm=arm,
-        laws=laws.values,
-        wrenches=wrenches.values,
-        minima=lows.values,
-        maximum=maximum,
-        directions=directions.values,
-        outputs=names,
-        worst_friction=worst_friction,
-        **wire,
-    )
-    frame = xarray.Dataset(coords=labels, attrs=attributes)
-    return Specification(task=task, poses=poses, frame=frame)
-
-
-def _outputs(outputs: Iterable[str]) -> tuple[str, ...]:
-    if not isinstance(outputs, Iterable):
-        raise InvalidInput("outputs", f"{outputs!r} given; names are needed.")
-    names = (outputs,) if isinstance(outputs, str) else tuple(outputs)
-    if not names:
-        raise InvalidInput("outputs", f"is empty; name some of {', '.join(QUANTITIES)}.")
-    for name in names:
-        one_of("output", name, QUANTITIES)
-        if names.count(name) > 1:
-            raise InvalidInput("outputs", f"holds {name!r} twice; name it once.")
-    return names
+    return labels

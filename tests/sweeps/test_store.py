@@ -18,7 +18,7 @@ import cdsm
 from cdsm.sweeps import description, run, store
 from cdsm.sweeps.blocks import extents
 from cdsm.sweeps.evaluation import BlockResult, SweepTask, evaluate
-from cdsm.sweeps.specification import Specification, specify
+from cdsm.sweeps.specification import Specification
 from tests.support.patience import HANGS
 from tests.support.sweeps import CASES, GRID, STEEL, Deadly, short_arm
 
@@ -34,19 +34,19 @@ def whole() -> xr.Dataset:
 
 
 def specified(**changes: Any) -> Specification:
-    given: dict[str, Any] = {
-        "minimum": 9.0,
-        "maximum": np.inf,
-        "elasticity": None,
-        "wrench": np.zeros(6),
-        "direction": {"x": (1, 0, 0), "y": (0, 1, 0), "z": (0, 0, 1)},
-        "outputs": ["margin"],
-        "worst_friction": False,
-        "diameter": 0.0,
-        "breaking_load": None,
-        "bend_diameter": None,
-    }
-    return specify(short_arm(), GRID, **{**given, **changes})
+    """What a sweep gives to its store."""
+    found: list[Specification] = []
+
+    def keep(path: Path, asked: Specification, extent: Any) -> None:
+        found.append(asked)
+        raise InterruptedError
+
+    options = {"minimum": 9.0, "outputs": "margin", **changes}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(store, "opened", keep)
+        with pytest.raises(InterruptedError):
+            cdsm.sweep(short_arm(), GRID, **options, store="s")
+    return found[0]
 
 
 def kept(path: Path, **changes: Any) -> xr.Dataset:
