@@ -118,10 +118,9 @@ def clearances(
 ) -> dict[str, Array]:
     """Compute the distances of :func:`clearance` at postures q (B, nv) [rad], (B,) [m] by name.
 
-    ``diameter`` is that of all cables [m].
-
-    ``threads`` is the maximum number of threads; by default one for each core. Raises InvalidInput
-    as :func:`clearance` does, and if ``q`` is not (B, nv) numbers.
+    ``diameter`` [m] is that of all cables; ``threads`` is the largest number of threads, by default
+    one for each core. Raises InvalidInput as :func:`clearance` does, and if ``q`` is not (B, nv)
+    numbers.
     """
     angles = postures(instance("arm", arm, Manipulator), q)
     d = quantity("diameter", diameter, "length", zero=True)

@@ -12,10 +12,10 @@ from cdsm.support.validation import instance
 def tension_factor(pose: Posture) -> float:
     """Compute the tension factor [-]: the largest min(F)/max(F) of F ≥ 0 with J_Lᵀ F = 0.
 
-    1: equal tensions cause no joint torque. 0: not all cables can be taut without a load, so the
-    arm has no wrench closure (:func:`has_wrench_closure`). A linear program finds the largest
-    ratio; SolverError if it fails. Pham, Yeo, Yang and Chen, Robotics and Autonomous Systems 57
-    (2009), use the ratio of one solution, so their factor may be smaller.
+    1: equal tensions cause no joint torque. 0: there is no wrench closure
+    (:func:`has_wrench_closure`). SolverError if the linear program fails. Pham, Yeo, Yang and Chen,
+    Robotics and Autonomous Systems 57 (2009), use the ratio of one solution, so their factor may be
+    smaller.
     """
     return tension_ratio(instance("pose", pose, Posture).length_jacobian)
 

@@ -178,7 +178,7 @@ def force_polytope(
 def directions_of(jacobian: Array, length: float) -> tuple[Array, Array]:
     """Return unit directions (3, k) in which the joints move the tip, and the others (3−k, 3).
 
-    ``jacobian`` is J_X (6, nv), and ``length`` [m] that of the arm: much smaller motions are zero.
+    ``jacobian`` is J_X (6, nv); motions far below the ``length`` [m] of the arm are zero.
     """
     axes, size, _ = np.linalg.svd(jacobian[:3])
     moving = np.zeros(3, dtype=np.bool_)

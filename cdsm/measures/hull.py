@@ -72,10 +72,9 @@ def hull_of(loads: Loads) -> Hull | None:
 
 
 def _span(farthest: _Farthest, k: int) -> tuple[list[Array], list[Array], list[float]]:
-    """Return points (k,) that span a polytope, and pairs of facets where its width is zero.
+    """Return points (k,) that span a polytope, and normals and offsets of its facets of width zero.
 
-    ``farthest(u)`` returns the largest u·x in the polytope and a point x with it. A facet is given
-    by its normal and its offset, in two lists.
+    ``farthest(u)`` returns the largest u·x in the polytope, and a point x with it.
     """
     found: list[Array] = []
     normals: list[Array] = []
@@ -105,8 +104,7 @@ def _polytope(
 ) -> tuple[Array, NDArray[np.intp], Array, Array]:
     """Build corners, triangles, normals and offsets of a polytope of 2 or 3 dimensions.
 
-    ``farthest`` is that of :func:`_span`, ``points`` (n, k) are some points of the polytope, and
-    the rows of ``spanned`` an orthonormal basis of the directions that they span.
+    ``points`` (n, k) lie in it; rows of ``spanned`` are an orthonormal basis of their directions.
     """
     from scipy.spatial import ConvexHull
 

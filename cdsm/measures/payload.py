@@ -145,10 +145,7 @@ def payload(
 
 
 def largest_force(loads: Loads) -> float:
-    """Return the largest force [N] along the one direction of ``loads`` (k = 1).
-
-    It is 0 if the arm cannot balance any.
-    """
+    """Return the largest force [N] along the one direction of ``loads``; 0 if none is balanced."""
     found = loads.largest(np.ones(1), positive=True)
     return 0.0 if found is None else found[0]
 
@@ -156,10 +153,10 @@ def largest_force(loads: Loads) -> float:
 def _worst(
     polytope: ForcePolytope, compliance: Array, allowed: float
 ) -> tuple[Array, dict[str, float]]:
-    """Return the direction in which ``polytope`` or the deflection allows the least force.
+    """Return the direction of least allowed force, and the largest forces there [N].
 
-    Also return the largest forces there [N]: that of the tensions, and that of the deflection.
-    ``compliance`` is C_vv [m/N], and ``allowed`` the largest deflection [m].
+    They are those that the tensions and the deflection allow. ``compliance`` is C_vv [m/N], and
+    ``allowed`` the largest deflection [m].
     """
     tension = polytope.margin()
     values, vectors = np.linalg.eigh(compliance.T @ compliance)
@@ -186,10 +183,9 @@ def _until_unstable(
 ) -> tuple[Array, float, str]:
     """Return direction, force [N] and reason at which an arm becomes unstable under a load along u.
 
-    The reason is ``"buckling"`` (K_θ is not positive definite), or ``"elasticity"`` (K_θ is not
-    defined: one of the least tensions between the bounds ``low`` and ``high`` (C,) [N] leaves the
-    domain of its law). The force is inf if neither happens up to ``most`` [N]. With ``worst``,
-    other directions are searched too, and the one with the least force is returned.
+    The reason is ``"buckling"`` (K_θ is not positive definite) or ``"elasticity"`` (a least tension
+    leaves the domain of its law). The force is inf if neither happens up to ``most`` [N]. With
+    ``worst``, it is the least force of u and other directions.
     """
     if not K.is_stable:
         return u, 0.0, "buckling"

@@ -43,10 +43,7 @@ class Loads(NamedTuple):
 
     @classmethod
     def of(cls, pose: Posture, low: Array, high: Array, wrench: Array, directions: Array) -> Self:
-        """Build the balance of a posture; U (3, k) are directions.
-
-        ``low`` and ``high`` (C,) [N] are checked bounds of the tensions.
-        """
+        """Build the balance of a posture from directions U (3, k) and bounds (C,) [N]."""
         torque = pose.jacobian.T @ wrench - pose.gravity_torque
         motion = pose.jacobian[:3].T @ directions
         return cls.scaled(pose.length_jacobian, motion, torque, low, high, pose.arm.length)
@@ -55,11 +52,7 @@ class Loads(NamedTuple):
     def scaled(
         cls, J: Array, motion: Array, torque: Array, low: Array, high: Array, length: float
     ) -> Self:
-        """Build the balance from J_L (C, nv), ``motion`` J_vᵀ U (nv, k) and the torque (nv,).
-
-        ``low`` and ``high`` (C,) [N] are the bounds of the tensions; ``length`` is that of the
-        arm [m].
-        """
+        """Build the balance from J_L, ``motion`` J_vᵀ U (nv, k), torque and bounds (C,) [N]."""
         A, b, low, high, arm, force = tension_kernels.scaled_balance(J, torque, low, high, length)
         columns = np.hstack([A, -motion / arm])
         # HiGHS drops entries below 1e-9, so each column is scaled by its own largest entry

@@ -39,10 +39,7 @@ def require(
     breaking_load: float | None,
     bend_diameter: float | None,
 ) -> None:
-    """Raise InvalidInput if the measures ``names`` lack an argument, or an argument is invalid.
-
-    The other arguments are those of :func:`~cdsm.sweep`.
-    """
+    """Raise InvalidInput if measures lack an argument of :func:`~cdsm.sweep`, or it is invalid."""
     if flag("worst_friction", worst_friction) and not arm.has_friction:
         raise InvalidInput(
             "worst_friction",
@@ -69,10 +66,7 @@ def measured(
     diameter: float = 0.0,
     threads: int | None = None,
 ) -> dict[str, Array]:
-    """Compute measures of :data:`MEASURED` at postures q (B, nv); return (B,) for each name.
-
-    ``diameter`` is that of all cables [m].
-    """
+    """Compute measures of :data:`MEASURED` at postures q (B, nv); return (B,) for each name."""
     found: dict[str, Array] = {}
     if any(name in KINDS for name in names):
         found |= clearances(arm, q, diameter, threads=threads)
@@ -83,10 +77,7 @@ def measured(
 
 
 def friction_losses(arm: Manipulator, q: Array, threads: int | None = None) -> Array:
-    """Compute exp(Σ μ φ) (B, C) [-] of each cable at postures q (B, nv).
-
-    It is the largest ratio of two tensions along a cable.
-    """
+    """Compute exp(Σ μ φ) (B, C) [-], the largest ratio of tensions along a cable, at q (B, nv)."""
     model, grip = arm._model, np.empty((len(q), len(arm.cables)))
     *routing, _, hole, own = model.chain_arrays
     holes = hole, own, model.chains.cable[hole], model.chains.friction
@@ -101,11 +92,11 @@ def friction_losses(arm: Manipulator, q: Array, threads: int | None = None) -> A
 def narrowed_bounds(
     arm: Manipulator, minimum: ArrayLike, maximum: ArrayLike, loss: Array
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Narrow the bounds ``minimum`` and ``maximum`` by :func:`friction_losses`, ``loss`` (B, C).
+    """Narrow the bounds so that every segment of a cable is within them, if ``loss`` is (B, C).
 
-    Each is (), (B,) or (B, C) [N]. Every segment of a cable is then within the given bounds. Return
-    the lower and upper bounds (B, C) [N], and whether the narrowed bounds of each posture are
-    consistent (B,): no lower bound above the upper one. Other postures keep the given bounds.
+    ``loss`` are :func:`friction_losses`; the bounds are (), (B,) or (B, C) [N]. Return the lower
+    and upper bounds (B, C) [N], and whether they exist at each posture (B,). Other postures keep
+    the given bounds.
     """
     given = _each_bound(arm, minimum, maximum, loss.shape)
     low, high = given[0] * loss, given[1] / loss
@@ -123,10 +114,9 @@ def payloads(
     directions: Array,
     threads: int | None = None,
 ) -> Array:
-    """Compute the largest forces (B, D) [N] that the bounds of the tensions allow.
+    """Compute the largest forces (B, D) [N] along unit directions (D, 3) that the bounds allow.
 
-    Each of the postures q (B, nv) has a wrench (B, 6). ``minimum`` and ``maximum`` are (), (B,) or
-    (B, C) [N]. The unit directions of the forces are (D, 3).
+    Each of the postures q (B, nv) has a wrench (B, 6). The bounds are (), (B,) or (B, C) [N].
     """
     JX, J, torque, low, high = _balances(arm, q, wrench, minimum, maximum, threads)
     motion = np.einsum("nij,di->ndj", JX[:, :3], directions)
@@ -167,10 +157,7 @@ def _balances(
     maximum: ArrayLike,
     threads: int | None,
 ) -> tuple[Array, Array, Array, Array, Array]:
-    """Return J_X, J_L, the torques J_Xᵀ W − g, and lower and upper bounds (B, C) [N] of postures.
-
-    Arguments are those of :func:`payloads`.
-    """
+    """Return J_X, J_L, J_Xᵀ W − g and both bounds of :func:`payloads`, one of each per posture."""
     names = ("jacobian", "length_jacobian", "gravity_torque")
     found = evaluate(arm, q, outputs=names, check_limits=False, threads=threads)
     JX, J, g = (found[name] for name in names)
@@ -181,10 +168,7 @@ def _balances(
 def _each_bound(
     arm: Manipulator, minimum: ArrayLike, maximum: ArrayLike, shape: tuple[int, int]
 ) -> tuple[Array, Array]:
-    """Return ``minimum`` and ``maximum``, checked, with the ``shape`` (B, C) [N].
-
-    They may be (), (B,), one for each posture, or (B, C).
-    """
+    """Return bounds that are (), (B,) or (B, C) [N], checked, with the ``shape`` (B, C)."""
     bounds = (np.asarray(bound, dtype=np.float64) for bound in (minimum, maximum))
     low, high = (np.broadcast_to(b[:, None] if b.ndim == 1 else b, shape) for b in bounds)
     return checked_bounds(arm, low, high, shape[0])

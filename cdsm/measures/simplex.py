@@ -28,8 +28,7 @@ _AT_LOW, _AT_HIGH, _FREE, _BASIC = 0, 1, 2, 3
 def single_largest(cost: Array, A: Array, b: Array, low: Array, high: Array, x: Array) -> bool:
     """Maximise cost · x with A x = b, low ≤ x ≤ high; return whether x is proved to be best.
 
-    False if no x exists, if the cost has no largest value, or if rounding is too large. Entries of
-    ``cost`` and ``A`` are of order one.
+    False if there is no largest value, or rounding is too large. ``cost`` and A are of order one.
     """
     m, n = A.shape
     state = np.empty(n, dtype=np.intp)
@@ -140,8 +139,7 @@ def _proved(
 ) -> bool:
     """Correct x by its residual; return whether it then meets the conditions of a maximum.
 
-    The program is that of :func:`single_largest`. ``state``, ``basis``, ``inverse`` and ``price``
-    are those of the simplex method at x.
+    ``state``, ``basis``, ``inverse`` and ``price`` are those of :func:`single_largest` at x.
     """
     m, n = A.shape
     left, size = b.copy(), np.abs(b)
@@ -186,9 +184,8 @@ def payload_rows(
 ) -> None:
     """Fill ``force`` (B, D) [N] with the largest forces of B postures along D directions u.
 
-    J is J_L (B, C, nv), ``torque`` J_Xᵀ W − g (B, nv), ``motion`` J_vᵀ u (B, D, nv); ``low`` and
-    ``high`` are the bounds (B, C) [N], and ``reach`` is the length of the arm [m]. The force is NaN
-    where the method proves none.
+    J is J_L (B, C, nv), ``torque`` J_Xᵀ W − g (B, nv), ``motion`` J_vᵀ u (B, D, nv), ``reach`` the
+    length of the arm [m]. The bounds are (B, C) [N]. NaN: the method proves no force.
     """
     rows, count, nv = J.shape
     columns, x = np.empty((nv, count + 1)), np.empty(count + 1)

@@ -62,7 +62,7 @@ class Admissible:
         ]
 
     def piece(self, F: Array) -> tuple[Array, Array]:
-        """Return bounds (C,) [N] around F (C,) [N] between which no rigidity has a kink.
+        """Return the bounds (C,) [N] of the range without kinks that contains F (C,) [N].
 
         A tension exactly at a kink belongs to the range below it, and so does the slope there.
         """
@@ -79,10 +79,7 @@ class Admissible:
         return np.asarray(self.rows @ (self.least.values - F))
 
     def nearest(self, wanted: Array, low: Array, high: Array) -> Array | None:
-        """Return the balancing tensions (C,) [N] from ``low`` to ``high`` nearest to ``wanted``.
-
-        Returns None if no tensions in these bounds (C,) [N] balance the arm.
-        """
+        """Return the balancing tensions (C,) [N] in the bounds nearest to ``wanted``, or None."""
         size = max(self.scale, float(abs(wanted).max()))
         found = solve(
             np.eye(wanted.size),
@@ -155,8 +152,8 @@ def solve(
 ) -> Optimum | None:
     """Solve min ½xᵀPx + qᵀx with A x = b, low ≤ x ≤ high and G x ≤ h; return None on failure.
 
-    ``P`` is positive definite, ``equations`` are A and b, ``bounds`` low and high, ``cuts`` G and
-    h. DAQP is called directly: through qpsolvers a plan takes a quarter longer.
+    ``equations`` are A and b, ``cuts`` G and h. P is positive definite. DAQP is called directly:
+    through qpsolvers a plan takes a quarter longer.
     """
     (A, b), (low, high) = equations, bounds
     G, h = cuts if cuts is not None else (A[:0], b[:0])

@@ -10,7 +10,7 @@ from cdsm.planning.admissible import Admissible
 from cdsm.planning.path_plan import InfeasibleSample
 from cdsm.planning.planner import Planner
 from cdsm.planning.sqp import EFFORT, Program, search
-from cdsm.planning.stiffness_model import Constraints, ConstraintValues, StiffnessModel
+from cdsm.planning.stiffness_model import Constraints, StiffnessModel
 from cdsm.support.values import Array
 
 _MISSED = (
@@ -71,11 +71,7 @@ class Follower:
     def _near(
         self, region: Admissible | None, sample: Sample, other: Sample | None
     ) -> Admissible | None:
-        """Return the tensions of ``region`` that are within the rate of the ``other`` sample.
-
-        The rate is multiplied by the number of steps between the two samples. None means no region
-        or no limit.
-        """
+        """Return the tensions of ``region`` that the rate allows between a sample and ``other``."""
         if region is None or other is None:
             return region
         return region.within(self.rate * abs(other.index - sample.index), other.F)
@@ -83,35 +79,22 @@ class Follower:
     def _search(
         self, sample: Sample, region: Admissible | None, start: Array, centre: Array | float = 0.0
     ) -> Sample | None:
-        """Plan a sample by one search in ``region`` for the tensions nearest to ``centre``.
-
-        The search begins at ``start`` (C,) [N]; ``centre`` is (C,) [N] or 0. Returns None if the
-        result misses the target.
-        """
-        if region is None:
-            return None
+        """Plan a sample by :func:`_search`; None if the result misses the target."""
         found = _search(sample.model, region, sample.constraints, start, centre)
-        if found is None or not found[0].met(found[1]):
-            return None
-        return replace(sample, F=region.tension(found[1].evaluation.F).values)
+        return replace(sample, F=found[0]) if found and found[1] else None
 
     def _from_scratch(self, sample: Sample) -> Sample | None:
-        """Plan ``sample`` with the least tensions that hit its target, with an unlimited rate.
-
-        Returns None if several targets cannot be hit together; one target raises
-        UnreachableStiffness.
-        """
+        """Plan a sample alone, as :meth:`Planner.least`; None if it cannot hit all targets."""
         found = Planner(sample.model, sample.constraints, self.starts, self.seed).least()
         if found is None:
             return None
         return replace(sample, F=sample.model.region.tension(found.evaluation.F).values)
 
     def _replan_towards(self, goal: Sample) -> bool:
-        """Plan the last samples again to lead to ``goal`` within the rate; return success.
+        """Plan the last samples again, backwards, to lead to ``goal``; return success.
 
-        The loop goes backwards from the last sample. Each sample stays within the rate of its
-        successor and comes as near as possible to its predecessor. The loop ends when a sample is
-        within the rate of both.
+        Each sample stays within the rate of its successor and comes as near as possible to its
+        predecessor. The loop ends when a sample is within the rate of both.
         """
         later = [goal]
         for k in reversed(range(max(len(self.planned) - _BACK, 0), len(self.planned))):
@@ -144,37 +127,34 @@ class Follower:
 def least_change(
     model: StiffnessModel, constraints: Constraints, before: Array, rate: Array
 ) -> Array | None:
-    """Return tensions (C,) [N] that meet ``constraints``, nearest to ``before`` (C,) [N].
+    """Return the tensions (C,) [N] within ``rate`` of ``before`` that meet ``constraints``.
 
-    They differ from ``before`` at most by ``rate`` (C,) [N]. If none meet the constraints, return
-    the tensions of least miss that one search finds. Return None if the search has no stable
-    tensions within the rate to begin with.
+    Of several, they are nearest to ``before``. If none meet the constraints, they are those of
+    least miss that one search finds. None if it finds no stable tensions to begin with.
     """
-    region = model.region.within(rate, before)
-    found = None if region is None else _search(model, region, constraints, before, before)
-    if region is None or found is None:
-        return None
-    return region.tension(found[1].evaluation.F).values
+    found = _search(model, model.region.within(rate, before), constraints, before, before)
+    return found[0] if found else None
 
 
 def _search(
     model: StiffnessModel,
-    region: Admissible,
+    region: Admissible | None,
     constraints: Constraints,
     start: Array,
     centre: Array | float,
-) -> tuple[Program, ConstraintValues] | None:
+) -> tuple[Array, bool] | None:
     """Search ``region`` once for the tensions nearest to ``centre`` that meet ``constraints``.
 
-    The search begins at the tensions of ``region`` nearest to ``start`` (C,) [N].
-    Return the program and the result; None if no stable tensions to begin with are found.
+    The search begins at the tensions nearest to ``start``. All tensions are (C,) [N]. Return the
+    result, and whether it meets the constraints; None if there is no stable point to begin with.
     """
-    F = region.nearest(start, region.low, region.high)
-    if F is None:
+    F = None if region is None else region.nearest(start, region.low, region.high)
+    if region is None or F is None:
         return None
     point = model.at(F)
     if point.reserve <= 0.0:
         return None
     unit = max(region.scale, float(point.F.max()))
     program = Program(region, point, constraints, EFFORT, unit, centre)
-    return program, search(program, point)
+    found = search(program, point)
+    return region.tension(found.evaluation.F).values, program.met(found)

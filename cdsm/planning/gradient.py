@@ -47,8 +47,8 @@ class StiffnessGradient(ReadOnlyState):
     def margin(self) -> Array:
         """∂λ_min/∂F = vᵀ ∂K_θ/∂F v (C,) [m/rad²], where v is the critical direction.
 
-        A multiple eigenvalue has no gradient. Then this is the gradient of vᵀ K_θ v for one v of
-        its eigenspace. It is an upper bound for the change of the smallest eigenvalue.
+        A multiple eigenvalue has no gradient. Then this is an upper bound of its change, for one v
+        of its eigenspace.
         """
         v = self.stiffness.critical_direction[:, None]
         return frozen(self._projected(v, v)[:, 0, 0])

@@ -56,9 +56,8 @@ def half_way(
 ) -> HalfWay:
     """Compute the arm half-way between sample number ``index`` and the next sample.
 
-    ``ends`` are the stiffnesses of both samples. ``unstrained`` (H,) [m] and ``target`` [N/m] are
-    the means of their l_0 and their targets. ``directions`` are (3,) or (n, 3), None for
-    ``cartesian``.
+    ``ends`` are the stiffnesses of both samples; l_0 (H,) [m] ``unstrained`` and ``target`` [N/m]
+    are means. ``directions`` are (3,) or (n, 3), None for ``cartesian``.
     """
     K, value, off, reason = None, None, math.inf, ""
     try:
@@ -73,10 +72,7 @@ def half_way(
 
 
 def _at_rest(ends: tuple[Stiffness, Stiffness], unstrained: Array) -> Stiffness:
-    """Compute K_θ at the equilibrium near the mean posture of ``ends``.
-
-    ``unstrained`` (H,) [m] are the unstretched lengths l_0 of the position-controlled cables.
-    """
+    """Compute K_θ at the equilibrium near the mean posture, with l_0 ``unstrained`` (H,) [m]."""
     one, other = ends
     q = (one.posture.q + other.posture.q) / 2.0
     F = frozen((one.tension + other.tension) / 2.0)

@@ -21,10 +21,9 @@ _CURVATURE = 1e-6  # curvatures below this part of the largest are raised to it
 def stiffness_at(
     constant: Array, hessian: Array, length_jacobian: Array, tension: Array, springs: Array
 ) -> tuple[Array, Array, Array]:
-    """Return K_θ = constant + Σ (F_c H_c + k_c J_c J_cᵀ), F ``tension``, k ``springs``, both (C,).
+    """Return K_θ = constant + Σ (F_c H_c + k_c J_c J_cᵀ), and its eigenvalues and eigenvectors.
 
-    ``constant`` (nv, nv) are the terms of gravity and load. Also return the eigenvalues and the
-    eigenvectors (columns) of the symmetric part.
+    They are those of the symmetric part. ``constant`` (nv, nv) are the terms of gravity and load.
     """
     K = constant.copy()
     count, nv = length_jacobian.shape
@@ -39,10 +38,7 @@ def stiffness_at(
 
 @compiled
 def _inverse(A: Array) -> Array:
-    """Return A⁻¹ of a regular matrix, with the same bits whether numba or Python runs this.
-
-    With ``np.linalg.inv`` the last bits would differ.
-    """
+    """Return A⁻¹; unlike ``np.linalg.inv``, with the same bits in numba and in Python."""
     n = len(A)
     M = np.zeros((n, 2 * n, 1))
     for i in range(n):
@@ -55,10 +51,7 @@ def _inverse(A: Array) -> Array:
 
 @compiled
 def tip_stiffness(K: Array, rows: Array) -> tuple[Array, Array, Array, Array]:
-    """Return X = (R K_θ⁻¹ Rᵀ)⁻¹, K_θ⁻¹ Rᵀ X, K_θ⁻ᵀ Rᵀ Xᵀ and K_θ⁻¹ of a regular K_θ.
-
-    R is ``rows`` (r, nv), rows of the tip Jacobian.
-    """
+    """Return X = (R K_θ⁻¹ Rᵀ)⁻¹, K_θ⁻¹ Rᵀ X, K_θ⁻ᵀ Rᵀ Xᵀ and K_θ⁻¹, with R = ``rows`` (r, nv)."""
     inverse = _inverse(K)
     soft = np.dot(inverse, rows.T)
     X = _inverse(np.dot(rows, soft))
@@ -109,10 +102,7 @@ def form_by_tension(
 def constraint_jacobian(
     hessian: Array, length_jacobian: Array, slope: Array, weights: Array, left: Array, right: Array
 ) -> Array:
-    """Return E_j : leftᵀ (∂K_θ/∂F_c) right (n, C) for weights E (n, r, r).
-
-    A : B is the sum of A_ab B_ab.
-    """
+    """Return Σ_ab E_ab (leftᵀ (∂K_θ/∂F_c) right)_ab (n, C) for each of the weights E (n, r, r)."""
     rates = form_by_tension(hessian, length_jacobian, slope, left, right)
     result = np.zeros((weights.shape[0], rates.shape[0]))
     for n in range(weights.shape[0]):
@@ -135,10 +125,7 @@ def constraint_hessian(
     left: Array,
     right: Array,
 ) -> Array:
-    """Return ∂²(Σ Y_ij X_ij)/∂F² (C, C) for weights Y (r, r).
-
-    X, ``right``, ``left`` and ``inverse`` are the results of :func:`tip_stiffness` for ``rows``.
-    """
+    """Return ∂²(Σ Y_ij X_ij)/∂F² (C, C) for weights Y (r, r) and X of :func:`tip_stiffness`."""
     left_torques = _torques_by_tension(hessian, length_jacobian, slope, left)
     right_torques = _torques_by_tension(hessian, length_jacobian, slope, right)
     count, nv, r = right_torques.shape
@@ -169,8 +156,8 @@ def constraint_hessian(
 def convex(W: Array, null: Array, normals: Array) -> Array:
     """Return a positive definite matrix that equals W on the admissible steps if W is convex there.
 
-    Admissible steps keep the balance (columns of ``null`` (C, p) are an orthonormal basis) and do
-    not change constraints, to first order (rows of ``held`` (n, C) are the gradients).
+    Admissible steps keep the balance (columns of ``null`` (C, p) are an orthonormal basis) and, to
+    first order, the constraints with the gradients ``normals`` (n, C).
     """
     count, p = null.shape
     inner = np.dot(np.ascontiguousarray(null.T), np.dot(W, null))

@@ -26,10 +26,7 @@ def checked_starts(starts: object, seed: object) -> tuple[int, int]:
 def target_constraints(
     model: StiffnessModel, directions: Array | None, target: Array
 ) -> Constraints:
-    """Build constraints of the tensions of ``model``: a target [N/m] of ``along`` or ``cartesian``.
-
-    It is of ``along`` for ``directions`` (3,) or (n, 3), of ``cartesian`` if they are None.
-    """
+    """Build the constraints of a target [N/m] of ``along``; of ``cartesian`` without directions."""
     K = stiffness(model.pose, model.region.least)
     if directions is None:
         _ = K.cartesian  # raises if it does not exist
@@ -55,13 +52,9 @@ def cartesian_constraints(model: StiffnessModel, target: Array) -> Constraints:
 
     They are 6 values, whose norm is that of the symmetric part of the matrix (3, 3).
     """
-    weights = []
-    for i in range(3):
-        for j in range(i, 3):
-            E = np.zeros((3, 3))
-            E[i, j] = E[j, i] = 1.0 if i == j else np.sqrt(0.5)
-            weights.append(E)
-    E = np.array(weights) / np.linalg.norm(target)
+    k, (i, j), E = np.arange(6), np.triu_indices(3), np.zeros((6, 3, 3))
+    E[k, i, j] = E[k, j, i] = np.where(i == j, 1.0, np.sqrt(0.5))
+    E /= np.linalg.norm(target)
     part = Constraint(model.pose.jacobian[:3].copy(), E)
     return Constraints((part,), np.tensordot(E, target))
 
@@ -75,10 +68,7 @@ def achieved(K: Stiffness, directions: Array | None) -> Array:
 
 
 def misfit(achieved: Array, target: Array, directions: Array | None) -> float:
-    """Return how far ``achieved`` is from ``target`` [-]; see :attr:`cdsm.StiffnessPlan.misfit`.
-
-    Both are ``cartesian`` [N/m] if ``directions`` is None, else ``along``.
-    """
+    """Return how far ``achieved`` is from ``target`` [-]; see :attr:`cdsm.StiffnessPlan.misfit`."""
     if directions is None:
         off = (achieved + achieved.T) / 2.0 - target
         return float(np.linalg.norm(off) / np.linalg.norm(target))
@@ -86,10 +76,7 @@ def misfit(achieved: Array, target: Array, directions: Array | None) -> float:
 
 
 def unstable(arm: Manipulator, problem: str, mode: Array) -> SingularStiffness:
-    """Build the error of an arm that no tensions make stable; it begins with ``problem``.
-
-    ``mode`` (nv,) is the softest joint motion.
-    """
+    """Build the error of an arm that no tensions make stable; its softest motion is ``mode``."""
     mode = mode * np.sign(mode[abs(mode).argmax()])
     remedy = "Change the bounds, the posture or the load, take stiffer cables, or lower margin."
     if all(cable.control == "force" for cable in arm.cables):
@@ -100,10 +87,7 @@ def unstable(arm: Manipulator, problem: str, mode: Array) -> SingularStiffness:
 
 
 def checked_targets(directions: Array | None, target: ArrayLike) -> Array:
-    """Check and return ``target``, the wanted stiffness at one posture [N/m].
-
-    It is one value for each direction, () or (m,), or a (3, 3) matrix if no direction is given.
-    """
+    """Check and return the wanted stiffness [N/m]: one per direction, or (3, 3) without any."""
     targets = number_array("target", target)
     if directions is None and targets.shape != (3, 3):
         raise InvalidInput(

@@ -187,10 +187,7 @@ def checked_rate(arm: Manipulator, rate: ArrayLike) -> Array:
 
 
 def _per_sample(name: str, value: ArrayLike, tail: tuple[int, ...], size: int) -> Array:
-    """Return one value per sample (S, …) from a value for all samples or one for each.
-
-    A value has the shape ``tail``; there are ``size`` = S samples.
-    """
+    """Return one value per sample (S, …); given is one of shape ``tail`` for all, or (S, …)."""
     given = number_array(name, value)
     if given.shape not in (tail, (size, *tail)):
         raise InvalidInput(

@@ -110,9 +110,8 @@ class PathPlan(ReadOnlyState):
     def unstrained_lengths(self) -> Array:
         """Unstretched lengths l_0 (P, H) [m] paid out by motors of H position-controlled cables.
 
-        l_0 + Δl(F, l_0) = L, with Δl of :meth:`~cdsm.Cable.elongation`: l_0 is the length at the
-        low end of the domain of the elasticity, with the series spring at rest. It does not depend
-        on ``original_length`` of the arm, which only affects K_θ.
+        l_0 + Δl(F, l_0) = L, with Δl of :meth:`~cdsm.Cable.elongation`. They do not depend on
+        ``original_length`` of the arm, which only affects K_θ.
         """
         motors = CableLaws(self.arm.cables, "unstrained")
         pairs = zip(self.cable_lengths, self.tensions, strict=True)
@@ -121,10 +120,9 @@ class PathPlan(ReadOnlyState):
 
     @cached_property
     def between(self) -> tuple[HalfWay, ...]:
-        """Arm half-way between each two consecutive planned samples.
+        """Arm half-way between each two consecutive planned samples; motors move at constant speed.
 
-        The motors move at constant speed between samples. Half the step gives a quarter of the
-        misfit. The first use takes some milliseconds per pair.
+        Half the step gives a quarter of the misfit. The first use takes some milliseconds per pair.
         """
         pairs = list(zip(self.planned, self.planned[1:], strict=False))
         l_0, targets = self.unstrained_lengths, self.target

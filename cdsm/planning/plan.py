@@ -85,8 +85,7 @@ class StiffnessPlan(ReadOnlyState):
     def plot(self, attainable: StiffnessRange | None = None) -> Figure:
         """Plot the planned tensions [N], between those of the softest and the stiffest arm.
 
-        ``attainable`` is the range of stiffness of this posture and direction; another range raises
-        InvalidInput.
+        InvalidInput if ``attainable`` is the range of another posture or direction.
         """
         from cdsm.plots import plot_stiffness_plan  # matplotlib imports slowly
 

@@ -55,8 +55,7 @@ class Planner:
     def least(self) -> ConstraintValues | None:
         """Return the constraint values at the tensions of least ‖F‖ that hit all targets.
 
-        If there are none, returns None for several targets, and raises UnreachableStiffness for
-        one.
+        If there are none, return None for several targets, and raise UnreachableStiffness for one.
         """
         found = self._best(self._starts())
         if found is None and self.constraints.single is not None:
@@ -64,10 +63,7 @@ class Planner:
         return found
 
     def nearest(self) -> ConstraintValues:
-        """Return the constraint values at the tensions with the least sum of squared misses.
-
-        If several tensions have it, these are the tensions of least ‖F‖.
-        """
+        """Return the constraint values where the sum of squared misses, then ‖F‖, is least."""
         program = replace(self.program, objective=NEAREST)
 
         def misses(place: ConstraintValues) -> float:
@@ -82,10 +78,10 @@ class Planner:
         return least if smaller else best
 
     def _within_range(self, u: Array, target: float) -> ConstraintValues:
-        """Return the constraint values at the least tensions, by ‖F‖, that hit ``target`` [N/m].
+        """Return the constraint values at the least tensions that hit ``target`` [N/m] along u.
 
-        The target is along ``u`` (3,). Raises UnreachableStiffness if it is beyond the range that
-        searches find, or if no tensions that they find hit it.
+        Raises UnreachableStiffness if the target is beyond the range that searches find, or not
+        hit.
         """
         softest, stiffest = range_ends(self.model, u, _RANGE_STARTS, self.seed)
         low = 0.0 if softest.open else softest.value
@@ -154,10 +150,7 @@ class Planner:
     def _crossings(
         self, hub: Evaluation, others: list[Evaluation], precision: float = 1e-2
     ) -> list[Evaluation]:
-        """Find stable points that hit the single target, on lines from ``hub`` to the other points.
-
-        The points are sorted by effort. ``precision`` is that of the position on the line.
-        """
+        """Find stable points that hit the target, on lines from ``hub``; least effort first."""
         at_hub, guesses = self._miss(hub), []
         for other in others:
             at_other, step = self._miss(other), other.F - hub.F
@@ -177,10 +170,7 @@ class Planner:
         return sorted(stable, key=lambda point: float(point.F @ point.F))
 
     def _bridges(self, seen: list[ConstraintValues]) -> list[Evaluation]:
-        """Find stable points that hit the target, on lines between the nearest of ``seen``.
-
-        One end of each line is below the target, the other above it.
-        """
+        """Find stable points that hit the target, between the nearest below and above it."""
         order = sorted(seen, key=lambda place: float(abs(place.values[0])))
         below = [place.evaluation for place in order if place.values[0] < 0.0][:_SIDES]
         above = [place.evaluation for place in order if place.values[0] > 0.0][:_SIDES]

@@ -193,9 +193,8 @@ def range_ends(
 ) -> tuple[RangeEnd, RangeEnd]:
     """Find the lowest and the highest stiffness of ``model`` along a unit direction ``u`` (3,).
 
-    Each is the best result of several searches; ``starts`` and ``seed`` are those of
-    :func:`stiffness_range`. If tensions are unbounded, a cap on them rises until both results lie
-    below it, or to its largest value.
+    If tensions are unbounded, a cap on them rises until both lie below it, or to its largest value.
+    ``starts`` and ``seed`` are as for :func:`stiffness_range`.
     """
     region = model.region
     if np.isfinite(region.high).all():
@@ -247,10 +246,7 @@ def _bounded_ends(
 
 
 def _rigidities_rise(region: Admissible) -> bool:
-    """Return whether the rigidity of every cable never falls between its bounds in ``region``.
-
-    False for user-defined laws, which cannot be checked between samples.
-    """
+    """Return whether all rigidities rise within the bounds; False for user-defined laws."""
     cables = region.least.posture.arm.cables
     for cable, low, high in zip(cables, region.low, region.high, strict=True):
         law = cable.elasticity

@@ -3,8 +3,9 @@ r"""Sequential quadratic programming over the admissible tensions of a stable ar
     min f(F)   subject to   c(F) = 0,  J_Lᵀ F = τ,  low ≤ F ≤ high,  λ_min(K_θ(F)) ≥ floor.
 
 Only c and the last condition are nonlinear. Every iterate balances the arm and is stable, so K_θ
-can be inverted there. scipy's SLSQP with differences is three times as slow
-(tests/benchmarks/test_planning_speed.py).
+can be inverted there. scipy's SLSQP with the same gradients ends at the same ‖F‖, but needs twice
+the evaluations, sometimes a hundred times as many. With gradients by differences it takes three
+times as long (tests/benchmarks/test_planning_speed.py).
 
 **The quadratic program of a step.** Let d = ΔF/size, g = ∂f/∂d and G = ∂c/∂d. The Lagrangian is
 L = f + y·c − z·reserve, with the multipliers y and z of the step before. Solve
@@ -13,26 +14,24 @@ L = f + y·c − z·reserve, with the multipliers y and z of the step before. So
     subject to  J_Lᵀ d = 0,  c + G d = s − t,  s, t ≥ 0,  reserve + ∂reserve·d ≥ 0,
              bounds,  |d_c| ≤ radius.
 
-s and t are the positive and the negative violations of c, and ρ is their weight. With them the
-program has a solution even if the linearized c cannot be met ("elastic mode"). The penalty weight ρ
-(``price``) makes the penalty exact if it exceeds the largest multiplier of c. It rises tenfold
-until c is met, or until a rise does not help. Once c is met, it falls to three times the
-multiplier: a large ρ shortens the steps along a curved c.
+s and t are the positive and the negative violations of c. Their weight ρ (``price``) makes the
+penalty exact if it exceeds the largest multiplier of c. It rises tenfold until c is met, or until a
+rise does not help. Then it falls to three times the multiplier: a large ρ shortens the steps along
+a curved c.
 
-**The curvature W.** W is the exact Hessian of L, with the second derivatives of K_θ⁻¹ and λ_min,
-made positive definite by :func:`cdsm.planning.kernels.convex` on the steps that keep the balance, c
-and, if z > 0, the reserve. If it is so already, the last steps converge quadratically.
+**The curvature W.** W is the exact Hessian of L, made positive definite by
+:func:`cdsm.planning.kernels.convex` on the steps that keep the balance, c and, if z > 0, the
+reserve. If it is so already, the last steps converge quadratically.
 
 **The trust region.** A step is accepted if the merit f + ρ (‖c‖₁ + ½ ‖c‖²) falls by at least 1e-4
 of the prediction. If c bends away from its tangent, a second program uses the value of c after the
 step (second-order correction). A step that leaves the stable tensions is moved back towards an
-anchor, a stable point well inside. With constant rigidities K_θ is affine in F. Then the stable
-tensions are convex, and all points on the way to the anchor are stable.
+anchor, a stable point well inside.
 
 **Kinks.** At a kink of a rigidity (Eq. 19 has one at 31 N) c is continuous, but its slope is not.
-Kinks divide the tensions into boxes ("pieces") on which c is smooth. A search crosses kinks freely
-until a step across a kink fails. Then it stays in its piece, whose walls act as bounds. If it ends
-at a wall, it starts again on the other side with the other slope, until that is not better.
+Kinks divide the tensions into boxes ("pieces") on which c is smooth. A search crosses kinks until a
+step across a kink fails. Then it stays in its piece, whose walls act as bounds. If it ends at a
+wall, it starts again on the other side with the other slope, until that is not better.
 """
 
 from __future__ import annotations
@@ -62,10 +61,7 @@ _AT_KINK = 1e-6  # relative distance from a kink that counts as zero
 
 
 class Objective(NamedTuple):
-    """Objective f of the constraint values c: linear·Σc + square·½‖c‖².
-
-    Or, if ``effort``, f = ½‖(F − centre)/unit‖² subject to c = 0.
-    """
+    """Objective f: linear·Σc + square·½‖c‖²; if ``effort``, ½‖(F − centre)/unit‖² with c = 0."""
 
     linear: float = 0.0
     square: float = 0.0
@@ -99,11 +95,7 @@ class Program:
     centre: Array | float = 0.0
 
     def merit(self, at: ConstraintValues, price: float) -> float:
-        """Return the merit at a point, which a step of the search must decrease.
-
-        For the objective *effort* it is f plus ``price`` times the violation of the constraints.
-        Other objectives are functions of the constraints, so f alone is the merit.
-        """
+        """Return the merit at a point: f, for *effort* plus ``price`` times the violation of c."""
         c = at.values
         if self.objective.effort:
             x = (at.evaluation.F - self.centre) / self.unit
@@ -111,10 +103,7 @@ class Program:
         return self.objective.linear * float(c.sum()) + 0.5 * self.objective.square * float(c @ c)
 
     def met(self, at: ConstraintValues) -> bool:
-        """Return whether all values c at the point ``at`` have |c| ≤ 1e-9 [-].
-
-        Always True for objectives other than the effort.
-        """
+        """Return whether |c| ≤ 1e-9 [-] for all c at a point; True for objectives without c = 0."""
         return not self.objective.effort or bool((abs(at.values) <= MET).all())
 
     def better(self, one: ConstraintValues, other: ConstraintValues) -> bool:
@@ -127,10 +116,7 @@ class Program:
 
 
 def search(program: Program, start: Evaluation) -> ConstraintValues:
-    """Find a local optimum of ``program`` from the stable tensions ``start``.
-
-    Kinks of rigidities are crossed if that is better.
-    """
+    """Find a local optimum of ``program``, also across kinks, from the stable point ``start``."""
     best = _search(program, start, in_piece=False)
     for _ in range(_CROSSINGS):
         for F in _beyond_kinks(program.region, best.evaluation.F):
@@ -157,8 +143,8 @@ def _beyond_kinks(region: Admissible, F: Array) -> Iterator[Array]:
 def _search(program: Program, start: Evaluation, *, in_piece: bool) -> ConstraintValues:
     """Find a local optimum of ``program``; with ``in_piece`` only between the kinks around it."""
     region, iterate = program.region, program.constraints.at(start)
-    y, z = np.zeros(iterate.values.size if program.objective.effort else 0), 0.0
-    price, radius = _FIRST_PRICE, _FIRST_RADIUS
+    multipliers = np.zeros(iterate.values.size if program.objective.effort else 0)
+    step, radius = _Step(np.zeros_like(start.F), multipliers, 0.0, 0.0, _FIRST_PRICE), _FIRST_RADIUS
     in_piece = in_piece or not region.kinks
     for _ in range(_ITERATIONS):
         if radius < _SMALLEST_RADIUS:
@@ -166,15 +152,16 @@ def _search(program: Program, start: Evaluation, *, in_piece: bool) -> Constrain
         start.model.iterations += 1
         low, high = region.piece(iterate.evaluation.F)
         bounds = (low, high) if in_piece else (region.low, region.high)
-        local = _LocalModel(program, iterate, y, z, bounds, radius)
-        step = local.step(price, local.c)
-        y, z, price, length = step.y, step.z, step.price, float(abs(step.d).max(initial=0.0))
+        local = _LocalModel(program, iterate, step, bounds, radius)
+        step = local.step(step.price, local.c)
+        length = float(abs(step.d).max(initial=0.0))
         small = length <= _ARRIVED and bool((abs(local.c) <= _ARRIVED).all())
-        if small or step.predicted <= _ROUNDING * max(1.0, abs(program.merit(iterate, price))):
+        if small or step.predicted <= _ROUNDING * max(1.0, abs(program.merit(iterate, step.price))):
             if not in_piece:  # finish on one side of the kinks, where c is smooth
                 in_piece = True
-            elif not program.met(iterate) and price < _LARGEST_PRICE:
-                price = min(100.0 * price, _LARGEST_PRICE)  # converged, but only at this low price
+            elif not program.met(iterate) and step.price < _LARGEST_PRICE:
+                # converged, but only at this low price
+                step = step._replace(price=min(100.0 * step.price, _LARGEST_PRICE))
             else:
                 break
             continue
@@ -194,31 +181,26 @@ def _search(program: Program, start: Evaluation, *, in_piece: bool) -> Constrain
 
 
 class _Step(NamedTuple):
-    """Step d, with multipliers of c and of the reserve λ_min − floor.
+    """Step of a search: the solution of its quadratic program."""
 
-    ``predicted`` is the fall of the merit, and ``price`` the weight of the violation of c in it.
-    """
-
-    d: Array
-    y: Array
-    z: float
-    predicted: float
-    price: float
+    d: Array  # ΔF/size (C,)
+    y: Array  # multipliers of c
+    z: float  # multiplier of the reserve λ_min − floor
+    predicted: float  # fall of the merit
+    price: float  # weight of the violation of c in the merit
 
 
 class _LocalModel:
-    """f, c and the convex curvature of the Lagrangian at an iterate, as functions of d = ΔF/size.
+    """Quadratic model of the program at an iterate, as a function of d = ΔF/size.
 
-    y and z are the multipliers of c and of the reserve in the previous step. ``bounds`` limit the
-    tensions [N]; ``radius`` limits each |d_c|.
+    ``before`` is the step before, ``bounds`` limit the tensions [N], ``radius`` limits each |d_c|.
     """
 
     def __init__(
         self,
         program: Program,
         iterate: ConstraintValues,
-        y: Array,
-        z: float,
+        before: _Step,
         bounds: tuple[Array, Array],
         radius: float,
     ) -> None:
@@ -229,7 +211,7 @@ class _LocalModel:
         if objective.effort:
             relative = size / program.unit
             g = relative * (evaluation.F - program.centre) / program.unit
-            W = iterate.hessian(y) * size**2
+            W = iterate.hessian(before.y) * size**2
             W[np.diag_indices(len(W))] += relative**2
         else:
             # c is part of f, whose Hessian gets a Gauss-Newton term; no constraint is left
@@ -238,8 +220,8 @@ class _LocalModel:
             W = iterate.hessian(weights) * size**2 + objective.square * G.T @ G
             c, G = np.zeros(0), np.zeros((0, g.size))
         normals = G
-        if z > 0.0:  # stability was active: its curvature counts, on steps that keep the reserve
-            W -= z * size**2 / evaluation.model.scale * evaluation.reserve_hessian()
+        if before.z > 0.0:  # stability was active: its curvature counts, on steps that keep it
+            W -= before.z * size**2 / evaluation.model.scale * evaluation.reserve_hessian()
             normals = np.vstack([G, evaluation.reserve_gradient])
         self.g, self.c, self.G = g, c, G
         self.W = kernels.convex(W, program.region.null, normals)
@@ -272,7 +254,7 @@ class _LocalModel:
             if found is None:
                 break
             before, miss = miss, float(found.x[misses].sum())
-            if best is not None and miss > 0.9 * before:
+            if miss > 0.9 * before:
                 price /= 10.0  # the last rise did not help
                 break
             best = found

@@ -76,11 +76,9 @@ class StartPoints:
 def _stabilize(model: StiffnessModel, region: Admissible, start: Evaluation) -> Evaluation:
     """Find tensions in ``region`` with about the largest reserve λ_min − floor, by cutting planes.
 
-    The search begins at ``start``, which need not be stable.
-
-    vᵀ K_θ(F) v is an upper bound of the smallest eigenvalue for every unit v. This bound is linear
-    in F if K_θ is. The bounds of the two softest modes of each iterate limit the reserve of the
-    next iterate, which stays within a trust region.
+    vᵀ K_θ(F) v is an upper bound of the smallest eigenvalue for every unit v, linear in F if K_θ
+    is. The bounds of the two softest modes of each iterate limit the reserve of the next, which
+    stays within a trust region. ``start`` need not be stable.
     """
     iterate, radius, unit = start, 1.0, model.scale
     modes: list[Array] = []

@@ -117,8 +117,8 @@ class Evaluation:
         """Return ∂²reserve/∂F² (C, C) [m/(N rad²)].
 
         Entry cd: 2 Σ_j (vᵀ ∂_c K_θ v_j)(v_jᵀ ∂_d K_θ v)/(λ − λ_j) + δ_cd vᵀ J_c k″_c J_cᵀ v. v is
-        the eigenvector of λ = λ_min, v_j are the others; ∂_c = ∂/∂F_c, and δ_cd is 1 for c = d,
-        else 0.
+        the eigenvector of λ = λ_min, v_j are the others, ∂_c = ∂/∂F_c, and δ is the Kronecker
+        symbol.
         """
         J, v = self.model.pose.length_jacobian, np.ascontiguousarray(self.eigenvectors[:, :1])
         first, second = self.spring_slopes

@@ -121,10 +121,7 @@ def saturation(
 
 
 def _stable(at: StiffnessAt, low: float, high: float) -> tuple[float, float]:
-    """Return the first range (low, high) of lower bounds [N] in which the arm is stable.
-
-    An end at which K_θ is singular is moved a little inwards.
-    """
+    """Return the first stable range (low, high) of lower bounds [N], without singular ends."""
     places, margins, stable = stable_ranges(at, low, high)
     if not stable:
         best = at(float(places[int(margins.argmax())]))
@@ -142,8 +139,8 @@ def _stable(at: StiffnessAt, low: float, high: float) -> tuple[float, float]:
 def _kinks(at: StiffnessAt, places: Array) -> Array:
     """Find the lower bounds [N], rising, within ``places`` at which the slope is discontinuous.
 
-    There a cable reaches or leaves a bound, or passes a kink of its rigidity. If the same cables
-    are at their bounds at both ends of an interval, the least tensions are linear in the bound.
+    There a cable reaches or leaves a bound, or passes a kink of its rigidity. Between, the least
+    tensions are linear in the bound.
     """
     found: list[float] = []
     todo = list(pairwise(places.tolist()))
@@ -176,11 +173,7 @@ def _active(K: Stiffness) -> Array:
 
 
 def _slope(K: Stiffness, u: Array) -> float:
-    """Compute the slope d along/db [1/m] of the least tensions over their lower bound b.
-
-    Cables at b rise; the free cables balance them with least norm (optimality conditions of
-    Eq. 17).
-    """
+    """Compute d along/db [1/m]: cables at the bound b rise, the free ones balance them (Eq. 17)."""
     A, active = K.posture.length_jacobian.T, _active(K)
     rate, free = np.maximum(active, 0.0), active == 0.0
     rate[free] = np.linalg.lstsq(A[:, free], -A[:, active > 0.0].sum(axis=1), rcond=None)[0]
@@ -188,10 +181,7 @@ def _slope(K: Stiffness, u: Array) -> float:
 
 
 def _steepest(curve: Array, slope: Callable[[float], float]) -> tuple[float, float]:
-    """Return the lower bound [N] with the largest slope, and this slope [1/m].
-
-    ``curve`` (n, 3) is that of :class:`Saturation`.
-    """
+    """Return the lower bound [N] with the largest slope, and this slope [1/m]."""
     best = int(curve[:, 2].argmax())
     around = curve[max(best - 1, 0) : best + 2, 0]
     place, value = float(curve[best, 0]), float(curve[best, 2])
@@ -206,10 +196,7 @@ def _steepest(curve: Array, slope: Callable[[float], float]) -> tuple[float, flo
 
 
 def _falls(curve: Array, slope: Callable[[float], float], start: float, level: float) -> float:
-    """Return the first lower bound [N] beyond ``start`` with a slope below ``level`` [1/m], or inf.
-
-    ``curve`` (n, 3) is that of :class:`Saturation`.
-    """
+    """Return the first lower bound [N] beyond ``start`` with a slope below ``level``, or inf."""
     for place, _, value in curve[curve[:, 0] > start].tolist():
         if value < level:
             return sign_change(lambda x: slope(x) - level, start, place)

@@ -25,15 +25,12 @@ class Jump(NamedTuple):
 
 
 def find_jump(law: Elasticity) -> Jump | None:
-    """Find the largest discontinuity of the rigidity of a law; None if EA(F) is continuous.
+    """Find the largest discontinuity of the rigidity of a user-defined law; None if there is none.
 
-    EA is sampled at 257 tensions. Each interval is then halved repeatedly, and the half with the
-    larger change of EA is kept. This ends when the change is below 1e-4 of EA, or the interval is
-    as narrow as rounding. A steep continuous law passes, because its change shrinks with the
-    interval. A discontinuity much smaller than the change of EA over an interval may be missed.
-
-    Laws of this library are continuous by construction and are not sampled. If a user-defined law
-    raises an error, return None, because the first use of the law reports the error.
+    EA is sampled at 257 tensions. Each interval is then halved, and the half with the larger change
+    of EA is kept, until the change is below 1e-4 of EA or the interval is as narrow as rounding. A
+    discontinuity much smaller than the change of EA over an interval may be missed. If the law
+    raises an error, return None, because its first use reports the error.
     """
     if isinstance(law, SlackBelow):
         law = law.law

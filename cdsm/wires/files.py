@@ -71,10 +71,7 @@ def table_of(elasticity: Elasticity) -> list[str]:
 
 
 def from_table(data: object) -> Elasticity:
-    """Build an elasticity from ``data``, a parsed TOML table.
-
-    Raise GeometryError or InvalidInput for its faults.
-    """
+    """Build an elasticity from a parsed TOML table, or raise GeometryError or InvalidInput."""
     kind = data.get("kind") if isinstance(data, dict) else data
     if not isinstance(kind, str) or kind not in _KINDS:
         raise GeometryError([f"kind: must be one of {', '.join(_KINDS)}, but is {kind!r}"])

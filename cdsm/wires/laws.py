@@ -112,10 +112,9 @@ class StrandElasticity(Elasticity):
         return Domain(self.low, self.high, low_included=False)
 
     def polynomial(self, tension: ArrayLike) -> Array:
-        """Evaluate the polynomials [N] at F of any shape without checks: to show a misprint.
+        """Evaluate the polynomials [N] at F of any shape, also beyond the domain.
 
-        The outer ranges extend beyond the domain. InvalidInput if ``tension`` is not finite
-        numbers.
+        InvalidInput if ``tension`` is not finite numbers.
         """
         values = number_array("tension", tension)
         return piecewise(self._joins, self._table, values)

@@ -97,19 +97,13 @@ class Panels(NamedTuple):
     end: float
 
     def integral(self, F: Array, power: int) -> Array:
-        """Integrate Fⁿ dF/p, n = ``power`` = 0 or 1, from the low end to each F, any shape.
-
-        F is at most :attr:`end`.
-        """
+        """Integrate Fⁿ dF/p, n = ``power``, from the low end to each F ≤ ``end``, any shape."""
         found = _integrals(self.edges, self.coefficients, self.before, power, F.ravel())
         return np.asarray(found.reshape(F.shape))
 
 
 def panels(rows: Sequence[Sequence[float]], edges: Sequence[float]) -> Panels:
-    """Divide piecewise polynomials into panels; ``rows`` are coefficients, lowest power first.
-
-    ``edges`` are the start of the first range, then the end of each range. They rise.
-    """
+    """Divide piecewise polynomials, lowest power first, with ranges ``edges`` into panels."""
     ends: list[float] = [edges[0]]
     piece: list[int] = []
     end = np.inf
@@ -128,20 +122,14 @@ def panels(rows: Sequence[Sequence[float]], edges: Sequence[float]) -> Panels:
 
 
 def _significant(row: Sequence[float], high: float) -> list[float]:
-    """Drop the coefficients of high powers that are negligible up to F = ``high``.
-
-    The roots that they cause would overflow.
-    """
+    """Drop coefficients of high powers that are negligible up to ``high``; their roots overflow."""
     sizes = abs(np.array(row)) * high ** np.arange(len(row))
     last = np.flatnonzero(sizes > _NEGLIGIBLE * sizes.max()).max(initial=0)
     return list(row[: last + 1])
 
 
 def _panel_ends(roots: NDArray[np.complex128], low: float, high: float) -> list[float]:
-    """Find the ends of panels from low to high on which the Gauss rule is exact to rounding.
-
-    ``roots`` are those of the polynomial.
-    """
+    """Return the ends of panels on which the Gauss rule is exact to rounding."""
     narrowest = _NARROWEST * np.spacing(high)
     ends: list[float] = []
     intervals = [(low, high)] if low < high else []

@@ -60,10 +60,7 @@ class SlackBelow(Elasticity):
         return float(self.law.rigidity(self.law.domain.first))
 
     def scaled(self, factor: float) -> SlackBelow:
-        """Return the law with its rigidity EA multiplied by ``factor``, slack branch included.
-
-        See :meth:`Elasticity.scaled`.
-        """
+        """Return the law and slack branch of ``factor`` × EA; see :meth:`Elasticity.scaled`."""
         return SlackBelow(self.law.scaled(factor))
 
     def rigidity(self, tension: ArrayLike) -> Array:
@@ -87,10 +84,7 @@ class SlackBelow(Elasticity):
         return np.where(below < 0.0, slack, self.law.energy(inside))
 
     def _split(self, tension: ArrayLike) -> tuple[Array, Array]:
-        """Return max(F, low) and min(F − low, 0) at tensions F, with the low end of the law.
-
-        The first is inside the domain of the law; the second is the part of F on the slack branch.
-        """
+        """Return max(F, low), inside the law, and min(F − low, 0), the part on the slack branch."""
         values = self.domain.check(tension)
         inside = np.maximum(values, self.law.domain.first)
         return inside, np.where(values < inside, values - self.rest, 0.0)

@@ -23,11 +23,10 @@ class Basis(NamedTuple):
 
     @classmethod
     def of(cls, points: Points, noise: float) -> Basis:
-        """Build splines over the tensions from the first force of ``points`` to the largest.
+        """Build splines over the tensions from the first force F_0 of ``points`` to the largest.
 
-        The knots are equally spaced in the mean of log(F − F_0 + corner) and F, each scaled to 0…1.
-        So they are nearly equally spaced in F below the corner [N], and denser there than above it.
-        The corner is a small force, well above the ``noise`` [N]; F_0 is the first force.
+        The knots are equally spaced in the mean of log(F − F_0 + corner) and F, each scaled to 0…1:
+        nearly equally in F below the corner, a small force well above the ``noise`` [N].
         """
         low, high = max(float(points.force[0]) - 3.0 * noise, 0.0), float(points.force.max())
         corner = max(low, 8.0 * noise, 5e-3 * high)

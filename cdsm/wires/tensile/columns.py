@@ -166,10 +166,7 @@ def _column(at: int, cell: str, below: str) -> Column:
 
 
 def _candidates(header: Header, wanted: Sequence[str | int] | None) -> list[list[Column]]:
-    """Return the columns of a header that may be the displacement, and those that may be the force.
-
-    ``wanted`` is as for :func:`find_header`.
-    """
+    """Return the columns that may be the displacement, and those that may be the force."""
     if wanted is not None:
         return [_wanted(header, name, kind) for name, kind in zip(wanted, _BOTH, strict=True)]
 
@@ -181,10 +178,7 @@ def _candidates(header: Header, wanted: Sequence[str | int] | None) -> list[list
 
 
 def _wanted(header: Header, name: str | int, kind: str) -> list[Column]:
-    """Return the columns called ``name`` (a number from 1 on, or a name) as columns of a kind.
-
-    A name may have its unit.
-    """
+    """Return the columns called ``name``, or with this number from 1 on, as columns of a kind."""
     if str(name).isdigit():
         found = [column for column in header.columns if column.at == int(name) - 1]
     else:

@@ -140,10 +140,7 @@ def local_noise(errors: Array) -> Array:
 
 
 def _slips(points: Points, gauge_length: float, least: float) -> list[str]:
-    """Return a note for each place where the force falls while the displacement grows.
-
-    The force falls by more than ``least`` [N].
-    """
+    """Return a note for each place where the force falls by more than ``least`` [N]."""
     highest = np.maximum.accumulate(points.force)
     fall = highest - points.force
     notes = []
@@ -159,10 +156,7 @@ def _slips(points: Points, gauge_length: float, least: float) -> list[str]:
 
 
 def _slack(points: Points, noise: float, least: float) -> int:
-    """Count the points of a slack cable, before the force begins to rise.
-
-    The rise must be significant, with the standard errors of :func:`_trends`.
-    """
+    """Count the points of a slack cable, before the force begins to rise significantly."""
     slope, error = _trends(points, noise, least)
     flat = np.flatnonzero(slope <= _SURE * error)
     count = int(flat[-1]) + 1 if len(flat) else 0
@@ -178,8 +172,8 @@ def _slack(points: Points, noise: float, least: float) -> int:
 def _trends(points: Points, noise: float, least: float) -> tuple[Array, Array]:
     """Compute the slope [N per point] of the first n points, for each n, and its standard error.
 
-    The error follows from the ``noise`` [N] of one point, or from the scatter of the points if that
-    is smaller, but from ``least`` [N] at least.
+    The error follows from the ``noise`` [N] or from the scatter of the points if that is smaller,
+    but from ``least`` [N] at least.
     """
     w, x, y = points.count, np.arange(len(points.force)), points.force - points.force[0]
     total = np.cumsum(w)
@@ -224,10 +218,7 @@ def _check_rigidity(points: Points, gauge_length: float) -> None:
 
 
 def _likely(rigidity: float, reach: float, gauge_length: float) -> str:
-    """Suggest the mistake (units, gauge length) that explains a rigidity [N] and a strain range.
-
-    ``reach`` is the range [-], ``gauge_length`` [m] the given one.
-    """
+    """Suggest the mistake of units or gauge length [m] that explains a rigidity [N]."""
     found = []
     low, high = _GAUGES
     for mistake, force, displacement, gauge in _MISTAKEN:

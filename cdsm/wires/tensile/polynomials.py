@@ -21,10 +21,7 @@ _FEWEST = 2 * _HALF + 2 * (_DEGREE + 1)  # points: twice as many slopes as coeff
 
 
 def polynomials(points: Points, join: float) -> tuple[StrandElasticity, tuple[str, ...]]:
-    """Fit two polynomials that meet at a join [N] to the slopes. Keep the longest range of EA > 0.
-
-    If one side of the join has too few points, fit one polynomial.
-    """
+    """Fit two polynomials that meet at a join [N], or one, to the slopes; cut them where EA ≤ 0."""
     if len(points.force) < _FEWEST:
         raise TensileTestError(
             f"only {len(points.force)} points are left, and polynomials of degree {_DEGREE} need "
@@ -53,10 +50,7 @@ def polynomials(points: Points, join: float) -> tuple[StrandElasticity, tuple[st
 
 
 def _positive(rows: list[list[float]], edges: tuple[float, ...]) -> list[tuple[float, float]]:
-    """Find the ranges of tension [N] where the polynomials are positive, or one empty range.
-
-    ``rows`` are their coefficients, lowest power first; ``edges`` [N] are the ends of their ranges.
-    """
+    """Find the ranges of tension [N] where polynomials are positive; lowest power first."""
     tensions = np.linspace(edges[0], edges[-1], 400)
     values = piecewise(np.array(edges[1:-1]), coefficient_table(rows), tensions)
     margin = 1e-6 * float(abs(values).max())  # keeps the strain ∫ dF/EA finite
@@ -88,9 +82,7 @@ def _joins_of(points: Points, join: float) -> tuple[float, ...]:
 
 
 def _coefficients(points: Points, joins: tuple[float, ...]) -> list[list[float]]:
-    """Fit polynomials to the slopes of ``points`` over the force, one per range.
-
-    Return their coefficients, lowest power first.
+    """Fit one polynomial per range to the slopes over the force; return them, lowest power first.
 
     Two ranges share the value v at the join. With y = F − join, the polynomials are v + Σ a_k yᵏ
     and v + Σ b_k yᵏ: one linear least-squares problem in v, a and b.

@@ -109,10 +109,7 @@ class Curve:
         return np.asarray(inside + before + np.maximum(strain - grid[-1], 0.0) * rigidity[-1])
 
     def jacobian(self, strain: Array) -> Array:
-        """Compute derivatives of :meth:`force` at strains (n,) by the unknowns (n, k + 1).
-
-        The columns are those of the k coefficients, then that of the anchor strain.
-        """
+        """Compute the derivatives (n, k + 1) of :meth:`force` by coefficients and anchor strain."""
         tensions, grid = self.basis.tensions, self.strain
         inside = np.clip(strain, grid[0], grid[-1])
         at = np.clip(np.searchsorted(grid, inside) - 1, 0, len(grid) - 2)
@@ -174,13 +171,10 @@ class Curve:
     def interval(self, points: Points, probability: float) -> tuple[Array, Array]:
         """Compute a confidence interval of log EA at each tension of the grid: middle, half-width.
 
-        It contains log EA with a ``probability`` from 0 to 1.
-
-        The most likely curve is smooth, so it is biased where EA bends. An interval from its
-        scatter alone would contain EA too rarely there. The interval therefore belongs to a rougher
-        curve, with :data:`_ROUGHER` times less smoothing than the likelihood allows. Its bias is
-        far below its scatter. The scatter and its degrees of freedom are those of the neighbouring
-        points.
+        It contains log EA with a ``probability`` from 0 to 1. The most likely curve is smooth, so
+        it is biased where EA bends. The interval therefore belongs to a rougher curve, with
+        :data:`_ROUGHER` times less smoothing than the likelihood allows: its bias is far below its
+        scatter. Scatter and degrees of freedom are those of the neighbouring points.
         """
         loosest = self.loosest(points)
         rough = replace(loosest, smoothing=loosest.smoothing / _ROUGHER).refitted(points)
@@ -196,10 +190,7 @@ class Curve:
         return np.asarray(splines @ rough.coefficients), np.asarray(half)
 
     def _inverse(self, rows: Array) -> tuple[Array, Array]:
-        """Return the inverse of the penalised normal matrix, and the leverage of each point.
-
-        ``rows`` (n, k + 1) are as in :meth:`_linearised`.
-        """
+        """Return the inverse of the penalised normal matrix, and the leverage of each point."""
         factor, scale = self._factored(rows)
         inverse = cho_solve(factor, np.eye(len(scale))) / np.outer(scale, scale)
         return inverse, np.clip(((rows @ inverse) * rows).sum(axis=1), 0.0, 1.0)
@@ -207,8 +198,8 @@ class Curve:
     def loosest(self, points: Points) -> Curve:
         """Find the curve with the least smoothing that its restricted likelihood allows.
 
-        Its −2 log likelihood is 1 above the minimum (one standard deviation). If the points show no
-        bend, the most likely curve is straight, and a band around it would be too narrow.
+        Its −2 log likelihood is 1 above the minimum (one standard deviation). Without bends the
+        most likely curve is straight, and a band around it would be too narrow.
         """
         least, chosen = np.inf, self
         for smoothing in self.smoothing * 10.0 ** np.arange(0.0, -6.0, -0.25):
@@ -221,10 +212,7 @@ class Curve:
         return chosen
 
     def _likelihood(self, points: Points) -> float:
-        """Compute −2 log of the restricted likelihood of the smoothing, given the points.
-
-        The curve is linearised.
-        """
+        """Compute −2 log of the restricted likelihood of the smoothing; the curve is linearised."""
         rows, error = self._linearised(points)
         unknowns = np.append(self.coefficients, self.anchor_strain)
         factor, scale = self._factored(rows)
@@ -250,10 +238,7 @@ class Curve:
         return weight[:, None] * self.jacobian(points.strain), error
 
     def _factored(self, rows: Array) -> tuple[tuple[Array, bool], Array]:
-        """Scale the penalised normal matrix of ``rows`` (n, k + 1) to a unit diagonal.
-
-        Return its Cholesky factor and the scale.
-        """
+        """Return the Cholesky factor of the penalised normal matrix, scaled, and the scale."""
         normal = rows.T @ rows + self._penalty
         # strain and log EA are orders apart
         scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
@@ -262,10 +247,7 @@ class Curve:
 
 
 def fit_curve(points: Points, noise: float) -> Curve:
-    """Fit the curve; restricted likelihood determines the smoothing (Fellner-Schall iteration).
-
-    ``noise`` is a first estimate of the noise of one point [N].
-    """
+    """Fit the curve; restricted likelihood sets the smoothing (Fellner-Schall iteration)."""
     basis = Basis.of(points, noise)
     tensions, size = basis.tensions, basis.splines.shape[1]
     # start from secants so coarse that they are positive

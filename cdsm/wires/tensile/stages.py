@@ -37,7 +37,7 @@ def yield_onset(tensions: Array, rigidity: Array, deviation: Array) -> float | N
 def pretension_end(tensions: Array, rigidity: Array, deviation: Array) -> float | None:
     """Find the tension [N] from which EA grows slower than √F; arguments of :func:`yield_onset`.
 
-    None if EA does not grow faster than √F at any tension, beyond its uncertainty.
+    None if EA nowhere grows faster than √F, beyond its uncertainty.
     """
     level = np.log(rigidity)
     inner = (tensions > _STEP * tensions[0]) & (tensions < tensions[-1] / _STEP) & (tensions > 0)
@@ -57,10 +57,7 @@ def pretension_end(tensions: Array, rigidity: Array, deviation: Array) -> float 
 
 
 def refuse_jumps(curve: Curve, points: Points) -> None:
-    """Raise TensileTestError if the force is discontinuous.
-
-    It is if EA of the curve exceeds ten times EA of every chord between neighbouring points.
-    """
+    """Raise TensileTestError if EA exceeds ten times that of every chord between points."""
     first, last = curve.force(points.strain[[0, -1]])
     inside = (curve.basis.tensions >= first) & (curve.basis.tensions <= last)
     steepest = int(np.where(inside, curve.rigidity, 0.0).argmax())
@@ -74,10 +71,7 @@ def refuse_jumps(curve: Curve, points: Points) -> None:
 
 
 def doubts(points: Points, spread: Spread, gauge_length: float) -> tuple[str, ...]:
-    """Return one sentence for each reason to doubt the fit: a far point, correlated residuals.
-
-    ``spread`` has the residuals at ``points``; ``gauge_length`` [m].
-    """
+    """Return one sentence for each reason to doubt the fit: a far point, correlated residuals."""
     errors, reach = spread.errors, float(np.ptp(points.force))
     notes = []
     times = abs(errors) / np.maximum(local_noise(errors), _SEEN * reach)
