@@ -15,10 +15,9 @@ import typer
 import cdsm
 from cdsm.cli.arm import check, export, stiffness, urdf
 from cdsm.cli.command import Command, as_command
-from cdsm.cli.cycle import cycle
 from cdsm.cli.design import design
 from cdsm.cli.identify import identify
-from cdsm.cli.loads import buckle, weigh
+from cdsm.cli.loads import buckle, cycle, weigh
 from cdsm.cli.new import new
 from cdsm.cli.output import debug_wanted
 from cdsm.cli.paper import reproduce

@@ -11,7 +11,7 @@ import typer
 
 import cdsm
 from cdsm.cli.options import Angles, ArmOptions, AsJson, LoadOptions, TensionOptions
-from cdsm.cli.output import Json, answer, by_cable, written
+from cdsm.cli.output import Json, answer, by_cable, write
 
 
 def urdf(
@@ -138,13 +138,12 @@ def check(
     The options are those of `cdsm stiffness`.
     Exit code 0: it can be trusted; 3: it cannot, and the report says why.
     """
+    from cdsm.support.files import write_text
+
     pose = arm.at(angles)
     tension = tensions.distribute(pose, load.at_tip(pose.arm))
     report = cdsm.stiffness(pose, tension).report()
-    if out is not None:
-        from cdsm.support.files import write_text
-
-        written(write_text(out, report.to_html()))
+    write(out, lambda file: write_text(file, report.to_html()))
     warnings = () if report.trustworthy else ("NOT to be trusted: the report says why.",)
     answer(as_json, report.to_dict, tensions.conditions(pose.arm), report, warnings=warnings)
 

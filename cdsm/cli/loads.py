@@ -1,9 +1,9 @@
-"""``cdsm weigh`` and ``cdsm buckle``: displacement under a weight, and buckling."""
+"""``cdsm weigh | cycle | buckle``: displacement under loads, hysteresis, buckling."""
 
 from __future__ import annotations
 
-import dataclasses
 import math
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -20,7 +20,7 @@ from cdsm.cli.options import (
     WeightOptions,
     wrench_of,
 )
-from cdsm.cli.output import answer, write_picture
+from cdsm.cli.output import answer, write, write_picture
 from cdsm.cli.values import numbers
 
 
@@ -48,8 +48,8 @@ def weigh(
     write_picture(figure, test.plot)
     without = " without friction" if pose.arm.has_friction else ""
     loaded = f"at the full load{without}:\n{test.loaded[-1]}"
-    conditions = dataclasses.replace(tensions.conditions(pose.arm), friction=True)
     warnings = (*cdsm.stiffness(pose, tension).warnings, *test.warnings)
+    conditions = tensions.conditions(pose.arm, friction=True)
     answer(as_json, test.to_dict, conditions, test, loaded, warnings=warnings)
 
 
@@ -105,4 +105,63 @@ def buckle(
         Conditions(pose.arm, low),
         *found,
         warnings=[warning for each in found for warning in each.warnings],
+    )
+
+
+def cycle(
+    arm: ArmOptions,
+    tensions: TensionOptions,
+    weight: WeightOptions,
+    wrench: options.Wrench = None,
+    angles: Angles = "0",
+    cycles: Annotated[int, typer.Option(help="Number of cycles.", min=1, max=100)] = 2,
+    steps: Annotated[
+        int, typer.Option(help="Steps from zero load to the largest.", min=1, max=1000)
+    ] = 12,
+    one_sided: Annotated[
+        bool, typer.Option("--one-sided", help="Unload to zero; do not reverse the load.")
+    ] = False,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", "-o", help="File to write: .nc (NetCDF) or .csv, SI units."),
+    ] = None,
+    figure: Picture = None,
+    as_json: AsJson = False,
+) -> None:
+    """Load the tip slowly up and down, and print the hysteresis due to friction in the holes.
+
+    --force or --mass is the largest load; --wrench is a constant load in addition.
+    """
+    import numpy as np
+
+    from cdsm.sweeps.export import check_target
+
+    if not weight.given:
+        raise typer.BadParameter("give it or --mass: the largest load.", param_hint="--force")
+    if out is not None:
+        check_target(out)
+    pose = arm.at(angles)
+    tension = tensions.distribute(pose, wrench_of(wrench))
+    up = np.arange(1, steps + 1) / steps
+    hump = np.concatenate([up, up[-2::-1] if steps > 1 else [], [0.0]])
+    factors = hump if one_sided else np.concatenate([hump, -hump])
+    added = np.append(weight.vector(pose.arm), np.zeros(3))
+    wrenches = tension.wrench + np.tile(factors, cycles)[:, None] * added
+    history = cdsm.load_cycle(pose, tension, wrenches)
+    write(out, history.write)
+    write_picture(figure, history.plot)
+    lost = float(history.dissipated[-len(factors) :].sum())
+    left = float(np.linalg.norm(history.displacement[-1]))
+    note = (
+        f"the last cycle loses {1000.0 * lost:.4g} mJ; without load the tip is left "
+        f"{1e6 * left:.4g} µm from where it was"
+    )
+    if not pose.arm.has_friction:
+        note = "the holes have no friction, so there is no loop: give --friction, e.g. 0.1"
+    answer(
+        as_json,
+        lambda: history.to_dict() | {"lost_in_last_cycle_J": lost, "left_over_m": left},
+        tensions.conditions(pose.arm, friction=True),
+        history,
+        note,
     )

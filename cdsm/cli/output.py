@@ -82,15 +82,16 @@ def by_cable(arm: cdsm.Manipulator, values: Array) -> Json:
     return dict(zip((cable.name for cable in arm.cables), values.tolist(), strict=True))
 
 
-def write_picture(path: Path | None, draw: Callable[[], Figure]) -> None:
-    """Write the figure that ``draw`` returns, if a path is given."""
+def write(path: Path | None, fill: Callable[[Path], object]) -> None:
+    """If a path is given, write it by ``fill``, and say so on standard error."""
     if path is not None:
-        written(cdsm.plots.save_figure(draw(), path))
+        fill(path)
+        typer.echo(f"written: {path}", err=True)
 
 
-def written(path: Path) -> None:
-    """Print to standard error that the file ``path`` is written."""
-    typer.echo(f"written: {path}", err=True)
+def write_picture(path: Path | None, draw: Callable[[], Figure]) -> None:
+    """If a path is given, write the figure that ``draw`` returns."""
+    write(path, lambda file: cdsm.plots.save_figure(draw(), file))
 
 
 def _show(

@@ -12,7 +12,7 @@ import cdsm
 from cdsm.cli import options
 from cdsm.cli.conditions import Conditions
 from cdsm.cli.options import ArmOptions, AsJson, LoadOptions, MaxTension, MinTension, Picture
-from cdsm.cli.output import answer, write_picture, written
+from cdsm.cli.output import answer, write, write_picture
 from cdsm.cli.values import axis, numbers
 
 
@@ -79,12 +79,9 @@ def plan(
         plan = cdsm.plan_path(
             robot, u, targets, *bounds, angles=file.angles, tips=file.tips, rate=rate
         )
-        if out is not None:
-            written(plan.write(out))
+        write(out, plan.write)
         write_picture(figure, plan.plot)
-        if animation is not None:
-            cdsm.plots.plot_path(plan, animate=animation)
-            written(animation)
+        write(animation, lambda file: cdsm.plots.plot_path(plan, animate=file))
         missed = len(plan.target) - len(plan.planned)
         warnings = [f"NOT REACHED at {missed} of {len(plan.target)} samples"] if missed else []
         conditions = Conditions(robot, (min_tension,))
@@ -100,7 +97,7 @@ def plan(
         attainable = cdsm.stiffness_range(pose, u, *bounds)
         best = cdsm.plan_stiffness(pose, u, wanted, *bounds)
         if out is not None:  # repeats the search as a path of one sample
-            written(cdsm.plan_path(pose.arm, u, wanted, *bounds, angles=[pose.q]).write(out))
+            write(out, cdsm.plan_path(pose.arm, u, wanted, *bounds, angles=[pose.q]).write)
         write_picture(figure, lambda: best.plot(attainable))
         conditions = Conditions(pose.arm, (min_tension,))
         results = [attainable, best]

@@ -13,7 +13,7 @@ import cdsm
 from cdsm.cli import options
 from cdsm.cli.conditions import Conditions
 from cdsm.cli.options import ArmOptions, AsJson, MaxTension, MinTension, Picture
-from cdsm.cli.output import answer, write_picture, written
+from cdsm.cli.output import answer, write, write_picture
 from cdsm.cli.values import axis, numbers
 
 
@@ -159,11 +159,10 @@ def track(
         felt=felt,
         seed=seed,
     )
-    if out is not None:
-        written(run.write(out))
-    write_picture(figure, lambda: run.plot())
-    if animate is not None:
-        written(run.write(animate) if animate.suffix.lower() == ".csv" else run.animate(animate))
+    write(out, run.write)
+    write_picture(figure, run.plot)
+    table = animate is not None and animate.suffix.lower() == ".csv"
+    write(animate, run.write if table else run.animate)
     answer(as_json, run.to_dict, conditions, run, warnings=run.warnings)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import webbrowser
-from dataclasses import fields, replace
+from dataclasses import fields
 from pathlib import Path
 from typing import Annotated
 
@@ -74,7 +74,7 @@ def view(
             arm_arguments=_arguments(arm),
         ) as page:
             text = f"shown at {page.url}; Ctrl-C ends it"
-            conditions = replace(tensions.conditions(robot), friction=sag)
+            conditions = tensions.conditions(robot, friction=sag)
             facts: Json = {"name": robot.name, "url": page.url}
             answer(as_json, lambda: facts, conditions, text)
             if browser:

@@ -11,7 +11,7 @@ import typer
 
 import cdsm
 from cdsm.cli.options import AsJson, Picture
-from cdsm.cli.output import Json, answer, written
+from cdsm.cli.output import Json, answer, write, write_picture
 
 
 def fit(
@@ -66,14 +66,9 @@ def fit(
             fitted = cdsm.fit_tensile_test(data.displacement, data.force, data.gauge_length, method)
     except cdsm.TensileTestError as error:
         raise cdsm.TensileTestError(_as_options(str(error))) from None
-    if out is not None:
-        written(cdsm.write_elasticity(fitted.elasticity, out))
-    if tolerances is not None:
-        written(cdsm.Tolerances(rigidity=fitted.tolerance()).write(tolerances))
-    if figure is not None:
-        from cdsm.support.files import write_file
-
-        written(write_file(figure, fitted.plot().savefig))
+    write(out, lambda file: cdsm.write_elasticity(fitted.elasticity, file))
+    write(tolerances, lambda file: cdsm.Tolerances(rigidity=fitted.tolerance()).write(file))
+    write_picture(figure, fitted.plot)
     read = f"{test}: {data.source}"
     answer(as_json, lambda: {"read": data.source, **_numbers(fitted)}, f"{read}\n{fitted}")
 

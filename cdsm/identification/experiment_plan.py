@@ -138,7 +138,7 @@ class ExperimentPlan(ReadOnlyState):
 
     def plot(self) -> Figure:
         """Plot the intervals to expect, and how useful each candidate is."""
-        from cdsm.plots.experiment import plot_experiment_plan  # matplotlib imports slowly
+        from cdsm.plots.measured import plot_experiment_plan  # matplotlib imports slowly
 
         return plot_experiment_plan(self)
 

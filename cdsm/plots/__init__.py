@@ -15,11 +15,11 @@ from cdsm.plots.by_cable import (
 )
 from cdsm.plots.designs import plot_designs
 from cdsm.plots.forces import plot_force_polytope
-from cdsm.plots.friction import plot_load_history
 from cdsm.plots.loads import (
     plot_bifurcation,
     plot_critical_load,
     plot_critical_tension,
+    plot_load_history,
     plot_weight_test,
 )
 from cdsm.plots.maps import plot_map

@@ -20,8 +20,7 @@ from cdsm.plots.style import (
     VERMILLION,
     equal_axes,
     expect,
-    fill_canvas,
-    heading,
+    finish_picture,
     picture_axes,
 )
 from cdsm.support.values import Array, frozen
@@ -80,17 +79,9 @@ def plot_arm(
         tension_bar(figure, colors)
     draw_arm(axes, pose, shades)
     frame_arms(axes, None)
-    heading(figure, f"{'UNSTABLE: ' if unstable else ''}{pose.arm.name}")
-    picture_legend(figure, axes)
-    fill_canvas(axes, 1.0 if tension is None else BESIDE_BAR)
+    title = f"{'UNSTABLE: ' if unstable else ''}{pose.arm.name}"
+    finish_picture(figure, axes, title, 1.0 if tension is None else BESIDE_BAR)
     return figure
-
-
-def picture_legend(figure: Figure, axes: Any) -> None:
-    """Draw the legend of a 3D picture at the bottom of its figure, if it has any entry."""
-    handles, labels = axes.get_legend_handles_labels()
-    if handles:
-        figure.legend(handles, labels, loc="lower center", ncols=3, fontsize=SMALL, frameon=False)
 
 
 def tension_bar(figure: Figure, colors: ScalarMappable) -> None:

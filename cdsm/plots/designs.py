@@ -47,41 +47,26 @@ def plot_designs(found: DesignSearch, named: Sequence[int] = ()) -> Figure:
         figure, axes = panels(ONE_COLUMN, 2.4, 1)
         panel = axes[0, 0]
         steps = [step for step in found.history if step.feasible]
-        panel.plot(
-            [step.designs for step in steps],
-            [step.best / scales[0][1] for step in steps],
-            color=BLUE,
-            marker=".",
-            markersize=3,
-            linewidth=1.2,
-        )
-        panel.set_xlabel("designs evaluated")
-        panel.set_ylabel(names[0])
+        counts = [step.designs for step in steps]
+        best = [step.best / scales[0][1] for step in steps]
+        panel.plot(counts, best, color=BLUE, marker=".", markersize=3, linewidth=1.2)
+        panel.set(xlabel="designs evaluated", ylabel=names[0])
         return figure
     every = found.evaluated
     feasible = np.setdiff1d(np.flatnonzero(every.feasible), found.front)
-    pairs = [(0, k) for k in range(1, len(objectives))]
-    width = ONE_COLUMN if len(pairs) == 1 else TWO_COLUMNS
-    figure, axes = panels(width, 2.9, len(pairs))
-    for panel, (i, k) in zip(axes.flat, pairs, strict=True):
-        x, y = (every[objectives[n].key] / scales[n][1] for n in (i, k))
+    others = range(1, len(objectives))
+    figure, axes = panels(ONE_COLUMN if len(others) == 1 else TWO_COLUMNS, 2.9, len(others))
+    for panel, k in zip(axes.flat, others, strict=True):
+        x, y = (every[objectives[n].key] / scales[n][1] for n in (0, k))
         panel.plot(x[feasible], y[feasible], ".", color="0.7", markersize=3, label="feasible")
         panel.plot(x[found.front], y[found.front], ".-", color=BLUE, linewidth=0.8, label="front")
         for number in named:  # a page finds them by these names
             n = found.front[number]
             panel.plot(x[n], y[n], "o", color=BLUE, markersize=4, gid=f"design-{number}-{k}")
         chosen = found.front[found.compromise]
-        panel.plot(
-            x[chosen],
-            y[chosen],
-            "o",
-            color=VERMILLION,
-            markerfacecolor="none",
-            markersize=8,
-            label="compromise",
-        )
-        panel.set_xlabel(names[i])
-        panel.set_ylabel(names[k])
+        ring = {"color": VERMILLION, "markerfacecolor": "none", "markersize": 8}
+        panel.plot(x[chosen], y[chosen], "o", label="compromise", **ring)
+        panel.set(xlabel=names[0], ylabel=names[k])
     heading(figure, f"{len(every)} designs of {found.problem.arm.name}")
     legend_below(figure, axes, 3)
     return figure

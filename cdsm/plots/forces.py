@@ -9,16 +9,8 @@ from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
 
 from cdsm.errors import InvalidInput
-from cdsm.plots.arm import frame_arms, picture_legend
-from cdsm.plots.style import (
-    BLACK,
-    SKY,
-    VERMILLION,
-    expect,
-    fill_canvas,
-    heading,
-    picture_axes,
-)
+from cdsm.plots.arm import frame_arms
+from cdsm.plots.style import BLACK, SKY, VERMILLION, expect, finish_picture, picture_axes
 
 if TYPE_CHECKING:
     from cdsm.measures.forces import ForcePolytope
@@ -52,7 +44,5 @@ def plot_force_polytope(polytope: ForcePolytope) -> Figure:
     box = np.array([polytope.vertices.min(axis=0), polytope.vertices.max(axis=0)])
     frame_arms(axes, box.T, "force {} [N]")
     axes.tick_params(pad=1)
-    heading(figure, "loads at the tip that the cables hold")
-    picture_legend(figure, axes)
-    fill_canvas(axes)
+    finish_picture(figure, axes, "loads at the tip that the cables hold")
     return figure

@@ -13,14 +13,7 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
 from cdsm.errors import InvalidInput
-from cdsm.plots.arm import (
-    BESIDE_BAR,
-    color_scale,
-    draw_arm,
-    frame_arms,
-    picture_legend,
-    tension_bar,
-)
+from cdsm.plots.arm import BESIDE_BAR, color_scale, draw_arm, frame_arms, tension_bar
 from cdsm.plots.style import (
     COLORS,
     MM,
@@ -28,6 +21,7 @@ from cdsm.plots.style import (
     VERMILLION,
     expect,
     fill_canvas,
+    finish_picture,
     heading,
     picture_axes,
 )
@@ -88,9 +82,8 @@ def plot_path(
     axes.plot(*tips.T, color=VERMILLION, linewidth=1.2, label="path of the tip")
     axes.plot(*tips[-1:].T, "o", color=VERMILLION, markersize=3, label="its end")
     frame_arms(axes, limits)
-    heading(figure, f"{poses[0].arm.name}: the last of {len(poses)} postures, others pale")
-    picture_legend(figure, axes)
-    fill_canvas(axes)
+    title = f"{poses[0].arm.name}: the last of {len(poses)} postures, others pale"
+    finish_picture(figure, axes, title)
     if animate is not None:
         _animate(animate, poses, colored, limits)
     return figure
@@ -119,9 +112,7 @@ def plot_modes(modes: Modes) -> Figure:
         axes.plot(*(MM * bones.T), color=color, linewidth=1.5, label=label)
     frame_arms(axes, _limits(poses))
     unstable = "" if modes.is_stable else "UNSTABLE: "
-    heading(figure, f"{unstable}{pose.arm.name}, enlarged modes")
-    picture_legend(figure, axes)
-    fill_canvas(axes)
+    finish_picture(figure, axes, f"{unstable}{pose.arm.name}, enlarged modes")
     return figure
 
 

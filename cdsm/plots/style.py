@@ -220,6 +220,15 @@ def picture_axes() -> tuple[Figure, Any]:
     return figure, axes
 
 
+def finish_picture(figure: Figure, axes: Any, title: str, right: float = 1.0) -> None:
+    """Write title and legend of a 3D picture, then enlarge it as :func:`fill_canvas` does."""
+    heading(figure, title)
+    handles, labels = axes.get_legend_handles_labels()
+    if handles:
+        figure.legend(handles, labels, loc="lower center", ncols=3, fontsize=SMALL, frameon=False)
+    fill_canvas(axes, right)
+
+
 def fill_canvas(axes: Any, right: float = 1.0) -> None:
     """Enlarge a 3D picture until it fills its figure, up to a fraction ``right`` of the width.
 
