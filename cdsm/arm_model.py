@@ -113,8 +113,8 @@ class ArmModel:
     def moving(self) -> tuple[Indices, Indices, Indices, Indices]:
         """Cable segments, and joints that change their length, as (a, b, segment, joint).
 
-        ``a`` and ``b`` (n,) are the indices of the two sites of each of n segments. ``segment`` and
-        ``joint`` (m,) are m pairs: a segment, and a joint between the links of its two sites.
+        ``a`` and ``b`` (n,) are the indices of the two sites of each segment. ``segment`` and
+        ``joint`` (m,) are pairs of a segment and a joint between the links of its sites.
         """
         segment, joint = self.routing.segment, self.routing.joint
         over = np.repeat(np.arange(len(segment) - 1), np.diff(segment[:, 3]))
@@ -124,8 +124,7 @@ class ArmModel:
     def wire_laws(self) -> CableLaws:
         """Elasticities of the cables; cables with friction are taken as position-controlled.
 
-        A motor that controls force keeps it constant only up to the first hole that sticks. The
-        wire behind this hole has a stiffness.
+        Behind the first hole that sticks, a motor that controls force does not keep it constant.
         """
         forced = {c for c, cable in enumerate(self._cables) if cable.control == "force"}
         if not any(any(self._cables[c].friction) for c in forced):
@@ -160,10 +159,7 @@ class ArmModel:
 
 
 def route(body: RigidBody, tree: Tree, cables: Sequence[Cable]) -> Routing:
-    """Return the routing of cables: sites in the frames of their joints, and cable segments.
-
-    Each segment has the joints that change its length. ``tree`` is the kinematic tree of ``body``.
-    """
+    """Return the routing of cables: sites in the frames of their joints, and cable segments."""
     row, point, fixed = [], [], np.array([cable.lead for cable in cables])
     parts: list[tuple[int, int, int, int, int]] = []
     joints: list[int] = []

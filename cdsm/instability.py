@@ -176,10 +176,9 @@ def _remedy(
 
 
 def _first_zero(margin: Callable[[float], float], factors: tuple[float, ...]) -> float | None:
-    """Return the factor between 1 and ``factors`` where ``margin`` rises through 0, or None.
+    """Return the factor where ``margin`` rises through 0 between 1 and ``factors``, or None.
 
-    The factors are tried in their order; the root lies between the first one with a positive
-    margin and the one before it.
+    The root lies before the first factor with a positive margin.
     """
     from scipy.optimize import brentq  # slow to import
 
@@ -195,10 +194,7 @@ def _first_zero(margin: Callable[[float], float], factors: tuple[float, ...]) ->
 
 
 def _with_disks(K: Stiffness, factor: float) -> tuple[Cable, ...]:
-    """Return the cables of the arm with all disk offsets multiplied by a factor.
-
-    Raise GeometryError if disks would touch at this posture.
-    """
+    """Return the cables with scaled disk offsets, or raise GeometryError if disks would touch."""
     arm = K.posture.arm
     joints = (
         replace(each, disk_offset=factor * each.disk_offset, limit=None)

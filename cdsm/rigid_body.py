@@ -45,8 +45,7 @@ class Shapes(NamedTuple):
 class RigidBody:
     """A Pinocchio model of a tree of revolute and prismatic joints, with one tip frame.
 
-    Other joints raise UrdfError, an unknown tip UnknownName, wrong joint names InvalidInput. The
-    URDF text must have passed the checks of :mod:`cdsm.urdf_reader`. Other arguments are as for
+    The URDF text must have passed :mod:`cdsm.urdf_reader`. Arguments and errors are as for
     :meth:`cdsm.Manipulator.from_urdf`.
     """
 
@@ -92,8 +91,7 @@ class RigidBody:
     def locate(self, link: str) -> tuple[int, Array, Array]:
         """Return the row of a link's joint, and the link's frame in the frame of that joint.
 
-        The frame is a rotation (3, 3) and a translation (3,) [m]. An unknown link raises
-        UnknownName.
+        The frame is a rotation (3, 3) and a translation (3,) [m]. UnknownName without the link.
         """
         frame = self._model.frames[self._frame(link)]
         return (
@@ -150,10 +148,7 @@ class RigidBody:
         )
 
     def state(self, q: Array) -> BodyState:
-        """Compute the fields of :class:`BodyState` at joint angles q (nv,) [rad].
-
-        The Jacobian (6, nv) is at the tip in base axes, linear rows first.
-        """
+        """Compute the fields of :class:`BodyState` at joint angles q (nv,) [rad]."""
         model, data = self._model, self._data()
         if self._reordered:
             q = q[self._ours]
@@ -192,7 +187,7 @@ class RigidBody:
     def visualizer(self, urdf: str, server: object, node: str) -> Shapes | None:
         """Draw the shapes of the URDF below a node of a viser server; return None if it has none.
 
-        If a shape, e.g. a mesh, cannot be read, nothing is drawn and UrdfError is raised.
+        UrdfError if a shape cannot be read; then nothing is drawn.
         """
         from pinocchio.visualize import ViserVisualizer
 

@@ -86,10 +86,7 @@ def urdf_text(name: str, parts: Iterable[etree._Element], comment: str) -> str:
 
 
 def joint(kind: str, name: str, parent: str, child: str, *parts: etree._Element) -> etree._Element:
-    """Build a joint of type ``kind`` from link ``parent`` to link ``child``.
-
-    ``parts`` are its origin, axis and limit.
-    """
+    """Build a joint of type ``kind`` between two links, with its origin, axis and limit."""
     return E.joint(E.parent(link=parent), E.child(link=child), *parts, name=name, type=kind)
 
 

@@ -21,9 +21,8 @@ def overlapping(disks: Sequence[Disk], poses: dict[str, Array]) -> list[tuple[st
     """Return the pairs of links whose bodies overlap; neighbours are left out.
 
     The body of a link is the cylinder from its first disk to its last, with the larger of their
-    radii. ``poses`` has the pose (4, 4) of each link. For each pair, a point is projected onto one
-    cylinder, then onto the other, and so on. Both are convex, so the distance between two such
-    projections converges to the distance between the cylinders.
+    radii; ``poses`` has the pose (4, 4) of each link. A point is projected onto both cylinders of a
+    pair in turn. Both are convex, so the distance of two such projections converges to theirs.
     """
     links = list(poses)
     pairs = np.array([(i, j) for i, j in combinations(range(len(links)), 2) if j - i > 1])
@@ -48,10 +47,9 @@ def overlapping(disks: Sequence[Disk], poses: dict[str, Array]) -> list[tuple[st
 
 
 def _projected(points: Array, centre: Array, axis: Array, half: Array, radius: Array) -> Array:
-    """Project one point onto each of n solid cylinders: return the nearest points (n, 3).
+    """Return the points (n, 3) of n solid cylinders that are nearest to ``points`` (n, 3) [m].
 
-    ``points`` and the centres are (n, 3) [m], ``axis`` (n, 3) are unit vectors. ``half`` (n,) is
-    half the length of each cylinder, ``radius`` (n,) its radius [m].
+    A cylinder has the unit vector ``axis``, half its length ``half`` and its ``radius`` [m].
     """
     offset = points - centre
     along = np.einsum("ni,ni->n", offset, axis)

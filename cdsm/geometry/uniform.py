@@ -47,9 +47,8 @@ def uniform(
 ) -> dict[str, Any]:
     """Return the attributes of the Geometry of a uniform arm; GeometryError if one is invalid.
 
-    ``axes`` has the axes of each joint. ``usual_angles`` returns the hole angles of each joint for
-    a number of cables per joint, if no ``hole_angles`` are given. ``keywords`` are those of
-    :meth:`Geometry.universal`.
+    ``axes`` has the axes of each joint, ``keywords`` are those of :meth:`Geometry.universal`.
+    ``usual_angles`` returns the hole angles of each joint for a number of cables per joint.
     """
     cables_per_joint, hole_angles = keywords["cables_per_joint"], keywords["hole_angles"]
     sizes = {key: keywords[key] for key in _SIZES}

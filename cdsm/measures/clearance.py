@@ -56,18 +56,21 @@ class Clearance(ReadOnlyState):
     def to_dict(self) -> dict[str, object]:
         """Return the distances in SI for JSON, with units in the keys; inf as None."""
         numbers: dict[str, object] = {**self.posture._coordinates, "diameter_m": self.diameter}
-        values = (self.cables, self.links, self.disks)
-        for kind, value, names in zip(KINDS, values, self.nearest, strict=True):
+        for kind, value, names in self._by_kind:
             numbers |= {f"{kind}_m": value, f"{kind}_between": names}
         return dict(plain(numbers))
+
+    @property
+    def _by_kind(self) -> list[tuple[str, float, tuple[str, str]]]:
+        values = (self.cables, self.links, self.disks)
+        return list(zip(KINDS, values, self.nearest, strict=True))
 
     def __repr__(self) -> str:
         return f"<Clearance {1e3 * min(self.cables, self.links, self.disks):.4g} mm>"
 
     def __str__(self) -> str:
         lines = []
-        values = (self.cables, self.links, self.disks)
-        for kind, value, (one, other) in zip(KINDS, values, self.nearest, strict=True):
+        for kind, value, (one, other) in self._by_kind:
             what = kind.partition("_")[0]
             said = f"{1e3 * value:.4g} mm, {one} and {other}" if one else "none near"
             lines.append(f"cable to {what:<6} {said}")
@@ -147,10 +150,8 @@ def _rows(arm: Manipulator, q: Array, threads: int) -> tuple[Array, Indices]:
     shape = _shape(arm)
 
     def fill(part: slice) -> None:
-        arguments: tuple[Any, ...] = (
-            *(arm._model.tree, *shape[:7]),
-            *(q[part], distance[part], nearest[part]),
-        )
+        bodies: tuple[Any, ...] = arm._model.tree, *shape[:7]
+        arguments = *bodies, q[part], distance[part], nearest[part]
         clearance_rows(*arguments)
 
     run_slices(fill, len(q), 1, threads)
@@ -163,8 +164,7 @@ def _shape(arm: Manipulator) -> _Shape:
     model = arm._model
     rows = model.routing.row.tolist()
     points = model.routing.point.tolist()
-    segment = []
-    start = 0
+    segment, start = [], 0
     for c, cable in enumerate(arm.cables):
         segment += [(c, start + i, start + i + 1) for i in range(len(cable.sites) - 1)]
         start += len(cable.sites)
@@ -179,13 +179,10 @@ def _shape(arm: Manipulator) -> _Shape:
     if arm.is_serpentine:
         for disk in reversed(arm.geometry.disks):
             radii[model.body.locate(disk.link)[0]] = _BACKBONE * disk.hole_radius
-    ends = [
-        *zip(model.tree.parent[1:].tolist(), model.tree.translation[1:], strict=True),
-        (int(model.masses.tip), model.masses.point),
-    ]
+    parents = [*model.tree.parent[1:].tolist(), int(model.masses.tip)]
     bones = [
         (add(row, np.zeros(3)), add(row, end), radii.get(row, 0.0), names[row])
-        for row, end in ends
+        for row, end in zip(parents, [*model.tree.translation[1:], model.masses.point], strict=True)
         if np.any(end)
     ]
     disks, own = [], np.zeros((len(segment), 0), dtype=np.intp)
@@ -201,21 +198,19 @@ def _shape(arm: Manipulator) -> _Shape:
             ]
             column = [1 if at[a] else 2 if at[b] else 0 for _, a, b in segment]
             own = np.column_stack([own, column]).astype(np.intp)
-    routing = Routing(
-        frozen(np.array(rows, dtype=np.intp)),
-        frozen(np.array(points)),
-        model.routing.segment,
-        model.routing.joint,
-        model.routing.fixed,
-    )
+    places = {"row": frozen(np.array(rows, dtype=np.intp)), "point": frozen(np.array(points))}
     return _Shape(
-        routing,
+        model.routing._replace(**places),
         np.array(segment, dtype=np.intp),
-        np.array([bone[:2] for bone in bones], dtype=np.intp).reshape(-1, 2),
-        np.array([bone[2] for bone in bones]),
-        np.array([disk[:2] for disk in disks], dtype=np.intp).reshape(-1, 2),
-        np.array([disk[2] for disk in disks]),
+        *_arrays(bones),
+        *_arrays(disks),
         np.ascontiguousarray(own),
         [bone[3] for bone in bones],
         [disk[3] for disk in disks],
     )
+
+
+def _arrays(bodies: list[tuple[int, int, float, str]]) -> tuple[Indices, Array]:
+    """Return the points (n, 2) of n bodies, as indices, and their radii (n,) [m]."""
+    ends = np.array([body[:2] for body in bodies], dtype=np.intp).reshape(-1, 2)
+    return ends, np.array([body[2] for body in bodies])

@@ -49,12 +49,8 @@ def hull_of(loads: Loads) -> Hull | None:
     points, normals, offsets = _span(farthest, k)
     start, *others = points
     spanned = np.linalg.svd(np.array([p - start for p in others]).reshape(-1, k))[2][: len(others)]
-    flat = Hull(
-        np.array(points),
-        np.zeros((0, 3), np.intp),
-        np.array(normals).reshape(-1, k),
-        np.array(offsets),
-    )
+    none, facets = np.zeros((0, 3), np.intp), np.array(normals).reshape(-1, k)
+    flat = Hull(np.array(points), none, facets, np.array(offsets))
     if len(spanned) < 2:
         along = [(u, *farthest(u)) for v in spanned for u in (v, -v)]
         return flat._replace(
@@ -62,12 +58,10 @@ def hull_of(loads: Loads) -> Hull | None:
             normals=np.vstack([flat.normals, *[u[None] for u, *_ in along]]),
             offsets=np.concatenate([flat.offsets, [b for _, b, _ in along]]),
         )
-    corners, faces, facets, ends = _polytope(farthest, np.array(points), spanned)
-    return Hull(
-        corners,
-        faces,
-        np.vstack([flat.normals, facets]),
-        np.concatenate([flat.offsets, ends]),
+    whole = _polytope(farthest, flat.points, spanned)
+    return whole._replace(
+        normals=np.vstack([flat.normals, whole.normals]),
+        offsets=np.concatenate([flat.offsets, whole.offsets]),
     )
 
 
@@ -99,12 +93,10 @@ def _span(farthest: _Farthest, k: int) -> tuple[list[Array], list[Array], list[f
     return points, normals, offsets
 
 
-def _polytope(
-    farthest: _Farthest, points: Array, spanned: Array
-) -> tuple[Array, NDArray[np.intp], Array, Array]:
-    """Build corners, triangles, normals and offsets of a polytope of 2 or 3 dimensions.
+def _polytope(farthest: _Farthest, points: Array, spanned: Array) -> Hull:
+    """Build a polytope of 2 or 3 dimensions from some of its points (n, k).
 
-    ``points`` (n, k) lie in it; rows of ``spanned`` are an orthonormal basis of their directions.
+    The rows of ``spanned`` are an orthonormal basis of the directions between the points.
     """
     from scipy.spatial import ConvexHull
 
@@ -138,9 +130,5 @@ def _polytope(
     faces = np.zeros((0, 3), np.intp)
     if spanned.shape[0] == 3:
         faces = np.array([[place[int(v)] for v in each] for each in hull.simplices], np.intp)
-    return (
-        points[corners],
-        faces,
-        np.array([n for n, _ in facets]),
-        np.array([b for _, b in facets]),
-    )
+    normals, offsets = zip(*facets, strict=True)
+    return Hull(points[corners], faces, np.array(normals), np.array(offsets))

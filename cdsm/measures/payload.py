@@ -132,8 +132,8 @@ def payload(
     u, failing, kind = _until_unstable(K, u, known, low, high, worst=direction is None)
     limits |= {"stability": failing if kind == "buckling" else math.inf}
     limits |= {"elasticity": failing if kind == "elasticity" else math.inf}
-    force = max(min(limits.values()), 0.0)
     reason = min(limits, key=lambda name: limits[name])
+    force = max(limits[reason], 0.0)
     return Payload(
         posture=pose,
         direction=frozen(u),

@@ -62,16 +62,10 @@ class WireUse(ReadOnlyState):
         )
 
     def __str__(self) -> str:
+        columns = np.transpose([self.largest, self.strain, self.safety, self.life_margin])
         rows = [
             [name, f"{F:.2f}", f"{1e3 * e:.3f}", f"{s:.3g}", f"{m:.3g}"]
-            for name, F, e, s, m in zip(
-                self.tension.keys(),
-                self.largest,
-                self.strain,
-                self.safety,
-                self.life_margin,
-                strict=True,
-            )
+            for name, (F, e, s, m) in zip(self.tension.keys(), columns, strict=True)
         ]
         head = ["cable", "largest [N]", "strain [1e-3]", "safety", "life margin"]
         return "\n".join([*aligned([head, *rows]), f"D/d: {self.bend_ratio:.3g}"])

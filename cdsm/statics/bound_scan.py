@@ -57,10 +57,7 @@ def tension_domain(arm: Manipulator) -> tuple[float, float]:
 
 
 def last_true(true: Callable[[float], bool], a: float, b: float) -> tuple[float, float]:
-    """Bisect between a, where ``true`` holds, and b, where it does not.
-
-    Returns the last number at which it holds, and the next one, at relative precision 1e-12.
-    """
+    """Bisect between a, where ``true`` holds, and b, where it does not; return both ends."""
     nothing = PRECISION**2 * b  # a may be zero, and the condition false right above it
     while b - a > max(PRECISION * b, nothing):
         middle = (a + b) / 2.0
@@ -69,11 +66,10 @@ def last_true(true: Callable[[float], bool], a: float, b: float) -> tuple[float,
 
 
 def scan_end(at: StiffnessAt, low: float, highest: float) -> float:
-    """Return the end [N] of a scan of the lower bound that begins at ``low``; at most ``highest``.
+    """Return the end [N] of a scan of the lower bound from ``low``, at most ``highest``.
 
-    The scan ends where no tensions balance the arm within the domains of the elasticities. If
-    tensions balance the arm at every bound, the scan ends where the terms of K_θ that grow with the
-    tension decide whether it is positive definite.
+    The scan ends where no tensions balance the arm within the domains of the elasticities. If some
+    always do, it ends where the terms of K_θ that grow with the tension decide its sign.
     """
     if math.isinf(highest):
         # At large bounds the tensions grow in proportion to the bound. The active part of K_θ
@@ -117,8 +113,7 @@ def stable_ranges(
 ) -> tuple[Array, Array, tuple[tuple[float, float], ...]]:
     """Scan lower bounds from ``low`` to ``high`` [N]; return bounds, margins and stable ranges.
 
-    Bounds (N,) [N], the smallest eigenvalue of K_θ at each (N,) [N m/rad], and the ranges (low,
-    high) [N] in which the arm is stable.
+    Margins (N,) [N m/rad] are the smallest eigenvalues of K_θ; a range is (low, high) [N].
     """
 
     def margin(place: float) -> float:

@@ -81,8 +81,8 @@ class Equilibrium(ReadOnlyState):
     def stable(self) -> bool:
         """Whether K_θ (symmetric part) is positive definite for the joints without stop reaction.
 
-        It is False for a neutral state, for example if all cables are slack. It is also False if
-        the softest motion is blocked only by stops whose reaction is still zero.
+        It is False for a neutral state, for example if all cables are slack, and if only stops
+        without a reaction block the softest motion.
         """
         values = eigenvalues(self.stiffness.joint, self._off_stops)
         return bool((values > FLAT * abs(values).max(initial=0.0)).all())

@@ -29,7 +29,7 @@ _SLIGHT = 1e-9
 def follow_load(
     before: Equilibrium, wrench: Array, added: Array, reached: float, goal: float
 ) -> Equilibrium:
-    """Follow stable equilibria under wrench + λ · added from λ = ``reached`` to λ = ``goal``.
+    """Follow equilibria under wrench + λ · added from λ = ``reached`` to ``goal``.
 
     ``before`` is the equilibrium at ``reached``. Raises EquilibriumError if the arm buckles.
     """
@@ -57,9 +57,9 @@ def follow_load(
 def follow(before: Equilibrium, wrench: Array, start: Array | None = None) -> Equilibrium | None:
     """Find the equilibrium that continues ``before`` under another ``wrench`` (6,), or None.
 
-    The search starts at the joint angles ``start`` (nv,) [rad], by default those of ``before``. It
-    returns None if no path of stable postures leads to an equilibrium: the arm buckles, or the step
-    between the wrenches is too large to decide. Errors are those of :func:`~cdsm.equilibrium`.
+    None: no path of stable postures leads there, or the step is too large to decide. The search
+    starts at the joint angles ``start`` (nv,) [rad], by default those of ``before``. Errors are
+    those of :func:`~cdsm.equilibrium`.
     """
     loaded = LoadedArm(before.reference, before.reference_tension, wrench)
     iterate = loaded.at(before.pose, before.tension)
@@ -77,10 +77,8 @@ def follow(before: Equilibrium, wrench: Array, start: Array | None = None) -> Eq
 def _is_stable_between(loaded: LoadedArm, start: Iterate, search: RestSearch[Iterate]) -> bool:
     """Return whether the straight path from ``start`` to the equilibrium is short and stable.
 
-    The equilibrium is the result of ``search``. K_θ of the joints off their stops is checked at
-    points along the path.
-    An arm that snaps through has an unstable posture on this path. The search may have stepped over
-    it.
+    K_θ of the joints off their stops is checked at points along the path: an arm that snaps through
+    has an unstable posture there, over which the search may have stepped.
     """
     path = search.state.q - start.q
     length = float(abs(path).max())

@@ -56,10 +56,9 @@ class FrictionalArm(NamedTuple):
         return self.limits
 
     def moved(self, q: Array, near: Settled) -> Settled:
-        """Compute the arm at joint angles ``q`` (nv,) [rad].
+        """Compute the arm at joint angles ``q`` (nv,) [rad], with tensions searched from ``near``.
 
-        The search for tensions starts from those of ``near``, a state at similar angles. Raises
-        CableError if two sites coincide.
+        Raises CableError if two sites coincide.
         """
         pose = near.pose.arm.at(q, check_limits=False)
         return self.at(pose, np.maximum(near.chain.tension + near.slope @ (q - near.q), 0.0))

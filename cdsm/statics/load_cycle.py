@@ -105,10 +105,10 @@ def load_cycle(
 
 
 def slow_loading(pose: Posture, tension: Array, wrench: Array, accuracy: float) -> SlowLoading:
-    """Return the :class:`SlowLoading` of an arm at its reference ``pose``, from checked arguments.
+    """Return the :class:`SlowLoading` of an arm at its reference, from checked arguments.
 
-    Its cables have tensions (C,) [N] there under ``wrench`` (6,). ``accuracy`` [-] is that of
-    :func:`load_cycle`. Raises InvalidInput if ``pose`` is beyond a joint limit.
+    Its cables have tensions (C,) [N] under ``wrench`` (6,). Raises InvalidInput if ``pose`` is
+    beyond a joint limit.
     """
     require_between_stops(pose)
     LoadedArm(pose, tension, wrench)  # refuses a spring that leaves no wire
@@ -120,10 +120,7 @@ def slow_loading(pose: Posture, tension: Array, wrench: Array, accuracy: float) 
 
 
 def _commands(motors: ArrayLike, forced: NDArray[np.bool_]) -> Array:
-    """Check and return the commands ``motors`` (n, C); their shape is checked elsewhere.
-
-    ``forced`` (C,) marks force-controlled cables, whose tension must not be negative.
-    """
+    """Check and return the commands (n, C); force-controlled cables (``forced``) only pull."""
     commands = number_array("motors", motors)
     if commands.ndim == 2 and commands.shape[1] == forced.size:
         tensions = commands[:, forced]

@@ -158,10 +158,7 @@ class LoadHistory(ReadOnlyState):
         return dataset(variables, labels, title=title).assign_coords(of_holes)
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Return a table with a row per load: wrench, displacement, sliding holes, energies.
-
-        MissingExtra without pandas.
-        """
+        """Return a table in SI units with a row per load; MissingExtra without pandas."""
         loads, moved = self.wrenches.T, self.displacement.T
         columns: dict[str, NDArray[Any]] = {
             **{f"force {axis} [N]": force for axis, force in zip("xyz", loads[:3], strict=True)},

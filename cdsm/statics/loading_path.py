@@ -43,8 +43,7 @@ class _Rest(NamedTuple):
 class LoadingPath:
     """Equilibria ("rests") of an arm with friction during a series of loads.
 
-    Their number does not depend on the arm, unlike that of the sub-steps of
-    :func:`~cdsm.load_cycle`. So a small change of the arm changes the tips smoothly.
+    Their number does not depend on the arm, so a small change of it changes the tips smoothly.
     """
 
     loading: SlowLoading
@@ -104,20 +103,14 @@ class LoadingPath:
         return np.array([self.rests[i].state.pose.tip[:3, 3] for i in self.last])
 
     def motion(self, i: int, load: int, part: float) -> Array | None:
-        """Return the joint motion (nv,) [rad] that led to rest ``i``.
-
-        Returns None unless rest i is at the fraction ``part`` of the step to load number ``load``.
-        """
+        """Return the motion (nv,) [rad] that led to rest ``i`` at this load and part, or None."""
         if i < len(self.rests) and self.rests[i][1:] == (load, part):
             return self.rests[i].state.motion
         return None
 
     @cached_property
     def _responses(self) -> list[tuple[Array, Array]]:
-        """Return −K⁻¹ (nv, nv) and ∂A/∂q (S, nv) [m/rad] of each rest; 0 for joints at stops.
-
-        −K⁻¹ is the motion per residual torque; A are the natural lengths of the segments.
-        """
+        """Return −K⁻¹ (nv, nv) and ∂A/∂q (S, nv) [m/rad] of each rest; 0 for joints at stops."""
         responses = []
         for state, _, _ in self.rests:
             chain, settled = state.settled.chain, state.settled

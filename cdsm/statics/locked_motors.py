@@ -96,10 +96,9 @@ class LoadedArm:
         return Iterate(K, K.residual, rounding(K))
 
     def moved(self, q: Array, near: Iterate) -> Iterate:
-        """Compute the arm at joint angles ``q`` (nv,) [rad].
+        """Compute the arm at joint angles ``q`` (nv,) [rad], with tensions searched from ``near``.
 
-        The search for tensions starts from those of ``near``, a state at similar angles. Raises
-        CableError if two sites coincide.
+        Raises CableError if two sites coincide.
         """
         before = near.K
         pose = self.reference.arm.at(q, check_limits=False)
@@ -111,10 +110,7 @@ class LoadedArm:
         return stops(self.reference)
 
     def require_domains(self, tension: Array) -> None:
-        """Raise ElasticityRangeError if tensions (C,) [N] are outside the domains of their laws.
-
-        Zero is allowed if the law begins at zero: the cable is slack.
-        """
+        """Raise ElasticityRangeError if tensions (C,) [N] are outside the domains of their laws."""
         groups = [(each.law, each.cables) for each in self._laws]
         require_domains(self.reference.arm.cables, groups, tension)
 
@@ -170,9 +166,8 @@ def rounding(K: Stiffness) -> Array:
 def tilt_torque(pose: Posture, tension: Array) -> Array:
     """Compute the error of joint torques (nv,) [N m] per relative rounding error of the sites.
 
-    Errors of the sites rotate the segments, short ones most. Between disks that nearly touch this
-    is the largest part of the rounding. ``tension`` [N] has an entry for each segment that joints
-    can change.
+    Errors of the sites rotate the segments, short ones most. ``tension`` [N] has an entry for each
+    segment that joints can change.
     """
     start, end, over, joint = pose.arm._model.moving
     site, origin = pose._frames.site, pose._frames.origin
@@ -191,8 +186,7 @@ def tilt_torque(pose: Posture, tension: Array) -> Array:
 class _LockedLaw:
     """Position-controlled cables with one law; all arrays are over these cables.
 
-    Outside the domain of its law a cable has the stiffness of the nearest bound. ``lengths`` L [m]
-    and ``tension`` F [N] are those at the reference.
+    Outside the domain a cable has the stiffness of the nearest bound. L and F are of the reference.
     """
 
     def __init__(

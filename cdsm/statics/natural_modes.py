@@ -211,8 +211,7 @@ class Carried(NamedTuple):
 def mass_matrix(pose: Posture, carried: Iterable[Carried]) -> Array:
     """Compute the joint-space mass matrix (nv, nv) [kg m²] of the bodies ``carried`` by links.
 
-    M = Σ (m J_vᵀ J_v + J_ωᵀ I J_ω), with the Jacobians J_v of the centre of mass and J_ω of the
-    rotation, and the inertia I about the centre of mass.
+    M = Σ (m J_vᵀ J_v + J_ωᵀ I J_ω), with J_v of the centre of mass and J_ω of the rotation.
     """
     arm, frames = pose.arm, pose._frames
     M = np.zeros((arm.nv, arm.nv))

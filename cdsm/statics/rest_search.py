@@ -98,10 +98,7 @@ def require_between_stops(pose: Posture) -> None:
 
 
 def settled(loaded: LoadedArm, search: RestSearch[Iterate], iterations: int) -> Equilibrium:
-    """Return the equilibrium of ``loaded`` that ``search`` found after ``iterations`` in total.
-
-    Raises ElasticityRangeError if a tension is outside the domain of its law.
-    """
+    """Return the equilibrium that ``search`` found, or raise ElasticityRangeError."""
     K = search.state.K
     loaded.require_domains(K.tension)
     reaction = np.where(search.at_stop, K.residual, 0.0)

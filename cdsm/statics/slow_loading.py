@@ -147,10 +147,7 @@ class SlowLoading(NamedTuple):
         return state, total
 
     def arm(self, natural: Array, wrench: Array, motors: Array) -> FrictionalArm:
-        """Return the arm under a wrench (6,), with natural lengths (S,) [m] before wire slips.
-
-        ``motors`` (C,) are the commands of :class:`Load`.
-        """
+        """Return the arm with natural lengths (S,) [m] before wire slips, under these commands."""
         forced = np.where(self.forced, motors, np.nan)
         return FrictionalArm(self.problem, self.limits, natural, wrench, forced)
 
@@ -177,10 +174,7 @@ class SlowLoading(NamedTuple):
         return State(load, search.state, reaction, search.state.q - old.q), search
 
     def _energies(self, start: State, middle: State, end: State) -> tuple[Passage, float]:
-        """Compute the energies of a sub-step, and their rounding error [J].
-
-        ``start``, ``middle`` and ``end`` are the equilibria of the sub-step.
-        """
+        """Compute the energies of a sub-step from its equilibria, and their rounding error [J]."""
         states = (start, middle, end)
         torque = [s.load.wrench @ s.pose.jacobian + s.load.holding for s in states]
         P = [self.problem.potential(s.settled.chain.tension) for s in states]
@@ -208,10 +202,7 @@ class SlowLoading(NamedTuple):
 
 
 def _guess(arm: FrictionalArm, old: Settled, motion: Array, holding: Array) -> Settled | None:
-    """Return the arm after a joint motion (nv,) [rad] from ``old``, or None if sites meet there.
-
-    ``holding`` (nv,) [N m] is the torque of :class:`Load` that is subtracted from the residual.
-    """
+    """Return the arm after a joint motion (nv,) [rad] from ``old``, or None if sites meet there."""
     try:
         return arm.moved(np.clip(old.q + motion, *arm.limits), old).holding_back(holding)
     except CdsmError:
@@ -221,8 +212,7 @@ def _guess(arm: FrictionalArm, old: Settled, motion: Array, holding: Array) -> S
 def _newton_step(arm: FrictionalArm, old: Settled, start: Settled, holding: Array) -> Settled:
     """Return the arm after a Newton step with the tangent of ``old`` and the torque of ``start``.
 
-    ``holding`` (nv,) [N m] is the torque of :class:`Load`. Returns ``start`` if the step does not
-    reduce the torque.
+    Returns ``start`` if the step does not reduce the torque.
     """
     try:
         step = np.linalg.solve(old.stiffness, -start.torque)
@@ -234,10 +224,7 @@ def _newton_step(arm: FrictionalArm, old: Settled, start: Settled, holding: Arra
 
 
 def _work(force: list[Array], place: list[Array]) -> float:
-    """Integrate ``force`` over the path ``place``; each has its values at start, middle and end.
-
-    The result [J] is exact if both are quadratic functions of the path parameter.
-    """
+    """Integrate ``force`` over ``place`` [J] by Simpson's rule: values at start, middle and end."""
     half, whole = place[1] - place[0], place[2] - place[0]
     ends = force[0] @ (4.0 * half - whole) + force[2] @ (3.0 * whole - 4.0 * half)
     return float(ends + 4.0 * (force[1] @ whole)) / 6.0
@@ -246,8 +233,8 @@ def _work(force: list[Array], place: list[Array]) -> float:
 def _dissipated(jump: list[Array], half: Array, other: Array) -> float:
     """Compute the dissipation [J] of a sub-step: the integral of P_{j+1} − P_j over the slip s_j.
 
-    ``jump`` are the differences of P at start, middle and end; ``half`` and ``other`` are the slips
-    in the two halves. Every term is ≥ 0.
+    ``jump`` are the differences of P at start, middle and end, ``half`` and ``other`` the slips in
+    the two halves. Every term is ≥ 0.
     """
     start, middle, end = jump
     whole, again = half + other, half * other > 0.0

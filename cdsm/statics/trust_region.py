@@ -70,10 +70,9 @@ class Loaded(Protocol[State]):
     """Arm under a load."""
 
     def moved(self, q: Array, near: State) -> State:
-        """Compute the arm at joint angles ``q`` (nv,) [rad].
+        """Compute the arm at joint angles ``q`` (nv,) [rad], with tensions searched from ``near``.
 
-        ``near`` is a state at similar angles, from which a search for tensions may start. Raises
-        CableError if two sites coincide.
+        Raises CableError if two sites coincide.
         """
 
     def stops(self) -> tuple[Array, Array]:
@@ -124,10 +123,7 @@ class _Free(NamedTuple):
 def find_rest(
     loaded: Loaded[State], start: State, holding: Array | float = 0.0
 ) -> RestSearch[State]:
-    """Find the equilibrium of ``loaded``, where the residual torque r is ``holding``.
-
-    The search begins at ``start``. ``holding`` is (nv,) [N m], by default zero.
-    """
+    """Find the equilibrium of ``loaded`` from ``start``: residual torque r = ``holding`` [N m]."""
     stops = loaded.stops()
     state, radius = start.holding_back(holding), _FIRST
     free = _Free.of(state, *stops)
@@ -170,8 +166,7 @@ def _trial(
 ) -> tuple[Array, float]:
     """Return joint angles (nv,) at most ``radius`` from ``state``, and the predicted work [J].
 
-    The work is 0 if no step between the stops decreases the quadratic model. ``free`` are the
-    joints of ``state`` that are not at a stop.
+    The work is 0 if no step between the stops decreases the quadratic model.
     """
     # at a saddle r is rounding and must not decide the way to leave it
     torque, signs = (0.0 * state.torque, (1.0, -1.0)) if free.balanced else (state.torque, (1.0,))
@@ -202,8 +197,7 @@ def _descend(
 ) -> Array:
     """Return joint angles (nv,) that decrease the quadratic model; a joint stays at its stop.
 
-    The model is that at ``state``, with the residual ``torque``. The path from there is at most
-    ``radius`` [rad] long. ``sign`` is that of :func:`_step`.
+    The path from ``state`` is at most ``radius`` [rad] long. ``sign`` is that of :func:`_step`.
     """
     (lower, upper), q, indices, spectrum = stops, state.q.copy(), free.indices, free.spectrum
     while indices.size and radius > 0.0:
@@ -226,10 +220,9 @@ def _descend(
 def _step(
     torque: Array, stiffness: Array, values: Array, vectors: Array, radius: float, sign: float
 ) -> Array:
-    """Return the p of least r·p + ½ pᵀKp with |p| ≤ ``radius``; r ``torque``, K ``stiffness``.
+    """Return the p of least r·p + ½ pᵀKp with |p| ≤ ``radius``, r the ``torque``.
 
-    ``values`` and ``vectors`` are the eigenvalues and eigenvectors of K. If r = 0, both p and −p
-    are minima, and ``sign`` chooses one.
+    ``values`` and ``vectors`` are of K. If r = 0, ``sign`` chooses between the minima p and −p.
     """
     along = vectors.T @ torque
     size, largest = float(np.linalg.norm(along)), float(abs(values).max())

@@ -61,8 +61,8 @@ class WeightFriction(ReadOnlyState):
     def sliding_load(self) -> float:
         """Weight [N] from which the arm slides: its tangent is within 25 % of the frictionless one.
 
-        The load is increased until this holds. 0 without friction; inf if the arm does not slide up
-        to 100 times the breakaway load, or if no equilibrium is found before.
+        0 without friction; inf if the arm does not slide up to 100 times the breakaway load, or if
+        no equilibrium is found before.
         """
         first, u = self.breakaway.load, self.breakaway.direction
         if not 0.0 < first < math.inf:
@@ -104,9 +104,8 @@ class WeightFriction(ReadOnlyState):
     def dithered(self) -> float:
         """Weight over displacement [N/m] after dither: the load alternates with fading amplitude.
 
-        Dither adds ± amplitude to the weight. The amplitude falls linearly from
-        :attr:`sliding_load` to zero in :attr:`dither_cycles` cycles. NaN if the arm does not slide,
-        no equilibrium is found on the way, or the result does not converge within 64 cycles.
+        It falls linearly from :attr:`sliding_load` to zero in :attr:`dither_cycles` cycles. NaN if
+        the arm does not slide, no equilibrium is found on the way, or 64 cycles are too few.
         """
         return self._dither[1]
 
@@ -114,8 +113,8 @@ class WeightFriction(ReadOnlyState):
     def dither_cycles(self) -> int:
         """Number of dither cycles; doubling it changes the stiffness by at most 1 %.
 
-        The stiffness then is near the frictionless one, but not equal: shaking along the load does
-        not move all cables. 0 without friction, and where ``dithered`` is NaN.
+        The stiffness then is near the frictionless one, but shaking along the load does not move
+        all cables. 0 without friction, and where ``dithered`` is NaN.
         """
         return self._dither[0]
 
