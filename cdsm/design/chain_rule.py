@@ -32,7 +32,7 @@ class Chain:
     """
 
     def __init__(self, problem: DesignProblem, design: Array, arm: Manipulator) -> None:
-        self._problem, self._arm, self.inputs = problem, arm, inputs_of(arm)
+        self._rough, self.inputs = problem.worst_friction, inputs_of(arm)
         self._columns = [_column(arm, self.inputs, each) for each in problem.variables]
         # a cable may have a larger lower bound of its own
         minimum = problem.minimum_of(design)
@@ -41,20 +41,19 @@ class Chain:
         self._limits = np.zeros((arm.nv, len(self._columns)))
         if isinstance(problem.postures, RandomPoses):
             self._limits = np.column_stack([_limit_slopes(arm, each) for each in problem.variables])
+        by_variable = {
+            source: np.array([each.get(source, np.zeros(len(labels))) for each in self._columns])
+            for source, labels in self.inputs.labels.items()
+        }
+        still = Places(*(np.zeros_like(place) for place in self.inputs.places))
+        self._moved = still.moved(self.inputs.displaced(by_variable))
 
     def at(self, tension: Tension, loss: Array) -> Posed:
         """Return the chain rule at the posture of a tension; ``loss`` (C,) is exp(Σ μ φ) [-]."""
-        pose, inputs = tension.posture, self.inputs
+        pose = tension.posture
         turned, grip = pose.q[:, None] * self._limits, np.zeros_like(self._bound)
-        if self._problem.worst_friction:
-            by_variable = {
-                source: np.array(
-                    [each.get(source, np.zeros(len(labels))) for each in self._columns]
-                )
-                for source, labels in inputs.labels.items()
-            }
-            still = Places(*(np.zeros_like(place) for place in inputs.places))
-            grip = grip_slopes(pose, inputs, still.moved(inputs.displaced(by_variable)), turned)
+        if self._rough:
+            grip = grip_slopes(pose, self.inputs, self._moved, turned)
         return Posed(self, Balance.of(tension), turned, grip, loss[:, None] * self._bound)
 
     def apply(self, by_input: dict[str, Array]) -> Array:
@@ -69,16 +68,9 @@ class Chain:
             ]
         )
 
-    def of_links(self, of: str) -> Array:
-        """Return the derivatives of the mass [kg] or the length [m] of all links (n,)."""
-        links = self._arm.geometry.links
-        slopes = [link.mass / link.length if of == "mass" else 1.0 for link in links]
-        return np.array(
-            [
-                sum(slopes[k] for k in _joints(self._arm, each)) * (each.of == "link_length")
-                for each in self._problem.variables
-            ]
-        )
+    def of_links(self, source: str) -> Array:
+        """Return the derivatives (n,) of the sum of all link masses [kg] or link lengths [m]."""
+        return np.array([float(np.sum(column.get(source, 0.0))) for column in self._columns])
 
 
 class Posed(NamedTuple):
@@ -148,19 +140,15 @@ def _column(arm: Manipulator, inputs: Inputs, variable: Variable) -> dict[str, A
         return {}
     if of == "hole_radius":
         moves = [disks[i] in joints and routes[c].radius is None for c, i in sites]
-    elif of in ("hole_angle", "phase"):
-        of = "hole_angle"
-        names = geometry.cable_names
-        moves = [
-            names[c] == variable.at
-            if variable.of == "hole_angle"
-            else routes[c].joint - 1 in joints
-            for c, _ in sites
-        ]
+    elif of == "hole_angle":
+        moves = [geometry.cable_names[c] == variable.at for c, _ in sites]
+    elif of == "phase":
+        of, moves = "hole_angle", [routes[c].joint - 1 in joints for c, _ in sites]
     elif of == "disk_offset":
-        # in the order of the disks, which sites name first
-        number = {name: d for d, name in enumerate(_disk_labels(arm))}
-        moves = [disks[number[name]] in joints for name in labels["disk_offset"]]
+        of_link = [disk.link for disk in geometry.disks]
+        names = [f"disk {of_link[: d + 1].count(link)} of {link}" for d, link in enumerate(of_link)]
+        joint_of = dict(zip(names, disks, strict=True))
+        moves = [joint_of[name] in joints for name in labels["disk_offset"]]
     elif of == "lead":
         moves = [route.joint - 1 in joints for route in routes]
     else:  # link_length: the mass grows with it
@@ -176,13 +164,3 @@ def _column(arm: Manipulator, inputs: Inputs, variable: Variable) -> dict[str, A
         ]
         return {"link_length": np.array(moves, float), "link_mass": np.array(heavier)}
     return {of: np.array(moves, dtype=np.float64)}
-
-
-def _disk_labels(arm: Manipulator) -> list[str]:
-    """Return the name of each disk in the labels of the inputs, base to tip."""
-    count: dict[str, int] = {}
-    names = []
-    for disk in arm.geometry.disks:
-        count[disk.link] = count.get(disk.link, 0) + 1
-        names.append(f"disk {count[disk.link]} of {disk.link}")
-    return names

@@ -211,6 +211,12 @@ class Constraint(Measure):
         return limit
 
     @property
+    def _scale(self) -> float:
+        """Size by which violations are divided, as the limit; negative with ``at_most``."""
+        size = abs(self.limit) or self.unit[1]
+        return size if self.at_most is None else -size
+
+    @property
     def asked(self) -> str:
         """The limit, in words."""
         which = "at most" if self.at_least is None else "at least"
@@ -218,6 +224,5 @@ class Constraint(Measure):
 
     def violation(self, value: float) -> float:
         """Return how far a value violates the limit, divided by the limit [-]; 0 if it does not."""
-        short = self.limit - value if self.at_least is not None else value - self.limit
-        size = abs(self.limit) or KINDS[self.of].shown[1]
-        return max(short / size, 0.0) if short == short else float("inf")
+        far = (value - self.limit) / self._scale
+        return max(0.0, -far) if far == far else float("inf")

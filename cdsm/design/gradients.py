@@ -11,8 +11,7 @@ are computed as differences of exact first derivatives.
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from typing import Final
 
 import numpy as np
@@ -20,12 +19,11 @@ import numpy as np
 from cdsm.design.chain_rule import Chain, Posed
 from cdsm.design.goals import Measure
 from cdsm.design.problem import DesignProblem
-from cdsm.design.quantities import has_margin, margin
-from cdsm.errors import CdsmWarning, InvalidInput, SingularStiffness
-from cdsm.manipulator import Manipulator
+from cdsm.design.quantities import balanced, has_margin, margin, quiet_arm
+from cdsm.errors import InvalidInput, SingularStiffness
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.values import Array
-from cdsm.tension import Tension, distribute_tension, grip
+from cdsm.tension import Tension
 from cdsm.tolerances.readings import Question
 
 SMOOTH: Final = ("stiffness", "margin", "deflection", "motor_force", "mass", "length")
@@ -69,15 +67,15 @@ def rows_and_gradients(
     """
     if measure.of not in SMOOTH:
         raise InvalidInput(measure.of, f"has no exact derivatives; {', '.join(SMOOTH)} have.")
-    arm = _arm(problem, design)
+    arm = quiet_arm(problem, design)
     chain = Chain(problem, design, arm)
     if measure.of in ("mass", "length"):
         links = arm.geometry.links
         value = sum(link.mass for link in links) if measure.of == "mass" else arm.geometry.length
-        return np.array([value]), chain.of_links(measure.of)[None]
-    values, slopes, balanced = [], [], []
-    for tension, loss in _balanced(problem, design, arm):
-        balanced.append((tension, loss))
+        return np.array([value]), chain.of_links(f"link_{measure.of}")[None]
+    values, slopes, held = [], [], []
+    for tension, loss in balanced(problem, design, arm):
+        held.append((tension, loss))
         posed, K = chain.at(tension, loss), stiffness(tension.posture, tension)
         if not K.is_stable:
             raise SingularStiffness("the arm is unstable here.", K.critical_direction)
@@ -93,35 +91,17 @@ def rows_and_gradients(
     if not has_margin(problem, measure):
         return np.array(values), np.array(slopes)
     return (
-        np.array(values) + _margins(problem, measure, balanced),
+        np.array(values) + _margins(problem, measure, held),
         np.array(slopes) + _margin_slopes(problem, design, measure),
     )
 
 
-def _arm(problem: DesignProblem, design: Array) -> Manipulator:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", CdsmWarning)  # cables may share a hole
-        return problem.arm_of(design)
-
-
-def _balanced(
-    problem: DesignProblem, design: Array, arm: Manipulator
-) -> Iterator[tuple[Tension, Array]]:
-    """Yield the least tensions at each posture and load, and exp(Σ μ φ) (C,) of the cables."""
-    bounds, worst = (problem.minimum_of(design), problem.maximum), problem.worst_friction
-    for q in problem.postures_of(arm):
-        pose = arm.at(q)
-        loss = np.exp(grip(pose)) if worst else np.ones(len(arm.cables))
-        for load in problem.loads:
-            yield distribute_tension(pose, *bounds, load, worst_friction=worst), loss
-
-
 def _margins(
-    problem: DesignProblem, measure: Measure, balanced: Iterable[tuple[Tension, Array]]
+    problem: DesignProblem, measure: Measure, held: Iterable[tuple[Tension, Array]]
 ) -> Array:
-    """Compute the margin for tolerances of each row (R,) of what :func:`_balanced` yields."""
+    """Compute the margin for tolerances of each row (R,) of what :func:`balanced` yields."""
     found = []
-    for tension, loss in balanced:
+    for tension, loss in held:
         cables = range(len(tension)) if measure.of == "motor_force" else (None,)
         found += [margin(problem, measure, tension, loss, c) for c in cables]
     return np.array(found)
@@ -138,8 +118,8 @@ def _margin_slopes(problem: DesignProblem, design: Array, measure: Measure) -> A
         for count, weight in weights.items():
             moved = design.copy()
             moved[n] += count * step
-            balanced = _balanced(problem, moved, _arm(problem, moved))
-            slope = slope + weight / step * _margins(problem, measure, balanced)
+            held = balanced(problem, moved, quiet_arm(problem, moved))
+            slope = slope + weight / step * _margins(problem, measure, held)
         found.append(slope)
     return np.array(found).T
 

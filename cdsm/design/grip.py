@@ -17,7 +17,7 @@ import numpy as np
 from cdsm.kernels.chains import STRAIGHT
 from cdsm.posture import Posture
 from cdsm.support.values import Array
-from cdsm.tolerances.inputs import Inputs, Places
+from cdsm.tolerances.inputs import Inputs, Places, rotations
 
 
 def grip_slopes(pose: Posture, inputs: Inputs, moved: Places, turned: Array) -> Array:
@@ -56,11 +56,8 @@ def grip_slopes(pose: Posture, inputs: Inputs, moved: Places, turned: Array) -> 
 def _motion(pose: Posture, moved: Places) -> Array:
     """Return the derivatives (n, P, 3) of the cable sites in base axes, at constant angles."""
     tree, row = pose.arm._model.tree, pose.arm._model.routing.row
-    rotation = np.tile(np.eye(3), (len(tree.parent), 1, 1))
-    origin = np.zeros_like(moved.origin)
+    rotation, origin = rotations(pose), np.zeros_like(moved.origin)
     for i in tree.order.tolist():
-        before, angle = tree.parent[i], pose.q[i - 1]
-        start, cosine, sine = tree.turn[i]
-        rotation[i] = rotation[before] @ (start + np.cos(angle) * cosine + np.sin(angle) * sine)
+        before = tree.parent[i]
         origin[:, i] = origin[:, before] + moved.origin[:, i] @ rotation[before].T
     return np.asarray(origin[:, row] + np.einsum("prs,nps->npr", rotation[row], moved.site))

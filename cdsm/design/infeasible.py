@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import warnings
 from typing import NoReturn
 
 import numpy as np
 
 from cdsm.design.evaluation import Designs
 from cdsm.design.goals import KINDS
-from cdsm.errors import CdsmError, CdsmWarning, InfeasibleDesign
+from cdsm.design.quantities import balanced, quiet_arm
+from cdsm.errors import CdsmError, InfeasibleDesign
 from cdsm.stiffness_matrix import stiffness
 from cdsm.support.format import plural
-from cdsm.tension import distribute_tension
 
 
 def explain(designs: Designs) -> NoReturn:
@@ -59,21 +58,14 @@ def explain(designs: Designs) -> NoReturn:
 def _first_reason(designs: Designs, best: int) -> str:
     """Return why the arm of design ``best`` is not balanced or stable at the first such posture."""
     problem, row = designs.problem, designs.designs[best]
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", CdsmWarning)
-        arm = problem.arm_of(row)
-    minimum = problem.minimum_of(row)
-    for n, q in enumerate(problem.postures_of(arm)):
-        for load in problem.loads:
-            try:
-                pose = arm.at(q)
-                rough = problem.worst_friction
-                K = stiffness(
-                    pose,
-                    distribute_tension(pose, minimum, problem.maximum, load, worst_friction=rough),
-                )
-            except CdsmError as error:
-                return f"posture {n}: {error}"
+    held, loads = 0, len(problem.loads)
+    try:
+        for tension, _ in balanced(problem, row, quiet_arm(problem, row)):
+            K = stiffness(tension.posture, tension)
             if not K.is_stable:
-                return f"posture {n}: UNSTABLE, {KINDS['margin'].words} {K.margin:.3g} N m/rad"
+                margin = f"{KINDS['margin'].words} {K.margin:.3g} N m/rad"
+                return f"posture {held // loads}: UNSTABLE, {margin}"
+            held += 1
+    except CdsmError as error:
+        return f"posture {held // loads}: {error}"
     return "its tensions are at the edge"

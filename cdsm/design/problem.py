@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm.cable import Cable, Site
-from cdsm.design.goals import KINDS, Constraint, Measure, MeasureName, Objective
+from cdsm.design.goals import Constraint, Measure, MeasureName, Objective
 from cdsm.design.variables import WHOLE, Value, Variable, changed, check, present
 from cdsm.errors import InvalidInput
 from cdsm.geometry.cables import serpentine_cables
@@ -144,8 +144,8 @@ class DesignProblem(ReadOnlyState):
         """
         full, asked = self, {each.of for each in self.measures}
         for of in get_args(MeasureName):
-            if of not in asked and not KINDS[of].directed:
-                with suppress(InvalidInput):  # names what is missing, such as a breaking load
+            if of not in asked:
+                with suppress(InvalidInput):  # a direction, or data such as a breaking load
                     full = replace(full, objectives=(*full.objectives, Objective(of)))
         return full
 
@@ -155,9 +155,8 @@ class DesignProblem(ReadOnlyState):
 
         Not if the problem asks how many postures can be balanced: ``held``, ``workspace``.
         """
-        return not any(
-            each.of in ("held", "workspace") for each in (*self.objectives, *self.constraints)
-        )
+        asked = {each.of for each in (*self.objectives, *self.constraints)}
+        return not asked & {"held", "workspace"}
 
     @cached_property
     def bounds(self) -> Array:

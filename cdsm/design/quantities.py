@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -25,7 +26,7 @@ from cdsm.measures.rows import (
 from cdsm.measures.wire_use import life_margin, safety, strains
 from cdsm.support.status import Status
 from cdsm.support.values import Array
-from cdsm.tension import Tension, distribute_tension
+from cdsm.tension import Tension, distribute_tension, grip
 from cdsm.tolerances.budget import uncertainty
 from cdsm.tolerances.readings import Reading
 
@@ -47,14 +48,31 @@ class Found(NamedTuple):
 def measure(problem: DesignProblem, row: Array) -> Found:
     """Compute the quantities of one design ``row`` (n,)."""
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", CdsmWarning)  # cables may share a hole
-            arm = problem.arm_of(row)
+        arm = quiet_arm(problem, row)
     except GeometryError as error:
         return Found(np.full(len(problem.measures), math.nan), "; ".join(error.faults))
     except CdsmError as error:
         return Found(np.full(len(problem.measures), math.nan), str(error))
     return Found(_Arm(problem, row, arm).values())
+
+
+def quiet_arm(problem: DesignProblem, design: Array) -> Manipulator:
+    """Build the arm of a design (n,) without warnings, as of cables that share a hole."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", CdsmWarning)
+        return problem.arm_of(design)
+
+
+def balanced(
+    problem: DesignProblem, design: Array, arm: Manipulator
+) -> Iterator[tuple[Tension, Array]]:
+    """Yield the least tensions at each posture and load, and exp(Σ μ φ) (C,) of the cables."""
+    bounds, worst = (problem.minimum_of(design), problem.maximum), problem.worst_friction
+    for q in problem.postures_of(arm):
+        pose = arm.at(q)
+        loss = np.exp(grip(pose)) if worst else np.ones(len(arm.cables))
+        for load in problem.loads:
+            yield distribute_tension(pose, *bounds, load, worst_friction=worst), loss
 
 
 class _Arm:

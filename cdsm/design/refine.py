@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,7 +21,6 @@ from cdsm.support.values import Array, frozen
 _SAFE = 1e-7
 """Relative distance of a refined design from each limit, so that rounding violates none."""
 
-
 _FAR = 10.0
 """Violation of the scaled constraints that stands for a design that does not hold all postures."""
 
@@ -31,13 +29,6 @@ _AT_END = 1e-9
 
 _ROUNDS = 2
 """Number of times that a design is improved and then moved inside its limits."""
-
-
-class _Rows(NamedTuple):
-    """Values (R,) of a measure, and derivatives (R, n) by variables divided by their ranges."""
-
-    values: Array
-    slopes: Array
 
 
 def refine_design(
@@ -77,70 +68,20 @@ def refine_design(
         raise InvalidInput("start", "is needed: the given arm is outside the ranges.")
     problem.values(begin)
     low, high = problem.bounds.T
-    size = high - low
-    objective = problem.objectives[0]
-    first = rows_and_gradients(problem, begin, objective)[0]
-    scale = float(abs(first).max()) or 1.0
-    known: dict[bytes, dict[str, _Rows] | None] = {}
-    visited: list[Array] = []
-
-    def at(z: Array) -> dict[str, _Rows]:
-        key = z[:-1].tobytes()
-        if key not in known:
-            part = np.where(z[:-1] < _AT_END, 0.0, np.where(z[:-1] > 1.0 - _AT_END, 1.0, z[:-1]))
-            x = np.clip(low + size * part, low, high)
-            visited.append(x)
-            known[key] = _all_rows(problem, x, size)
-        rows = known[key]
-        if rows is None:
-            raise _PostureNotHeld
-        return rows
-
-    def slack(z: Array) -> Array:
-        try:
-            rows = at(z)
-        except _PostureNotHeld:  # the line search then takes a smaller step
-            return np.full(count, -_FAR)
-        parts = [z[-1] - objective.sign * rows[objective.key].values / scale]
-        for each in problem.constraints:
-            sign = 1.0 if each.at_most is None else -1.0
-            bound = abs(each.limit) or KINDS[each.of].shown[1]
-            parts.append(sign * (rows[each.key].values - each.limit) / bound - _SAFE)
-        return np.concatenate(parts)
-
-    def slope(z: Array) -> Array:
-        rows = at(z)
-        of = rows[objective.key].slopes
-        parts = [np.column_stack([-objective.sign * of / scale, np.ones(len(of))])]
-        for each in problem.constraints:
-            sign = 1.0 if each.at_most is None else -1.0
-            bound = abs(each.limit) or KINDS[each.of].shown[1]
-            of = rows[each.key].slopes
-            parts.append(np.column_stack([sign * of / bound, np.zeros(len(of))]))
-        return np.vstack(parts)
-
-    def limits(y: Array) -> Array:
-        return slack(np.append(y, 0.0))[len(first) :]
-
-    def limit_slopes(y: Array) -> Array:
-        return slope(np.append(y, 0.0))[len(first) :, :-1]
-
-    y = (begin - low) / size
-    inside = [(0.0, 1.0)] * len(size)
-    up = np.append(np.zeros(len(size)), 1.0)
+    first = rows_and_gradients(problem, begin, problem.objectives[0])[0]
+    smooth = _SmoothProblem(problem, float(abs(first).max()) or 1.0)
+    y = (begin - low) / (high - low)
+    inside = [(0.0, 1.0)] * len(y)
+    up = np.append(np.zeros(len(y)), 1.0)
     # where smaller steps do not help either, the best before counts
     with suppress(_PostureNotHeld):
-        start_rows = at(np.append(y, 0.0))
-        each_goal = (objective, *problem.constraints)
-        count = sum(len(start_rows[each.key].values) for each in each_goal)
         for _ in range(_ROUNDS):
-            worst = float((objective.sign * at(np.append(y, 0.0))[objective.key].values).max())
             found = minimize(
                 lambda z: z[-1],
-                np.append(y, worst / scale),
+                np.append(y, -smooth.rows(y)[0][: len(first)].min()),
                 jac=lambda z: up,
                 bounds=[*inside, (None, None)],
-                constraints={"type": "ineq", "fun": slack, "jac": slope},
+                constraints={"type": "ineq", "fun": smooth.conditions, "jac": smooth.slopes},
                 method="SLSQP",
                 options={"maxiter": iterations, "ftol": 1e-9},
             )
@@ -148,37 +89,85 @@ def refine_design(
             # outside: the nearest design inside is close
             y = ended = found.x[:-1]
             if problem.constraints:
+                limits = {
+                    "fun": lambda y: smooth.conditions(np.append(y, 0.0))[len(first) :],
+                    "jac": lambda y: smooth.rows(y)[1][len(first) :],
+                }
                 y = minimize(
                     lambda y, to: 0.5 * float((y - to) @ (y - to)),
                     ended,
                     (ended,),
                     jac=lambda y, to: y - to,
                     bounds=inside,
-                    constraints={"type": "ineq", "fun": limits, "jac": limit_slopes},
+                    constraints={"type": "ineq"} | limits,
                     method="SLSQP",
                     options={"maxiter": iterations, "ftol": 1e-12},
                 ).x
-    return _finished(problem, visited)
+    return _finished(problem, smooth.visited)
 
 
 class _PostureNotHeld(Exception):
     """Raised if SLSQP tries a design that does not hold all postures."""
 
 
-def _all_rows(problem: DesignProblem, x: Array, size: Array) -> dict[str, _Rows] | None:
-    """Compute all quantities of the problem for a design x (n,); ``size`` (n,) are the ranges.
+class _SmoothProblem:
+    """The smooth problem: min t with all conditions c(y) + a t ≥ 0, at every posture and load.
 
-    Return None for a design that does not hold all postures, or has no derivatives.
+    y (n,) is the design, each variable over its range: 0 to 1. The first conditions are those of
+    the objective: t − objective, over ``scale``; a = 1. The others have a = 0: they are the
+    distances from the limits, over the limits.
+
+    Attributes:
+        visited: All designs (n,) for which the conditions were computed.
     """
-    found: dict[str, _Rows] = {}
-    for each in (*problem.objectives, *problem.constraints):
-        if each.key not in found:
-            try:
-                values, slopes = rows_and_gradients(problem, x, Measure(each.of, each.direction))
-            except CdsmError:
-                return None
-            found[each.key] = _Rows(values, slopes * size)
-    return found
+
+    def __init__(self, problem: DesignProblem, scale: float) -> None:
+        goal = problem.objectives[0]
+        self.visited: list[Array] = []
+        self._problem = problem
+        self._goals: list[tuple[Measure, float, float]] = [(goal, 0.0, -goal.sign * scale)]
+        self._goals += [(each, each.limit, each._scale) for each in problem.constraints]
+        self._found: dict[bytes, tuple[Array, Array] | None] = {}
+
+    def rows(self, y: Array) -> tuple[Array, Array]:
+        """Return c (R,) and ∂c/∂y (R, n); raise _PostureNotHeld if they do not exist."""
+        key = y.tobytes()
+        if key not in self._found:
+            low, high = self._problem.bounds.T
+            part = np.where(y < _AT_END, 0.0, np.where(y > 1.0 - _AT_END, 1.0, y))
+            self.visited.append(np.clip(low + (high - low) * part, low, high))
+            self._found[key] = self._rows(self.visited[-1])
+        found = self._found[key]
+        if found is None:
+            raise _PostureNotHeld
+        return found
+
+    def conditions(self, z: Array) -> Array:
+        """Compute c + a t (R,) at z = (y, t); far below 0 if they do not exist."""
+        try:
+            return np.asarray(self.rows(z[:-1])[0] + z[-1] * self._raised)
+        except _PostureNotHeld:  # the line search then takes a smaller step
+            return np.full(self._raised.size, -_FAR)
+
+    def slopes(self, z: Array) -> Array:
+        """Compute the derivatives (R, n + 1) of :meth:`conditions`."""
+        return np.column_stack([self.rows(z[:-1])[1], self._raised])
+
+    def _rows(self, design: Array) -> tuple[Array, Array] | None:
+        """Compute c and ∂c/∂y of a design (n,); None if it does not hold all postures."""
+        try:
+            each = {goal.key: goal for goal, *_ in self._goals}
+            found = {key: rows_and_gradients(self._problem, design, of) for key, of in each.items()}
+        except CdsmError:
+            return None
+        size = np.ptp(self._problem.bounds, axis=1)
+        values = [(found[goal.key][0] - limit) / scale for goal, limit, scale in self._goals]
+        slopes = [found[goal.key][1] * size / scale for goal, _, scale in self._goals]
+        count = len(values[0])
+        c = np.concatenate(values)
+        c[count:] -= _SAFE
+        self._raised = np.append(np.ones(count), np.zeros(len(c) - count))
+        return c, np.vstack(slopes)
 
 
 def _finished(problem: DesignProblem, visited: list[Array]) -> DesignSearch:

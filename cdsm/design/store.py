@@ -94,7 +94,6 @@ class Store:
 def digest(problem: DesignProblem) -> str:
     """Return a digest of everything on which the quantities of a problem depend."""
     poses = poses_of(problem.arm, problem.postures)
-    q = poses.angles({dim: slice(0, size) for dim, size in poses.sizes.items()})
     rest = [each.name for each in fields(problem) if each.name not in ("arm", "postures", "loads")]
     parts = [
         json.dumps(attributes_of(problem.arm)),
@@ -102,5 +101,6 @@ def digest(problem: DesignProblem) -> str:
         repr(problem.arm.gravity.tolist()),
         poses.description,
     ]
-    data = "\n".join(parts).encode() + q.tobytes() + problem.loads.tobytes()
+    data = "\n".join(parts).encode() + problem.postures_of(problem.arm).tobytes()
+    data += problem.loads.tobytes()
     return hashlib.sha256(data).hexdigest()

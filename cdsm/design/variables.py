@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Final, Literal, NamedTuple, final, get_args
 
@@ -211,41 +211,43 @@ def _even(geometry: Geometry, count: int) -> list[CableRoute]:
     return cables
 
 
-def present(variable: Variable, geometry: Geometry, minimum: float) -> float | None:
+def present(variable: Variable, geometry: Geometry, minimum: float) -> float:
     """Return the present value of a variable in an arm [SI].
 
-    ``minimum`` is the present lower bound of all tensions [N]. None if joints or cables have
+    ``minimum`` is the present lower bound of all tensions [N]. NaN if joints or cables have
     different values, or for a wire.
     """
-    k = variable.at - 1 if isinstance(variable.at, int) else None
-    of: dict[str, Callable[[], list[float]]] = {
-        "hole_radius": lambda: [*geometry.hole_radii],
-        "disk_offset": lambda: [joint.disk_offset for joint in geometry.joints],
-        "link_length": lambda: [link.length for link in geometry.links],
-        "lead": lambda: [_lead(geometry, joint) for joint in range(1, len(geometry.joints) + 1)],
-        "phase": lambda: [0.0] * len(geometry.joints),
-        "minimum": lambda: [minimum],
-    }
-    if variable.of in _OF_CABLE:
-        cable = geometry.cables[geometry.cable_names.index(str(variable.at))]
-        return cable.joint if variable.of == "end" else cable.angle
-    if variable.of == "cables_per_joint":
-        counts = [
-            len([c for c in geometry.cables if c.joint == k + 1])
-            for k in range(len(geometry.joints))
-        ]
-        return counts[0] if len(set(counts)) == 1 else None
-    if variable.of not in of:
-        return None
-    values = of[variable.of]()
-    if k is not None:
-        return values[k]
-    return values[0] if len(set(values)) == 1 else None
+    own = [
+        [cable for cable in geometry.cables if cable.joint == k]
+        for k in range(1, len(geometry.joints) + 1)
+    ]
+    values: Sequence[float]
+    match variable.of:
+        case "end" | "hole_angle":
+            cable = geometry.cables[geometry.cable_names.index(str(variable.at))]
+            return cable.joint if variable.of == "end" else cable.angle
+        case "hole_radius":
+            values = geometry.hole_radii
+        case "disk_offset":
+            values = [joint.disk_offset for joint in geometry.joints]
+        case "link_length":
+            values = [link.length for link in geometry.links]
+        case "lead":
+            values = [_common([cable.lead for cable in cables]) for cables in own]
+        case "cables_per_joint":
+            values = [len(cables) for cables in own]
+        case "phase":
+            values = [0.0] * len(own)
+        case "minimum":
+            values = [minimum]
+        case "wire":
+            return math.nan
+    return values[variable.at - 1] if isinstance(variable.at, int) else _common(values)
 
 
-def _lead(geometry: Geometry, joint: int) -> float:
-    leads = {cable.lead for cable in geometry.cables if cable.joint == joint}
-    return leads.pop() if len(leads) == 1 else math.nan
+def _common(values: Sequence[float]) -> float:
+    """Return the value of all ``values``; NaN if they differ or there is none."""
+    return values[0] if len(set(values)) == 1 else math.nan
 
 
 def check(variable: Variable, geometry: Geometry) -> None:

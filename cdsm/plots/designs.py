@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from cdsm.plots.style import (
     BLUE,
@@ -50,6 +51,7 @@ def plot_designs(found: DesignSearch, named: Sequence[int] = ()) -> Figure:
         counts = [step.designs for step in steps]
         best = [step.best / scales[0][1] for step in steps]
         panel.plot(counts, best, color=BLUE, marker=".", markersize=3, linewidth=1.2)
+        panel.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
         panel.set(xlabel="designs evaluated", ylabel=names[0])
         return figure
     every = found.evaluated
@@ -67,6 +69,9 @@ def plot_designs(found: DesignSearch, named: Sequence[int] = ()) -> Figure:
         ring = {"color": VERMILLION, "markerfacecolor": "none", "markersize": 8}
         panel.plot(x[chosen], y[chosen], "o", label="compromise", **ring)
         panel.set(xlabel=names[0], ylabel=names[k])
+        for axis, n in ((panel.xaxis, 0), (panel.yaxis, k)):
+            if objectives[n].of == "cables":
+                axis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
     heading(figure, f"{len(every)} designs of {found.problem.arm.name}")
     legend_below(figure, axes, 3)
     return figure

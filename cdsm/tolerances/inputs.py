@@ -17,6 +17,7 @@ from scipy.sparse import csr_matrix, hstack
 
 from cdsm.errors import InvalidInput
 from cdsm.manipulator import Manipulator
+from cdsm.posture import Posture
 from cdsm.support.values import Array, frozen
 from cdsm.tolerance import Tolerances
 from cdsm.urdf import CROSS_MASS
@@ -57,6 +58,17 @@ class Places(NamedTuple):
         return Places(
             *(x + part.reshape(-1, *x.shape) for x, part in zip(self, parts, strict=True))
         )
+
+
+def rotations(pose: Posture) -> Array:
+    """Return the rotation of each joint's frame (nv+1, 3, 3) in base axes; row 0 is the base."""
+    tree = pose.arm._model.tree
+    found = np.tile(np.eye(3), (len(tree.parent), 1, 1))
+    for i in tree.order.tolist():
+        start, cosine, sine = tree.turn[i]
+        turn = start + np.cos(pose.q[i - 1]) * cosine + np.sin(pose.q[i - 1]) * sine
+        found[i] = found[tree.parent[i]] @ turn
+    return found
 
 
 _found: WeakKeyDictionary[Manipulator, Inputs] = WeakKeyDictionary()

@@ -20,7 +20,7 @@ from cdsm.support.values import Array, ReadOnlyState
 from cdsm.tolerance import Tolerances
 from cdsm.tolerances.balanced import Balance, buckling_gradient
 from cdsm.tolerances.drawn import DrawnArms, laws_at, margins
-from cdsm.tolerances.inputs import Inputs, Places, inputs_of
+from cdsm.tolerances.inputs import Inputs, Places, inputs_of, rotations
 from cdsm.tolerances.parts import Part, parts_of
 from cdsm.tolerances.stuck import Ties
 
@@ -220,14 +220,13 @@ def _tip_gradient(K: Stiffness, inputs: Inputs, direction: Array) -> dict[str, A
     """Compute the derivatives of the tip's coordinate along ``direction`` (3,), by source."""
     pose, tree, masses = K.posture, K.posture.arm._model.tree, K.posture.arm._model.masses
     none = {name: np.zeros(len(labels)) for name, labels in inputs.labels.items()}
-    origin, rotation = np.zeros_like(tree.translation), np.eye(3)
-    for i in masses.tip_joints:  # base first; a place in a frame moves the tip by R δ
-        origin[i + 1] = direction @ rotation
-        start, cosine, sine = tree.turn[i + 1]
-        rotation = rotation @ (start + np.cos(pose.q[i]) * cosine + np.sin(pose.q[i]) * sine)
+    # a point that moves by δ in a frame of rotation R moves the tip by R δ
+    along = direction @ rotations(pose)
+    origin, row = np.zeros_like(tree.translation), masses.tip_joints + 1
+    origin[row] = along[tree.parent[row]]
     still = inputs.places
     moved = Places(
-        np.zeros_like(still.site), origin, np.zeros_like(still.centre), direction @ rotation
+        np.zeros_like(still.site), origin, np.zeros_like(still.centre), along[masses.tip]
     )
     return none | inputs.by_source(moved) | {"joint_angle": direction @ pose.jacobian[:3]}
 

@@ -433,6 +433,14 @@ def test_files_for_the_workshop(tmp_path: Path) -> None:
         assert float(row[5]) <= float(row[4]) <= float(row[6])
 
 
+def test_axes_count_designs_and_cables_in_whole_numbers() -> None:
+    cables, force = cdsm.Objective("cables"), cdsm.Objective("motor_force")
+    for objectives in ((force,), (cables, force)):
+        task = problem(objectives=objectives)
+        (axes,) = cdsm.search_designs(task, generations=2, population=4).plot().axes
+        assert (axes.get_xticks() % 1.0 == 0.0).all()
+
+
 def test_a_page_of_a_long_front_shows_some_of_it(monkeypatch: pytest.MonkeyPatch) -> None:
     task = problem(
         variables=(cdsm.Variable("link_length", 0.05, 0.1),),
