@@ -1,16 +1,14 @@
 """Derivatives of segment tensions with respect to joint angles, for sticking and sliding cables.
 
-Segment j of length l_j and unstrained length a_j has the tension T_j = f(l_j/a_j − 1). With
-k = ∂T/∂l = EA/a and κ = −∂T/∂a = k (1 + ε), a joint motion δθ and a change δa_j of the unstrained
+Segment j of length l_j and unstrained length a_j has the tension T_j = f(l_j/a_j − 1). With k =
+∂T/∂l = EA/a and κ = −∂T/∂a = k (1 + ε), a joint motion δθ and a change δa_j of the unstrained
 length, as wire slides into the segment, change the tension by
 
     δT_j = k_j g_j·δθ − κ_j δa_j,   g_j = ∂l_j/∂θ.
 
 No wire passes a hole in which the cable sticks. Segments that are joined by holes in which it
-slides form a block with Σ δa_j = 0; :func:`~cdsm.kernels.chain_problem.chain_tangent` computes its
-δT_j. Σ_j T_j g_j, the torque against the cables, changes by Σ_j (T_j ∂²l_j/∂θ² δθ + g_j δT_j). If
-the cables stick in all holes, δT_j = k_j g_j·δθ: each segment is a separate spring. Without
-friction, each cable is one block: this gives the frictionless stiffness.
+slides form a block with Σ δa_j = 0, whose δT_j :func:`~cdsm.kernels.chain_problem.chain_tangent`
+computes. Without friction, each cable is one block: this gives the frictionless stiffness.
 
 A force of 1 N at the tip of a stuck arm moves the joints by θ̇ (nv,) [rad/N]. Hole i is between the
 segments j and j + 1, with the friction coefficient μ and the wrap angle φ_i. To first order, the

@@ -58,18 +58,17 @@ def plan_path(
 ) -> PathPlan:
     """Plan tensions for a wanted stiffness along a path: min ‖F_i‖² with along(u) = target_i.
 
-    Each of S samples is planned as by :func:`~cdsm.planning.plan.plan_stiffness`. The search starts
-    from the tensions of the sample before. If it fails, or for the first sample, it starts from
-    scratch. An infeasible sample does not stop the path: ``infeasible`` of the result lists it with
-    its reason.
+    Each of S samples is planned as by :func:`~cdsm.planning.plan.plan_stiffness`, starting from the
+    tensions of the sample before, or from scratch if that fails. An infeasible sample does not stop
+    the path: ``infeasible`` of the result lists it with its reason.
 
     The rate limits the change of every tension between a planned sample and the planned sample
-    before it: k·rate if they are k samples apart. The plan takes the least tensions within this
-    limit. If these miss the target although others hit it, up to 50 earlier samples are planned
-    again, backwards. They still hit their targets, with tensions that lead to this sample. If this
-    fails, the sample has the status ``"rate"``, and the next sample may change the tensions by one
-    rate more. So after a step of the target the plan misses samples until the motors can reach it.
-    Give a ramp if the arm must follow in between.
+    before it: k·rate if they are k samples apart. If no tensions within this limit hit the target
+    although others do, up to 50 earlier samples are planned again, backwards, so that they still
+    hit their targets and lead to this sample. If this fails, the sample has the status ``"rate"``,
+    and the next sample may change the tensions by one rate more. So after a step of the target the
+    plan misses samples until the motors can reach it. Give a ramp if the arm must follow in
+    between.
 
     The plan hits the targets at the samples. ``between`` of the result gives the stiffness half-way
     between two samples. Its misfit is of second order in the step between samples.

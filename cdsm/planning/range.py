@@ -121,9 +121,8 @@ def stiffness_range(
     """Compute the smallest and largest ``along(u)`` that admissible tensions give (Eqs. 13, 20).
 
     The constraints on F are those of :func:`~cdsm.plan_stiffness`. With a rigidity that is constant
-    or levels off, ``along`` is a concave function of F. It has one maximum and many minima in the
-    corners, so ``low`` is searched from many starts. With other laws it may have many maxima too.
-    Then ``low`` and ``high`` are searched from many starts, in the corners and between.
+    or levels off, ``along`` is a concave function of F, with one maximum and many minima in the
+    corners, so ``low`` is searched from many starts. With other laws ``high`` is, too.
     ``high_found`` shows how often ``high`` was found. More starts include the starts of a smaller
     number. If tension can buckle the arm, it is softest just before, and ``low`` depends on
     ``margin``.

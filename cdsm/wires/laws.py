@@ -94,15 +94,13 @@ class StrandElasticity(Elasticity):
     def eq19_repaired(cls) -> StrandElasticity:
         """Return Eq. 19 of a 1×19 strand of 1.2 mm, with the digits missing in print filled in.
 
-        The coefficient printed as −1e-3 is read as −1e-4. With −1e-3 the branch gives −787 884 N at
-        31 N, where the other branch gives 11 352 N. All coefficients keep their printed digits.
-        These leave EA(31 N) uncertain by 6 kN and EA(810 N) by 35 kN. Within them, this law is
-        continuous, and as level as possible from 400 to 810 N, where the text calls EA
-        near-constant. Otherwise it is nearest to the printed values. Linear programs find it
-        (``tests/laws/test_errata.py``). At 31 N, the slope falls from 1022 to 368. No law with
-        these digits has a continuous slope there. The least fall, from 662, would put every other
-        coefficient at the limit of its rounding. The polynomial is negative below 2.11 N, so the
-        domain is (2.2 N, 810 N].
+        The coefficient printed as −1e-3 is read as −1e-4: with −1e-3 the branch gives −787 884 N at
+        31 N, where the other branch gives 11 352 N. The printed digits leave EA(31 N) uncertain by
+        6 kN and EA(810 N) by 35 kN. Within them, this law is continuous, as level as possible from
+        400 to 810 N, where the text calls EA near-constant, and else nearest to the printed values.
+        Linear programs find it (``tests/laws/test_errata.py``). At 31 N, the slope falls from 1022
+        to 368. No law with these digits has a continuous slope there. The polynomial is negative
+        below 2.11 N, so the domain is (2.2 N, 810 N].
         """
         return cls(EQ19, joins=(31.0,), low=2.2, high=810.0)
 
@@ -188,28 +186,22 @@ class StrandElasticity(Elasticity):
 class TabulatedElasticity(Elasticity):
     """Rising curve of strain over tension through measured points of any wire.
 
-    Between two points dε/dF = c N/D², with θ from 0 to 1, θ' = 1 − θ, N = b θ² + 2 θ θ' + a θ'²,
-    D = θ² + (a + b) θ θ' + θ'², c = Δε/ΔF of the chord, and slopes a c and b c at the points
-    (Gregory and Delbourgo, IMA J. Numer. Anal. 2, 1982). Strain and its inverse (force over strain)
-    are C1. EA = 1/(dε/dF) is continuous and positive.
+    Between two points dε/dF = c N/D², with θ from 0 to 1, θ' = 1 − θ, N = b θ² + 2 θ θ' + a θ'², D
+    = θ² + (a + b) θ θ' + θ'², c = Δε/ΔF of the chord, and slopes a c and b c at the points (Gregory
+    and Delbourgo, IMA J. Numer. Anal. 2, 1982). Strain and its inverse (force over strain) are C1.
+    EA = 1/(dε/dF) is continuous and positive.
 
     The slopes at the points follow from ln EA of the chords. Each value is assigned to the middle
     of the chord's strain, and the values are interpolated over the strain. At an end, ln EA changes
     by at most the change of a straight line, and by at least half of it. A slope is at most 3 times
-    the slope of either neighbouring chord. It is at least the smaller slope of the two. At the
-    first and the last point it is at least half the slope of the chord.
+    that of either neighbouring chord, and at least the smaller of the two, or half of it at an end.
+    EA on an interval is then at most 2.1 times the largest rigidity of its chord and the two
+    neighbours: D²/N is convex in (a, b), so it is largest in a corner.
 
-    EA on an interval is at most 2.1 times the largest rigidity of three chords: its own chord and
-    the two neighbours. Proof: let this largest rigidity be M times that of the own chord (M at
-    least 2 in the first and last interval). Then 1/M <= a, b <= 3. EA over the rigidity of the own
-    chord is D²/N. This is convex in (a, b), so it is largest in a corner: if a = b = 1/M, D <= 1
-    and N >= 1/M; if a = b = 3, N >= D and D <= 2; if only one is 3, D²/N is at most max(2.1, M).
-
-    Accuracy of EA in the last interval from five or more exact points, if the wire stiffens
-    (Eq. 19, power laws, exponential toes): 2 % for even steps, 8 % for steps that grow up to
-    twofold, 9 % for steps of 1, 2, 5, 10, … N, 25 % and more for steps that grow faster. If the
-    wire levels off between the last two points, which the points cannot show, up to 31 %. Nor do
-    the points show how EA rises in the first interval of a wire without stiffness at 0 N.
+    Accuracy of EA in the last interval from five or more exact points, if the wire stiffens (Eq.
+    19, power laws, exponential toes): 2 % for even steps, 8 % for steps that grow up to twofold, 9
+    % for steps of 1, 2, 5, 10, … N, 25 % and more for steps that grow faster. The points do not
+    show a wire that levels off between the last two (up to 31 %), or how EA rises from 0 at 0 N.
 
     Attributes:
         tensions: Tensions F of the points [N], rising from 0 or more.

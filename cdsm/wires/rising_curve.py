@@ -7,10 +7,10 @@ Anal. 2, 1982) in the notation of :class:`cdsm.TabulatedElasticity`:
 
 All terms are nonnegative. So y' is positive, and no digits cancel.
 
-scipy's monotone interpolators bound y' from above, but EA = 1/y' needs a bound from below. Test
-with points of Eq. 19 at 2.3, 5, 10, 20, 50, … N: the median error of EA is 0.51 % for this curve,
-0.77 % for PCHIP and 0.58 % for Akima. Next to the soft end it is 134, 209 and 185 %. For uneven
-steps, EA is up to 1.02 times the largest EA of the chords nearby, and up to 2.0 times with PCHIP.
+scipy's monotone interpolators bound y' from above, but EA = 1/y' needs a bound from below. With
+points of Eq. 19 at 2.3, 5, 10, 20, 50, … N the median error of EA is 0.51 % for this curve, 0.77 %
+for PCHIP and 0.58 % for Akima; next to the soft end 134, 209 and 185 %. For uneven steps EA is up
+to 1.02 times that of the chords nearby, with PCHIP 2.0 times.
 """
 
 from __future__ import annotations

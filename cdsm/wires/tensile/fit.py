@@ -54,24 +54,19 @@ class Stage:
 class Band(ReadOnlyState):
     """Confidence band: it contains EA at each tension with 95 %, given the scatter of the points.
 
-    The band exp(m ± t s) belongs to a rougher curve than the fitted one. m is ln EA of the rougher
-    curve, s the standard deviation of m from the residuals near each tension, and t the quantile of
-    Student's distribution for their degrees of freedom. The fitted curve is biased where EA bends:
-    it rounds off the bend. The bias of the rougher curve is far below its scatter. The band is
-    therefore wider than the scatter of the fitted law, and this law may touch the edge of the band.
+    The band exp(m ± t s) belongs to a rougher curve than the fitted one, since its bias is far
+    below its scatter. m is ln EA of the rougher curve, s the standard deviation of m from the
+    residuals near each tension, and t the quantile of Student's distribution. The fitted law is
+    smoother and may touch the edge of the band where EA bends.
 
-    Measured, in 100 tests of 400 points each: of Eq. 19, a linear wire and a wire with a soft toe,
-    with 0.5 N and 2 N of noise, it covers 95.3 % of all cases. At each of 16 tensions from 10 N to
-    790 N it covers between 89 and 100 %, the usual scatter of 100 tests. In 300 other tests of
-    Eq. 19 with 0.5 N it covers 93 to 98 % at each of 13 tensions, but 92 % at 80 N, where EA bends:
-    95 % is not promised at a bend. Where EA is discontinuous (a kink of force over strain), the
-    smooth curve cannot follow it: the band misses EA within some newtons of the kink.
+    Measured, in 100 tests of 400 points each, of three wires with 0.5 N and 2 N of noise, it covers
+    95.3 % of all cases, and 89 to 100 % at each of 16 tensions. Where EA bends it may cover less:
+    Eq. 19 at 80 N 92 %. Within some newtons of a kink of force over strain it misses EA.
 
     The band leaves out errors of calibration and gauge length, and errors that neighbouring points
     share (drift, ripple, slip). ``TensileFit.notes`` names shared errors if the residuals show
-    them; a drift as slow as the test stays hidden. Neighbours also share steps of a load cell
-    coarser than the noise. With steps of 0.5 N and Eq. 19, the band covers 34 % of the tensions
-    without noise, 83 % with 0.1 N, and 95 % with 0.5 N.
+    them. Steps of a load cell coarser than the noise are shared, too: with steps of 0.5 N the band
+    covers 34 % of the tensions of Eq. 19 without noise, 83 % with 0.1 N, and 95 % with 0.5 N.
 
     Attributes:
         tensions: Tensions F, shape (n,) [N].
@@ -157,19 +152,18 @@ def fit_tensile_test(
 ) -> TensileFit:
     r"""Fit the tangent rigidity EA(F) = l_0 dF/dΔl [N] of a wire to its tensile test.
 
-    ``monotone`` fits the forces by a curve whose log EA is a spline. So EA > 0, and the curve is
-    C1. Its smoothness follows from the data (restricted likelihood). ``polynomial`` is the method
-    of the paper, for comparison: two polynomials of degree 6 through slopes of the measured curve,
-    without a band.
+    ``monotone`` fits the forces by a C1 curve with EA > 0, whose log EA is a spline. Its smoothness
+    follows from the data (restricted likelihood). ``polynomial`` is the method of the paper, for
+    comparison: two polynomials of degree 6 through slopes of the measured curve, without a band.
 
     Points of equal displacement are averaged. Left out are unloading, points after the largest
-    force, single points far from their neighbours, and slack. Slack ends where the force rises
-    beyond three standard deviations of its noise. ``notes`` lists these points. It also lists
-    points far from the curve, falls of the force (a grip slips) and correlated residuals (drift).
+    force, single points far from their neighbours, and slack, which ends where the force rises
+    beyond three standard deviations of its noise. ``notes`` lists these points, points far from the
+    curve, falls of the force (a grip slips) and correlated residuals (drift).
 
     The domain ends where plasticity begins: from there on, EA stays below 0.8 of its largest value,
-    beyond its uncertainty. The first of the ``stages``, pre-tensioning, in which EA rises steeply,
-    ends where EA begins to grow slower than √F.
+    beyond its uncertainty. The first of the ``stages``, pre-tensioning, ends where EA begins to
+    grow slower than √F.
 
     Wrong units are found only if the strain is above 1 or the rigidity is outside 1 N to 1e9 N. A
     force in kN passes for a thin thread. Read the report.
