@@ -135,28 +135,23 @@ def _remedies(K: Stiffness) -> Iterator[Remedy]:
         yield _remedy("wire", rigidity, wire, _STIFFER)
     if sprung := [k for each in locked if math.isfinite(k := each.series_stiffness)]:
         yield _remedy("spring", sprung, spring, _STIFFER)
-    distributed = K.distribution
-    if distributed is None or not distributed.least:
+    given = K.distribution
+    if given is None or not given.least:
         return
 
-    def tension(factor: float) -> float:
-        low = np.where(
-            distributed.minimum < distributed.maximum,
-            factor * distributed.minimum,
-            distributed.minimum,
-        )
-        found = distribute_tension(pose, low, distributed.maximum, K.wrench, distributed.solver)
-        return margin(pose, found.values)
-
-    def offset(factor: float) -> float:
-        there = changed(_with_disks(K, factor))
-        found = distribute_tension(
-            there, distributed.minimum, distributed.maximum, K.wrench, distributed.solver
-        )
+    def distributed(there: Posture, low: Array) -> float:
+        found = distribute_tension(there, low, given.maximum, K.wrench, given.solver)
         return margin(there, found.values)
 
-    if distributed.minimum.any():
-        yield _remedy("tension", distributed.minimum, tension, _LESS, _MORE)
+    def tension(factor: float) -> float:
+        low = given.minimum
+        return distributed(pose, np.where(low < given.maximum, factor * low, low))
+
+    def offset(factor: float) -> float:
+        return distributed(changed(_with_disks(K, factor)), given.minimum)
+
+    if given.minimum.any():
+        yield _remedy("tension", given.minimum, tension, _LESS, _MORE)
     if arm.is_serpentine and _with_disks(K, 1.0) == arm.cables:
         offsets = [joint.disk_offset for joint in arm.geometry.joints]
         yield _remedy("disk offset", offsets, offset, _LESS, _MORE)

@@ -31,15 +31,10 @@ class BodyState(NamedTuple):
 
 
 class Shapes(NamedTuple):
-    """Drawn shapes of a URDF.
+    """Drawn shapes of a URDF."""
 
-    Attributes:
-        place: Function that moves the shapes to joint angles (nv,) [rad].
-        rows: Rows in :class:`Tree` of the joints whose links have shapes.
-    """
-
-    place: Callable[[Array], None]
-    rows: frozenset[int]
+    place: Callable[[Array], None]  # moves the shapes to joint angles (nv,) [rad]
+    rows: frozenset[int]  # rows in Tree of the joints whose links have shapes
 
 
 class RigidBody:

@@ -23,23 +23,14 @@ from cdsm.support.values import Array
 
 
 class Loads(NamedTuple):
-    """Balance under loads, in dimensionless form; symbols as in the module's docstring.
+    """Balance under loads, in dimensionless form; symbols as in the module's docstring."""
 
-    Attributes:
-        A: [J_Lᵀ, −J_vᵀ U], scaled (nv, C+k).
-        b: Torque J_Xᵀ W − g, scaled (nv,).
-        low: Lower bounds of the tensions, scaled (C,).
-        high: Upper bounds of the tensions, scaled (C,).
-        lever: Scale of each column (C+k,).
-        force: Unit of force [N].
-    """
-
-    A: Array
-    b: Array
-    low: Array
-    high: Array
-    lever: Array
-    force: float
+    A: Array  # [J_Lᵀ, −J_vᵀ U], scaled (nv, C+k)
+    b: Array  # torque J_Xᵀ W − g, scaled (nv,)
+    low: Array  # lower bounds of the tensions, scaled (C,)
+    high: Array  # upper bounds of the tensions, scaled (C,)
+    lever: Array  # scale of each column (C+k,)
+    force: float  # unit of force [N]
 
     @classmethod
     def of(cls, pose: Posture, low: Array, high: Array, wrench: Array, directions: Array) -> Self:

@@ -32,23 +32,14 @@ class Optimum(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Admissible:
-    """Admissible tensions F (C,) [N]: J_Lᵀ F = J_Xᵀ W − g (Eq. 13) and low ≤ F ≤ high.
+    """Admissible tensions F (C,) [N]: J_Lᵀ F = J_Xᵀ W − g (Eq. 13) and low ≤ F ≤ high."""
 
-    Attributes:
-        least: The least admissible tensions (Eq. 17), with the bounds of the caller.
-        low: Lower bounds (C,) [N], within the domains of the elasticities.
-        high: Upper bounds (C,) [N], within the domains of the elasticities; inf if there is none.
-        scale: Largest of the least tensions [N], or 1 N if all are zero.
-        rows: Orthonormal basis (r, C) of the row space of J_Lᵀ, whose rank is r.
-        null: Orthonormal basis (C, p) of the null space of J_Lᵀ, p = C − r.
-    """
-
-    least: Tension
-    low: Array
-    high: Array
-    scale: float
-    rows: Array
-    null: Array
+    least: Tension  # the least admissible tensions (Eq. 17), with the bounds of the caller
+    low: Array  # lower bounds (C,) [N], within the domains of the elasticities
+    high: Array  # upper bounds (C,) [N], within the domains; inf if there is none
+    scale: float  # largest of the least tensions [N], or 1 N if all are zero
+    rows: Array  # orthonormal basis (r, C) of the row space of J_Lᵀ, whose rank is r
+    null: Array  # orthonormal basis (C, p) of the null space of J_Lᵀ, p = C − r
 
     @cached_property
     def kinks(self) -> list[tuple[int, float]]:

@@ -76,23 +76,14 @@ NEAREST: Final = Objective(square=1.0)
 
 @dataclass(frozen=True, eq=False)
 class Program:
-    """Nonlinear program over the tensions.
+    """Nonlinear program over the tensions."""
 
-    Attributes:
-        region: The admissible tensions.
-        anchor: Stable point well inside, towards which steps are moved back.
-        constraints: The constraints c(F) = 0.
-        objective: The objective f(F).
-        unit: Unit of the effort [N], of the order of the tensions in the solution.
-        centre: Tensions (C,) [N] at which the effort is zero, or 0.
-    """
-
-    region: Admissible
-    anchor: Evaluation
-    constraints: Constraints
-    objective: Objective
-    unit: float
-    centre: Array | float = 0.0
+    region: Admissible  # the admissible tensions
+    anchor: Evaluation  # stable point well inside, towards which steps are moved back
+    constraints: Constraints  # c(F) = 0
+    objective: Objective  # f(F)
+    unit: float  # of the effort [N], of the order of the tensions in the solution
+    centre: Array | float = 0.0  # tensions (C,) [N] at which the effort is zero, or 0
 
     def merit(self, at: ConstraintValues, price: float) -> float:
         """Return the merit at a point: f, for *effort* plus ``price`` times the violation of c."""

@@ -159,17 +159,11 @@ class Constraint(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Constraints:
-    """c(F): values of all constraints minus their targets, to be zero.
-
-    Attributes:
-        parts: The constraints.
-        targets: Their targets (n,) [-].
-        single: u (3,) and the target [N/m] if this is one direction, else None.
-    """
+    """c(F): values of all constraints minus their targets, to be zero."""
 
     parts: tuple[Constraint, ...]
-    targets: Array
-    single: tuple[Array, float] | None = None
+    targets: Array  # (n,) [-]
+    single: tuple[Array, float] | None = None  # u (3,) and target [N/m] of one direction
 
     def at(self, evaluation: Evaluation) -> ConstraintValues:
         """Return the constraint values c at the stable tensions of ``evaluation``."""

@@ -82,19 +82,12 @@ def _integrals(edges: Array, table: Array, before: Array, power: int, F: Array) 
 
 
 class Panels(NamedTuple):
-    """Panels from the low end up to :attr:`end`; made by :func:`panels`.
+    """Panels from the low end up to :attr:`end`; made by :func:`panels`."""
 
-    Attributes:
-        edges: Tensions at which the panels begin and end (P+1,) [N].
-        coefficients: Coefficients of the polynomial on each panel, lowest power first, (powers, P).
-        before: ∫ Fⁿ dF/p from the low end to the beginning of each panel, n = 0 and 1, (2, P).
-        end: Tension from which p is not positive [N]; inf if p is positive everywhere.
-    """
-
-    edges: Array
-    coefficients: Array
-    before: Array
-    end: float
+    edges: Array  # tensions at which the panels begin and end (P+1,) [N]
+    coefficients: Array  # of the polynomial on each panel, lowest power first, (powers, P)
+    before: Array  # ∫ Fⁿ dF/p from the low end to the beginning of each panel, n = 0, 1, (2, P)
+    end: float  # tension from which p is not positive [N]; inf if p is positive everywhere
 
     def integral(self, F: Array, power: int) -> Array:
         """Integrate Fⁿ dF/p, n = ``power``, from the low end to each F ≤ ``end``, any shape."""

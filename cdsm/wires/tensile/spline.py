@@ -73,22 +73,15 @@ class Spread(NamedTuple):
 class Curve:
     """Fitted curve, given by log EA on a grid of tensions and by the strain at one of them.
 
-    This tension is the anchor.
-
-    Attributes:
-        basis: Splines of log EA.
-        coefficients: Coefficients of the splines (k,).
-        anchor: Index of the anchor on the grid, where the wire is stiff. At a soft end, any change
-            of EA would shift the rest of the curve, and the fit would converge slowly.
-        anchor_strain: Strain ε at the anchor [-].
-        smoothing: Weight of the roughness [N²].
+    This tension is the anchor, where the wire is stiff. At a soft end, any change of EA would shift
+    the rest of the curve, and the fit would converge slowly.
     """
 
-    basis: Basis
-    coefficients: Array
-    anchor: int
-    anchor_strain: float
-    smoothing: float
+    basis: Basis  # splines of log EA
+    coefficients: Array  # of the splines (k,)
+    anchor: int  # index of the anchor on the grid
+    anchor_strain: float  # strain ε at the anchor [-]
+    smoothing: float  # weight of the roughness [N²]
 
     @cached_property
     def rigidity(self) -> Array:
