@@ -40,8 +40,7 @@ class UnknownName(CdsmError, LookupError):
         super().__init__(f"{message} {remedy}".rstrip())
 
 
-_PATH = 1000
-"""Number of characters of a path that a message shows."""
+_PATH = 1000  # number of characters of a path that a message shows
 
 
 class FileError(CdsmError, OSError):

@@ -14,8 +14,7 @@ if TYPE_CHECKING:
 LONGEST = 30.0
 """If an arm is longer than this [m], its lengths are probably in millimetres."""
 
-_WIDEST = 1.0
-"""A hole radius or disk offset larger than this [m] is probably in millimetres."""
+_WIDEST = 1.0  # a hole radius or disk offset larger than this [m] is probably in millimetres
 
 
 def disks_of(geometry: Description) -> tuple[Disk, ...]:

@@ -10,11 +10,8 @@ import numpy as np
 from cdsm.geometry.parts import Disk
 from cdsm.support.values import Array
 
-_ROUNDS = 60
-"""Number of alternating projections: enough to decide gaps and overlaps of 0.01 radius."""
-
-_TOUCHING = 1e-3
-"""A gap below this fraction of the radius counts as an overlap."""
+_ROUNDS = 60  # number of alternating projections: enough to decide gaps and overlaps of 0.01 radius
+_TOUCHING = 1e-3  # a gap below this fraction of the radius counts as an overlap
 
 
 def overlapping(disks: Sequence[Disk], poses: dict[str, Array]) -> list[tuple[str, str]]:

@@ -24,8 +24,7 @@ KINDS = ("cable_clearance", "link_clearance", "disk_clearance")
 _BACKBONE = 0.2
 """Radius of a link's backbone over hole radius of its first disk, as in the URDF's shapes."""
 
-_ON = 1e-9
-"""A site this near to a disk [m] is on the disk."""
+_ON = 1e-9  # a site this near to a disk [m] is on the disk
 
 
 @final

@@ -17,8 +17,7 @@ from cdsm.errors import SolverError
 from cdsm.measures.program import Loads
 from cdsm.support.values import Array
 
-_FLAT = 1e-8
-"""Smaller widths of a polytope, relative to its size, count as zero."""
+_FLAT = 1e-8  # smaller widths of a polytope, relative to its size, count as zero
 
 
 class Hull(NamedTuple):

@@ -15,11 +15,8 @@ from cdsm.kernels.tension import scaled_balance
 from cdsm.kernels.tree import Indices
 from cdsm.support.values import Array
 
-_ROUNDING = 1e-11
-"""Reduced costs and pivots below this are rounding; coefficients are of order one."""
-
-_PROOF = 1e-10
-"""Violation of a constraint, relative to the bounded quantity, that is rounding."""
+_ROUNDING = 1e-11  # reduced costs and pivots below this are rounding; coefficients are of order one
+_PROOF = 1e-10  # violation of a constraint, relative to the bounded quantity, that is rounding
 
 _AT_LOW, _AT_HIGH, _FREE, _BASIC = 0, 1, 2, 3
 

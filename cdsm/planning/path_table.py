@@ -9,8 +9,7 @@ import numpy as np
 if TYPE_CHECKING:
     from cdsm.planning.path_plan import PathPlan
 
-_NO_ANGLE = 1e-15
-"""A smaller joint coordinate [rad or m] of a path is rounding."""
+_NO_ANGLE = 1e-15  # a smaller joint coordinate [rad or m] of a path is rounding
 
 
 def path_table(plan: PathPlan) -> tuple[list[str], list[list[Any]]]:

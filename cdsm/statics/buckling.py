@@ -35,8 +35,7 @@ from cdsm.tension import DEFAULT_SOLVER, distribute_tension
 _NOWHERE: Final = 1e6
 """Largest load factor that is tried. If the arm stays stable under it, the factor is infinite."""
 
-_SHOWN: Final = 10.0
-"""Largest load factor of the curve if the critical factor is infinite."""
+_SHOWN: Final = 10.0  # largest load factor of the curve if the critical factor is infinite
 
 
 def critical_tension(

@@ -13,17 +13,13 @@ from cdsm.statics.rest_search import settled
 from cdsm.statics.trust_region import RestSearch, find_rest
 from cdsm.support.values import Array, frozen
 
-_FAR = 0.1
-"""Largest joint motion [rad] between two equilibria that :func:`follow` connects."""
+_FAR = 0.1  # largest joint motion [rad] between two equilibria that follow connects
 
 _DENSE = 0.02
 """Distance [rad] between postures whose stability is checked; shorter unstable parts go unseen."""
 
-_FINEST = 2.0**-12
-"""Relative precision of a buckling load."""
-
-_SLIGHT = 1e-9
-"""Buckling loads below this part of the load are found to this absolute precision."""
+_FINEST = 2.0**-12  # relative precision of a buckling load
+_SLIGHT = 1e-9  # buckling loads below this part of the load are found to this absolute precision
 
 
 def follow_load(

@@ -23,8 +23,7 @@ ROUNDING = 16.0 * float(np.finfo(np.float64).eps)
 _APART = 1e-6
 """A joint stops this far [rad] before its disks touch, where a cable would have no direction."""
 
-_BEYOND = 1e-9
-"""A tension outside the domain of a law by at most this part is rounding."""
+_BEYOND = 1e-9  # a tension outside the domain of a law by at most this part is rounding
 
 
 class Iterate(NamedTuple):

@@ -26,8 +26,7 @@ from cdsm.urdf import CROSS_INERTIA, CROSS_MASS
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_MASSLESS = 1e-12
-"""A motion has no mass if its eigenvalue of M is below this part of the largest."""
+_MASSLESS = 1e-12  # a motion has no mass if its eigenvalue of M is below this part of the largest
 
 _STAND_IN = 0.02
 """Largest share of placeholder masses in the kinetic energy; it changes a frequency by 1 %."""

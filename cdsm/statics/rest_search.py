@@ -23,8 +23,7 @@ from cdsm.support.validation import wrench_vector
 from cdsm.support.values import Array, frozen
 from cdsm.tension import Tension
 
-_SMALLEST_STEP = 2.0**-6
-"""Smallest load step that is tried."""
+_SMALLEST_STEP = 2.0**-6  # smallest load step that is tried
 
 
 _CLOSE = 1e-3

@@ -33,8 +33,7 @@ _FINEST, _SHORTEST = 2.0**-12, 2.0**-6
 """Smallest sub-steps, as a part of the step between two loads: where the energy balance stays
 inaccurate (the arm snaps through), and where no equilibrium is found."""
 
-_ROUNDING = 16.0 * float(np.finfo(np.float64).eps)
-"""Relative rounding of the stored energy."""
+_ROUNDING = 16.0 * float(np.finfo(np.float64).eps)  # relative rounding of the stored energy
 
 _OF_LENGTHS = 2.0**-52
 """Relative rounding of a cable length; times length and tension, it is an error of the work."""

@@ -26,8 +26,7 @@ _SETTLED, _MOST_CYCLES = 0.01, 64
 _GROWTH, _MOST = 1.25, 100.0
 """Factor of the load from trial to trial; largest load as a multiple of the breakaway load."""
 
-_HALVINGS = 6
-"""Number of bisections of the load from which the arm slides; they reach 0.4 %."""
+_HALVINGS = 6  # number of bisections of the load from which the arm slides; they reach 0.4 %
 
 
 @final

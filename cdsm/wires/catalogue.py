@@ -28,8 +28,7 @@ WIRES: Final[dict[str, Elasticity]] = {"1x19-1.2mm": STRAND, "solid-1.2mm": SOLI
 
 _FILES = (".toml", ".csv", ".txt", ".tsv")  # of tables too: their reader says to fit them first
 
-_NAMED = 3
-"""Largest number of different wires that a text names."""
+_NAMED = 3  # largest number of different wires that a text names
 
 Wire = Elasticity | str | float | os.PathLike[str]
 """Ways to give a wire: its law, a name of :data:`WIRES`, EA [N], or the path of a WIRE.toml."""

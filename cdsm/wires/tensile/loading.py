@@ -15,8 +15,7 @@ from cdsm.wires.tensile.record import TensileTest
 FEWEST = 8
 """Least number of points of a fit. Fewer points show no bend."""
 _MOST = 800  # fitted points; more are averaged, which makes the fit faster
-_OUTLYING = 5e-3
-"""An outlier is farther from its neighbours than this fraction of the range."""
+_OUTLYING = 5e-3  # an outlier is farther from its neighbours than this fraction of the range
 _AROUND = 25  # neighbouring points over which the noise is assumed constant
 _SURE = 3.0  # standard deviations beyond which a rise of the force is certain
 _MAD = 1.4826  # standard deviation of normal noise over its median magnitude
