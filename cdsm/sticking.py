@@ -45,15 +45,9 @@ def holding(pose: Posture) -> Flags:
 def tension_gradient(pose: Posture, tension: Array, sliding: Flags) -> Array:
     """Compute ∂T/∂θ (S, nv) [N/rad] of the segments at checked tensions T (S,) [N].
 
-    Args:
-        pose: The posture.
-        tension: T of each segment, within the domain of its law. Where the cable slides, the larger
-            tension at the hole is exp(μ φ) times the smaller.
-        sliding: Whether the cable slides in each hole (P,). In holes in which the cable cannot
-            stick, see :func:`holding`, it always slides.
-
-    Raises:
-        ElasticityRangeError: A tension is outside the domain of its cable's elasticity.
+    ``sliding`` marks the holes (P,) in which the cable slides: there the larger tension is exp(μ φ)
+    times the smaller. In holes in which it cannot stick, see :func:`holding`, it always slides.
+    ElasticityRangeError if a tension is outside the domain of its law.
     """
     model, segments = pose.arm._model, pose.segments
     chains, laws, length = segments.chains, model.segment_laws, segments.lengths
@@ -77,11 +71,7 @@ def tension_gradient(pose: Posture, tension: Array, sliding: Flags) -> Array:
 def first_order_loads(pose: Posture, tension: Array, gradient: Array, motion: Array) -> Array:
     """Compute the loads W_i (P,) [N] at which cables of a stuck arm begin to slide; inf: never.
 
-    Args:
-        pose: The posture.
-        tension: T (S,) [N].
-        gradient: ∂T/∂θ (S, nv) [N/rad] of the stuck arm.
-        motion: θ̇ (nv,) [rad/N]: joint motion under a force of 1 N.
+    T are the tensions (S,) [N], ``gradient`` ∂T/∂θ (S, nv) [N/rad], ``motion`` θ̇ (nv,) [rad/N].
     """
     segments = pose.segments
     chains, slack = segments.chains, tension == 0.0

@@ -52,16 +52,10 @@ class Loads(NamedTuple):
         return cls(columns / lever, b, low, high, lever, force)
 
     def largest(self, along: Array, *, positive: bool = False) -> tuple[float, Array] | None:
-        """Compute the largest a·x over all loads x that tensions balance, and one such x (k,).
+        """Compute the largest a·x, a = ``along`` (k,), over all balanced loads x, and one such x.
 
-        The value is inf, and x is NaN, if a·x is unbounded. Return None if no load is balanced.
-
-        Args:
-            along: a (k,).
-            positive: Allow only x ≥ 0.
-
-        Raises:
-            SolverError: The solver stops for another reason.
+        With ``positive`` only x ≥ 0 counts. The value is inf, and x is NaN, if a·x is unbounded.
+        Return None if no load is balanced; SolverError if the solver stops for another reason.
         """
         count = self.low.size
         tensions, loads = self.lever[:count], self.lever[count:]

@@ -43,13 +43,10 @@ class Follower:
     def add(self, sample: Sample) -> InfeasibleSample | None:
         """Plan one more sample. Return None if it succeeds, else the reason of the failure.
 
-        The plan takes the least tensions within the rate of the last planned sample. If no tensions
-        within the rate hit the target, but other tensions do, earlier samples are planned again so
-        that they lead to the other tensions.
-
-        Raises:
-            UnreachableStiffness: No tensions hit the single target, even with an unlimited rate.
-            SingularStiffness: No admissible tensions make the arm stable, even with that.
+        The plan takes the least tensions within the rate of the last planned sample. If these miss
+        the target although others hit it, earlier samples are planned again so that they lead to
+        the others. Raises UnreachableStiffness or SingularStiffness if none do, even with an
+        unlimited rate.
         """
         region = sample.model.region
         last = self.planned[-1] if self.planned else None

@@ -36,8 +36,7 @@ _AS_NEAR = 1e-8  # misses up to this count as zero: next to buckling a search ma
 class Planner:
     """Search, from several starts, for the tensions F of least ‖F‖ with constraints c(F) = 0.
 
-    Attributes:
-        efforts: ‖F‖ [N] at the end of each search that hit the target, rising.
+    ``efforts`` are ‖F‖ [N] at the end of each search that hit the target, rising.
     """
 
     def __init__(

@@ -19,16 +19,13 @@ _NO_GAIN = 1e-9  # a gain of reserve below this part of the scale of K_θ is not
 
 
 class StartPoints:
-    """Stable tensions in a bounded region from which searches start.
+    """Stable tensions in a bounded region from which searches start; SingularStiffness without any.
 
     Corners are searched in the directions of the cables and in a number of random directions.
 
     Attributes:
         anchor: A stable point well inside.
         points: The anchor, and stable points towards the corners. More directions only add points.
-
-    Raises:
-        SingularStiffness: No admissible tensions were found that make the arm stable.
     """
 
     def __init__(

@@ -174,18 +174,14 @@ class ConstraintValues:
     """Constraint values at stable tensions F, with their first and second derivatives.
 
     A value is a weighted sum of the entries of a tip stiffness X = (R K_θ⁻¹ Rᵀ)⁻¹, minus a target.
-    R are rows of the tip Jacobian. M = K_θ⁻¹ Rᵀ X is the joint motion per motion of the tip.
-    P = K_θ⁻¹ − M R K_θ⁻¹ is the joint motion per torque with the tip fixed. With ∂_i = ∂/∂F_i for
-    cable i, and δ_ij = 1 for i = j, else 0,
+    R are rows of the tip Jacobian. M = K_θ⁻¹ Rᵀ X is the joint motion per motion of the tip, and P
+    = K_θ⁻¹ − M R K_θ⁻¹ that per torque with the tip fixed. With ∂_i = ∂/∂F_i for cable i,
 
         ∂_i X = Mᵀ ∂_i K_θ M,
         ∂_i ∂_j X = −Mᵀ (∂_i K_θ P ∂_j K_θ + ∂_j K_θ P ∂_i K_θ) M + δ_ij Mᵀ J_i k″_i J_iᵀ M.
 
-    J_i is the gradient of the length of cable i, and k″_i the second derivative of its stiffness.
-
-    Attributes:
-        evaluation: K_θ at these tensions.
-        values: The values c (n,) [-] of :class:`Constraints`.
+    J_i is the gradient of the length of cable i, k″_i the second derivative of its stiffness, and δ
+    the Kronecker symbol. ``values`` are the values c (n,) [-] of :class:`Constraints`.
     """
 
     def __init__(self, constraints: Constraints, evaluation: Evaluation) -> None:

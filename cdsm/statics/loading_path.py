@@ -66,9 +66,7 @@ class LoadingPath:
 
         ``parts`` is the number of rests over the range of the forces. The searches start from the
         motions of a ``near`` path, of a similar arm under the same loads: up to twice as fast.
-
-        Raises:
-            CdsmError: The posture is beyond a joint limit, or no equilibrium was found on the way.
+        CdsmError if the posture is beyond a joint limit, or no equilibrium was found on the way.
         """
         loading = slow_loading(pose, tension, wrench, 1.0)
         start = state = loading.begin(tension, wrench)

@@ -49,19 +49,13 @@ class Iterate(NamedTuple):
 
 
 class LoadedArm:
-    """Arm under a wrench, its motors locked at a reference.
+    """Arm under a wrench W (6,), its motors locked at a reference posture with tensions F (C,) [N].
 
     A position-controlled cable keeps its original length l_0. Its elongation is that at the
     reference plus the change of its length. A force-controlled cable keeps its tension. Below the
-    domain of its law a cable has the stiffness of the lower bound until its tension is zero; then
-    it is slack. Above the domain it has the stiffness of the upper bound. Only iterates may leave
-    the domain: :meth:`require_domains` rejects such tensions in a solution.
-
-    Args:
-        reference: The posture at which the motors were locked.
-        tension: F (C,) [N] at the reference, within the domains of position-controlled cables.
-        wrench: W (6,) on the arm: force [N], then moment [N m].
-        lengths: L (C,) [m] at which the cables have these tensions. Default: L at the reference.
+    domain of its law a cable has the stiffness of the lower bound until it is slack, above that of
+    the upper bound: only iterates may be there, see :meth:`require_domains`. ``lengths`` are L (C,)
+    [m] at which the cables have these tensions, by default those of the reference.
 
     Raises:
         ElasticityRangeError: A law gives no strain; or a series spring stretches by more than the

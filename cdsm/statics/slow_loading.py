@@ -115,11 +115,8 @@ class SlowLoading(NamedTuple):
     def carry(self, before: State, load: Load, what: str) -> tuple[State, Passage]:
         """Change the load of the equilibrium ``before`` to ``load`` in sub-steps.
 
-        Returns the new state, and the energies and slips on the way. ``what`` names the load in an
-        error message.
-
-        Raises:
-            EquilibriumError: No equilibrium was found on the way.
+        Returns the new state, and the energies and slips on the way. EquilibriumError, which names
+        the load as ``what``, if no equilibrium was found on the way.
         """
         first, state = before.load, before
         total = Passage(0.0, 0.0, 0.0, 0.0, np.zeros(before.settled.chain.slip.size))

@@ -31,14 +31,9 @@ _NODES, _WEIGHTS = (leggauss(24)[0] + 1.0) / 2.0, leggauss(24)[1] / 2.0
 
 
 class RisingCurve:
-    """Curve through n points. A point belongs to the piece below it.
+    """Curve through n points with rising x and y (n,). A point belongs to the piece below it.
 
-    Args:
-        x: Abscissae of the points, rising (n,).
-        y: Ordinates of the points, rising (n,).
-
-    Attributes:
-        chords: Slopes (n − 1,) of the straight lines between neighbouring points.
+    ``chords`` are the slopes (n − 1,) of the straight lines between neighbouring points.
     """
 
     def __init__(self, x: Array, y: Array) -> None:
