@@ -14,8 +14,8 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from cdsm.control.plant import PlantState, SlowPlant, SlowState
-from cdsm.errors import CdsmError
-from cdsm.friction.band import RestBand, rest_band
+from cdsm.errors import CdsmError, SingularStiffness
+from cdsm.friction.band import rest_band
 from cdsm.friction.breakaway import breakaway
 from cdsm.manipulator import Manipulator
 from cdsm.statics.locked_motors import LoadedArm
@@ -36,33 +36,43 @@ _DISPLACED: Final = 1e-3
 
 
 class Assessment(NamedTuple):
-    """True stiffness and band of one state of a plant.
+    """True stiffness and band of one state of a plant; NaN where there is none.
 
     Attributes:
-        stiffness: Frictionless K_θ with the same wire and load; None if the arm buckles.
-        band: Where the tip may rest along a direction, relative to the posture of ``stiffness``; or
-            None.
+        tip: Tip (3,) [m] at the equilibrium without friction.
+        stiffness: Stiffness along each direction (D,) [N/m] there.
+        margin: Smallest eigenvalue of K_θ [N m/rad] there.
+        band: Least and largest proved displacement from there along the first direction [m].
     """
 
-    stiffness: Stiffness | None
-    band: RestBand | None
+    tip: Array
+    stiffness: list[float]
+    margin: float
+    band: tuple[float, float]
 
 
 def assess(
-    arm: Manipulator, state: PlantState, wrench: Array, u: Array, *, banded: bool
+    arm: Manipulator, state: PlantState, wrench: Array, directions: Array, *, banded: bool
 ) -> Assessment:
-    """Find the frictionless equilibrium near a state under ``wrench`` (6,), and K_θ there.
-
-    With ``banded``, also find the proved band of rest about it along u (3,).
-    """
+    """Assess a state under ``wrench`` (6,) along ``directions`` (D, 3); the band if ``banded``."""
+    nan = math.nan
     try:
         K = frictionless_stiffness(arm, state, wrench)
     except CdsmError:
-        return Assessment(None, None)
-    if not (banded and K.is_stable):
-        return Assessment(K, None)
-    band = rest_band(K.posture, K.tension, u, K.wrench)
-    return Assessment(K, band if band.proved else None)
+        return Assessment(np.full(3, nan), [nan] * len(directions), nan, (nan, nan))
+    ends = nan, nan
+    if banded and K.is_stable:
+        band = rest_band(K.posture, K.tension, directions[0], K.wrench)
+        ends = (band.low, band.high) if band.proved else ends
+    return Assessment(K.posture.tip[:3, 3], [_along(K, u) for u in directions], K.margin, ends)
+
+
+def _along(K: Stiffness, u: Array) -> float:
+    """Return the stiffness along u [N/m]; NaN if K_θ is singular."""
+    try:
+        return K.along(u)
+    except SingularStiffness:
+        return math.nan
 
 
 def frictionless_stiffness(arm: Manipulator, state: PlantState, wrench: Array) -> Stiffness:

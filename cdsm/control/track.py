@@ -24,11 +24,9 @@ from cdsm.errors import (
     ElasticityRangeError,
     EquilibriumError,
     InvalidInput,
-    SingularStiffness,
 )
 from cdsm.planning.path import checked_rate
 from cdsm.planning.path_plan import PathPlan
-from cdsm.stiffness_matrix import Stiffness
 from cdsm.support import progress
 from cdsm.support.validation import flag, instance, one_of, quantity, scalar, whole_number
 from cdsm.support.values import Array, frozen
@@ -149,7 +147,7 @@ def track(
             break
         truth.append(state.true)
         banded = every > 0 and k % every == 0 and plant.arm.has_friction
-        judged = assess(plant.arm, state, wrenches[k], schedule.directions[0], banded=banded)
+        judged = assess(plant.arm, state, wrenches[k], schedule.directions, banded=banded)
         found = [
             felt_stiffness(plant, state, wrenches[k], observer, estimate, (low, high), u, apart)
             for u in (schedule.directions if feels and k % feels == 0 else ())
@@ -198,16 +196,14 @@ class _Step(NamedTuple):
 
 
 def _columns(schedule: Schedule, wrenches: Array, records: list[_Step]) -> dict[str, Any]:
-    n, u, nan = len(records), schedule.directions, math.nan
-    rests = [record.judged.stiffness for record in records]
-    bands = [record.judged.band for record in records]
+    n, u = len(records), schedule.directions
 
     def rows(values: list[Any], *tail: int) -> Array:
         return frozen(np.array(values, dtype=np.float64).reshape(n, *tail))
 
     joints, cables = schedule.references[0].angles.size, schedule.references[0].wire.size
     tips = rows([record.state.pose.tip[:3, 3] for record in records], 3)
-    places = rows([[nan] * 3 if K is None else K.posture.tip[:3, 3] for K in rests], 3)
+    rests = rows([record.judged.tip for record in records], 3)
     return {
         "goals": frozen(schedule.tips[:n].copy()),
         "target": frozen(schedule.targets[:n].copy()),
@@ -223,22 +219,12 @@ def _columns(schedule: Schedule, wrenches: Array, records: list[_Step]) -> dict[
         "saturated": frozen(
             np.array([record.command.saturated for record in records]).reshape(n, cables)
         ),
-        "stiffness": rows([[_along(K, each) for each in u] for K in rests], len(u)),
-        "margin": rows([nan if K is None else K.margin for K in rests]),
-        "felt": rows([record.felt or [nan] * len(u) for record in records], len(u)),
+        "stiffness": rows([record.judged.stiffness for record in records], len(u)),
+        "margin": rows([record.judged.margin for record in records]),
+        "felt": rows([record.felt or [math.nan] * len(u) for record in records], len(u)),
         "banded": frozen(np.array([record.banded for record in records], dtype=np.bool_)),
-        "band": rows([(nan, nan) if each is None else (each.low, each.high) for each in bands], 2),
-        "displacement": frozen((tips - places) @ u[0]),
+        "band": rows([record.judged.band for record in records], 2),
+        "displacement": frozen((tips - rests) @ u[0]),
         "estimated_force": rows([record.estimate.force for record in records], 3),
         "rigidity": rows([1.0 / record.estimate.softness for record in records]),
     }
-
-
-def _along(K: Stiffness | None, u: Array) -> float:
-    """Return the stiffness along u [N/m]; NaN if the arm has none."""
-    if K is None:
-        return math.nan
-    try:
-        return K.along(u)
-    except SingularStiffness:
-        return math.nan

@@ -159,11 +159,12 @@ def gathered(problem: DesignProblem, rows: Array, found: Sequence[Found]) -> Des
     )
 
 
-_Compute = Callable[[Array], Iterable[Found]]
+Compute = Callable[[Array], Iterable[Found]]
+"""Function that evaluates designs (D, n), in their order."""
 
 
 @contextmanager
-def workers(problem: DesignProblem, jobs: int, client: Client | None) -> Iterator[_Compute]:
+def workers(problem: DesignProblem, jobs: int, client: Client | None) -> Iterator[Compute]:
     """Yield a function that evaluates designs (D, n) in order, in processes or on a cluster."""
     whole_number("jobs", jobs, 1)
     if client is not None:
@@ -182,7 +183,7 @@ def workers(problem: DesignProblem, jobs: int, client: Client | None) -> Iterato
                 raise
 
 
-def _on_cluster(problem: DesignProblem, client: Client) -> _Compute:
+def _on_cluster(problem: DesignProblem, client: Client) -> Compute:
     from cdsm.sweeps.cluster import checked_client
 
     checked_client(client)

@@ -89,10 +89,7 @@ def search_designs(
             if asked is None or not len(asked):
                 break
             designs = np.array([_numbers(problem, each) for each in asked.get("X")])
-            new = _unknown(kept, designs)
-            kept.add(new, compute(new) if len(new) else ())
-            answers = [kept.get(row) for row in designs]
-            evaluated = [each for each in answers if each is not None]
+            evaluated = kept.evaluated(designs, compute)
             advance(len(designs))
             _tell(problem, algorithm, asked, designs, evaluated)
             rows += [*designs]
@@ -130,12 +127,6 @@ def pareto(designs: Designs) -> Indices:
         if not beats.any() and not same:
             kept.append(i)
     return np.array(sorted(kept, key=lambda i: tuple(goals[i])), dtype=np.intp)
-
-
-def _unknown(kept: Store, designs: Array) -> Array:
-    """Return those of ``designs`` (D, n) that are not in the store yet, each once."""
-    new = {row.tobytes(): row for row in designs if kept.get(row) is None}
-    return np.array([*new.values()]).reshape(-1, designs.shape[1])
 
 
 def progress_of(problem: DesignProblem, generation: int, values: Array) -> DesignProgress:

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from cdsm.design.evaluation import Compute
 from cdsm.design.problem import DesignProblem
 from cdsm.design.quantities import Found
 from cdsm.errors import FileError, StoreError
@@ -69,12 +70,15 @@ class Store:
             whole = "\n".join([first, *lines[:-1], ""])
             self._path.write_text(whole, encoding="utf-8")
 
-    def get(self, row: Array) -> Found | None:
-        """Return the recorded evaluation of a design ``row`` (n,), or None."""
-        return self._found.get(row.tobytes())
+    def evaluated(self, designs: Array, compute: Compute) -> list[Found]:
+        """Return the evaluations of designs (D, n); compute and record those that are new."""
+        new = {row.tobytes(): row for row in designs if row.tobytes() not in self._found}
+        if new:
+            rows = np.array([*new.values()])
+            self._add(rows, compute(rows))
+        return [self._found[row.tobytes()] for row in designs]
 
-    def add(self, rows: Iterable[Array], found: Iterable[Found]) -> None:
-        """Record the evaluations ``found`` of designs ``rows``, (n,) each."""
+    def _add(self, rows: Array, found: Iterable[Found]) -> None:
         lines = []
         for row, each in zip(rows, found, strict=True):
             self._found[row.tobytes()] = each
@@ -83,7 +87,7 @@ class Store:
                 for name, numbers in (("at", row), ("is", each.values))
             }
             lines.append(json.dumps(entry | ({"fault": each.fault} if each.fault else {})))
-        if self._path is not None and lines:
+        if self._path is not None:
             try:
                 with self._path.open("a", encoding="utf-8") as file:
                     file.write("\n".join([*lines, ""]))

@@ -62,12 +62,10 @@ class ChainProblem:
         self._rest[first] = [cable.elasticity.rest for cable in cables]
         self._base, self._softness = np.ones(size), np.zeros(size)
         self._curved: list[tuple[Elasticity, Indices]] = []
-        self.laws: list[tuple[Elasticity, list[int]]] = []
+        by_law: dict[int, tuple[Elasticity, list[int]]] = {}
         for c, cable in enumerate(cables):
-            same = next((of for law, of in self.laws if law is cable.elasticity), None)
-            if same is None:
-                self.laws.append((cable.elasticity, same := []))
-            same.append(c)
+            by_law.setdefault(id(cable.elasticity), (cable.elasticity, []))[1].append(c)
+        self.laws = list(by_law.values())
         for law, of in self.laws:
             segments = np.flatnonzero(np.isin(self._cable, of))
             if isinstance(law, LinearElasticity):

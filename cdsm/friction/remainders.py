@@ -2,8 +2,9 @@
 
 Let r be the largest distance of a segment's sites from the joints that change it, p the largest
 motion of the sites across the segment per turn, m its smallest length, and σ the sum of the turns.
-Then the third derivative of its length has |l′′′| ≤ (3 r p²/m² + 3 r p/m + r) σ³. Its direction
-turns by p σ/m, with a second derivative of at most (2 p r/m² + p²/m² + r/m) σ².
+Then the third derivative of its length l has |l′′′| ≤ c σ³ with c = 3 r p²/m² + 3 r p/m + r. So l
+differs from its second-order expansion by at most c σ³/6, and ∂l/∂θ_i from its tangent by at most
+c σ²/2. The segment turns by p σ/m, with a second derivative of at most (2 p r/m² + p²/m² + r/m) σ².
 """
 
 from __future__ import annotations

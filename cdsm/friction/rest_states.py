@@ -11,14 +11,9 @@ tip in it are two linear programs. All neglected terms, also those of nonlinear 
 a neighbourhood |δ_i| ≤ ρ_i, |ΔT_j| ≤ ρ_T and added to the right-hand sides. The polyhedron then
 contains all states of rest in the neighbourhood (outer correction):
 
-- Let r be the largest distance of a segment's sites from the joints that change it, p the largest
-  motion of the sites across the segment per turn, and m its smallest length. Then the third
-  derivative of its length per turn has |l′′′| ≤ c = 3 r p²/m² + 3 r p/m + r. With σ = Σ ρ_i over
-  its joints, l differs from its second-order expansion by at most c σ³/6, and ∂l/∂θ_i from its
-  tangent by at most c σ²/2.
 - δ is a sum of one motion per hole. So quadratic and cubic forms of δ are sums over two and three
   holes, bounded term by term: those of the lengths, of the torques of weight and wrench, and of the
-  tip displacement. The remainders are bounded by :mod:`~cdsm.friction.remainders`.
+  tip displacement. What these forms leave out is bounded by :mod:`~cdsm.friction.remainders`.
 - The wrap angles are replaced by their tangents, or by constants, with bounded errors.
 - Over a range |ΔT| ≤ ρ_T of tensions, 1/(1 + ε) falls, and lies between two parallel lines.
 - Products of δ and ΔT are at most those of ρ and ρ_T.

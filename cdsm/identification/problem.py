@@ -105,42 +105,39 @@ class Model:
         """Compute all residuals (n,) for these ``parameters``, in standard deviations."""
         return self.weigh(self.predict(parameters)[1])
 
-    def predict(self, parameters: Parameters) -> tuple[Manipulator, list[Array]]:
-        """Build the arm of ``parameters``; predict each stiffness (1,) [N/m] or loop (m,) [m].
-
-        The predicted displacements of a loop start from the tip of the arm without the forces.
-        """
-        arm = self.arm(parameters)
-        paths = self._paths_at(parameters, arm)
-        predicted = []
-        for i, (each, path) in enumerate(zip(self.measurements, paths, strict=True)):
-            if isinstance(each, WeightLoop):
-                assert path is not None
-                tips = path.tips - path.loading.reference.tip[:3, 3]
-                predicted.append((tips @ each.axes.T).ravel())
-            else:
-                predicted.append(np.array([self._stiffness_of(i, arm, each, parameters)]))
-        return arm, predicted
-
     def residuals_beside(self, here: Parameters, moved: Parameters) -> Array:
         """Compute the residuals (n,) for slightly changed parameters ``moved``, to first order.
 
-        Predictions of the loops follow from the rest states of the loops at ``here``, without a
-        search for equilibria. That is ten times as fast.
+        Loops follow from their rest states at ``here``, without a search for equilibria: that is
+        ten times as fast.
         """
-        arm, paths, predicted = self.arm(moved), self._paths_at(here), list[Array]()
+        return self.weigh(self.predict(moved, here)[1])
+
+    def predict(
+        self, parameters: Parameters, near: Parameters | None = None
+    ) -> tuple[Manipulator, list[Array]]:
+        """Build the arm of ``parameters``; predict each stiffness (1,) [N/m] or loop (m,) [m].
+
+        The predicted displacements of a loop start from the tip of the arm without the forces. They
+        are exact, or to first order from the rest states at the parameters ``near``.
+        """
+        arm = self.arm(parameters)
+        paths = self._paths_at(near) if near else self._paths_at(parameters, arm)
+        predicted = []
         for i, (each, path) in enumerate(zip(self.measurements, paths, strict=True)):
-            if not isinstance(each, WeightLoop):
-                predicted.append(np.array([self._stiffness_of(i, arm, each, moved)]))
-                continue
-            assert path is not None
             with no_model(f"measurement {label(i, each)}: "):
-                pose, tension, wrench = self._started(arm, each, moved)
-                if not same_segments(pose, path.start.pose):
-                    raise NoModelError("the cables have other segments than beside there.")
-                tips = path.beside(pose, tension, wrench) - pose.tip[:3, 3]
-            predicted.append((tips @ each.axes.T).ravel())
-        return self.weigh(predicted)
+                if isinstance(each, Measurement):
+                    predicted.append(np.array([self._along(arm, each, parameters)]))
+                    continue
+                assert path is not None
+                tips, pose = path.tips, path.loading.reference
+                if near:
+                    pose, tension, wrench = self._started(arm, each, parameters)
+                    if not same_segments(pose, path.start.pose):
+                        raise NoModelError("the cables have other segments than beside there.")
+                    tips = path.beside(pose, tension, wrench)
+                predicted.append(((tips - pose.tip[:3, 3]) @ each.axes.T).ravel())
+        return arm, predicted
 
     def weigh(self, predicted: list[Array]) -> Array:
         """Compute the residuals (n,), in standard deviations, of the result of :meth:`predict`."""
@@ -239,12 +236,6 @@ class Model:
                 columns.append(((near - far) @ axes.T).ravel() / (2.0 * _STEP))
             by_tensions = np.column_stack(columns)
         return by_forces, by_tensions
-
-    def _stiffness_of(
-        self, i: int, arm: Manipulator, measurement: Measurement, parameters: Parameters
-    ) -> float:
-        with no_model(f"measurement {label(i, measurement)}: "):
-            return self._along(arm, measurement, parameters)
 
     def _along(self, arm: Manipulator, measurement: Measurement, parameters: Parameters) -> float:
         pose = arm.at(measurement.angles)

@@ -65,10 +65,9 @@ def identify(
     its width determines the friction. Errors of its forces and tensions count as errors of its
     readings, with their correlations. Derivatives of loops are implicit, without a search.
 
-    Most of the time goes into predictions of all measurements. The search needs about 50 P of them,
-    and the profiles of :meth:`Identification.confidence` about 20 P². A measurement with a force
-    takes ten times as long as one without, and longer if the arm moves far; a loop, some tens
-    of milliseconds.
+    The search predicts all measurements some 50 P times, the profiles of
+    :meth:`Identification.confidence` some 20 P² times. A measurement with a force takes ten times
+    as long as one without; a loop takes some tens of milliseconds.
 
     ::
 
@@ -137,10 +136,7 @@ def identify(
 
 
 def problem_of(model: Model, bounds: Mapping[str, tuple[float, float]]) -> LeastSquares:
-    """Return the least-squares problem of ``model`` within ``bounds`` (low, high) by name.
-
-    Its finite differences use :meth:`Model.residuals_beside` if there are loops.
-    """
+    """Return the least-squares problem of ``model`` within ``bounds`` (low, high) by name."""
     beside = model.residuals_beside if model.loops else None
     return LeastSquares(model.residuals, model.count, bounds, beside)
 
@@ -187,14 +183,10 @@ def _checked_bounds(free: Mapping[str, tuple[float, float]]) -> dict[str, tuple[
 
 
 def check_call(name: str, function: object, positional: int, names: Sequence[str]) -> None:
-    """Raise if ``function`` cannot be called with these arguments, before any search.
+    """Raise UnknownName or InvalidInput if ``function`` does not take these arguments.
 
     They are ``positional`` positional arguments, and one by keyword for each of ``names``. The
     error calls the function ``name``.
-
-    Raises:
-        UnknownName: It does not take one of ``names``.
-        InvalidInput: It is no function, or needs other arguments.
     """
     if not callable(function):
         raise InvalidInput(name, f"{function!r} given; a function is needed.")
@@ -237,8 +229,7 @@ def _starts(problem: LeastSquares, start: Mapping[str, float] | None) -> list[Ar
         points = [problem.box.point(_checked_start(problem, start))]
     # a search that starts on a bound may stop there
     points = [np.clip(point, 1e-6, 1.0 - 1e-6) for point in points]
-    usable = [point for point in points if math.isfinite(problem.cost(point))]
-    if usable:
+    if usable := [point for point in points if math.isfinite(problem.cost(point))]:
         return sorted(usable, key=problem.cost)[:_STARTS]
     failure = problem.failure(points[0])
     assert failure is not None

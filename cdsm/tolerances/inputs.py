@@ -8,7 +8,7 @@ the points into derivatives with respect to the inputs.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import NamedTuple
 from weakref import WeakKeyDictionary
 
@@ -172,11 +172,10 @@ class Inputs:
         """
         body, (P, rows) = arm._model.body, (len(sites), arm.nv + 1)
         end, origin, centre = 3 * P + 6 * rows, 3 * P, 3 * P + 3 * rows
-        found: dict[str, dict[str, list[tuple[int, float]]]] = {name: {} for name in _ON_DISKS}
+        found: dict[str, dict[str, Array]] = {name: {} for name in _ON_DISKS}
 
-        def add(source: str, label: str, at: int, motion: Iterable[float]) -> None:
-            entries = found[source].setdefault(label, [])
-            entries += [(at + r, x) for r, x in enumerate(motion) if x]
+        def add(source: str, label: str, at: int, motion: Array) -> None:
+            found[source].setdefault(label, np.zeros(end + 3))[at : at + 3] = motion
 
         disks = arm.geometry.disks
         offsets = {name: [disk.x for disk in disks if disk.link == name] for name, *_ in disks}
@@ -212,9 +211,5 @@ class Inputs:
         maps = {}
         for source, inputs in found.items():
             self.labels[source] = tuple(inputs)
-            at = [(i, n, x) for n, entries in enumerate(inputs.values()) for i, x in entries]
-            matrix = np.zeros((end + 3, len(inputs)))
-            for place, n, motion in at:
-                matrix[place, n] = motion
-            maps[source] = csr_matrix(matrix)
+            maps[source] = csr_matrix(np.array([*inputs.values()]).reshape(-1, end + 3).T)
         return maps

@@ -8,7 +8,6 @@ from fnmatch import fnmatchcase
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cdsm.errors import InvalidInput
 from cdsm.kernels.tree import Indices
@@ -82,7 +81,7 @@ def parts_of(
         for each in given:
             inputs = _ALL if each.of == EVERY else _matching(source, each.of, names)
             if taken[inputs].any():
-                twice = names[int(np.flatnonzero(taken & _mask(inputs, len(names)))[0])]
+                twice = names[int(np.arange(len(names))[inputs][taken[inputs]][0])]
                 raise InvalidInput(
                     source, f"{twice} has two tolerances; {each.of!r} is the second."
                 )
@@ -144,12 +143,6 @@ def _matching(source: str, pattern: str, names: Sequence[str]) -> Indices:
             source, f"no input is called {pattern!r}; the first of {len(names)} is {names[0]!r}."
         )
     return found
-
-
-def _mask(inputs: slice | Indices, count: int) -> NDArray[np.bool_]:
-    mask = np.zeros(count, dtype=np.bool_)
-    mask[inputs] = True
-    return mask
 
 
 def _standardised(tolerance: Tolerance, rng: np.random.Generator, shape: tuple[int, int]) -> Array:

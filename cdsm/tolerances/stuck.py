@@ -23,9 +23,6 @@ from cdsm.sticking import holding
 from cdsm.support.values import Array
 from cdsm.tolerances.inputs import inputs_of
 
-_NONE = np.zeros(0, dtype=np.intp)
-"""No inputs: the arm of blocks has no friction."""
-
 
 class Ties(NamedTuple):
     """Correspondence between the inputs of an arm and those of its arm of blocks.
@@ -51,7 +48,7 @@ class Ties(NamedTuple):
         """Convert ``errors`` (N, inputs) of the arm's inputs to those of the arm of blocks."""
         found = {}
         for source, drawn in errors.items():
-            at = self.inputs.get(source, _NONE)
+            at = self.inputs[source]
             found[source] = np.where(at >= 0, drawn[:, at], 0.0)
         return found
 
@@ -82,47 +79,31 @@ def blocks_of(pose: Posture, tension: Array) -> tuple[Posture, Array, Ties]:
             behind.append(i > 0 or 0 in at)
             if behind[-1]:  # a hole that holds keeps lead, spring and motor away
                 block = replace(block, lead=0.0, series_stiffness=math.inf, control="position")
+            names[block.name] = cable.name
             for k, site in enumerate(part, start=1):
-                names[f"{block.name} on {site.link}, site {k}"] = (
-                    f"{cable.name} on {site.link}, site {i + k}"
-                )
+                of_block = f"{block.name} on {site.link}, site {k}"
+                of_cable = f"{cable.name} on {site.link}, site {i + k}"
+                for axis in ("", ", x", ", y", ", z"):  # a hole, and its coordinates
+                    names[of_block + axis] = of_cable + axis
             blocks.append(block)
             own.append(c)
     stuck = arm.with_cables(blocks)
-    cable_of = np.array(own, dtype=np.intp)
-    ties = Ties(
-        inputs_of(arm).labels, tension, _matching_inputs(arm, stuck, cable_of, names, behind)
-    )
-    return stuck.at(pose.q, check_limits=False), tension[cable_of], ties
+    ties = Ties(inputs_of(arm).labels, tension, _matching_inputs(arm, stuck, names, behind))
+    return stuck.at(pose.q, check_limits=False), tension[own], ties
 
 
 def _matching_inputs(
-    arm: Manipulator,
-    stuck: Manipulator,
-    cable_of: Indices,
-    names: Mapping[str, str],
-    behind: Sequence[bool],
+    arm: Manipulator, stuck: Manipulator, names: Mapping[str, str], behind: Sequence[bool]
 ) -> dict[str, Indices]:
     """Find the input of the arm for each input of the arm of blocks, ``stuck``, by its name.
 
-    ``cable_of`` is the cable of each block. ``names`` maps site names of the arm of blocks to those
-    of the arm. ``behind`` says which blocks begin at a sticking hole, and so have no lead.
+    ``names`` maps names of blocks and their sites to those of the arm. ``behind`` says which blocks
+    begin at a sticking hole, and so have no lead.
     """
     theirs, found = inputs_of(arm).labels, {}
     for source, labels in inputs_of(stuck).labels.items():
         at = {name: i for i, name in enumerate(theirs[source])}
-        if source in ("rigidity", "tension"):
-            found[source] = cable_of
-        elif source == "lead":
-            found[source] = np.where(behind, -1, cable_of)
-        elif source == "spring":
-            each = [at[label.rpartition(":")[0]] for label in labels]
-            found[source] = np.array(each, dtype=np.intp)
-        elif source == "site":
-            sites = (label.rpartition(", ") for label in labels)
-            each = [at[f"{names[site]}, {axis}"] for site, _, axis in sites]
-            found[source] = np.array(each, dtype=np.intp)
-        elif source != "friction":
-            each = [at[names.get(label, label)] for label in labels]
-            found[source] = np.array(each, dtype=np.intp)
+        each = [at[names.get(label, label)] for label in labels]
+        found[source] = np.array(each, dtype=np.intp)
+    found["lead"] = np.where(behind, -1, found["lead"])
     return found
