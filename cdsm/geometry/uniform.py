@@ -68,50 +68,37 @@ def uniform(
         )
     if faults:
         raise GeometryError(faults)
-    each: dict[str, tuple[Any, ...]] = {
-        key: tuple(value) if isinstance(value, Sequence) else (value,) * n
-        for key, value in sizes.items()
-    }
     if hole_angles is None:
         angles: Sequence[Sequence[float]] = usual_angles(cables_per_joint or 0)
     else:
         angles = hole_angles if isinstance(hole_angles[0], Sequence) else (hole_angles,) * n
-    hole_radius = each["hole_radius"][0]
-    cables = [
-        CableRoute(
-            joint=k + 1,
-            angle=angle + phase if phase else angle,
-            lead=each["lead"][k],
-            friction=each["friction"][k],
-            radius=each["cable_radius"][k],
+    rows = [value if isinstance(value, Sequence) else (value,) * n for value in sizes.values()]
+    each = [dict(zip(_SIZES, row, strict=True)) for row in zip(*rows, strict=True)]
+    hole_radius = each[0]["hole_radius"]
+    joints, links = [], []
+    cables: list[CableRoute] = []
+    for k, size in enumerate(each):
+        R, phase = size["hole_radius"], size["phase"]
+        joints.append(
+            Joint(
+                axes=axes[k],
+                disk_offset=size["disk_offset"],
+                limit=size["joint_limit"],
+                hole_radius=None if hole_radius == R else R,
+                disk_radius=size["disk_radius"],
+            )
         )
-        for k, phase in enumerate(each["phase"])
-        for angle in angles[k]
-    ]
+        links.append(Link(length=size["link_length"], mass=size["link_mass"]))
+        kept = {"lead": size["lead"], "friction": size["friction"], "radius": size["cable_radius"]}
+        cables += [
+            CableRoute(joint=k + 1, angle=angle + phase if phase else angle, **kept)
+            for angle in angles[k]
+        ]
     return {
         "name": keywords["name"],
         "base_length": keywords["base_length"],
         "hole_radius": hole_radius,
-        "joints": tuple(
-            Joint(
-                axes=axis,
-                disk_offset=h,
-                limit=limit,
-                hole_radius=None if hole_radius == R else R,
-                disk_radius=disk,
-            )
-            for axis, h, limit, R, disk in zip(
-                axes,
-                each["disk_offset"],
-                each["joint_limit"],
-                each["hole_radius"],
-                each["disk_radius"],
-                strict=True,
-            )
-        ),
-        "links": tuple(
-            Link(length=length, mass=mass)
-            for length, mass in zip(each["link_length"], each["link_mass"], strict=True)
-        ),
+        "joints": tuple(joints),
+        "links": tuple(links),
         "cables": spread_out(cables, keywords["spread"]),
     }

@@ -173,39 +173,37 @@ def _shape(arm: Manipulator) -> _Shape:
         points.append(point.tolist())
         return len(rows) - 1
 
+    disks = arm.geometry.disks if arm.is_serpentine else ()
+    # the radius of a link's backbone is that of its first disk
+    radii = {model.body.locate(d.link)[0]: _BACKBONE * d.hole_radius for d in reversed(disks)}
     names = ("the base", *(f"the link after {name}" for name in arm.joint_names))
-    radii = {}
-    if arm.is_serpentine:
-        for disk in reversed(arm.geometry.disks):
-            radii[model.body.locate(disk.link)[0]] = _BACKBONE * disk.hole_radius
     parents = [*model.tree.parent[1:].tolist(), int(model.masses.tip)]
     bones = [
         (add(row, np.zeros(3)), add(row, end), radii.get(row, 0.0), names[row])
         for row, end in zip(parents, [*model.tree.translation[1:], model.masses.point], strict=True)
         if np.any(end)
     ]
-    disks, own = [], np.zeros((len(segment), 0), dtype=np.intp)
-    if arm.is_serpentine:
-        for number, disk in enumerate(arm.geometry.disks, start=1):
-            row, rotation, translation = model.body.locate(disk.link)
-            place = translation + rotation @ np.array([disk.x, 0.0, 0.0])
-            ahead = place + rotation @ np.array([1.0, 0.0, 0.0])
-            disks.append((add(row, place), add(row, ahead), disk.radius, f"disk {number}"))
-            at = [
-                rows[p] == row and abs((np.array(points[p]) - place) @ (ahead - place)) < _ON
-                for p in range(start)
-            ]
-            column = [1 if at[a] else 2 if at[b] else 0 for _, a, b in segment]
-            own = np.column_stack([own, column]).astype(np.intp)
+    plates, own = [], []
+    for number, disk in enumerate(disks, start=1):
+        row, rotation, translation = model.body.locate(disk.link)
+        place = translation + rotation @ np.array([disk.x, 0.0, 0.0])
+        ahead = place + rotation @ np.array([1.0, 0.0, 0.0])
+        plates.append((add(row, place), add(row, ahead), disk.radius, f"disk {number}"))
+        at = [
+            rows[p] == row and abs((np.array(points[p]) - place) @ (ahead - place)) < _ON
+            for p in range(start)
+        ]
+        own.append([1 if at[a] else 2 if at[b] else 0 for _, a, b in segment])
     places = {"row": frozen(np.array(rows, dtype=np.intp)), "point": frozen(np.array(points))}
+    columns = np.array(own, dtype=np.intp).reshape(len(disks), len(segment))
     return _Shape(
         model.routing._replace(**places),
         np.array(segment, dtype=np.intp),
         *_arrays(bones),
-        *_arrays(disks),
-        np.ascontiguousarray(own),
+        *_arrays(plates),
+        np.ascontiguousarray(columns.T),
         [bone[3] for bone in bones],
-        [disk[3] for disk in disks],
+        [plate[3] for plate in plates],
     )
 
 

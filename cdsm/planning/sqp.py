@@ -3,9 +3,9 @@ r"""Sequential quadratic programming over the admissible tensions of a stable ar
     min f(F)   subject to   c(F) = 0,  J_Lᵀ F = τ,  low ≤ F ≤ high,  λ_min(K_θ(F)) ≥ floor.
 
 Only c and the last condition are nonlinear. Every iterate balances the arm and is stable, so K_θ
-can be inverted there. scipy's SLSQP with the same gradients ends at the same ‖F‖, but needs twice
-the evaluations, sometimes a hundred times as many. With gradients by differences it takes three
-times as long (tests/benchmarks/test_planning_speed.py).
+can be inverted there. scipy's SLSQP with the same gradients ends at the same tensions
+(tests/planning/test_sqp.py), but needs twice the evaluations, sometimes a hundred times as many.
+With differences it takes three times as long (tests/benchmarks/test_planning_speed.py).
 
 **The quadratic program of a step.** Let d = ΔF/size, g = ∂f/∂d and G = ∂c/∂d. The Lagrangian is
 L = f + y·c − z·reserve, with the multipliers y and z of the step before. Solve

@@ -1,12 +1,17 @@
 """Searches end where the conditions of first order hold, on either side of kinks and at them."""
 
+from typing import Any
+
 import numpy as np
 import pytest
+from scipy.optimize import minimize
 
 import cdsm
+from cdsm import presets
 from cdsm.planning.objectives import along_constraints
 from cdsm.planning.sqp import EFFORT, HIGHEST, MET, NEAREST, Program, search
-from cdsm.planning.stiffness_model import StiffnessModel
+from cdsm.planning.stiffness_model import Evaluation, StiffnessModel
+from cdsm.support.values import Array
 from tests.support import arms
 from tests.support.locked import STRAND
 
@@ -66,3 +71,49 @@ def test_other_objectives() -> None:
         end = search(other, model.at(cdsm.distribute_tension(model.pose, 15.0).values))
         value = float(end.values[0])
         assert value > 0.0 if better else abs(value) < 1e-6
+
+
+def with_slsqp(program: Program, start: Evaluation) -> Array:
+    """Tensions of least effort by SLSQP, with the values and gradients that a search has."""
+    region, model, unit = program.region, start.model, program.unit
+    scale = unit / model.scale
+
+    def c(x: Array) -> Any:
+        return program.constraints.at(model.at(unit * x))
+
+    balance = region.rows @ region.least.values / unit
+    found: Any = minimize(
+        lambda x: (0.5 * float(x @ x), x),
+        start.F / unit,
+        jac=True,
+        method="SLSQP",
+        bounds=np.column_stack([region.low, region.high]) / unit,
+        constraints=[
+            {
+                "type": "eq",
+                "fun": lambda x: region.rows @ x - balance,
+                "jac": lambda x: region.rows,
+            },
+            {"type": "eq", "fun": lambda x: c(x).values, "jac": lambda x: unit * c(x).jacobian},
+            {
+                "type": "ineq",
+                "fun": lambda x: model.at(unit * x).reserve / model.scale,
+                "jac": lambda x: scale * model.at(unit * x).reserve_gradient,
+            },
+        ],
+        options={"ftol": 1e-12, "maxiter": 300},
+    )
+    return np.asarray(unit * found.x)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_slsqp_with_the_same_gradients_ends_at_the_same_tensions(seed: int) -> None:
+    rng, one = np.random.default_rng(seed), presets.virtual_prototype()
+    pose = one.at(presets.TEN_DEGREES * rng.uniform(-1.0, 1.0, one.nv))
+    target = cdsm.stiffness(pose, cdsm.distribute_tension(pose, 100.0)).along(UP[0])
+    model = StiffnessModel(pose, 50.0, 800.0, np.zeros(6), 1e-4)
+    start = model.at(model.region.least.values)
+    constraints = along_constraints(model, UP, np.array([0.98 * target]))
+    program = Program(model.region, start, constraints, EFFORT, model.region.scale)
+    F = search(program, start).evaluation.F
+    np.testing.assert_allclose(with_slsqp(program, start), F, rtol=1e-6)
