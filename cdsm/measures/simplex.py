@@ -28,43 +28,39 @@ def single_largest(cost: Array, A: Array, b: Array, low: Array, high: Array, x: 
     False if there is no largest value, or rounding is too large. ``cost`` and A are of order one.
     """
     m, n = A.shape
-    state = np.empty(n, dtype=np.intp)
+    # artificial variables n + i take what is missing of equation i; the first phase removes them
+    ends, price, column = np.zeros((2, n + m)), np.empty(m), np.empty(m)
+    ends[0, :n], ends[1, :n], ends[1, n:] = low, high, math.inf
+    worth, point = np.zeros(n + m), np.zeros(n + m)
+    state, basis = np.full(n + m, _FREE), np.arange(n, n + m)
+    inverse = np.zeros((m, m))
     for j in range(n):
         if low[j] > -math.inf:
-            x[j], state[j] = low[j], _AT_LOW
+            point[j], state[j] = low[j], _AT_LOW
         elif high[j] < math.inf:
-            x[j], state[j] = high[j], _AT_HIGH
-        else:
-            x[j], state[j] = 0.0, _FREE
-    # artificial variables n + i take what is missing of equation i
-    basis, value, inverse = np.empty(m, dtype=np.intp), np.empty(m), np.zeros((m, m))
+            point[j], state[j] = high[j], _AT_HIGH
     for i in range(m):
         missing = b[i]
         for j in range(n):
-            missing -= A[i, j] * x[j]
-        basis[i], value[i] = n + i, abs(missing)
+            missing -= A[i, j] * point[j]
+        point[n + i], worth[n + i], state[n + i] = abs(missing), -1.0, _BASIC
         inverse[i, i] = 1.0 if missing >= 0.0 else -1.0
-    price, column = np.empty(m), np.empty(m)
     first, most = True, 20 * (m + n)
     for step in range(2 * most):
         for k in range(m):
             price[k] = 0.0
             for i in range(m):
-                own = 0.0 if basis[i] >= n else cost[basis[i]]
-                if first:
-                    own = -1.0 if basis[i] >= n else 0.0
-                price[k] += own * inverse[i, k]
+                price[k] += worth[basis[i]] * inverse[i, k]
         enters, best, way = -1, _ROUNDING, 1.0
         for j in range(n):
             if state[j] == _BASIC or low[j] == high[j]:
                 continue
-            gain = 0.0 if first else cost[j]
+            gain = worth[j]
             for i in range(m):
                 gain -= price[i] * A[i, j]
+            sign = 1.0
             if state[j] == _AT_HIGH or (state[j] == _FREE and gain < 0.0):
                 gain, sign = -gain, -1.0
-            else:
-                sign = 1.0
             if gain > best:
                 enters, way = j, sign
                 if step > most:  # Bland's rule, which cannot cycle
@@ -72,11 +68,11 @@ def single_largest(cost: Array, A: Array, b: Array, low: Array, high: Array, x: 
                 best = gain
         if enters < 0:
             if not first:
+                x[:] = point[:n]
                 return _proved(cost, A, b, low, high, x, state, basis, inverse, price)
-            first = False
-            for i in range(m):
-                if basis[i] >= n and value[i] > _PROOF:
-                    return False
+            if point[n:].max() > _PROOF:
+                return False
+            first, worth[:n], worth[n:], ends[1, n:] = False, cost, 0.0, 0.0
             continue
         for i in range(m):
             column[i] = 0.0
@@ -85,33 +81,26 @@ def single_largest(cost: Array, A: Array, b: Array, low: Array, high: Array, x: 
         # how far it may go: to its other bound, or until a basic variable is at one
         far, leaves, pivot = high[enters] - low[enters], -1, 0.0
         for i in range(m):
-            rate = -way * column[i]
+            rate, value = -way * column[i], point[basis[i]]
             if abs(rate) <= _ROUNDING:
                 continue
-            at_low, at_high = 0.0, math.inf if first else 0.0
-            if basis[i] < n:
-                at_low, at_high = low[basis[i]], high[basis[i]]
-            room = (at_high - value[i] if rate > 0.0 else value[i] - at_low) / abs(rate)
-            room = max(room, 0.0)
+            room = ends[1, basis[i]] - value if rate > 0.0 else value - ends[0, basis[i]]
+            room = max(room / abs(rate), 0.0)
             if room < far or (room == far and abs(rate) > pivot):
                 far, leaves, pivot = room, i, abs(rate)
         if far == math.inf:
             return False
         for i in range(m):
-            value[i] -= way * column[i] * far
-            if basis[i] < n:
-                x[basis[i]] = value[i]
-        x[enters] += way * far
+            point[basis[i]] -= way * column[i] * far
+        point[enters] += way * far
         if leaves < 0:
             state[enters] = _AT_HIGH if way > 0.0 else _AT_LOW
-            x[enters] = high[enters] if way > 0.0 else low[enters]
+            point[enters] = high[enters] if way > 0.0 else low[enters]
             continue
-        old = basis[leaves]
-        if old < n:
-            falls = way * column[leaves] > 0.0
-            state[old] = _AT_LOW if falls else _AT_HIGH
-            x[old] = low[old] if falls else high[old]
-        basis[leaves], state[enters], value[leaves] = enters, _BASIC, x[enters]
+        old, falls = basis[leaves], way * column[leaves] > 0.0
+        state[old] = _AT_LOW if falls else _AT_HIGH
+        point[old] = ends[0 if falls else 1, old]
+        basis[leaves], state[enters] = enters, _BASIC
         for k in range(m):
             inverse[leaves, k] /= column[leaves]
         for i in range(m):
