@@ -92,7 +92,7 @@ class ArmFacts(Printed):
         """Which length of a wire is l_0 in EA/l_0; see :class:`Manipulator`."""
         return self._parts.original_length
 
-    @property
+    @cached_property
     def has_friction(self) -> bool:
         """Whether a cable has friction in a hole. Results that neglect friction say so."""
         return any(any(cable.friction) for cable in self.cables)

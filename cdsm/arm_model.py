@@ -137,8 +137,8 @@ class ArmModel:
 
     @cached_property
     def holes(self) -> Holes:
-        """Holes and wires of the cables, as the kernels of batches take them."""
-        cables, wires = self._cables, self.wire_laws
+        """Holes of the cables, as the kernels of batches take them."""
+        cables = self._cables
         first = np.cumsum([0, *(len(cable.sites) for cable in cables)])
         sites = [site for cable in cables for site in cable.sites]
         links = [cable.sites[0].link for cable in cables]
@@ -149,8 +149,6 @@ class ArmModel:
             lead=frozen(np.array([cable.lead for cable in cables])),
             axis=frozen(np.array([self.body.locate(link)[1][:, 0] for link in links])),
             locked=frozen(np.array([float(cable.control == "position") for cable in cables])),
-            constant=wires.constant,
-            linear=wires.linear,
         )
 
     def beyond_limits(self, q: Array) -> NDArray[np.bool_]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,12 +13,12 @@ from cdsm.cable import Cable
 from cdsm.elasticity import Elasticity, LinearElasticity
 from cdsm.errors import ElasticityRangeError, InvalidInput
 from cdsm.kernels.stiffness import single_cable_stiffness
-from cdsm.kernels.wires import AT_ONCE, Wires
+from cdsm.kernels.wires import AT_ONCE, CURVE, POLYNOMIAL, Wires, single_rigidity
 from cdsm.support.validation import LARGEST, RANGES
 from cdsm.support.values import Array, frozen
 from cdsm.wires.continuity import find_jump
-from cdsm.wires.laws import StrandElasticity
-from cdsm.wires.quadrature import NODES, WEIGHTS, Panels
+from cdsm.wires.laws import StrandElasticity, TabulatedElasticity
+from cdsm.wires.quadrature import NODES, WEIGHTS
 from cdsm.wires.slack import SlackBelow
 
 OriginalLength = Literal["unstrained", "stretched"]
@@ -79,7 +79,7 @@ class CableLaws:
             else:
                 self.nonlinear.append((law, of))
         self.constant, self.linear = frozen(constant), frozen(linear)
-        self.without_kernel = [law for law, _ in self.nonlinear if _polynomials(law) is None]
+        self.without_kernel = [law for law, _ in self.nonlinear if _pieces(law) is None]
 
     def require_continuity(self) -> None:
         """Raise InvalidInput if the rigidity of a law is discontinuous."""
@@ -96,31 +96,34 @@ class CableLaws:
 
     @cached_property
     def wires(self) -> Wires:
-        """The laws that are polynomials in the tension, for the kernel of a batch."""
+        """The laws that kernels can evaluate, for all cables."""
         count = len(self._cables)
-        panels, ends = np.tile([0, -1], (count, 1)), np.zeros((count, 6))
-        tables: list[Panels] = []
+        of_cable, ends = np.tile([0, -1, 0], (count, 1)), np.zeros((count, 6))
+        edges, coefficients = [np.zeros((3, 0))], [np.zeros((0, 0))]
         for law, held in self.nonlinear:
-            strand = _polynomials(law)
-            if strand is None:
+            pieces = _pieces(law)
+            if pieces is None:
                 continue
-            first = sum(len(table.before[0]) for table in tables)
-            tables.append(strand.panels)
-            panels[held] = first, first + len(strand.panels.before[0]) - 1
-            lowest, slack = strand.domain.first, law is not strand
+            first, inside = sum(each.shape[1] for each in edges), _without_slack(law)
+            kind = CURVE if isinstance(inside, TabulatedElasticity) else POLYNOMIAL
+            of_cable[held] = first, first + pieces[0].shape[1] - 1, kind
+            edges.append(pieces[0])
+            coefficients.append(pieces[1])
             ends[held] = (
                 law.domain.first,
                 law.domain.high,
-                law.rest if slack else -math.inf,
-                lowest,
-                strand.rigidity(lowest),
+                -math.inf if inside is law else law.rest,
+                inside.domain.first,
+                inside.rigidity(inside.domain.first),
                 self._unstrained,
             )
         return Wires(
-            frozen(panels.astype(np.intp)),
+            self.constant,
+            self.linear,
+            frozen(of_cable.astype(np.intp)),
             frozen(ends),
-            frozen(np.hstack([np.zeros((3, 0)), *(_edges(table) for table in tables)])),
-            frozen(_coefficients([table.coefficients for table in tables])),
+            frozen(np.hstack(edges)),
+            frozen(_joined(coefficients)),
             frozen(np.array([NODES, WEIGHTS])),
         )
 
@@ -136,16 +139,24 @@ class CableLaws:
         Force-controlled cables have the stiffness 0. ``lengths`` is L (C,) [m] and ``tension`` is
         F (C,) [N], both checked and not negative.
         """
-        rigidity = self.constant
-        if self.nonlinear:
-            rigidity = rigidity.copy()
-            for law, held in self.nonlinear:
-                try:
-                    rigidity[held] = self.stretched_rigidity(law, tension[held])
-                except ElasticityRangeError as error:
-                    raise self.naming(error, held) from None
+        rigidity = self._rigidity(tension) if self.nonlinear else self.constant
         k = single_cable_stiffness(lengths, tension, rigidity, self.linear, self.series, self.rest)
         return frozen(k)
+
+    def _rigidity(self, tension: Array) -> Array:
+        """Compute EA (1 + ε) (C,) [N]; of linear laws its constant part."""
+        if not self.without_kernel:
+            arguments: tuple[Any, ...] = (self.constant, *self.wires[2:], tension)
+            rigidity = single_rigidity(*arguments)
+            if rigidity.min() >= 0.0:  # else the law says what is wrong
+                return rigidity
+        rigidity = self.constant.copy()
+        for law, held in self.nonlinear:
+            try:
+                rigidity[held] = self.stretched_rigidity(law, tension[held])
+            except ElasticityRangeError as error:
+                raise self.naming(error, held) from None
+        return rigidity
 
     def stretched_rigidity(self, law: Elasticity, tension: Array) -> Array:
         """Compute EA (1 + ε) [N] of a law at ``tension``, in the shape of ``tension``.
@@ -238,29 +249,27 @@ def kinks(law: Elasticity) -> tuple[float, ...]:
     return law.joins if isinstance(law, StrandElasticity) else ()
 
 
-def _polynomials(law: Elasticity) -> StrandElasticity | None:
-    """Return the strand law that kernels can evaluate for a law; None if there is none.
+def _without_slack(law: Elasticity) -> Elasticity:
+    """Return the law below which ``law`` adds a slack branch, else the law itself."""
+    return law.law if isinstance(law, SlackBelow) else law
 
-    It is the law itself, or the law below which it adds a slack branch. Its polynomials must be
-    positive on the whole domain.
+
+def _pieces(law: Elasticity) -> tuple[Array, Array] | None:
+    """Return the edges and coefficients with which kernels evaluate a law; None if they cannot.
+
+    Polynomials must be positive on the whole domain.
     """
-    inside = law.law if isinstance(law, SlackBelow) else law
+    inside = _without_slack(law)
+    if isinstance(inside, TabulatedElasticity):
+        return inside._curve.pieces
     whole = isinstance(inside, StrandElasticity) and inside.panels.end == math.inf
-    return inside if isinstance(inside, StrandElasticity) and whole else None
+    return inside.panels.pieces if isinstance(inside, StrandElasticity) and whole else None
 
 
-def _edges(table: Panels) -> Array:
-    return np.array([table.edges[:-1], table.edges[1:], table.before[0]])
-
-
-def _coefficients(tables: list[Array]) -> Array:
-    """Join tables of polynomial coefficients, one column per polynomial, into one array.
-
-    Zeros fill the rows, one per power, up to a multiple of AT_ONCE.
-    """
-    powers = AT_ONCE * -(-max((len(table) for table in tables), default=0) // AT_ONCE)
-    padded = [np.pad(table, ((0, powers - len(table)), (0, 0))) for table in tables]
-    return np.hstack([np.zeros((powers, 0)), *padded])
+def _joined(tables: list[Array]) -> Array:
+    """Join tables of coefficients side by side; zeros fill rows up to a multiple of AT_ONCE."""
+    rows = AT_ONCE * -(-max(map(len, tables)) // AT_ONCE)
+    return np.hstack([np.pad(each, ((0, rows - len(each)), (0, 0))) for each in tables])
 
 
 def _checked_rigidity(law: Elasticity, tension: Array) -> Array:

@@ -15,7 +15,6 @@ from cdsm.cable_chains import Segments
 from cdsm.errors import first_of
 from cdsm.geometry.contacts import overlapping
 from cdsm.kernels import chains as chain_kernels
-from cdsm.kernels import segments as segment_kernels
 from cdsm.kernels import stiffness as stiffness_kernels
 from cdsm.kernels.tree import Frames, Routing
 from cdsm.support.format import JointUnits, aligned, coordinates, plain
@@ -101,7 +100,7 @@ class Posture(ReadOnlyState):
     def length_hessian(self) -> Array:
         """H_L[c, i, j] = ∂²L_c/∂θ_i∂θ_j, (C, nv, nv) [m/rad²], computed on first use."""
         routing, cables = self.arm._model.routing, len(self.cable_lengths)
-        hessian = segment_kernels.single_length_hessian(
+        hessian = stiffness_kernels.single_length_hessian(
             routing.segment, routing.joint, *self._frames, cables
         )
         return frozen(hessian)

@@ -22,7 +22,7 @@ import pytest
 
 import cdsm
 from cdsm import errors
-from cdsm.kernels import posture, segments
+from cdsm.kernels import posture
 from cdsm.kernels import stiffness as stiffness_kernels
 from cdsm.support.values import Array
 from tests.support.arms import (
@@ -613,7 +613,7 @@ def test_unpickled_posture_needs_no_new_compilation() -> None:
     cdsm.stiffness(pose, tension)
     kernels = [
         stiffness_kernels.single_stiffness,
-        segments.single_length_hessian,
+        stiffness_kernels.single_length_hessian,
         posture.single_pose,
     ]
     compiled = [len(kernel.signatures) for kernel in kernels]  # type: ignore[attr-defined]

@@ -117,7 +117,7 @@ class Evaluator:
         # whether the kernel needs rigidities that only Python computes
         needs_springs = bool(self._wanted.size) and self._wanted[-1] > layout.LOAD
         laws = arm._model.wire_laws if self._sticks else arm._model.laws
-        self._asks = needs_springs and bool(laws.nonlinear if self._sticks else laws.without_kernel)
+        self._asks = needs_springs and bool(laws.without_kernel)
         record = int(self._start[-1])
         width = WIDTH // (1 if record < _SHORT else 2 if record < _LONG else 4)
         self._block = max(1, min(width, len(q)))

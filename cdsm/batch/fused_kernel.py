@@ -32,11 +32,10 @@ from cdsm.batch.layout import (
 from cdsm.kernels.bodies import Masses, gravity_torque, set_gravity_stiffness, tip_jacobian
 from cdsm.kernels.compiling import Index, Width, inlined, inner, lanes, threaded, upwards
 from cdsm.kernels.distribution import distribute, keep_balance, set_arms, set_torque
-from cdsm.kernels.records import clear, contains, copy, fetch, matrix, store, vector
+from cdsm.kernels.records import clear, contains, copy, fetch, matrix, mirror, store, vector
 from cdsm.kernels.segments import (
     SHORTEST_SEGMENT,
     add_length_hessian,
-    mirror,
     segment_scratch,
     set_lengths,
 )
@@ -45,13 +44,12 @@ from cdsm.kernels.stiffness import (
     add_passive_stiffness,
     set_cable_stiffness,
     set_load_stiffness,
-    sum_magnitudes,
     sum_terms,
 )
 from cdsm.kernels.stuck import Holes, add_stuck_stiffness, sticking_scratch
 from cdsm.kernels.tension import Balance, certificate
 from cdsm.kernels.tree import Indices, Routing, Tree, empty_frames, forward_kinematics
-from cdsm.kernels.wires import Wires, set_linear_rigidity, set_wire_rigidity, wire_scratch
+from cdsm.kernels.wires import Wires, set_rigidity, wire_scratch
 from cdsm.support.values import Array
 
 
@@ -66,8 +64,7 @@ def evaluate_rows(
     smallest_arm: float,
     series: Array,
     rest: Array,
-    constant: Array,
-    linear: Array,
+    laws: Wires,
     wires: Wires,
     holes: Holes,
     q: Array,
@@ -104,17 +101,16 @@ def evaluate_rows(
         smallest_arm: Moment arms below this are rounding in the balance of tensions [m].
         series: 1/k_series of the cables (C,) [m/N].
         rest: Tension at which the series springs are at rest (C,) [N].
-        constant: Constant part of EA (1 + ε) (C,) [N]; 0 under force control.
-        linear: Factor (C,) of the tension in EA (1 + ε): 1 for linear laws, else 0.
-        wires: Laws of cables that are polynomials in the tension.
-        holes: Holes and wires of the cables.
+        laws: Laws of the cables; EA is 0 under force control.
+        wires: As ``laws``, for cables that stick: EA is not 0 under force control.
+        holes: Holes of the cables.
         q: Joint angles (b, nv) [rad].
         tension: F (b, C) [N]; (0, C) if tensions are distributed or not needed.
         low: Lower bounds (b, C) [N] of distributed tensions; (0, C) if none are distributed.
         high: Upper bounds, with the shape of ``low``.
-        rigidity: EA (1 + ε) (b, C) [N]; 0 under force control, negative outside the domain. (0, C)
-            if it follows from ``constant``, ``linear`` and ``wires``.
-        wire: As ``rigidity``, for cables that stick: it is not 0 under force control.
+        rigidity: EA (1 + ε) (b, C) [N], negative outside the domain; (0, C) if it follows from
+            ``laws``.
+        wire: As ``rigidity``, from ``wires``.
         wrench: W (b, 6).
         start: Index in the record at which each quantity begins.
         wanted: Numbers of the requested quantities, rising.
@@ -156,13 +152,14 @@ def evaluate_rows(
     angles, loads = np.empty((nv, width)), np.empty((6, width))
     stretched, least = np.empty((cables, width)), np.empty((cables, width))
     most, springs = np.empty((cables, width)), np.empty((nv, nv, width))
+    none = np.empty((0, nv, width))
     frames, segments = empty_frames(tree, routing, width), segment_scratch(nv, width)
     rotation, carried = np.empty((bodies, 3, 3, width)), np.empty((bodies, 7, width))
     guess, check = empty_guess(blocks, nv, cables, width), certificate(nv, cables, width)
     arms, torque = np.empty((cables, nv, width)), np.empty((nv, width))
     six, shortest = np.empty((6, width)), np.empty(width)
     code, known = np.empty(width, dtype=np.intp), np.empty(width, dtype=np.intp)
-    wiring = wire_scratch(wires, width)
+    wiring, own_wiring = wire_scratch(laws, width), wire_scratch(wires, width)
     sticking, slot = sticking_scratch(nv, width), np.zeros(cables, dtype=np.intp)
 
     for first in range(0, rows, width):
@@ -222,8 +219,7 @@ def evaluate_rows(
         # quantities that need the rigidity of the cables
         if last > LOAD:
             if not rigidity.shape[0]:
-                set_linear_rigidity(constant, linear, F, stretched, width)
-                set_wire_rigidity(wires, F, stretched, wiring, width)
+                set_rigidity(laws, F, stretched, wiring, width)
             for w in lanes(width):
                 if code[w] == OK and _is_negative(stretched, w):
                     code[w] = OUTSIDE_ELASTICITY
@@ -233,17 +229,15 @@ def evaluate_rows(
                 add_passive_stiffness(J, k, passive, six, width)
                 if contains(wanted, PASSIVE):
                     mirror(passive, width)
-                total = joint[block] if joint.shape[0] else K
-                sum_terms(active, passive, gravity, load, total, width)
-                if joint.shape[0]:
-                    sum_magnitudes(active, passive, gravity, load, parts[block], width)
-                    if contains(wanted, JOINT):
-                        copy(total, K, width)
+                own_K, sizes = (joint[block], parts[block]) if joint.shape[0] else (K, none)
+                sum_terms(active, passive, gravity, load, own_K, sizes, width)
+                if joint.shape[0] and contains(wanted, JOINT):
+                    copy(own_K, K, width)
             _note(code, JOINT, known, width)
             if sticks:
                 fetch(wire, first, stretched, width)
                 if not wire.shape[0]:
-                    set_linear_rigidity(holes.constant, holes.linear, F, stretched, width)
+                    set_rigidity(wires, F, stretched, own_wiring, width)
                 for w in lanes(width):
                     if code[w] == OK and _is_negative(stretched, w):
                         code[w] = OUTSIDE_ELASTICITY
@@ -252,13 +246,11 @@ def evaluate_rows(
                     routing, holes, frames, rotation, F, stretched, series, rest, segments,
                     sticking, springs, width,
                 )  # fmt: skip
-                total = stuck[block] if stuck.shape[0] else stuck_K
-                sum_terms(active, springs, gravity, load, total, width)
-                if stuck.shape[0]:
-                    sizes = stuck_parts[block]
-                    sum_magnitudes(active, springs, gravity, load, sizes, width)
-                    if contains(wanted, STUCK_JOINT):
-                        copy(total, stuck_K, width)
+                held = bool(stuck.shape[0])
+                own_K, sizes = (stuck[block], stuck_parts[block]) if held else (stuck_K, none)
+                sum_terms(active, springs, gravity, load, own_K, sizes, width)
+                if held and contains(wanted, STUCK_JOINT):
+                    copy(own_K, stuck_K, width)
                 _note(code, STUCK_JOINT, known, width)
         store(record, start, wanted, code, known, first, out, status)
 

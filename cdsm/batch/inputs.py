@@ -39,9 +39,8 @@ def kernel_arm(arm: Manipulator, check_limits: bool) -> tuple[Any, ...]:
         NO_ARM * arm.length,
         model.laws.series,
         model.laws.rest,
-        model.laws.constant,
-        model.laws.linear,
         model.laws.wires,
+        model.wire_laws.wires,
         model.holes,
     )
 

@@ -55,7 +55,7 @@ def read_stuck(
     """Compute readings of the stuck arm at postures q (b, nv) under tensions F (b, C) [N].
 
     ``names`` are those of the wanted readings, ``kept`` the arrays from which they follow.
-    ``wire`` is EA (1 + ε) of the wires, (b, C) or (1, C) [N]; (0, C) if all laws are linear.
+    ``wire`` is EA (1 + ε) of the wires, (b, C) or (1, C) [N]; (0, C) if kernels know all laws.
     ``directions`` (D, 3) are unit vectors, and ``status`` (B, W) is as for
     :func:`~cdsm.kernels.read.read`. The posture is the last axis of all results.
     """
@@ -67,17 +67,16 @@ def read_stuck(
     wanted = {WITHOUT_FRICTION.get(name, "along") for name in names}
     values = read(kept.stuck, kept.stuck_parts, kept.jacobian, directions, wanted, status, width)
     if "breakaway" in names:
-        holes = model.holes
-        rigidity = wire if len(wire) else holes.constant + holes.linear * tension
         arguments: tuple[Any, ...] = (
             model.tree,
             model.routing,
-            holes,
+            model.holes,
+            model.wire_laws.wires,
             model.laws.series,
             model.laws.rest,
             q,
             frozen(np.ascontiguousarray(tension)),
-            frozen(np.broadcast_to(rigidity, tension.shape).copy()),
+            wire,
             np.ascontiguousarray(values["motion"]),
             width,
             load[: len(q)],

@@ -21,6 +21,7 @@ import numpy as np
 
 from cdsm.kernels.chains import STRAIGHT
 from cdsm.kernels.compiling import Index, Width, inlined, inner, lanes, threaded, upwards
+from cdsm.kernels.records import fetch
 from cdsm.kernels.segments import Segments, segment_scratch, set_direction
 from cdsm.kernels.stuck import (
     Holes,
@@ -33,6 +34,7 @@ from cdsm.kernels.stuck import (
     sticking_scratch,
 )
 from cdsm.kernels.tree import Frames, Routing, Tree, empty_frames, forward_kinematics
+from cdsm.kernels.wires import Wires, set_rigidity, wire_scratch
 from cdsm.support.values import Array
 
 ROUNDING = 1e-12
@@ -58,8 +60,8 @@ class Velocities(NamedTuple):
 class SlipRates(NamedTuple):
     """|Ṫ′ − Ṫ|/F, μ φ̇ and μ φ of each hole (P, W), in the row of the next hole that holds.
 
-    μ φ is −1 in the other rows. ``last`` (3, W) belongs to the last hole passed: Ṫ/F of the section
-    before it, its μ φ̇ and its μ φ. The symbols are those of the module's docstring.
+    μ φ is −1 in the other rows. ``last`` (3, W) are, at the last hole passed, Ṫ/F before it, μ φ̇
+    and μ φ.
     """
 
     jump: Array
@@ -73,6 +75,7 @@ def set_breakaway(
     tree: Tree,
     routing: Routing,
     holes: Holes,
+    wires: Wires,
     series: Array,
     rest: Array,
     q: Array,
@@ -87,12 +90,13 @@ def set_breakaway(
     Args:
         tree: Joints of the arm.
         routing: Cable sites of the arm.
-        holes: Holes and wires of its cables.
+        holes: Holes of its cables.
+        wires: Laws of its cables.
         series: 1/k_series of the cables (C,) [m/N].
         rest: Tension at which the series springs are at rest (C,) [N].
         q: Joint angles (b, nv) [rad].
         tension: F (b, C) [N].
-        wire: EA (1 + ε) of the wires at F (b, C) [N].
+        wire: EA (1 + ε) (b, C) or (1, C) [N]; (0, C) if it follows from ``wires``.
         motion: θ̇ of the stuck arm in B blocks of W postures (B, nv, D, W) [rad/N].
         width: W, the number of postures in a block.
         out: The loads; inf where no hole ever slides, 0 where no cable sticks.
@@ -102,29 +106,18 @@ def set_breakaway(
     angles, F, EA = np.empty((nv, width)), np.empty((cables, width)), np.empty((cables, width))
     frames, scratch = empty_frames(tree, routing, width), segment_scratch(nv, width)
     rotation, section = np.empty((rows, 3, 3, width)), sticking_scratch(nv, width)
-    rates = Velocities(
-        np.zeros((rows, 3, width)),
-        np.zeros((rows, 3, width)),
-        np.empty((sites, 3, width)),
-        np.empty((3, width)),
-        np.empty((3, width)),
-        np.empty(width),
-    )
-    slips = SlipRates(
-        np.empty((sites, width)),
-        np.empty((sites, width)),
-        np.empty((sites, width)),
-        np.empty((3, width)),
-    )
-    load = np.empty(width)
+    links, holding = np.zeros((2, rows, 3, width)), np.empty((3, sites, width))
+    moved, beside = np.empty((sites, 3, width)), np.empty((3, 3, width))
+    rates = Velocities(links[0], links[1], moved, beside[0], beside[1], np.empty(width))
+    slips = SlipRates(holding[0], holding[1], holding[2], beside[2])
+    load, wiring = np.empty(width), wire_scratch(wires, width)
     for b in range(motion.shape[0]):
         first = b * width
-        for w in range(width):
-            row = min(first + w, q.shape[0] - 1)
-            for i in range(nv):
-                angles[i, w] = q[row, i]
-            for c in range(cables):
-                F[c, w], EA[c, w] = tension[row, c], wire[row, c]
+        fetch(q, first, angles, width)
+        fetch(tension, first, F, width)
+        fetch(wire, first, EA, width)
+        if not wire.shape[0]:
+            set_rigidity(wires, F, EA, wiring, width)
         forward_kinematics(tree, routing, angles, np.empty((2, width)), rotation, frames, width)
         for d in range(motion.shape[2]):
             _set_velocities(tree, routing, frames, motion[b], d, rates, width)
@@ -158,25 +151,27 @@ def _set_velocities(
         for r in upwards(0, turn.shape[1]):
             for w in lanes(width):
                 turn[i, r, w] = turn[before, r, w] + frames.axis[i, r, w] * motion[joint, d, w]
-        for r in range(3):
-            m, n = (r + 1) % 3, (r + 2) % 3
+        origin = frames.origin[before]
+        _set_velocity(turn[before], moved[before], origin, frames.origin[i], moved[i], width)
+        for r in range(3 if frames.slide.shape[0] else 0):
             for w in lanes(width):
-                y = frames.origin[i, m, w] - frames.origin[before, m, w]
-                z = frames.origin[i, n, w] - frames.origin[before, n, w]
-                moved[i, r, w] = (
-                    moved[before, r, w] + turn[before, m, w] * z - turn[before, n, w] * y
-                )
-            if frames.slide.shape[0]:
-                for w in lanes(width):
-                    moved[i, r, w] += frames.slide[i, r, w] * motion[joint, d, w]
+                moved[i, r, w] += frames.slide[i, r, w] * motion[joint, d, w]
     for p in upwards(0, routing.row.shape[0]):
         i = np.uint64(routing.row[p])
-        for r in range(3):
-            m, n = (r + 1) % 3, (r + 2) % 3
-            for w in lanes(width):
-                y = frames.site[p, m, w] - frames.origin[i, m, w]
-                z = frames.site[p, n, w] - frames.origin[i, n, w]
-                rates.site[p, r, w] = moved[i, r, w] + turn[i, m, w] * z - turn[i, n, w] * y
+        site = frames.site[p]
+        _set_velocity(turn[i], moved[i], frames.origin[i], site, rates.site[p], width)
+
+
+@inner
+def _set_velocity(
+    turn: Array, moved: Array, origin: Array, point: Array, velocity: Array, width: Width
+) -> None:
+    """Fill v + ω × (x − o) (3, W), x a ``point`` of a link; v and ω are those of its origin o."""
+    for r in range(3):
+        m, n = (r + 1) % 3, (r + 2) % 3
+        for w in lanes(width):
+            y, z = point[m, w] - origin[m, w], point[n, w] - origin[n, w]
+            velocity[r, w] = moved[r, w] + turn[m, w] * z - turn[n, w] * y
 
 
 @inner
@@ -198,9 +193,7 @@ def _set_slip_rates(
     u, length, _, _, along, _ = scratch
     for p in upwards(0, slips.limit.shape[0]):
         for w in lanes(width):
-            slips.jump[p, w] = 0.0
-        for w in lanes(width):
-            slips.limit[p, w] = -1.0
+            slips.jump[p, w], slips.limit[p, w] = 0.0, -1.0
     for c in upwards(0, holes.lead.shape[0]):
         open_first_section(holes, c, tension, series, rest, section, width)
         set_lead(routing, holes, c, rotation, section.before, width)
@@ -233,12 +226,9 @@ def _set_slip_rates(
                 _store_hole(holes, p, tension, wire, c, u, section, rates, slips, width)
             for r in upwards(0, u.shape[0]):
                 for w in lanes(width):
-                    section.before[r, w] = u[r, w]
-                for w in lanes(width):
-                    rates.before[r, w] = rates.after[r, w]
+                    section.before[r, w], rates.before[r, w] = u[r, w], rates.after[r, w]
             for w in lanes(width):
                 section.length[w] += length[w]
-            for w in lanes(width):
                 rates.longer[w] += along[w]
         for w in lanes(width):
             section.holds[w] = 1.0

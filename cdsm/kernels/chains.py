@@ -21,11 +21,10 @@ import math
 import numpy as np
 
 from cdsm.kernels.compiling import Width, compiled, inner, lanes, threaded, upwards
+from cdsm.kernels.records import mirror
 from cdsm.kernels.segments import (
     Segments,
     add_length_hessian,
-    mirror,
-    one_frames,
     segment_scratch,
     set_derivative,
     set_direction,
@@ -38,6 +37,7 @@ from cdsm.kernels.tree import (
     Tree,
     empty_frames,
     forward_kinematics,
+    one_frames,
 )
 from cdsm.support.values import Array
 

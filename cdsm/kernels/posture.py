@@ -6,7 +6,8 @@ import numpy as np
 
 from cdsm.kernels.bodies import Masses, gravity_torque, set_gravity_stiffness, tip_jacobian
 from cdsm.kernels.compiling import compiled
-from cdsm.kernels.segments import mirror, segment_scratch, set_lengths
+from cdsm.kernels.records import mirror
+from cdsm.kernels.segments import segment_scratch, set_lengths
 from cdsm.kernels.tree import (
     Indices,
     Routing,

@@ -43,6 +43,15 @@ def clear(matrix: Array, width: Width) -> None:
                 matrix[i, j, w] = 0.0
 
 
+@inner
+def mirror(matrix: Array, width: Width) -> None:
+    """Copy the upper triangle of each ``matrix`` (nv, nv, W) to the lower triangle."""
+    for i in upwards(0, matrix.shape[0]):
+        for j in range(i):
+            for w in lanes(width):
+                matrix[i, j, w] = matrix[j, i, w]
+
+
 @inlined
 def vector(record: Array, start: Indices, quantity: int) -> Array:
     """Return a quantity of the record as vectors of W postures, (size, W)."""

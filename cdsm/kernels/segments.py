@@ -25,7 +25,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cdsm.kernels.compiling import Index, Width, axes, compiled, inlined, inner, lanes, upwards
+from cdsm.kernels.compiling import Index, Width, axes, inlined, inner, lanes, upwards
 from cdsm.kernels.tree import Frames, Indices, Routing
 from cdsm.support.values import Array
 
@@ -153,41 +153,54 @@ def _add_slide_rate(u: Array, slide: Array, sign: float, rate: Array, width: Wid
 
 
 @inner
-def _set_left_factor(
+def _set_factors(
+    point: Array,
+    origin: Array,
+    axis: Array,
     u: Array,
     inverse: Array,
-    d: Array,
-    axis: Array,
+    sign: float,
     weight: Array,
+    dx: Array,
+    dy: Array,
+    dz: Array,
     cx: Array,
     cy: Array,
     cz: Array,
     width: Width,
 ) -> None:
-    """Fill ``cx``, ``cy``, ``cz`` (W,) with ``weight`` times the left factor c.
+    """Fill d = ±z × (x − o), and ``weight`` (W,) times its left factor c, by components (W,).
 
-    c = (d − (u·d) u)/ℓ + u × z, with 1/ℓ ``inverse`` (W,) and z ``axis`` (3, W).
+    c = (d − (u·d) u)/ℓ + u × z, with 1/ℓ ``inverse`` (W,) and z ``axis`` (3, W). The end x is
+    ``point``, and o is ``origin``.
     """
     for w in lanes(width):
-        along = u[0, w] * d[0, w] + u[1, w] * d[1, w] + u[2, w] * d[2, w]
+        x, y = sign * (point[0, w] - origin[0, w]), sign * (point[1, w] - origin[1, w])
+        z = sign * (point[2, w] - origin[2, w])
+        ex, ey = axis[1, w] * z - axis[2, w] * y, axis[2, w] * x - axis[0, w] * z
+        ez = axis[0, w] * y - axis[1, w] * x
+        along = u[0, w] * ex + u[1, w] * ey + u[2, w] * ez
+        dx[w], dy[w], dz[w] = ex, ey, ez
         cx[w] = weight[w] * (
-            (d[0, w] - along * u[0, w]) * inverse[w] + u[1, w] * axis[2, w] - u[2, w] * axis[1, w]
+            (ex - along * u[0, w]) * inverse[w] + u[1, w] * axis[2, w] - u[2, w] * axis[1, w]
         )
         cy[w] = weight[w] * (
-            (d[1, w] - along * u[1, w]) * inverse[w] + u[2, w] * axis[0, w] - u[0, w] * axis[2, w]
+            (ey - along * u[1, w]) * inverse[w] + u[2, w] * axis[0, w] - u[0, w] * axis[2, w]
         )
         cz[w] = weight[w] * (
-            (d[2, w] - along * u[2, w]) * inverse[w] + u[0, w] * axis[1, w] - u[1, w] * axis[0, w]
+            (ez - along * u[2, w]) * inverse[w] + u[0, w] * axis[1, w] - u[1, w] * axis[0, w]
         )
 
 
 @inner
-def mirror(matrix: Array, width: Width) -> None:
-    """Copy the upper triangle of each ``matrix`` (nv, nv, W) to the lower triangle."""
-    for i in upwards(0, matrix.shape[0]):
-        for j in range(i):
-            for w in lanes(width):
-                matrix[i, j, w] = matrix[j, i, w]
+def _add_slide_factor(
+    slide: Array, u: Array, inverse: Array, sign: float, weight: Array, c: Array, width: Width
+) -> None:
+    """Add to c (3, W) what a slide s adds to it: ``weight`` times ±(s − (u·s) u)/ℓ."""
+    for r in axes(c.shape[0], width):
+        for w in lanes(width):
+            along = u[0, w] * slide[0, w] + u[1, w] * slide[1, w] + u[2, w] * slide[2, w]
+            c[r, w] += weight[w] * (sign * (slide[r, w] - along * u[r, w]) * inverse[w])
 
 
 @inner
@@ -263,9 +276,12 @@ def add_length_hessian(
                                 u[p, w] * axis[i, q, w] - u[q, w] * axis[i, p, w]
                             )
             sign, site = (1.0, b) if t >= split else (-1.0, a)
-            set_derivative(frames, sign, site, j, d, width)
             c, z, force = left[own], axis[j], weight[cable]
-            _set_left_factor(u, inverse, d, z, force, c[0], c[1], c[2], width)
+            ends = frames.site[site], frames.origin[j], z, u, inverse
+            _set_factors(*ends, sign, force, d[0], d[1], d[2], c[0], c[1], c[2], width)
+            if frames.slide.shape[0]:
+                _add_slide(frames.slide[j], sign, d, width)
+                _add_slide_factor(frames.slide[j], u, inverse, sign, force, c, width)
             # pair joint j with itself and all joints before it, also those of the other side
             for k in upwards(0, t + 1 - first):
                 i = np.uint64(joint[first + np.intp(k)])
@@ -275,37 +291,3 @@ def add_length_hessian(
                     hessian[own_slot, row, column, w] += (
                         left[k, 0, w] * d[0, w] + left[k, 1, w] * d[1, w] + left[k, 2, w] * d[2, w]
                     )
-
-
-@inlined
-def one_frames(origin: Array, axis: Array, slide: Array, site: Array) -> Frames:
-    """Return the :class:`Frames` of one posture from arrays without an axis of postures."""
-    return Frames(
-        origin.reshape(origin.shape[0], 3, 1),
-        axis.reshape(axis.shape[0], 3, 1),
-        slide.reshape(slide.shape[0], 3, 1),
-        site.reshape(site.shape[0], 3, 1),
-    )
-
-
-@compiled
-def single_length_hessian(
-    segment: Indices,
-    joint: Indices,
-    origin: Array,
-    axis: Array,
-    slide: Array,
-    site: Array,
-    cables: int,
-) -> Array:
-    """Compute ∂²L_c/∂θ_i∂θ_j (C, nv, nv) [m/rad²] of one posture.
-
-    The arrays have no axis of postures.
-    """
-    nv = origin.shape[0] - 1
-    hessian, weight, slot = np.zeros((cables, nv, nv, 1)), np.ones((cables, 1)), np.arange(cables)
-    frames = one_frames(origin, axis, slide, site)
-    add_length_hessian(segment, joint, frames, weight, slot, segment_scratch(nv, 1), hessian, None)
-    for c in range(cables):
-        mirror(hessian[c], None)
-    return hessian.reshape(cables, nv, nv)

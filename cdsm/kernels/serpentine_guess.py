@@ -4,10 +4,9 @@ The cables that end at a joint turn this joint and the joints before it, but no 
 J_Lᵀ is block triangular; a block is the axes of one joint (at most two) and the cables that end
 there. From the last joint to the first, one cable per axis is raised above its lower bound to
 balance the joint. From the first joint to the last, the multipliers follow from these cables.
-Mostly this guess is the optimum. With three cables for each universal joint, it was the optimum in
-all of 9000 random postures up to half the joint limits, and in three of four postures up to nine
-tenths of the limits. A guess takes 0.3 to 1.5 µs, a search by :mod:`cdsm.kernels.active_set` 9 to
-16 µs.
+Mostly this guess is the optimum: with three cables for each universal joint, in all of 9000 random
+postures up to half the joint limits, and in three of four up to nine tenths. A guess takes 0.3 to
+1.5 µs, a search by :mod:`cdsm.kernels.active_set` 9 to 16 µs.
 """
 
 from __future__ import annotations

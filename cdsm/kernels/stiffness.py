@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from cdsm.kernels.compiling import Index, Width, compiled, inner, lanes, upwards
-from cdsm.kernels.segments import add_length_hessian, mirror, one_frames, segment_scratch
-from cdsm.kernels.tree import Indices
+from cdsm.kernels.records import mirror
+from cdsm.kernels.segments import add_length_hessian, segment_scratch
+from cdsm.kernels.tree import Indices, one_frames
 from cdsm.support.values import Array
 
 
@@ -39,10 +40,13 @@ def set_cable_stiffness(
 def add_passive_stiffness(
     length_jacobian: Array, cable_stiffness: Array, passive: Array, scratch: Array, width: Width
 ) -> None:
-    """Add J_Lᵀ K_L J_L to ``passive`` (nv, nv, W), for i ≤ j only; scratch is (3, W)."""
+    """Add J_Lᵀ K_L J_L to ``passive`` (nv, nv, W), for i ≤ j; scratch is (6, W).
+
+    Three cables and two rows at a time need fewer memory accesses.
+    """
     J, k = length_jacobian, cable_stiffness
     count, nv, one = np.uint64(J.shape[0]), np.uint64(J.shape[1]), np.uint64(1)
-    for first in range(0, J.shape[0], 3):  # three cables at a time: a third of the memory accesses
+    for first in range(0, J.shape[0], 3):
         c = np.uint64(first)
         d, e = (
             min(c + np.uint64(1), count - np.uint64(1)),
@@ -51,18 +55,45 @@ def add_passive_stiffness(
         end = nv  # joints behind the end of a cable do not change its length
         while end > 0 and not _moves(J, c, d, e, end - one, width):
             end -= one
-        for i in range(end):
-            for w in lanes(width):
-                scratch[0, w] = k[c, w] * J[c, i, w]
-                scratch[1, w] = k[d, w] * J[d, i, w] if d > c else 0.0
-                scratch[2, w] = k[e, w] * J[e, i, w] if e > d else 0.0
-            for j in range(i, end):
+        for m in range(0, np.intp(end), 2):
+            i, next_row = np.uint64(m), min(np.uint64(m) + one, end - one)
+            for r, row in ((0, i), (3, next_row)):
                 for w in lanes(width):
-                    passive[i, j, w] += (
-                        scratch[0, w] * J[c, j, w]
-                        + scratch[1, w] * J[d, j, w]
-                        + scratch[2, w] * J[e, j, w]
-                    )
+                    scratch[r, w] = k[c, w] * J[c, row, w]
+                    scratch[r + 1, w] = k[d, w] * J[d, row, w] if d > c else 0.0
+                    scratch[r + 2, w] = k[e, w] * J[e, row, w] if e > d else 0.0
+            for w in lanes(width):
+                passive[i, i, w] += (
+                    scratch[0, w] * J[c, i, w]
+                    + scratch[1, w] * J[d, i, w]
+                    + scratch[2, w] * J[e, i, w]
+                )
+            if i < next_row:
+                rows = passive[i], passive[next_row]
+                _add_rows(scratch, J[c], J[d], J[e], next_row, end, *rows, width)
+
+
+@inner
+def _add_rows(
+    products: Array,
+    x: Array,
+    y: Array,
+    z: Array,
+    first: Index,
+    end: Index,
+    upper: Array,
+    lower: Array,
+    width: Width,
+) -> None:
+    """Add p·(x, y, z) and q·(x, y, z) to the entries ``first`` to ``end`` − 1 of two rows.
+
+    ``products`` (6, W) are p and q; x, y and z (nv, W) are rows of J_L.
+    """
+    p = products
+    for j in upwards(first, end):
+        for w in lanes(width):
+            upper[j, w] += p[0, w] * x[j, w] + p[1, w] * y[j, w] + p[2, w] * z[j, w]
+            lower[j, w] += p[3, w] * x[j, w] + p[4, w] * y[j, w] + p[5, w] * z[j, w]
 
 
 @inner
@@ -115,30 +146,30 @@ def set_load_stiffness(
 
 @inner
 def sum_terms(
-    active: Array, passive: Array, gravity: Array, load: Array, K: Array, width: Width
+    active: Array,
+    passive: Array,
+    gravity: Array,
+    load: Array,
+    K: Array,
+    parts: Array,
+    width: Width,
 ) -> None:
-    """Fill K_θ (nv, nv, W). Of all terms but the load's, only entries with i ≤ j are read."""
+    """Fill K_θ (nv, nv, W), and with the sum of the magnitudes of its terms ``parts``, if any.
+
+    Of all terms but the load's, only entries with i ≤ j are read.
+    """
     for i in upwards(0, K.shape[0]):
         for j in upwards(0, K.shape[0]):
             a, b = min(i, j), max(i, j)
             for w in lanes(width):
                 K[i, j, w] = active[a, b, w] + passive[a, b, w] + gravity[a, b, w] + load[i, j, w]
-
-
-@inner
-def sum_magnitudes(
-    active: Array, passive: Array, gravity: Array, load: Array, parts: Array, width: Width
-) -> None:
-    """Fill P (nv, nv, W), the sum of the magnitudes of the terms, which are as in sum_terms."""
-    for i in upwards(0, parts.shape[0]):
-        for j in upwards(0, parts.shape[0]):
-            a, b = min(i, j), max(i, j)
-            for w in lanes(width):
-                parts[i, j, w] = (
-                    abs(active[a, b, w])
-                    + abs(passive[a, b, w])
-                    + (abs(gravity[a, b, w]) + abs(load[i, j, w]))
-                )
+            if parts.shape[0]:
+                for w in lanes(width):
+                    parts[i, j, w] = (
+                        abs(active[a, b, w])
+                        + abs(passive[a, b, w])
+                        + (abs(gravity[a, b, w]) + abs(load[i, j, w]))
+                    )
 
 
 @compiled
@@ -169,11 +200,34 @@ def single_stiffness(
     frames, slot = one_frames(origin, axis, slide, site), np.zeros(count, dtype=np.intp)
     add_length_hessian(segment, joint, frames, F, slot, segment_scratch(nv, 1), active, None)
     mirror(active[0], None)
-    add_passive_stiffness(J, k, passive, np.empty((3, 1)), None)
+    add_passive_stiffness(J, k, passive, np.empty((6, 1)), None)
     mirror(passive, None)
     set_load_stiffness(JX, wrench.reshape(6, 1), tip_joints, load, np.empty((6, 1)), None)
     terms = active.reshape(nv, nv), passive.reshape(nv, nv), load.reshape(nv, nv)
     return *terms, terms[0] + terms[1] + gravity + terms[2]
+
+
+@compiled
+def single_length_hessian(
+    segment: Indices,
+    joint: Indices,
+    origin: Array,
+    axis: Array,
+    slide: Array,
+    site: Array,
+    cables: int,
+) -> Array:
+    """Compute ∂²L_c/∂θ_i∂θ_j (C, nv, nv) [m/rad²] of one posture.
+
+    The arrays have no axis of postures.
+    """
+    nv = origin.shape[0] - 1
+    hessian, weight, slot = np.zeros((cables, nv, nv, 1)), np.ones((cables, 1)), np.arange(cables)
+    frames = one_frames(origin, axis, slide, site)
+    add_length_hessian(segment, joint, frames, weight, slot, segment_scratch(nv, 1), hessian, None)
+    for c in range(cables):
+        mirror(hessian[c], None)
+    return hessian.reshape(cables, nv, nv)
 
 
 @compiled

@@ -25,7 +25,7 @@ from cdsm.support.values import Array
 
 
 class Holes(NamedTuple):
-    """Holes and wires of all cables; the P sites of all cables follow each other, as in Routing.
+    """Holes and leads of all cables; the P sites of all cables follow each other, as in Routing.
 
     Attributes:
         first: Index of the first site of each cable, and P at the end (C+1,).
@@ -34,8 +34,6 @@ class Holes(NamedTuple):
         lead: Length of each lead (C,) [m].
         axis: Direction of each lead in the frame of the joint of its first site (C, 3).
         locked: 1 for each cable with a locked motor, 0 where the motor controls the force (C,).
-        constant: Constant part of EA (1 + ε) of each wire (C,) [N].
-        linear: Factor (C,) of the tension in EA (1 + ε): 1 for linear laws, else 0.
     """
 
     first: Indices
@@ -44,8 +42,6 @@ class Holes(NamedTuple):
     lead: Array
     axis: Array
     locked: Array
-    constant: Array
-    linear: Array
 
 
 class Sticking(NamedTuple):

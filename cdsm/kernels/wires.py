@@ -1,7 +1,7 @@
-"""Kernels of linear laws EA(F), and of laws that are polynomials on intervals (panels), as Eq. 19.
+"""Kernels of the rigidity EA(F) of wires: linear laws, polynomials on intervals, and tables.
 
-The results have the bits of :mod:`cdsm.wires.quadrature`, which takes one tension at a time and
-twice as long.
+The results have the bits of :mod:`cdsm.wires.quadrature` and :mod:`cdsm.wires.rising_curve`, which
+take one law at a time and twice as long.
 """
 
 from __future__ import annotations
@@ -10,29 +10,41 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cdsm.kernels.compiling import Width, inlined, inner, lanes, upwards
+from cdsm.kernels.compiling import Width, compiled, inlined, inner, lanes, upwards
 from cdsm.kernels.tree import Indices
+from cdsm.support.validation import RANGES
 from cdsm.support.values import Array
 
 AT_ONCE = 4
-"""The number of powers in a table is a multiple of this."""
+"""The number of rows of coefficients is a multiple of this."""
+
+POLYNOMIAL, CURVE = range(2)
+"""What the coefficients of a piece are: of a polynomial EA(F), or of a curve of strain."""
+
+_, _LEAST, _MOST = RANGES["rigidity"]
 
 
 class Wires(NamedTuple):
-    """Laws of all cables; the panels of one law follow those of another.
+    """Laws of all cables; the pieces of one law follow those of another.
 
     Attributes:
-        panels: First and last panel of the law of each cable (C, 2); last below first if the law is
-            no polynomial.
+        constant: Constant part of EA (1 + ε) of linear laws (C,) [N]; 0 for other laws, and where
+            the motor controls the force.
+        linear: Factor (C,) of the tension in EA (1 + ε): 1 for linear laws, else 0.
+        pieces: First and last piece of the law of each cable, and POLYNOMIAL or CURVE (C, 3); last
+            below first if the law is linear or a function of Python.
         ends: Of each law (C, 6): least and largest tension; tension below which the wire is slack
-            and EA constant, −inf if there is none; least tension of the polynomials, and EA there
+            and EA constant, −inf if there is none; least tension of the pieces, and EA there
             [N]; 1 if the original length is the unstrained one, 0 if it is the stretched one.
-        edges: Start and end of each panel [N], and the strain at its start (3, P).
-        coefficients: Of the polynomial on each panel, lowest power first (powers, P).
+        edges: Start and end of each piece [N], and the strain at its start (3, P).
+        coefficients: Of the polynomial, lowest power first; or slope and rise of the chord, then a
+            and b of :class:`~cdsm.TabulatedElasticity`; (rows, P).
         nodes: Nodes and weights of the Gauss rule on (0, 1), (2, N).
     """
 
-    panels: Indices
+    constant: Array
+    linear: Array
+    pieces: Indices
     ends: Array
     edges: Array
     coefficients: Array
@@ -40,9 +52,9 @@ class Wires(NamedTuple):
 
 
 class WireScratch(NamedTuple):
-    """Scratch of one cable: panel (W,), rows of values (7, W), coefficients (powers, W)."""
+    """Scratch of one cable: piece (W,), rows of values (7, W), coefficients (rows, W)."""
 
-    panel: Indices
+    piece: Indices
     values: Array
     coefficients: Array
 
@@ -50,36 +62,28 @@ class WireScratch(NamedTuple):
 @inlined
 def wire_scratch(wires: Wires, width: int) -> WireScratch:
     """Allocate the scratch for a block."""
-    powers = wires.coefficients.shape[0]
+    rows = wires.coefficients.shape[0]
     return WireScratch(
-        np.empty(width, dtype=np.intp), np.empty((7, width)), np.empty((powers, width))
+        np.empty(width, dtype=np.intp), np.empty((7, width)), np.empty((rows, width))
     )
 
 
 @inner
-def set_linear_rigidity(
-    constant: Array, linear: Array, F: Array, rigidity: Array, width: Width
-) -> None:
-    """Fill EA (1 + ε) (C, W) of linear laws."""
-    for c in upwards(0, F.shape[0]):
-        for w in lanes(width):
-            rigidity[c, w] = constant[c] + linear[c] * F[c, w]
-
-
-@inner
-def set_wire_rigidity(
+def set_rigidity(
     wires: Wires, tension: Array, rigidity: Array, scratch: WireScratch, width: Width
 ) -> None:
-    """Fill ``rigidity`` (C, W) [N] with EA (1 + ε) of cables with polynomials.
+    """Fill ``rigidity`` (C, W) [N] with EA (1 + ε) at tensions F (C, W) [N].
 
     It is −1 outside the domain of the law, and EA alone if the original length of a wire is the
-    stretched one.
+    stretched one. Laws that are functions of Python are left out: it is 0.
     """
-    panel, values, coefficients = scratch
-    x, begin, before, inside = values[0], values[1], values[2], values[3]
-    node, value, total = values[4], values[5], values[6]
+    piece, values, coefficients = scratch
+    x, begin, end, before = values[0], values[1], values[2], values[3]
+    node, value, strain = values[4], values[5], values[6]
     for c in upwards(0, tension.shape[0]):
-        first, last = wires.panels[c, 0], wires.panels[c, 1]
+        for w in lanes(width):
+            rigidity[c, w] = wires.constant[c] + wires.linear[c] * tension[c, w]
+        first, last, kind = wires.pieces[c, 0], wires.pieces[c, 1], wires.pieces[c, 2]
         if last < first:
             continue
         least, most, rest = wires.ends[c, 0], wires.ends[c, 1], wires.ends[c, 2]
@@ -87,35 +91,75 @@ def set_wire_rigidity(
         for w in lanes(width):
             x[w] = max(tension[c, w], lowest)
         for w in lanes(width):
-            panel[w] = first
-        for p in upwards(first, last):  # the panel of each tension, without a branch
-            end = wires.edges[1, p]
+            piece[w] = first
+        left = last - first + 1
+        while left > 1:  # bisection, the same for all postures
+            half = left // 2
             for w in lanes(width):
-                panel[w] += 1 if x[w] > end else 0
+                behind = x[w] > wires.edges[1, np.uint64(piece[w] + half - 1)]
+                piece[w] += half if behind else 0
+            left -= half
+        for k, edge in enumerate((begin, end, before)):
+            for w in lanes(width):
+                edge[w] = wires.edges[k, np.uint64(piece[w])]
         for r in upwards(0, coefficients.shape[0]):
             for w in lanes(width):
-                coefficients[r, w] = wires.coefficients[r, np.uint64(panel[w])]
-        for w in lanes(width):
-            begin[w] = wires.edges[0, np.uint64(panel[w])]
-        for w in lanes(width):
-            before[w] = wires.edges[2, np.uint64(panel[w])]
-        for w in lanes(width):
-            inside[w] = x[w] - begin[w]
-        for w in lanes(width):
-            total[w] = 0.0
-        for n in upwards(0, wires.nodes.shape[1]):  # Gauss rule for ∫ dF/EA from the panel's start
-            at, weight = wires.nodes[0, n], wires.nodes[1, n]
-            for w in lanes(width):
-                node[w] = begin[w] + inside[w] * at
-            _set_polynomial(coefficients, node, value, width)
-            for w in lanes(width):
-                total[w] += weight / value[w]
-        _set_polynomial(coefficients, x, value, width)
+                coefficients[r, w] = wires.coefficients[r, np.uint64(piece[w])]
+        if kind == CURVE:
+            _set_curve(coefficients, x, begin, end, value, strain, width)
+        else:
+            _set_integral(wires.nodes, coefficients, x, begin, node, value, strain, width)
+            _set_polynomial(coefficients, x, value, width)
         for w in lanes(width):
             F = tension[c, w]
-            strain = (F - rest) / soft if rest > F else before[w] + inside[w] * total[w]
-            usable = least <= F <= most and value[w] > 0.0
-            rigidity[c, w] = value[w] * (1.0 + strained * strain) if usable else -1.0
+            change = (F - rest) / soft if rest > F else before[w] + strain[w]
+            usable = least <= F <= most and _LEAST <= value[w] <= _MOST
+            rigidity[c, w] = value[w] * (1.0 + strained * change) if usable else -1.0
+
+
+@inner
+def _set_curve(
+    coefficients: Array,
+    x: Array,
+    begin: Array,
+    end: Array,
+    rigidity: Array,
+    strain: Array,
+    width: Width,
+) -> None:
+    """Fill EA and ε (W,) at x (W,) of curves of strain, ε from the start of the piece."""
+    chord, rise, a, b = coefficients[0], coefficients[1], coefficients[2], coefficients[3]
+    for w in lanes(width):
+        wide = end[w] - begin[w]
+        t, u = (x[w] - begin[w]) / wide, (end[w] - x[w]) / wide
+        D = t * t + (a[w] + b[w]) * t * u + u * u
+        N = b[w] * t * t + 2.0 * t * u + a[w] * u * u
+        rigidity[w], strain[w] = 1.0 / (chord[w] * N / (D * D)), rise[w] * (t * (t + a[w] * u) / D)
+
+
+@inner
+def _set_integral(
+    nodes: Array,
+    coefficients: Array,
+    x: Array,
+    begin: Array,
+    node: Array,
+    value: Array,
+    integral: Array,
+    width: Width,
+) -> None:
+    """Fill ∫ dF/EA (W,) from ``begin`` to x (W,) of polynomials EA, by a Gauss rule."""
+    for w in lanes(width):
+        integral[w] = 0.0
+    for n in upwards(0, nodes.shape[1]):
+        at, weight = nodes[0, n], nodes[1, n]
+        for w in lanes(width):
+            node[w] = begin[w] + (x[w] - begin[w]) * at
+        _set_polynomial(coefficients, node, value, width)
+        for w in lanes(width):
+            integral[w] += weight / value[w]
+    for w in lanes(width):
+        integral[w] *= x[w] - begin[w]
 
 
 @inner
@@ -129,3 +173,24 @@ def _set_polynomial(coefficients: Array, x: Array, value: Array, width: Width) -
         c, d = coefficients[k + np.uint64(2)], coefficients[k + np.uint64(3)]
         for w in lanes(width):
             value[w] = (((value[w] * x[w] + d[w]) * x[w] + c[w]) * x[w] + b[w]) * x[w] + a[w]
+
+
+@compiled
+def single_rigidity(
+    constant: Array,
+    pieces: Indices,
+    ends: Array,
+    edges: Array,
+    coefficients: Array,
+    nodes: Array,
+    tension: Array,
+) -> Array:
+    """Compute EA (1 + ε) (C,) at tensions F (C,) of one posture; of linear laws its constant part.
+
+    The arguments before the tensions are fields of :class:`Wires`; see :func:`set_rigidity`.
+    """
+    count = tension.shape[0]
+    linear, rigidity = np.zeros(count), np.empty((count, 1))
+    wires = Wires(constant, linear, pieces, ends, edges, coefficients, nodes)
+    set_rigidity(wires, tension.reshape(count, 1), rigidity, wire_scratch(wires, 1), None)
+    return rigidity.reshape(count)

@@ -89,6 +89,11 @@ class Panels(NamedTuple):
     before: Array  # ∫ Fⁿ dF/p from the low end to the beginning of each panel, n = 0, 1, (2, P)
     end: float  # tension from which p is not positive [N]; inf if p is positive everywhere
 
+    @property
+    def pieces(self) -> tuple[Array, Array]:
+        """Edges (3, P) and coefficients (powers, P) of :class:`~cdsm.kernels.wires.Wires`."""
+        return np.array([self.edges[:-1], self.edges[1:], self.before[0]]), self.coefficients
+
     def integral(self, F: Array, power: int) -> Array:
         """Integrate Fⁿ dF/p, n = ``power``, from the low end to each F ≤ ``end``, any shape."""
         found = _integrals(self.edges, self.coefficients, self.before, power, F.ravel())

@@ -63,6 +63,12 @@ class RisingCurve:
         k = self._piece(x)
         return np.asarray(self._moments[k] + self._moment(k, x))
 
+    @property
+    def pieces(self) -> tuple[Array, Array]:
+        """Edges (3, n − 1) and coefficients (4, n − 1) of :class:`~cdsm.kernels.wires.Wires`."""
+        edges = np.array([self._x[:-1], self._x[1:], self._y[:-1]])
+        return edges, np.array([self.chords, self._rise, *self._ends])
+
     @cached_property
     def _ends(self) -> Array:
         """Slopes (2, n − 1) at both ends of each piece, over the slope of its chord: a and b."""

@@ -3,7 +3,7 @@
 import numpy as np
 
 from cdsm.kernels import bodies as body_kernels
-from cdsm.kernels import segments
+from cdsm.kernels import records
 from cdsm.kernels.tree import Frames, Routing
 from cdsm.rigid_body import RigidBody
 from tests.kernels.test_segments import BRANCH_JOINT, BRANCHES, forward_kinematics
@@ -12,7 +12,7 @@ from tests.support.kernels import from_python
 tip_jacobian = from_python(body_kernels.tip_jacobian)
 gravity_torque = from_python(body_kernels.gravity_torque)
 set_gravity_stiffness = from_python(body_kernels.set_gravity_stiffness)
-mirror = from_python(segments.mirror)
+mirror = from_python(records.mirror)
 
 
 def test_tree_that_branches_weighs_what_pinocchio_says() -> None:

@@ -17,6 +17,6 @@ def test_passive_term_is_a_sum_over_cables_however_sparse_their_moment_arms() ->
         k = rng.uniform(0.0, 1e-2, (width, count))
         before = rng.normal(size=(width, nv, nv))
         got = block(before)
-        add_passive_stiffness(block(J), block(k), got, np.empty((3, width)), width)
+        add_passive_stiffness(block(J), block(k), got, np.empty((6, width)), width)
         expected = before + np.triu(np.einsum("wc,wci,wcj->wij", k, J, J))
         np.testing.assert_allclose(got, block(expected), rtol=1e-13, atol=1e-15)
