@@ -105,9 +105,10 @@ def _polytope(farthest: _Farthest, points: Array, spanned: Array) -> Hull:
     while True:
         inside = (points - start) @ spanned.T
         hull = ConvexHull(inside / size)
+        flats = [tuple(each[:-1]) for each in np.unique(np.round(hull.equations, 9), axis=0)]
         farther = []
-        for *entries, _ in np.unique(np.round(hull.equations, 9), axis=0):
-            if (flat := tuple(entries)) in done:
+        for flat in flats:
+            if flat in done:
                 continue
             normal = np.array(flat) @ spanned
             normal /= np.linalg.norm(normal)
@@ -122,12 +123,8 @@ def _polytope(farthest: _Farthest, points: Array, spanned: Array) -> Hull:
         points = np.vstack([points, *[x[None] for x in farther]])
         size = float(np.ptp(points, axis=0).max())
     # only facets of the last hull
-    last = {tuple(each[:-1]) for each in np.unique(np.round(hull.equations, 9), axis=0)}
-    facets = [done[flat] for flat in done if flat in last]
-    corners = hull.vertices
-    place = {int(v): i for i, v in enumerate(corners)}
+    normals, offsets = zip(*(done[flat] for flat in done if flat in flats), strict=True)
     faces = np.zeros((0, 3), np.intp)
-    if spanned.shape[0] == 3:
-        faces = np.array([[place[int(v)] for v in each] for each in hull.simplices], np.intp)
-    normals, offsets = zip(*facets, strict=True)
-    return Hull(points[corners], faces, np.array(normals), np.array(offsets))
+    if len(spanned) == 3:
+        faces = np.searchsorted(hull.vertices, hull.simplices)  # vertices rise in 3 dimensions
+    return Hull(points[hull.vertices], faces, np.array(normals), np.array(offsets))
