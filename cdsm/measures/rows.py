@@ -92,11 +92,11 @@ def friction_losses(arm: Manipulator, q: Array, threads: int | None = None) -> A
 def narrowed_bounds(
     arm: Manipulator, minimum: ArrayLike, maximum: ArrayLike, loss: Array
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Narrow the bounds so that every segment of a cable is within them, if ``loss`` is (B, C).
+    """Narrow the bounds so that every segment of a cable stays within the given ones.
 
-    ``loss`` are :func:`friction_losses`; the bounds are (), (B,) or (B, C) [N]. Return the lower
-    and upper bounds (B, C) [N], and whether they exist at each posture (B,). Other postures keep
-    the given bounds.
+    ``loss`` (B, C) are :func:`friction_losses`; bounds are given as (), (B,) or (B, C) [N]. Return
+    the lower and upper bounds (B, C) [N], and whether they are consistent at each posture (B,).
+    Other postures keep the given bounds.
     """
     given = _each_bound(arm, minimum, maximum, loss.shape)
     low, high = given[0] * loss, given[1] / loss
@@ -157,7 +157,7 @@ def _balances(
     maximum: ArrayLike,
     threads: int | None,
 ) -> tuple[Array, Array, Array, Array, Array]:
-    """Return J_X, J_L, J_Xᵀ W − g and both bounds of :func:`payloads`, one of each per posture."""
+    """Return J_X, J_L, J_Xᵀ W − g and both bounds at each posture; see :func:`payloads`."""
     names = ("jacobian", "length_jacobian", "gravity_torque")
     found = evaluate(arm, q, outputs=names, check_limits=False, threads=threads)
     JX, J, g = (found[name] for name in names)
@@ -168,7 +168,7 @@ def _balances(
 def _each_bound(
     arm: Manipulator, minimum: ArrayLike, maximum: ArrayLike, shape: tuple[int, int]
 ) -> tuple[Array, Array]:
-    """Return bounds that are (), (B,) or (B, C) [N], checked, with the ``shape`` (B, C)."""
+    """Return bounds given as (), (B,) or (B, C) [N], checked and in the ``shape`` (B, C)."""
     bounds = (np.asarray(bound, dtype=np.float64) for bound in (minimum, maximum))
     low, high = (np.broadcast_to(b[:, None] if b.ndim == 1 else b, shape) for b in bounds)
     return checked_bounds(arm, low, high, shape[0])

@@ -186,7 +186,7 @@ def checked_rate(arm: Manipulator, rate: ArrayLike) -> Array:
 
 
 def _per_sample(name: str, value: ArrayLike, tail: tuple[int, ...], size: int) -> Array:
-    """Return one value per sample (S, …); given is one of shape ``tail`` for all, or (S, …)."""
+    """Return one value per sample (S, …) from one of shape ``tail`` for all, or from S values."""
     given = number_array(name, value)
     if given.shape not in (tail, (size, *tail)):
         raise InvalidInput(

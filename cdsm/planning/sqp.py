@@ -86,7 +86,7 @@ class Program:
     centre: Array | float = 0.0  # tensions (C,) [N] at which the effort is zero, or 0
 
     def merit(self, at: ConstraintValues, price: float) -> float:
-        """Return the merit at a point: f, for *effort* plus ``price`` times the violation of c."""
+        """Return f at a point; for the effort plus ``price`` times the violation of c."""
         c = at.values
         if self.objective.effort:
             x = (at.evaluation.F - self.centre) / self.unit

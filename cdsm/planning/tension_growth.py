@@ -121,7 +121,7 @@ def saturation(
 
 
 def _stable(at: StiffnessAt, low: float, high: float) -> tuple[float, float]:
-    """Return the first stable range (low, high) of lower bounds [N], without singular ends."""
+    """Return the first range of lower bounds [N] in which the arm is stable, without its edges."""
     places, margins, stable = stable_ranges(at, low, high)
     if not stable:
         best = at(float(places[int(margins.argmax())]))

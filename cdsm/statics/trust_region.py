@@ -220,9 +220,10 @@ def _descend(
 def _step(
     torque: Array, stiffness: Array, values: Array, vectors: Array, radius: float, sign: float
 ) -> Array:
-    """Return the p of least r·p + ½ pᵀKp with |p| ≤ ``radius``, r the ``torque``.
+    """Return the step p of least r·p + ½ pᵀKp with |p| ≤ ``radius``, where r is ``torque``.
 
-    ``values`` and ``vectors`` are of K. If r = 0, ``sign`` chooses between the minima p and −p.
+    ``values`` and ``vectors`` are the eigenvalues and eigenvectors of K. If r = 0, ``sign`` chooses
+    between the minima p and −p.
     """
     along = vectors.T @ torque
     size, largest = float(np.linalg.norm(along)), float(abs(values).max())

@@ -101,7 +101,7 @@ class Panels(NamedTuple):
 
 
 def panels(rows: Sequence[Sequence[float]], edges: Sequence[float]) -> Panels:
-    """Divide piecewise polynomials, lowest power first, with ranges ``edges`` into panels."""
+    """Divide polynomials, lowest power first, into panels; ``edges`` bound their ranges."""
     ends: list[float] = [edges[0]]
     piece: list[int] = []
     end = np.inf
@@ -120,7 +120,7 @@ def panels(rows: Sequence[Sequence[float]], edges: Sequence[float]) -> Panels:
 
 
 def _significant(row: Sequence[float], high: float) -> list[float]:
-    """Drop coefficients of high powers that are negligible up to ``high``; their roots overflow."""
+    """Drop coefficients of high powers that are negligible up to ``high``: their roots overflow."""
     sizes = abs(np.array(row)) * high ** np.arange(len(row))
     last = np.flatnonzero(sizes > _NEGLIGIBLE * sizes.max()).max(initial=0)
     return list(row[: last + 1])

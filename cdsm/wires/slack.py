@@ -60,7 +60,7 @@ class SlackBelow(Elasticity):
         return float(self.law.rigidity(self.law.domain.first))
 
     def scaled(self, factor: float) -> SlackBelow:
-        """Return the law and slack branch of ``factor`` × EA; see :meth:`Elasticity.scaled`."""
+        """Return the law of factor × EA, with its slack branch; see :meth:`Elasticity.scaled`."""
         return SlackBelow(self.law.scaled(factor))
 
     def rigidity(self, tension: ArrayLike) -> Array:

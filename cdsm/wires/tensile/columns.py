@@ -175,7 +175,7 @@ def _candidates(header: Header, wanted: Sequence[str | int] | None) -> list[list
 
 
 def _wanted(header: Header, name: str | int, kind: str) -> list[Column]:
-    """Return the columns called ``name``, or with this number from 1 on, as columns of a kind."""
+    """Return the columns with this name, or this number from 1 on, as columns of a kind."""
     if str(name).isdigit():
         found = [column for column in header.columns if column.at == int(name) - 1]
     else:

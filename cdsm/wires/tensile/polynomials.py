@@ -21,7 +21,7 @@ _FEWEST = 2 * _HALF + 2 * (_DEGREE + 1)  # points: twice as many slopes as coeff
 
 
 def polynomials(points: Points, join: float) -> tuple[StrandElasticity, tuple[str, ...]]:
-    """Fit two polynomials that meet at a join [N], or one, to the slopes; cut them where EA ≤ 0."""
+    """Fit two polynomials that meet at a join [N], or one, to the slopes; keep where EA > 0."""
     if len(points.force) < _FEWEST:
         raise TensileTestError(
             f"only {len(points.force)} points are left, and polynomials of degree {_DEGREE} need "
@@ -50,7 +50,7 @@ def polynomials(points: Points, join: float) -> tuple[StrandElasticity, tuple[st
 
 
 def _positive(rows: list[list[float]], edges: tuple[float, ...]) -> list[tuple[float, float]]:
-    """Find the ranges of tension [N] where polynomials are positive; lowest power first."""
+    """Find the ranges of tension [N] where the polynomials ``rows`` are positive."""
     tensions = np.linspace(edges[0], edges[-1], 400)
     values = piecewise(np.array(edges[1:-1]), coefficient_table(rows), tensions)
     margin = 1e-6 * float(abs(values).max())  # keeps the strain ∫ dF/EA finite
