@@ -22,9 +22,8 @@ def overlapping(disks: Sequence[Disk], poses: dict[str, Array]) -> list[tuple[st
     pair in turn. Both are convex, so the distance of two such projections converges to theirs.
     """
     links = list(poses)
-    pairs = np.array([(i, j) for i, j in combinations(range(len(links)), 2) if j - i > 1])
-    if not len(pairs):
-        return []
+    apart = [(i, j) for i, j in combinations(range(len(links)), 2) if j - i > 1]
+    pairs = np.array(apart, dtype=np.intp).reshape(-1, 2)
     ends = [[disk.x for disk in disks if disk.link == link] for link in links]
     half = np.array([(max(x) - min(x)) / 2.0 for x in ends])
     radius = np.array([max(disk.radius for disk in disks if disk.link == link) for link in links])
@@ -32,14 +31,16 @@ def overlapping(disks: Sequence[Disk], poses: dict[str, Array]) -> list[tuple[st
     axis = pose[:, :3, 0]
     centre = pose[:, :3, 3] + axis * [[(max(x) + min(x)) / 2.0] for x in ends]
     reach = np.hypot(half, radius)
-    apart = np.linalg.norm(centre[pairs[:, 0]] - centre[pairs[:, 1]], axis=1)
-    pairs = pairs[apart < reach[pairs].sum(axis=1)]
+    distance = np.linalg.norm(centre[pairs[:, 0]] - centre[pairs[:, 1]], axis=1)
+    pairs = pairs[distance < reach[pairs].sum(axis=1)]
+    if not len(pairs):
+        return []
     one, other = pairs.T
     there = centre[other]
-    for _ in range(_ROUNDS if len(pairs) else 0):
+    for _ in range(_ROUNDS):
         here = _projected(there, centre[one], axis[one], half[one], radius[one])
         there = _projected(here, centre[other], axis[other], half[other], radius[other])
-    gap = np.linalg.norm(there - here, axis=1) if len(pairs) else np.zeros(0)
+    gap = np.linalg.norm(there - here, axis=1)
     return [(links[i], links[j]) for i, j in pairs[gap <= _TOUCHING * radius[one]].tolist()]
 
 

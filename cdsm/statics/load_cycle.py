@@ -85,14 +85,9 @@ def load_cycle(
     if not _LEAST <= share <= _MOST:
         raise InvalidInput("accuracy", f"{share:g} given; {_LEAST:g} to {_MOST:g} is needed.")
     loading = slow_loading(pose, F, W, share)
-    forced, resting = loading.forced, np.where(loading.forced, F, 0.0)
-    commands = np.tile(resting, (len(loads), 1)) if motors is None else _commands(motors, forced)
-    if commands.shape != (len(loads), F.size):
-        raise InvalidInput(
-            "motors",
-            f"shape {commands.shape} given, ({len(loads)}, {F.size}) needed: for each load one "
-            "command per cable.",
-        )
+    commands = np.tile(np.where(loading.forced, F, 0.0), (len(loads), 1))
+    if motors is not None:
+        commands = _commands(motors, loading.forced, commands.shape)
     state, none = loading.begin(F, W), frozen(np.zeros(pose.q.size))
     history = []
     for k, (wrench, command) in enumerate(track(tuple(zip(loads, commands, strict=True)), "loads")):
@@ -119,15 +114,19 @@ def slow_loading(pose: Posture, tension: Array, wrench: Array, accuracy: float) 
     return SlowLoading(problem, start, stops(pose), forced, pose, accuracy)
 
 
-def _commands(motors: ArrayLike, forced: NDArray[np.bool_]) -> Array:
+def _commands(motors: ArrayLike, forced: NDArray[np.bool_], shape: tuple[int, ...]) -> Array:
     """Check and return the commands (n, C); force-controlled cables (``forced``) only pull."""
     commands = number_array("motors", motors)
-    if commands.ndim == 2 and commands.shape[1] == forced.size:
-        tensions = commands[:, forced]
-        if tensions.size and tensions.min() < 0.0:
-            raise InvalidInput("motors", f"{tensions.min():g} N given; cables only pull.")
-        number_array("motors", commands[:, ~forced], "length")
-        number_array("motors", tensions, "tension")
+    if commands.shape != shape:
+        raise InvalidInput(
+            "motors",
+            f"shape {commands.shape} given, {shape} needed: for each load one command per cable.",
+        )
+    tensions = commands[:, forced]
+    if tensions.min(initial=0.0) < 0.0:
+        raise InvalidInput("motors", f"{tensions.min():g} N given; cables only pull.")
+    number_array("motors", commands[:, ~forced], "length")
+    number_array("motors", tensions, "tension")
     return commands
 
 
