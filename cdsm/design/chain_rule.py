@@ -42,8 +42,8 @@ class Chain:
         if isinstance(problem.postures, RandomPoses):
             self._limits = np.column_stack([_limit_slopes(arm, each) for each in problem.variables])
         by_variable = {
-            source: np.array([each.get(source, np.zeros(len(labels))) for each in self._columns])
-            for source, labels in self.inputs.labels.items()
+            source: np.array([each.get(source, zero) for each in self._columns])
+            for source, zero in self.inputs.zeros().items()
         }
         still = Places(*(np.zeros_like(place) for place in self.inputs.places))
         self._moved = still.moved(self.inputs.displaced(by_variable))

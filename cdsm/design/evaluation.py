@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
@@ -20,6 +18,7 @@ from cdsm.design.quantities import Found, measure
 from cdsm.design.variables import UNITS
 from cdsm.errors import InvalidInput
 from cdsm.support.progress import progress_bar
+from cdsm.support.tables import csv_text
 from cdsm.support.validation import number_array, whole_number
 from cdsm.support.values import Array, ReadOnlyState, frozen
 
@@ -75,12 +74,9 @@ class Designs(ReadOnlyState):
 
         The last columns are 1 for a feasible design, and why a design does not make an arm.
         """
-        out = io.StringIO()
-        table = csv.writer(out, lineterminator="\n")
         columns = self._columns() | {"feasible": self.feasible.astype(int), "fault": self.faults}
-        table.writerow(["design", *columns])
-        table.writerows([i, *row] for i, row in enumerate(zip(*columns.values(), strict=True)))
-        return out.getvalue()
+        rows = enumerate(zip(*columns.values(), strict=True))
+        return csv_text(["design", *columns], ([i, *row] for i, row in rows))
 
     def _columns(self) -> dict[str, Sequence[Any]]:
         """Return a column for each variable and quantity, headed by its unit."""

@@ -6,7 +6,8 @@ the design: they are the least that balance the arm. So the derivative of their 
 added, with that of the bounds that friction narrows. These derivatives are exact.
 
 The margin for tolerances is made of such derivatives, so its own derivatives are second ones. They
-are computed as differences of exact first derivatives.
+are central differences of exact first derivatives, or one-sided ones at an end of a range; both are
+of second order in the step.
 """
 
 from __future__ import annotations
@@ -47,16 +48,10 @@ def rows_and_gradients(
 ) -> tuple[Array, Array]:
     """Compute the quantity ``measure`` of a design (n,) in R cases, and its derivatives (R, n).
 
-    The cases are all combinations of postures and loads of the problem.
-
-    ``motor_force`` has a row for each cable too. A constrained quantity includes its margin for
-    tolerances. The derivatives are exact but for that of this margin, ± coverage · u: u² is a
-    quadratic form of exact first derivatives, and u is differentiated by central differences,
-    one-sided ones at an end of a range, both of second order in the step.
-
-    With ``worst_friction`` the bounds of the tensions, minimum · exp(Σ μ φ) and maximum · exp(−Σ μ
-    φ), follow the wrap angles φ. Where a cable goes straight through a hole, φ = 0 has a kink; the
-    derivative used there is 0, the mean of both sides.
+    The cases are all combinations of postures and loads, and for ``motor_force`` of cables. A
+    constrained quantity includes its margin for tolerances, ± coverage · u. With ``worst_friction``
+    the bounds of the tensions, minimum · exp(Σ μ φ) and maximum · exp(−Σ μ φ), follow the wrap
+    angles φ; see :mod:`cdsm.design.grip`.
 
     Raises:
         InvalidInput: The quantity has no exact derivatives, or the tensions have none for this

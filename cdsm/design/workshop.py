@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
-from collections.abc import Iterable, Sequence
 
 import numpy as np
 
 from cdsm.manipulator import Manipulator
+from cdsm.support.tables import csv_text
 from cdsm.support.values import Array
 from cdsm.wires.catalogue import label
 
@@ -34,7 +32,7 @@ def hole_table(arm: Manipulator) -> str:
             rows.append([number, disk.link, *map(_mm, sizes), name, ends, _mm(angle)])
             rows[-1] += [_mm(1e3 * y), _mm(1e3 * z)]
     head = ["disk", "link", "x [mm]", "disk radius [mm]", "hole radius [mm]", "cable", "here it"]
-    return _csv([*head, "angle [deg]", "y [mm]", "z [mm]"], rows)
+    return csv_text([*head, "angle [deg]", "y [mm]", "z [mm]"], rows)
 
 
 def cable_table(arm: Manipulator, q: Array) -> str:
@@ -54,16 +52,8 @@ def cable_table(arm: Manipulator, q: Array) -> str:
         lengths = (cable.lead, straight[c], shortest[c], longest[c], longest[c] - shortest[c])
         rows.append([cable.name, joint, label(cable.elasticity), *(_mm(1e3 * x) for x in lengths)])
     head = ["cable", "ends after joint", "wire", "lead [mm]", "straight [mm]", "shortest [mm]"]
-    return _csv([*head, "cut [mm]", "stroke [mm]"], rows)
+    return csv_text([*head, "cut [mm]", "stroke [mm]"], rows)
 
 
 def _mm(value: float) -> str:
     return f"{round(value, _DIGITS) + 0.0:g}" if abs(value) < 1e-4 else f"{value:.{_DIGITS}f}"
-
-
-def _csv(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    out = io.StringIO()
-    table = csv.writer(out, lineterminator="\n")
-    table.writerow(head)
-    table.writerows(rows)
-    return out.getvalue()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import final
 
 import numpy as np
@@ -132,8 +132,9 @@ def rest_band(
     """
     K = stiffness(pose, tension, wrench)
     u = unit_direction("direction", direction)
+    band = partial(RestBand, stiffness=K, direction=u)
     if not holding(pose).any():  # one state of rest
-        return RestBand(stiffness=K, direction=u, low=0.0, high=0.0, first_order=0.0, room=0.0)
+        return band(low=0.0, high=0.0, first_order=0.0, room=0.0)
     room, near, bends = _ROOM, Neighbourhood(K, _ROOM), Bends(K)
     half = float(near.largest(u @ pose.jacobian[:3])) / room
     for _ in range(_WIDENINGS):
@@ -144,22 +145,7 @@ def rest_band(
         except (ElasticityRangeError, SolverError):  # too far for the law, or for the sites
             break
         if high.reach <= _INSIDE:
-            return RestBand(
-                stiffness=K,
-                direction=u,
-                low=-low.bound,
-                high=high.bound,
-                first_order=half,
-                room=room,
-            )
+            return band(low=-low.bound, high=high.bound, first_order=half, room=room)
         room *= _ROOM
         near = Neighbourhood(K, room)
-    return RestBand(
-        stiffness=K,
-        direction=u,
-        low=-half,
-        high=half,
-        first_order=half,
-        room=_ROOM,
-        proved=False,
-    )
+    return band(low=-half, high=half, first_order=half, room=_ROOM, proved=False)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import os
 from dataclasses import dataclass
 from functools import cached_property
@@ -22,6 +20,7 @@ from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.files import write_text
 from cdsm.support.format import JointUnits, plain
 from cdsm.support.progress import track
+from cdsm.support.tables import csv_text
 from cdsm.support.tidy import data_frame
 from cdsm.support.values import Array, ReadOnlyState, frozen
 
@@ -209,12 +208,7 @@ class PathPlan(ReadOnlyState):
         Raises:
             FileError: The file cannot be written.
         """
-        header, rows = path_table(self)
-        text = io.StringIO()
-        writer = csv.writer(text, lineterminator="\n")
-        writer.writerow(header)
-        writer.writerows(rows)
-        return write_text(path, text.getvalue())
+        return write_text(path, csv_text(*path_table(self)))
 
     def write_csv(self, path: str | os.PathLike[str]) -> Path:
         """Write the plan with :meth:`write`; this old name is kept for one release."""

@@ -106,16 +106,8 @@ class Balance(NamedTuple):
             *(none, none, none, weights, self.tension.wrench, 0.0, loaded),
         )
         _, by_q, *by_places, by_mass, _, _ = single_gradient(*arguments)
-        return {
-            "rigidity": none,
-            "spring": np.zeros(len(inputs.labels["spring"])),
-            "joint_angle": by_q,
-            "tension": none,
-            "lead": none,
-            "friction": np.zeros(len(inputs.labels["friction"])),
-            "link_mass": by_mass[inputs.link_rows],
-            **inputs.by_source(Places(*by_places)),
-        }
+        by_link = {"joint_angle": by_q, "link_mass": by_mass[inputs.link_rows]}
+        return inputs.zeros() | by_link | inputs.by_source(Places(*by_places))
 
 
 def buckling_gradient(

@@ -18,7 +18,7 @@ from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension
 from cdsm.tolerance import Tolerances
 from cdsm.tolerances.inputs import inputs_of
-from cdsm.tolerances.parts import Part, draw_errors, standards, variance
+from cdsm.tolerances.parts import Part, draw, standards, variance
 from cdsm.tolerances.question import checked_question, chosen_tolerances
 from cdsm.tolerances.readings import Question, Reading
 
@@ -76,19 +76,22 @@ class Uncertainty(ReadOnlyState):
         The standard uncertainty of Monte Carlo differs from u_c at most by this fraction. It is inf
         if the reading does not exist for one of the arms.
         """
-        question, rng = self.question, np.random.default_rng(0)
-        labels = question.labels
-        errors = draw_errors(self.parts, labels, rng, _PROBED)
+        errors = self._drawn(np.random.default_rng(0), _PROBED)
         if not errors:
             return 0.0
         try:
-            left = question.at(errors) - self.value
+            left = self.question.at(errors) - self.value
         except CdsmError:
             return math.inf
         for source, drawn in errors.items():
             left -= drawn @ self.sensitivities[source]
         rounding = _ROUNDING * abs(self.value)
         return float(np.sqrt(np.mean(left**2))) / max(self.standard_uncertainty, rounding)
+
+    def _drawn(self, rng: np.random.Generator, draws: int) -> dict[str, Array]:
+        """Draw errors (draws, n) of the n inputs of each source that has a tolerance."""
+        labels = self.question.labels
+        return {name: draw(own, rng, draws, len(labels[name])) for name, own in self.parts.items()}
 
     @property
     def is_linear(self) -> bool:

@@ -109,18 +109,18 @@ class Inputs:
             for cable in arm.cables
             for i, site in enumerate(cable.sites, start=1)
         ]
+        each = (site for cable in arm.cables for site in cable.sites)
+        holes = zip(sites, each, strict=True)
         self.labels: dict[str, tuple[str, ...]] = {
             "rigidity": tuple(cables),
             "spring": tuple(cables[c] for c in np.flatnonzero(model.laws.series)),
             "joint_angle": arm.joint_names,
             "tension": tuple(cables),
             "lead": tuple(cables),
+            "friction": tuple(name for name, site in holes if site.friction),
             "link_mass": tuple(f"link moved by {rows[i]}" for i in self.link_rows),
             "site": tuple(f"{site}, {axis}" for site in sites for axis in "xyz"),
         }
-        each = (site for cable in arm.cables for site in cable.sites)
-        holes = zip(sites, each, strict=True)
-        self.labels["friction"] = tuple(name for name, site in holes if site.friction)
         total, count = self.places.stacked().size, 3 * len(sites)
         maps = {"site": csr_matrix(np.eye(total, count))}
         if arm.is_serpentine:
@@ -129,6 +129,10 @@ class Inputs:
         ends = np.cumsum([0, *(each.shape[1] for each in maps.values())]).tolist()
         self.columns = {source: slice(*ends[i : i + 2]) for i, source in enumerate(maps)}
         self._transposed = csr_matrix(self.map.T)
+
+    def zeros(self) -> dict[str, Array]:
+        """Return a zero for each input, as arrays by source."""
+        return {source: np.zeros(len(names)) for source, names in self.labels.items()}
 
     def by_source(self, by_place: Places) -> dict[str, Array]:
         """Return derivatives with respect to the inputs, as an array for each source of error.

@@ -26,9 +26,8 @@ from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension
 from cdsm.tolerance import Tolerances
 from cdsm.tolerances.budget import Uncertainty, checked_probability, uncertainty, with_uncertainty
-from cdsm.tolerances.parts import draw_errors
 from cdsm.tolerances.question import chosen_tolerances
-from cdsm.tolerances.readings import Question, Reading
+from cdsm.tolerances.readings import Reading
 
 if TYPE_CHECKING:
     import xarray
@@ -98,17 +97,13 @@ class MonteCarlo(ReadOnlyState):
         need("sweep", "xarray")
         import xarray
 
-        question, tolerances = self.budget.question, self.budget.tolerances
-        labels = question.labels
-        drawn = [
-            _errors(question, tolerances, self.seed, i, count)
-            for i, count in _blocks(self.values.size)
-        ]
+        question, labels = self.budget.question, self.budget.question.labels
+        drawn = [_errors(self.budget, self.seed, *block) for block in _blocks(self.values.size)]
         reading = xarray.Variable(
             "draw", self.values, {"long_name": question.name, "units": question.si_unit}
         )
         variables: dict[str, object] = {question.of: reading}
-        for source in tolerances.given:
+        for source in self.budget.parts:
             size = f"{source}_input"
             variables[f"{source}_error"] = (
                 (("draw", size)),
@@ -196,7 +191,7 @@ def monte_carlo(
     )
     folder = None if store is None else _open_store(store, budget, start)
     values = np.empty(count)
-    compute = partial(_block, budget.question, tolerances, start, folder)
+    compute = partial(_block, budget, start, folder)
     blocks = list(_blocks(count))
     with (
         progress_bar("Monte Carlo", count, wanted=wanted, rate=True) as advance,
@@ -216,31 +211,20 @@ def _blocks(count: int) -> Iterator[tuple[int, int]]:
         yield i, min(_BLOCK, count - i * _BLOCK)
 
 
-def _errors(
-    question: Question, tolerances: Tolerances, seed: int, block: int, count: int
-) -> dict[str, Array]:
+def _errors(budget: Uncertainty, seed: int, block: int, count: int) -> dict[str, Array]:
     """Draw the errors (count, inputs) by source of the first ``count`` arms of a block."""
-    rng = np.random.default_rng([seed, block])
-    labels = question.labels
-    errors = draw_errors(question.parts(tolerances), labels, rng, _BLOCK)
+    errors = budget._drawn(np.random.default_rng([seed, block]), _BLOCK)
     return {source: drawn[:count] for source, drawn in errors.items()}
 
 
-def _block(
-    question: Question,
-    tolerances: Tolerances,
-    seed: int,
-    folder: Path | None,
-    block: int,
-    count: int,
-) -> Array:
+def _block(budget: Uncertainty, seed: int, folder: Path | None, block: int, count: int) -> Array:
     """Compute the readings (count,) of a block's first ``count`` arms, or read its file."""
     path = None if folder is None else folder / f"{block:06d}.npy"
     if path is not None and path.exists():
         stored = np.load(path)
         if stored.size >= count:
             return np.asarray(stored[:count])
-    values = question.at(_errors(question, tolerances, seed, block, count))
+    values = budget.question.at(_errors(budget, seed, block, count))
     if path is not None:
         write_file(path, lambda aside: np.save(aside, values))
     return values

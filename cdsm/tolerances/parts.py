@@ -122,16 +122,6 @@ def draw(parts: Sequence[Part], rng: np.random.Generator, draws: int, count: int
     return errors
 
 
-def draw_errors(
-    parts: Mapping[str, Sequence[Part]],
-    labels: Mapping[str, Sequence[str]],
-    rng: np.random.Generator,
-    draws: int,
-) -> dict[str, Array]:
-    """Draw errors (draws, n) of the n inputs of each source, whose names are ``labels``."""
-    return {source: draw(own, rng, draws, len(labels[source])) for source, own in parts.items()}
-
-
 def _matching(source: str, pattern: str, names: Sequence[str]) -> Indices:
     """Return the indices of ``names`` that match ``pattern``.
 

@@ -185,13 +185,12 @@ def _gradient(K: Stiffness, inputs: Inputs, motion: Array, direction: Array) -> 
         *(F, k, slope, np.zeros_like(F), K.wrench, 1.0, 0.0),
     )
     _, by_q, *by_places, by_mass, by_tension, by_stiffness = single_gradient(*arguments)
-    return {
+    return inputs.zeros() | {
         "rigidity": by_stiffness * by_stretched * rigidity,
         "spring": (by_stiffness * by_spring)[laws.series > 0.0],
         "joint_angle": by_q,
         "tension": by_tension + by_stiffness * by_force,
         "lead": by_stiffness * slope,
-        "friction": np.zeros(len(inputs.labels["friction"])),
         "link_mass": by_mass[inputs.link_rows],
         **inputs.by_source(Places(*by_places)),
     }
@@ -219,7 +218,6 @@ def _skew_gradient(K: Stiffness, left: Array, right: Array) -> Array:
 def _tip_gradient(K: Stiffness, inputs: Inputs, direction: Array) -> dict[str, Array]:
     """Compute the derivatives of the tip's coordinate along ``direction`` (3,), by source."""
     pose, tree, masses = K.posture, K.posture.arm._model.tree, K.posture.arm._model.masses
-    none = {name: np.zeros(len(labels)) for name, labels in inputs.labels.items()}
     # a point that moves by δ in a frame of rotation R moves the tip by R δ
     along = direction @ rotations(pose)
     origin, row = np.zeros_like(tree.translation), masses.tip_joints + 1
@@ -228,7 +226,7 @@ def _tip_gradient(K: Stiffness, inputs: Inputs, direction: Array) -> dict[str, A
     moved = Places(
         np.zeros_like(still.site), origin, np.zeros_like(still.centre), along[masses.tip]
     )
-    return none | inputs.by_source(moved) | {"joint_angle": direction @ pose.jacobian[:3]}
+    return inputs.zeros() | inputs.by_source(moved) | {"joint_angle": direction @ pose.jacobian[:3]}
 
 
 def _stretched_slope(K: Stiffness, strain: Array) -> Array:
