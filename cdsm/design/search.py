@@ -167,12 +167,10 @@ def _algorithm(problem: DesignProblem, population: int, generations: int, seed: 
     random = np.random.default_rng(seed)
     first = MixedVariableSampling()(bare, population, random_state=random)
     if problem.start is not None:
-        names = [each.name for each in problem.variables]
-        values = [
-            round(x) if each.of in WHOLE and not each.choices else x
+        given = {
+            each.name: round(x) if each.of in WHOLE and not each.choices else x
             for each, x in zip(problem.variables, problem.start.tolist(), strict=True)
-        ]
-        given = dict(zip(names, values, strict=True))
+        }
         first = Population.merge(Population.new(X=[given]), first[1:])
     algorithm = NSGA2(
         pop_size=population,

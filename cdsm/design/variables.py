@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Final, Literal, NamedTuple, final, get_args
 
 from cdsm.errors import InvalidInput
-from cdsm.geometry import CableRoute, Geometry, Joint, Link
+from cdsm.geometry import CableRoute, Geometry
 from cdsm.geometry.holes import evenly_spaced, hinge_hole_angles
 from cdsm.support.validation import one_of, scalar, whole_number
 from cdsm.wires.catalogue import Wire, as_wire
@@ -153,47 +153,39 @@ def changed(geometry: Geometry, variables: Sequence[Variable], values: Iterable[
         of, at = variable.of, variable.at
         if of == "wire" or isinstance(value, str):
             wire = value
-        elif of == "minimum":
-            minimum = float(value)
-        elif of == "cables_per_joint":
-            cables = _even(geometry, int(value))
-        elif of == "end":
-            c = geometry.cable_names.index(str(at))
-            cables[c] = replace(cables[c], joint=int(value))
-        elif of == "hole_angle":
-            c = geometry.cable_names.index(str(at))
-            cables[c] = replace(cables[c], angle=value)
-        else:
-            for k in range(len(joints)) if at is None else [int(at) - 1]:
-                _change(of, value, k, joints, links, cables)
+            continue
+        where = range(1, len(joints) + 1) if at is None or of in _OF_CABLE else [int(at)]
+        match of:
+            case "minimum":
+                minimum = float(value)
+            case "cables_per_joint":
+                cables = _even(geometry, int(value))
+            case "end":
+                c = geometry.cable_names.index(str(at))
+                cables[c] = replace(cables[c], joint=int(value))
+            case "hole_angle":
+                c = geometry.cable_names.index(str(at))
+                cables[c] = replace(cables[c], angle=value)
+            case "lead":
+                cables = [replace(c, lead=value) if c.joint in where else c for c in cables]
+            case "phase":
+                turns = [value if c.joint in where else 0.0 for c in cables]
+                cables = [replace(c, angle=c.angle + x) for c, x in zip(cables, turns, strict=True)]
+            case "link_length":
+                for k in where:
+                    mass = links[k - 1].mass * value / links[k - 1].length
+                    links[k - 1] = replace(links[k - 1], length=value, mass=mass)
+            case "hole_radius":
+                for k in where:
+                    joints[k - 1] = replace(joints[k - 1], hole_radius=value)
+            case "disk_offset":
+                for k in where:
+                    joints[k - 1] = replace(joints[k - 1], disk_offset=value)
     return Changed(
         geometry.replace(joints=tuple(joints), links=tuple(links), cables=tuple(cables)),
         wire,
         minimum,
     )
-
-
-def _change(
-    of: str,
-    value: float,
-    k: int,
-    joints: list[Joint],
-    links: list[Link],
-    cables: list[CableRoute],
-) -> None:
-    if of == "hole_radius":
-        joints[k] = replace(joints[k], hole_radius=value)
-    elif of == "disk_offset":
-        joints[k] = replace(joints[k], disk_offset=value)
-    elif of == "link_length":
-        old = links[k]
-        links[k] = replace(old, length=value, mass=old.mass * value / old.length)
-    else:
-        for c, cable in enumerate(cables):
-            if cable.joint == k + 1 and of == "lead":
-                cables[c] = replace(cable, lead=value)
-            elif cable.joint == k + 1:
-                cables[c] = replace(cable, angle=cable.angle + value)
 
 
 def _even(geometry: Geometry, count: int) -> list[CableRoute]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -225,23 +225,21 @@ def _candidates(
     if len(forces) * len(angles) > _MOST:
         raise InvalidInput("postures", f"more than {_MOST} candidates; give fewer.")
     bound = number_array("minimum", minimum)
-    first = WeightLoop(
-        direction="z",
-        angles=tuple(angles[0].tolist()),
-        forces=up_and_down(1.0, whole_number("steps", steps, 1, 100)),
-        displacement_std=noise[0],
-        force_std=noise[1],
-        tension_std=noise[2],
-        minimum=float(bound) if bound.ndim == 0 else tuple(bound.tolist()),
-    )
+    shared: dict[str, Any] = {
+        "displacement_std": noise[0],
+        "force_std": noise[1],
+        "tension_std": noise[2],
+        "minimum": float(bound) if bound.ndim == 0 else tuple(bound.tolist()),
+    }
+    count = whole_number("steps", steps, 1, 100)
     axes = np.atleast_2d(unit_directions("directions", directions))
     return [
-        replace(
-            first,
+        WeightLoop(
             label=f"posture {i + 1}, {_named(u)}, {force:g} N",
             angles=tuple(q.tolist()),
             direction=tuple(u.tolist()),
-            forces=up_and_down(force, steps),
+            forces=up_and_down(force, count),
+            **shared,
         )
         for i, q in enumerate(angles)
         for u in axes

@@ -70,6 +70,6 @@ def checked_question(
         blocks, F, ties = blocks_of(pose, K.tension)
         K = stiffness(blocks, F, K.wrench)
     u = None if direction is None else unit_direction("direction", direction)
-    names = [each.name for each in pose.arm.cables]
+    names = pose.arm.cables.names
     index = None if cable is None else names.index(one_of("cable", cable, names))
     return Question(of, K, u, index, ties)
