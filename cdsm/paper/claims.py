@@ -96,9 +96,7 @@ SUMMARY = ("number that deviates most", "compared", "deviation", "paper", "compu
 
 
 def to_summary(figures: Sequence[Figure]) -> list[tuple[str, ...]]:
-    """Return a row of text per figure, with the number that deviates most from the paper.
-
-    :data:`SUMMARY` names the columns.
+    """Return a row per figure with the number that deviates most; :data:`SUMMARY` has the columns.
 
     A deviation is relative to the largest number of the paper in the same claim.
     """

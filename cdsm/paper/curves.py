@@ -127,9 +127,9 @@ class Pair(NamedTuple):
 def over_cases(
     label: str, q: Array, cases: Sequence[tuple[Elasticity, float]], swept: Array, part: Part
 ) -> Pair:
-    """Compute curves over N cases (law, lower bound of tension [N]) at one posture q (nv,) [rad].
+    """Compute curves over N cases (law, lower bound [N]) at a posture q (nv,) [rad].
 
-    ``label`` names the curves, ``swept`` (N,) is their abscissa, ``part`` a term of K_θ.
+    ``swept`` (N,) is their abscissa, ``part`` a term of K_θ.
     """
 
     def curve(length: OriginalLength) -> Curve:

@@ -85,10 +85,7 @@ def _branches(rows: Array) -> tuple[Array, Array]:
 def _least(
     cost: Array, positive: Array, bounds: Sequence[tuple[float | None, float | None]]
 ) -> Array:
-    """Find the coefficients c (14,) of a law that minimise cost·c with positive·c ≥ 0.
-
-    The law is continuous at 31 N; ``bounds`` limit d. A solution exists for the printed digits.
-    """
+    """Find the coefficients c (14,) of a continuous law that minimise cost·c, positive·c ≥ 0."""
     lower, upper = _branches(powers(JOIN)[0])
     join = lower - upper
     solution = linprog(

@@ -15,7 +15,8 @@ import numpy as np
 
 from cdsm.paper.claims import Claim, Figure, floats
 from cdsm.paper.prototype_fit import STEPS, PrototypeFit, identified, section_v_claim
-from cdsm.paper.section_v import AXES, DROPS, HYBRID, RISES, TENSIONS
+from cdsm.paper.section_v import DROPS, HYBRID, RISES, TENSIONS
+from cdsm.support.validation import XYZ
 from cdsm.support.values import Array, frozen
 
 _POINTS: Final = 40
@@ -171,28 +172,26 @@ def _over_tension(fit: PrototypeFit) -> list[Trace]:
             paper_at=frozen(prototype.levels),
             paper=frozen(column.copy()),
         )
-        for axis, curve, column in zip(AXES, curves.T, fit.step.table.T, strict=True)
+        for axis, curve, column in zip(XYZ, curves.T, fit.step.table.T, strict=True)
     ]
 
 
 def _configurations(
     fit: PrototypeFit, swept: Array, curves: Sequence[Array], paper: Sequence[float]
 ) -> tuple[Trace, ...]:
-    """Build a trace per configuration of the fitted prototype: a curve relative to its first value.
-
-    ``curves`` have the computed stiffness over ``swept`` (N,), ``paper`` the paper's last value.
-    """
-    named = zip(("first", "second"), fit.prototype.configurations, strict=True)
-    labels = [f"{which}: {', '.join(f'{x:.0f}°' for x in np.rad2deg(q))}" for which, q in named]
+    """Build a trace per configuration: a curve over ``swept``, relative to its first value."""
+    configurations = np.rad2deg(fit.prototype.configurations)
     return tuple(
         Trace(
-            label=label,
+            label=f"{which}: {', '.join(f'{x:.0f}°' for x in q)}",
             swept=frozen(swept),
             computed=frozen(curve / curve[0]),
             paper_at=frozen(swept[-1:].copy()),
             paper=frozen(np.array([stated])),
         )
-        for label, curve, stated in zip(labels, curves, paper, strict=True)
+        for which, q, curve, stated in zip(
+            ("first", "second"), configurations, curves, paper, strict=True
+        )
     )
 
 
@@ -209,7 +208,7 @@ def _table_claims(fit: PrototypeFit) -> list[Claim]:
             computed=floats(ours / 1e3),
             assumption=assumption,
         )
-        for axis, theirs, ours in zip(AXES, table.T, computed.T, strict=True)
+        for axis, theirs, ours in zip(XYZ, table.T, computed.T, strict=True)
     ]
     claims.append(
         section_v_claim(

@@ -22,7 +22,7 @@ from cdsm.elasticity.scaled import ScaledElasticity
 from cdsm.errors import EquilibriumError
 from cdsm.identification.least_squares import LeastSquares, no_model
 from cdsm.manipulator import Manipulator
-from cdsm.paper.prototype import Prototype
+from cdsm.paper.prototype import Prototype, arm_of
 from cdsm.paper.prototype_fit import BOUNDS, TABLE_START
 from cdsm.paper.section_v import POSTURE, TABLE_II, TENSIONS
 from cdsm.posture import Posture
@@ -81,18 +81,8 @@ class RoughPrototype:
 
     def arm(self) -> Manipulator:
         """Build the arm; the springs of the bearings are its last cables."""
-        one = self.prototype
-        arm = presets.experimental_prototype(
-            ScaledElasticity(presets.STRAND_1X19, self.rigidity),
-            series_stiffness=one.drive_stiffness,
-            link_length=one.link_length,
-            tool_length=one.tool_length,
-            hole_radius=one.hole_radius,
-            disk_offset=one.hole_radius * one.disk_ratio,
-            lead=one.lead,
-            link_mass=one.link_mass,
-            friction=self.friction,
-        )
+        strand = ScaledElasticity(presets.STRAND_1X19, self.rigidity)
+        arm = arm_of(self.prototype, strand, self.prototype.drive_stiffness, self.friction)
         if self.bearing == 0.0:
             return arm
         springs = [

@@ -54,10 +54,7 @@ class LeadFigure(Figure):
 
 
 def figure_lead() -> LeadFigure:
-    """Compute the change of stiffness if the lower bound of tension rises from 100 N to 800 N.
-
-    It is computed over the lead, with EA = 48 kN.
-    """
+    """Compute the change of stiffness from a lower bound of 100 N to 800 N, over the lead."""
     unstrained, stretched = (
         frozen(np.array([_changes(lead, length) for lead in LEADS.tolist()]))
         for length in ("unstrained", "stretched")
@@ -86,11 +83,7 @@ def figure_lead() -> LeadFigure:
 
 
 def _changes(lead: float, length: OriginalLength) -> Array:
-    """Compute the change of K_R and of the stiffness for a weight, in x, y and z (2, 3) [%].
-
-    The change is from the first to the last tension of :data:`MINIMA`, at a lead [m] and an
-    ``original_length``.
-    """
+    """Compute the change of K_R and of what a weight measures, over :data:`MINIMA` (2, 3) [%]."""
     arm = presets.virtual_prototype(presets.ELASTIC_STAGE, lead=lead, original_length=length)
     q = np.full(arm.nv, presets.TEN_DEGREES)
     first, last = (readings(at_minimum(arm, q, F)) for F in MINIMA)
@@ -100,8 +93,7 @@ def _changes(lead: float, length: OriginalLength) -> Array:
 def _first_fall(changes: Array, length: OriginalLength, reading: int) -> tuple[float, ...]:
     """Find the lead [mm] above which stiffness falls, for x, y and z; 0 if it always falls.
 
-    ``changes`` (N, 3) [%] are the changes at :data:`LEADS` for one original length; ``reading`` is
-    their row in :func:`_changes`.
+    ``changes`` (N, 3) [%] at :data:`LEADS` are the row ``reading`` of :func:`_changes`.
     """
 
     def crossing(axis: int) -> float:

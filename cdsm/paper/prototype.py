@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm import presets
-from cdsm.elasticity import LinearElasticity
+from cdsm.elasticity import Elasticity, LinearElasticity
 from cdsm.errors import SingularStiffness
 from cdsm.manipulator import Manipulator
 from cdsm.paper.claims import floats
@@ -96,16 +96,9 @@ class Prototype:
 
         GeometryError if the dimensions are invalid.
         """
-        return presets.experimental_prototype(
-            presets.STRAND_1X19 if cable_stiffness is None else _RIGID,
-            series_stiffness=self.drive_stiffness if cable_stiffness is None else cable_stiffness,
-            link_length=self.link_length,
-            tool_length=self.tool_length,
-            hole_radius=self.hole_radius,
-            disk_offset=self.hole_radius * self.disk_ratio,
-            lead=self.lead,
-            link_mass=self.link_mass,
-        )
+        if cable_stiffness is None:
+            return arm_of(self, presets.STRAND_1X19, self.drive_stiffness)
+        return arm_of(self, _RIGID, cable_stiffness)
 
     def measure(self, pose: Posture, tensions: ArrayLike) -> Array:
         """Compute stiffness (N, 3) [N/m] along x, y, z at N reported tensions [N].
@@ -124,10 +117,7 @@ class Prototype:
         return self._measured(pose, tensions, self.weights)
 
     def _measured(self, pose: Posture, tensions: ArrayLike, weights: Array) -> Array:
-        """Compute the stiffness (N, 3) [N/m] along x, y and z at N reported tensions [N].
-
-        It is the secant under a row of ``weights`` (3, 3) [N], the tangent where a row is zero.
-        """
+        """Compute secant stiffness (N, 3) [N/m] under each weight; the tangent if it is zero."""
         forced = [cable.name for cable in pose.arm.cables if cable.control == "force"]
         rows = []
         for tension in np.atleast_1d(np.asarray(tensions, dtype=np.float64)).tolist():
@@ -167,6 +157,23 @@ class Prototype:
             rises=floats(stiffest / middle - 1.0),
             check=float(measured[0, 1, 2]),
         )
+
+
+def arm_of(
+    one: Prototype, law: Elasticity, series_stiffness: float, friction: float = 0.0
+) -> Manipulator:
+    """Build the arm with the dimensions of a prototype, cables of a law with springs in series."""
+    return presets.experimental_prototype(
+        law,
+        series_stiffness=series_stiffness,
+        link_length=one.link_length,
+        tool_length=one.tool_length,
+        hole_radius=one.hole_radius,
+        disk_offset=one.hole_radius * one.disk_ratio,
+        lead=one.lead,
+        link_mass=one.link_mass,
+        friction=friction,
+    )
 
 
 @final

@@ -6,9 +6,8 @@ from typing import Final
 
 import numpy as np
 
+from cdsm.support.validation import XYZ
 from cdsm.support.values import frozen
-
-AXES: Final = ("x", "y", "z")
 
 TABLE_II: Final = frozen(
     1e3
@@ -56,7 +55,7 @@ HYBRID: Final = 1890.0
 """Stiffness of the hybrid cables (strand and spring together) of Fig. 12 [N/m]."""
 
 NAMES: Final = (
-    *(f"Table II, {axis}, row {row}" for row in range(1, 6) for axis in AXES),
+    *(f"Table II, {axis}, row {row}" for row in range(1, 6) for axis in XYZ),
     *("Fig. 12, first", "Fig. 12, second", "Fig. 13, first", "Fig. 13, second"),
     "V-B, z",
 )

@@ -41,8 +41,7 @@ the second differences has four times the noise of f.
 def gradients(f: Sampled, size: int, first: float, noise: Noise) -> Estimates:
     """Compute first derivatives (T, ..., n) of T functions at zero, and their error bounds (T,).
 
-    The functions have n = ``size`` variables. ``first`` is the largest step, and ``noise`` returns
-    the rounding errors (T,) of the functions for a step.
+    The functions have ``size`` variables; ``first`` is the largest step.
     """
     corners = np.vstack([np.eye(size), -np.eye(size)])
 
@@ -54,10 +53,7 @@ def gradients(f: Sampled, size: int, first: float, noise: Noise) -> Estimates:
 
 
 def hessians(f: Sampled, size: int, first: float, noise: Noise) -> Estimates:
-    """Compute Hessians (T, n, n) of T functions (P, n) → (P, T) at zero, and error bounds (T,).
-
-    ``size``, ``first`` and ``noise`` are those of :func:`gradients`.
-    """
+    """Compute Hessians (T, n, n) of T functions at zero, and error bounds, as `gradients` does."""
     unit = np.eye(size)
     i, j = np.triu_indices(size, 1)
     pairs = (s * unit[i] + t * unit[j] for s in (1.0, -1.0) for t in (1.0, -1.0))
@@ -80,10 +76,9 @@ def _extrapolated(
 ) -> Estimates:
     """Halve the step until rounding dominates; keep the best extrapolation of each function.
 
-    ``level(h)`` computes the differences of this ``order`` (1 or 2) with the step h; ``first`` and
-    ``noise`` are those of :func:`gradients`.
-    The error bound is twice the error of the *coarser* of two extrapolations. So it is valid even
-    if a derivative is discontinuous, where the error falls only in proportion to h.
+    ``level(h)`` computes the differences of this ``order`` (1 or 2) with the step h. The error
+    bound is twice the error of the *coarser* of two extrapolations: it is valid even if a
+    derivative is discontinuous, where the error falls only in proportion to h.
     """
     found: list[Array] = []
     best, error = np.zeros(0), np.full(noise(first).shape, np.inf)

@@ -213,10 +213,9 @@ class Sticking(ReadOnlyState):
 
 
 def sticking(K: Stiffness, readings: Readings | None) -> Sticking | None:
-    """Compute the tip stiffnesses while cables stick.
+    """Compute the tip stiffnesses while cables stick, beside the frictionless ``readings``.
 
-    ``readings`` are the frictionless ones of ``K``. Returns None if no cable sticks, if K_θ is
-    singular (no readings), or if a tension is outside the domain of its law.
+    None if no cable sticks, K_θ is singular, or a tension is outside the domain of its law.
     """
     pose, sticks = K.posture, holding(K.posture)
     T, J = K.tension[pose.segments.chains.cable], pose.jacobian[:3]

@@ -38,10 +38,13 @@ _BESIDE = 1e-6
 
 
 class LockedCable(NamedTuple):
-    """A position-controlled cable with locked motor, computed from strain and energy of its law.
+    """A cable with locked motor, computed from strain and energy of its law.
 
-    It is number ``number`` of the arm. It has the tension F [N] at the posture, and the motor keeps
-    its original length l_0 [m].
+    Attributes:
+        number: Index among the cables of the arm.
+        cable: The cable.
+        tension: F at the posture [N].
+        free_length: Original length l_0, which the motor keeps [m].
     """
 
     number: int
@@ -50,10 +53,7 @@ class LockedCable(NamedTuple):
     free_length: float
 
     def tensions(self, longer: Array) -> Array:
-        """Compute the tensions (P,) [N] of this cable at P elongations.
-
-        ``longer`` (P, C) [m] are the changes of length of all cables of the arm.
-        """
+        """Compute the tensions (P,) [N] for P changes of length of all cables, (P, C) [m]."""
         cable, start = self.cable, self.free_length
         more = longer[:, self.number]
         return evaluate_law(
@@ -61,10 +61,7 @@ class LockedCable(NamedTuple):
         )
 
     def stored(self, longer: Array) -> Array:
-        """Compute the energy (P,) [J] that this cable stores, minus the work F ΔL.
-
-        ΔL is its column of ``longer`` (P, C) [m], as in :meth:`tensions`.
-        """
+        """Compute the stored energy minus the work F ΔL (P,) [J]; ``longer`` as in `tensions`."""
         cable, F, start = self.cable, self.tension, self.free_length
         tensions = self.tensions(longer)
         more = evaluate_law(cable, lambda: cable.energy(tensions, start) - cable.energy(F, start))
@@ -73,7 +70,7 @@ class LockedCable(NamedTuple):
     def room(self) -> float:
         """Return the distance [N] from the tension to the nearest bound or kink of the law."""
         F, law = self.tension, self.cable.elasticity
-        edges = [law.domain.low, law.domain.high, *kinks(law)]
+        edges = [edge for edge, _ in self._edges]
         law = law.law if isinstance(law, SlackBelow) else law
         if isinstance(law, TabulatedElasticity):
             # the rigidity has kinks at the points of a table. A point too near leaves no room for
@@ -83,26 +80,25 @@ class LockedCable(NamedTuple):
 
     def one_sided(self) -> list[str]:
         """Return a message for each bound or kink of the law at the tension; mostly none."""
-        F, law = self.tension, self.cable.elasticity
+        F, name = self.tension, self.cable.name
         if F == 0.0:
-            return [f"{self.cable.name} is slack (0 N), and K_θ counts it as if it were taut"]
-        edges = [
+            return [f"{name} is slack (0 N), and K_θ counts it as if it were taut"]
+        near = [what for edge, what in self._edges if abs(F - edge) <= ONE_SIDED * F]
+        return [f"{name} at {F:.6g} N stands at {what}" for what in near]
+
+    @property
+    def _edges(self) -> list[tuple[float, str]]:
+        """Return tension [N] and name of each bound and kink of the law."""
+        law = self.cable.elasticity
+        return [
             (law.domain.low, f"the low end of its law {law.domain}"),
             (law.domain.high, f"the high end of its law {law.domain}"),
             *((T, f"a sharp bend of its tangent rigidity, at {T:g} N") for T in kinks(law)),
         ]
-        return [
-            f"{self.cable.name} at {F:.6g} N stands at {what}"
-            for edge, what in edges
-            if abs(F - edge) <= ONE_SIDED * F
-        ]
 
 
 def evaluate_law(cable: Cable, answer: Callable[[], Array]) -> Array:
-    """Call ``answer``, which evaluates the law of ``cable``, and return its values.
-
-    Raises InvalidInput if a user-defined law fails or its values are not finite.
-    """
+    """Return what ``answer`` computes by the law of ``cable``; InvalidInput if the law fails."""
     try:
         values = np.asarray(answer(), dtype=np.float64)
     except CdsmError:
@@ -129,11 +125,10 @@ _ROOT = 2e-13
 
 
 class Neighbourhood:
-    """The arm near a posture, with motors locked at this posture.
+    """The arm near the posture of K, with its motors locked there.
 
-    Posture, tensions, wrench and original lengths are those of K; its cable stiffness is only used
-    to choose step sizes. ``places`` (P, nv) are joint displacements from the posture in units of
-    :attr:`unit`. So all derivatives with respect to ``places`` are in N m.
+    ``places`` (P, nv) are joint displacements from the posture in units of :attr:`unit`, so all
+    derivatives with respect to them are in N m.
 
     Attributes:
         locked: The position-controlled cables. Slack cables without stiffness (at some equilibria)
@@ -157,20 +152,15 @@ class Neighbourhood:
     # --- potentials ---------------------------------------------------------------------------
 
     def kinematic(self, places: Array) -> Array:
-        """Compute active, gravity and load part of the potential U (P, 3) [N m].
+        """Compute active, gravity and load part of U (P, 3) [N m], without the moment."""
+        return self.work(places, np.zeros(3))
 
-        The load part is that of the force only, since a moment has no potential.
+    def work(self, places: Array, moment: Array | None = None) -> Array:
+        """Compute the parts of U (P, 3) [N m] with the work of a moment, exact to first order.
+
+        The moment is (3,) [N m]; None is that of the wrench.
         """
-        return self._kinematic(places, np.zeros(3))
-
-    def work(self, places: Array) -> Array:
-        """Compute :meth:`kinematic` (P, 3) [N m]; the load part includes the work of the moment.
-
-        That work is exact to first order.
-        """
-        return self._kinematic(places, self._wrench[3:])
-
-    def _kinematic(self, places: Array, moment: Array) -> Array:
+        moment = self._wrench[3:] if moment is None else moment
         pose, arm = self._pose, self._pose.arm
         body, force = arm._model.body, self._wrench[:3]
         start = body.potential_energy(pose.q)
@@ -217,10 +207,7 @@ class Neighbourhood:
         return np.array(torques)[:, None] * self.unit
 
     def measured_lengths(self) -> Array:
-        """Compute L (C,) [m] a second time, from the link poses that Pinocchio computes.
-
-        L includes the lead (the straight cable between its actuator and the base disk).
-        """
+        """Compute the cable lengths L (C,) [m] from the link poses that Pinocchio computes."""
         pose = self._pose
         links = {site.link for cable in pose.arm.cables for site in cable.sites}
         frames = {link: pose.link_pose(link) for link in links}
@@ -237,10 +224,7 @@ class Neighbourhood:
 
     @property
     def first_step(self) -> float:
-        """Return a first step so small that no cable segment loses more than half its length.
-
-        Steps are joint displacements in :attr:`unit`.
-        """
+        """Return a step, in :attr:`unit`, with which no cable segment loses half its length."""
         return min(_FIRST, self._closing_motion / 4.0)
 
     @property
@@ -288,10 +272,7 @@ class Neighbourhood:
         return np.array([_ROOT * stored + 2.0 * step * (k * self._arms) @ self.length_noise])
 
     def kinematic_torque_noise(self, step: float) -> Array:
-        """Return the rounding error of :meth:`kinematic_torques` (3,) [N m], for all steps.
-
-        It is large at short segments.
-        """
+        """Return the rounding error of :meth:`kinematic_torques` (3,) [N m], for all steps."""
         noise = self.kinematic_noise(step)
         noise[0] *= 1.0 + 1.0 / self._closing_motion
         return noise

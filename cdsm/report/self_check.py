@@ -135,13 +135,11 @@ class SelfCheck(ReadOnlyState):
 
 
 def self_check(K: Stiffness) -> SelfCheck:
-    """Compare K_θ, its terms and the torque residual with finite differences.
+    """Compare K_θ, its terms and the residual of Eq. 13 with finite differences.
 
-    K_θ and its terms are compared with second differences of the potential and with first
-    differences of the torque, the residual of Eq. 13 with first differences of the potential.
-    Position-controlled cables store energy; force-controlled cables do the work F·L; motors do not
-    move. The tensions need not balance the arm. No error is raised: a comparison that is not
-    possible names the reason.
+    K_θ is compared with second differences of the potential and with first differences of the
+    torque, the residual with first differences of the potential. Motors do not move, and the
+    tensions need not balance the arm. A comparison that is not possible names the reason.
     """
     near = Neighbourhood(K)
     energies, torques = _recomputed_terms(near)
@@ -173,10 +171,7 @@ def self_check(K: Stiffness) -> SelfCheck:
 
 
 def _recomputed_terms(near: Neighbourhood) -> tuple[list[_Recomputed], list[_Recomputed]]:
-    """Compute active, passive, gravity and load term by second differences of the potential.
-
-    Also return them by first differences of the torque. ``near`` is the arm near the posture.
-    """
+    """Compute the four terms by second differences of the potential, and by first of the torque."""
     step = near.first_step
     moved = _differentiated(hessians, near, near.kinematic, near.kinematic_noise, step)
     turned = _differentiated(
@@ -201,11 +196,7 @@ def _differentiated(
     noise: Noise,
     step: float,
 ) -> list[_Recomputed]:
-    """Compute derivatives of three kinematic parts or one elastic part ``f`` of ``near``.
-
-    ``derive`` is :func:`gradients` or :func:`hessians`, with first step ``step`` and rounding
-    errors ``noise``. If it raises an error, its text is the reason why there is no value.
-    """
+    """Compute the derivatives of the parts ``f`` of ``near``; an error becomes their reason."""
     try:
         values, errors = derive(f, near.unit.size, step, noise)
     except CdsmError as error:
@@ -234,10 +225,7 @@ def _compare(
     torque: _Recomputed = _NONE,
     whole: float = 0.0,
 ) -> Agreement:
-    """Compare ``given`` with its values by finite differences of the potential and of the torque.
-
-    ``largest`` is that of :class:`Agreement`, and ``whole`` the largest entry of K_θ.
-    """
+    """Compare ``given`` with its values by differences; ``whole`` is the largest entry of K_θ."""
     unit = _UNITS.get(name, "N m/rad")
     enough = max(RESOLVED * largest, _NEGLIGIBLE * whole)
     differences = [
@@ -270,10 +258,7 @@ def _compare(
 
 
 def _with_sum_checked(found: Agreement, matrix: Array, parts: Array, what: str) -> Agreement:
-    """Change the verdict of ``found`` to DIFFERS if ``matrix`` is not the sum of ``parts``.
-
-    ``matrix`` is (nv, nv), ``parts`` (n, nv, nv); ``what`` names their sum in the reason.
-    """
+    """Change the verdict of ``found`` to DIFFERS if ``matrix`` is not the sum of ``parts``."""
     off = float(abs(matrix - parts.sum(axis=0)).max())
     if off <= _SUM * float(abs(parts).sum(axis=0).max()) or found.verdict == "DIFFERS":
         return found
